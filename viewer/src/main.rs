@@ -1,0 +1,2 @@
+//! The native viewer.
+fn main() {}
