@@ -1,1 +1,7 @@
-//! The visual target tracker.
+//! The visual target tracker of Sightline.
+
+pub mod frames;
+pub mod error;
+pub mod camera;
+pub mod image;
+pub mod correlate;

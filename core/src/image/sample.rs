@@ -1,0 +1,1 @@
+//! Interpolated reading of images.
