@@ -1,0 +1,3 @@
+//! The validation experiments: grid in, table and figure out; and the truth they are measured against.
+
+pub mod truth;
