@@ -8,6 +8,7 @@
 pub mod run;
 pub mod track;
 pub mod view;
+pub mod wire;
 
 use std::sync::Arc;
 
