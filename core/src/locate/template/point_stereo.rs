@@ -25,7 +25,7 @@ use super::match_noise::match_covariance;
 use super::settings::{DisparityInterval, StereoReference, TemplateSettings};
 use super::stereo_curve::{Curve, window_through};
 use crate::camera::Camera;
-use crate::correlate::peak::quadratic_peak;
+use crate::correlate::peak::Fit;
 use crate::correlate::zncc::zncc;
 use crate::frames::Pixel;
 use crate::image::GrayImage;
@@ -216,14 +216,14 @@ fn refine(scores: &[f32], rows: usize, from: f64, spacing: f64, side: i32, sub_p
         at_end,
     };
     if sub_pixel && !at_end {
-        let at = |dx: i32, dy: i32| {
-            scores[((column as i32 + dx) * rows as i32 + row as i32 + dy) as usize]
-        };
-        let neighbours: [[f32; 3]; 3] =
-            [[at(-1, -1), at(0, -1), at(1, -1)], [at(-1, 0), at(0, 0), at(1, 0)], [at(-1, 1), at(0, 1), at(1, 1)]];
-        if let Some(fit) = quadratic_peak(&neighbours) {
-            best.along += fit.dx * spacing;
-            best.across += fit.dy;
+        // Row by row as the fit expects: across the curve downwards, along it to the right.
+        let neighbours = std::array::from_fn(|k| {
+            let (dx, dy) = (k % 3, k / 3);
+            f64::from(scores[(column + dx - 1) * rows + row + dy - 1])
+        });
+        if let Some(fit) = Fit::new(&neighbours) {
+            best.along += fit.offset.x * spacing;
+            best.across += fit.offset.y;
             best.score = fit.score;
         }
     }

@@ -111,8 +111,9 @@ impl Curve {
 /// The window of `image` around `centre` as seen through `right_from_left`: offset o takes `centre + A o`.
 pub fn window_through(image: &GrayImage, centre: Pixel, right_from_left: &Matrix2<f64>, half: u32, kernel: Kernel) -> Patch {
     let size = 2 * half + 1;
-    Patch::from_fn(size, size, |x, y| {
+    GrayImage::from_fn(size, size, |x, y| {
         let offset = right_from_left * Vector2::new(f64::from(x) - f64::from(half), f64::from(y) - f64::from(half));
         image::Luma([kernel.sample(image, centre.offset(offset.x, offset.y)).unwrap_or(f32::NAN)])
     })
+    .into()
 }
