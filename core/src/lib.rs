@@ -5,3 +5,4 @@ pub mod error;
 pub mod camera;
 pub mod image;
 pub mod correlate;
+pub mod estimate;
