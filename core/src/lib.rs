@@ -6,3 +6,4 @@ pub mod camera;
 pub mod image;
 pub mod correlate;
 pub mod estimate;
+pub mod traverse;

@@ -28,7 +28,9 @@ pub(super) struct StopCameras {
 pub(super) fn check_index(index: &TraverseIndex) -> Result<(), String> {
     if index.format != FORMAT_VERSION {
         let version = index.format;
-        return Err(format!("format: version {version} is unknown; this program reads version {FORMAT_VERSION}"));
+        return Err(format!(
+            "format: version {version} is unknown; this program reads version {FORMAT_VERSION}"
+        ));
     }
     if index.stops.is_empty() {
         return Err("stops: there is none, but a traverse has at least one".to_owned());
@@ -77,7 +79,8 @@ pub(super) fn check_stop(stop: &Stop, folder: &Path) -> Result<StopCameras, Stri
     Ok(StopCameras {
         left: check_view("left", &stop.left, folder)?,
         right: check_view("right", &stop.right, folder)?,
-        true_left: true_camera("left_camera", truth.and_then(|truth| truth.left_camera.as_ref())).transpose()?,
+        true_left: true_camera("left_camera", truth.and_then(|truth| truth.left_camera.as_ref()))
+            .transpose()?,
         true_right: true_camera("right_camera", truth.and_then(|truth| truth.right_camera.as_ref()))
             .transpose()?,
     })

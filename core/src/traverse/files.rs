@@ -16,7 +16,7 @@ const TEMPORARY_NAMES: u32 = 10_000;
 ///
 /// # Errors
 /// A sentence without the file's name: what is wrong with the name.
-pub fn resolve(folder: &Path, name: &str) -> Result<PathBuf, String> {
+pub(super) fn resolve(folder: &Path, name: &str) -> Result<PathBuf, String> {
     if name.trim().is_empty() {
         return Err("the file name is empty".to_owned());
     }
@@ -34,7 +34,9 @@ pub fn resolve(folder: &Path, name: &str) -> Result<PathBuf, String> {
     });
     match real {
         Some(Ok(real)) if real.starts_with(&root) => Ok(path),
-        _ => Err(format!("\"{name}\" is a link that leads out of the folder or nowhere; copy the file instead")),
+        _ => Err(format!(
+            "\"{name}\" is a link that leads out of the folder or nowhere; copy the file instead"
+        )),
     }
 }
 
@@ -42,7 +44,7 @@ pub fn resolve(folder: &Path, name: &str) -> Result<PathBuf, String> {
 ///
 /// # Errors
 /// [`Error::Write`] naming `path`; nothing is left behind.
-pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
+pub(super) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     let unwritable = |source| Error::Write { path: path.to_owned(), source };
     let folder = path.parent().unwrap_or(Path::new(""));
     std::fs::create_dir_all(folder).map_err(unwritable)?;

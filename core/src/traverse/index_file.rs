@@ -50,11 +50,13 @@ pub enum Existing {
 ///
 /// # Errors
 /// Nothing there, no index in the folder, or two of them.
-pub fn find(path: &Path) -> Result<(PathBuf, IndexFormat)> {
+pub(super) fn find(path: &Path) -> Result<(PathBuf, IndexFormat)> {
     if path.is_dir() {
         let present = [IndexFormat::Toml, IndexFormat::Json].map(|format| path.join(format.file_name()));
         return match present.each_ref().map(|path| path.is_file()) {
-            [true, true] => Err(Error::format(path, "holds traverse.toml and traverse.json; name one of them")),
+            [true, true] => {
+                Err(Error::format(path, "holds traverse.toml and traverse.json; name one of them"))
+            }
             [true, false] => Ok((path.join(IndexFormat::Toml.file_name()), IndexFormat::Toml)),
             [false, true] => Ok((path.join(IndexFormat::Json.file_name()), IndexFormat::Json)),
             [false, false] => Err(Error::format(
@@ -66,7 +68,12 @@ pub fn find(path: &Path) -> Result<(PathBuf, IndexFormat)> {
     let format = match path.extension().and_then(|extension| extension.to_str()) {
         Some("toml") => IndexFormat::Toml,
         Some("json") => IndexFormat::Json,
-        _ => return Err(Error::format(path, "is neither a folder nor an index with the ending .toml or .json")),
+        _ => {
+            return Err(Error::format(
+                path,
+                "is neither a folder nor an index with the ending .toml or .json",
+            ));
+        }
     };
     Ok((path.to_owned(), format))
 }
@@ -75,7 +82,7 @@ pub fn find(path: &Path) -> Result<(PathBuf, IndexFormat)> {
 ///
 /// # Errors
 /// A file that cannot be read, or whose form is not that of an index: the sentence names line and field.
-pub fn read(path: &Path, format: IndexFormat) -> Result<TraverseIndex> {
+pub(super) fn read(path: &Path, format: IndexFormat) -> Result<TraverseIndex> {
     let unreadable = |source| Error::Read { path: path.to_owned(), source };
     if std::fs::metadata(path).map_err(unreadable)?.len() > SIZE_LIMIT {
         let limit = SIZE_LIMIT >> 20;
@@ -123,7 +130,12 @@ fn field(path: &str) -> String {
 ///
 /// # Errors
 /// An index that is there already and may not be replaced, or a folder that cannot be written.
-pub fn write(index: &TraverseIndex, folder: &Path, format: IndexFormat, existing: Existing) -> Result<()> {
+pub(super) fn write(
+    index: &TraverseIndex,
+    folder: &Path,
+    format: IndexFormat,
+    existing: Existing,
+) -> Result<()> {
     let path = folder.join(format.file_name());
     let either = [IndexFormat::Toml, IndexFormat::Json].map(|format| folder.join(format.file_name()));
     for there in either.iter().filter(|path| path.exists()) {
@@ -134,7 +146,9 @@ pub fn write(index: &TraverseIndex, folder: &Path, format: IndexFormat, existing
     let unwritable = |problem: String| Error::format(&path, format!("cannot be written ({problem})"));
     let text = match format {
         IndexFormat::Toml => toml::to_string(index).map_err(|error| unwritable(error.to_string()))?,
-        IndexFormat::Json => serde_json::to_string_pretty(index).map_err(|error| unwritable(error.to_string()))?,
+        IndexFormat::Json => {
+            serde_json::to_string_pretty(index).map_err(|error| unwritable(error.to_string()))?
+        }
     };
     write_atomically(&path, text.as_bytes())
 }
@@ -144,7 +158,9 @@ impl<'de> Deserialize<'de> for CameraSource {
         let table = serde_json::Map::deserialize(deserializer)?;
         if let Some(file) = table.get("file") {
             if let Some(other) = table.keys().find(|key| *key != "file") {
-                return Err(D::Error::custom(format!("`{other}` beside `file`; give the camera in one place")));
+                return Err(D::Error::custom(format!(
+                    "`{other}` beside `file`; give the camera in one place"
+                )));
             }
             let file = file.as_str().ok_or_else(|| D::Error::custom("`file` must be the name of a file"))?;
             return Ok(Self::File { file: file.to_owned() });
@@ -154,7 +170,9 @@ impl<'de> Deserialize<'de> for CameraSource {
 }
 
 /// Reads a camera that may be left out, and refuses fields that cameras do not have.
-pub(super) fn optional_camera<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Camera>, D::Error> {
+pub(super) fn optional_camera<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Option<Camera>, D::Error> {
     let table = Option::<serde_json::Map<_, _>>::deserialize(deserializer)?;
     table.map(camera_from_table).transpose().map_err(D::Error::custom)
 }

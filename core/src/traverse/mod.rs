@@ -134,9 +134,17 @@ pub struct StopTruth {
     /// The true pose of the rover in the site frame.
     pub site_from_rover: PoseRecord,
     /// The true left camera in the rover frame, where it differs from the one the tracker is given.
-    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "index_file::optional_camera")]
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "index_file::optional_camera"
+    )]
     pub left_camera: Option<Camera>,
     /// The true right camera in the rover frame, alike.
-    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "index_file::optional_camera")]
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "index_file::optional_camera"
+    )]
     pub right_camera: Option<Camera>,
 }

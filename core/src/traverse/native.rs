@@ -48,13 +48,12 @@
 //! [`CACHE_LIMIT_BYTES`].
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::check::{self, StopCameras};
 use super::files::resolve;
-pub use super::image_cache::StereoPair;
 use super::image_cache::ImageCache;
+pub use super::image_cache::StereoPair;
 use super::index_file::{self, Existing, IndexFormat};
 use super::{Stop, TraverseIndex, View};
 use crate::camera::Camera;
@@ -174,7 +173,8 @@ impl Traverse {
 
     fn stop(&self, step: usize) -> Result<&Stop> {
         let count = self.stop_count();
-        let missing = || Error::Request(format!("there is no step {step}; the traverse has 0 to {}", count - 1));
+        let missing =
+            || Error::Request(format!("there is no step {step}; the traverse has 0 to {}", count - 1));
         self.index.stops.get(step).ok_or_else(missing)
     }
 
@@ -186,8 +186,9 @@ impl Traverse {
     fn read_image(&self, step: usize, side: &str, view: &View, camera: &Camera) -> Result<GrayImage> {
         let which = format!("the {side} image of step {step}");
         // Checked again, because a link may have been put there since the folder was opened.
-        let path = resolve(&self.folder, &view.image)
-            .map_err(|problem| Error::format(&self.index_path, format!("stops[{step}].{side}.image: {problem}")))?;
+        let path = resolve(&self.folder, &view.image).map_err(|problem| {
+            Error::format(&self.index_path, format!("stops[{step}].{side}.image: {problem}"))
+        })?;
         let image = io::read_png(&path, self.index.full_scale_dn).map_err(|error| match error {
             Error::Read { path, source } => Error::format(path, format!("{which} cannot be read ({source})")),
             Error::Format { path, problem } => Error::format(path, format!("{which}: {problem}")),
@@ -213,3 +214,7 @@ pub fn write(index: &TraverseIndex, folder: &Path, format: IndexFormat, existing
     check::check_index(index).map_err(|problem| Error::format(folder.join(format.file_name()), problem))?;
     index_file::write(index, folder, format, existing)
 }
+
+#[cfg(test)]
+#[path = "native_tests.rs"]
+mod tests;

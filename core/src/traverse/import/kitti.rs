@@ -165,7 +165,10 @@ fn read_cameras(path: &Path, size: [u32; 2]) -> Result<[Camera; 2]> {
         let line = text.lines().find_map(|line| line.trim().strip_prefix(key)?.strip_prefix(':'));
         let values: Option<[f64; 12]> = line.and_then(numbers).and_then(|values| values.try_into().ok());
         let values = values.ok_or_else(|| {
-            Error::format(path, format!("needs a line \"{key}: …\" with the 12 numbers of a projection matrix"))
+            Error::format(
+                path,
+                format!("needs a line \"{key}: …\" with the 12 numbers of a projection matrix"),
+            )
         })?;
         let model = cahv(&values).ok_or_else(|| Error::format(path, format!("{key} has no inverse")))?;
         model.validate().map_err(|problem| Error::format(path, format!("{key}: {problem}")))?;
@@ -223,10 +226,11 @@ fn read_times(path: &Path) -> Result<Vec<f64>> {
         return Ok(Vec::new());
     }
     let text = read_text(path)?;
-    let times = text.lines().filter(|line| !line.trim().is_empty()).map(|line| match numbers(line)?.as_slice() {
-        [time] => Some(*time),
-        _ => None,
-    });
+    let times =
+        text.lines().filter(|line| !line.trim().is_empty()).map(|line| match numbers(line)?.as_slice() {
+            [time] => Some(*time),
+            _ => None,
+        });
     times.collect::<Option<_>>().ok_or_else(|| Error::format(path, "must have one time in seconds a line"))
 }
 

@@ -198,6 +198,8 @@ pub fn import(
         for file in &output.written {
             // The first error is the one to tell.
             let _ = std::fs::remove_file(file);
+            // Fails, as it should, for a subfolder that holds other files.
+            let _ = file.parent().filter(|parent| *parent != folder).map(std::fs::remove_dir);
         }
     })?;
     Ok(Imported { index, images_written: output.written.len(), notes: output.notes })
@@ -236,3 +238,6 @@ fn check_folder(path: &Path, folder: &Path, existing: Existing) -> Result<()> {
         _ => Ok(()),
     }
 }
+
+#[cfg(test)]
+mod tests;

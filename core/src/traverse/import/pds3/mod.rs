@@ -17,6 +17,7 @@ mod product;
 mod raster;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 pub use product::{FILE_LIMIT, Product, SIZE_LIMIT, camera_model, is_product};
 pub use raster::Raster;
@@ -46,7 +47,11 @@ impl ImportFormat for Pds3 {
     }
 
     fn sniff(&self, path: &Path) -> bool {
-        if path.is_file() { is_product(path) } else { product_files(path).is_ok_and(|files| !files.is_empty()) }
+        if path.is_file() {
+            is_product(path)
+        } else {
+            product_files(path).is_ok_and(|files| !files.is_empty())
+        }
     }
 
     fn import(&self, path: &Path, options: &ImportOptions, output: &mut Output<'_>) -> Result<TraverseIndex> {
@@ -92,7 +97,8 @@ impl ImportFormat for Pds3 {
 
 fn description(first: &Product, pairs: &[Pair]) -> String {
     let sol = first.label.number("PLANET_DAY_NUMBER").map(|sol| format!(", sol {sol}")).unwrap_or_default();
-    let products: Vec<_> = pairs.iter().flat_map(|pair| [pair.left.product.id(), pair.right.product.id()]).collect();
+    let products: Vec<_> =
+        pairs.iter().flat_map(|pair| [pair.left.product.id(), pair.right.product.id()]).collect();
     format!("PDS3 pictures of {}{sol}: {}.", first.instrument(), products.join(", "))
 }
 
@@ -107,7 +113,7 @@ fn product_files(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(unreadable)? {
         let path = entry.map_err(unreadable)?.path();
-        let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
+        let extension = path.extension().map(std::ffi::OsStr::to_ascii_lowercase);
         if extension.is_some_and(|extension| extension == "img" || extension == "lbl") && is_product(&path) {
             files.push(path);
         }
@@ -118,13 +124,13 @@ fn product_files(folder: &Path) -> Result<Vec<PathBuf>> {
 
 /// The stops of a folder, or the one that a file belongs to.
 fn choose(path: &Path, output: &mut Output<'_>) -> Result<(Vec<Pair>, StereoGeometry)> {
-    let mut frames: Vec<Frame> = Vec::new();
+    let mut frames: Vec<Arc<Frame>> = Vec::new();
     for file in product_files(folder_of(path))? {
         output.check_cancelled()?;
         match Product::read(&file).and_then(Frame::new) {
             // A product with both an attached and a detached label is one product.
             Ok(frame) if frames.iter().any(|other| other.product.id() == frame.product.id()) => {}
-            Ok(frame) => frames.push(frame),
+            Ok(frame) => frames.push(Arc::new(frame)),
             Err(error) if file == path => return Err(error),
             Err(error) => output.note(format!("left out: {error}")),
         }
@@ -154,9 +160,12 @@ fn chosen_by_hand(
 ) -> Result<(Vec<Pair>, StereoGeometry)> {
     if !options.files.len().is_multiple_of(2) {
         let count = options.files.len();
-        return Err(Error::setting("files", format!("names {count} files, but each stop needs a left and a right")));
+        return Err(Error::setting(
+            "files",
+            format!("names {count} files, but each stop needs a left and a right"),
+        ));
     }
-    let read = |file: &PathBuf| Product::read(&folder_of(path).join(file)).and_then(Frame::new);
+    let read = |file: &PathBuf| Product::read(&folder_of(path).join(file)).and_then(Frame::new).map(Arc::new);
     let mut pairs = Vec::new();
     for files in options.files.chunks_exact(2) {
         output.check_cancelled()?;
@@ -168,7 +177,8 @@ fn chosen_by_hand(
 
 /// Refuses stops whose poses are in different frames.
 fn one_site(pairs: &[Pair]) -> Result<()> {
-    let mut sites = pairs.iter().flat_map(|pair| [&pair.left, &pair.right]).map(|frame| (frame, frame.site()));
+    let mut sites =
+        pairs.iter().flat_map(|pair| [&pair.left, &pair.right]).map(|frame| (frame, frame.site()));
     let Some((_, first)) = sites.next() else { return Ok(()) };
     match sites.find(|(_, site)| *site != first) {
         Some((frame, _)) => {
@@ -212,7 +222,8 @@ fn write_view(frame: &Frame, camera: Camera, scale: &Scale, output: &mut Output<
         output.note(format!("{}: {negative} samples below zero became 0", frame.product.id()));
     }
     // One number of the PNG is one number of the detector: the image is a fraction of 65535, not of full scale.
-    let samples = raster.samples.iter().map(|&v| (f64::from(v) * scale.factor / PNG_LIMIT_DN) as f32).collect();
+    let samples =
+        raster.samples.iter().map(|&v| (f64::from(v) * scale.factor / PNG_LIMIT_DN) as f32).collect();
     let image = GrayImage::from_raw(raster.width, raster.height, samples);
     let image = image.ok_or_else(|| frame.product.problem("the picture is not complete"))?;
     let name = format!("{}.png", file_name(&frame.product.id()));

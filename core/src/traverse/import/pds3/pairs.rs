@@ -10,6 +10,8 @@
 //! Lateral pairs are preferred; all stops of a traverse are of the same camera family, the one with the most
 //! stops.
 
+use std::sync::Arc;
+
 use super::product::Product;
 use crate::camera::Camera;
 use crate::error::Result;
@@ -24,7 +26,6 @@ const OVERLAP_GRID: u32 = 9;
 const OVERLAP_RANGES_M: [f64; 4] = [1.0, 3.0, 10.0, 30.0];
 
 /// A product that can be one view of a stop.
-#[derive(Clone)]
 pub(super) struct Frame {
     pub(super) product: Product,
     pub(super) camera: Camera,
@@ -88,8 +89,8 @@ impl Frame {
 /// The two views of one stop.
 #[derive(Clone)]
 pub(super) struct Pair {
-    pub(super) left: Frame,
-    pub(super) right: Frame,
+    pub(super) left: Arc<Frame>,
+    pub(super) right: Arc<Frame>,
 }
 
 impl Pair {
@@ -124,7 +125,8 @@ impl Pair {
     /// Whether any point of the first view, at a usual range, is seen in the second.
     fn overlaps(&self) -> bool {
         let (left, right) = (&self.left.camera, self.right_camera_in_left_rover());
-        let place = |index: u32, side: u32| f64::from(index) / f64::from(OVERLAP_GRID - 1) * f64::from(side - 1);
+        let place =
+            |index: u32, side: u32| f64::from(index) / f64::from(OVERLAP_GRID - 1) * f64::from(side - 1);
         (0..OVERLAP_GRID * OVERLAP_GRID).any(|index| {
             let (column, row) = (index % OVERLAP_GRID, index / OVERLAP_GRID);
             let pixel = Pixel::new(place(column, left.width()), place(row, left.height()));
@@ -135,7 +137,7 @@ impl Pair {
 }
 
 /// The stops that the pictures make, in the order of their clocks.
-pub(super) fn assemble(frames: &[Frame]) -> (Vec<Pair>, StereoGeometry) {
+pub(super) fn assemble(frames: &[Arc<Frame>]) -> (Vec<Pair>, StereoGeometry) {
     let mut frames = frames.to_vec();
     let clock = |frame: &Frame| frame.product.clock_s().unwrap_or(f64::INFINITY);
     // The sort is stable: pictures without a clock stay in the order of their names.
@@ -148,7 +150,7 @@ pub(super) fn assemble(frames: &[Frame]) -> (Vec<Pair>, StereoGeometry) {
 }
 
 /// Pairs each picture with the nearest later or earlier one that fits; no picture is used twice.
-fn pair_up(frames: &[Frame], fits: impl Fn(&Pair) -> bool) -> Vec<Pair> {
+fn pair_up(frames: &[Arc<Frame>], fits: impl Fn(&Pair) -> bool) -> Vec<Pair> {
     let mut used = vec![false; frames.len()];
     let mut pairs = Vec::new();
     for first in 0..frames.len() {
@@ -156,9 +158,11 @@ fn pair_up(frames: &[Frame], fits: impl Fn(&Pair) -> bool) -> Vec<Pair> {
             if used[first] || used[second] {
                 continue;
             }
-            let (a, b) = (frames[first].clone(), frames[second].clone());
-            let swapped = Pair { left: b.clone(), right: a.clone() };
-            let pair = [Pair { left: a, right: b }, swapped].into_iter().find(&fits);
+            let pair = |left: usize, right: usize| Pair {
+                left: Arc::clone(&frames[left]),
+                right: Arc::clone(&frames[right]),
+            };
+            let pair = [pair(first, second), pair(second, first)].into_iter().find(&fits);
             if let Some(pair) = pair {
                 (used[first], used[second]) = (true, true);
                 pairs.push(pair);
@@ -178,5 +182,8 @@ fn largest_family(pairs: Vec<Pair>) -> Vec<Pair> {
             best = Some((family, own));
         }
     }
-    pairs.into_iter().filter(|pair| best.as_ref().is_some_and(|(family, _)| pair.left.family() == *family)).collect()
+    pairs
+        .into_iter()
+        .filter(|pair| best.as_ref().is_some_and(|(family, _)| pair.left.family() == *family))
+        .collect()
 }

@@ -49,7 +49,10 @@ impl Product {
         let length = file.metadata().map_err(unreadable)?.len();
         if length > FILE_LIMIT {
             let (mib, limit) = (length >> 20, FILE_LIMIT >> 20);
-            return Err(Error::format(path, format!("the file has {mib} MiB, more than the {limit} allowed")));
+            return Err(Error::format(
+                path,
+                format!("the file has {mib} MiB, more than the {limit} allowed"),
+            ));
         }
         let mut head = Vec::new();
         file.take(LABEL_LIMIT).read_to_end(&mut head).map_err(unreadable)?;
@@ -148,9 +151,7 @@ pub fn camera_model(label: &Group) -> Result<CameraModel, String> {
     let optical_axis = || component(group, "O").map(Vector3::from);
     let model = match group.text("MODEL_TYPE").unwrap_or("NONE") {
         "CAHV" => CameraModel::Cahv(linear),
-        "CAHVOR" => {
-            CameraModel::Cahvor(Cahvor::normalised(linear, optical_axis()?, component(group, "R")?))
-        }
+        "CAHVOR" => CameraModel::Cahvor(Cahvor::normalised(linear, optical_axis()?, component(group, "R")?)),
         "CAHVORE" => {
             let [kind] = component(group, "T")?;
             let imaging = Imaging::try_from(kind as u8)?;

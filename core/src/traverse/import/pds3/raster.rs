@@ -182,7 +182,8 @@ impl Product {
             return Ok((path, number - 1));
         }
         let record = self.label.number("RECORD_BYTES").filter(|&n| n >= 1.0 && n <= FILE_LIMIT as f64);
-        let record = record.ok_or_else(|| self.problem("^IMAGE counts records, but RECORD_BYTES is missing"))?;
+        let record =
+            record.ok_or_else(|| self.problem("^IMAGE counts records, but RECORD_BYTES is missing"))?;
         Ok((path, (number - 1).saturating_mul(record as u64)))
     }
 
@@ -190,7 +191,8 @@ impl Product {
     fn beside(&self, name: &str) -> Result<PathBuf> {
         let folder = self.path.parent().unwrap_or(&self.path);
         let same_name = |path: &PathBuf| path.file_name().is_some_and(|own| own.eq_ignore_ascii_case(name));
-        let entries = std::fs::read_dir(folder).map_err(|source| Error::Read { path: folder.into(), source })?;
+        let entries =
+            std::fs::read_dir(folder).map_err(|source| Error::Read { path: folder.into(), source })?;
         let found = entries.filter_map(|entry| Some(entry.ok()?.path())).find(same_name);
         found.ok_or_else(|| self.problem(format!("^IMAGE names {name}, which is not in the same folder")))
     }
