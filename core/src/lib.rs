@@ -6,4 +6,5 @@ pub mod camera;
 pub mod image;
 pub mod correlate;
 pub mod estimate;
+pub mod sim;
 pub mod traverse;
