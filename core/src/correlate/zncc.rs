@@ -20,7 +20,7 @@
 //! | j' | window of the image, shifted | fraction of full scale |
 //! | N | `count`: pixels of the template | – |
 
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::dot::{TILE_COLUMNS, TILE_ROWS, Tile, Weights};
@@ -115,8 +115,7 @@ impl<'a> Job<'a> {
         let count = rounded.len() as f64;
         let weights_sum: f64 = rounded.iter().map(|t| f64::from(*t)).sum();
         let squares: f64 = rounded.iter().map(|t| f64::from(*t).powi(2)).sum();
-        let rows = (0..region.height as usize).map(|y| integral::row(image, &region, y));
-        let (shift, has_invalid) = Arch::new().dispatch(|| integral::rough_mean(rows));
+        let (shift, has_invalid) = Arch::new().dispatch(RoughMean { image, region });
         Self {
             weights: Weights::new(&rounded, exact.width),
             weights_sum,
@@ -132,6 +131,11 @@ impl<'a> Job<'a> {
         }
     }
 
+    /// Scores the band of positions that starts at row `top`; gives the number of positions without contrast.
+    fn band(&self, scratch: &mut Scratch<'a>, top: usize, scores: &mut [f32]) -> u32 {
+        Arch::new().dispatch(Band { job: self, scratch, top, scores })
+    }
+
     fn scratch(&self) -> Scratch<'a> {
         let tiles = self.width.div_ceil(TILE_COLUMNS);
         Scratch {
@@ -143,42 +147,33 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// Scores the rows of positions from `top`; gives the number of positions without contrast.
-    fn band(&self, scratch: &mut Scratch<'a>, top: usize, scores: &mut [f32]) -> u32 {
-        let (arch, rows) = (Arch::new(), scores.len() / self.width);
-        arch.dispatch(|| self.numerators(arch, scratch, top, rows));
-        let mut flat = 0;
-        for (y, scores) in scores.chunks_exact_mut(self.width).enumerate() {
-            let any_doubtful = arch.dispatch(|| {
-                if y == 0 { scratch.integral.start(top) } else { scratch.integral.advance() }
-                self.score_row(scratch, y, scores)
-            });
-            if any_doubtful || self.has_invalid {
-                flat += self.repair_row(scratch, top + y, scores);
-            }
-        }
-        flat
-    }
-
     /// The numerators of a band, tile by tile.
-    fn numerators(&self, arch: Arch, scratch: &mut Scratch<'a>, top: usize, rows: usize) {
+    #[inline(always)]
+    fn numerators<S: Simd>(&self, simd: S, scratch: &mut Scratch<'a>, top: usize, rows: usize) {
         let stride = self.width.next_multiple_of(TILE_COLUMNS);
         for (tile, left) in (0..self.width).step_by(TILE_COLUMNS).enumerate() {
             let columns = TILE_COLUMNS.min(self.width - left);
-            scratch.tile_shifts[tile] =
-                arch.dispatch(|| self.load_tile(left, top, columns, rows, &mut scratch.input));
+            scratch.tile_shifts[tile] = self.load_tile(simd, left, top, columns, rows, &mut scratch.input);
             let (weights, input) = (&self.weights, scratch.input.as_slice());
             let output = &mut scratch.sums[left..];
-            arch.dispatch(Tile { weights, input, columns, rows, output, stride });
+            Tile { weights, input, columns, rows, output, stride }.with_simd(simd);
         }
     }
 
     /// Copies the pixels of a tile, less their mean, which is returned relative to the region's.
     #[inline(always)]
-    fn load_tile(&self, left: usize, top: usize, columns: usize, rows: usize, input: &mut [f32]) -> f64 {
+    fn load_tile<S: Simd>(
+        &self,
+        simd: S,
+        left: usize,
+        top: usize,
+        columns: usize,
+        rows: usize,
+        input: &mut [f32],
+    ) -> f64 {
         let (width, height) = (columns + self.size - 1, rows + self.size - 1);
         let pixels = |y: usize| &integral::row(self.image, &self.region, top + y)[left..left + width];
-        let (shift, _) = integral::rough_mean((0..height).map(pixels));
+        let (shift, _) = integral::rough_mean(simd, (0..height).map(pixels));
         for (y, out) in input.chunks_exact_mut(self.weights.input_columns()).enumerate() {
             let (inside, outside) = out.split_at_mut(width);
             outside.fill(0.0);
@@ -239,6 +234,54 @@ impl<'a> Job<'a> {
             }
         }
         flat
+    }
+}
+
+/// The scores of a band of rows: all of it runs with the widest vectors of the processor.
+struct Band<'s, 'a> {
+    job: &'s Job<'a>,
+    scratch: &'s mut Scratch<'a>,
+    top: usize,
+    scores: &'s mut [f32],
+}
+
+impl WithSimd for Band<'_, '_> {
+    type Output = u32;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> u32 {
+        let Self { job, scratch, top, scores } = self;
+        job.numerators(simd, scratch, top, scores.len() / job.width);
+        let mut flat = 0;
+        for (y, scores) in scores.chunks_exact_mut(job.width).enumerate() {
+            if y == 0 {
+                scratch.integral.start(top);
+            } else {
+                scratch.integral.advance();
+            }
+            if job.score_row(scratch, y, scores) || job.has_invalid {
+                flat += job.repair_row(scratch, top + y, scores);
+            }
+        }
+        flat
+    }
+}
+
+/// About the mean of a region, and whether it holds an invalid pixel.
+struct RoughMean<'a> {
+    image: &'a GrayImage,
+    region: PixelRect,
+}
+
+impl WithSimd for RoughMean<'_> {
+    type Output = (f32, bool);
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> (f32, bool) {
+        integral::rough_mean(
+            simd,
+            (0..self.region.height as usize).map(|y| integral::row(self.image, &self.region, y)),
+        )
     }
 }
 

@@ -15,6 +15,8 @@
 //! | v | pixel value | fraction of full scale |
 //! | shift | `shift` | fraction of full scale |
 
+use pulp::Simd;
+
 use super::{GrayImage, PixelRect};
 
 /// Sums over the columns of a strip of rows, and their running totals.
@@ -40,7 +42,13 @@ impl<'a> RollingIntegral<'a> {
     /// Strips of `height` rows of `region`, which lies inside `image`; [`Self::start`] comes next.
     ///
     /// `shift` is any value near the region's; `has_invalid` says whether a pixel of it is invalid.
-    pub fn new(image: &'a GrayImage, region: PixelRect, height: usize, shift: f32, has_invalid: bool) -> Self {
+    pub fn new(
+        image: &'a GrayImage,
+        region: PixelRect,
+        height: usize,
+        shift: f32,
+        has_invalid: bool,
+    ) -> Self {
         let width = region.width as usize;
         let counts = if has_invalid { width } else { 0 };
         Self {
@@ -133,26 +141,26 @@ pub(crate) fn row<'a>(image: &'a GrayImage, region: &PixelRect, y: usize) -> &'a
 
 /// Mean of the valid values of some rows, and whether a value is invalid; the mean is 0 when none is valid.
 ///
-/// Sixteen `f32` sums side by side: good to a few digits, for a shift that may be any value nearby.
+/// Sums of `f32` side by side: good to a few digits, for a shift that may be any value nearby.
 #[inline(always)]
-pub(crate) fn rough_mean<'a>(rows: impl Iterator<Item = &'a [f32]>) -> (f32, bool) {
-    let (mut sums, mut counts, mut total) = ([0.0_f32; 16], [0.0_f32; 16], 0);
+pub(crate) fn rough_mean<'a, S: Simd>(simd: S, rows: impl Iterator<Item = &'a [f32]>) -> (f32, bool) {
+    let (zero, one) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0));
+    let infinity = simd.splat_f32s(f32::INFINITY);
+    let (mut sums, mut counts, mut total) = (zero, zero, 0);
     for row in rows {
         total += row.len();
-        let (chunks, rest) = row.as_chunks::<16>();
-        for chunk in chunks {
-            for ((sum, count), v) in sums.iter_mut().zip(&mut counts).zip(chunk) {
-                *sum += if v.is_finite() { *v } else { 0.0 };
-                *count += if v.is_finite() { 1.0 } else { 0.0 };
-            }
+        let (vectors, rest) = S::as_simd_f32s(row);
+        for v in vectors {
+            let is_valid = simd.less_than_f32s(simd.abs_f32s(*v), infinity);
+            sums = simd.add_f32s(sums, simd.select_f32s(is_valid, *v, zero));
+            counts = simd.add_f32s(counts, simd.select_f32s(is_valid, one, zero));
         }
-        for v in rest.iter().filter(|v| v.is_finite()) {
-            (sums[0], counts[0]) = (sums[0] + v, counts[0] + 1.0);
-        }
+        // The rest counts only where its validity does: it is too short to move the mean.
+        total -= rest.iter().filter(|v| v.is_finite()).count();
     }
-    let count = counts.iter().map(|c| f64::from(*c)).sum::<f64>();
-    let sum = sums.iter().map(|s| f64::from(*s)).sum::<f64>();
-    (if count > 0.0 { (sum / count) as f32 } else { 0.0 }, count < total as f64)
+    let count = simd.reduce_sum_f32s(counts);
+    let mean = if count > 0.0 { simd.reduce_sum_f32s(sums) / count } else { 0.0 };
+    (mean, (count as usize) < total)
 }
 
 #[cfg(test)]
@@ -161,7 +169,8 @@ mod tests {
 
     #[test]
     fn sums_of_every_window_equal_direct_sums_and_invalid_pixels_are_counted() {
-        let mut image = GrayImage::from_fn(13, 11, |x, y| image::Luma([((x * 7 + y * 13) % 10) as f32 / 10.0]));
+        let mut image =
+            GrayImage::from_fn(13, 11, |x, y| image::Luma([((x * 7 + y * 13) % 10) as f32 / 10.0]));
         image.put_pixel(6, 5, image::Luma([f32::NAN]));
         let (region, shift) = (PixelRect::new(2, 1, 9, 8), 0.375);
         let mut strip = RollingIntegral::new(&image, region, 3, shift, true);
@@ -187,10 +196,9 @@ mod tests {
 
     #[test]
     fn the_rough_mean_leaves_invalid_values_out_and_reports_them() {
-        let rows = [vec![0.25; 37], vec![0.75; 37]];
-        assert_eq!(rough_mean(rows.iter().map(Vec::as_slice)), (0.5, false));
-        let rows = [vec![f32::NAN; 20], vec![0.75; 37]];
-        assert_eq!(rough_mean(rows.iter().map(Vec::as_slice)), (0.75, true));
-        assert_eq!(rough_mean(std::iter::once(&[f32::NAN][..])), (0.0, true));
+        let mean = |rows: &[Vec<f32>]| rough_mean(pulp::Scalar, rows.iter().map(Vec::as_slice));
+        assert_eq!(mean(&[vec![0.25; 37], vec![0.75; 37]]), (0.5, false));
+        assert_eq!(mean(&[vec![f32::NAN; 20], vec![0.75; 37]]), (0.75, true));
+        assert_eq!(mean(&[vec![f32::NAN]]), (0.0, true));
     }
 }
