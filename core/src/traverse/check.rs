@@ -58,8 +58,8 @@ pub(super) fn check_index(index: &TraverseIndex) -> Result<(), String> {
     Ok(())
 }
 
-/// Checks one stop and reads its cameras.
-pub(super) fn check_stop(stop: &Stop, folder: &Path) -> Result<StopCameras, String> {
+/// Checks the time, the poses and the mast angles of one stop.
+pub(super) fn check_stop_numbers(stop: &Stop) -> Result<(), String> {
     if !stop.time_s.is_finite() {
         return Err(format!("time_s: is {}, but it must be a finite number", stop.time_s));
     }
@@ -69,10 +69,16 @@ pub(super) fn check_stop(stop: &Stop, folder: &Path) -> Result<StopCameras, Stri
     {
         return Err("mast_angles: must be finite numbers".to_owned());
     }
-    let truth = stop.truth.as_ref();
-    if let Some(truth) = truth {
-        check_pose("truth.site_from_rover", &truth.site_from_rover)?;
+    match &stop.truth {
+        Some(truth) => check_pose("truth.site_from_rover", &truth.site_from_rover),
+        None => Ok(()),
     }
+}
+
+/// Checks one stop and reads its cameras.
+pub(super) fn check_stop(stop: &Stop, folder: &Path) -> Result<StopCameras, String> {
+    check_stop_numbers(stop)?;
+    let truth = stop.truth.as_ref();
     let true_camera = |side: &str, camera: Option<&Camera>| {
         camera.cloned().map(|camera| checked(camera).map_err(|problem| format!("truth.{side}: {problem}")))
     };

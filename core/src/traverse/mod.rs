@@ -10,6 +10,7 @@ mod image_cache;
 pub mod import;
 mod index_file;
 pub mod native;
+mod simulated;
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -19,6 +20,7 @@ use crate::frames::PoseRecord;
 
 pub use index_file::{Existing, IndexFormat};
 pub use native::{StereoPair, Traverse, write};
+pub use simulated::create_simulated;
 
 /// The version of the folder format that this code writes.
 pub const FORMAT_VERSION: u32 = 1;

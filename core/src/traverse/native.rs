@@ -48,6 +48,7 @@
 //! [`CACHE_LIMIT_BYTES`].
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::check::{self, StopCameras};
@@ -55,11 +56,13 @@ use super::files::resolve;
 use super::image_cache::ImageCache;
 pub use super::image_cache::StereoPair;
 use super::index_file::{self, Existing, IndexFormat};
+use super::simulated::Simulated;
 use super::{Stop, TraverseIndex, View};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::frames::Pose;
 use crate::image::{GrayImage, io};
+use crate::sim::World;
 
 /// The most memory that decoded pairs may take, bytes (32 pairs of 1024 × 1024).
 pub const CACHE_LIMIT_BYTES: usize = 256 << 20;
@@ -72,6 +75,7 @@ pub struct Traverse {
     cameras: Vec<StopCameras>,
     warnings: Vec<String>,
     cache: Mutex<ImageCache>,
+    pub(super) simulated: Option<Simulated>,
 }
 
 impl Traverse {
@@ -94,9 +98,11 @@ impl Traverse {
         };
         let cameras = index.stops.iter().enumerate().map(read_stop).collect::<Result<_, _>>();
         let cameras = cameras.map_err(problem)?;
+        let read_scenario = |name: &String| Simulated::open(&index, name, &folder);
+        let simulated = index.scenario.as_ref().map(read_scenario).transpose().map_err(problem)?;
         let warnings = check::warnings(&index, &folder);
         let cache = Mutex::new(ImageCache::new(CACHE_LIMIT_BYTES));
-        Ok(Self { folder, index_path, index, cameras, warnings, cache })
+        Ok(Self { folder, index_path, index, cameras, warnings, cache, simulated })
     }
 
     /// The index as it was read.
@@ -153,7 +159,35 @@ impl Traverse {
         self.index.stops[step].truth.as_ref().map(|_| cameras.true_right.as_ref().unwrap_or(&cameras.right))
     }
 
-    /// The stereo pair of a stop, in fractions of full scale.
+    /// The simulated world, whose surface is the truth; `None` for a recorded traverse.
+    ///
+    /// It is built when it is first asked for, which may take seconds.
+    pub fn world(&self) -> Option<&World> {
+        self.simulated.as_ref().map(Simulated::world)
+    }
+
+    /// Whether the images of a stop need no rendering: always for recorded ones, whether they exist or not.
+    pub fn is_ready(&self, step: usize) -> bool {
+        let exists = |view: &View| resolve(&self.folder, &view.image).is_ok_and(|path| path.exists());
+        let stop = &self.index.stops[step];
+        self.simulated.is_none() || (exists(&stop.left) && exists(&stop.right))
+    }
+
+    /// Renders the images of a simulated stop that are missing; does nothing for a recorded one.
+    ///
+    /// # Errors
+    /// No such stop, images that cannot be written, or [`Error::Cancelled`] soon after `cancel` is set.
+    pub fn render_step(&self, step: usize, cancel: &AtomicBool) -> Result<()> {
+        let stop = self.stop(step)?;
+        match &self.simulated {
+            Some(simulated) if !self.is_ready(step) => {
+                simulated.render_missing(step, stop, &self.cameras[step], &self.folder, cancel)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The stereo pair of a stop, in fractions of full scale; a simulated one is rendered where it is missing.
     ///
     /// # Errors
     /// No such stop, or an image that is missing, damaged or not of its camera's size; the sentence names it.
@@ -162,6 +196,7 @@ impl Traverse {
         if let Some(pair) = self.cached(|cache| cache.get(step)) {
             return Ok(pair);
         }
+        self.render_step(step, &AtomicBool::new(false))?;
         let cameras = &self.cameras[step];
         let pair = StereoPair {
             left: Arc::new(self.read_image(step, "left", &stop.left, &cameras.left)?),
@@ -208,10 +243,15 @@ impl Traverse {
 /// Writes an index into `folder`, which is made where it is missing; images are written by the caller.
 ///
 /// # Errors
-/// An index that would not open again, one that is there already and may not be replaced, or a folder that
+/// An index with an implausible number in it, one that is there already and may not be replaced, or a folder that
 /// cannot be written.
 pub fn write(index: &TraverseIndex, folder: &Path, format: IndexFormat, existing: Existing) -> Result<()> {
-    check::check_index(index).map_err(|problem| Error::format(folder.join(format.file_name()), problem))?;
+    let problem = |problem| Error::format(folder.join(format.file_name()), problem);
+    check::check_index(index).map_err(problem)?;
+    for (step, stop) in index.stops.iter().enumerate() {
+        let numbers = check::check_stop_numbers(stop);
+        numbers.map_err(|sentence| problem(format!("stops[{step}].{sentence}")))?;
+    }
     index_file::write(index, folder, format, existing)
 }
 

@@ -14,28 +14,26 @@
 //! model with A, H, V = third, first, second row of M and C = −M⁻¹ p.
 //!
 //! **The poses are true**, so the estimate that the tracker is given is made from them as odometry would make
-//! it: each step's motion is measured with an error of its own, and the errors add up. With T_k the true and
-//! E_k the estimated pose (`site_from_rover`) at stop k:
+//! it, by the simulator's model ([`crate::sim::drive::estimates`]): with T_k the true and E_k the estimated
+//! pose (`site_from_rover`) at stop k,
 //!
 //! ```text
 //! Δ_k = T_{k−1}⁻¹ T_k = (R, t)                  true motion of the step, in the rover frame before it
 //! t' = t + (a n₁) u + (c n₂) v + (c n₃) w       u along t, v and w across; a = along_fraction · |t|, c alike
-//! R' = R · exp([α n₄, α n₅, α n₆]ₓ)             α = attitude_deg in rad
-//! E_0 = T_0,   E_k = E_{k−1} · (R', t')         n₁ … n₆ standard normal, from the seed
+//! R' = R · Rz(α n₆) Ry(α n₅) Rx(α n₄)           α = attitude_deg in rad
+//! E_0 = T_0,   E_k = E_{k−1} · (R', t')         n₁ … n₆ standard normal, from the seed: errors add up
 //! ```
 
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
-use rand::SeedableRng;
-use rand_distr::{Distribution, StandardNormal};
-use rand_pcg::Pcg64Mcg;
 
 use super::{ImportFormat, ImportOptions, Output};
 use crate::camera::{Cahv, Camera, CameraModel};
 use crate::error::{Error, Result};
 use crate::frames::{Point3, Pose, PoseRecord, Vector3};
 use crate::image::io;
+use crate::sim::drive;
 use crate::traverse::{
     CameraSource, FORMAT_VERSION, OdometryError, StereoGeometry, Stop, StopTruth, TraverseIndex, View,
 };
@@ -76,7 +74,7 @@ impl ImportFormat for Kitti {
             across_fraction: options.odometry_fraction,
             attitude_deg: options.attitude_deg,
         };
-        let estimates = disturb(&truth, &odometry_error, options.seed);
+        let estimates = drive::estimates(&truth, &odometry_error, options.seed);
         let time = |frame: usize| times.get(frame).copied().unwrap_or(frame as f64 * FRAME_TIME_S);
         let mut stops = Vec::with_capacity(frames.len());
         for (((frame, file), truth), estimate) in frames.iter().zip(&truth).zip(&estimates) {
@@ -119,28 +117,6 @@ impl ImportFormat for Kitti {
             stops,
         })
     }
-}
-
-/// The estimated poses that odometry with this error would give for the true ones (header).
-pub fn disturb(truth: &[Pose], error: &OdometryError, seed: u64) -> Vec<Pose> {
-    let mut random = Pcg64Mcg::seed_from_u64(seed);
-    let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-    let mut estimates: Vec<Pose> = truth.first().copied().into_iter().collect();
-    for pair in truth.windows(2) {
-        let motion = pair[0].inverse() * pair[1];
-        let way = motion.translation.vector;
-        let length = way.norm();
-        let along = if length > 0.0 { way / length } else { Vector3::x() };
-        let across = along.cross(&if along.z.abs() < 0.9 { Vector3::z() } else { Vector3::x() }).normalize();
-        let (a, c) = (error.along_fraction * length, error.across_fraction * length);
-        let disturbed_way =
-            way + along * (a * normal()) + across * (c * normal()) + along.cross(&across) * (c * normal());
-        let turn = Vector3::new(normal(), normal(), normal()) * error.attitude_deg.to_radians();
-        let rotation = motion.rotation * UnitQuaternion::from_scaled_axis(turn);
-        let last = estimates.last().copied().unwrap_or_else(Pose::identity);
-        estimates.push(last * Pose::from_parts(Translation3::from(disturbed_way), rotation));
-    }
-    estimates
 }
 
 /// Rover x = camera z, y = camera x, z = camera y.
