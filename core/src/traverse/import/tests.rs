@@ -322,3 +322,25 @@ fn an_option_out_of_range_is_named() {
         assert!(refusal(source.path(), &options).starts_with(&format!("setting {key}: ")));
     }
 }
+
+proptest::proptest! {
+    #![proptest_config(proptest::prelude::ProptestConfig::with_cases(200))]
+    #[test]
+    fn a_damaged_product_is_answered_and_never_panics(
+        cut in 0..1700_usize,
+        at in 0..1536_usize,
+        bytes in proptest::collection::vec(proptest::prelude::any::<u8>(), 0..12),
+    ) {
+        let source = tempfile::tempdir().unwrap();
+        pds3(source.path(), "A", "LEFT", 0.0, "100");
+        let file = source.path().join("A.IMG");
+        let mut content = std::fs::read(&file).unwrap();
+        content.splice(at..at + bytes.len().min(1536 - at), bytes);
+        content.truncate(if cut < 1590 { cut } else { usize::MAX });
+        std::fs::write(&file, content).unwrap();
+        if let Ok(product) = pds3::Product::read(&file) {
+            let _ = (product.camera(), product.site_from_rover(), product.read_raster(), product.clock_s());
+            let _ = (product.motion_counter(), product.id());
+        }
+    }
+}
