@@ -110,12 +110,9 @@ impl Tile<'_> {
                 }
             }
         }
-        for r in 0..ROWS {
+        for (r, sums) in sums.into_iter().enumerate() {
             let out = &mut self.output[(y + r) * self.stride + x..][..span];
-            let (out, _) = S::as_mut_simd_f32s(out);
-            for v in 0..V {
-                out[v] = sums[r][v];
-            }
+            S::as_mut_simd_f32s(out).0.copy_from_slice(&sums);
         }
     }
 }

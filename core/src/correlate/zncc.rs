@@ -47,7 +47,7 @@ const PARALLEL_WORK: usize = 2_000_000;
 /// `None` when the template is not square, has an even side or an invalid pixel, or when no position holds it.
 pub fn zncc_surface(template: &Patch, image: &GrayImage, region: PixelRect) -> Option<Surface> {
     let size = template.width();
-    if template.height() != size || size % 2 == 0 {
+    if template.height() != size || size.is_multiple_of(2) {
         return None;
     }
     let exact = Template::new(template)?;
@@ -212,7 +212,7 @@ impl<'a> Job<'a> {
                 let numerator = f64::from(numerators[x]) - self.weights_sum * offset;
                 let norm = (variance as f32).sqrt() * self.weights_norm as f32;
                 scores[x] = (numerator as f32 / norm).clamp(-1.0, 1.0);
-                doubtful[x] = !(variance > floor) | (offset * offset * offset_limit > variance);
+                doubtful[x] = (variance <= floor) | (offset * offset * offset_limit > variance);
                 any |= doubtful[x];
             }
         }
