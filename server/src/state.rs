@@ -44,7 +44,8 @@ struct Inner {
     notices: Vec<String>,
     designations: Lane,
     pictures: Lane,
-    streams: Mutex<BTreeMap<String, LiveStream>>,
+    exports: Lane,
+    streams: Mutex<BTreeMap<String, Arc<LiveStream>>>,
 }
 
 #[derive(Default)]
@@ -95,6 +96,7 @@ impl AppState {
             notices,
             designations: Lane::new(2, 16),
             pictures: Lane::new(8, 256),
+            exports: Lane::new(1, 8),
             streams: Mutex::default(),
         })))
     }
@@ -202,13 +204,18 @@ impl AppState {
         &self.0.designations
     }
 
-    /// Where images are read and recordings written.
+    /// Where images are read.
     pub fn pictures(&self) -> &Lane {
         &self.0.pictures
     }
 
+    /// Where recordings are written.
+    pub fn exports(&self) -> &Lane {
+        &self.0.exports
+    }
+
     /// The live Rerun streams, by session.
-    pub fn streams(&self) -> &Mutex<BTreeMap<String, LiveStream>> {
+    pub fn streams(&self) -> &Mutex<BTreeMap<String, Arc<LiveStream>>> {
         &self.0.streams
     }
 }
