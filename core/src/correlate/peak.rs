@@ -132,18 +132,18 @@ fn neighbours(surface: &Surface, ix: u32, iy: u32) -> Option<[f64; 9]> {
 }
 
 /// The quadratic through the neighbourhood of a maximum.
-struct Fit {
+pub(crate) struct Fit {
     /// From the whole pixel to the maximum, px.
-    offset: Vector2<f64>,
+    pub(crate) offset: Vector2<f64>,
     /// Value of the quadratic there.
-    score: f64,
+    pub(crate) score: f64,
     /// Curvature, 1/px²; negative definite.
     hessian: Matrix2<f64>,
 }
 
 impl Fit {
     /// `None` unless the curvature is negative in every direction.
-    fn new(f: &[f64; 9]) -> Option<Self> {
+    pub(crate) fn new(f: &[f64; 9]) -> Option<Self> {
         let gradient = Vector2::new((f[5] - f[3]) / 2.0, (f[7] - f[1]) / 2.0);
         let (xx, yy) = (f[5] - 2.0 * f[4] + f[3], f[7] - 2.0 * f[4] + f[1]);
         let xy = (f[8] - f[6] - f[2] + f[0]) / 4.0;
