@@ -17,7 +17,7 @@
 //! | curve parameter | arc length from the far end | px in the right image |
 //! | A | `right_from_left` | px per px |
 
-use nalgebra::Matrix2;
+use nalgebra::{Matrix2, Matrix3};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -227,12 +227,9 @@ fn refine(scores: &[f32], rows: usize, from: f64, spacing: f64, side: i32, sub_p
         at_end,
     };
     if sub_pixel && !at_end {
-        // Row by row as the fit expects: across the curve downwards, along it to the right.
-        let neighbours = std::array::from_fn(|k| {
-            let (dx, dy) = (k % 3, k / 3);
-            f64::from(scores[(column + dx - 1) * rows + row + dy - 1])
-        });
-        if let Some(fit) = Fit::new(&neighbours) {
+        // Rows of the fit lie across the curve, columns along it.
+        let neighbours = Matrix3::from_fn(|dy, dx| f64::from(scores[(column + dx - 1) * rows + row + dy - 1]));
+        if let Some(fit) = Fit::quadratic(&neighbours) {
             best.along += fit.offset.x * spacing;
             best.across += fit.offset.y;
             best.score = fit.score;
