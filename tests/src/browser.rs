@@ -12,7 +12,9 @@ use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use fantoccini::actions::{InputSource, KeyAction, KeyActions, MOUSE_BUTTON_LEFT, MouseActions, PointerAction};
+use fantoccini::actions::{
+    InputSource, KeyAction, KeyActions, MOUSE_BUTTON_LEFT, MouseActions, PointerAction,
+};
 use fantoccini::key::Key;
 use fantoccini::wd::{Capabilities, WebDriverCompatibleCommand};
 use fantoccini::{Client, ClientBuilder};
@@ -121,8 +123,11 @@ impl Browser {
 
     /// The errors that the console has received since the last call.
     pub async fn console_errors(&self) -> Vec<String> {
-        let entries =
-            self.client.issue_cmd(ConsoleLog).await.unwrap_or_else(|error| panic!("the console is mute: {error}"));
+        let entries = self
+            .client
+            .issue_cmd(ConsoleLog)
+            .await
+            .unwrap_or_else(|error| panic!("the console is mute: {error}"));
         let errors = entries.as_array().into_iter().flatten().filter(|entry| entry["level"] == "SEVERE");
         errors.map(|entry| entry["message"].as_str().unwrap_or_default().to_owned()).collect()
     }
@@ -142,7 +147,8 @@ impl Browser {
         let corner = self.evaluate(&script).await;
         let offset = |index: usize| corner[index].as_f64().unwrap_or_default();
         let there = PointerAction::MoveTo { duration: None, x: offset(0) + x, y: offset(1) + y };
-        let mouse = rest.iter().cloned().fold(MouseActions::new("mouse".to_owned()).then(there), InputSource::then);
+        let mouse =
+            rest.iter().cloned().fold(MouseActions::new("mouse".to_owned()).then(there), InputSource::then);
         self.client
             .perform_actions(mouse)
             .await
@@ -177,7 +183,8 @@ impl Driver {
         });
         // The driver stops when it cannot write, so what it says later is read and forgotten.
         std::thread::spawn(move || lines.for_each(drop));
-        let port = port.unwrap_or_else(|| panic!("{} says no port and has probably ended", program.display()));
+        let port =
+            port.unwrap_or_else(|| panic!("{} says no port and has probably ended", program.display()));
         Self { process, port, profile }
     }
 
@@ -185,7 +192,11 @@ impl Driver {
     fn shut_down(&self) -> std::io::Result<()> {
         let mut stream = TcpStream::connect(("127.0.0.1", self.port))?;
         stream.set_read_timeout(Some(Duration::from_secs(5)))?;
-        write!(stream, "GET /shutdown HTTP/1.1\r\nHost: 127.0.0.1:{}\r\nConnection: close\r\n\r\n", self.port)?;
+        write!(
+            stream,
+            "GET /shutdown HTTP/1.1\r\nHost: 127.0.0.1:{}\r\nConnection: close\r\n\r\n",
+            self.port
+        )?;
         stream.read_to_end(&mut Vec::new()).map(drop)
     }
 }
@@ -222,12 +233,13 @@ fn program(variable: &str, names: &[&str]) -> PathBuf {
     let named = std::env::var_os(variable).map(PathBuf::from);
     let path = std::env::var_os("PATH").unwrap_or_default();
     let found = || {
-        let in_directory = |name: &&str| std::env::split_paths(&path).map(|at| at.join(name)).find(|at| at.is_file());
+        let in_directory =
+            |name: &&str| std::env::split_paths(&path).map(|at| at.join(name)).find(|at| at.is_file());
         names.iter().find_map(in_directory)
     };
-    named
-        .or_else(found)
-        .unwrap_or_else(|| panic!("{} is missing: run the tests with `cargo xtask test`, which installs it", names[0]))
+    named.or_else(found).unwrap_or_else(|| {
+        panic!("{} is missing: run the tests with `cargo xtask test`, which installs it", names[0])
+    })
 }
 
 /// How the browser starts: no window, no sandbox (the tests also run as root), WebGL in software, nothing fetched.
