@@ -41,13 +41,15 @@ impl Browser {
     /// When the programs are missing or do not start.
     pub async fn start() -> Self {
         let chromium = program("SIGHTLINE_CHROMIUM", &["chromium", "chromium-browser", "google-chrome"]);
-        let driver = Driver::start();
+        let mut driver = Driver::start();
         let capabilities = capabilities(&chromium, &driver.profile);
         let client = ClientBuilder::new(HttpConnector::new())
             .capabilities(capabilities)
             .connect(&format!("http://127.0.0.1:{}", driver.port))
             .await
             .unwrap_or_else(|error| panic!("chromedriver cannot start {}: {error}", chromium.display()));
+        let process = client.capabilities().and_then(|all| all.get("goog:processID")).and_then(Value::as_u64);
+        driver.browser = Some(process.expect("chromedriver tells the process of its browser"));
         Self { client, driver }
     }
 
@@ -159,6 +161,8 @@ impl Browser {
 /// A running chromedriver with the profile of its browser.
 struct Driver {
     process: Child,
+    /// The browser's process, once there is one.
+    browser: Option<u64>,
     port: u16,
     profile: TempDir,
 }
@@ -185,7 +189,7 @@ impl Driver {
         std::thread::spawn(move || lines.for_each(drop));
         let port =
             port.unwrap_or_else(|| panic!("{} says no port and has probably ended", program.display()));
-        Self { process, port, profile }
+        Self { process, browser: None, port, profile }
     }
 
     /// Asks the driver to end its browser and itself.
@@ -203,8 +207,15 @@ impl Driver {
 
 impl Drop for Driver {
     fn drop(&mut self) {
-        // A driver that does not answer is killed below; its browser ends when the connection to it breaks.
-        self.shut_down().unwrap_or_default();
+        if let (Err(_), Some(browser)) = (self.shut_down(), self.browser) {
+            // A driver that does not answer leaves its browser behind; one that is gone already needs no signal.
+            Command::new("kill")
+                .arg(browser.to_string())
+                .stderr(Stdio::null())
+                .status()
+                .map(drop)
+                .unwrap_or_default();
+        }
         let start = Instant::now();
         while matches!(self.process.try_wait(), Ok(None)) && start.elapsed() < Duration::from_secs(5) {
             std::thread::sleep(Duration::from_millis(20));
