@@ -1,1 +1,3 @@
 //! All tests that cross crates.
+
+mod zncc_reference;
