@@ -1,3 +1,5 @@
 //! Helpers shared by the integration tests.
 
 pub mod data;
+pub mod rrd;
+pub mod troubled;
