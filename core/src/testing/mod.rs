@@ -13,9 +13,8 @@ use crate::error::{Error, Result};
 use crate::frames::{Pixel, Point3, Pose, Vector3};
 use crate::image::GrayImage;
 use crate::pipeline::Stops;
-use crate::stages::capture::StereoPair;
 use crate::study::truth::TruthSource;
-use crate::traverse::{OdometryError, StereoGeometry};
+use crate::traverse::{OdometryError, StereoGeometry, StereoPair};
 
 /// What a stop of the test world shows instead of the plane.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::image::GrayImage;
 
 /// The two images of a stop, in fractions of full scale.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct StereoPair {
     /// The left (or first) image.
     pub left: Arc<GrayImage>,

@@ -5,6 +5,7 @@
 //! into a folder by its importer (`import/`, one file per format).
 
 mod check;
+mod drive;
 mod files;
 mod image_cache;
 pub mod import;
