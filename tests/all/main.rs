@@ -3,3 +3,4 @@
 mod imports;
 mod recorded_cameras;
 mod zncc_reference;
+mod rerun_export;
