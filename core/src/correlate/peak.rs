@@ -144,18 +144,18 @@ fn neighbours<const N: usize>(surface: &Surface, ix: u32, iy: u32) -> Option<SMa
 
 /// A smooth function fitted to the neighbourhood of the highest score, at its maximum.
 #[derive(Clone, Copy)]
-struct Fit {
+pub(crate) struct Fit {
     /// From the whole pixel to the maximum, px.
-    offset: Vector2<f64>,
+    pub(crate) offset: Vector2<f64>,
     /// Value there.
-    score: f64,
+    pub(crate) score: f64,
     /// Curvature there, 1/px²; negative definite.
     hessian: Matrix2<f64>,
 }
 
 impl Fit {
     /// The quadratic of R67; rows are y. `None` unless the curvature is negative in every direction.
-    fn quadratic(f: &SMatrix<f64, 3, 3>) -> Option<Self> {
+    pub(crate) fn quadratic(f: &SMatrix<f64, 3, 3>) -> Option<Self> {
         let gradient = Vector2::new((f[(1, 2)] - f[(1, 0)]) / 2.0, (f[(2, 1)] - f[(0, 1)]) / 2.0);
         let middle = f[(1, 1)];
         let (xx, yy) = (f[(1, 2)] - 2.0 * middle + f[(1, 0)], f[(2, 1)] - 2.0 * middle + f[(0, 1)]);

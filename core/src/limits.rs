@@ -1,0 +1,121 @@
+//! Every threshold and parameter that a person may change: unit, default, range and source, said once.
+//!
+//! [`settings_group!`] turns a table into a struct, its defaults and its description, so that the viewer's
+//! form, `--set key=value` and the documentation are the same table. Values marked *(ours)* are not from the
+//! papers (R228).
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// Which values a setting may take.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Domain {
+    /// A number between two bounds, both included.
+    Between(f64, f64),
+    /// An odd whole number between two bounds, both included.
+    OddBetween(u32, u32),
+    /// On or off.
+    Switch,
+    /// One of these words.
+    Choice(Vec<String>),
+}
+
+impl Domain {
+    /// One of `words`.
+    pub fn choice(words: &[&str]) -> Self {
+        Self::Choice(words.iter().map(|&w| w.to_owned()).collect())
+    }
+
+    /// Why `value` does not fit, as a clause that can follow the setting's name.
+    pub fn problem_with(&self, value: &serde_json::Value) -> Option<String> {
+        match self {
+            Self::Between(low, high) => match value.as_f64() {
+                Some(v) if (*low..=*high).contains(&v) => None,
+                _ => Some(format!("must be a number from {low} to {high}, not {value}")),
+            },
+            Self::OddBetween(low, high) => match value.as_u64() {
+                Some(v) if v % 2 == 1 && (u64::from(*low)..=u64::from(*high)).contains(&v) => None,
+                _ => Some(format!("must be an odd whole number from {low} to {high}, not {value}")),
+            },
+            Self::Switch => (!value.is_boolean()).then(|| format!("must be true or false, not {value}")),
+            Self::Choice(words) => {
+                let known = value.as_str().is_some_and(|v| words.iter().any(|w| w == v));
+                (!known).then(|| format!("must be one of {}, not {value}", words.join(", ")))
+            }
+        }
+    }
+}
+
+/// What is known about one setting.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct SettingInfo {
+    /// The name, unique over all groups.
+    pub key: String,
+    /// The group it belongs to: `limits` or the locator's name.
+    pub group: String,
+    /// The unit, empty for pure numbers.
+    pub unit: String,
+    /// The default.
+    #[schema(value_type = Object)]
+    pub default: serde_json::Value,
+    /// The values it may take.
+    pub domain: Domain,
+    /// Where the default comes from.
+    pub source: String,
+    /// What it does, and what one sees when it is wrong.
+    pub help: String,
+}
+
+/// Declares a group of settings: the struct, its defaults, and `table()` that describes it.
+#[macro_export]
+macro_rules! settings_group {
+    ($(#[$meta:meta])* $name:ident as $group:literal {
+        $( $(#[doc = $help:literal])+ $key:ident: $ty:ty = $default:expr, $unit:literal, $domain:expr, $source:literal; )*
+    }) => {
+        $(#[$meta])*
+        #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize, utoipa::ToSchema)]
+        #[serde(default, deny_unknown_fields)]
+        pub struct $name { $( $(#[doc = $help])+ pub $key: $ty, )* }
+
+        impl Default for $name {
+            fn default() -> Self { Self { $( $key: $default, )* } }
+        }
+
+        impl $name {
+            /// The description of every setting of this group, in the order of declaration.
+            pub fn table() -> Vec<$crate::limits::SettingInfo> {
+                let defaults = Self::default();
+                vec![ $( $crate::limits::SettingInfo {
+                    key: stringify!($key).to_owned(),
+                    group: $group.to_owned(),
+                    unit: $unit.to_owned(),
+                    default: serde_json::to_value(&defaults.$key).unwrap_or_default(),
+                    domain: $domain,
+                    source: $source.to_owned(),
+                    help: [$($help.trim()),+].join(" "),
+                }, )* ]
+            }
+        }
+    };
+}
+
+settings_group! {
+    /// The thresholds of `judge`: the four loss criteria of K§4.6 and the state machine.
+    Limits as "limits" {
+        /// Criterion 1: a match below this score is a loss. Too high: false losses; too low: false tracking.
+        ncc_min: f64 = 0.7, "", Domain::Between(-1.0, 1.0), "K§4.6, R81";
+        /// Criterion 2: a point-stereo match below this score is a loss.
+        stereo_ncc_min: f64 = 0.7, "", Domain::Between(-1.0, 1.0), "K§4.6, R82";
+        /// Safety factor on the distance and position tolerances (criteria 3 and 4).
+        tolerance_factor: f64 = 1.5, "", Domain::Between(0.1, 100.0), "ours, R87";
+        /// Disparity error that the tolerances assume, as a 3σ value.
+        disparity_error_px: f64 = 1.0, "px", Domain::Between(0.01, 20.0), "K§4.2, R35";
+        /// Navigation error that the tolerances assume, as a fraction of the distance driven.
+        navigation_error_fraction: f64 = 0.02, "", Domain::Between(0.0, 1.0), "K§4.2, R38";
+        /// Updates that may follow a loss before failure is declared.
+        n_retry: u32 = 2, "updates", Domain::Between(0.0, 100.0), "K§4.6, R90";
+        /// Whether the update that detects the loss counts among them (the stricter reading).
+        count_detecting_update: bool = false, "", Domain::Switch, "E16, R91";
+    }
+}

@@ -1,0 +1,117 @@
+//! Stage 4, `locate`: where the target is now. Here the trackers differ, each behind [`Locator`].
+//!
+//! | tracker | steps |
+//! |---|---|
+//! | `template` (Kim et al. 2009) | `scale_roll` → `match_template` → `point_stereo` → `triangulate` |
+//!
+//! A locator never fails: where it finds nothing it says so in `Located::missing`, and `judge` rejects it.
+//! Two contracts hold for all of them: the same input gives the same bits, and whatever was seen on the way
+//! is in the evidence.
+
+pub mod template;
+
+use nalgebra::{Matrix2, Matrix3};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::frames::{Pixel, Point3, Pose};
+use crate::settings::{Settings, TrackerKind};
+use crate::stages::capture::Capture;
+use crate::stages::point_mast::Pointing;
+use crate::stages::predict::Prediction;
+use crate::target::Target;
+use crate::traverse::StereoGeometry;
+
+/// Where the target is now, and how that was found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Located {
+    /// Position in the left image, px.
+    pub left_pixel: Option<Pixel>,
+    /// Position in the right image, px.
+    pub right_pixel: Option<Pixel>,
+    /// Covariance of the left position against the designated point, px², template drift included.
+    #[schema(value_type = Vec<f64>)]
+    pub left_covariance_px2: Matrix2<f64>,
+    /// Position in the rover frame, m.
+    #[schema(value_type = Option<[f64; 3]>)]
+    pub position_in_rover: Option<Point3>,
+    /// Covariance of that position, m².
+    #[schema(value_type = Option<Vec<f64>>)]
+    pub covariance_in_rover: Option<Matrix3<f64>>,
+    /// Confidence, from 0 to 1: for `template` the score of the match, cut at 0.
+    pub confidence: f64,
+    /// What could not be found and why, as one sentence.
+    pub missing: Option<String>,
+    /// What was seen on the way.
+    pub evidence: Evidence,
+}
+
+/// What a locator saw on the way, step by step.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(tag = "tracker", rename_all = "snake_case")]
+pub enum Evidence {
+    /// Of the template locator.
+    Template(Box<template::TemplateEvidence>),
+}
+
+impl Evidence {
+    /// The evidence of the template locator.
+    pub fn template(&self) -> Option<&template::TemplateEvidence> {
+        match self {
+            Self::Template(evidence) => Some(evidence),
+        }
+    }
+}
+
+/// What a locator is given at the stop of the designation.
+#[derive(Clone, Copy, Debug)]
+pub struct DesignateInput<'a> {
+    /// The designated position in the left image, px.
+    pub pixel: Pixel,
+    /// The stereo pair.
+    pub capture: &'a Capture,
+    /// Camera models.
+    pub left: &'a crate::camera::Camera,
+    /// Camera models.
+    pub right: &'a crate::camera::Camera,
+    /// How the two images relate.
+    pub stereo: StereoGeometry,
+    /// The configuration.
+    pub settings: &'a Settings,
+}
+
+/// What a locator is given at every later stop.
+#[derive(Clone, Copy, Debug)]
+pub struct LocateInput<'a> {
+    /// The target as the last stop left it.
+    pub target: &'a Target,
+    /// Where it should be.
+    pub prediction: &'a Prediction,
+    /// Camera models and the predicted pixels.
+    pub pointing: &'a Pointing,
+    /// The stereo pair.
+    pub capture: &'a Capture,
+    /// Takes points of the rover frame at which the template was taken into the present rover frame.
+    pub now_from_template: &'a Pose,
+    /// How the two images relate.
+    pub stereo: StereoGeometry,
+    /// Updates in a row that were bad so far.
+    pub lost_count: u32,
+    /// The configuration.
+    pub settings: &'a Settings,
+}
+
+/// One tracker's way of finding the target.
+pub trait Locator: Send + Sync {
+    /// Finds the 3-D position of a designated pixel.
+    fn designate(&self, input: &DesignateInput<'_>) -> Located;
+    /// Finds the target again after a move.
+    fn locate(&self, input: &LocateInput<'_>) -> Located;
+}
+
+/// The locator of a configuration.
+pub fn locator(kind: TrackerKind) -> &'static dyn Locator {
+    match kind {
+        TrackerKind::Template => &template::TemplateLocator,
+    }
+}

@@ -1,0 +1,85 @@
+//! How well one match fixes its position, measured from the match itself (ours).
+//!
+//! Least squares of the normalised patches: with the residual r = Ĵ − ncc·Î and the gradients g of the matched
+//! patch (per px), a displacement error is `δ = A⁻¹ Σ g r`, `A = Σ g gᵀ`. Residuals of neighbouring pixels are
+//! alike (both patches were resampled, and what perspective changes is smooth), so their covariance is taken
+//! with its spatial correlation (White 1980; Newey & West 1987, with Bartlett weights in two dimensions):
+//! ```text
+//! Σ_δ = A⁻¹ B A⁻¹,   B = Σ_ij w(i − j) r_i r_j g_i g_jᵀ,   w = (1 − |Δx|/(L+1)) (1 − |Δy|/(L+1))
+//! ```
+//! so no noise level has to be assumed. To this comes a floor for the sub-pixel fit itself, whose error does
+//! not show in the residual.
+//!
+//! | symbol | name | unit |
+//! |---|---|---|
+//! | L | `CORRELATION_REACH_PX` | px |
+//! | Σ_δ | result | px² |
+
+use nalgebra::{Matrix2, Vector2};
+
+use crate::image::gradient;
+use crate::image::patch::{Patch, normalise};
+
+/// Over how many pixels residuals are taken as correlated.
+const CORRELATION_REACH_PX: i64 = 4;
+
+/// 1σ error of the quadratic fit of a peak and of resampling, px.
+const FIT_FLOOR_PX: f64 = 0.03;
+
+/// 1σ given to a direction in which the patch has no gradient at all, px.
+const UNDETERMINED_PX: f64 = 10.0;
+
+/// Covariance of the position of `matched` against `template`, px²; both patches have the same size.
+pub fn match_covariance(template: &Patch, matched: &Patch) -> Matrix2<f64> {
+    let undetermined = Matrix2::identity() * UNDETERMINED_PX.powi(2);
+    let (Some(template), Some(image)) = (normalise(template), normalise(matched)) else {
+        return undetermined;
+    };
+    let (gx, gy) = gradient::central(&image);
+    let (width, height) = image.dimensions();
+    let score = mean_product(&template, &image);
+    let mut influence = vec![Vector2::zeros(); (width * height) as usize];
+    let mut information = Matrix2::zeros();
+    for y in 1..height - 1 {
+        for x in 1..width - 1 {
+            let g = Vector2::new(f64::from(gx.get_pixel(x, y)[0]), f64::from(gy.get_pixel(x, y)[0]));
+            let residual =
+                f64::from(image.get_pixel(x, y)[0]) - score * f64::from(template.get_pixel(x, y)[0]);
+            if residual.is_finite() && g.iter().all(|v| v.is_finite()) {
+                information += g * g.transpose();
+                influence[(y * width + x) as usize] = g * residual;
+            }
+        }
+    }
+    let meat = correlated_sum(&influence, i64::from(width), i64::from(height));
+    information
+        .try_inverse()
+        .map_or(undetermined, |inverse| inverse * meat * inverse + Matrix2::identity() * FIT_FLOOR_PX.powi(2))
+}
+
+/// `Σ_ij w(i − j) v_i v_jᵀ` over a grid of vectors.
+fn correlated_sum(vectors: &[Vector2<f64>], width: i64, height: i64) -> Matrix2<f64> {
+    let reach = CORRELATION_REACH_PX;
+    let weight = |d: i64| 1.0 - d.abs() as f64 / (reach + 1) as f64;
+    let mut sum = Matrix2::zeros();
+    for y in 0..height {
+        for x in 0..width {
+            let here = vectors[(y * width + x) as usize];
+            let mut around = Vector2::zeros();
+            for v in (y - reach).max(0)..=(y + reach).min(height - 1) {
+                for u in (x - reach).max(0)..=(x + reach).min(width - 1) {
+                    around += vectors[(v * width + u) as usize] * (weight(u - x) * weight(v - y));
+                }
+            }
+            sum += here * around.transpose();
+        }
+    }
+    (sum + sum.transpose()) * 0.5
+}
+
+fn mean_product(a: &Patch, b: &Patch) -> f64 {
+    let products =
+        a.iter().zip(b.iter()).map(|(a, b)| f64::from(*a) * f64::from(*b)).filter(|p| p.is_finite());
+    let (sum, count) = products.fold((0.0, 0_u32), |(sum, count), p| (sum + p, count + 1));
+    sum / f64::from(count.max(1))
+}

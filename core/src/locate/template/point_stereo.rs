@@ -1,0 +1,272 @@
+//! Step `point_stereo`: the one target point in the right image, along the epipolar curve (K§4.4, R73–R76).
+//!
+//! The left pixel's ray, sampled by range, projects into the right image as a curve; with real models it is
+//! not an image row (E38). Along that curve, and up to the tolerance to either side of it, the left window is
+//! compared with right windows by normalised correlation (R76). Each right window is resampled through
+//! `A = ∂right/∂left` at the candidate's range, so that cameras which are turned against each other still see
+//! the same patch; for two parallel eyes A is the identity. The best position is refined by a quadratic fit
+//! along and across the curve.
+//!
+//! The interval searched is one of disparity for two eyes side by side: as wide as half the search window,
+//! centred on the predicted range (R74, R75, E13), and the whole of the curve at designation or where the two
+//! views are free. The slope of the surface (how the right position moves when the left one does) comes from
+//! the same search at four neighbours: it turns an error of the left pixel into one of range.
+//!
+//! | symbol | name | unit |
+//! |---|---|---|
+//! | curve parameter | arc length from the far end | px in the right image |
+//! | A | `right_from_left` | px per px |
+
+use nalgebra::{Matrix2, Matrix3};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::match_noise::match_covariance;
+use super::settings::{DisparityInterval, StereoReference, TemplateSettings};
+use super::stereo_curve::{Curve, window_through};
+use crate::camera::Camera;
+use crate::correlate::peak::Fit;
+use crate::correlate::zncc::zncc;
+use crate::frames::Pixel;
+use crate::image::GrayImage;
+use crate::image::patch::{self, Patch};
+use crate::traverse::StereoGeometry;
+
+/// Distance of the neighbours from which the slope is measured, px in the left image.
+const SLOPE_BASE_PX: f64 = 8.0;
+
+/// How far along the curve a neighbour's match may differ from the target's, px.
+const SLOPE_REACH_PX: f64 = 5.0;
+
+/// A neighbour below this score says nothing about the slope.
+const SLOPE_SCORE_MIN: f32 = 0.6;
+
+/// What point stereo is given.
+#[derive(Clone, Copy, Debug)]
+pub struct StereoInput<'a> {
+    /// The target in the left image, px.
+    pub left_pixel: Pixel,
+    /// The left image.
+    pub left_image: &'a GrayImage,
+    /// The right image.
+    pub right_image: &'a GrayImage,
+    /// The left camera, rover frame.
+    pub left: &'a Camera,
+    /// The right camera, rover frame.
+    pub right: &'a Camera,
+    /// How the two images relate.
+    pub geometry: StereoGeometry,
+    /// Predicted distance from the left camera, m; null at designation.
+    pub predicted_range_m: Option<f64>,
+}
+
+/// One candidate on the epipolar curve.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct CurvePoint {
+    /// Where it lies in the right image, px.
+    pub pixel: Pixel,
+    /// Range along the left ray, m.
+    pub range_m: f64,
+    /// Best score within the tolerance across the curve; null where no window fits.
+    pub score: Option<f32>,
+}
+
+/// The corresponding point in the right image.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct PointStereo {
+    /// The part of the epipolar curve that was searched, far end first, about a pixel apart.
+    pub curve: Vec<CurvePoint>,
+    /// The best position, px.
+    pub right_pixel: Pixel,
+    /// Its score.
+    pub score: f64,
+    /// Its range along the left ray on the curve, m.
+    pub range_m: f64,
+    /// How far it lies beside the curve, px.
+    pub across_px: f64,
+    /// Whether the best position is at an end of the searched interval.
+    pub at_end: bool,
+    /// Covariance of the right position for a given left one, px².
+    #[schema(value_type = Vec<f64>)]
+    pub covariance_px2: Matrix2<f64>,
+    /// How the right position moves with the left one on the target's surface, px per px.
+    #[schema(value_type = Vec<f64>)]
+    pub right_from_left: Matrix2<f64>,
+    /// The right image at the match, resampled as the left sees it.
+    #[serde(skip)]
+    #[schema(ignore)]
+    pub right_window: Patch,
+}
+
+/// A score at a place along and across the curve.
+struct Best {
+    along: f64,
+    across: f64,
+    score: f64,
+    at_end: bool,
+}
+
+/// Finds the left pixel's point in the right image.
+///
+/// # Errors
+/// A sentence saying why there is nothing to compare.
+pub fn point_stereo(input: &StereoInput<'_>, settings: &TemplateSettings) -> Result<PointStereo, String> {
+    let half = settings.template_size_px / 2;
+    let template = patch::extract(input.left_image, input.left_pixel, half, settings.kernel);
+    if template.iter().any(|v| !v.is_finite()) {
+        return Err("the stereo window reaches over the border of the left image".to_owned());
+    }
+    let mut curve =
+        Curve::new(input.left, input.right, input.left_pixel, settings.range_min_m, settings.range_max_m)
+            .ok_or("the target's ray is not seen by the right camera")?;
+    if settings.stereo_reference == StereoReference::ImageRow {
+        curve.flatten_to_row(input.left_pixel.y);
+    }
+    let interval = search_interval(&curve, input, settings)?;
+    let (points, best) = search(&curve, &template, input, interval, settings);
+    let best = best.ok_or("no window of the right image fits on the searched part of the epipolar curve")?;
+    let (right_pixel, range_m) = curve.at(best.along, best.across);
+    let affine = curve.right_from_left(input.left, input.right, input.left_pixel, range_m);
+    let right_window = window_through(input.right_image, right_pixel, &affine, half, settings.kernel);
+    Ok(PointStereo {
+        curve: points,
+        right_pixel,
+        score: best.score,
+        range_m,
+        across_px: best.across,
+        at_end: best.at_end,
+        covariance_px2: affine * match_covariance(&template, &right_window) * affine.transpose(),
+        right_from_left: surface_slope(&curve, &affine, best.along, input, settings).unwrap_or(affine),
+        right_window,
+    })
+}
+
+/// The part of the curve to search: first and last arc length, px.
+fn search_interval(
+    curve: &Curve,
+    input: &StereoInput<'_>,
+    settings: &TemplateSettings,
+) -> Result<(f64, f64), String> {
+    let whole = (0.0, curve.length_px());
+    let range_m = match (input.geometry, input.predicted_range_m) {
+        (StereoGeometry::Lateral, Some(range_m)) => range_m,
+        _ => return Ok(whole),
+    };
+    let width = settings.disparity_range_px;
+    let (from, to) = match settings.disparity_interval {
+        DisparityInterval::Centred => {
+            let centre = curve.along_of_range(range_m);
+            (centre - width / 2.0, centre + width / 2.0)
+        }
+        DisparityInterval::FromZero => (0.0, width),
+    };
+    let cut = (from.max(whole.0), to.min(whole.1));
+    if cut.0 < cut.1 { Ok(cut) } else { Err("the disparity interval lies off the epipolar curve".to_owned()) }
+}
+
+/// Compares windows about a pixel apart along the interval and up to the tolerance across it.
+fn search(
+    curve: &Curve,
+    template: &Patch,
+    input: &StereoInput<'_>,
+    (from, to): (f64, f64),
+    settings: &TemplateSettings,
+) -> (Vec<CurvePoint>, Option<Best>) {
+    let steps = (to - from).ceil().max(1.0) as usize;
+    let spacing = (to - from) / steps as f64;
+    let side = settings.epipolar_tolerance_px.floor() as i32;
+    // One more to either side, so that the quadratic fit across the curve has neighbours.
+    let rows = (2 * (side + 1) + 1) as usize;
+    let mut scores = vec![f32::NAN; (steps + 1) * rows];
+    let mut points = Vec::with_capacity(steps + 1);
+    for i in 0..=steps {
+        let along = from + spacing * i as f64;
+        let (pixel, range_m) = curve.at(along, 0.0);
+        let affine = curve.right_from_left(input.left, input.right, input.left_pixel, range_m);
+        let mut best: Option<f32> = None;
+        for row in 0..rows {
+            let across = row as i32 - side - 1;
+            let (at, _) = curve.at(along, f64::from(across));
+            let window = window_through(
+                input.right_image,
+                at,
+                &affine,
+                settings.template_size_px / 2,
+                settings.kernel,
+            );
+            if let Some(score) = zncc(template, &window) {
+                scores[i * rows + row] = score;
+                if across.abs() <= side {
+                    best = Some(best.map_or(score, |b| b.max(score)));
+                }
+            }
+        }
+        points.push(CurvePoint { pixel, range_m, score: best });
+    }
+    let best = refine(&scores, rows, from, spacing, side, settings.sub_pixel);
+    (points, best)
+}
+
+/// The highest score within the tolerance, refined by a quadratic fit along and across.
+fn refine(scores: &[f32], rows: usize, from: f64, spacing: f64, side: i32, sub_pixel: bool) -> Option<Best> {
+    let columns = scores.len() / rows;
+    let inside = |row: usize| (1..rows - 1).contains(&row);
+    let (index, score) =
+        scores.iter().enumerate().filter(|(index, score)| inside(index % rows) && score.is_finite()).fold(
+            None,
+            |best: Option<(usize, f32)>, (index, &score)| {
+                if best.is_none_or(|(_, b)| score > b) { Some((index, score)) } else { best }
+            },
+        )?;
+    let (column, row) = (index / rows, index % rows);
+    let at_end = column == 0 || column + 1 == columns;
+    let mut best = Best {
+        along: from + spacing * column as f64,
+        across: f64::from(row as i32 - side - 1),
+        score: f64::from(score),
+        at_end,
+    };
+    if sub_pixel && !at_end {
+        // Rows of the fit lie across the curve, columns along it.
+        let neighbours = Matrix3::from_fn(|dy, dx| f64::from(scores[(column + dx - 1) * rows + row + dy - 1]));
+        if let Some(fit) = Fit::quadratic(&neighbours) {
+            best.along += fit.offset.x * spacing;
+            best.across += fit.offset.y;
+            best.score = fit.score;
+        }
+    }
+    Some(best)
+}
+
+/// How the right position moves with the left one, from the matches of four neighbours of the target.
+fn surface_slope(
+    curve: &Curve,
+    affine: &Matrix2<f64>,
+    along: f64,
+    input: &StereoInput<'_>,
+    settings: &TemplateSettings,
+) -> Option<Matrix2<f64>> {
+    let (_, range_m) = curve.at(along, 0.0);
+    let neighbour = |dx: f64, dy: f64| -> Option<f64> {
+        let left_pixel = input.left_pixel.offset(dx, dy);
+        let half = settings.template_size_px / 2;
+        let template = patch::extract(input.left_image, left_pixel, half, settings.kernel);
+        let own =
+            Curve::new(input.left, input.right, left_pixel, settings.range_min_m, settings.range_max_m)?;
+        let expected = own.along_of_range(range_m);
+        let interval =
+            ((expected - SLOPE_REACH_PX).max(0.0), (expected + SLOPE_REACH_PX).min(own.length_px()));
+        let shifted = StereoInput { left_pixel, ..*input };
+        let narrow = TemplateSettings { epipolar_tolerance_px: 0.0, ..settings.clone() };
+        let (_, best) = search(&own, &template, &shifted, interval, &narrow);
+        best.filter(|b| b.score as f32 >= SLOPE_SCORE_MIN && !b.at_end).map(|b| b.along - expected)
+    };
+    let slope = |a: Option<f64>, b: Option<f64>| match (a, b) {
+        (Some(a), Some(b)) => Some((b - a) / (2.0 * SLOPE_BASE_PX)),
+        _ => None,
+    };
+    let du = slope(neighbour(-SLOPE_BASE_PX, 0.0), neighbour(SLOPE_BASE_PX, 0.0))?;
+    let dv = slope(neighbour(0.0, -SLOPE_BASE_PX), neighbour(0.0, SLOPE_BASE_PX))?;
+    let tangent = curve.tangent(along);
+    Some(affine + tangent * nalgebra::RowVector2::new(du, dv))
+}

@@ -1,0 +1,171 @@
+//! Step `scale_roll`: the template as the target should look now (K§4.3.1, K-Eq 6–10, R48–R59).
+//!
+//! ```text
+//! s     = |p_old − C_old| / |p_new − C_new|                      K-Eq 6
+//! H_x   = (H − (A·H) A) / |A × H|        of the old left camera  K-Eq 7–9
+//! p_adj = p_0 + k H_x,  k = 0.05 m                               K-Eq 10
+//! ρ     = atan2(dy, dx) of p_0 → p_adj in the new left image, clockwise on screen positive (R56)
+//! ```
+//! The window keeps its size in pixels; the image content is magnified by s and turned by ρ (R51, R58).
+//! Only the prediction is used, never the stereo result to come (R50). Out-of-plane change is not
+//! compensated (R60).
+//!
+//! | symbol | name | unit, frame |
+//! |---|---|---|
+//! | p_old, C_old | `appearance.position_in_rover`, `appearance.camera` | m, rover frame of the template's stop |
+//! | p_new, C_new | `now_from_template * p_old`, `left` | m, present rover frame |
+//! | s | `scale` | – |
+//! | ρ | `roll_rad` | rad |
+
+use nalgebra::{Matrix2, Rotation2};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::settings::{RollReference, TemplateSettings};
+use crate::camera::Camera;
+use crate::frames::{Pixel, Point3, Pose};
+use crate::image::patch::{self, Patch};
+use crate::target::Appearance;
+
+/// Length of the helper vector, m (K-Eq 10).
+const HELPER_LENGTH_M: f64 = 0.05;
+
+/// The template, scaled and rolled.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ScaleRoll {
+    /// Scale by the ratio of distances; applied only where the setting `scale` is on.
+    pub scale: f64,
+    /// Roll, rad, clockwise on screen; applied only where the setting `roll` is on.
+    pub roll_rad: f64,
+    /// Scale that was applied.
+    pub applied_scale: f64,
+    /// Roll that was applied, rad.
+    pub applied_roll_rad: f64,
+    /// Distance from the left camera when the template was taken, m.
+    pub old_distance_m: f64,
+    /// Predicted distance from the left camera now, m.
+    pub new_distance_m: f64,
+    /// The stop at which the template was taken.
+    pub template_step: usize,
+    /// The window as it was in the image from which it was taken.
+    #[serde(skip)]
+    #[schema(ignore)]
+    pub reference: Patch,
+    /// The window after scaling.
+    #[serde(skip)]
+    #[schema(ignore)]
+    pub scaled: Patch,
+    /// The window after scaling and rolling: what is matched.
+    #[serde(skip)]
+    #[schema(ignore)]
+    pub rolled: Patch,
+}
+
+impl ScaleRoll {
+    /// Takes offsets in the old image into offsets in the present one: `s R(ρ)`, px per px.
+    pub fn image_from_template(&self) -> Matrix2<f64> {
+        Rotation2::new(self.applied_roll_rad).into_inner() * self.applied_scale
+    }
+}
+
+/// The scale and roll of the geometry alone: `(s, ρ in rad, D_old in m, D_new in m)`.
+///
+/// # Errors
+/// A sentence when the prediction lies behind the camera.
+pub fn geometry(
+    position_then: &Point3,
+    camera_then: &Camera,
+    now_from_then: &Pose,
+    camera_now: &Camera,
+    roll_reference: RollReference,
+) -> Result<(f64, f64, f64, f64), String> {
+    let position_now = now_from_then * position_then;
+    let old_distance_m = (position_then - camera_then.model.centre()).norm();
+    let new_distance_m = (position_now - camera_now.model.centre()).norm();
+    let helper_then = position_then + camera_then.model.horizontal_axis() * HELPER_LENGTH_M;
+    let direction = |camera: &Camera, from: &Point3, to: &Point3| -> Option<f64> {
+        let (a, b): (Pixel, Pixel) = (camera.project(from)?, camera.project(to)?);
+        Some((b.y - a.y).atan2(b.x - a.x))
+    };
+    let now = direction(camera_now, &position_now, &(now_from_then * helper_then))
+        .ok_or("the predicted target lies behind the left camera or outside its model")?;
+    let then = match roll_reference {
+        RollReference::Horizontal => 0.0,
+        RollReference::OldImage => direction(camera_then, position_then, &helper_then).unwrap_or(0.0),
+    };
+    Ok((old_distance_m / new_distance_m, now - then, old_distance_m, new_distance_m))
+}
+
+/// Scales and rolls the template of `appearance` for the present left camera.
+///
+/// # Errors
+/// A sentence saying why there is no template.
+pub fn scale_roll(
+    appearance: &Appearance,
+    now_from_template: &Pose,
+    left: &Camera,
+    settings: &TemplateSettings,
+) -> Result<ScaleRoll, String> {
+    let (scale, roll_rad, old_distance_m, new_distance_m) = geometry(
+        &appearance.position_in_rover,
+        &appearance.camera,
+        now_from_template,
+        left,
+        settings.roll_reference,
+    )?;
+    let applied_scale = if settings.scale { scale } else { 1.0 };
+    let applied_roll_rad = if settings.roll { roll_rad } else { 0.0 };
+    let (image, pixel) = (appearance.image.as_ref(), appearance.pixel);
+    let (size, kernel) = (settings.template_size_px, settings.kernel);
+    let rolled = patch::scale_roll(image, pixel, applied_scale, applied_roll_rad, size, kernel);
+    Ok(ScaleRoll {
+        scale,
+        roll_rad,
+        applied_scale,
+        applied_roll_rad,
+        old_distance_m,
+        new_distance_m,
+        template_step: appearance.step,
+        reference: patch::extract(image, pixel, size / 2, kernel),
+        scaled: patch::scale_roll(image, pixel, applied_scale, 0.0, size, kernel),
+        rolled,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{Cahv, Cahvor, CameraModel};
+    use crate::frames::{PoseRecord, Vector3};
+
+    /// Opportunity's left navcam, vectors as printed (domain.md, TV1).
+    fn navcam() -> Camera {
+        let linear = Cahv::as_printed(
+            Point3::new(0.442604, -0.0611635, -1.25106),
+            Vector3::new(0.93995, -0.338133, 0.0464979),
+            Vector3::new(884.72, 981.763, 24.1472),
+            Vector3::new(418.579, -152.039, 1245.75),
+        );
+        let optical_axis = Vector3::new(0.946551, -0.315595, 0.0666419);
+        let model = Cahvor::as_printed(linear, optical_axis, [0.00096, -0.002183, 0.018547]);
+        Camera::new(CameraModel::Cahvor(model), 1024, 1024)
+    }
+
+    #[test]
+    fn scale_and_roll_of_test_vector_five_agree_to_its_last_digit() {
+        let new_pose = PoseRecord {
+            position_m: [0.9, 0.05, -0.02],
+            quaternion_sxyz: [0.9985338374, 0.0440542148, -0.0162881723, 0.026909053],
+        };
+        let now_from_then = new_pose.to_pose().inverse();
+        let target = Point3::new(8.0, -2.6, 0.1);
+        let (scale, roll, old_m, new_m) =
+            geometry(&target, &navcam(), &now_from_then, &navcam(), RollReference::Horizontal).unwrap();
+        assert!((scale - 1.1102799965).abs() < 1e-9, "{scale}");
+        assert!((roll.to_degrees() + 5.9429401632).abs() < 1e-6, "{}", roll.to_degrees());
+        assert!((old_m - 8.0861170037).abs() < 1e-9 && (new_m - 7.2829529754).abs() < 1e-8);
+        let (_, against_old, ..) =
+            geometry(&target, &navcam(), &now_from_then, &navcam(), RollReference::OldImage).unwrap();
+        assert!(((roll - against_old).to_degrees() + 0.0237861221).abs() < 1e-6);
+    }
+}

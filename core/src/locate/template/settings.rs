@@ -1,0 +1,90 @@
+//! The settings of the template locator, with unit, default and source.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::image::sample::Kernel;
+use crate::limits::Domain;
+use crate::settings_group;
+
+/// What the roll of the template is measured against (R57).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RollReference {
+    /// The horizontal of the old image, taken as exactly horizontal, as the paper does.
+    #[default]
+    Horizontal,
+    /// The helper point's true direction in the old image, which distortion tilts a little.
+    OldImage,
+}
+
+/// From where the vertical tolerance of point stereo is measured (R73, E38).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum StereoReference {
+    /// The epipolar curve of the camera models.
+    #[default]
+    EpipolarCurve,
+    /// The same image row, which fails on real unrectified pairs.
+    ImageRow,
+}
+
+/// Where the interval of disparities lies (R75, E13).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum DisparityInterval {
+    /// Around the disparity of the predicted range.
+    #[default]
+    Centred,
+    /// From zero, the literal reading, which excludes near targets.
+    FromZero,
+}
+
+/// Where the pixel noise comes from that the position covariance propagates.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum NoiseModel {
+    /// Measured from each match: residual, gradients and template drift.
+    #[default]
+    Measured,
+    /// Half a pixel in each coordinate of each eye, as the papers assume.
+    HalfPixel,
+}
+
+settings_group! {
+    /// The settings of the template locator (Kim et al. 2009).
+    TemplateSettings as "template" {
+        /// Side of the square template. Small: ambiguous; large: foreshortening and depth edges spoil it.
+        template_size_px: u32 = 21, "px", Domain::OddBetween(5, 101), "K§4.1, R23";
+        /// Side of the square subframe shown and exposed for.
+        subframe_px: u32 = 161, "px", Domain::OddBetween(33, 1023), "K-Fig 3, R31";
+        /// Side of the square region in which the whole template must lie: 143 searches ±61 positions.
+        search_window_px: u32 = 143, "px", Domain::OddBetween(21, 1023), "K§7.2, R33, E7";
+        /// Growth of the search window at each update while lost.
+        lost_search_growth: f64 = 1.0, "", Domain::Between(1.0, 4.0), "ours, R92";
+        /// Scale the template by the ratio of distances.
+        scale: bool = true, "", Domain::Switch, "K§4.3.1, R49";
+        /// Roll the template by the camera geometry.
+        roll: bool = true, "", Domain::Switch, "K§4.3.1, R52";
+        /// What the roll is measured against.
+        roll_reference: RollReference = RollReference::Horizontal, "", Domain::choice(&["horizontal", "old_image"]), "R57";
+        /// Interpolation kernel of the template.
+        kernel: Kernel = Kernel::Bicubic, "", Domain::choice(&["bilinear", "bicubic"]), "ours, R58";
+        /// Keep the match below the pixel; off shows the random walk of whole pixels.
+        sub_pixel: bool = true, "", Domain::Switch, "ours, R67";
+        /// Tolerance across the epipolar curve.
+        epipolar_tolerance_px: f64 = 2.0, "px", Domain::Between(0.0, 30.0), "K§4.4, R73";
+        /// From where that tolerance is measured.
+        stereo_reference: StereoReference = StereoReference::EpipolarCurve, "", Domain::choice(&["epipolar_curve", "image_row"]), "E38, R73";
+        /// Width of the disparity interval.
+        disparity_range_px: f64 = 80.0, "px", Domain::Between(2.0, 1024.0), "K§4.4, R74";
+        /// Where the disparity interval lies.
+        disparity_interval: DisparityInterval = DisparityInterval::Centred, "", Domain::choice(&["centred", "from_zero"]), "E13, R75";
+        /// Nearest range searched by point stereo.
+        range_min_m: f64 = 0.5, "m", Domain::Between(0.05, 1000.0), "ours";
+        /// Farthest range searched by point stereo.
+        range_max_m: f64 = 200.0, "m", Domain::Between(0.1, 100_000.0), "ours";
+        /// Where the pixel noise of the covariance comes from.
+        noise_model: NoiseModel = NoiseModel::Measured, "", Domain::choice(&["measured", "half_pixel"]), "ours; papers: R170";
+    }
+}

@@ -1,0 +1,206 @@
+//! One step, on one page: the six stages in running order, from values to a value.
+//!
+//! ```text
+//! designate:   capture → locate (stereo only) → target
+//! run_step:    predict → point_mast → capture → locate → judge → update
+//! ```
+//! The comparison with the truth is not a stage: `session::track` adds it to the record.
+//! Everything is a function of the traverse, the target as the last stop left it, and the settings: the same
+//! input gives the same bits, and going back is a read of what was recorded.
+
+use std::sync::Arc;
+
+use crate::camera::{Camera, Mast, MastAngles};
+use crate::error::{Error, Result};
+use crate::frames::Pose;
+use crate::locate::{DesignateInput, LocateInput, locator};
+use crate::settings::Settings;
+use crate::stages::capture;
+use crate::stages::judge::{self, Verdict};
+use crate::stages::point_mast::{self, Pointing, UsedPointing};
+use crate::stages::predict;
+use crate::stages::update::{self, Updated};
+use crate::target::{Appearance, Designation, Target, TrackingState};
+use crate::trace::StepTrace;
+use crate::traverse::{OdometryError, StereoGeometry, StereoPair};
+
+/// The stops of a drive, as the stages see them.
+pub trait Stops {
+    /// How many stops there are.
+    fn stop_count(&self) -> usize;
+    /// Time since the first stop, s.
+    fn time_s(&self, step: usize) -> f64;
+    /// The estimated pose.
+    fn site_from_rover(&self, step: usize) -> Pose;
+    /// The left and right camera in the rover frame, at the pointing in use.
+    fn cameras(&self, step: usize) -> (&Camera, &Camera);
+    /// The mast, where it is known.
+    fn mast(&self) -> Option<&Mast>;
+    /// The mast angles in use.
+    fn mast_angles(&self, step: usize) -> Option<MastAngles>;
+    /// The error model of the pose estimates.
+    fn odometry_error(&self) -> OdometryError;
+    /// How the two images of a stop relate.
+    fn stereo(&self) -> StereoGeometry;
+    /// The stereo pair.
+    ///
+    /// # Errors
+    /// A sentence that names the missing or damaged file.
+    fn capture(&self, step: usize) -> Result<StereoPair>;
+}
+
+/// The first step of a run: the 3-D position and template of a designated pixel (R16, R19).
+///
+/// # Errors
+/// [`Error::Target`] when the pixel or step does not exist or no 3-D position is found; file errors of the stop.
+pub fn designate(stops: &dyn Stops, designation: Designation, settings: &Settings) -> Result<StepTrace> {
+    let step = designation.step;
+    if step >= stops.stop_count() {
+        return Err(Error::Target(format!(
+            "step {step} does not exist: the traverse has {} stops",
+            stops.stop_count()
+        )));
+    }
+    let (left, right) = stops.cameras(step);
+    let pixel = designation.pixel;
+    if !(pixel.x.is_finite() && pixel.y.is_finite() && pixel.is_inside(left.width(), left.height())) {
+        return Err(Error::Target(format!(
+            "pixel ({}, {}) lies outside the left image of {} x {} pixels",
+            pixel.x,
+            pixel.y,
+            left.width(),
+            left.height()
+        )));
+    }
+    let pair = stops.capture(step)?;
+    let capture = capture::capture(pair, Some(pixel), settings.template.subframe_px);
+    let stereo = stops.stereo();
+    let input = DesignateInput { pixel, capture: &capture, left, right, stereo, settings };
+    let located = locator(settings.tracker).designate(&input);
+    let (Some(position_in_rover), Some(covariance_in_rover)) =
+        (located.position_in_rover, located.covariance_in_rover)
+    else {
+        let why = located.missing.unwrap_or_else(|| "no 3-D position".to_owned());
+        return Err(Error::Target(format!(
+            "no 3-D position at pixel ({:.1}, {:.1}): {why}",
+            pixel.x, pixel.y
+        )));
+    };
+    let distance_m = (position_in_rover - left.model.centre()).norm();
+    let appearance = Appearance {
+        step,
+        pixel,
+        position_in_rover,
+        camera: left.clone(),
+        image: Arc::clone(&capture.pair.left),
+    };
+    let target = Target {
+        designation,
+        step,
+        position_in_rover,
+        covariance_in_rover,
+        initial_position_in_site: stops.site_from_rover(step) * position_in_rover,
+        initial_distance_m: distance_m,
+        travelled_m: 0.0,
+        last_distance_m: distance_m,
+        travelled_since_update_m: 0.0,
+        drift_covariance_px2: located.left_covariance_px2,
+        appearance,
+    };
+    let pointing = pointing(stops, step, &target);
+    let update = Updated {
+        target,
+        state: TrackingState::Tracking,
+        template_renewed: true,
+        correction_m: None,
+        correction_px: None,
+    };
+    Ok(StepTrace {
+        step,
+        time_s: stops.time_s(step),
+        fault: None,
+        predict: None,
+        point_mast: Some(pointing),
+        capture: Some(capture),
+        locate: Some(located),
+        judge: None,
+        update,
+        truth: None,
+    })
+}
+
+/// One later step of a run: what `last` left behind is found again at the next stop.
+pub fn run_step(stops: &dyn Stops, last: &Updated, settings: &Settings) -> StepTrace {
+    let (target, step) = (&last.target, last.target.step + 1);
+    let site_from_rover = stops.site_from_rover(step);
+    let prediction = predict::predict(
+        target,
+        &stops.site_from_rover(target.step),
+        &site_from_rover,
+        &stops.odometry_error(),
+    );
+    let carried = update::carry(target, step, &prediction);
+    let pointing = pointing(stops, step, &carried);
+    let mut trace = StepTrace {
+        step,
+        time_s: stops.time_s(step),
+        fault: None,
+        predict: Some(prediction.clone()),
+        point_mast: Some(pointing.clone()),
+        capture: None,
+        locate: None,
+        judge: None,
+        update: Updated {
+            target: carried,
+            state: last.state,
+            template_renewed: false,
+            correction_m: None,
+            correction_px: None,
+        },
+        truth: None,
+    };
+    match stops.capture(step) {
+        Err(error) => trace.fault = Some(error.to_string()),
+        Ok(pair) => {
+            let captured = capture::capture(pair, pointing.predicted_left, settings.template.subframe_px);
+            let now_from_template = site_from_rover.inverse() * stops.site_from_rover(target.appearance.step);
+            let located = locator(settings.tracker).locate(&LocateInput {
+                target,
+                prediction: &prediction,
+                pointing: &pointing,
+                capture: &captured,
+                now_from_template: &now_from_template,
+                stereo: stops.stereo(),
+                lost_count: lost_count(last.state),
+                settings,
+            });
+            let verdict: Verdict = judge::judge(
+                target,
+                &prediction,
+                &pointing,
+                &located,
+                &site_from_rover,
+                last.state,
+                &settings.limits,
+            );
+            trace.update =
+                update::update(target, step, &prediction, &pointing, &captured, &located, &verdict);
+            (trace.capture, trace.locate, trace.judge) = (Some(captured), Some(located), Some(verdict));
+        }
+    }
+    trace
+}
+
+/// Cameras and wanted pointing for a target that was carried to `step`.
+fn pointing(stops: &dyn Stops, step: usize, carried: &Target) -> Pointing {
+    let (left, right) = stops.cameras(step);
+    let used = UsedPointing { mast: stops.mast(), angles: stops.mast_angles(step), left, right };
+    point_mast::point_mast(&carried.position_in_rover, &carried.covariance_in_rover, used)
+}
+
+fn lost_count(state: TrackingState) -> u32 {
+    match state {
+        TrackingState::Lost { count } => count,
+        _ => 0,
+    }
+}

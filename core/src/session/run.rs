@@ -1,0 +1,45 @@
+//! A run: one configuration over one target, step by step.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::settings::Settings;
+use crate::trace::StepTrace;
+
+/// Where a run left another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Fork {
+    /// The run it left.
+    pub run: usize,
+    /// The first step that was computed with the new settings.
+    pub from_step: usize,
+}
+
+/// One configuration over one target. Steps shared with the run it forked from are the same values.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// The configuration.
+    pub settings: Arc<Settings>,
+    /// Where it left another run.
+    pub fork: Option<Fork>,
+    /// The steps so far; the first is the designation.
+    pub steps: Vec<Arc<StepTrace>>,
+    /// Why it stopped before the last stop: `cancelled`, or what went wrong.
+    pub stopped: Option<String>,
+}
+
+impl Run {
+    /// A run that begins with `steps`.
+    pub fn new(settings: Arc<Settings>, fork: Option<Fork>, steps: Vec<Arc<StepTrace>>) -> Self {
+        Self { settings, fork, steps, stopped: None }
+    }
+
+    /// The record of a stop, where it was computed.
+    pub fn step(&self, step: usize) -> Option<&Arc<StepTrace>> {
+        let first = self.steps.first()?.step;
+        self.steps.get(step.checked_sub(first)?)
+    }
+}

@@ -1,0 +1,158 @@
+//! What of a session travels: the view that pages and scripts read, and the saved form that survives a restart.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::{Cursor, Fork, Run, Session, TargetRecord};
+use crate::settings::{Changes, Settings};
+use crate::target::Designation;
+use crate::trace::{StepRow, Summary, summarise};
+
+/// A session as pages and scripts see it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct SessionView {
+    /// The session's name in paths.
+    pub id: String,
+    /// The traverse's name in paths.
+    pub traverse: String,
+    /// How many stops the traverse has.
+    pub stop_count: usize,
+    /// What is looked at.
+    pub cursor: Cursor,
+    /// The targets that were not removed.
+    pub targets: Vec<TargetView>,
+}
+
+/// A target as pages and scripts see it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct TargetView {
+    /// Its number in paths.
+    pub number: usize,
+    /// What the person calls it.
+    pub label: String,
+    /// How it was designated.
+    pub designation: Designation,
+    /// Its runs, by number.
+    pub runs: Vec<RunView>,
+}
+
+/// A run as pages and scripts see it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct RunView {
+    /// Its number in paths.
+    pub number: usize,
+    /// Where it left another run.
+    pub fork: Option<Fork>,
+    /// The settings that differ from the defaults.
+    #[schema(value_type = Object)]
+    pub changes: Changes,
+    /// The configuration.
+    pub settings: Settings,
+    /// One line a step, so far.
+    pub rows: Vec<StepRow>,
+    /// Whether the last stop was reached.
+    pub complete: bool,
+    /// Why it stopped before.
+    pub stopped: Option<String>,
+    /// The verdict so far.
+    pub summary: Summary,
+}
+
+/// What a person did, from which the session comes again.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SavedSession {
+    /// Version of this form.
+    pub format: u32,
+    /// The session's name.
+    pub id: String,
+    /// The traverse's name.
+    pub traverse: String,
+    /// What was looked at.
+    pub cursor: Cursor,
+    /// The targets, by number.
+    pub targets: Vec<SavedTarget>,
+}
+
+/// A target as it was designated, and the configurations tried on it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SavedTarget {
+    /// What the person calls it.
+    pub label: String,
+    /// How it was designated.
+    pub designation: Designation,
+    /// Whether the person removed it.
+    pub removed: bool,
+    /// Its runs, by number.
+    pub runs: Vec<SavedRun>,
+}
+
+/// A configuration tried on a target.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SavedRun {
+    /// Where it left another run.
+    pub fork: Option<Fork>,
+    /// The whole configuration: defaults may change between versions.
+    pub settings: Settings,
+}
+
+impl Session {
+    /// The session as pages and scripts see it.
+    pub fn view(&self) -> SessionView {
+        let live = self.targets.iter().enumerate().filter(|(_, record)| !record.removed);
+        SessionView {
+            id: self.id.clone(),
+            traverse: self.traverse.clone(),
+            stop_count: self.stop_count,
+            cursor: self.cursor,
+            targets: live.map(|(number, record)| self.target_view(number, record)).collect(),
+        }
+    }
+
+    /// A run as pages and scripts see it.
+    pub fn run_view(&self, number: usize, run: &Run) -> RunView {
+        RunView {
+            number,
+            fork: run.fork,
+            changes: run.settings.changes(),
+            settings: run.settings.as_ref().clone(),
+            rows: run.steps.iter().map(|trace| trace.row()).collect(),
+            complete: run.steps.last().is_some_and(|last| last.step + 1 == self.stop_count),
+            stopped: run.stopped.clone(),
+            summary: summarise(run.steps.iter().map(AsRef::as_ref)),
+        }
+    }
+
+    /// What the person did.
+    pub fn saved(&self) -> SavedSession {
+        let saved_run = |run: &Run| SavedRun { fork: run.fork, settings: run.settings.as_ref().clone() };
+        SavedSession {
+            format: 1,
+            id: self.id.clone(),
+            traverse: self.traverse.clone(),
+            cursor: self.cursor,
+            targets: self
+                .targets
+                .iter()
+                .map(|record| SavedTarget {
+                    label: record.label.clone(),
+                    designation: record.designation,
+                    removed: record.removed,
+                    runs: record.runs.iter().map(saved_run).collect(),
+                })
+                .collect(),
+        }
+    }
+
+    fn target_view(&self, number: usize, record: &TargetRecord) -> TargetView {
+        let runs = record.runs.iter().enumerate().map(|(number, run)| self.run_view(number, run));
+        TargetView {
+            number,
+            label: record.label.clone(),
+            designation: record.designation,
+            runs: runs.collect(),
+        }
+    }
+}

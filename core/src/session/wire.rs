@@ -1,0 +1,149 @@
+//! What page and server say to each other, beside [`super::view`]: requests, the traverse, and events.
+//!
+//! Server and viewer never see each other's code; these types are their whole common language.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::frames::{Pixel, PoseRecord};
+use crate::settings::Changes;
+use crate::traverse::StereoGeometry;
+
+/// A traverse as pages and scripts see it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct TraverseView {
+    /// Its name in paths.
+    pub id: String,
+    /// Its short name.
+    pub name: String,
+    /// What was recorded.
+    pub description: String,
+    /// Whether its images are rendered.
+    pub simulated: bool,
+    /// How the two images of a stop relate.
+    pub stereo: StereoGeometry,
+    /// What was odd when it was opened.
+    pub warnings: Vec<String>,
+    /// Its stops.
+    pub stops: Vec<StopView>,
+}
+
+/// One stop as pages and scripts see it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct StopView {
+    /// Time since the first stop, s.
+    pub time_s: f64,
+    /// The estimated pose in the site frame.
+    pub site_from_rover: PoseRecord,
+    /// The true pose, where it is known.
+    pub true_site_from_rover: Option<PoseRecord>,
+    /// Size of the left image (width, height), px.
+    pub left_size: [u32; 2],
+    /// Size of the right image (width, height), px.
+    pub right_size: [u32; 2],
+    /// Whether the images are there; those of a simulated traverse are rendered when they are first asked for.
+    pub ready: bool,
+}
+
+/// Begins a session.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewSession {
+    /// The traverse's name in paths.
+    pub traverse: String,
+}
+
+/// Designates a target.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewTarget {
+    /// The stop whose left image was clicked.
+    pub step: usize,
+    /// The position in it, px.
+    pub pixel: Pixel,
+    /// What to call it.
+    #[serde(default)]
+    pub label: Option<String>,
+    /// Settings that differ from the defaults, by name.
+    #[serde(default)]
+    #[schema(value_type = Object)]
+    pub settings: Changes,
+}
+
+/// Runs a target again from a step with changed settings.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewRun {
+    /// The run to leave.
+    pub run: usize,
+    /// The first step to compute anew.
+    pub from_step: usize,
+    /// The settings that change, by name.
+    #[serde(default)]
+    #[schema(value_type = Object)]
+    pub settings: Changes,
+}
+
+/// A live Rerun stream that was opened for a session.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct RerunStream {
+    /// The page that shows it.
+    pub viewer_url: String,
+    /// Where the data come from.
+    pub stream_url: String,
+}
+
+/// What the server tells every open page over the WebSocket.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(tag = "event", rename_all = "snake_case")]
+pub enum Event {
+    /// Something of a session changed: read its view again.
+    SessionChanged {
+        /// The session.
+        session: String,
+    },
+    /// A run went on.
+    RunProgress {
+        /// The session.
+        session: String,
+        /// The target's number.
+        target: usize,
+        /// The run's number.
+        run: usize,
+        /// Steps done.
+        k: usize,
+        /// Steps in all.
+        n: usize,
+        /// Whether it has ended.
+        ended: bool,
+        /// What is being done, in words.
+        doing: String,
+    },
+    /// Images of a simulated traverse were rendered.
+    RenderProgress {
+        /// The traverse.
+        traverse: String,
+        /// Stops done.
+        k: usize,
+        /// Stops in all.
+        n: usize,
+        /// The stop that became ready, where one did.
+        ready: Option<usize>,
+    },
+}
+
+/// A problem as the server reports it (RFC 9457).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Problem {
+    /// A stable name for programs.
+    pub code: String,
+    /// A short title.
+    pub title: String,
+    /// The HTTP status.
+    pub status: u16,
+    /// One sentence that names the culprit.
+    pub detail: String,
+    /// How to mend it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hint: Option<String>,
+}

@@ -1,0 +1,161 @@
+//! One tracker configuration: the limits and the locator's own settings, changed by `key=value`.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use utoipa::ToSchema;
+
+use crate::error::{Error, Result};
+use crate::limits::{Limits, SettingInfo};
+use crate::locate::template::TemplateSettings;
+
+/// Changes to settings by name, as a person writes them.
+pub type Changes = BTreeMap<String, Value>;
+
+/// Which locator finds the target.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum TrackerKind {
+    /// Normalised correlation of a scaled and rolled template (Kim et al. 2009).
+    #[default]
+    Template,
+}
+
+/// One tracker configuration.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    /// The locator.
+    pub tracker: TrackerKind,
+    /// The thresholds of `judge`.
+    pub limits: Limits,
+    /// The settings of the template locator.
+    pub template: TemplateSettings,
+}
+
+impl Settings {
+    /// The description of every setting, group by group.
+    pub fn table() -> Vec<SettingInfo> {
+        let mut table = Limits::table();
+        table.extend(TemplateSettings::table());
+        table
+    }
+
+    /// These settings with `changes` applied; an unknown name or a value out of range changes nothing.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] naming the key, what is wrong with it, and the nearest known name.
+    pub fn with(&self, changes: &Changes) -> Result<Self> {
+        let table = Self::table();
+        let mut document = serde_json::to_value(self).map_err(|e| Error::setting("", e.to_string()))?;
+        for (key, value) in changes {
+            let info = table.iter().find(|info| info.key == *key).ok_or_else(|| unknown(key, &table))?;
+            if let Some(problem) = info.domain.problem_with(value) {
+                return Err(Error::setting(key, problem));
+            }
+            document[&info.group][key] = value.clone();
+        }
+        serde_json::from_value(document).map_err(|e| Error::setting(join_keys(changes), e.to_string()))
+    }
+
+    /// The settings that differ from the defaults, by name.
+    pub fn changes(&self) -> Changes {
+        let document = serde_json::to_value(self).unwrap_or_default();
+        Self::table()
+            .into_iter()
+            .filter_map(|info| {
+                let value = document.get(&info.group)?.get(&info.key)?.clone();
+                (value != info.default).then_some((info.key, value))
+            })
+            .collect()
+    }
+}
+
+/// Reads `key=value`; the value is JSON where it can be (numbers, `true`), else a word.
+///
+/// # Errors
+/// [`Error::Setting`] when there is no `=`.
+pub fn parse_assignment(text: &str) -> Result<(String, Value)> {
+    let (key, value) = text
+        .split_once('=')
+        .ok_or_else(|| Error::setting(text, "write it as key=value, for example ncc_min=0.6"))?;
+    let value = value.trim();
+    let parsed = serde_json::from_str(value).unwrap_or_else(|_| Value::String(value.to_owned()));
+    Ok((key.trim().to_owned(), parsed))
+}
+
+fn join_keys(changes: &Changes) -> String {
+    changes.keys().cloned().collect::<Vec<_>>().join(", ")
+}
+
+fn unknown(key: &str, table: &[SettingInfo]) -> Error {
+    let nearest = table.iter().min_by_key(|info| edit_distance(key, &info.key)).map(|info| info.key.as_str());
+    let hint = nearest.map(|n| format!("; did you mean {n}?")).unwrap_or_default();
+    Error::setting(key, format!("there is no such setting{hint}"))
+}
+
+/// Levenshtein's distance, for naming the nearest known word.
+fn edit_distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, ca) in a.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, cb) in b.iter().enumerate() {
+            let substituted = diagonal + usize::from(ca != *cb);
+            diagonal = row[j + 1];
+            row[j + 1] = substituted.min(diagonal + 1).min(row[j] + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn change(key: &str, value: Value) -> Result<Settings> {
+        Settings::default().with(&Changes::from([(key.to_owned(), value)]))
+    }
+
+    #[test]
+    fn a_known_setting_changes_and_is_listed_as_changed() {
+        let settings = change("ncc_min", json!(0.55)).unwrap();
+        assert_eq!(settings.limits.ncc_min, 0.55);
+        assert_eq!(settings.changes(), Changes::from([("ncc_min".to_owned(), json!(0.55))]));
+    }
+
+    #[test]
+    fn an_unknown_setting_names_itself_and_its_nearest_neighbour() {
+        let message = change("ncc_mim", json!(0.5)).unwrap_err().to_string();
+        assert!(message.contains("ncc_mim") && message.contains("ncc_min"), "{message}");
+    }
+
+    #[test]
+    fn a_value_out_of_range_is_refused_with_the_range() {
+        let message = change("template_size_px", json!(20)).unwrap_err().to_string();
+        assert!(message.contains("template_size_px") && message.contains("odd"), "{message}");
+    }
+
+    #[test]
+    fn every_default_lies_in_its_own_domain_and_names_are_unique() {
+        let table = Settings::table();
+        for info in &table {
+            assert_eq!(info.domain.problem_with(&info.default), None, "{}", info.key);
+        }
+        let mut keys: Vec<_> = table.iter().map(|i| i.key.clone()).collect();
+        keys.sort();
+        keys.dedup();
+        assert_eq!(keys.len(), table.len());
+    }
+
+    #[test]
+    fn an_assignment_reads_numbers_switches_and_words() {
+        assert_eq!(parse_assignment("a=1.5").unwrap().1, json!(1.5));
+        assert_eq!(parse_assignment("a = true").unwrap().1, json!(true));
+        assert_eq!(parse_assignment("kernel=bicubic").unwrap().1, json!("bicubic"));
+        assert!(parse_assignment("nonsense").unwrap_err().to_string().contains("key=value"));
+    }
+}

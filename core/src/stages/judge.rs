@@ -1,0 +1,251 @@
+//! Stage 5, `judge`: the four loss criteria and the state machine (K§4.6, R81–R91).
+//!
+//! | criterion | value | limit |
+//! |---|---|---|
+//! | 1 `ncc` | score of the match | ≥ `ncc_min` |
+//! | 2 `stereo_ncc` | score of point stereo | ≥ `stereo_ncc_min` |
+//! | 3 `distance_correction_m` | `│ │p − C│ − │p_pred − C│ │` | ≤ tol_dist |
+//! | 4 `position_correction_m` | `│p_site − p_initial,site│` | ≤ tol_pos |
+//!
+//! The tolerances are recomputed at every update (R86, R87, ours):
+//! ```text
+//! tol_dist = g √( ΔR(D_old)² + ΔR(D_new)² + (f L_step)² )
+//! tol_pos  = g √( ΔR(D_0)²   + ΔR(D_new)² + (f L_total)² + (D_new/f_p · 0.5 · D_0/D_new)² )
+//! ΔR(D)    = D² Δd / (f_p B)                                                     K-Eq 1
+//! ```
+//! | symbol | name | unit |
+//! |---|---|---|
+//! | g | `limits.tolerance_factor` | – |
+//! | Δd | `limits.disparity_error_px` | px |
+//! | f | `limits.navigation_error_fraction` | – |
+//! | f_p, B | effective focal length at the target, distance of the camera centres | px, m |
+//! | L_step, L_total | driven since the last accepted update, since designation | m |
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::frames::{Point3, Pose};
+use crate::limits::Limits;
+use crate::locate::Located;
+use crate::stages::point_mast::Pointing;
+use crate::stages::predict::Prediction;
+use crate::target::{Target, TrackingState};
+
+/// One criterion with its value and limit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Gate {
+    /// The criterion's number in K§4.6.
+    pub criterion: u8,
+    /// Its name.
+    pub name: String,
+    /// Its unit, empty for scores.
+    pub unit: String,
+    /// The value; null where nothing was found to judge.
+    pub value: Option<f64>,
+    /// The limit.
+    pub limit: f64,
+    /// Whether the value must be at least the limit; otherwise at most.
+    pub at_least: bool,
+    /// How far the value is on the good side of the limit, in its unit.
+    pub margin: Option<f64>,
+    /// Whether the criterion is met.
+    pub passed: bool,
+}
+
+impl Gate {
+    fn new(criterion: u8, name: &str, unit: &str, value: Option<f64>, limit: f64, at_least: bool) -> Self {
+        let margin = value.map(|v| if at_least { v - limit } else { limit - v });
+        Self {
+            criterion,
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            value,
+            limit,
+            at_least,
+            margin,
+            passed: margin.is_some_and(|m| m >= 0.0),
+        }
+    }
+}
+
+/// The verdict on one update.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Verdict {
+    /// The criteria, in the paper's order.
+    pub gates: Vec<Gate>,
+    /// Whether all of them are met.
+    pub good: bool,
+    /// Whether the update is used: good, and the target had not failed before.
+    pub accepted: bool,
+    /// Why not, as one sentence.
+    pub reason: Option<String>,
+    /// The state before this update.
+    pub state_before: TrackingState,
+    /// The state after it.
+    pub state: TrackingState,
+}
+
+/// Judges what was located against the prediction and the limits.
+pub fn judge(
+    target: &Target,
+    prediction: &Prediction,
+    pointing: &Pointing,
+    located: &Located,
+    site_from_rover: &Pose,
+    state_before: TrackingState,
+    limits: &Limits,
+) -> Verdict {
+    let gates = gates(target, prediction, pointing, located, site_from_rover, limits);
+    let good = gates.iter().all(|gate| gate.passed);
+    let state = next_state(state_before, good, limits);
+    Verdict {
+        reason: (!good).then(|| reason(&gates, located)),
+        accepted: good && state == TrackingState::Tracking,
+        good,
+        gates,
+        state_before,
+        state,
+    }
+}
+
+fn gates(
+    target: &Target,
+    prediction: &Prediction,
+    pointing: &Pointing,
+    located: &Located,
+    site_from_rover: &Pose,
+    limits: &Limits,
+) -> Vec<Gate> {
+    let evidence = located.evidence.template();
+    let ncc = evidence.and_then(|e| e.match_template.as_ref()).map(|m| m.peak.score);
+    let stereo = evidence.and_then(|e| e.point_stereo.as_ref()).map(|s| s.score);
+    let centre = pointing.left.model.centre();
+    let predicted_m = (prediction.position_in_rover - centre).norm();
+    let found = located.position_in_rover;
+    let distance = found.map(|p| ((p - centre).norm() - predicted_m).abs());
+    let position = found.map(|p: Point3| (site_from_rover * p - target.initial_position_in_site).norm());
+    let new_m = found.map_or(predicted_m, |p| (p - centre).norm());
+    let tolerance = Tolerance::new(pointing, predicted_m, limits);
+    vec![
+        Gate::new(1, "ncc", "", ncc, limits.ncc_min, true),
+        Gate::new(2, "stereo_ncc", "", stereo, limits.stereo_ncc_min, true),
+        Gate::new(
+            3,
+            "distance_correction_m",
+            "m",
+            distance,
+            tolerance.distance_m(target, prediction, new_m),
+            false,
+        ),
+        Gate::new(
+            4,
+            "position_correction_m",
+            "m",
+            position,
+            tolerance.position_m(target, prediction, new_m),
+            false,
+        ),
+    ]
+}
+
+/// The two tolerances of R87.
+struct Tolerance<'a> {
+    limits: &'a Limits,
+    focal_px: f64,
+    baseline_m: f64,
+}
+
+impl<'a> Tolerance<'a> {
+    fn new(pointing: &Pointing, predicted_m: f64, limits: &'a Limits) -> Self {
+        let (left, right) = (&pointing.left, &pointing.right);
+        let at = pointing.predicted_left.unwrap_or_else(|| left.centre_pixel());
+        let focal_px = left.model.focal_length_px(at).unwrap_or(predicted_m.max(1.0));
+        Self { limits, focal_px, baseline_m: (right.model.centre() - left.model.centre()).norm() }
+    }
+
+    /// K-Eq 1, m.
+    fn stereo_m(&self, distance_m: f64) -> f64 {
+        distance_m * distance_m * self.limits.disparity_error_px / (self.focal_px * self.baseline_m)
+    }
+
+    fn distance_m(&self, target: &Target, prediction: &Prediction, new_m: f64) -> f64 {
+        let navigation = self.limits.navigation_error_fraction * prediction.travelled_since_update_m;
+        let stereo = self.stereo_m(target.last_distance_m).hypot(self.stereo_m(new_m));
+        self.limits.tolerance_factor * stereo.hypot(navigation)
+    }
+
+    fn position_m(&self, target: &Target, prediction: &Prediction, new_m: f64) -> f64 {
+        let navigation = self.limits.navigation_error_fraction * prediction.travelled_m;
+        let stereo = self.stereo_m(target.initial_distance_m).hypot(self.stereo_m(new_m));
+        // Half a pixel of the first image, seen from where the rover is now (R40).
+        let designation = 0.5 * target.initial_distance_m / self.focal_px;
+        self.limits.tolerance_factor * stereo.hypot(navigation).hypot(designation)
+    }
+}
+
+/// The next state (R90, R91): a loss, then up to `n_retry` further updates, then failure until cleared.
+pub fn next_state(before: TrackingState, good: bool, limits: &Limits) -> TrackingState {
+    let bad = match before {
+        TrackingState::Cleared | TrackingState::Failed => return before,
+        _ if good => return TrackingState::Tracking,
+        TrackingState::Tracking => 1,
+        TrackingState::Lost { count } => count + 1,
+    };
+    let allowed = limits.n_retry.saturating_sub(u32::from(limits.count_detecting_update));
+    if bad > allowed { TrackingState::Failed } else { TrackingState::Lost { count: bad } }
+}
+
+fn reason(gates: &[Gate], located: &Located) -> String {
+    let failed = gates.iter().filter(|gate| !gate.passed).filter_map(|gate| {
+        let relation = if gate.at_least { "below" } else { "above" };
+        let (value, limit) = (gate.value?, gate.limit);
+        Some(
+            format!("{} {value:.3} is {relation} its limit {limit:.3} {}", gate.name, gate.unit)
+                .trim_end()
+                .to_owned(),
+        )
+    });
+    failed.chain(located.missing.clone()).collect::<Vec<_>>().join("; ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(pattern: &str, limits: &Limits) -> TrackingState {
+        pattern.chars().fold(TrackingState::Tracking, |state, c| next_state(state, c == 'G', limits))
+    }
+
+    #[test]
+    fn two_retries_follow_a_loss_and_a_good_one_resets_the_count() {
+        let limits = Limits::default();
+        assert_eq!(run("GBG", &limits), TrackingState::Tracking);
+        assert_eq!(run("GBBG", &limits), TrackingState::Tracking);
+        assert_eq!(run("GBB", &limits), TrackingState::Lost { count: 2 });
+        assert_eq!(run("GBBGBB", &limits), TrackingState::Lost { count: 2 });
+        assert_eq!(run("GBBB", &limits), TrackingState::Failed);
+        assert_eq!(run("GBBBGGGG", &limits), TrackingState::Failed);
+    }
+
+    #[test]
+    fn the_stricter_reading_counts_the_detecting_update() {
+        let limits = Limits { count_detecting_update: true, ..Limits::default() };
+        assert_eq!(run("GBG", &limits), TrackingState::Tracking);
+        assert_eq!(run("GBB", &limits), TrackingState::Failed);
+    }
+
+    #[test]
+    fn without_retries_the_first_loss_is_a_failure_and_cleared_stays_cleared() {
+        let limits = Limits { n_retry: 0, ..Limits::default() };
+        assert_eq!(run("GB", &limits), TrackingState::Failed);
+        assert_eq!(next_state(TrackingState::Cleared, true, &limits), TrackingState::Cleared);
+    }
+
+    #[test]
+    fn a_gate_knows_its_margin_and_fails_without_a_value() {
+        let gate = Gate::new(1, "ncc", "", Some(0.75), 0.7, true);
+        assert!(gate.passed && (gate.margin.unwrap() - 0.05).abs() < 1e-12);
+        assert!(!Gate::new(3, "d", "m", Some(0.4), 0.3, false).passed);
+        assert!(!Gate::new(1, "ncc", "", None, 0.7, true).passed);
+    }
+}

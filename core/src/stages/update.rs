@@ -1,0 +1,88 @@
+//! Stage 6, `update`: the next target (K§4.1 step 5, R28, R70, R78, R92).
+//!
+//! An accepted update renews the position, its covariance and the template, which is taken anew around the
+//! sub-pixel match. Otherwise the position is carried by the prediction alone and the template stays.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::frames::Pixel;
+use crate::locate::Located;
+use crate::stages::capture::Capture;
+use crate::stages::judge::Verdict;
+use crate::stages::point_mast::Pointing;
+use crate::stages::predict::Prediction;
+use crate::target::{Appearance, Target, TrackingState};
+
+/// What this stop leaves to the next.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Updated {
+    /// The target.
+    pub target: Target,
+    /// The tracking state.
+    pub state: TrackingState,
+    /// Whether the template was taken anew.
+    pub template_renewed: bool,
+    /// How far the located position lies from the predicted one, m (R30).
+    pub correction_m: Option<f64>,
+    /// How far the match lies from the predicted pixel, px (R32).
+    pub correction_px: Option<f64>,
+}
+
+/// The next target from an update that was judged.
+pub fn update(
+    target: &Target,
+    step: usize,
+    prediction: &Prediction,
+    pointing: &Pointing,
+    capture: &Capture,
+    located: &Located,
+    verdict: &Verdict,
+) -> Updated {
+    let correction_m = located.position_in_rover.map(|p| (p - prediction.position_in_rover).norm());
+    let correction_px =
+        located.left_pixel.zip(pointing.predicted_left).map(|(a, b): (Pixel, Pixel)| a.distance(b));
+    let carried = carry(target, step, prediction);
+    let renewed = verdict.accepted.then(|| renew(&carried, pointing, capture, located)).flatten();
+    Updated {
+        template_renewed: renewed.is_some(),
+        target: renewed.unwrap_or(carried),
+        state: verdict.state,
+        correction_m,
+        correction_px,
+    }
+}
+
+/// The target carried to this stop by the prediction alone.
+pub fn carry(target: &Target, step: usize, prediction: &Prediction) -> Target {
+    Target {
+        step,
+        position_in_rover: prediction.position_in_rover,
+        covariance_in_rover: prediction.covariance_in_rover,
+        travelled_m: prediction.travelled_m,
+        travelled_since_update_m: prediction.travelled_since_update_m,
+        ..target.clone()
+    }
+}
+
+/// The carried target with position and template as located.
+fn renew(carried: &Target, pointing: &Pointing, capture: &Capture, located: &Located) -> Option<Target> {
+    let (position_in_rover, pixel) = (located.position_in_rover?, located.left_pixel?);
+    Some(Target {
+        position_in_rover,
+        covariance_in_rover: located.covariance_in_rover?,
+        last_distance_m: (position_in_rover - pointing.left.model.centre()).norm(),
+        travelled_since_update_m: 0.0,
+        drift_covariance_px2: located.left_covariance_px2,
+        appearance: Appearance {
+            step: carried.step,
+            pixel,
+            position_in_rover,
+            camera: pointing.left.clone(),
+            image: Arc::clone(&capture.pair.left),
+        },
+        ..carried.clone()
+    })
+}

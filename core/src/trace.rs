@@ -1,0 +1,283 @@
+//! What one step saw and decided: the return values of the six stages, side by side.
+//!
+//! The debugger is a view of this record. The fields bear the stages' names; arrays are left out of the
+//! serialised form and fetched one by one under the names of [`ArrayName`].
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::correlate::zncc::Surface;
+use crate::frames::{Pixel, Point3};
+use crate::image::patch::Patch;
+use crate::locate::Located;
+use crate::locate::template::TemplateEvidence;
+use crate::stages::capture::Capture;
+use crate::stages::judge::Verdict;
+use crate::stages::point_mast::Pointing;
+use crate::stages::predict::Prediction;
+use crate::stages::update::Updated;
+
+/// One step of a run. At the designation there is no `predict` and no `judge`; at a stop whose files are
+/// damaged there is a `fault` and nothing after `point_mast`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct StepTrace {
+    /// The stop, from 0.
+    pub step: usize,
+    /// Time since the first stop, s.
+    pub time_s: f64,
+    /// What is wrong with the stop's files, as one sentence.
+    pub fault: Option<String>,
+    /// Stage 1.
+    pub predict: Option<Prediction>,
+    /// Stage 2.
+    pub point_mast: Option<Pointing>,
+    /// Stage 3.
+    pub capture: Option<Capture>,
+    /// Stage 4.
+    pub locate: Option<Located>,
+    /// Stage 5.
+    pub judge: Option<Verdict>,
+    /// Stage 6.
+    pub update: Updated,
+    /// The comparison with the truth, where that is known.
+    pub truth: Option<StepTruth>,
+}
+
+/// What the truth of a target is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum TruthKind {
+    /// The surface point under the designated pixel, seen through the true camera.
+    Surface,
+    /// The first estimate carried by the true poses: what remains is what tracking added (its drift).
+    Carried,
+}
+
+/// The comparison of one step with the truth.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct StepTruth {
+    /// What the truth is.
+    pub kind: TruthKind,
+    /// The true position in the true rover frame of this stop, m.
+    #[schema(value_type = [f64; 3])]
+    pub position_in_rover: Point3,
+    /// The truth in the left image, px; null where it is not visible.
+    pub left_pixel: Option<Pixel>,
+    /// Distance between estimated and true position in the present rover frame, m.
+    pub err_m: f64,
+    /// Distance between located and true pixel, px; null where nothing was located or the truth is hidden.
+    pub err_px: Option<f64>,
+    /// Squared Mahalanobis distance of the error, 3 degrees of freedom; null without a covariance.
+    pub nees: Option<f64>,
+    /// Magnification since the designation.
+    pub magnification: f64,
+    /// The error up to which the target counts as tracked, px (R116).
+    pub tolerance_px: f64,
+    /// Whether the target is tracked: state `tracking` and within the tolerance; null where the truth is hidden.
+    pub tracked: Option<bool>,
+}
+
+/// One line of a run: the columns of plots, tables and `sightline track`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct StepRow {
+    /// The stop, from 0.
+    pub step: usize,
+    /// The tracking state's word.
+    pub state: String,
+    /// Scale by the ratio of distances.
+    pub scale: Option<f64>,
+    /// Roll, deg.
+    pub roll_deg: Option<f64>,
+    /// Score of the match.
+    pub ncc: Option<f64>,
+    /// Score of point stereo.
+    pub stereo_score: Option<f64>,
+    /// Error against the truth in the left image, px.
+    pub err_px: Option<f64>,
+    /// Error against the truth, m.
+    pub err_m: Option<f64>,
+    /// Largest 1σ axis of the position covariance, m.
+    pub sigma_m: Option<f64>,
+    /// Squared Mahalanobis distance of the error.
+    pub nees: Option<f64>,
+    /// Whether the target is tracked against the truth.
+    pub tracked: Option<bool>,
+    /// Estimated position in the rover frame, m.
+    pub position_in_rover: [f64; 3],
+    /// Located position in the left image, px.
+    pub left_pixel: Option<Pixel>,
+    /// Why an update was rejected, or what is wrong with the stop's files.
+    pub reason: Option<String>,
+}
+
+/// The verdict on a whole run against the truth.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Summary {
+    /// Steps run, the designation included.
+    pub steps: usize,
+    /// Steps that were tracked; null without truth.
+    pub steps_tracked: Option<usize>,
+    /// Steps in state `lost` or `failed`.
+    pub steps_lost: usize,
+    /// Steps in state `tracking` that were not tracked; null without truth.
+    pub false_tracked: Option<usize>,
+    /// Steps lost or failed whose evidence was right; null without truth.
+    pub false_lost: Option<usize>,
+    /// Whether the last step was tracked; null without truth.
+    pub run_tracked: Option<bool>,
+    /// Error of the last step, px.
+    pub final_err_px: Option<f64>,
+    /// Error of the last step, m.
+    pub final_err_m: Option<f64>,
+}
+
+impl StepTrace {
+    /// The evidence of the template locator, where something was located.
+    pub fn template(&self) -> Option<&TemplateEvidence> {
+        self.locate.as_ref().and_then(|located| located.evidence.template())
+    }
+
+    /// This step as one line.
+    pub fn row(&self) -> StepRow {
+        let evidence = self.template();
+        let scale_roll = evidence.and_then(|e| e.scale_roll.as_ref());
+        let covariance = self.update.target.covariance_in_rover;
+        let largest = covariance.symmetric_eigenvalues().max();
+        StepRow {
+            step: self.step,
+            state: self.update.state.word().to_owned(),
+            scale: scale_roll.map(|s| s.scale),
+            roll_deg: scale_roll.map(|s| s.roll_rad.to_degrees()),
+            ncc: evidence.and_then(|e| e.match_template.as_ref()).map(|m| m.peak.score),
+            stereo_score: evidence.and_then(|e| e.point_stereo.as_ref()).map(|s| s.score),
+            err_px: self.truth.as_ref().and_then(|t| t.err_px),
+            err_m: self.truth.as_ref().map(|t| t.err_m),
+            sigma_m: largest.is_finite().then(|| largest.max(0.0).sqrt()),
+            nees: self.truth.as_ref().and_then(|t| t.nees),
+            tracked: self.truth.as_ref().and_then(|t| t.tracked),
+            position_in_rover: self.update.target.position_in_rover.coords.into(),
+            left_pixel: self.locate.as_ref().and_then(|l| l.left_pixel),
+            reason: self.fault.clone().or_else(|| self.judge.as_ref().and_then(|v| v.reason.clone())),
+        }
+    }
+
+    /// Whether the step was lost although its evidence was right.
+    pub fn is_false_loss(&self) -> bool {
+        let within = |t: &StepTruth| t.err_px.is_some_and(|e| e <= t.tolerance_px);
+        self.update.state.is_lost() && self.truth.as_ref().is_some_and(within)
+    }
+
+    /// An array of this step, where the stage that makes it was reached.
+    pub fn array(&self, name: ArrayName) -> Option<ArrayView<'_>> {
+        let evidence = self.template()?;
+        let scale_roll = evidence.scale_roll.as_ref();
+        let matched = evidence.match_template.as_ref();
+        match name {
+            ArrayName::Reference => scale_roll.map(|s| ArrayView::Patch(&s.reference)),
+            ArrayName::Scaled => scale_roll.map(|s| ArrayView::Patch(&s.scaled)),
+            ArrayName::Rolled => scale_roll.map(|s| ArrayView::Patch(&s.rolled)),
+            ArrayName::Matched => matched.map(|m| ArrayView::Patch(&m.matched)),
+            ArrayName::Difference => matched.map(|m| ArrayView::Patch(&m.difference)),
+            ArrayName::Surface => matched.map(|m| ArrayView::Surface(&m.surface)),
+            ArrayName::RightWindow => {
+                evidence.point_stereo.as_ref().map(|s| ArrayView::Patch(&s.right_window))
+            }
+        }
+    }
+}
+
+/// The arrays of a step, in the order of the strip.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ArrayName {
+    /// The template as it was taken.
+    Reference,
+    /// The template, scaled.
+    Scaled,
+    /// The template, scaled and rolled: what was matched.
+    Rolled,
+    /// The image at the match.
+    Matched,
+    /// Matched minus rolled, both normalised.
+    Difference,
+    /// The scores of all positions of the search window.
+    Surface,
+    /// The right image at the stereo match.
+    RightWindow,
+}
+
+impl ArrayName {
+    /// All arrays, in the order of the strip.
+    pub const ALL: [Self; 7] = [
+        Self::Reference,
+        Self::Scaled,
+        Self::Rolled,
+        Self::Matched,
+        Self::Difference,
+        Self::Surface,
+        Self::RightWindow,
+    ];
+
+    /// The name as paths and files write it.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Reference => "reference",
+            Self::Scaled => "scaled",
+            Self::Rolled => "rolled",
+            Self::Matched => "matched",
+            Self::Difference => "difference",
+            Self::Surface => "surface",
+            Self::RightWindow => "right_window",
+        }
+    }
+
+    /// The array of that name.
+    pub fn from_word(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|name| name.word() == word)
+    }
+}
+
+/// A borrowed two-dimensional array of `f32`.
+#[derive(Clone, Copy, Debug)]
+pub enum ArrayView<'a> {
+    /// A patch of grey values; NaN where invalid.
+    Patch(&'a Patch),
+    /// A surface of scores; NaN where excluded.
+    Surface(&'a Surface),
+}
+
+impl<'a> ArrayView<'a> {
+    /// Width and height.
+    pub fn size(&self) -> [u32; 2] {
+        match self {
+            Self::Patch(patch) => patch.dimensions().into(),
+            Self::Surface(surface) => [surface.width, surface.height],
+        }
+    }
+
+    /// Row-major values.
+    pub fn values(&self) -> &'a [f32] {
+        match self {
+            Self::Patch(patch) => patch.as_raw(),
+            Self::Surface(surface) => &surface.scores,
+        }
+    }
+}
+
+/// Sums up a run.
+pub fn summarise<'a>(steps: impl IntoIterator<Item = &'a StepTrace>) -> Summary {
+    let mut summary = Summary::default();
+    for trace in steps {
+        summary.steps += 1;
+        summary.steps_lost += usize::from(trace.update.state.is_lost());
+        let Some(truth) = &trace.truth else { continue };
+        let tracking = trace.update.state == crate::target::TrackingState::Tracking;
+        *summary.steps_tracked.get_or_insert(0) += usize::from(truth.tracked == Some(true));
+        *summary.false_tracked.get_or_insert(0) += usize::from(tracking && truth.tracked == Some(false));
+        *summary.false_lost.get_or_insert(0) += usize::from(trace.is_false_loss());
+        summary.run_tracked = truth.tracked;
+        summary.final_err_px = truth.err_px;
+        summary.final_err_m = Some(truth.err_m);
+    }
+    summary
+}
