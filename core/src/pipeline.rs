@@ -15,14 +15,14 @@ use crate::error::{Error, Result};
 use crate::frames::Pose;
 use crate::locate::{DesignateInput, LocateInput, locator};
 use crate::settings::Settings;
-use crate::stages::capture;
+use crate::stages::capture::{self, StereoPair};
 use crate::stages::judge::{self, Verdict};
 use crate::stages::point_mast::{self, Pointing, UsedPointing};
 use crate::stages::predict;
 use crate::stages::update::{self, Updated};
 use crate::target::{Appearance, Designation, Target, TrackingState};
 use crate::trace::StepTrace;
-use crate::traverse::{OdometryError, StereoGeometry, StereoPair};
+use crate::traverse::{OdometryError, StereoGeometry};
 
 /// The stops of a drive, as the stages see them.
 pub trait Stops {

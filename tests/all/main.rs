@@ -3,3 +3,4 @@
 mod imports;
 mod recorded_cameras;
 mod rerun_export;
+mod zncc_reference;

@@ -1,7 +1,7 @@
 //! The debugger's page: data in, commands out.
 
 #[cfg(target_arch = "wasm32")]
-mod web;
+pub mod web;
 
 /// The application.
 #[derive(Default)]

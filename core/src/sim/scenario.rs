@@ -92,11 +92,11 @@ impl Default for RockSettings {
             area_fraction: 0.09,
             smallest_m: 0.04,
             largest_m: 0.6,
-            farthest_m: 45.0,
+            farthest_m: 100.0,
             height_ratio: 0.5,
             cluster_count: 14,
             cluster_radius_m: 1.3,
-            cluster_smallest_m: 0.15,
+            cluster_smallest_m: 0.25,
         }
     }
 }
@@ -115,6 +115,8 @@ pub struct TextureSettings {
     pub soil_slope_std: f64,
     /// The same for rocks.
     pub rock_slope_std: f64,
+    /// How much of the soil's albedo lies as dust on a rock's face that looks straight up, 0 to 1.
+    pub dust: f64,
     /// The longest wavelength of the texture, m.
     pub longest_m: f64,
     /// The shortest wavelength of the texture, m (below the 1.6 mm that a pixel spans at 2 m).
@@ -129,7 +131,8 @@ impl Default for TextureSettings {
             albedo_std: 0.12,
             soil_slope_std: 0.12,
             rock_slope_std: 0.25,
-            longest_m: 0.8,
+            dust: 0.45,
+            longest_m: 0.4,
             shortest_m: 0.0015,
         }
     }
@@ -308,7 +311,7 @@ impl Scenario {
         within("rocks.area_fraction", rocks.area_fraction, 0.0, 0.4)?;
         within("rocks.smallest_m", rocks.smallest_m, 0.02, 0.5)?;
         within("rocks.largest_m", rocks.largest_m, rocks.smallest_m * 1.01, 2.0)?;
-        within("rocks.farthest_m", rocks.farthest_m, 1.0, 100.0)?;
+        within("rocks.farthest_m", rocks.farthest_m, 1.0, 150.0)?;
         within("rocks.height_ratio", rocks.height_ratio, 0.1, 1.0)?;
         within("rocks.cluster_count", f64::from(rocks.cluster_count), 0.0, 200.0)?;
         within("rocks.cluster_radius_m", rocks.cluster_radius_m, 0.1, 10.0)?;
@@ -318,6 +321,7 @@ impl Scenario {
         within("texture.albedo_std", texture.albedo_std, 0.0, 0.5)?;
         within("texture.soil_slope_std", texture.soil_slope_std, 0.0, 1.0)?;
         within("texture.rock_slope_std", texture.rock_slope_std, 0.0, 1.0)?;
+        within("texture.dust", texture.dust, 0.0, 1.0)?;
         within("texture.longest_m", texture.longest_m, 0.01, 10.0)?;
         within("texture.shortest_m", texture.shortest_m, 0.0005, texture.longest_m)
     }

@@ -17,7 +17,7 @@
 
 use crate::frames::Ray;
 
-use super::terrain::{BLOCK_CELLS, MEAN_GROUND_Z_M, Terrain};
+use super::terrain::{BLOCK_SHIFT, MEAN_GROUND_Z_M, Terrain};
 
 /// A ray in units of cells: position (p + d t), t in metres.
 struct CellRay {
@@ -93,32 +93,34 @@ impl Terrain {
 
     /// Walks the blocks of `level` inside the parent block that starts at cell `first`, over [enter, leave].
     fn walk(&self, level: usize, first: [usize; 2], ray: &CellRay, enter_m: f64, leave_m: f64) -> Option<f64> {
-        let side = BLOCK_CELLS[level];
-        let span = if level == 0 { usize::MAX } else { BLOCK_CELLS[level - 1] };
-        let inverse_side = 1.0 / side as f64;
+        let shift = BLOCK_SHIFT[level];
+        let side = (1usize << shift) as f64;
+        let inverse_side = 1.0 / side;
+        let span = if level == 0 { usize::MAX >> 1 } else { 1usize << BLOCK_SHIFT[level - 1] };
         let (mut block, mut next_m, mut step_m) = ([0usize; 2], [f64::INFINITY; 2], [f64::INFINITY; 2]);
-        let (mut low, mut high) = ([0usize; 2], [0usize; 2]);
+        let mut last = [0usize; 2];
         for k in 0..2 {
-            let last_cell = first[k].saturating_add(span).min(self.cells[k]) - 1;
-            (low[k], high[k]) = (first[k] / side, last_cell / side);
+            let low = first[k] >> shift;
+            let high = ((first[k] + span).min(self.cells[k]) - 1) >> shift;
             let position = (ray.p[k] + ray.d[k] * enter_m) * inverse_side;
-            block[k] = (position.max(0.0) as usize).clamp(low[k], high[k]);
+            block[k] = (position.max(0.0) as usize).clamp(low, high);
+            last[k] = if ray.d[k] > 0.0 { high } else { low };
             if ray.d[k] != 0.0 {
-                let border = (block[k] + usize::from(ray.d[k] > 0.0)) * side;
-                next_m[k] = (border as f64 - ray.p[k]) * ray.inverse[k];
-                step_m[k] = side as f64 * ray.inverse[k].abs();
+                let border = block[k] + usize::from(ray.d[k] > 0.0);
+                next_m[k] = (border as f64 * side - ray.p[k]) * ray.inverse[k];
+                step_m[k] = side * ray.inverse[k].abs();
             }
         }
+        let tops = &self.tops[level];
         let mut t = enter_m;
         loop {
             let axis = usize::from(next_m[1] < next_m[0]);
             let end = next_m[axis].min(leave_m);
-            let tops = &self.tops[level];
             let top_m = f64::from(tops.z_m[block[1] * tops.columns + block[0]]);
             let lowest_m = ray.z_m + ray.dz * if ray.dz > 0.0 { end } else { t };
             if lowest_m >= top_m && end >= t {
-                let cell = [block[0] * side, block[1] * side];
-                let hit = if side == 1 { self.hit_cell(cell, ray, t, end) } else { self.walk(level + 1, cell, ray, t, end) };
+                let cell = [block[0] << shift, block[1] << shift];
+                let hit = if shift == 0 { self.hit_cell(cell, ray, t, end) } else { self.walk(level + 1, cell, ray, t, end) };
                 if hit.is_some() {
                     return hit;
                 }
@@ -128,11 +130,10 @@ impl Terrain {
             }
             t = end.max(t);
             next_m[axis] += step_m[axis];
-            let forward = ray.d[axis] > 0.0;
-            if if forward { block[axis] == high[axis] } else { block[axis] == low[axis] } {
+            if block[axis] == last[axis] {
                 return None;
             }
-            block[axis] = if forward { block[axis] + 1 } else { block[axis] - 1 };
+            block[axis] = if ray.d[axis] > 0.0 { block[axis] + 1 } else { block[axis] - 1 };
         }
     }
 
@@ -188,7 +189,7 @@ mod tests {
         let below = |t: f64| ray.at(t).z >= terrain.z_at(ray.at(t).x, ray.at(t).y);
         let step = 5e-4;
         let first = (0..=(to_m / step) as usize).map(|k| k as f64 * step).find(|t| below(*t))?;
-        let (mut above, mut under) = (first - step, first);
+        let (mut above, mut under) = ((first - step).max(0.0), first);
         for _ in 0..60 {
             let middle = 0.5 * (above + under);
             if below(middle) { under = middle } else { above = middle }

@@ -163,6 +163,8 @@ impl World {
     /// Whether the ground stands on a ray to the sun.
     #[inline(always)]
     pub(super) fn is_blocked_by_ground(&self, to_sun: &Ray) -> bool {
-        self.terrain.cast(to_sun, OFF_SURFACE_M, f64::INFINITY).is_some()
+        // Most grounds are nowhere as steep as the sun is high.
+        let rise = -to_sun.direction.z / to_sun.direction.xy().norm();
+        rise <= self.terrain.steepest() && self.terrain.cast(to_sun, OFF_SURFACE_M, f64::INFINITY).is_some()
     }
 }

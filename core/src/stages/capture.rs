@@ -3,12 +3,22 @@
 //! The subframe is what the flight software downlinks and exposes for: 161 × 161 px around the prediction.
 //! In a replay the exposure is the recorded one; its mean and its saturated share in the subframe are reported.
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::frames::Pixel;
 use crate::image::{GrayImage, PixelRect};
-use crate::traverse::StereoPair;
+
+/// Both images of one stop.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct StereoPair {
+    /// The left (or first) image.
+    pub left: Arc<GrayImage>,
+    /// The right (or second) image.
+    pub right: Arc<GrayImage>,
+}
 
 /// The stereo pair with what is known of its exposure.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]

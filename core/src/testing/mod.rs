@@ -13,8 +13,9 @@ use crate::error::{Error, Result};
 use crate::frames::{Pixel, Point3, Pose, Vector3};
 use crate::image::GrayImage;
 use crate::pipeline::Stops;
+use crate::stages::capture::StereoPair;
 use crate::study::truth::TruthSource;
-use crate::traverse::{OdometryError, StereoGeometry, StereoPair};
+use crate::traverse::{OdometryError, StereoGeometry};
 
 /// What a stop of the test world shows instead of the plane.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
