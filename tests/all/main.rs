@@ -2,5 +2,5 @@
 
 mod imports;
 mod recorded_cameras;
-mod zncc_reference;
 mod rerun_export;
+mod zncc_reference;

@@ -9,7 +9,7 @@ use sightline_core::frames::{Pixel, Point3, Pose};
 use sightline_core::image::GrayImage;
 use sightline_core::pipeline::Stops;
 use sightline_core::sim::{Scenario, choose_targets};
-use sightline_core::stages::capture::StereoPair;
+use sightline_core::traverse::StereoPair;
 use sightline_core::study::truth::TruthSource;
 use sightline_core::traverse::{OdometryError, StereoGeometry, Traverse, create_simulated};
 
@@ -53,35 +53,35 @@ pub fn short_scenario() -> Scenario {
 
 impl Stops for Troubled {
     fn stop_count(&self) -> usize {
-        self.traverse.stop_count()
+        Stops::stop_count(&self.traverse)
     }
     fn time_s(&self, step: usize) -> f64 {
-        self.traverse.time_s(step)
+        Stops::time_s(&self.traverse, step)
     }
     fn site_from_rover(&self, step: usize) -> Pose {
-        self.traverse.site_from_rover(step)
+        Stops::site_from_rover(&self.traverse, step)
     }
     fn cameras(&self, step: usize) -> (&Camera, &Camera) {
-        self.traverse.cameras(step)
+        Stops::cameras(&self.traverse, step)
     }
     fn mast(&self) -> Option<&Mast> {
-        self.traverse.mast()
+        Stops::mast(&self.traverse)
     }
     fn mast_angles(&self, step: usize) -> Option<MastAngles> {
-        self.traverse.mast_angles(step)
+        Stops::mast_angles(&self.traverse, step)
     }
     fn odometry_error(&self) -> OdometryError {
-        self.traverse.odometry_error()
+        Stops::odometry_error(&self.traverse)
     }
     fn stereo(&self) -> StereoGeometry {
-        self.traverse.stereo()
+        Stops::stereo(&self.traverse)
     }
     fn capture(&self, step: usize) -> Result<StereoPair> {
         if self.missing.contains(&step) {
             let path = PathBuf::from(&self.traverse.index().stops[step].left.image);
             return Err(Error::Read { path, source: std::io::ErrorKind::NotFound.into() });
         }
-        let mut pair = self.traverse.capture(step)?;
+        let mut pair = Stops::capture(&self.traverse, step)?;
         if self.covered.contains(&step) {
             let grey = |image: &GrayImage| {
                 Arc::new(GrayImage::from_pixel(image.width(), image.height(), image::Luma([0.2])))
@@ -94,15 +94,15 @@ impl Stops for Troubled {
 
 impl TruthSource for Troubled {
     fn true_site_from_rover(&self, step: usize) -> Option<Pose> {
-        self.traverse.true_site_from_rover(step)
+        TruthSource::true_site_from_rover(&self.traverse, step)
     }
     fn true_left_camera(&self, step: usize) -> &Camera {
-        self.traverse.true_left_camera(step)
+        TruthSource::true_left_camera(&self.traverse, step)
     }
     fn surface_point_in_site(&self, step: usize, pixel: Pixel) -> Option<Point3> {
-        self.traverse.surface_point_in_site(step, pixel)
+        TruthSource::surface_point_in_site(&self.traverse, step, pixel)
     }
     fn is_visible(&self, step: usize, point_in_site: &Point3) -> bool {
-        self.traverse.is_visible(step, point_in_site)
+        TruthSource::is_visible(&self.traverse, step, point_in_site)
     }
 }
