@@ -99,6 +99,7 @@ impl Default for RockSettings {
             cluster_count: 14,
             cluster_radius_m: 1.3,
             cluster_smallest_m: 0.25,
+            cluster_largest_m: 0.9,
         }
     }
 }
