@@ -1,5 +1,7 @@
 //! All tests that cross crates.
 
+mod api;
+mod cli;
 mod imports;
 mod recorded_cameras;
 mod rerun_export;
