@@ -1,2 +1,97 @@
-//! The project commands.
-fn main() {}
+//! The project's commands: `cargo xtask serve | test | check | web | bench | dist | screenshot`.
+//!
+//! Each command installs or builds what it needs and says in one sentence what to do when it cannot. All native
+//! builds name the whole workspace, so that every command asks Cargo for one set of features and the large
+//! dependencies compile once.
+
+mod cmd;
+mod web;
+mod wasm_std;
+mod debian_source;
+mod chromium;
+mod serve;
+mod test;
+mod check;
+mod house_rules;
+mod imports;
+mod bench;
+mod dist;
+
+use std::io::Write;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// The project's commands.
+#[derive(Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask", disable_help_subcommand = true)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Task,
+}
+
+/// What can be done.
+#[derive(Subcommand)]
+enum Task {
+    /// Build everything and start the server; it prints its address.
+    Serve {
+        /// Arguments for `sightline serve`, after `--`.
+        #[arg(last = true)]
+        arguments: Vec<String>,
+    },
+    /// Build everything and run every test, in the browser too.
+    Test {
+        /// Run only the tests whose names contain this.
+        filter: Option<String>,
+    },
+    /// Check format, lints (native and WASM), documentation and the rules of the house.
+    Check,
+    /// Build what the browser loads into `target/web`.
+    Web,
+    /// Run the benchmarks.
+    Bench {
+        /// Run only the benchmarks whose names contain this.
+        filter: Option<String>,
+    },
+    /// Build the program to hand out, with the viewer inside, as `target/dist/sightline`.
+    Dist,
+    /// Take the picture in the README again.
+    Screenshot,
+}
+
+fn main() -> ExitCode {
+    let done = match Arguments::parse().command {
+        Task::Serve { arguments } => serve::serve(&arguments),
+        Task::Test { filter } => test::test(filter.as_deref()),
+        Task::Check => check::check(),
+        Task::Web => web::web(),
+        Task::Bench { filter } => bench::bench(filter.as_deref()),
+        Task::Dist => dist::dist(),
+        Task::Screenshot => test::screenshot(),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            // Standard error may be closed; the exit code still tells.
+            writeln!(std::io::stderr(), "xtask: {error:#}").unwrap_or_default();
+            ExitCode::FAILURE
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn arguments_after_two_dashes_go_to_the_server() {
+        let parsed = Arguments::parse_from(["cargo xtask", "serve", "--", "--port", "0"]);
+        assert!(matches!(parsed.command, Task::Serve { arguments } if arguments == ["--port", "0"]));
+    }
+}

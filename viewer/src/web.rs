@@ -1,0 +1,42 @@
+//! The way in from the browser: `start` puts the application on a canvas, and a panic becomes a sentence on the page.
+
+use std::sync::Once;
+
+use eframe::{WebOptions, WebRunner};
+use wasm_bindgen::prelude::*;
+
+use crate::SightlineApp;
+
+/// The event that tells the page of a panic; its detail is the panic's message.
+const PANIC_EVENT: &str = "sightline-panic";
+
+/// Starts the application on the canvas with this id.
+///
+/// # Errors
+/// When the page has no such canvas, or the browser gives it no WebGL context.
+#[wasm_bindgen]
+pub async fn start(canvas_id: String) -> Result<(), JsValue> {
+    static HOOK: Once = Once::new();
+    HOOK.call_once(report_panics_to_the_page);
+    let canvas = web_sys::window()
+        .and_then(|window| window.document())
+        .and_then(|document| document.get_element_by_id(&canvas_id))
+        .and_then(|element| element.dyn_into::<web_sys::HtmlCanvasElement>().ok())
+        .ok_or_else(|| JsValue::from_str(&format!("the page has no canvas with the id `{canvas_id}`")))?;
+    WebRunner::new()
+        .start(canvas, WebOptions::default(), Box::new(|context| Ok(Box::new(SightlineApp::new(context)))))
+        .await
+}
+
+/// Sends every panic to the page as an event; eframe's own hook, installed later, logs it and then calls this one.
+fn report_panics_to_the_page() {
+    std::panic::set_hook(Box::new(|panic| {
+        let details = web_sys::CustomEventInit::new();
+        details.set_detail(&JsValue::from_str(&panic.to_string()));
+        let event = web_sys::CustomEvent::new_with_event_init_dict(PANIC_EVENT, &details);
+        if let (Some(window), Ok(event)) = (web_sys::window(), event) {
+            // Nothing is left to do where the page itself cannot be told.
+            window.dispatch_event(&event).unwrap_or_default();
+        }
+    }));
+}

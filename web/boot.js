@@ -1,0 +1,126 @@
+// Brings the viewer up: says what is being loaded, and says in a sentence why it cannot be.
+
+const CANVAS = "sightline";
+const BINDINGS = "./sightline_viewer.js";
+const MODULE = "./sightline_viewer_bg.wasm";
+const SERVER_GONE =
+  "The Sightline server does not answer. Start it with `cargo xtask serve` and load this page again.";
+
+const message = document.getElementById("message");
+const text = document.getElementById("message-text");
+const progress = document.getElementById("message-progress");
+const detail = document.getElementById("message-detail");
+
+/** A failure with a sentence for the person before the screen; `cause` is shown small below it. */
+class Failure extends Error {}
+
+/** Shows what is being done, and how much of it is. */
+function tell(sentence, fraction) {
+  text.textContent = sentence;
+  progress.hidden = fraction === undefined;
+  if (fraction !== undefined) {
+    progress.value = fraction;
+  }
+}
+
+/** Replaces the page by a sentence; the first one stays, because what follows a failure only repeats it. */
+function fail(sentence, cause) {
+  if (message.classList.contains("failed")) {
+    return;
+  }
+  message.classList.add("failed");
+  message.hidden = false;
+  tell(sentence);
+  detail.hidden = !cause;
+  detail.textContent = cause ? String(cause) : "";
+}
+
+/** Refuses a browser in which the viewer cannot run, before anything large is loaded. */
+function requireBrowser() {
+  if (typeof WebAssembly !== "object" || typeof WebAssembly.instantiateStreaming !== "function") {
+    throw new Failure("This browser cannot run WebAssembly, or it is switched off. Use a current Firefox, Chrome, Edge or Safari.");
+  }
+  // A canvas of its own: the viewer's canvas can be given one context only.
+  const probe = document.createElement("canvas");
+  const context = probe.getContext("webgl2") ?? probe.getContext("webgl");
+  if (!context) {
+    throw new Failure("This browser offers no WebGL, with which the viewer paints. Switch on hardware acceleration in its settings, or use another browser.");
+  }
+  context.getExtension("WEBGL_lose_context")?.loseContext();
+}
+
+function megabytes(bytes) {
+  return (bytes / 1e6).toFixed(1);
+}
+
+/** Fetches the WASM, telling how much has come. */
+async function fetchModule() {
+  let response;
+  try {
+    response = await fetch(MODULE);
+  } catch (cause) {
+    throw new Failure(SERVER_GONE, { cause });
+  }
+  if (!response.ok) {
+    throw new Failure("The server has no viewer to send. Build it with `cargo xtask web` and load this page again.", {
+      cause: `${response.status} ${response.statusText} for ${response.url}`,
+    });
+  }
+  // The length of a compressed response is not that of what is read from it.
+  const total = response.headers.get("Content-Encoding") ? NaN : Number(response.headers.get("Content-Length") ?? NaN);
+  let received = 0;
+  const count = new TransformStream({
+    transform(chunk, controller) {
+      received += chunk.byteLength;
+      if (total > 0) {
+        tell(`Loading the viewer: ${megabytes(received)} of ${megabytes(total)} MB`, received / total);
+      } else {
+        tell(`Loading the viewer: ${megabytes(received)} MB`);
+      }
+      controller.enqueue(chunk);
+    },
+    flush() {
+      tell("Starting the viewer");
+    },
+  });
+  const headers = { "Content-Type": "application/wasm" };
+  return new Response(response.body.pipeThrough(count), { headers });
+}
+
+/** Loads the JavaScript side of the viewer. */
+async function importBindings() {
+  try {
+    return await import(BINDINGS);
+  } catch (cause) {
+    throw new Failure(SERVER_GONE, { cause });
+  }
+}
+
+async function boot() {
+  requireBrowser();
+  tell("Loading the viewer");
+  const [bindings, module] = await Promise.all([importBindings(), fetchModule()]);
+  try {
+    await bindings.default({ module_or_path: module });
+  } catch (cause) {
+    throw new Failure("The viewer did not arrive whole. Load this page again; if that does not help, restart the server.", { cause });
+  }
+  await bindings.start(CANVAS);
+  if (!message.classList.contains("failed")) {
+    message.hidden = true;
+    document.getElementById(CANVAS).focus();
+  }
+}
+
+// A panic inside the viewer calls this with its message; afterwards nothing on the canvas answers any more.
+window.addEventListener("sightline-panic", (event) => {
+  fail("The viewer stopped because of a fault in it. Load this page again; your session is safe on the server.", event.detail);
+});
+
+boot().catch((error) => {
+  if (error instanceof Failure) {
+    fail(error.message, error.cause);
+  } else {
+    fail("The viewer could not start. Load this page again; if that does not help, use another browser.", error);
+  }
+});

@@ -1,0 +1,47 @@
+//! `cargo xtask check`: format, lints, documentation and the rules of the house.
+
+use anyhow::{Context, Result, bail};
+
+use crate::{cmd, house_rules, wasm_std, web};
+
+/// Runs every check, the quick ones first.
+pub(crate) fn check() -> Result<()> {
+    keep_rules()?;
+    cmd::run(&mut cmd::cargo(&["fmt", "--all", "--check"]), "run `cargo fmt --all`")?;
+    // The server's build embeds or names this folder, which a fresh clone does not have.
+    std::fs::create_dir_all(web::output_dir()).context("the folder target/web cannot be made")?;
+    let mend = "mend what Clippy reports above";
+    let std = wasm_std::ensure()?;
+    let lints = ["--", "-D", "warnings"];
+    cmd::run(
+        web::viewer_cargo("clippy", std).args(["--package", "sightline-viewer", "--lib"]).args(lints),
+        mend,
+    )?;
+    for crates in [&["--package", "xtask"][..], &["--workspace", "--exclude", "xtask"]] {
+        cmd::run(cmd::cargo(&["clippy", "--all-targets"]).args(crates).args(lints), mend)?;
+        cmd::run(
+            cmd::cargo(&["doc", "--no-deps", "--document-private-items"])
+                .args(crates)
+                .env("RUSTDOCFLAGS", "-D warnings"),
+            "mend the documentation reported above",
+        )?;
+    }
+    cmd::say("All checks pass.");
+    Ok(())
+}
+
+/// Compares the sources with the rules of the house.
+fn keep_rules() -> Result<()> {
+    let broken = house_rules::broken_rules(&cmd::root())?;
+    for finding in &broken {
+        cmd::say(finding);
+    }
+    match broken.len() {
+        0 => {
+            cmd::say("The rules of the house are kept.");
+            Ok(())
+        }
+        1 => bail!("one rule of the house is broken: mend it as its message says"),
+        number => bail!("{number} rules of the house are broken: mend them as their messages say"),
+    }
+}

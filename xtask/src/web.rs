@@ -1,0 +1,100 @@
+//! `cargo xtask web`: the viewer as WASM, its bindings and the page, in `target/web`.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::UNIX_EPOCH;
+
+use anyhow::{Context, Result};
+use wasm_bindgen_cli_support::Bindgen;
+
+use crate::cmd;
+use crate::wasm_std::{self, WasmStd};
+
+/// The folder from which the server serves, or embeds, the page.
+pub(crate) fn output_dir() -> PathBuf {
+    cmd::root().join("target").join("web")
+}
+
+/// Builds what changed.
+pub(crate) fn web() -> Result<()> {
+    let std = wasm_std::ensure()?;
+    cmd::run(viewer_cargo("build", std).args(["--package", "sightline-viewer", "--lib"]), "mend the viewer")?;
+    let wasm = cmd::root().join("target/viewer").join(wasm_std::TARGET).join("viewer/sightline_viewer.wasm");
+    let output = output_dir();
+    std::fs::create_dir_all(&output).with_context(|| format!("{} cannot be made", output.display()))?;
+    bind(&wasm, &output)?;
+    copy_page(&cmd::root().join("web"), &output)?;
+    let bytes = std::fs::metadata(output.join("sightline_viewer_bg.wasm"))?.len();
+    cmd::say(format!("The page is in target/web; its WASM has {:.1} MB.", bytes as f64 / 1e6));
+    Ok(())
+}
+
+/// A Cargo command for the viewer in the browser, with a directory and a profile of its own.
+///
+/// The native crates are compiled with other features and flags; apart, neither ever makes the other compile again.
+pub(crate) fn viewer_cargo(task: &str, std: WasmStd) -> Command {
+    let mut cargo = cmd::cargo(&[task, "--target", wasm_std::TARGET, "--target-dir", "target/viewer"]);
+    cargo.args(["--profile", "viewer"]);
+    std.prepare(&mut cargo);
+    cargo
+}
+
+/// Writes the JavaScript bindings and the WASM that goes with them, unless they are those of this build already.
+fn bind(wasm: &Path, output: &Path) -> Result<()> {
+    let described = describe(wasm)?;
+    let note = cmd::root().join("target/viewer/bound");
+    let written = ["sightline_viewer.js", "sightline_viewer_bg.wasm"];
+    let is_there = written.iter().all(|name| output.join(name).is_file());
+    if is_there && std::fs::read_to_string(&note).is_ok_and(|remembered| remembered == described) {
+        return Ok(());
+    }
+    let mut bindgen = Bindgen::new();
+    bindgen
+        .web(true)
+        .and_then(|bindgen| bindgen.input_path(wasm).out_name("sightline_viewer").typescript(false).generate(output))
+        .context("wasm-bindgen fails on the viewer; give wasm-bindgen and wasm-bindgen-cli-support the same version")?;
+    std::fs::write(&note, described).with_context(|| format!("{} cannot be written", note.display()))
+}
+
+/// What tells one build of the viewer from another without reading it.
+fn describe(wasm: &Path) -> Result<String> {
+    let metadata = std::fs::metadata(wasm)
+        .with_context(|| format!("Cargo left no {}; mend the viewer", wasm.display()))?;
+    let modified = metadata.modified()?.duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos();
+    Ok(format!("{} bytes, {modified} ns", metadata.len()))
+}
+
+/// Copies the files of the page that differ.
+fn copy_page(page: &Path, output: &Path) -> Result<()> {
+    for entry in std::fs::read_dir(page).with_context(|| format!("{} cannot be read", page.display()))? {
+        let file = entry?.path();
+        let Some(name) = file.file_name().filter(|_| file.is_file()) else { continue };
+        let copy = output.join(name);
+        let content = std::fs::read(&file).with_context(|| format!("{} cannot be read", file.display()))?;
+        if std::fs::read(&copy).is_ok_and(|present| present == content) {
+            continue;
+        }
+        std::fs::write(&copy, content).with_context(|| format!("{} cannot be written", copy.display()))?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_page_is_copied_again_only_where_it_differs() {
+        let page = tempfile::tempdir().expect("a temporary folder");
+        let output = tempfile::tempdir().expect("a temporary folder");
+        std::fs::write(page.path().join("index.html"), "one").expect("a file");
+        copy_page(page.path(), output.path()).expect("the page is copied");
+        let copy = output.path().join("index.html");
+        let modified = std::fs::metadata(&copy).expect("a copy").modified().expect("a time");
+        copy_page(page.path(), output.path()).expect("nothing differs");
+        assert_eq!(std::fs::metadata(&copy).expect("a copy").modified().expect("a time"), modified);
+        std::fs::write(page.path().join("index.html"), "two").expect("a file");
+        copy_page(page.path(), output.path()).expect("the page is copied");
+        assert_eq!(std::fs::read_to_string(&copy).expect("a copy"), "two");
+    }
+}
