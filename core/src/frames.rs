@@ -52,7 +52,10 @@ impl Pixel {
 
     /// Whether the pixel lies on an image of `width` × `height`, its border pixels included.
     pub fn is_inside(self, width: u32, height: u32) -> bool {
-        self.x >= -0.5 && self.y >= -0.5 && self.x <= f64::from(width) - 0.5 && self.y <= f64::from(height) - 0.5
+        self.x >= -0.5
+            && self.y >= -0.5
+            && self.x <= f64::from(width) - 0.5
+            && self.y <= f64::from(height) - 0.5
     }
 }
 

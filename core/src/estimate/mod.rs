@@ -1,0 +1,4 @@
+//! Estimation that several trackers use.
+
+pub mod triangulate;
+pub mod unscented;
