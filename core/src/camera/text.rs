@@ -19,7 +19,10 @@ use std::path::Path;
 
 use super::{Cahv, Cahvor, Cahvore, Camera, CameraModel, Imaging};
 use crate::error::{Error, Result};
-use crate::frames::{Point3, Vector3};
+use crate::frames::Point3;
+
+/// The keys whose values make the camera.
+const KEYS: [&str; 9] = ["Model", "Dimensions", "C", "A", "H", "V", "O", "R", "E"];
 
 /// Reads a text camera file; O is made unit.
 ///
@@ -66,11 +69,19 @@ fn model_line(model: &CameraModel) -> String {
     match model {
         CameraModel::Cahv(_) => "CAHV = perspective, linear".to_owned(),
         CameraModel::Cahvor(_) => "CAHVOR = perspective, distortion".to_owned(),
-        CameraModel::Cahvore(model) => match model.imaging {
-            Imaging::Perspective => "CAHVORE1 = perspective, distortion, pupil".to_owned(),
-            Imaging::Fisheye => "CAHVORE2 = fish-eye".to_owned(),
-            Imaging::General => format!("CAHVORE3,{} = general", model.linearity_parameter),
-        },
+        CameraModel::Cahvore(model) => {
+            let description = match model.imaging {
+                Imaging::Perspective => "perspective, distortion, pupil",
+                Imaging::Fisheye => "fish-eye",
+                Imaging::General => "general",
+            };
+            // The parameter means nothing for the other two laws, but it is kept where it was given.
+            let parameter = match (model.imaging, model.linearity_parameter) {
+                (Imaging::Perspective | Imaging::Fisheye, 0.0) => String::new(),
+                (_, parameter) => format!(",{parameter}"),
+            };
+            format!("CAHVORE{}{parameter} = {description}", u8::from(model.imaging))
+        }
     }
 }
 
@@ -134,7 +145,8 @@ fn entries(text: &str) -> Result<HashMap<String, Entry>, String> {
         if let Some((key, value)) = content.split_once('=') {
             let key = key.trim().to_owned();
             let entry = Entry { line, value: value.trim().to_owned() };
-            if let Some(first) = entries.insert(key.clone(), entry) {
+            let first = entries.insert(key.clone(), entry);
+            if let Some(first) = first.filter(|_| KEYS.contains(&key.as_str())) {
                 return Err(format!("line {line} gives {key} again; it was given in line {}", first.line));
             }
             last = Some(key);
@@ -178,17 +190,24 @@ fn kind(Entry { line, value }: &Entry) -> Result<Kind, String> {
     // What follows a second "=" is a description for people.
     let name = value.split('=').next().unwrap_or_default().replace(char::is_whitespace, "");
     let (family, parameter) = name.split_once(',').unwrap_or((&name, ""));
-    match (family, parameter) {
-        ("CAHV", "") => Ok(Kind::Cahv),
-        ("CAHVOR", "") => Ok(Kind::Cahvor),
-        ("CAHVORE1", _) => Ok(Kind::Cahvore(Imaging::Perspective, parameter.parse().unwrap_or(0.0))),
-        ("CAHVORE2", _) => Ok(Kind::Cahvore(Imaging::Fisheye, parameter.parse().unwrap_or(0.0))),
-        ("CAHVORE3", _) => match parameter.parse::<f64>() {
-            Ok(linearity) if linearity.is_finite() => Ok(Kind::Cahvore(Imaging::General, linearity)),
-            _ => Err(format!("line {line}: CAHVORE3 needs its linearity, as in \"CAHVORE3,0.37\"")),
-        },
+    let imaging = match (family, parameter) {
+        ("CAHV", "") => return Ok(Kind::Cahv),
+        ("CAHVOR", "") => return Ok(Kind::Cahvor),
+        ("CAHVORE1", _) => Imaging::Perspective,
+        ("CAHVORE2", _) => Imaging::Fisheye,
+        ("CAHVORE3", _) => Imaging::General,
+        _ => {
+            return Err(format!(
+                "line {line}: the model is {name:?}, \
+                 but it must be CAHV, CAHVOR, CAHVORE1, CAHVORE2 or CAHVORE3,P"
+            ));
+        }
+    };
+    match parameter.parse::<f64>() {
+        Ok(linearity) if linearity.is_finite() => Ok(Kind::Cahvore(imaging, linearity)),
+        _ if parameter.is_empty() && imaging != Imaging::General => Ok(Kind::Cahvore(imaging, 0.0)),
         _ => Err(format!(
-            "line {line}: the model is {name:?}, but it must be CAHV, CAHVOR, CAHVORE1, CAHVORE2 or CAHVORE3,P"
+            "line {line}: {family} is followed by {parameter:?}, not by its linearity as in \"CAHVORE3,0.37\""
         )),
     }
 }
@@ -197,6 +216,7 @@ fn kind(Entry { line, value }: &Entry) -> Result<Kind, String> {
 mod tests {
     use super::super::tests::all_kinds;
     use super::*;
+    use crate::frames::Vector3;
 
     const JPL: &str = "# made by CCALADJ\n\nModel = CAHVORE3,0.37 = general\n\nDimensions = 1024 768\n\n\
         C =      0.609331000     -0.041064000     -0.233849000\nA = 0.703447 -0.005161 0.710729\n\
@@ -210,7 +230,14 @@ mod tests {
 
     #[test]
     fn text_gives_every_model_back_bit_for_bit() {
-        for camera in all_kinds() {
+        let mut cameras = all_kinds().to_vec();
+        for (imaging, parameter) in [(Imaging::Perspective, 0.0), (Imaging::Fisheye, 0.1)] {
+            let mut camera = cameras[2].clone();
+            let CameraModel::Cahvore(model) = &mut camera.model else { panic!("{camera:?}") };
+            (model.imaging, model.linearity_parameter) = (imaging, parameter);
+            cameras.push(camera);
+        }
+        for camera in cameras {
             let text = write_text(&camera);
             assert_eq!(read_text(&text, Path::new("memory")).unwrap(), camera, "{text}");
         }
@@ -237,7 +264,8 @@ mod tests {
             ("A = 0.703447 -0.005161 0.710729", "A = 7 0 1", "vector A has length"),
             ("Dimensions = 1024 768", "Dimensions = 1024", "line 5: Dimensions must be"),
             ("Dimensions = 1024 768", "Dimensions = 0 768", "line 5: Dimensions must be"),
-            ("CAHVORE3,0.37", "CAHVORE3", "line 3: CAHVORE3 needs its linearity"),
+            ("CAHVORE3,0.37", "CAHVORE3", "line 3: CAHVORE3 is followed by \"\""),
+            ("CAHVORE3,0.37", "CAHVORE1,x", "line 3: CAHVORE1 is followed by \"x\""),
             ("CAHVORE3,0.37", "PSPH", "line 3: the model is \"PSPH\""),
             ("E = 0.001442", "C = 0.001442", "line 14 gives C again; it was given in line 7"),
             ("# made by CCALADJ", "made by CCALADJ", "line 1 is \"made by CCALADJ\""),

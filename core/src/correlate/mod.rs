@@ -1,1 +1,23 @@
-//! Correlation.
+//! Normalised cross-correlation and its peaks (K§4.3.2, R62–R69).
+//!
+//! ```text
+//! ncc = Σ(I − Ī)(J − J̄) / sqrt(Σ(I − Ī)² Σ(J − J̄)²)                                             K-Eq 11
+//! ```
+//! | file | what it does |
+//! |---|---|
+//! | `zncc` | the dense surface of scores of one template over a region, and one score of two patches |
+//! | `surface` | the scores and which pixel each belongs to |
+//! | `dot` | the numerators, in SIMD registers: nearly all the work |
+//! | `exact` | one position in double precision: windows too flat for the fast sums |
+//! | `peak` | the best match below the pixel, its covariance, and the second best |
+
+pub mod zncc;
+pub mod surface;
+mod dot;
+mod exact;
+pub mod peak;
+
+pub use crate::image::PixelRect;
+pub use peak::{Peak, SecondPeak, find_peak, second_peak};
+pub use surface::Surface;
+pub use zncc::{zncc, zncc_surface};

@@ -1,3 +1,5 @@
 //! The validation experiments: grid in, table and figure out; and the truth they are measured against.
 
 pub mod truth;
+pub mod calibration;
+pub mod approach;

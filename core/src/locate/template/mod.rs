@@ -17,6 +17,9 @@ pub mod triangulate;
 
 pub use settings::TemplateSettings;
 
+#[cfg(test)]
+mod tests;
+
 use nalgebra::Matrix2;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;

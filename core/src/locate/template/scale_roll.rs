@@ -131,3 +131,41 @@ pub fn scale_roll(
         rolled,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{Cahv, Cahvor, CameraModel};
+    use crate::frames::{PoseRecord, Vector3};
+
+    /// Opportunity's left navcam, vectors as printed (domain.md, TV1).
+    fn navcam() -> Camera {
+        let linear = Cahv::as_printed(
+            Point3::new(0.442604, -0.0611635, -1.25106),
+            Vector3::new(0.93995, -0.338133, 0.0464979),
+            Vector3::new(884.72, 981.763, 24.1472),
+            Vector3::new(418.579, -152.039, 1245.75),
+        );
+        let optical_axis = Vector3::new(0.946551, -0.315595, 0.0666419);
+        let model = Cahvor::as_printed(linear, optical_axis, [0.00096, -0.002183, 0.018547]);
+        Camera::new(CameraModel::Cahvor(model), 1024, 1024)
+    }
+
+    #[test]
+    fn scale_and_roll_of_test_vector_five_agree_to_its_last_digit() {
+        let new_pose = PoseRecord {
+            position_m: [0.9, 0.05, -0.02],
+            quaternion_sxyz: [0.9985338374, 0.0440542148, -0.0162881723, 0.026909053],
+        };
+        let now_from_then = new_pose.to_pose().inverse();
+        let target = Point3::new(8.0, -2.6, 0.1);
+        let (scale, roll, old_m, new_m) =
+            geometry(&target, &navcam(), &now_from_then, &navcam(), RollReference::Horizontal).unwrap();
+        assert!((scale - 1.1102799965).abs() < 1e-9, "{scale}");
+        assert!((roll.to_degrees() + 5.9429401632).abs() < 1e-6, "{}", roll.to_degrees());
+        assert!((old_m - 8.0861170037).abs() < 1e-9 && (new_m - 7.2829529754).abs() < 1e-8);
+        let (_, against_old, ..) =
+            geometry(&target, &navcam(), &now_from_then, &navcam(), RollReference::OldImage).unwrap();
+        assert!(((roll - against_old).to_degrees() + 0.0237861221).abs() < 1e-6);
+    }
+}
