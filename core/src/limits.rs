@@ -38,9 +38,7 @@ impl Domain {
                 Some(v) if v % 2 == 1 && (u64::from(*low)..=u64::from(*high)).contains(&v) => None,
                 _ => Some(format!("must be an odd whole number from {low} to {high}, not {value}")),
             },
-            Self::Switch => {
-                (!value.is_boolean()).then(|| format!("must be true or false, not {value}"))
-            }
+            Self::Switch => (!value.is_boolean()).then(|| format!("must be true or false, not {value}")),
             Self::Choice(words) => {
                 let known = value.as_str().is_some_and(|v| words.iter().any(|w| w == v));
                 (!known).then(|| format!("must be one of {}, not {value}", words.join(", ")))

@@ -53,14 +53,13 @@ pub trait Stops {
 ///
 /// # Errors
 /// [`Error::Target`] when the pixel or step does not exist or no 3-D position is found; file errors of the stop.
-pub fn designate(
-    stops: &dyn Stops,
-    designation: Designation,
-    settings: &Settings,
-) -> Result<StepTrace> {
+pub fn designate(stops: &dyn Stops, designation: Designation, settings: &Settings) -> Result<StepTrace> {
     let step = designation.step;
     if step >= stops.stop_count() {
-        return Err(Error::Target(format!("step {step} does not exist: the traverse has {} stops", stops.stop_count())));
+        return Err(Error::Target(format!(
+            "step {step} does not exist: the traverse has {} stops",
+            stops.stop_count()
+        )));
     }
     let (left, right) = stops.cameras(step);
     let pixel = designation.pixel;
@@ -78,14 +77,23 @@ pub fn designate(
     let stereo = stops.stereo();
     let input = DesignateInput { pixel, capture: &capture, left, right, stereo, settings };
     let located = locator(settings.tracker).designate(&input);
-    let (Some(position_in_rover), Some(covariance_in_rover)) = (located.position_in_rover, located.covariance_in_rover)
+    let (Some(position_in_rover), Some(covariance_in_rover)) =
+        (located.position_in_rover, located.covariance_in_rover)
     else {
         let why = located.missing.unwrap_or_else(|| "no 3-D position".to_owned());
-        return Err(Error::Target(format!("no 3-D position at pixel ({:.1}, {:.1}): {why}", pixel.x, pixel.y)));
+        return Err(Error::Target(format!(
+            "no 3-D position at pixel ({:.1}, {:.1}): {why}",
+            pixel.x, pixel.y
+        )));
     };
     let distance_m = (position_in_rover - left.model.centre()).norm();
-    let appearance =
-        Appearance { step, pixel, position_in_rover, camera: left.clone(), image: Arc::clone(&capture.pair.left) };
+    let appearance = Appearance {
+        step,
+        pixel,
+        position_in_rover,
+        camera: left.clone(),
+        image: Arc::clone(&capture.pair.left),
+    };
     let target = Target {
         designation,
         step,
@@ -155,8 +163,7 @@ pub fn run_step(stops: &dyn Stops, last: &Updated, settings: &Settings) -> StepT
         Err(error) => trace.fault = Some(error.to_string()),
         Ok(pair) => {
             let captured = capture::capture(pair, pointing.predicted_left, settings.template.subframe_px);
-            let now_from_template =
-                site_from_rover.inverse() * stops.site_from_rover(target.appearance.step);
+            let now_from_template = site_from_rover.inverse() * stops.site_from_rover(target.appearance.step);
             let located = locator(settings.tracker).locate(&LocateInput {
                 target,
                 prediction: &prediction,
@@ -167,9 +174,17 @@ pub fn run_step(stops: &dyn Stops, last: &Updated, settings: &Settings) -> StepT
                 lost_count: lost_count(last.state),
                 settings,
             });
-            let verdict: Verdict =
-                judge::judge(target, &prediction, &pointing, &located, &site_from_rover, last.state, &settings.limits);
-            trace.update = update::update(target, step, &prediction, &pointing, &captured, &located, &verdict);
+            let verdict: Verdict = judge::judge(
+                target,
+                &prediction,
+                &pointing,
+                &located,
+                &site_from_rover,
+                last.state,
+                &settings.limits,
+            );
+            trace.update =
+                update::update(target, step, &prediction, &pointing, &captured, &located, &verdict);
             (trace.capture, trace.locate, trace.judge) = (Some(captured), Some(located), Some(verdict));
         }
     }

@@ -77,8 +77,9 @@ impl Settings {
 /// # Errors
 /// [`Error::Setting`] when there is no `=`.
 pub fn parse_assignment(text: &str) -> Result<(String, Value)> {
-    let (key, value) =
-        text.split_once('=').ok_or_else(|| Error::setting(text, "write it as key=value, for example ncc_min=0.6"))?;
+    let (key, value) = text
+        .split_once('=')
+        .ok_or_else(|| Error::setting(text, "write it as key=value, for example ncc_min=0.6"))?;
     let value = value.trim();
     let parsed = serde_json::from_str(value).unwrap_or_else(|_| Value::String(value.to_owned()));
     Ok((key.trim().to_owned(), parsed))

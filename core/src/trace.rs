@@ -179,7 +179,9 @@ impl StepTrace {
             ArrayName::Matched => matched.map(|m| ArrayView::Patch(&m.matched)),
             ArrayName::Difference => matched.map(|m| ArrayView::Patch(&m.difference)),
             ArrayName::Surface => matched.map(|m| ArrayView::Surface(&m.surface)),
-            ArrayName::RightWindow => evidence.point_stereo.as_ref().map(|s| ArrayView::Patch(&s.right_window)),
+            ArrayName::RightWindow => {
+                evidence.point_stereo.as_ref().map(|s| ArrayView::Patch(&s.right_window))
+            }
         }
     }
 }

@@ -299,6 +299,24 @@ fn points_behind_a_camera_are_rejected() {
 }
 
 #[test]
+fn points_beyond_the_fold_of_a_distortion_are_rejected() {
+    // With R = (0, −0.1, 0) the seen radius turns back at the tangent √(10/3), 61.3° off the axis.
+    let [linear, ..] = all_kinds();
+    let linear = linear.model.linear().clone();
+    let (axis, across) = (linear.axis.normalize(), linear.horizontal_axis().normalize());
+    let camera = CameraModel::Cahvor(Cahvor::normalised(linear, axis, [0.0, -0.1, 0.0]));
+    let at = |angle_deg: f64| {
+        let (sin, cos) = angle_deg.to_radians().sin_cos();
+        camera.centre() + axis * cos + across * sin
+    };
+    assert!(camera.project(&at(61.0)).is_some());
+    for beyond in [61.6, 70.0, 89.0, 91.0, 150.0] {
+        assert_eq!(camera.project(&at(beyond)), None, "{beyond}°");
+        assert_eq!(camera.project_with_jacobian(&at(beyond)), None, "{beyond}°");
+    }
+}
+
+#[test]
 fn a_hazcam_sees_beyond_ninety_degrees_of_its_axis() {
     let [_, _, camera] = all_kinds();
     let wider = Camera { model: camera.model.shifted(-30.0, -30.0), size: [1084, 1084] };

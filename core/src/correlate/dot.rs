@@ -60,8 +60,10 @@ pub(super) struct Tile<'a> {
     pub(super) columns: usize,
     /// Rows of positions wanted, at most `TILE_ROWS`.
     pub(super) rows: usize,
-    /// The sums, `TILE_ROWS` × `TILE_COLUMNS`; those beyond what is wanted are arbitrary.
+    /// The sums, rows of `stride`, which holds whole tiles; those beyond what is wanted are arbitrary.
     pub(super) output: &'a mut [f32],
+    /// Numbers from one row of sums to the next.
+    pub(super) stride: usize,
 }
 
 impl WithSimd for Tile<'_> {
@@ -99,8 +101,7 @@ impl Tile<'_> {
         for (row, weights) in self.weights.values.chunks_exact(size).enumerate() {
             let pixels = &self.input[(y + row) * stride + x..][..size - 1 + span];
             for (weights, pixels) in weights.iter().zip(pixels.windows(span)) {
-                let pixels: [S::f32s; V] =
-                    std::array::from_fn(|v| load::<S>(&pixels[v * S::F32_LANES..(v + 1) * S::F32_LANES]));
+                let Some(pixels) = S::as_simd_f32s(pixels).0.first_chunk::<V>() else { return };
                 for r in 0..ROWS {
                     let weight = simd.splat_f32s(weights[r]);
                     for v in 0..V {
@@ -109,14 +110,9 @@ impl Tile<'_> {
                 }
             }
         }
-        for (r, sums) in sums.iter().enumerate() {
-            let out = &mut self.output[(y + r) * TILE_COLUMNS + x..][..span];
-            out.copy_from_slice(bytemuck::cast_slice(sums));
+        for (r, sums) in sums.into_iter().enumerate() {
+            let out = &mut self.output[(y + r) * self.stride + x..][..span];
+            S::as_mut_simd_f32s(out).0.copy_from_slice(&sums);
         }
     }
-}
-
-#[inline(always)]
-fn load<S: Simd>(pixels: &[f32]) -> S::f32s {
-    bytemuck::pod_read_unaligned(bytemuck::cast_slice(pixels))
 }

@@ -8,32 +8,39 @@
 //! whole pixel stands when H is not negative definite, or when a neighbour is missing or excluded; each
 //! component of d* is held within ±1 px.
 //!
+//! *Departure.* Where the 5 × 5 neighbours exist, d* is then moved to the maximum of the polynomial of fourth
+//! degree in x and in y that passes through all of them (Newton's method from d*). The surface is lopsided, because
+//! the norm of the window changes as it moves, and a quadratic cannot follow: with 21 × 21 pixels of noiseless
+//! texture it errs by 0.03 px (rms, up to 0.08), the quartic by less than 0.01.
+//!
 //! **Covariance.** With patches of zero mean and unit norm a shift by δ lowers the score by ½ δᵀ(−H)δ, so −H is
 //! the information of the squared difference per unit of its variance. What the match leaves unexplained,
 //! 1 − ncc², is spread over the N pixels of the window less the four numbers fitted (gain, level, two shifts):
 //! ```text
 //! σ² = (1 − ncc²) / (N − 4),     Σ = σ² (−H)⁻¹ + floor² 1
 //! ```
-//! It is the Cramér–Rao bound for noise that is independent from pixel to pixel. Where the residual is correlated
+//! It is the Cramér–Rao bound for noise that is independent from pixel to pixel. It does not hold the bias of the
+//! correlation itself, which noise draws towards windows of more contrast (0.02 px at a score of 0.97, where the
+//! contrast grows by a few percent per pixel). Where the residual is correlated
 //! over an area of A px² (perspective, shadow) the effective count is N/A and Σ is A times larger: who needs that
-//! measures it from the patches. The floor is the error of the quadratic itself. A peak kept on whole pixels adds
+//! measures it from the patches. The floor is the error of the fit itself. A peak kept on whole pixels adds
 //! the variance of rounding, 1/12 px²; without a fit the position is known to the neighbours, 3 px wide: 3²/12.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
 //! | f₀ | `integer_score` | – |
-//! | g, H | `Fit::gradient`, `Fit::hessian` | 1/px, 1/px² |
+//! | H | `Fit::hessian` | 1/px² |
 //! | d* | `Fit::offset` | px |
 //! | Σ | `covariance_px2` | px² |
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Matrix2, Matrix5, SMatrix, Vector2, Vector5};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::surface::Surface;
 use crate::frames::Pixel;
 
-/// 1σ error of the quadratic on textures with detail down to three pixels, px.
+/// 1σ error of the fit itself on textures with detail down to three pixels, px.
 const FIT_FLOOR_PX: f64 = 0.02;
 
 /// The best match of a surface.
@@ -73,8 +80,11 @@ pub struct SecondPeak {
 pub fn find_peak(surface: &Surface, sub_pixel: bool) -> Option<Peak> {
     let (ix, iy, highest) = surface.maximum()?;
     let whole = surface.pixel_of(ix, iy);
-    let neighbours = neighbours(surface, ix, iy);
-    let fit = neighbours.as_ref().and_then(Fit::new);
+    let near = neighbours::<3>(surface, ix, iy);
+    let fit = near
+        .as_ref()
+        .and_then(Fit::quadratic)
+        .map(|fit| neighbours::<5>(surface, ix, iy).and_then(|wide| fit.refined(&wide)).unwrap_or(fit));
     let integer_score = f64::from(highest);
     let (offset, score) = match &fit {
         Some(fit) if sub_pixel => (fit.offset, fit.score.clamp(-1.0, 1.0)),
@@ -92,7 +102,7 @@ pub fn find_peak(surface: &Surface, sub_pixel: bool) -> Option<Peak> {
         integer: [surface.origin[0] + ix as i32, surface.origin[1] + iy as i32],
         integer_score,
         covariance_px2,
-        at_edge: neighbours.is_none(),
+        at_edge: near.is_none(),
     })
 }
 
@@ -121,39 +131,65 @@ fn is_local_maximum(surface: &Surface, ix: u32, iy: u32) -> bool {
     })
 }
 
-/// The 3 × 3 scores around an index, row by row; `None` when one is missing or excluded.
-fn neighbours(surface: &Surface, ix: u32, iy: u32) -> Option<[f64; 9]> {
-    let mut scores = [0.0; 9];
-    for (i, score) in scores.iter_mut().enumerate() {
-        let (u, v) = ((ix + i as u32 % 3).checked_sub(1)?, (iy + i as u32 / 3).checked_sub(1)?);
-        *score = f64::from(surface.at(u, v)?);
+/// The N × N scores around an index, indexed by (row, column); `None` when one is missing or excluded.
+fn neighbours<const N: usize>(surface: &Surface, ix: u32, iy: u32) -> Option<SMatrix<f64, N, N>> {
+    let mut scores = SMatrix::zeros();
+    for (row, column) in (0..N).flat_map(|row| (0..N).map(move |column| (row, column))) {
+        let u = (ix + column as u32).checked_sub(N as u32 / 2)?;
+        let v = (iy + row as u32).checked_sub(N as u32 / 2)?;
+        scores[(row, column)] = f64::from(surface.at(u, v)?);
     }
     Some(scores)
 }
 
-/// The quadratic through the neighbourhood of a maximum.
-struct Fit {
+/// A smooth function fitted to the neighbourhood of the highest score, at its maximum.
+#[derive(Clone, Copy)]
+pub(crate) struct Fit {
     /// From the whole pixel to the maximum, px.
-    offset: Vector2<f64>,
-    /// Value of the quadratic there.
-    score: f64,
-    /// Curvature, 1/px²; negative definite.
+    pub(crate) offset: Vector2<f64>,
+    /// Value there.
+    pub(crate) score: f64,
+    /// Curvature there, 1/px²; negative definite.
     hessian: Matrix2<f64>,
 }
 
 impl Fit {
-    /// `None` unless the curvature is negative in every direction.
-    fn new(f: &[f64; 9]) -> Option<Self> {
-        let gradient = Vector2::new((f[5] - f[3]) / 2.0, (f[7] - f[1]) / 2.0);
-        let (xx, yy) = (f[5] - 2.0 * f[4] + f[3], f[7] - 2.0 * f[4] + f[1]);
-        let xy = (f[8] - f[6] - f[2] + f[0]) / 4.0;
+    /// The quadratic of R67; rows are y. `None` unless the curvature is negative in every direction.
+    pub(crate) fn quadratic(f: &SMatrix<f64, 3, 3>) -> Option<Self> {
+        let gradient = Vector2::new((f[(1, 2)] - f[(1, 0)]) / 2.0, (f[(2, 1)] - f[(0, 1)]) / 2.0);
+        let middle = f[(1, 1)];
+        let (xx, yy) = (f[(1, 2)] - 2.0 * middle + f[(1, 0)], f[(2, 1)] - 2.0 * middle + f[(0, 1)]);
+        let xy = (f[(2, 2)] - f[(2, 0)] - f[(0, 2)] + f[(0, 0)]) / 4.0;
         let hessian = Matrix2::new(xx, xy, xy, yy);
-        if !(xx < 0.0 && hessian.determinant() > 1e-12) {
+        if !is_maximum(&hessian) {
             return None;
         }
         let offset = (-hessian.try_inverse()? * gradient).map(|d| d.clamp(-1.0, 1.0));
-        let score = f[4] + gradient.dot(&offset) + 0.5 * offset.dot(&(hessian * offset));
+        let score = middle + gradient.dot(&offset) + 0.5 * offset.dot(&(hessian * offset));
         Some(Self { offset, score, hessian })
+    }
+
+    /// The maximum of the polynomial through 5 × 5 scores nearest to this fit; `None` when Newton's method does
+    /// not settle within a pixel of the highest score.
+    fn refined(&self, f: &SMatrix<f64, 5, 5>) -> Option<Self> {
+        let coefficients = QUARTIC * f * QUARTIC.transpose();
+        let mut offset = self.offset;
+        for _ in 0..NEWTON_STEPS {
+            let ([x, dx, ddx], [y, dy, ddy]) = (powers(offset.x), powers(offset.y));
+            let value = |y: &Vector5<f64>, x: &Vector5<f64>| y.dot(&(coefficients * x));
+            let gradient = Vector2::new(value(&y, &dx), value(&dy, &x));
+            let cross = value(&dy, &dx);
+            let hessian = Matrix2::new(value(&y, &ddx), cross, cross, value(&ddy, &x));
+            if !is_maximum(&hessian) || offset.amax() > 1.0 {
+                return None;
+            }
+            let step = -hessian.try_inverse()? * gradient;
+            if step.amax() < 1e-9 {
+                return Some(Self { offset, score: value(&y, &x), hessian });
+            }
+            offset += step;
+        }
+        None
     }
 
     /// Covariance of the maximum of a template of `samples` pixels that scores `score`, px².
@@ -162,6 +198,34 @@ impl Fit {
         let information = (-self.hessian).try_inverse().unwrap_or_else(Matrix2::identity);
         information * variance + Matrix2::identity() * FIT_FLOOR_PX.powi(2)
     }
+}
+
+/// Newton's method doubles its digits at every step; from a quadratic's answer four suffice.
+const NEWTON_STEPS: usize = 12;
+
+/// Coefficients of 1, d, d², d³, d⁴ of the quartic through values at d = −2 … 2.
+#[rustfmt::skip]
+const QUARTIC: Matrix5<f64> = Matrix5::new(
+    0.0, 0.0, 1.0, 0.0, 0.0,
+    1.0 / 12.0, -8.0 / 12.0, 0.0, 8.0 / 12.0, -1.0 / 12.0,
+    -1.0 / 24.0, 16.0 / 24.0, -30.0 / 24.0, 16.0 / 24.0, -1.0 / 24.0,
+    -1.0 / 12.0, 2.0 / 12.0, 0.0, -2.0 / 12.0, 1.0 / 12.0,
+    1.0 / 24.0, -4.0 / 24.0, 6.0 / 24.0, -4.0 / 24.0, 1.0 / 24.0,
+);
+
+/// Powers 0 to 4 of `d`, and their first and second derivatives.
+fn powers(d: f64) -> [Vector5<f64>; 3] {
+    let (d2, d3) = (d * d, d * d * d);
+    [
+        Vector5::new(1.0, d, d2, d3, d2 * d2),
+        Vector5::new(0.0, 1.0, 2.0 * d, 3.0 * d2, 4.0 * d3),
+        Vector5::new(0.0, 0.0, 2.0, 6.0 * d, 12.0 * d2),
+    ]
+}
+
+/// Whether the curvature is negative in every direction, by more than the rounding of `f32` scores.
+fn is_maximum(hessian: &Matrix2<f64>) -> bool {
+    hessian.m11 < 0.0 && hessian.m22 < 0.0 && hessian.determinant() > 1e-12
 }
 
 #[cfg(test)]

@@ -179,6 +179,29 @@ mod tests {
     }
 
     #[test]
+    fn covariances_of_rank_one_are_transformed_without_noise_of_rounding() {
+        for case in 0..2000 {
+            let direction =
+                SVector::<f64, 6>::from_fn(|row, _| (1.7 * f64::from(case) + 2.3 * row as f64).sin());
+            let covariance = direction * direction.transpose();
+            let (_, result) =
+                unscented(&direction, &covariance, UnscentedParameters::default(), |x| Some(*x)).unwrap();
+            assert!((result - covariance).norm() < 1e-12, "case {case}: {result}");
+        }
+    }
+
+    #[test]
+    fn beta_two_gives_the_exact_variance_of_a_squared_gaussian() {
+        let (mean, variance) = (SVector::<f64, 1>::zeros(), SMatrix::<f64, 1, 1>::new(0.09));
+        for alpha in [1.0, 0.5, 0.1] {
+            let parameters = UnscentedParameters { alpha, beta: 2.0, kappa: 0.0 };
+            let (y, p) = unscented(&mean, &variance, parameters, |x| Some(x.component_mul(x))).unwrap();
+            assert!((y[0] - 0.09).abs() < 1e-15);
+            assert!((p[(0, 0)] - 2.0 * 0.09 * 0.09).abs() < 1e-14, "{p}");
+        }
+    }
+
+    #[test]
     fn what_has_no_answer_gives_none() {
         let mean = Vector2::new(1.0, 1.0);
         let ask =

@@ -1,127 +1,166 @@
-//! Integral images: sums, sums of squares and counts of invalid pixels of any rectangle in four reads (Crow 1984).
+//! A rolling integral image: sums over every window of a strip of rows in two reads (after Crow 1984).
 //!
+//! Of the integral image only what one row of windows needs is held: sums over the `height` rows of each column,
+//! and their running total along the row,
 //! ```text
-//! S(x, y) = Σ_{i<x, j<y} (v(i, j) − shift)          and the same with the square
+//! C(x) = Σ_{rows of the strip} (v(x, y) − shift)        S(x) = Σ_{i<x} C(i)        and the same with the square
 //! ```
-//! The variance of a window is a small difference of large sums, so the values are taken relative to the mean
-//! of the region and summed in `f64`. Invalid pixels add nothing and are counted.
+//! so that a window of w columns from x sums to S(x + w) − S(x). The strip moves down by adding a row and
+//! taking one away. A whole integral image would cost more in fresh memory than in additions, and its corners
+//! grow with the image, of which the variance of a window is a small difference: sums are in `f64`, of
+//! values relative to `shift`. Invalid pixels add nothing and are counted.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
 //! | v | pixel value | fraction of full scale |
 //! | shift | `shift` | fraction of full scale |
 
+use pulp::Simd;
+
 use super::{GrayImage, PixelRect};
 
-/// Integral images of a region of an image.
+/// Sums over the columns of a strip of rows, and their running totals.
 #[derive(Clone, Debug)]
-pub struct Integral {
-    /// What was subtracted from every pixel: the mean of the region's valid pixels.
-    pub shift: f64,
-    stride: usize,
+pub struct RollingIntegral<'a> {
+    image: &'a GrayImage,
+    region: PixelRect,
+    /// Rows of the strip.
+    height: usize,
+    /// First row of the strip, from the region's first.
+    top: usize,
+    shift: f32,
+    column_sums: Vec<f64>,
+    column_squares: Vec<f64>,
     sums: Vec<f64>,
     squares: Vec<f64>,
-    /// Left empty when every pixel is valid, which is nearly always.
+    /// Left empty when every pixel of the region is valid, which is nearly always.
+    column_invalid: Vec<u32>,
     invalid: Vec<u32>,
 }
 
-impl Integral {
-    /// The integral images of `region`, which lies inside `image`.
-    pub fn new(image: &GrayImage, region: &PixelRect) -> Self {
-        let rows = |y: u32| row(image, region, y);
-        let (mut sum, mut valid) = (0.0, 0_u64);
-        for y in 0..region.height {
-            let (row_sum, row_valid) = sum_of_valid(rows(y));
-            sum += row_sum;
-            valid += u64::from(row_valid);
+impl<'a> RollingIntegral<'a> {
+    /// Strips of `height` rows of `region`, which lies inside `image`; [`Self::start`] comes next.
+    ///
+    /// `shift` is any value near the region's; `has_invalid` says whether a pixel of it is invalid.
+    pub fn new(
+        image: &'a GrayImage,
+        region: PixelRect,
+        height: usize,
+        shift: f32,
+        has_invalid: bool,
+    ) -> Self {
+        let width = region.width as usize;
+        let counts = if has_invalid { width } else { 0 };
+        Self {
+            image,
+            region,
+            height,
+            top: 0,
+            shift,
+            column_sums: vec![0.0; width],
+            column_squares: vec![0.0; width],
+            sums: vec![0.0; width + 1],
+            squares: vec![0.0; width + 1],
+            column_invalid: vec![0; counts],
+            invalid: vec![0; if has_invalid { width + 1 } else { 0 }],
         }
-        let shift = if valid == 0 { 0.0 } else { sum / valid as f64 };
-        let stride = region.width as usize + 1;
-        let zeros = || vec![0.0; stride * (region.height as usize + 1)];
-        let mut integral = Self { shift, stride, sums: zeros(), squares: zeros(), invalid: Vec::new() };
-        for y in 0..region.height {
-            integral.fill_row(y as usize + 1, rows(y));
-        }
-        if valid < region.area() {
-            integral.invalid = invalid_counts(region, rows);
-        }
-        integral
     }
 
-    fn fill_row(&mut self, y: usize, pixels: &[f32]) {
-        let (start, stride) = (y * self.stride, self.stride);
+    /// Puts the strip's first row at `top`, summed afresh.
+    #[inline(always)]
+    pub fn start(&mut self, top: usize) {
+        self.top = top;
+        self.column_sums.fill(0.0);
+        self.column_squares.fill(0.0);
+        self.column_invalid.fill(0);
+        for y in top..top + self.height {
+            self.add(row(self.image, &self.region, y), 1.0);
+        }
+        self.total();
+    }
+
+    /// Moves the strip down by one row.
+    #[inline(always)]
+    pub fn advance(&mut self) {
+        self.add(row(self.image, &self.region, self.top), -1.0);
+        self.add(row(self.image, &self.region, self.top + self.height), 1.0);
+        self.top += 1;
+        self.total();
+    }
+
+    /// Running totals along the strip of the shifted values and of their squares: one more than columns.
+    #[inline(always)]
+    pub fn totals(&self) -> (&[f64], &[f64]) {
+        (&self.sums, &self.squares)
+    }
+
+    /// Whether all pixels of the strip's `width` columns from `x` are valid.
+    pub fn all_valid(&self, x: usize, width: usize) -> bool {
+        self.invalid.is_empty() || self.invalid[x] == self.invalid[x + width]
+    }
+
+    /// Adds (`sign` 1) or takes away (−1) a row.
+    #[inline(always)]
+    fn add(&mut self, pixels: &[f32], sign: f64) {
+        let shift = self.shift;
+        for ((sum, square), v) in self.column_sums.iter_mut().zip(&mut self.column_squares).zip(pixels) {
+            let v = f64::from(if v.is_finite() { *v } else { shift }) - f64::from(shift);
+            *sum += sign * v;
+            *square += sign * (v * v);
+        }
+        for (count, v) in self.column_invalid.iter_mut().zip(pixels) {
+            let invalid = u32::from(!v.is_finite());
+            *count = if sign > 0.0 { *count + invalid } else { *count - invalid };
+        }
+    }
+
+    #[inline(always)]
+    fn total(&mut self) {
         let (mut sum, mut square) = (0.0, 0.0);
-        let (above, here) = self.sums[start - stride..start + stride].split_at_mut(stride);
-        let (squares_above, squares_here) = self.squares[start - stride..start + stride].split_at_mut(stride);
-        for (x, value) in pixels.iter().enumerate() {
-            let v = if value.is_finite() { f64::from(*value) - self.shift } else { 0.0 };
-            (sum, square) = (sum + v, square + v * v);
-            here[x + 1] = above[x + 1] + sum;
-            squares_here[x + 1] = squares_above[x + 1] + square;
+        let columns = self.column_sums.iter().zip(&self.column_squares);
+        for ((s, q), (column, column_square)) in
+            self.sums[1..].iter_mut().zip(&mut self.squares[1..]).zip(columns)
+        {
+            (sum, square) = (sum + column, square + column_square);
+            (*s, *q) = (sum, square);
         }
-    }
-
-    /// Sum and sum of squares of the shifted valid pixels of `width` × `height` from (`x`, `y`) of the region.
-    pub fn sums(&self, x: usize, y: usize, width: usize, height: usize) -> [f64; 2] {
-        let (top, bottom) = (y * self.stride + x, (y + height) * self.stride + x);
-        [&self.sums, &self.squares].map(|s| s[bottom + width] - s[bottom] - (s[top + width] - s[top]))
-    }
-
-    /// Whether all pixels of `width` × `height` from (`x`, `y`) of the region are valid.
-    pub fn all_valid(&self, x: usize, y: usize, width: usize, height: usize) -> bool {
-        let (top, bottom) = (y * self.stride + x, (y + height) * self.stride + x);
-        let n = &self.invalid;
-        n.is_empty() || n[bottom + width] + n[top] == n[bottom] + n[top + width]
-    }
-
-    /// Whether the region holds an invalid pixel.
-    pub fn has_invalid(&self) -> bool {
-        !self.invalid.is_empty()
-    }
-
-    /// Sums and sums of squares of everything above and to the left of each corner of row `y`: one number more
-    /// than there are pixels in a row. For loops that need many windows of one row.
-    pub fn corner_row(&self, y: usize) -> (&[f64], &[f64]) {
-        let row = y * self.stride..(y + 1) * self.stride;
-        (&self.sums[row.clone()], &self.squares[row])
-    }
-
-    /// Sum of squares over the whole region: the size of the numbers of which differences are taken.
-    pub fn total_squares(&self) -> f64 {
-        self.squares.last().copied().unwrap_or(0.0)
+        let mut count = 0;
+        for (total, column) in self.invalid.iter_mut().skip(1).zip(&self.column_invalid) {
+            count += column;
+            *total = count;
+        }
     }
 }
 
-/// Row `y` of the region.
-pub(crate) fn row<'a>(image: &'a GrayImage, region: &PixelRect, y: u32) -> &'a [f32] {
-    let start = (region.y as usize + y as usize) * image.width() as usize + region.x as usize;
+/// Row `y` of the region, counted from its first.
+#[inline(always)]
+pub(crate) fn row<'a>(image: &'a GrayImage, region: &PixelRect, y: usize) -> &'a [f32] {
+    let start = (region.y as usize + y) * image.width() as usize + region.x as usize;
     &image.as_raw()[start..start + region.width as usize]
 }
 
-fn sum_of_valid(row: &[f32]) -> (f64, u32) {
-    // Eight sums side by side let the additions overlap; their order is fixed, so the result is too.
-    let mut lanes = [(0.0, 0_u32); 8];
-    for chunk in row.chunks(8) {
-        for (lane, v) in lanes.iter_mut().zip(chunk) {
-            let valid = v.is_finite();
-            lane.0 += if valid { f64::from(*v) } else { 0.0 };
-            lane.1 += u32::from(valid);
+/// Mean of the valid values of some rows, and whether a value is invalid; the mean is 0 when none is valid.
+///
+/// Sums of `f32` side by side: good to a few digits, for a shift that may be any value nearby.
+#[inline(always)]
+pub(crate) fn rough_mean<'a, S: Simd>(simd: S, rows: impl Iterator<Item = &'a [f32]>) -> (f32, bool) {
+    let (zero, one) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0));
+    let infinity = simd.splat_f32s(f32::INFINITY);
+    let (mut sums, mut counts, mut total) = (zero, zero, 0);
+    for row in rows {
+        total += row.len();
+        let (vectors, rest) = S::as_simd_f32s(row);
+        for v in vectors {
+            let is_valid = simd.less_than_f32s(simd.abs_f32s(*v), infinity);
+            sums = simd.add_f32s(sums, simd.select_f32s(is_valid, *v, zero));
+            counts = simd.add_f32s(counts, simd.select_f32s(is_valid, one, zero));
         }
+        // The rest counts only where its validity does: it is too short to move the mean.
+        total -= rest.iter().filter(|v| v.is_finite()).count();
     }
-    lanes.iter().fold((0.0, 0), |sum, lane| (sum.0 + lane.0, sum.1 + lane.1))
-}
-
-fn invalid_counts<'a>(region: &PixelRect, rows: impl Fn(u32) -> &'a [f32]) -> Vec<u32> {
-    let stride = region.width as usize + 1;
-    let mut counts = vec![0; stride * (region.height as usize + 1)];
-    for y in 0..region.height {
-        let (start, mut count) = ((y as usize + 1) * stride, 0);
-        for (x, v) in rows(y).iter().enumerate() {
-            count += u32::from(!v.is_finite());
-            counts[start + x + 1] = counts[start + x + 1 - stride] + count;
-        }
-    }
-    counts
+    let count = simd.reduce_sum_f32s(counts);
+    let mean = if count > 0.0 { simd.reduce_sum_f32s(sums) / count } else { 0.0 };
+    (mean, (count as usize) < total)
 }
 
 #[cfg(test)]
@@ -129,24 +168,37 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sums_of_every_rectangle_equal_direct_sums_and_invalid_pixels_are_counted() {
+    fn sums_of_every_window_equal_direct_sums_and_invalid_pixels_are_counted() {
         let mut image =
             GrayImage::from_fn(13, 11, |x, y| image::Luma([((x * 7 + y * 13) % 10) as f32 / 10.0]));
         image.put_pixel(6, 5, image::Luma([f32::NAN]));
-        let region = PixelRect::new(2, 1, 9, 8);
-        let integral = Integral::new(&image, &region);
-        for (y, x, h, w) in [(0, 0, 8, 9), (1, 2, 3, 4), (4, 4, 1, 1), (5, 0, 3, 4), (0, 0, 0, 0)] {
-            let (mut sums, mut all_valid) = ([0.0, 0.0], true);
-            for (j, i) in (y..y + h).flat_map(|j| (x..x + w).map(move |i| (j, i))) {
-                let v = f64::from(image.get_pixel(i as u32 + 2, j as u32 + 1)[0]) - integral.shift;
-                all_valid &= v.is_finite();
-                if v.is_finite() {
-                    sums = [sums[0] + v, sums[1] + v * v];
+        let (region, shift) = (PixelRect::new(2, 1, 9, 8), 0.375);
+        let mut strip = RollingIntegral::new(&image, region, 3, shift, true);
+        for start in [0, 2] {
+            strip.start(start);
+            for y in start..=5 {
+                for (x, w) in (0..9).flat_map(|x| (0..=9 - x).map(move |w| (x, w))) {
+                    let pixels = (y..y + 3).flat_map(|j| row(&image, &region, j)[x..x + w].iter());
+                    let (valid, invalid): (Vec<f32>, Vec<f32>) = pixels.partition(|v| v.is_finite());
+                    let sum: f64 = valid.iter().map(|v| f64::from(v - shift)).sum();
+                    let square: f64 = valid.iter().map(|v| f64::from(v - shift).powi(2)).sum();
+                    let (sums, squares) = strip.totals();
+                    assert!((sums[x + w] - sums[x] - sum).abs() < 1e-6);
+                    assert!((squares[x + w] - squares[x] - square).abs() < 1e-6);
+                    assert_eq!(strip.all_valid(x, w), invalid.is_empty());
+                }
+                if y < 5 {
+                    strip.advance();
                 }
             }
-            let found = integral.sums(x, y, w, h);
-            assert!((found[0] - sums[0]).abs() < 1e-12 && (found[1] - sums[1]).abs() < 1e-12);
-            assert_eq!(integral.all_valid(x, y, w, h), all_valid);
         }
+    }
+
+    #[test]
+    fn the_rough_mean_leaves_invalid_values_out_and_reports_them() {
+        let mean = |rows: &[Vec<f32>]| rough_mean(pulp::Scalar, rows.iter().map(Vec::as_slice));
+        assert_eq!(mean(&[vec![0.25; 37], vec![0.75; 37]]), (0.5, false));
+        assert_eq!(mean(&[vec![f32::NAN; 20], vec![0.75; 37]]), (0.75, true));
+        assert_eq!(mean(&[vec![f32::NAN]]), (0.0, true));
     }
 }

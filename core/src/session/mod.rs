@@ -83,7 +83,8 @@ impl Session {
     pub fn add_target(&mut self, label: Option<String>, settings: Settings, first: Arc<StepTrace>) -> usize {
         let number = self.targets.len();
         let designation = first.update.target.designation;
-        let label = label.filter(|l| !l.trim().is_empty()).unwrap_or_else(|| format!("target {}", number + 1));
+        let label =
+            label.filter(|l| !l.trim().is_empty()).unwrap_or_else(|| format!("target {}", number + 1));
         let run = Run::new(Arc::new(settings), None, vec![first]);
         self.targets.push(TargetRecord { label, designation, runs: vec![run], removed: false });
         self.cursor = Cursor { target: Some(number), run: 0, step: designation.step };
@@ -124,7 +125,9 @@ impl Session {
             None => parent.steps.iter().filter(|trace| trace.step < from_step).cloned().collect(),
         };
         if kept.is_empty() || kept.last().is_some_and(|last| last.step + 1 < from_step) {
-            return Err(Error::Request(format!("run {run} of target {target} has no step before step {from_step} yet")));
+            return Err(Error::Request(format!(
+                "run {run} of target {target} has no step before step {from_step} yet"
+            )));
         }
         let forked = Run::new(settings, Some(Fork { run, from_step }), kept);
         let record = self.target_mut(target)?;
@@ -175,7 +178,10 @@ impl Session {
         }
         if cursor.step >= self.stop_count {
             let count = self.stop_count;
-            return Err(Error::Request(format!("step {} does not exist: the traverse has {count} stops", cursor.step)));
+            return Err(Error::Request(format!(
+                "step {} does not exist: the traverse has {count} stops",
+                cursor.step
+            )));
         }
         self.cursor = cursor;
         Ok(())

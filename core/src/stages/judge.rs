@@ -129,8 +129,22 @@ fn gates(
     vec![
         Gate::new(1, "ncc", "", ncc, limits.ncc_min, true),
         Gate::new(2, "stereo_ncc", "", stereo, limits.stereo_ncc_min, true),
-        Gate::new(3, "distance_correction_m", "m", distance, tolerance.distance_m(target, prediction, new_m), false),
-        Gate::new(4, "position_correction_m", "m", position, tolerance.position_m(target, prediction, new_m), false),
+        Gate::new(
+            3,
+            "distance_correction_m",
+            "m",
+            distance,
+            tolerance.distance_m(target, prediction, new_m),
+            false,
+        ),
+        Gate::new(
+            4,
+            "position_correction_m",
+            "m",
+            position,
+            tolerance.position_m(target, prediction, new_m),
+            false,
+        ),
     ]
 }
 
@@ -182,15 +196,16 @@ pub fn next_state(before: TrackingState, good: bool, limits: &Limits) -> Trackin
 }
 
 fn reason(gates: &[Gate], located: &Located) -> String {
-    if let Some(missing) = &located.missing {
-        return missing.clone();
-    }
-    let failed = gates.iter().filter(|gate| !gate.passed).map(|gate| {
+    let failed = gates.iter().filter(|gate| !gate.passed).filter_map(|gate| {
         let relation = if gate.at_least { "below" } else { "above" };
-        let value = gate.value.map_or_else(|| "nothing".to_owned(), |v| format!("{v:.3}"));
-        format!("{} {value} is {relation} its limit {:.3} {}", gate.name, gate.limit, gate.unit).trim_end().to_owned()
+        let (value, limit) = (gate.value?, gate.limit);
+        Some(
+            format!("{} {value:.3} is {relation} its limit {limit:.3} {}", gate.name, gate.unit)
+                .trim_end()
+                .to_owned(),
+        )
     });
-    failed.collect::<Vec<_>>().join("; ")
+    failed.chain(located.missing.clone()).collect::<Vec<_>>().join("; ")
 }
 
 #[cfg(test)]

@@ -48,7 +48,11 @@ pub struct UsedPointing<'a> {
 }
 
 /// Computes the wanted pointing and projects the prediction through the cameras in use.
-pub fn point_mast(position_in_rover: &Point3, covariance_in_rover: &Matrix3<f64>, used: UsedPointing<'_>) -> Pointing {
+pub fn point_mast(
+    position_in_rover: &Point3,
+    covariance_in_rover: &Matrix3<f64>,
+    used: UsedPointing<'_>,
+) -> Pointing {
     let projected = used.left.model.project_with_jacobian(position_in_rover);
     Pointing {
         wanted: used.mast.and_then(|mast| mast.point_left_centre_at(position_in_rover)),

@@ -73,7 +73,8 @@ fn motion_covariance(point: &Point3, way: &Vector3, odometry: &OdometryError) ->
     let along = odometry.along_fraction * length_m;
     let across = odometry.across_fraction * length_m;
     let forward = way.try_normalize(1e-9).unwrap_or_else(Vector3::x);
-    let rover_from_way = Rotation3::rotation_between(&Vector3::x(), &forward).unwrap_or_else(Rotation3::identity);
+    let rover_from_way =
+        Rotation3::rotation_between(&Vector3::x(), &forward).unwrap_or_else(Rotation3::identity);
     let diagonal = Matrix3::from_diagonal(&Vector3::new(along * along, across * across, across * across));
     let translation = rover_from_way.matrix() * diagonal * rover_from_way.matrix().transpose();
     let attitude_rad = odometry.attitude_deg.to_radians();

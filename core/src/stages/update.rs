@@ -42,7 +42,8 @@ pub fn update(
     verdict: &Verdict,
 ) -> Updated {
     let correction_m = located.position_in_rover.map(|p| (p - prediction.position_in_rover).norm());
-    let correction_px = located.left_pixel.zip(pointing.predicted_left).map(|(a, b): (Pixel, Pixel)| a.distance(b));
+    let correction_px =
+        located.left_pixel.zip(pointing.predicted_left).map(|(a, b): (Pixel, Pixel)| a.distance(b));
     let carried = carry(target, step, prediction);
     let renewed = verdict.accepted.then(|| renew(&carried, pointing, capture, located)).flatten();
     Updated {

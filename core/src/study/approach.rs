@@ -66,13 +66,18 @@ pub struct ApproachSummary {
 }
 
 /// Tracks every pixel of `targets`, designated at the first stop, through one world.
-pub fn track_world<D: Drive>(drive: &D, world: u64, targets: &[Pixel], settings: &Settings) -> Vec<ApproachRun> {
-    let track = |(target, &pixel): (usize, &Pixel)| {
-        match track::run(drive, Designation { step: 0, pixel }, settings) {
+pub fn track_world<D: Drive>(
+    drive: &D,
+    world: u64,
+    targets: &[Pixel],
+    settings: &Settings,
+) -> Vec<ApproachRun> {
+    let track =
+        |(target, &pixel): (usize, &Pixel)| match track::run(drive, Designation { step: 0, pixel }, settings)
+        {
             Ok(steps) => describe(world, target, pixel, &steps),
             Err(error) => ApproachRun { refused: Some(error.to_string()), ..empty(world, target, pixel) },
-        }
-    };
+        };
     targets.par_iter().enumerate().map(track).collect()
 }
 

@@ -66,7 +66,8 @@ impl<'a> TargetTruth<'a> {
         let distance_m = (position_in_rover - camera.model.centre()).norm();
         let magnification = self.initial_distance_m / distance_m;
         let tolerance_px = (0.5 * magnification).max(5.0);
-        let visible = camera.sees(&position_in_rover) && self.source.is_visible(trace.step, &self.position_in_site);
+        let visible =
+            camera.sees(&position_in_rover) && self.source.is_visible(trace.step, &self.position_in_site);
         let left_pixel = if visible { camera.project(&position_in_rover) } else { None };
         let located = trace.locate.as_ref().and_then(|l| l.left_pixel);
         let err_px = left_pixel.zip(located).map(|(a, b)| a.distance(b));

@@ -32,7 +32,9 @@ const UNDETERMINED_PX: f64 = 10.0;
 /// Covariance of the position of `matched` against `template`, px²; both patches have the same size.
 pub fn match_covariance(template: &Patch, matched: &Patch) -> Matrix2<f64> {
     let undetermined = Matrix2::identity() * UNDETERMINED_PX.powi(2);
-    let (Some(template), Some(image)) = (normalise(template), normalise(matched)) else { return undetermined };
+    let (Some(template), Some(image)) = (normalise(template), normalise(matched)) else {
+        return undetermined;
+    };
     let (gx, gy) = gradient::central(&image);
     let (width, height) = image.dimensions();
     let score = mean_product(&template, &image);
@@ -41,7 +43,8 @@ pub fn match_covariance(template: &Patch, matched: &Patch) -> Matrix2<f64> {
     for y in 1..height - 1 {
         for x in 1..width - 1 {
             let g = Vector2::new(f64::from(gx.get_pixel(x, y)[0]), f64::from(gy.get_pixel(x, y)[0]));
-            let residual = f64::from(image.get_pixel(x, y)[0]) - score * f64::from(template.get_pixel(x, y)[0]);
+            let residual =
+                f64::from(image.get_pixel(x, y)[0]) - score * f64::from(template.get_pixel(x, y)[0]);
             if residual.is_finite() && g.iter().all(|v| v.is_finite()) {
                 information += g * g.transpose();
                 influence[(y * width + x) as usize] = g * residual;
@@ -49,9 +52,9 @@ pub fn match_covariance(template: &Patch, matched: &Patch) -> Matrix2<f64> {
         }
     }
     let meat = correlated_sum(&influence, i64::from(width), i64::from(height));
-    information.try_inverse().map_or(undetermined, |inverse| {
-        inverse * meat * inverse + Matrix2::identity() * FIT_FLOOR_PX.powi(2)
-    })
+    information
+        .try_inverse()
+        .map_or(undetermined, |inverse| inverse * meat * inverse + Matrix2::identity() * FIT_FLOOR_PX.powi(2))
 }
 
 /// `Σ_ij w(i − j) v_i v_jᵀ` over a grid of vectors.
@@ -75,7 +78,8 @@ fn correlated_sum(vectors: &[Vector2<f64>], width: i64, height: i64) -> Matrix2<
 }
 
 fn mean_product(a: &Patch, b: &Patch) -> f64 {
-    let products = a.iter().zip(b.iter()).map(|(a, b)| f64::from(*a) * f64::from(*b)).filter(|p| p.is_finite());
+    let products =
+        a.iter().zip(b.iter()).map(|(a, b)| f64::from(*a) * f64::from(*b)).filter(|p| p.is_finite());
     let (sum, count) = products.fold((0.0, 0_u32), |(sum, count), p| (sum + p, count + 1));
     sum / f64::from(count.max(1))
 }

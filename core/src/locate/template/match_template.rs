@@ -57,7 +57,8 @@ pub fn match_template(
     settings: &TemplateSettings,
 ) -> Result<TemplateMatch, String> {
     let image = input.capture.pair.left.as_ref();
-    let predicted = input.pointing.predicted_left.ok_or("the predicted target lies behind the left camera")?;
+    let predicted =
+        input.pointing.predicted_left.ok_or("the predicted target lies behind the left camera")?;
     let growth = settings.lost_search_growth.powi(input.lost_count as i32);
     let side = (f64::from(settings.search_window_px) * growth).round() as u32 | 1;
     let search_window = PixelRect::centred(predicted, side)

@@ -29,7 +29,7 @@ use self::point_stereo::{PointStereo, StereoInput};
 use self::scale_roll::ScaleRoll;
 use self::settings::NoiseModel;
 use self::triangulate::Triangulation;
-use super::{DesignateInput, Evidence, Located, LocateInput, Locator};
+use super::{DesignateInput, Evidence, LocateInput, Located, Locator};
 use crate::frames::Pixel;
 
 /// What the template locator saw; a step that was not reached is null.

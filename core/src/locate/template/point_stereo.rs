@@ -17,7 +17,7 @@
 //! | curve parameter | arc length from the far end | px in the right image |
 //! | A | `right_from_left` | px per px |
 
-use nalgebra::Matrix2;
+use nalgebra::{Matrix2, Matrix3};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -25,7 +25,7 @@ use super::match_noise::match_covariance;
 use super::settings::{DisparityInterval, StereoReference, TemplateSettings};
 use super::stereo_curve::{Curve, window_through};
 use crate::camera::Camera;
-use crate::correlate::peak::quadratic_peak;
+use crate::correlate::peak::Fit;
 use crate::correlate::zncc::zncc;
 use crate::frames::Pixel;
 use crate::image::GrayImage;
@@ -116,8 +116,9 @@ pub fn point_stereo(input: &StereoInput<'_>, settings: &TemplateSettings) -> Res
     if template.iter().any(|v| !v.is_finite()) {
         return Err("the stereo window reaches over the border of the left image".to_owned());
     }
-    let mut curve = Curve::new(input.left, input.right, input.left_pixel, settings.range_min_m, settings.range_max_m)
-        .ok_or("the target's ray is not seen by the right camera")?;
+    let mut curve =
+        Curve::new(input.left, input.right, input.left_pixel, settings.range_min_m, settings.range_max_m)
+            .ok_or("the target's ray is not seen by the right camera")?;
     if settings.stereo_reference == StereoReference::ImageRow {
         curve.flatten_to_row(input.left_pixel.y);
     }
@@ -141,7 +142,11 @@ pub fn point_stereo(input: &StereoInput<'_>, settings: &TemplateSettings) -> Res
 }
 
 /// The part of the curve to search: first and last arc length, px.
-fn search_interval(curve: &Curve, input: &StereoInput<'_>, settings: &TemplateSettings) -> Result<(f64, f64), String> {
+fn search_interval(
+    curve: &Curve,
+    input: &StereoInput<'_>,
+    settings: &TemplateSettings,
+) -> Result<(f64, f64), String> {
     let whole = (0.0, curve.length_px());
     let range_m = match (input.geometry, input.predicted_range_m) {
         (StereoGeometry::Lateral, Some(range_m)) => range_m,
@@ -182,7 +187,13 @@ fn search(
         for row in 0..rows {
             let across = row as i32 - side - 1;
             let (at, _) = curve.at(along, f64::from(across));
-            let window = window_through(input.right_image, at, &affine, settings.template_size_px / 2, settings.kernel);
+            let window = window_through(
+                input.right_image,
+                at,
+                &affine,
+                settings.template_size_px / 2,
+                settings.kernel,
+            );
             if let Some(score) = zncc(template, &window) {
                 scores[i * rows + row] = score;
                 if across.abs() <= side {
@@ -200,13 +211,13 @@ fn search(
 fn refine(scores: &[f32], rows: usize, from: f64, spacing: f64, side: i32, sub_pixel: bool) -> Option<Best> {
     let columns = scores.len() / rows;
     let inside = |row: usize| (1..rows - 1).contains(&row);
-    let (index, score) = scores
-        .iter()
-        .enumerate()
-        .filter(|(index, score)| inside(index % rows) && score.is_finite())
-        .fold(None, |best: Option<(usize, f32)>, (index, &score)| {
-            if best.is_none_or(|(_, b)| score > b) { Some((index, score)) } else { best }
-        })?;
+    let (index, score) =
+        scores.iter().enumerate().filter(|(index, score)| inside(index % rows) && score.is_finite()).fold(
+            None,
+            |best: Option<(usize, f32)>, (index, &score)| {
+                if best.is_none_or(|(_, b)| score > b) { Some((index, score)) } else { best }
+            },
+        )?;
     let (column, row) = (index / rows, index % rows);
     let at_end = column == 0 || column + 1 == columns;
     let mut best = Best {
@@ -216,14 +227,11 @@ fn refine(scores: &[f32], rows: usize, from: f64, spacing: f64, side: i32, sub_p
         at_end,
     };
     if sub_pixel && !at_end {
-        let at = |dx: i32, dy: i32| {
-            scores[((column as i32 + dx) * rows as i32 + row as i32 + dy) as usize]
-        };
-        let neighbours: [[f32; 3]; 3] =
-            [[at(-1, -1), at(0, -1), at(1, -1)], [at(-1, 0), at(0, 0), at(1, 0)], [at(-1, 1), at(0, 1), at(1, 1)]];
-        if let Some(fit) = quadratic_peak(&neighbours) {
-            best.along += fit.dx * spacing;
-            best.across += fit.dy;
+        // Rows of the fit lie across the curve, columns along it.
+        let neighbours = Matrix3::from_fn(|dy, dx| f64::from(scores[(column + dx - 1) * rows + row + dy - 1]));
+        if let Some(fit) = Fit::quadratic(&neighbours) {
+            best.along += fit.offset.x * spacing;
+            best.across += fit.offset.y;
             best.score = fit.score;
         }
     }
@@ -243,9 +251,11 @@ fn surface_slope(
         let left_pixel = input.left_pixel.offset(dx, dy);
         let half = settings.template_size_px / 2;
         let template = patch::extract(input.left_image, left_pixel, half, settings.kernel);
-        let own = Curve::new(input.left, input.right, left_pixel, settings.range_min_m, settings.range_max_m)?;
+        let own =
+            Curve::new(input.left, input.right, left_pixel, settings.range_min_m, settings.range_max_m)?;
         let expected = own.along_of_range(range_m);
-        let interval = ((expected - SLOPE_REACH_PX).max(0.0), (expected + SLOPE_REACH_PX).min(own.length_px()));
+        let interval =
+            ((expected - SLOPE_REACH_PX).max(0.0), (expected + SLOPE_REACH_PX).min(own.length_px()));
         let shifted = StereoInput { left_pixel, ..*input };
         let narrow = TemplateSettings { epipolar_tolerance_px: 0.0, ..settings.clone() };
         let (_, best) = search(&own, &template, &shifted, interval, &narrow);

@@ -9,9 +9,9 @@ use nalgebra::{Matrix2, Vector2};
 
 use crate::camera::Camera;
 use crate::frames::Pixel;
+use crate::image::GrayImage;
 use crate::image::patch::Patch;
 use crate::image::sample::Kernel;
-use crate::image::GrayImage;
 
 /// Samples of the curve; between them it is taken as straight, which errs by less than 1e-3 px.
 const SAMPLES: usize = 256;
@@ -26,7 +26,13 @@ pub struct Curve {
 
 impl Curve {
     /// The curve of `left_pixel` between two ranges (m); none when fewer than two samples are visible.
-    pub fn new(left: &Camera, right: &Camera, left_pixel: Pixel, range_min_m: f64, range_max_m: f64) -> Option<Self> {
+    pub fn new(
+        left: &Camera,
+        right: &Camera,
+        left_pixel: Pixel,
+        range_min_m: f64,
+        range_max_m: f64,
+    ) -> Option<Self> {
         let ray = left.ray(left_pixel)?;
         let (far, near) = (1.0 / range_max_m, 1.0 / range_min_m);
         let mut curve = Self { pixels: Vec::new(), inverse_ranges: Vec::new(), arc_px: Vec::new() };
@@ -86,7 +92,13 @@ impl Curve {
     }
 
     /// `∂right/∂left` of a patch at `range_m` that faces the left camera, px per px.
-    pub fn right_from_left(&self, left: &Camera, right: &Camera, left_pixel: Pixel, range_m: f64) -> Matrix2<f64> {
+    pub fn right_from_left(
+        &self,
+        left: &Camera,
+        right: &Camera,
+        left_pixel: Pixel,
+        range_m: f64,
+    ) -> Matrix2<f64> {
         let through = |dx: f64, dy: f64| -> Option<Pixel> {
             right.project(&left.ray(left_pixel.offset(dx, dy))?.at(range_m))
         };
@@ -109,10 +121,18 @@ impl Curve {
 }
 
 /// The window of `image` around `centre` as seen through `right_from_left`: offset o takes `centre + A o`.
-pub fn window_through(image: &GrayImage, centre: Pixel, right_from_left: &Matrix2<f64>, half: u32, kernel: Kernel) -> Patch {
+pub fn window_through(
+    image: &GrayImage,
+    centre: Pixel,
+    right_from_left: &Matrix2<f64>,
+    half: u32,
+    kernel: Kernel,
+) -> Patch {
     let size = 2 * half + 1;
-    Patch::from_fn(size, size, |x, y| {
-        let offset = right_from_left * Vector2::new(f64::from(x) - f64::from(half), f64::from(y) - f64::from(half));
+    GrayImage::from_fn(size, size, |x, y| {
+        let offset =
+            right_from_left * Vector2::new(f64::from(x) - f64::from(half), f64::from(y) - f64::from(half));
         image::Luma([kernel.sample(image, centre.offset(offset.x, offset.y)).unwrap_or(f32::NAN)])
     })
+    .into()
 }

@@ -42,7 +42,12 @@ fn an_approach_stays_within_a_tenth_of_a_pixel_a_step_and_a_few_millimetres() {
     for step in &steps[1..] {
         let truth = step.truth.as_ref().unwrap();
         assert_eq!(step.update.state, TrackingState::Tracking, "step {}", step.step);
-        assert!(truth.err_px.unwrap() < 0.1 * step.step as f64 + 0.05, "step {}: {:?}", step.step, truth.err_px);
+        assert!(
+            truth.err_px.unwrap() < 0.1 * step.step as f64 + 0.05,
+            "step {}: {:?}",
+            step.step,
+            truth.err_px
+        );
         // At 5 m, 0.1 px of disparity is 2 cm.
         assert!(truth.err_m < 0.03, "step {}: {} m", step.step, truth.err_m);
     }
@@ -138,7 +143,9 @@ fn a_pixel_outside_the_image_is_refused_with_both_sizes() {
     let refused = track::designate(&world, designation(300.0, 10.0), &Settings::default()).unwrap_err();
     assert!(refused.to_string().contains("300") && refused.to_string().contains("256 x 256"), "{refused}");
     let late = Designation { step: 9, pixel: Pixel::new(1.0, 1.0) };
-    assert!(track::designate(&world, late, &Settings::default()).unwrap_err().to_string().contains("6 stops"));
+    assert!(
+        track::designate(&world, late, &Settings::default()).unwrap_err().to_string().contains("6 stops")
+    );
 }
 
 #[test]

@@ -59,7 +59,9 @@ pub fn triangulate(
     let (_, covariance_in_rover) = unscented(&mean, &covariance, UnscentedParameters::default(), |z| {
         meet(Pixel::new(z[0], z[1]), Pixel::new(z[2], z[3])).map(|t| t.point.coords)
     })
-    .ok_or("the position is too uncertain: rays within the pixel noise do not meet in front of the cameras")?;
+    .ok_or(
+        "the position is too uncertain: rays within the pixel noise do not meet in front of the cameras",
+    )?;
     let focal_px = input.left.model.focal_length_px(left).unwrap_or(0.0);
     Ok(Triangulation {
         position_in_rover: found.point,

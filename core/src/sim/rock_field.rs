@@ -1,0 +1,280 @@
+//! Where the rocks lie: the size distribution of Golombek & Rapp, and dart throwing.
+//!
+//! The fraction of the area covered by rocks of diameter D or more is F(D) = k e^{−qD} with
+//! q = 1.79 + 0.152/k; from −dF/dD = (π D²/4) n(D) follows their number per m² (domain.md 10.1):
+//! `N(≥D) = (4 k q/π) [e^{−qD}/D − q E1(qD)]`. The number in an area is Poisson; diameters are drawn by
+//! inverting N. Rocks are placed from the largest to the smallest; a place that overlaps one that is taken
+//! is drawn again, and a rock that finds no place in 60 draws is left out.
+//!
+//! Rocks are scattered over the wedge that the cameras see, in strips across the drive; the smallest
+//! diameter grows slowly beyond the goal, where smaller ones would span less than about four pixels. Around
+//! the goal a cluster follows the same law with a larger smallest diameter. The wheels' tracks are kept
+//! free, and between them nothing is higher than the rover's belly.
+//!
+//! | symbol | name | unit |
+//! |---|---|---|
+//! | k | `area_fraction` | – |
+//! | q | – | 1/m |
+//! | D | `diameter_m` | m |
+//! | N | `number_per_m2` | 1/m² |
+//!
+//! Frame: site. Sources: Golombek & Rapp 1997; domain.md 5.4 (wheels), 10.
+
+use rand::{RngExt, SeedableRng};
+use rand_distr::{Distribution, Poisson};
+use rand_pcg::Pcg64;
+
+use super::rocks::{Rock, RockSeed};
+use super::scenario::RockSettings;
+use super::terrain::Terrain;
+use super::texture::mix;
+
+/// Inner and outer edge of the wheels' tracks, m from the middle line (domain.md 5.4, wheel 16 cm wide).
+const TRACK_Y_M: [f64; 2] = [0.43, 0.70];
+/// The highest rock that passes below the rover's belly, m (ours).
+const BELLY_M: f64 = 0.20;
+/// Where the scatter of rocks starts, m ahead of the first stop: nearer ground is never seen.
+const NEAREST_M: f64 = 1.5;
+/// Draws of a place before a rock is left out.
+const DRAWS: usize = 60;
+
+/// What the placing of rocks must know of the drive, site frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Approach {
+    /// The point that the rover approaches, m.
+    pub goal_m: [f64; 2],
+    /// How far along x the front wheels get, m.
+    pub wheels_reach_m: f64,
+}
+
+/// The exponential integral E1(x), x > 0 (series below 1, continued fraction above).
+fn exponential_integral(x: f64) -> f64 {
+    const EULER: f64 = 0.577_215_664_901_532_9;
+    if x < 1.0 {
+        let (mut sum, mut term) = (-EULER - x.ln(), 1.0);
+        for k in 1..40 {
+            let k = f64::from(k);
+            term *= -x / k;
+            sum -= term / k;
+        }
+        return sum;
+    }
+    let fraction = (1..=80).rev().fold(0.0, |rest, k| {
+        let k = f64::from(k);
+        k / (1.0 + k / (x + rest))
+    });
+    (-x).exp() / (x + fraction)
+}
+
+/// Rocks of diameter `diameter_m` or more per m².
+pub fn number_per_m2(area_fraction: f64, diameter_m: f64) -> f64 {
+    if area_fraction <= 0.0 {
+        return 0.0;
+    }
+    let q = 1.79 + 0.152 / area_fraction;
+    let x = q * diameter_m;
+    4.0 * area_fraction * q / std::f64::consts::PI * ((-x).exp() / diameter_m - q * exponential_integral(x))
+}
+
+/// A diameter between the two limits, from a number in [0, 1).
+fn draw_diameter_m(area_fraction: f64, smallest_m: f64, largest_m: f64, unit: f64) -> f64 {
+    let (most, least) = (number_per_m2(area_fraction, smallest_m), number_per_m2(area_fraction, largest_m));
+    let wanted = most + unit * (least - most);
+    let (mut low, mut high) = (smallest_m, largest_m);
+    for _ in 0..50 {
+        let middle = (low * high).sqrt();
+        if number_per_m2(area_fraction, middle) > wanted { low = middle } else { high = middle }
+    }
+    low
+}
+
+/// The smallest rock worth placing at `x_m` ahead, m: at least about four pixels as seen from the start.
+fn smallest_m(settings: &RockSettings, approach: &Approach, x_m: f64) -> f64 {
+    settings.smallest_m.max(0.0045 * (x_m - approach.goal_m[0]))
+}
+
+/// Half the width of the wedge that the cameras see at `x_m` ahead, with a margin for shadows, m.
+fn half_width_m(x_m: f64) -> f64 {
+    2.0 + 0.46 * x_m
+}
+
+/// A rock that wants a place.
+struct Candidate {
+    diameter_m: f64,
+    /// Rectangle (x from, to; half width) or disc (radius about the goal).
+    place: Place,
+}
+
+enum Place {
+    Strip { from_m: f64, to_m: f64 },
+    Disc { radius_m: f64 },
+}
+
+/// Scatters the rocks of a site on its ground.
+pub fn scatter(settings: &RockSettings, approach: &Approach, terrain: &Terrain, seed: u64) -> Vec<Rock> {
+    let mut random = Pcg64::seed_from_u64(mix(seed ^ 0x20c5));
+    let mut candidates = candidates(settings, approach, &mut random);
+    candidates.sort_by(|a, b| b.diameter_m.total_cmp(&a.diameter_m));
+    let mut taken = Taken::new();
+    let mut seeds = Vec::with_capacity(candidates.len());
+    for candidate in &candidates {
+        for _ in 0..DRAWS {
+            let [x_m, y_m] = draw_place(&candidate.place, approach, &mut random);
+            let reach_m = 0.55 * candidate.diameter_m;
+            let height_m = 1.3 * settings.height_ratio * candidate.diameter_m;
+            if is_in_the_way(approach, x_m, y_m, reach_m, height_m) || taken.overlaps(x_m, y_m, reach_m) {
+                continue;
+            }
+            taken.add(x_m, y_m, reach_m);
+            let seed = mix(seed ^ mix(seeds.len() as u64 + 1));
+            let height_ratio = settings.height_ratio;
+            seeds.push(RockSeed { x_m, y_m, diameter_m: candidate.diameter_m, height_ratio, seed });
+            break;
+        }
+    }
+    seeds.iter().map(|rock| Rock::grow(rock, terrain.z_at(rock.x_m, rock.y_m))).collect()
+}
+
+/// All rocks that want a place: the cluster and the strips.
+fn candidates(settings: &RockSettings, approach: &Approach, random: &mut Pcg64) -> Vec<Candidate> {
+    let k = settings.area_fraction.max(0.01);
+    let mut candidates = Vec::new();
+    for _ in 0..settings.cluster_count {
+        let diameter_m = draw_diameter_m(k, settings.cluster_smallest_m, settings.largest_m, random.random());
+        candidates.push(Candidate { diameter_m, place: Place::Disc { radius_m: settings.cluster_radius_m } });
+    }
+    if settings.area_fraction <= 0.0 {
+        return candidates;
+    }
+    let strips = (settings.farthest_m - NEAREST_M).max(0.0) as usize;
+    for strip in 0..strips {
+        let from_m = NEAREST_M + strip as f64;
+        let to_m = from_m + 1.0;
+        let smallest = smallest_m(settings, approach, from_m);
+        if smallest >= settings.largest_m {
+            break;
+        }
+        let per_m2 = number_per_m2(k, smallest) - number_per_m2(k, settings.largest_m);
+        let mean = per_m2 * 2.0 * half_width_m(from_m);
+        let count = Poisson::new(mean).map_or(0.0, |poisson| poisson.sample(random)) as usize;
+        for _ in 0..count {
+            let diameter_m = draw_diameter_m(k, smallest, settings.largest_m, random.random());
+            candidates.push(Candidate { diameter_m, place: Place::Strip { from_m, to_m } });
+        }
+    }
+    candidates
+}
+
+/// A place drawn evenly over the strip or the disc.
+fn draw_place(place: &Place, approach: &Approach, random: &mut Pcg64) -> [f64; 2] {
+    match *place {
+        Place::Strip { from_m, to_m } => {
+            let half_m = half_width_m(from_m);
+            [random.random_range(from_m..to_m), random.random_range(-half_m..half_m)]
+        }
+        Place::Disc { radius_m } => {
+            let (r, angle) = (radius_m * random.random::<f64>().sqrt(), random.random_range(0.0..std::f64::consts::TAU));
+            [approach.goal_m[0] + r * angle.cos(), approach.goal_m[1] + r * angle.sin()]
+        }
+    }
+}
+
+/// Whether a rock would stand in a wheel's track or touch the belly.
+fn is_in_the_way(approach: &Approach, x_m: f64, y_m: f64, reach_m: f64, height_m: f64) -> bool {
+    let aside_m = (y_m - approach.goal_m[1]).abs();
+    let beside = aside_m - reach_m > TRACK_Y_M[1];
+    let between = aside_m + reach_m < TRACK_Y_M[0] && height_m < BELLY_M;
+    x_m - reach_m < approach.wheels_reach_m && !beside && !between
+}
+
+/// The places that are taken, in a coarse grid so that a look-up stays short.
+struct Taken {
+    cells: std::collections::HashMap<(i32, i32), Vec<[f64; 3]>>,
+}
+
+impl Taken {
+    /// Side of a cell, m; no rock reaches farther than one cell.
+    const CELL_M: f64 = 1.2;
+
+    fn new() -> Self {
+        Self { cells: std::collections::HashMap::new() }
+    }
+
+    fn cell(x_m: f64, y_m: f64) -> (i32, i32) {
+        ((x_m / Self::CELL_M).floor() as i32, (y_m / Self::CELL_M).floor() as i32)
+    }
+
+    fn add(&mut self, x_m: f64, y_m: f64, reach_m: f64) {
+        self.cells.entry(Self::cell(x_m, y_m)).or_default().push([x_m, y_m, reach_m]);
+    }
+
+    fn overlaps(&self, x_m: f64, y_m: f64, reach_m: f64) -> bool {
+        let (cx, cy) = Self::cell(x_m, y_m);
+        let near = |dx: i32, dy: i32| self.cells.get(&(cx + dx, cy + dy)).into_iter().flatten();
+        (-1..=1)
+            .flat_map(|dy| (-1..=1).flat_map(move |dx| near(dx, dy)))
+            .any(|[x, y, r]| (x - x_m).hypot(y - y_m) < r + reach_m)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::scenario::TerrainSettings;
+
+    fn approach() -> Approach {
+        Approach { goal_m: [10.3, 0.0], wheels_reach_m: 9.7 }
+    }
+
+    fn field(settings: &RockSettings, seed: u64) -> Vec<Rock> {
+        let terrain = Terrain::new(&TerrainSettings::default(), [-2.0, 2.0], [-2.0, 2.0], seed);
+        scatter(settings, &approach(), &terrain, seed)
+    }
+
+    #[test]
+    fn numbers_per_area_are_those_of_the_table() {
+        // domain.md 10.1: rows k = 0.03, 0.10 and 0.30.
+        for (k, d, n) in [(0.03, 0.05, 2.2653), (0.03, 0.5, 0.0033), (0.1, 0.2, 0.5261), (0.3, 1.0, 0.0225)] {
+            assert!((number_per_m2(k, d) - n).abs() < 6e-5, "{k} {d}: {}", number_per_m2(k, d));
+        }
+    }
+
+    #[test]
+    fn rocks_near_the_approach_follow_the_distribution() {
+        let settings = RockSettings { cluster_count: 0, ..RockSettings::default() };
+        let (mut counted, mut area_m2) = ([0.0; 2], 0.0);
+        for seed in 0..10 {
+            for rock in field(&settings, seed) {
+                // Outside the tracks, where nothing was kept free.
+                let (x, y) = (rock.centre.x, rock.centre.y.abs());
+                if (2.5..8.5).contains(&x) && (1.2..3.0).contains(&y) {
+                    counted[0] += f64::from(rock.diameter_m >= 0.04);
+                    counted[1] += f64::from(rock.diameter_m >= 0.15);
+                }
+            }
+            area_m2 += 2.0 * 6.0 * 1.8;
+        }
+        let most = number_per_m2(0.09, 0.6);
+        for (counted, diameter_m) in counted.into_iter().zip([0.04, 0.15]) {
+            let expected = (number_per_m2(0.09, diameter_m) - most) * area_m2;
+            assert!((counted - expected).abs() < 4.0 * expected.sqrt(), "{counted} {expected}");
+        }
+    }
+
+    #[test]
+    fn a_dozen_rocks_stand_near_the_goal_and_none_in_the_tracks_or_in_another() {
+        for seed in 0..10 {
+            let rocks = field(&RockSettings::default(), seed);
+            let near = |rock: &&Rock| (rock.centre.x - 10.3).hypot(rock.centre.y) < 1.5;
+            assert!(rocks.iter().filter(near).filter(|rock| rock.diameter_m >= 0.15).count() >= 12);
+            for (index, rock) in rocks.iter().enumerate() {
+                let aside = rock.centre.y.abs();
+                assert!(rock.centre.x > 9.7 || !(0.43..0.70).contains(&aside));
+                for other in &rocks[index + 1..] {
+                    let gap_m = (rock.centre - other.centre).xy().norm();
+                    assert!(gap_m >= 0.55 * (rock.diameter_m + other.diameter_m));
+                }
+            }
+        }
+    }
+}

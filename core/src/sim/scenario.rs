@@ -1,0 +1,393 @@
+//! The scenario: every number from which a simulated traverse follows, read from and written to TOML.
+//!
+//! A field that is left out takes its default; a field that does not exist is refused by name. Two equal
+//! scenarios give the same bits. Defaults describe a Spirit-like rover on a plain with the rock abundance
+//! of Gusev's rockier places; none is chosen by looking at a tracker's result.
+//!
+//! Frames: the site frame is level (+z down), its x axis is the direction of the drive, its origin lies on
+//! the mean ground below which the first stop's middle wheels stand, 0.294 m above the mean plane: where the
+//! rover frame of a rover on flat ground would be. Angles of the sun are measured in it (domain.md 1.5).
+//! Sources: domain.md 2.1 (block average), 5.1 (detector), 5.5 (odometry), 10 (rocks, ground), 11 (light,
+//! sensor); papers.md R21 (window rule), R104–R106 (steps), R227 (seeds).
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::error::{Error, Result};
+use crate::traverse::OdometryError;
+
+/// Every number from which a simulated traverse follows.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Scenario {
+    /// A short name.
+    pub name: String,
+    /// The seed of everything random: relief, rocks, texture, pose errors, noise, choice of targets.
+    pub seed: u64,
+    /// The relief of the ground.
+    pub terrain: TerrainSettings,
+    /// How many rocks of which size.
+    pub rocks: RockSettings,
+    /// Albedo and micro-relief of soil and rock.
+    pub texture: TextureSettings,
+    /// The sun and the sky.
+    pub sun: SunSettings,
+    /// The detector and the optics.
+    pub camera: CameraSettings,
+    /// The way that the rover drives.
+    pub drive: DriveSettings,
+    /// 1σ errors of the pose estimate, step by step (default 1 % along, 0.5 % across, 0.1°: domain.md 5.5).
+    pub odometry_error: OdometryError,
+    /// The rule that chooses the targets.
+    pub targets: TargetRule,
+}
+
+/// The relief of the ground: a fractal height field on a regular grid, and a plane beyond it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct TerrainSettings {
+    /// Side of a cell of the height field, m (0.01 to 0.10; ours).
+    pub cell_m: f64,
+    /// RMS difference of height between two places 1 m apart, m (0.02: domain.md 10.4).
+    pub rms_at_1m_m: f64,
+    /// Hurst exponent: the RMS difference grows as distance to this power (0.8: domain.md 10.4).
+    pub hurst: f64,
+    /// The longest wavelength of the relief, m; beyond it the ground is level on average (ours).
+    pub longest_wavelength_m: f64,
+}
+
+impl Default for TerrainSettings {
+    fn default() -> Self {
+        Self { cell_m: 0.02, rms_at_1m_m: 0.02, hurst: 0.8, longest_wavelength_m: 6.0 }
+    }
+}
+
+/// Rocks by the size distribution of Golombek & Rapp, and a cluster near the targets' centre.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct RockSettings {
+    /// Fraction k of the area that rocks cover (0.09; Spirit's plain 0.05, Pathfinder 0.19: domain.md 10.2).
+    pub area_fraction: f64,
+    /// The smallest rock near the approach, m of diameter; grows with distance from it (ours).
+    pub smallest_m: f64,
+    /// The largest rock, m of diameter (ours).
+    pub largest_m: f64,
+    /// How far rocks are scattered ahead of the first stop, m (ours).
+    pub farthest_m: f64,
+    /// Mean ratio of the height above ground to the diameter (0.5: domain.md 10.3, Viking 2).
+    pub height_ratio: f64,
+    /// Rocks of the cluster around the targets' centre (ours).
+    pub cluster_count: u32,
+    /// Radius of the cluster, m (ours).
+    pub cluster_radius_m: f64,
+    /// The smallest rock of the cluster, m of diameter (ours).
+    pub cluster_smallest_m: f64,
+}
+
+impl Default for RockSettings {
+    fn default() -> Self {
+        Self {
+            area_fraction: 0.09,
+            smallest_m: 0.04,
+            largest_m: 0.6,
+            farthest_m: 45.0,
+            height_ratio: 0.5,
+            cluster_count: 14,
+            cluster_radius_m: 1.3,
+            cluster_smallest_m: 0.15,
+        }
+    }
+}
+
+/// Albedo and micro-relief. Contrast on Mars is low: about one part in eight (ours).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct TextureSettings {
+    /// Mean albedo of the soil, without unit.
+    pub soil_albedo: f64,
+    /// Mean albedo of the rocks, without unit; each rock differs by 15 % (1σ).
+    pub rock_albedo: f64,
+    /// Standard deviation of the albedo within one surface, relative, all octaves together.
+    pub albedo_std: f64,
+    /// Standard deviation of one component of the soil's micro-slope, m/m, all octaves together.
+    pub soil_slope_std: f64,
+    /// The same for rocks.
+    pub rock_slope_std: f64,
+    /// The longest wavelength of the texture, m.
+    pub longest_m: f64,
+    /// The shortest wavelength of the texture, m (below the 1.6 mm that a pixel spans at 2 m).
+    pub shortest_m: f64,
+}
+
+impl Default for TextureSettings {
+    fn default() -> Self {
+        Self {
+            soil_albedo: 0.26,
+            rock_albedo: 0.19,
+            albedo_std: 0.12,
+            soil_slope_std: 0.12,
+            rock_slope_std: 0.25,
+            longest_m: 0.8,
+            shortest_m: 0.0015,
+        }
+    }
+}
+
+/// The sun, with hard shadows, and the light of the sky.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct SunSettings {
+    /// Where the sun stands, deg, clockwise from above, 0 straight ahead of the drive, 90 on the right.
+    pub azimuth_deg: f64,
+    /// Its height above the horizon, deg.
+    pub elevation_deg: f64,
+    /// The sky's part of the light on level ground (0.35: optical depth 0.4, sun at 45°, domain.md 11.1).
+    pub diffuse_fraction: f64,
+    /// L of the lunar–Lambert law, 0 = Lambert (0.5: domain.md 11.2).
+    pub lunar_lambert: f64,
+}
+
+impl Default for SunSettings {
+    fn default() -> Self {
+        Self { azimuth_deg: 115.0, elevation_deg: 42.0, diffuse_fraction: 0.35, lunar_lambert: 0.5 }
+    }
+}
+
+/// The detector and the optics (domain.md 5.1 and 11.3).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct CameraSettings {
+    /// Side of the square image, px: 1024, 512, 256 or 128; smaller ones are block averages (domain.md 2.1).
+    pub image_size: u32,
+    /// σ of the optics' Gaussian blur, px of the image (0.5–0.7: domain.md 11.3).
+    pub blur_px: f64,
+    /// Samples along each axis of a pixel, 1 to 8; the pixel's value is their mean over its area.
+    pub samples_per_axis: u32,
+    /// Bits of a recorded pixel: 12, or 8 (the 12-bit number scaled down).
+    pub bit_depth: u32,
+    /// Electrons per number of the 12-bit converter (42: 170 ke⁻ / 4095).
+    pub gain_electrons_per_dn: f64,
+    /// Read noise, electrons (30).
+    pub read_noise_electrons: f64,
+    /// Number that the converter gives in the dark, DN of 12 bits (20).
+    pub bias_dn: f64,
+    /// Pixel-to-pixel spread of the response, relative, fixed for each camera (0.01).
+    pub response_spread: f64,
+    /// Mean of the first left image, fraction of full scale; the exposure is then kept for all images (ours).
+    pub mean_level: f64,
+}
+
+impl Default for CameraSettings {
+    fn default() -> Self {
+        Self {
+            image_size: 1024,
+            blur_px: 0.6,
+            samples_per_axis: 4,
+            bit_depth: 12,
+            gain_electrons_per_dn: 42.0,
+            read_noise_electrons: 30.0,
+            bias_dn: 20.0,
+            response_spread: 0.01,
+            mean_level: 0.4,
+        }
+    }
+}
+
+/// The straight approach: distances follow `start · (1 − step)^i` until `end` is reached (R104, R106).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct DriveSettings {
+    /// Distance from the centre of the left camera to the targets' centre at the first stop, m (10: R108).
+    pub start_distance_m: f64,
+    /// The last stop is the first one at this distance or nearer, m (2: R106).
+    pub end_distance_m: f64,
+    /// Part of the remaining distance that a step takes away (0.10: R104).
+    pub step_fraction: f64,
+    /// 1σ error of each mast angle, deg; the index gives the measured angles, its truth the real cameras
+    /// (0 by default; 0.05 is plausible: domain.md 4.5).
+    pub pointing_error_deg: f64,
+}
+
+impl Default for DriveSettings {
+    fn default() -> Self {
+        Self { start_distance_m: 10.0, end_distance_m: 2.0, step_fraction: 0.10, pointing_error_deg: 0.0 }
+    }
+}
+
+/// The rule that chooses targets; `targets.rs` states it in full.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct TargetRule {
+    /// How many targets.
+    pub count: u32,
+    /// Greatest distance of a target's surface point from the targets' centre, m.
+    pub radius_m: f64,
+    /// Side of the square window on which the rule is tested, px (21: R21).
+    pub window_px: u32,
+    /// Greatest part of the window in shadow (0.20: R21).
+    pub shadow_fraction: f64,
+    /// Greatest range of depth inside the window, as a part of the distance (0.10: R21).
+    pub depth_range_fraction: f64,
+}
+
+impl Default for TargetRule {
+    fn default() -> Self {
+        Self { count: 20, radius_m: 1.0, window_px: 21, shadow_fraction: 0.20, depth_range_fraction: 0.10 }
+    }
+}
+
+impl Default for Scenario {
+    fn default() -> Self {
+        Self {
+            name: "rocky plain".into(),
+            seed: 1,
+            terrain: TerrainSettings::default(),
+            rocks: RockSettings::default(),
+            texture: TextureSettings::default(),
+            sun: SunSettings::default(),
+            camera: CameraSettings::default(),
+            drive: DriveSettings::default(),
+            odometry_error: OdometryError {
+                along_fraction: 0.01,
+                across_fraction: 0.005,
+                attitude_deg: 0.1,
+            },
+            targets: TargetRule::default(),
+        }
+    }
+}
+
+/// The largest seed that every reader of the file takes exactly (TOML has 63 bits, a browser 53).
+const MAX_SEED: u64 = 1 << 53;
+
+/// Refuses a value outside `[low, high]`, or one that is no number.
+fn within(key: &str, value: f64, low: f64, high: f64) -> Result<()> {
+    if value >= low && value <= high {
+        return Ok(());
+    }
+    Err(Error::setting(key, format!("{value} is outside {low} to {high}")))
+}
+
+impl Scenario {
+    /// The scenario of the demonstration: a 10 m to 2 m straight approach over a rocky plain.
+    pub fn demo() -> Self {
+        Self { name: "straight approach, rocky plain".into(), ..Self::default() }
+    }
+
+    /// Reads and checks a scenario; `path` only names the culprit in the message.
+    pub fn from_toml(text: &str, path: &Path) -> Result<Self> {
+        let scenario: Self =
+            toml::from_str(text).map_err(|problem| Error::format(path, problem.to_string()))?;
+        scenario.validate()?;
+        Ok(scenario)
+    }
+
+    /// The scenario as TOML, every field written.
+    pub fn to_toml(&self) -> String {
+        toml::to_string_pretty(self).unwrap_or_default()
+    }
+
+    /// Refuses settings that no world can be made of, naming the first bad one.
+    pub fn validate(&self) -> Result<()> {
+        if self.seed > MAX_SEED {
+            return Err(Error::setting("seed", format!("{} is above 2^53", self.seed)));
+        }
+        self.validate_ground()?;
+        self.validate_light_and_camera()?;
+        self.validate_drive_and_targets()
+    }
+
+    fn validate_ground(&self) -> Result<()> {
+        let (terrain, rocks, texture) = (&self.terrain, &self.rocks, &self.texture);
+        within("terrain.cell_m", terrain.cell_m, 0.01, 0.10)?;
+        within("terrain.rms_at_1m_m", terrain.rms_at_1m_m, 0.0, 0.2)?;
+        within("terrain.hurst", terrain.hurst, 0.1, 1.5)?;
+        within("terrain.longest_wavelength_m", terrain.longest_wavelength_m, 0.1, 50.0)?;
+        within("rocks.area_fraction", rocks.area_fraction, 0.0, 0.4)?;
+        within("rocks.smallest_m", rocks.smallest_m, 0.02, 0.5)?;
+        within("rocks.largest_m", rocks.largest_m, rocks.smallest_m * 1.01, 2.0)?;
+        within("rocks.farthest_m", rocks.farthest_m, 1.0, 100.0)?;
+        within("rocks.height_ratio", rocks.height_ratio, 0.1, 1.0)?;
+        within("rocks.cluster_count", f64::from(rocks.cluster_count), 0.0, 200.0)?;
+        within("rocks.cluster_radius_m", rocks.cluster_radius_m, 0.1, 10.0)?;
+        within("rocks.cluster_smallest_m", rocks.cluster_smallest_m, 0.02, rocks.largest_m / 1.01)?;
+        within("texture.soil_albedo", texture.soil_albedo, 0.02, 0.9)?;
+        within("texture.rock_albedo", texture.rock_albedo, 0.02, 0.9)?;
+        within("texture.albedo_std", texture.albedo_std, 0.0, 0.5)?;
+        within("texture.soil_slope_std", texture.soil_slope_std, 0.0, 1.0)?;
+        within("texture.rock_slope_std", texture.rock_slope_std, 0.0, 1.0)?;
+        within("texture.longest_m", texture.longest_m, 0.01, 10.0)?;
+        within("texture.shortest_m", texture.shortest_m, 0.0005, texture.longest_m)
+    }
+
+    fn validate_light_and_camera(&self) -> Result<()> {
+        let (sun, camera) = (&self.sun, &self.camera);
+        within("sun.azimuth_deg", sun.azimuth_deg, -360.0, 360.0)?;
+        within("sun.elevation_deg", sun.elevation_deg, 5.0, 90.0)?;
+        within("sun.diffuse_fraction", sun.diffuse_fraction, 0.0, 1.0)?;
+        within("sun.lunar_lambert", sun.lunar_lambert, 0.0, 1.0)?;
+        if ![1024, 512, 256, 128].contains(&camera.image_size) {
+            return Err(Error::setting("camera.image_size", "choose 1024, 512, 256 or 128"));
+        }
+        within("camera.blur_px", camera.blur_px, 0.0, 3.0)?;
+        within("camera.samples_per_axis", f64::from(camera.samples_per_axis), 1.0, 8.0)?;
+        if ![12, 8].contains(&camera.bit_depth) {
+            return Err(Error::setting("camera.bit_depth", "choose 12 or 8"));
+        }
+        within("camera.gain_electrons_per_dn", camera.gain_electrons_per_dn, 0.1, 1000.0)?;
+        within("camera.read_noise_electrons", camera.read_noise_electrons, 0.0, 1000.0)?;
+        within("camera.bias_dn", camera.bias_dn, 0.0, 1000.0)?;
+        within("camera.response_spread", camera.response_spread, 0.0, 0.2)?;
+        within("camera.mean_level", camera.mean_level, 0.02, 0.9)
+    }
+
+    fn validate_drive_and_targets(&self) -> Result<()> {
+        let (drive, error, targets) = (&self.drive, &self.odometry_error, &self.targets);
+        within("drive.end_distance_m", drive.end_distance_m, 1.8, 50.0)?;
+        within("drive.start_distance_m", drive.start_distance_m, drive.end_distance_m, 50.0)?;
+        within("drive.step_fraction", drive.step_fraction, 0.005, 0.5)?;
+        let last_m = super::drive::distances_m(drive).last().copied().unwrap_or(0.0);
+        within("drive.end_distance_m (distance of the last stop)", last_m, 1.7, 50.0)?;
+        within("drive.pointing_error_deg", drive.pointing_error_deg, 0.0, 5.0)?;
+        within("odometry_error.along_fraction", error.along_fraction, 0.0, 1.0)?;
+        within("odometry_error.across_fraction", error.across_fraction, 0.0, 1.0)?;
+        within("odometry_error.attitude_deg", error.attitude_deg, 0.0, 10.0)?;
+        within("targets.count", f64::from(targets.count), 0.0, 10_000.0)?;
+        within("targets.radius_m", targets.radius_m, 0.05, 20.0)?;
+        within("targets.window_px", f64::from(targets.window_px), 1.0, 201.0)?;
+        within("targets.shadow_fraction", targets.shadow_fraction, 0.0, 1.0)?;
+        within("targets.depth_range_fraction", targets.depth_range_fraction, 0.0, 10.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scenario_survives_toml() {
+        let mut scenario = Scenario::demo();
+        scenario.sun.azimuth_deg = -33.25;
+        let read = Scenario::from_toml(&scenario.to_toml(), Path::new("scenario.toml"));
+        assert_eq!(read.unwrap(), scenario);
+    }
+
+    #[test]
+    fn what_is_left_out_takes_its_default() {
+        let read = Scenario::from_toml("seed = 9\n[sun]\nelevation_deg = 20.0\n", Path::new("s.toml")).unwrap();
+        assert_eq!((read.seed, read.sun.elevation_deg), (9, 20.0));
+        assert_eq!(read.rocks, RockSettings::default());
+    }
+
+    #[test]
+    fn unknown_and_impossible_settings_are_refused_by_name() {
+        let refused =
+            |text: &str| Scenario::from_toml(text, Path::new("s.toml")).expect_err("refused").to_string();
+        assert!(refused("[sun]\nheight_deg = 3.0\n").contains("height_deg"));
+        assert!(refused("[sun]\nelevation_deg = -3.0\n").contains("sun.elevation_deg"));
+        assert!(refused("[camera]\nimage_size = 1000\n").contains("camera.image_size"));
+        assert!(refused("[drive]\nend_distance_m = nan\n").contains("drive.end_distance_m"));
+    }
+}

@@ -1,0 +1,226 @@
+//! The ground: a fractal height field of bilinear patches on a regular grid, and a plane beyond it.
+//!
+//! **Relief.** Heights at the grid's vertices are a sum of octaves of value noise (`texture.rs`), amplitude
+//! ∝ λ^H with the Hurst exponent H, so that the RMS difference of height grows as distance^H
+//! (domain.md 10.4: H = 0.8, 2 cm at 1 m). They fade to the mean plane over the outer 1.5 m of the grid,
+//! so that the plane beyond continues the surface without a step. A vertex is stored as `f32`; that number
+//! *is* the surface, all geometry on it is done in `f64`.
+//!
+//! The intersection with a ray is in `terrain_cast.rs`.
+//!
+//! | symbol | name | unit, frame |
+//! |---|---|---|
+//! | z | `z_m` | m, site frame, down |
+//! | u, v | position within a cell, 0 to 1 along x and y | – |
+
+use crate::frames::Vector3;
+
+use super::scenario::TerrainSettings;
+use super::texture::{OctaveSettings, Octaves, mix};
+
+/// Height of the mean plane, m, site frame: flat ground in the rover frame (domain.md 1.3).
+pub const MEAN_GROUND_Z_M: f64 = 0.294;
+
+/// Over which width the relief fades to the plane at the edges of the grid, m.
+const FADE_M: f64 = 1.5;
+
+/// Cells along a side of a block, from the coarsest walk to the finest.
+pub(super) const BLOCK_CELLS: [usize; 4] = [64, 16, 4, 1];
+
+/// The RMS difference over 1 m of a relief whose octave at 1 m has unit amplitude, for H = 0.8 and octaves
+/// from 6 m down; the amplitude is divided by it. Other exponents change it by less than 15 % (tested).
+const UNIT_RMS_AT_1M: f64 = 0.93;
+
+/// Height of the highest point (least z) of every block of one size.
+#[derive(Clone, Debug)]
+pub(super) struct Tops {
+    pub(super) columns: usize,
+    pub(super) z_m: Vec<f32>,
+}
+
+/// The ground of the site.
+#[derive(Clone, Debug)]
+pub struct Terrain {
+    pub(super) origin_m: [f64; 2],
+    pub(super) cell_m: f64,
+    /// Cells along x and y.
+    pub(super) cells: [usize; 2],
+    /// Heights of the (cells + 1)² vertices, rows along x.
+    z_m: Vec<f32>,
+    /// Gradient of the height at the vertices, for smooth shading.
+    slope: Vec<[f32; 2]>,
+    pub(super) tops: Vec<Tops>,
+    pub(super) highest_z_m: f64,
+}
+
+impl Terrain {
+    /// A fractal ground over the rectangle `x_m` × `y_m` (from, to) of the site frame.
+    pub fn new(settings: &TerrainSettings, x_m: [f64; 2], y_m: [f64; 2], seed: u64) -> Self {
+        let cell_m = settings.cell_m;
+        let cells = [x_m, y_m].map(|[from, to]| (((to - from) / cell_m).ceil() as usize).max(1));
+        let relief = Octaves::<2>::new(&relief_octaves(settings), mix(seed ^ 0x7e44_a170));
+        let amplitude_m = settings.rms_at_1m_m / UNIT_RMS_AT_1M;
+        let mut z_m = Vec::with_capacity((cells[0] + 1) * (cells[1] + 1));
+        for iy in 0..=cells[1] {
+            for ix in 0..=cells[0] {
+                let (x, y) = (x_m[0] + ix as f64 * cell_m, y_m[0] + iy as f64 * cell_m);
+                let edge_cells = ix.min(cells[0] - ix).min(iy).min(cells[1] - iy);
+                let t = (edge_cells as f64 * cell_m / FADE_M).min(1.0);
+                let noise = f64::from(relief.at(x, y, 1e-6).albedo);
+                z_m.push((MEAN_GROUND_Z_M + amplitude_m * t * t * (3.0 - 2.0 * t) * noise) as f32);
+            }
+        }
+        Self::from_heights([x_m[0], y_m[0]], cell_m, cells, z_m)
+    }
+
+    /// A ground of given vertex heights, m down; `z_m` holds (cells + 1) vertices along each axis.
+    fn from_heights(origin_m: [f64; 2], cell_m: f64, cells: [usize; 2], z_m: Vec<f32>) -> Self {
+        let tops: Vec<Tops> = BLOCK_CELLS.iter().map(|&side| tops(&z_m, cells, side)).collect();
+        let highest_z_m = tops[0].z_m.iter().copied().fold(MEAN_GROUND_Z_M, |a, b| a.min(f64::from(b)));
+        let slope = vertex_slopes(&z_m, cells, cell_m);
+        Self { origin_m, cell_m, cells, z_m, slope, tops, highest_z_m }
+    }
+
+    /// The cell of a place and the position within it, or nothing beyond the grid.
+    fn locate(&self, x_m: f64, y_m: f64) -> Option<([usize; 2], f64, f64)> {
+        let p = [(x_m - self.origin_m[0]) / self.cell_m, (y_m - self.origin_m[1]) / self.cell_m];
+        if !(0..2).all(|k| p[k] >= 0.0 && p[k] < self.cells[k] as f64) {
+            return None;
+        }
+        let cell = [p[0] as usize, p[1] as usize];
+        Some((cell, p[0] - cell[0] as f64, p[1] - cell[1] as f64))
+    }
+
+    /// The four vertex heights of a cell: (0,0), (1,0), (0,1), (1,1).
+    #[inline(always)]
+    pub(super) fn corners(&self, cell: [usize; 2]) -> [f64; 4] {
+        let at = cell[1] * (self.cells[0] + 1) + cell[0];
+        let below = at + self.cells[0] + 1;
+        [self.z_m[at], self.z_m[at + 1], self.z_m[below], self.z_m[below + 1]].map(f64::from)
+    }
+
+    /// Height of the ground at a place, m down.
+    pub fn z_at(&self, x_m: f64, y_m: f64) -> f64 {
+        let Some((cell, u, v)) = self.locate(x_m, y_m) else { return MEAN_GROUND_Z_M };
+        let [z00, z10, z01, z11] = self.corners(cell);
+        z00 + (z10 - z00) * u + (z01 - z00) * v + (z00 - z10 - z01 + z11) * u * v
+    }
+
+    /// The unit normal of the surface itself at a place, pointing up (negative z).
+    pub fn normal_at(&self, x_m: f64, y_m: f64) -> Vector3 {
+        let Some((cell, u, v)) = self.locate(x_m, y_m) else { return -Vector3::z() };
+        let [z00, z10, z01, z11] = self.corners(cell);
+        let twist = z00 - z10 - z01 + z11;
+        let (zx, zy) = ((z10 - z00 + twist * v) / self.cell_m, (z01 - z00 + twist * u) / self.cell_m);
+        Vector3::new(zx, zy, -1.0).normalize()
+    }
+
+    /// The gradient (∂z/∂x, ∂z/∂y) used for shading: that of the vertices, joined smoothly.
+    ///
+    /// The true gradient jumps from cell to cell; shading with it would show the grid.
+    #[inline(always)]
+    pub fn smooth_slope_at(&self, x_m: f64, y_m: f64) -> [f32; 2] {
+        let Some((cell, u, v)) = self.locate(x_m, y_m) else { return [0.0; 2] };
+        let at = cell[1] * (self.cells[0] + 1) + cell[0];
+        let below = at + self.cells[0] + 1;
+        let (u, v) = (u as f32, v as f32);
+        let corner = [self.slope[at], self.slope[at + 1], self.slope[below], self.slope[below + 1]];
+        std::array::from_fn(|k| {
+            let near = corner[0][k] + u * (corner[1][k] - corner[0][k]);
+            let far = corner[2][k] + u * (corner[3][k] - corner[2][k]);
+            near + v * (far - near)
+        })
+    }
+
+}
+
+/// The octaves of the relief, with unit amplitude at 1 m wavelength (in units of its standard deviation).
+fn relief_octaves(settings: &TerrainSettings) -> OctaveSettings {
+    let ratio = 1.8;
+    let shortest_m = 3.0 * settings.cell_m;
+    let exponent = settings.hurst;
+    let norm = std::iter::successors(Some(settings.longest_wavelength_m), |w: &f64| Some(w / ratio))
+        .take_while(|w| *w >= shortest_m * 0.999)
+        .map(|w| w.powf(2.0 * exponent))
+        .sum::<f64>()
+        .sqrt();
+    OctaveSettings {
+        longest_m: settings.longest_wavelength_m.max(shortest_m),
+        shortest_m,
+        ratio,
+        albedo_exponent: exponent,
+        albedo_std: norm,
+        slope_std: 0.0,
+    }
+}
+
+/// The highest point of every block of `side` × `side` cells.
+fn tops(z_m: &[f32], cells: [usize; 2], side: usize) -> Tops {
+    let [columns, rows] = cells.map(|n| n.div_ceil(side));
+    let mut top = vec![f32::INFINITY; columns * rows];
+    let width = cells[0] + 1;
+    for row in 0..rows {
+        for column in 0..columns {
+            let [x1, y1] = [((column + 1) * side).min(cells[0]), ((row + 1) * side).min(cells[1])];
+            for y in row * side..=y1 {
+                let line = &z_m[y * width + column * side..=y * width + x1];
+                top[row * columns + column] =
+                    line.iter().copied().fold(top[row * columns + column], f32::min);
+            }
+        }
+    }
+    Tops { columns, z_m: top }
+}
+
+/// Central differences of the vertex heights (one-sided at the edges).
+fn vertex_slopes(z_m: &[f32], cells: [usize; 2], cell_m: f64) -> Vec<[f32; 2]> {
+    let width = cells[0] + 1;
+    let z = |x: usize, y: usize| f64::from(z_m[y * width + x]);
+    let mut slopes = Vec::with_capacity(z_m.len());
+    for y in 0..=cells[1] {
+        for x in 0..=cells[0] {
+            let (x0, x1) = (x.saturating_sub(1), (x + 1).min(cells[0]));
+            let (y0, y1) = (y.saturating_sub(1), (y + 1).min(cells[1]));
+            let along_x = (z(x1, y) - z(x0, y)) / ((x1 - x0) as f64 * cell_m);
+            let along_y = (z(x, y1) - z(x, y0)) / ((y1 - y0) as f64 * cell_m);
+            slopes.push([along_x as f32, along_y as f32]);
+        }
+    }
+    slopes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ground(seed: u64, rms_m: f64) -> Terrain {
+        let settings = TerrainSettings { rms_at_1m_m: rms_m, ..TerrainSettings::default() };
+        Terrain::new(&settings, [-2.0, 10.0], [-4.0, 4.0], seed)
+    }
+
+    #[test]
+    fn relief_has_the_stated_rms_difference_and_exponent() {
+        let (mut at_1m, mut at_4cm) = (Vec::new(), Vec::new());
+        for seed in 0..12 {
+            let terrain = ground(seed, 0.02);
+            for k in 0..4000u32 {
+                let (x, y) = (0.0 + f64::from(k % 63) * 0.11, -2.0 + f64::from(k / 63) * 0.06);
+                at_1m.push(terrain.z_at(x + 1.0, y) - terrain.z_at(x, y));
+                at_4cm.push(terrain.z_at(x, y + 0.08) - terrain.z_at(x, y));
+            }
+        }
+        let rms = |d: &[f64]| (d.iter().map(|v| v * v).sum::<f64>() / d.len() as f64).sqrt();
+        assert!((rms(&at_1m) / 0.02 - 1.0).abs() < 0.1, "{}", rms(&at_1m));
+        let exponent = (rms(&at_1m) / rms(&at_4cm)).ln() / (1.0 / 0.08f64).ln();
+        assert!((exponent - 0.8).abs() < 0.12, "{exponent}");
+    }
+
+    #[test]
+    fn the_surface_joins_the_plane_beyond_the_grid() {
+        let terrain = ground(3, 0.02);
+        for k in 0..800 {
+            let y = -4.0 + f64::from(k) * 0.01;
+            assert!((terrain.z_at(9.999_999, y) - MEAN_GROUND_Z_M).abs() < 1e-6);
+        }
+    }
+}

@@ -1,0 +1,3 @@
+//! Claims about the simulator as a whole.
+
+use super::*;
