@@ -34,6 +34,7 @@ pub mod stages;
 pub mod locate;
 pub mod trace;
 pub mod pipeline;
+pub mod sim;
 pub mod traverse;
 pub mod sim;
 pub mod session;

@@ -1,1 +1,4 @@
 //! All tests that cross crates.
+
+mod imports;
+mod recorded_cameras;

@@ -4,11 +4,23 @@
 //! is a folder whose images are rendered when they are first asked for, and a foreign recording is turned
 //! into a folder by its importer (`import/`, one file per format).
 
+mod check;
+mod files;
+mod image_cache;
+pub mod import;
+mod index_file;
+pub mod native;
+mod simulated;
+
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::camera::{Camera, Mast, MastAngles};
 use crate::frames::PoseRecord;
+
+pub use index_file::{Existing, IndexFormat};
+pub use native::{StereoPair, Traverse, write};
+pub use simulated::create_simulated;
 
 /// The version of the folder format that this code writes.
 pub const FORMAT_VERSION: u32 = 1;
@@ -103,7 +115,9 @@ pub struct View {
 }
 
 /// A camera model, written in the index or in a file of JPL's text form beside it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+///
+/// Read by hand (`index_file.rs`), because an untagged enum could not say which field is wrong.
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
 #[serde(untagged)]
 pub enum CameraSource {
     /// Written in the index itself.
@@ -122,9 +136,17 @@ pub struct StopTruth {
     /// The true pose of the rover in the site frame.
     pub site_from_rover: PoseRecord,
     /// The true left camera in the rover frame, where it differs from the one the tracker is given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "index_file::optional_camera"
+    )]
     pub left_camera: Option<Camera>,
     /// The true right camera in the rover frame, alike.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "index_file::optional_camera"
+    )]
     pub right_camera: Option<Camera>,
 }

@@ -1,0 +1,193 @@
+//! Reading and writing the index of a traverse, as TOML or JSON.
+//!
+//! Numbers are written with all their digits, so that reading gives the same bits. What cannot be read is
+//! answered with the file, the line and the field (`traverse.toml: line 12: stops[3].left.camera: …`).
+
+use std::path::{Path, PathBuf};
+
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer};
+
+use super::files::write_atomically;
+use super::{CameraSource, TraverseIndex};
+use crate::camera::Camera;
+use crate::error::{Error, Result};
+
+/// The largest index that is read, bytes.
+const SIZE_LIMIT: u64 = 64 << 20;
+
+/// The form of an index.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum IndexFormat {
+    /// `traverse.toml`, which people write by hand.
+    #[default]
+    Toml,
+    /// `traverse.json`, which programs write.
+    Json,
+}
+
+impl IndexFormat {
+    /// The name of the index in its folder.
+    pub fn file_name(self) -> &'static str {
+        match self {
+            Self::Toml => "traverse.toml",
+            Self::Json => "traverse.json",
+        }
+    }
+}
+
+/// What to do with an index that is already there.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Existing {
+    /// Leave it and say so.
+    #[default]
+    Refuse,
+    /// Replace it.
+    Replace,
+}
+
+/// Where the index of `path` is, which may be the folder or the index itself.
+///
+/// # Errors
+/// Nothing there, no index in the folder, or two of them.
+pub(super) fn find(path: &Path) -> Result<(PathBuf, IndexFormat)> {
+    if path.is_dir() {
+        let present = [IndexFormat::Toml, IndexFormat::Json].map(|format| path.join(format.file_name()));
+        return match present.each_ref().map(|path| path.is_file()) {
+            [true, true] => {
+                Err(Error::format(path, "holds traverse.toml and traverse.json; name one of them"))
+            }
+            [true, false] => Ok((path.join(IndexFormat::Toml.file_name()), IndexFormat::Toml)),
+            [false, true] => Ok((path.join(IndexFormat::Json.file_name()), IndexFormat::Json)),
+            [false, false] => Err(Error::format(
+                path,
+                "holds neither traverse.toml nor traverse.json; import a foreign recording first",
+            )),
+        };
+    }
+    let format = match path.extension().and_then(|extension| extension.to_str()) {
+        Some("toml") => IndexFormat::Toml,
+        Some("json") => IndexFormat::Json,
+        _ => {
+            return Err(Error::format(
+                path,
+                "is neither a folder nor an index with the ending .toml or .json",
+            ));
+        }
+    };
+    Ok((path.to_owned(), format))
+}
+
+/// Reads an index; its content is not checked beyond its form.
+///
+/// # Errors
+/// A file that cannot be read, or whose form is not that of an index: the sentence names line and field.
+pub(super) fn read(path: &Path, format: IndexFormat) -> Result<TraverseIndex> {
+    let unreadable = |source| Error::Read { path: path.to_owned(), source };
+    if std::fs::metadata(path).map_err(unreadable)?.len() > SIZE_LIMIT {
+        let limit = SIZE_LIMIT >> 20;
+        return Err(Error::format(path, format!("is larger than {limit} MiB, the most an index may have")));
+    }
+    let text = std::fs::read_to_string(path).map_err(unreadable)?;
+    parse(&text, format).map_err(|problem| Error::format(path, problem))
+}
+
+fn parse(text: &str, format: IndexFormat) -> Result<TraverseIndex, String> {
+    match format {
+        IndexFormat::Toml => {
+            let toml = toml::Deserializer::parse(text).map_err(|error| at_line(text, &error, ""))?;
+            serde_path_to_error::deserialize(toml)
+                .map_err(|error| at_line(text, error.inner(), &error.path().to_string()))
+        }
+        IndexFormat::Json => {
+            let mut json = serde_json::Deserializer::from_str(text);
+            let index: TraverseIndex = serde_path_to_error::deserialize(&mut json).map_err(|error| {
+                let (line, field) = (error.inner().line(), field(&error.path().to_string()));
+                let message = error.inner().to_string();
+                // serde_json puts the place behind the message; here it comes first, as for TOML.
+                let message = message.split(" at line ").next().unwrap_or_default();
+                format!("line {line}: {field}{message}")
+            })?;
+            json.end().map_err(|error| format!("line {}: text after the end", error.line()))?;
+            Ok(index)
+        }
+    }
+}
+
+fn at_line(text: &str, error: &toml::de::Error, path: &str) -> String {
+    let place = error.span().and_then(|span| text.get(..span.start));
+    let line = place.map(|before| format!("line {}: ", before.matches('\n').count() + 1));
+    let message = error.message().replace('\n', ", ");
+    format!("{}{}{message}", line.unwrap_or_default(), field(path))
+}
+
+/// The field's path with a colon, where there is one.
+fn field(path: &str) -> String {
+    if matches!(path, "" | "." | "?") { String::new() } else { format!("{path}: ") }
+}
+
+/// Writes an index into `folder`, which is made where it is missing.
+///
+/// # Errors
+/// An index that is there already and may not be replaced, or a folder that cannot be written.
+pub(super) fn write(
+    index: &TraverseIndex,
+    folder: &Path,
+    format: IndexFormat,
+    existing: Existing,
+) -> Result<()> {
+    let path = folder.join(format.file_name());
+    let either = [IndexFormat::Toml, IndexFormat::Json].map(|format| folder.join(format.file_name()));
+    for there in either.iter().filter(|path| path.exists()) {
+        if existing == Existing::Refuse || *there != path {
+            return Err(Error::format(there, "is already there; choose another folder or remove it first"));
+        }
+    }
+    let unwritable = |problem: String| Error::format(&path, format!("cannot be written ({problem})"));
+    let text = match format {
+        IndexFormat::Toml => toml::to_string(index).map_err(|error| unwritable(error.to_string()))?,
+        IndexFormat::Json => {
+            serde_json::to_string_pretty(index).map_err(|error| unwritable(error.to_string()))?
+        }
+    };
+    write_atomically(&path, text.as_bytes())
+}
+
+impl<'de> Deserialize<'de> for CameraSource {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let table = serde_json::Map::deserialize(deserializer)?;
+        if let Some(file) = table.get("file") {
+            if let Some(other) = table.keys().find(|key| *key != "file") {
+                return Err(D::Error::custom(format!(
+                    "`{other}` beside `file`; give the camera in one place"
+                )));
+            }
+            let file = file.as_str().ok_or_else(|| D::Error::custom("`file` must be the name of a file"))?;
+            return Ok(Self::File { file: file.to_owned() });
+        }
+        camera_from_table(table).map(Self::Inline).map_err(D::Error::custom)
+    }
+}
+
+/// Reads a camera that may be left out, and refuses fields that cameras do not have.
+pub(super) fn optional_camera<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Option<Camera>, D::Error> {
+    let table = Option::<serde_json::Map<_, _>>::deserialize(deserializer)?;
+    table.map(camera_from_table).transpose().map_err(D::Error::custom)
+}
+
+fn camera_from_table(table: serde_json::Map<String, serde_json::Value>) -> Result<Camera, String> {
+    let fields: &[&str] = match table.get("model").and_then(serde_json::Value::as_str) {
+        Some("CAHV") => &["C", "A", "H", "V"],
+        Some("CAHVOR") => &["C", "A", "H", "V", "O", "R"],
+        Some("CAHVORE") => &["C", "A", "H", "V", "O", "R", "E", "T", "P"],
+        Some(other) => return Err(format!("the model is `{other}`, but it must be CAHV, CAHVOR or CAHVORE")),
+        None => return Err("give the camera's `model` (CAHV, CAHVOR or CAHVORE) or its `file`".to_owned()),
+    };
+    let known = |key: &str| matches!(key, "model" | "size") || fields.contains(&key);
+    if let Some(unknown) = table.keys().find(|key| !known(key)) {
+        return Err(format!("unknown field `{unknown}`, expected model, size, {}", fields.join(", ")));
+    }
+    serde_json::from_value(serde_json::Value::Object(table)).map_err(|error| error.to_string())
+}

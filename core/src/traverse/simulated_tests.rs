@@ -1,0 +1,138 @@
+//! A small world whose images are rendered when they are asked for.
+
+use std::sync::Arc;
+
+use super::*;
+use crate::image::GrayImage;
+
+/// Two stops, 128 × 128 px, one sample a pixel.
+fn scenario() -> Scenario {
+    let mut scenario = Scenario::demo();
+    scenario.camera.image_size = 128;
+    scenario.camera.samples_per_axis = 1;
+    scenario.drive.start_distance_m = 3.0;
+    scenario.drive.end_distance_m = 2.5;
+    scenario.drive.step_fraction = 0.2;
+    scenario.drive.pointing_error_deg = 0.05;
+    scenario.rocks.area_fraction = 0.02;
+    scenario.rocks.farthest_m = 6.0;
+    scenario
+}
+
+fn files(folder: &Path) -> usize {
+    std::fs::read_dir(folder.join("images")).map_or(0, Iterator::count)
+}
+
+#[test]
+fn a_simulated_traverse_renders_what_is_asked_for_and_only_that() {
+    let folder = tempfile::tempdir().unwrap();
+    let traverse = create_simulated(&scenario(), folder.path()).unwrap();
+    assert_eq!(traverse.stop_count(), 2);
+    assert!(traverse.warnings().is_empty());
+    assert!(!traverse.is_ready(0) && !traverse.is_ready(1));
+    let pair = traverse.capture(1).unwrap();
+    assert!(!traverse.is_ready(0) && traverse.is_ready(1));
+    assert_eq!(files(folder.path()), 2);
+    assert!(traverse.world().is_some());
+
+    // The same as the simulator renders from the true camera, to the bit.
+    let stop = &traverse.index().stops[1];
+    let camera = sim::true_camera_in_site(stop, Eye::Right).unwrap();
+    let seed = NoiseSeed { step: 1, eye: Eye::Right };
+    let expected: GrayImage = sim::render(traverse.world().unwrap(), &scenario(), &camera, seed);
+    assert_eq!(*pair.right, expected);
+    assert_ne!(traverse.true_left_camera(1), Some(traverse.left_camera(1)));
+}
+
+#[test]
+fn what_was_rendered_is_read_again_and_what_is_lost_is_rendered_alike() {
+    let folder = tempfile::tempdir().unwrap();
+    let first = create_simulated(&scenario(), folder.path()).unwrap().capture(0).unwrap();
+    let again = create_simulated(&scenario(), folder.path()).unwrap();
+    assert!(again.is_ready(0));
+    assert_eq!(again.capture(0).unwrap().left, first.left);
+    std::fs::remove_file(folder.path().join(&again.index().stops[0].left.image)).unwrap();
+    let reopened = Traverse::open(folder.path()).unwrap();
+    assert!(!reopened.is_ready(0));
+    assert_eq!(reopened.capture(0).unwrap().left, first.left);
+}
+
+#[test]
+fn eight_bits_are_kept_as_eight_bits() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut eight = scenario();
+    eight.camera.bit_depth = 8;
+    let traverse = create_simulated(&eight, folder.path()).unwrap();
+    let pair = traverse.capture(0).unwrap();
+    assert!(pair.left.pixels().all(|p| ((p[0] * 255.0).round() - p[0] * 255.0).abs() < 1e-4));
+}
+
+#[test]
+fn a_cancelled_rendering_leaves_no_image() {
+    let folder = tempfile::tempdir().unwrap();
+    let traverse = create_simulated(&scenario(), folder.path()).unwrap();
+    let error = traverse.render_step(0, &AtomicBool::new(true)).unwrap_err();
+    assert!(matches!(error, Error::Cancelled));
+    assert_eq!(files(folder.path()), 0);
+    traverse.render_step(0, &AtomicBool::new(false)).unwrap();
+    assert!(traverse.is_ready(0));
+}
+
+#[test]
+fn many_who_ask_for_the_same_stop_get_the_same_pair() {
+    use rayon::prelude::*;
+    let folder = tempfile::tempdir().unwrap();
+    let traverse = create_simulated(&scenario(), folder.path()).unwrap();
+    let pairs: Vec<_> = (0..16).into_par_iter().map(|k| (k % 2, traverse.capture(k % 2).unwrap())).collect();
+    for (step, pair) in pairs {
+        assert_eq!(Arc::as_ref(&pair.left), Arc::as_ref(&traverse.capture(step).unwrap().left));
+    }
+    assert_eq!(files(folder.path()), 4);
+}
+
+#[test]
+fn a_folder_with_something_else_in_it_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let traverse = create_simulated(&scenario(), folder.path()).unwrap();
+    let mut other = scenario();
+    other.seed += 1;
+    let refusal = |scenario: &Scenario, folder: &Path| match create_simulated(scenario, folder) {
+        Ok(_) => panic!("made"),
+        Err(error) => error.to_string(),
+    };
+    assert!(refusal(&other, folder.path()).contains("holds another traverse already"));
+    other.sun.elevation_deg = -3.0;
+    assert!(refusal(&other, folder.path()).contains("sun.elevation_deg"));
+
+    traverse.capture(0).unwrap();
+    std::fs::remove_file(folder.path().join("traverse.toml")).unwrap();
+    let message = refusal(&scenario(), folder.path());
+    assert!(message.contains(".png: is there without a traverse"), "{message}");
+}
+
+#[test]
+fn an_index_that_cannot_be_rendered_names_the_field() {
+    let folder = tempfile::tempdir().unwrap();
+    let good = create_simulated(&scenario(), folder.path()).unwrap().index().clone();
+    let refusal = |index: &TraverseIndex| {
+        write(index, folder.path(), IndexFormat::Toml, Existing::Replace).unwrap();
+        Traverse::open(folder.path()).map(|_| ()).unwrap_err().to_string()
+    };
+    let mut index = good.clone();
+    index.stops[1].truth = None;
+    assert!(refusal(&index).contains("traverse.toml: stops[1].truth: is missing"));
+    let mut index = good.clone();
+    index.stops[1].left.image = index.stops[0].right.image.clone();
+    assert!(
+        refusal(&index).contains("stops[1].left.image: images/right_0000.png is the image of another view")
+    );
+    let mut index = good.clone();
+    index.stops[0].left.image = "traverse.toml".into();
+    assert!(refusal(&index).contains("stops[0].left.image: must end in .png"));
+    let mut index = good.clone();
+    index.scenario = Some("../scenario.toml".into());
+    assert!(refusal(&index).contains("traverse.toml: scenario: "));
+    std::fs::write(folder.path().join("scenario.toml"), "[sun]\nelevation_deg = -3.0\n").unwrap();
+    let message = refusal(&good);
+    assert!(message.contains("scenario.toml: setting sun.elevation_deg"), "{message}");
+}

@@ -1,0 +1,158 @@
+//! Real recordings, imported and opened: what the files say is what the traverse says.
+
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use nalgebra::{Matrix3, Point3};
+use sightline_core::frames::Pixel;
+use sightline_core::traverse::import::pds3::Product;
+use sightline_core::traverse::import::{ImportOptions, Imported, import};
+use sightline_core::traverse::{StereoGeometry, Traverse};
+use sightline_tests::data;
+
+fn imported(source: &Path, folder: &Path) -> (Imported, Traverse) {
+    let cancel = AtomicBool::new(false);
+    let imported = import(source, &ImportOptions::default(), folder, &mut |_, _| {}, &cancel).unwrap();
+    (imported, Traverse::open(folder).unwrap())
+}
+
+#[test]
+fn kitti_opens_with_its_true_poses_in_rover_axes() {
+    let Some(source) = data::set("kitti-seq1-frames-0-19", "the KITTI import") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let (made, traverse) = imported(&source, folder.path());
+    assert_eq!((traverse.stop_count(), made.images_written), (20, 40));
+    assert!(made.notes.is_empty() && traverse.warnings().is_empty());
+    let baseline = traverse.right_camera(0).model.centre() - traverse.left_camera(0).model.centre();
+    assert!((baseline.y - 0.53715).abs() < 1e-5 && baseline.x == 0.0 && baseline.z == 0.0, "{baseline}");
+
+    let text = std::fs::read_to_string(source.join("poses.txt")).unwrap();
+    for (step, line) in text.lines().enumerate() {
+        let p: Vec<f64> = line.split_whitespace().map(|word| word.parse().unwrap()).collect();
+        let pose = traverse.true_site_from_rover(step).unwrap();
+        // Rover x, y, z are camera z, x, y.
+        let position = Point3::new(p[11], p[3], p[7]);
+        assert!((pose * Point3::origin() - position).norm() < 1e-8, "step {step}");
+        let rotation = Matrix3::new(p[10], p[8], p[9], p[2], p[0], p[1], p[6], p[4], p[5]);
+        let difference = pose.rotation.to_rotation_matrix().matrix() - rotation;
+        assert!(difference.amax() < 1e-6, "step {step}: {difference}");
+        assert!((traverse.index().stops[step].time_s - 0.1 * step as f64).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn kitti_images_are_copied_bit_for_bit_and_fit_their_cameras() {
+    let Some(source) = data::set("kitti-seq1-frames-0-19", "the KITTI images") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let (_, traverse) = imported(&source, folder.path());
+    for (step, stop) in traverse.index().stops.iter().enumerate() {
+        let pair = traverse.capture(step).unwrap();
+        assert_eq!((pair.left.dimensions(), pair.right.dimensions()), ((1226, 370), (1226, 370)));
+        for name in [&stop.left.image, &stop.right.image] {
+            assert_eq!(
+                std::fs::read(source.join(name)).unwrap(),
+                std::fs::read(folder.path().join(name)).unwrap()
+            );
+        }
+    }
+}
+
+#[test]
+fn the_navcam_pair_opens_as_one_convergent_stop() {
+    let Some(source) = data::set("mer1-navcam-sol4087-pair", "the PDS3 import") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let (made, traverse) = imported(&source, folder.path());
+    assert_eq!((traverse.stop_count(), traverse.index().stereo), (1, StereoGeometry::Convergent));
+    assert_eq!(made.notes, ["left out: 1F490747543EFFCNY9P1214L0M1 (FRONT_HAZCAM_LEFT)"]);
+    let stop = &traverse.index().stops[0];
+    assert_eq!(stop.site_from_rover.position_m, [73.9193, 65.9703, 6.56288]);
+    assert_eq!(stop.site_from_rover.quaternion_sxyz, [0.580525, 0.0333603, -0.128929, 0.803278]);
+    assert_eq!(traverse.index().full_scale_dn, Some(4095.0));
+    let views =
+        [(stop.left.image.as_str(), traverse.left_camera(0)), (&stop.right.image, traverse.right_camera(0))];
+    assert!(views[0].0.starts_with("1N491020376") && views[1].0.starts_with("1N491020519"));
+
+    for row in data::table(&source.join("expected_projections.csv"), 2) {
+        let name = row.names[0].replace(".IMG", ".png");
+        let Some((_, camera)) = views.iter().find(|(image, _)| *image == name) else { continue };
+        let [x, y, z] = [0, 1, 2].map(|k| row.numbers[k]);
+        let pixel = camera.project(&Point3::new(x, y, z)).unwrap();
+        assert!(
+            pixel.distance(Pixel::new(row.numbers[3], row.numbers[4])) < 0.001,
+            "{name}: {:?}",
+            row.numbers
+        );
+    }
+}
+
+#[test]
+fn matched_points_of_the_navcam_pair_project_to_where_they_were_matched() {
+    let Some(source) = data::set("mer1-navcam-sol4087-pair", "its reference matches") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let (_, traverse) = imported(&source, folder.path());
+    let mut residuals_px = Vec::new();
+    for row in data::table(&source.join("reference_matches.csv"), 0) {
+        let [u1, v1, u2, v2, x, y, z] = [0, 1, 2, 3, 4, 5, 6].map(|k| row.numbers[k]);
+        let point = Point3::new(x, y, z);
+        residuals_px.push(traverse.left_camera(0).project(&point).unwrap().distance(Pixel::new(u1, v1)));
+        residuals_px.push(traverse.right_camera(0).project(&point).unwrap().distance(Pixel::new(u2, v2)));
+    }
+    residuals_px.sort_by(f64::total_cmp);
+    let median_px = residuals_px[residuals_px.len() / 2];
+    // The README of the set gives 0.30 px.
+    assert!((median_px - 0.30).abs() < 0.02, "{median_px}");
+}
+
+#[test]
+fn pixels_have_the_statistics_of_their_labels_and_survive_the_import() {
+    for (set, file, mean, smallest, largest) in [
+        ("mer2-navcam-sol1869", "2n292280938effb100p0703l0m1.img", 1231.7844, 297.0, 4079.0),
+        ("mer1-hazcam-edr", "1F483288473EFFCMUFP1214L0M1.IMG", 840.0535, 5.0, 4046.0),
+        ("mer1-navcam-sol4087-pair", "1N491020376ILFCNY9P0706L0M1.IMG", 1421.7096, 517.0, 4029.0),
+    ] {
+        let Some(folder) = data::set(set, "its label statistics") else { continue };
+        let product = Product::read(&folder.join(file)).unwrap();
+        let raster = product.read_raster().unwrap();
+        let (own_mean, own_smallest, own_largest) = raster.statistics();
+        assert!((own_mean - mean).abs() < 5e-5, "{file}: {own_mean}");
+        assert_eq!(
+            (own_smallest, own_largest, raster.full_scale_dn),
+            (smallest, largest, Some(4095.0)),
+            "{file}"
+        );
+    }
+    let Some(source) = data::set("mer1-navcam-sol4087-pair", "its imported pixels") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let (_, traverse) = imported(&source, folder.path());
+    let product = Product::read(&source.join("1N491020519ILFCNY9P0706L0M1.IMG")).unwrap();
+    let raster = product.read_raster().unwrap();
+    let image = traverse.capture(0).unwrap().right;
+    for (dn, fraction) in raster.samples.iter().zip(image.as_raw()) {
+        assert!((f64::from(*fraction) * 4095.0 - f64::from(*dn)).abs() < 1e-3);
+    }
+}
+
+#[test]
+fn a_folder_without_a_pair_says_what_it_lacks() {
+    for set in ["mer2-navcam-linearized", "msl-navcam-hazcam", "mer1-hazcam-edr"] {
+        let Some(source) = data::set(set, "the refusal of its import") else { continue };
+        let folder = tempfile::tempdir().unwrap();
+        let options = ImportOptions::default();
+        let refused = import(&source, &options, folder.path(), &mut |_, _| {}, &AtomicBool::new(false));
+        let message = refused.unwrap_err().to_string();
+        assert!(message.contains("no two pictures that make a stereo stop"), "{message}");
+    }
+}
+
+#[test]
+fn two_products_chosen_by_name_make_a_stop() {
+    let Some(source) = data::set("mer2-navcam-sol1869", "an import of chosen files") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let files = ["2n292280989effb100p0703l0m1.img", "2n292280938effb100p0703l0m1.img"];
+    let options = ImportOptions { files: files.map(Into::into).to_vec(), ..ImportOptions::default() };
+    import(&source, &options, folder.path(), &mut |_, _| {}, &AtomicBool::new(false)).unwrap();
+    let traverse = Traverse::open(folder.path()).unwrap();
+    assert_eq!(traverse.index().stops[0].left.image, "2N292280989EFFB100P0703L0M1.png");
+    assert_eq!(traverse.index().stereo, StereoGeometry::Convergent);
+    assert!(traverse.capture(0).is_ok());
+}

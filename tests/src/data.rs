@@ -1,0 +1,48 @@
+//! Where the recorded data sets are, which the repository does not hold.
+//!
+//! `$SIGHTLINE_DATA` names their folder; without it, it is `../shared/data` beside the workspace. A test
+//! whose data set is missing says so and passes: whoever has the data runs it with them.
+
+use std::path::{Path, PathBuf};
+
+/// The folder of the data set `name`; where it is missing, says what `test` leaves out.
+pub fn set(name: &str, test: &str) -> Option<PathBuf> {
+    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let beside = || workspace.join("../shared/data");
+    let folder = std::env::var_os("SIGHTLINE_DATA").map_or_else(beside, PathBuf::from).join(name);
+    if folder.is_dir() {
+        return Some(folder);
+    }
+    println!(
+        "left out: {test} needs {} (set SIGHTLINE_DATA to the folder of the data sets)",
+        folder.display()
+    );
+    None
+}
+
+/// One row of a table: the text of the leading columns, the numbers of the others.
+pub struct Row {
+    /// The leading columns.
+    pub names: Vec<String>,
+    /// The columns after them.
+    pub numbers: Vec<f64>,
+}
+
+/// Reads a table of comma separated values whose first line is a title and whose first `names` columns are
+/// text; lines that begin with `#` are comments.
+///
+/// # Panics
+/// When the file cannot be read or a number is none: the data sets are known to be whole.
+pub fn table(path: &Path, names: usize) -> Vec<Row> {
+    let text = std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let read = |line: &str| {
+        let columns: Vec<_> = line.split(',').map(str::trim).collect();
+        let number = |column: &&str| column.parse().unwrap_or_else(|_| panic!("{}: {line}", path.display()));
+        Row {
+            names: columns[..names].iter().map(|&name| name.to_owned()).collect(),
+            numbers: columns[names..].iter().map(number).collect(),
+        }
+    };
+    let lines = text.lines().filter(|line| !line.trim().is_empty() && !line.starts_with('#'));
+    lines.skip(1).map(read).collect()
+}
