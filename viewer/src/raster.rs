@@ -38,7 +38,7 @@ impl Raster {
         (limits.max_image_width, limits.max_image_height) = (Some(SIDE_MAX), Some(SIDE_MAX));
         reader.limits(limits);
         let decoded = reader.decode().map_err(|e| format!("{name} is damaged: {e}"))?;
-        let values = decoded.into_luma32f();
+        let values = decoded.to_luma32f();
         let colours = values.iter().map(|&v| theme::grey(v)).collect();
         // Whole pixels when magnified, no shimmer when the image is made small.
         let options = TextureOptions {

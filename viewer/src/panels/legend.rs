@@ -49,7 +49,7 @@ pub fn show(ui: &mut egui::Ui, canvas: &Canvas, entries: &[Entry], state: &State
         let row = Rect::from_min_size(at, vec2(width - 8.0, ROW));
         let shown = !state.hidden.contains(&entry.layer);
         paint_legend_row(&canvas.painter, at, entry.mark, entry.colour, &entry.word, shown);
-        let response = ui.interact(row, ui.id().with(("legend", entry.layer)), Sense::click());
+        let response = ui.interact(row, ui.scope_id().with(("legend", entry.layer)), Sense::click());
         let action = if shown { "hide" } else { "show" };
         response.widget_info(|| {
             egui::WidgetInfo::selected(egui::Role::CheckBox, true, shown, format!("{} (legend)", entry.word))

@@ -87,7 +87,7 @@ fn arrow(ui: &Ui, middle: Pos2, words: &str) {
 }
 
 fn show_patch(ui: &mut Ui, state: &State, patch: &Patch, frame: Rect, out: &mut Vec<Command>) {
-    let response = ui.interact(frame, ui.id().with(("patch", patch.array)), Sense::click());
+    let response = ui.interact(frame, ui.scope_id().with(("patch", patch.array)), Sense::click());
     let painter = ui.painter();
     let above = frame.center_top() - vec2(0.0, 3.0);
     painter.text(above, Align2::CENTER_BOTTOM, &patch.title, theme::image_font(), theme::TEXT);
