@@ -36,7 +36,6 @@ pub mod trace;
 pub mod pipeline;
 pub mod sim;
 pub mod traverse;
-pub mod sim;
 pub mod session;
 pub mod study;
 #[cfg(test)]

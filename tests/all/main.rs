@@ -2,3 +2,4 @@
 
 mod imports;
 mod recorded_cameras;
+mod zncc_reference;

@@ -29,7 +29,7 @@ pub mod contour;
 pub mod theme;
 pub mod status;
 #[cfg(target_arch = "wasm32")]
-mod web;
+pub mod web;
 #[cfg(test)]
 mod tests;
 

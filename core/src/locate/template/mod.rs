@@ -126,7 +126,14 @@ fn finish(
         }
     };
     located.right_pixel = Some(stereo.right_pixel);
-    match triangulate::triangulate(input, &stereo, left_covariance_px2, settings.noise_model) {
+    // A best score at the end of the curve may belong to a point beyond it: its range is not known.
+    let triangulated = if stereo.at_end {
+        let range_m = stereo.range_m;
+        Err(format!("the best stereo match lies at the end of the searched ranges, at {range_m:.1} m"))
+    } else {
+        triangulate::triangulate(input, &stereo, left_covariance_px2, settings.noise_model)
+    };
+    match triangulated {
         Ok(triangulation) => {
             located.position_in_rover = Some(triangulation.position_in_rover);
             located.covariance_in_rover = Some(triangulation.covariance_in_rover);
