@@ -1,7 +1,5 @@
 //! All tests that cross crates.
 
-mod api;
-mod cli;
 mod imports;
 mod recorded_cameras;
 mod rerun_export;
