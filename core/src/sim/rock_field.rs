@@ -173,7 +173,8 @@ fn draw_place(place: &Place, approach: &Approach, random: &mut Pcg64) -> [f64; 2
             [random.random_range(from_m..to_m), random.random_range(-half_m..half_m)]
         }
         Place::Disc { radius_m } => {
-            let (r, angle) = (radius_m * random.random::<f64>().sqrt(), random.random_range(0.0..std::f64::consts::TAU));
+            let (r, angle) =
+                (radius_m * random.random::<f64>().sqrt(), random.random_range(0.0..std::f64::consts::TAU));
             [approach.goal_m[0] + r * angle.cos(), approach.goal_m[1] + r * angle.sin()]
         }
     }

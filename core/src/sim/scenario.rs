@@ -259,11 +259,7 @@ impl Default for Scenario {
             sun: SunSettings::default(),
             camera: CameraSettings::default(),
             drive: DriveSettings::default(),
-            odometry_error: OdometryError {
-                along_fraction: 0.01,
-                across_fraction: 0.005,
-                attitude_deg: 0.1,
-            },
+            odometry_error: OdometryError { along_fraction: 0.01, across_fraction: 0.005, attitude_deg: 0.1 },
             targets: TargetRule::default(),
         }
     }
@@ -388,7 +384,8 @@ mod tests {
 
     #[test]
     fn what_is_left_out_takes_its_default() {
-        let read = Scenario::from_toml("seed = 9\n[sun]\nelevation_deg = 20.0\n", Path::new("s.toml")).unwrap();
+        let read =
+            Scenario::from_toml("seed = 9\n[sun]\nelevation_deg = 20.0\n", Path::new("s.toml")).unwrap();
         assert_eq!((read.seed, read.sun.elevation_deg), (9, 20.0));
         assert_eq!(read.rocks, RockSettings::default());
     }
