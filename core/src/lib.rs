@@ -36,6 +36,7 @@ pub mod trace;
 pub mod pipeline;
 pub mod sim;
 pub mod traverse;
+pub mod sim;
 pub mod session;
 pub mod study;
 #[cfg(test)]

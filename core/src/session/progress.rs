@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use super::view::{SavedRun, SavedSession, SavedTarget};
-use super::{Cursor, Pending, Run, Session, TargetRecord};
+use super::{Pending, Run, Session, TargetRecord};
 use crate::error::{Error, Result};
 use crate::settings::Settings;
 use crate::target::Designation;
@@ -162,7 +162,7 @@ fn restored_run(saved: &SavedRun) -> Run {
 mod tests {
     use super::*;
     use crate::frames::Pixel;
-    use crate::session::Fork;
+    use crate::session::{Cursor, Fork};
 
     fn saved() -> SavedSession {
         let designation = Designation { step: 1, pixel: Pixel::new(3.0, 4.0) };
