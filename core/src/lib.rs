@@ -34,7 +34,6 @@ pub mod stages;
 pub mod locate;
 pub mod trace;
 pub mod pipeline;
-pub mod sim;
 pub mod traverse;
 pub mod session;
 pub mod study;

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use rerun::{RecordingStream, RecordingStreamBuilder, TextDocument};
 use sightline_core::pipeline::Stops;
-use sightline_core::traverse::StereoPair;
+use sightline_core::stages::capture::StereoPair;
 use sightline_core::trace::StepTrace;
 
 use super::step::Step;

@@ -4,7 +4,7 @@ use rerun::{AsComponents, Clear, RecordingStream, SeriesLines};
 use sightline_core::frames::{Point3, Pose};
 use sightline_core::locate::template::TemplateEvidence;
 use sightline_core::locate::template::match_template::TemplateMatch;
-use sightline_core::traverse::StereoPair;
+use sightline_core::stages::capture::StereoPair;
 use sightline_core::stages::point_mast::Pointing;
 use sightline_core::trace::StepTrace;
 
