@@ -9,7 +9,7 @@ use sightline_core::frames::{Pixel, Point3, Pose};
 use sightline_core::image::GrayImage;
 use sightline_core::pipeline::Stops;
 use sightline_core::sim::{Scenario, choose_targets};
-use sightline_core::traverse::StereoPair;
+use sightline_core::stages::capture::StereoPair;
 use sightline_core::study::truth::TruthSource;
 use sightline_core::traverse::{OdometryError, StereoGeometry, Traverse, create_simulated};
 
