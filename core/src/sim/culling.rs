@@ -147,8 +147,7 @@ impl SunGrid {
         if rocks.is_empty() {
             return Self { across, low_m: [0.0; 2], cells: [0; 2], starts: vec![0], rocks: Vec::new() };
         }
-        let cells: [usize; 2] =
-            std::array::from_fn(|k| ((high_m[k] - low_m[k]) / Self::CELL_M) as usize + 1);
+        let cells: [usize; 2] = std::array::from_fn(|k| ((high_m[k] - low_m[k]) / Self::CELL_M) as usize + 1);
         let mut lists = vec![Vec::new(); cells[0] * cells[1]];
         for (index, rock) in rocks.iter().enumerate() {
             let range: [[usize; 2]; 2] = std::array::from_fn(|k| {
@@ -171,12 +170,12 @@ impl SunGrid {
     #[inline(always)]
     pub fn towards_sun(&self, point: &Point3) -> &[u32] {
         let mut cell = [0usize; 2];
-        for k in 0..2 {
+        for (k, cell) in cell.iter_mut().enumerate() {
             let position = (point.coords.dot(&self.across[k]) - self.low_m[k]) / Self::CELL_M;
             if position < 0.0 || position >= self.cells[k] as f64 {
                 return &[];
             }
-            cell[k] = position as usize;
+            *cell = position as usize;
         }
         let at = cell[1] * self.cells[0] + cell[0];
         &self.rocks[self.starts[at] as usize..self.starts[at + 1] as usize]

@@ -108,7 +108,9 @@ impl<'a> Sampler<'a> {
         let rocks = self.world.rocks.iter().enumerate();
         let mut list: Vec<(f64, usize)> = rocks
             .filter(|(_, rock)| in_cone(&cone, &rock.centre, rock.radius_m))
-            .map(|(index, rock)| ((rock.centre - cone.apex).norm() - rock.radius_m - cone.apex_radius_m, index))
+            .map(|(index, rock)| {
+                ((rock.centre - cone.apex).norm() - rock.radius_m - cone.apex_radius_m, index)
+            })
             .collect();
         list.sort_by(|a, b| a.0.total_cmp(&b.0));
         list

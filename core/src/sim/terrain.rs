@@ -140,7 +140,6 @@ impl Terrain {
             near + v * (far - near)
         })
     }
-
 }
 
 /// The octaves of the relief, with unit amplitude at 1 m wavelength (in units of its standard deviation).

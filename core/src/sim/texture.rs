@@ -177,7 +177,8 @@ impl<const DIMENSIONS: usize> Octaves<DIMENSIONS> {
                 .collect();
         let amplitude = |w: f64| (w / settings.longest_m).powf(settings.albedo_exponent);
         let norm = wavelengths_m.iter().map(|w| amplitude(*w).powi(2)).sum::<f64>().sqrt();
-        let slope = settings.slope_std / (SLOPE_OVER_VALUE * std_of_one * (wavelengths_m.len() as f64).sqrt());
+        let slope =
+            settings.slope_std / (SLOPE_OVER_VALUE * std_of_one * (wavelengths_m.len() as f64).sqrt());
         let octaves = wavelengths_m.iter().enumerate().map(|(index, &wavelength_m)| {
             let turn = turn::<DIMENSIONS>(seed, index as u64);
             Octave {
@@ -250,8 +251,8 @@ impl Octaves<3> {
             let (albedo, g) = value_noise_3d(lattice, octave.seed);
             sum.albedo += weight * octave.albedo * albedo;
             let (slope, r) = (weight * octave.slope, &octave.turn);
-            for k in 0..3 {
-                sum.slope[k] += slope * (r[0][k] * g[0] + r[1][k] * g[1] + r[2][k] * g[2]);
+            for (k, sum) in sum.slope.iter_mut().enumerate() {
+                *sum += slope * (r[0][k] * g[0] + r[1][k] * g[1] + r[2][k] * g[2]);
             }
         }
         sum

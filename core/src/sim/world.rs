@@ -156,7 +156,8 @@ impl World {
         self.sun_grid.towards_sun(&to_sun.origin).iter().any(|&index| {
             let interval = self.rocks[index as usize].interval(to_sun);
             // Where the ray starts on a lit face it leaves at once.
-            interval.is_some_and(|i| i.leave_m - i.enter_m.max(0.0) > OFF_SURFACE_M && i.leave_m > OFF_SURFACE_M)
+            interval
+                .is_some_and(|i| i.leave_m - i.enter_m.max(0.0) > OFF_SURFACE_M && i.leave_m > OFF_SURFACE_M)
         })
     }
 

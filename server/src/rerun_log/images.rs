@@ -58,7 +58,7 @@ pub(super) fn log_subframe(step: &Step<'_>) -> Logged {
 pub(super) fn log_footprint(step: &Step<'_>) -> Logged {
     let prepared = step.template().and_then(|e| e.scale_roll.as_ref());
     let strip = prepared.zip(step.predicted().and_then(|p| p.predicted_left)).map(|(prepared, centre)| {
-        square(centre, prepared.reference.width(), &prepared.image_from_template())
+        square(centre, prepared.reference.width(), &prepared.prepared_from_template())
     });
     step.log("/{target}/locate/scale_roll/footprint", strip.map(|s| haloed(&[s], PREDICTION)))
 }

@@ -56,11 +56,8 @@ fn the_index_gives_estimate_and_truth_apart_and_equal_at_the_start() {
 #[test]
 fn estimates_have_the_stated_errors_over_many_seeds() {
     let demo = demo();
-    let poses: Vec<Pose> = true_stops(&demo.world, &demo.scenario)
-        .unwrap()
-        .iter()
-        .map(|stop| stop.site_from_rover)
-        .collect();
+    let poses: Vec<Pose> =
+        true_stops(&demo.world, &demo.scenario).unwrap().iter().map(|stop| stop.site_from_rover).collect();
     let error = demo.scenario.odometry_error;
     let (mut along, mut across, mut attitude) = (Vec::new(), Vec::new(), Vec::new());
     for seed in 0..300 {

@@ -96,10 +96,12 @@ fn shadows_agree_with_asking_every_rock() {
         let down = Ray { origin: Point3::new(place.x, place.y, -3.0), direction: Vector3::z() };
         let hit = world.cast(&down).unwrap();
         let to_sun = Ray { origin: hit.point, direction: world.to_sun() };
-        let by_rock = world.rocks.iter().filter_map(|rock| rock.interval(&to_sun)).any(|interval| {
-            interval.leave_m > 1e-6 && interval.leave_m - interval.enter_m.max(0.0) > 1e-6
-        });
-        let by_ground = (1..400).map(|step| to_sun.at(f64::from(step) * 1e-3)).any(|p| p.z > world.ground_z_at(p.x, p.y));
+        let by_rock =
+            world.rocks.iter().filter_map(|rock| rock.interval(&to_sun)).any(|interval| {
+                interval.leave_m > 1e-6 && interval.leave_m - interval.enter_m.max(0.0) > 1e-6
+            });
+        let by_ground =
+            (1..400).map(|step| to_sun.at(f64::from(step) * 1e-3)).any(|p| p.z > world.ground_z_at(p.x, p.y));
         // The demonstration's ground is nowhere as steep as its sun is high.
         assert!(!by_ground || hit.surface != SurfaceId::Ground);
         assert_eq!(world.in_shadow(&hit.point), by_rock, "{hit:?}");
@@ -111,7 +113,8 @@ fn shadows_agree_with_asking_every_rock() {
 #[test]
 fn a_low_sun_makes_the_ground_shade_itself() {
     let mut scenario = demo().scenario.clone();
-    (scenario.sun.elevation_deg, scenario.terrain.rms_at_1m_m, scenario.rocks.area_fraction) = (6.0, 0.06, 0.0);
+    (scenario.sun.elevation_deg, scenario.terrain.rms_at_1m_m, scenario.rocks.area_fraction) =
+        (6.0, 0.06, 0.0);
     scenario.rocks.cluster_count = 0;
     scenario.terrain.cell_m = 0.05;
     let world = World::new(&scenario);
