@@ -35,6 +35,7 @@ pub mod locate;
 pub mod trace;
 pub mod pipeline;
 pub mod traverse;
+pub mod sim;
 pub mod session;
 pub mod study;
 #[cfg(test)]
