@@ -4,3 +4,6 @@ mod imports;
 mod recorded_cameras;
 mod rerun_export;
 mod zncc_reference;
+mod api;
+mod api_security;
+mod cli;
