@@ -42,8 +42,8 @@ static FIXTURE: LazyLock<Fixture> = LazyLock::new(|| {
 
 impl Fixture {
     fn logs(&self) -> Vec<RunLog<'_>> {
-        let log = |(target, steps): (usize, &'_ Vec<_>)| RunLog { target, run: 0, label: LABELS[target], steps };
-        self.runs.iter().enumerate().map(log).collect()
+        let numbered = self.runs.iter().enumerate();
+        numbered.map(|(target, steps)| RunLog { target, run: 0, label: LABELS[target], steps }).collect()
     }
 
     fn exported(&self) -> Recording {

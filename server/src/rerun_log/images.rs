@@ -20,12 +20,12 @@ const PLUS_ARM_PX: f64 = 6.0;
 
 /// The left image.
 pub(super) fn log_left_image(step: &Step<'_>) -> Logged {
-    step.log("/capture/left", step.pair.as_ref().and_then(|pair| png(&pair.left)))
+    step.log("/capture/left", step.images.as_ref().and_then(|[left, _]| png(left)))
 }
 
 /// The right image.
 pub(super) fn log_right_image(step: &Step<'_>) -> Logged {
-    step.log("/capture/right", step.pair.as_ref().and_then(|pair| png(&pair.right)))
+    step.log("/capture/right", step.images.as_ref().and_then(|[_, right]| png(right)))
 }
 
 /// The prediction in the left image.

@@ -2,10 +2,11 @@
 //! come, and the images of a stop once for all runs.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use rerun::{RecordingStream, RecordingStreamBuilder, TextDocument};
+use sightline_core::image::GrayImage;
 use sightline_core::pipeline::Stops;
-use sightline_core::stages::capture::StereoPair;
 use sightline_core::trace::StepTrace;
 
 use super::step::Step;
@@ -21,7 +22,7 @@ pub struct RunLog<'a> {
     /// What the person calls it.
     pub label: &'a str,
     /// Its steps so far.
-    pub steps: &'a [std::sync::Arc<StepTrace>],
+    pub steps: &'a [Arc<StepTrace>],
 }
 
 /// A recording that is being written.
@@ -53,6 +54,7 @@ impl Recorder {
         if std::mem::replace(&mut self.has_traverse, true) {
             return Ok(());
         }
+        self.stream.send_recording_name(name)?;
         let about = format!("# {name}\n{} stops. Frames: site x north, y east, z down.", stops.stop_count());
         self.stream.log_static("/traverse", &TextDocument::from_markdown(about))?;
         map::log_site_axes(&self.stream)?;
@@ -94,7 +96,7 @@ impl Recorder {
             root: &root,
             label: run.label,
             trace,
-            pair: if is_first_here { pair(trace, stops) } else { None },
+            images: if is_first_here { images(trace, stops) } else { None },
             site_from_rover: stops.site_from_rover(trace.step),
         };
         log_step(&step, is_first_here)
@@ -108,7 +110,8 @@ impl Recorder {
 
 /// The images of a step. Those of a run that was read back from disk are not in the trace and come from the
 /// traverse.
-fn pair(trace: &StepTrace, stops: &dyn Stops) -> Option<StereoPair> {
-    let capture = trace.capture.as_ref()?;
-    if capture.pair.left.width() > 0 { Some(capture.pair.clone()) } else { stops.capture(trace.step).ok() }
+fn images(trace: &StepTrace, stops: &dyn Stops) -> Option<[Arc<GrayImage>; 2]> {
+    let kept = trace.capture.as_ref()?.pair.clone();
+    let pair = if kept.left.width() > 0 { kept } else { stops.capture(trace.step).ok()? };
+    Some([pair.left, pair.right])
 }

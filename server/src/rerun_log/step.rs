@@ -1,10 +1,12 @@
 //! One step of one run on its way into a recording: where its rows go, and what the `log_*` functions read.
 
+use std::sync::Arc;
+
 use rerun::{AsComponents, Clear, RecordingStream, SeriesLines};
 use sightline_core::frames::{Point3, Pose};
+use sightline_core::image::GrayImage;
 use sightline_core::locate::template::TemplateEvidence;
 use sightline_core::locate::template::match_template::TemplateMatch;
-use sightline_core::stages::capture::StereoPair;
 use sightline_core::stages::point_mast::Pointing;
 use sightline_core::trace::StepTrace;
 
@@ -20,8 +22,8 @@ pub(super) struct Step<'a> {
     pub(super) label: &'a str,
     /// What the stages saw and decided.
     pub(super) trace: &'a StepTrace,
-    /// The images of the stop, where they could be read.
-    pub(super) pair: Option<StereoPair>,
+    /// The left and the right image of the stop, where they could be read and are still to be logged.
+    pub(super) images: Option<[Arc<GrayImage>; 2]>,
     /// The estimated pose of the stop.
     pub(super) site_from_rover: Pose,
 }
