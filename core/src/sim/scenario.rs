@@ -227,7 +227,8 @@ pub struct TargetRule {
     pub count: u32,
     /// Greatest distance of a target's surface point from the targets' centre, m.
     pub radius_m: f64,
-    /// Side of the square window on which the rule is tested, px (21: R21).
+    /// Side of the square window on which the rule is tested, px of this image (21: R21; reduce it together
+    /// with the image, 11 at 512 and 7 at 256, or few windows are even enough).
     pub window_px: u32,
     /// Greatest part of the window in shadow (0.20: R21).
     pub shadow_fraction: f64,

@@ -12,9 +12,11 @@
 //!
 //! Nothing else is asked: not texture, not contrast, not how well anything tracks it, not whether it lies on
 //! a rock or on the ground. Between 10 m and 8.5 m a window on level ground ranges over about 10 % of the
-//! distance, because the ground is seen at a grazing angle; so most targets of the default scenario lie on
-//! rocks ([`share_on_rocks`] tells the part). Drawing ends after 2000 draws per target asked for; then
-//! there are fewer targets.
+//! distance, because the ground is seen at a grazing angle; so more targets of the default scenario lie on
+//! rocks than on soil: 40 to 100 % in the worlds of seeds 1 to 8, 69 % on average ([`share_on_rocks`] tells
+//! a world's part). Drawing ends after 2000 draws per target asked for; then there are fewer targets. That
+//! happens when the image is reduced and the window is not: 21 px of a 512-pixel image span 34 cm at 10 m,
+//! and hardly any such window is even enough, while 11 px give as many targets as 21 in the full image.
 //!
 //! Units: px, m. Frames: pixels of the first left image, rays in the site frame. Sources: papers.md R21.
 
