@@ -114,7 +114,7 @@ async function boot() {
 
 // A panic inside the viewer calls this with its message; afterwards nothing on the canvas answers any more.
 window.addEventListener("sightline-panic", (event) => {
-  fail("The viewer stopped because of a fault in it. Load this page again; your session is safe on the server.", event.detail);
+  fail("The viewer stopped because of a fault in it. Load this page again to go on.", event.detail);
 });
 
 boot().catch((error) => {

@@ -1,20 +1,20 @@
 //! Speed of the dense correlation surface against what the processor can do.
 //!
-//! **The bound.** A template of n × n over P positions needs n² P multiply-adds. The image is read once into
-//! the cache, so memory is no limit: the smallest case touches 161 × 161 × 4 = 104 kB of pixels and 0.4 MB of
-//! integral images in the second-level cache.
+//! **The bound.** A template of n × n over P positions needs n² P multiply-adds. Memory is no limit: the
+//! smallest case reads 161 × 161 × 4 = 104 kB of pixels and writes 80 kB of scores, microseconds of cache traffic.
 //!
 //! | case | positions | multiply-adds |
 //! |---|---|---|
-//! | 21 × 21 in 161 × 161 | 141² = 19 881 | 8.77 M |
 //! | 21 × 21 in 143 × 143 | 123² = 15 129 | 6.67 M |
+//! | 21 × 21 in 161 × 161 | 141² = 19 881 | 8.77 M |
 //! | 21 × 21 in 600 × 600 | 580² = 336 400 | 148.4 M |
 //!
-//! A core with two 512-bit multiply-add units does 32 of them a cycle: 8.77 M take 274 000 cycles, 0.1 ms at
-//! 2.7 GHz; with 256-bit units twice as long. Of this the blocks lose (n + 3)/n = 14 % to the rows in which
-//! some of their windows have not begun (`correlate::dot`), and the integral images and the division by the
-//! norms add about 5 ns for every pixel, a fifth of the sums. `dense_one_thread` is the number to hold
-//! against the bound; `dense` is what the tracker sees with the threads it has.
+//! A core with two 512-bit multiply-add units does 32 of them a cycle: 8.77 M take 274 000 cycles, 67 µs at
+//! 4.1 GHz (131 billion a second); with 256-bit units twice as long. Of this the blocks lose (n + 3)/n = 14 %
+//! to the rows in which some of their windows have not begun (`correlate::dot`), and what is left over a multiple
+//! of the vector's width. The rest goes into work that grows with the positions and not with the template:
+//! copying tiles, running sums, square roots and divisions, about 3 ns for each. `dense_one_thread` is the
+//! number to hold against the bound; `dense` is what the tracker sees with the threads it has.
 //!
 //! Run with `cargo bench -p sightline-core --profile dev --bench zncc` (the profile `dev` is optimised).
 

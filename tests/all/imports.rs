@@ -12,8 +12,9 @@ use sightline_tests::data;
 
 fn imported(source: &Path, folder: &Path) -> (Imported, Traverse) {
     let cancel = AtomicBool::new(false);
-    let imported = import(source, &ImportOptions::default(), folder, &mut |_, _| {}, &cancel).unwrap();
-    (imported, Traverse::open(folder).unwrap())
+    let imported =
+        import(source, &ImportOptions::default(), folder, &mut |_, _| {}, &cancel).expect("importable");
+    (imported, Traverse::open(folder).expect("a traverse that opens"))
 }
 
 #[test]
@@ -86,21 +87,30 @@ fn the_navcam_pair_opens_as_one_convergent_stop() {
 }
 
 #[test]
-fn matched_points_of_the_navcam_pair_project_to_where_they_were_matched() {
-    let Some(source) = data::set("mer1-navcam-sol4087-pair", "its reference matches") else { return };
-    let folder = tempfile::tempdir().unwrap();
-    let (_, traverse) = imported(&source, folder.path());
-    let mut residuals_px = Vec::new();
-    for row in data::table(&source.join("reference_matches.csv"), 0) {
-        let [u1, v1, u2, v2, x, y, z] = [0, 1, 2, 3, 4, 5, 6].map(|k| row.numbers[k]);
-        let point = Point3::new(x, y, z);
-        residuals_px.push(traverse.left_camera(0).project(&point).unwrap().distance(Pixel::new(u1, v1)));
-        residuals_px.push(traverse.right_camera(0).project(&point).unwrap().distance(Pixel::new(u2, v2)));
+fn matched_points_project_to_where_they_were_matched() {
+    for (set, count, expected_px) in
+        [("mer1-navcam-sol4087-pair", 616, 0.30), ("mer2-navcam-sol1869", 621, 0.85)]
+    {
+        let Some(source) = data::set(set, "its reference matches") else { continue };
+        let folder = tempfile::tempdir().unwrap();
+        let (_, traverse) = imported(&source, folder.path());
+        let rows = data::table(&source.join("reference_matches.csv"), 0);
+        assert_eq!(rows.len(), count, "{set}");
+        let mut residuals_px = Vec::new();
+        for row in rows {
+            let [u1, v1, u2, v2, x, y, z] = [0, 1, 2, 3, 4, 5, 6].map(|k| row.numbers[k]);
+            let point = Point3::new(x, y, z);
+            let seen = traverse.left_camera(0).project(&point).zip(traverse.right_camera(0).project(&point));
+            // The rays of matches near the horizon diverge by noise: those "points" lie behind the cameras.
+            let Some((left, right)) = seen else { continue };
+            residuals_px.extend([left.distance(Pixel::new(u1, v1)), right.distance(Pixel::new(u2, v2))]);
+        }
+        assert!(residuals_px.len() as f64 > 2.0 * 0.85 * count as f64, "{set}: {}", residuals_px.len());
+        residuals_px.sort_by(f64::total_cmp);
+        let median_px = residuals_px[residuals_px.len() / 2];
+        // The medians of the sets' READMEs; the points are given to 1 mm, which is 0.1 px at 5 m.
+        assert!((median_px - expected_px).abs() < 0.03, "{set}: {median_px}");
     }
-    residuals_px.sort_by(f64::total_cmp);
-    let median_px = residuals_px[residuals_px.len() / 2];
-    // The README of the set gives 0.30 px.
-    assert!((median_px - 0.30).abs() < 0.02, "{median_px}");
 }
 
 #[test]

@@ -89,14 +89,15 @@ fn the_real_stereo_pair_projects_as_the_independent_implementation_does() {
 
 /// The model of one case of the reference: its vectors as printed, L as T and P.
 fn reference_model(case: &serde_json::Value) -> CameraModel {
-    let numbers = |key: &str| -> [f64; 3] { std::array::from_fn(|k| case[key][k].as_f64().unwrap()) };
+    let numbers =
+        |key: &str| -> [f64; 3] { std::array::from_fn(|k| case[key][k].as_f64().expect("a number")) };
     let vector = |key: &str| Vector3::from(numbers(key));
     let linear = Cahv::as_printed(Point3::from(numbers("C")), vector("A"), vector("H"), vector("V"));
-    match case["model"].as_str().unwrap() {
+    match case["model"].as_str().expect("a model") {
         "CAHV" => CameraModel::Cahv(linear),
         "CAHVOR" => CameraModel::Cahvor(Cahvor::as_printed(linear, vector("O"), numbers("R"))),
         "CAHVORE" => {
-            let law = match case["linearity"].as_f64().unwrap() {
+            let law = match case["linearity"].as_f64().expect("a number") {
                 1.0 => (Imaging::Perspective, 0.0),
                 0.0 => (Imaging::Fisheye, 0.0),
                 linearity => (Imaging::General, linearity),

@@ -1,3 +1,6 @@
 //! Helpers shared by the integration tests.
 
+pub mod browser;
 pub mod data;
+pub mod rrd;
+pub mod troubled;

@@ -1,38 +1,36 @@
 //! The debugger's page: data in, commands out.
+//!
+//! | file | what it does |
+//! |---|---|
+//! | `app` | lays the panels out and carries their commands to state and network |
+//! | `state` | what is known and looked at: the one value of which every panel is a view |
+//! | `command`, `keys` | what a person can ask for, and by which key |
+//! | `net` | requests and events; nothing blocks |
+//! | `cache`, `raster` | what was loaded, with a limit of memory, and how pixels become a texture |
+//! | `panels` | one file a panel: read-only data in, commands out |
+//! | `layout` | where the panels are |
+//! | `view2d`, `overlay`, `ellipse`, `contour` | the zoomable canvas and the marks on it |
+//! | `theme` | colours, text styles and spacing, and nowhere else |
+//! | `status` | the machine-readable status for tests in a browser |
 
+pub mod app;
+pub mod state;
+pub mod command;
+pub mod keys;
+pub mod net;
+pub mod cache;
+pub mod raster;
+pub mod panels;
+pub mod layout;
+pub mod view2d;
+pub mod overlay;
+pub mod ellipse;
+pub mod contour;
+pub mod theme;
+pub mod status;
 #[cfg(target_arch = "wasm32")]
-mod web;
+pub mod web;
+#[cfg(test)]
+mod tests;
 
-/// The application.
-#[derive(Default)]
-pub struct SightlineApp {
-    clicks: u32,
-    key: String,
-}
-
-impl SightlineApp {
-    /// The application as it is when the page opens.
-    pub fn new(_context: &eframe::CreationContext<'_>) -> Self {
-        Self::default()
-    }
-}
-
-impl eframe::App for SightlineApp {
-    fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
-        egui::CentralPanel::default().show(ui, |ui| {
-            ui.heading("Sightline");
-            if ui.button("Count a click").clicked() {
-                self.clicks += 1;
-            }
-            ui.input(|input| {
-                for event in &input.events {
-                    if let egui::Event::Key { key, pressed: true, .. } = event {
-                        self.key = key.name().to_owned();
-                    }
-                }
-            });
-            ui.label(format!("Clicks: {}; last key: {}", self.clicks, self.key));
-            assert!(self.key != "P", "the key P was pressed");
-        });
-    }
-}
+pub use app::{Link, SightlineApp};

@@ -1,9 +1,23 @@
-//! The native viewer.
+//! The native viewer: `sightline-viewer [http://127.0.0.1:4870[/#session=ID]]`.
+
+use sightline_viewer::{Link, SightlineApp};
+
+/// Where the server listens unless it is told otherwise.
+const DEFAULT: &str = "http://127.0.0.1:4870";
 
 fn main() -> eframe::Result {
+    let link = link(&std::env::args().nth(1).unwrap_or_else(|| DEFAULT.to_owned()));
+    let viewport = egui::ViewportBuilder::default().with_inner_size([1600.0, 1000.0]).with_title("Sightline");
     eframe::run_native(
         "Sightline",
-        eframe::NativeOptions::default(),
-        Box::new(|context| Ok(Box::new(sightline_viewer::SightlineApp::new(context)))),
+        eframe::NativeOptions { viewport, ..Default::default() },
+        Box::new(|context| Ok(Box::new(SightlineApp::new(&context.egui_ctx, link)))),
     )
+}
+
+/// The server and session that an address names.
+fn link(address: &str) -> Link {
+    let (origin, fragment) = address.split_once('#').unwrap_or((address, ""));
+    let session = fragment.split('&').find_map(|part| part.strip_prefix("session="));
+    Link { origin: origin.trim_end_matches('/').to_owned(), session: session.map(str::to_owned) }
 }

@@ -1,14 +1,17 @@
 //! The way in from the browser: `start` puts the application on a canvas, and a panic becomes a sentence on the page.
 
-use std::sync::Once;
+use std::sync::{Once, OnceLock};
 
 use eframe::{WebOptions, WebRunner};
 use wasm_bindgen::prelude::*;
 
-use crate::SightlineApp;
+use crate::{Link, SightlineApp};
 
 /// The event that tells the page of a panic; its detail is the panic's message.
 const PANIC_EVENT: &str = "sightline-panic";
+
+/// The canvas on which the application runs.
+static CANVAS: OnceLock<String> = OnceLock::new();
 
 /// Starts the application on the canvas with this id.
 ///
@@ -23,9 +26,46 @@ pub async fn start(canvas_id: String) -> Result<(), JsValue> {
         .and_then(|document| document.get_element_by_id(&canvas_id))
         .and_then(|element| element.dyn_into::<web_sys::HtmlCanvasElement>().ok())
         .ok_or_else(|| JsValue::from_str(&format!("the page has no canvas with the id `{canvas_id}`")))?;
+    CANVAS.get_or_init(|| canvas_id);
+    let link = link();
     WebRunner::new()
-        .start(canvas, WebOptions::default(), Box::new(|context| Ok(Box::new(SightlineApp::new(context)))))
+        .start(
+            canvas,
+            WebOptions::default(),
+            Box::new(|context| Ok(Box::new(SightlineApp::new(&context.egui_ctx, link)))),
+        )
         .await
+}
+
+/// The server that sent the page, and the session that its fragment names: `#session=ID`.
+fn link() -> Link {
+    let location = web_sys::window().map(|window| window.location());
+    let origin = location.as_ref().and_then(|location| location.origin().ok()).unwrap_or_default();
+    let fragment = location.and_then(|location| location.hash().ok()).unwrap_or_default();
+    let parts = fragment.trim_start_matches('#').split('&');
+    let session = parts.filter_map(|part| part.strip_prefix("session=")).find(|id| !id.is_empty());
+    Link { origin, session: session.map(str::to_owned) }
+}
+
+/// Writes the session into the page's address, so that the address opens it again; the history stays as it is.
+pub(crate) fn keep_link(session: &str) {
+    let history = web_sys::window().and_then(|window| window.history().ok());
+    if let Some(history) = history {
+        // Where the browser forbids it the page works all the same, only its address does not.
+        history
+            .replace_state_with_url(&JsValue::NULL, "", Some(&format!("#session={session}")))
+            .unwrap_or_default();
+    }
+}
+
+/// Sets an attribute of the canvas.
+pub(crate) fn publish(name: &str, value: &str) {
+    let document = web_sys::window().and_then(|window| window.document());
+    let canvas = CANVAS.get().and_then(|id| document?.get_element_by_id(id));
+    if let Some(canvas) = canvas {
+        // Only tests read it; without it the page is the same.
+        canvas.set_attribute(name, value).unwrap_or_default();
+    }
 }
 
 /// Sends every panic to the page as an event; eframe's own hook, installed later, logs it and then calls this one.

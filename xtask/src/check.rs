@@ -20,9 +20,7 @@ pub(crate) fn check() -> Result<()> {
     for crates in [&["--package", "xtask"][..], &["--workspace", "--exclude", "xtask"]] {
         cmd::run(cmd::cargo(&["clippy", "--all-targets"]).args(crates).args(lints), mend)?;
         cmd::run(
-            cmd::cargo(&["doc", "--no-deps", "--document-private-items"])
-                .args(crates)
-                .env("RUSTDOCFLAGS", "-D warnings"),
+            cmd::cargo(&["doc", "--no-deps"]).args(crates).env("RUSTDOCFLAGS", "-D warnings"),
             "mend the documentation reported above",
         )?;
     }

@@ -30,9 +30,16 @@ pub(crate) fn install(sysroot: &Path) -> Result<()> {
         bail!("this machine's apt sources name no Debian mirror");
     }
     let work = cmd::root().join("target").join("rust-src");
+    let mut reason = format!("no suite of this machine's Debian mirror has rust-src {version}");
     for mirror in &mirrors {
         for suite in SUITES {
-            let Ok(apt) = Apt::update(&work, mirror, suite) else { continue };
+            let apt = match Apt::update(&work, mirror, suite) {
+                Ok(apt) => apt,
+                Err(error) => {
+                    reason = format!("{error:#}");
+                    continue;
+                }
+            };
             let Some(package) = apt.package_of(&version)? else { continue };
             cmd::say(format!("Debian's {suite} has rust-src {package}: downloading it."));
             let unpacked = apt.download_and_unpack(&package)?;
@@ -42,7 +49,7 @@ pub(crate) fn install(sysroot: &Path) -> Result<()> {
             return Ok(());
         }
     }
-    bail!("no suite of this machine's Debian mirror has rust-src {version}")
+    bail!(reason)
 }
 
 /// The compiler's version, such as `1.95.0`.
@@ -67,7 +74,10 @@ impl Apt {
         let options = mirror.signed_by.as_ref().map_or_else(String::new, |key| format!("[signed-by={key}] "));
         let line = format!("deb {options}{} {suite} main\n", mirror.uri);
         std::fs::write(work.join("sources.list"), line).context("target/rust-src cannot be written")?;
-        cmd::output(apt.command("apt-get").args(["update", "--error-on=any"]), "see the next suite")?;
+        cmd::output(
+            apt.command("apt-get").args(["update", "--error-on=any"]),
+            "look at the machine's network",
+        )?;
         Ok(apt)
     }
 

@@ -41,23 +41,26 @@ pub(crate) fn ensure() -> Result<WasmStd> {
         cmd::say("WASM standard library: installed with the compiler.");
         return Ok(WasmStd::Installed);
     }
-    if add_with_rustup(&sysroot) {
+    let note = cmd::root().join("target/viewer/rustup-refused");
+    if add_with_rustup(&sysroot, &note) {
         cmd::say("WASM standard library: installed by `rustup target add`.");
         return Ok(WasmStd::Installed);
     }
     if has_source(&sysroot) {
         cmd::say("WASM standard library: built from the source that lies beside the compiler.");
-        return Ok(WasmStd::FromSource);
-    }
-    if let Err(error) = debian_source::install(&sysroot) {
+    } else if let Err(error) = debian_source::install(&sysroot) {
         bail!(
             "the standard library for {TARGET} is missing, `rustup` cannot install it and Debian's source of it did \
              not come ({error:#}): run `rustup target add {TARGET}` or `rustup component add rust-src` where it can \
              download, or copy the folder `library` of this compiler's source to {}",
             source_dir(&sysroot).display()
         );
+    } else {
+        cmd::say("WASM standard library: built from Debian's source for this compiler.");
     }
-    cmd::say("WASM standard library: built from Debian's source for this compiler.");
+    // Without this note the next start only asks `rustup` again.
+    note.parent().map_or(Ok(()), std::fs::create_dir_all).unwrap_or_default();
+    std::fs::write(&note, sysroot.to_string_lossy().as_bytes()).unwrap_or_default();
     Ok(WasmStd::FromSource)
 }
 
@@ -79,25 +82,16 @@ fn has_source(sysroot: &Path) -> bool {
     source_dir(sysroot).join("Cargo.lock").is_file() && source_dir(sysroot).join("std/Cargo.toml").is_file()
 }
 
-/// Asks `rustup` for the target.
+/// Asks `rustup` for the target, unless `note` says that it refused this compiler before.
 ///
-/// A machine whose `rustup` cannot download must not wait for it at every start, so a failure is remembered in the
-/// target directory for as long as the same compiler is used.
-fn add_with_rustup(sysroot: &Path) -> bool {
-    let refused = cmd::root().join("target/viewer/rustup-refused");
-    let name = sysroot.to_string_lossy();
-    if std::fs::read_to_string(&refused).is_ok_and(|remembered| remembered == name) {
+/// A machine whose `rustup` cannot download must not wait for it at every start, and at the first not for long.
+fn add_with_rustup(sysroot: &Path, note: &Path) -> bool {
+    if std::fs::read_to_string(note).is_ok_and(|refused| refused == sysroot.to_string_lossy()) {
         return false;
     }
     let mut rustup = cmd::program("rustup");
     rustup.args(["target", "add", TARGET]).env("RUSTUP_MAX_RETRIES", "0");
-    if cmd::succeeds(&mut rustup, Duration::from_secs(120)) && is_installed(sysroot) {
-        return true;
-    }
-    // Without this note the next start only asks again.
-    refused.parent().map_or(Ok(()), std::fs::create_dir_all).unwrap_or_default();
-    std::fs::write(&refused, name.as_bytes()).unwrap_or_default();
-    false
+    cmd::succeeds(&mut rustup, Duration::from_secs(60)) && is_installed(sysroot)
 }
 
 #[cfg(test)]

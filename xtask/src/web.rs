@@ -50,6 +50,8 @@ fn bind(wasm: &Path, output: &Path) -> Result<()> {
     }
     let mut bindgen = Bindgen::new();
     bindgen
+        .remove_name_section(true)
+        .remove_producers_section(true)
         .web(true)
         .and_then(|bindgen| bindgen.input_path(wasm).out_name("sightline_viewer").typescript(false).generate(output))
         .context("wasm-bindgen fails on the viewer; give wasm-bindgen and wasm-bindgen-cli-support the same version")?;

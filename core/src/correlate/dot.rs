@@ -116,3 +116,57 @@ impl Tile<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Sums a tile of `rows` × `columns` positions and compares each with the definition.
+    fn assert_sums<S: Simd>(simd: S, size: usize, rows: usize, columns: usize) {
+        let value = |i: usize| ((i * 7919 + size) % 101) as f32 / 101.0 - 0.5;
+        let template: Vec<f32> = (0..size * size).map(value).collect();
+        let weights = Weights::new(&template, size);
+        let stride = weights.input_columns();
+        let input: Vec<f32> = (0..stride * weights.input_rows()).map(|i| value(3 * i + 1)).collect();
+        let mut output = vec![0.0; TILE_ROWS * TILE_COLUMNS];
+        let tile = Tile {
+            weights: &weights,
+            input: &input,
+            columns,
+            rows,
+            output: &mut output,
+            stride: TILE_COLUMNS,
+        };
+        simd.vectorize(tile);
+        for (y, x) in (0..rows).flat_map(|y| (0..columns).map(move |x| (y, x))) {
+            let products = template
+                .iter()
+                .enumerate()
+                .map(|(i, t)| f64::from(*t) * f64::from(input[(y + i / size) * stride + x + i % size]));
+            let expected: f64 = products.sum();
+            let found = f64::from(output[y * TILE_COLUMNS + x]);
+            assert!(
+                (found - expected).abs() < 1e-4,
+                "size {size} at ({x}, {y}): {found} instead of {expected}"
+            );
+        }
+    }
+
+    fn assert_all_sums<S: Simd>(simd: S) {
+        for size in [1, 3, 5, 21, 41] {
+            for (rows, columns) in [(1, 1), (3, 17), (4, 33), (24, 50), (23, 64)] {
+                assert_sums(simd, size, rows, columns);
+            }
+        }
+    }
+
+    #[test]
+    fn every_instruction_set_of_this_processor_gives_the_definition() {
+        assert_all_sums(pulp::Scalar);
+        #[cfg(target_arch = "x86_64")]
+        {
+            pulp::x86::V3::try_new().into_iter().for_each(assert_all_sums);
+            pulp::x86::V4::try_new().into_iter().for_each(assert_all_sums);
+        }
+    }
+}

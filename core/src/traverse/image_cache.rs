@@ -1,25 +1,8 @@
 //! The decoded pairs that were asked for last, within a fixed amount of memory.
 
 use std::collections::VecDeque;
-use std::sync::Arc;
 
-use crate::image::GrayImage;
-
-/// The two images of a stop, in fractions of full scale.
-#[derive(Clone, Debug)]
-pub struct StereoPair {
-    /// The left (or first) image.
-    pub left: Arc<GrayImage>,
-    /// The right (or second) image.
-    pub right: Arc<GrayImage>,
-}
-
-impl StereoPair {
-    /// The memory of both images, bytes.
-    pub fn bytes(&self) -> usize {
-        (self.left.as_raw().len() + self.right.as_raw().len()) * size_of::<f32>()
-    }
-}
+use crate::stages::capture::StereoPair;
 
 /// Pairs by step, the most recently used at the back.
 pub(super) struct ImageCache {
@@ -50,13 +33,21 @@ impl ImageCache {
     }
 
     fn bytes(&self) -> usize {
-        self.pairs.iter().map(|(_, pair)| pair.bytes()).sum()
+        self.pairs.iter().map(|(_, pair)| bytes_of(pair)).sum()
     }
+}
+
+/// The memory of both images, bytes.
+fn bytes_of(pair: &StereoPair) -> usize {
+    (pair.left.as_raw().len() + pair.right.as_raw().len()) * size_of::<f32>()
 }
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
+    use crate::image::GrayImage;
 
     fn pair() -> StereoPair {
         let image = Arc::new(GrayImage::new(4, 4));
@@ -65,19 +56,19 @@ mod tests {
 
     #[test]
     fn the_pair_that_was_unused_for_longest_goes_first() {
-        let mut cache = ImageCache::new(2 * pair().bytes());
+        let mut cache = ImageCache::new(2 * bytes_of(&pair()));
         cache.insert(0, pair());
         cache.insert(1, pair());
         assert!(cache.get(0).is_some());
         cache.insert(2, pair());
         assert!(cache.get(1).is_none());
         assert!(cache.get(0).is_some() && cache.get(2).is_some());
-        assert_eq!(cache.bytes(), 2 * pair().bytes());
+        assert_eq!(cache.bytes(), 2 * bytes_of(&pair()));
     }
 
     #[test]
     fn a_pair_beyond_the_limit_is_not_kept() {
-        let mut cache = ImageCache::new(pair().bytes() - 1);
+        let mut cache = ImageCache::new(bytes_of(&pair()) - 1);
         cache.insert(0, pair());
         assert!(cache.get(0).is_none());
     }

@@ -5,12 +5,13 @@
 //! into a folder by its importer (`import/`, one file per format).
 
 mod check;
-mod files;
+pub mod files;
 mod image_cache;
 pub mod import;
 mod index_file;
 pub mod native;
 mod simulated;
+mod stops;
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -19,7 +20,7 @@ use crate::camera::{Camera, Mast, MastAngles};
 use crate::frames::PoseRecord;
 
 pub use index_file::{Existing, IndexFormat};
-pub use native::{StereoPair, Traverse, write};
+pub use native::{Traverse, write};
 pub use simulated::create_simulated;
 
 /// The version of the folder format that this code writes.

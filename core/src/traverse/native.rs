@@ -54,7 +54,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::check::{self, StopCameras};
 use super::files::resolve;
 use super::image_cache::ImageCache;
-pub use super::image_cache::StereoPair;
 use super::index_file::{self, Existing, IndexFormat};
 use super::simulated::Simulated;
 use super::{Stop, TraverseIndex, View};
@@ -63,6 +62,7 @@ use crate::error::{Error, Result};
 use crate::frames::Pose;
 use crate::image::{GrayImage, io};
 use crate::sim::World;
+use crate::stages::capture::StereoPair;
 
 /// The most memory that decoded pairs may take, bytes (32 pairs of 1024 × 1024).
 pub const CACHE_LIMIT_BYTES: usize = 256 << 20;
@@ -146,17 +146,17 @@ impl Traverse {
         Some(self.index.stops[step].truth.as_ref()?.site_from_rover.to_pose())
     }
 
-    /// The true left camera in the rover frame: the given one where the truth does not differ; `None` where
-    /// nothing is known to be true.
-    pub fn true_left_camera(&self, step: usize) -> Option<&Camera> {
+    /// The camera in the rover frame that truly took the left image, as far as is known: the given one where
+    /// the index says nothing else.
+    pub fn true_left_camera(&self, step: usize) -> &Camera {
         let cameras = &self.cameras[step];
-        self.index.stops[step].truth.as_ref().map(|_| cameras.true_left.as_ref().unwrap_or(&cameras.left))
+        cameras.true_left.as_ref().unwrap_or(&cameras.left)
     }
 
-    /// The true right camera in the rover frame, alike.
-    pub fn true_right_camera(&self, step: usize) -> Option<&Camera> {
+    /// The camera that truly took the right image, alike.
+    pub fn true_right_camera(&self, step: usize) -> &Camera {
         let cameras = &self.cameras[step];
-        self.index.stops[step].truth.as_ref().map(|_| cameras.true_right.as_ref().unwrap_or(&cameras.right))
+        cameras.true_right.as_ref().unwrap_or(&cameras.right)
     }
 
     /// The simulated world, whose surface is the truth; `None` for a recorded traverse.

@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use super::*;
+use crate::frames::{Pixel, Vector3};
 use crate::image::GrayImage;
+use crate::study::truth::TruthSource;
 
 /// Two stops, 128 × 128 px, one sample a pixel.
 fn scenario() -> Scenario {
@@ -41,7 +43,23 @@ fn a_simulated_traverse_renders_what_is_asked_for_and_only_that() {
     let seed = NoiseSeed { step: 1, eye: Eye::Right };
     let expected: GrayImage = sim::render(traverse.world().unwrap(), &scenario(), &camera, seed);
     assert_eq!(*pair.right, expected);
-    assert_ne!(traverse.true_left_camera(1), Some(traverse.left_camera(1)));
+    assert_ne!(traverse.true_left_camera(1), traverse.left_camera(1));
+}
+
+#[test]
+fn the_surface_under_a_pixel_is_seen_there_again_from_the_next_stop() {
+    let folder = tempfile::tempdir().unwrap();
+    let traverse = create_simulated(&scenario(), folder.path()).unwrap();
+    let point = traverse.surface_point_in_site(0, Pixel::new(63.5, 63.5)).unwrap();
+    for step in 0..2 {
+        let rover_from_site = traverse.true_site_from_rover(step).unwrap().inverse();
+        let pixel = traverse.true_left_camera(step).project(&(rover_from_site * point)).unwrap();
+        assert!(traverse.is_visible(step, &point));
+        let again = traverse.surface_point_in_site(step, pixel).unwrap();
+        assert!((again - point).norm() < 1e-6, "step {step}: {again} {point}");
+    }
+    let below_ground = point + Vector3::z();
+    assert!(!traverse.is_visible(0, &below_ground));
 }
 
 #[test]

@@ -1,0 +1,67 @@
+//! A traverse as the pipeline and the comparison with the truth see it.
+//!
+//! The pipeline is given estimates only: poses, cameras and images. The truth stands in a trait of its own,
+//! so that no stage can look at it. A recorded traverse knows true poses at most: it has no surface, and
+//! nothing is known to hide a point.
+
+use crate::camera::{Camera, Mast, MastAngles};
+use crate::error::Result;
+use crate::frames::{Pixel, Point3, Pose};
+use crate::pipeline::Stops;
+use crate::sim::surface_point;
+use crate::stages::capture::StereoPair;
+use crate::study::truth::TruthSource;
+
+use super::{OdometryError, StereoGeometry, Traverse};
+
+impl Stops for Traverse {
+    fn stop_count(&self) -> usize {
+        self.stop_count()
+    }
+    fn time_s(&self, step: usize) -> f64 {
+        self.index().stops[step].time_s
+    }
+    fn site_from_rover(&self, step: usize) -> Pose {
+        self.site_from_rover(step)
+    }
+    fn cameras(&self, step: usize) -> (&Camera, &Camera) {
+        (self.left_camera(step), self.right_camera(step))
+    }
+    fn mast(&self) -> Option<&Mast> {
+        self.index().mast.as_ref()
+    }
+    fn mast_angles(&self, step: usize) -> Option<MastAngles> {
+        self.index().stops[step].mast_angles
+    }
+    fn odometry_error(&self) -> OdometryError {
+        self.index().odometry_error
+    }
+    fn stereo(&self) -> StereoGeometry {
+        self.index().stereo
+    }
+    fn capture(&self, step: usize) -> Result<StereoPair> {
+        self.capture(step)
+    }
+}
+
+impl TruthSource for Traverse {
+    fn true_site_from_rover(&self, step: usize) -> Option<Pose> {
+        self.true_site_from_rover(step)
+    }
+    fn true_left_camera(&self, step: usize) -> &Camera {
+        self.true_left_camera(step)
+    }
+    fn surface_point_in_site(&self, step: usize, pixel: Pixel) -> Option<Point3> {
+        let site_from_rover = self.true_site_from_rover(step)?;
+        surface_point(self.world()?, &self.true_left_camera(step).moved(&site_from_rover), pixel)
+    }
+    fn is_visible(&self, step: usize, point_in_site: &Point3) -> bool {
+        let (Some(world), Some(site_from_rover)) = (self.world(), self.true_site_from_rover(step)) else {
+            return true;
+        };
+        let camera_in_site = self.true_left_camera(step).moved(&site_from_rover);
+        // The ray of the point's pixel starts where the light enters, which is not C in a fisheye lens.
+        let ray = camera_in_site.project(point_in_site).and_then(|pixel| camera_in_site.ray(pixel));
+        ray.is_some_and(|ray| world.is_visible(&ray.origin, point_in_site))
+    }
+}

@@ -1,0 +1,308 @@
+//! A browser for the tests: Chromium without a window, painting WebGL in software, driven through chromedriver.
+//!
+//! `cargo xtask test` installs both programs and names them in `SIGHTLINE_CHROMIUM` and `SIGHTLINE_CHROMEDRIVER`;
+//! without these variables they are looked for in `PATH`. Every [`Browser`] has a driver, a profile and a port of its
+//! own, so tests may run side by side, and nothing outlives it.
+//!
+//! A step that fails is a panic with a sentence: this is code of tests, and there is nothing to recover.
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use fantoccini::actions::{
+    InputSource, KeyAction, KeyActions, MOUSE_BUTTON_LEFT, MouseActions, PointerAction,
+};
+use fantoccini::key::Key;
+use fantoccini::wd::{Capabilities, WebDriverCompatibleCommand};
+use fantoccini::{Client, ClientBuilder};
+use hyper_util::client::legacy::connect::HttpConnector;
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+/// The id of the canvas on which the viewer paints.
+const CANVAS: &str = "sightline";
+
+/// How long a page may take to come to the state that a test waits for; painting in software is slow.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A running Chromium.
+pub struct Browser {
+    client: Client,
+    driver: Driver,
+}
+
+impl Browser {
+    /// Starts a driver and a browser with a fresh profile; the window has 1600 × 1000 pixels.
+    ///
+    /// # Panics
+    /// When the programs are missing or do not start.
+    pub async fn start() -> Self {
+        let chromium = program("SIGHTLINE_CHROMIUM", &["chromium", "chromium-browser", "google-chrome"]);
+        let mut driver = Driver::start();
+        let capabilities = capabilities(&chromium, &driver.profile);
+        let client = ClientBuilder::new(HttpConnector::new())
+            .capabilities(capabilities)
+            .connect(&format!("http://127.0.0.1:{}", driver.port))
+            .await
+            .unwrap_or_else(|error| panic!("chromedriver cannot start {}: {error}", chromium.display()));
+        let process = client.capabilities().and_then(|all| all.get("goog:processID")).and_then(Value::as_u64);
+        driver.browser = Some(process.expect("chromedriver tells the process of its browser"));
+        Self { client, driver }
+    }
+
+    /// Opens a page and returns when the browser has loaded it; the viewer may still be on its way.
+    pub async fn goto(&self, url: &str) {
+        self.client.goto(url).await.unwrap_or_else(|error| panic!("{url} cannot be opened: {error}"));
+    }
+
+    /// Waits until the page has taken away its loading message, which it does when the viewer runs.
+    ///
+    /// # Panics
+    /// With what the page says, when the viewer cannot start.
+    pub async fn wait_for_viewer(&self) {
+        let script = "const message = document.getElementById('message'); \
+                      return message.hidden || message.classList.contains('failed')";
+        self.wait_for("the viewer to start", script).await;
+        let said = self
+            .evaluate("const m = document.getElementById('message'); return m.hidden ? null : m.innerText")
+            .await;
+        assert!(said.is_null(), "the viewer did not start; the page says: {said}");
+    }
+
+    /// Waits until a script such as `return document.title === "ready"` gives a true value.
+    pub async fn wait_for(&self, what: &str, script: &str) {
+        let start = Instant::now();
+        loop {
+            let value = self.evaluate(script).await;
+            if !matches!(value, Value::Null | Value::Bool(false)) {
+                return;
+            }
+            assert!(start.elapsed() < PATIENCE, "waited {PATIENCE:?} for {what}, in vain");
+            tokio::time::sleep(Duration::from_millis(100)).await;
+        }
+    }
+
+    /// Runs the body of a JavaScript function in the page and returns what it returns.
+    pub async fn evaluate(&self, script: &str) -> Value {
+        self.client
+            .execute(script, Vec::new())
+            .await
+            .unwrap_or_else(|error| panic!("the script `{script}` failed: {error}"))
+    }
+
+    /// Moves the pointer to a place on the canvas, in CSS pixels from its upper left corner.
+    pub async fn point_at(&self, x: f64, y: f64) {
+        self.act(x, y, &[]).await;
+    }
+
+    /// Clicks with the left button at a place on the canvas, in CSS pixels from its upper left corner.
+    pub async fn click(&self, x: f64, y: f64) {
+        let pause = PointerAction::Pause { duration: Duration::from_millis(50) };
+        let down = PointerAction::Down { button: MOUSE_BUTTON_LEFT };
+        let up = PointerAction::Up { button: MOUSE_BUTTON_LEFT };
+        self.act(x, y, &[pause.clone(), down, pause, up]).await;
+    }
+
+    /// Presses and releases a key, named as JavaScript names it: `ArrowRight`, `Home`, `a`, `+` and so on.
+    pub async fn press(&self, key: &str) {
+        let value = key_value(key);
+        let keyboard = KeyActions::new("keyboard".to_owned())
+            .then(KeyAction::Down { value })
+            .then(KeyAction::Up { value });
+        self.client
+            .perform_actions(keyboard)
+            .await
+            .unwrap_or_else(|error| panic!("the key {key} cannot be pressed: {error}"));
+    }
+
+    /// The page as it looks now, as a PNG file's bytes.
+    pub async fn screenshot(&self) -> Vec<u8> {
+        self.client.screenshot().await.unwrap_or_else(|error| panic!("the page cannot be pictured: {error}"))
+    }
+
+    /// The errors that the console has received since the last call.
+    pub async fn console_errors(&self) -> Vec<String> {
+        let entries = self
+            .client
+            .issue_cmd(ConsoleLog)
+            .await
+            .unwrap_or_else(|error| panic!("the console is mute: {error}"));
+        let errors = entries.as_array().into_iter().flatten().filter(|entry| entry["level"] == "SEVERE");
+        errors.map(|entry| entry["message"].as_str().unwrap_or_default().to_owned()).collect()
+    }
+
+    /// Ends the browser; dropping it does the same, less politely.
+    pub async fn close(self) {
+        let Self { client, driver } = self;
+        client.close().await.unwrap_or_else(|error| panic!("the browser cannot be closed: {error}"));
+        drop(driver);
+    }
+
+    /// Moves the pointer to a place on the canvas and does the rest there.
+    async fn act(&self, x: f64, y: f64, rest: &[PointerAction]) {
+        let script = format!(
+            "const r = document.getElementById('{CANVAS}').getBoundingClientRect(); return [r.left, r.top]"
+        );
+        let corner = self.evaluate(&script).await;
+        let offset = |index: usize| corner[index].as_f64().unwrap_or_default();
+        let there = PointerAction::MoveTo { duration: None, x: offset(0) + x, y: offset(1) + y };
+        let mouse =
+            rest.iter().cloned().fold(MouseActions::new("mouse".to_owned()).then(there), InputSource::then);
+        self.client
+            .perform_actions(mouse)
+            .await
+            .unwrap_or_else(|error| panic!("the pointer cannot act at {x}, {y}: {error}"));
+    }
+}
+
+/// A running chromedriver with the profile of its browser.
+struct Driver {
+    process: Child,
+    /// The browser's process, once there is one.
+    browser: Option<u64>,
+    port: u16,
+    profile: TempDir,
+}
+
+impl Driver {
+    /// Starts the driver on a port that the system chooses.
+    fn start() -> Self {
+        let program = program("SIGHTLINE_CHROMEDRIVER", &["chromedriver"]);
+        let profile = tempfile::tempdir().expect("a temporary folder for the browser's profile");
+        let mut process = Command::new(&program)
+            .arg("--port=0")
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap_or_else(|error| panic!("{} cannot be started: {error}", program.display()));
+        let output = process.stdout.take().expect("chromedriver's output is piped");
+        let mut lines = BufReader::new(output).lines().map_while(Result::ok);
+        let port = lines.find_map(|line| {
+            let number = line.split("successfully on port ").nth(1)?;
+            number.trim_end_matches('.').parse().ok()
+        });
+        // The driver stops when it cannot write, so what it says later is read and forgotten.
+        std::thread::spawn(move || lines.for_each(drop));
+        let port =
+            port.unwrap_or_else(|| panic!("{} says no port and has probably ended", program.display()));
+        Self { process, browser: None, port, profile }
+    }
+
+    /// Asks the driver to end its browser and itself.
+    fn shut_down(&self) -> std::io::Result<()> {
+        let mut stream = TcpStream::connect(("127.0.0.1", self.port))?;
+        stream.set_read_timeout(Some(Duration::from_secs(5)))?;
+        write!(
+            stream,
+            "GET /shutdown HTTP/1.1\r\nHost: 127.0.0.1:{}\r\nConnection: close\r\n\r\n",
+            self.port
+        )?;
+        stream.read_to_end(&mut Vec::new()).map(drop)
+    }
+}
+
+impl Drop for Driver {
+    fn drop(&mut self) {
+        if let (Err(_), Some(browser)) = (self.shut_down(), self.browser) {
+            // A driver that does not answer leaves its browser behind; one that is gone already needs no signal.
+            Command::new("kill")
+                .arg(browser.to_string())
+                .stderr(Stdio::null())
+                .status()
+                .map(drop)
+                .unwrap_or_default();
+        }
+        let start = Instant::now();
+        while matches!(self.process.try_wait(), Ok(None)) && start.elapsed() < Duration::from_secs(5) {
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        self.process.kill().unwrap_or_default();
+        self.process.wait().map(drop).unwrap_or_default();
+    }
+}
+
+/// Chromedriver's own command for what the console received.
+#[derive(Debug)]
+struct ConsoleLog;
+
+impl WebDriverCompatibleCommand for ConsoleLog {
+    fn endpoint(&self, base: &url::Url, session: Option<&str>) -> Result<url::Url, url::ParseError> {
+        base.join(&format!("session/{}/se/log", session.unwrap_or_default()))
+    }
+
+    fn method_and_body(&self, _url: &url::Url) -> (axum::http::Method, Option<String>) {
+        (axum::http::Method::POST, Some(json!({ "type": "browser" }).to_string()))
+    }
+}
+
+/// A program of the browser, from its variable or from `PATH`.
+fn program(variable: &str, names: &[&str]) -> PathBuf {
+    let named = std::env::var_os(variable).map(PathBuf::from);
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let found = || {
+        let in_directory =
+            |name: &&str| std::env::split_paths(&path).map(|at| at.join(name)).find(|at| at.is_file());
+        names.iter().find_map(in_directory)
+    };
+    named.or_else(found).unwrap_or_else(|| {
+        panic!("{} is missing: run the tests with `cargo xtask test`, which installs it", names[0])
+    })
+}
+
+/// How the browser starts: no window, no sandbox (the tests also run as root), WebGL in software, nothing fetched.
+fn capabilities(chromium: &std::path::Path, profile: &TempDir) -> Capabilities {
+    let mut arguments: Vec<String> = [
+        "--headless=new",
+        "--no-sandbox",
+        "--use-angle=swiftshader",
+        "--enable-unsafe-swiftshader",
+        "--disable-quic",
+        "--no-first-run",
+        "--disable-background-networking",
+        "--disable-component-update",
+        "--disable-sync",
+        "--disable-dev-shm-usage",
+        "--window-size=1600,1000",
+    ]
+    .map(str::to_owned)
+    .into();
+    arguments.push(format!("--user-data-dir={}", profile.path().display()));
+    let options = json!({ "binary": chromium, "args": arguments });
+    let all = [
+        ("browserName", json!("chrome")),
+        ("goog:chromeOptions", options),
+        ("goog:loggingPrefs", json!({ "browser": "ALL" })),
+    ];
+    all.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+}
+
+/// The character with which the protocol names a key.
+fn key_value(key: &str) -> char {
+    let named = match key {
+        "ArrowLeft" => Key::Left,
+        "ArrowRight" => Key::Right,
+        "ArrowUp" => Key::Up,
+        "ArrowDown" => Key::Down,
+        "Home" => Key::Home,
+        "End" => Key::End,
+        "PageUp" => Key::PageUp,
+        "PageDown" => Key::PageDown,
+        "Enter" => Key::Enter,
+        "Escape" => Key::Escape,
+        "Tab" => Key::Tab,
+        "Backspace" => Key::Backspace,
+        "Delete" => Key::Delete,
+        _ => {
+            let mut letters = key.chars();
+            return match (letters.next(), letters.next()) {
+                (Some(letter), None) => letter,
+                _ => panic!("`{key}` is no key that the tests know: add it to `key_value`"),
+            };
+        }
+    };
+    named.into()
+}

@@ -1,0 +1,205 @@
+//! What a person can ask for. Panels and keys make commands; `state` carries them out.
+
+use sightline_core::frames::Pixel;
+use sightline_core::settings::Changes;
+
+use crate::view2d::View2d;
+
+/// Where to go along the drive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Go {
+    /// To a stop.
+    Step(usize),
+    /// By so many stops.
+    By(isize),
+    /// To the first stop.
+    First,
+    /// To the last stop.
+    Last,
+    /// To the next change of state.
+    NextEvent,
+    /// To the previous change of state.
+    PreviousEvent,
+}
+
+/// A stage or a step of `locate`, in running order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Stage {
+    /// Stage 1.
+    Predict,
+    /// Stage 2.
+    PointMast,
+    /// Stage 3.
+    Capture,
+    /// Stage 4.
+    Locate,
+    /// First step of `locate`.
+    ScaleRoll,
+    /// Second step of `locate`.
+    MatchTemplate,
+    /// Third step of `locate`.
+    PointStereo,
+    /// Last step of `locate`.
+    Triangulate,
+    /// Stage 5.
+    Judge,
+    /// Stage 6.
+    Update,
+}
+
+impl Stage {
+    /// All of them, in running order.
+    pub const ALL: [Self; 10] = [
+        Self::Predict,
+        Self::PointMast,
+        Self::Capture,
+        Self::Locate,
+        Self::ScaleRoll,
+        Self::MatchTemplate,
+        Self::PointStereo,
+        Self::Triangulate,
+        Self::Judge,
+        Self::Update,
+    ];
+
+    /// The word of the house.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Predict => "predict",
+            Self::PointMast => "point_mast",
+            Self::Capture => "capture",
+            Self::Locate => "locate",
+            Self::ScaleRoll => "scale_roll",
+            Self::MatchTemplate => "match_template",
+            Self::PointStereo => "point_stereo",
+            Self::Triangulate => "triangulate",
+            Self::Judge => "judge",
+            Self::Update => "update",
+        }
+    }
+
+    /// What it answers.
+    pub const fn question(self) -> &'static str {
+        match self {
+            Self::Predict => "Where should the target be now, by dead reckoning?",
+            Self::PointMast => "Which pointing centres the prediction, and where does it appear?",
+            Self::Capture => "What was photographed, and how well is it exposed?",
+            Self::Locate => "Where is the target now?",
+            Self::ScaleRoll => "How should the template look from here?",
+            Self::MatchTemplate => "Where does the template fit best in the left image?",
+            Self::PointStereo => "Which point of the right image is it?",
+            Self::Triangulate => "Which point in space do both pixels see?",
+            Self::Judge => "Can the match be trusted?",
+            Self::Update => "What does this stop leave to the next?",
+        }
+    }
+
+    /// Whether it is a step of `locate`.
+    pub const fn is_step_of_locate(self) -> bool {
+        matches!(self, Self::ScaleRoll | Self::MatchTemplate | Self::PointStereo | Self::Triangulate)
+    }
+}
+
+/// Panels with a zoomable view.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Panel {
+    /// The left image.
+    Left,
+    /// The right image.
+    Right,
+    /// The surface of scores.
+    Surface,
+}
+
+/// Marks that can be switched off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Layer {
+    /// The predicted point and its gate.
+    Prediction,
+    /// The search window.
+    SearchWindow,
+    /// The subframe.
+    Subframe,
+    /// The template window at the match.
+    Template,
+    /// The match with its ellipse.
+    Match,
+    /// The truth.
+    Truth,
+    /// The epipolar curve with its ticks.
+    Curve,
+    /// The other targets.
+    Others,
+}
+
+/// What the pointer and the keys mean at the moment.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Mode {
+    /// Looking around.
+    #[default]
+    Look,
+    /// The next click in the left image designates a target.
+    Pick,
+    /// A step is being typed.
+    GoTo(String),
+    /// The help sheet is open.
+    Help,
+}
+
+/// What a person asks for.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Command {
+    /// Moves along the drive.
+    Go(Go),
+    /// Opens a traverse.
+    OpenTraverse(String),
+    /// Looks at a run of a target.
+    Look {
+        /// The target's number.
+        target: usize,
+        /// The run's number.
+        run: usize,
+    },
+    /// Looks at a stage.
+    SelectStage(Stage),
+    /// Changes what pointer and keys mean.
+    SetMode(Mode),
+    /// Designates the target under a pixel of the left image.
+    Pick(Pixel),
+    /// Removes a target.
+    RemoveTarget(usize),
+    /// Changes a setting of the draft; none takes the change back.
+    Draft {
+        /// The setting's name.
+        key: String,
+        /// The new value.
+        value: Option<serde_json::Value>,
+    },
+    /// Takes all changes of the draft back.
+    ClearDraft,
+    /// Runs from the cursor's step with these changes.
+    RunFromHere(Changes),
+    /// Stops a run.
+    CancelRun {
+        /// The target's number.
+        target: usize,
+        /// The run's number.
+        run: usize,
+    },
+    /// Changes what a panel shows.
+    View(Panel, View2d),
+    /// Fits every image to its panel.
+    FitAll,
+    /// Shows or hides a layer of marks.
+    ToggleLayer(Layer),
+    /// Shows or hides all marks.
+    ToggleMarks,
+    /// Downloads the session as a Rerun recording.
+    ExportRrd,
+    /// Opens the session in Rerun.
+    OpenRerun,
+    /// Takes a message away.
+    Dismiss(u64),
+    /// Connects again at once.
+    Reconnect,
+}

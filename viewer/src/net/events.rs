@@ -1,0 +1,82 @@
+//! The server's events over a WebSocket, connected again with growing patience when it is lost.
+
+use ewebsock::{Options, WsEvent, WsMessage, WsReceiver, WsSender};
+use sightline_core::session::wire::Event;
+
+use crate::state::Connection;
+
+/// The longest pause between two attempts, s.
+const PATIENCE_S: f64 = 10.0;
+
+/// The events of one server.
+pub(super) struct Events {
+    url: String,
+    context: egui::Context,
+    // The sender closes the connection when it is dropped.
+    socket: Option<(WsSender, WsReceiver)>,
+    is_open: bool,
+    attempts: u32,
+    retry_at: f64,
+}
+
+impl Events {
+    /// The events of the server at `origin`; the first poll connects.
+    pub(super) fn new(origin: &str, context: egui::Context) -> Self {
+        let url = format!("{}/api/v1/events", origin.replacen("http", "ws", 1));
+        Self { url, context, socket: None, is_open: false, attempts: 0, retry_at: 0.0 }
+    }
+
+    /// Does not wait for the next attempt.
+    pub(super) fn reconnect_now(&mut self) {
+        if !self.is_open {
+            (self.socket, self.retry_at) = (None, 0.0);
+        }
+    }
+
+    /// What was told since the last time, and how the connection is.
+    pub(super) fn poll(&mut self, now: f64) -> (Vec<Event>, Connection) {
+        if self.socket.is_none() && now >= self.retry_at {
+            self.connect(now);
+        }
+        let mut told = Vec::new();
+        let mut is_lost = false;
+        while let Some(event) = self.socket.as_ref().and_then(|(_, receiver)| receiver.try_recv()) {
+            match event {
+                WsEvent::Opened => (self.is_open, self.attempts) = (true, 0),
+                // An event that this page does not know is for a newer one.
+                WsEvent::Message(WsMessage::Text(text)) => told.extend(serde_json::from_str::<Event>(&text)),
+                WsEvent::Message(_) => {}
+                WsEvent::Error(_) | WsEvent::Closed => is_lost = true,
+            }
+        }
+        if is_lost {
+            self.lose(now);
+        }
+        (told, self.connection())
+    }
+
+    fn connection(&self) -> Connection {
+        match (self.is_open, self.attempts) {
+            (true, _) => Connection::Live,
+            (false, 0) => Connection::Connecting,
+            (false, attempts) => Connection::Gone { attempts },
+        }
+    }
+
+    fn connect(&mut self, now: f64) {
+        let context = self.context.clone();
+        let wake = move || context.request_repaint();
+        match ewebsock::connect_with_wakeup(self.url.clone(), Options::default(), wake) {
+            Ok(socket) => self.socket = Some(socket),
+            Err(_) => self.lose(now),
+        }
+    }
+
+    fn lose(&mut self, now: f64) {
+        (self.socket, self.is_open) = (None, false);
+        self.attempts += 1;
+        let pause = f64::from(1_u32 << self.attempts.min(4) >> 1).min(PATIENCE_S);
+        self.retry_at = now + pause;
+        self.context.request_repaint_after(std::time::Duration::from_secs_f64(pause));
+    }
+}

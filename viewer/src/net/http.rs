@@ -1,0 +1,188 @@
+//! Requests over HTTP and how their answers are read.
+
+use std::sync::Arc;
+
+use ehttp::{Headers, Method};
+use serde::de::DeserializeOwned;
+use serde::Serialize;
+use sightline_core::session::wire::Problem;
+
+use super::{Arrived, Designated, Reply, Request};
+use crate::cache::{Item, Key, StepKey};
+use crate::raster::Raster;
+
+/// Sends `request` to the server at `origin` and hands the answer to `done`, perhaps on another thread.
+pub(super) fn send(
+    origin: &str,
+    request: Request,
+    context: &egui::Context,
+    done: impl FnOnce(Arrived) + Send + 'static,
+) {
+    let (method, path, body) = describe(&request);
+    let mut http = ehttp::Request::get(format!("{origin}/api/v1/{path}"));
+    http.method = method;
+    // Rendering an image or designating a target takes as long as it takes.
+    http.timeout = None;
+    if let Some(body) = body {
+        http.headers = Headers::new(&[("Accept", "application/json"), ("Content-Type", "application/json")]);
+        http.body = body;
+    }
+    let context = context.clone();
+    ehttp::fetch(http, move |answer| {
+        let outcome = match answer {
+            Ok(response) if response.ok && response.status != 202 => read(&request, &response, &context),
+            Ok(response) if response.status == 202 && !matches!(request, Request::Item(_)) => {
+                read(&request, &response, &context)
+            }
+            Ok(response) => Err(problem(&response)),
+            Err(why) => Err(unreachable(&why.to_string())),
+        };
+        done(Arrived { request, outcome });
+    });
+}
+
+/// Method, path and body of a request.
+fn describe(request: &Request) -> (Method, String, Option<Vec<u8>>) {
+    let get = |path: String| (Method::GET, path, None);
+    match request {
+        Request::Traverses => get("traverses".to_owned()),
+        Request::Settings => get("settings".to_owned()),
+        Request::Traverse(id) => get(format!("traverses/{id}")),
+        Request::Sessions => get("sessions".to_owned()),
+        Request::Session(id) => get(format!("sessions/{id}")),
+        Request::NewSession(new) => (Method::POST, "sessions".to_owned(), json(new)),
+        Request::PutCursor { session, cursor } => (Method::PUT, format!("sessions/{session}/cursor"), json(cursor)),
+        Request::NewTarget { session, target } => (Method::POST, format!("sessions/{session}/targets"), json(target)),
+        Request::RemoveTarget { session, target } => {
+            (Method::DELETE, format!("sessions/{session}/targets/{target}"), None)
+        }
+        Request::NewRun { session, target, new } => {
+            (Method::POST, format!("sessions/{session}/targets/{target}/runs"), json(new))
+        }
+        Request::CancelRun { session, target, run } => {
+            (Method::POST, format!("sessions/{session}/targets/{target}/runs/{run}/cancel"), json(&serde_json::json!({})))
+        }
+        Request::OpenRerun(session) => {
+            (Method::POST, format!("sessions/{session}/rerun"), json(&serde_json::json!({})))
+        }
+        Request::Item(key) => get(item_path(key)),
+        Request::Reconnect => get(String::new()),
+    }
+}
+
+fn item_path(key: &Key) -> String {
+    let step_path = |StepKey { session, target, run, step }: &StepKey| {
+        format!("sessions/{session}/targets/{target}/runs/{run}/steps/{step}")
+    };
+    match key {
+        Key::Image { traverse, step, eye } => format!("traverses/{traverse}/steps/{step}/images/{}.png", eye.word()),
+        Key::Trace(step) => step_path(step),
+        Key::Array(step, name) => format!("{}/arrays/{}.npy", step_path(step), name.word()),
+    }
+}
+
+fn json(value: &impl Serialize) -> Option<Vec<u8>> {
+    serde_json::to_vec(value).ok()
+}
+
+/// Reads the body of an answer to `request`.
+fn read(request: &Request, response: &ehttp::Response, context: &egui::Context) -> Result<Reply, Problem> {
+    let bytes = &response.bytes;
+    Ok(match request {
+        Request::Traverses => Reply::Traverses(parse(bytes)?),
+        Request::Settings => Reply::Settings(parse(bytes)?),
+        Request::Traverse(_) => Reply::Traverse(Box::new(parse(bytes)?)),
+        Request::Sessions => Reply::Sessions(parse(bytes)?),
+        Request::Session(_) | Request::NewSession(_) => Reply::Session(Box::new(parse(bytes)?)),
+        Request::NewTarget { .. } => {
+            let Designated { target, session } = parse(bytes)?;
+            Reply::Designated { target, session: Box::new(session) }
+        }
+        Request::NewRun { .. } => Reply::Run(Box::new(parse(bytes)?)),
+        Request::OpenRerun(_) => Reply::Rerun(parse(bytes)?),
+        Request::Item(key) => Reply::Item(read_item(key, bytes, context)?),
+        Request::PutCursor { .. } | Request::RemoveTarget { .. } | Request::CancelRun { .. } | Request::Reconnect => {
+            Reply::Done
+        }
+    })
+}
+
+fn read_item(key: &Key, bytes: &[u8], context: &egui::Context) -> Result<Item, Problem> {
+    let raster = match key {
+        Key::Trace(_) => return Ok(Item::Trace(Arc::new(parse(bytes)?))),
+        Key::Image { step, eye, .. } => {
+            Raster::from_png(context, &format!("the {} image of step {step}", eye.word()), bytes)
+        }
+        Key::Array(_, name) => Raster::from_npy(context, *name, bytes),
+    };
+    raster.map(|raster| Item::Raster(Arc::new(raster))).map_err(|why| misread(&why))
+}
+
+fn parse<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
+    serde_json::from_slice(bytes).map_err(|why| misread(&why.to_string()))
+}
+
+/// What the server said instead of an answer.
+fn problem(response: &ehttp::Response) -> Problem {
+    serde_json::from_slice(&response.bytes).unwrap_or_else(|_| Problem {
+        code: "unexpected".to_owned(),
+        title: response.status_text.clone(),
+        status: response.status,
+        detail: format!("The server answered {} {}.", response.status, response.status_text),
+        hint: None,
+    })
+}
+
+fn unreachable(why: &str) -> Problem {
+    Problem {
+        code: "unreachable".to_owned(),
+        title: "no answer".to_owned(),
+        status: 0,
+        detail: format!("The server does not answer ({why})."),
+        hint: None,
+    }
+}
+
+fn misread(why: &str) -> Problem {
+    Problem {
+        code: "misread".to_owned(),
+        title: "unreadable answer".to_owned(),
+        status: 500,
+        detail: format!("The server's answer cannot be read: {why}."),
+        hint: Some("Page and server may be of different versions: load the page again.".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cache::Eye;
+    use sightline_core::trace::ArrayName;
+
+    #[test]
+    fn every_thing_has_its_path() {
+        let step = StepKey { session: "s1".to_owned(), target: 2, run: 3, step: 4 };
+        let image = Key::Image { traverse: "t".to_owned(), step: 7, eye: Eye::Right };
+        assert_eq!(item_path(&image), "traverses/t/steps/7/images/right.png");
+        assert_eq!(item_path(&Key::Trace(step.clone())), "sessions/s1/targets/2/runs/3/steps/4");
+        assert_eq!(
+            item_path(&Key::Array(step, ArrayName::RightWindow)),
+            "sessions/s1/targets/2/runs/3/steps/4/arrays/right_window.npy"
+        );
+    }
+
+    #[test]
+    fn an_answer_without_a_problem_document_is_still_a_problem() {
+        let response = ehttp::Response {
+            url: String::new(),
+            ok: false,
+            status: 502,
+            status_text: "Bad Gateway".to_owned(),
+            headers: Headers::default(),
+            bytes: b"<html>".to_vec(),
+        };
+        let problem = problem(&response);
+        assert_eq!(problem.status, 502);
+        assert!(problem.detail.contains("Bad Gateway"));
+    }
+}

@@ -1,0 +1,202 @@
+//! Everything that crosses the network. Nothing here blocks: answers come in through a channel.
+
+mod events;
+mod http;
+
+use std::sync::mpsc::{Receiver, Sender, channel};
+
+use serde::Deserialize;
+use sightline_core::frames::Pixel;
+use sightline_core::limits::SettingInfo;
+use sightline_core::session::Cursor;
+use sightline_core::session::view::{RunView, SessionView};
+use sightline_core::session::wire::{Event, NewRun, NewSession, NewTarget, Problem, RerunStream, TraverseView};
+
+use self::events::Events;
+use crate::cache::{Item, Key};
+use crate::state::Connection;
+
+/// How many images, arrays and records are asked for at a time.
+const AT_A_TIME: usize = 6;
+
+/// A traverse in the server's list.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+pub struct TraverseEntry {
+    /// Its name in paths.
+    pub id: String,
+    /// Its short name.
+    pub name: String,
+}
+
+/// A session in the server's list.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+pub struct SessionEntry {
+    /// Its name in paths.
+    pub id: String,
+    /// The traverse's name in paths.
+    pub traverse: String,
+}
+
+/// What the page asks of the server.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Request {
+    /// The list of traverses.
+    Traverses,
+    /// The table of settings.
+    Settings,
+    /// A traverse.
+    Traverse(String),
+    /// The list of sessions.
+    Sessions,
+    /// A session.
+    Session(String),
+    /// To begin a session.
+    NewSession(NewSession),
+    /// To move a session's cursor.
+    PutCursor {
+        /// The session.
+        session: String,
+        /// Where to.
+        cursor: Cursor,
+    },
+    /// To designate a target.
+    NewTarget {
+        /// The session.
+        session: String,
+        /// The designation.
+        target: NewTarget,
+    },
+    /// To remove a target.
+    RemoveTarget {
+        /// The session.
+        session: String,
+        /// The target's number.
+        target: usize,
+    },
+    /// To run again from a step.
+    NewRun {
+        /// The session.
+        session: String,
+        /// The target's number.
+        target: usize,
+        /// Which run to leave, where, and how.
+        new: NewRun,
+    },
+    /// To stop a run.
+    CancelRun {
+        /// The session.
+        session: String,
+        /// The target's number.
+        target: usize,
+        /// The run's number.
+        run: usize,
+    },
+    /// To stream a session to Rerun.
+    OpenRerun(String),
+    /// An image, an array or a record.
+    Item(Key),
+    /// To connect to the events again at once.
+    Reconnect,
+}
+
+/// What the server answered.
+pub enum Reply {
+    /// The list of traverses.
+    Traverses(Vec<TraverseEntry>),
+    /// The table of settings.
+    Settings(Vec<SettingInfo>),
+    /// A traverse.
+    Traverse(Box<TraverseView>),
+    /// The list of sessions.
+    Sessions(Vec<SessionEntry>),
+    /// A session.
+    Session(Box<SessionView>),
+    /// A designated target.
+    Designated {
+        /// Its number.
+        target: usize,
+        /// The session with it.
+        session: Box<SessionView>,
+    },
+    /// A run.
+    Run(Box<RunView>),
+    /// A stream to Rerun.
+    Rerun(RerunStream),
+    /// An image, an array or a record.
+    Item(Item),
+    /// It is done.
+    Done,
+}
+
+/// An answer with what was asked.
+pub struct Arrived {
+    /// What was asked.
+    pub request: Request,
+    /// What came of it.
+    pub outcome: Result<Reply, Problem>,
+}
+
+/// The network side of the page.
+pub struct Net {
+    origin: String,
+    context: egui::Context,
+    sender: Sender<Arrived>,
+    receiver: Receiver<Arrived>,
+    items_under_way: usize,
+    events: Events,
+}
+
+impl Net {
+    /// Talks to the server at `origin`; wakes `context` when something arrives.
+    pub fn new(origin: String, context: egui::Context) -> Self {
+        let (sender, receiver) = channel();
+        let events = Events::new(&origin, context.clone());
+        Self { origin, context, sender, receiver, items_under_way: 0, events }
+    }
+
+    /// How many more images, arrays and records may be asked for now.
+    pub fn room(&self) -> usize {
+        AT_A_TIME.saturating_sub(self.items_under_way)
+    }
+
+    /// Sends a request; its answer arrives later.
+    pub fn send(&mut self, request: Request) {
+        if request == Request::Reconnect {
+            self.events.reconnect_now();
+            return;
+        }
+        self.items_under_way += usize::from(matches!(request, Request::Item(_)));
+        let (sender, context) = (self.sender.clone(), self.context.clone());
+        http::send(&self.origin, request, &self.context, move |arrived| {
+            // Without a receiver the page is closing, and nobody waits for the answer.
+            if sender.send(arrived).is_ok() {
+                context.request_repaint();
+            }
+        });
+    }
+
+    /// What arrived since the last time.
+    pub fn poll(&mut self) -> Vec<Arrived> {
+        let arrived: Vec<Arrived> = self.receiver.try_iter().collect();
+        let items = arrived.iter().filter(|a| matches!(a.request, Request::Item(_))).count();
+        self.items_under_way -= items;
+        arrived
+    }
+
+    /// The events since the last time, and how they come in.
+    pub fn poll_events(&mut self, now: f64) -> (Vec<Event>, Connection) {
+        self.events.poll(now)
+    }
+}
+
+/// The answer to [`Request::NewTarget`].
+#[derive(Deserialize)]
+struct Designated {
+    target: usize,
+    session: SessionView,
+}
+
+/// A position in words, for titles of textures and messages.
+pub fn pixel_words(pixel: Pixel) -> String {
+    format!("{:.1}, {:.1}", pixel.x, pixel.y)
+}

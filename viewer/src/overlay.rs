@@ -1,0 +1,185 @@
+//! Marks on images: lines of 2 points with a dark halo of 1 point, so that they read on any rock.
+
+use egui::{Align2, Color32, Painter, Pos2, Rect, Shape, Stroke, Vec2, pos2, vec2};
+use nalgebra::Matrix2;
+use sightline_core::frames::Pixel;
+use sightline_core::image::PixelRect;
+
+use crate::view2d::Transform;
+use crate::{ellipse, theme};
+
+/// Width of a line, points.
+const WIDTH: f32 = 2.0;
+/// Width of its halo on either side, points.
+const HALO: f32 = 1.0;
+/// Half the size of a mark, points.
+const REACH: f32 = 7.0;
+
+/// How a line is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Line {
+    /// Without gaps.
+    Solid,
+    /// Dashes.
+    Dashed,
+    /// Dots.
+    Dotted,
+}
+
+/// The shape of a mark.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mark {
+    /// A ring.
+    Ring,
+    /// An upright cross.
+    Plus,
+    /// A diagonal cross.
+    Cross,
+    /// A square.
+    Square,
+    /// A diamond.
+    Diamond,
+    /// A short stretch of line.
+    Stroke(Line),
+}
+
+/// Paints marks given in pixels.
+pub struct Overlay<'a> {
+    painter: &'a Painter,
+    transform: &'a Transform,
+}
+
+impl<'a> Overlay<'a> {
+    /// Paints with `painter` through `transform`.
+    pub fn new(painter: &'a Painter, transform: &'a Transform) -> Self {
+        Self { painter, transform }
+    }
+
+    /// A line through pixels.
+    pub fn line(&self, pixels: &[Pixel], colour: Color32, line: Line) {
+        let points: Vec<Pos2> = pixels.iter().map(|&pixel| self.transform.to_screen(pixel)).collect();
+        paint_line(self.painter, &points, colour, line, WIDTH);
+    }
+
+    /// A closed line through pixels.
+    pub fn outline(&self, pixels: &[Pixel], colour: Color32, line: Line) {
+        let closed: Vec<Pixel> = pixels.iter().chain(pixels.first()).copied().collect();
+        self.line(&closed, colour, line);
+    }
+
+    /// The border of a rectangle of pixels.
+    pub fn rectangle(&self, region: PixelRect, colour: Color32, line: Line) {
+        let area = self.transform.area(region);
+        let corners = [area.left_top(), area.right_top(), area.right_bottom(), area.left_bottom(), area.left_top()];
+        paint_line(self.painter, &corners, colour, line, WIDTH);
+    }
+
+    /// The ellipse of a covariance (px²) about a pixel.
+    pub fn ellipse(&self, centre: Pixel, covariance: &Matrix2<f64>, sigmas: f64, colour: Color32, line: Line) {
+        if let Some(outline) = ellipse::outline(covariance, sigmas) {
+            let pixels: Vec<Pixel> = outline.iter().map(|d| centre.offset(d.x, d.y)).collect();
+            self.line(&pixels, colour, line);
+        }
+    }
+
+    /// A mark at a pixel; its size on the screen does not change with the zoom.
+    pub fn mark(&self, pixel: Pixel, mark: Mark, colour: Color32) {
+        paint_mark(self.painter, self.transform.to_screen(pixel), mark, colour, REACH);
+    }
+
+    /// Words beside a pixel, offset by `offset` points.
+    pub fn words(&self, pixel: Pixel, offset: Vec2, words: &str, colour: Color32) {
+        paint_words(self.painter, self.transform.to_screen(pixel) + offset, words, colour);
+    }
+}
+
+/// A line with its halo.
+pub fn paint_line(painter: &Painter, points: &[Pos2], colour: Color32, line: Line, width: f32) {
+    if points.len() < 2 {
+        return;
+    }
+    let shapes = |colour: Color32, width: f32| -> Vec<Shape> {
+        let stroke = Stroke::new(width, colour);
+        match line {
+            Line::Solid => vec![Shape::line(points.to_vec(), stroke)],
+            Line::Dashed => Shape::dashed_line(points, stroke, 7.0, 5.0),
+            Line::Dotted => Shape::dotted_line(points, colour, 5.0, width / 2.0),
+        }
+    };
+    painter.extend(shapes(theme::HALO, width + 2.0 * HALO));
+    painter.extend(shapes(colour, width));
+}
+
+/// A mark with its halo, `reach` points to either side.
+pub fn paint_mark(painter: &Painter, at: Pos2, mark: Mark, colour: Color32, reach: f32) {
+    let to = |x: f32, y: f32| at + vec2(x, y) * reach;
+    let lines: Vec<Vec<Pos2>> = match mark {
+        Mark::Ring => {
+            painter.circle_stroke(at, reach * 0.75, Stroke::new(WIDTH + 2.0 * HALO, theme::HALO));
+            painter.circle_stroke(at, reach * 0.75, Stroke::new(WIDTH, colour));
+            return;
+        }
+        Mark::Plus => vec![vec![to(-1.0, 0.0), to(1.0, 0.0)], vec![to(0.0, -1.0), to(0.0, 1.0)]],
+        Mark::Cross => vec![vec![to(-0.7, -0.7), to(0.7, 0.7)], vec![to(-0.7, 0.7), to(0.7, -0.7)]],
+        Mark::Square => vec![vec![to(-0.7, -0.7), to(0.7, -0.7), to(0.7, 0.7), to(-0.7, 0.7), to(-0.7, -0.75)]],
+        Mark::Diamond => vec![vec![to(0.0, -0.9), to(0.9, 0.0), to(0.0, 0.9), to(-0.9, 0.0), to(0.05, -0.95)]],
+        Mark::Stroke(line) => {
+            paint_line(painter, &[to(-1.0, 0.0), to(1.0, 0.0)], colour, line, WIDTH);
+            return;
+        }
+    };
+    for (colour, width) in [(theme::HALO, WIDTH + 2.0 * HALO), (colour, WIDTH)] {
+        for line in &lines {
+            painter.add(Shape::line(line.clone(), Stroke::new(width, colour)));
+        }
+    }
+}
+
+/// Words on a dark scrim, their left middle at `at`. Returns the area taken.
+pub fn paint_words(painter: &Painter, at: Pos2, words: &str, colour: Color32) -> Rect {
+    let galley = painter.layout_no_wrap(words.to_owned(), theme::image_font(), colour);
+    let area = Align2::LEFT_CENTER.anchor_rect(Rect::from_min_size(at, galley.size()));
+    painter.rect_filled(area.expand2(vec2(3.0, 1.0)), 2.0, theme::SCRIM);
+    painter.galley(area.min, galley, colour);
+    area
+}
+
+/// The four corners of a square template window with `side` px, turned and magnified by `image_from_template`.
+pub fn template_quad(centre: Pixel, side: u32, image_from_template: &Matrix2<f64>) -> [Pixel; 4] {
+    let half = f64::from(side) / 2.0;
+    [(-half, -half), (half, -half), (half, half), (-half, half)].map(|(x, y)| {
+        let corner = image_from_template * nalgebra::Vector2::new(x, y);
+        centre.offset(corner.x, corner.y)
+    })
+}
+
+/// A row of the legend at `at`: the mark, then its word. Returns the row's area.
+pub fn paint_legend_row(painter: &Painter, at: Pos2, mark: Mark, colour: Color32, word: &str, shown: bool) -> Rect {
+    let faded = |c: Color32| if shown { c } else { c.gamma_multiply(0.35) };
+    paint_mark(painter, at + vec2(9.0, 7.0), mark, faded(colour), 6.0);
+    let galley = painter.layout_no_wrap(word.to_owned(), theme::image_font(), faded(theme::TEXT));
+    let size = galley.size();
+    painter.galley(pos2(at.x + 22.0, at.y + 7.0 - size.y / 2.0), galley, faded(theme::TEXT));
+    Rect::from_min_size(at, vec2(26.0 + size.x, 15.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_quad_of_an_unchanged_template_covers_its_whole_pixels() {
+        let quad = template_quad(Pixel::new(100.0, 50.0), 21, &Matrix2::identity());
+        assert_eq!(quad[0], Pixel::new(89.5, 39.5));
+        assert_eq!(quad[2], Pixel::new(110.5, 60.5));
+    }
+
+    #[test]
+    fn a_rolled_quad_turns_clockwise_on_the_screen_and_grows_with_the_scale() {
+        let turn = nalgebra::Rotation2::new(10.0_f64.to_radians()).into_inner() * 1.5;
+        let quad = template_quad(Pixel::new(0.0, 0.0), 20, &turn);
+        // The top edge runs right and down when content turns clockwise (y points down).
+        assert!(quad[1].y > quad[0].y);
+        assert!((quad[0].distance(quad[1]) - 30.0).abs() < 1e-9);
+    }
+}

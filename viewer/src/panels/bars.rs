@@ -1,0 +1,207 @@
+//! The bars: title and status at the top, stages and the newest message at the bottom, and the banner.
+
+use egui::{Align, Button, ComboBox, Layout, RichText, Ui};
+use sightline_core::target::TrackingState;
+use sightline_core::trace::StepTrace;
+
+use super::inspector;
+use crate::command::{Command, Go, Mode, Stage};
+use crate::state::messages::Weight;
+use crate::state::{Connection, State, run_letter};
+use crate::theme;
+
+/// The top bar: what is open, where the cursor is, and what can be done with the whole.
+pub fn top(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    ui.horizontal_centered(|ui| {
+        ui.label(RichText::new("Sightline").size(16.0).strong().color(theme::ACCENT));
+        ui.separator();
+        traverse_choice(ui, state, out);
+        ui.separator();
+        status(ui, state);
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            if ui.button("?").on_hover_text("Keys and conventions").clicked() {
+                out.push(Command::SetMode(Mode::Help));
+            }
+            let has_targets = state.session.as_ref().is_some_and(|session| !session.targets.is_empty());
+            let rerun = ui.add_enabled(has_targets, Button::new("Open in Rerun"));
+            if rerun.on_hover_text("Streams this session to a Rerun viewer in a new tab").clicked() {
+                out.push(Command::OpenRerun);
+            }
+            let export = ui.add_enabled(has_targets, Button::new("Export .rrd"));
+            if export.on_hover_text("Downloads this session as a Rerun recording").clicked() {
+                out.push(Command::ExportRrd);
+            }
+        });
+    });
+}
+
+fn traverse_choice(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let open = state.traverse.as_ref();
+    let name = open.map_or_else(|| "no traverse".to_owned(), |traverse| traverse.name.clone());
+    let list = state.traverses.as_deref().unwrap_or_default();
+    let choice = ComboBox::from_id_salt("traverse").width(170.0).selected_text(name).show_ui(ui, |ui| {
+        for entry in list {
+            let is_open = open.is_some_and(|traverse| traverse.id == entry.id);
+            if ui.selectable_label(is_open, &entry.name).clicked() {
+                out.push(Command::OpenTraverse(entry.id.clone()));
+            }
+        }
+    });
+    if let Some(traverse) = open {
+        let mut words = traverse.description.clone();
+        for warning in &traverse.warnings {
+            words += &format!("\n! {warning}");
+        }
+        choice.response.on_hover_text(words);
+    }
+}
+
+/// The status line: step, state, score and error.
+pub fn status(ui: &mut Ui, state: &State) {
+    let Some(last) = state.stop_count().checked_sub(1) else {
+        ui.label(theme::label(state.missing_target()));
+        return;
+    };
+    ui.label(theme::label("step"));
+    ui.label(theme::number(format!("{}/{last}", state.cursor.step)).size(13.0));
+    if let Some(target) = state.target() {
+        ui.label(theme::label(format!("{} · run {}", target.label, run_letter(state.cursor.run))));
+    }
+    let Some(row) = state.row() else {
+        ui.label(theme::label(if state.target().is_some() { "not computed" } else { "no target" }));
+        return;
+    };
+    let tracking = state.tracking().unwrap_or_default();
+    let word = match tracking {
+        TrackingState::Lost { count } => format!("LOST {count}"),
+        other => other.word().to_uppercase(),
+    };
+    ui.label(RichText::new(word).strong().color(theme::state(tracking)));
+    for (name, value, unit) in [
+        ("ncc", row.ncc.map(|v| format!("{v:.2}")), ""),
+        ("err", row.err_px.map(|v| format!("{v:.1}")), "px"),
+        ("σ", row.sigma_m.map(|v| format!("{:.1}", v * 100.0)), "cm"),
+    ] {
+        if let Some(value) = value {
+            ui.label(theme::label(name));
+            ui.label(theme::number(value).size(13.0));
+            ui.label(theme::note(unit));
+        }
+    }
+}
+
+/// The banner that says the server is gone.
+pub fn banner(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    if let Connection::Gone { attempts } = state.connection {
+        ui.horizontal(|ui| {
+            let words = format!("The server is gone. Steps that are loaded stay browsable; retrying ({attempts}) …");
+            ui.label(RichText::new(words).color(theme::LOST));
+            if ui.small_button("Retry now").clicked() {
+                out.push(Command::Reconnect);
+            }
+        });
+    }
+}
+
+/// Buttons along the drive, and how far run and rendering are.
+pub fn transport(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 3.0;
+        for (words, help, go) in [
+            ("|<", "first step (Home)", Go::First),
+            ("<<", "previous event (PgUp)", Go::PreviousEvent),
+            ("<", "one step back (Left)", Go::By(-1)),
+            (">", "one step on (Right)", Go::By(1)),
+            (">>", "next event (PgDn)", Go::NextEvent),
+            (">|", "last step (End)", Go::Last),
+        ] {
+            let button = Button::new(RichText::new(words).monospace()).min_size(egui::vec2(30.0, 22.0));
+            if ui.add(button).on_hover_text(help).clicked() {
+                out.push(Command::Go(go));
+            }
+        }
+        ui.add_space(8.0);
+        run_progress(ui, state, out);
+        if let Some((k, n)) = state.rendering {
+            progress_bar(ui, &format!("rendering {k} of {n} stops"), k, n);
+        }
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| newest_message(ui, state));
+    });
+}
+
+fn run_progress(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    for ((target, run), progress) in &state.progress {
+        let name = run_letter(*run);
+        progress_bar(ui, &format!("run {name}: {} of {}, {}", progress.k, progress.n, progress.doing), progress.k, progress.n);
+        if ui.small_button("Cancel").clicked() {
+            out.push(Command::CancelRun { target: *target, run: *run });
+        }
+        ui.add_space(6.0);
+    }
+}
+
+/// A thin bar with its words.
+fn progress_bar(ui: &mut Ui, words: &str, k: usize, n: usize) {
+    let fraction = k as f32 / n.max(1) as f32;
+    let (rect, _) = ui.allocate_exact_size(egui::vec2(90.0, 6.0), egui::Sense::hover());
+    ui.painter().rect_filled(rect, 3.0, theme::UNKNOWN);
+    let done = egui::Rect::from_min_size(rect.min, egui::vec2(rect.width() * fraction, rect.height()));
+    ui.painter().rect_filled(done, 3.0, theme::ACCENT);
+    ui.label(theme::note(words));
+}
+
+fn newest_message(ui: &mut Ui, state: &State) {
+    if let Some(message) = state.messages.newest() {
+        let colour = if message.weight == Weight::Problem { theme::LOST } else { theme::WEAK };
+        let words = RichText::new(&message.text).small().color(colour);
+        ui.add(egui::Label::new(words).truncate()).on_hover_text(&message.text);
+    }
+}
+
+/// The stages in running order; the steps of `locate` stand in brackets after it.
+pub fn stages(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 3.0;
+        for (i, stage) in Stage::ALL.into_iter().enumerate() {
+            if i > 0 {
+                let between = match stage {
+                    Stage::ScaleRoll => "(",
+                    Stage::Judge => ")  ›",
+                    _ => "›",
+                };
+                ui.label(theme::note(between));
+            }
+            stage_button(ui, state, stage, out);
+        }
+    });
+}
+
+fn stage_button(ui: &mut Ui, state: &State, stage: Stage, out: &mut Vec<Command>) {
+    let reached = state.trace().map(|trace| inspector::record(trace, stage).is_some());
+    let colour = match (reached, has_failed(state.trace(), stage)) {
+        (_, true) => theme::FAILED,
+        (Some(true), _) => theme::TEXT,
+        _ => theme::WEAK.gamma_multiply(0.7),
+    };
+    let size = if stage.is_step_of_locate() { 11.5 } else { 12.5 };
+    let words = RichText::new(stage.word()).size(size).color(colour);
+    let button = Button::selectable(state.stage == stage, words);
+    let note = match reached {
+        Some(false) => "\nNot reached at this step.",
+        _ => "",
+    };
+    if ui.add(button).on_hover_text(format!("{}{note}", stage.question())).clicked() {
+        out.push(Command::SelectStage(stage));
+    }
+}
+
+/// Whether a stage is where the step went wrong.
+fn has_failed(trace: Option<&StepTrace>, stage: Stage) -> bool {
+    let Some(trace) = trace else { return false };
+    match stage {
+        Stage::Capture => trace.fault.is_some(),
+        Stage::Locate => trace.locate.as_ref().is_some_and(|located| located.missing.is_some()),
+        Stage::Judge => trace.judge.as_ref().is_some_and(|verdict| !verdict.good),
+        _ => false,
+    }
+}

@@ -1,0 +1,132 @@
+//! The gates: the four loss criteria with value, limit and margin, and the verdict as a sentence.
+
+use egui::{Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
+use sightline_core::stages::judge::{Gate, Verdict};
+use sightline_core::target::TrackingState;
+
+use super::digits;
+use crate::command::Command;
+use crate::state::State;
+use crate::{panels, theme};
+
+/// Height of a margin bar, points.
+const BAR: f32 = 8.0;
+
+/// Shows the gates.
+pub fn show(ui: &mut Ui, state: &State, _out: &mut Vec<Command>) {
+    let verdict = state.trace().and_then(|trace| trace.judge.as_ref());
+    let Some(verdict) = verdict else {
+        panels::missing(ui, &state.missing_step());
+        return;
+    };
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        sentence(ui, verdict, state);
+        ui.add_space(2.0);
+        for gate in &verdict.gates {
+            show_gate(ui, gate);
+        }
+    });
+}
+
+/// The verdict in words, with the counter of the state machine.
+fn sentence(ui: &mut Ui, verdict: &Verdict, state: &State) {
+    let (word, colour) = match (verdict.accepted, verdict.good) {
+        (true, _) => ("ACCEPTED", theme::TRACKING),
+        (false, true) => ("GOOD, BUT NOT USED", theme::LOST),
+        (false, false) => ("REJECTED", theme::FAILED),
+    };
+    ui.horizontal_wrapped(|ui| {
+        ui.label(RichText::new(word).strong().color(colour));
+        ui.label(theme::note(transition(verdict, state)));
+    });
+    if let Some(reason) = &verdict.reason {
+        ui.add(egui::Label::new(RichText::new(reason).small().color(theme::TEXT)).wrap());
+    }
+}
+
+/// The change of state, with how many retries remain.
+fn transition(verdict: &Verdict, state: &State) -> String {
+    let retries = state.setting("limits", "n_retry").and_then(|v| v.as_u64()).unwrap_or(2);
+    let before = verdict.state_before.word();
+    match verdict.state {
+        TrackingState::Lost { count } => format!("{before} → lost, bad update {count}; {retries} may follow the loss"),
+        TrackingState::Failed if before != "failed" => format!("{before} → failed: no retries are left"),
+        TrackingState::Failed => "stays failed until the target is picked again".to_owned(),
+        other if other.word() == before => format!("stays {before}"),
+        other => format!("{before} → {}", other.word()),
+    }
+}
+
+fn show_gate(ui: &mut Ui, gate: &Gate) {
+    let colour = theme::verdict(gate.passed);
+    let relation = if gate.at_least { "≥" } else { "≤" };
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 5.0;
+        ui.label(theme::note(gate.criterion.to_string()));
+        ui.label(RichText::new(readable(&gate.name)).size(12.0).color(theme::TEXT));
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            ui.label(RichText::new(if gate.passed { "pass" } else { "FAIL" }).strong().color(colour));
+            let value = gate.value.map_or_else(|| "nothing".to_owned(), digits);
+            ui.label(theme::note(format!("{relation} {} {}", digits(gate.limit), gate.unit).trim_end().to_owned()));
+            ui.label(theme::number(value));
+        });
+    });
+    bar(ui, gate, colour);
+}
+
+/// A bar with the value against its limit; the good side of the limit is to its right for scores, else to its left.
+fn bar(ui: &mut Ui, gate: &Gate, colour: egui::Color32) {
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), BAR + 4.0), Sense::hover());
+    let rail = Rect::from_min_size(rect.min + vec2(0.0, 2.0), vec2(rect.width(), BAR));
+    let painter = ui.painter();
+    painter.rect_filled(rail, 2.0, theme::WELL);
+    let (value, limit) = fractions(gate);
+    let at = |fraction: f32| rail.left() + rail.width() * fraction;
+    if let Some(value) = value {
+        let (low, high) = if gate.at_least { (0.0, value) } else { (0.0, value) };
+        let fill = Rect::from_min_max(pos2(at(low), rail.top()), pos2(at(high).max(at(low) + 2.0), rail.bottom()));
+        painter.rect_filled(fill, 2.0, colour.gamma_multiply(0.85));
+    }
+    painter.vline(at(limit), rail.expand(2.0).y_range(), egui::Stroke::new(2.0, theme::STRONG));
+    let margin = gate.margin.map_or_else(
+        || "there was nothing to judge".to_owned(),
+        |m| format!("margin {} {}", digits(m), gate.unit),
+    );
+    response.on_hover_text(margin.trim_end().to_owned());
+}
+
+/// Value and limit as fractions of the bar: scores from 0 to 1, others from 0 to twice the limit.
+fn fractions(gate: &Gate) -> (Option<f32>, f32) {
+    let full = if gate.at_least { 1.0 } else { 2.0 * gate.limit.max(1e-9) };
+    let fraction = |v: f64| (v / full).clamp(0.0, 1.0) as f32;
+    (gate.value.map(fraction), fraction(gate.limit))
+}
+
+/// A gate's name in words.
+fn readable(name: &str) -> &str {
+    match name {
+        "ncc" => "match score",
+        "stereo_ncc" => "stereo score",
+        "distance_correction_m" => "distance correction",
+        "position_correction_m" => "position correction",
+        other => other,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn gate(value: Option<f64>, limit: f64, at_least: bool) -> Gate {
+        let (name, unit) = ("ncc".to_owned(), String::new());
+        Gate { criterion: 1, name, unit, value, limit, at_least, margin: None, passed: true }
+    }
+
+    #[test]
+    fn a_score_fills_its_bar_up_to_one_and_a_distance_up_to_twice_its_limit() {
+        assert_eq!(fractions(&gate(Some(0.83), 0.7, true)), (Some(0.83), 0.7));
+        assert_eq!(fractions(&gate(Some(0.05), 0.1, false)), (Some(0.25), 0.5));
+        assert_eq!(fractions(&gate(Some(9.0), 0.1, false)), (Some(1.0), 0.5));
+        assert_eq!(fractions(&gate(None, 0.1, false)), (None, 0.5));
+    }
+}

@@ -1,0 +1,254 @@
+//! The left image with all that the tracker knew of the target in it.
+
+use egui::{Align, CursorIcon, Layout, Rect, Ui, pos2, vec2};
+use sightline_core::frames::Pixel;
+use sightline_core::image::PixelRect;
+use sightline_core::trace::StepTrace;
+
+use super::legend::{self, Entry};
+use crate::cache::{Eye, Slot};
+use crate::command::{Command, Layer, Mode, Panel};
+use crate::overlay::{Line, Mark, Overlay, paint_words, template_quad};
+use crate::raster::Raster;
+use crate::state::{State, row_of, run_letter};
+use crate::view2d::Canvas;
+use crate::{overlay, panels, theme};
+
+/// Height of the status line below an image, points.
+pub const STATUS: f32 = 18.0;
+
+/// Shows the left image. Returns its canvas' transform and size, from which a test can compute where to click.
+pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) -> Option<(crate::view2d::Transform, [u32; 2])> {
+    let Some(raster) = ready_image(ui, state, Eye::Left) else { return None };
+    let [width, height] = raster.size();
+    let region = PixelRect::whole(width, height);
+    let canvas = Canvas::new(ui, state.view(Panel::Left), region, STATUS);
+    canvas.texture(&raster.texture, region);
+    canvas.pixel_grid(region);
+    if state.marks {
+        paint_others(&canvas, state);
+        if let Some(trace) = state.trace() {
+            paint_marks(&Overlay::new(&canvas.painter, &canvas.transform), trace, state);
+        }
+    }
+    legend::show(ui, &canvas, &entries(state), state, out);
+    paint_designation(&canvas, state);
+    pick(ui, &canvas, raster, state, out);
+    status_line(ui, &canvas, raster, region);
+    if let Some(view) = canvas.moved {
+        out.push(Command::View(Panel::Left, view));
+    }
+    Some((canvas.transform, raster.size()))
+}
+
+/// An image of the cursor's stop, or the sentence that says why it is not there yet.
+pub fn ready_image<'a>(ui: &mut Ui, state: &'a State, eye: Eye) -> Option<&'a Raster> {
+    let word = eye.word();
+    let step = state.cursor.step;
+    match state.image(eye) {
+        Slot::Ready(raster) => return Some(raster),
+        Slot::Failed(problem) => {
+            panels::missing(ui, &format!("The {word} image of step {step} cannot be shown: {}", problem.detail));
+        }
+        Slot::Absent if state.traverse.is_none() => panels::missing(ui, &state.missing_target()),
+        Slot::Absent | Slot::Loading => panels::missing(ui, &waiting_words(state, word, step)),
+    }
+    None
+}
+
+fn waiting_words(state: &State, word: &str, step: usize) -> String {
+    let is_rendered = state.stop().is_some_and(|stop| stop.ready);
+    match (is_rendered, state.rendering) {
+        (true, _) => format!("Loading the {word} image of step {step} …"),
+        (false, Some((k, n))) => {
+            format!("The images of step {step} are being rendered: {k} of {n} stops are done. They appear here by themselves.")
+        }
+        (false, None) => format!("The images of step {step} are being rendered. They appear here by themselves."),
+    }
+}
+
+/// What the legend of the left image lists.
+fn entries(state: &State) -> Vec<Entry> {
+    let Some(trace) = state.trace() else { return Vec::new() };
+    let pointing = trace.point_mast.as_ref();
+    let evidence = trace.template();
+    let matched = evidence.and_then(|e| e.match_template.as_ref());
+    let run = theme::run(state.cursor.run);
+    let mut entries = Vec::new();
+    if trace.truth.as_ref().is_some_and(|t| t.left_pixel.is_some()) {
+        entries.push(Entry::new(Layer::Truth, Mark::Plus, theme::TRUTH, "truth"));
+    }
+    if trace.locate.as_ref().is_some_and(|l| l.left_pixel.is_some()) {
+        let word = if trace.predict.is_some() { "match, 3σ" } else { "picked" };
+        let word = format!("{word} · run {}", run_letter(state.cursor.run));
+        entries.push(Entry::new(Layer::Match, Mark::Ring, run, word));
+    }
+    if trace.predict.is_some() && pointing.is_some_and(|p| p.predicted_left.is_some()) {
+        entries.push(Entry::new(Layer::Prediction, Mark::Stroke(Line::Dotted), theme::PREDICTION, "predicted, 3σ gate"));
+    }
+    if matched.is_some() {
+        entries.push(Entry::new(Layer::Template, Mark::Stroke(Line::Solid), run, "template window (dotted: scaled, rolled)"));
+        entries.push(Entry::new(Layer::SearchWindow, Mark::Stroke(Line::Dashed), theme::SEARCH, "search window"));
+    }
+    if trace.capture.as_ref().is_some_and(|c| c.subframe.is_some()) {
+        entries.push(Entry::new(Layer::Subframe, Mark::Stroke(Line::Dotted), theme::SUBFRAME, "subframe"));
+    }
+    if state.session.as_ref().is_some_and(|s| s.targets.len() > 1) {
+        entries.push(Entry::new(Layer::Others, Mark::Diamond, theme::WEAK, "other targets"));
+    }
+    entries
+}
+
+/// Paints what one step saw.
+fn paint_marks(overlay: &Overlay<'_>, trace: &StepTrace, state: &State) {
+    let run = theme::run(state.cursor.run);
+    let evidence = trace.template();
+    let matched = evidence.and_then(|e| e.match_template.as_ref());
+    if let Some(subframe) = trace.capture.as_ref().and_then(|c| c.subframe).filter(|_| state.shows(Layer::Subframe)) {
+        overlay.rectangle(subframe, theme::SUBFRAME, Line::Dotted);
+    }
+    if let Some(found) = matched.filter(|_| state.shows(Layer::SearchWindow)) {
+        overlay.rectangle(found.search_window, theme::SEARCH, Line::Dashed);
+    }
+    if state.shows(Layer::Prediction) && trace.predict.is_some() {
+        paint_prediction(overlay, trace);
+    }
+    if let (Some(found), Some(prepared)) = (matched, evidence.and_then(|e| e.scale_roll.as_ref()))
+        && state.shows(Layer::Template)
+    {
+        // What was compared is an upright square; the quad is where the reference's own window went.
+        let (at, side) = (found.peak.pixel, template_side(state));
+        overlay.outline(&template_quad(at, side, &nalgebra::Matrix2::identity()), run, Line::Solid);
+        overlay.outline(&template_quad(at, side, &prepared.prepared_from_template()), run, Line::Dotted);
+    }
+    if let Some((located, pixel)) = trace.locate.as_ref().and_then(|l| Some((l, l.left_pixel?)))
+        && state.shows(Layer::Match)
+    {
+        overlay.ellipse(pixel, &located.left_covariance_px2, 3.0, run, Line::Solid);
+        overlay.mark(pixel, Mark::Ring, run);
+    }
+    if let Some(pixel) = trace.truth.as_ref().and_then(|t| t.left_pixel).filter(|_| state.shows(Layer::Truth)) {
+        overlay.mark(pixel, Mark::Plus, theme::TRUTH);
+    }
+}
+
+fn paint_prediction(overlay: &Overlay<'_>, trace: &StepTrace) {
+    let Some(pointing) = &trace.point_mast else { return };
+    let Some(pixel) = pointing.predicted_left else { return };
+    if let Some(covariance) = &pointing.predicted_covariance_px2 {
+        overlay.ellipse(pixel, covariance, 3.0, theme::PREDICTION, Line::Dotted);
+        if let Some([long, _]) = crate::ellipse::axes(covariance) {
+            let end = pixel.offset(3.0 * long.x.abs(), 3.0 * long.x.signum() * long.y);
+            overlay.words(end, vec2(6.0, 0.0), "3σ", theme::PREDICTION);
+        }
+    }
+    overlay.mark(pixel, Mark::Cross, theme::PREDICTION);
+}
+
+/// Side of the template, px.
+pub fn template_side(state: &State) -> u32 {
+    let value = state.setting("template", "template_size_px").and_then(|v| v.as_u64());
+    value.and_then(|v| u32::try_from(v).ok()).unwrap_or(21)
+}
+
+/// The other targets, where their latest runs place them.
+fn paint_others(canvas: &Canvas, state: &State) {
+    let Some(session) = state.session.as_ref().filter(|_| state.shows(Layer::Others)) else { return };
+    let overlay = Overlay::new(&canvas.painter, &canvas.transform);
+    for target in session.targets.iter().filter(|target| Some(target.number) != state.cursor.target) {
+        let row = target.runs.last().and_then(|run| row_of(run, state.cursor.step));
+        if let Some(pixel) = row.and_then(|row| row.left_pixel) {
+            overlay.mark(pixel, Mark::Diamond, theme::WEAK);
+            overlay.words(pixel, vec2(10.0, 0.0), &target.label, theme::WEAK);
+        }
+    }
+}
+
+/// A designation that is being computed or was refused.
+fn paint_designation(canvas: &Canvas, state: &State) {
+    let here = |step: usize| step == state.cursor.step;
+    let overlay = Overlay::new(&canvas.painter, &canvas.transform);
+    if let Some(place) = state.designating.filter(|place| here(place.step)) {
+        overlay.mark(place.pixel, Mark::Ring, theme::ACCENT);
+        overlay.words(place.pixel, vec2(12.0, 0.0), "computing the position …", theme::ACCENT);
+    }
+    if let Some(refusal) = state.refusal.as_ref().filter(|refusal| here(refusal.place.step)) {
+        overlay.mark(refusal.place.pixel, Mark::Cross, theme::FAILED);
+        let at = canvas.transform.to_screen(refusal.place.pixel) + vec2(12.0, 0.0);
+        paint_wrapped(canvas, at, &format!("refused: {}", refusal.sentence));
+    }
+}
+
+/// Words near a place, wrapped and held inside the canvas.
+fn paint_wrapped(canvas: &Canvas, at: egui::Pos2, words: &str) {
+    let area = canvas.transform.rect.shrink(6.0);
+    let width = 280.0_f32.min(area.width());
+    let galley = canvas.painter.layout(words.to_owned(), theme::image_font(), theme::LOST, width);
+    let size = galley.size();
+    let corner = pos2(
+        at.x.clamp(area.left(), (area.right() - size.x).max(area.left())),
+        (at.y - size.y / 2.0).clamp(area.top(), (area.bottom() - size.y).max(area.top())),
+    );
+    canvas.painter.rect_filled(Rect::from_min_size(corner, size).expand(4.0), 3.0, theme::SCRIM);
+    canvas.painter.galley(corner, galley, theme::LOST);
+}
+
+/// In pick mode: the loupe, and the designation on a click.
+fn pick(ui: &Ui, canvas: &Canvas, raster: &Raster, state: &State, out: &mut Vec<Command>) {
+    if state.mode != Mode::Pick {
+        return;
+    }
+    let border = canvas.transform.rect.shrink(1.0);
+    canvas.painter.rect_stroke(border, 0.0, egui::Stroke::new(2.0, theme::ACCENT), egui::StrokeKind::Inside);
+    let hint = "Click the point to track. Esc cancels.";
+    paint_words(&canvas.painter, border.left_bottom() + vec2(10.0, -14.0), hint, theme::ACCENT);
+    let [width, height] = raster.size();
+    let Some(pixel) = canvas.hovered(PixelRect::whole(width, height)) else { return };
+    ui.ctx().set_cursor_icon(CursorIcon::Crosshair);
+    loupe(canvas, raster, pixel);
+    if canvas.response.clicked() {
+        out.push(Command::Pick(pixel));
+    }
+}
+
+/// The surroundings of the pointer, magnified, in the corner away from it.
+fn loupe(canvas: &Canvas, raster: &Raster, pixel: Pixel) {
+    const PIXELS: f32 = 21.0;
+    const SIDE: f32 = 147.0;
+    let area = canvas.transform.rect.shrink(8.0);
+    if canvas.transform.scale > 6.0 || area.width() < 2.5 * SIDE || area.height() < 1.5 * SIDE {
+        return;
+    }
+    let on_left = canvas.transform.to_screen(pixel).x > area.center().x;
+    let corner = if on_left { area.left_bottom() - vec2(0.0, SIDE + 20.0) } else { area.right_bottom() - vec2(SIDE, SIDE) };
+    let frame = Rect::from_min_size(corner, vec2(SIDE, SIDE));
+    let [width, height] = raster.size().map(|v| v as f32);
+    let middle = pos2((pixel.x as f32 + 0.5) / width, (pixel.y as f32 + 0.5) / height);
+    let part = Rect::from_center_size(middle, vec2(PIXELS / width, PIXELS / height));
+    canvas.painter.image(raster.texture.id(), frame, part, theme::UNTINTED);
+    canvas.painter.rect_stroke(frame, 0.0, egui::Stroke::new(1.0, theme::ACCENT), egui::StrokeKind::Outside);
+    overlay::paint_mark(&canvas.painter, frame.center(), Mark::Plus, theme::ACCENT, 9.0);
+}
+
+/// Pixel and grey value under the pointer, magnification, and the convention.
+pub fn status_line(ui: &mut Ui, canvas: &Canvas, raster: &Raster, region: PixelRect) {
+    ui.horizontal(|ui| {
+        ui.set_height(STATUS - 4.0);
+        match canvas.hovered(region) {
+            Some(pixel) => {
+                let value = raster.at(pixel.x.round() as i64, pixel.y.round() as i64);
+                let grey = value.map_or_else(|| "no data".to_owned(), |v| format!("{v:.4}"));
+                ui.label(theme::number(format!("x {:7.1}  y {:7.1}", pixel.x, pixel.y)).size(11.0));
+                ui.label(theme::note("grey"));
+                ui.label(theme::number(grey).size(11.0));
+            }
+            None => {
+                ui.label(theme::note(format!("{} × {} px", region.width, region.height)));
+            }
+        }
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            ui.label(theme::note(format!("×{:.2}", canvas.transform.scale)))
+                .on_hover_text("Points on the screen per pixel. (0, 0) is the centre of the first pixel.");
+        });
+    });
+}

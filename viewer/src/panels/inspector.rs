@@ -1,0 +1,213 @@
+//! The inspector: the selected stage's record as a tree of values with units.
+
+use egui::{CollapsingHeader, RichText, ScrollArea, Ui};
+use serde_json::Value;
+use sightline_core::trace::StepTrace;
+
+use super::digits;
+use crate::command::{Command, Stage};
+use crate::state::State;
+use crate::{panels, theme};
+
+/// Shows the record.
+pub fn show(ui: &mut Ui, state: &State, _out: &mut Vec<Command>) {
+    ui.horizontal_wrapped(|ui| {
+        ui.label(RichText::new(state.stage.word()).strong().color(theme::STRONG));
+        ui.label(theme::note(state.stage.question()));
+    });
+    let Some(trace) = state.trace() else {
+        panels::missing(ui, &state.missing_step());
+        return;
+    };
+    let Some(record) = record(trace, state.stage) else {
+        panels::missing(ui, &not_reached(trace, state));
+        return;
+    };
+    ScrollArea::vertical().auto_shrink(false).id_salt(state.stage).show(ui, |ui| {
+        entries(ui, &record);
+        if let Some(truth) = trace.truth.as_ref().and_then(|truth| serde_json::to_value(truth).ok()) {
+            ui.add_space(4.0);
+            ui.label(theme::title("against the truth"));
+            entries(ui, &truth);
+        }
+    });
+}
+
+fn not_reached(trace: &StepTrace, state: &State) -> String {
+    let word = state.stage.word();
+    match (&trace.fault, trace.predict.is_none()) {
+        (Some(fault), _) => format!("{word} was not reached: {fault}"),
+        (None, true) => {
+            format!("{word} is not part of the designation. Go one step on (Right) to see it, or select `point_stereo`.")
+        }
+        (None, false) => format!("{word} was not reached: {}", state.missing_step()),
+    }
+}
+
+/// What a stage returned; none where it was not reached.
+pub fn record(trace: &StepTrace, stage: Stage) -> Option<Value> {
+    let evidence = trace.template();
+    let value = match stage {
+        Stage::Predict => serde_json::to_value(trace.predict.as_ref()?),
+        Stage::PointMast => serde_json::to_value(trace.point_mast.as_ref()?),
+        Stage::Capture => serde_json::to_value(trace.capture.as_ref()?),
+        Stage::Locate => serde_json::to_value(trace.locate.as_ref()?),
+        Stage::ScaleRoll => serde_json::to_value(evidence?.scale_roll.as_ref()?),
+        Stage::MatchTemplate => serde_json::to_value(evidence?.match_template.as_ref()?),
+        Stage::PointStereo => serde_json::to_value(evidence?.point_stereo.as_ref()?),
+        Stage::Triangulate => serde_json::to_value(evidence?.triangulate.as_ref()?),
+        Stage::Judge => serde_json::to_value(trace.judge.as_ref()?),
+        Stage::Update => serde_json::to_value(&trace.update),
+    };
+    let mut value = value.ok()?;
+    if let (Stage::Locate, Some(object)) = (stage, value.as_object_mut()) {
+        // Its steps have records of their own.
+        object.remove("evidence");
+    }
+    Some(value)
+}
+
+/// The fields of a record, plain values first.
+fn entries(ui: &mut Ui, record: &Value) {
+    let Some(fields) = record.as_object() else {
+        ui.label(theme::number(record.to_string()));
+        return;
+    };
+    let (plain, nested): (Vec<_>, Vec<_>) = fields.iter().partition(|(key, value)| words(key, value).is_some());
+    egui::Grid::new(ui.next_auto_id()).num_columns(2).spacing([10.0, 2.0]).show(ui, |ui| {
+        for (key, value) in plain {
+            let (name, unit) = name_and_unit(key);
+            ui.label(theme::label(name).size(12.0));
+            ui.horizontal_wrapped(|ui| {
+                ui.spacing_mut().item_spacing.x = 4.0;
+                ui.label(theme::number(words(key, value).unwrap_or_default()));
+                ui.label(theme::note(unit));
+            });
+            ui.end_row();
+        }
+    });
+    for (key, value) in nested {
+        let (name, unit) = name_and_unit(key);
+        let count = value.as_array().map(|list| format!(" ({})", list.len())).unwrap_or_default();
+        let header = RichText::new(format!("{name}{count} {unit}").trim_end().to_owned()).size(12.0).color(theme::TEXT);
+        CollapsingHeader::new(header).id_salt(key).default_open(is_small(value)).show(ui, |ui| children(ui, value));
+    }
+}
+
+fn children(ui: &mut Ui, value: &Value) {
+    match value {
+        Value::Array(rows) if is_matrix(rows) => matrix(ui, rows),
+        Value::Array(list) => {
+            for (i, item) in list.iter().enumerate() {
+                let title = item.get("name").and_then(Value::as_str).map_or_else(|| i.to_string(), str::to_owned);
+                if item.is_object() {
+                    CollapsingHeader::new(RichText::new(title).size(12.0)).id_salt(i).show(ui, |ui| entries(ui, item));
+                } else {
+                    ui.label(theme::number(item.to_string()));
+                }
+            }
+        }
+        _ => entries(ui, value),
+    }
+}
+
+/// Whether a record is short enough to be open from the start.
+fn is_small(value: &Value) -> bool {
+    match value {
+        Value::Array(list) => is_matrix(list),
+        Value::Object(fields) => fields.len() <= 8,
+        _ => true,
+    }
+}
+
+fn is_matrix(rows: &[Value]) -> bool {
+    rows.len() <= 4 && rows.iter().all(|row| row.as_array().is_some_and(|r| r.iter().all(Value::is_number)))
+}
+
+/// A symmetric matrix: rows and columns are the same, whichever comes first in the document.
+fn matrix(ui: &mut Ui, rows: &[Value]) {
+    egui::Grid::new(ui.next_auto_id()).spacing([12.0, 1.0]).show(ui, |ui| {
+        let count = rows.first().and_then(Value::as_array).map_or(0, Vec::len);
+        for i in 0..count {
+            for column in rows {
+                let value = column.get(i).and_then(Value::as_f64).unwrap_or(f64::NAN);
+                ui.label(theme::number(format!("{value:+.3e}")).size(11.0));
+            }
+            ui.end_row();
+        }
+    });
+}
+
+/// A value that fits on a line; none for records and long lists.
+fn words(key: &str, value: &Value) -> Option<String> {
+    match value {
+        Value::Null => Some("none".to_owned()),
+        Value::Bool(is) => Some(if *is { "yes" } else { "no" }.to_owned()),
+        Value::Number(number) => {
+            let number = number.as_f64()?;
+            if key.ends_with("_rad") {
+                return Some(format!("{} ({:.2}°)", digits(number), number.to_degrees()));
+            }
+            Some(digits(number))
+        }
+        Value::String(text) => Some(text.clone()),
+        Value::Array(list) if list.len() <= 4 && list.iter().all(Value::is_number) => {
+            Some(list.iter().filter_map(Value::as_f64).map(digits).collect::<Vec<_>>().join("  "))
+        }
+        Value::Object(fields) if fields.len() == 2 && fields.contains_key("x") && fields.contains_key("y") => {
+            let [x, y] = ["x", "y"].map(|k| fields[k].as_f64().unwrap_or(f64::NAN));
+            Some(format!("{x:.2}, {y:.2}"))
+        }
+        _ => None,
+    }
+}
+
+/// A field's name in words and the unit that its name ends with.
+fn name_and_unit(key: &str) -> (String, &'static str) {
+    const UNITS: [(&str, &str); 8] = [
+        ("_px2", "px²"),
+        ("_px", "px"),
+        ("_m2", "m²"),
+        ("_m", "m"),
+        ("_rad", "rad"),
+        ("_deg", "°"),
+        ("_s", "s"),
+        ("_in_rover", "m, rover"),
+    ];
+    if key.starts_with("covariance_in_rover") {
+        return ("covariance".to_owned(), "m², rover");
+    }
+    if let Some(name) = key.strip_suffix("_in_site") {
+        return (name.replace('_', " "), "m, site");
+    }
+    if matches!(key, "left_pixel" | "right_pixel" | "pixel" | "predicted_left" | "predicted_right" | "integer") {
+        return (key.replace('_', " "), "px");
+    }
+    let found = UNITS.iter().find_map(|(suffix, unit)| Some((key.strip_suffix(suffix)?, *unit)));
+    let (name, unit) = found.unwrap_or((key, ""));
+    (name.replace('_', " "), unit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn units_come_from_the_names() {
+        assert_eq!(name_and_unit("gap_m"), ("gap".to_owned(), "m"));
+        assert_eq!(name_and_unit("covariance_px2"), ("covariance".to_owned(), "px²"));
+        assert_eq!(name_and_unit("position_in_rover"), ("position".to_owned(), "m, rover"));
+        assert_eq!(name_and_unit("score"), ("score".to_owned(), ""));
+        assert_eq!(name_and_unit("left_pixel"), ("left pixel".to_owned(), "px"));
+    }
+
+    #[test]
+    fn values_read_like_values() {
+        assert_eq!(words("roll_rad", &json!(0.1)).unwrap(), "0.100 (5.73°)");
+        assert_eq!(words("pixel", &json!({"x": 1.25, "y": 2.0})).unwrap(), "1.25, 2.00");
+        assert_eq!(words("position_in_rover", &json!([1.0, 2.5, -0.2])).unwrap(), "1  2.500  -0.200");
+        assert_eq!(words("missing", &Value::Null).unwrap(), "none");
+        assert!(words("peak", &json!({"score": 1, "x": 2})).is_none());
+    }
+}

@@ -1,0 +1,147 @@
+//! The template strip: how the reference became what was compared, and what remained.
+
+use egui::{Align2, Pos2, Rect, Sense, Ui, pos2, vec2};
+use sightline_core::trace::{ArrayName, StepTrace};
+
+use crate::cache::Slot;
+use crate::command::{Command, Stage};
+use crate::raster::{DIFFERENCE_LIMIT, PATCH_SIGMAS, Raster};
+use crate::state::State;
+use crate::{panels, theme, view2d};
+
+/// Room for the arrow and the number between two patches, points.
+const BETWEEN: f32 = 52.0;
+/// Room for the words above and below a patch, points.
+const WORDS: (f32, f32) = (17.0, 31.0);
+
+/// One patch of the strip.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Patch {
+    /// The array.
+    pub array: ArrayName,
+    /// What it is.
+    pub title: String,
+    /// What happened on the way to it.
+    pub step: String,
+    /// The stage that made it.
+    pub stage: Stage,
+}
+
+/// The patches of a step, in their order; those that were not reached are left out.
+pub fn patches(trace: &StepTrace) -> Vec<Patch> {
+    let Some(evidence) = trace.template() else { return Vec::new() };
+    let mut patches = Vec::new();
+    let mut add = |array, title: String, step: String, stage| patches.push(Patch { array, title, step, stage });
+    if let Some(s) = &evidence.scale_roll {
+        let applied = |is_on: bool, words: String| if is_on { words } else { "off".to_owned() };
+        add(ArrayName::Reference, format!("reference, step {}", s.template_step), String::new(), Stage::ScaleRoll);
+        let scale = applied(s.applied_scale == s.scale, format!("×{:.3}", s.applied_scale));
+        add(ArrayName::Scaled, "scaled".to_owned(), scale, Stage::ScaleRoll);
+        let roll = applied(s.applied_roll_rad == s.roll_rad, format!("{:+.2}°", s.applied_roll_rad.to_degrees()));
+        add(ArrayName::Rolled, "rolled".to_owned(), roll, Stage::ScaleRoll);
+    }
+    if let Some(m) = &evidence.match_template {
+        let score = format!("ncc {:.2}", m.peak.score);
+        add(ArrayName::Matched, "matched".to_owned(), score, Stage::MatchTemplate);
+        add(ArrayName::Difference, "difference".to_owned(), "−".to_owned(), Stage::MatchTemplate);
+    }
+    if let Some(s) = &evidence.point_stereo {
+        add(ArrayName::RightWindow, "right image".to_owned(), format!("ncc {:.2}", s.score), Stage::PointStereo);
+    }
+    patches
+}
+
+/// Shows the strip.
+pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let patches = state.trace().map(patches).unwrap_or_default();
+    if patches.is_empty() {
+        panels::missing(ui, &state.missing_step());
+        return;
+    }
+    let area = ui.available_rect_before_wrap();
+    let count = patches.len() as f32;
+    let across = (area.width() - BETWEEN * (count - 1.0)) / count;
+    let side = across.min(area.height() - WORDS.0 - WORDS.1).max(16.0);
+    let width = side * count + BETWEEN * (count - 1.0);
+    let mut at = pos2(area.left() + ((area.width() - width) / 2.0).max(0.0), area.top() + WORDS.0);
+    for patch in &patches {
+        if !patch.step.is_empty() {
+            arrow(ui, pos2(at.x - BETWEEN / 2.0, at.y + side / 2.0), &patch.step);
+        }
+        let frame = Rect::from_min_size(at, vec2(side, side));
+        show_patch(ui, state, patch, frame, out);
+        at.x += side + BETWEEN;
+    }
+    ui.advance_cursor_after_rect(area);
+}
+
+/// The arrow between two patches with what happened.
+fn arrow(ui: &Ui, middle: Pos2, words: &str) {
+    let painter = ui.painter();
+    let stroke = egui::Stroke::new(1.5, theme::WEAK);
+    let tip = middle + vec2(12.0, 6.0);
+    painter.line_segment([middle + vec2(-12.0, 6.0), tip], stroke);
+    painter.line_segment([tip, tip + vec2(-4.0, -4.0)], stroke);
+    painter.line_segment([tip, tip + vec2(-4.0, 4.0)], stroke);
+    painter.text(middle - vec2(0.0, 2.0), Align2::CENTER_BOTTOM, words, theme::digit_font(), theme::STRONG);
+}
+
+fn show_patch(ui: &mut Ui, state: &State, patch: &Patch, frame: Rect, out: &mut Vec<Command>) {
+    let response = ui.interact(frame, ui.scope_id().with(("patch", patch.array)), Sense::click());
+    let painter = ui.painter();
+    let above = frame.center_top() - vec2(0.0, 3.0);
+    painter.text(above, Align2::CENTER_BOTTOM, &patch.title, theme::image_font(), theme::TEXT);
+    let border = if response.hovered() { theme::ACCENT } else { theme::LINE };
+    match state.array(patch.array) {
+        Slot::Ready(raster) => {
+            view2d::checker(painter, frame);
+            let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+            painter.image(raster.texture.id(), frame, whole, theme::UNTINTED);
+            statistics(ui, raster, patch.array, frame);
+        }
+        Slot::Failed(_) => {
+            painter.rect_filled(frame, 0.0, theme::WELL);
+            painter.text(frame.center(), Align2::CENTER_CENTER, "not kept", theme::image_font(), theme::LOST);
+        }
+        Slot::Absent | Slot::Loading => {
+            painter.rect_filled(frame, 0.0, theme::WELL);
+            painter.text(frame.center(), Align2::CENTER_CENTER, "loading …", theme::image_font(), theme::WEAK);
+        }
+    }
+    ui.painter().rect_stroke(frame, 0.0, egui::Stroke::new(1.0, border), egui::StrokeKind::Outside);
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, format!("{} patch", patch.title)));
+    if response.on_hover_text(explain(patch.array)).clicked() {
+        out.push(Command::SelectStage(patch.stage));
+    }
+}
+
+/// Mean and standard deviation below a patch, and the limits of the difference.
+fn statistics(ui: &Ui, raster: &Raster, array: ArrayName, frame: Rect) {
+    let painter = ui.painter();
+    let below = frame.center_bottom() + vec2(0.0, 3.0);
+    let first = format!("mean {:.3}  σ {:.3}", raster.mean, raster.sigma);
+    painter.text(below, Align2::CENTER_TOP, first, theme::digit_font(), theme::TEXT);
+    let [width, height] = raster.size();
+    let second = match array {
+        ArrayName::Difference => format!("blue −{DIFFERENCE_LIMIT}  red +{DIFFERENCE_LIMIT}"),
+        _ => format!("{width} × {height} px"),
+    };
+    painter.text(below + vec2(0.0, 14.0), Align2::CENTER_TOP, second, theme::digit_font(), theme::WEAK);
+}
+
+fn explain(array: ArrayName) -> String {
+    let what = match array {
+        ArrayName::Reference => "The template as it was taken.",
+        ArrayName::Scaled => "The template magnified by the ratio of distances, so that it has the size expected now.",
+        ArrayName::Rolled => "Then turned by the roll of the camera: this is what was searched for.",
+        ArrayName::Matched => "The left image at the match.",
+        ArrayName::Difference => "Matched minus rolled, both with mean 0 and deviation 1: blue darker, red brighter.",
+        ArrayName::RightWindow => "The right image at the stereo match, resampled as the left camera sees it.",
+        ArrayName::Surface => "The scores of all positions.",
+    };
+    if array == ArrayName::Difference {
+        what.to_owned()
+    } else {
+        format!("{what}\nShown from {PATCH_SIGMAS} σ below its mean to {PATCH_SIGMAS} σ above: correlation ignores both.")
+    }
+}

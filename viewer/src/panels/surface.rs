@@ -1,0 +1,164 @@
+//! The surface of match scores over the search window, with its peaks, the threshold and the prediction.
+
+use egui::{Align2, Rect, Ui, pos2, vec2};
+use sightline_core::frames::Pixel;
+use sightline_core::image::PixelRect;
+use sightline_core::locate::template::match_template::TemplateMatch;
+use sightline_core::trace::{ArrayName, StepTrace};
+
+use super::images_left::STATUS;
+use crate::cache::Slot;
+use crate::command::{Command, Panel};
+use crate::contour::contour;
+use crate::overlay::{Line, Mark, Overlay};
+use crate::raster::Raster;
+use crate::state::State;
+use crate::view2d::Canvas;
+use crate::{panels, theme};
+
+/// Width of the colour bar with its numbers, points.
+const BAR: f32 = 46.0;
+/// Scores with a tick.
+const TICKS: [f32; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
+
+/// Shows the surface.
+pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let matched = state.trace().and_then(StepTrace::template).and_then(|e| e.match_template.as_ref());
+    let (Some(trace), Some(matched)) = (state.trace(), matched) else {
+        panels::missing(ui, &state.missing_step());
+        return;
+    };
+    let raster = match state.array(ArrayName::Surface) {
+        Slot::Ready(raster) => raster,
+        Slot::Failed(problem) => return panels::missing(ui, &format!("The scores cannot be shown: {}", problem.detail)),
+        Slot::Absent | Slot::Loading => return panels::missing(ui, "Loading the scores …"),
+    };
+    let area = ui.available_rect_before_wrap();
+    let (rest, bar) = area.split_left_right_at_x(area.right() - BAR);
+    let mut left = ui.new_child(egui::UiBuilder::new().max_rect(rest).id_salt("scores"));
+    let region = region_of(matched.search_window, raster.size());
+    let canvas = Canvas::new(&mut left, state.view(Panel::Surface), region, STATUS);
+    canvas.checker(region);
+    canvas.texture(&raster.texture, region);
+    let threshold = state.setting("limits", "ncc_min").and_then(|v| v.as_f64()).unwrap_or(0.7) as f32;
+    if state.marks {
+        paint_contour(&canvas, raster, region, threshold);
+        paint_marks(&canvas, trace, matched, theme::run(state.cursor.run));
+    }
+    warn_of_edge(&canvas, matched);
+    status(&mut left, &canvas, raster, region, matched);
+    let bar = bar.shrink2(vec2(4.0, 2.0)).with_max_y(bar.bottom() - STATUS);
+    colour_bar(ui, bar, threshold, matched.peak.score as f32, theme::run(state.cursor.run));
+    ui.advance_cursor_after_rect(area);
+    if let Some(view) = canvas.moved {
+        out.push(Command::View(Panel::Surface, view));
+    }
+}
+
+/// The pixels on which the template's centre lay: the search window less half a template on each side.
+pub fn region_of(search_window: PixelRect, size: [u32; 2]) -> PixelRect {
+    let inset = |whole: u32, inner: u32| (whole.saturating_sub(inner) / 2) as i32;
+    PixelRect::new(
+        search_window.x + inset(search_window.width, size[0]),
+        search_window.y + inset(search_window.height, size[1]),
+        size[0],
+        size[1],
+    )
+}
+
+/// The line along which the scores have the threshold's height.
+fn paint_contour(canvas: &Canvas, raster: &Raster, region: PixelRect, threshold: f32) {
+    let (x, y) = (f64::from(region.x), f64::from(region.y));
+    let stroke = egui::Stroke::new(1.5, theme::STRONG);
+    for segment in contour(raster.values.as_raw(), raster.values.width() as usize, threshold) {
+        let ends = segment.map(|[dx, dy]| canvas.transform.to_screen(Pixel::new(x + dx, y + dy)));
+        canvas.painter.line_segment(ends, stroke);
+    }
+}
+
+fn paint_marks(canvas: &Canvas, trace: &StepTrace, matched: &TemplateMatch, run: egui::Color32) {
+    let overlay = Overlay::new(&canvas.painter, &canvas.transform);
+    if let Some(pixel) = trace.point_mast.as_ref().and_then(|p| p.predicted_left) {
+        if let Some(covariance) = trace.point_mast.as_ref().and_then(|p| p.predicted_covariance_px2.as_ref()) {
+            overlay.ellipse(pixel, covariance, 3.0, theme::PREDICTION, Line::Dotted);
+        }
+        overlay.mark(pixel, Mark::Cross, theme::PREDICTION);
+    }
+    if let Some(second) = &matched.second_peak {
+        overlay.mark(second.pixel, Mark::Square, theme::STRONG);
+        let words = format!("2nd: {:.0} % at {:.0} px", second.ratio * 100.0, second.distance_px);
+        overlay.words(second.pixel, vec2(12.0, 0.0), &words, theme::STRONG);
+    }
+    let peak = &matched.peak;
+    overlay.ellipse(peak.pixel, &matched.covariance_px2, 3.0, run, Line::Solid);
+    overlay.mark(peak.pixel, Mark::Ring, run);
+    overlay.words(peak.pixel, vec2(12.0, -12.0), &format!("peak {:.3}", peak.score), theme::STRONG);
+    if let Some(pixel) = trace.truth.as_ref().and_then(|t| t.left_pixel) {
+        overlay.mark(pixel, Mark::Plus, theme::TRUTH);
+    }
+}
+
+fn warn_of_edge(canvas: &Canvas, matched: &TemplateMatch) {
+    if matched.peak.at_edge {
+        let area = canvas.transform.rect.shrink(1.0);
+        canvas.painter.rect_stroke(area, 0.0, egui::Stroke::new(2.0, theme::LOST), egui::StrokeKind::Inside);
+        let words = "The peak is at the edge: the true one may lie outside the search window.";
+        let galley = canvas.painter.layout(words.to_owned(), theme::image_font(), theme::LOST, area.width() - 16.0);
+        let frame = Rect::from_min_size(area.left_top() + vec2(8.0, 6.0), galley.size());
+        canvas.painter.rect_filled(frame.expand(3.0), 2.0, theme::SCRIM);
+        canvas.painter.galley(frame.min, galley, theme::LOST);
+    }
+}
+
+/// Pixel and score under the pointer, else what the surface holds.
+fn status(ui: &mut Ui, canvas: &Canvas, raster: &Raster, region: PixelRect, matched: &TemplateMatch) {
+    ui.horizontal(|ui| {
+        ui.set_height(STATUS - 4.0);
+        let Some(pixel) = canvas.hovered(region) else {
+            let flat = if matched.flat_positions > 0 { format!(", {} flat", matched.flat_positions) } else { String::new() };
+            ui.label(theme::note(format!("{} positions{flat}; white line: threshold; checker: excluded", matched.positions)));
+            return;
+        };
+        let (x, y) = (pixel.x.round() as i64, pixel.y.round() as i64);
+        let value = raster.at(x - i64::from(region.x), y - i64::from(region.y));
+        ui.label(theme::number(format!("x {x}  y {y}")).size(11.0));
+        ui.label(theme::note("ncc"));
+        ui.label(theme::number(value.map_or_else(|| "excluded".to_owned(), |v| format!("{v:+.3}"))).size(11.0));
+    });
+}
+
+/// The colour bar from −1 to 1 with ticks, the threshold and the peak.
+fn colour_bar(ui: &Ui, area: Rect, threshold: f32, peak: f32, run: egui::Color32) {
+    let painter = ui.painter();
+    let strip = Rect::from_min_max(area.min + vec2(2.0, 8.0), pos2(area.left() + 13.0, area.bottom() - 8.0));
+    let at = |score: f32| strip.bottom() - (score.clamp(-1.0, 1.0) + 1.0) / 2.0 * strip.height();
+    let mut mesh = egui::Mesh::default();
+    let steps = 64;
+    for i in 0..steps {
+        let [low, high] = [i, i + 1].map(|i| -1.0 + 2.0 * i as f32 / steps as f32);
+        let row = Rect::from_min_max(pos2(strip.left(), at(high)), pos2(strip.right(), at(low)));
+        mesh.add_colored_rect(row, theme::score((low + high) / 2.0));
+    }
+    painter.add(egui::Shape::mesh(mesh));
+    for tick in TICKS {
+        let end = pos2(strip.right() + 4.0, at(tick));
+        painter.line_segment([pos2(strip.right(), at(tick)), end], egui::Stroke::new(1.0, theme::WEAK));
+        let words = if tick == 0.0 { "0".to_owned() } else { format!("{tick:+}") };
+        painter.text(end + vec2(2.0, 0.0), Align2::LEFT_CENTER, words, theme::digit_font(), theme::WEAK);
+    }
+    painter.hline(strip.x_range(), at(threshold), egui::Stroke::new(2.0, theme::STRONG));
+    let tip = pos2(strip.left() - 1.0, at(peak));
+    let arrow = vec![tip, tip + vec2(-5.0, -4.0), tip + vec2(-5.0, 4.0)];
+    painter.add(egui::Shape::convex_polygon(arrow, run, egui::Stroke::NONE));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_region_of_the_scores_is_the_window_less_half_a_template() {
+        let window = PixelRect::new(100, 50, 143, 143);
+        assert_eq!(region_of(window, [123, 123]), PixelRect::new(110, 60, 123, 123));
+    }
+}

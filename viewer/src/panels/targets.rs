@@ -1,0 +1,136 @@
+//! Targets and their runs.
+
+use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui, vec2};
+use sightline_core::session::view::{RunView, TargetView};
+
+use super::digits;
+use crate::command::{Command, Mode};
+use crate::overlay::{Mark, paint_mark};
+use crate::state::{State, run_letter, state_of_word};
+use crate::{panels, theme};
+
+/// Shows the targets.
+pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let is_picking = state.mode == Mode::Pick;
+    let words = if is_picking { "Cancel picking  (Esc)" } else { "Pick a target  (T)" };
+    let button = egui::Button::new(words).selected(is_picking).min_size(vec2(ui.available_width(), 26.0));
+    if ui.add_enabled(state.session.is_some(), button).clicked() {
+        out.push(Command::SetMode(if is_picking { Mode::Look } else { Mode::Pick }));
+    }
+    ui.add_space(2.0);
+    let targets = state.session.as_ref().map(|session| session.targets.as_slice()).unwrap_or_default();
+    if targets.is_empty() {
+        panels::missing(ui, &state.missing_target());
+        return;
+    }
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        for target in targets {
+            show_target(ui, state, target, out);
+            ui.add_space(6.0);
+        }
+    });
+}
+
+fn show_target(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Command>) {
+    let is_selected = state.cursor.target == Some(target.number);
+    ui.horizontal(|ui| {
+        let text = RichText::new(&target.label).strong().color(if is_selected { theme::STRONG } else { theme::TEXT });
+        if ui.add(egui::Label::new(text).sense(Sense::click())).clicked() {
+            let run = target.runs.last().map_or(0, |run| run.number);
+            out.push(Command::Look { target: target.number, run });
+        }
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            if ui.small_button("Remove").on_hover_text("Takes the target and its runs out of the session").clicked() {
+                out.push(Command::RemoveTarget(target.number));
+            }
+            let at = target.designation;
+            ui.label(theme::note(format!("step {} at {:.0}, {:.0}", at.step, at.pixel.x, at.pixel.y)));
+        });
+    });
+    for run in &target.runs {
+        show_run(ui, state, target, run, out);
+    }
+}
+
+fn show_run(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: &mut Vec<Command>) {
+    let is_selected = state.cursor.target == Some(target.number) && state.cursor.run == run.number;
+    let fill = if is_selected { theme::SELECTED } else { egui::Color32::TRANSPARENT };
+    let frame = egui::Frame::new().fill(fill).corner_radius(4).inner_margin(egui::Margin::symmetric(6, 3));
+    let inside = frame.show(ui, |ui| {
+        ui.set_width(ui.available_width());
+        ui.horizontal(|ui| {
+            let (mark, _) = ui.allocate_exact_size(vec2(14.0, 14.0), Sense::hover());
+            paint_mark(ui.painter(), mark.center(), run_mark(run.number), theme::run(run.number), 6.0);
+            ui.label(RichText::new(format!("run {}", run_letter(run.number))).color(theme::STRONG));
+            let from = run.fork.map(|f| format!("{} › step {}", run_letter(f.run), f.from_step));
+            ui.label(theme::note(from.unwrap_or_default()));
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| how_far(ui, state, target, run, out));
+        });
+        sparkline(ui, run, state.stop_count());
+        ui.label(theme::note(summary(run)));
+        for (key, value) in &run.changes {
+            ui.label(theme::note(format!("{key} = {value}")).monospace());
+        }
+    });
+    let response = inside.response.interact(Sense::click());
+    response.widget_info(|| {
+        egui::WidgetInfo::selected(egui::Role::Button, true, is_selected, format!("run {}", run_letter(run.number)))
+    });
+    if response.clicked() {
+        out.push(Command::Look { target: target.number, run: run.number });
+    }
+}
+
+/// The shape that goes with a run's colour.
+pub fn run_mark(number: usize) -> Mark {
+    [Mark::Ring, Mark::Square, Mark::Plus, Mark::Diamond][number % 4]
+}
+
+/// How far a run is, with a way to stop it.
+fn how_far(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: &mut Vec<Command>) {
+    if let Some(progress) = state.progress.get(&(target.number, run.number)) {
+        if ui.small_button("Cancel").clicked() {
+            out.push(Command::CancelRun { target: target.number, run: run.number });
+        }
+        ui.label(theme::number(format!("{} of {}", progress.k, progress.n)).size(11.0));
+    } else if let Some(why) = &run.stopped {
+        ui.label(RichText::new(why).small().color(theme::LOST));
+    } else if run.complete {
+        ui.label(theme::note("complete"));
+    } else {
+        ui.label(theme::note(format!("{} steps", run.rows.len())));
+    }
+}
+
+/// The states of a run, one thin cell a step.
+fn sparkline(ui: &mut Ui, run: &RunView, stop_count: usize) {
+    let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), 5.0), Sense::hover());
+    let width = rect.width() / stop_count.max(1) as f32;
+    ui.painter().rect_filled(rect, 1.0, theme::BEFORE);
+    for row in &run.rows {
+        let state = state_of_word(&row.state);
+        let left = rect.left() + width * row.step as f32;
+        // What is not well is lower, so that the shape tells it too.
+        let top = if state.is_lost() { rect.top() + 2.5 } else { rect.top() };
+        let cell = egui::Rect::from_min_max(egui::pos2(left, top), egui::pos2(left + width, rect.bottom()));
+        ui.painter().rect_filled(cell, 0.0, theme::state(state));
+    }
+}
+
+fn summary(run: &RunView) -> String {
+    let summary = &run.summary;
+    let mut words = Vec::new();
+    if let Some(tracked) = summary.steps_tracked {
+        words.push(format!("{tracked} of {} tracked", summary.steps));
+    }
+    if summary.steps_lost > 0 {
+        words.push(format!("{} lost", summary.steps_lost));
+    }
+    if let Some(false_tracked) = summary.false_tracked.filter(|&n| n > 0) {
+        words.push(format!("{false_tracked} false"));
+    }
+    if let Some(err_px) = summary.final_err_px {
+        words.push(format!("last {} px", digits((err_px * 100.0).round() / 100.0)));
+    }
+    if words.is_empty() { format!("{} steps", summary.steps) } else { words.join(", ") }
+}

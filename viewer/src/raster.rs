@@ -1,0 +1,138 @@
+//! Pixels that came from the server, with the texture that shows them.
+
+use egui::{Color32, ColorImage, TextureFilter, TextureHandle, TextureOptions};
+use sightline_core::image::{GrayImage, npy};
+use sightline_core::trace::ArrayName;
+
+use crate::theme;
+
+/// The difference of two normalised patches is shown between ± this many standard deviations.
+pub const DIFFERENCE_LIMIT: f32 = 2.0;
+
+/// Patches are shown from this many standard deviations below their mean to as many above.
+pub const PATCH_SIGMAS: f32 = 2.5;
+
+/// The largest side of an image that is taken, px.
+const SIDE_MAX: u32 = 8192;
+
+/// A grid of values and how it looks.
+pub struct Raster {
+    /// The values; fractions of full scale for images, scores for surfaces; NaN where there is none.
+    pub values: GrayImage,
+    /// What shows them, one texel a value.
+    pub texture: TextureHandle,
+    /// Mean of the values that exist.
+    pub mean: f32,
+    /// Standard deviation of the values that exist.
+    pub sigma: f32,
+}
+
+impl Raster {
+    /// An image of a stop from its PNG.
+    ///
+    /// # Errors
+    /// A sentence when the bytes are no grey image of reasonable size.
+    pub fn from_png(context: &egui::Context, name: &str, bytes: &[u8]) -> Result<Self, String> {
+        let mut reader = image::ImageReader::with_format(std::io::Cursor::new(bytes), image::ImageFormat::Png);
+        let mut limits = image::Limits::default();
+        (limits.max_image_width, limits.max_image_height) = (Some(SIDE_MAX), Some(SIDE_MAX));
+        reader.limits(limits);
+        let decoded = reader.decode().map_err(|e| format!("{name} is damaged: {e}"))?;
+        let values = decoded.to_luma32f();
+        let colours = values.iter().map(|&v| theme::grey(v)).collect();
+        // Whole pixels when magnified, no shimmer when the image is made small.
+        let options = TextureOptions {
+            magnification: TextureFilter::Nearest,
+            minification: TextureFilter::Linear,
+            mipmap_mode: Some(TextureFilter::Linear),
+            ..TextureOptions::NEAREST
+        };
+        Ok(Self::new(context, name, values, colours, options))
+    }
+
+    /// An array of a step from its NumPy file.
+    ///
+    /// # Errors
+    /// A sentence when the bytes are no 2-D array of numbers.
+    pub fn from_npy(context: &egui::Context, array: ArrayName, bytes: &[u8]) -> Result<Self, String> {
+        let values = npy::decode(bytes, array.word()).map_err(|e| e.to_string())?;
+        let (mean, sigma) = statistics(&values);
+        let colour = |v: f32| match array {
+            ArrayName::Surface => theme::score(v),
+            ArrayName::Difference => theme::signed(v, DIFFERENCE_LIMIT),
+            _ => theme::grey(0.5 + (v - mean) / (2.0 * PATCH_SIGMAS * sigma.max(1e-6))),
+        };
+        let colours = values.iter().map(|&v| colour(v)).collect();
+        Ok(Self::new(context, array.word(), values, colours, TextureOptions::NEAREST))
+    }
+
+    fn new(
+        context: &egui::Context,
+        name: &str,
+        values: GrayImage,
+        colours: Vec<Color32>,
+        options: TextureOptions,
+    ) -> Self {
+        let size = [values.width() as usize, values.height() as usize];
+        let texture = context.load_texture(name, ColorImage::new(size, colours), options);
+        let (mean, sigma) = statistics(&values);
+        Self { values, texture, mean, sigma }
+    }
+
+    /// Width and height.
+    pub fn size(&self) -> [u32; 2] {
+        self.values.dimensions().into()
+    }
+
+    /// The value at a column and row, where there is one.
+    pub fn at(&self, x: i64, y: i64) -> Option<f32> {
+        let (x, y) = (u32::try_from(x).ok()?, u32::try_from(y).ok()?);
+        self.values.get_pixel_checked(x, y).map(|p| p[0]).filter(|v| !v.is_nan())
+    }
+
+    /// Memory that values and texture take.
+    pub fn bytes(&self) -> usize {
+        self.values.as_raw().len() * (size_of::<f32>() + size_of::<Color32>())
+    }
+}
+
+/// Mean and standard deviation of the values that exist.
+fn statistics(values: &GrayImage) -> (f32, f32) {
+    let valid = || values.iter().filter(|v| v.is_finite()).map(|&v| f64::from(v));
+    let count = valid().count().max(1) as f64;
+    let mean = valid().sum::<f64>() / count;
+    let variance = valid().map(|v| (v - mean).powi(2)).sum::<f64>() / count;
+    (mean as f32, variance.sqrt() as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn statistics_leave_out_what_does_not_exist() {
+        let values = GrayImage::from_raw(4, 1, vec![1.0, f32::NAN, 3.0, 2.0]).unwrap();
+        let (mean, sigma) = statistics(&values);
+        assert_eq!(mean, 2.0);
+        assert!((sigma - (2.0_f32 / 3.0).sqrt()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_damaged_file_is_refused_with_its_name() {
+        let context = egui::Context::default();
+        assert!(Raster::from_png(&context, "left image", b"nonsense").err().unwrap().contains("left image"));
+        assert!(Raster::from_npy(&context, ArrayName::Surface, b"nonsense").err().unwrap().contains("surface"));
+    }
+
+    #[test]
+    fn an_array_comes_back_with_its_values_and_holes() {
+        let values = GrayImage::from_raw(2, 2, vec![0.25, f32::NAN, -1.0, 1.0]).unwrap();
+        let raster =
+            Raster::from_npy(&egui::Context::default(), ArrayName::Surface, &npy::encode(&values).unwrap()).unwrap();
+        assert_eq!(raster.size(), [2, 2]);
+        assert_eq!(raster.at(0, 0), Some(0.25));
+        assert_eq!(raster.at(1, 0), None);
+        assert_eq!(raster.at(0, 2), None);
+        assert_eq!(raster.bytes(), 4 * 8);
+    }
+}

@@ -1,0 +1,165 @@
+//! Carrying out what the person asked for.
+
+use sightline_core::session::wire::{NewRun, NewTarget};
+use sightline_core::session::{Cursor, Fork};
+use sightline_core::settings::Changes;
+use sightline_core::frames::Pixel;
+
+use super::{Place, State, events, run_letter};
+use crate::command::{Command, Go, Mode, Panel};
+use crate::net::Request;
+use crate::state::Views;
+
+impl State {
+    /// Carries out one command.
+    pub fn apply(&mut self, command: Command) {
+        match command {
+            Command::Go(go) => self.go(go),
+            Command::OpenTraverse(id) => self.open_traverse(id),
+            Command::Look { target, run } => self.look(target, run),
+            Command::SelectStage(stage) => self.stage = stage,
+            Command::SetMode(mode) => self.set_mode(mode),
+            Command::Pick(pixel) => self.pick(pixel),
+            Command::RemoveTarget(target) => {
+                self.ask(|session| Request::RemoveTarget { session, target });
+            }
+            Command::Draft { key, value } => {
+                match value {
+                    Some(value) => self.draft.insert(key, value),
+                    None => self.draft.remove(&key),
+                };
+            }
+            Command::ClearDraft => self.draft.clear(),
+            Command::RunFromHere(changes) => self.run_from_here(changes),
+            Command::CancelRun { target, run } => {
+                self.ask(|session| Request::CancelRun { session, target, run });
+            }
+            Command::View(panel, view) => match panel {
+                Panel::Left => self.views.left = view,
+                Panel::Right => self.views.right = view,
+                Panel::Surface => self.views.surface = view,
+            },
+            Command::FitAll => self.views = Views::default(),
+            Command::ToggleLayer(layer) => {
+                if !self.hidden.remove(&layer) {
+                    self.hidden.insert(layer);
+                }
+            }
+            Command::ToggleMarks => self.marks = !self.marks,
+            Command::ExportRrd => self.export(),
+            Command::OpenRerun => {
+                self.ask(Request::OpenRerun);
+                self.messages.note("Opening the session in Rerun …");
+            }
+            Command::Dismiss(id) => self.messages.dismiss(id),
+            Command::Reconnect => self.outbox.push(Request::Reconnect),
+        }
+    }
+
+    fn go(&mut self, go: Go) {
+        let Some(last) = self.stop_count().checked_sub(1) else { return };
+        let events = self.run().map(events).unwrap_or_default();
+        let step = self.cursor.step;
+        let to = match go {
+            Go::Step(to) => to,
+            Go::By(by) => step.saturating_add_signed(by),
+            Go::First => 0,
+            Go::Last => last,
+            Go::NextEvent => events.iter().copied().find(|&event| event > step).unwrap_or(step),
+            Go::PreviousEvent => events.iter().copied().rev().find(|&event| event < step).unwrap_or(step),
+        };
+        if let Go::Step(to) = go
+            && to > last
+        {
+            self.messages.problem(format!("Step {to} does not exist: the last one is {last}."), None);
+        }
+        self.cursor.step = to.min(last);
+        if self.refusal.as_ref().is_some_and(|refusal| refusal.place.step != self.cursor.step) {
+            self.refusal = None;
+        }
+    }
+
+    fn open_traverse(&mut self, id: String) {
+        if self.traverse.as_ref().is_some_and(|open| open.id == id) {
+            return;
+        }
+        self.open(id);
+    }
+
+    fn look(&mut self, target: usize, run: usize) {
+        let is_other = self.cursor.target != Some(target) || self.cursor.run != run;
+        self.cursor = Cursor { target: Some(target), run, ..self.cursor };
+        if is_other {
+            self.draft.clear();
+        }
+    }
+
+    fn set_mode(&mut self, mode: Mode) {
+        if mode == Mode::Look && self.mode == Mode::Look {
+            self.refusal = None;
+        }
+        if mode == Mode::Pick {
+            self.refusal = None;
+            if self.session.is_none() {
+                self.messages.problem("There is nothing to pick yet: no traverse is open.", None);
+                return;
+            }
+        }
+        self.mode = mode;
+    }
+
+    fn pick(&mut self, pixel: Pixel) {
+        if self.designating.is_some() {
+            self.messages.note("The last designation is still being computed.");
+            return;
+        }
+        let place = Place { step: self.cursor.step, pixel };
+        let target = NewTarget { step: place.step, pixel, label: None, settings: Changes::new() };
+        if self.ask(|session| Request::NewTarget { session, target }) {
+            (self.designating, self.refusal) = (Some(place), None);
+        }
+    }
+
+    /// Forks the run that is looked at; before the step after the designation everything is computed anew.
+    fn run_from_here(&mut self, changes: Changes) {
+        let Some((target, run)) = self.target().map(|t| t.number).zip(self.run().map(|r| r.number)) else {
+            self.messages.problem("There is no run to leave: pick a target first.", None);
+            return;
+        };
+        let first = self.run().and_then(|run| run.rows.first()).map_or(0, |row| row.step);
+        let computed = self.run().and_then(|run| run.rows.last()).map_or(first, |row| row.step);
+        let from_step = self.cursor.step.clamp(first, computed + 1);
+        let new = NewRun { run, from_step, settings: changes };
+        if self.ask(|session| Request::NewRun { session, target, new }) {
+            self.messages.note(format!("Running {} again from step {from_step} …", run_letter(run)));
+        }
+    }
+
+    fn export(&mut self) {
+        match &self.session {
+            Some(session) => {
+                self.open_url = Some(format!("{}/api/v1/sessions/{}/export.rrd", self.origin, session.id));
+            }
+            None => self.messages.problem("There is no session to export yet.", None),
+        }
+    }
+
+    /// Puts a request about the open session into the outbox; says so when there is none.
+    fn ask(&mut self, request: impl FnOnce(String) -> Request) -> bool {
+        match self.session.as_ref().map(|session| session.id.clone()) {
+            Some(session) => {
+                self.outbox.push(request(session));
+                true
+            }
+            None => {
+                self.messages.problem("No session is open yet.", None);
+                false
+            }
+        }
+    }
+}
+
+/// Where a run left another, in words.
+pub fn fork_words(fork: Fork) -> String {
+    format!("from {} at step {}", run_letter(fork.run), fork.from_step)
+}

@@ -1,0 +1,245 @@
+//! Taking in what the server answers and tells.
+
+use sightline_core::session::Cursor;
+use sightline_core::session::view::{RunView, SessionView};
+use sightline_core::session::wire::{Event, NewSession, Problem};
+
+use super::{Connection, Progress, Refusal, State, run_letter};
+use crate::cache::Key;
+use crate::command::Mode;
+use crate::net::{Arrived, Reply, Request, SessionEntry, TraverseEntry};
+
+impl State {
+    /// Asks for what a page needs first.
+    pub fn begin(&mut self) {
+        self.outbox.extend([Request::Settings, Request::Traverses]);
+        if let Some(session) = self.sync.linked.clone() {
+            self.outbox.push(Request::Session(session));
+        }
+    }
+
+    /// Takes in an answer.
+    pub fn arrived(&mut self, arrived: Arrived, now: f64) {
+        match (arrived.request, arrived.outcome) {
+            (Request::Item(key), Ok(Reply::Item(item))) => self.cache.arrived(key, Ok(item), now),
+            (Request::Item(key), Err(problem)) => self.cache.arrived(key, Err(problem), now),
+            (request, Ok(reply)) => self.answered(request, reply),
+            (request, Err(problem)) => self.refused(request, problem),
+        }
+    }
+
+    /// Takes in what the server tells every page.
+    pub fn told(&mut self, event: Event) {
+        let is_ours = |session: &str| self.session.as_ref().is_some_and(|open| open.id == session);
+        match event {
+            Event::SessionChanged { session } => self.sync.session_stale |= is_ours(&session),
+            Event::RunProgress { session, target, run, k, n, ended, doing } if is_ours(&session) => {
+                if ended {
+                    self.progress.remove(&(target, run));
+                } else {
+                    self.progress.insert((target, run), Progress { k, n, doing });
+                }
+                self.sync.session_stale = true;
+            }
+            Event::RunProgress { .. } => {}
+            Event::RenderProgress { traverse, k, n, ready } => self.rendered(&traverse, k, n, ready),
+        }
+    }
+
+    /// Takes in that the events come in, or do not.
+    pub fn connected(&mut self, connection: Connection) {
+        let was = std::mem::replace(&mut self.connection, connection);
+        if was == connection {
+            return;
+        }
+        match (was, connection) {
+            (Connection::Gone { .. }, Connection::Live) => {
+                self.messages.note("The server answers again.");
+                self.catch_up();
+            }
+            // Nothing can be missed before the first connection, except what the first answers lacked.
+            (_, Connection::Live) => self.sync.session_stale = true,
+            (Connection::Live | Connection::Connecting, Connection::Gone { .. }) => {
+                let hint = "Start it with `sightline serve`; the steps that are loaded stay browsable.";
+                self.messages.problem("The server does not answer.", Some(hint.to_owned()));
+            }
+            _ => {}
+        }
+    }
+
+    /// Asks again for what may have been missed while the server was gone.
+    fn catch_up(&mut self) {
+        self.cache.retry(|_| true);
+        self.progress.clear();
+        self.sync.session_stale = true;
+        if self.settings.is_empty() {
+            self.outbox.push(Request::Settings);
+        }
+        if self.traverses.is_none() {
+            self.outbox.push(Request::Traverses);
+        }
+        match (&self.session, &self.traverse, &self.sync.linked) {
+            (Some(session), None, _) => self.outbox.push(Request::Traverse(session.traverse.clone())),
+            (None, _, Some(linked)) => self.outbox.push(Request::Session(linked.clone())),
+            _ => {}
+        }
+    }
+
+    fn rendered(&mut self, traverse: &str, k: usize, n: usize, ready: Option<usize>) {
+        let Some(open) = self.traverse.as_mut().filter(|open| open.id == traverse) else { return };
+        self.rendering = (k < n).then_some((k, n));
+        if let Some(stop) = ready.and_then(|step| open.stops.get_mut(step)) {
+            stop.ready = true;
+        }
+        self.cache.retry(|key| matches!(key, Key::Image { step, .. } if Some(*step) == ready));
+    }
+
+    fn answered(&mut self, request: Request, reply: Reply) {
+        match reply {
+            Reply::Traverses(list) => self.took_traverses(list),
+            Reply::Settings(table) => self.settings = table,
+            Reply::Traverse(traverse) => self.traverse = Some(*traverse),
+            Reply::Sessions(list) => self.took_sessions(&list),
+            Reply::Session(view) => {
+                let asked = self.sync.session_asked.take();
+                let was_read = matches!(request, Request::Session(_));
+                self.adopt(*view, was_read && asked.is_some_and(|moves| moves != self.sync.cursor_moves));
+            }
+            Reply::Designated { target, session } => self.designated(target, *session),
+            Reply::Run(run) => self.took_run(request, *run),
+            Reply::Rerun(stream) => {
+                self.messages.note_with_link("Rerun shows this session.", stream.viewer_url.clone());
+                self.open_url = Some(stream.viewer_url);
+            }
+            Reply::Done => match request {
+                Request::PutCursor { cursor, .. } => {
+                    self.sync.cursor_asked = false;
+                    self.sync.server_cursor = cursor;
+                }
+                _ => self.sync.session_stale = true,
+            },
+            Reply::Item(_) => {}
+        }
+    }
+
+    fn refused(&mut self, request: Request, problem: Problem) {
+        match request {
+            Request::PutCursor { cursor, .. } => {
+                // The page keeps its cursor and tells the server of the next one.
+                self.sync.cursor_asked = false;
+                self.sync.server_cursor = cursor;
+                return;
+            }
+            Request::NewTarget { .. } => {
+                if let Some(place) = self.designating.take() {
+                    self.refusal = Some(Refusal { place, sentence: problem.detail.clone() });
+                }
+            }
+            Request::Session(_) => {
+                self.sync.session_asked = None;
+                if self.session.is_none() && problem.status != 0 {
+                    // The link names a session that is no more: open what there is.
+                    self.sync.linked = None;
+                    self.open_first();
+                }
+            }
+            _ => {}
+        }
+        // That the server is gone is said once, by the banner.
+        if problem.status != 0 {
+            self.messages.problem(problem.detail, problem.hint);
+        }
+    }
+
+    fn took_traverses(&mut self, list: Vec<TraverseEntry>) {
+        self.traverses = Some(list);
+        if self.session.is_none() && self.sync.linked.is_none() {
+            self.open_first();
+        }
+    }
+
+    fn open_first(&mut self) {
+        let first = self.traverses.as_ref().and_then(|list| list.first());
+        if let Some(id) = first.map(|entry| entry.id.clone()) {
+            self.open(id);
+        }
+    }
+
+    /// Opens the latest session of a traverse, or begins one.
+    pub(super) fn open(&mut self, traverse: String) {
+        self.sync.opening = Some(traverse);
+        self.outbox.push(Request::Sessions);
+    }
+
+    fn took_sessions(&mut self, list: &[SessionEntry]) {
+        let Some(traverse) = self.sync.opening.take() else { return };
+        let latest = list.iter().rev().find(|entry| entry.traverse == traverse);
+        self.outbox.push(match latest {
+            Some(entry) => Request::Session(entry.id.clone()),
+            None => Request::NewSession(NewSession { traverse }),
+        });
+    }
+
+    /// Takes a session over; the cursor stays where the person put it unless somebody else moved it.
+    fn adopt(&mut self, view: SessionView, moved_meanwhile: bool) {
+        let is_other = self.session.as_ref().is_none_or(|open| open.id != view.id);
+        if is_other {
+            self.progress.clear();
+            self.draft.clear();
+            self.mode = Mode::Look;
+            (self.designating, self.refusal, self.rendering) = (None, None, None);
+        }
+        if self.traverse.as_ref().is_none_or(|open| open.id != view.traverse) {
+            self.traverse = None;
+            self.outbox.push(Request::Traverse(view.traverse.clone()));
+        }
+        let is_moved_elsewhere = !self.sync.cursor_asked && !moved_meanwhile && view.cursor != self.sync.server_cursor;
+        if is_other || is_moved_elsewhere {
+            self.cursor = view.cursor;
+            self.sync.server_cursor = view.cursor;
+        }
+        self.sync.linked = Some(view.id.clone());
+        self.session = Some(view);
+        self.keep_cursor_valid();
+    }
+
+    /// Moves the cursor off a target or run that is no more.
+    fn keep_cursor_valid(&mut self) {
+        let Some(session) = &self.session else { return };
+        if self.target().is_none() {
+            let newest = session.targets.last();
+            self.cursor = Cursor { target: newest.map(|target| target.number), run: 0, ..self.cursor };
+        }
+        if self.run().is_none() {
+            self.cursor.run = 0;
+        }
+        self.cursor.step = self.cursor.step.min(session.stop_count.saturating_sub(1));
+    }
+
+    fn designated(&mut self, target: usize, session: SessionView) {
+        (self.designating, self.refusal, self.mode) = (None, None, Mode::Look);
+        self.adopt(session, true);
+        self.cursor.target = Some(target);
+        self.cursor.run = 0;
+        self.draft.clear();
+        self.keep_cursor_valid();
+        if let Some(target) = self.target() {
+            let text = format!("{} is picked; the run goes on by itself. Step along with Right and Left.", target.label);
+            self.messages.note(text);
+        }
+    }
+
+    fn took_run(&mut self, request: Request, run: RunView) {
+        self.sync.session_stale = true;
+        let Request::NewRun { target, .. } = request else { return };
+        let number = run.number;
+        let of_target = self.session.as_mut().and_then(|s| s.targets.iter_mut().find(|t| t.number == target));
+        let Some(record) = of_target else { return };
+        if record.runs.iter().all(|known| known.number != number) {
+            record.runs.push(run);
+        }
+        self.cursor = Cursor { target: Some(target), run: number, ..self.cursor };
+        self.draft.clear();
+        self.messages.note(format!("Run {} goes on from here.", run_letter(number)));
+    }
+}

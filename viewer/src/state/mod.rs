@@ -1,0 +1,425 @@
+//! What is known and what is looked at: the one value of which every panel is a view.
+//!
+//! Three things change it: commands of the person ([`apply`]), answers of the server ([`arrive`]) and its events.
+//! What it wants from the server it puts into an outbox; it does no input or output itself.
+
+mod apply;
+mod arrive;
+pub mod messages;
+
+use std::collections::{BTreeMap, HashSet};
+
+use serde_json::Value;
+use sightline_core::frames::Pixel;
+use sightline_core::limits::SettingInfo;
+use sightline_core::session::Cursor;
+use sightline_core::session::view::{RunView, SessionView, TargetView};
+use sightline_core::session::wire::{Problem, StopView, TraverseView};
+use sightline_core::settings::Changes;
+use sightline_core::target::TrackingState;
+use sightline_core::trace::{ArrayName, StepRow, StepTrace};
+
+use self::messages::Messages;
+use crate::cache::{Cache, Eye, Key, Slot, StepKey};
+use crate::command::{Layer, Mode, Panel, Stage};
+use crate::net::{Request, TraverseEntry};
+use crate::raster::Raster;
+use crate::view2d::View2d;
+
+/// How the server's events come in.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Connection {
+    /// The first attempt is under way.
+    #[default]
+    Connecting,
+    /// Events come in.
+    Live,
+    /// The server does not answer.
+    Gone {
+        /// Attempts so far.
+        attempts: u32,
+    },
+}
+
+/// How far a run is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Progress {
+    /// Steps done.
+    pub k: usize,
+    /// Steps in all.
+    pub n: usize,
+    /// What is being done.
+    pub doing: String,
+}
+
+/// A place in the left image of a stop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// The stop.
+    pub step: usize,
+    /// The position, px.
+    pub pixel: Pixel,
+}
+
+/// Why a target could not be designated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Refusal {
+    /// Where.
+    pub place: Place,
+    /// What the server said.
+    pub sentence: String,
+}
+
+/// What each panel shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Views {
+    /// The left image.
+    pub left: View2d,
+    /// The right image.
+    pub right: View2d,
+    /// The surface of scores.
+    pub surface: View2d,
+}
+
+impl Default for Views {
+    fn default() -> Self {
+        Self { left: View2d::Fit, right: View2d::Fit, surface: View2d::Fit }
+    }
+}
+
+/// Everything that is known and looked at.
+pub struct State {
+    /// Where the server is, without a slash at the end.
+    pub origin: String,
+    /// How the server's events come in.
+    pub connection: Connection,
+    /// The traverses that the server has; none before it has said.
+    pub traverses: Option<Vec<TraverseEntry>>,
+    /// The traverse that is open.
+    pub traverse: Option<TraverseView>,
+    /// The session that is open.
+    pub session: Option<SessionView>,
+    /// Every setting.
+    pub settings: Vec<SettingInfo>,
+    /// What is looked at; ahead of the server's cursor by the time of a request.
+    pub cursor: Cursor,
+    /// The stage that is looked at.
+    pub stage: Stage,
+    /// What pointer and keys mean.
+    pub mode: Mode,
+    /// Changed settings that no run uses yet.
+    pub draft: Changes,
+    /// What was loaded.
+    pub cache: Cache,
+    /// Runs that go on, by target and run.
+    pub progress: BTreeMap<(usize, usize), Progress>,
+    /// Stops rendered, and stops in all, while rendering goes on.
+    pub rendering: Option<(usize, usize)>,
+    /// A designation that waits for its answer.
+    pub designating: Option<Place>,
+    /// The last designation that was refused.
+    pub refusal: Option<Refusal>,
+    /// What was said to the person.
+    pub messages: Messages,
+    /// What each panel shows.
+    pub views: Views,
+    /// Layers of marks that are switched off.
+    pub hidden: HashSet<Layer>,
+    /// Whether marks are shown at all.
+    pub marks: bool,
+    /// A page to open in a new tab.
+    pub open_url: Option<String>,
+    outbox: Vec<Request>,
+    sync: Sync,
+}
+
+/// What keeps the page and the server's session together.
+#[derive(Default)]
+struct Sync {
+    /// The session is to be read again.
+    session_stale: bool,
+    /// The session is being read, asked for at this count of cursor moves.
+    session_asked: Option<u64>,
+    /// The cursor as the server knows it.
+    server_cursor: Cursor,
+    /// A cursor is on its way to the server.
+    cursor_asked: bool,
+    /// How often a cursor was sent.
+    cursor_moves: u64,
+    /// The session named by the page's link, before it was opened.
+    linked: Option<String>,
+    /// The traverse whose latest session is to be opened.
+    opening: Option<String>,
+}
+
+impl State {
+    /// Nothing known yet; `linked` is the session that the page's link names.
+    pub fn new(origin: String, linked: Option<String>) -> Self {
+        Self {
+            origin,
+            connection: Connection::default(),
+            traverses: None,
+            traverse: None,
+            session: None,
+            settings: Vec::new(),
+            cursor: Cursor::default(),
+            stage: Stage::MatchTemplate,
+            mode: Mode::default(),
+            draft: Changes::new(),
+            cache: Cache::default(),
+            progress: BTreeMap::new(),
+            rendering: None,
+            designating: None,
+            refusal: None,
+            messages: Messages::default(),
+            views: Views::default(),
+            hidden: HashSet::new(),
+            marks: true,
+            open_url: None,
+            outbox: Vec::new(),
+            sync: Sync { linked, ..Sync::default() },
+        }
+    }
+
+    /// How many stops the traverse has.
+    pub fn stop_count(&self) -> usize {
+        self.traverse.as_ref().map_or(0, |traverse| traverse.stops.len())
+    }
+
+    /// The stop that is looked at.
+    pub fn stop(&self) -> Option<&StopView> {
+        self.traverse.as_ref()?.stops.get(self.cursor.step)
+    }
+
+    /// The target that is looked at.
+    pub fn target(&self) -> Option<&TargetView> {
+        let number = self.cursor.target?;
+        self.session.as_ref()?.targets.iter().find(|target| target.number == number)
+    }
+
+    /// The run that is looked at.
+    pub fn run(&self) -> Option<&RunView> {
+        self.target()?.runs.iter().find(|run| run.number == self.cursor.run)
+    }
+
+    /// A step of the run that is looked at, as one line; none before the designation or where it was not computed.
+    pub fn row_at(&self, step: usize) -> Option<&StepRow> {
+        row_of(self.run()?, step)
+    }
+
+    /// The cursor's step as one line.
+    pub fn row(&self) -> Option<&StepRow> {
+        self.row_at(self.cursor.step)
+    }
+
+    /// How the cursor's run goes on, while it does.
+    pub fn run_progress(&self) -> Option<&Progress> {
+        self.progress.get(&(self.cursor.target?, self.cursor.run))
+    }
+
+    /// The name of a step of the run that is looked at.
+    pub fn step_key(&self, step: usize) -> Option<StepKey> {
+        let (session, target) = (self.session.as_ref()?, self.target()?);
+        Some(StepKey { session: session.id.clone(), target: target.number, run: self.cursor.run, step })
+    }
+
+    /// What a step saw and decided.
+    pub fn trace_at(&self, step: usize) -> Slot<'_, StepTrace> {
+        self.step_key(step).map_or(Slot::Absent, |key| self.cache.trace(&key))
+    }
+
+    /// What the cursor's step saw and decided, once it is here.
+    pub fn trace(&self) -> Option<&StepTrace> {
+        self.trace_at(self.cursor.step).ready()
+    }
+
+    /// The name of an image of a stop.
+    pub fn image_key(&self, step: usize, eye: Eye) -> Option<Key> {
+        Some(Key::Image { traverse: self.traverse.as_ref()?.id.clone(), step, eye })
+    }
+
+    /// An image of the cursor's stop.
+    pub fn image(&self, eye: Eye) -> Slot<'_, Raster> {
+        self.image_key(self.cursor.step, eye).map_or(Slot::Absent, |key| self.cache.raster(&key))
+    }
+
+    /// An array of the cursor's step.
+    pub fn array(&self, name: ArrayName) -> Slot<'_, Raster> {
+        let key = self.step_key(self.cursor.step).map(|key| Key::Array(key, name));
+        key.map_or(Slot::Absent, |key| self.cache.raster(&key))
+    }
+
+    /// A setting of the run that is looked at.
+    pub fn setting(&self, group: &str, key: &str) -> Option<Value> {
+        let document = serde_json::to_value(&self.run()?.settings).ok()?;
+        document.get(group)?.get(key).cloned()
+    }
+
+    /// Whether a layer of marks is shown.
+    pub fn shows(&self, layer: Layer) -> bool {
+        self.marks && !self.hidden.contains(&layer)
+    }
+
+    /// The view of a panel.
+    pub fn view(&self, panel: Panel) -> View2d {
+        match panel {
+            Panel::Left => self.views.left,
+            Panel::Right => self.views.right,
+            Panel::Surface => self.views.surface,
+        }
+    }
+
+    /// Why the panels of a step have nothing to show, as a sentence that says how to get it.
+    pub fn missing_step(&self) -> String {
+        let Some(target) = self.target() else { return self.missing_target() };
+        let step = self.cursor.step;
+        if step < target.designation.step {
+            let first = target.designation.step;
+            return format!("{} was picked at step {first}. Go there, or press PgDn for the next event.", target.label);
+        }
+        if self.row().is_none() {
+            return match (self.run_progress(), self.run().and_then(|run| run.stopped.as_deref())) {
+                (Some(p), _) => format!("Step {step} is not computed yet: the run has done {} of {}.", p.k, p.n),
+                (None, Some(why)) => format!("The run stopped before step {step} ({why}). Press “Run from here” at an earlier step."),
+                (None, None) => format!("Step {step} is not computed yet. It appears here as soon as the run reaches it."),
+            };
+        }
+        match self.trace_at(step) {
+            Slot::Failed(problem) => format!("Step {step} cannot be shown: {}", problem.detail),
+            Slot::Ready(trace) => match (&trace.fault, &trace.locate) {
+                (Some(fault), _) => format!("The files of step {step} are at fault: {fault}"),
+                (None, Some(located)) if located.missing.is_some() => {
+                    located.missing.clone().unwrap_or_default()
+                }
+                _ if trace.predict.is_none() => {
+                    "Here the target was picked: nothing had to be matched. Go one step on (Right) to see a match.".to_owned()
+                }
+                _ => "This stage was not reached at this step.".to_owned(),
+            },
+            Slot::Absent | Slot::Loading => format!("Loading step {step} …"),
+        }
+    }
+
+    /// Why there is no target, as a sentence that says how to get one.
+    pub fn missing_target(&self) -> String {
+        match (&self.traverse, &self.traverses) {
+            (None, None) => "Asking the server for its traverses …".to_owned(),
+            (None, Some(list)) if list.is_empty() => {
+                "The server has no traverse. Import one with `sightline import`, or simulate one with `sightline simulate`.".to_owned()
+            }
+            (None, Some(_)) => "Opening the traverse …".to_owned(),
+            (Some(_), _) => "No target yet. Press T, then click a rock in the left image.".to_owned(),
+        }
+    }
+
+    /// The latest tracking state of the cursor's step.
+    pub fn tracking(&self) -> Option<TrackingState> {
+        if let Some(trace) = self.trace() {
+            return Some(trace.update.state);
+        }
+        self.row().map(|row| state_of_word(&row.state))
+    }
+
+    /// What the server last refused about the cursor's images, if it did.
+    pub fn image_problem(&self, eye: Eye) -> Option<&Problem> {
+        match self.image(eye) {
+            Slot::Failed(problem) => Some(problem),
+            _ => None,
+        }
+    }
+
+    /// What the page wants loaded, most urgent first: the cursor's step, then the next and the previous one.
+    pub fn wanted(&self) -> Vec<Key> {
+        let step = self.cursor.step;
+        let mut keys = Vec::new();
+        for (near, step) in [(false, Some(step)), (true, step.checked_add(1)), (true, step.checked_sub(1))] {
+            if let Some(step) = step.filter(|&step| step < self.stop_count()) {
+                self.want_step(step, near, &mut keys);
+            }
+        }
+        keys
+    }
+
+    fn want_step(&self, step: usize, is_neighbour: bool, keys: &mut Vec<Key>) {
+        let computed = self.row_at(step).and_then(|_| self.step_key(step));
+        keys.extend(computed.clone().map(Key::Trace));
+        // The images of a simulated stop take a while: only the one that is looked at is worth that.
+        let is_ready = self.traverse.as_ref().and_then(|t| t.stops.get(step)).is_some_and(|stop| stop.ready);
+        if is_ready || !is_neighbour {
+            keys.extend([Eye::Left, Eye::Right].into_iter().filter_map(|eye| self.image_key(step, eye)));
+        }
+        if let Some((trace, key)) = self.trace_at(step).ready().zip(computed) {
+            let there = ArrayName::ALL.into_iter().filter(|&name| has_array(trace, name));
+            keys.extend(there.map(|name| Key::Array(key.clone(), name)));
+        }
+    }
+
+    /// What to ask the server, taken out of the outbox.
+    pub fn take_requests(&mut self) -> Vec<Request> {
+        self.sync_session();
+        std::mem::take(&mut self.outbox)
+    }
+
+    /// Asks for what keeps page and session together.
+    fn sync_session(&mut self) {
+        let Some(id) = self.session.as_ref().map(|session| session.id.clone()) else { return };
+        if self.sync.session_stale && self.sync.session_asked.is_none() {
+            self.sync.session_stale = false;
+            self.sync.session_asked = Some(self.sync.cursor_moves);
+            self.outbox.push(Request::Session(id.clone()));
+        }
+        if self.cursor != self.sync.server_cursor && !self.sync.cursor_asked && self.connection == Connection::Live {
+            self.sync.cursor_asked = true;
+            self.sync.cursor_moves += 1;
+            self.outbox.push(Request::PutCursor { session: id, cursor: self.cursor });
+        }
+    }
+}
+
+/// Whether the stage that makes an array was reached.
+fn has_array(trace: &StepTrace, name: ArrayName) -> bool {
+    let Some(evidence) = trace.template() else { return false };
+    match name {
+        ArrayName::Reference | ArrayName::Scaled | ArrayName::Rolled => evidence.scale_roll.is_some(),
+        ArrayName::Matched | ArrayName::Difference | ArrayName::Surface => evidence.match_template.is_some(),
+        ArrayName::RightWindow => evidence.point_stereo.is_some(),
+    }
+}
+
+/// A step of a run as one line.
+pub fn row_of(run: &RunView, step: usize) -> Option<&StepRow> {
+    let first = run.rows.first()?.step;
+    run.rows.get(step.checked_sub(first)?)
+}
+
+/// The steps at which a run's state changes, its designation and its faults included.
+pub fn events(run: &RunView) -> Vec<usize> {
+    let mut events: Vec<usize> = run.rows.first().map(|row| row.step).into_iter().collect();
+    for pair in run.rows.windows(2) {
+        if pair[0].state != pair[1].state || is_fault(&pair[1]) {
+            events.push(pair[1].step);
+        }
+    }
+    events
+}
+
+/// Whether nothing at all could be done at a step: its files are damaged.
+pub fn is_fault(row: &StepRow) -> bool {
+    row.reason.is_some() && row.scale.is_none() && row.left_pixel.is_none()
+}
+
+/// The state that a row's word names.
+pub fn state_of_word(word: &str) -> TrackingState {
+    match word {
+        "tracking" => TrackingState::Tracking,
+        "lost" => TrackingState::Lost { count: 1 },
+        "failed" => TrackingState::Failed,
+        _ => TrackingState::Cleared,
+    }
+}
+
+/// The letter of a run.
+pub fn run_letter(number: usize) -> String {
+    let letter = char::from(b'A' + (number % 26) as u8);
+    if number < 26 { letter.to_string() } else { format!("{letter}{}", number / 26) }
+}

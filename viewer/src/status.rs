@@ -1,0 +1,125 @@
+//! A small machine-readable status, so that a test in a browser knows what is shown and where to click.
+//!
+//! In the browser it is the attribute `data-status` of the canvas, written whenever it changes:
+//!
+//! ```json
+//! {
+//!   "phase": "ready",              // "starting", "opening" (no traverse yet) or "ready"
+//!   "connection": "live",          // "connecting", "live" or "gone"
+//!   "traverse": "name", "session": "id",
+//!   "step": 3, "stop_count": 17,   // the cursor and how many stops there are
+//!   "target": 0, "run": 0,         // numbers as in the interface's paths; target is null without one
+//!   "targets": 1,                  // how many there are
+//!   "state": "tracking",           // of the cursor's step: tracking, lost, failed; null where not computed
+//!   "steps_done": 17,              // of the run that is looked at
+//!   "running": false,              // whether that run goes on
+//!   "shown": true,                 // whether the step's record and left image are on the screen
+//!   "stage": "match_template",
+//!   "left_image_rect": [x, y, w, h],           // of the panel's image area, CSS px from the canvas' corner
+//!   "left_image_size": [w, h],                 // of the image, px
+//!   "image_to_screen": {"scale": s, "origin": [x, y]},
+//!   "pick_mode": false,
+//!   "designating": false,          // whether a designation waits for its answer
+//!   "problem": "sentence or null"  // the newest message, where that is a problem
+//! }
+//! ```
+//! An image pixel (u, v), (0, 0) being the centre of the first pixel, lies on the canvas at
+//! `origin + scale · (u, v)`, in CSS px; it is visible where that falls inside `left_image_rect`.
+
+use serde_json::{Value, json};
+use sightline_core::frames::Pixel;
+
+use crate::command::Mode;
+use crate::layout::LeftImage;
+use crate::state::messages::Weight;
+use crate::state::{Connection, State};
+
+/// Writes the status where it changed.
+#[derive(Default)]
+pub struct Publisher {
+    published: String,
+}
+
+impl Publisher {
+    /// Publishes the status if it differs from the last one; `zoom` is egui's own zoom of the whole page.
+    pub fn publish(&mut self, state: &State, left_image: &LeftImage, zoom: f32) {
+        let text = describe(state, left_image, zoom).to_string();
+        if text != self.published {
+            #[cfg(target_arch = "wasm32")]
+            crate::web::publish("data-status", &text);
+            self.published = text;
+        }
+    }
+}
+
+/// The status as a document.
+pub fn describe(state: &State, left_image: &LeftImage, zoom: f32) -> Value {
+    let phase = match (&state.traverse, &state.traverses) {
+        (Some(_), _) if state.session.is_some() => "ready",
+        (None, None) => "starting",
+        _ => "opening",
+    };
+    let connection = match state.connection {
+        Connection::Connecting => "connecting",
+        Connection::Live => "live",
+        Connection::Gone { .. } => "gone",
+    };
+    let problem = state.messages.newest().filter(|message| message.weight == Weight::Problem);
+    let mut status = json!({
+        "phase": phase,
+        "connection": connection,
+        "traverse": state.traverse.as_ref().map(|traverse| &traverse.id),
+        "session": state.session.as_ref().map(|session| &session.id),
+        "step": state.cursor.step,
+        "stop_count": state.stop_count(),
+        "target": state.target().map(|target| target.number),
+        "run": state.cursor.run,
+        "targets": state.session.as_ref().map_or(0, |session| session.targets.len()),
+        "state": state.tracking().map(sightline_core::target::TrackingState::word),
+        "steps_done": state.run().map_or(0, |run| run.rows.len()),
+        "running": state.run_progress().is_some(),
+        "shown": left_image.is_some() && (state.row().is_none() || state.trace().is_some()),
+        "stage": state.stage.word(),
+        "pick_mode": state.mode == Mode::Pick,
+        "designating": state.designating.is_some(),
+        "problem": problem.map(|message| &message.text),
+        "left_image_rect": null,
+        "left_image_size": null,
+        "image_to_screen": null,
+    });
+    if let Some((transform, size)) = left_image {
+        let round = |v: f64| (v * f64::from(zoom) * 1e4).round() / 1e4;
+        let rect = transform.rect;
+        let place = [rect.left(), rect.top(), rect.width(), rect.height()].map(|v| round(f64::from(v)));
+        let origin = transform.to_screen(Pixel::new(0.0, 0.0));
+        status["left_image_rect"] = json!(place);
+        status["left_image_size"] = json!(size);
+        status["image_to_screen"] = json!({
+            "scale": round(transform.scale),
+            "origin": [round(f64::from(origin.x)), round(f64::from(origin.y))],
+        });
+    }
+    status
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::view2d::{Transform, View2d};
+    use sightline_core::image::PixelRect;
+
+    #[test]
+    fn a_pixel_can_be_found_on_the_screen_from_the_status() {
+        let rect = egui::Rect::from_min_size(egui::pos2(200.0, 60.0), egui::vec2(512.0, 512.0));
+        let transform = Transform::new(View2d::Fit, PixelRect::whole(1024, 1024), rect);
+        let state = State::new(String::new(), None);
+        let status = describe(&state, &Some((transform, [1024, 1024])), 1.0);
+        let number = |value: &Value| value.as_f64().unwrap();
+        let scale = number(&status["image_to_screen"]["scale"]);
+        let x = number(&status["image_to_screen"]["origin"][0]) + scale * 600.0;
+        let y = number(&status["image_to_screen"]["origin"][1]) + scale * 300.0;
+        let expected = transform.to_screen(Pixel::new(600.0, 300.0));
+        assert!((x - f64::from(expected.x)).abs() < 1e-3 && (y - f64::from(expected.y)).abs() < 1e-3);
+        assert_eq!(status["phase"], "starting");
+    }
+}
