@@ -34,8 +34,8 @@ pub mod stages;
 pub mod locate;
 pub mod trace;
 pub mod pipeline;
-pub mod sim;
 pub mod traverse;
+pub mod sim;
 pub mod session;
 pub mod study;
 #[cfg(test)]

@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use crate::camera::{Camera, Mast, MastAngles};
 use crate::error::{Error, Result};
-use crate::frames::Pose;
+use crate::frames::{Pixel, Pose};
 use crate::locate::{DesignateInput, LocateInput, locator};
 use crate::settings::Settings;
 use crate::stages::capture::{self, StereoPair};
@@ -62,16 +62,7 @@ pub fn designate(stops: &dyn Stops, designation: Designation, settings: &Setting
         )));
     }
     let (left, right) = stops.cameras(step);
-    let pixel = designation.pixel;
-    if !(pixel.x.is_finite() && pixel.y.is_finite() && pixel.is_inside(left.width(), left.height())) {
-        return Err(Error::Target(format!(
-            "pixel ({}, {}) lies outside the left image of {} x {} pixels",
-            pixel.x,
-            pixel.y,
-            left.width(),
-            left.height()
-        )));
-    }
+    let pixel = check_pixel(designation, left)?;
     let pair = stops.capture(step)?;
     let capture = capture::capture(pair, Some(pixel), settings.template.subframe_px);
     let stereo = stops.stereo();
@@ -91,6 +82,7 @@ pub fn designate(stops: &dyn Stops, designation: Designation, settings: &Setting
         step,
         pixel,
         position_in_rover,
+        surface_by_pixel: located.surface_by_pixel,
         camera: left.clone(),
         image: Arc::clone(&capture.pair.left),
     };
@@ -105,6 +97,7 @@ pub fn designate(stops: &dyn Stops, designation: Designation, settings: &Setting
         last_distance_m: distance_m,
         travelled_since_update_m: 0.0,
         drift_covariance_px2: located.left_covariance_px2,
+        drift_bias_px: located.left_bias_px,
         appearance,
     };
     let pointing = pointing(stops, step, &target);
@@ -189,6 +182,21 @@ pub fn run_step(stops: &dyn Stops, last: &Updated, settings: &Settings) -> StepT
         }
     }
     trace
+}
+
+/// The designated pixel, if the left image has it.
+fn check_pixel(designation: Designation, left: &Camera) -> Result<Pixel> {
+    let pixel = designation.pixel;
+    if pixel.x.is_finite() && pixel.y.is_finite() && pixel.is_inside(left.width(), left.height()) {
+        return Ok(pixel);
+    }
+    Err(Error::Target(format!(
+        "pixel ({}, {}) lies outside the left image of {} x {} pixels",
+        pixel.x,
+        pixel.y,
+        left.width(),
+        left.height()
+    )))
 }
 
 /// Cameras and wanted pointing for a target that was carried to `step`.

@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Matrix2, Matrix3};
+use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -34,6 +34,9 @@ pub struct Appearance {
     /// Where the target was in the rover frame *of that stop*, m: `p_old` of K-Eq 6.
     #[schema(value_type = [f64; 3])]
     pub position_in_rover: Point3,
+    /// How the surface point moves with that pixel, m per px, where stereo told.
+    #[schema(value_type = Option<Vec<f64>>)]
+    pub surface_by_pixel: Option<Matrix3x2<f64>>,
     /// The left camera in the rover frame of that stop.
     pub camera: Camera,
     /// The whole left image of that stop, so that rolled and shrunk templates have no empty corners (R59).
@@ -70,6 +73,9 @@ pub struct Target {
     /// from which the template was taken: what the renewals of the template have added so far.
     #[schema(value_type = Vec<f64>)]
     pub drift_covariance_px2: Matrix2<f64>,
+    /// The part of that drift which points the same way step after step, px: the sum of the matches' biases.
+    #[schema(value_type = [f64; 2])]
+    pub drift_bias_px: Vector2<f64>,
     /// How it looked when the template was taken.
     pub appearance: Appearance,
 }

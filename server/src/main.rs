@@ -1,2 +1,7 @@
 //! The command `sightline`.
-fn main() {}
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    sightline_server::cli::run()
+}

@@ -2,4 +2,5 @@
 
 mod imports;
 mod recorded_cameras;
+mod rerun_export;
 mod zncc_reference;

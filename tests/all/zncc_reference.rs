@@ -1,8 +1,7 @@
 //! Correlation scores on real images against OpenCV, and against K-Eq 11 in double precision (R62, R63, R66).
 //!
 //! `tests/reference/zncc_reference.py` wrote the numbers and says how. The images are not part of the project:
-//! they lie where `SIGHTLINE_DATA` says, or in `../shared/data` beside the workspace; cases whose images are
-//! missing are named and left out.
+//! cases whose data set is missing are named and left out (`sightline_tests::data`).
 
 #![allow(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
@@ -14,6 +13,7 @@ use sightline_core::frames::Pixel;
 use sightline_core::image::patch::extract;
 use sightline_core::image::sample::Kernel;
 use sightline_core::image::{GrayImage, io};
+use sightline_tests::data;
 
 /// OpenCV sums in single precision.
 const OPENCV_TOLERANCE: f64 = 1e-4;
@@ -25,8 +25,11 @@ fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-fn data() -> PathBuf {
-    std::env::var_os("SIGHTLINE_DATA").map_or_else(|| workspace().join("../shared/data"), PathBuf::from)
+/// The image that a case names as `key`, unless its data set is missing.
+fn image_of(case: &Value, key: &str) -> Option<GrayImage> {
+    let (set, file) = case[key].as_str().unwrap().split_once('/').unwrap();
+    let folder = data::set(set, case["name"].as_str().unwrap())?;
+    Some(read_image(&folder.join(file)))
 }
 
 /// A grey PNG, or the 16-bit samples of a PDS3 image whose `^IMAGE` is a record number.
@@ -96,13 +99,9 @@ fn scores_on_real_images_equal_those_of_opencv_and_of_the_formula() {
     let document: Value = serde_json::from_str(&text).unwrap();
     for case in document["cases"].as_array().unwrap() {
         let name = case["name"].as_str().unwrap();
-        let path = |key: &str| data().join(case[key].as_str().unwrap());
-        let (template_source, searched) = (path("template_source"), path("searched_source"));
-        if let Some(missing) = [&template_source, &searched].into_iter().find(|path| !path.exists()) {
-            println!("{name} was left out: there is no {}", missing.display());
-            continue;
-        }
-        let (opencv, exact) = compare(case, &read_image(&template_source), &read_image(&searched));
+        let Some(template_source) = image_of(case, "template_source") else { continue };
+        let Some(searched) = image_of(case, "searched_source") else { continue };
+        let (opencv, exact) = compare(case, &template_source, &searched);
         println!(
             "{name}: differs from OpenCV by {opencv:.1e}, from K-Eq 11 in double precision by {exact:.1e}"
         );

@@ -2,3 +2,5 @@
 
 pub mod browser;
 pub mod data;
+pub mod rrd;
+pub mod troubled;

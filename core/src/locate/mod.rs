@@ -10,7 +10,7 @@
 
 pub mod template;
 
-use nalgebra::{Matrix2, Matrix3};
+use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -32,12 +32,18 @@ pub struct Located {
     /// Covariance of the left position against the designated point, px², template drift included.
     #[schema(value_type = Vec<f64>)]
     pub left_covariance_px2: Matrix2<f64>,
+    /// The error of the left position that points the same way step after step, px; not in the covariance.
+    #[schema(value_type = [f64; 2])]
+    pub left_bias_px: Vector2<f64>,
     /// Position in the rover frame, m.
     #[schema(value_type = Option<[f64; 3]>)]
     pub position_in_rover: Option<Point3>,
     /// Covariance of that position, m².
     #[schema(value_type = Option<Vec<f64>>)]
     pub covariance_in_rover: Option<Matrix3<f64>>,
+    /// How the surface point moves with the left pixel, m per px.
+    #[schema(value_type = Option<Vec<f64>>)]
+    pub surface_by_pixel: Option<Matrix3x2<f64>>,
     /// Confidence, from 0 to 1: for `template` the score of the match, cut at 0.
     pub confidence: f64,
     /// What could not be found and why, as one sentence.

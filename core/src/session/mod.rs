@@ -5,6 +5,7 @@
 //! fork. What is worth keeping is small: [`Session::saved`] is the list of what the person did, from which
 //! the same session comes again bit for bit, since every step is a function of its input.
 
+pub mod progress;
 pub mod run;
 pub mod track;
 pub mod view;
@@ -15,6 +16,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+pub use self::progress::Next;
 pub use self::run::{Fork, Run};
 use crate::error::{Error, Result};
 use crate::settings::{Changes, Settings};
@@ -135,14 +137,14 @@ impl Session {
         Ok(record.runs.len() - 1)
     }
 
-    /// What the next step of a run needs; none when the run is complete or its target removed.
+    /// What the next step of a run needs; none when the run is complete or stopped.
     ///
     /// # Errors
     /// [`Error::Request`] when there is no such target or run.
     pub fn pending(&self, target: usize, run: usize) -> Result<Option<Pending>> {
-        let record = self.target(target)?;
         let run = self.run(target, run)?;
-        let last = run.steps.last().filter(|last| last.step + 1 < self.stop_count && !record.removed);
+        let end = run.stop_after.map_or(self.stop_count, |stop| self.stop_count.min(stop + 1));
+        let last = run.steps.last().filter(|last| last.step + 1 < end && run.stopped.is_none());
         Ok(last.map(|last| Pending {
             first: Arc::clone(&run.steps[0]),
             last: Arc::clone(last),
@@ -155,11 +157,7 @@ impl Session {
     /// # Errors
     /// [`Error::Request`] when there is no such target or run, or the step is not the next one.
     pub fn record(&mut self, target: usize, run: usize, trace: Arc<StepTrace>) -> Result<()> {
-        let run = self
-            .target_mut(target)?
-            .runs
-            .get_mut(run)
-            .ok_or_else(|| Error::Request(format!("target {target} has no run {run}")))?;
+        let run = self.run_mut(target, run)?;
         let expected = run.steps.last().map(|last| last.step + 1);
         if expected != Some(trace.step) {
             return Err(Error::Request(format!("step {} does not follow the run's last one", trace.step)));

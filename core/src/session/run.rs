@@ -27,6 +27,8 @@ pub struct Run {
     pub fork: Option<Fork>,
     /// The steps so far; the first is the designation.
     pub steps: Vec<Arc<StepTrace>>,
+    /// The step after which a person stopped it.
+    pub stop_after: Option<usize>,
     /// Why it stopped before the last stop: `cancelled`, or what went wrong.
     pub stopped: Option<String>,
 }
@@ -34,7 +36,7 @@ pub struct Run {
 impl Run {
     /// A run that begins with `steps`.
     pub fn new(settings: Arc<Settings>, fork: Option<Fork>, steps: Vec<Arc<StepTrace>>) -> Self {
-        Self { settings, fork, steps, stopped: None }
+        Self { settings, fork, steps, stop_after: None, stopped: None }
     }
 
     /// The record of a stop, where it was computed.

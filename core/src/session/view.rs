@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::progress::SAVED_FORMAT;
 use super::{Cursor, Fork, Run, Session, TargetRecord};
 use crate::settings::{Changes, Settings};
 use crate::target::Designation;
@@ -96,6 +97,9 @@ pub struct SavedRun {
     pub fork: Option<Fork>,
     /// The whole configuration: defaults may change between versions.
     pub settings: Settings,
+    /// The step after which the person stopped it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stop_after: Option<usize>,
 }
 
 impl Session {
@@ -120,16 +124,20 @@ impl Session {
             settings: run.settings.as_ref().clone(),
             rows: run.steps.iter().map(|trace| trace.row()).collect(),
             complete: run.steps.last().is_some_and(|last| last.step + 1 == self.stop_count),
-            stopped: run.stopped.clone(),
+            stopped: run.why_stopped(),
             summary: summarise(run.steps.iter().map(AsRef::as_ref)),
         }
     }
 
     /// What the person did.
     pub fn saved(&self) -> SavedSession {
-        let saved_run = |run: &Run| SavedRun { fork: run.fork, settings: run.settings.as_ref().clone() };
+        let saved_run = |run: &Run| SavedRun {
+            fork: run.fork,
+            settings: run.settings.as_ref().clone(),
+            stop_after: run.stop_after,
+        };
         SavedSession {
-            format: 1,
+            format: SAVED_FORMAT,
             id: self.id.clone(),
             traverse: self.traverse.clone(),
             cursor: self.cursor,

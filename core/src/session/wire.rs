@@ -6,8 +6,35 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::frames::{Pixel, PoseRecord};
+use crate::session::view::SessionView;
 use crate::settings::Changes;
 use crate::traverse::StereoGeometry;
+
+/// A traverse in the server's list.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct TraverseEntry {
+    /// Its name in paths.
+    pub id: String,
+    /// Its short name.
+    pub name: String,
+    /// What was recorded.
+    pub description: String,
+    /// Whether its images are rendered.
+    pub simulated: bool,
+    /// How many stops it has.
+    pub stop_count: usize,
+}
+
+/// A session in the server's list.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct SessionEntry {
+    /// Its name in paths.
+    pub id: String,
+    /// The traverse's name in paths.
+    pub traverse: String,
+    /// How many targets it has.
+    pub target_count: usize,
+}
 
 /// A traverse as pages and scripts see it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -68,6 +95,15 @@ pub struct NewTarget {
     #[serde(default)]
     #[schema(value_type = Object)]
     pub settings: Changes,
+}
+
+/// A target that was designated, with the session that now has it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Designated {
+    /// The target's number in paths.
+    pub target: usize,
+    /// The session with it.
+    pub session: SessionView,
 }
 
 /// Runs a target again from a step with changed settings.

@@ -98,7 +98,9 @@ mod tests {
 
     #[test]
     fn variance_is_that_of_shot_and_read_noise() {
-        for (level, gain, read) in [(0.05f32, 42.0, 30.0), (0.4, 42.0, 30.0), (0.8, 42.0, 30.0), (0.3, 8.0, 60.0)] {
+        for (level, gain, read) in
+            [(0.05f32, 42.0, 30.0), (0.4, 42.0, 30.0), (0.8, 42.0, 30.0), (0.3, 8.0, 60.0)]
+        {
             let image = recorded(level, |camera| {
                 camera.gain_electrons_per_dn = gain;
                 camera.read_noise_electrons = read;

@@ -6,7 +6,7 @@
 //! * [`SunGrid`]: all rays to the sun are parallel. The rocks' spheres are projected along them on a plane,
 //!   whose cells list the discs that touch them: a shadow ray looks into one cell.
 //! * [`in_cone`]: a tile of the image sees a narrow cone; a sphere of radius r at distance |v| is in it when
-//!   the angle from the cone's axis is at most the cone's half angle plus asin(r/|v|).
+//!   the angle from the cone's axis is at most the cone's half angle plus asin(r/|v|), below 180° in sum.
 //!
 //! Frames: site, m. Sources: ours.
 
@@ -147,8 +147,7 @@ impl SunGrid {
         if rocks.is_empty() {
             return Self { across, low_m: [0.0; 2], cells: [0; 2], starts: vec![0], rocks: Vec::new() };
         }
-        let cells: [usize; 2] =
-            std::array::from_fn(|k| ((high_m[k] - low_m[k]) / Self::CELL_M) as usize + 1);
+        let cells: [usize; 2] = std::array::from_fn(|k| ((high_m[k] - low_m[k]) / Self::CELL_M) as usize + 1);
         let mut lists = vec![Vec::new(); cells[0] * cells[1]];
         for (index, rock) in rocks.iter().enumerate() {
             let range: [[usize; 2]; 2] = std::array::from_fn(|k| {
@@ -171,12 +170,12 @@ impl SunGrid {
     #[inline(always)]
     pub fn towards_sun(&self, point: &Point3) -> &[u32] {
         let mut cell = [0usize; 2];
-        for k in 0..2 {
+        for (k, cell) in cell.iter_mut().enumerate() {
             let position = (point.coords.dot(&self.across[k]) - self.low_m[k]) / Self::CELL_M;
             if position < 0.0 || position >= self.cells[k] as f64 {
                 return &[];
             }
-            cell[k] = position as usize;
+            *cell = position as usize;
         }
         let at = cell[1] * self.cells[0] + cell[0];
         &self.rocks[self.starts[at] as usize..self.starts[at + 1] as usize]
@@ -192,17 +191,20 @@ pub struct Cone {
     pub apex_radius_m: f64,
     /// Unit direction of the middle ray.
     pub axis: Vector3,
-    /// Half the opening angle, rad.
-    pub half_angle_rad: f64,
+    /// Cosine of half the opening angle, which is at most a right angle.
+    pub half_angle_cos: f64,
+    /// Its sine.
+    pub half_angle_sin: f64,
 }
 
 /// Whether any ray of the cone can meet a sphere.
 pub fn in_cone(cone: &Cone, centre: &Point3, radius_m: f64) -> bool {
     let v = centre - cone.apex;
-    let (distance_m, radius_m) = (v.norm(), radius_m + cone.apex_radius_m);
-    if distance_m <= radius_m {
+    let (distance_m2, radius_m) = (v.norm_squared(), radius_m + cone.apex_radius_m);
+    if distance_m2 <= radius_m * radius_m {
         return true;
     }
-    let reach_rad = cone.half_angle_rad + (radius_m / distance_m).asin();
-    reach_rad >= std::f64::consts::PI || v.dot(&cone.axis) >= distance_m * reach_rad.cos()
+    // cos(half angle + asin(r/d)) · d, without trigonometry: this runs for every rock of every tile.
+    let tangent_m = (distance_m2 - radius_m * radius_m).sqrt();
+    v.dot(&cone.axis) >= cone.half_angle_cos * tangent_m - cone.half_angle_sin * radius_m
 }

@@ -126,7 +126,8 @@ fn stop_at_distance(world: &World, mast: &Mast, wanted_m: f64) -> Result<TrueSto
     }
     let stop = stop_at(world, mast, far_x_m)?;
     if (distance_m(world, mast, &stop) - wanted_m).abs() > 1e-9 {
-        let problem = format!("no place on the line of the drive is {wanted_m:.3} m from the targets' centre");
+        let problem =
+            format!("no place on the line of the drive is {wanted_m:.3} m from the targets' centre");
         return Err(Error::setting("drive.end_distance_m", problem));
     }
     Ok(stop)

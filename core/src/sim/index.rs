@@ -10,7 +10,7 @@
 use crate::camera::Camera;
 use crate::error::Result;
 use crate::frames::{Pose, PoseRecord};
-use crate::traverse::{CameraSource, FORMAT_VERSION, Stop, StopTruth, StereoGeometry, TraverseIndex, View};
+use crate::traverse::{CameraSource, FORMAT_VERSION, StereoGeometry, Stop, StopTruth, TraverseIndex, View};
 
 use super::camera_noise::FULL_SCALE_DN;
 use super::drive;

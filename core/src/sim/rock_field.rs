@@ -140,7 +140,7 @@ fn candidates(settings: &RockSettings, approach: &Approach, random: &mut Pcg64) 
     let k = settings.area_fraction.max(0.01);
     let mut candidates = Vec::new();
     for _ in 0..settings.cluster_count {
-        let diameter_m = draw_diameter_m(k, settings.cluster_smallest_m, settings.largest_m, random.random());
+        let diameter_m = draw_diameter_m(k, settings.cluster_smallest_m, settings.cluster_largest_m, random.random());
         candidates.push(Candidate { diameter_m, place: Place::Disc { radius_m: settings.cluster_radius_m } });
     }
     if settings.area_fraction <= 0.0 {
@@ -173,7 +173,8 @@ fn draw_place(place: &Place, approach: &Approach, random: &mut Pcg64) -> [f64; 2
             [random.random_range(from_m..to_m), random.random_range(-half_m..half_m)]
         }
         Place::Disc { radius_m } => {
-            let (r, angle) = (radius_m * random.random::<f64>().sqrt(), random.random_range(0.0..std::f64::consts::TAU));
+            let (r, angle) =
+                (radius_m * random.random::<f64>().sqrt(), random.random_range(0.0..std::f64::consts::TAU));
             [approach.goal_m[0] + r * angle.cos(), approach.goal_m[1] + r * angle.sin()]
         }
     }

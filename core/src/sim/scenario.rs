@@ -84,6 +84,8 @@ pub struct RockSettings {
     pub cluster_radius_m: f64,
     /// The smallest rock of the cluster, m of diameter (ours).
     pub cluster_smallest_m: f64,
+    /// The largest rock of the cluster, m of diameter (ours: a rock worth driving to).
+    pub cluster_largest_m: f64,
 }
 
 impl Default for RockSettings {
@@ -92,11 +94,12 @@ impl Default for RockSettings {
             area_fraction: 0.09,
             smallest_m: 0.04,
             largest_m: 0.6,
-            farthest_m: 45.0,
+            farthest_m: 100.0,
             height_ratio: 0.5,
             cluster_count: 14,
             cluster_radius_m: 1.3,
-            cluster_smallest_m: 0.15,
+            cluster_smallest_m: 0.25,
+            cluster_largest_m: 0.9,
         }
     }
 }
@@ -115,6 +118,8 @@ pub struct TextureSettings {
     pub soil_slope_std: f64,
     /// The same for rocks.
     pub rock_slope_std: f64,
+    /// How much of the soil's albedo lies as dust on a rock's face that looks straight up, 0 to 1.
+    pub dust: f64,
     /// The longest wavelength of the texture, m.
     pub longest_m: f64,
     /// The shortest wavelength of the texture, m (below the 1.6 mm that a pixel spans at 2 m).
@@ -129,7 +134,8 @@ impl Default for TextureSettings {
             albedo_std: 0.12,
             soil_slope_std: 0.12,
             rock_slope_std: 0.25,
-            longest_m: 0.8,
+            dust: 0.45,
+            longest_m: 0.4,
             shortest_m: 0.0015,
         }
     }
@@ -230,11 +236,15 @@ pub struct TargetRule {
     pub shadow_fraction: f64,
     /// Greatest range of depth inside the window, as a part of the distance (0.10: R21).
     pub depth_range_fraction: f64,
+    /// Whether targets must lie on rocks, off their occluding boundaries (true: R20).
+    pub on_rocks: bool,
+    /// Least part of the window that lies on the same rock as the target (0.90, ours).
+    pub same_rock_fraction: f64,
 }
 
 impl Default for TargetRule {
     fn default() -> Self {
-        Self { count: 20, radius_m: 1.0, window_px: 21, shadow_fraction: 0.20, depth_range_fraction: 0.10 }
+        Self { count: 20, radius_m: 1.6, window_px: 21, shadow_fraction: 0.20, depth_range_fraction: 0.10, on_rocks: true, same_rock_fraction: 0.90 }
     }
 }
 
@@ -249,11 +259,7 @@ impl Default for Scenario {
             sun: SunSettings::default(),
             camera: CameraSettings::default(),
             drive: DriveSettings::default(),
-            odometry_error: OdometryError {
-                along_fraction: 0.01,
-                across_fraction: 0.005,
-                attitude_deg: 0.1,
-            },
+            odometry_error: OdometryError { along_fraction: 0.01, across_fraction: 0.005, attitude_deg: 0.1 },
             targets: TargetRule::default(),
         }
     }
@@ -308,16 +314,18 @@ impl Scenario {
         within("rocks.area_fraction", rocks.area_fraction, 0.0, 0.4)?;
         within("rocks.smallest_m", rocks.smallest_m, 0.02, 0.5)?;
         within("rocks.largest_m", rocks.largest_m, rocks.smallest_m * 1.01, 2.0)?;
-        within("rocks.farthest_m", rocks.farthest_m, 1.0, 100.0)?;
+        within("rocks.farthest_m", rocks.farthest_m, 1.0, 150.0)?;
         within("rocks.height_ratio", rocks.height_ratio, 0.1, 1.0)?;
         within("rocks.cluster_count", f64::from(rocks.cluster_count), 0.0, 200.0)?;
         within("rocks.cluster_radius_m", rocks.cluster_radius_m, 0.1, 10.0)?;
-        within("rocks.cluster_smallest_m", rocks.cluster_smallest_m, 0.02, rocks.largest_m / 1.01)?;
+        within("rocks.cluster_smallest_m", rocks.cluster_smallest_m, 0.02, rocks.cluster_largest_m / 1.01)?;
+        within("rocks.cluster_largest_m", rocks.cluster_largest_m, 0.03, 2.0)?;
         within("texture.soil_albedo", texture.soil_albedo, 0.02, 0.9)?;
         within("texture.rock_albedo", texture.rock_albedo, 0.02, 0.9)?;
         within("texture.albedo_std", texture.albedo_std, 0.0, 0.5)?;
         within("texture.soil_slope_std", texture.soil_slope_std, 0.0, 1.0)?;
         within("texture.rock_slope_std", texture.rock_slope_std, 0.0, 1.0)?;
+        within("texture.dust", texture.dust, 0.0, 1.0)?;
         within("texture.longest_m", texture.longest_m, 0.01, 10.0)?;
         within("texture.shortest_m", texture.shortest_m, 0.0005, texture.longest_m)
     }
@@ -376,7 +384,8 @@ mod tests {
 
     #[test]
     fn what_is_left_out_takes_its_default() {
-        let read = Scenario::from_toml("seed = 9\n[sun]\nelevation_deg = 20.0\n", Path::new("s.toml")).unwrap();
+        let read =
+            Scenario::from_toml("seed = 9\n[sun]\nelevation_deg = 20.0\n", Path::new("s.toml")).unwrap();
         assert_eq!((read.seed, read.sun.elevation_deg), (9, 20.0));
         assert_eq!(read.rocks, RockSettings::default());
     }

@@ -26,10 +26,8 @@ pub struct Surfaces {
     rock: Octaves<3>,
     soil_albedo: f32,
     rock_albedo: f32,
+    dust: f32,
 }
-
-/// How much of the soil's albedo lies as dust on a face that looks straight up.
-const DUST: f32 = 0.45;
 
 #[inline(always)]
 fn unit(v: [f32; 3]) -> [f32; 3] {
@@ -44,7 +42,7 @@ impl Surfaces {
             longest_m,
             shortest_m: settings.shortest_m,
             ratio: 2.1,
-            albedo_exponent: 0.15,
+            albedo_exponent: 0.05,
             albedo_std: settings.albedo_std,
             slope_std,
         };
@@ -55,6 +53,7 @@ impl Surfaces {
             rock: Octaves::new(&octaves(rock_longest_m, settings.rock_slope_std), mix(seed ^ 0x20c4)),
             soil_albedo: settings.soil_albedo as f32,
             rock_albedo: settings.rock_albedo as f32,
+            dust: settings.dust as f32,
         }
     }
 
@@ -80,7 +79,7 @@ impl Surfaces {
         let out = n[0] * texture.slope[0] + n[1] * texture.slope[1] + n[2] * texture.slope[2];
         let normal = unit(std::array::from_fn(|k| n[k] - (texture.slope[k] - out * n[k])));
         let up = (-n[2]).max(0.0);
-        let dust = DUST * up * up;
+        let dust = self.dust * up * up;
         let own = self.rock_albedo * rock.brightness;
         let albedo = own + dust * (self.soil_albedo - own);
         Appearance { albedo: albedo * (1.0 + texture.albedo).max(0.1), normal }

@@ -24,12 +24,12 @@ pub const MEAN_GROUND_Z_M: f64 = 0.294;
 /// Over which width the relief fades to the plane at the edges of the grid, m.
 const FADE_M: f64 = 1.5;
 
-/// Cells along a side of a block, from the coarsest walk to the finest.
-pub(super) const BLOCK_CELLS: [usize; 4] = [64, 16, 4, 1];
+/// Blocks have 2^shift cells along a side: 64, 16, 4 and 1, from the coarsest walk to the finest.
+pub(super) const BLOCK_SHIFT: [usize; 4] = [6, 4, 2, 0];
 
 /// The RMS difference over 1 m of a relief whose octave at 1 m has unit amplitude, for H = 0.8 and octaves
 /// from 6 m down; the amplitude is divided by it. Other exponents change it by less than 15 % (tested).
-const UNIT_RMS_AT_1M: f64 = 0.93;
+const UNIT_RMS_AT_1M: f64 = 3.15;
 
 /// Height of the highest point (least z) of every block of one size.
 #[derive(Clone, Debug)]
@@ -51,6 +51,7 @@ pub struct Terrain {
     slope: Vec<[f32; 2]>,
     pub(super) tops: Vec<Tops>,
     pub(super) highest_z_m: f64,
+    steepest: f64,
 }
 
 impl Terrain {
@@ -75,10 +76,18 @@ impl Terrain {
 
     /// A ground of given vertex heights, m down; `z_m` holds (cells + 1) vertices along each axis.
     fn from_heights(origin_m: [f64; 2], cell_m: f64, cells: [usize; 2], z_m: Vec<f32>) -> Self {
-        let tops: Vec<Tops> = BLOCK_CELLS.iter().map(|&side| tops(&z_m, cells, side)).collect();
+        let tops: Vec<Tops> = BLOCK_SHIFT.iter().map(|&shift| tops(&z_m, cells, 1 << shift)).collect();
         let highest_z_m = tops[0].z_m.iter().copied().fold(MEAN_GROUND_Z_M, |a, b| a.min(f64::from(b)));
         let slope = vertex_slopes(&z_m, cells, cell_m);
-        Self { origin_m, cell_m, cells, z_m, slope, tops, highest_z_m }
+        let steepest = steepest(&z_m, cells) / cell_m;
+        Self { origin_m, cell_m, cells, z_m, slope, tops, highest_z_m, steepest }
+    }
+
+    /// No part of the ground is steeper than this, m/m.
+    ///
+    /// A ray that rises more steeply never meets the ground again after leaving it.
+    pub fn steepest(&self) -> f64 {
+        self.steepest
     }
 
     /// The cell of a place and the position within it, or nothing beyond the grid.
@@ -131,7 +140,6 @@ impl Terrain {
             near + v * (far - near)
         })
     }
-
 }
 
 /// The octaves of the relief, with unit amplitude at 1 m wavelength (in units of its standard deviation).
@@ -172,6 +180,22 @@ fn tops(z_m: &[f32], cells: [usize; 2], side: usize) -> Tops {
     Tops { columns, z_m: top }
 }
 
+/// An upper bound of the steepness of any cell, m per cell: a patch's slopes along x and along y are
+/// between those of its edges.
+fn steepest(z_m: &[f32], cells: [usize; 2]) -> f64 {
+    let width = cells[0] + 1;
+    let mut steepest = 0.0f64;
+    for y in 0..cells[1] {
+        for x in 0..cells[0] {
+            let at = y * width + x;
+            let [a, b, c, d] = [z_m[at], z_m[at + 1], z_m[at + width], z_m[at + width + 1]].map(f64::from);
+            let (along_x, along_y) = ((b - a).abs().max((d - c).abs()), (c - a).abs().max((d - b).abs()));
+            steepest = steepest.max(along_x.hypot(along_y));
+        }
+    }
+    steepest
+}
+
 /// Central differences of the vertex heights (one-sided at the edges).
 fn vertex_slopes(z_m: &[f32], cells: [usize; 2], cell_m: f64) -> Vec<[f32; 2]> {
     let width = cells[0] + 1;
@@ -210,6 +234,7 @@ mod tests {
             }
         }
         let rms = |d: &[f64]| (d.iter().map(|v| v * v).sum::<f64>() / d.len() as f64).sqrt();
+        println!("rms {}", rms(&at_1m));
         assert!((rms(&at_1m) / 0.02 - 1.0).abs() < 0.1, "{}", rms(&at_1m));
         let exponent = (rms(&at_1m) / rms(&at_4cm)).ln() / (1.0 / 0.08f64).ln();
         assert!((exponent - 0.8).abs() < 0.12, "{exponent}");

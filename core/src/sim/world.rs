@@ -156,13 +156,16 @@ impl World {
         self.sun_grid.towards_sun(&to_sun.origin).iter().any(|&index| {
             let interval = self.rocks[index as usize].interval(to_sun);
             // Where the ray starts on a lit face it leaves at once.
-            interval.is_some_and(|i| i.leave_m - i.enter_m.max(0.0) > OFF_SURFACE_M && i.leave_m > OFF_SURFACE_M)
+            interval
+                .is_some_and(|i| i.leave_m - i.enter_m.max(0.0) > OFF_SURFACE_M && i.leave_m > OFF_SURFACE_M)
         })
     }
 
     /// Whether the ground stands on a ray to the sun.
     #[inline(always)]
     pub(super) fn is_blocked_by_ground(&self, to_sun: &Ray) -> bool {
-        self.terrain.cast(to_sun, OFF_SURFACE_M, f64::INFINITY).is_some()
+        // Most grounds are nowhere as steep as the sun is high.
+        let rise = -to_sun.direction.z / to_sun.direction.xy().norm();
+        rise <= self.terrain.steepest() && self.terrain.cast(to_sun, OFF_SURFACE_M, f64::INFINITY).is_some()
     }
 }

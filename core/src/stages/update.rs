@@ -76,10 +76,12 @@ fn renew(carried: &Target, pointing: &Pointing, capture: &Capture, located: &Loc
         last_distance_m: (position_in_rover - pointing.left.model.centre()).norm(),
         travelled_since_update_m: 0.0,
         drift_covariance_px2: located.left_covariance_px2,
+        drift_bias_px: located.left_bias_px,
         appearance: Appearance {
             step: carried.step,
             pixel,
             position_in_rover,
+            surface_by_pixel: located.surface_by_pixel,
             camera: pointing.left.clone(),
             image: Arc::clone(&capture.pair.left),
         },

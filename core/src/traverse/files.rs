@@ -44,7 +44,7 @@ pub(super) fn resolve(folder: &Path, name: &str) -> Result<PathBuf, String> {
 ///
 /// # Errors
 /// [`Error::Write`] naming `path`; nothing is left behind.
-pub(super) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
+pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     let unwritable = |source| Error::Write { path: path.to_owned(), source };
     let folder = path.parent().unwrap_or(Path::new(""));
     std::fs::create_dir_all(folder).map_err(unwritable)?;

@@ -1,7 +1,8 @@
 //! The decoded pairs that were asked for last, within a fixed amount of memory.
 
-use crate::stages::capture::StereoPair;
 use std::collections::VecDeque;
+
+use crate::stages::capture::StereoPair;
 
 /// Pairs by step, the most recently used at the back.
 pub(super) struct ImageCache {

@@ -5,7 +5,7 @@
 //! into a folder by its importer (`import/`, one file per format).
 
 mod check;
-mod files;
+pub mod files;
 mod image_cache;
 pub mod import;
 mod index_file;

@@ -119,7 +119,7 @@ fn paint_marks(overlay: &Overlay<'_>, trace: &StepTrace, state: &State) {
         // What was compared is an upright square; the quad is where the reference's own window went.
         let (at, side) = (found.peak.pixel, template_side(state));
         overlay.outline(&template_quad(at, side, &nalgebra::Matrix2::identity()), run, Line::Solid);
-        overlay.outline(&template_quad(at, side, &prepared.image_from_template()), run, Line::Dotted);
+        overlay.outline(&template_quad(at, side, &prepared.prepared_from_template()), run, Line::Dotted);
     }
     if let Some((located, pixel)) = trace.locate.as_ref().and_then(|l| Some((l, l.left_pixel?)))
         && state.shows(Layer::Match)

@@ -10,10 +10,20 @@
 //! so no noise level has to be assumed. To this comes a floor for the sub-pixel fit itself, whose error does
 //! not show in the residual.
 //!
+//! Where the template was prepared by scale and roll alone, the surface's slope stretches the image by another
+//! map, F = I + E. The best shift of a patch that is stretched by E and yet compared unstretched is not zero:
+//! ```text
+//! b = A⁻¹ Σ g gᵀ E o        o: offset of a pixel from the patch's middle
+//! ```
+//! This bias depends on where the patch has its texture, points the same way step after step, and is therefore
+//! returned apart from the covariance.
+//!
 //! | symbol | name | unit |
 //! |---|---|---|
 //! | L | `CORRELATION_REACH_PX` | px |
-//! | Σ_δ | result | px² |
+//! | Σ_δ | `covariance_px2` | px² |
+//! | E | `misfit` | px per px |
+//! | b | `bias_px` | px |
 
 use nalgebra::{Matrix2, Vector2};
 
@@ -29,32 +39,44 @@ const FIT_FLOOR_PX: f64 = 0.03;
 /// 1σ given to a direction in which the patch has no gradient at all, px.
 const UNDETERMINED_PX: f64 = 10.0;
 
-/// Covariance of the position of `matched` against `template`, px²; both patches have the same size.
-pub fn match_covariance(template: &Patch, matched: &Patch) -> Matrix2<f64> {
-    let undetermined = Matrix2::identity() * UNDETERMINED_PX.powi(2);
-    let (Some(template), Some(image)) = (normalise(template), normalise(matched)) else {
-        return undetermined;
-    };
+/// The error of one match.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MatchNoise {
+    /// Covariance of the position, px².
+    pub covariance_px2: Matrix2<f64>,
+    /// What the misfit of the prepared template adds to the position, px.
+    pub bias_px: Vector2<f64>,
+}
+
+/// The error of the position of `matched` against `template`, patches of the same size, where the true map
+/// between them is `I + misfit`.
+pub fn match_noise(template: &Patch, matched: &Patch, misfit: &Matrix2<f64>) -> MatchNoise {
+    let undetermined =
+        MatchNoise { covariance_px2: Matrix2::identity() * UNDETERMINED_PX.powi(2), bias_px: Vector2::zeros() };
+    let (Some(template), Some(image)) = (normalise(template), normalise(matched)) else { return undetermined };
     let (gx, gy) = gradient::central(&image);
     let (width, height) = image.dimensions();
+    let middle = Vector2::new(f64::from(width - 1), f64::from(height - 1)) / 2.0;
     let score = mean_product(&template, &image);
     let mut influence = vec![Vector2::zeros(); (width * height) as usize];
-    let mut information = Matrix2::zeros();
+    let (mut information, mut stretched) = (Matrix2::zeros(), Vector2::zeros());
     for y in 1..height - 1 {
         for x in 1..width - 1 {
             let g = Vector2::new(f64::from(gx.get_pixel(x, y)[0]), f64::from(gy.get_pixel(x, y)[0]));
-            let residual =
-                f64::from(image.get_pixel(x, y)[0]) - score * f64::from(template.get_pixel(x, y)[0]);
+            let residual = f64::from(image.get_pixel(x, y)[0]) - score * f64::from(template.get_pixel(x, y)[0]);
             if residual.is_finite() && g.iter().all(|v| v.is_finite()) {
+                let offset = Vector2::new(f64::from(x), f64::from(y)) - middle;
                 information += g * g.transpose();
+                stretched += g * g.dot(&(misfit * offset));
                 influence[(y * width + x) as usize] = g * residual;
             }
         }
     }
     let meat = correlated_sum(&influence, i64::from(width), i64::from(height));
-    information
-        .try_inverse()
-        .map_or(undetermined, |inverse| inverse * meat * inverse + Matrix2::identity() * FIT_FLOOR_PX.powi(2))
+    information.try_inverse().map_or(undetermined, |inverse| MatchNoise {
+        covariance_px2: inverse * meat * inverse + Matrix2::identity() * FIT_FLOOR_PX.powi(2),
+        bias_px: inverse * stretched,
+    })
 }
 
 /// `Σ_ij w(i − j) v_i v_jᵀ` over a grid of vectors.

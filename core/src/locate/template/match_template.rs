@@ -4,11 +4,11 @@
 //! prediction; its surface of scores is exhaustive. The match is the peak, refined below the pixel by a
 //! quadratic fit (R67); the second peak at least half a template away is reported as a warning (R68).
 
-use nalgebra::Matrix2;
+use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::match_noise::match_covariance;
+use super::match_noise::match_noise;
 use super::scale_roll::ScaleRoll;
 use super::settings::TemplateSettings;
 use crate::correlate::peak::{self, Peak, SecondPeak};
@@ -33,6 +33,9 @@ pub struct TemplateMatch {
     /// Covariance of this match alone, px².
     #[schema(value_type = Vec<f64>)]
     pub covariance_px2: Matrix2<f64>,
+    /// What the surface's slope, which scale and roll leave out, adds to this match, px.
+    #[schema(value_type = [f64; 2])]
+    pub bias_px: Vector2<f64>,
     /// Scores of all positions.
     #[serde(skip)]
     #[schema(ignore)]
@@ -70,12 +73,14 @@ pub fn match_template(
     let peak = peak::find_peak(&surface, settings.sub_pixel).ok_or("no valid score in the search window")?;
     let second_peak = peak::second_peak(&surface, &peak, f64::from(settings.template_size_px) / 2.0);
     let matched = patch::extract(image, peak.pixel, settings.template_size_px / 2, settings.kernel);
+    let noise = match_noise(&prepared.rolled, &matched, &prepared.misfit());
     let difference = patch::normalised_difference(&matched, &prepared.rolled);
     Ok(TemplateMatch {
         search_window,
         positions: surface.width * surface.height,
         flat_positions: surface.flat_positions,
-        covariance_px2: match_covariance(&prepared.rolled, &matched),
+        covariance_px2: noise.covariance_px2,
+        bias_px: noise.bias_px,
         peak,
         second_peak,
         surface,

@@ -4,8 +4,9 @@
 //! numbers but never serialised with them: the interface serves them one by one.
 //!
 //! Noise (ours; the papers' half pixel is the preset `half_pixel`): the covariance of the target's left
-//! position against the designated point is that of the template carried along, `s² R D Rᵀ`, plus that of
-//! this match. `point_stereo` sees the same left position, so both eyes share its error.
+//! position against the designated point is that of the template carried along on the surface, `F D Fᵀ`, plus
+//! that of this match; what biases the matches is carried as `F B + b` and enters the position as `B Bᵀ`.
+//! `point_stereo` sees the same left position, so both eyes share its error.
 
 pub mod settings;
 pub mod scale_roll;
@@ -20,7 +21,7 @@ pub use settings::TemplateSettings;
 #[cfg(test)]
 mod tests;
 
-use nalgebra::Matrix2;
+use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -30,7 +31,6 @@ use self::scale_roll::ScaleRoll;
 use self::settings::NoiseModel;
 use self::triangulate::Triangulation;
 use super::{DesignateInput, Evidence, LocateInput, Located, Locator};
-use crate::frames::Pixel;
 
 /// What the template locator saw; a step that was not reached is null.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -68,7 +68,7 @@ impl Locator for TemplateLocator {
             geometry: input.stereo,
             predicted_range_m: None,
         };
-        finish(TemplateEvidence::default(), input.pixel, covariance, &stereo, &input.settings.template)
+        finish(TemplateEvidence::default(), &stereo, (covariance, Vector2::zeros()), &input.settings.template)
     }
 
     fn locate(&self, input: &LocateInput<'_>) -> Located {
@@ -84,14 +84,14 @@ impl Locator for TemplateLocator {
             Ok(matched) => matched,
             Err(missing) => return nothing(evidence, missing),
         };
-        let image_from_template = prepared.image_from_template();
         let left_pixel = matched.peak.pixel;
-        let covariance = match settings.noise_model {
-            NoiseModel::Measured => {
-                image_from_template * input.target.drift_covariance_px2 * image_from_template.transpose()
-                    + matched.covariance_px2
-            }
-            NoiseModel::HalfPixel => Matrix2::identity() * HALF_PIXEL_VARIANCE,
+        let carry = prepared.image_from_template;
+        let error = match settings.noise_model {
+            NoiseModel::Measured => (
+                carry * input.target.drift_covariance_px2 * carry.transpose() + matched.covariance_px2,
+                carry * input.target.drift_bias_px + matched.bias_px,
+            ),
+            NoiseModel::HalfPixel => (Matrix2::identity() * HALF_PIXEL_VARIANCE, Vector2::zeros()),
         };
         evidence.match_template = Some(matched);
         let stereo = StereoInput {
@@ -103,20 +103,20 @@ impl Locator for TemplateLocator {
             geometry: input.stereo,
             predicted_range_m: Some((input.prediction.position_in_rover - left.model.centre()).norm()),
         };
-        finish(evidence, left_pixel, covariance, &stereo, settings)
+        finish(evidence, &stereo, error, settings)
     }
 }
 
 /// The two steps that designation and tracking share: point stereo and triangulation.
 fn finish(
     mut evidence: TemplateEvidence,
-    left_pixel: Pixel,
-    left_covariance_px2: Matrix2<f64>,
     input: &StereoInput<'_>,
+    (left_covariance_px2, left_bias_px): (Matrix2<f64>, Vector2<f64>),
     settings: &TemplateSettings,
 ) -> Located {
     let confidence = evidence.match_template.as_ref().map_or(1.0, |m| m.peak.score.clamp(0.0, 1.0));
-    let mut located = Located { left_pixel: Some(left_pixel), left_covariance_px2, confidence, ..empty() };
+    let left_pixel = Some(input.left_pixel);
+    let mut located = Located { left_pixel, left_covariance_px2, left_bias_px, confidence, ..empty() };
     let stereo = match point_stereo::point_stereo(input, settings) {
         Ok(stereo) => stereo,
         Err(missing) => {
@@ -131,12 +131,14 @@ fn finish(
         let range_m = stereo.range_m;
         Err(format!("the best stereo match lies at the end of the searched ranges, at {range_m:.1} m"))
     } else {
-        triangulate::triangulate(input, &stereo, left_covariance_px2, settings.noise_model)
+        let error_px2 = left_covariance_px2 + left_bias_px * left_bias_px.transpose();
+        triangulate::triangulate(input, &stereo, error_px2, settings.noise_model)
     };
     match triangulated {
         Ok(triangulation) => {
             located.position_in_rover = Some(triangulation.position_in_rover);
             located.covariance_in_rover = Some(triangulation.covariance_in_rover);
+            located.surface_by_pixel = triangulation.surface_by_pixel;
             evidence.triangulate = Some(triangulation);
         }
         Err(missing) => located.missing = Some(missing),
@@ -155,6 +157,8 @@ fn empty() -> Located {
         left_pixel: None,
         right_pixel: None,
         left_covariance_px2: Matrix2::zeros(),
+        left_bias_px: Vector2::zeros(),
+        surface_by_pixel: None,
         position_in_rover: None,
         covariance_in_rover: None,
         confidence: 0.0,

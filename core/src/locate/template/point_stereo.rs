@@ -21,7 +21,7 @@ use nalgebra::{Matrix2, Matrix3};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::match_noise::match_covariance;
+use super::match_noise::match_noise;
 use super::settings::{DisparityInterval, StereoReference, TemplateSettings};
 use super::stereo_curve::{Curve, window_through};
 use crate::camera::Camera;
@@ -128,6 +128,10 @@ pub fn point_stereo(input: &StereoInput<'_>, settings: &TemplateSettings) -> Res
     let (right_pixel, range_m) = curve.at(best.along, best.across);
     let affine = curve.right_from_left(input.left, input.right, input.left_pixel, range_m);
     let right_window = window_through(input.right_image, right_pixel, &affine, half, settings.kernel);
+    let right_from_left = surface_slope(&curve, &affine, best.along, input, settings).unwrap_or(affine);
+    let misfit = affine.try_inverse().map_or_else(Matrix2::zeros, |inverse| inverse * right_from_left - Matrix2::identity());
+    let noise = match_noise(&template, &right_window, &misfit);
+    let seen = noise.covariance_px2 + noise.bias_px * noise.bias_px.transpose();
     Ok(PointStereo {
         curve: points,
         right_pixel,
@@ -135,8 +139,8 @@ pub fn point_stereo(input: &StereoInput<'_>, settings: &TemplateSettings) -> Res
         range_m,
         across_px: best.across,
         at_end: best.at_end,
-        covariance_px2: affine * match_covariance(&template, &right_window) * affine.transpose(),
-        right_from_left: surface_slope(&curve, &affine, best.along, input, settings).unwrap_or(affine),
+        covariance_px2: affine * seen * affine.transpose(),
+        right_from_left,
         right_window,
     })
 }

@@ -8,7 +8,8 @@
 //! ```
 //! The window keeps its size in pixels; the image content is magnified by s and turned by ρ (R51, R58).
 //! Only the prediction is used, never the stereo result to come (R50). Out-of-plane change is not
-//! compensated (R60).
+//! compensated (R60), but known where stereo measured the surface's slope: `image_from_template` is the map that
+//! carries the uncertainty of the target's position in the image.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
@@ -47,6 +48,9 @@ pub struct ScaleRoll {
     pub new_distance_m: f64,
     /// The stop at which the template was taken.
     pub template_step: usize,
+    /// How offsets in the old image move on the target's surface, px per px; `s R(ρ)` where its slope is not known.
+    #[schema(value_type = Vec<f64>)]
+    pub image_from_template: Matrix2<f64>,
     /// The window as it was in the image from which it was taken.
     #[serde(skip)]
     #[schema(ignore)]
@@ -62,10 +66,23 @@ pub struct ScaleRoll {
 }
 
 impl ScaleRoll {
-    /// Takes offsets in the old image into offsets in the present one: `s R(ρ)`, px per px.
-    pub fn image_from_template(&self) -> Matrix2<f64> {
+    /// How the template was prepared: `s R(ρ)`, px per px.
+    pub fn prepared_from_template(&self) -> Matrix2<f64> {
         Rotation2::new(self.applied_roll_rad).into_inner() * self.applied_scale
     }
+
+    /// By how much the surface stretches the prepared template further: `F (s R)⁻¹ − I`, px per px.
+    pub fn misfit(&self) -> Matrix2<f64> {
+        let inverse = self.prepared_from_template().try_inverse().unwrap_or_else(Matrix2::identity);
+        self.image_from_template * inverse - Matrix2::identity()
+    }
+}
+
+/// How offsets in the old image move on the target's surface: `∂pixel_new/∂p · R · ∂p/∂pixel_old`, px per px.
+fn surface_map(appearance: &Appearance, now_from_template: &Pose, left: &Camera) -> Option<Matrix2<f64>> {
+    let slope = appearance.surface_by_pixel?;
+    let (_, jacobian) = left.model.project_with_jacobian(&(now_from_template * appearance.position_in_rover))?;
+    Some(jacobian * now_from_template.rotation.to_rotation_matrix().matrix() * slope)
 }
 
 /// The scale and roll of the geometry alone: `(s, ρ in rad, D_old in m, D_new in m)`.
@@ -118,7 +135,9 @@ pub fn scale_roll(
     let (image, pixel) = (appearance.image.as_ref(), appearance.pixel);
     let (size, kernel) = (settings.template_size_px, settings.kernel);
     let rolled = patch::scale_roll(image, pixel, applied_scale, applied_roll_rad, size, kernel);
+    let similarity = Rotation2::new(roll_rad).into_inner() * scale;
     Ok(ScaleRoll {
+        image_from_template: surface_map(appearance, now_from_template, left).unwrap_or(similarity),
         scale,
         roll_rad,
         applied_scale,

@@ -10,7 +10,7 @@
 //! ```
 //! The preset `half_pixel` is the papers': independent half pixels in both eyes, `P = I/4` (R172).
 
-use nalgebra::{Matrix2, Matrix3, Matrix4, Vector4};
+use nalgebra::{Matrix2, Matrix3, Matrix3x2, Matrix4, Vector2, Vector4};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -30,6 +30,9 @@ pub struct Triangulation {
     /// Its covariance, m².
     #[schema(value_type = Vec<f64>)]
     pub covariance_in_rover: Matrix3<f64>,
+    /// How the surface point moves with the left pixel, m per px: its two tangents, column by column.
+    #[schema(value_type = Option<Vec<f64>>)]
+    pub surface_by_pixel: Option<Matrix3x2<f64>>,
     /// Distance from the left camera, m.
     pub range_m: f64,
     /// How far the two rays miss each other, m.
@@ -62,10 +65,20 @@ pub fn triangulate(
     .ok_or(
         "the position is too uncertain: rays within the pixel noise do not meet in front of the cameras",
     )?;
+    let tangent = |offset: Vector2<f64>| {
+        let moved = stereo.right_from_left * offset;
+        let at = |sign: f64| {
+            let l = left.offset(sign * offset.x, sign * offset.y);
+            meet(l, right.offset(sign * moved.x, sign * moved.y)).map(|t| t.point)
+        };
+        Some((at(1.0)? - at(-1.0)?) / 2.0)
+    };
+    let tangents = tangent(Vector2::x()).zip(tangent(Vector2::y()));
     let focal_px = input.left.model.focal_length_px(left).unwrap_or(0.0);
     Ok(Triangulation {
         position_in_rover: found.point,
         covariance_in_rover,
+        surface_by_pixel: tangents.map(|(u, v)| Matrix3x2::from_columns(&[u, v])),
         range_m: found.range_left_m,
         gap_m: found.gap_m,
         gap_px: found.gap_m * focal_px / found.range_left_m,

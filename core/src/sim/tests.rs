@@ -1,3 +1,0 @@
-//! Claims about the simulator as a whole.
-
-use super::*;

@@ -1,0 +1,34 @@
+//! Claims about the simulator as a whole: rays, pictures, the drive and its targets.
+//!
+//! All tests share one world, that of the demonstration; it is built once.
+
+mod drive;
+mod geometry;
+mod pictures;
+
+use std::sync::OnceLock;
+
+use super::*;
+use crate::traverse::TraverseIndex;
+
+/// The demonstration's scenario with its world and index.
+struct Demo {
+    scenario: Scenario,
+    world: World,
+    index: TraverseIndex,
+}
+
+fn demo() -> &'static Demo {
+    static DEMO: OnceLock<Demo> = OnceLock::new();
+    DEMO.get_or_init(|| {
+        let scenario = Scenario::demo();
+        let world = World::new(&scenario);
+        let index = index(&scenario, &world).expect("the demonstration can be driven");
+        Demo { scenario, world, index }
+    })
+}
+
+/// A number in [0, 1) from two others.
+fn unit(a: u64, b: u64) -> f64 {
+    (texture::mix(texture::mix(a) ^ b) >> 11) as f64 / (1u64 << 53) as f64
+}

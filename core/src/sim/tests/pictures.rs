@@ -1,0 +1,215 @@
+//! Pictures are true to the geometry, to their seed, and to nothing else.
+
+use std::sync::atomic::AtomicBool;
+
+use super::*;
+use crate::camera::Camera;
+use crate::error::Error;
+use crate::frames::Pixel;
+use crate::image::{GrayImage, sample::bicubic};
+
+fn region(world: &World, scenario: &Scenario, camera: &Camera, region: Region) -> GrayImage {
+    render_region(world, scenario, camera, region, &AtomicBool::new(false)).unwrap()
+}
+
+fn camera(index: &TraverseIndex, stop: usize, eye: Eye) -> Camera {
+    true_camera_in_site(&index.stops[stop], eye).unwrap()
+}
+
+/// The square region of `side` px around a pixel.
+fn around(pixel: Pixel, side: u32) -> Region {
+    let first = |v: f64| (v.round() - f64::from(side / 2)).max(0.0) as u32;
+    Region { x: first(pixel.x), y: first(pixel.y), width: side, height: side }
+}
+
+/// Normalised correlation of two lists of the same length.
+fn correlation(a: &[f64], b: &[f64]) -> f64 {
+    let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+    let (ma, mb) = (mean(a), mean(b));
+    let sum = |f: &dyn Fn(f64, f64) -> f64| a.iter().zip(b).map(|(p, q)| f(p - ma, q - mb)).sum::<f64>();
+    sum(&|p, q| p * q) / (sum(&|p, _| p * p) * sum(&|_, q| q * q)).sqrt()
+}
+
+/// Where a parabola through three values one step apart has its top, in steps.
+fn top(low: f64, middle: f64, high: f64) -> f64 {
+    0.5 * (low - high) / (low - 2.0 * middle + high)
+}
+
+/// The shift (px) of the right picture against where geometry puts the left patch, by best correlation.
+fn stereo_shift(demo: &Demo, stop: usize, pixel: Pixel) -> Option<[f64; 2]> {
+    let (left, right) = (camera(&demo.index, stop, Eye::Left), camera(&demo.index, stop, Eye::Right));
+    let half = 10i32;
+    let patch = around(pixel, 21);
+    let left_image = region(&demo.world, &demo.scenario, &left, patch);
+    let mut places = Vec::new();
+    let mut values = Vec::new();
+    let middle_m = demo.world.cast(&left.ray(pixel)?)?.distance_m;
+    for dy in -half..=half {
+        for dx in -half..=half {
+            let at = pixel.offset(f64::from(dx), f64::from(dy));
+            let hit = demo.world.cast(&left.ray(at)?)?;
+            // Steps in depth show different things to the two eyes: they would test something else.
+            if (hit.distance_m / middle_m - 1.0).abs() > 0.05 {
+                return None;
+            }
+            places.push(right.project(&hit.point)?);
+            values.push(f64::from(left_image.get_pixel((dx + half) as u32, (dy + half) as u32).0[0]));
+        }
+    }
+    let mean_of = |f: &dyn Fn(&Pixel) -> f64| places.iter().map(f).sum::<f64>() / places.len() as f64;
+    let window = around(Pixel::new(mean_of(&|p| p.x), mean_of(&|p| p.y)), 41);
+    let right_image = region(&demo.world, &demo.scenario, &right, window);
+    let score = |dx: f64, dy: f64| {
+        let moved: Option<Vec<f64>> = places
+            .iter()
+            .map(|p| bicubic(&right_image, p.offset(dx - f64::from(window.x), dy - f64::from(window.y))))
+            .map(|value| value.map(f64::from))
+            .collect();
+        moved.map(|moved| correlation(&values, &moved))
+    };
+    let (step, peak) = (0.25, score(0.0, 0.0)?);
+    (peak > 0.9).then_some(())?;
+    Some([
+        step * top(score(-step, 0.0)?, peak, score(step, 0.0)?),
+        step * top(score(0.0, -step)?, peak, score(0.0, step)?),
+    ])
+}
+
+#[test]
+fn a_patch_of_the_left_picture_correlates_best_where_geometry_puts_it_in_the_right() {
+    let demo = demo();
+    let mut shifts = Vec::new();
+    for k in 0..60 {
+        let stop = [10, 13, 16][(k % 3) as usize];
+        let pixel = Pixel::new((200.0 + 600.0 * unit(k, 0)).round(), (300.0 + 500.0 * unit(k, 1)).round());
+        shifts.extend(stereo_shift(demo, stop, pixel));
+    }
+    assert!(shifts.len() > 15, "{}", shifts.len());
+    for axis in 0..2 {
+        let mut along: Vec<f64> = shifts.iter().map(|shift| shift[axis]).collect();
+        along.sort_by(f64::total_cmp);
+        let bias = along[along.len() / 2];
+        along.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
+        // One patch in ten may show a rock's edge or a slope that shines to one eye only.
+        let (median, most) = (along[along.len() / 2].abs(), along[along.len() * 9 / 10].abs());
+        assert!(bias.abs() < 0.005 && median < 0.02 && most < 0.05, "{bias} {median} {most}: {shifts:?}");
+    }
+}
+
+/// The demonstration's rocks, nearly black under an even sky on nearly white ground: pure silhouettes.
+fn silhouettes() -> (Scenario, World) {
+    let mut scenario = demo().scenario.clone();
+    (scenario.texture.soil_albedo, scenario.texture.rock_albedo) = (0.9, 0.02);
+    (scenario.texture.albedo_std, scenario.texture.soil_slope_std, scenario.texture.rock_slope_std) =
+        (0.0, 0.0, 0.0);
+    (scenario.texture.dust, scenario.sun.diffuse_fraction) = (0.0, 1.0);
+    (scenario.camera.blur_px, scenario.camera.samples_per_axis) = (0.0, 4);
+    let mut world = World::new(&scenario);
+    // Without contact shadows, which lie beside the silhouettes.
+    world.openness = openness::Openness::new(&[], [0.0, 1.0], [0.0, 1.0]);
+    (scenario, world)
+}
+
+/// The part of a pixel that shows rock, from 16 × 16 exact rays.
+fn rock_part(world: &World, camera: &Camera, x: f64, y: f64) -> f64 {
+    let rays = (0..256).filter_map(|k| {
+        let (u, v) = ((f64::from(k % 16) + 0.5) / 16.0 - 0.5, (f64::from(k / 16) + 0.5) / 16.0 - 0.5);
+        world.cast(&camera.ray(Pixel::new(x + u, y + v))?)
+    });
+    let hits: Vec<bool> = rays.map(|hit| hit.surface != SurfaceId::Ground).collect();
+    hits.iter().filter(|rock| **rock).count() as f64 / hits.len().max(1) as f64
+}
+
+#[test]
+fn silhouettes_lie_where_exact_rays_of_the_camera_model_put_them() {
+    let (scenario, world) = silhouettes();
+    let index = &demo().index;
+    for (stop, eye, x) in [(2, Eye::Left, 480), (10, Eye::Right, 400), (14, Eye::Left, 480)] {
+        let camera = camera(index, stop, eye);
+        let window = Region { x, y: 470, width: 72, height: 72 };
+        let image = region(&world, &scenario, &camera, window);
+        let part =
+            |x: u32, y: u32| rock_part(&world, &camera, f64::from(window.x + x), f64::from(window.y + y));
+        let parts: Vec<f64> = (0..72 * 72).map(|k| part(k % 72, k / 72)).collect();
+        let at = |x: usize, y: usize| parts[y * 72 + x];
+        // Least squares: level = a + b part + c ∂part/∂x + d ∂part/∂y; a shift of s px gives c = −b s.
+        let (mut matrix, mut right_side) = (nalgebra::Matrix4::zeros(), nalgebra::Vector4::zeros());
+        for y in 1..71usize {
+            for x in 1..71usize {
+                let slope = [0.5 * (at(x + 1, y) - at(x - 1, y)), 0.5 * (at(x, y + 1) - at(x, y - 1))];
+                let row = nalgebra::Vector4::new(1.0, at(x, y), slope[0], slope[1]);
+                matrix += row * row.transpose();
+                right_side += row * f64::from(image.get_pixel(x as u32, y as u32).0[0]);
+            }
+        }
+        let fit = matrix.try_inverse().unwrap() * right_side;
+        let shift = [-fit[2] / fit[1], -fit[3] / fit[1]];
+        assert!(fit[1] < -0.1, "rocks are dark: {fit:?}");
+        assert!(shift.iter().all(|s| s.abs() < 0.01), "{shift:?}");
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bits_with_one_thread_and_with_four() {
+    let demo = demo();
+    let camera = camera(&demo.index, 9, Eye::Left);
+    let window = Region { x: 440, y: 460, width: 128, height: 128 };
+    let picture = |threads: usize, seed: u64| {
+        let mut scenario = demo.scenario.clone();
+        scenario.seed = seed;
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let world = World::new(&scenario);
+            let clean = region(&world, &scenario, &camera, window);
+            let seed = NoiseSeed { step: 9, eye: Eye::Left };
+            let noisy = camera_noise::expose(&clean, &scenario, seed, [window.x, window.y]);
+            (clean.into_raw(), noisy.into_raw())
+        })
+    };
+    let (clean, noisy) = picture(1, 1);
+    assert!((clean.clone(), noisy.clone()) == picture(4, 1));
+    let other = picture(4, 2);
+    assert!(clean != other.0 && noisy != other.1 && clean != noisy);
+}
+
+#[test]
+fn a_region_has_the_bits_of_the_whole_picture() {
+    let demo = demo();
+    let camera = camera(&demo.index, 12, Eye::Right);
+    let big = Region { x: 400, y: 500, width: 90, height: 70 };
+    let small = Region { x: 423, y: 517, width: 31, height: 29 };
+    let seed = NoiseSeed { step: 12, eye: Eye::Right };
+    let record = |window: Region| {
+        let clean = region(&demo.world, &demo.scenario, &camera, window);
+        camera_noise::expose(&clean, &demo.scenario, seed, [window.x, window.y])
+    };
+    let (whole, part) = (record(big), record(small));
+    for (x, y, pixel) in part.enumerate_pixels() {
+        assert_eq!(whole.get_pixel(x + 23, y + 17), pixel);
+    }
+}
+
+#[test]
+fn the_clean_picture_is_the_mean_of_noisy_ones_and_the_first_has_the_stated_level() {
+    let mut scenario = demo().scenario.clone();
+    (scenario.camera.image_size, scenario.camera.samples_per_axis) = (128, 2);
+    scenario.camera.response_spread = 0.0;
+    let world = World::new(&scenario);
+    let index = index(&scenario, &world).unwrap();
+    let camera = camera(&index, 0, Eye::Left);
+    let clean = render_clean(&world, &scenario, &camera);
+    let mean = |image: &GrayImage| image.iter().map(|v| f64::from(*v)).sum::<f64>() / image.len() as f64;
+    assert!((mean(&clean) - 0.4).abs() < 0.01, "{}", mean(&clean));
+    let noisy = render(&world, &scenario, &camera, NoiseSeed { step: 0, eye: Eye::Left });
+    // 16 384 pixels with a noise of 7 DN each.
+    assert!((mean(&noisy) - mean(&clean)).abs() < 4.0 * 7.0 / 4095.0 / 128.0);
+}
+
+#[test]
+fn rendering_stops_when_it_is_cancelled() {
+    let demo = demo();
+    let camera = camera(&demo.index, 0, Eye::Left);
+    let cancelled = AtomicBool::new(true);
+    let result = render_region(&demo.world, &demo.scenario, &camera, Region::whole(&camera), &cancelled);
+    assert!(matches!(result, Err(Error::Cancelled)));
+}

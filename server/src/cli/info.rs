@@ -1,0 +1,113 @@
+//! `sightline info`: what a traverse holds, in words.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use sightline_core::camera::CameraModel;
+use sightline_core::error::Result;
+use sightline_core::frames::PoseRecord;
+use sightline_core::traverse::{StereoGeometry, Traverse};
+
+use super::{open, say};
+
+/// Say what a traverse holds.
+#[derive(Debug, Args)]
+pub struct Info {
+    /// The traverse: a folder, an index or a scenario.
+    traverse: PathBuf,
+}
+
+impl Info {
+    /// Writes the summary.
+    ///
+    /// # Errors
+    /// A traverse that cannot be opened.
+    pub fn run(self) -> Result<()> {
+        let traverse = open::open(&self.traverse, None)?;
+        summary(&traverse).iter().try_for_each(|line| say::line(line))
+    }
+}
+
+fn summary(traverse: &Traverse) -> Vec<String> {
+    let index = traverse.index();
+    let count = traverse.stop_count();
+    let mut lines = vec![format!("name         {}", index.name)];
+    if !index.description.is_empty() {
+        lines.push(format!("description  {}", index.description));
+    }
+    lines.push(format!("folder       {}", traverse.folder().display()));
+    let way_m: f64 = index.stops.windows(2).map(|pair| between_m(&pair[0].site_from_rover, &pair[1].site_from_rover)).sum();
+    let duration_s = index.stops.last().map_or(0.0, |stop| stop.time_s);
+    lines.push(format!("stops        {count}, {way_m:.2} m driven by the estimates, {duration_s:.0} s"));
+    lines.push(format!("left camera  {}", camera(traverse, true)));
+    lines.push(format!("right camera {}", camera(traverse, false)));
+    let stereo = match index.stereo {
+        StereoGeometry::Lateral => "lateral: two eyes side by side",
+        StereoGeometry::Convergent => "convergent: two freely placed views",
+    };
+    lines.push(format!("stereo       {stereo}, base {:.3} m at the first stop", base_m(traverse)));
+    lines.push(format!("mast         {}", if index.mast.is_some() { "known" } else { "not known" }));
+    let error = index.odometry_error;
+    lines.push(format!(
+        "odometry     1σ {:.2} % along, {:.2} % across, {:.2}° a step",
+        100.0 * error.along_fraction,
+        100.0 * error.across_fraction,
+        error.attitude_deg
+    ));
+    lines.push(format!("truth        {}", truth(traverse)));
+    lines.push(format!("images       {}", images(traverse)));
+    lines.extend(traverse.warnings().iter().map(|warning| format!("warning      {warning}")));
+    lines
+}
+
+fn camera(traverse: &Traverse, is_left: bool) -> String {
+    let of = |step| if is_left { traverse.left_camera(step) } else { traverse.right_camera(step) };
+    let [width, height] = of(0).size;
+    let is_constant = (1..traverse.stop_count()).all(|step| of(step) == of(0));
+    let moves = if is_constant { "the same at all stops" } else { "moves with the mast" };
+    let model = match of(0).model {
+        CameraModel::Cahv(_) => "CAHV",
+        CameraModel::Cahvor(_) => "CAHVOR",
+        CameraModel::Cahvore(_) => "CAHVORE",
+    };
+    format!("{model}, {width} × {height} px, {moves}")
+}
+
+fn base_m(traverse: &Traverse) -> f64 {
+    (traverse.right_camera(0).model.centre() - traverse.left_camera(0).model.centre()).norm()
+}
+
+fn truth(traverse: &Traverse) -> String {
+    let stops = &traverse.index().stops;
+    let known = stops.iter().filter(|stop| stop.truth.is_some()).count();
+    match (known, traverse.index().scenario.is_some()) {
+        (0, _) => "none: nothing can be compared".to_owned(),
+        (_, true) => "poses, cameras and surface: the traverse is simulated".to_owned(),
+        (known, false) => format!("poses of {known} of {} stops: what is compared is the drift", stops.len()),
+    }
+}
+
+fn images(traverse: &Traverse) -> String {
+    let stops = &traverse.index().stops;
+    let is_there = |name: &str| traverse.folder().join(name).is_file();
+    let missing: Vec<_> = stops
+        .iter()
+        .flat_map(|stop| [&stop.left.image, &stop.right.image])
+        .filter(|name| !is_there(name))
+        .collect();
+    let all = 2 * stops.len();
+    match (missing.as_slice(), traverse.index().scenario.is_some()) {
+        ([], _) => format!("all {all} there"),
+        (missing, true) => format!("{} of {all} to be rendered when they are needed", missing.len()),
+        (missing, false) => {
+            let names: Vec<_> = missing.iter().take(10).map(|name| name.as_str()).collect();
+            let more = if missing.len() > names.len() { ", …" } else { "" };
+            format!("{} of {all} missing: {}{more}", missing.len(), names.join(", "))
+        }
+    }
+}
+
+fn between_m(a: &PoseRecord, b: &PoseRecord) -> f64 {
+    let difference = a.position_m.iter().zip(&b.position_m).map(|(a, b)| (a - b) * (a - b));
+    difference.sum::<f64>().sqrt()
+}

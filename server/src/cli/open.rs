@@ -1,0 +1,100 @@
+//! Opening what a command was given: a folder, an index, or a scenario, from which a folder is made first.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+use sightline_core::error::{Error, Result};
+use sightline_core::sim::Scenario;
+use sightline_core::traverse::{Traverse, create_simulated};
+
+use super::say::{self, Progress};
+use crate::state::{hash, slug};
+
+/// The largest scenario that is read, bytes.
+const SCENARIO_LIMIT: u64 = 1 << 20;
+
+/// The folder in which the program keeps what it makes.
+///
+/// # Errors
+/// When neither the command nor the environment names one.
+pub(super) fn data_folder(given: Option<&Path>) -> Result<PathBuf> {
+    let from = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    let found = given
+        .map(Path::to_owned)
+        .or_else(|| from("SIGHTLINE_HOME"))
+        .or_else(|| from("XDG_DATA_HOME").map(|data| data.join("sightline")))
+        .or_else(|| from("HOME").map(|home| home.join(".local/share/sightline")));
+    found.ok_or_else(|| Error::Request("there is no home folder; choose a folder with --data-dir".to_owned()))
+}
+
+/// Opens a traverse by its folder or index, or makes one from a scenario in the data folder.
+///
+/// # Errors
+/// As [`Traverse::open`] and [`create_simulated`].
+pub(super) fn open(path: &Path, data: Option<&Path>) -> Result<Traverse> {
+    match read_scenario_or_index(path)? {
+        Some(scenario) => simulated(&scenario, &data_folder(data)?),
+        None => Traverse::open(path),
+    }
+}
+
+/// The traverse of a scenario: the same scenario always has the same folder, so that images are rendered once.
+///
+/// # Errors
+/// As [`create_simulated`].
+pub(super) fn simulated(scenario: &Scenario, data: &Path) -> Result<Traverse> {
+    let name = format!("{}-{}", slug(&scenario.name), &hash(scenario.to_toml().as_bytes())[..12]);
+    let folder = data.join("traverses").join(name);
+    if !folder.exists() {
+        say::error(&format!("making the simulated traverse {}", folder.display()));
+    }
+    create_simulated(scenario, &folder)
+}
+
+/// The scenario in a file.
+///
+/// # Errors
+/// A file that cannot be read or is no scenario.
+pub(super) fn scenario(path: &Path) -> Result<Scenario> {
+    Scenario::from_toml(&read(path)?, path)
+}
+
+/// Renders what is missing of a simulated traverse, telling progress; recorded ones need nothing.
+///
+/// # Errors
+/// As [`Traverse::render_step`].
+pub(super) fn render(traverse: &Traverse) -> Result<()> {
+    let missing: Vec<_> = (0..traverse.stop_count()).filter(|&step| !traverse.is_ready(step)).collect();
+    let mut progress = Progress::new("rendered stop");
+    for (done, step) in missing.iter().enumerate() {
+        progress.tell(done, missing.len());
+        traverse.render_step(*step, &AtomicBool::new(false))?;
+    }
+    if !missing.is_empty() {
+        progress.tell(missing.len(), missing.len());
+    }
+    Ok(())
+}
+
+/// The scenario in `path`, where that is a file of one; an index always has stops, a scenario never.
+fn read_scenario_or_index(path: &Path) -> Result<Option<Scenario>> {
+    if path.is_dir() || path.extension().is_none_or(|ending| ending != "toml") {
+        return Ok(None);
+    }
+    // An index may be larger than any scenario.
+    if std::fs::metadata(path).is_ok_and(|about| about.len() > SCENARIO_LIMIT) {
+        return Ok(None);
+    }
+    let text = read(path)?;
+    let is_index = toml::from_str::<toml::Table>(&text)
+        .is_ok_and(|table| table.contains_key("stops") || table.contains_key("format"));
+    if is_index { Ok(None) } else { Scenario::from_toml(&text, path).map(Some) }
+}
+
+fn read(path: &Path) -> Result<String> {
+    let unreadable = |source| Error::Read { path: path.to_owned(), source };
+    if std::fs::metadata(path).map_err(unreadable)?.len() > SCENARIO_LIMIT {
+        return Err(Error::format(path, "is too large for a scenario"));
+    }
+    std::fs::read_to_string(path).map_err(unreadable)
+}

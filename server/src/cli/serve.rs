@@ -1,0 +1,116 @@
+//! `sightline serve`: the page, the interface and the sessions of one or more traverses.
+
+use std::fs::{File, TryLockError};
+use std::net::{IpAddr, SocketAddr, TcpListener};
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use sightline_core::error::{Error, Result};
+use sightline_core::sim::Scenario;
+use sightline_core::traverse::Traverse;
+
+use super::{open, say};
+use crate::guard::Hosts;
+use crate::state::AppState;
+
+/// Open traverses in the browser.
+#[derive(Debug, Args)]
+pub struct Serve {
+    /// Folders or indexes of traverses, or scenarios to simulate; none for the demonstration.
+    traverses: Vec<PathBuf>,
+    /// The port; 0 for any free one.
+    #[arg(long, default_value_t = 7700)]
+    port: u16,
+    /// The address to listen on; another one than this machine's own also needs --allow-host.
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
+    listen: IpAddr,
+    /// A further name under which the server may be addressed; can be given more than once.
+    #[arg(long, value_name = "NAME")]
+    allow_host: Vec<String>,
+    /// Where sessions and simulated traverses are kept.
+    #[arg(long, value_name = "FOLDER")]
+    data_dir: Option<PathBuf>,
+}
+
+impl Serve {
+    /// Serves until the program is ended.
+    ///
+    /// # Errors
+    /// A traverse that cannot be opened, a data folder in use, or a port that is taken.
+    pub fn run(self) -> Result<()> {
+        if !self.listen.is_loopback() && self.allow_host.is_empty() {
+            let message = "listening beyond this machine needs --allow-host with the name by which pages will \
+                           address the server; anyone who reaches it can use it";
+            return Err(Error::Request(message.to_owned()));
+        }
+        let data = open::data_folder(self.data_dir.as_deref())?;
+        let listener = bind(SocketAddr::new(self.listen, self.port))?;
+        let address = listener.local_addr().map_err(|error| Error::Request(error.to_string()))?;
+        let _lock = lock(&data)?;
+        let traverses = self.open_traverses(&data)?;
+        let state = AppState::new(traverses, &data.join("sessions"), Hosts::new(address.port(), &self.allow_host))?;
+        if !self.listen.is_loopback() {
+            say::error("warning: anyone who reaches this address can use the server");
+        }
+        let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build();
+        let runtime = runtime.map_err(|error| Error::Request(format!("cannot start: {error}")))?;
+        runtime.block_on(serve(listener, address, state))
+    }
+
+    fn open_traverses(&self, data: &Path) -> Result<Vec<Traverse>> {
+        if self.traverses.is_empty() {
+            return Ok(vec![open::simulated(&Scenario::demo(), data)?]);
+        }
+        self.traverses.iter().map(|path| open::open(path, Some(data))).collect()
+    }
+}
+
+async fn serve(listener: TcpListener, address: SocketAddr, state: AppState) -> Result<()> {
+    let failed = |error: std::io::Error| Error::Request(format!("the server stopped: {error}"));
+    let listener = tokio::net::TcpListener::from_std(listener).map_err(failed)?;
+    let app = crate::app(state);
+    say::line(&format!("Sightline is ready: {}", url(address)))?;
+    tokio::select! {
+        ended = async { axum::serve(listener, app).await } => ended.map_err(failed),
+        // Sessions are on disk already, so there is nothing to wait for.
+        _ = tokio::signal::ctrl_c() => Ok(()),
+    }
+}
+
+/// Takes the port before anything long begins.
+fn bind(address: SocketAddr) -> Result<TcpListener> {
+    let listener = TcpListener::bind(address).map_err(|error| match error.kind() {
+        std::io::ErrorKind::AddrInUse => {
+            let port = address.port();
+            Error::Request(format!("port {port} is taken; choose another one with --port, or --port 0 for a free one"))
+        }
+        _ => Error::Request(format!("cannot listen on {address}: {error}")),
+    })?;
+    listener.set_nonblocking(true).map_err(|error| Error::Request(error.to_string()))?;
+    Ok(listener)
+}
+
+/// The address as a browser takes it.
+fn url(address: SocketAddr) -> String {
+    if address.ip().is_unspecified() {
+        format!("http://127.0.0.1:{}/", address.port())
+    } else {
+        format!("http://{address}/")
+    }
+}
+
+/// Two servers must not write the same sessions; the system lets go of the lock when the program ends.
+fn lock(data: &Path) -> Result<File> {
+    let path = data.join("lock");
+    let unwritable = |source| Error::Write { path: path.clone(), source };
+    std::fs::create_dir_all(data).map_err(unwritable)?;
+    let file = File::create(&path).map_err(unwritable)?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::Error(source)) => Err(unwritable(source)),
+        Err(TryLockError::WouldBlock) => {
+            let folder = data.display();
+            Err(Error::Request(format!("another server uses {folder}; choose another folder with --data-dir")))
+        }
+    }
+}

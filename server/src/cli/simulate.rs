@@ -1,0 +1,98 @@
+//! `sightline simulate`: renders a simulated traverse into a folder.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use sightline_core::error::{Error, Result};
+use sightline_core::sim::Scenario;
+use sightline_core::traverse::create_simulated;
+
+use super::{open, say};
+
+/// Render a simulated traverse into a folder.
+#[derive(Debug, Args)]
+pub struct Simulate {
+    /// The folder to make.
+    #[arg(long, value_name = "FOLDER")]
+    out: PathBuf,
+    /// The scenario; by default that of the demonstration.
+    #[arg(long, value_name = "FILE")]
+    scenario: Option<PathBuf>,
+    /// Another seed than the scenario's.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// A setting of the scenario, for example sun.elevation_deg=20; can be given more than once.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+}
+
+impl Simulate {
+    /// Makes the folder and renders every stop.
+    ///
+    /// # Errors
+    /// A bad scenario or setting, or a folder that cannot be written or holds another traverse.
+    pub fn run(self) -> Result<()> {
+        let mut scenario = self.scenario.as_deref().map_or_else(|| Ok(Scenario::demo()), open::scenario)?;
+        scenario.seed = self.seed.unwrap_or(scenario.seed);
+        let scenario = with(&scenario, &self.set)?;
+        let traverse = create_simulated(&scenario, &self.out)?;
+        open::render(&traverse)?;
+        let (stops, folder) = (traverse.stop_count(), self.out.display());
+        say::line(&format!("{folder}: {stops} stops"))
+    }
+}
+
+/// The scenario with settings changed by name.
+fn with(scenario: &Scenario, changes: &[String]) -> Result<Scenario> {
+    let mut document: toml::Table =
+        toml::from_str(&scenario.to_toml()).map_err(|error| Error::Request(error.to_string()))?;
+    for change in changes {
+        let (key, value) = change
+            .split_once('=')
+            .ok_or_else(|| Error::setting(change, "write it as key=value, for example sun.elevation_deg=20"))?;
+        set(&mut document, key.trim(), value.trim())?;
+    }
+    Scenario::from_toml(&document.to_string(), Path::new("--set"))
+}
+
+/// Replaces a value that the scenario has; a whole number may stand for one with a fraction.
+fn set(document: &mut toml::Table, key: &str, value: &str) -> Result<()> {
+    let mut path = key.split('.');
+    let mut place = path.next().and_then(|first| document.get_mut(first));
+    for part in path {
+        place = place.and_then(|table| table.get_mut(part));
+    }
+    let place = place.filter(|place| !place.is_table());
+    let place = place.ok_or_else(|| Error::setting(key, "the scenario has no such setting"))?;
+    let written: Option<toml::Value> =
+        toml::from_str::<toml::Table>(&format!("value = {value}")).ok().and_then(|mut table| table.remove("value"));
+    *place = match (place.is_float(), written) {
+        (true, Some(toml::Value::Integer(whole))) => toml::Value::Float(whole as f64),
+        (_, Some(written)) => written,
+        (_, None) => toml::Value::String(value.to_owned()),
+    };
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_of_a_scenario_change_by_name() {
+        let changes = ["sun.elevation_deg=20".to_owned(), "name = two words".to_owned()];
+        let changed = with(&Scenario::demo(), &changes).unwrap();
+        assert_eq!((changed.sun.elevation_deg, changed.name.as_str()), (20.0, "two words"));
+        assert_eq!(changed.rocks, Scenario::demo().rocks);
+    }
+
+    #[test]
+    fn what_no_scenario_has_is_refused_by_name() {
+        for (change, named) in [("sun.height=3", "sun.height"), ("sun=3", "sun"), ("seed", "key=value")] {
+            let message = with(&Scenario::demo(), &[change.to_owned()]).unwrap_err().to_string();
+            assert!(message.contains(named), "{message}");
+        }
+        let message = with(&Scenario::demo(), &["sun.elevation_deg=-3".to_owned()]).unwrap_err().to_string();
+        assert!(message.contains("sun.elevation_deg"), "{message}");
+    }
+}

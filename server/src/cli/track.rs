@@ -1,0 +1,213 @@
+//! `sightline track`: runs the tracker without a browser, by the very functions that the server calls.
+//!
+//! Each step is one line of JSON on the standard output as soon as it is computed, and each run ends with a
+//! line `{"summary": …}`. With several targets every line begins with the target's number.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+use sightline_core::error::{Error, Result};
+use sightline_core::frames::Pixel;
+use sightline_core::session::track;
+use sightline_core::settings::{Changes, Settings, TrackerKind, parse_assignment};
+use sightline_core::target::Designation;
+use sightline_core::trace::{StepRow, StepTrace, Summary, summarise};
+use sightline_core::traverse::Traverse;
+
+use super::say::{self, Progress};
+use super::open;
+use crate::columns;
+use crate::rerun_log::{self, RunLog};
+
+/// Track targets without a browser.
+#[derive(Debug, Args)]
+pub struct Track {
+    /// The traverse: a folder, an index or a scenario.
+    traverse: PathBuf,
+    /// The position of a target in the left image, px; can be given more than once.
+    #[arg(long, value_name = "X,Y", required = true, value_parser = pixel, allow_hyphen_values = true)]
+    target: Vec<Pixel>,
+    /// The stop in whose left image the targets are designated.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    from_step: usize,
+    /// The tracker.
+    #[arg(long, default_value = "template")]
+    tracker: Tracker,
+    /// A setting of the tracker, for example ncc_min=0.6; can be given more than once.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// How the steps are written.
+    #[arg(long, default_value = "jsonl")]
+    format: Format,
+    /// Also write a Rerun recording, a new file.
+    #[arg(long, value_name = "FILE")]
+    rrd: Option<PathBuf>,
+    /// Also write a CSV table; with several targets they follow each other.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+}
+
+/// How the steps are written.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Format {
+    /// One JSON object a step, then one with the summary.
+    Jsonl,
+}
+
+/// Which tracker runs.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Tracker {
+    /// Normalised correlation of a scaled and rolled template.
+    Template,
+}
+
+/// A line of a step.
+#[derive(Serialize)]
+struct StepLine<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    target: Option<usize>,
+    #[serde(flatten)]
+    row: &'a StepRow,
+}
+
+/// The line after the last step.
+#[derive(Serialize)]
+struct SummaryLine<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    target: Option<usize>,
+    summary: &'a Summary,
+}
+
+impl Track {
+    /// Tracks every target to the last stop.
+    ///
+    /// # Errors
+    /// A traverse, target or setting that does not exist, or a file that cannot be written.
+    pub fn run(self) -> Result<()> {
+        let settings = self.settings()?;
+        let traverse = open::open(&self.traverse, None)?;
+        for path in [&self.rrd, &self.csv].into_iter().flatten().filter(|path| path.exists()) {
+            return Err(Error::format(path, "exists already; choose another name"));
+        }
+        let mut runs = Vec::new();
+        // All targets are designated first, so that a bad one is told before anything long begins.
+        for pixel in &self.target {
+            runs.push(vec![Arc::new(designate(&traverse, self.from_step, *pixel, &settings)?)]);
+        }
+        for (number, steps) in runs.iter_mut().enumerate() {
+            let target = (self.target.len() > 1).then_some(number);
+            follow(&traverse, target, steps, &settings)?;
+        }
+        if let Some(path) = &self.csv {
+            write_csv(path, &runs)?;
+        }
+        if let Some(path) = &self.rrd {
+            write_rrd(path, &traverse, &runs)?;
+        }
+        Ok(())
+    }
+
+    fn settings(&self) -> Result<Settings> {
+        let tracker = match self.tracker {
+            Tracker::Template => TrackerKind::Template,
+        };
+        let changes = self.set.iter().map(|text| parse_assignment(text)).collect::<Result<Changes>>()?;
+        Settings { tracker, ..Settings::default() }.with(&changes)
+    }
+}
+
+/// The first step of a run.
+fn designate(traverse: &Traverse, step: usize, pixel: Pixel, settings: &Settings) -> Result<StepTrace> {
+    track::designate(traverse, Designation { step, pixel }, settings)
+}
+
+/// Computes and writes the steps of one run.
+fn follow(
+    traverse: &Traverse,
+    target: Option<usize>,
+    steps: &mut Vec<Arc<StepTrace>>,
+    settings: &Settings,
+) -> Result<()> {
+    let what = target.map_or_else(|| "tracked step".to_owned(), |target| format!("target {target}: tracked step"));
+    let mut progress = Progress::new(what);
+    let first = Arc::clone(&steps[0]);
+    let all = traverse.stop_count() - first.step;
+    let mut last = Arc::clone(&first);
+    loop {
+        say::line(&json(&StepLine { target, row: &last.row() })?)?;
+        progress.tell(steps.len(), all);
+        if last.step + 1 >= traverse.stop_count() {
+            break;
+        }
+        // A stop that cannot be rendered is a fault of that step, which the step itself reports.
+        let _ = traverse.render_step(last.step + 1, &AtomicBool::new(false));
+        let next = Arc::new(track::advance(traverse, &first, &last, settings));
+        steps.push(Arc::new(without_images(&next)));
+        last = next;
+    }
+    let summary = summarise(steps.iter().map(AsRef::as_ref));
+    say::line(&json(&SummaryLine { target, summary: &summary })?)
+}
+
+/// A copy without the stop's images, of which a long drive has more than fit into memory.
+fn without_images(trace: &StepTrace) -> StepTrace {
+    let mut lighter = trace.clone();
+    lighter.update.target.appearance.image = Arc::default();
+    if let Some(capture) = &mut lighter.capture {
+        capture.pair = Default::default();
+    }
+    lighter
+}
+
+fn json(line: &impl Serialize) -> Result<String> {
+    serde_json::to_string(line).map_err(|error| Error::Request(error.to_string()))
+}
+
+fn write_csv(path: &Path, runs: &[Vec<Arc<StepTrace>>]) -> Result<()> {
+    let unwritable = |source| Error::Write { path: path.to_owned(), source };
+    let mut file = BufWriter::new(File::create_new(path).map_err(unwritable)?);
+    for (number, steps) in runs.iter().enumerate() {
+        let rows: Vec<_> = steps.iter().map(|trace| trace.row()).collect();
+        let table = columns::csv(&rows);
+        let lines = table.lines().enumerate().filter(|(line, _)| number == 0 || *line > 0);
+        for (line, text) in lines {
+            let named = match (runs.len(), line) {
+                (1, _) => String::new(),
+                (_, 0) => "target,".to_owned(),
+                _ => format!("{number},"),
+            };
+            writeln!(file, "{named}{text}").map_err(unwritable)?;
+        }
+    }
+    file.flush().map_err(unwritable)
+}
+
+fn write_rrd(path: &Path, traverse: &Traverse, runs: &[Vec<Arc<StepTrace>>]) -> Result<()> {
+    let labels: Vec<_> = (1..=runs.len()).map(|number| format!("target {number}")).collect();
+    let logs: Vec<_> = runs
+        .iter()
+        .enumerate()
+        .map(|(target, steps)| RunLog { target, run: 0, label: &labels[target], steps })
+        .collect();
+    let mut progress = Progress::new("wrote stop");
+    let mut tell = |done, all| {
+        progress.tell(done, all);
+        ControlFlow::Continue(())
+    };
+    rerun_log::export(path, &traverse.index().name, traverse, &logs, &mut tell)
+}
+
+/// Reads `x,y`.
+fn pixel(text: &str) -> Result<Pixel, String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some([x, y]) => Ok(Pixel::new(*x, *y)),
+        _ => Err("write it as x,y in pixels, for example 512.5,300".to_owned()),
+    }
+}

@@ -1,0 +1,165 @@
+//! Who may speak to the server: the checks that come before every route, and the headers on every answer.
+//!
+//! A page of any site can send requests to a server on this machine. What stops it: the Host must be one of
+//! ours, exactly (a rebinding page controls both Host and Origin, so comparing them with each other would
+//! prove nothing); a foreign Origin may change nothing and open no WebSocket; bodies must be JSON, which a
+//! form cannot send. Scripts without a browser send no Origin and are not hindered.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use axum::extract::{Request, State};
+use axum::http::header::{self, HeaderName};
+use axum::http::{HeaderMap, HeaderValue, Method, Uri};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+
+use crate::extract::check_content_type;
+use crate::problem::{ApiError, ApiResult};
+
+/// The hosts under which the server may be addressed.
+#[derive(Clone, Debug)]
+pub struct Hosts(Arc<BTreeSet<String>>);
+
+impl Hosts {
+    /// This machine's own names with `port`, and `others`, each with or without a port of its own.
+    pub fn new(port: u16, others: &[String]) -> Self {
+        let own = ["localhost", "127.0.0.1", "[::1]"];
+        let others: Vec<_> = others.iter().map(|host| host.to_ascii_lowercase()).collect();
+        let named = own.into_iter().chain(others.iter().map(String::as_str));
+        let mut hosts: BTreeSet<_> = named.map(|host| format!("{host}:{port}")).collect();
+        if port == 80 {
+            // Browsers leave out the port that the scheme implies.
+            hosts.extend(own.map(str::to_owned));
+        }
+        hosts.extend(others);
+        Self(Arc::new(hosts))
+    }
+
+    fn has(&self, host: &str) -> bool {
+        self.0.contains(&host.to_ascii_lowercase())
+    }
+}
+
+/// Checks a request before it is routed, and puts the headers on its answer.
+pub async fn guard(State(hosts): State<Hosts>, request: Request, next: Next) -> Response {
+    let checked = check(&hosts, request.method(), request.uri(), request.headers());
+    let (host, is_api) = match &checked {
+        Ok(host) => (Some(host.clone()), request.uri().path().starts_with("/api/")),
+        Err(_) => (None, false),
+    };
+    let mut response = match checked {
+        Ok(_) => next.run(request).await,
+        Err(refusal) => {
+            tracing::warn!("refused: {}", crate::plain(&refusal.problem().detail));
+            refusal.into_response()
+        }
+    };
+    put_headers(response.headers_mut(), host.as_deref(), is_api);
+    response
+}
+
+/// The host by which we are addressed, where the request may come in.
+fn check(hosts: &Hosts, method: &Method, uri: &Uri, headers: &HeaderMap) -> ApiResult<String> {
+    let mut named = headers.get_all(header::HOST).iter();
+    let host = match (named.next().map(HeaderValue::to_str), named.next()) {
+        (Some(Ok(host)), None) if hosts.has(host) => host,
+        _ => return Err(foreign_host()),
+    };
+    if uri.authority().is_some_and(|authority| !hosts.has(authority.as_str())) {
+        return Err(foreign_host());
+    }
+    let is_upgrade = headers.contains_key(header::UPGRADE);
+    if !method.is_safe() || is_upgrade {
+        let is_ours = |origin: &HeaderValue| {
+            let origin = origin.to_str().unwrap_or_default();
+            let host = origin.strip_prefix("http://").or_else(|| origin.strip_prefix("https://"));
+            host.is_some_and(|host| hosts.has(host))
+        };
+        if !headers.get_all(header::ORIGIN).iter().all(is_ours) {
+            return Err(ApiError::forbidden("origin", "A page of another site may not do this."));
+        }
+    }
+    let said = |name: &'static str| headers.get(HeaderName::from_static(name)).map(HeaderValue::as_bytes);
+    let is_navigation = *method == Method::GET && said("sec-fetch-mode") == Some(b"navigate") && !is_upgrade;
+    if said("sec-fetch-site") == Some(b"cross-site") && !is_navigation {
+        return Err(ApiError::forbidden("origin", "A page of another site may not read this."));
+    }
+    check_content_type(method, headers)?;
+    Ok(host.to_owned())
+}
+
+fn foreign_host() -> ApiError {
+    ApiError::forbidden("host", "The server is not known under the name by which it was addressed.")
+        .hint("Use http://127.0.0.1 with the server's port, or start it with `--allow-host NAME`.")
+}
+
+fn put_headers(headers: &mut HeaderMap, host: Option<&str>, is_api: bool) {
+    // The host was checked, so it can end no directive. Older browsers do not count WebSockets as 'self'.
+    let sockets = host.map(|host| format!(" ws://{host} wss://{host}")).unwrap_or_default();
+    let policy = format!(
+        "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'self'{sockets}; \
+         img-src 'self' data: blob:; object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    );
+    let policy = HeaderValue::try_from(policy).unwrap_or(HeaderValue::from_static("default-src 'none'"));
+    headers.insert(header::CONTENT_SECURITY_POLICY, policy);
+    headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
+    headers.insert(header::REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
+    let same_origin = HeaderValue::from_static("same-origin");
+    headers.insert(HeaderName::from_static("cross-origin-opener-policy"), same_origin.clone());
+    headers.insert(HeaderName::from_static("cross-origin-resource-policy"), same_origin);
+    if is_api && !headers.contains_key(header::CACHE_CONTROL) {
+        headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn verdict(method: Method, headers: &[(&'static str, &str)]) -> Result<String, u16> {
+        let pairs = headers.iter().map(|(name, value)| {
+            (HeaderName::from_static(name), HeaderValue::from_str(value).unwrap())
+        });
+        let headers: HeaderMap = pairs.collect();
+        let hosts = Hosts::new(7700, &["rover.example".to_owned()]);
+        check(&hosts, &method, &Uri::from_static("/"), &headers).map_err(|error| error.problem().status)
+    }
+
+    #[test]
+    fn only_our_own_names_are_answered_and_only_exactly() {
+        for host in ["localhost:7700", "127.0.0.1:7700", "[::1]:7700", "LOCALHOST:7700", "rover.example"] {
+            assert!(verdict(Method::GET, &[("host", host)]).is_ok(), "{host}");
+        }
+        for host in ["localhost", "localhost:7701", "localhost:7700.evil.example", "evil-localhost:7700", ""] {
+            assert_eq!(verdict(Method::GET, &[("host", host)]), Err(403), "{host}");
+        }
+        assert_eq!(verdict(Method::GET, &[]), Err(403));
+    }
+
+    #[test]
+    fn a_foreign_page_may_change_nothing() {
+        let ours = ("host", "localhost:7700");
+        for origin in ["http://localhost:7700", "http://127.0.0.1:7700"] {
+            assert!(verdict(Method::POST, &[ours, ("origin", origin)]).is_ok(), "{origin}");
+        }
+        for origin in ["http://localhost:3000", "https://evil.example", "null", "http://localhost:7700.evil.example"] {
+            assert_eq!(verdict(Method::POST, &[ours, ("origin", origin)]), Err(403), "{origin}");
+            assert_eq!(verdict(Method::GET, &[ours, ("origin", origin), ("upgrade", "websocket")]), Err(403));
+        }
+        let cross = ("sec-fetch-site", "cross-site");
+        assert_eq!(verdict(Method::GET, &[ours, cross]), Err(403));
+        assert!(verdict(Method::GET, &[ours, cross, ("sec-fetch-mode", "navigate")]).is_ok());
+    }
+
+    #[test]
+    fn a_form_is_refused_whether_or_not_it_has_fields() {
+        let ours = ("host", "localhost:7700");
+        let form = ("content-type", "application/x-www-form-urlencoded");
+        assert_eq!(verdict(Method::POST, &[ours, form, ("content-length", "0")]), Err(415));
+        assert_eq!(verdict(Method::POST, &[ours, ("content-length", "5")]), Err(415));
+        assert!(verdict(Method::POST, &[ours, ("content-length", "0")]).is_ok());
+        let json = ("content-type", "Application/JSON; charset=utf-8");
+        assert!(verdict(Method::POST, &[ours, json, ("content-length", "5")]).is_ok());
+    }
+}

@@ -1,0 +1,136 @@
+//! What can go wrong with a request, as `application/problem+json` (RFC 9457).
+//!
+//! What the person may see and what the log gets are different strings: a fault of the program says only
+//! that it happened, and its cause goes to the log.
+
+use axum::http::{HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use sightline_core::error::Error;
+use sightline_core::session::wire::Problem;
+use utoipa::openapi::{ContentBuilder, RefOr, ResponseBuilder};
+
+/// The media type of problems.
+pub const PROBLEM_JSON: &str = "application/problem+json";
+
+/// A request that cannot be answered.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ApiError {
+    problem: Problem,
+    log: Option<String>,
+}
+
+/// The result of a handler.
+pub type ApiResult<T> = Result<T, ApiError>;
+
+impl ApiError {
+    /// A problem of that status; `code` is its stable name for programs.
+    pub fn new(status: StatusCode, code: &str, detail: impl Into<String>) -> Self {
+        let problem = Problem {
+            code: code.to_owned(),
+            title: status.canonical_reason().unwrap_or("Problem").to_owned(),
+            status: status.as_u16(),
+            detail: detail.into(),
+            hint: None,
+        };
+        Self { problem, log: None }
+    }
+
+    /// Adds how to mend it.
+    #[must_use]
+    pub fn hint(mut self, hint: impl Into<String>) -> Self {
+        self.problem.hint = Some(hint.into());
+        self
+    }
+
+    /// There is nothing of that name.
+    pub fn not_found(detail: impl Into<String>) -> Self {
+        Self::new(StatusCode::NOT_FOUND, "not_found", detail)
+    }
+
+    /// The request can be read but not be carried out.
+    pub fn invalid(code: &str, detail: impl Into<String>) -> Self {
+        Self::new(StatusCode::UNPROCESSABLE_ENTITY, code, detail)
+    }
+
+    /// The state of things does not allow it now.
+    pub fn conflict(detail: impl Into<String>) -> Self {
+        Self::new(StatusCode::CONFLICT, "conflict", detail)
+    }
+
+    /// The request may not come from there.
+    pub fn forbidden(code: &str, detail: impl Into<String>) -> Self {
+        Self::new(StatusCode::FORBIDDEN, code, detail)
+    }
+
+    /// Too much is waiting already.
+    pub fn busy() -> Self {
+        Self::new(StatusCode::SERVICE_UNAVAILABLE, "busy", "The server has too much to do already.")
+            .hint("Wait until some of it is done, or cancel a run.")
+    }
+
+    /// A fault of the program; `cause` goes to the log only.
+    pub fn internal(cause: impl Into<String>) -> Self {
+        let detail = "The server met a fault of its own; its log says more.";
+        let problem = Self::new(StatusCode::INTERNAL_SERVER_ERROR, "internal", detail);
+        Self { log: Some(cause.into()), ..problem }
+    }
+
+    /// The same problem about something that the path names.
+    #[must_use]
+    pub fn about_path(self) -> Self {
+        if self.problem.status == StatusCode::UNPROCESSABLE_ENTITY.as_u16() {
+            Self::not_found(self.problem.detail)
+        } else {
+            self
+        }
+    }
+
+    /// What the person may see.
+    pub fn problem(&self) -> &Problem {
+        &self.problem
+    }
+}
+
+impl From<Error> for ApiError {
+    fn from(error: Error) -> Self {
+        let detail = error.to_string();
+        match error {
+            Error::Setting { .. } => Self::invalid("setting", detail),
+            Error::Target(_) => Self::invalid("target", detail),
+            Error::Request(_) => Self::invalid("request", detail),
+            Error::Read { .. } | Error::Format { .. } => Self::invalid("file", detail),
+            Error::Cancelled => Self::conflict(detail),
+            Error::Write { .. } => {
+                let status = StatusCode::INSUFFICIENT_STORAGE;
+                Self { log: Some(detail.clone()), ..Self::new(status, "write", detail) }
+            }
+        }
+    }
+}
+
+impl IntoResponse for ApiError {
+    fn into_response(self) -> Response {
+        if let Some(cause) = &self.log {
+            tracing::error!(code = self.problem.code, "{}", crate::plain(cause));
+        }
+        let status = StatusCode::from_u16(self.problem.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
+        let mut response = (status, axum::Json(&self.problem)).into_response();
+        response.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static(PROBLEM_JSON));
+        if status == StatusCode::SERVICE_UNAVAILABLE {
+            response.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from_static("2"));
+        }
+        response
+    }
+}
+
+/// The answer of every route when it cannot do what was asked, for the OpenAPI document.
+impl utoipa::IntoResponses for ApiError {
+    fn responses() -> std::collections::BTreeMap<String, RefOr<utoipa::openapi::Response>> {
+        let content = ContentBuilder::new().schema(Some(utoipa::openapi::Ref::from_schema_name("Problem")));
+        let response = ResponseBuilder::new()
+            .description("What is wrong and how to mend it")
+            .content(PROBLEM_JSON, content.build())
+            .build();
+        [("default".to_owned(), RefOr::T(response))].into()
+    }
+}

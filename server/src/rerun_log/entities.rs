@@ -1,0 +1,171 @@
+//! Every entity of a recording, in the order in which a step logs them: the table that the module's header
+//! prints and that a test compares with what is read back from a file.
+
+use sightline_core::trace::StepTrace;
+
+use super::scores::SCORES;
+use super::step::path;
+
+/// How many rows an entity has.
+#[derive(Clone, Copy, Debug)]
+pub enum Rows {
+    /// One row outside of all time.
+    Once,
+    /// One row for every stop of the traverse.
+    EachStop,
+    /// One row for every step of the run: data where the condition holds and a `Clear` elsewhere. Entities that
+    /// all runs share have one row for every step that any of them has.
+    EachStep {
+        /// When there are data, in words.
+        when: &'static str,
+        /// Whether this step has data.
+        holds: fn(&StepTrace) -> bool,
+    },
+    /// The same, for a number.
+    EachScore {
+        /// When there is a number, in words.
+        when: &'static str,
+        /// The number of this step.
+        value: fn(&StepTrace) -> Option<f64>,
+    },
+}
+
+/// What is known about one entity of a recording.
+#[derive(Clone, Debug)]
+pub struct EntityDoc {
+    /// Its path.
+    pub path: String,
+    /// The archetype of its rows.
+    pub archetype: &'static str,
+    /// The archetype that says, outside of all time, how the rows are drawn.
+    pub style: Option<&'static str>,
+    /// How many rows it has.
+    pub rows: Rows,
+}
+
+impl EntityDoc {
+    /// Whether the entity has data at a step.
+    pub fn has_data_at(&self, trace: &StepTrace) -> bool {
+        match self.rows {
+            Rows::Once => false,
+            Rows::EachStop => true,
+            Rows::EachStep { holds, .. } => holds(trace),
+            Rows::EachScore { value, .. } => value(trace).is_some_and(f64::is_finite),
+        }
+    }
+
+    /// The entity as a row of the table: path, archetype, when.
+    pub fn table_row(&self) -> String {
+        let when = match self.rows {
+            Rows::Once => "once",
+            Rows::EachStop => "every stop",
+            Rows::EachStep { when, .. } | Rows::EachScore { when, .. } => when,
+        };
+        let style = self.style.map(|style| format!(", static `{style}`")).unwrap_or_default();
+        format!("| `{}` | `{}`{style} | {when} |", self.path, self.archetype)
+    }
+}
+
+/// The entities that all runs of a recording share.
+pub fn shared_entities() -> Vec<EntityDoc> {
+    let doc = |path: &str, archetype, style, rows| EntityDoc { path: path.to_owned(), archetype, style, rows };
+    let captured = Rows::EachStep { when: "the stop's files are whole", holds: |t| t.capture.is_some() };
+    vec![
+        doc("/", "ViewCoordinates", None, Rows::Once),
+        doc("/traverse", "TextDocument", None, Rows::Once),
+        doc("/rover/path", "LineStrips3D", None, Rows::Once),
+        doc("/rover/pose", "Transform3D", Some("TransformAxes3D"), Rows::EachStop),
+        doc("/rover/pose/left", "LineStrips3D", None, Rows::EachStop),
+        doc("/rover/pose/right", "LineStrips3D", None, Rows::EachStop),
+        doc("/capture/left", "EncodedImage", None, captured),
+        doc("/capture/right", "EncodedImage", None, captured),
+    ]
+}
+
+/// The entities of the run that is called `root` in paths.
+pub fn entities_of(root: &str) -> Vec<EntityDoc> {
+    let docs = EVIDENCE.iter().map(|&(entity, archetype, when, holds)| {
+        let style = (archetype == "StateChange").then_some("StateConfiguration");
+        EntityDoc { path: path(entity, root), archetype, style, rows: Rows::EachStep { when, holds } }
+    });
+    let scores = SCORES.iter().map(|score| EntityDoc {
+        path: path(score.entity, root),
+        archetype: "Scalars",
+        style: Some("SeriesLines"),
+        rows: Rows::EachScore { when: score.when, value: score.value },
+    });
+    let label = EntityDoc { path: path("/{target}", root), archetype: "TextDocument", style: None, rows: Rows::Once };
+    std::iter::once(label).chain(docs).chain(scores).collect()
+}
+
+/// All entities of a recording with this many targets of one run each.
+pub fn documented_entities(targets: usize) -> Vec<EntityDoc> {
+    let own = (0..targets).flat_map(|target| entities_of(&super::root(target, 0)));
+    shared_entities().into_iter().chain(own).collect()
+}
+
+/// Entity, archetype, when there are data, and the test for it.
+type Evidence = (&'static str, &'static str, &'static str, fn(&StepTrace) -> bool);
+
+/// What is logged of a run beside its numbers, in the order of the stages.
+#[rustfmt::skip]
+const EVIDENCE: &[Evidence] = &[
+    ("/{target}/predict/position", "Points3D", "predicted", |t| t.predict.is_some()),
+    ("/{target}/predict/covariance", "Ellipsoids3D", "predicted", |t| t.predict.is_some()),
+    ("/{target}/predict/left", "Points2D", "predicted in front of the left camera", predicted_left),
+    ("/{target}/predict/right", "Points2D", "predicted in front of the right camera", predicted_right),
+    ("/{target}/point_mast/gate", "LineStrips2D", "predicted in front of the left camera", predicted_left),
+    ("/{target}/capture/subframe", "Boxes2D", "the subframe lies in the image", |t| t.capture.as_ref().is_some_and(|c| c.subframe.is_some())),
+    ("/{target}/locate/scale_roll/footprint", "LineStrips2D", "prepared", |t| prepared(t) && predicted_left(t)),
+    ("/{target}/locate/scale_roll/reference", "DepthImage", "prepared", prepared),
+    ("/{target}/locate/scale_roll/scaled", "DepthImage", "prepared", prepared),
+    ("/{target}/locate/scale_roll/rolled", "DepthImage", "prepared", prepared),
+    ("/{target}/locate/match_template/window", "Boxes2D", "matched", matched),
+    ("/{target}/locate/match_template/surface", "DepthImage", "matched", matched),
+    ("/{target}/locate/match_template/surface/peak", "Points2D", "matched", matched),
+    ("/{target}/locate/match_template/surface/second_peak", "Points2D", "there is a second peak", second_peak),
+    ("/{target}/locate/match_template/peak", "Points2D", "matched", matched),
+    ("/{target}/locate/match_template/second_peak", "Points2D", "there is a second peak", second_peak),
+    ("/{target}/locate/match_template/matched_window", "LineStrips2D", "matched", matched),
+    ("/{target}/locate/match_template/matched", "DepthImage", "matched", matched),
+    ("/{target}/locate/match_template/difference", "Image", "matched", matched),
+    ("/{target}/locate/point_stereo/curve", "LineStrips2D", "stereo matched", stereo_matched),
+    ("/{target}/locate/point_stereo/match", "Points2D", "stereo matched", stereo_matched),
+    ("/{target}/locate/point_stereo/right_window", "DepthImage", "stereo matched", stereo_matched),
+    ("/{target}/locate/triangulate/position", "Points3D", "triangulated", triangulated),
+    ("/{target}/locate/triangulate/covariance", "Ellipsoids3D", "triangulated", triangulated),
+    ("/{target}/locate/left_covariance", "LineStrips2D", "designated or matched", |t| t.locate.as_ref().is_some_and(|l| l.left_pixel.is_some())),
+    ("/{target}/judge/state", "StateChange", "always", |_| true),
+    ("/{target}/judge/verdict", "TextLog", "always", |_| true),
+    ("/{target}/update/position", "Points3D", "always", |_| true),
+    ("/truth/{target}/left", "LineStrips2D", "the truth is visible", |t| t.truth.as_ref().is_some_and(|t| t.left_pixel.is_some())),
+    ("/truth/{target}/position", "Points3D", "the truth is known", |t| t.truth.is_some()),
+];
+
+fn predicted_left(trace: &StepTrace) -> bool {
+    trace.predict.is_some() && trace.point_mast.as_ref().is_some_and(|p| p.predicted_left.is_some())
+}
+
+fn predicted_right(trace: &StepTrace) -> bool {
+    trace.predict.is_some() && trace.point_mast.as_ref().is_some_and(|p| p.predicted_right.is_some())
+}
+
+fn prepared(trace: &StepTrace) -> bool {
+    trace.template().is_some_and(|e| e.scale_roll.is_some())
+}
+
+fn matched(trace: &StepTrace) -> bool {
+    trace.template().is_some_and(|e| e.match_template.is_some())
+}
+
+fn second_peak(trace: &StepTrace) -> bool {
+    trace.template().and_then(|e| e.match_template.as_ref()).is_some_and(|m| m.second_peak.is_some())
+}
+
+fn stereo_matched(trace: &StepTrace) -> bool {
+    trace.template().is_some_and(|e| e.point_stereo.is_some())
+}
+
+fn triangulated(trace: &StepTrace) -> bool {
+    trace.template().is_some_and(|e| e.triangulate.is_some())
+}

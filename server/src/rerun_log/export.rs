@@ -1,0 +1,132 @@
+//! A recording as an `.rrd` file: written beside its place, then moved there whole.
+
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use rerun::external::re_build_info::CrateVersion;
+use rerun::external::re_log_encoding::{Encoder, EncodingOptions};
+use rerun::log::ChunkBatcherConfig;
+use rerun::sink::MemorySinkStorage;
+use sightline_core::error::{Error, Result};
+use sightline_core::pipeline::Stops;
+
+use super::recorder::{Recorder, RunLog, builder};
+
+/// How many steps are gathered before they are written: rows of one entity then share a chunk.
+const STEPS_AT_ONCE: usize = 16;
+
+/// Size at which a chunk of one entity is closed, bytes.
+const CHUNK_BYTES: u64 = 4 << 20;
+
+/// Writes `runs` with their layout to `path`, a new file.
+///
+/// `progress` is told the steps done and the steps in all; when it breaks, nothing is left behind.
+///
+/// # Errors
+/// [`Error::Cancelled`] when `progress` breaks; [`Error::Write`] when the file exists or cannot be written.
+pub fn export(
+    path: &Path,
+    traverse_name: &str,
+    stops: &dyn Stops,
+    runs: &[RunLog<'_>],
+    progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
+) -> Result<()> {
+    if path.exists() {
+        return Err(failed(path, "the file exists already; choose another name"));
+    }
+    let partial = Partial::beside(path);
+    write(&partial.path, traverse_name, stops, runs, progress)?;
+    std::fs::rename(&partial.path, path).map_err(|source| Error::Write { path: path.to_owned(), source })
+}
+
+fn write(
+    path: &Path,
+    traverse_name: &str,
+    stops: &dyn Stops,
+    runs: &[RunLog<'_>],
+    progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
+) -> Result<()> {
+    let wrong = |error: &dyn std::fmt::Display| failed(path, &error.to_string());
+    let gather = ChunkBatcherConfig { flush_tick: Duration::MAX, flush_num_bytes: CHUNK_BYTES, ..Default::default() };
+    let (stream, gathered) =
+        builder(traverse_name).batcher_config(gather).memory().map_err(|error| wrong(&error))?;
+    let mut recorder = Recorder::new(stream, false);
+    let mut file = RrdFile::create(path)?;
+    recorder.log_runs(runs).and_then(|()| recorder.log_traverse(traverse_name, stops)).map_err(|e| wrong(&e))?;
+    let all: BTreeSet<usize> = runs.iter().flat_map(|run| run.steps).map(|trace| trace.step).collect();
+    for (done, step) in all.iter().enumerate() {
+        if progress(done, all.len()).is_break() {
+            return Err(Error::Cancelled);
+        }
+        for run in runs {
+            for trace in run.steps.iter().filter(|trace| trace.step == *step) {
+                recorder.log_step(run, stops, trace).map_err(|error| wrong(&error))?;
+            }
+        }
+        if done % STEPS_AT_ONCE == STEPS_AT_ONCE - 1 {
+            file.append(&gathered)?;
+        }
+    }
+    file.append(&gathered)?;
+    file.finish()?;
+    // Everything is on disk: a break now would come too late, so its answer does not matter.
+    let _ = progress(all.len(), all.len());
+    Ok(())
+}
+
+/// An `.rrd` file in work. Rerun's own file sink reports a full disk only to its log, so we write ourselves.
+struct RrdFile<'a> {
+    path: &'a Path,
+    encoder: Encoder<BufWriter<File>>,
+}
+
+impl<'a> RrdFile<'a> {
+    fn create(path: &'a Path) -> Result<Self> {
+        let file = File::create_new(path).map_err(|source| Error::Write { path: path.to_owned(), source })?;
+        let options = EncodingOptions::PROTOBUF_COMPRESSED;
+        let encoder = Encoder::new_eager(CrateVersion::LOCAL, options, BufWriter::new(file));
+        Ok(Self { path, encoder: encoder.map_err(|error| failed(path, &error.to_string()))? })
+    }
+
+    fn append(&mut self, gathered: &MemorySinkStorage) -> Result<()> {
+        for message in gathered.take() {
+            self.encoder.append(&message).map_err(|error| failed(self.path, &error.to_string()))?;
+        }
+        Ok(())
+    }
+
+    fn finish(mut self) -> Result<()> {
+        self.encoder.finish().map_err(|error| failed(self.path, &error.to_string()))?;
+        let mut file = self.encoder.into_inner().map_err(|error| failed(self.path, &error.to_string()))?;
+        file.flush()
+            .and_then(|()| file.get_ref().sync_all())
+            .map_err(|source| Error::Write { path: self.path.to_owned(), source })
+    }
+}
+
+/// The file in work, which is removed unless it was moved away.
+struct Partial {
+    path: PathBuf,
+}
+
+impl Partial {
+    fn beside(path: &Path) -> Self {
+        let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        Self { path: path.with_file_name(format!(".{name}.{}.partial", std::process::id())) }
+    }
+}
+
+impl Drop for Partial {
+    fn drop(&mut self) {
+        // After the move there is nothing to remove, and otherwise there is nobody left to tell.
+        let _ = std::fs::remove_file(&self.path);
+    }
+}
+
+fn failed(path: &Path, problem: &str) -> Error {
+    Error::Write { path: path.to_owned(), source: std::io::Error::other(problem.to_owned()) }
+}

@@ -1,0 +1,127 @@
+//! The map: what is known of the rover and the target in the site frame.
+//!
+//! Everything is placed by the *estimated* pose of the stop, the truth of the target included: its true
+//! position in the rover frame is carried to the site frame by the same pose as the estimate, so that the gap
+//! between the two is `err_m` and the drift of the site frame stays out of it.
+
+use nalgebra::Matrix3;
+use rerun::{Color, Ellipsoids3D, LineStrips3D, Radius, RecordingStream, TransformAxes3D, ViewCoordinates};
+use sightline_core::camera::Camera;
+use sightline_core::frames::{Pixel, Point3};
+use sightline_core::pipeline::Stops;
+
+use super::Logged;
+use super::border::{dot_3d, ellipsoids, point_3d, transform};
+use super::palette::{MEASUREMENT, PREDICTION, ROVER, Rgb, TRUTH, color, faint, of_state};
+use super::step::Step;
+
+/// Length of the drawn camera pyramids, m.
+const FRUSTUM_M: f64 = 0.8;
+
+/// Length of the drawn axes of the rover, m.
+const AXES_M: f32 = 0.5;
+
+/// Points along each edge of an image, so that a fisheye's pyramid has its curved base.
+const EDGE_POINTS: u32 = 8;
+
+/// The axes of the site frame: x north (forward), y east (right), z down.
+pub(super) fn log_site_axes(stream: &RecordingStream) -> Logged {
+    stream.log_static("/", &ViewCoordinates::FRD())
+}
+
+/// The way driven, by the estimated poses of all stops.
+pub(super) fn log_path(stream: &RecordingStream, stops: &dyn Stops) -> Logged {
+    let strip = (0..stops.stop_count()).map(|step| point_3d(&stops.site_from_rover(step).translation.vector.into()));
+    let line = LineStrips3D::new([strip.collect::<Vec<_>>()])
+        .with_colors([color(ROVER)])
+        .with_radii([Radius::new_ui_points(1.0)]);
+    stream.log_static("/rover/path", &line)
+}
+
+/// The rover's estimated pose; its axes are drawn the same at every stop.
+pub(super) fn log_pose(stream: &RecordingStream, stops: &dyn Stops, step: usize) -> Logged {
+    if step == 0 {
+        stream.log_static("/rover/pose", &TransformAxes3D::new(AXES_M))?;
+    }
+    stream.log("/rover/pose", &transform(&stops.site_from_rover(step)))
+}
+
+/// The left camera's pyramid, in the rover frame.
+pub(super) fn log_left_frustum(stream: &RecordingStream, stops: &dyn Stops, step: usize) -> Logged {
+    stream.log("/rover/pose/left", &frustum(stops.cameras(step).0, PREDICTION))
+}
+
+/// The right camera's pyramid, in the rover frame.
+pub(super) fn log_right_frustum(stream: &RecordingStream, stops: &dyn Stops, step: usize) -> Logged {
+    stream.log("/rover/pose/right", &frustum(stops.cameras(step).1, ROVER))
+}
+
+/// The predicted position.
+pub(super) fn log_predicted_position(step: &Step<'_>) -> Logged {
+    let point = step.trace.predict.as_ref().map(|p| dot_3d(p.position_in_site, PREDICTION, "predicted"));
+    step.log("/{target}/predict/position", point)
+}
+
+/// The covariance of the prediction.
+pub(super) fn log_predicted_covariance(step: &Step<'_>) -> Logged {
+    let predict = step.trace.predict.as_ref();
+    let found = predict.and_then(|p| spread(step, &p.position_in_rover, &p.covariance_in_rover, PREDICTION));
+    step.log("/{target}/predict/covariance", found)
+}
+
+/// The position from both pixels, accepted or not.
+pub(super) fn log_triangulated_position(step: &Step<'_>) -> Logged {
+    let found = step.template().and_then(|e| e.triangulate.as_ref());
+    let point = found.map(|t| dot_3d(step.in_site(&t.position_in_rover), MEASUREMENT, "triangulated"));
+    step.log("/{target}/locate/triangulate/position", point)
+}
+
+/// The covariance of that position.
+pub(super) fn log_triangulated_covariance(step: &Step<'_>) -> Logged {
+    let found = step.template().and_then(|e| e.triangulate.as_ref());
+    let found = found.and_then(|t| spread(step, &t.position_in_rover, &t.covariance_in_rover, MEASUREMENT));
+    step.log("/{target}/locate/triangulate/covariance", found)
+}
+
+/// The target as the step leaves it, in the colour of its state.
+pub(super) fn log_position(step: &Step<'_>) -> Logged {
+    let updated = &step.trace.update;
+    let position = step.in_site(&updated.target.position_in_rover);
+    let point = dot_3d(position, of_state(updated.state), step.label).with_show_labels(true);
+    step.log("/{target}/update/position", Some(point))
+}
+
+/// The true position of the target.
+pub(super) fn log_true_position(step: &Step<'_>) -> Logged {
+    let truth = step.trace.truth.as_ref();
+    let point = truth.map(|t| dot_3d(step.in_site(&t.position_in_rover), TRUTH, "truth"));
+    step.log("/truth/{target}/position", point)
+}
+
+/// The ellipsoids of a covariance in the rover frame, turned into the site frame.
+fn spread(step: &Step<'_>, point_in_rover: &Point3, covariance: &Matrix3<f64>, rgb: Rgb) -> Option<Ellipsoids3D> {
+    let turn = step.site_from_rover.rotation.to_rotation_matrix();
+    let covariance_in_site = turn.matrix() * covariance * turn.matrix().transpose();
+    let colors: [Color; 2] = [color(rgb), faint(rgb, 110)];
+    ellipsoids(&step.in_site(point_in_rover), &covariance_in_site, colors)
+}
+
+/// The pyramid that an image's border sees, by the camera's true rays and not by a pinhole.
+fn frustum(camera: &Camera, rgb: Rgb) -> LineStrips3D {
+    let (w, h) = (f64::from(camera.width()), f64::from(camera.height()));
+    let corners = [(0.0, 0.0), (w, 0.0), (w, h), (0.0, h)];
+    let reach = |(x, y): (f64, f64)| {
+        camera.ray(Pixel::new(x - 0.5, y - 0.5)).map(|ray| [point_3d(&ray.origin), point_3d(&ray.at(FRUSTUM_M))])
+    };
+    let edges = (0..corners.len()).flat_map(|i| {
+        let (a, b) = (corners[i], corners[(i + 1) % corners.len()]);
+        (0..EDGE_POINTS).map(move |k| {
+            let t = f64::from(k) / f64::from(EDGE_POINTS);
+            (a.0 + (b.0 - a.0) * t, a.1 + (b.1 - a.1) * t)
+        })
+    });
+    let mut base: Vec<[f32; 3]> = edges.filter_map(reach).map(|[_, end]| end).collect();
+    base.extend(base.first().copied());
+    let sides = corners.into_iter().filter_map(reach).map(Vec::from);
+    LineStrips3D::new(sides.chain([base])).with_colors([color(rgb)]).with_radii([Radius::new_ui_points(0.75)])
+}

@@ -1,0 +1,129 @@
+//! The Rerun side of the debugger: runs as an `.rrd` file ([`export`]) or as a live stream ([`LiveStream`]).
+//!
+//! Every entity has one `log_*` function, called in the order of the stages from [`log_step`]; the numbers are
+//! one table in `scores`. `{target}` is the run's name: `target_1` for the first run of the first target,
+//! `target_1_run_1` for the first run that was forked from it.
+//!
+//! Timelines: `step`, the stop from 0, and `time`, the time since the first stop. Rows carry no clock time.
+//!
+//! **Pixels.** Ours has (0, 0) at the centre of the first pixel, rerun's 2-D space at that pixel's top left
+//! corner: half a pixel is added in `border` and nowhere else. **Frames.** Space is the site frame (x north, y
+//! east, z down), declared once at the root; what lies below `/rover/pose` is in the rover frame.
+//!
+//! **Every step has a row.** Where a stage was not reached, its entities get a `Clear`, because a viewer would
+//! go on showing the last step's; a number that is missing is a gap of its line.
+//!
+//! | path | archetype | when |
+//! |---|---|---|
+//! TABLE
+
+mod blueprint;
+mod border;
+mod entities;
+mod export;
+mod images;
+mod live;
+mod map;
+mod page;
+mod palette;
+mod recorder;
+mod scores;
+mod states;
+mod step;
+mod surface;
+mod templates;
+
+use rerun::{RecordingStream, RecordingStreamResult};
+use sightline_core::pipeline::Stops;
+
+pub use entities::{EntityDoc, Rows, documented_entities, entities_of, shared_entities};
+pub use export::export;
+pub use live::{HISTORY_BYTES, LiveStream};
+pub use recorder::RunLog;
+
+use scores::SCORES;
+use step::Step;
+
+/// Whether a row could be handed to rerun.
+type Logged = RecordingStreamResult<()>;
+
+/// The name of a run in entity paths; both numbers count from 0.
+pub fn root(target: usize, run: usize) -> String {
+    match run {
+        0 => format!("target_{}", target + 1),
+        run => format!("target_{}_run_{run}", target + 1),
+    }
+}
+
+/// Logs what a stop is, whichever runs come by.
+fn log_stop(stream: &RecordingStream, stops: &dyn Stops, step: usize) -> Logged {
+    map::log_pose(stream, stops, step)?;
+    map::log_left_frustum(stream, stops, step)?;
+    map::log_right_frustum(stream, stops, step)
+}
+
+/// Logs one step of a run, stage by stage; the images only where it is the first run at this stop.
+fn log_step(step: &Step<'_>, is_first_here: bool) -> Logged {
+    map::log_predicted_position(step)?;
+    map::log_predicted_covariance(step)?;
+    images::log_predicted_left(step)?;
+    images::log_predicted_right(step)?;
+
+    images::log_gate(step)?;
+
+    if is_first_here {
+        images::log_left_image(step)?;
+        images::log_right_image(step)?;
+    }
+    images::log_subframe(step)?;
+
+    images::log_footprint(step)?;
+    templates::log_reference(step)?;
+    templates::log_scaled(step)?;
+    templates::log_rolled(step)?;
+    images::log_search_window(step)?;
+    surface::log_surface(step)?;
+    surface::log_surface_peak(step)?;
+    surface::log_surface_second_peak(step)?;
+    images::log_peak(step)?;
+    images::log_second_peak(step)?;
+    images::log_matched_window(step)?;
+    templates::log_matched(step)?;
+    templates::log_difference(step)?;
+    images::log_curve(step)?;
+    images::log_right_match(step)?;
+    templates::log_right_window(step)?;
+    map::log_triangulated_position(step)?;
+    map::log_triangulated_covariance(step)?;
+    images::log_left_covariance(step)?;
+
+    states::log_state(step)?;
+    states::log_verdict(step)?;
+
+    map::log_position(step)?;
+
+    images::log_true_left(step)?;
+    map::log_true_position(step)?;
+
+    SCORES.iter().try_for_each(|score| scores::log_score(step, score))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_of_this_file_lists_every_entity() {
+        let own = entities_of("{target}");
+        let rows: Vec<_> = shared_entities().iter().chain(&own).map(EntityDoc::table_row).collect();
+        let header: Vec<_> =
+            include_str!("mod.rs").lines().filter_map(|line| line.strip_prefix("//! ")).filter(|l| l.starts_with("| `")).collect();
+        assert_eq!(header, rows, "put these rows in the header:\n//! {}", rows.join("\n//! "));
+    }
+
+    #[test]
+    fn runs_are_told_apart_by_their_names() {
+        assert_eq!(root(0, 0), "target_1");
+        assert_eq!(root(2, 1), "target_3_run_1");
+    }
+}

@@ -1,0 +1,117 @@
+//! Which rows are still to be logged: a recording takes every step of every run once, in whatever order they
+//! come, and the images of a stop once for all runs.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use rerun::{RecordingStream, RecordingStreamBuilder, TextDocument};
+use sightline_core::image::GrayImage;
+use sightline_core::pipeline::Stops;
+use sightline_core::trace::StepTrace;
+
+use super::step::Step;
+use super::{Logged, blueprint, log_step, log_stop, map, root, scores, states};
+
+/// One run: which it is, and its steps.
+#[derive(Clone, Copy, Debug)]
+pub struct RunLog<'a> {
+    /// The target's number, from 0.
+    pub target: usize,
+    /// The run's number within the target, from 0.
+    pub run: usize,
+    /// What the person calls it.
+    pub label: &'a str,
+    /// Its steps so far.
+    pub steps: &'a [Arc<StepTrace>],
+}
+
+/// A recording that is being written.
+pub(super) struct Recorder {
+    stream: RecordingStream,
+    /// Whether a viewer should follow the newest step.
+    live: bool,
+    has_traverse: bool,
+    /// Stops whose images are in the recording.
+    captured: BTreeSet<usize>,
+    /// The runs by their names in paths, with the steps that are in the recording.
+    runs: BTreeMap<String, BTreeSet<usize>>,
+}
+
+/// What every recording of ours begins with. The environment cannot switch it off: a person asked for it.
+pub(super) fn builder(name: &str) -> RecordingStreamBuilder {
+    RecordingStreamBuilder::new("sightline").recording_name(name).enabled(true)
+}
+
+impl Recorder {
+    /// A recording into `stream`; its rows carry no clock time, only the step and the traverse's own time.
+    pub(super) fn new(stream: RecordingStream, live: bool) -> Self {
+        stream.set_log_time_enabled(false);
+        Self { stream, live, has_traverse: false, captured: BTreeSet::new(), runs: BTreeMap::new() }
+    }
+
+    /// Logs what does not depend on any run, the first time it is called.
+    pub(super) fn log_traverse(&mut self, name: &str, stops: &dyn Stops) -> Logged {
+        if std::mem::replace(&mut self.has_traverse, true) {
+            return Ok(());
+        }
+        self.stream.send_recording_name(name)?;
+        let about = format!("# {name}\n{} stops. Frames: site x north, y east, z down.", stops.stop_count());
+        self.stream.log_static("/traverse", &TextDocument::from_markdown(about))?;
+        map::log_site_axes(&self.stream)?;
+        map::log_path(&self.stream, stops)?;
+        (0..stops.stop_count()).try_for_each(|step| {
+            self.set_time(step, stops);
+            log_stop(&self.stream, stops, step)
+        })
+    }
+
+    /// Makes runs known, so that a viewer lays them out; those already known cost nothing.
+    pub(super) fn log_runs(&mut self, runs: &[RunLog<'_>]) -> Logged {
+        let known = self.runs.len();
+        for run in runs {
+            let root = root(run.target, run.run);
+            let Some(first) = run.steps.first().filter(|_| !self.runs.contains_key(&root)) else { continue };
+            states::log_run(&self.stream, &root, run.label, first)?;
+            states::log_styles(&self.stream, &root)?;
+            scores::log_styles(&self.stream, &root)?;
+            self.runs.insert(root, BTreeSet::new());
+        }
+        if self.runs.len() == known {
+            return Ok(());
+        }
+        let roots: Vec<_> = self.runs.keys().cloned().collect();
+        blueprint::blueprint(&roots, self.live).send(&self.stream, rerun::blueprint::BlueprintActivation::default())
+    }
+
+    /// Logs one step of a run that was made known, unless it is in the recording already.
+    pub(super) fn log_step(&mut self, run: &RunLog<'_>, stops: &dyn Stops, trace: &StepTrace) -> Logged {
+        let root = root(run.target, run.run);
+        if !self.runs.get_mut(&root).is_some_and(|steps| steps.insert(trace.step)) {
+            return Ok(());
+        }
+        self.set_time(trace.step, stops);
+        let is_first_here = self.captured.insert(trace.step);
+        let step = Step {
+            stream: &self.stream,
+            root: &root,
+            label: run.label,
+            trace,
+            images: if is_first_here { images(trace, stops) } else { None },
+            site_from_rover: stops.site_from_rover(trace.step),
+        };
+        log_step(&step, is_first_here)
+    }
+
+    fn set_time(&self, step: usize, stops: &dyn Stops) {
+        self.stream.set_time_sequence("step", step as i64);
+        self.stream.set_duration_secs("time", stops.time_s(step));
+    }
+}
+
+/// The images of a step. Those of a run that was read back from disk are not in the trace and come from the
+/// traverse.
+fn images(trace: &StepTrace, stops: &dyn Stops) -> Option<[Arc<GrayImage>; 2]> {
+    let kept = trace.capture.as_ref()?.pair.clone();
+    let pair = if kept.left.width() > 0 { kept } else { stops.capture(trace.step).ok()? };
+    Some([pair.left, pair.right])
+}

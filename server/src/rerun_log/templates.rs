@@ -1,0 +1,78 @@
+//! The patches of `locate`: how the template was prepared and what it was compared with.
+//!
+//! The four patches that must look alike share their limits, the darkest and the brightest value among them.
+//! The difference is in standard deviations and has fixed, symmetric limits.
+
+use rerun::components::Colormap;
+use rerun::{ColorModel, DepthImage, Image};
+use sightline_core::image::Patch;
+
+use super::Logged;
+use super::border::mapped;
+use super::palette::of_difference;
+use super::step::Step;
+
+/// Limit of the difference's colours, standard deviations of a patch.
+const DIFFERENCE_LIMIT: f32 = 3.0;
+
+/// The template as it was taken.
+pub(super) fn log_reference(step: &Step<'_>) -> Logged {
+    let patch = step.template().and_then(|e| e.scale_roll.as_ref()).map(|s| &s.reference);
+    step.log("/{target}/locate/scale_roll/reference", patch.and_then(|p| grey(p, shared_limits(step))))
+}
+
+/// The template, scaled.
+pub(super) fn log_scaled(step: &Step<'_>) -> Logged {
+    let patch = step.template().and_then(|e| e.scale_roll.as_ref()).map(|s| &s.scaled);
+    step.log("/{target}/locate/scale_roll/scaled", patch.and_then(|p| grey(p, shared_limits(step))))
+}
+
+/// The template, scaled and rolled: what was matched.
+pub(super) fn log_rolled(step: &Step<'_>) -> Logged {
+    let patch = step.template().and_then(|e| e.scale_roll.as_ref()).map(|s| &s.rolled);
+    step.log("/{target}/locate/scale_roll/rolled", patch.and_then(|p| grey(p, shared_limits(step))))
+}
+
+/// The left image at the match.
+pub(super) fn log_matched(step: &Step<'_>) -> Logged {
+    let patch = step.matched().map(|m| &m.matched);
+    step.log("/{target}/locate/match_template/matched", patch.and_then(|p| grey(p, shared_limits(step))))
+}
+
+/// Matched minus rolled, both normalised.
+pub(super) fn log_difference(step: &Step<'_>) -> Logged {
+    let patch = step.matched().map(|m| &m.difference);
+    step.log("/{target}/locate/match_template/difference", patch.map(signed))
+}
+
+/// The right image at the stereo match, as the left sees it.
+pub(super) fn log_right_window(step: &Step<'_>) -> Logged {
+    let patch = step.template().and_then(|e| e.point_stereo.as_ref()).map(|s| &s.right_window);
+    step.log("/{target}/locate/point_stereo/right_window", patch.and_then(|p| grey(p, limits([p]))))
+}
+
+fn shared_limits(step: &Step<'_>) -> [f64; 2] {
+    let prepared = step.template().and_then(|e| e.scale_roll.as_ref());
+    let prepared = prepared.into_iter().flat_map(|s| [&s.reference, &s.scaled, &s.rolled]);
+    limits(prepared.chain(step.matched().map(|m| &m.matched)))
+}
+
+/// The least and the greatest valid value; never equal, so that a flat patch still has a colour.
+fn limits<'a>(patches: impl IntoIterator<Item = &'a Patch>) -> [f64; 2] {
+    let values = patches.into_iter().flat_map(|p| p.as_raw()).filter(|v| v.is_finite());
+    let [low, high] = values.fold([f32::MAX, f32::MIN], |[low, high], &v| [low.min(v), high.max(v)]);
+    if low < high { [f64::from(low), f64::from(high)] } else { [0.0, 1.0] }
+}
+
+fn grey(patch: &Patch, limits: [f64; 2]) -> Option<DepthImage> {
+    mapped(patch.dimensions().into(), patch.as_raw(), limits, Colormap::Grayscale)
+}
+
+/// Blue below, white at zero, red above; an invalid pixel is transparent.
+fn signed(patch: &Patch) -> Image {
+    let rgba = patch.as_raw().iter().flat_map(|v| {
+        let [r, g, b] = of_difference(v / DIFFERENCE_LIMIT);
+        if v.is_finite() { [r, g, b, 255] } else { [0; 4] }
+    });
+    Image::from_elements(&rgba.collect::<Vec<u8>>(), patch.dimensions().into(), ColorModel::RGBA)
+}

@@ -1,0 +1,259 @@
+//! What the handlers share: the open traverses, the sessions, and the ways to compute, to save and to tell.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+
+use sha2::{Digest, Sha256};
+use sightline_core::error::{Error, Result};
+use sightline_core::session::Session;
+use sightline_core::session::wire::Event;
+use sightline_core::traverse::Traverse;
+use tokio::sync::broadcast;
+
+use crate::guard::Hosts;
+use crate::jobs::{Jobs, Lane, lock};
+use crate::live::LiveSession;
+use crate::problem::{ApiError, ApiResult};
+use crate::rendering::{Ahead, OpenTraverse};
+use crate::rerun_log::LiveStream;
+use crate::runner;
+use crate::store::{self, Store};
+
+/// Events that a slow page may be behind before it is told to read everything again.
+const EVENT_BACKLOG: usize = 256;
+/// Runs that are computed at a time; each uses all processors where it can.
+const RUNS_AT_A_TIME: usize = 2;
+/// Runs that may wait.
+const RUNS_WAITING: usize = 256;
+/// How many sessions there may be.
+const SESSION_LIMIT: usize = 1000;
+
+/// What the handlers share.
+#[derive(Clone)]
+pub struct AppState(Arc<Inner>);
+
+struct Inner {
+    hosts: Hosts,
+    traverses: Vec<Arc<OpenTraverse>>,
+    sessions: Mutex<Sessions>,
+    events: broadcast::Sender<Event>,
+    jobs: Jobs,
+    ahead: Arc<Ahead>,
+    store: Store,
+    notices: Vec<String>,
+    designations: Lane,
+    pictures: Lane,
+    exports: Lane,
+    streams: Mutex<BTreeMap<String, Arc<LiveStream>>>,
+}
+
+#[derive(Default)]
+struct Sessions {
+    by_number: BTreeMap<u64, Arc<LiveSession>>,
+    last_number: u64,
+}
+
+impl Drop for Inner {
+    fn drop(&mut self) {
+        self.ahead.close();
+    }
+}
+
+impl AppState {
+    /// Opens the state: sessions are kept in `folder` and read back from it.
+    ///
+    /// # Errors
+    /// A folder that cannot be read or made, or a system without threads.
+    pub fn new(traverses: Vec<Traverse>, folder: &Path, hosts: Hosts) -> Result<Self> {
+        let no_threads = |error: std::io::Error| Error::Request(format!("cannot start a thread: {error}"));
+        let events = broadcast::Sender::new(EVENT_BACKLOG);
+        let mut open: Vec<Arc<OpenTraverse>> = Vec::new();
+        for traverse in traverses {
+            let id = name_of(&traverse)?;
+            // The same traverse given twice is one.
+            if open.iter().all(|other| other.id != id) {
+                open.push(Arc::new(OpenTraverse::new(id, traverse, events.clone())));
+            }
+        }
+        let store = Store::open(folder)?;
+        let (sessions, notices) = read_back(&store, &open)?;
+        for notice in &notices {
+            tracing::warn!("{}", crate::plain(notice));
+        }
+        let ahead = Ahead::start().map_err(no_threads)?;
+        if let Some(first) = open.first() {
+            ahead.look_at(first, 0);
+        }
+        Ok(Self(Arc::new(Inner {
+            hosts,
+            traverses: open,
+            sessions: Mutex::new(sessions),
+            events,
+            jobs: Jobs::start(RUNS_AT_A_TIME, RUNS_WAITING).map_err(no_threads)?,
+            ahead,
+            store,
+            notices,
+            designations: Lane::new(2, 16),
+            pictures: Lane::new(8, 256),
+            exports: Lane::new(1, 8),
+            streams: Mutex::default(),
+        })))
+    }
+
+    /// The hosts under which the server may be addressed.
+    pub fn hosts(&self) -> &Hosts {
+        &self.0.hosts
+    }
+
+    /// What a person should know about this start of the server, one sentence each.
+    pub fn notices(&self) -> &[String] {
+        &self.0.notices
+    }
+
+    /// The open traverses.
+    pub fn traverses(&self) -> &[Arc<OpenTraverse>] {
+        &self.0.traverses
+    }
+
+    /// The traverse of that name.
+    ///
+    /// # Errors
+    /// A problem when there is none.
+    pub fn traverse(&self, id: &str) -> ApiResult<Arc<OpenTraverse>> {
+        let found = self.0.traverses.iter().find(|open| open.id == id).cloned();
+        found.ok_or_else(|| ApiError::not_found("There is no such traverse."))
+    }
+
+    /// The sessions, in the order in which they were begun.
+    pub fn sessions(&self) -> Vec<Arc<LiveSession>> {
+        lock(&self.0.sessions).by_number.values().cloned().collect()
+    }
+
+    /// The session of that name; one that sleeps is woken, and its runs computed again.
+    ///
+    /// # Errors
+    /// A problem when there is none.
+    pub fn session(&self, id: &str) -> ApiResult<Arc<LiveSession>> {
+        let number = store::number_of(id);
+        let found = number.and_then(|number| lock(&self.0.sessions).by_number.get(&number).cloned());
+        let live = found.ok_or_else(|| ApiError::not_found("There is no such session."))?;
+        if live.wake() {
+            runner::restore(self, &live)?;
+        }
+        Ok(live)
+    }
+
+    /// Begins a session on a traverse.
+    ///
+    /// # Errors
+    /// A problem when there are too many already.
+    pub fn begin_session(&self, traverse: Arc<OpenTraverse>) -> ApiResult<Arc<LiveSession>> {
+        let mut sessions = lock(&self.0.sessions);
+        if sessions.by_number.len() >= SESSION_LIMIT {
+            let detail = format!("There are {SESSION_LIMIT} sessions already.");
+            return Err(ApiError::conflict(detail).hint("Remove files of old ones from the data folder."));
+        }
+        sessions.last_number += 1;
+        let number = sessions.last_number;
+        let session = Session::new(store::id_of(number), &traverse.id, traverse.traverse.stop_count());
+        let live = Arc::new(LiveSession::new(session, traverse, true));
+        sessions.by_number.insert(number, Arc::clone(&live));
+        Ok(live)
+    }
+
+    /// Saves a session that was changed, and tells every page.
+    ///
+    /// # Errors
+    /// A problem when it cannot be written.
+    pub fn changed(&self, live: &LiveSession) -> ApiResult<()> {
+        self.tell(Event::SessionChanged { session: live.id.clone() });
+        Ok(live.save(&self.0.store)?)
+    }
+
+    /// Renders the stops of `traverse` from `from` on before all others.
+    pub fn look_at(&self, traverse: &Arc<OpenTraverse>, from: usize) {
+        self.0.ahead.look_at(traverse, from);
+    }
+
+    /// Tells every page.
+    pub fn tell(&self, event: Event) {
+        // Nobody may be listening.
+        let _ = self.0.events.send(event);
+    }
+
+    /// Where events are told.
+    pub fn events(&self) -> &broadcast::Sender<Event> {
+        &self.0.events
+    }
+
+    /// What a page must hear that may have missed anything.
+    pub fn everything_may_have_changed(&self) -> Vec<Event> {
+        let sessions = self.sessions().into_iter().map(|live| Event::SessionChanged { session: live.id.clone() });
+        let traverses = self.traverses().iter().filter(|open| open.traverse.index().scenario.is_some());
+        sessions.chain(traverses.map(|open| open.progress(None))).collect()
+    }
+
+    /// Where runs are computed.
+    pub fn jobs(&self) -> &Jobs {
+        &self.0.jobs
+    }
+
+    /// Where designations are computed.
+    pub fn designations(&self) -> &Lane {
+        &self.0.designations
+    }
+
+    /// Where images are read.
+    pub fn pictures(&self) -> &Lane {
+        &self.0.pictures
+    }
+
+    /// Where recordings are written.
+    pub fn exports(&self) -> &Lane {
+        &self.0.exports
+    }
+
+    /// The live Rerun streams, by session.
+    pub fn streams(&self) -> &Mutex<BTreeMap<String, Arc<LiveStream>>> {
+        &self.0.streams
+    }
+}
+
+/// The name of a traverse in paths: readable, and another one when its index is another.
+fn name_of(traverse: &Traverse) -> Result<String> {
+    let index = serde_json::to_vec(traverse.index()).map_err(|error| Error::Request(error.to_string()))?;
+    Ok(format!("{}-{}", slug(&traverse.index().name), &hash(&index)[..6]))
+}
+
+/// A name that can be part of a path or a file name: small letters, digits and hyphens.
+pub fn slug(name: &str) -> String {
+    let plain = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { ' ' };
+    let words: String = name.chars().map(plain).take(60).collect();
+    let joined = words.split_whitespace().collect::<Vec<_>>().join("-");
+    if joined.is_empty() { "traverse".to_owned() } else { joined }
+}
+
+/// The SHA-256 of `bytes`, as hexadecimal digits.
+pub fn hash(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// The sessions on disk whose traverses are open; the others stay where they are.
+fn read_back(store: &Store, traverses: &[Arc<OpenTraverse>]) -> Result<(Sessions, Vec<String>)> {
+    let found = store.load()?;
+    let mut sessions = Sessions { last_number: found.last_number, ..Sessions::default() };
+    let mut notices = found.messages;
+    for saved in found.sessions {
+        let traverse = traverses.iter().find(|open| open.id == saved.traverse);
+        let (Some(traverse), Some(number)) = (traverse, store::number_of(&saved.id)) else { continue };
+        match Session::restored(&saved, traverse.traverse.stop_count()) {
+            Ok(session) => {
+                let live = LiveSession::new(session, Arc::clone(traverse), false);
+                sessions.by_number.insert(number, Arc::new(live));
+            }
+            Err(error) => notices.push(store.set_aside(&saved.id, &error.to_string())),
+        }
+    }
+    Ok((sessions, notices))
+}

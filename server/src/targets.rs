@@ -1,0 +1,94 @@
+//! `sessions/{session}/targets`: designating targets and removing them.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::{StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use sightline_core::session::view::SessionView;
+use sightline_core::session::wire::{Designated, NewTarget};
+use sightline_core::settings::Settings;
+use sightline_core::target::Designation;
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+
+use crate::extract::{Body, Path};
+use crate::jobs::blocking;
+use crate::live::{LiveSession, TARGET_LIMIT};
+use crate::problem::{ApiError, ApiResult};
+use crate::runner;
+use crate::state::AppState;
+
+/// How many characters a label may have.
+const LABEL_LIMIT: usize = 100;
+
+/// The routes of this resource.
+pub fn router() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new().routes(routes!(designate)).routes(routes!(remove))
+}
+
+/// Designates a target
+///
+/// The designation is computed before the answer; the steps after it follow in the background.
+#[utoipa::path(post, path = "/sessions/{session}/targets", tag = "targets", params(("session" = String, Path)),
+    request_body = NewTarget, responses((status = 201, body = Designated), ApiError))]
+async fn designate(
+    State(state): State<AppState>,
+    Path(session): Path<String>,
+    Body(new): Body<NewTarget>,
+) -> ApiResult<Response> {
+    let live = state.session(&session)?;
+    if new.label.as_ref().is_some_and(|label| label.chars().count() > LABEL_LIMIT) {
+        return Err(ApiError::invalid("field", format!("label: may have at most {LABEL_LIMIT} characters")));
+    }
+    let settings = Settings::default().with(&new.settings)?;
+    let work_state = state.clone();
+    state.designations().run(move || add(&work_state, &live, new, settings)).await
+}
+
+/// Removes a target; its number is not used again
+#[utoipa::path(delete, path = "/sessions/{session}/targets/{target}", tag = "targets", params(
+    ("session" = String, Path), ("target" = usize, Path)), responses((status = 200, body = SessionView), ApiError))]
+async fn remove(
+    State(state): State<AppState>,
+    Path((session, target)): Path<(String, usize)>,
+) -> ApiResult<Json<SessionView>> {
+    let live = state.session(&session)?;
+    blocking(move || {
+        let removed = live.with(|session| session.remove_target(target));
+        removed.map_err(|error| ApiError::from(error).about_path())?;
+        live.tell_to_end(target, None);
+        state.changed(&live)?;
+        Ok(Json(live.with(|session| session.view())))
+    })
+    .await
+}
+
+fn add(state: &AppState, live: &Arc<LiveSession>, new: NewTarget, settings: Settings) -> ApiResult<Response> {
+    let has_room = |count: usize| {
+        let full = || ApiError::conflict(format!("A session may have at most {TARGET_LIMIT} targets."));
+        (count < TARGET_LIMIT).then_some(()).ok_or_else(full)
+    };
+    has_room(live.with(|session| session.targets.len()))?;
+    let designation = Designation { step: new.step, pixel: new.pixel };
+    let first = Arc::new(runner::designate(&live.traverse, designation, &settings)?);
+    let (target, view) = live.with(|session| {
+        has_room(session.targets.len())?;
+        let target = session.add_target(new.label, settings, first);
+        Ok::<_, ApiError>((target, session.view()))
+    })?;
+    state.look_at(&live.traverse, designation.step);
+    state.changed(live)?;
+    start_or_say(state, live, target, 0);
+    let location = [(header::LOCATION, format!("/api/v1/sessions/{}/targets/{target}", live.id))];
+    Ok((StatusCode::CREATED, location, Json(Designated { target, session: view })).into_response())
+}
+
+/// Continues a run; when too much is waiting, the run says so and can be resumed.
+pub fn start_or_say(state: &AppState, live: &Arc<LiveSession>, target: usize, run: usize) {
+    if let Err(busy) = runner::start(state, live, target, run) {
+        // The target may have been removed meanwhile.
+        let _ = live.with(|session| session.fail(target, run, busy.problem().detail.clone()));
+    }
+}

@@ -1,0 +1,190 @@
+//! `traverses`: what was recorded or is simulated, and its images.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use serde::Deserialize;
+use sightline_core::image::io;
+use sightline_core::session::wire::{StopView, TraverseEntry, TraverseView};
+use utoipa::{IntoParams, ToSchema};
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+
+use crate::extract::{Params, Path};
+use crate::jobs::blocking;
+use crate::problem::{ApiError, ApiResult};
+use crate::rendering::OpenTraverse;
+use crate::state::{AppState, hash};
+
+/// The routes of this resource.
+pub fn router() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new()
+        .routes(routes!(list))
+        .routes(routes!(show))
+        .routes(routes!(image))
+        .routes(routes!(prefetch))
+}
+
+/// How an image is wanted.
+#[derive(Clone, Copy, Debug, Default, Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+struct ImageParams {
+    /// Bits of a pixel: 8 (the default) or 16.
+    #[serde(default)]
+    bits: Option<u8>,
+}
+
+/// Which stops are wanted soon.
+#[derive(Clone, Copy, Debug, Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+struct PrefetchParams {
+    /// The first of them.
+    from: usize,
+}
+
+/// The bytes of a file, for the OpenAPI document.
+#[derive(ToSchema)]
+#[schema(value_type = String, format = Binary)]
+pub struct FileBytes(#[allow(dead_code)] Vec<u8>);
+
+/// The traverses that are open
+#[utoipa::path(get, path = "/traverses", tag = "traverses", responses(
+    (status = 200, body = Vec<TraverseEntry>), ApiError))]
+async fn list(State(state): State<AppState>) -> Json<Vec<TraverseEntry>> {
+    let entry = |open: &Arc<OpenTraverse>| {
+        let index = open.traverse.index();
+        TraverseEntry {
+            id: open.id.clone(),
+            name: index.name.clone(),
+            description: index.description.clone(),
+            simulated: index.scenario.is_some(),
+            stop_count: index.stops.len(),
+        }
+    };
+    Json(state.traverses().iter().map(entry).collect())
+}
+
+/// A traverse with its stops
+#[utoipa::path(get, path = "/traverses/{id}", tag = "traverses", params(("id" = String, Path)), responses(
+    (status = 200, body = TraverseView), ApiError))]
+async fn show(State(state): State<AppState>, Path(id): Path<String>) -> ApiResult<Json<TraverseView>> {
+    let open = state.traverse(&id)?;
+    blocking(move || Ok(Json(view(&open)))).await
+}
+
+/// An image of a stop as PNG
+///
+/// An image of a simulated stop is rendered when it is first asked for, which takes some seconds.
+#[utoipa::path(get, path = "/traverses/{id}/steps/{step}/images/{file}", tag = "traverses", params(
+    ("id" = String, Path), ("step" = usize, Path), ("file" = String, Path, description = "left.png or right.png"),
+    ImageParams), responses(
+    (status = 200, content_type = "image/png", body = FileBytes),
+    (status = 304, description = "It is the one that you have (If-None-Match)"), ApiError))]
+async fn image(
+    State(state): State<AppState>,
+    Path((id, step, file)): Path<(String, usize, String)>,
+    Params(params): Params<ImageParams>,
+    headers: HeaderMap,
+) -> ApiResult<Response> {
+    let open = state.traverse(&id)?;
+    let is_left = match file.as_str() {
+        "left.png" => true,
+        "right.png" => false,
+        _ => return Err(ApiError::not_found("A stop has the images left.png and right.png.")),
+    };
+    let is_deep = match params.bits {
+        None | Some(8) => false,
+        Some(16) => true,
+        Some(bits) => return Err(ApiError::invalid("query", format!("bits: must be 8 or 16, not {bits}"))),
+    };
+    if step >= open.traverse.stop_count() {
+        return Err(ApiError::not_found(format!("The traverse has no step {step}.")));
+    }
+    let cancel = CancelOnDrop::default();
+    let flag = cancel.flag();
+    let png = state.pictures().run(move || Ok(encode(&open, step, is_left, is_deep, &flag)?)).await?;
+    Ok(picture(png, &headers))
+}
+
+/// Renders the stops from this one on before all others
+#[utoipa::path(post, path = "/traverses/{id}/prefetch", tag = "traverses", params(
+    ("id" = String, Path), PrefetchParams), responses((status = 204), ApiError))]
+async fn prefetch(
+    State(state): State<AppState>,
+    Path(id): Path<String>,
+    Params(params): Params<PrefetchParams>,
+) -> ApiResult<StatusCode> {
+    let open = state.traverse(&id)?;
+    state.look_at(&open, params.from);
+    Ok(StatusCode::NO_CONTENT)
+}
+
+fn view(open: &OpenTraverse) -> TraverseView {
+    let (traverse, index) = (&open.traverse, open.traverse.index());
+    let stops = index.stops.iter().enumerate().map(|(step, stop)| StopView {
+        time_s: stop.time_s,
+        site_from_rover: stop.site_from_rover,
+        true_site_from_rover: stop.truth.as_ref().map(|truth| truth.site_from_rover),
+        left_size: traverse.left_camera(step).size,
+        right_size: traverse.right_camera(step).size,
+        ready: traverse.is_ready(step),
+    });
+    TraverseView {
+        id: open.id.clone(),
+        name: index.name.clone(),
+        description: index.description.clone(),
+        simulated: index.scenario.is_some(),
+        stereo: index.stereo,
+        warnings: traverse.warnings().to_vec(),
+        stops: stops.collect(),
+    }
+}
+
+/// The image as the bytes of a PNG file; whatever the file on disk is, a full scale of 1 becomes the brightest.
+fn encode(
+    open: &OpenTraverse,
+    step: usize,
+    is_left: bool,
+    is_deep: bool,
+    cancel: &AtomicBool,
+) -> sightline_core::error::Result<Vec<u8>> {
+    open.make_ready(step, cancel)?;
+    let pair = open.traverse.capture(step)?;
+    let image = if is_left { &pair.left } else { &pair.right };
+    if is_deep { io::encode_png_u16(image, None) } else { io::encode_png_u8(image) }
+}
+
+/// An answer that the browser keeps, and asks about before it uses it again: files may be exchanged between
+/// two starts of the server.
+fn picture(png: Vec<u8>, headers: &HeaderMap) -> Response {
+    let tag = format!("\"{}\"", &hash(&png)[..32]);
+    let known = headers.get(header::IF_NONE_MATCH).and_then(|value| value.to_str().ok());
+    let caching = [(header::ETAG, tag.clone()), (header::CACHE_CONTROL, "private, no-cache".to_owned())];
+    if known.is_some_and(|known| known.split(',').any(|one| one.trim().trim_start_matches("W/") == tag)) {
+        return (StatusCode::NOT_MODIFIED, caching).into_response();
+    }
+    ([(header::CONTENT_TYPE, "image/png")], caching, png).into_response()
+}
+
+/// Cancels the work for a request that goes away.
+#[derive(Default)]
+pub struct CancelOnDrop(Arc<AtomicBool>);
+
+impl CancelOnDrop {
+    /// What is set when the request goes away.
+    pub fn flag(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.0)
+    }
+}
+
+impl Drop for CancelOnDrop {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}

@@ -1,0 +1,211 @@
+//! The `.rrd` export and the live stream, on a short simulated drive with a missing image and covered eyes.
+
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::{Arc, LazyLock};
+
+use sightline_core::error::Error;
+use sightline_core::frames::Pixel;
+use sightline_core::session::{Session, track};
+use sightline_core::settings::Settings;
+use sightline_core::target::{Designation, TrackingState};
+use sightline_core::trace::StepTrace;
+use sightline_server::rerun_log::{LiveStream, Rows, RunLog, documented_entities, entities_of, export, root, shared_entities};
+use sightline_tests::rrd::{self, EntityRows, Recording};
+use sightline_tests::troubled::Troubled;
+
+/// The stop whose image is missing.
+const MISSING: usize = 2;
+/// The stop at which both eyes are covered.
+const COVERED: usize = 4;
+
+/// The drive and the runs of two targets, tracked once for all tests.
+struct Fixture {
+    drive: Troubled,
+    runs: Vec<Vec<Arc<StepTrace>>>,
+    _folder: tempfile::TempDir,
+}
+
+static FIXTURE: LazyLock<Fixture> = LazyLock::new(|| {
+    let folder = tempfile::tempdir().unwrap();
+    let drive = Troubled { missing: vec![MISSING], covered: vec![COVERED], ..Troubled::short(folder.path()) };
+    let run = |pixel: &Pixel| {
+        let designation = Designation { step: 0, pixel: *pixel };
+        let steps = track::run(&drive, designation, &Settings::default()).unwrap();
+        steps.into_iter().map(Arc::new).collect()
+    };
+    let runs = drive.targets.iter().take(2).map(run).collect();
+    Fixture { drive, runs, _folder: folder }
+});
+
+impl Fixture {
+    fn logs(&self) -> Vec<RunLog<'_>> {
+        let numbered = self.runs.iter().enumerate();
+        numbered.map(|(target, steps)| RunLog { target, run: 0, label: LABELS[target], steps }).collect()
+    }
+
+    fn exported(&self) -> Recording {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("short.rrd");
+        export(&path, "short approach", &self.drive, &self.logs(), &mut |_, _| ControlFlow::Continue(())).unwrap();
+        assert_eq!(names(folder.path()), ["short.rrd"], "nothing else may be left behind");
+        rrd::read(&path)
+    }
+}
+
+const LABELS: [&str; 2] = ["left rock", "right rock"];
+
+fn names(folder: &Path) -> Vec<String> {
+    std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
+}
+
+/// The steps with and without data that the documentation promises.
+fn promised(rows: Rows, doc: &sightline_server::rerun_log::EntityDoc, steps: &[Arc<StepTrace>]) -> EntityRows {
+    let split = |wanted: bool| {
+        steps.iter().filter(|t| doc.has_data_at(t) == wanted).map(|t| t.step as i64).collect::<Vec<_>>()
+    };
+    let mut promised = EntityRows { fixed: usize::from(doc.style.is_some()), ..EntityRows::default() };
+    match rows {
+        Rows::Once => promised.fixed = 1,
+        Rows::EachStop => promised.data = (0..FIXTURE.drive.traverse.stop_count() as i64).collect(),
+        Rows::EachStep { .. } | Rows::EachScore { .. } => {
+            (promised.data, promised.cleared) = (split(true), split(false));
+        }
+    }
+    promised
+}
+
+fn sorted(mut steps: Vec<i64>) -> Vec<i64> {
+    steps.sort_unstable();
+    steps
+}
+
+#[test]
+fn an_export_holds_every_documented_entity_with_the_documented_rows_and_no_other() {
+    let recording = FIXTURE.exported();
+    let shared = shared_entities().into_iter().map(|doc| (0, doc));
+    let own = (0..2).flat_map(|target| entities_of(&root(target, 0)).into_iter().map(move |doc| (target, doc)));
+    for (target, doc) in shared.chain(own) {
+        let found = recording.entities.get(&doc.path).unwrap_or_else(|| panic!("{} is not in the file", doc.path));
+        let expected = promised(doc.rows, &doc, &FIXTURE.runs[target]);
+        assert_eq!(found.fixed, expected.fixed, "rows outside of time of {}", doc.path);
+        assert_eq!(sorted(found.data.clone()), expected.data, "steps with data of {}", doc.path);
+        assert_eq!(sorted(found.cleared.clone()), expected.cleared, "cleared steps of {}", doc.path);
+        for archetype in std::iter::once(doc.archetype).chain(doc.style) {
+            let missing = expected.data.is_empty() && expected.fixed == 0;
+            let styled_only = expected.data.is_empty() && Some(archetype) != doc.style;
+            assert!(missing || styled_only || found.archetypes.contains(archetype), "{}: {archetype}", doc.path);
+        }
+        let timelines: Vec<_> = found.timelines.iter().map(String::as_str).collect();
+        let none = matches!(doc.rows, Rows::Once);
+        assert_eq!(timelines, if none { vec![] } else { vec!["step", "time"] }, "timelines of {}", doc.path);
+    }
+    let documented: Vec<_> = documented_entities(2).into_iter().map(|doc| doc.path).collect();
+    let others = recording.entities.keys().filter(|path| !path.starts_with("/__properties"));
+    let undocumented: Vec<_> = others.filter(|path| !documented.contains(path)).collect();
+    assert!(undocumented.is_empty(), "not in the documentation: {undocumented:?}");
+}
+
+#[test]
+fn the_fixture_has_a_fault_a_loss_and_a_recovery() {
+    let steps = &FIXTURE.runs[0];
+    assert!(steps[MISSING].fault.as_deref().is_some_and(|fault| fault.contains("left_0002.png")));
+    assert_eq!(steps[COVERED].update.state, TrackingState::Lost { count: 1 });
+    assert_eq!(steps[COVERED + 1].update.state, TrackingState::Tracking);
+}
+
+#[test]
+fn a_step_without_images_clears_its_scores_and_still_says_what_is_wrong() {
+    let recording = FIXTURE.exported();
+    let at = MISSING as i64;
+    for path in ["/capture/left", "/target_1/judge/ncc", "/target_1/locate/match_template/surface"] {
+        assert!(recording.entities[path].cleared.contains(&at), "{path}");
+        assert!(!recording.entities[path].data.contains(&at), "{path}");
+    }
+    for path in ["/target_1/judge/state", "/target_1/judge/verdict", "/target_1/predict/position"] {
+        assert!(recording.entities[path].data.contains(&at), "{path}");
+    }
+}
+
+#[test]
+fn numbers_and_positions_come_back_as_the_trace_has_them_half_a_pixel_further() {
+    let recording = FIXTURE.exported();
+    let number = |path: &str, component: &str, step: usize| {
+        recording.entities[path].numbers[&(component.to_owned(), step as i64)].clone()
+    };
+    let mut matched = 0;
+    for trace in FIXTURE.runs[0].iter() {
+        let Some(found) = trace.template().and_then(|e| e.match_template.as_ref()) else { continue };
+        let ncc = number("/target_1/judge/ncc", "Scalars:scalars", trace.step);
+        assert_eq!(ncc, [found.peak.score]);
+        let peak = number("/target_1/locate/match_template/peak", "Points2D:positions", trace.step);
+        assert_eq!(peak, [(found.peak.pixel.x + 0.5) as f32, (found.peak.pixel.y + 0.5) as f32].map(f64::from));
+        let site = FIXTURE.drive.traverse.site_from_rover(trace.step) * trace.update.target.position_in_rover;
+        let position = number("/target_1/update/position", "Points3D:positions", trace.step);
+        assert_eq!(position, [site.x as f32, site.y as f32, site.z as f32].map(f64::from));
+        matched += 1;
+    }
+    assert!(matched >= 4, "only {matched} steps were matched");
+}
+
+#[test]
+fn the_layout_is_in_the_file_and_shall_be_shown() {
+    let recording = FIXTURE.exported();
+    assert_eq!(recording.application, "sightline");
+    assert!(recording.blueprint_activated);
+    assert!(recording.blueprint.iter().any(|path| path.starts_with("/view/")), "{:?}", recording.blueprint);
+}
+
+#[test]
+fn a_cancelled_export_leaves_nothing_and_an_existing_file_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("short.rrd");
+    let mut seen = Vec::new();
+    let cancelled = export(&path, "short", &FIXTURE.drive, &FIXTURE.logs(), &mut |done, all| {
+        seen.push((done, all));
+        if done == 2 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    assert!(matches!(cancelled, Err(Error::Cancelled)), "{cancelled:?}");
+    let all = FIXTURE.runs[0].len();
+    assert_eq!(seen, [(0, all), (1, all), (2, all)]);
+    assert!(names(folder.path()).is_empty());
+
+    std::fs::write(&path, "mine").unwrap();
+    let refused = export(&path, "short", &FIXTURE.drive, &FIXTURE.logs(), &mut |_, _| ControlFlow::Continue(()));
+    assert!(matches!(refused, Err(Error::Write { .. })), "{refused:?}");
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), "mine");
+}
+
+#[test]
+fn the_live_page_answers_on_loopback_and_may_talk_to_nobody_else() {
+    let stream = LiveStream::start().unwrap();
+    let mut session = Session::new("s", "short", FIXTURE.drive.traverse.stop_count());
+    session.add_target(Some("rock".to_owned()), Settings::default(), Arc::clone(&FIXTURE.runs[0][0]));
+    stream.log_session("short", &FIXTURE.drive, &session).unwrap();
+    for trace in &FIXTURE.runs[0][1..] {
+        session.record(0, 0, Arc::clone(trace)).unwrap();
+        stream.log_session("short", &FIXTURE.drive, &session).unwrap();
+    }
+    let url = stream.viewer_url();
+    let port = url.strip_prefix("http://127.0.0.1:").and_then(|rest| rest.split('/').next()).unwrap();
+    let head = get(port.parse().unwrap(), "/");
+    assert!(head.starts_with("HTTP/1.1 200 OK"), "{head}");
+    let policy = head.lines().find(|line| line.starts_with("content-security-policy:")).unwrap();
+    let data = stream.stream_url().replace("rerun+http", "http").replace("/proxy", "");
+    assert!(policy.contains("default-src 'none'") && policy.contains(&format!("connect-src 'self' {data};")), "{policy}");
+    assert!(get(port.parse().unwrap(), "/re_viewer_bg.wasm").starts_with("HTTP/1.1 200 OK"));
+    assert!(get(port.parse().unwrap(), "/signed-in").starts_with("HTTP/1.1 404"));
+    drop(stream);
+    assert!(TcpStream::connect(("127.0.0.1", port.parse().unwrap())).is_err(), "the page outlives the stream");
+}
+
+/// The head of an answer over plain HTTP.
+fn get(port: u16, path: &str) -> String {
+    let mut socket = TcpStream::connect(("127.0.0.1", port)).unwrap();
+    write!(socket, "GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nConnection: close\r\n\r\n").unwrap();
+    let mut head = vec![0; 4096];
+    let count = socket.read(&mut head).unwrap();
+    String::from_utf8_lossy(&head[..count]).into_owned()
+}

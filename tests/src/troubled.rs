@@ -1,0 +1,108 @@
+//! A simulated drive on which things go wrong at chosen stops: an image is missing, or both eyes are covered.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use sightline_core::camera::{Camera, Mast, MastAngles};
+use sightline_core::error::{Error, Result};
+use sightline_core::frames::{Pixel, Point3, Pose};
+use sightline_core::image::GrayImage;
+use sightline_core::pipeline::Stops;
+use sightline_core::sim::{Scenario, choose_targets};
+use sightline_core::stages::capture::StereoPair;
+use sightline_core::study::truth::TruthSource;
+use sightline_core::traverse::{OdometryError, StereoGeometry, Traverse, create_simulated};
+
+/// A simulated drive with trouble.
+pub struct Troubled {
+    /// The drive as it was simulated.
+    pub traverse: Traverse,
+    /// Stops whose left image is missing.
+    pub missing: Vec<usize>,
+    /// Stops at which both images are one grey.
+    pub covered: Vec<usize>,
+    /// Targets by the scenario's own rule, px of the first left image.
+    pub targets: Vec<Pixel>,
+}
+
+impl Troubled {
+    /// The drive of a scenario, in an empty folder.
+    pub fn simulate(scenario: &Scenario, folder: &Path) -> Self {
+        let traverse = create_simulated(scenario, folder).expect("the scenario makes a traverse");
+        let world = traverse.world().expect("a simulated traverse has a world");
+        let targets = choose_targets(world, scenario, traverse.index());
+        Self { traverse, missing: Vec::new(), covered: Vec::new(), targets }
+    }
+
+    /// A drive of few stops and small images, which renders in about a second a stop.
+    pub fn short(folder: &Path) -> Self {
+        Self::simulate(&short_scenario(), folder)
+    }
+}
+
+/// The scenario of [`Troubled::short`].
+pub fn short_scenario() -> Scenario {
+    let mut scenario = Scenario { name: "short approach".to_owned(), ..Scenario::default() };
+    scenario.camera.image_size = 256;
+    scenario.camera.samples_per_axis = 1;
+    scenario.drive.start_distance_m = 6.0;
+    scenario.drive.end_distance_m = 3.0;
+    scenario.targets.count = 3;
+    scenario
+}
+
+impl Stops for Troubled {
+    fn stop_count(&self) -> usize {
+        Stops::stop_count(&self.traverse)
+    }
+    fn time_s(&self, step: usize) -> f64 {
+        Stops::time_s(&self.traverse, step)
+    }
+    fn site_from_rover(&self, step: usize) -> Pose {
+        Stops::site_from_rover(&self.traverse, step)
+    }
+    fn cameras(&self, step: usize) -> (&Camera, &Camera) {
+        Stops::cameras(&self.traverse, step)
+    }
+    fn mast(&self) -> Option<&Mast> {
+        Stops::mast(&self.traverse)
+    }
+    fn mast_angles(&self, step: usize) -> Option<MastAngles> {
+        Stops::mast_angles(&self.traverse, step)
+    }
+    fn odometry_error(&self) -> OdometryError {
+        Stops::odometry_error(&self.traverse)
+    }
+    fn stereo(&self) -> StereoGeometry {
+        Stops::stereo(&self.traverse)
+    }
+    fn capture(&self, step: usize) -> Result<StereoPair> {
+        if self.missing.contains(&step) {
+            let path = PathBuf::from(&self.traverse.index().stops[step].left.image);
+            return Err(Error::Read { path, source: std::io::ErrorKind::NotFound.into() });
+        }
+        let mut pair = Stops::capture(&self.traverse, step)?;
+        if self.covered.contains(&step) {
+            let grey = |image: &GrayImage| {
+                Arc::new(GrayImage::from_pixel(image.width(), image.height(), image::Luma([0.2])))
+            };
+            pair = StereoPair { left: grey(&pair.left), right: grey(&pair.right) };
+        }
+        Ok(pair)
+    }
+}
+
+impl TruthSource for Troubled {
+    fn true_site_from_rover(&self, step: usize) -> Option<Pose> {
+        TruthSource::true_site_from_rover(&self.traverse, step)
+    }
+    fn true_left_camera(&self, step: usize) -> &Camera {
+        TruthSource::true_left_camera(&self.traverse, step)
+    }
+    fn surface_point_in_site(&self, step: usize, pixel: Pixel) -> Option<Point3> {
+        TruthSource::surface_point_in_site(&self.traverse, step, pixel)
+    }
+    fn is_visible(&self, step: usize, point_in_site: &Point3) -> bool {
+        TruthSource::is_visible(&self.traverse, step, point_in_site)
+    }
+}
