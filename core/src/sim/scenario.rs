@@ -2,7 +2,7 @@
 //!
 //! A field that is left out takes its default; a field that does not exist is refused by name. Two equal
 //! scenarios give the same bits. Defaults describe a Spirit-like rover on a plain with the rock abundance
-//! of Gusev's rockier places; none is chosen by looking at a tracker's result.
+//! of Gusev's rockier places; none may be chosen by looking at a tracker's result.
 //!
 //! Frames: the site frame is level (+z down), its x axis is the direction of the drive, its origin lies on
 //! the mean ground below which the first stop's middle wheels stand, 0.294 m above the mean plane: where the
