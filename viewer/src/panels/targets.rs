@@ -93,7 +93,10 @@ fn how_far(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: 
         }
         ui.label(theme::number(format!("{} of {}", progress.k, progress.n)).size(11.0));
     } else if let Some(why) = &run.stopped {
-        ui.label(RichText::new(why).small().color(theme::LOST));
+        if ui.small_button("Resume").clicked() {
+            out.push(Command::ResumeRun { target: target.number, run: run.number });
+        }
+        ui.add(egui::Label::new(RichText::new(why).small().color(theme::LOST)).truncate()).on_hover_text(why);
     } else if run.complete {
         ui.label(theme::note("complete"));
     } else {

@@ -33,6 +33,9 @@ impl State {
             Command::CancelRun { target, run } => {
                 self.ask(|session| Request::CancelRun { session, target, run });
             }
+            Command::ResumeRun { target, run } => {
+                self.ask(|session| Request::ResumeRun { session, target, run });
+            }
             Command::View(panel, view) => match panel {
                 Panel::Left => self.views.left = view,
                 Panel::Right => self.views.right = view,

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Matrix2, Matrix3};
+use nalgebra::{Matrix2, Matrix3, Vector2};
 use sightline_core::camera::{Camera, Mast};
 use sightline_core::correlate::peak::{Peak, SecondPeak};
 use sightline_core::frames::{Pixel, Point3, Pose, PoseRecord};
@@ -14,7 +14,7 @@ use sightline_core::locate::template::scale_roll::ScaleRoll;
 use sightline_core::locate::template::triangulate::Triangulation;
 use sightline_core::locate::{Evidence, Located};
 use sightline_core::session::view::{RunView, SessionView, TargetView};
-use sightline_core::session::wire::{StopView, TraverseView};
+use sightline_core::session::wire::{StopView, TraverseEntry, TraverseView};
 use sightline_core::session::Cursor;
 use sightline_core::settings::{Changes, Settings};
 use sightline_core::stages::capture::Capture;
@@ -27,7 +27,6 @@ use sightline_core::trace::{ArrayName, StepTrace, StepTruth, TruthKind, summaris
 use sightline_core::traverse::StereoGeometry;
 
 use crate::cache::{Eye, Item, Key, StepKey};
-use crate::net::TraverseEntry;
 use crate::raster::Raster;
 use crate::state::{Connection, State};
 
@@ -42,11 +41,22 @@ pub(super) fn nothing() -> State {
     State::new("http://localhost".to_owned(), None)
 }
 
+/// The drive in the server's list.
+pub(super) fn entry() -> TraverseEntry {
+    TraverseEntry {
+        id: "drive".to_owned(),
+        name: "Six stops".to_owned(),
+        description: "A fixed drive.".to_owned(),
+        simulated: true,
+        stop_count: STOPS,
+    }
+}
+
 /// An open traverse and session without targets.
 pub(super) fn without_target() -> State {
     let mut state = nothing();
     state.connection = Connection::Live;
-    state.traverses = Some(vec![TraverseEntry { id: "drive".to_owned(), name: "Six stops".to_owned() }]);
+    state.traverses = Some(vec![entry()]);
     state.traverse = Some(traverse());
     state.settings = Settings::table();
     state.session = Some(SessionView {
@@ -198,6 +208,7 @@ fn located(is_designation: bool, is_good: bool, covariance: Matrix3<f64>) -> Loc
     evidence.triangulate = Some(Triangulation {
         position_in_rover: Point3::from(POSITION),
         covariance_in_rover: covariance,
+        surface_by_pixel: None,
         range_m: 6.0,
         gap_m: 0.001,
         gap_px: 0.2,
@@ -211,6 +222,7 @@ fn located(is_designation: bool, is_good: bool, covariance: Matrix3<f64>) -> Loc
             old_distance_m: 6.8,
             new_distance_m: 6.0,
             template_step: 1,
+            image_from_template: Matrix2::identity() * 1.13,
             reference: Default::default(),
             scaled: Default::default(),
             rolled: Default::default(),
@@ -221,6 +233,8 @@ fn located(is_designation: bool, is_good: bool, covariance: Matrix3<f64>) -> Loc
         left_pixel: Some(PIXEL),
         right_pixel: Some(PIXEL.offset(-58.0, 0.5)),
         left_covariance_px2: Matrix2::new(0.2, 0.05, 0.05, 0.1),
+        left_bias_px: Vector2::new(0.05, 0.0),
+        surface_by_pixel: None,
         position_in_rover: Some(Point3::from(POSITION)),
         covariance_in_rover: Some(covariance),
         confidence: score,
@@ -244,6 +258,7 @@ fn template_match(score: f64) -> TemplateMatch {
         },
         second_peak: Some(SecondPeak { pixel: PIXEL.offset(12.0, 9.0), score: 0.4, ratio: 0.48, distance_px: 15.0 }),
         covariance_px2: Matrix2::identity() * 0.04,
+        bias_px: Vector2::zeros(),
         surface: Default::default(),
         matched: Default::default(),
         difference: Default::default(),
@@ -309,11 +324,13 @@ fn updated(step: usize, state: TrackingState, renewed: bool, covariance: Matrix3
             last_distance_m: 6.0,
             travelled_since_update_m: 0.0,
             drift_covariance_px2: Matrix2::zeros(),
+            drift_bias_px: Vector2::zeros(),
             appearance: Appearance {
                 step,
                 pixel: PIXEL,
                 position_in_rover: Point3::from(POSITION),
                 camera,
+                surface_by_pixel: None,
                 image: Arc::default(),
             },
         },

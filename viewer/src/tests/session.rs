@@ -2,13 +2,13 @@
 
 use sightline_core::frames::Pixel;
 use sightline_core::session::Cursor;
-use sightline_core::session::wire::{Event, Problem};
+use sightline_core::session::wire::{Event, Problem, SessionEntry};
 use sightline_core::trace::ArrayName;
 
 use super::fixture::{STOPS, at_step, nothing, without_target};
 use crate::cache::{Eye, Key, Slot};
 use crate::command::{Command, Go, Mode};
-use crate::net::{Arrived, Reply, Request, SessionEntry, TraverseEntry};
+use crate::net::{Arrived, Reply, Request};
 use crate::state::{Connection, State, events};
 
 fn loaded(step: usize) -> State {
@@ -50,10 +50,14 @@ fn a_page_without_a_link_opens_the_latest_session_of_the_first_traverse() {
     let mut state = nothing();
     state.begin();
     assert_eq!(state.take_requests(), vec![Request::Settings, Request::Traverses]);
-    let list = vec![TraverseEntry { id: "drive".to_owned(), name: "Drive".to_owned() }];
+    let list = vec![super::fixture::entry()];
     state.arrived(Arrived { request: Request::Traverses, outcome: Ok(Reply::Traverses(list)) }, 0.0);
     assert_eq!(state.take_requests(), vec![Request::Sessions]);
-    let entry = |id: &str, traverse: &str| SessionEntry { id: id.to_owned(), traverse: traverse.to_owned() };
+    let entry = |id: &str, traverse: &str| SessionEntry {
+        id: id.to_owned(),
+        traverse: traverse.to_owned(),
+        target_count: 1,
+    };
     let list = vec![entry("a", "drive"), entry("b", "drive"), entry("c", "other")];
     state.arrived(Arrived { request: Request::Sessions, outcome: Ok(Reply::Sessions(list)) }, 0.0);
     assert_eq!(state.take_requests(), vec![Request::Session("b".to_owned())]);
