@@ -83,7 +83,8 @@ fn a_refused_designation_is_shown_at_its_place_with_the_servers_sentence() {
 #[test]
 fn the_cursor_is_sent_once_at_a_time_and_an_older_answer_does_not_move_it_back() {
     let mut state = loaded(0);
-    state.take_requests();
+    let [put] = state.take_requests().try_into().unwrap();
+    state.arrived(Arrived { request: put, outcome: Ok(Reply::Done) }, 0.0);
     state.apply(Command::Go(Go::By(1)));
     let first = state.take_requests();
     assert!(state.take_requests().is_empty(), "nothing is sent while one is under way");
