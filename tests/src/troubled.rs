@@ -43,11 +43,12 @@ impl Troubled {
 /// The scenario of [`Troubled::short`].
 pub fn short_scenario() -> Scenario {
     let mut scenario = Scenario { name: "short approach".to_owned(), ..Scenario::default() };
-    scenario.camera.image_size = 256;
+    scenario.camera.image_size = 512;
     scenario.camera.samples_per_axis = 1;
     scenario.drive.start_distance_m = 6.0;
     scenario.drive.end_distance_m = 3.0;
     scenario.targets.count = 3;
+    scenario.targets.depth_range_fraction = 0.2;
     scenario
 }
 

@@ -87,6 +87,11 @@ impl<'a> Overlay<'a> {
         paint_mark(self.painter, self.transform.to_screen(pixel), mark, colour, REACH);
     }
 
+    /// How far two pixels are apart on the screen, points.
+    pub fn length(&self, from: Pixel, to: Pixel) -> f32 {
+        self.transform.to_screen(from).distance(self.transform.to_screen(to))
+    }
+
     /// Words beside a pixel, offset by `offset` points.
     pub fn words(&self, pixel: Pixel, offset: Vec2, words: &str, colour: Color32) {
         paint_words(self.painter, self.transform.to_screen(pixel) + offset, words, colour);

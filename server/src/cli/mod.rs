@@ -8,6 +8,8 @@ pub mod simulate;
 pub mod import;
 pub mod info;
 pub mod track;
+pub mod study;
+mod figure;
 mod open;
 mod say;
 
@@ -40,6 +42,8 @@ enum Command {
     Info(info::Info),
     /// Track targets without a browser; one JSON object a step.
     Track(track::Track),
+    /// Run a validation experiment: many targets in many worlds against the truth.
+    Study(study::Study),
 }
 
 /// Runs the command that the arguments name.
@@ -52,6 +56,7 @@ pub fn run() -> ExitCode {
         Command::Import(command) => command.run(),
         Command::Info(command) => command.run(),
         Command::Track(command) => command.run(),
+        Command::Study(command) => command.run(),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -15,7 +15,72 @@
 //!
 //! | path | archetype | when |
 //! |---|---|---|
-//! TABLE
+//! | `/` | `ViewCoordinates` | once |
+//! | `/traverse` | `TextDocument` | once |
+//! | `/rover/path` | `LineStrips3D` | once |
+//! | `/rover/pose` | `Transform3D`, static `TransformAxes3D` | every stop |
+//! | `/rover/pose/left` | `LineStrips3D` | every stop |
+//! | `/rover/pose/right` | `LineStrips3D` | every stop |
+//! | `/capture/left` | `EncodedImage` | the stop's files are whole |
+//! | `/capture/right` | `EncodedImage` | the stop's files are whole |
+//! | `/{target}` | `TextDocument` | once |
+//! | `/{target}/predict/position` | `Points3D` | predicted |
+//! | `/{target}/predict/covariance` | `Ellipsoids3D` | predicted |
+//! | `/{target}/predict/left` | `Points2D` | predicted in front of the left camera |
+//! | `/{target}/predict/right` | `Points2D` | predicted in front of the right camera |
+//! | `/{target}/point_mast/gate` | `LineStrips2D` | predicted in front of the left camera |
+//! | `/{target}/capture/subframe` | `Boxes2D` | the subframe lies in the image |
+//! | `/{target}/locate/scale_roll/footprint` | `LineStrips2D` | prepared |
+//! | `/{target}/locate/scale_roll/reference` | `DepthImage` | prepared |
+//! | `/{target}/locate/scale_roll/scaled` | `DepthImage` | prepared |
+//! | `/{target}/locate/scale_roll/rolled` | `DepthImage` | prepared |
+//! | `/{target}/locate/match_template/window` | `Boxes2D` | matched |
+//! | `/{target}/locate/match_template/surface` | `DepthImage` | matched |
+//! | `/{target}/locate/match_template/surface/peak` | `Points2D` | matched |
+//! | `/{target}/locate/match_template/surface/second_peak` | `Points2D` | there is a second peak |
+//! | `/{target}/locate/match_template/peak` | `Points2D` | matched |
+//! | `/{target}/locate/match_template/second_peak` | `Points2D` | there is a second peak |
+//! | `/{target}/locate/match_template/matched_window` | `LineStrips2D` | matched |
+//! | `/{target}/locate/match_template/matched` | `DepthImage` | matched |
+//! | `/{target}/locate/match_template/difference` | `Image` | matched |
+//! | `/{target}/locate/point_stereo/curve` | `LineStrips2D` | stereo matched |
+//! | `/{target}/locate/point_stereo/match` | `Points2D` | stereo matched |
+//! | `/{target}/locate/point_stereo/right_window` | `DepthImage` | stereo matched |
+//! | `/{target}/locate/triangulate/position` | `Points3D` | triangulated |
+//! | `/{target}/locate/triangulate/covariance` | `Ellipsoids3D` | triangulated |
+//! | `/{target}/locate/left_covariance` | `LineStrips2D` | designated or matched |
+//! | `/{target}/judge/state` | `StateChange`, static `StateConfiguration` | always |
+//! | `/{target}/judge/verdict` | `TextLog` | always |
+//! | `/{target}/update/position` | `Points3D` | always |
+//! | `/truth/{target}/left` | `LineStrips2D` | the truth is visible |
+//! | `/truth/{target}/position` | `Points3D` | the truth is known |
+//! | `/{target}/point_mast/wanted_azimuth_deg` | `Scalars`, static `SeriesLines` | there is a mast and it reaches |
+//! | `/{target}/point_mast/wanted_elevation_deg` | `Scalars`, static `SeriesLines` | there is a mast and it reaches |
+//! | `/{target}/point_mast/used_azimuth_deg` | `Scalars`, static `SeriesLines` | there is a mast |
+//! | `/{target}/point_mast/used_elevation_deg` | `Scalars`, static `SeriesLines` | there is a mast |
+//! | `/{target}/capture/subframe_mean` | `Scalars`, static `SeriesLines` | the subframe lies in the image |
+//! | `/{target}/capture/subframe_saturated` | `Scalars`, static `SeriesLines` | the subframe lies in the image |
+//! | `/{target}/locate/scale_roll/scale` | `Scalars`, static `SeriesLines` | prepared |
+//! | `/{target}/locate/scale_roll/roll_deg` | `Scalars`, static `SeriesLines` | prepared |
+//! | `/{target}/locate/match_template/second_peak_ratio` | `Scalars`, static `SeriesLines` | there is a second peak |
+//! | `/{target}/locate/point_stereo/range_m` | `Scalars`, static `SeriesLines` | stereo matched |
+//! | `/{target}/locate/point_stereo/across_px` | `Scalars`, static `SeriesLines` | stereo matched |
+//! | `/{target}/locate/triangulate/gap_px` | `Scalars`, static `SeriesLines` | triangulated |
+//! | `/{target}/judge/ncc` | `Scalars`, static `SeriesLines` | judged and matched |
+//! | `/{target}/judge/ncc/limit` | `Scalars`, static `SeriesLines` | judged |
+//! | `/{target}/judge/stereo_ncc` | `Scalars`, static `SeriesLines` | judged and stereo matched |
+//! | `/{target}/judge/stereo_ncc/limit` | `Scalars`, static `SeriesLines` | judged |
+//! | `/{target}/judge/distance_correction_m` | `Scalars`, static `SeriesLines` | judged and triangulated |
+//! | `/{target}/judge/distance_correction_m/limit` | `Scalars`, static `SeriesLines` | judged |
+//! | `/{target}/judge/position_correction_m` | `Scalars`, static `SeriesLines` | judged and triangulated |
+//! | `/{target}/judge/position_correction_m/limit` | `Scalars`, static `SeriesLines` | judged |
+//! | `/{target}/update/sigma_m` | `Scalars`, static `SeriesLines` | always |
+//! | `/{target}/update/correction_px` | `Scalars`, static `SeriesLines` | matched and predicted in the left image |
+//! | `/{target}/update/correction_m` | `Scalars`, static `SeriesLines` | triangulated |
+//! | `/truth/{target}/err_px` | `Scalars`, static `SeriesLines` | matched and the truth is visible |
+//! | `/truth/{target}/tolerance_px` | `Scalars`, static `SeriesLines` | the truth is known |
+//! | `/truth/{target}/err_m` | `Scalars`, static `SeriesLines` | the truth is known |
+//! | `/truth/{target}/nees` | `Scalars`, static `SeriesLines` | the truth is known and there is a covariance |
 
 mod blueprint;
 mod border;

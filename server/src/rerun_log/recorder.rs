@@ -19,10 +19,17 @@ pub struct RunLog<'a> {
     pub target: usize,
     /// The run's number within the target, from 0.
     pub run: usize,
-    /// What the person calls it.
+    /// What the person calls the target.
     pub label: &'a str,
     /// Its steps so far.
     pub steps: &'a [Arc<StepTrace>],
+}
+
+impl RunLog<'_> {
+    /// What the run is called in the recording: its target's label, with the number of a forked run.
+    fn title(&self) -> String {
+        if self.run == 0 { self.label.to_owned() } else { format!("{}, run {}", self.label, self.run) }
+    }
 }
 
 /// A recording that is being written.
@@ -71,7 +78,7 @@ impl Recorder {
         for run in runs {
             let root = root(run.target, run.run);
             let Some(first) = run.steps.first().filter(|_| !self.runs.contains_key(&root)) else { continue };
-            states::log_run(&self.stream, &root, run.label, first)?;
+            states::log_run(&self.stream, &root, &run.title(), first)?;
             states::log_styles(&self.stream, &root)?;
             scores::log_styles(&self.stream, &root)?;
             self.runs.insert(root, BTreeSet::new());
@@ -94,7 +101,7 @@ impl Recorder {
         let step = Step {
             stream: &self.stream,
             root: &root,
-            label: run.label,
+            label: &run.title(),
             trace,
             images: if is_first_here { images(trace, stops) } else { None },
             site_from_rover: stops.site_from_rover(trace.step),

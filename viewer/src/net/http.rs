@@ -5,9 +5,9 @@ use std::sync::Arc;
 use ehttp::{Headers, Method};
 use serde::de::DeserializeOwned;
 use serde::Serialize;
-use sightline_core::session::wire::Problem;
+use sightline_core::session::wire::{Designated, Problem};
 
-use super::{Arrived, Designated, Reply, Request};
+use super::{Arrived, Reply, Request};
 use crate::cache::{Item, Key, StepKey};
 use crate::raster::Raster;
 
@@ -62,6 +62,9 @@ fn describe(request: &Request) -> (Method, String, Option<Vec<u8>>) {
         Request::CancelRun { session, target, run } => {
             (Method::POST, format!("sessions/{session}/targets/{target}/runs/{run}/cancel"), json(&serde_json::json!({})))
         }
+        Request::ResumeRun { session, target, run } => {
+            (Method::POST, format!("sessions/{session}/targets/{target}/runs/{run}/resume"), json(&serde_json::json!({})))
+        }
         Request::OpenRerun(session) => {
             (Method::POST, format!("sessions/{session}/rerun"), json(&serde_json::json!({})))
         }
@@ -101,9 +104,11 @@ fn read(request: &Request, response: &ehttp::Response, context: &egui::Context) 
         Request::NewRun { .. } => Reply::Run(Box::new(parse(bytes)?)),
         Request::OpenRerun(_) => Reply::Rerun(parse(bytes)?),
         Request::Item(key) => Reply::Item(read_item(key, bytes, context)?),
-        Request::PutCursor { .. } | Request::RemoveTarget { .. } | Request::CancelRun { .. } | Request::Reconnect => {
-            Reply::Done
-        }
+        Request::PutCursor { .. }
+        | Request::RemoveTarget { .. }
+        | Request::CancelRun { .. }
+        | Request::ResumeRun { .. }
+        | Request::Reconnect => Reply::Done,
     })
 }
 

@@ -5,12 +5,12 @@ mod http;
 
 use std::sync::mpsc::{Receiver, Sender, channel};
 
-use serde::Deserialize;
-use sightline_core::frames::Pixel;
 use sightline_core::limits::SettingInfo;
 use sightline_core::session::Cursor;
 use sightline_core::session::view::{RunView, SessionView};
-use sightline_core::session::wire::{Event, NewRun, NewSession, NewTarget, Problem, RerunStream, TraverseView};
+use sightline_core::session::wire::{
+    Event, NewRun, NewSession, NewTarget, Problem, RerunStream, SessionEntry, TraverseEntry, TraverseView,
+};
 
 use self::events::Events;
 use crate::cache::{Item, Key};
@@ -18,24 +18,6 @@ use crate::state::Connection;
 
 /// How many images, arrays and records are asked for at a time.
 const AT_A_TIME: usize = 6;
-
-/// A traverse in the server's list.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-pub struct TraverseEntry {
-    /// Its name in paths.
-    pub id: String,
-    /// Its short name.
-    pub name: String,
-}
-
-/// A session in the server's list.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-pub struct SessionEntry {
-    /// Its name in paths.
-    pub id: String,
-    /// The traverse's name in paths.
-    pub traverse: String,
-}
 
 /// What the page asks of the server.
 #[derive(Clone, Debug, PartialEq)]
@@ -84,6 +66,15 @@ pub enum Request {
     },
     /// To stop a run.
     CancelRun {
+        /// The session.
+        session: String,
+        /// The target's number.
+        target: usize,
+        /// The run's number.
+        run: usize,
+    },
+    /// To let a stopped run go on.
+    ResumeRun {
         /// The session.
         session: String,
         /// The target's number.
@@ -187,16 +178,4 @@ impl Net {
     pub fn poll_events(&mut self, now: f64) -> (Vec<Event>, Connection) {
         self.events.poll(now)
     }
-}
-
-/// The answer to [`Request::NewTarget`].
-#[derive(Deserialize)]
-struct Designated {
-    target: usize,
-    session: SessionView,
-}
-
-/// A position in words, for titles of textures and messages.
-pub fn pixel_words(pixel: Pixel) -> String {
-    format!("{:.1}, {:.1}", pixel.x, pixel.y)
 }

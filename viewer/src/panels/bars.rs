@@ -47,12 +47,13 @@ fn traverse_choice(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             }
         }
     });
+    let response = choice.response.accessible_name("traverse");
     if let Some(traverse) = open {
         let mut words = traverse.description.clone();
         for warning in &traverse.warnings {
             words += &format!("\n! {warning}");
         }
-        choice.response.on_hover_text(words);
+        response.on_hover_text(words);
     }
 }
 

@@ -86,6 +86,9 @@ fn paint_marks(canvas: &Canvas, trace: &StepTrace, state: &State) {
             overlay.ellipse(pixel, &stereo.covariance_px2, 3.0, run, Line::Solid);
             let words = format!("{:.2} m, ncc {:.2}", stereo.range_m, stereo.score);
             overlay.words(pixel, vec2(12.0, -14.0), &words, run);
+            if stereo.at_end {
+                overlay.words(pixel, vec2(12.0, 4.0), "at the end of the searched ranges", theme::LOST);
+            }
         }
         overlay.mark(pixel, Mark::Ring, run);
     }

@@ -15,7 +15,7 @@ use crate::view2d::Canvas;
 use crate::{overlay, panels, theme};
 
 /// Height of the status line below an image, points.
-pub const STATUS: f32 = 18.0;
+pub const STATUS: f32 = 24.0;
 
 /// Shows the left image. Returns its canvas' transform and size, from which a test can compute where to click.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) -> Option<(crate::view2d::Transform, [u32; 2])> {
@@ -124,7 +124,8 @@ fn paint_marks(overlay: &Overlay<'_>, trace: &StepTrace, state: &State) {
     if let Some((located, pixel)) = trace.locate.as_ref().and_then(|l| Some((l, l.left_pixel?)))
         && state.shows(Layer::Match)
     {
-        overlay.ellipse(pixel, &located.left_covariance_px2, 3.0, run, Line::Solid);
+        let bias = located.left_bias_px;
+        overlay.ellipse(pixel, &(located.left_covariance_px2 + bias * bias.transpose()), 3.0, run, Line::Solid);
         overlay.mark(pixel, Mark::Ring, run);
     }
     if let Some(pixel) = trace.truth.as_ref().and_then(|t| t.left_pixel).filter(|_| state.shows(Layer::Truth)) {
@@ -139,7 +140,9 @@ fn paint_prediction(overlay: &Overlay<'_>, trace: &StepTrace) {
         overlay.ellipse(pixel, covariance, 3.0, theme::PREDICTION, Line::Dotted);
         if let Some([long, _]) = crate::ellipse::axes(covariance) {
             let end = pixel.offset(3.0 * long.x.abs(), 3.0 * long.x.signum() * long.y);
-            overlay.words(end, vec2(6.0, 0.0), "3σ", theme::PREDICTION);
+            if overlay.length(pixel, end) > 24.0 {
+                overlay.words(end, vec2(6.0, 0.0), "3σ", theme::PREDICTION);
+            }
         }
     }
     overlay.mark(pixel, Mark::Cross, theme::PREDICTION);
@@ -233,7 +236,7 @@ fn loupe(canvas: &Canvas, raster: &Raster, pixel: Pixel) {
 /// Pixel and grey value under the pointer, magnification, and the convention.
 pub fn status_line(ui: &mut Ui, canvas: &Canvas, raster: &Raster, region: PixelRect) {
     ui.horizontal(|ui| {
-        ui.set_height(STATUS - 4.0);
+        ui.set_height(STATUS - 6.0);
         match canvas.hovered(region) {
             Some(pixel) => {
                 let value = raster.at(pixel.x.round() as i64, pixel.y.round() as i64);

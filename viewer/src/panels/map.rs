@@ -32,16 +32,19 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         .data_aspect(1.0)
         .set_margin_fraction(vec2(0.12, 0.12))
         .show_grid([true, true])
-        .x_axis_label(theme::note("east, m"))
-        .y_axis_label(theme::note("north, m"))
-        .y_axis_min_width(34.0)
+        .y_axis_min_width(24.0)
         .allow_boxed_zoom(false)
         .label_formatter(|_| None)
         .coordinates_formatter(
             egui_plot::Corner::RightBottom,
             egui_plot::CoordinatesFormatter::new(|at, _| format!("E {:.2}  N {:.2} m", at.x, at.y)),
         )
-        .legend(egui_plot::Legend::default().text_style(egui::TextStyle::Small).background_alpha(0.8));
+        .legend(
+            egui_plot::Legend::default()
+                .position(egui_plot::Corner::LeftTop)
+                .text_style(egui::TextStyle::Small)
+                .background_alpha(0.6),
+        );
     let response = plot.show(ui, |plot| {
         paint_paths(plot, stops, state.cursor.step);
         if let Some(run) = state.run() {
@@ -78,9 +81,9 @@ fn paint_rover(plot: &mut PlotUi<'_>, site_from_rover: &Pose, stops: &[StopView]
     let length_m = (span_m(stops) * 0.12).clamp(0.4, 20.0);
     let nose = site_from_rover * Point3::new(length_m, 0.0, 0.0);
     let origin = on_map(&Point3::from(site_from_rover.translation.vector));
-    let arrow = Arrows::new("rover", PlotPoints::from(vec![origin]), PlotPoints::from(vec![on_map(&nose)]));
+    let arrow = Arrows::new("", PlotPoints::from(vec![origin]), PlotPoints::from(vec![on_map(&nose)]));
     plot.arrows(arrow.color(theme::ACCENT).tip_length(9.0));
-    plot.points(Points::new("rover", origin).color(theme::ACCENT).radius(5.0).shape(MarkerShape::Circle));
+    plot.points(Points::new("", origin).color(theme::ACCENT).radius(5.0).shape(MarkerShape::Circle));
 }
 
 /// The longer side of the box around the path, m.
@@ -117,7 +120,7 @@ fn paint_trail(plot: &mut PlotUi<'_>, state: &State, stops: &[StopView], run: &R
         let Some(outline) = ellipse::outline(&from_above, sigmas) else { continue };
         let [east, north] = on_map(&centre);
         let points: Vec<[f64; 2]> = outline.iter().map(|d| [east + d.x, north + d.y]).collect();
-        let polygon = Polygon::new(format!("{sigmas}σ"), points).style(style).allow_hover(false);
+        let polygon = Polygon::new("", points).style(style).allow_hover(false);
         plot.polygon(polygon.fill_color(egui::Color32::TRANSPARENT).stroke(egui::Stroke::new(1.5, colour)));
     }
     plot.points(Points::new(&name, on_map(&centre)).color(colour).radius(5.0).shape(MarkerShape::Diamond).filled(false));
@@ -136,7 +139,7 @@ fn paint_truth(plot: &mut PlotUi<'_>, state: &State, estimate_in_site: &Point3) 
     let [east, north] = on_map(estimate_in_site);
     let words = format!("  {:.0} cm off in the site frame", offset.norm() * 100.0);
     plot.text(
-        Text::new("offset", PlotPoint::new(east, north), theme::note(words))
+        Text::new("", PlotPoint::new(east, north), theme::note(words).color(theme::TEXT))
             .anchor(egui::Align2::LEFT_TOP)
             .allow_hover(false),
     );

@@ -98,23 +98,26 @@ fn edit(ui: &mut Ui, info: &SettingInfo, value: &Value) -> Option<Value> {
     match &info.domain {
         Domain::Switch => {
             let mut is_on = value.as_bool().unwrap_or_default();
-            let response = ui.checkbox(&mut is_on, "");
+            let response = ui.checkbox(&mut is_on, "").accessible_name(&info.key);
             response.changed().then(|| json!(is_on))
         }
         Domain::Choice(words) => {
             let mut chosen = value.as_str().unwrap_or_default().to_owned();
             let before = chosen.clone();
-            ComboBox::from_id_salt(&info.key).width(78.0).selected_text(RichText::new(&chosen).size(11.0)).show_ui(ui, |ui| {
+            let choice = ComboBox::from_id_salt(&info.key).width(78.0).selected_text(RichText::new(&chosen).size(11.0));
+            let shown = choice.show_ui(ui, |ui| {
                 for word in words {
                     ui.selectable_value(&mut chosen, word.clone(), word);
                 }
             });
+            shown.response.accessible_name(&info.key);
             (chosen != before).then(|| json!(chosen))
         }
         Domain::OddBetween(low, high) => {
             let mut number = value.as_u64().unwrap_or_default();
             let before = number;
-            ui.add(DragValue::new(&mut number).range(u64::from(*low)..=u64::from(*high)).speed(0.2));
+            ui.add(DragValue::new(&mut number).range(u64::from(*low)..=u64::from(*high)).speed(0.2))
+                .accessible_name(&info.key);
             // An even number cannot be meant: the odd one in the direction of the change is.
             if number != before && number % 2 == 0 {
                 number = if number > before { number + 1 } else { number - 1 };
@@ -124,14 +127,16 @@ fn edit(ui: &mut Ui, info: &SettingInfo, value: &Value) -> Option<Value> {
         Domain::Between(low, high) if info.default.is_u64() => {
             let mut number = value.as_i64().unwrap_or_default();
             let before = number;
-            ui.add(DragValue::new(&mut number).range(low.ceil() as i64..=high.floor() as i64).speed(0.05));
+            ui.add(DragValue::new(&mut number).range(low.ceil() as i64..=high.floor() as i64).speed(0.05))
+                .accessible_name(&info.key);
             (number != before).then(|| json!(number))
         }
         Domain::Between(low, high) => {
             let mut number = value.as_f64().unwrap_or_default();
             let before = number;
             let speed = (before.abs() * 0.01).max(0.002);
-            ui.add(DragValue::new(&mut number).range(*low..=*high).speed(speed).max_decimals(4));
+            ui.add(DragValue::new(&mut number).range(*low..=*high).speed(speed).max_decimals(4))
+                .accessible_name(&info.key);
             (number != before).then(|| json!(number))
         }
     }

@@ -10,9 +10,9 @@ use crate::state::State;
 use crate::{panels, theme, view2d};
 
 /// Room for the arrow and the number between two patches, points.
-const BETWEEN: f32 = 52.0;
+const BETWEEN: f32 = 68.0;
 /// Room for the words above and below a patch, points.
-const WORDS: (f32, f32) = (17.0, 31.0);
+const WORDS: (f32, f32) = (16.0, 18.0);
 
 /// One patch of the strip.
 #[derive(Clone, Debug, PartialEq)]
@@ -97,7 +97,7 @@ fn show_patch(ui: &mut Ui, state: &State, patch: &Patch, frame: Rect, out: &mut 
             view2d::checker(painter, frame);
             let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
             painter.image(raster.texture.id(), frame, whole, theme::UNTINTED);
-            statistics(ui, raster, patch.array, frame);
+            statistics(ui, raster, frame);
         }
         Slot::Failed(_) => {
             painter.rect_filled(frame, 0.0, theme::WELL);
@@ -115,18 +115,11 @@ fn show_patch(ui: &mut Ui, state: &State, patch: &Patch, frame: Rect, out: &mut 
     }
 }
 
-/// Mean and standard deviation below a patch, and the limits of the difference.
-fn statistics(ui: &Ui, raster: &Raster, array: ArrayName, frame: Rect) {
-    let painter = ui.painter();
-    let below = frame.center_bottom() + vec2(0.0, 3.0);
-    let first = format!("mean {:.3}  σ {:.3}", raster.mean, raster.sigma);
-    painter.text(below, Align2::CENTER_TOP, first, theme::digit_font(), theme::TEXT);
-    let [width, height] = raster.size();
-    let second = match array {
-        ArrayName::Difference => format!("blue −{DIFFERENCE_LIMIT}  red +{DIFFERENCE_LIMIT}"),
-        _ => format!("{width} × {height} px"),
-    };
-    painter.text(below + vec2(0.0, 14.0), Align2::CENTER_TOP, second, theme::digit_font(), theme::WEAK);
+/// Mean and standard deviation below a patch.
+fn statistics(ui: &Ui, raster: &Raster, frame: Rect) {
+    let below = frame.center_bottom() + vec2(0.0, 4.0);
+    let words = format!("mean {:.3}  σ {:.3}", raster.mean, raster.sigma);
+    ui.painter().text(below, Align2::CENTER_TOP, words, theme::digit_font(), theme::TEXT);
 }
 
 fn explain(array: ArrayName) -> String {
@@ -135,12 +128,12 @@ fn explain(array: ArrayName) -> String {
         ArrayName::Scaled => "The template magnified by the ratio of distances, so that it has the size expected now.",
         ArrayName::Rolled => "Then turned by the roll of the camera: this is what was searched for.",
         ArrayName::Matched => "The left image at the match.",
-        ArrayName::Difference => "Matched minus rolled, both with mean 0 and deviation 1: blue darker, red brighter.",
+        ArrayName::Difference => "Matched minus rolled, both with mean 0 and deviation 1: blue is darker, red brighter.",
         ArrayName::RightWindow => "The right image at the stereo match, resampled as the left camera sees it.",
         ArrayName::Surface => "The scores of all positions.",
     };
     if array == ArrayName::Difference {
-        what.to_owned()
+        format!("{what}\nShown from −{DIFFERENCE_LIMIT} (blue) over 0 (white) to +{DIFFERENCE_LIMIT} (red).")
     } else {
         format!("{what}\nShown from {PATCH_SIGMAS} σ below its mean to {PATCH_SIGMAS} σ above: correlation ignores both.")
     }

@@ -113,7 +113,7 @@ fn warn_of_edge(canvas: &Canvas, matched: &TemplateMatch) {
 /// Pixel and score under the pointer, else what the surface holds.
 fn status(ui: &mut Ui, canvas: &Canvas, raster: &Raster, region: PixelRect, matched: &TemplateMatch) {
     ui.horizontal(|ui| {
-        ui.set_height(STATUS - 4.0);
+        ui.set_height(STATUS - 6.0);
         let Some(pixel) = canvas.hovered(region) else {
             let flat = if matched.flat_positions > 0 { format!(", {} flat", matched.flat_positions) } else { String::new() };
             ui.label(theme::note(format!("{} positions{flat}; white line: threshold; checker: excluded", matched.positions)));

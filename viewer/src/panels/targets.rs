@@ -3,7 +3,6 @@
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui, vec2};
 use sightline_core::session::view::{RunView, TargetView};
 
-use super::digits;
 use crate::command::{Command, Mode};
 use crate::overlay::{Mark, paint_mark};
 use crate::state::{State, run_letter, state_of_word};
@@ -94,7 +93,10 @@ fn how_far(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: 
         }
         ui.label(theme::number(format!("{} of {}", progress.k, progress.n)).size(11.0));
     } else if let Some(why) = &run.stopped {
-        ui.label(RichText::new(why).small().color(theme::LOST));
+        if ui.small_button("Resume").clicked() {
+            out.push(Command::ResumeRun { target: target.number, run: run.number });
+        }
+        ui.add(egui::Label::new(RichText::new(why).small().color(theme::LOST)).truncate()).on_hover_text(why);
     } else if run.complete {
         ui.label(theme::note("complete"));
     } else {
@@ -130,7 +132,7 @@ fn summary(run: &RunView) -> String {
         words.push(format!("{false_tracked} false"));
     }
     if let Some(err_px) = summary.final_err_px {
-        words.push(format!("last {} px", digits((err_px * 100.0).round() / 100.0)));
+        words.push(format!("last {err_px:.1} px"));
     }
     if words.is_empty() { format!("{} steps", summary.steps) } else { words.join(", ") }
 }

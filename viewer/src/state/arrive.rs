@@ -2,12 +2,12 @@
 
 use sightline_core::session::Cursor;
 use sightline_core::session::view::{RunView, SessionView};
-use sightline_core::session::wire::{Event, NewSession, Problem};
+use sightline_core::session::wire::{Event, NewSession, Problem, SessionEntry, TraverseEntry};
 
 use super::{Connection, Progress, Refusal, State, run_letter};
 use crate::cache::Key;
 use crate::command::Mode;
-use crate::net::{Arrived, Reply, Request, SessionEntry, TraverseEntry};
+use crate::net::{Arrived, Reply, Request};
 
 impl State {
     /// Asks for what a page needs first.

@@ -14,7 +14,7 @@ use sightline_core::frames::Pixel;
 use sightline_core::limits::SettingInfo;
 use sightline_core::session::Cursor;
 use sightline_core::session::view::{RunView, SessionView, TargetView};
-use sightline_core::session::wire::{Problem, StopView, TraverseView};
+use sightline_core::session::wire::{Problem, StopView, TraverseEntry, TraverseView};
 use sightline_core::settings::Changes;
 use sightline_core::target::TrackingState;
 use sightline_core::trace::{ArrayName, StepRow, StepTrace};
@@ -22,7 +22,7 @@ use sightline_core::trace::{ArrayName, StepRow, StepTrace};
 use self::messages::Messages;
 use crate::cache::{Cache, Eye, Key, Slot, StepKey};
 use crate::command::{Layer, Mode, Panel, Stage};
-use crate::net::{Request, TraverseEntry};
+use crate::net::Request;
 use crate::raster::Raster;
 use crate::view2d::View2d;
 
