@@ -139,7 +139,7 @@ impl AppState {
         let found = number.and_then(|number| lock(&self.0.sessions).by_number.get(&number).cloned());
         let live = found.ok_or_else(|| ApiError::not_found("There is no such session."))?;
         if live.wake() {
-            runner::restore(self, &live)?;
+            runner::restore(self, &live).inspect_err(|_| live.sleep())?;
         }
         Ok(live)
     }

@@ -147,7 +147,7 @@ async fn stops_ahead_of_the_cursor_are_rendered_unasked() {
     std::fs::remove_dir_all(drive.path().join("images")).unwrap();
     let server = TestServer::open(drive.path(), folder.path());
     let mut events = server.state.events().subscribe();
-    let path = format!("traverses/{}/prefetch?from=2", server.traverse);
+    let path = format!("traverses/{}/prefetch?from=3", server.traverse);
     assert_eq!(server.post(&path, &json!({})).await.status, 204);
     let mut order = Vec::new();
     while order.len() < 5 {
@@ -155,9 +155,9 @@ async fn stops_ahead_of_the_cursor_are_rendered_unasked() {
         let event = serde_json::to_value(event).unwrap();
         order.extend(event["ready"].as_u64().filter(|_| event["event"] == json!("render_progress")));
     }
-    let from = order.iter().position(|step| *step == 2).unwrap();
-    assert!(from <= 1, "at most the stop in work comes before: {order:?}");
-    assert_eq!(order[from..from + 3], [2, 3, 4], "{order:?}");
+    // Stops 0 and 1 may have been under way already.
+    let place = |step: u64| order.iter().position(|done| *done == step);
+    assert!(place(3) < place(4) && place(4) < place(2), "{order:?}");
     let view = server.get(&format!("traverses/{}", server.traverse)).await.expect(200);
     assert!(view["stops"].as_array().unwrap().iter().all(|stop| stop["ready"] == json!(true)));
 }

@@ -92,7 +92,7 @@ impl Track {
     pub fn run(self) -> Result<()> {
         let settings = self.settings()?;
         let traverse = open::open(&self.traverse, None)?;
-        for path in [&self.rrd, &self.csv].into_iter().flatten().filter(|path| path.exists()) {
+        if let Some(path) = [&self.rrd, &self.csv].into_iter().flatten().find(|path| path.exists()) {
             return Err(Error::format(path, "exists already; choose another name"));
         }
         let mut runs = Vec::new();
