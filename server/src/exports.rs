@@ -123,7 +123,8 @@ async fn follow(live: Arc<LiveSession>, stream: Arc<LiveStream>, mut events: Rec
         }
         loop {
             match events.recv().await {
-                Ok(Event::SessionChanged { session } | Event::RunProgress { session, .. }) if session != live.id => {}
+                Ok(Event::SessionChanged { session } | Event::RunProgress { session, .. })
+                    if session != live.id => {}
                 Ok(Event::RenderProgress { .. }) => {}
                 Ok(_) | Err(RecvError::Lagged(_)) => break,
                 Err(RecvError::Closed) => return,

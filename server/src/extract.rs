@@ -95,7 +95,8 @@ pub fn check_content_type(method: &Method, headers: &HeaderMap) -> ApiResult<()>
         media_type.eq_ignore_ascii_case("application/json")
     };
     let length = headers.get(header::CONTENT_LENGTH);
-    let has_body = length.is_some_and(|length| length != "0") || headers.contains_key(header::TRANSFER_ENCODING);
+    let has_body =
+        length.is_some_and(|length| length != "0") || headers.contains_key(header::TRANSFER_ENCODING);
     let mut types = headers.get_all(header::CONTENT_TYPE).iter().peekable();
     let is_unsaid = types.peek().is_none();
     if (is_unsaid && has_body) || !types.all(is_json) { Err(not_json()) } else { Ok(()) }

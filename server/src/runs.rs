@@ -48,7 +48,8 @@ async fn fork(
     Body(new): Body<NewRun>,
 ) -> ApiResult<Response> {
     let live = state.session(&session)?;
-    live.with(|session| session.target(target).map(|_| ())).map_err(|error| ApiError::from(error).about_path())?;
+    live.with(|session| session.target(target).map(|_| ()))
+        .map_err(|error| ApiError::from(error).about_path())?;
     let work_state = state.clone();
     state.designations().run(move || add(&work_state, &live, target, &new)).await
 }
@@ -136,7 +137,10 @@ fn add(state: &AppState, live: &Arc<LiveSession>, target: usize, new: &NewRun) -
     let stops = live.traverse.traverse.stop_count();
     if !(designation.step..stops).contains(&new.from_step) {
         let (first, last, given) = (designation.step, stops - 1, new.from_step);
-        return Err(ApiError::invalid("field", format!("from_step: must be from {first} to {last}, not {given}")));
+        return Err(ApiError::invalid(
+            "field",
+            format!("from_step: must be from {first} to {last}, not {given}"),
+        ));
     }
     let redesignated = if new.from_step == designation.step {
         Some(Arc::new(runner::designate(&live.traverse, designation, &settings)?))
@@ -156,7 +160,11 @@ fn add(state: &AppState, live: &Arc<LiveSession>, target: usize, new: &NewRun) -
 
 fn has_room(session: &Session, target: usize) -> ApiResult<()> {
     let full = session.target(target)?.runs.len() >= RUN_LIMIT;
-    if full { Err(ApiError::conflict(format!("A target may have at most {RUN_LIMIT} runs."))) } else { Ok(()) }
+    if full {
+        Err(ApiError::conflict(format!("A target may have at most {RUN_LIMIT} runs.")))
+    } else {
+        Ok(())
+    }
 }
 
 /// The run that the path names.

@@ -17,10 +17,7 @@ use crate::state::AppState;
 
 /// The routes of this resource.
 pub fn router() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new()
-        .routes(routes!(list, begin))
-        .routes(routes!(show))
-        .routes(routes!(move_cursor))
+    OpenApiRouter::new().routes(routes!(list, begin)).routes(routes!(show)).routes(routes!(move_cursor))
 }
 
 /// The sessions on open traverses, oldest first

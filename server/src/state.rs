@@ -189,7 +189,8 @@ impl AppState {
 
     /// What a page must hear that may have missed anything.
     pub fn everything_may_have_changed(&self) -> Vec<Event> {
-        let sessions = self.sessions().into_iter().map(|live| Event::SessionChanged { session: live.id.clone() });
+        let sessions =
+            self.sessions().into_iter().map(|live| Event::SessionChanged { session: live.id.clone() });
         let traverses = self.traverses().iter().filter(|open| open.traverse.index().scenario.is_some());
         sessions.chain(traverses.map(|open| open.progress(None))).collect()
     }

@@ -55,7 +55,9 @@ async fn stage(
         "locate" => json(&trace.locate),
         "judge" => json(&trace.judge),
         "update" => json(&trace.update),
-        _ => Err(ApiError::not_found("The stages are predict, point_mast, capture, locate, judge and update.")),
+        _ => {
+            Err(ApiError::not_found("The stages are predict, point_mast, capture, locate, judge and update."))
+        }
     }
 }
 
@@ -75,7 +77,8 @@ async fn array(
         ApiError::not_found(format!("The arrays are {}, each with the ending .npy.", words.join(", ")))
     })?;
     blocking(move || {
-        let missing = || ApiError::not_found(format!("Step {step} did not come to the array {}.", name.word()));
+        let missing =
+            || ApiError::not_found(format!("Step {step} did not come to the array {}.", name.word()));
         let view = trace.array(name).ok_or_else(missing)?;
         let [width, height] = view.size();
         let image = GrayImage::from_raw(width, height, view.values().to_vec())
@@ -91,7 +94,13 @@ fn json(value: &impl Serialize) -> ApiResult<Response> {
 }
 
 /// The recorded step that the path names.
-fn find(state: &AppState, session: &str, target: usize, run: usize, step: usize) -> ApiResult<Arc<StepTrace>> {
+fn find(
+    state: &AppState,
+    session: &str,
+    target: usize,
+    run: usize,
+    step: usize,
+) -> ApiResult<Arc<StepTrace>> {
     let live = state.session(session)?;
     live.with(|session| {
         let found = session.run(target, run).map_err(|error| ApiError::from(error).about_path())?;
