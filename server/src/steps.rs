@@ -26,7 +26,7 @@ pub fn router() -> OpenApiRouter<AppState> {
 /// A step
 ///
 /// Arrays are left out; they are fetched one by one.
-#[utoipa::path(get, path = "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}", tag = "steps", params(
+#[utoipa::path(get, operation_id = "show_step", path = "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}", tag = "steps", params(
     ("session" = String, Path), ("target" = usize, Path), ("run" = usize, Path), ("step" = usize, Path)),
     responses((status = 200, body = StepTrace), ApiError))]
 async fn show(
@@ -38,7 +38,7 @@ async fn show(
 }
 
 /// One stage of a step; null where it was not reached
-#[utoipa::path(get, path = "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/stages/{stage}",
+#[utoipa::path(get, operation_id = "show_stage", path = "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/stages/{stage}",
     tag = "steps", params(
     ("session" = String, Path), ("target" = usize, Path), ("run" = usize, Path), ("step" = usize, Path),
     ("stage" = String, Path, description = "predict, point_mast, capture, locate, judge or update")),
@@ -62,7 +62,7 @@ async fn stage(
 }
 
 /// An array of a step as a NumPy file; NaN where invalid
-#[utoipa::path(get, path = "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/arrays/{file}",
+#[utoipa::path(get, operation_id = "show_array", path = "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/arrays/{file}",
     tag = "steps", params(
     ("session" = String, Path), ("target" = usize, Path), ("run" = usize, Path), ("step" = usize, Path),
     ("file" = String, Path, description = "The array's name with the ending .npy")),

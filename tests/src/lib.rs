@@ -4,3 +4,4 @@ pub mod browser;
 pub mod data;
 pub mod rrd;
 pub mod troubled;
+pub mod server;
