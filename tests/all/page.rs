@@ -89,7 +89,8 @@ async fn wait(browser: &Browser, what: &str, condition: &str) {
 async fn place(browser: &Browser, pixel: Pixel) -> (f64, f64) {
     let status = status(browser).await;
     let map = &status["image_to_screen"];
-    let number = |value: &Value| value.as_f64().unwrap_or_else(|| panic!("no map of the left image: {status}"));
+    let number =
+        |value: &Value| value.as_f64().unwrap_or_else(|| panic!("no map of the left image: {status}"));
     let scale = number(&map["scale"]);
     (number(&map["origin"][0]) + scale * pixel.x, number(&map["origin"][1]) + scale * pixel.y)
 }
@@ -126,7 +127,8 @@ async fn a_person_picks_a_rock_steps_to_the_end_and_back_and_exports() {
 
     for step in 1..bench.stop_count {
         browser.press("ArrowRight").await;
-        wait(&browser, "the next step", &format!("s.step === {step} && s.shown && s.state === 'tracking'")).await;
+        wait(&browser, "the next step", &format!("s.step === {step} && s.shown && s.state === 'tracking'"))
+            .await;
     }
     browser.press("ArrowRight").await;
     browser.press("Home").await;
@@ -143,7 +145,8 @@ async fn a_person_picks_a_rock_steps_to_the_end_and_back_and_exports() {
     for row in rows {
         assert_eq!((&row["state"], &row["tracked"]), (&"tracking".into(), &true.into()), "{row}");
     }
-    let designated = &bench.json(&format!("/api/v1/sessions/{session}"))["targets"][0]["designation"]["pixel"];
+    let designated =
+        &bench.json(&format!("/api/v1/sessions/{session}"))["targets"][0]["designation"]["pixel"];
     let clicked = Pixel::new(designated["x"].as_f64().unwrap(), designated["y"].as_f64().unwrap());
     assert!(clicked.distance(bench.rock) < 2.0, "clicked {clicked:?} for {:?}", bench.rock);
     let error_m = run["summary"]["final_err_m"].as_f64().unwrap();
@@ -168,11 +171,14 @@ fn check_export(bench: &Bench, session: &str) {
     let traces: Vec<StepTrace> = (0..bench.stop_count).map(read).collect();
     let mut checked = 0;
     for doc in documented_entities(1) {
-        let found = recording.entities.get(&doc.path).unwrap_or_else(|| panic!("{} is not in the file", doc.path));
+        let found =
+            recording.entities.get(&doc.path).unwrap_or_else(|| panic!("{} is not in the file", doc.path));
         let expected = match doc.rows {
             Rows::Once => 0,
             Rows::EachStop => bench.stop_count,
-            Rows::EachStep { .. } | Rows::EachScore { .. } => traces.iter().filter(|t| doc.has_data_at(t)).count(),
+            Rows::EachStep { .. } | Rows::EachScore { .. } => {
+                traces.iter().filter(|t| doc.has_data_at(t)).count()
+            }
         };
         assert_eq!(found.data.len(), expected, "rows of {}", doc.path);
         checked += 1;

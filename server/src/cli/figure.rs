@@ -39,17 +39,26 @@ fn nees(area: &Area<'_>, runs: &[ApproachRun], summary: &ApproachSummary) -> std
     let count = values.len() as f64;
     let title = summary.calibration.as_ref().map_or_else(
         || "no tracked run".to_owned(),
-        |c| format!("mean NEES {:.2}, 95 % band {:.2} to {:.2} ({} runs)", c.mean_nees, c.band[0], c.band[1], c.count),
+        |c| {
+            format!(
+                "mean NEES {:.2}, 95 % band {:.2} to {:.2} ({} runs)",
+                c.mean_nees, c.band[0], c.band[1], c.count
+            )
+        },
     );
     let mut chart = chart(area, &title, 0.0..16.0, 0.0..1.0, ["NEES", "share of runs below"])?;
     let steps = values.iter().enumerate().map(|(i, &v)| (v, (i + 1) as f64 / count));
-    let line = chart.draw_series(LineSeries::new(steps, MEASURED.stroke_width(2))).map_err(|e| e.to_string())?;
+    let line =
+        chart.draw_series(LineSeries::new(steps, MEASURED.stroke_width(2))).map_err(|e| e.to_string())?;
     line.label("measured").legend(|(x, y)| PathElement::new([(x, y), (x + 18, y)], MEASURED.stroke_width(2)));
     let chi_squared = ChiSquared::new(3.0).map_err(|e| e.to_string())?;
     let expected = (0..=160).map(|i| f64::from(i) / 10.0).map(|x| (x, chi_squared.cdf(x)));
-    let line = chart.draw_series(LineSeries::new(expected, EXPECTED.stroke_width(2))).map_err(|e| e.to_string())?;
-    line.label("χ² with 3 d.o.f.").legend(|(x, y)| PathElement::new([(x, y), (x + 18, y)], EXPECTED.stroke_width(2)));
-    let labels = chart.configure_series_labels().position(SeriesLabelPosition::LowerRight).border_style(BLACK).draw();
+    let line =
+        chart.draw_series(LineSeries::new(expected, EXPECTED.stroke_width(2))).map_err(|e| e.to_string())?;
+    line.label("χ² with 3 d.o.f.")
+        .legend(|(x, y)| PathElement::new([(x, y), (x + 18, y)], EXPECTED.stroke_width(2)));
+    let labels =
+        chart.configure_series_labels().position(SeriesLabelPosition::LowerRight).border_style(BLACK).draw();
     labels.map_err(|e| e.to_string())
 }
 

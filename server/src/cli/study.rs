@@ -78,7 +78,8 @@ impl Approach {
     fn track_world(&self, scenario: &Scenario, settings: &Settings) -> Result<Vec<ApproachRun>> {
         let traverse = create_simulated(scenario, &self.out.join(format!("world-{}", scenario.seed)))?;
         open::render(&traverse)?;
-        let world = traverse.world().ok_or_else(|| Error::Request("a simulated world has no surface".to_owned()))?;
+        let world =
+            traverse.world().ok_or_else(|| Error::Request("a simulated world has no surface".to_owned()))?;
         let targets = sim::choose_targets(world, scenario, traverse.index());
         let runs = approach::track_world(&traverse, scenario.seed, &targets, settings);
         say::line(&format!("world {}: {}", scenario.seed, sentence(&approach::summarise_runs(&runs))))?;
@@ -118,7 +119,9 @@ fn sentence(summary: &ApproachSummary) -> String {
 /// The runs as comma separated values, one a line.
 fn table(runs: &[ApproachRun]) -> String {
     let number = |v: Option<f64>| v.map_or_else(String::new, |v| v.to_string());
-    let mut text = "world,target,x_px,y_px,distance_m,run_tracked,steps_lost,err_px,err_m,err_range_m,sigma_m,nees\n".to_owned();
+    let mut text =
+        "world,target,x_px,y_px,distance_m,run_tracked,steps_lost,err_px,err_m,err_range_m,sigma_m,nees\n"
+            .to_owned();
     for run in runs {
         let tracked = run.summary.run_tracked.map_or_else(String::new, |t| t.to_string());
         let columns = [

@@ -67,12 +67,12 @@ const SERIES: [(&str, &[&str]); 6] = [
         ],
     ),
     ("pixels", &["/truth/{target}/err_px", "/truth/{target}/tolerance_px", "/{target}/update/correction_px"]),
-    (
-        "metres",
-        &["/truth/{target}/err_m", "/{target}/update/sigma_m", "/{target}/update/correction_m"],
-    ),
+    ("metres", &["/truth/{target}/err_m", "/{target}/update/sigma_m", "/{target}/update/correction_m"]),
     ("scale and roll", &["/{target}/locate/scale_roll/scale", "/{target}/locate/scale_roll/roll_deg"]),
-    ("gates in metres", &["/{target}/judge/distance_correction_m/**", "/{target}/judge/position_correction_m/**"]),
+    (
+        "gates in metres",
+        &["/{target}/judge/distance_correction_m/**", "/{target}/judge/position_correction_m/**"],
+    ),
     (
         "pointing",
         &[
@@ -105,7 +105,11 @@ pub(super) fn blueprint(roots: &[String], live: bool) -> Blueprint {
         .with_blueprint_panel(BlueprintPanel::from_state(PanelState::Collapsed))
         .with_selection_panel(SelectionPanel::from_state(PanelState::Collapsed))
         .with_time_panel(
-            TimePanel::new().with_state(PanelState::Collapsed).with_timeline("step").with_fps(2.0).with_play_state(play),
+            TimePanel::new()
+                .with_state(PanelState::Collapsed)
+                .with_timeline("step")
+                .with_fps(2.0)
+                .with_play_state(play),
         )
 }
 
@@ -142,7 +146,8 @@ fn run(root: &str) -> ContainerLike {
 }
 
 fn words(roots: &[String]) -> ContainerLike {
-    let log: ContainerLike = TextLogView::new("log").with_contents(of_all(&["/{target}/judge/verdict"], roots)).into();
+    let log: ContainerLike =
+        TextLogView::new("log").with_contents(of_all(&["/{target}/judge/verdict"], roots)).into();
     let about = TextDocumentView::new("traverse").with_origin("/traverse").with_contents(["$origin"]).into();
     let labels = roots.iter().map(|root| {
         TextDocumentView::new(root).with_origin(path("/{target}", root)).with_contents(["$origin"]).into()

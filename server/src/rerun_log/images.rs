@@ -92,26 +92,33 @@ pub(super) fn log_second_peak(step: &Step<'_>) -> Logged {
 /// The covariance of the located left position.
 pub(super) fn log_left_covariance(step: &Step<'_>) -> Logged {
     let located = step.trace.locate.as_ref();
-    let strip = located.and_then(|located| ellipse(located.left_pixel?, &located.left_covariance_px2, SIGMAS));
+    let strip =
+        located.and_then(|located| ellipse(located.left_pixel?, &located.left_covariance_px2, SIGMAS));
     step.log("/{target}/locate/left_covariance", strip.map(|s| haloed(&[s], MEASUREMENT)))
 }
 
 /// The searched part of the epipolar curve, coloured by score.
 pub(super) fn log_curve(step: &Step<'_>) -> Logged {
     let stereo = step.template().and_then(|e| e.point_stereo.as_ref());
-    step.log("/{target}/locate/point_stereo/curve", stereo.map(|stereo| {
-        let pairs = || stereo.curve.windows(2);
-        LineStrips2D::new(pairs().map(|p| [point(p[0].pixel), point(p[1].pixel)]))
-            .with_colors(pairs().map(|p| p[0].score.map_or(faint(TRUTH, 60), |s| color(of_score(s)))))
-            .with_radii([Radius::new_ui_points(1.5)])
-            .with_draw_order(20.0)
-    }))
+    step.log(
+        "/{target}/locate/point_stereo/curve",
+        stereo.map(|stereo| {
+            let pairs = || stereo.curve.windows(2);
+            LineStrips2D::new(pairs().map(|p| [point(p[0].pixel), point(p[1].pixel)]))
+                .with_colors(pairs().map(|p| p[0].score.map_or(faint(TRUTH, 60), |s| color(of_score(s)))))
+                .with_radii([Radius::new_ui_points(1.5)])
+                .with_draw_order(20.0)
+        }),
+    )
 }
 
 /// The corresponding point in the right image.
 pub(super) fn log_right_match(step: &Step<'_>) -> Logged {
     let stereo = step.template().and_then(|e| e.point_stereo.as_ref());
-    step.log("/{target}/locate/point_stereo/match", stereo.map(|s| dot(s.right_pixel, MEASUREMENT, step.label)))
+    step.log(
+        "/{target}/locate/point_stereo/match",
+        stereo.map(|s| dot(s.right_pixel, MEASUREMENT, step.label)),
+    )
 }
 
 /// The truth in the left image.

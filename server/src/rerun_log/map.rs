@@ -31,7 +31,8 @@ pub(super) fn log_site_axes(stream: &RecordingStream) -> Logged {
 
 /// The way driven, by the estimated poses of all stops.
 pub(super) fn log_path(stream: &RecordingStream, stops: &dyn Stops) -> Logged {
-    let strip = (0..stops.stop_count()).map(|step| point_3d(&stops.site_from_rover(step).translation.vector.into()));
+    let strip =
+        (0..stops.stop_count()).map(|step| point_3d(&stops.site_from_rover(step).translation.vector.into()));
     let line = LineStrips3D::new([strip.collect::<Vec<_>>()])
         .with_colors([color(ROVER)])
         .with_radii([Radius::new_ui_points(1.0)]);
@@ -99,7 +100,12 @@ pub(super) fn log_true_position(step: &Step<'_>) -> Logged {
 }
 
 /// The ellipsoids of a covariance in the rover frame, turned into the site frame.
-fn spread(step: &Step<'_>, point_in_rover: &Point3, covariance: &Matrix3<f64>, rgb: Rgb) -> Option<Ellipsoids3D> {
+fn spread(
+    step: &Step<'_>,
+    point_in_rover: &Point3,
+    covariance: &Matrix3<f64>,
+    rgb: Rgb,
+) -> Option<Ellipsoids3D> {
     let turn = step.site_from_rover.rotation.to_rotation_matrix();
     let covariance_in_site = turn.matrix() * covariance * turn.matrix().transpose();
     let colors: [Color; 2] = [color(rgb), faint(rgb, 110)];
@@ -111,7 +117,9 @@ fn frustum(camera: &Camera, rgb: Rgb) -> LineStrips3D {
     let (w, h) = (f64::from(camera.width()), f64::from(camera.height()));
     let corners = [(0.0, 0.0), (w, 0.0), (w, h), (0.0, h)];
     let reach = |(x, y): (f64, f64)| {
-        camera.ray(Pixel::new(x - 0.5, y - 0.5)).map(|ray| [point_3d(&ray.origin), point_3d(&ray.at(FRUSTUM_M))])
+        camera
+            .ray(Pixel::new(x - 0.5, y - 0.5))
+            .map(|ray| [point_3d(&ray.origin), point_3d(&ray.at(FRUSTUM_M))])
     };
     let edges = (0..corners.len()).flat_map(|i| {
         let (a, b) = (corners[i], corners[(i + 1) % corners.len()]);

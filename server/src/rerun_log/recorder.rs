@@ -87,7 +87,8 @@ impl Recorder {
             return Ok(());
         }
         let roots: Vec<_> = self.runs.keys().cloned().collect();
-        blueprint::blueprint(&roots, self.live).send(&self.stream, rerun::blueprint::BlueprintActivation::default())
+        blueprint::blueprint(&roots, self.live)
+            .send(&self.stream, rerun::blueprint::BlueprintActivation::default())
     }
 
     /// Logs one step of a run that was made known, unless it is in the recording already.

@@ -4,9 +4,9 @@
 
 use rerun::{RecordingStream, Scalars};
 use sightline_core::camera::MastAngles;
+use sightline_core::locate::template::TemplateEvidence;
 use sightline_core::stages::capture::Capture;
 use sightline_core::stages::judge::Gate;
-use sightline_core::locate::template::TemplateEvidence;
 use sightline_core::trace::{StepTrace, StepTruth};
 
 use super::Logged;
@@ -25,7 +25,12 @@ pub(super) struct Score {
     rgb: Rgb,
 }
 
-const fn score(entity: &'static str, when: &'static str, rgb: Rgb, value: fn(&StepTrace) -> Option<f64>) -> Score {
+const fn score(
+    entity: &'static str,
+    when: &'static str,
+    rgb: Rgb,
+    value: fn(&StepTrace) -> Option<f64>,
+) -> Score {
     Score { entity, when, value, rgb }
 }
 
