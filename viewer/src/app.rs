@@ -87,7 +87,9 @@ impl SightlineApp {
             timeline::show(ui, state, &mut out);
         });
         let mut panels = Panels { state, out: &mut out, left_image: None };
-        CentralPanel::default().frame(Frame::new().fill(theme::PAGE)).show(ui, |ui| self.tree.ui(&mut panels, ui));
+        CentralPanel::default()
+            .frame(Frame::new().fill(theme::PAGE))
+            .show(ui, |ui| self.tree.ui(&mut panels, ui));
         self.left_image = panels.left_image;
         help::show(ui, state, &mut out);
         out

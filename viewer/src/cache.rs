@@ -5,8 +5,8 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use sightline_core::trace::{ArrayName, StepTrace};
 use sightline_core::session::wire::Problem;
+use sightline_core::trace::{ArrayName, StepTrace};
 
 use crate::raster::Raster;
 
@@ -137,7 +137,9 @@ impl Cache {
         for key in keys {
             match self.entries.get_mut(key) {
                 Some(Entry::Ready { wanted, .. }) => *wanted = self.round,
-                Some(Entry::Waiting { until }) if *until <= now && missing.len() < room => missing.push(key.clone()),
+                Some(Entry::Waiting { until }) if *until <= now && missing.len() < room => {
+                    missing.push(key.clone())
+                }
                 None if missing.len() < room => missing.push(key.clone()),
                 _ => {}
             }
@@ -166,9 +168,8 @@ impl Cache {
 
     /// Forgets refusals and waiting, so that everything not loaded is asked for again.
     pub fn retry(&mut self, which: impl Fn(&Key) -> bool) {
-        self.entries.retain(|key, entry| {
-            matches!(entry, Entry::Ready { .. } | Entry::Loading) || !which(key)
-        });
+        self.entries
+            .retain(|key, entry| matches!(entry, Entry::Ready { .. } | Entry::Loading) || !which(key));
     }
 
     /// When the first of what is waited for is to be asked for again.
@@ -240,7 +241,9 @@ mod tests {
     fn raster(side: u32) -> Item {
         let values = sightline_core::image::GrayImage::new(side, side);
         let bytes = sightline_core::image::npy::encode(&values).unwrap();
-        Item::Raster(Arc::new(Raster::from_npy(&egui::Context::default(), ArrayName::Surface, &bytes).unwrap()))
+        Item::Raster(Arc::new(
+            Raster::from_npy(&egui::Context::default(), ArrayName::Surface, &bytes).unwrap(),
+        ))
     }
 
     fn problem(status: u16) -> Problem {

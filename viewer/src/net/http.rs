@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use ehttp::{Headers, Method};
-use serde::de::DeserializeOwned;
 use serde::Serialize;
+use serde::de::DeserializeOwned;
 use sightline_core::session::wire::{Designated, Problem};
 
 use super::{Arrived, Reply, Request};
@@ -51,20 +51,28 @@ fn describe(request: &Request) -> (Method, String, Option<Vec<u8>>) {
         Request::Sessions => get("sessions".to_owned()),
         Request::Session(id) => get(format!("sessions/{id}")),
         Request::NewSession(new) => (Method::POST, "sessions".to_owned(), json(new)),
-        Request::PutCursor { session, cursor } => (Method::PUT, format!("sessions/{session}/cursor"), json(cursor)),
-        Request::NewTarget { session, target } => (Method::POST, format!("sessions/{session}/targets"), json(target)),
+        Request::PutCursor { session, cursor } => {
+            (Method::PUT, format!("sessions/{session}/cursor"), json(cursor))
+        }
+        Request::NewTarget { session, target } => {
+            (Method::POST, format!("sessions/{session}/targets"), json(target))
+        }
         Request::RemoveTarget { session, target } => {
             (Method::DELETE, format!("sessions/{session}/targets/{target}"), None)
         }
         Request::NewRun { session, target, new } => {
             (Method::POST, format!("sessions/{session}/targets/{target}/runs"), json(new))
         }
-        Request::CancelRun { session, target, run } => {
-            (Method::POST, format!("sessions/{session}/targets/{target}/runs/{run}/cancel"), json(&serde_json::json!({})))
-        }
-        Request::ResumeRun { session, target, run } => {
-            (Method::POST, format!("sessions/{session}/targets/{target}/runs/{run}/resume"), json(&serde_json::json!({})))
-        }
+        Request::CancelRun { session, target, run } => (
+            Method::POST,
+            format!("sessions/{session}/targets/{target}/runs/{run}/cancel"),
+            json(&serde_json::json!({})),
+        ),
+        Request::ResumeRun { session, target, run } => (
+            Method::POST,
+            format!("sessions/{session}/targets/{target}/runs/{run}/resume"),
+            json(&serde_json::json!({})),
+        ),
         Request::OpenRerun(session) => {
             (Method::POST, format!("sessions/{session}/rerun"), json(&serde_json::json!({})))
         }
@@ -78,7 +86,9 @@ fn item_path(key: &Key) -> String {
         format!("sessions/{session}/targets/{target}/runs/{run}/steps/{step}")
     };
     match key {
-        Key::Image { traverse, step, eye } => format!("traverses/{traverse}/steps/{step}/images/{}.png", eye.word()),
+        Key::Image { traverse, step, eye } => {
+            format!("traverses/{traverse}/steps/{step}/images/{}.png", eye.word())
+        }
         Key::Trace(step) => step_path(step),
         Key::Array(step, name) => format!("{}/arrays/{}.npy", step_path(step), name.word()),
     }

@@ -95,7 +95,8 @@ pub fn status(ui: &mut Ui, state: &State) {
 pub fn banner(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     if let Connection::Gone { attempts } = state.connection {
         ui.horizontal(|ui| {
-            let words = format!("The server is gone. Steps that are loaded stay browsable; retrying ({attempts}) …");
+            let words =
+                format!("The server is gone. Steps that are loaded stay browsable; retrying ({attempts}) …");
             ui.label(RichText::new(words).color(theme::LOST));
             if ui.small_button("Retry now").clicked() {
                 out.push(Command::Reconnect);
@@ -133,7 +134,12 @@ pub fn transport(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 fn run_progress(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     for ((target, run), progress) in &state.progress {
         let name = run_letter(*run);
-        progress_bar(ui, &format!("run {name}: {} of {}, {}", progress.k, progress.n, progress.doing), progress.k, progress.n);
+        progress_bar(
+            ui,
+            &format!("run {name}: {} of {}, {}", progress.k, progress.n, progress.doing),
+            progress.k,
+            progress.n,
+        );
         if ui.small_button("Cancel").clicked() {
             out.push(Command::CancelRun { target: *target, run: *run });
         }

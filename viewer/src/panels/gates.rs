@@ -49,7 +49,9 @@ fn transition(verdict: &Verdict, state: &State) -> String {
     let retries = state.setting("limits", "n_retry").and_then(|v| v.as_u64()).unwrap_or(2);
     let before = verdict.state_before.word();
     match verdict.state {
-        TrackingState::Lost { count } => format!("{before} → lost, bad update {count}; {retries} may follow the loss"),
+        TrackingState::Lost { count } => {
+            format!("{before} → lost, bad update {count}; {retries} may follow the loss")
+        }
         TrackingState::Failed if before != "failed" => format!("{before} → failed: no retries are left"),
         TrackingState::Failed => "stays failed until the target is picked again".to_owned(),
         other if other.word() == before => format!("stays {before}"),
@@ -67,7 +69,11 @@ fn show_gate(ui: &mut Ui, gate: &Gate) {
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             let word = if gate.passed { "pass" } else { "FAIL" };
             column(ui, 32.0, RichText::new(word).strong().color(colour));
-            column(ui, 62.0, theme::note(format!("{relation} {:.3} {}", gate.limit, gate.unit).trim_end().to_owned()));
+            column(
+                ui,
+                62.0,
+                theme::note(format!("{relation} {:.3} {}", gate.limit, gate.unit).trim_end().to_owned()),
+            );
             let value = gate.value.map_or_else(|| "nothing".to_owned(), |v| format!("{v:.3}"));
             column(ui, 50.0, theme::number(value));
         });

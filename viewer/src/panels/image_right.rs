@@ -75,7 +75,8 @@ fn paint_marks(canvas: &Canvas, trace: &StepTrace, state: &State) {
         }
         paint_ticks(canvas, &overlay, curve);
     }
-    if trace.predict.is_some() && state.shows(Layer::Prediction)
+    if trace.predict.is_some()
+        && state.shows(Layer::Prediction)
         && let Some(pixel) = pointing.predicted_right
     {
         overlay.mark(pixel, Mark::Cross, theme::PREDICTION);
@@ -111,7 +112,9 @@ fn paint_ticks(canvas: &Canvas, overlay: &Overlay<'_>, curve: impl Fn(f64) -> Op
     for range_m in TICKS_M {
         let (Some(at), Some(beyond)) = (curve(range_m), curve(range_m * 1.01)) else { continue };
         let screen = canvas.transform.to_screen(at);
-        if !canvas.transform.rect.contains(screen) || last.is_some_and(|last| last.distance(screen) < TICK_GAP) {
+        if !canvas.transform.rect.contains(screen)
+            || last.is_some_and(|last| last.distance(screen) < TICK_GAP)
+        {
             continue;
         }
         let length = at.distance(beyond).max(1e-9);

@@ -18,7 +18,11 @@ use crate::{overlay, panels, theme};
 pub const STATUS: f32 = 24.0;
 
 /// Shows the left image. Returns its canvas' transform and size, from which a test can compute where to click.
-pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) -> Option<(crate::view2d::Transform, [u32; 2])> {
+pub fn show(
+    ui: &mut Ui,
+    state: &State,
+    out: &mut Vec<Command>,
+) -> Option<(crate::view2d::Transform, [u32; 2])> {
     let Some(raster) = ready_image(ui, state, Eye::Left) else { return None };
     let [width, height] = raster.size();
     let region = PixelRect::whole(width, height);
@@ -48,7 +52,10 @@ pub fn ready_image<'a>(ui: &mut Ui, state: &'a State, eye: Eye) -> Option<&'a Ra
     match state.image(eye) {
         Slot::Ready(raster) => return Some(raster),
         Slot::Failed(problem) => {
-            panels::missing(ui, &format!("The {word} image of step {step} cannot be shown: {}", problem.detail));
+            panels::missing(
+                ui,
+                &format!("The {word} image of step {step} cannot be shown: {}", problem.detail),
+            );
         }
         Slot::Absent if state.traverse.is_none() => panels::missing(ui, &state.missing_target()),
         Slot::Absent | Slot::Loading => panels::missing(ui, &waiting_words(state, word, step)),
@@ -61,9 +68,13 @@ fn waiting_words(state: &State, word: &str, step: usize) -> String {
     match (is_rendered, state.rendering) {
         (true, _) => format!("Loading the {word} image of step {step} …"),
         (false, Some((k, n))) => {
-            format!("The images of step {step} are being rendered: {k} of {n} stops are done. They appear here by themselves.")
+            format!(
+                "The images of step {step} are being rendered: {k} of {n} stops are done. They appear here by themselves."
+            )
         }
-        (false, None) => format!("The images of step {step} are being rendered. They appear here by themselves."),
+        (false, None) => {
+            format!("The images of step {step} are being rendered. They appear here by themselves.")
+        }
     }
 }
 
@@ -84,11 +95,26 @@ fn entries(state: &State) -> Vec<Entry> {
         entries.push(Entry::new(Layer::Match, Mark::Ring, run, word));
     }
     if trace.predict.is_some() && pointing.is_some_and(|p| p.predicted_left.is_some()) {
-        entries.push(Entry::new(Layer::Prediction, Mark::Stroke(Line::Dotted), theme::PREDICTION, "predicted, 3σ gate"));
+        entries.push(Entry::new(
+            Layer::Prediction,
+            Mark::Stroke(Line::Dotted),
+            theme::PREDICTION,
+            "predicted, 3σ gate",
+        ));
     }
     if matched.is_some() {
-        entries.push(Entry::new(Layer::Template, Mark::Stroke(Line::Solid), run, "template window (dotted: scaled, rolled)"));
-        entries.push(Entry::new(Layer::SearchWindow, Mark::Stroke(Line::Dashed), theme::SEARCH, "search window"));
+        entries.push(Entry::new(
+            Layer::Template,
+            Mark::Stroke(Line::Solid),
+            run,
+            "template window (dotted: scaled, rolled)",
+        ));
+        entries.push(Entry::new(
+            Layer::SearchWindow,
+            Mark::Stroke(Line::Dashed),
+            theme::SEARCH,
+            "search window",
+        ));
     }
     if trace.capture.as_ref().is_some_and(|c| c.subframe.is_some()) {
         entries.push(Entry::new(Layer::Subframe, Mark::Stroke(Line::Dotted), theme::SUBFRAME, "subframe"));
@@ -104,7 +130,9 @@ fn paint_marks(overlay: &Overlay<'_>, trace: &StepTrace, state: &State) {
     let run = theme::run(state.cursor.run);
     let evidence = trace.template();
     let matched = evidence.and_then(|e| e.match_template.as_ref());
-    if let Some(subframe) = trace.capture.as_ref().and_then(|c| c.subframe).filter(|_| state.shows(Layer::Subframe)) {
+    if let Some(subframe) =
+        trace.capture.as_ref().and_then(|c| c.subframe).filter(|_| state.shows(Layer::Subframe))
+    {
         overlay.rectangle(subframe, theme::SUBFRAME, Line::Dotted);
     }
     if let Some(found) = matched.filter(|_| state.shows(Layer::SearchWindow)) {
@@ -125,10 +153,17 @@ fn paint_marks(overlay: &Overlay<'_>, trace: &StepTrace, state: &State) {
         && state.shows(Layer::Match)
     {
         let bias = located.left_bias_px;
-        overlay.ellipse(pixel, &(located.left_covariance_px2 + bias * bias.transpose()), 3.0, run, Line::Solid);
+        overlay.ellipse(
+            pixel,
+            &(located.left_covariance_px2 + bias * bias.transpose()),
+            3.0,
+            run,
+            Line::Solid,
+        );
         overlay.mark(pixel, Mark::Ring, run);
     }
-    if let Some(pixel) = trace.truth.as_ref().and_then(|t| t.left_pixel).filter(|_| state.shows(Layer::Truth)) {
+    if let Some(pixel) = trace.truth.as_ref().and_then(|t| t.left_pixel).filter(|_| state.shows(Layer::Truth))
+    {
         overlay.mark(pixel, Mark::Plus, theme::TRUTH);
     }
 }
@@ -223,7 +258,11 @@ fn loupe(canvas: &Canvas, raster: &Raster, pixel: Pixel) {
         return;
     }
     let on_left = canvas.transform.to_screen(pixel).x > area.center().x;
-    let corner = if on_left { area.left_bottom() - vec2(0.0, SIDE + 20.0) } else { area.right_bottom() - vec2(SIDE, SIDE) };
+    let corner = if on_left {
+        area.left_bottom() - vec2(0.0, SIDE + 20.0)
+    } else {
+        area.right_bottom() - vec2(SIDE, SIDE)
+    };
     let frame = Rect::from_min_size(corner, vec2(SIDE, SIDE));
     let [width, height] = raster.size().map(|v| v as f32);
     let middle = pos2((pixel.x as f32 + 0.5) / width, (pixel.y as f32 + 0.5) / height);

@@ -38,7 +38,9 @@ fn not_reached(trace: &StepTrace, state: &State) -> String {
     match (&trace.fault, trace.predict.is_none()) {
         (Some(fault), _) => format!("{word} was not reached: {fault}"),
         (None, true) => {
-            format!("{word} is not part of the designation. Go one step on (Right) to see it, or select `point_stereo`.")
+            format!(
+                "{word} is not part of the designation. Go one step on (Right) to see it, or select `point_stereo`."
+            )
         }
         (None, false) => format!("{word} was not reached: {}", state.missing_step()),
     }
@@ -73,7 +75,8 @@ fn entries(ui: &mut Ui, record: &Value) {
         ui.label(theme::number(record.to_string()));
         return;
     };
-    let (plain, nested): (Vec<_>, Vec<_>) = fields.iter().partition(|(key, value)| words(key, value).is_some());
+    let (plain, nested): (Vec<_>, Vec<_>) =
+        fields.iter().partition(|(key, value)| words(key, value).is_some());
     egui::Grid::new(ui.next_auto_id()).num_columns(2).spacing([10.0, 2.0]).show(ui, |ui| {
         for (key, value) in plain {
             let (name, unit) = name_and_unit(key);
@@ -90,8 +93,13 @@ fn entries(ui: &mut Ui, record: &Value) {
         let (name, unit) = name_and_unit(key);
         let list = value.as_array().filter(|_| !is_matrix(key, value));
         let count = list.map(|list| format!(" ({})", list.len())).unwrap_or_default();
-        let header = RichText::new(format!("{name}{count} {unit}").trim_end().to_owned()).size(12.0).color(theme::TEXT);
-        CollapsingHeader::new(header).id_salt(key).default_open(is_small(key, value)).show(ui, |ui| children(ui, key, value));
+        let header = RichText::new(format!("{name}{count} {unit}").trim_end().to_owned())
+            .size(12.0)
+            .color(theme::TEXT);
+        CollapsingHeader::new(header)
+            .id_salt(key)
+            .default_open(is_small(key, value))
+            .show(ui, |ui| children(ui, key, value));
     }
 }
 
@@ -100,9 +108,12 @@ fn children(ui: &mut Ui, key: &str, value: &Value) {
         Value::Array(list) if is_matrix(key, value) => matrix(ui, list),
         Value::Array(list) => {
             for (i, item) in list.iter().enumerate() {
-                let title = item.get("name").and_then(Value::as_str).map_or_else(|| i.to_string(), str::to_owned);
+                let title =
+                    item.get("name").and_then(Value::as_str).map_or_else(|| i.to_string(), str::to_owned);
                 if item.is_object() {
-                    CollapsingHeader::new(RichText::new(title).size(12.0)).id_salt(i).show(ui, |ui| entries(ui, item));
+                    CollapsingHeader::new(RichText::new(title).size(12.0))
+                        .id_salt(i)
+                        .show(ui, |ui| entries(ui, item));
                 } else {
                     ui.label(theme::number(item.to_string()));
                 }
@@ -124,7 +135,10 @@ fn is_small(key: &str, value: &Value) -> bool {
 /// Whether a list is a square matrix: they are written as one list, column by column.
 fn is_matrix(key: &str, value: &Value) -> bool {
     let is_named = key.contains("covariance") || key.contains("_from_");
-    is_named && value.as_array().is_some_and(|list| matches!(list.len(), 4 | 9) && list.iter().all(Value::is_number))
+    is_named
+        && value
+            .as_array()
+            .is_some_and(|list| matches!(list.len(), 4 | 9) && list.iter().all(Value::is_number))
 }
 
 /// A square matrix in rows and columns.
@@ -154,10 +168,14 @@ fn words(key: &str, value: &Value) -> Option<String> {
             Some(digits(number))
         }
         Value::String(text) => Some(text.clone()),
-        Value::Array(list) if list.len() <= 4 && !is_matrix(key, value) && list.iter().all(Value::is_number) => {
+        Value::Array(list)
+            if list.len() <= 4 && !is_matrix(key, value) && list.iter().all(Value::is_number) =>
+        {
             Some(list.iter().filter_map(Value::as_f64).map(digits).collect::<Vec<_>>().join("  "))
         }
-        Value::Object(fields) if fields.len() == 2 && fields.contains_key("x") && fields.contains_key("y") => {
+        Value::Object(fields)
+            if fields.len() == 2 && fields.contains_key("x") && fields.contains_key("y") =>
+        {
             let [x, y] = ["x", "y"].map(|k| fields[k].as_f64().unwrap_or(f64::NAN));
             Some(format!("{x:.2}, {y:.2}"))
         }
@@ -183,7 +201,10 @@ fn name_and_unit(key: &str) -> (String, &'static str) {
     if let Some(name) = key.strip_suffix("_in_site") {
         return (name.replace('_', " "), "m, site");
     }
-    if matches!(key, "left_pixel" | "right_pixel" | "pixel" | "predicted_left" | "predicted_right" | "integer") {
+    if matches!(
+        key,
+        "left_pixel" | "right_pixel" | "pixel" | "predicted_left" | "predicted_right" | "integer"
+    ) {
         return (key.replace('_', " "), "px");
     }
     let found = UNITS.iter().find_map(|(suffix, unit)| Some((key.strip_suffix(suffix)?, *unit)));

@@ -3,11 +3,13 @@
 //! Site frame: +x north, +y east, +z down. On the map east is to the right, so a site point is drawn at (y, x).
 
 use egui::{Ui, vec2};
-use egui_plot::{Arrows, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotPoints, PlotUi, Points, Polygon, Text};
+use egui_plot::{
+    Arrows, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotPoints, PlotUi, Points, Polygon, Text,
+};
 use nalgebra::Matrix2;
 use sightline_core::frames::{Point3, Pose, PoseRecord, Vector3};
-use sightline_core::session::wire::StopView;
 use sightline_core::session::view::RunView;
+use sightline_core::session::wire::StopView;
 
 use crate::command::{Command, Go};
 use crate::state::{State, run_letter};
@@ -64,12 +66,17 @@ fn poses<'a>(stops: &'a [StopView], of: impl Fn(&StopView) -> Option<PoseRecord>
 fn paint_paths(plot: &mut PlotUi<'_>, stops: &[StopView], step: usize) {
     let truth = poses(stops, |stop| stop.true_site_from_rover);
     if !truth.is_empty() {
-        plot.line(Line::new("true path", truth).color(theme::TRUTH).style(LineStyle::dotted_loose()).width(1.5));
+        plot.line(
+            Line::new("true path", truth).color(theme::TRUTH).style(LineStyle::dotted_loose()).width(1.5),
+        );
     }
     let estimated = poses(stops, |stop| Some(stop.site_from_rover));
     plot.line(Line::new("estimated path", estimated.clone()).color(theme::PREDICTION).width(1.5));
     plot.points(
-        Points::new("estimated path", estimated).color(theme::PREDICTION).radius(2.0).shape(MarkerShape::Circle),
+        Points::new("estimated path", estimated)
+            .color(theme::PREDICTION)
+            .radius(2.0)
+            .shape(MarkerShape::Circle),
     );
     if let Some(stop) = stops.get(step) {
         paint_rover(plot, &stop.site_from_rover.to_pose(), stops);
@@ -123,7 +130,13 @@ fn paint_trail(plot: &mut PlotUi<'_>, state: &State, stops: &[StopView], run: &R
         let polygon = Polygon::new("", points).style(style).allow_hover(false);
         plot.polygon(polygon.fill_color(egui::Color32::TRANSPARENT).stroke(egui::Stroke::new(1.5, colour)));
     }
-    plot.points(Points::new(&name, on_map(&centre)).color(colour).radius(5.0).shape(MarkerShape::Diamond).filled(false));
+    plot.points(
+        Points::new(&name, on_map(&centre))
+            .color(colour)
+            .radius(5.0)
+            .shape(MarkerShape::Diamond)
+            .filled(false),
+    );
     paint_truth(plot, state, &centre);
 }
 

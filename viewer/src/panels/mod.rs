@@ -34,9 +34,8 @@ pub fn title_row(ui: &mut Ui, title: &str, beside: impl FnOnce(&mut Ui)) -> Resp
 /// The sentence of a panel that has nothing to show.
 pub fn missing(ui: &mut Ui, sentence: &str) {
     let space = ui.available_rect_before_wrap();
-    let mut middle = ui.new_child(
-        UiBuilder::new().max_rect(space.shrink(6.0)).layout(Layout::top_down(Align::Center)),
-    );
+    let mut middle =
+        ui.new_child(UiBuilder::new().max_rect(space.shrink(6.0)).layout(Layout::top_down(Align::Center)));
     middle.add_space((space.height() / 2.0 - 20.0).clamp(2.0, 80.0));
     middle.add(egui::Label::new(RichText::new(sentence).color(theme::WEAK)).wrap());
     ui.advance_cursor_after_rect(space);

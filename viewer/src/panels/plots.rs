@@ -71,13 +71,26 @@ fn charts(state: &State, run: &RunView) -> Vec<Chart> {
         thresholds: limit("ncc_min").into_iter().chain(limit("stereo_ncc_min")).collect(),
         anchor: 1.0,
     }];
-    let mut position = vec![series("σ", theme::WEAK, diamond, MarkerShape::Diamond, |row| row.sigma_m.map(|v| v * 100.0))];
+    let mut position =
+        vec![series("σ", theme::WEAK, diamond, MarkerShape::Diamond, |row| row.sigma_m.map(|v| v * 100.0))];
     if run.rows.iter().any(|row| row.err_m.is_some()) {
         let error = series("error", colour, ring, MarkerShape::Circle, |row| row.err_px);
-        charts.push(Chart { title: "pixel", unit: "px", series: vec![error], thresholds: Vec::new(), anchor: 0.0 });
+        charts.push(Chart {
+            title: "pixel",
+            unit: "px",
+            series: vec![error],
+            thresholds: Vec::new(),
+            anchor: 0.0,
+        });
         position.push(series("error", colour, ring, MarkerShape::Circle, |row| row.err_m.map(|v| v * 100.0)));
     }
-    charts.push(Chart { title: "position", unit: "cm", series: position, thresholds: Vec::new(), anchor: 0.0 });
+    charts.push(Chart {
+        title: "position",
+        unit: "cm",
+        series: position,
+        thresholds: Vec::new(),
+        anchor: 0.0,
+    });
     charts
 }
 
@@ -113,31 +126,34 @@ fn plot(
     is_last: bool,
 ) -> Option<usize> {
     let last = state.stop_count().saturating_sub(1) as f64;
-    let plot = Plot::new((chart.title, state.traverse.as_ref().map(|t| t.id.clone())))
-        .height(height)
-        .allow_scroll(false)
-        .allow_drag(false)
-        .allow_zoom(false)
-        .allow_boxed_zoom(false)
-        .allow_axis_zoom_drag(false)
-        .show_axes([is_last, true])
-        .include_x(-0.4)
-        .include_x(last + 0.4)
-        .include_y(chart.anchor)
-        .set_margin_fraction(vec2(0.0, 0.12))
-        .y_axis_min_width(30.0)
-        .x_axis_formatter(|mark: GridMark, _: &std::ops::RangeInclusive<f64>| {
-            if mark.value.fract() == 0.0 { format!("{}", mark.value) } else { String::new() }
-        })
-        .link_axis(Id::unique("steps"), [true, false])
-        .label_formatter(|near| match near {
-            HoverPosition::NearDataPoint { plot_name, position, .. } => {
-                Some(format!("step {}\n{plot_name} {:.3}", position.x, position.y))
-            }
-            HoverPosition::Elsewhere { .. } => None,
-        });
+    let plot =
+        Plot::new((chart.title, state.traverse.as_ref().map(|t| t.id.clone())))
+            .height(height)
+            .allow_scroll(false)
+            .allow_drag(false)
+            .allow_zoom(false)
+            .allow_boxed_zoom(false)
+            .allow_axis_zoom_drag(false)
+            .show_axes([is_last, true])
+            .include_x(-0.4)
+            .include_x(last + 0.4)
+            .include_y(chart.anchor)
+            .set_margin_fraction(vec2(0.0, 0.12))
+            .y_axis_min_width(30.0)
+            .x_axis_formatter(|mark: GridMark, _: &std::ops::RangeInclusive<f64>| {
+                if mark.value.fract() == 0.0 { format!("{}", mark.value) } else { String::new() }
+            })
+            .link_axis(Id::unique("steps"), [true, false])
+            .label_formatter(|near| match near {
+                HoverPosition::NearDataPoint { plot_name, position, .. } => {
+                    Some(format!("step {}\n{plot_name} {:.3}", position.x, position.y))
+                }
+                HoverPosition::Elsewhere { .. } => None,
+            });
     let response = plot.show(ui, |plot| {
-        plot.vline(VLine::new("", state.cursor.step as f64).color(theme::ACCENT).width(1.5).allow_hover(false));
+        plot.vline(
+            VLine::new("", state.cursor.step as f64).color(theme::ACCENT).width(1.5).allow_hover(false),
+        );
         for &value in &chart.thresholds {
             let line = HLine::new("", value).color(theme::FAILED).style(LineStyle::dashed_dense());
             plot.hline(line.width(1.0).allow_hover(false));

@@ -39,7 +39,12 @@ fn foot(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         let words = format!("Run from here (step {step})");
         let wrong = state.settings.iter().find_map(|info| problem(state, info));
         let button = ui.add_enabled(wrong.is_none(), egui::Button::new(words).min_size(vec2(150.0, 24.0)));
-        if button.on_hover_text("Forks a new run with the changed settings; nothing recorded is overwritten. Key R").clicked() {
+        if button
+            .on_hover_text(
+                "Forks a new run with the changed settings; nothing recorded is overwritten. Key R",
+            )
+            .clicked()
+        {
             out.push(Command::RunFromHere(state.draft.clone()));
         }
         if ui.add_enabled(!state.draft.is_empty(), egui::Button::new("Discard")).clicked() {
@@ -70,7 +75,13 @@ fn show_setting(ui: &mut Ui, state: &State, info: &SettingInfo, out: &mut Vec<Co
     };
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        let mark = if drafted.is_some() { "● " } else if in_run != info.default { "○ " } else { "" };
+        let mark = if drafted.is_some() {
+            "● "
+        } else if in_run != info.default {
+            "○ "
+        } else {
+            ""
+        };
         let label = RichText::new(format!("{mark}{}", info.key)).size(12.0).color(colour);
         let room = (ui.available_width() - 118.0).max(60.0);
         ui.allocate_ui_with_layout(vec2(room, 20.0), Layout::left_to_right(Align::Center), |ui| {
@@ -104,7 +115,9 @@ fn edit(ui: &mut Ui, info: &SettingInfo, value: &Value) -> Option<Value> {
         Domain::Choice(words) => {
             let mut chosen = value.as_str().unwrap_or_default().to_owned();
             let before = chosen.clone();
-            let choice = ComboBox::from_id_salt(&info.key).width(78.0).selected_text(RichText::new(&chosen).size(11.0));
+            let choice = ComboBox::from_id_salt(&info.key)
+                .width(78.0)
+                .selected_text(RichText::new(&chosen).size(11.0));
             let shown = choice.show_ui(ui, |ui| {
                 for word in words {
                     ui.selectable_value(&mut chosen, word.clone(), word);

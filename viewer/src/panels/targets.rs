@@ -33,13 +33,21 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 fn show_target(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Command>) {
     let is_selected = state.cursor.target == Some(target.number);
     ui.horizontal(|ui| {
-        let text = RichText::new(&target.label).strong().color(if is_selected { theme::STRONG } else { theme::TEXT });
+        let text = RichText::new(&target.label).strong().color(if is_selected {
+            theme::STRONG
+        } else {
+            theme::TEXT
+        });
         if ui.add(egui::Label::new(text).sense(Sense::click())).clicked() {
             let run = target.runs.last().map_or(0, |run| run.number);
             out.push(Command::Look { target: target.number, run });
         }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            if ui.small_button("Remove").on_hover_text("Takes the target and its runs out of the session").clicked() {
+            if ui
+                .small_button("Remove")
+                .on_hover_text("Takes the target and its runs out of the session")
+                .clicked()
+            {
                 out.push(Command::RemoveTarget(target.number));
             }
             let at = target.designation;
@@ -73,7 +81,12 @@ fn show_run(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out:
     });
     let response = inside.response.interact(Sense::click());
     response.widget_info(|| {
-        egui::WidgetInfo::selected(egui::Role::Button, true, is_selected, format!("run {}", run_letter(run.number)))
+        egui::WidgetInfo::selected(
+            egui::Role::Button,
+            true,
+            is_selected,
+            format!("run {}", run_letter(run.number)),
+        )
     });
     if response.clicked() {
         out.push(Command::Look { target: target.number, run: run.number });

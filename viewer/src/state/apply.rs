@@ -1,9 +1,9 @@
 //! Carrying out what the person asked for.
 
-use sightline_core::session::wire::{NewRun, NewTarget};
-use sightline_core::session::Cursor;
-use sightline_core::settings::Changes;
 use sightline_core::frames::Pixel;
+use sightline_core::session::Cursor;
+use sightline_core::session::wire::{NewRun, NewTarget};
+use sightline_core::settings::Changes;
 
 use super::{Place, State, Views, events, run_letter};
 use crate::command::{Command, Go, Mode, Panel};

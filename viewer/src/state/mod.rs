@@ -275,13 +275,22 @@ impl State {
         let step = self.cursor.step;
         if step < target.designation.step {
             let first = target.designation.step;
-            return format!("{} was picked at step {first}. Go there, or press PgDn for the next event.", target.label);
+            return format!(
+                "{} was picked at step {first}. Go there, or press PgDn for the next event.",
+                target.label
+            );
         }
         if self.row().is_none() {
             return match (self.run_progress(), self.run().and_then(|run| run.stopped.as_deref())) {
-                (Some(p), _) => format!("Step {step} is not computed yet: the run has done {} of {}.", p.k, p.n),
-                (None, Some(why)) => format!("The run stopped before step {step} ({why}). Press “Run from here” at an earlier step."),
-                (None, None) => format!("Step {step} is not computed yet. It appears here as soon as the run reaches it."),
+                (Some(p), _) => {
+                    format!("Step {step} is not computed yet: the run has done {} of {}.", p.k, p.n)
+                }
+                (None, Some(why)) => format!(
+                    "The run stopped before step {step} ({why}). Press “Run from here” at an earlier step."
+                ),
+                (None, None) => {
+                    format!("Step {step} is not computed yet. It appears here as soon as the run reaches it.")
+                }
             };
         }
         match self.trace_at(step) {
@@ -368,7 +377,10 @@ impl State {
             self.sync.session_asked = Some(self.sync.cursor_moves);
             self.outbox.push(Request::Session(id.clone()));
         }
-        if self.cursor != self.sync.server_cursor && !self.sync.cursor_asked && self.connection == Connection::Live {
+        if self.cursor != self.sync.server_cursor
+            && !self.sync.cursor_asked
+            && self.connection == Connection::Live
+        {
             self.sync.cursor_asked = true;
             self.sync.cursor_moves += 1;
             self.outbox.push(Request::PutCursor { session: id, cursor: self.cursor });

@@ -13,9 +13,9 @@ use sightline_core::locate::template::point_stereo::{CurvePoint, PointStereo};
 use sightline_core::locate::template::scale_roll::ScaleRoll;
 use sightline_core::locate::template::triangulate::Triangulation;
 use sightline_core::locate::{Evidence, Located};
+use sightline_core::session::Cursor;
 use sightline_core::session::view::{RunView, SessionView, TargetView};
 use sightline_core::session::wire::{StopView, TraverseEntry, TraverseView};
-use sightline_core::session::Cursor;
 use sightline_core::settings::{Changes, Settings};
 use sightline_core::stages::capture::Capture;
 use sightline_core::stages::judge::{Gate, Verdict};
@@ -256,7 +256,12 @@ fn template_match(score: f64) -> TemplateMatch {
             covariance_px2: Matrix2::identity() * 0.02,
             at_edge: false,
         },
-        second_peak: Some(SecondPeak { pixel: PIXEL.offset(12.0, 9.0), score: 0.4, ratio: 0.48, distance_px: 15.0 }),
+        second_peak: Some(SecondPeak {
+            pixel: PIXEL.offset(12.0, 9.0),
+            score: 0.4,
+            ratio: 0.48,
+            distance_px: 15.0,
+        }),
         covariance_px2: Matrix2::identity() * 0.04,
         bias_px: Vector2::zeros(),
         surface: Default::default(),
@@ -285,16 +290,17 @@ fn point_stereo() -> PointStereo {
 }
 
 fn verdict(is_good: bool, state: TrackingState) -> Verdict {
-    let gate = |criterion: u8, name: &str, unit: &str, value: f64, limit: f64, at_least: bool, passed: bool| Gate {
-        criterion,
-        name: name.to_owned(),
-        unit: unit.to_owned(),
-        value: Some(value),
-        limit,
-        at_least,
-        margin: Some(if at_least { value - limit } else { limit - value }),
-        passed,
-    };
+    let gate =
+        |criterion: u8, name: &str, unit: &str, value: f64, limit: f64, at_least: bool, passed: bool| Gate {
+            criterion,
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            value: Some(value),
+            limit,
+            at_least,
+            margin: Some(if at_least { value - limit } else { limit - value }),
+            passed,
+        };
     let ncc = if is_good { 0.83 } else { 0.41 };
     Verdict {
         gates: vec![
@@ -311,7 +317,13 @@ fn verdict(is_good: bool, state: TrackingState) -> Verdict {
     }
 }
 
-fn updated(step: usize, state: TrackingState, renewed: bool, covariance: Matrix3<f64>, camera: Camera) -> Updated {
+fn updated(
+    step: usize,
+    state: TrackingState,
+    renewed: bool,
+    covariance: Matrix3<f64>,
+    camera: Camera,
+) -> Updated {
     Updated {
         target: Target {
             designation: Designation { step: 0, pixel: PIXEL },

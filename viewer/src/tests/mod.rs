@@ -78,7 +78,9 @@ fn no_panel_is_blank_before_the_server_said_anything() {
 
 #[test]
 fn without_a_target_every_panel_tells_how_to_get_one() {
-    for pane in [Pane::Targets, Pane::Settings, Pane::Strip, Pane::Surface, Pane::Plots, Pane::Gates, Pane::Inspector] {
+    for pane in
+        [Pane::Targets, Pane::Settings, Pane::Strip, Pane::Surface, Pane::Plots, Pane::Gates, Pane::Inspector]
+    {
         Shown::pane(pane, |_| fixture::without_target()).says("Press T");
     }
 }

@@ -96,7 +96,9 @@ fn the_cursor_is_sent_once_at_a_time_and_an_older_answer_does_not_move_it_back()
     assert_eq!(state.cursor.step, 2);
     let [put] = first.try_into().unwrap();
     state.arrived(Arrived { request: put, outcome: Ok(Reply::Done) }, 0.0);
-    let [Request::PutCursor { cursor, .. }] = &state.take_requests()[..] else { panic!("the newest cursor is sent") };
+    let [Request::PutCursor { cursor, .. }] = &state.take_requests()[..] else {
+        panic!("the newest cursor is sent")
+    };
     assert_eq!(cursor.step, 2);
 }
 
