@@ -1,13 +1,12 @@
 //! All tests that cross crates.
 
-// A test may stop at the first thing that is not as it should be, and so may its helpers.
-#![allow(clippy::unwrap_used)]
-
+mod api;
+mod api_security;
+mod approach;
+mod cli;
 mod imports;
 mod page;
 mod recorded_cameras;
+mod recorded_tracking;
 mod rerun_export;
 mod zncc_reference;
-mod api;
-mod api_security;
-mod cli;

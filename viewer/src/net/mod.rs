@@ -3,6 +3,7 @@
 mod events;
 mod http;
 
+use std::collections::HashSet;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
 use sightline_core::limits::SettingInfo;
@@ -18,6 +19,9 @@ use crate::state::Connection;
 
 /// How many images, arrays and records are asked for at a time.
 const AT_A_TIME: usize = 6;
+
+/// How many of them may be images that must be rendered first: a browser has few connections to one server.
+const SLOW_AT_A_TIME: usize = 2;
 
 /// What the page asks of the server.
 #[derive(Clone, Debug, PartialEq)]
@@ -133,7 +137,8 @@ pub struct Net {
     context: egui::Context,
     sender: Sender<Arrived>,
     receiver: Receiver<Arrived>,
-    items_under_way: usize,
+    under_way: HashSet<Key>,
+    slow: HashSet<Key>,
     events: Events,
 }
 
@@ -142,12 +147,19 @@ impl Net {
     pub fn new(origin: String, context: egui::Context) -> Self {
         let (sender, receiver) = channel();
         let events = Events::new(&origin, context.clone());
-        Self { origin, context, sender, receiver, items_under_way: 0, events }
+        Self { origin, context, sender, receiver, under_way: HashSet::new(), slow: HashSet::new(), events }
     }
 
-    /// How many more images, arrays and records may be asked for now.
-    pub fn room(&self) -> usize {
-        AT_A_TIME.saturating_sub(self.items_under_way)
+    /// Takes a place for something that is asked for next, where there is one.
+    pub fn take_place(&mut self, key: &Key, is_slow: bool) -> bool {
+        let is_place = self.under_way.len() < AT_A_TIME && (!is_slow || self.slow.len() < SLOW_AT_A_TIME);
+        if is_place {
+            self.under_way.insert(key.clone());
+        }
+        if is_place && is_slow {
+            self.slow.insert(key.clone());
+        }
+        is_place
     }
 
     /// Sends a request; its answer arrives later.
@@ -156,7 +168,6 @@ impl Net {
             self.events.reconnect_now();
             return;
         }
-        self.items_under_way += usize::from(matches!(request, Request::Item(_)));
         let (sender, context) = (self.sender.clone(), self.context.clone());
         http::send(&self.origin, request, &self.context, move |arrived| {
             // Without a receiver the page is closing, and nobody waits for the answer.
@@ -169,8 +180,12 @@ impl Net {
     /// What arrived since the last time.
     pub fn poll(&mut self) -> Vec<Arrived> {
         let arrived: Vec<Arrived> = self.receiver.try_iter().collect();
-        let items = arrived.iter().filter(|a| matches!(a.request, Request::Item(_))).count();
-        self.items_under_way -= items;
+        for answer in &arrived {
+            if let Request::Item(key) = &answer.request {
+                self.under_way.remove(key);
+                self.slow.remove(key);
+            }
+        }
         arrived
     }
 

@@ -23,7 +23,7 @@ pub fn show(
     state: &State,
     out: &mut Vec<Command>,
 ) -> Option<(crate::view2d::Transform, [u32; 2])> {
-    let Some(raster) = ready_image(ui, state, Eye::Left) else { return None };
+    let raster = ready_image(ui, state, Eye::Left)?;
     let [width, height] = raster.size();
     let region = PixelRect::whole(width, height);
     let canvas = Canvas::new(ui, state.view(Panel::Left), region, STATUS);

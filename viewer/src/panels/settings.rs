@@ -132,7 +132,7 @@ fn edit(ui: &mut Ui, info: &SettingInfo, value: &Value) -> Option<Value> {
             ui.add(DragValue::new(&mut number).range(u64::from(*low)..=u64::from(*high)).speed(0.2))
                 .accessible_name(&info.key);
             // An even number cannot be meant: the odd one in the direction of the change is.
-            if number != before && number % 2 == 0 {
+            if number != before && number.is_multiple_of(2) {
                 number = if number > before { number + 1 } else { number - 1 };
             }
             (number != before).then(|| json!(number))

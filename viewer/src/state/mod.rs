@@ -349,6 +349,14 @@ impl State {
         keys
     }
 
+    /// Those of `keys` that are images which must be rendered first.
+    pub fn unrendered(&self, keys: &[Key]) -> Vec<Key> {
+        let is_ready =
+            |step: usize| self.traverse.as_ref().and_then(|t| t.stops.get(step)).is_some_and(|s| s.ready);
+        let is_slow = |key: &&Key| matches!(key, Key::Image { step, .. } if !is_ready(*step));
+        keys.iter().filter(is_slow).cloned().collect()
+    }
+
     fn want_step(&self, step: usize, is_neighbour: bool, keys: &mut Vec<Key>) {
         let computed = self.row_at(step).and_then(|_| self.step_key(step));
         keys.extend(computed.clone().map(Key::Trace));

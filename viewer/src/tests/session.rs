@@ -157,11 +157,11 @@ fn a_stop_that_was_rendered_is_asked_for_again() {
     let mut state = without_target();
     state.cursor.step = STOPS - 1;
     let key = state.image_key(STOPS - 1, Eye::Left).unwrap();
-    state.cache.want(std::slice::from_ref(&key), 1, 0.0);
+    state.cache.want(std::slice::from_ref(&key), |_| true, 0.0);
     state.arrived(Arrived { request: Request::Item(key.clone()), outcome: Err(problem(503)) }, 0.0);
-    assert!(state.cache.want(std::slice::from_ref(&key), 1, 0.1).is_empty());
+    assert!(state.cache.want(std::slice::from_ref(&key), |_| true, 0.1).is_empty());
     let (traverse, ready) = ("drive".to_owned(), Some(STOPS - 1));
     state.told(Event::RenderProgress { traverse, k: STOPS, n: STOPS, ready });
-    assert_eq!(state.cache.want(std::slice::from_ref(&key), 1, 0.1), vec![key]);
+    assert_eq!(state.cache.want(std::slice::from_ref(&key), |_| true, 0.1), vec![key]);
     assert!(state.stop().unwrap().ready && state.rendering.is_none());
 }
