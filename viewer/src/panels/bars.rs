@@ -184,7 +184,7 @@ pub fn stages(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 }
 
 fn stage_button(ui: &mut Ui, state: &State, stage: Stage, out: &mut Vec<Command>) {
-    let reached = state.trace().map(|trace| inspector::record(trace, stage).is_some());
+    let reached = state.trace().map(|trace| inspector::is_reached(trace, stage));
     let colour = match (reached, has_failed(state.trace(), stage)) {
         (_, true) => theme::FAILED,
         (Some(true), _) => theme::TEXT,

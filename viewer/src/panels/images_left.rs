@@ -233,13 +233,17 @@ fn paint_wrapped(canvas: &Canvas, at: egui::Pos2, words: &str) {
 
 /// In pick mode: the loupe, and the designation on a click.
 fn pick(ui: &Ui, canvas: &Canvas, raster: &Raster, state: &State, out: &mut Vec<Command>) {
+    let border = canvas.transform.rect.shrink(1.0);
+    let corner = border.left_bottom() + vec2(10.0, -14.0);
     if state.mode != Mode::Pick {
+        if state.session.as_ref().is_some_and(|session| session.targets.is_empty()) {
+            paint_words(&canvas.painter, corner, "Press T, then click the rock to track.", theme::ACCENT);
+        }
         return;
     }
-    let border = canvas.transform.rect.shrink(1.0);
     canvas.painter.rect_stroke(border, 0.0, egui::Stroke::new(2.0, theme::ACCENT), egui::StrokeKind::Inside);
     let hint = "Click the point to track. Esc cancels.";
-    paint_words(&canvas.painter, border.left_bottom() + vec2(10.0, -14.0), hint, theme::ACCENT);
+    paint_words(&canvas.painter, corner, hint, theme::ACCENT);
     let [width, height] = raster.size();
     let Some(pixel) = canvas.hovered(PixelRect::whole(width, height)) else { return };
     ui.ctx().set_cursor_icon(CursorIcon::Crosshair);

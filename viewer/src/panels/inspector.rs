@@ -46,6 +46,23 @@ fn not_reached(trace: &StepTrace, state: &State) -> String {
     }
 }
 
+/// Whether a stage was reached.
+pub fn is_reached(trace: &StepTrace, stage: Stage) -> bool {
+    let evidence = trace.template();
+    match stage {
+        Stage::Predict => trace.predict.is_some(),
+        Stage::PointMast => trace.point_mast.is_some(),
+        Stage::Capture => trace.capture.is_some(),
+        Stage::Locate => trace.locate.is_some(),
+        Stage::ScaleRoll => evidence.is_some_and(|e| e.scale_roll.is_some()),
+        Stage::MatchTemplate => evidence.is_some_and(|e| e.match_template.is_some()),
+        Stage::PointStereo => evidence.is_some_and(|e| e.point_stereo.is_some()),
+        Stage::Triangulate => evidence.is_some_and(|e| e.triangulate.is_some()),
+        Stage::Judge => trace.judge.is_some(),
+        Stage::Update => true,
+    }
+}
+
 /// What a stage returned; none where it was not reached.
 pub fn record(trace: &StepTrace, stage: Stage) -> Option<Value> {
     let evidence = trace.template();
