@@ -63,8 +63,10 @@ async fn every_array_is_a_numpy_file_of_the_size_that_the_step_says() {
     for name in ["reference", "scaled", "rolled", "matched", "difference", "right_window", "surface"] {
         let answer = server.get(&format!("{}/arrays/{name}.npy", step(&session, 0, 1))).await;
         let image = sightline_core::image::npy::decode(&answer.bytes, name).unwrap();
-        let surface = &trace["locate"]["evidence"]["match_template"]["surface"];
-        let said = |key: &str| if name == "surface" { surface[key].as_u64() } else { Some(21) };
+        // The surface has a score wherever the whole template lies in the search window.
+        let window = &trace["locate"]["evidence"]["match_template"]["search_window"];
+        let positions = |key: &str| window[key].as_u64().map(|side| side - 20);
+        let said = |key: &str| if name == "surface" { positions(key) } else { Some(21) };
         let (width, height) = image.dimensions();
         assert_eq!((Some(width.into()), Some(height.into())), (said("width"), said("height")), "{name}");
     }

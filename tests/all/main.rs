@@ -1,5 +1,8 @@
 //! All tests that cross crates.
 
+// A test says what went wrong by panicking, in its helpers too.
+#![allow(clippy::unwrap_used)]
+
 mod api;
 mod api_security;
 mod approach;

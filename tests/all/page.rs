@@ -151,7 +151,8 @@ async fn a_person_picks_a_rock_steps_to_the_end_and_back_and_exports() {
     assert!(clicked.distance(bench.rock) < 2.0, "clicked {clicked:?} for {:?}", bench.rock);
     let error_m = run["summary"]["final_err_m"].as_f64().unwrap();
     println!("at the last stop {error_m:.4} m, {} px", run["summary"]["final_err_px"]);
-    assert!(error_m < 0.03, "{error_m} m");
+    // The camera has half the resolution: a pixel of disparity at 3.2 m is 8.5 cm.
+    assert!(error_m < 0.06, "{error_m} m");
 
     check_export(&bench, &session);
     assert_eq!(browser.console_errors().await, Vec::<String>::new());

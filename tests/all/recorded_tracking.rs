@@ -33,7 +33,7 @@ fn error_px(step: &StepTrace) -> Option<(f64, f64)> {
 }
 
 #[test]
-fn street_targets_of_five_depths_agree_among_themselves_within_two_pixels_for_four_frames() {
+fn far_street_targets_move_alike_within_a_pixel_and_a_half_for_three_frames() {
     let Some(set) = data::set("kitti-seq1-frames-0-19", "tracking along a street") else { return };
     let folder = tempfile::tempdir().unwrap();
     let traverse = imported(&set, &folder.path().join("street"));
@@ -45,7 +45,8 @@ fn street_targets_of_five_depths_agree_among_themselves_within_two_pixels_for_fo
     );
     for step in 1..4 {
         // The true poses of so short a sequence err by up to 0.16° a frame (the set's README), which moves all
-        // targets alike: what is left after their common motion is the tracker's own.
+        // targets alike; their translation errs by 1.5 % of the way, which moves the near ones more. So the far
+        // ones, after their common motion, show the tracker's own error.
         let errors: Vec<(f64, f64)> = runs.iter().filter_map(|run| error_px(&run[step])).collect();
         assert_eq!(errors.len(), STREET.len(), "all are tracked at step {step}");
         let common =
@@ -53,7 +54,7 @@ fn street_targets_of_five_depths_agree_among_themselves_within_two_pixels_for_fo
         let (x, y) = (common(|e| e.0), common(|e| e.1));
         let own: Vec<f64> = errors.iter().map(|e| (e.0 - x).hypot(e.1 - y)).collect();
         println!("step {step}: common ({x:.2}, {y:.2}) px, own {own:.2?} px");
-        assert!(median(&own).unwrap() < 1.0 && own.iter().all(|&e| e < 4.0), "step {step}: {own:?}");
+        assert!(median(&own).unwrap() < 1.0 && own[..3].iter().all(|&e| e < 1.5), "step {step}: {own:?}");
     }
     assert!(
         runs.iter().flatten().all(|step| step.truth.as_ref().is_none_or(|t| t.kind == TruthKind::Carried))
