@@ -112,9 +112,9 @@ pub fn overview() -> Tree<Pane> {
     let inspector = tabs(&mut tiles, &[Pane::Inspector, Pane::Messages]);
     let images = linear(&mut tiles, LinearDir::Horizontal, &[(left, 1.0), (right, 1.0)]);
     let charts = linear(&mut tiles, LinearDir::Horizontal, &[(surface, 1.0), (map, 1.1), (plots, 1.1)]);
-    let middle = linear(&mut tiles, LinearDir::Vertical, &[(images, 0.46), (strip, 0.21), (charts, 0.33)]);
+    let middle = linear(&mut tiles, LinearDir::Vertical, &[(images, 0.49), (strip, 0.19), (charts, 0.32)]);
     let record = linear(&mut tiles, LinearDir::Vertical, &[(gates, 0.31), (inspector, 0.69)]);
-    let root = linear(&mut tiles, LinearDir::Horizontal, &[(side, 0.165), (middle, 0.635), (record, 0.2)]);
+    let root = linear(&mut tiles, LinearDir::Horizontal, &[(side, 0.17), (middle, 0.63), (record, 0.2)]);
     Tree::new(egui::Id::unique("panels"), root, tiles)
 }
 

@@ -102,7 +102,12 @@ impl<'a> Overlay<'a> {
 
     /// Words beside a pixel, offset by `offset` points.
     pub fn words(&self, pixel: Pixel, offset: Vec2, words: &str, colour: Color32) {
-        paint_words(self.painter, self.transform.to_screen(pixel) + offset, words, colour);
+        let at = self.transform.to_screen(pixel);
+        let width = self.painter.layout_no_wrap(words.to_owned(), theme::image_font(), colour).size().x;
+        // Words that would leave the canvas on the right stand left of their place.
+        let leaves = at.x + offset.x + width > self.transform.rect.right() - 4.0;
+        let x = if leaves { -offset.x.abs() - width } else { offset.x };
+        paint_words(self.painter, at + vec2(x, offset.y), words, colour);
     }
 }
 

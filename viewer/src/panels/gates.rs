@@ -1,14 +1,18 @@
 //! The gates: the four loss criteria with value, limit and margin, and the verdict as a sentence.
 
-use egui::{Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
+use egui::{Align2, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
 use sightline_core::stages::judge::{Gate, Verdict};
 use sightline_core::target::TrackingState;
 
-use super::digits;
 use crate::command::Command;
 use crate::state::State;
 use crate::{panels, theme};
 
+/// What the panel is for.
+const PURPOSE: &str = "Whether the match can be trusted: four criteria with their limits.";
+
+/// Room for the margin in digits, points.
+const MARGIN: f32 = 50.0;
 /// Height of a margin bar, points.
 const BAR: f32 = 8.0;
 
@@ -16,7 +20,7 @@ const BAR: f32 = 8.0;
 pub fn show(ui: &mut Ui, state: &State, _out: &mut Vec<Command>) {
     let verdict = state.trace().and_then(|trace| trace.judge.as_ref());
     let Some(verdict) = verdict else {
-        panels::missing(ui, &state.missing_step());
+        panels::missing(ui, PURPOSE, &state.missing_step());
         return;
     };
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
@@ -91,8 +95,8 @@ fn column(ui: &mut Ui, width: f32, text: RichText) {
 
 /// A bar with the value against its limit; the good side is right of the limit for scores, else left of it.
 fn bar(ui: &mut Ui, gate: &Gate, colour: egui::Color32) {
-    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), BAR + 4.0), Sense::hover());
-    let rail = Rect::from_min_size(rect.min + vec2(0.0, 2.0), vec2(rect.width(), BAR));
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), BAR + 6.0), Sense::hover());
+    let rail = Rect::from_min_size(rect.min + vec2(0.0, 3.0), vec2(rect.width() - MARGIN, BAR));
     let painter = ui.painter();
     painter.rect_filled(rail, 2.0, theme::WELL);
     let (value, limit) = fractions(gate);
@@ -103,11 +107,9 @@ fn bar(ui: &mut Ui, gate: &Gate, colour: egui::Color32) {
         painter.rect_filled(fill, 2.0, colour.gamma_multiply(0.85));
     }
     painter.vline(at(limit), rail.expand(2.0).y_range(), egui::Stroke::new(2.0, theme::STRONG));
-    let margin = gate.margin.map_or_else(
-        || "there was nothing to judge".to_owned(),
-        |m| format!("margin {} {}", digits(m), gate.unit),
-    );
-    response.on_hover_text(margin.trim_end().to_owned());
+    let margin = gate.margin.map_or_else(|| "–".to_owned(), |m| format!("{m:+.3}"));
+    painter.text(rect.right_center(), Align2::RIGHT_CENTER, margin, theme::digit_font(), colour);
+    response.on_hover_text("At the end: the margin, positive on the good side of the limit.");
 }
 
 /// Value and limit as fractions of the bar: scores from 0 to 1, others from 0 to twice the limit.

@@ -54,11 +54,12 @@ pub fn ready_image<'a>(ui: &mut Ui, state: &'a State, eye: Eye) -> Option<&'a Ra
         Slot::Failed(problem) => {
             panels::missing(
                 ui,
+                "",
                 &format!("The {word} image of step {step} cannot be shown: {}", problem.detail),
             );
         }
-        Slot::Absent if state.traverse.is_none() => panels::missing(ui, &state.missing_target()),
-        Slot::Absent | Slot::Loading => panels::missing(ui, &waiting_words(state, word, step)),
+        Slot::Absent if state.traverse.is_none() => panels::missing(ui, "", &state.missing_target()),
+        Slot::Absent | Slot::Loading => panels::missing(ui, "", &waiting_words(state, word, step)),
     }
     None
 }

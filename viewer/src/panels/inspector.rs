@@ -16,11 +16,11 @@ pub fn show(ui: &mut Ui, state: &State, _out: &mut Vec<Command>) {
         ui.label(theme::note(state.stage.question()));
     });
     let Some(trace) = state.trace() else {
-        panels::missing(ui, &state.missing_step());
+        panels::missing(ui, "", &state.missing_step());
         return;
     };
     let Some(record) = record(trace, state.stage) else {
-        panels::missing(ui, &not_reached(trace, state));
+        panels::missing(ui, "", &not_reached(trace, state));
         return;
     };
     ScrollArea::vertical().auto_shrink(false).id_salt(state.stage).show(ui, |ui| {

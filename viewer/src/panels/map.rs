@@ -15,6 +15,9 @@ use crate::command::{Command, Go};
 use crate::state::{State, run_letter};
 use crate::{ellipse, panels, theme};
 
+/// What the panel is for.
+const PURPOSE: &str = "The rover’s path and the target, seen from above.";
+
 /// How near to a stop a click must be to go there, points.
 const CLICK_REACH: f32 = 14.0;
 
@@ -26,7 +29,7 @@ fn on_map(point_in_site: &Point3) -> [f64; 2] {
 /// Shows the map.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let Some(traverse) = state.traverse.as_ref().filter(|t| !t.stops.is_empty()) else {
-        panels::missing(ui, &state.missing_target());
+        panels::missing(ui, PURPOSE, &state.missing_target());
         return;
     };
     let stops = &traverse.stops;
@@ -34,6 +37,8 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         .data_aspect(1.0)
         .set_margin_fraction(vec2(0.12, 0.12))
         .show_grid([true, true])
+        .x_axis_label(theme::note("east, m"))
+        .y_axis_label(theme::note("north, m"))
         .y_axis_min_width(24.0)
         .allow_boxed_zoom(false)
         .label_formatter(|_| None)
@@ -71,7 +76,7 @@ fn paint_paths(plot: &mut PlotUi<'_>, stops: &[StopView], step: usize) {
         );
     }
     let estimated = poses(stops, |stop| Some(stop.site_from_rover));
-    plot.line(Line::new("estimated path", estimated.clone()).color(theme::PREDICTION).width(1.5));
+    plot.line(Line::new("estimated path", estimated.clone()).color(theme::WEAK).width(1.5));
     plot.points(
         Points::new("estimated path", estimated)
             .color(theme::PREDICTION)
@@ -150,7 +155,7 @@ fn paint_truth(plot: &mut PlotUi<'_>, state: &State, estimate_in_site: &Point3) 
     );
     let offset: Vector3 = estimate_in_site - point;
     let [east, north] = on_map(estimate_in_site);
-    let words = format!("  {:.0} cm off in the site frame", offset.norm() * 100.0);
+    let words = format!("    {:.0} cm off in the site frame", offset.norm() * 100.0);
     plot.text(
         Text::new("", PlotPoint::new(east, north), theme::note(words).color(theme::TEXT))
             .anchor(egui::Align2::LEFT_TOP)

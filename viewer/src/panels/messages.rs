@@ -12,6 +12,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     if state.messages.all().is_empty() {
         panels::missing(
             ui,
+            "",
             "No messages. Whatever is refused or fails is written here, with how to mend it.",
         );
         return;

@@ -16,42 +16,21 @@ pub mod surface;
 pub mod targets;
 pub mod timeline;
 
-use egui::{Align, Layout, Response, RichText, Sense, Ui, UiBuilder, vec2};
+use egui::{Align, Layout, RichText, Ui, UiBuilder};
 
 use crate::theme;
 
-/// A panel's title on the left and what belongs beside it on the right. Returns the title's response for dragging.
-pub fn title_row(ui: &mut Ui, title: &str, beside: impl FnOnce(&mut Ui)) -> Response {
-    let height = 18.0;
-    let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), height), Sense::hover());
-    let mut row = ui.new_child(UiBuilder::new().max_rect(rect).layout(Layout::left_to_right(Align::Center)));
-    let response = row.add(egui::Label::new(theme::title(title)).selectable(false).sense(Sense::drag()));
-    row.add_space(8.0);
-    row.with_layout(Layout::right_to_left(Align::Center), beside);
-    response
-}
-
-/// The sentence of a panel that has nothing to show.
-pub fn missing(ui: &mut Ui, sentence: &str) {
+/// A panel that has nothing to show: what it is for, and the sentence that says how to fill it.
+pub fn missing(ui: &mut Ui, purpose: &str, sentence: &str) {
     let space = ui.available_rect_before_wrap();
-    let mut middle =
-        ui.new_child(UiBuilder::new().max_rect(space.shrink(6.0)).layout(Layout::top_down(Align::Center)));
-    middle.add_space((space.height() / 2.0 - 20.0).clamp(2.0, 80.0));
-    middle.add(egui::Label::new(RichText::new(sentence).color(theme::WEAK)).wrap());
+    let builder = UiBuilder::new().max_rect(space.shrink(6.0)).layout(Layout::top_down(Align::Center));
+    let mut middle = ui.new_child(builder);
+    middle.add_space((space.height() / 2.0 - 24.0).clamp(0.0, 80.0));
+    middle.add(egui::Label::new(RichText::new(sentence).color(theme::TEXT)).wrap());
+    if !purpose.is_empty() {
+        middle.add(egui::Label::new(theme::note(purpose)).wrap());
+    }
     ui.advance_cursor_after_rect(space);
-}
-
-/// A row of a grid: a label, then a value and its unit.
-pub fn value_row(ui: &mut Ui, label: &str, value: &str, unit: &str) {
-    ui.label(theme::label(label));
-    ui.horizontal(|ui| {
-        ui.spacing_mut().item_spacing.x = 4.0;
-        ui.label(theme::number(value));
-        if !unit.is_empty() {
-            ui.label(theme::note(unit));
-        }
-    });
-    ui.end_row();
 }
 
 /// A number with as many digits as make sense for its size.

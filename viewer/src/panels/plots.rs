@@ -12,6 +12,9 @@ use crate::overlay::{self, Mark, paint_mark};
 use crate::state::State;
 use crate::{panels, theme};
 
+/// What the panel is for.
+const PURPOSE: &str = "Scores and errors of the run, step by step.";
+
 /// Height of the row above a plot that names its lines, points.
 const NAMES: f32 = 15.0;
 
@@ -37,7 +40,7 @@ struct Chart {
 /// Shows the plots, one below the other over the same steps.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let Some(run) = state.run() else {
-        panels::missing(ui, &state.missing_target());
+        panels::missing(ui, PURPOSE, &state.missing_target());
         return;
     };
     let charts = charts(state, run);
@@ -76,7 +79,7 @@ fn charts(state: &State, run: &RunView) -> Vec<Chart> {
     if run.rows.iter().any(|row| row.err_m.is_some()) {
         let error = series("error", colour, ring, MarkerShape::Circle, |row| row.err_px);
         charts.push(Chart {
-            title: "pixel",
+            title: "pixel error",
             unit: "px",
             series: vec![error],
             thresholds: Vec::new(),
@@ -85,7 +88,7 @@ fn charts(state: &State, run: &RunView) -> Vec<Chart> {
         position.push(series("error", colour, ring, MarkerShape::Circle, |row| row.err_m.map(|v| v * 100.0)));
     }
     charts.push(Chart {
-        title: "position",
+        title: "position error",
         unit: "cm",
         series: position,
         thresholds: Vec::new(),

@@ -8,14 +8,17 @@ use crate::command::Command;
 use crate::state::{State, run_letter};
 use crate::{panels, theme};
 
+/// Width of the column of units, points.
+const UNIT: f32 = 24.0;
+
 /// Shows the form.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     if state.settings.is_empty() {
-        panels::missing(ui, "Asking the server for its settings …");
+        panels::missing(ui, "Thresholds and parameters of a run", "Asking the server for its settings …");
         return;
     }
     if state.run().is_none() {
-        panels::missing(ui, &format!("Settings belong to a run. {}", state.missing_target()));
+        panels::missing(ui, "Thresholds and parameters of a run", &state.missing_target());
         return;
     }
     foot(ui, state, out);
@@ -83,20 +86,20 @@ fn show_setting(ui: &mut Ui, state: &State, info: &SettingInfo, out: &mut Vec<Co
             ""
         };
         let label = RichText::new(format!("{mark}{}", info.key)).size(12.0).color(colour);
-        let room = (ui.available_width() - 118.0).max(60.0);
-        ui.allocate_ui_with_layout(vec2(room, 20.0), Layout::left_to_right(Align::Center), |ui| {
-            ui.set_width(room);
-            ui.add(egui::Label::new(label).truncate()).on_hover_text(help(info, &in_run));
-        });
+        // From the right: the unit, the control, and the name in what is left.
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            ui.allocate_ui(vec2(34.0, 18.0), |ui| {
-                ui.set_width(34.0);
-                ui.label(theme::note(&info.unit));
+            ui.allocate_ui_with_layout(vec2(UNIT, 18.0), Layout::left_to_right(Align::Center), |ui| {
+                ui.set_width(UNIT);
+                let unit = if info.unit == "updates" { "upd." } else { &info.unit };
+                ui.label(theme::note(unit));
             });
             if let Some(new) = edit(ui, info, &value) {
                 let value = (new != in_run).then_some(new);
                 out.push(Command::Draft { key: info.key.clone(), value });
             }
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                ui.add(egui::Label::new(label).truncate()).on_hover_text(help(info, &in_run));
+            });
         });
     });
     if let Some(problem) = problem(state, info) {

@@ -9,6 +9,9 @@ use crate::raster::{DIFFERENCE_LIMIT, PATCH_SIGMAS, Raster};
 use crate::state::State;
 use crate::{panels, theme, view2d};
 
+/// What the panel is for.
+const PURPOSE: &str = "The template from its reference to what was compared.";
+
 /// Room for the arrow and the number between two patches, points.
 const BETWEEN: f32 = 68.0;
 /// Room for the words above and below a patch, points.
@@ -67,7 +70,7 @@ pub fn patches(trace: &StepTrace) -> Vec<Patch> {
 pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let patches = state.trace().map(patches).unwrap_or_default();
     if patches.is_empty() {
-        panels::missing(ui, &state.missing_step());
+        panels::missing(ui, PURPOSE, &state.missing_step());
         return;
     }
     let area = ui.available_rect_before_wrap();

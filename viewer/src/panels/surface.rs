@@ -16,6 +16,9 @@ use crate::state::State;
 use crate::view2d::Canvas;
 use crate::{panels, theme};
 
+/// What the panel is for.
+const PURPOSE: &str = "The match score of every position in the search window.";
+
 /// Width of the colour bar with its numbers, points.
 const BAR: f32 = 46.0;
 /// Scores with a tick.
@@ -25,15 +28,15 @@ const TICKS: [f32; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
 pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let matched = state.trace().and_then(StepTrace::template).and_then(|e| e.match_template.as_ref());
     let (Some(trace), Some(matched)) = (state.trace(), matched) else {
-        panels::missing(ui, &state.missing_step());
+        panels::missing(ui, PURPOSE, &state.missing_step());
         return;
     };
     let raster = match state.array(ArrayName::Surface) {
         Slot::Ready(raster) => raster,
         Slot::Failed(problem) => {
-            return panels::missing(ui, &format!("The scores cannot be shown: {}", problem.detail));
+            return panels::missing(ui, PURPOSE, &format!("The scores cannot be shown: {}", problem.detail));
         }
-        Slot::Absent | Slot::Loading => return panels::missing(ui, "Loading the scores …"),
+        Slot::Absent | Slot::Loading => return panels::missing(ui, PURPOSE, "Loading the scores …"),
     };
     let area = ui.available_rect_before_wrap();
     let (rest, bar) = area.split_left_right_at_x(area.right() - BAR);

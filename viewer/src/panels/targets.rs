@@ -8,6 +8,9 @@ use crate::overlay::{Mark, paint_mark};
 use crate::state::{State, run_letter, state_of_word};
 use crate::{panels, theme};
 
+/// What the panel is for.
+const PURPOSE: &str = "What is tracked, and each configuration tried on it.";
+
 /// Shows the targets.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let is_picking = state.mode == Mode::Pick;
@@ -19,7 +22,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.add_space(2.0);
     let targets = state.session.as_ref().map(|session| session.targets.as_slice()).unwrap_or_default();
     if targets.is_empty() {
-        panels::missing(ui, &state.missing_target());
+        panels::missing(ui, PURPOSE, &state.missing_target());
         return;
     }
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {

@@ -94,6 +94,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         }
     }
     paint_numbers(&painter, count, width, frame);
+    paint_words(&painter, state, count, width, frame);
     for event in state.run().map(events).unwrap_or_default() {
         let top = frame(event).left_top() - vec2(0.0, 6.0);
         painter.vline(top.x, top.y..=top.y + 6.0, Stroke::new(2.0, theme::STRONG));
@@ -192,6 +193,28 @@ fn paint_numbers(painter: &Painter, count: usize, width: f32, frame: impl Fn(usi
     for step in (0..count).step_by(every) {
         let at = frame(step).center_bottom() + vec2(0.0, 5.0);
         painter.text(at, Align2::CENTER_TOP, step.to_string(), theme::digit_font(), theme::WEAK);
+    }
+}
+
+/// The word of each stretch of equal cells at its beginning, where it fits.
+fn paint_words(painter: &Painter, state: &State, count: usize, width: f32, frame: impl Fn(usize) -> Rect) {
+    let cells: Vec<Cell> = (0..count).map(|step| cell(state, step)).collect();
+    let mut step = 0;
+    for stretch in cells.chunk_by(|a, b| a == b) {
+        let (cell, first) = (stretch[0], frame(step));
+        step += stretch.len();
+        let room = width * stretch.len() as f32;
+        let galley = painter.layout_no_wrap(cell.word().to_owned(), theme::image_font(), theme::STRONG);
+        if galley.size().x + 16.0 > room || state.target().is_none() {
+            continue;
+        }
+        let at = first.left_center() + vec2(7.0, -galley.size().y / 2.0);
+        painter.rect_filled(
+            Rect::from_min_size(at, galley.size()).expand2(vec2(4.0, 0.0)),
+            2.0,
+            theme::SCRIM,
+        );
+        painter.galley(at, galley, theme::STRONG);
     }
 }
 
