@@ -112,8 +112,8 @@ pub fn overview() -> Tree<Pane> {
     let inspector = tabs(&mut tiles, &[Pane::Inspector, Pane::Messages]);
     let images = linear(&mut tiles, LinearDir::Horizontal, &[(left, 1.0), (right, 1.0)]);
     let charts = linear(&mut tiles, LinearDir::Horizontal, &[(surface, 1.0), (map, 1.1), (plots, 1.1)]);
-    let middle = linear(&mut tiles, LinearDir::Vertical, &[(images, 0.49), (strip, 0.19), (charts, 0.32)]);
-    let record = linear(&mut tiles, LinearDir::Vertical, &[(gates, 0.31), (inspector, 0.69)]);
+    let middle = linear(&mut tiles, LinearDir::Vertical, &[(images, 0.465), (strip, 0.205), (charts, 0.33)]);
+    let record = linear(&mut tiles, LinearDir::Vertical, &[(gates, 0.38), (inspector, 0.62)]);
     let root = linear(&mut tiles, LinearDir::Horizontal, &[(side, 0.17), (middle, 0.63), (record, 0.2)]);
     Tree::new(egui::Id::unique("panels"), root, tiles)
 }
@@ -139,6 +139,7 @@ pub struct Panels<'a> {
 impl Behavior<Pane> for Panels<'_> {
     fn pane_ui(&mut self, ui: &mut Ui, _tile: TileId, pane: &mut Pane) -> UiResponse {
         let margin = match pane {
+            Pane::Strip => Margin::symmetric(theme::MARGIN, 3),
             Pane::Left | Pane::Right | Pane::Surface => Margin { left: 4, right: 4, top: 4, bottom: 0 },
             _ => Margin::same(theme::MARGIN),
         };

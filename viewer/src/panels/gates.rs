@@ -24,8 +24,9 @@ pub fn show(ui: &mut Ui, state: &State, _out: &mut Vec<Command>) {
         return;
     };
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        ui.spacing_mut().item_spacing.y = 1.0;
         sentence(ui, verdict, state);
-        ui.add_space(2.0);
+        ui.add_space(3.0);
         for gate in &verdict.gates {
             show_gate(ui, gate);
         }
@@ -72,14 +73,11 @@ fn show_gate(ui: &mut Ui, gate: &Gate) {
         ui.label(RichText::new(readable(&gate.name)).size(12.0).color(theme::TEXT));
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             let word = if gate.passed { "pass" } else { "FAIL" };
-            column(ui, 32.0, RichText::new(word).strong().color(colour));
-            column(
-                ui,
-                62.0,
-                theme::note(format!("{relation} {:.3} {}", gate.limit, gate.unit).trim_end().to_owned()),
-            );
-            let value = gate.value.map_or_else(|| "nothing".to_owned(), |v| format!("{v:.3}"));
-            column(ui, 50.0, theme::number(value));
+            column(ui, 28.0, RichText::new(word).strong().color(colour));
+            let limit = format!("{relation} {:.3} {}", gate.limit, gate.unit);
+            column(ui, 56.0, theme::note(limit.trim_end()));
+            let value = gate.value.map_or_else(|| "none".to_owned(), |v| format!("{v:.3}"));
+            column(ui, 38.0, theme::number(value));
         });
     });
     bar(ui, gate, colour);
@@ -95,8 +93,8 @@ fn column(ui: &mut Ui, width: f32, text: RichText) {
 
 /// A bar with the value against its limit; the good side is right of the limit for scores, else left of it.
 fn bar(ui: &mut Ui, gate: &Gate, colour: egui::Color32) {
-    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), BAR + 6.0), Sense::hover());
-    let rail = Rect::from_min_size(rect.min + vec2(0.0, 3.0), vec2(rect.width() - MARGIN, BAR));
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), BAR + 5.0), Sense::hover());
+    let rail = Rect::from_min_size(rect.min + vec2(0.0, 2.0), vec2(rect.width() - MARGIN, BAR));
     let painter = ui.painter();
     painter.rect_filled(rail, 2.0, theme::WELL);
     let (value, limit) = fractions(gate);
@@ -124,8 +122,8 @@ fn readable(name: &str) -> &str {
     match name {
         "ncc" => "match score",
         "stereo_ncc" => "stereo score",
-        "distance_correction_m" => "distance correction",
-        "position_correction_m" => "position correction",
+        "distance_correction_m" => "range change",
+        "position_correction_m" => "site position",
         other => other,
     }
 }

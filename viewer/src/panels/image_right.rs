@@ -38,7 +38,8 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     if let Some(trace) = state.trace().filter(|_| state.marks) {
         paint_marks(&canvas, trace, state);
     }
-    legend::show(ui, &canvas, &entries(state), state, out);
+    let target = state.trace().and_then(|trace| trace.locate.as_ref()?.right_pixel);
+    legend::show(ui, &canvas, &entries(state), target, state, out);
     status_line(ui, &canvas, raster, region);
     if let Some(view) = canvas.moved {
         out.push(Command::View(Panel::Right, view));
@@ -56,7 +57,7 @@ fn entries(state: &State) -> Vec<Entry> {
         entries.push(Entry::new(Layer::Prediction, Mark::Cross, theme::PREDICTION, "predicted"));
     }
     if trace.locate.as_ref().is_some_and(|l| l.left_pixel.is_some()) {
-        let word = "epipolar curve (solid: searched), range in m";
+        let word = "epipolar curve, range in m";
         entries.push(Entry::new(Layer::Curve, Mark::Stroke(Line::Solid), theme::SEARCH, word));
     }
     entries

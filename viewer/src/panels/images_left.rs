@@ -35,7 +35,8 @@ pub fn show(
             paint_marks(&Overlay::new(&canvas.painter, &canvas.transform), trace, state);
         }
     }
-    legend::show(ui, &canvas, &entries(state), state, out);
+    let target = state.trace().and_then(|trace| trace.locate.as_ref()?.left_pixel);
+    legend::show(ui, &canvas, &entries(state), target, state, out);
     paint_designation(&canvas, state);
     pick(ui, &canvas, raster, state, out);
     status_line(ui, &canvas, raster, region);
@@ -104,12 +105,7 @@ fn entries(state: &State) -> Vec<Entry> {
         ));
     }
     if matched.is_some() {
-        entries.push(Entry::new(
-            Layer::Template,
-            Mark::Stroke(Line::Solid),
-            run,
-            "template window (dotted: scaled, rolled)",
-        ));
+        entries.push(Entry::new(Layer::Template, Mark::Stroke(Line::Solid), run, "template window"));
         entries.push(Entry::new(
             Layer::SearchWindow,
             Mark::Stroke(Line::Dashed),

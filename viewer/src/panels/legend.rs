@@ -1,6 +1,8 @@
 //! The legend of an image: each mark with its shape and its word; a click hides or shows it.
 
-use egui::{Rect, Sense, pos2, vec2};
+use egui::{Align2, Pos2, Rect, Sense, Vec2, pos2, vec2};
+
+use sightline_core::frames::Pixel;
 
 use crate::command::{Command, Layer};
 use crate::overlay::{Mark, paint_legend_row};
@@ -28,11 +30,21 @@ impl Entry {
     }
 }
 
+/// How far the legend stays away from what it must not cover, points.
+const CLEARANCE: f32 = 24.0;
+
 /// Height of a row, points.
 const ROW: f32 = 15.0;
 
-/// Paints the legend in the upper left corner of the canvas, where there is room for it.
-pub fn show(ui: &mut egui::Ui, canvas: &Canvas, entries: &[Entry], state: &State, out: &mut Vec<Command>) {
+/// Paints the legend in a corner of the canvas away from the pixel `keep_free`, where there is room for it.
+pub fn show(
+    ui: &mut egui::Ui,
+    canvas: &Canvas,
+    entries: &[Entry],
+    keep_free: Option<Pixel>,
+    state: &State,
+    out: &mut Vec<Command>,
+) {
     let area = canvas.transform.rect;
     if entries.is_empty()
         || !state.marks
@@ -46,7 +58,7 @@ pub fn show(ui: &mut egui::Ui, canvas: &Canvas, entries: &[Entry], state: &State
     });
     let width = galleys.fold(0.0_f32, f32::max) + 32.0;
     let size = vec2(width, ROW * entries.len() as f32 + 6.0);
-    let frame = Rect::from_min_size(area.left_top() + vec2(6.0, 6.0), size);
+    let frame = free_corner(area.shrink(6.0), size, keep_free.map(|pixel| canvas.transform.to_screen(pixel)));
     canvas.painter.rect_filled(frame, 4.0, theme::SCRIM);
     for (i, entry) in entries.iter().enumerate() {
         let at = pos2(frame.left() + 5.0, frame.top() + 3.0 + ROW * i as f32);
@@ -61,5 +73,28 @@ pub fn show(ui: &mut egui::Ui, canvas: &Canvas, entries: &[Entry], state: &State
         if response.on_hover_text(format!("Click to {action} “{}”", entry.word)).clicked() {
             out.push(Command::ToggleLayer(entry.layer));
         }
+    }
+}
+
+/// The first corner, beginning at the upper left, in which a box of `size` stays clear of `keep_free`.
+fn free_corner(area: Rect, size: Vec2, keep_free: Option<Pos2>) -> Rect {
+    let corners = [Align2::LEFT_TOP, Align2::LEFT_BOTTOM, Align2::RIGHT_TOP, Align2::RIGHT_BOTTOM];
+    let frames = corners.map(|corner| corner.align_size_within_rect(size, area));
+    let is_free = |frame: &&Rect| keep_free.is_none_or(|at| !frame.expand(CLEARANCE).contains(at));
+    *frames.iter().find(is_free).unwrap_or(&frames[0])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_legend_keeps_clear_of_the_target() {
+        let area = Rect::from_min_size(pos2(0.0, 0.0), vec2(400.0, 300.0));
+        let size = vec2(150.0, 80.0);
+        let corner = |at: Option<Pos2>| free_corner(area, size, at).min;
+        assert_eq!(corner(None), pos2(0.0, 0.0));
+        assert_eq!(corner(Some(pos2(300.0, 200.0))), pos2(0.0, 0.0));
+        assert_eq!(corner(Some(pos2(100.0, 50.0))), pos2(0.0, 220.0));
     }
 }

@@ -2,16 +2,16 @@
 //!
 //! Site frame: +x north, +y east, +z down. On the map east is to the right, so a site point is drawn at (y, x).
 
-use egui::{Ui, vec2};
-use egui_plot::{
-    Arrows, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotPoints, PlotUi, Points, Polygon, Text,
-};
+use egui::{Color32, Ui, vec2};
+use egui_plot::{Arrows, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotPoints, PlotUi, Points, Polygon};
 use nalgebra::Matrix2;
-use sightline_core::frames::{Point3, Pose, PoseRecord, Vector3};
+use sightline_core::frames::{Point3, Pose, PoseRecord};
 use sightline_core::session::view::RunView;
 use sightline_core::session::wire::StopView;
 
+use super::names;
 use crate::command::{Command, Go};
+use crate::overlay::{self, Mark};
 use crate::state::{State, run_letter};
 use crate::{ellipse, panels, theme};
 
@@ -33,6 +33,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         return;
     };
     let stops = &traverse.stops;
+    names::show(ui, "", &names_of(state, stops));
     let plot = Plot::new(("map", &traverse.id))
         .data_aspect(1.0)
         .set_margin_fraction(vec2(0.12, 0.12))
@@ -45,12 +46,6 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         .coordinates_formatter(
             egui_plot::Corner::RightBottom,
             egui_plot::CoordinatesFormatter::new(|at, _| format!("E {:.2}  N {:.2} m", at.x, at.y)),
-        )
-        .legend(
-            egui_plot::Legend::default()
-                .position(egui_plot::Corner::LeftTop)
-                .text_style(egui::TextStyle::Small)
-                .background_alpha(0.6),
         );
     let response = plot.show(ui, |plot| {
         paint_paths(plot, stops, state.cursor.step);
@@ -62,6 +57,22 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     if let Some(step) = response.inner {
         out.push(Command::Go(Go::Step(step)));
     }
+}
+
+/// What the row above the map names.
+fn names_of(state: &State, stops: &[StopView]) -> Vec<(Mark, Color32, String)> {
+    let mut names = vec![(Mark::Stroke(overlay::Line::Solid), theme::WEAK, "path".to_owned())];
+    if stops.iter().any(|stop| stop.true_site_from_rover.is_some()) {
+        names.push((Mark::Stroke(overlay::Line::Dotted), theme::TRUTH, "true".to_owned()));
+    }
+    if let Some(run) = state.run() {
+        let name = format!("target, run {}", run_letter(run.number));
+        names.push((Mark::Diamond, theme::run(run.number), name));
+    }
+    if let Some((_, off_m)) = truth_in_site(state) {
+        names.push((Mark::Plus, theme::TRUTH, format!("truth, {:.0} cm off", off_m * 100.0)));
+    }
+    names
 }
 
 fn poses<'a>(stops: &'a [StopView], of: impl Fn(&StopView) -> Option<PoseRecord> + 'a) -> Vec<[f64; 2]> {
@@ -133,7 +144,7 @@ fn paint_trail(plot: &mut PlotUi<'_>, state: &State, stops: &[StopView], run: &R
         let [east, north] = on_map(&centre);
         let points: Vec<[f64; 2]> = outline.iter().map(|d| [east + d.x, north + d.y]).collect();
         let polygon = Polygon::new("", points).style(style).allow_hover(false);
-        plot.polygon(polygon.fill_color(egui::Color32::TRANSPARENT).stroke(egui::Stroke::new(1.5, colour)));
+        plot.polygon(polygon.fill_color(Color32::TRANSPARENT).stroke(egui::Stroke::new(1.5, colour)));
     }
     plot.points(
         Points::new(&name, on_map(&centre))
@@ -142,25 +153,18 @@ fn paint_trail(plot: &mut PlotUi<'_>, state: &State, stops: &[StopView], run: &R
             .shape(MarkerShape::Diamond)
             .filled(false),
     );
-    paint_truth(plot, state, &centre);
+    if let Some((truth, _)) = truth_in_site(state) {
+        let points = Points::new("truth", on_map(&truth)).color(theme::TRUTH).radius(6.0);
+        plot.points(points.shape(MarkerShape::Plus));
+    }
 }
 
-/// The true position, carried by the true pose.
-fn paint_truth(plot: &mut PlotUi<'_>, state: &State, estimate_in_site: &Point3) {
-    let Some(truth) = state.trace().and_then(|trace| trace.truth.as_ref()) else { return };
-    let Some(true_pose) = state.stop().and_then(|stop| stop.true_site_from_rover) else { return };
-    let point = true_pose.to_pose() * truth.position_in_rover;
-    plot.points(
-        Points::new("truth", on_map(&point)).color(theme::TRUTH).radius(6.0).shape(MarkerShape::Plus),
-    );
-    let offset: Vector3 = estimate_in_site - point;
-    let [east, north] = on_map(estimate_in_site);
-    let words = format!("    {:.0} cm off in the site frame", offset.norm() * 100.0);
-    plot.text(
-        Text::new("", PlotPoint::new(east, north), theme::note(words).color(theme::TEXT))
-            .anchor(egui::Align2::LEFT_TOP)
-            .allow_hover(false),
-    );
+/// The true position, carried by the true pose, and the estimate's distance from it in the site frame, m.
+fn truth_in_site(state: &State) -> Option<(Point3, f64)> {
+    let (trace, stop) = (state.trace()?, state.stop()?);
+    let point = stop.true_site_from_rover?.to_pose() * trace.truth.as_ref()?.position_in_rover;
+    let estimate = stop.site_from_rover.to_pose() * trace.update.target.position_in_rover;
+    Some((point, (estimate - point).norm()))
 }
 
 /// The stop nearest to the pointer, where one is near.

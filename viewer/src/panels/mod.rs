@@ -9,6 +9,7 @@ pub mod inspector;
 pub mod legend;
 pub mod map;
 pub mod messages;
+pub mod names;
 pub mod plots;
 pub mod settings;
 pub mod strip;

@@ -1,22 +1,20 @@
 //! Plots over the steps of a run: scores, pixel error, and position error with its 1 σ.
 
-use egui::{Color32, Id, Sense, Ui, vec2};
+use egui::{Color32, Id, Ui, vec2};
 use egui_plot::{
     GridMark, HLine, HoverPosition, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotUi, Points, VLine,
 };
 use sightline_core::session::view::RunView;
 use sightline_core::trace::StepRow;
 
+use super::names::{self, HEIGHT as NAMES};
 use crate::command::{Command, Go};
-use crate::overlay::{self, Mark, paint_mark};
+use crate::overlay::{self, Mark};
 use crate::state::State;
 use crate::{panels, theme};
 
 /// What the panel is for.
 const PURPOSE: &str = "Scores and errors of the run, step by step.";
-
-/// Height of the row above a plot that names its lines, points.
-const NAMES: f32 = 15.0;
 
 /// A line of a plot: its name, colour and shape, and how a step's value is got.
 struct Series {
@@ -50,7 +48,8 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let height = ((ui.available_height() - axis - count * (NAMES + 2.0)) / count).max(24.0);
     for (i, chart) in charts.iter().enumerate() {
         let is_last = i + 1 == charts.len();
-        names(ui, chart);
+        let (title, lines) = names_of(chart);
+        names::show(ui, &title, &lines);
         let height = if is_last { height + axis } else { height };
         if let Some(step) = plot(ui, state, run, chart, height, is_last) {
             out.push(Command::Go(Go::Step(step)));
@@ -97,26 +96,14 @@ fn charts(state: &State, run: &RunView) -> Vec<Chart> {
     charts
 }
 
-/// The row that names a plot's lines, each with its shape.
-fn names(ui: &mut Ui, chart: &Chart) {
-    ui.horizontal(|ui| {
-        ui.set_height(NAMES);
-        ui.spacing_mut().item_spacing.x = 4.0;
-        let unit = if chart.unit.is_empty() { String::new() } else { format!(", {}", chart.unit) };
-        ui.label(theme::note(format!("{}{unit}", chart.title)).color(theme::TEXT));
-        for series in &chart.series {
-            ui.add_space(6.0);
-            let (mark, _) = ui.allocate_exact_size(vec2(10.0, 10.0), Sense::hover());
-            paint_mark(ui.painter(), mark.center(), series.mark, series.colour, 4.0);
-            ui.label(theme::note(series.name));
-        }
-        if !chart.thresholds.is_empty() {
-            ui.add_space(6.0);
-            let (mark, _) = ui.allocate_exact_size(vec2(16.0, 10.0), Sense::hover());
-            paint_mark(ui.painter(), mark.center(), Mark::Stroke(overlay::Line::Dashed), theme::FAILED, 8.0);
-            ui.label(theme::note("least allowed"));
-        }
-    });
+/// What the row above a plot names.
+fn names_of(chart: &Chart) -> (String, Vec<(Mark, Color32, String)>) {
+    let unit = if chart.unit.is_empty() { String::new() } else { format!(", {}", chart.unit) };
+    let mut names: Vec<_> = chart.series.iter().map(|s| (s.mark, s.colour, s.name.to_owned())).collect();
+    if !chart.thresholds.is_empty() {
+        names.push((Mark::Stroke(overlay::Line::Dashed), theme::FAILED, "least allowed".to_owned()));
+    }
+    (format!("{}{unit}", chart.title), names)
 }
 
 /// One plot. Returns the step that was clicked.

@@ -39,9 +39,9 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 fn foot(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let step = state.cursor.step;
     ui.horizontal(|ui| {
-        let words = format!("Run from here (step {step})");
         let wrong = state.settings.iter().find_map(|info| problem(state, info));
-        let button = ui.add_enabled(wrong.is_none(), egui::Button::new(words).min_size(vec2(150.0, 24.0)));
+        let button =
+            ui.add_enabled(wrong.is_none(), egui::Button::new("Run from here").min_size(vec2(100.0, 24.0)));
         if button
             .on_hover_text(
                 "Forks a new run with the changed settings; nothing recorded is overwritten. Key R",
@@ -56,9 +56,9 @@ fn foot(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     });
     let letter = run_letter(state.cursor.run);
     let words = match state.draft.len() {
-        0 => format!("As in run {letter}. Change a value to try another."),
-        1 => format!("1 change against run {letter}"),
-        n => format!("{n} changes against run {letter}"),
+        0 => format!("As in run {letter}; runs anew from step {step}"),
+        1 => format!("1 change against run {letter}, from step {step}"),
+        n => format!("{n} changes against run {letter}, from step {step}"),
     };
     ui.label(theme::note(words));
 }
@@ -90,8 +90,9 @@ fn show_setting(ui: &mut Ui, state: &State, info: &SettingInfo, out: &mut Vec<Co
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             ui.allocate_ui_with_layout(vec2(UNIT, 18.0), Layout::left_to_right(Align::Center), |ui| {
                 ui.set_width(UNIT);
-                let unit = if info.unit == "updates" { "upd." } else { &info.unit };
-                ui.label(theme::note(unit));
+                // Longer ones are words, which the help says.
+                let unit = Some(&info.unit).filter(|unit| unit.chars().count() <= 3);
+                ui.label(theme::note(unit.map_or("", String::as_str)));
             });
             if let Some(new) = edit(ui, info, &value) {
                 let value = (new != in_run).then_some(new);

@@ -141,7 +141,10 @@ fn show_patch(ui: &mut Ui, state: &State, patch: &Patch, frame: Rect, out: &mut 
 /// Mean and standard deviation below a patch.
 fn statistics(ui: &Ui, raster: &Raster, frame: Rect) {
     let below = frame.center_bottom() + vec2(0.0, 4.0);
-    let words = format!("mean {:.3}  σ {:.3}", raster.mean, raster.sigma);
+    let words = match frame.width() + BETWEEN {
+        room if room > 135.0 => format!("mean {:.3}  σ {:.3}", raster.mean, raster.sigma),
+        _ => format!("{:.3} ±{:.3}", raster.mean, raster.sigma),
+    };
     ui.painter().text(below, Align2::CENTER_TOP, words, theme::digit_font(), theme::TEXT);
 }
 

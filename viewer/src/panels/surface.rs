@@ -127,10 +127,7 @@ fn status(ui: &mut Ui, canvas: &Canvas, raster: &Raster, region: PixelRect, matc
             } else {
                 String::new()
             };
-            ui.label(theme::note(format!(
-                "{} positions{flat}; white line: threshold; checker: excluded",
-                matched.positions
-            )));
+            ui.label(theme::note(format!("{} positions{flat}; white line: threshold", matched.positions)));
             return;
         };
         let (x, y) = (pixel.x.round() as i64, pixel.y.round() as i64);

@@ -53,10 +53,10 @@ fn show_target(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Co
             {
                 out.push(Command::RemoveTarget(target.number));
             }
-            let at = target.designation;
-            ui.label(theme::note(format!("step {} at {:.0}, {:.0}", at.step, at.pixel.x, at.pixel.y)));
         });
     });
+    let at = target.designation;
+    ui.label(theme::note(format!("picked at step {}, pixel {:.1}, {:.1}", at.step, at.pixel.x, at.pixel.y)));
     for run in &target.runs {
         show_run(ui, state, target, run, out);
     }

@@ -180,8 +180,8 @@ fn settings_are_listed_by_group_and_run_from_here_forks() {
             show_pane(ui, Pane::Settings, state, out);
         },
     );
-    shown.says("LIMITS").says("TEMPLATE").says("ncc_min").says("1 change against run A");
-    let commands = shown.click("Run from here (step 2)");
+    shown.says("LIMITS").says("TEMPLATE").says("ncc_min").says("1 change against run A, from step 2");
+    let commands = shown.click("Run from here");
     let expected = [("ncc_min".to_owned(), serde_json::json!(0.6))].into();
     assert_eq!(commands, vec![Command::RunFromHere(expected)]);
 }
