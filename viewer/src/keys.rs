@@ -29,9 +29,6 @@ pub fn commands(context: &Context, state: &State) -> Vec<Command> {
     if context.text_edit_focused() {
         return Vec::new();
     }
-    if let Mode::GoTo(typed) = &state.mode {
-        return type_ahead(context, typed).into_iter().collect();
-    }
     context.input(|input| {
         let pressed = input.events.iter().filter_map(|event| match event {
             Event::Key { key, pressed: true, modifiers, .. } => command(*key, *modifiers, state),
@@ -39,19 +36,6 @@ pub fn commands(context: &Context, state: &State) -> Vec<Command> {
         });
         pressed.collect()
     })
-}
-
-/// What was typed before the field of the step had the focus.
-fn type_ahead(context: &Context, typed: &str) -> Option<Command> {
-    let ahead: String = context.input(|input| {
-        let texts = input.events.iter().filter_map(|event| match event {
-            Event::Text(text) => Some(text.as_str()),
-            _ => None,
-        });
-        // The letter that opened the field may come as text, too.
-        texts.filter(|text| text.chars().all(|c| c.is_ascii_digit() || matches!(c, '+' | '-'))).collect()
-    });
-    (!ahead.is_empty()).then(|| Command::SetMode(Mode::GoTo(format!("{typed}{ahead}"))))
 }
 
 /// What a key asks for.

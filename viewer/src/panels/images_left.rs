@@ -216,7 +216,9 @@ fn paint_designation(canvas: &Canvas, state: &State) {
 
 /// Words near a place, wrapped and held inside the canvas.
 fn paint_wrapped(canvas: &Canvas, at: egui::Pos2, words: &str) {
-    let area = canvas.transform.rect.shrink(6.0);
+    let mut area = canvas.transform.rect.shrink(6.0);
+    // Below stands the hint of the pick mode.
+    area.max.y -= 22.0;
     let width = 280.0_f32.min(area.width());
     let galley = canvas.painter.layout(words.to_owned(), theme::image_font(), theme::LOST, width);
     let size = galley.size();

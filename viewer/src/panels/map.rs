@@ -89,10 +89,7 @@ fn paint_paths(plot: &mut PlotUi<'_>, stops: &[StopView], step: usize) {
     let estimated = poses(stops, |stop| Some(stop.site_from_rover));
     plot.line(Line::new("estimated path", estimated.clone()).color(theme::WEAK).width(1.5));
     plot.points(
-        Points::new("estimated path", estimated)
-            .color(theme::PREDICTION)
-            .radius(2.0)
-            .shape(MarkerShape::Circle),
+        Points::new("estimated path", estimated).color(theme::WEAK).radius(2.0).shape(MarkerShape::Circle),
     );
     if let Some(stop) = stops.get(step) {
         paint_rover(plot, &stop.site_from_rover.to_pose(), stops);

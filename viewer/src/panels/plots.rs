@@ -31,8 +31,8 @@ struct Chart {
     unit: &'static str,
     series: Vec<Series>,
     thresholds: Vec<f64>,
-    /// A value that is always in view.
-    anchor: f64,
+    /// Values that are always in view, so that nothing looks large that is not.
+    in_view: [f64; 2],
 }
 
 /// Shows the plots, one below the other over the same steps.
@@ -71,7 +71,7 @@ fn charts(state: &State, run: &RunView) -> Vec<Chart> {
             series("stereo", theme::PREDICTION, square, MarkerShape::Square, |row| row.stereo_score),
         ],
         thresholds: limit("ncc_min").into_iter().chain(limit("stereo_ncc_min")).collect(),
-        anchor: 1.0,
+        in_view: [0.9, 1.0],
     }];
     let mut position =
         vec![series("σ", theme::WEAK, diamond, MarkerShape::Diamond, |row| row.sigma_m.map(|v| v * 100.0))];
@@ -82,7 +82,7 @@ fn charts(state: &State, run: &RunView) -> Vec<Chart> {
             unit: "px",
             series: vec![error],
             thresholds: Vec::new(),
-            anchor: 0.0,
+            in_view: [0.0, 1.0],
         });
         position.push(series("error", colour, ring, MarkerShape::Circle, |row| row.err_m.map(|v| v * 100.0)));
     }
@@ -91,7 +91,7 @@ fn charts(state: &State, run: &RunView) -> Vec<Chart> {
         unit: "cm",
         series: position,
         thresholds: Vec::new(),
-        anchor: 0.0,
+        in_view: [0.0, 1.0],
     });
     charts
 }
@@ -127,7 +127,8 @@ fn plot(
             .show_axes([is_last, true])
             .include_x(-0.4)
             .include_x(last + 0.4)
-            .include_y(chart.anchor)
+            .include_y(chart.in_view[0])
+            .include_y(chart.in_view[1])
             .set_margin_fraction(vec2(0.0, 0.12))
             .y_axis_min_width(30.0)
             .x_axis_formatter(|mark: GridMark, _: &std::ops::RangeInclusive<f64>| {

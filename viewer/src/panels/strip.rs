@@ -79,8 +79,8 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let side = across.min(area.height() - WORDS.0 - WORDS.1).max(16.0);
     let width = side * count + BETWEEN * (count - 1.0);
     let mut at = pos2(area.left() + ((area.width() - width) / 2.0).max(0.0), area.top() + WORDS.0);
-    for patch in &patches {
-        if !patch.step.is_empty() {
+    for (i, patch) in patches.iter().enumerate() {
+        if i > 0 {
             arrow(ui, pos2(at.x - BETWEEN / 2.0, at.y + side / 2.0), &patch.step);
         }
         let frame = Rect::from_min_size(at, vec2(side, side));

@@ -93,7 +93,7 @@ fn paint_marks(canvas: &Canvas, trace: &StepTrace, matched: &TemplateMatch, run:
     if let Some(second) = &matched.second_peak {
         overlay.mark(second.pixel, Mark::Square, theme::STRONG);
         let words = format!("2nd: {:.0} % at {:.0} px", second.ratio * 100.0, second.distance_px);
-        overlay.words(second.pixel, vec2(12.0, 0.0), &words, theme::STRONG);
+        overlay.words(second.pixel, vec2(12.0, 12.0), &words, theme::STRONG);
     }
     let peak = &matched.peak;
     overlay.ellipse(peak.pixel, &matched.covariance_px2, 3.0, run, Line::Solid);
