@@ -1,6 +1,6 @@
 //! The Rerun side of the debugger: runs as an `.rrd` file ([`export`]) or as a live stream ([`LiveStream`]).
 //!
-//! Every entity has one `log_*` function, called in the order of the stages from [`log_step`]; the numbers are
+//! Every entity has one `log_*` function, called in the order of the stages from `log_step`; the numbers are
 //! one table in `scores`. `{target}` is the run's name: `target_1` for the first run of the first target,
 //! `target_1_run_1` for the first run that was forked from it.
 //!
