@@ -103,7 +103,7 @@ impl State {
             Reply::Session(view) => {
                 let asked = self.sync.session_asked.take();
                 let was_read = matches!(request, Request::Session(_));
-                self.adopt(*view, was_read && asked.is_some_and(|moves| moves != self.sync.cursor_moves));
+                self.adopt(*view, was_read && asked.is_some_and(|count| count != self.sync.cursor_messages));
             }
             Reply::Designated { target, session } => self.designated(target, *session),
             Reply::Run(run) => self.took_run(request, *run),
@@ -112,22 +112,25 @@ impl State {
                 self.open_url = Some(stream.viewer_url);
             }
             Reply::Done => match request {
-                Request::PutCursor { cursor, .. } => {
-                    self.sync.cursor_asked = false;
-                    self.sync.server_cursor = cursor;
-                }
+                Request::PutCursor { cursor, .. } => self.put_cursor(cursor),
                 _ => self.sync.session_stale = true,
             },
             Reply::Item(_) => {}
         }
     }
 
+    /// A cursor that was sent has its answer.
+    fn put_cursor(&mut self, cursor: Cursor) {
+        self.sync.cursor_asked = false;
+        self.sync.cursor_messages += 1;
+        self.sync.server_cursor = cursor;
+    }
+
     fn refused(&mut self, request: Request, problem: Problem) {
         match request {
             Request::PutCursor { cursor, .. } => {
                 // The page keeps its cursor and tells the server of the next one.
-                self.sync.cursor_asked = false;
-                self.sync.server_cursor = cursor;
+                self.put_cursor(cursor);
                 return;
             }
             Request::NewTarget { .. } => {

@@ -138,14 +138,14 @@ pub struct State {
 struct Sync {
     /// The session is to be read again.
     session_stale: bool,
-    /// The session is being read, asked for at this count of cursor moves.
+    /// The session is being read, asked for at this count of cursor messages.
     session_asked: Option<u64>,
     /// The cursor as the server knows it.
     server_cursor: Cursor,
     /// A cursor is on its way to the server.
     cursor_asked: bool,
-    /// How often a cursor was sent.
-    cursor_moves: u64,
+    /// How often a cursor was sent or its answer came in: between the two an answer may hold either cursor.
+    cursor_messages: u64,
     /// The session named by the page's link, before it was opened.
     linked: Option<String>,
     /// The traverse whose latest session is to be opened.
@@ -382,7 +382,7 @@ impl State {
         let Some(id) = self.session.as_ref().map(|session| session.id.clone()) else { return };
         if self.sync.session_stale && self.sync.session_asked.is_none() {
             self.sync.session_stale = false;
-            self.sync.session_asked = Some(self.sync.cursor_moves);
+            self.sync.session_asked = Some(self.sync.cursor_messages);
             self.outbox.push(Request::Session(id.clone()));
         }
         if self.cursor != self.sync.server_cursor
@@ -390,7 +390,7 @@ impl State {
             && self.connection == Connection::Live
         {
             self.sync.cursor_asked = true;
-            self.sync.cursor_moves += 1;
+            self.sync.cursor_messages += 1;
             self.outbox.push(Request::PutCursor { session: id, cursor: self.cursor });
         }
     }

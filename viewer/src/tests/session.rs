@@ -103,6 +103,27 @@ fn the_cursor_is_sent_once_at_a_time_and_an_older_answer_does_not_move_it_back()
 }
 
 #[test]
+fn an_answer_from_before_the_cursor_was_taken_does_not_move_it_back() {
+    let mut state = loaded(0);
+    let [put] = state.take_requests().try_into().unwrap();
+    state.arrived(Arrived { request: put, outcome: Ok(Reply::Done) }, 0.0);
+    state.apply(Command::Go(Go::By(1)));
+    let [put] = state.take_requests().try_into().unwrap();
+    state.told(Event::SessionChanged { session: "s1".to_owned() });
+    let [get] = state.take_requests().try_into().unwrap();
+    let mut view = state.session.clone().unwrap();
+    view.cursor = Cursor { target: Some(0), run: 0, step: 0 };
+    state.arrived(Arrived { request: put, outcome: Ok(Reply::Done) }, 0.0);
+    state.arrived(Arrived { request: get, outcome: Ok(Reply::Session(Box::new(view.clone()))) }, 0.0);
+    assert_eq!(state.cursor.step, 1, "the session was read before the server took the cursor");
+    state.told(Event::SessionChanged { session: "s1".to_owned() });
+    let [get] = state.take_requests().try_into().unwrap();
+    view.cursor.step = 4;
+    state.arrived(Arrived { request: get, outcome: Ok(Reply::Session(Box::new(view))) }, 0.0);
+    assert_eq!(state.cursor.step, 4, "another page moved it");
+}
+
+#[test]
 fn progress_of_a_run_reads_the_session_again_and_ends() {
     let mut state = loaded(2);
     state.take_requests();
