@@ -12,7 +12,9 @@ use sightline_core::session::{Session, track};
 use sightline_core::settings::Settings;
 use sightline_core::target::{Designation, TrackingState};
 use sightline_core::trace::StepTrace;
-use sightline_server::rerun_log::{LiveStream, Rows, RunLog, documented_entities, entities_of, export, root, shared_entities};
+use sightline_server::rerun_log::{
+    LiveStream, Rows, RunLog, documented_entities, entities_of, export, root, shared_entities,
+};
 use sightline_tests::rrd::{self, EntityRows, Recording};
 use sightline_tests::troubled::Troubled;
 
@@ -49,7 +51,8 @@ impl Fixture {
     fn exported(&self) -> Recording {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("short.rrd");
-        export(&path, "short approach", &self.drive, &self.logs(), &mut |_, _| ControlFlow::Continue(())).unwrap();
+        export(&path, "short approach", &self.drive, &self.logs(), &mut |_, _| ControlFlow::Continue(()))
+            .unwrap();
         assert_eq!(names(folder.path()), ["short.rrd"], "nothing else may be left behind");
         rrd::read(&path)
     }
@@ -58,11 +61,18 @@ impl Fixture {
 const LABELS: [&str; 2] = ["left rock", "right rock"];
 
 fn names(folder: &Path) -> Vec<String> {
-    std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
+    std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect()
 }
 
 /// The steps with and without data that the documentation promises.
-fn promised(rows: Rows, doc: &sightline_server::rerun_log::EntityDoc, steps: &[Arc<StepTrace>]) -> EntityRows {
+fn promised(
+    rows: Rows,
+    doc: &sightline_server::rerun_log::EntityDoc,
+    steps: &[Arc<StepTrace>],
+) -> EntityRows {
     let split = |wanted: bool| {
         steps.iter().filter(|t| doc.has_data_at(t) == wanted).map(|t| t.step as i64).collect::<Vec<_>>()
     };
@@ -86,9 +96,11 @@ fn sorted(mut steps: Vec<i64>) -> Vec<i64> {
 fn an_export_holds_every_documented_entity_with_the_documented_rows_and_no_other() {
     let recording = FIXTURE.exported();
     let shared = shared_entities().into_iter().map(|doc| (0, doc));
-    let own = (0..2).flat_map(|target| entities_of(&root(target, 0)).into_iter().map(move |doc| (target, doc)));
+    let own =
+        (0..2).flat_map(|target| entities_of(&root(target, 0)).into_iter().map(move |doc| (target, doc)));
     for (target, doc) in shared.chain(own) {
-        let found = recording.entities.get(&doc.path).unwrap_or_else(|| panic!("{} is not in the file", doc.path));
+        let found =
+            recording.entities.get(&doc.path).unwrap_or_else(|| panic!("{} is not in the file", doc.path));
         let expected = promised(doc.rows, &doc, &FIXTURE.runs[target]);
         assert_eq!(found.fixed, expected.fixed, "rows outside of time of {}", doc.path);
         assert_eq!(sorted(found.data.clone()), expected.data, "steps with data of {}", doc.path);
@@ -96,7 +108,11 @@ fn an_export_holds_every_documented_entity_with_the_documented_rows_and_no_other
         for archetype in std::iter::once(doc.archetype).chain(doc.style) {
             let missing = expected.data.is_empty() && expected.fixed == 0;
             let styled_only = expected.data.is_empty() && Some(archetype) != doc.style;
-            assert!(missing || styled_only || found.archetypes.contains(archetype), "{}: {archetype}", doc.path);
+            assert!(
+                missing || styled_only || found.archetypes.contains(archetype),
+                "{}: {archetype}",
+                doc.path
+            );
         }
         let timelines: Vec<_> = found.timelines.iter().map(String::as_str).collect();
         let none = matches!(doc.rows, Rows::Once);
@@ -141,7 +157,10 @@ fn numbers_and_positions_come_back_as_the_trace_has_them_half_a_pixel_further() 
         let ncc = number("/target_1/judge/ncc", "Scalars:scalars", trace.step);
         assert_eq!(ncc, [found.peak.score]);
         let peak = number("/target_1/locate/match_template/peak", "Points2D:positions", trace.step);
-        assert_eq!(peak, [(found.peak.pixel.x + 0.5) as f32, (found.peak.pixel.y + 0.5) as f32].map(f64::from));
+        assert_eq!(
+            peak,
+            [(found.peak.pixel.x + 0.5) as f32, (found.peak.pixel.y + 0.5) as f32].map(f64::from)
+        );
         let site = FIXTURE.drive.traverse.site_from_rover(trace.step) * trace.update.target.position_in_rover;
         let position = number("/target_1/update/position", "Points3D:positions", trace.step);
         assert_eq!(position, [site.x as f32, site.y as f32, site.z as f32].map(f64::from));
@@ -173,7 +192,8 @@ fn a_cancelled_export_leaves_nothing_and_an_existing_file_is_kept() {
     assert!(names(folder.path()).is_empty());
 
     std::fs::write(&path, "mine").unwrap();
-    let refused = export(&path, "short", &FIXTURE.drive, &FIXTURE.logs(), &mut |_, _| ControlFlow::Continue(()));
+    let refused =
+        export(&path, "short", &FIXTURE.drive, &FIXTURE.logs(), &mut |_, _| ControlFlow::Continue(()));
     assert!(matches!(refused, Err(Error::Write { .. })), "{refused:?}");
     assert_eq!(std::fs::read_to_string(&path).unwrap(), "mine");
 }
@@ -194,11 +214,17 @@ fn the_live_page_answers_on_loopback_and_may_talk_to_nobody_else() {
     assert!(head.starts_with("HTTP/1.1 200 OK"), "{head}");
     let policy = head.lines().find(|line| line.starts_with("content-security-policy:")).unwrap();
     let data = stream.stream_url().replace("rerun+http", "http").replace("/proxy", "");
-    assert!(policy.contains("default-src 'none'") && policy.contains(&format!("connect-src 'self' {data};")), "{policy}");
+    assert!(
+        policy.contains("default-src 'none'") && policy.contains(&format!("connect-src 'self' {data};")),
+        "{policy}"
+    );
     assert!(get(port.parse().unwrap(), "/re_viewer_bg.wasm").starts_with("HTTP/1.1 200 OK"));
     assert!(get(port.parse().unwrap(), "/signed-in").starts_with("HTTP/1.1 404"));
     drop(stream);
-    assert!(TcpStream::connect(("127.0.0.1", port.parse().unwrap())).is_err(), "the page outlives the stream");
+    assert!(
+        TcpStream::connect(("127.0.0.1", port.parse().unwrap())).is_err(),
+        "the page outlives the stream"
+    );
 }
 
 /// The head of an answer over plain HTTP.

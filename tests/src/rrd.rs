@@ -51,9 +51,12 @@ pub fn read(path: &Path) -> Recording {
     for message in DecoderApp::decode_lazy(BufReader::new(file)) {
         match message.unwrap_or_else(|error| panic!("{}: {error}", path.display())) {
             LogMsg::SetStoreInfo(info) => recording.application = info.info.application_id().to_string(),
-            LogMsg::BlueprintActivationCommand(command) => recording.blueprint_activated = command.make_active,
+            LogMsg::BlueprintActivationCommand(command) => {
+                recording.blueprint_activated = command.make_active
+            }
             LogMsg::ArrowMsg(store, message) => {
-                let chunk = Chunk::from_arrow_msg(&message).unwrap_or_else(|error| panic!("a bad chunk: {error}"));
+                let chunk =
+                    Chunk::from_arrow_msg(&message).unwrap_or_else(|error| panic!("a bad chunk: {error}"));
                 let entity = chunk.entity_path().to_string();
                 if store.kind() == StoreKind::Blueprint {
                     recording.blueprint.insert(entity);
@@ -75,7 +78,8 @@ fn add(rows: &mut EntityRows, chunk: &Chunk) {
         rows.fixed += chunk.num_rows();
         return;
     }
-    let steps = chunk.timelines().get(&"step".into()).map(|column| column.times_raw().to_vec()).unwrap_or_default();
+    let steps =
+        chunk.timelines().get(&"step".into()).map(|column| column.times_raw().to_vec()).unwrap_or_default();
     for (row, step) in steps.iter().enumerate() {
         let is_set = |component: &ComponentIdentifier| {
             chunk.components().get_array(*component).is_some_and(|array| array.is_valid(row))

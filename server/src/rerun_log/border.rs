@@ -13,7 +13,7 @@ use rerun::{
     Transform3D,
 };
 use sightline_core::frames::{Pixel, Point3, Pose};
-use sightline_core::image::GrayImage;
+use sightline_core::image::{GrayImage, PixelRect};
 
 use super::palette::{HALO, Rgb, color};
 
@@ -25,11 +25,17 @@ pub(super) fn point(pixel: Pixel) -> [f32; 2] {
     [(pixel.x + 0.5) as f32, (pixel.y + 0.5) as f32]
 }
 
+/// The frame of a rectangle of whole pixels: its top left corner is the origin.
+pub(super) fn corner_frame(rect: &PixelRect) -> Transform3D {
+    let [x, y] = point(Pixel::new(f64::from(rect.x) - 0.5, f64::from(rect.y) - 0.5));
+    Transform3D::from_translation([x, y, 0.0])
+}
+
 /// A dot on an image.
 pub(super) fn dot(pixel: Pixel, rgb: Rgb, label: &str) -> Points2D {
     Points2D::new([point(pixel)])
         .with_colors([color(rgb)])
-        .with_radii([Radius::new_ui_points(4.0)])
+        .with_radii([Radius::new_ui_points(3.0)])
         .with_labels([label])
         .with_show_labels(false)
         .with_draw_order(30.0)
@@ -84,7 +90,8 @@ pub(super) fn ellipse(centre: Pixel, covariance_px2: &Matrix2<f64>, sigmas: f64)
         return None;
     }
     let eigen = SymmetricEigen::new(*covariance_px2);
-    let axes = eigen.eigenvectors * Matrix2::from_diagonal(&eigen.eigenvalues.map(|v| v.max(0.0).sqrt() * sigmas));
+    let axes =
+        eigen.eigenvectors * Matrix2::from_diagonal(&eigen.eigenvalues.map(|v| v.max(0.0).sqrt() * sigmas));
     Some(outline((0..ELLIPSE_POINTS).map(|i| {
         let angle = f64::from(i) / f64::from(ELLIPSE_POINTS) * std::f64::consts::TAU;
         let offset = axes * Vector2::new(angle.cos(), angle.sin());
@@ -111,7 +118,11 @@ fn quaternion(rotation: &UnitQuaternion<f64>) -> rerun::Quaternion {
 }
 
 /// The ellipsoids at 1σ and 3σ about `centre`; none when the covariance is not finite.
-pub(super) fn ellipsoids(centre: &Point3, covariance_m2: &Matrix3<f64>, colors: [Color; 2]) -> Option<rerun::Ellipsoids3D> {
+pub(super) fn ellipsoids(
+    centre: &Point3,
+    covariance_m2: &Matrix3<f64>,
+    colors: [Color; 2],
+) -> Option<rerun::Ellipsoids3D> {
     if !covariance_m2.iter().chain(centre.iter()).all(|v| v.is_finite()) {
         return None;
     }
@@ -153,7 +164,8 @@ pub(super) fn mapped(
 ) -> Option<DepthImage> {
     let whole = width > 0 && height > 0 && values.len() == width as usize * height as usize;
     let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
-    let format = ImageFormat::from(rerun::datatypes::ImageFormat::depth([width, height], ChannelDatatype::F32));
+    let format =
+        ImageFormat::from(rerun::datatypes::ImageFormat::depth([width, height], ChannelDatatype::F32));
     whole.then(|| {
         DepthImage::new(bytes, format)
             .with_meter(1.0)

@@ -68,7 +68,8 @@ impl EntityDoc {
 
 /// The entities that all runs of a recording share.
 pub fn shared_entities() -> Vec<EntityDoc> {
-    let doc = |path: &str, archetype, style, rows| EntityDoc { path: path.to_owned(), archetype, style, rows };
+    let doc =
+        |path: &str, archetype, style, rows| EntityDoc { path: path.to_owned(), archetype, style, rows };
     let captured = Rows::EachStep { when: "the stop's files are whole", holds: |t| t.capture.is_some() };
     vec![
         doc("/", "ViewCoordinates", None, Rows::Once),
@@ -94,7 +95,8 @@ pub fn entities_of(root: &str) -> Vec<EntityDoc> {
         style: Some("SeriesLines"),
         rows: Rows::EachScore { when: score.when, value: score.value },
     });
-    let label = EntityDoc { path: path("/{target}", root), archetype: "TextDocument", style: None, rows: Rows::Once };
+    let label =
+        EntityDoc { path: path("/{target}", root), archetype: "TextDocument", style: None, rows: Rows::Once };
     std::iter::once(label).chain(docs).chain(scores).collect()
 }
 
@@ -116,6 +118,7 @@ const EVIDENCE: &[Evidence] = &[
     ("/{target}/predict/right", "Points2D", "predicted in front of the right camera", predicted_right),
     ("/{target}/point_mast/gate", "LineStrips2D", "predicted in front of the left camera", predicted_left),
     ("/{target}/capture/subframe", "Boxes2D", "the subframe lies in the image", |t| t.capture.as_ref().is_some_and(|c| c.subframe.is_some())),
+    ("/{target}/capture/frame", "Transform3D", "the subframe lies in the image", |t| t.capture.as_ref().is_some_and(|c| c.subframe.is_some())),
     ("/{target}/locate/scale_roll/footprint", "LineStrips2D", "prepared", |t| prepared(t) && predicted_left(t)),
     ("/{target}/locate/scale_roll/reference", "DepthImage", "prepared", prepared),
     ("/{target}/locate/scale_roll/scaled", "DepthImage", "prepared", prepared),

@@ -51,12 +51,16 @@ fn write(
     progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
 ) -> Result<()> {
     let wrong = |error: &dyn std::fmt::Display| failed(path, &error.to_string());
-    let gather = ChunkBatcherConfig { flush_tick: Duration::MAX, flush_num_bytes: CHUNK_BYTES, ..Default::default() };
+    let gather =
+        ChunkBatcherConfig { flush_tick: Duration::MAX, flush_num_bytes: CHUNK_BYTES, ..Default::default() };
     let (stream, gathered) =
         builder(traverse_name).batcher_config(gather).memory().map_err(|error| wrong(&error))?;
     let mut recorder = Recorder::new(stream, false);
     let mut file = RrdFile::create(path)?;
-    recorder.log_runs(runs).and_then(|()| recorder.log_traverse(traverse_name, stops)).map_err(|e| wrong(&e))?;
+    recorder
+        .log_runs(runs, stops)
+        .and_then(|()| recorder.log_traverse(traverse_name, stops))
+        .map_err(|e| wrong(&e))?;
     let all: BTreeSet<usize> = runs.iter().flat_map(|run| run.steps).map(|trace| trace.step).collect();
     for (done, step) in all.iter().enumerate() {
         if progress(done, all.len()).is_break() {

@@ -8,7 +8,7 @@ use sightline_core::frames::Pixel;
 use sightline_core::image::PixelRect;
 
 use super::Logged;
-use super::border::{dot, ellipse, haloed, plus, png, point, square};
+use super::border::{corner_frame, dot, ellipse, haloed, plus, png, point, square};
 use super::palette::{MEASUREMENT, PREDICTION, Rgb, SECOND_PEAK, TRUTH, color, faint, of_score, of_state};
 use super::step::Step;
 
@@ -54,6 +54,12 @@ pub(super) fn log_subframe(step: &Step<'_>) -> Logged {
     step.log("/{target}/capture/subframe", subframe.map(|rect| frame(&rect, TRUTH, "subframe")))
 }
 
+/// The frame of the subframe, from which the close-up looks.
+pub(super) fn log_subframe_frame(step: &Step<'_>) -> Logged {
+    let subframe = step.trace.capture.as_ref().and_then(|capture| capture.subframe);
+    step.log("/{target}/capture/frame", subframe.map(|rect| corner_frame(&rect)))
+}
+
 /// What the template's window became by scale and roll, where it is expected.
 pub(super) fn log_footprint(step: &Step<'_>) -> Logged {
     let prepared = step.template().and_then(|e| e.scale_roll.as_ref());
@@ -92,26 +98,33 @@ pub(super) fn log_second_peak(step: &Step<'_>) -> Logged {
 /// The covariance of the located left position.
 pub(super) fn log_left_covariance(step: &Step<'_>) -> Logged {
     let located = step.trace.locate.as_ref();
-    let strip = located.and_then(|located| ellipse(located.left_pixel?, &located.left_covariance_px2, SIGMAS));
+    let strip =
+        located.and_then(|located| ellipse(located.left_pixel?, &located.left_covariance_px2, SIGMAS));
     step.log("/{target}/locate/left_covariance", strip.map(|s| haloed(&[s], MEASUREMENT)))
 }
 
 /// The searched part of the epipolar curve, coloured by score.
 pub(super) fn log_curve(step: &Step<'_>) -> Logged {
     let stereo = step.template().and_then(|e| e.point_stereo.as_ref());
-    step.log("/{target}/locate/point_stereo/curve", stereo.map(|stereo| {
-        let pairs = || stereo.curve.windows(2);
-        LineStrips2D::new(pairs().map(|p| [point(p[0].pixel), point(p[1].pixel)]))
-            .with_colors(pairs().map(|p| p[0].score.map_or(faint(TRUTH, 60), |s| color(of_score(s)))))
-            .with_radii([Radius::new_ui_points(1.5)])
-            .with_draw_order(20.0)
-    }))
+    step.log(
+        "/{target}/locate/point_stereo/curve",
+        stereo.map(|stereo| {
+            let pairs = || stereo.curve.windows(2);
+            LineStrips2D::new(pairs().map(|p| [point(p[0].pixel), point(p[1].pixel)]))
+                .with_colors(pairs().map(|p| p[0].score.map_or(faint(TRUTH, 60), |s| color(of_score(s)))))
+                .with_radii([Radius::new_ui_points(1.5)])
+                .with_draw_order(20.0)
+        }),
+    )
 }
 
 /// The corresponding point in the right image.
 pub(super) fn log_right_match(step: &Step<'_>) -> Logged {
     let stereo = step.template().and_then(|e| e.point_stereo.as_ref());
-    step.log("/{target}/locate/point_stereo/match", stereo.map(|s| dot(s.right_pixel, MEASUREMENT, step.label)))
+    step.log(
+        "/{target}/locate/point_stereo/match",
+        stereo.map(|s| dot(s.right_pixel, MEASUREMENT, step.label)),
+    )
 }
 
 /// The truth in the left image.

@@ -38,8 +38,10 @@ impl LiveStream {
     /// [`Error::Request`] when a port cannot be opened.
     pub fn start() -> Result<Self> {
         let port = free_port().map_err(|error| refused(&error))?;
-        let options =
-            ServerOptions { memory_limit: MemoryLimit::from_bytes(HISTORY_BYTES), ..ServerOptions::default() };
+        let options = ServerOptions {
+            memory_limit: MemoryLimit::from_bytes(HISTORY_BYTES),
+            ..ServerOptions::default()
+        };
         let stream = builder("live").serve_grpc_opts(Ipv4Addr::LOCALHOST.to_string(), port, options);
         let recorder = Recorder::new(stream.map_err(|error| refused(&error))?, true);
         wait_for(port)?;
@@ -67,7 +69,9 @@ impl LiveStream {
         let labels: Vec<_> = session.targets.iter().map(|target| target.label.as_str()).collect();
         let live = session.targets.iter().enumerate().filter(|(_, target)| !target.removed);
         let runs: Vec<_> = live
-            .flat_map(|(number, target)| target.runs.iter().enumerate().map(move |(run, record)| (number, run, record)))
+            .flat_map(|(number, target)| {
+                target.runs.iter().enumerate().map(move |(run, record)| (number, run, record))
+            })
             .map(|(target, run, record)| RunLog { target, run, label: labels[target], steps: &record.steps })
             .collect();
         runs.iter().try_for_each(|run| self.log_run(traverse_name, stops, run))
@@ -95,7 +99,7 @@ impl LiveStream {
         let mut recorder = self.recorder();
         let logged = recorder
             .log_traverse(traverse_name, stops)
-            .and_then(|()| recorder.log_runs(std::slice::from_ref(run)))
+            .and_then(|()| recorder.log_runs(std::slice::from_ref(run), stops))
             .and_then(|()| recorder.log_step(run, stops, trace));
         logged.map_err(|error| refused(&error))
     }

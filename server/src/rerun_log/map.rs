@@ -7,7 +7,7 @@
 use nalgebra::Matrix3;
 use rerun::{Color, Ellipsoids3D, LineStrips3D, Radius, RecordingStream, TransformAxes3D, ViewCoordinates};
 use sightline_core::camera::Camera;
-use sightline_core::frames::{Pixel, Point3};
+use sightline_core::frames::{Pixel, Point3, Vector3};
 use sightline_core::pipeline::Stops;
 
 use super::Logged;
@@ -24,6 +24,27 @@ const AXES_M: f32 = 0.5;
 /// Points along each edge of an image, so that a fisheye's pyramid has its curved base.
 const EDGE_POINTS: u32 = 8;
 
+/// From where a map is first seen.
+pub(super) struct Outlook {
+    /// Where the eye is, in the site frame.
+    pub(super) eye: Point3,
+    /// What it looks at, in the site frame.
+    pub(super) target: Point3,
+}
+
+impl Outlook {
+    /// From behind, above and beside the first stop, with way and target in the picture.
+    pub(super) fn over(stops: &dyn Stops, target_in_site: &Point3) -> Self {
+        let start = Point3::from(stops.site_from_rover(0).translation.vector);
+        let ahead = target_in_site - start;
+        let extent_m = ahead.norm().max(1.0);
+        let forward = Vector3::new(ahead.x, ahead.y, 0.0).try_normalize(1e-9).unwrap_or_else(Vector3::x);
+        let right = Vector3::new(-forward.y, forward.x, 0.0);
+        let eye = start + (right * 0.5 - forward * 0.15 - Vector3::z() * 0.5) * extent_m;
+        Self { eye, target: start + ahead * 0.6 }
+    }
+}
+
 /// The axes of the site frame: x north (forward), y east (right), z down.
 pub(super) fn log_site_axes(stream: &RecordingStream) -> Logged {
     stream.log_static("/", &ViewCoordinates::FRD())
@@ -31,7 +52,8 @@ pub(super) fn log_site_axes(stream: &RecordingStream) -> Logged {
 
 /// The way driven, by the estimated poses of all stops.
 pub(super) fn log_path(stream: &RecordingStream, stops: &dyn Stops) -> Logged {
-    let strip = (0..stops.stop_count()).map(|step| point_3d(&stops.site_from_rover(step).translation.vector.into()));
+    let strip =
+        (0..stops.stop_count()).map(|step| point_3d(&stops.site_from_rover(step).translation.vector.into()));
     let line = LineStrips3D::new([strip.collect::<Vec<_>>()])
         .with_colors([color(ROVER)])
         .with_radii([Radius::new_ui_points(1.0)]);
@@ -99,7 +121,12 @@ pub(super) fn log_true_position(step: &Step<'_>) -> Logged {
 }
 
 /// The ellipsoids of a covariance in the rover frame, turned into the site frame.
-fn spread(step: &Step<'_>, point_in_rover: &Point3, covariance: &Matrix3<f64>, rgb: Rgb) -> Option<Ellipsoids3D> {
+fn spread(
+    step: &Step<'_>,
+    point_in_rover: &Point3,
+    covariance: &Matrix3<f64>,
+    rgb: Rgb,
+) -> Option<Ellipsoids3D> {
     let turn = step.site_from_rover.rotation.to_rotation_matrix();
     let covariance_in_site = turn.matrix() * covariance * turn.matrix().transpose();
     let colors: [Color; 2] = [color(rgb), faint(rgb, 110)];
@@ -111,7 +138,9 @@ fn frustum(camera: &Camera, rgb: Rgb) -> LineStrips3D {
     let (w, h) = (f64::from(camera.width()), f64::from(camera.height()));
     let corners = [(0.0, 0.0), (w, 0.0), (w, h), (0.0, h)];
     let reach = |(x, y): (f64, f64)| {
-        camera.ray(Pixel::new(x - 0.5, y - 0.5)).map(|ray| [point_3d(&ray.origin), point_3d(&ray.at(FRUSTUM_M))])
+        camera
+            .ray(Pixel::new(x - 0.5, y - 0.5))
+            .map(|ray| [point_3d(&ray.origin), point_3d(&ray.at(FRUSTUM_M))])
     };
     let edges = (0..corners.len()).flat_map(|i| {
         let (a, b) = (corners[i], corners[(i + 1) % corners.len()]);

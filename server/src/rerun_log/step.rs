@@ -66,6 +66,12 @@ pub(super) fn path(entity: &str, root: &str) -> String {
 }
 
 /// Logs how a scalar is drawn, once and for all steps.
-pub(super) fn log_series(stream: &RecordingStream, path: &str, name: &str, color: rerun::Color, width: f32) -> Logged {
+pub(super) fn log_series(
+    stream: &RecordingStream,
+    path: &str,
+    name: &str,
+    color: rerun::Color,
+    width: f32,
+) -> Logged {
     stream.log_static(path, &SeriesLines::new().with_names([name]).with_colors([color]).with_widths([width]))
 }
