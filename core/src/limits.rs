@@ -1,6 +1,6 @@
 //! Every threshold and parameter that a person may change: unit, default, range and source, said once.
 //!
-//! [`settings_group!`] turns a table into a struct, its defaults and its description, so that the viewer's
+//! `settings_group!` turns a table into a struct, its defaults and its description, so that the viewer's
 //! form, `--set key=value` and the documentation are the same table. Values marked *(ours)* are not from the
 //! papers (R228).
 

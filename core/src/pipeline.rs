@@ -13,9 +13,9 @@ use std::sync::Arc;
 use crate::camera::{Camera, Mast, MastAngles};
 use crate::error::{Error, Result};
 use crate::frames::{Pixel, Pose};
-use crate::locate::{DesignateInput, LocateInput, locator};
+use crate::locate::{DesignateInput, LocateInput, Located, locator};
 use crate::settings::Settings;
-use crate::stages::capture::{self, StereoPair};
+use crate::stages::capture::{self, Capture, StereoPair};
 use crate::stages::judge::{self, Verdict};
 use crate::stages::point_mast::{self, Pointing, UsedPointing};
 use crate::stages::predict;
@@ -68,38 +68,7 @@ pub fn designate(stops: &dyn Stops, designation: Designation, settings: &Setting
     let stereo = stops.stereo();
     let input = DesignateInput { pixel, capture: &capture, left, right, stereo, settings };
     let located = locator(settings.tracker).designate(&input);
-    let (Some(position_in_rover), Some(covariance_in_rover)) =
-        (located.position_in_rover, located.covariance_in_rover)
-    else {
-        let why = located.missing.unwrap_or_else(|| "no 3-D position".to_owned());
-        return Err(Error::Target(format!(
-            "no 3-D position at pixel ({:.1}, {:.1}): {why}",
-            pixel.x, pixel.y
-        )));
-    };
-    let distance_m = (position_in_rover - left.model.centre()).norm();
-    let appearance = Appearance {
-        step,
-        pixel,
-        position_in_rover,
-        surface_by_pixel: located.surface_by_pixel,
-        camera: left.clone(),
-        image: Arc::clone(&capture.pair.left),
-    };
-    let target = Target {
-        designation,
-        step,
-        position_in_rover,
-        covariance_in_rover,
-        initial_position_in_site: stops.site_from_rover(step) * position_in_rover,
-        initial_distance_m: distance_m,
-        travelled_m: 0.0,
-        last_distance_m: distance_m,
-        travelled_since_update_m: 0.0,
-        drift_covariance_px2: located.left_covariance_px2,
-        drift_bias_px: located.left_bias_px,
-        appearance,
-    };
+    let target = first_target(stops, designation, &capture, &located)?;
     let pointing = pointing(stops, step, &target);
     let update = Updated {
         target,
@@ -182,6 +151,49 @@ pub fn run_step(stops: &dyn Stops, last: &Updated, settings: &Settings) -> StepT
         }
     }
     trace
+}
+
+/// The target that a designation makes.
+fn first_target(
+    stops: &dyn Stops,
+    designation: Designation,
+    capture: &Capture,
+    located: &Located,
+) -> Result<Target> {
+    let Designation { step, pixel } = designation;
+    let (Some(position_in_rover), Some(covariance_in_rover)) =
+        (located.position_in_rover, located.covariance_in_rover)
+    else {
+        let why = located.missing.as_deref().unwrap_or("no 3-D position");
+        return Err(Error::Target(format!(
+            "no 3-D position at pixel ({:.1}, {:.1}): {why}",
+            pixel.x, pixel.y
+        )));
+    };
+    let (left, _) = stops.cameras(step);
+    let distance_m = (position_in_rover - left.model.centre()).norm();
+    let appearance = Appearance {
+        step,
+        pixel,
+        position_in_rover,
+        surface_by_pixel: located.surface_by_pixel,
+        camera: left.clone(),
+        image: Arc::clone(&capture.pair.left),
+    };
+    Ok(Target {
+        designation,
+        step,
+        position_in_rover,
+        covariance_in_rover,
+        initial_position_in_site: stops.site_from_rover(step) * position_in_rover,
+        initial_distance_m: distance_m,
+        travelled_m: 0.0,
+        last_distance_m: distance_m,
+        travelled_since_update_m: 0.0,
+        drift_covariance_px2: located.left_covariance_px2,
+        drift_bias_px: located.left_bias_px,
+        appearance,
+    })
 }
 
 /// The designated pixel, if the left image has it.

@@ -54,7 +54,7 @@ pub struct Health {
 }
 
 /// What this program is
-#[utoipa::path(get, path = "/version", tag = "about", responses((status = 200, body = Version)))]
+#[utoipa::path(get, operation_id = "show_version", path = "/version", tag = "about", responses((status = 200, body = Version)))]
 async fn version() -> Json<Version> {
     Json(Version {
         name: "sightline".to_owned(),
@@ -66,7 +66,7 @@ async fn version() -> Json<Version> {
 }
 
 /// Whether the server is well
-#[utoipa::path(get, path = "/health", tag = "about", responses((status = 200, body = Health)))]
+#[utoipa::path(get, operation_id = "show_health", path = "/health", tag = "about", responses((status = 200, body = Health)))]
 async fn health(State(state): State<AppState>) -> Json<Health> {
     Json(Health { status: "ok".to_owned(), notices: state.notices().to_vec() })
 }

@@ -35,16 +35,8 @@ pub fn csv_header() -> String {
 /// One row with its line end.
 pub fn csv_line(row: &StepRow) -> String {
     let mut line = format!("{},{}", row.step, text_cell(&row.state));
-    let numbers = [
-        row.scale,
-        row.roll_deg,
-        row.ncc,
-        row.stereo_score,
-        row.err_px,
-        row.err_m,
-        row.sigma_m,
-        row.nees,
-    ];
+    let numbers =
+        [row.scale, row.roll_deg, row.ncc, row.stereo_score, row.err_px, row.err_m, row.sigma_m, row.nees];
     numbers.into_iter().for_each(|number| push(&mut line, number));
     push(&mut line, row.tracked);
     row.position_in_rover.into_iter().for_each(|number| push(&mut line, Some(number)));
@@ -64,7 +56,8 @@ fn push(line: &mut String, value: Option<impl std::fmt::Display>) {
 
 /// A cell of text: in quotes where it must be, and never a formula of a spreadsheet.
 fn text_cell(text: &str) -> String {
-    let text = if text.starts_with(['=', '+', '-', '@', '\t', '\r']) { format!("'{text}") } else { text.to_owned() };
+    let text =
+        if text.starts_with(['=', '+', '-', '@', '\t', '\r']) { format!("'{text}") } else { text.to_owned() };
     if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text }
 }
 

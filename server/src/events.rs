@@ -34,7 +34,7 @@ pub fn router() -> OpenApiRouter<AppState> {
 }
 
 /// Opens a WebSocket on which events arrive as JSON texts.
-#[utoipa::path(get, path = "/events", tag = "events", responses(
+#[utoipa::path(get, operation_id = "listen_to_events", path = "/events", tag = "events", responses(
     (status = 101, description = "From then on every message is one event", body = Event), ApiError))]
 async fn listen(
     State(state): State<AppState>,

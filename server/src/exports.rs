@@ -35,7 +35,7 @@ pub fn router() -> OpenApiRouter<AppState> {
 }
 
 /// A session as a Rerun recording
-#[utoipa::path(get, path = "/sessions/{session}/export.rrd", tag = "exports", params(("session" = String, Path)),
+#[utoipa::path(get, operation_id = "export_recording", path = "/sessions/{session}/export.rrd", tag = "exports", params(("session" = String, Path)),
     responses((status = 200, content_type = "application/octet-stream", body = FileBytes), ApiError))]
 async fn export(State(state): State<AppState>, Path(session): Path<String>) -> ApiResult<Response> {
     let live = state.session(&session)?;
@@ -56,7 +56,7 @@ async fn export(State(state): State<AppState>, Path(session): Path<String>) -> A
 ///
 /// Data and page come from two further ports of this machine, which ask for no token: every program of this
 /// machine can read them until the server ends.
-#[utoipa::path(post, path = "/sessions/{session}/rerun", tag = "exports", params(("session" = String, Path)),
+#[utoipa::path(post, operation_id = "stream_recording", path = "/sessions/{session}/rerun", tag = "exports", params(("session" = String, Path)),
     responses((status = 200, body = RerunStream), ApiError))]
 async fn stream(State(state): State<AppState>, Path(session): Path<String>) -> ApiResult<Json<RerunStream>> {
     let live = state.session(&session)?;
@@ -123,7 +123,8 @@ async fn follow(live: Arc<LiveSession>, stream: Arc<LiveStream>, mut events: Rec
         }
         loop {
             match events.recv().await {
-                Ok(Event::SessionChanged { session } | Event::RunProgress { session, .. }) if session != live.id => {}
+                Ok(Event::SessionChanged { session } | Event::RunProgress { session, .. })
+                    if session != live.id => {}
                 Ok(Event::RenderProgress { .. }) => {}
                 Ok(_) | Err(RecvError::Lagged(_)) => break,
                 Err(RecvError::Closed) => return,

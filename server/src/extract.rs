@@ -1,5 +1,7 @@
 //! How requests are read: names in paths, query parameters and JSON bodies, with problems that say what is wrong.
 
+use std::time::Duration;
+
 use axum::body::Bytes;
 use axum::extract::rejection::PathRejection;
 use axum::extract::{FromRequest, FromRequestParts, Query, Request};
@@ -11,6 +13,9 @@ use crate::problem::{ApiError, ApiResult};
 
 /// The largest body of a request, bytes.
 pub const BODY_LIMIT: usize = 1 << 20;
+
+/// How long a body may take to arrive.
+const BODY_PATIENCE: Duration = Duration::from_secs(30);
 
 /// The names in the path; what is not even of their form is not there.
 pub struct Path<T>(pub T);
@@ -53,7 +58,15 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Body<T> {
         if request.headers().get(header::CONTENT_TYPE).is_none() {
             return Err(not_json());
         }
-        let bytes = Bytes::from_request(request, state).await.map_err(|wrong| match wrong.status() {
+        let reading = tokio::time::timeout(BODY_PATIENCE, Bytes::from_request(request, state)).await;
+        let slow = |_| {
+            ApiError::new(
+                StatusCode::REQUEST_TIMEOUT,
+                "slow",
+                "The body of the request did not arrive in time.",
+            )
+        };
+        let bytes = reading.map_err(slow)?.map_err(|wrong| match wrong.status() {
             StatusCode::PAYLOAD_TOO_LARGE => {
                 let limit = BODY_LIMIT >> 20;
                 let detail = format!("The body of a request may have at most {limit} MiB.");
@@ -95,7 +108,8 @@ pub fn check_content_type(method: &Method, headers: &HeaderMap) -> ApiResult<()>
         media_type.eq_ignore_ascii_case("application/json")
     };
     let length = headers.get(header::CONTENT_LENGTH);
-    let has_body = length.is_some_and(|length| length != "0") || headers.contains_key(header::TRANSFER_ENCODING);
+    let has_body =
+        length.is_some_and(|length| length != "0") || headers.contains_key(header::TRANSFER_ENCODING);
     let mut types = headers.get_all(header::CONTENT_TYPE).iter().peekable();
     let is_unsaid = types.peek().is_none();
     if (is_unsaid && has_body) || !types.all(is_json) { Err(not_json()) } else { Ok(()) }

@@ -118,9 +118,9 @@ mod tests {
     use super::*;
 
     fn verdict(method: Method, headers: &[(&'static str, &str)]) -> Result<String, u16> {
-        let pairs = headers.iter().map(|(name, value)| {
-            (HeaderName::from_static(name), HeaderValue::from_str(value).unwrap())
-        });
+        let pairs = headers
+            .iter()
+            .map(|(name, value)| (HeaderName::from_static(name), HeaderValue::from_str(value).unwrap()));
         let headers: HeaderMap = pairs.collect();
         let hosts = Hosts::new(7700, &["rover.example".to_owned()]);
         check(&hosts, &method, &Uri::from_static("/"), &headers).map_err(|error| error.problem().status)
@@ -131,7 +131,8 @@ mod tests {
         for host in ["localhost:7700", "127.0.0.1:7700", "[::1]:7700", "LOCALHOST:7700", "rover.example"] {
             assert!(verdict(Method::GET, &[("host", host)]).is_ok(), "{host}");
         }
-        for host in ["localhost", "localhost:7701", "localhost:7700.evil.example", "evil-localhost:7700", ""] {
+        for host in ["localhost", "localhost:7701", "localhost:7700.evil.example", "evil-localhost:7700", ""]
+        {
             assert_eq!(verdict(Method::GET, &[("host", host)]), Err(403), "{host}");
         }
         assert_eq!(verdict(Method::GET, &[]), Err(403));
@@ -143,7 +144,9 @@ mod tests {
         for origin in ["http://localhost:7700", "http://127.0.0.1:7700"] {
             assert!(verdict(Method::POST, &[ours, ("origin", origin)]).is_ok(), "{origin}");
         }
-        for origin in ["http://localhost:3000", "https://evil.example", "null", "http://localhost:7700.evil.example"] {
+        for origin in
+            ["http://localhost:3000", "https://evil.example", "null", "http://localhost:7700.evil.example"]
+        {
             assert_eq!(verdict(Method::POST, &[ours, ("origin", origin)]), Err(403), "{origin}");
             assert_eq!(verdict(Method::GET, &[ours, ("origin", origin), ("upgrade", "websocket")]), Err(403));
         }

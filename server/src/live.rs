@@ -65,6 +65,11 @@ impl LiveSession {
         !self.is_awake.swap(true, Ordering::Relaxed)
     }
 
+    /// Lets the next one who asks for it be the first again.
+    pub fn sleep(&self) {
+        self.is_awake.store(false, Ordering::Relaxed);
+    }
+
     /// Marks a run as being computed, in place of what may still be ending.
     pub fn begin(&self, target: usize, run: usize) -> CancelFlag {
         let flag = CancelFlag::default();

@@ -41,7 +41,7 @@ pub fn router() -> OpenApiRouter<AppState> {
 }
 
 /// This document
-#[utoipa::path(get, path = "/openapi.json", tag = "about", responses(
+#[utoipa::path(get, operation_id = "show_openapi", path = "/openapi.json", tag = "about", responses(
     (status = 200, description = "The OpenAPI document", body = serde_json::Value)))]
 async fn document() -> impl IntoResponse {
     ([(header::CONTENT_TYPE, "application/json")], JSON.as_str())

@@ -15,7 +15,8 @@ pub const PROBLEM_JSON: &str = "application/problem+json";
 /// A request that cannot be answered.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ApiError {
-    problem: Problem,
+    // In a box, because every result of a handler has room for it.
+    problem: Box<Problem>,
     log: Option<String>,
 }
 
@@ -25,13 +26,13 @@ pub type ApiResult<T> = Result<T, ApiError>;
 impl ApiError {
     /// A problem of that status; `code` is its stable name for programs.
     pub fn new(status: StatusCode, code: &str, detail: impl Into<String>) -> Self {
-        let problem = Problem {
+        let problem = Box::new(Problem {
             code: code.to_owned(),
             title: status.canonical_reason().unwrap_or("Problem").to_owned(),
             status: status.as_u16(),
             detail: detail.into(),
             hint: None,
-        };
+        });
         Self { problem, log: None }
     }
 
@@ -114,7 +115,7 @@ impl IntoResponse for ApiError {
             tracing::error!(code = self.problem.code, "{}", crate::plain(cause));
         }
         let status = StatusCode::from_u16(self.problem.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
-        let mut response = (status, axum::Json(&self.problem)).into_response();
+        let mut response = (status, axum::Json(self.problem.as_ref())).into_response();
         response.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static(PROBLEM_JSON));
         if status == StatusCode::SERVICE_UNAVAILABLE {
             response.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from_static("2"));

@@ -86,7 +86,9 @@ impl OpenTraverse {
                 (turn.step, turn.yields) = (Some(step), yields.cloned());
                 break Ok(());
             }
-            if let Some(background) = turn.yields.as_ref().filter(|_| yields.is_none() && turn.step != Some(step)) {
+            if let Some(background) =
+                turn.yields.as_ref().filter(|_| yields.is_none() && turn.step != Some(step))
+            {
                 background.store(true, Ordering::Relaxed);
             }
             turn = self.turned.wait_timeout(turn, GLANCE).unwrap_or_else(PoisonError::into_inner).0;

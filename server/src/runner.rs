@@ -96,7 +96,13 @@ fn compute(state: &AppState, live: &LiveSession, target: usize, run: usize, flag
 }
 
 /// Computes and records one step; false when there is nothing more to compute.
-fn one_step(state: &AppState, live: &LiveSession, target: usize, run: usize, flag: &CancelFlag) -> Result<bool> {
+fn one_step(
+    state: &AppState,
+    live: &LiveSession,
+    target: usize,
+    run: usize,
+    flag: &CancelFlag,
+) -> Result<bool> {
     if flag.load(Ordering::Relaxed) {
         return Err(Error::Cancelled);
     }

@@ -39,7 +39,7 @@ pub type RunPath = (String, usize, usize);
 ///
 /// Nothing is overwritten: a new run shares the steps before that one. From the designation's own step on,
 /// the target is designated anew.
-#[utoipa::path(post, path = "/sessions/{session}/targets/{target}/runs", tag = "runs", params(
+#[utoipa::path(post, operation_id = "fork_run", path = "/sessions/{session}/targets/{target}/runs", tag = "runs", params(
     ("session" = String, Path), ("target" = usize, Path)),
     request_body = NewRun, responses((status = 202, body = RunView), ApiError))]
 async fn fork(
@@ -48,13 +48,14 @@ async fn fork(
     Body(new): Body<NewRun>,
 ) -> ApiResult<Response> {
     let live = state.session(&session)?;
-    live.with(|session| session.target(target).map(|_| ())).map_err(|error| ApiError::from(error).about_path())?;
+    live.with(|session| session.target(target).map(|_| ()))
+        .map_err(|error| ApiError::from(error).about_path())?;
     let work_state = state.clone();
     state.designations().run(move || add(&work_state, &live, target, &new)).await
 }
 
 /// A run so far
-#[utoipa::path(get, path = "/sessions/{session}/targets/{target}/runs/{run}", tag = "runs", params(
+#[utoipa::path(get, operation_id = "show_run", path = "/sessions/{session}/targets/{target}/runs/{run}", tag = "runs", params(
     ("session" = String, Path), ("target" = usize, Path), ("run" = usize, Path)),
     responses((status = 200, body = RunView), ApiError))]
 async fn show(
@@ -65,7 +66,7 @@ async fn show(
 }
 
 /// Stops a run after its last step so far
-#[utoipa::path(post, path = "/sessions/{session}/targets/{target}/runs/{run}/cancel", tag = "runs", params(
+#[utoipa::path(post, operation_id = "cancel_run", path = "/sessions/{session}/targets/{target}/runs/{run}/cancel", tag = "runs", params(
     ("session" = String, Path), ("target" = usize, Path), ("run" = usize, Path)),
     responses((status = 200, body = RunView), ApiError))]
 async fn cancel(
@@ -90,7 +91,7 @@ async fn cancel(
 }
 
 /// Lets a stopped run go on
-#[utoipa::path(post, path = "/sessions/{session}/targets/{target}/runs/{run}/resume", tag = "runs", params(
+#[utoipa::path(post, operation_id = "resume_run", path = "/sessions/{session}/targets/{target}/runs/{run}/resume", tag = "runs", params(
     ("session" = String, Path), ("target" = usize, Path), ("run" = usize, Path)),
     responses((status = 202, body = RunView), ApiError))]
 async fn resume(
@@ -111,7 +112,7 @@ async fn resume(
 }
 
 /// The columns of a run as a CSV table
-#[utoipa::path(get, path = "/sessions/{session}/targets/{target}/runs/{run}/columns.csv", tag = "runs", params(
+#[utoipa::path(get, operation_id = "run_columns_csv", path = "/sessions/{session}/targets/{target}/runs/{run}/columns.csv", tag = "runs", params(
     ("session" = String, Path), ("target" = usize, Path), ("run" = usize, Path)),
     responses((status = 200, content_type = "text/csv", body = String), ApiError))]
 async fn columns_csv(State(state): State<AppState>, Path(path): Path<RunPath>) -> ApiResult<Response> {
@@ -120,7 +121,7 @@ async fn columns_csv(State(state): State<AppState>, Path(path): Path<RunPath>) -
 }
 
 /// The columns of a run as JSON Lines, one step each
-#[utoipa::path(get, path = "/sessions/{session}/targets/{target}/runs/{run}/columns.jsonl", tag = "runs", params(
+#[utoipa::path(get, operation_id = "run_columns_jsonl", path = "/sessions/{session}/targets/{target}/runs/{run}/columns.jsonl", tag = "runs", params(
     ("session" = String, Path), ("target" = usize, Path), ("run" = usize, Path)),
     responses((status = 200, content_type = "application/jsonl", body = String), ApiError))]
 async fn columns_jsonl(State(state): State<AppState>, Path(path): Path<RunPath>) -> ApiResult<Response> {
@@ -136,7 +137,10 @@ fn add(state: &AppState, live: &Arc<LiveSession>, target: usize, new: &NewRun) -
     let stops = live.traverse.traverse.stop_count();
     if !(designation.step..stops).contains(&new.from_step) {
         let (first, last, given) = (designation.step, stops - 1, new.from_step);
-        return Err(ApiError::invalid("field", format!("from_step: must be from {first} to {last}, not {given}")));
+        return Err(ApiError::invalid(
+            "field",
+            format!("from_step: must be from {first} to {last}, not {given}"),
+        ));
     }
     let redesignated = if new.from_step == designation.step {
         Some(Arc::new(runner::designate(&live.traverse, designation, &settings)?))
@@ -156,7 +160,11 @@ fn add(state: &AppState, live: &Arc<LiveSession>, target: usize, new: &NewRun) -
 
 fn has_room(session: &Session, target: usize) -> ApiResult<()> {
     let full = session.target(target)?.runs.len() >= RUN_LIMIT;
-    if full { Err(ApiError::conflict(format!("A target may have at most {RUN_LIMIT} runs."))) } else { Ok(()) }
+    if full {
+        Err(ApiError::conflict(format!("A target may have at most {RUN_LIMIT} runs.")))
+    } else {
+        Ok(())
+    }
 }
 
 /// The run that the path names.

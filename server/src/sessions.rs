@@ -17,14 +17,11 @@ use crate::state::AppState;
 
 /// The routes of this resource.
 pub fn router() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new()
-        .routes(routes!(list, begin))
-        .routes(routes!(show))
-        .routes(routes!(move_cursor))
+    OpenApiRouter::new().routes(routes!(list, begin)).routes(routes!(show)).routes(routes!(move_cursor))
 }
 
 /// The sessions on open traverses, oldest first
-#[utoipa::path(get, path = "/sessions", tag = "sessions", responses((status = 200, body = Vec<SessionEntry>)))]
+#[utoipa::path(get, operation_id = "list_sessions", path = "/sessions", tag = "sessions", responses((status = 200, body = Vec<SessionEntry>)))]
 async fn list(State(state): State<AppState>) -> Json<Vec<SessionEntry>> {
     let entries = state.sessions().into_iter().map(|live| SessionEntry {
         id: live.id.clone(),
@@ -35,7 +32,7 @@ async fn list(State(state): State<AppState>) -> Json<Vec<SessionEntry>> {
 }
 
 /// Begins a session
-#[utoipa::path(post, path = "/sessions", tag = "sessions", request_body = NewSession, responses(
+#[utoipa::path(post, operation_id = "begin_session", path = "/sessions", tag = "sessions", request_body = NewSession, responses(
     (status = 201, body = SessionView), ApiError))]
 async fn begin(State(state): State<AppState>, Body(new): Body<NewSession>) -> ApiResult<Response> {
     let traverse = state.traverse(&new.traverse).map_err(|_| {
@@ -53,7 +50,7 @@ async fn begin(State(state): State<AppState>, Body(new): Body<NewSession>) -> Ap
 }
 
 /// A session with its targets and runs
-#[utoipa::path(get, path = "/sessions/{session}", tag = "sessions", params(("session" = String, Path)), responses(
+#[utoipa::path(get, operation_id = "show_session", path = "/sessions/{session}", tag = "sessions", params(("session" = String, Path)), responses(
     (status = 200, body = SessionView), ApiError))]
 async fn show(State(state): State<AppState>, Path(session): Path<String>) -> ApiResult<Json<SessionView>> {
     let live = state.session(&session)?;
@@ -61,7 +58,7 @@ async fn show(State(state): State<AppState>, Path(session): Path<String>) -> Api
 }
 
 /// Moves the cursor
-#[utoipa::path(put, path = "/sessions/{session}/cursor", tag = "sessions", params(("session" = String, Path)),
+#[utoipa::path(put, operation_id = "move_cursor", path = "/sessions/{session}/cursor", tag = "sessions", params(("session" = String, Path)),
     request_body = Cursor, responses((status = 200, body = Cursor), ApiError))]
 async fn move_cursor(
     State(state): State<AppState>,

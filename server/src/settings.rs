@@ -14,7 +14,7 @@ pub fn router() -> OpenApiRouter<AppState> {
 }
 
 /// The table of settings
-#[utoipa::path(get, path = "/settings", tag = "settings", responses((status = 200, body = Vec<SettingInfo>)))]
+#[utoipa::path(get, operation_id = "list_settings", path = "/settings", tag = "settings", responses((status = 200, body = Vec<SettingInfo>)))]
 async fn table() -> Json<Vec<SettingInfo>> {
     Json(Settings::table())
 }

@@ -139,7 +139,7 @@ impl AppState {
         let found = number.and_then(|number| lock(&self.0.sessions).by_number.get(&number).cloned());
         let live = found.ok_or_else(|| ApiError::not_found("There is no such session."))?;
         if live.wake() {
-            runner::restore(self, &live)?;
+            runner::restore(self, &live).inspect_err(|_| live.sleep())?;
         }
         Ok(live)
     }
@@ -189,7 +189,8 @@ impl AppState {
 
     /// What a page must hear that may have missed anything.
     pub fn everything_may_have_changed(&self) -> Vec<Event> {
-        let sessions = self.sessions().into_iter().map(|live| Event::SessionChanged { session: live.id.clone() });
+        let sessions =
+            self.sessions().into_iter().map(|live| Event::SessionChanged { session: live.id.clone() });
         let traverses = self.traverses().iter().filter(|open| open.traverse.index().scenario.is_some());
         sessions.chain(traverses.map(|open| open.progress(None))).collect()
     }

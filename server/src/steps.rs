@@ -26,7 +26,7 @@ pub fn router() -> OpenApiRouter<AppState> {
 /// A step
 ///
 /// Arrays are left out; they are fetched one by one.
-#[utoipa::path(get, path = "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}", tag = "steps", params(
+#[utoipa::path(get, operation_id = "show_step", path = "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}", tag = "steps", params(
     ("session" = String, Path), ("target" = usize, Path), ("run" = usize, Path), ("step" = usize, Path)),
     responses((status = 200, body = StepTrace), ApiError))]
 async fn show(
@@ -38,7 +38,7 @@ async fn show(
 }
 
 /// One stage of a step; null where it was not reached
-#[utoipa::path(get, path = "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/stages/{stage}",
+#[utoipa::path(get, operation_id = "show_stage", path = "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/stages/{stage}",
     tag = "steps", params(
     ("session" = String, Path), ("target" = usize, Path), ("run" = usize, Path), ("step" = usize, Path),
     ("stage" = String, Path, description = "predict, point_mast, capture, locate, judge or update")),
@@ -55,12 +55,14 @@ async fn stage(
         "locate" => json(&trace.locate),
         "judge" => json(&trace.judge),
         "update" => json(&trace.update),
-        _ => Err(ApiError::not_found("The stages are predict, point_mast, capture, locate, judge and update.")),
+        _ => {
+            Err(ApiError::not_found("The stages are predict, point_mast, capture, locate, judge and update."))
+        }
     }
 }
 
 /// An array of a step as a NumPy file; NaN where invalid
-#[utoipa::path(get, path = "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/arrays/{file}",
+#[utoipa::path(get, operation_id = "show_array", path = "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/arrays/{file}",
     tag = "steps", params(
     ("session" = String, Path), ("target" = usize, Path), ("run" = usize, Path), ("step" = usize, Path),
     ("file" = String, Path, description = "The array's name with the ending .npy")),
@@ -75,7 +77,8 @@ async fn array(
         ApiError::not_found(format!("The arrays are {}, each with the ending .npy.", words.join(", ")))
     })?;
     blocking(move || {
-        let missing = || ApiError::not_found(format!("Step {step} did not come to the array {}.", name.word()));
+        let missing =
+            || ApiError::not_found(format!("Step {step} did not come to the array {}.", name.word()));
         let view = trace.array(name).ok_or_else(missing)?;
         let [width, height] = view.size();
         let image = GrayImage::from_raw(width, height, view.values().to_vec())
@@ -91,7 +94,13 @@ fn json(value: &impl Serialize) -> ApiResult<Response> {
 }
 
 /// The recorded step that the path names.
-fn find(state: &AppState, session: &str, target: usize, run: usize, step: usize) -> ApiResult<Arc<StepTrace>> {
+fn find(
+    state: &AppState,
+    session: &str,
+    target: usize,
+    run: usize,
+    step: usize,
+) -> ApiResult<Arc<StepTrace>> {
     let live = state.session(session)?;
     live.with(|session| {
         let found = session.run(target, run).map_err(|error| ApiError::from(error).about_path())?;

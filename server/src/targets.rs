@@ -31,7 +31,7 @@ pub fn router() -> OpenApiRouter<AppState> {
 /// Designates a target
 ///
 /// The designation is computed before the answer; the steps after it follow in the background.
-#[utoipa::path(post, path = "/sessions/{session}/targets", tag = "targets", params(("session" = String, Path)),
+#[utoipa::path(post, operation_id = "designate_target", path = "/sessions/{session}/targets", tag = "targets", params(("session" = String, Path)),
     request_body = NewTarget, responses((status = 201, body = Designated), ApiError))]
 async fn designate(
     State(state): State<AppState>,
@@ -48,7 +48,7 @@ async fn designate(
 }
 
 /// Removes a target; its number is not used again
-#[utoipa::path(delete, path = "/sessions/{session}/targets/{target}", tag = "targets", params(
+#[utoipa::path(delete, operation_id = "remove_target", path = "/sessions/{session}/targets/{target}", tag = "targets", params(
     ("session" = String, Path), ("target" = usize, Path)), responses((status = 200, body = SessionView), ApiError))]
 async fn remove(
     State(state): State<AppState>,

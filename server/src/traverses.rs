@@ -54,7 +54,7 @@ struct PrefetchParams {
 pub struct FileBytes(#[allow(dead_code)] Vec<u8>);
 
 /// The traverses that are open
-#[utoipa::path(get, path = "/traverses", tag = "traverses", responses(
+#[utoipa::path(get, operation_id = "list_traverses", path = "/traverses", tag = "traverses", responses(
     (status = 200, body = Vec<TraverseEntry>), ApiError))]
 async fn list(State(state): State<AppState>) -> Json<Vec<TraverseEntry>> {
     let entry = |open: &Arc<OpenTraverse>| {
@@ -71,7 +71,7 @@ async fn list(State(state): State<AppState>) -> Json<Vec<TraverseEntry>> {
 }
 
 /// A traverse with its stops
-#[utoipa::path(get, path = "/traverses/{id}", tag = "traverses", params(("id" = String, Path)), responses(
+#[utoipa::path(get, operation_id = "show_traverse", path = "/traverses/{id}", tag = "traverses", params(("id" = String, Path)), responses(
     (status = 200, body = TraverseView), ApiError))]
 async fn show(State(state): State<AppState>, Path(id): Path<String>) -> ApiResult<Json<TraverseView>> {
     let open = state.traverse(&id)?;
@@ -81,7 +81,7 @@ async fn show(State(state): State<AppState>, Path(id): Path<String>) -> ApiResul
 /// An image of a stop as PNG
 ///
 /// An image of a simulated stop is rendered when it is first asked for, which takes some seconds.
-#[utoipa::path(get, path = "/traverses/{id}/steps/{step}/images/{file}", tag = "traverses", params(
+#[utoipa::path(get, operation_id = "show_image", path = "/traverses/{id}/steps/{step}/images/{file}", tag = "traverses", params(
     ("id" = String, Path), ("step" = usize, Path), ("file" = String, Path, description = "left.png or right.png"),
     ImageParams), responses(
     (status = 200, content_type = "image/png", body = FileBytes),
@@ -113,7 +113,7 @@ async fn image(
 }
 
 /// Renders the stops from this one on before all others
-#[utoipa::path(post, path = "/traverses/{id}/prefetch", tag = "traverses", params(
+#[utoipa::path(post, operation_id = "prefetch", path = "/traverses/{id}/prefetch", tag = "traverses", params(
     ("id" = String, Path), PrefetchParams), responses((status = 204), ApiError))]
 async fn prefetch(
     State(state): State<AppState>,

@@ -10,6 +10,7 @@ fn small_scenario() -> Scenario {
     let mut scenario = Scenario { seed: 3, ..Scenario::demo() };
     scenario.camera.image_size = 512;
     scenario.camera.samples_per_axis = 2;
+    scenario.targets.window_px = 11;
     scenario.drive.start_distance_m = 5.0;
     scenario.drive.end_distance_m = 3.2;
     scenario.targets.count = 6;

@@ -1,7 +1,14 @@
 //! All tests that cross crates.
 
+// A test says what went wrong by panicking, in its helpers too.
+#![allow(clippy::unwrap_used)]
+
+mod api;
+mod api_security;
 mod approach;
+mod cli;
 mod imports;
+mod page;
 mod recorded_cameras;
 mod recorded_tracking;
 mod rerun_export;

@@ -33,30 +33,39 @@ fn error_px(step: &StepTrace) -> Option<(f64, f64)> {
 }
 
 #[test]
-fn street_targets_of_five_depths_agree_among_themselves_within_two_pixels_for_four_frames() {
+fn far_street_targets_move_alike_within_a_pixel_and_a_half_for_three_frames() {
     let Some(set) = data::set("kitti-seq1-frames-0-19", "tracking along a street") else { return };
     let folder = tempfile::tempdir().unwrap();
     let traverse = imported(&set, &folder.path().join("street"));
     let runs: Vec<_> = STREET.iter().map(|&(x, y)| designate(&traverse, x, y).unwrap()).collect();
     let distances: Vec<f64> = runs.iter().map(|run| run[0].update.target.initial_distance_m).collect();
-    assert!(distances.iter().fold(0.0_f64, |a, &b| a.max(b)) > 4.0 * distances.iter().fold(1e9_f64, |a, &b| a.min(b)));
+    assert!(
+        distances.iter().fold(0.0_f64, |a, &b| a.max(b))
+            > 4.0 * distances.iter().fold(1e9_f64, |a, &b| a.min(b))
+    );
     for step in 1..4 {
         // The true poses of so short a sequence err by up to 0.16° a frame (the set's README), which moves all
-        // targets alike: what is left after their common motion is the tracker's own.
+        // targets alike; their translation errs by 1.5 % of the way, which moves the near ones more. So the far
+        // ones, after their common motion, show the tracker's own error.
         let errors: Vec<(f64, f64)> = runs.iter().filter_map(|run| error_px(&run[step])).collect();
         assert_eq!(errors.len(), STREET.len(), "all are tracked at step {step}");
-        let common = |axis: fn(&(f64, f64)) -> f64| median(&errors.iter().map(axis).collect::<Vec<_>>()).unwrap();
+        let common =
+            |axis: fn(&(f64, f64)) -> f64| median(&errors.iter().map(axis).collect::<Vec<_>>()).unwrap();
         let (x, y) = (common(|e| e.0), common(|e| e.1));
         let own: Vec<f64> = errors.iter().map(|e| (e.0 - x).hypot(e.1 - y)).collect();
         println!("step {step}: common ({x:.2}, {y:.2}) px, own {own:.2?} px");
-        assert!(median(&own).unwrap() < 1.0 && own.iter().all(|&e| e < 4.0), "step {step}: {own:?}");
+        assert!(median(&own).unwrap() < 1.0 && own[..3].iter().all(|&e| e < 1.5), "step {step}: {own:?}");
     }
-    assert!(runs.iter().flatten().all(|step| step.truth.as_ref().is_none_or(|t| t.kind == TruthKind::Carried)));
+    assert!(
+        runs.iter().flatten().all(|step| step.truth.as_ref().is_none_or(|t| t.kind == TruthKind::Carried))
+    );
 }
 
 #[test]
 fn a_street_target_that_leaves_the_image_is_lost_and_says_so() {
-    let Some(set) = data::set("kitti-seq1-frames-0-19", "losing a target that leaves the image") else { return };
+    let Some(set) = data::set("kitti-seq1-frames-0-19", "losing a target that leaves the image") else {
+        return;
+    };
     let folder = tempfile::tempdir().unwrap();
     let traverse = imported(&set, &folder.path().join("street"));
     let run = designate(&traverse, 204.0, 80.0).unwrap();

@@ -1,6 +1,10 @@
 //! Helpers shared by the integration tests.
 
+// A test says what went wrong by panicking, in its helpers too.
+#![allow(clippy::unwrap_used)]
+
 pub mod browser;
 pub mod data;
 pub mod rrd;
 pub mod troubled;
+pub mod server;

@@ -57,7 +57,9 @@ impl SightlineApp {
             return;
         }
         let wanted = self.state.wanted();
-        for key in self.state.cache.want(&wanted, self.net.room(), now) {
+        let slow = self.state.unrendered(&wanted);
+        let (cache, net) = (&mut self.state.cache, &mut self.net);
+        for key in cache.want(&wanted, |key| net.take_place(key, slow.contains(key)), now) {
             self.net.send(Request::Item(key));
         }
         if let Some(at) = self.state.cache.next_retry() {
@@ -87,7 +89,9 @@ impl SightlineApp {
             timeline::show(ui, state, &mut out);
         });
         let mut panels = Panels { state, out: &mut out, left_image: None };
-        CentralPanel::default().frame(Frame::new().fill(theme::PAGE)).show(ui, |ui| self.tree.ui(&mut panels, ui));
+        CentralPanel::default()
+            .frame(Frame::new().fill(theme::PAGE))
+            .show(ui, |ui| self.tree.ui(&mut panels, ui));
         self.left_image = panels.left_image;
         help::show(ui, state, &mut out);
         out

@@ -5,8 +5,8 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use sightline_core::trace::{ArrayName, StepTrace};
 use sightline_core::session::wire::Problem;
+use sightline_core::trace::{ArrayName, StepTrace};
 
 use crate::raster::Raster;
 
@@ -130,15 +130,16 @@ impl Cache {
         self.bytes
     }
 
-    /// Marks `keys`, most urgent first, as wanted, and returns those to load now, at most `room` of them.
-    pub fn want(&mut self, keys: &[Key], room: usize, now: f64) -> Vec<Key> {
+    /// Marks `keys`, most urgent first, as wanted, and returns those to load now: the missing ones for which
+    /// `room` finds a place.
+    pub fn want(&mut self, keys: &[Key], mut room: impl FnMut(&Key) -> bool, now: f64) -> Vec<Key> {
         self.round += 1;
         let mut missing = Vec::new();
         for key in keys {
             match self.entries.get_mut(key) {
                 Some(Entry::Ready { wanted, .. }) => *wanted = self.round,
-                Some(Entry::Waiting { until }) if *until <= now && missing.len() < room => missing.push(key.clone()),
-                None if missing.len() < room => missing.push(key.clone()),
+                Some(Entry::Waiting { until }) if *until <= now && room(key) => missing.push(key.clone()),
+                None if room(key) => missing.push(key.clone()),
                 _ => {}
             }
         }
@@ -166,9 +167,8 @@ impl Cache {
 
     /// Forgets refusals and waiting, so that everything not loaded is asked for again.
     pub fn retry(&mut self, which: impl Fn(&Key) -> bool) {
-        self.entries.retain(|key, entry| {
-            matches!(entry, Entry::Ready { .. } | Entry::Loading) || !which(key)
-        });
+        self.entries
+            .retain(|key, entry| matches!(entry, Entry::Ready { .. } | Entry::Loading) || !which(key));
     }
 
     /// When the first of what is waited for is to be asked for again.
@@ -237,10 +237,21 @@ mod tests {
         Key::Image { traverse: "t".to_owned(), step, eye: Eye::Left }
     }
 
+    fn at_most(n: usize) -> impl FnMut(&Key) -> bool {
+        let mut left = n;
+        move |_| {
+            let is_place = left > 0;
+            left = left.saturating_sub(1);
+            is_place
+        }
+    }
+
     fn raster(side: u32) -> Item {
         let values = sightline_core::image::GrayImage::new(side, side);
         let bytes = sightline_core::image::npy::encode(&values).unwrap();
-        Item::Raster(Arc::new(Raster::from_npy(&egui::Context::default(), ArrayName::Surface, &bytes).unwrap()))
+        Item::Raster(Arc::new(
+            Raster::from_npy(&egui::Context::default(), ArrayName::Surface, &bytes).unwrap(),
+        ))
     }
 
     fn problem(status: u16) -> Problem {
@@ -250,8 +261,8 @@ mod tests {
     #[test]
     fn what_is_missing_is_asked_for_once_and_in_order() {
         let mut cache = Cache::default();
-        assert_eq!(cache.want(&[key(3), key(4), key(5)], 2, 0.0), vec![key(3), key(4)]);
-        assert_eq!(cache.want(&[key(3), key(4), key(5)], 2, 0.0), vec![key(5)]);
+        assert_eq!(cache.want(&[key(3), key(4), key(5)], at_most(2), 0.0), vec![key(3), key(4)]);
+        assert_eq!(cache.want(&[key(3), key(4), key(5)], at_most(2), 0.0), vec![key(5)]);
         assert!(matches!(cache.raster(&key(3)), Slot::Loading));
         cache.arrived(key(3), Ok(raster(2)), 0.0);
         assert!(cache.raster(&key(3)).ready().is_some());
@@ -260,27 +271,27 @@ mod tests {
     #[test]
     fn a_refusal_stays_and_what_is_not_ready_is_asked_for_again() {
         let mut cache = Cache::default();
-        cache.want(&[key(1), key(2)], 9, 0.0);
+        cache.want(&[key(1), key(2)], |_| true, 0.0);
         cache.arrived(key(1), Err(problem(404)), 0.0);
         cache.arrived(key(2), Err(problem(503)), 0.0);
         assert!(matches!(cache.raster(&key(1)), Slot::Failed(_)));
         assert_eq!(cache.next_retry(), Some(RETRY_S));
-        assert!(cache.want(&[key(1), key(2)], 9, 1.0).is_empty());
-        assert_eq!(cache.want(&[key(1), key(2)], 9, 2.5), vec![key(2)]);
+        assert!(cache.want(&[key(1), key(2)], |_| true, 1.0).is_empty());
+        assert_eq!(cache.want(&[key(1), key(2)], |_| true, 2.5), vec![key(2)]);
         cache.retry(|_| true);
-        assert_eq!(cache.want(&[key(1), key(2)], 9, 2.5), vec![key(1)]);
+        assert_eq!(cache.want(&[key(1), key(2)], |_| true, 2.5), vec![key(1)]);
     }
 
     #[test]
     fn memory_keeps_its_limit_and_what_is_wanted_stays() {
         let mut cache = Cache::default();
         for step in 0..4 {
-            cache.want(&[key(step)], 1, 0.0);
+            cache.want(&[key(step)], |_| true, 0.0);
             cache.arrived(key(step), Ok(raster(16)), 0.0);
         }
         let one = 16 * 16 * 8;
         assert_eq!(cache.bytes(), 4 * one);
-        cache.want(&[key(0), key(3)], 0, 0.0);
+        cache.want(&[key(0), key(3)], |_| false, 0.0);
         cache.evict(2 * one);
         assert_eq!(cache.bytes(), 2 * one);
         assert!(cache.raster(&key(0)).ready().is_some() && cache.raster(&key(3)).ready().is_some());

@@ -186,6 +186,13 @@ pub enum Command {
         /// The run's number.
         run: usize,
     },
+    /// Lets a stopped run go on.
+    ResumeRun {
+        /// The target's number.
+        target: usize,
+        /// The run's number.
+        run: usize,
+    },
     /// Changes what a panel shows.
     View(Panel, View2d),
     /// Fits every image to its panel.

@@ -85,7 +85,10 @@ mod tests {
         let near = |segment: &Segment, corner: [f64; 2]| {
             segment.iter().all(|p| (p[0] - corner[0]).abs() + (p[1] - corner[1]).abs() <= 1.0)
         };
-        assert!(high.iter().any(|s| near(s, [1.0, 0.0])) && high.iter().any(|s| near(s, [0.0, 1.0])), "{high:?}");
+        assert!(
+            high.iter().any(|s| near(s, [1.0, 0.0])) && high.iter().any(|s| near(s, [0.0, 1.0])),
+            "{high:?}"
+        );
     }
 
     #[test]

@@ -1,7 +1,9 @@
 //! Where the panels are: a tree of tiles that a person can drag and resize.
 
 use egui::{Color32, Frame, Margin, Stroke, Ui, Visuals, WidgetText};
-use egui_tiles::{Behavior, Container, Linear, LinearDir, SimplificationOptions, TabState, TileId, Tiles, Tree, UiResponse};
+use egui_tiles::{
+    Behavior, Container, Linear, LinearDir, SimplificationOptions, TabState, TileId, Tiles, Tree, UiResponse,
+};
 
 use crate::command::Command;
 use crate::panels;
@@ -151,7 +153,9 @@ impl Behavior<Pane> for Panels<'_> {
     fn tab_title_for_pane(&mut self, pane: &Pane) -> WidgetText {
         let problems = self.state.messages.all().iter().filter(|m| m.weight == Weight::Problem).count();
         match pane {
-            Pane::Messages if problems > 0 => theme::title(&format!("Messages ({problems})")).color(theme::LOST).into(),
+            Pane::Messages if problems > 0 => {
+                theme::title(&format!("Messages ({problems})")).color(theme::LOST).into()
+            }
             Pane::Settings if !self.state.draft.is_empty() => {
                 theme::title(&format!("Settings ({})", self.state.draft.len())).color(theme::ACCENT).into()
             }
@@ -175,11 +179,23 @@ impl Behavior<Pane> for Panels<'_> {
         theme::BAR
     }
 
-    fn tab_bg_color(&self, _visuals: &Visuals, _tiles: &Tiles<Pane>, _tile: TileId, state: &TabState) -> Color32 {
+    fn tab_bg_color(
+        &self,
+        _visuals: &Visuals,
+        _tiles: &Tiles<Pane>,
+        _tile: TileId,
+        state: &TabState,
+    ) -> Color32 {
         if state.active { theme::PANEL } else { Color32::TRANSPARENT }
     }
 
-    fn tab_outline_stroke(&self, _visuals: &Visuals, _tiles: &Tiles<Pane>, _tile: TileId, _state: &TabState) -> Stroke {
+    fn tab_outline_stroke(
+        &self,
+        _visuals: &Visuals,
+        _tiles: &Tiles<Pane>,
+        _tile: TileId,
+        _state: &TabState,
+    ) -> Stroke {
         Stroke::NONE
     }
 

@@ -1,9 +1,9 @@
-//! The native viewer: `sightline-viewer [http://127.0.0.1:4870[/#session=ID]]`.
+//! The native viewer: `sightline-viewer [http://127.0.0.1:7700[/#session=ID]]`.
 
 use sightline_viewer::{Link, SightlineApp};
 
 /// Where the server listens unless it is told otherwise.
-const DEFAULT: &str = "http://127.0.0.1:4870";
+const DEFAULT: &str = "http://127.0.0.1:7700";
 
 fn main() -> eframe::Result {
     let link = link(&std::env::args().nth(1).unwrap_or_else(|| DEFAULT.to_owned()));

@@ -70,12 +70,20 @@ impl<'a> Overlay<'a> {
     /// The border of a rectangle of pixels.
     pub fn rectangle(&self, region: PixelRect, colour: Color32, line: Line) {
         let area = self.transform.area(region);
-        let corners = [area.left_top(), area.right_top(), area.right_bottom(), area.left_bottom(), area.left_top()];
+        let corners =
+            [area.left_top(), area.right_top(), area.right_bottom(), area.left_bottom(), area.left_top()];
         paint_line(self.painter, &corners, colour, line, WIDTH);
     }
 
     /// The ellipse of a covariance (px²) about a pixel.
-    pub fn ellipse(&self, centre: Pixel, covariance: &Matrix2<f64>, sigmas: f64, colour: Color32, line: Line) {
+    pub fn ellipse(
+        &self,
+        centre: Pixel,
+        covariance: &Matrix2<f64>,
+        sigmas: f64,
+        colour: Color32,
+        line: Line,
+    ) {
         if let Some(outline) = ellipse::outline(covariance, sigmas) {
             let pixels: Vec<Pixel> = outline.iter().map(|d| centre.offset(d.x, d.y)).collect();
             self.line(&pixels, colour, line);
@@ -85,6 +93,11 @@ impl<'a> Overlay<'a> {
     /// A mark at a pixel; its size on the screen does not change with the zoom.
     pub fn mark(&self, pixel: Pixel, mark: Mark, colour: Color32) {
         paint_mark(self.painter, self.transform.to_screen(pixel), mark, colour, REACH);
+    }
+
+    /// How far two pixels are apart on the screen, points.
+    pub fn length(&self, from: Pixel, to: Pixel) -> f32 {
+        self.transform.to_screen(from).distance(self.transform.to_screen(to))
     }
 
     /// Words beside a pixel, offset by `offset` points.
@@ -121,8 +134,12 @@ pub fn paint_mark(painter: &Painter, at: Pos2, mark: Mark, colour: Color32, reac
         }
         Mark::Plus => vec![vec![to(-1.0, 0.0), to(1.0, 0.0)], vec![to(0.0, -1.0), to(0.0, 1.0)]],
         Mark::Cross => vec![vec![to(-0.7, -0.7), to(0.7, 0.7)], vec![to(-0.7, 0.7), to(0.7, -0.7)]],
-        Mark::Square => vec![vec![to(-0.7, -0.7), to(0.7, -0.7), to(0.7, 0.7), to(-0.7, 0.7), to(-0.7, -0.75)]],
-        Mark::Diamond => vec![vec![to(0.0, -0.9), to(0.9, 0.0), to(0.0, 0.9), to(-0.9, 0.0), to(0.05, -0.95)]],
+        Mark::Square => {
+            vec![vec![to(-0.7, -0.7), to(0.7, -0.7), to(0.7, 0.7), to(-0.7, 0.7), to(-0.7, -0.75)]]
+        }
+        Mark::Diamond => {
+            vec![vec![to(0.0, -0.9), to(0.9, 0.0), to(0.0, 0.9), to(-0.9, 0.0), to(0.05, -0.95)]]
+        }
         Mark::Stroke(line) => {
             paint_line(painter, &[to(-1.0, 0.0), to(1.0, 0.0)], colour, line, WIDTH);
             return;
@@ -154,7 +171,14 @@ pub fn template_quad(centre: Pixel, side: u32, image_from_template: &Matrix2<f64
 }
 
 /// A row of the legend at `at`: the mark, then its word. Returns the row's area.
-pub fn paint_legend_row(painter: &Painter, at: Pos2, mark: Mark, colour: Color32, word: &str, shown: bool) -> Rect {
+pub fn paint_legend_row(
+    painter: &Painter,
+    at: Pos2,
+    mark: Mark,
+    colour: Color32,
+    word: &str,
+    shown: bool,
+) -> Rect {
     let faded = |c: Color32| if shown { c } else { c.gamma_multiply(0.35) };
     paint_mark(painter, at + vec2(9.0, 7.0), mark, faded(colour), 6.0);
     let galley = painter.layout_no_wrap(word.to_owned(), theme::image_font(), faded(theme::TEXT));

@@ -33,7 +33,8 @@ impl Raster {
     /// # Errors
     /// A sentence when the bytes are no grey image of reasonable size.
     pub fn from_png(context: &egui::Context, name: &str, bytes: &[u8]) -> Result<Self, String> {
-        let mut reader = image::ImageReader::with_format(std::io::Cursor::new(bytes), image::ImageFormat::Png);
+        let mut reader =
+            image::ImageReader::with_format(std::io::Cursor::new(bytes), image::ImageFormat::Png);
         let mut limits = image::Limits::default();
         (limits.max_image_width, limits.max_image_height) = (Some(SIDE_MAX), Some(SIDE_MAX));
         reader.limits(limits);
@@ -121,14 +122,17 @@ mod tests {
     fn a_damaged_file_is_refused_with_its_name() {
         let context = egui::Context::default();
         assert!(Raster::from_png(&context, "left image", b"nonsense").err().unwrap().contains("left image"));
-        assert!(Raster::from_npy(&context, ArrayName::Surface, b"nonsense").err().unwrap().contains("surface"));
+        assert!(
+            Raster::from_npy(&context, ArrayName::Surface, b"nonsense").err().unwrap().contains("surface")
+        );
     }
 
     #[test]
     fn an_array_comes_back_with_its_values_and_holes() {
         let values = GrayImage::from_raw(2, 2, vec![0.25, f32::NAN, -1.0, 1.0]).unwrap();
         let raster =
-            Raster::from_npy(&egui::Context::default(), ArrayName::Surface, &npy::encode(&values).unwrap()).unwrap();
+            Raster::from_npy(&egui::Context::default(), ArrayName::Surface, &npy::encode(&values).unwrap())
+                .unwrap();
         assert_eq!(raster.size(), [2, 2]);
         assert_eq!(raster.at(0, 0), Some(0.25));
         assert_eq!(raster.at(1, 0), None);

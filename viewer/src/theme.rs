@@ -4,7 +4,10 @@
 //! has a shape and a word besides. Scores are viridis with fixed limits, signed errors blue–white–red about zero,
 //! and a value that does not exist is a checker, never a colour.
 
-use egui::{Color32, CornerRadius, FontFamily, FontId, Margin, RichText, Stroke, TextStyle, Theme, Visuals};
+use egui::{
+    Color32, CornerRadius, FontDefinitions, FontFamily, FontId, Margin, RichText, Stroke, TextStyle, Theme,
+    Visuals,
+};
 use sightline_core::target::TrackingState;
 
 /// The page behind everything; the boot page has the same colour.
@@ -106,7 +109,11 @@ pub fn signed(value: f32, limit: f32) -> Color32 {
 
 /// Grey from black (0) to white (1); transparent where there is no value.
 pub fn grey(value: f32) -> Color32 {
-    if value.is_nan() { Color32::TRANSPARENT } else { Color32::from_gray((value.clamp(0.0, 1.0) * 255.0).round() as u8) }
+    if value.is_nan() {
+        Color32::TRANSPARENT
+    } else {
+        Color32::from_gray((value.clamp(0.0, 1.0) * 255.0).round() as u8)
+    }
 }
 
 fn ramp(gradient: colorous::Gradient, t: f64) -> Color32 {
@@ -119,6 +126,16 @@ fn ramp(gradient: colorous::Gradient, t: f64) -> Color32 {
 
 /// Gives the context its looks.
 pub fn apply(context: &egui::Context) {
+    let mut fonts = FontDefinitions::default();
+    // Arrows and dots, which the proportional font lacks, come from the one with equal widths.
+    let fallback = fonts.families.get(&FontFamily::Monospace).cloned().unwrap_or_default();
+    let proportional = fonts.families.entry(FontFamily::Proportional).or_default();
+    for font in fallback {
+        if !proportional.contains(&font) {
+            proportional.push(font);
+        }
+    }
+    context.set_fonts(fonts);
     context.set_theme(Theme::Dark);
     context.all_styles_mut(|style| {
         style.text_styles = [

@@ -70,7 +70,8 @@ impl Session {
                     match kept {
                         Some(kept) => current.steps = kept,
                         None => {
-                            current.stopped = Some(format!("run {}, which it left, has not come so far", fork.run));
+                            current.stopped =
+                                Some(format!("run {}, which it left, has not come so far", fork.run));
                         }
                     }
                 }
@@ -143,7 +144,9 @@ fn restored_target(number: usize, saved: &SavedTarget, stop_count: usize) -> Res
         return Err(wrong("it has no run".to_owned()));
     }
     let runs = saved.runs.iter().enumerate().map(|(run, saved)| match saved.fork {
-        Some(fork) if fork.run >= run => Err(wrong(format!("run {run} leaves run {}, which is later", fork.run))),
+        Some(fork) if fork.run >= run => {
+            Err(wrong(format!("run {run} leaves run {}, which is later", fork.run)))
+        }
         _ => Ok(restored_run(saved)),
     });
     Ok(TargetRecord {
@@ -190,7 +193,9 @@ mod tests {
     #[test]
     fn a_restored_run_begins_with_its_designation_and_a_fork_waits_for_its_parent() {
         let mut session = Session::restored(&saved(), 9).unwrap();
-        assert!(matches!(session.next(0, 0).unwrap(), Next::Designate { designation, .. } if designation.step == 1));
+        assert!(
+            matches!(session.next(0, 0).unwrap(), Next::Designate { designation, .. } if designation.step == 1)
+        );
         assert!(matches!(session.next(0, 1).unwrap(), Next::Nothing));
         assert!(session.run(0, 1).unwrap().why_stopped().unwrap().contains("run 0"));
     }

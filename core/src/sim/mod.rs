@@ -5,12 +5,12 @@
 //! that of a detector. Everything follows from a [`Scenario`] with a seed: equal scenarios give equal bits,
 //! whatever the number of threads. The truth is exact: poses to rounding, surface points in `f64`.
 //!
-//! Nothing here knows of any tracker, and no number was chosen by looking at what one makes of it.
+//! Nothing here knows of any tracker, and no number may be chosen by looking at what one makes of it.
 //!
 //! In the order in which to read:
 //!
 //! ```text
-//! scenario       every number, from and to TOML
+//! scenario, scenario_check                     every number, from and to TOML, and its range
 //! texture        seeded noise                          terrain, terrain_cast   the ground
 //! rocks          one rock                              rock_field              where they lie
 //! culling        which rocks a ray can meet            world                   cast, shadow, visibility
@@ -28,6 +28,7 @@
 //! Sources: domain.md 5, 10, 11; papers.md R104–R106, R21, R227.
 
 pub mod scenario;
+mod scenario_check;
 pub mod texture;
 pub mod terrain;
 mod terrain_cast;

@@ -140,7 +140,8 @@ fn candidates(settings: &RockSettings, approach: &Approach, random: &mut Pcg64) 
     let k = settings.area_fraction.max(0.01);
     let mut candidates = Vec::new();
     for _ in 0..settings.cluster_count {
-        let diameter_m = draw_diameter_m(k, settings.cluster_smallest_m, settings.cluster_largest_m, random.random());
+        let diameter_m =
+            draw_diameter_m(k, settings.cluster_smallest_m, settings.cluster_largest_m, random.random());
         candidates.push(Candidate { diameter_m, place: Place::Disc { radius_m: settings.cluster_radius_m } });
     }
     if settings.area_fraction <= 0.0 {
@@ -194,8 +195,8 @@ struct Taken {
 }
 
 impl Taken {
-    /// Side of a cell, m; no rock reaches farther than one cell.
-    const CELL_M: f64 = 1.2;
+    /// Side of a cell, m: two of the largest rocks that a scenario allows (2 m) do not reach farther.
+    const CELL_M: f64 = 2.4;
 
     fn new() -> Self {
         Self { cells: std::collections::HashMap::new() }

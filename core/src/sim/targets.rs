@@ -4,7 +4,8 @@
 //! whose surface point lies within `radius_m` of the targets' centre. A pixel becomes a target when
 //!
 //! 1. the window of `window_px` around it lies in the image;
-//! 2. its surface point is in the last left image, hidden by nothing, so that the run can be judged;
+//! 2. its surface point is in both images of the last stop with its whole window, hidden by nothing: the mast
+//!    points at the targets' centre, and a target that left one eye could not be judged;
 //! 3. at most `shadow_fraction` of the window's pixels are in shadow (R21);
 //! 4. depth along the left camera's rays ranges over at most `depth_range_fraction` of the target's
 //!    distance inside the window (R21), the sky counting as infinitely far;
@@ -12,8 +13,14 @@
 //!    same rock: the papers' targets are on rocks and off their occluding boundaries (R20, R110);
 //! 6. it was not chosen before.
 //!
-//! Nothing else is asked: not texture, not contrast, not how well anything tracks it. Drawing ends after 2000 draws per target asked for; then
-//! there are fewer targets.
+//! Nothing else is asked: not texture, not contrast, not how well anything tracks it. Drawing ends after 2000
+//! draws per target asked for; then there are fewer targets.
+//!
+//! What the rule finds in the default worlds of seeds 1 to 8: 20 targets (18 for seed 5) on two to four rocks,
+//! since at 10 m the window spans 17 cm and few rocks fill it. Without `on_rocks`, 20 targets each, of which 40
+//! to 100 % lie on rocks, 71 % on average ([`share_on_rocks`] tells a world's part): level ground seen at a
+//! grazing angle ranges over about 10 % of the distance inside the window. A reduced image needs a reduced
+//! window: 21 px of a 512-pixel image find nothing, 11 px almost what 21 px find in the full image.
 //!
 //! Units: px, m. Frames: pixels of the first left image, rays in the site frame. Sources: papers.md R21.
 
@@ -36,9 +43,11 @@ const DRAWS_PER_TARGET: u32 = 2000;
 /// Chooses targets by the rule of the module's header; fewer than asked for if the draws run out.
 pub fn choose_targets(world: &World, scenario: &Scenario, index: &TraverseIndex) -> Vec<Pixel> {
     let (Some(first), Some(last)) = (index.stops.first(), index.stops.last()) else { return Vec::new() };
-    let (Some(camera), Some(last_camera)) =
-        (true_camera_in_site(first, Eye::Left), true_camera_in_site(last, Eye::Left))
-    else {
+    let (Some(camera), Some(last_left), Some(last_right)) = (
+        true_camera_in_site(first, Eye::Left),
+        true_camera_in_site(last, Eye::Left),
+        true_camera_in_site(last, Eye::Right),
+    ) else {
         return Vec::new();
     };
     let rule = &scenario.targets;
@@ -52,7 +61,7 @@ pub fn choose_targets(world: &World, scenario: &Scenario, index: &TraverseIndex)
         let x = f64::from(random.random_range(bounds[0][0]..=bounds[0][1]));
         let y = f64::from(random.random_range(bounds[1][0]..=bounds[1][1]));
         let pixel = Pixel::new(x, y);
-        if !chosen.contains(&pixel) && is_target(world, &camera, &last_camera, rule, pixel) {
+        if !chosen.contains(&pixel) && is_target(world, &camera, [&last_left, &last_right], rule, pixel) {
             chosen.push(pixel);
         }
     }
@@ -96,14 +105,21 @@ fn bounds(world: &World, camera: &Camera, rule: &TargetRule) -> Option<[[u32; 2]
 }
 
 /// Whether a pixel satisfies the rule.
-fn is_target(world: &World, camera: &Camera, last_camera: &Camera, rule: &TargetRule, pixel: Pixel) -> bool {
+fn is_target(world: &World, camera: &Camera, last: [&Camera; 2], rule: &TargetRule, pixel: Pixel) -> bool {
     let Some(point) = surface_point(world, camera, pixel) else { return false };
+    (point - world.targets_centre()).norm() <= rule.radius_m
+        && window_is_inside(camera, pixel, rule)
+        && last.iter().all(|eye| {
+            visible_pixel(world, eye, &point).is_some_and(|seen| window_is_inside(eye, seen, rule))
+        })
+        && window_is_even(world, camera, rule, pixel)
+}
+
+/// Whether the whole window around a pixel lies in the image.
+fn window_is_inside(camera: &Camera, pixel: Pixel, rule: &TargetRule) -> bool {
     let half = f64::from(rule.window_px / 2);
     let corners = [pixel.offset(-half, -half), pixel.offset(half, half)];
-    (point - world.targets_centre()).norm() <= rule.radius_m
-        && corners.iter().all(|corner| corner.is_inside(camera.width(), camera.height()))
-        && visible_pixel(world, last_camera, &point).is_some()
-        && window_is_even(world, camera, rule, pixel)
+    corners.iter().all(|corner| corner.is_inside(camera.width(), camera.height()))
 }
 
 /// Whether a window lies on one rock (R20), given what its middle lies on and the part that lies on the same.

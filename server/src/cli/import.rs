@@ -73,7 +73,9 @@ impl Import {
         }
         if self.left.len() != self.right.len() {
             let (left, right) = (self.left.len(), self.right.len());
-            return Err(Error::Request(format!("--left and --right go in pairs, but there are {left} and {right}")));
+            return Err(Error::Request(format!(
+                "--left and --right go in pairs, but there are {left} and {right}"
+            )));
         }
         let files = self.left.into_iter().zip(self.right).flat_map(|(left, right)| [left, right]).collect();
         let options = ImportOptions {
@@ -93,7 +95,8 @@ impl Import {
         for note in &imported.notes {
             say::error(&format!("note: {note}"));
         }
-        let (folder, stops, images) = (self.out.display(), imported.index.stops.len(), imported.images_written);
+        let (folder, stops, images) =
+            (self.out.display(), imported.index.stops.len(), imported.images_written);
         say::line(&format!("{folder}: {stops} stops, {images} images"))
     }
 }

@@ -36,7 +36,11 @@ fn summary(traverse: &Traverse) -> Vec<String> {
         lines.push(format!("description  {}", index.description));
     }
     lines.push(format!("folder       {}", traverse.folder().display()));
-    let way_m: f64 = index.stops.windows(2).map(|pair| between_m(&pair[0].site_from_rover, &pair[1].site_from_rover)).sum();
+    let way_m: f64 = index
+        .stops
+        .windows(2)
+        .map(|pair| between_m(&pair[0].site_from_rover, &pair[1].site_from_rover))
+        .sum();
     let duration_s = index.stops.last().map_or(0.0, |stop| stop.time_s);
     lines.push(format!("stops        {count}, {way_m:.2} m driven by the estimates, {duration_s:.0} s"));
     lines.push(format!("left camera  {}", camera(traverse, true)));

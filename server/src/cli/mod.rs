@@ -8,9 +8,12 @@ pub mod simulate;
 pub mod import;
 pub mod info;
 pub mod track;
+pub mod study;
+mod figure;
 mod open;
 mod say;
 
+use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -39,6 +42,8 @@ enum Command {
     Info(info::Info),
     /// Track targets without a browser; one JSON object a step.
     Track(track::Track),
+    /// Run a validation experiment: many targets in many worlds against the truth.
+    Study(study::Study),
 }
 
 /// Runs the command that the arguments name.
@@ -51,6 +56,7 @@ pub fn run() -> ExitCode {
         Command::Import(command) => command.run(),
         Command::Info(command) => command.run(),
         Command::Track(command) => command.run(),
+        Command::Study(command) => command.run(),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -70,7 +76,11 @@ pub fn run() -> ExitCode {
 /// Logs warnings of our own and errors of others to the standard error; `RUST_LOG` says otherwise.
 fn start_log() {
     use tracing_subscriber::EnvFilter;
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("error,sightline_server=warn"));
+    let filter =
+        EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("error,sightline_server=warn"));
     // Another log may have been started by a library; then that one stays.
-    let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();
+    let colours = std::io::stderr().is_terminal();
+    let log =
+        tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_ansi(colours);
+    let _ = log.try_init();
 }

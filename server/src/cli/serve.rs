@@ -48,7 +48,8 @@ impl Serve {
         let address = listener.local_addr().map_err(|error| Error::Request(error.to_string()))?;
         let _lock = lock(&data)?;
         let traverses = self.open_traverses(&data)?;
-        let state = AppState::new(traverses, &data.join("sessions"), Hosts::new(address.port(), &self.allow_host))?;
+        let state =
+            AppState::new(traverses, &data.join("sessions"), Hosts::new(address.port(), &self.allow_host))?;
         if !self.listen.is_loopback() {
             say::error("warning: anyone who reaches this address can use the server");
         }
@@ -82,7 +83,9 @@ fn bind(address: SocketAddr) -> Result<TcpListener> {
     let listener = TcpListener::bind(address).map_err(|error| match error.kind() {
         std::io::ErrorKind::AddrInUse => {
             let port = address.port();
-            Error::Request(format!("port {port} is taken; choose another one with --port, or --port 0 for a free one"))
+            Error::Request(format!(
+                "port {port} is taken; choose another one with --port, or --port 0 for a free one"
+            ))
         }
         _ => Error::Request(format!("cannot listen on {address}: {error}")),
     })?;
@@ -110,7 +113,9 @@ fn lock(data: &Path) -> Result<File> {
         Err(TryLockError::Error(source)) => Err(unwritable(source)),
         Err(TryLockError::WouldBlock) => {
             let folder = data.display();
-            Err(Error::Request(format!("another server uses {folder}; choose another folder with --data-dir")))
+            Err(Error::Request(format!(
+                "another server uses {folder}; choose another folder with --data-dir"
+            )))
         }
     }
 }

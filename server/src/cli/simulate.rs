@@ -47,9 +47,9 @@ fn with(scenario: &Scenario, changes: &[String]) -> Result<Scenario> {
     let mut document: toml::Table =
         toml::from_str(&scenario.to_toml()).map_err(|error| Error::Request(error.to_string()))?;
     for change in changes {
-        let (key, value) = change
-            .split_once('=')
-            .ok_or_else(|| Error::setting(change, "write it as key=value, for example sun.elevation_deg=20"))?;
+        let (key, value) = change.split_once('=').ok_or_else(|| {
+            Error::setting(change, "write it as key=value, for example sun.elevation_deg=20")
+        })?;
         set(&mut document, key.trim(), value.trim())?;
     }
     Scenario::from_toml(&document.to_string(), Path::new("--set"))
@@ -64,8 +64,9 @@ fn set(document: &mut toml::Table, key: &str, value: &str) -> Result<()> {
     }
     let place = place.filter(|place| !place.is_table());
     let place = place.ok_or_else(|| Error::setting(key, "the scenario has no such setting"))?;
-    let written: Option<toml::Value> =
-        toml::from_str::<toml::Table>(&format!("value = {value}")).ok().and_then(|mut table| table.remove("value"));
+    let written: Option<toml::Value> = toml::from_str::<toml::Table>(&format!("value = {value}"))
+        .ok()
+        .and_then(|mut table| table.remove("value"));
     *place = match (place.is_float(), written) {
         (true, Some(toml::Value::Integer(whole))) => toml::Value::Float(whole as f64),
         (_, Some(written)) => written,

@@ -20,8 +20,8 @@ use sightline_core::target::Designation;
 use sightline_core::trace::{StepRow, StepTrace, Summary, summarise};
 use sightline_core::traverse::Traverse;
 
-use super::say::{self, Progress};
 use super::open;
+use super::say::{self, Progress};
 use crate::columns;
 use crate::rerun_log::{self, RunLog};
 
@@ -92,7 +92,7 @@ impl Track {
     pub fn run(self) -> Result<()> {
         let settings = self.settings()?;
         let traverse = open::open(&self.traverse, None)?;
-        for path in [&self.rrd, &self.csv].into_iter().flatten().filter(|path| path.exists()) {
+        if let Some(path) = [&self.rrd, &self.csv].into_iter().flatten().find(|path| path.exists()) {
             return Err(Error::format(path, "exists already; choose another name"));
         }
         let mut runs = Vec::new();
@@ -134,7 +134,8 @@ fn follow(
     steps: &mut Vec<Arc<StepTrace>>,
     settings: &Settings,
 ) -> Result<()> {
-    let what = target.map_or_else(|| "tracked step".to_owned(), |target| format!("target {target}: tracked step"));
+    let what =
+        target.map_or_else(|| "tracked step".to_owned(), |target| format!("target {target}: tracked step"));
     let mut progress = Progress::new(what);
     let first = Arc::clone(&steps[0]);
     let all = traverse.stop_count() - first.step;

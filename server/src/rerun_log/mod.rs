@@ -184,8 +184,11 @@ mod tests {
     fn the_table_of_this_file_lists_every_entity() {
         let own = entities_of("{target}");
         let rows: Vec<_> = shared_entities().iter().chain(&own).map(EntityDoc::table_row).collect();
-        let header: Vec<_> =
-            include_str!("mod.rs").lines().filter_map(|line| line.strip_prefix("//! ")).filter(|l| l.starts_with("| `")).collect();
+        let header: Vec<_> = include_str!("mod.rs")
+            .lines()
+            .filter_map(|line| line.strip_prefix("//! "))
+            .filter(|l| l.starts_with("| `"))
+            .collect();
         assert_eq!(header, rows, "put these rows in the header:\n//! {}", rows.join("\n//! "));
     }
 

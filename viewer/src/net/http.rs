@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use ehttp::{Headers, Method};
-use serde::de::DeserializeOwned;
 use serde::Serialize;
-use sightline_core::session::wire::Problem;
+use serde::de::DeserializeOwned;
+use sightline_core::session::wire::{Designated, Problem};
 
-use super::{Arrived, Designated, Reply, Request};
+use super::{Arrived, Reply, Request};
 use crate::cache::{Item, Key, StepKey};
 use crate::raster::Raster;
 
@@ -51,17 +51,28 @@ fn describe(request: &Request) -> (Method, String, Option<Vec<u8>>) {
         Request::Sessions => get("sessions".to_owned()),
         Request::Session(id) => get(format!("sessions/{id}")),
         Request::NewSession(new) => (Method::POST, "sessions".to_owned(), json(new)),
-        Request::PutCursor { session, cursor } => (Method::PUT, format!("sessions/{session}/cursor"), json(cursor)),
-        Request::NewTarget { session, target } => (Method::POST, format!("sessions/{session}/targets"), json(target)),
+        Request::PutCursor { session, cursor } => {
+            (Method::PUT, format!("sessions/{session}/cursor"), json(cursor))
+        }
+        Request::NewTarget { session, target } => {
+            (Method::POST, format!("sessions/{session}/targets"), json(target))
+        }
         Request::RemoveTarget { session, target } => {
             (Method::DELETE, format!("sessions/{session}/targets/{target}"), None)
         }
         Request::NewRun { session, target, new } => {
             (Method::POST, format!("sessions/{session}/targets/{target}/runs"), json(new))
         }
-        Request::CancelRun { session, target, run } => {
-            (Method::POST, format!("sessions/{session}/targets/{target}/runs/{run}/cancel"), json(&serde_json::json!({})))
-        }
+        Request::CancelRun { session, target, run } => (
+            Method::POST,
+            format!("sessions/{session}/targets/{target}/runs/{run}/cancel"),
+            json(&serde_json::json!({})),
+        ),
+        Request::ResumeRun { session, target, run } => (
+            Method::POST,
+            format!("sessions/{session}/targets/{target}/runs/{run}/resume"),
+            json(&serde_json::json!({})),
+        ),
         Request::OpenRerun(session) => {
             (Method::POST, format!("sessions/{session}/rerun"), json(&serde_json::json!({})))
         }
@@ -75,7 +86,9 @@ fn item_path(key: &Key) -> String {
         format!("sessions/{session}/targets/{target}/runs/{run}/steps/{step}")
     };
     match key {
-        Key::Image { traverse, step, eye } => format!("traverses/{traverse}/steps/{step}/images/{}.png", eye.word()),
+        Key::Image { traverse, step, eye } => {
+            format!("traverses/{traverse}/steps/{step}/images/{}.png", eye.word())
+        }
         Key::Trace(step) => step_path(step),
         Key::Array(step, name) => format!("{}/arrays/{}.npy", step_path(step), name.word()),
     }
@@ -101,9 +114,11 @@ fn read(request: &Request, response: &ehttp::Response, context: &egui::Context) 
         Request::NewRun { .. } => Reply::Run(Box::new(parse(bytes)?)),
         Request::OpenRerun(_) => Reply::Rerun(parse(bytes)?),
         Request::Item(key) => Reply::Item(read_item(key, bytes, context)?),
-        Request::PutCursor { .. } | Request::RemoveTarget { .. } | Request::CancelRun { .. } | Request::Reconnect => {
-            Reply::Done
-        }
+        Request::PutCursor { .. }
+        | Request::RemoveTarget { .. }
+        | Request::CancelRun { .. }
+        | Request::ResumeRun { .. }
+        | Request::Reconnect => Reply::Done,
     })
 }
 

@@ -3,14 +3,15 @@
 mod events;
 mod http;
 
+use std::collections::HashSet;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
-use serde::Deserialize;
-use sightline_core::frames::Pixel;
 use sightline_core::limits::SettingInfo;
 use sightline_core::session::Cursor;
 use sightline_core::session::view::{RunView, SessionView};
-use sightline_core::session::wire::{Event, NewRun, NewSession, NewTarget, Problem, RerunStream, TraverseView};
+use sightline_core::session::wire::{
+    Event, NewRun, NewSession, NewTarget, Problem, RerunStream, SessionEntry, TraverseEntry, TraverseView,
+};
 
 use self::events::Events;
 use crate::cache::{Item, Key};
@@ -19,23 +20,8 @@ use crate::state::Connection;
 /// How many images, arrays and records are asked for at a time.
 const AT_A_TIME: usize = 6;
 
-/// A traverse in the server's list.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-pub struct TraverseEntry {
-    /// Its name in paths.
-    pub id: String,
-    /// Its short name.
-    pub name: String,
-}
-
-/// A session in the server's list.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-pub struct SessionEntry {
-    /// Its name in paths.
-    pub id: String,
-    /// The traverse's name in paths.
-    pub traverse: String,
-}
+/// How many of them may be images that must be rendered first: a browser has few connections to one server.
+const SLOW_AT_A_TIME: usize = 2;
 
 /// What the page asks of the server.
 #[derive(Clone, Debug, PartialEq)]
@@ -84,6 +70,15 @@ pub enum Request {
     },
     /// To stop a run.
     CancelRun {
+        /// The session.
+        session: String,
+        /// The target's number.
+        target: usize,
+        /// The run's number.
+        run: usize,
+    },
+    /// To let a stopped run go on.
+    ResumeRun {
         /// The session.
         session: String,
         /// The target's number.
@@ -142,7 +137,8 @@ pub struct Net {
     context: egui::Context,
     sender: Sender<Arrived>,
     receiver: Receiver<Arrived>,
-    items_under_way: usize,
+    under_way: HashSet<Key>,
+    slow: HashSet<Key>,
     events: Events,
 }
 
@@ -151,12 +147,19 @@ impl Net {
     pub fn new(origin: String, context: egui::Context) -> Self {
         let (sender, receiver) = channel();
         let events = Events::new(&origin, context.clone());
-        Self { origin, context, sender, receiver, items_under_way: 0, events }
+        Self { origin, context, sender, receiver, under_way: HashSet::new(), slow: HashSet::new(), events }
     }
 
-    /// How many more images, arrays and records may be asked for now.
-    pub fn room(&self) -> usize {
-        AT_A_TIME.saturating_sub(self.items_under_way)
+    /// Takes a place for something that is asked for next, where there is one.
+    pub fn take_place(&mut self, key: &Key, is_slow: bool) -> bool {
+        let is_place = self.under_way.len() < AT_A_TIME && (!is_slow || self.slow.len() < SLOW_AT_A_TIME);
+        if is_place {
+            self.under_way.insert(key.clone());
+        }
+        if is_place && is_slow {
+            self.slow.insert(key.clone());
+        }
+        is_place
     }
 
     /// Sends a request; its answer arrives later.
@@ -165,7 +168,6 @@ impl Net {
             self.events.reconnect_now();
             return;
         }
-        self.items_under_way += usize::from(matches!(request, Request::Item(_)));
         let (sender, context) = (self.sender.clone(), self.context.clone());
         http::send(&self.origin, request, &self.context, move |arrived| {
             // Without a receiver the page is closing, and nobody waits for the answer.
@@ -178,8 +180,12 @@ impl Net {
     /// What arrived since the last time.
     pub fn poll(&mut self) -> Vec<Arrived> {
         let arrived: Vec<Arrived> = self.receiver.try_iter().collect();
-        let items = arrived.iter().filter(|a| matches!(a.request, Request::Item(_))).count();
-        self.items_under_way -= items;
+        for answer in &arrived {
+            if let Request::Item(key) = &answer.request {
+                self.under_way.remove(key);
+                self.slow.remove(key);
+            }
+        }
         arrived
     }
 
@@ -187,16 +193,4 @@ impl Net {
     pub fn poll_events(&mut self, now: f64) -> (Vec<Event>, Connection) {
         self.events.poll(now)
     }
-}
-
-/// The answer to [`Request::NewTarget`].
-#[derive(Deserialize)]
-struct Designated {
-    target: usize,
-    session: SessionView,
-}
-
-/// A position in words, for titles of textures and messages.
-pub fn pixel_words(pixel: Pixel) -> String {
-    format!("{:.1}, {:.1}", pixel.x, pixel.y)
 }

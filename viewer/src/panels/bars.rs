@@ -47,12 +47,13 @@ fn traverse_choice(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             }
         }
     });
+    let response = choice.response.accessible_name("traverse");
     if let Some(traverse) = open {
         let mut words = traverse.description.clone();
         for warning in &traverse.warnings {
             words += &format!("\n! {warning}");
         }
-        choice.response.on_hover_text(words);
+        response.on_hover_text(words);
     }
 }
 
@@ -94,7 +95,8 @@ pub fn status(ui: &mut Ui, state: &State) {
 pub fn banner(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     if let Connection::Gone { attempts } = state.connection {
         ui.horizontal(|ui| {
-            let words = format!("The server is gone. Steps that are loaded stay browsable; retrying ({attempts}) …");
+            let words =
+                format!("The server is gone. Steps that are loaded stay browsable; retrying ({attempts}) …");
             ui.label(RichText::new(words).color(theme::LOST));
             if ui.small_button("Retry now").clicked() {
                 out.push(Command::Reconnect);
@@ -132,7 +134,12 @@ pub fn transport(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 fn run_progress(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     for ((target, run), progress) in &state.progress {
         let name = run_letter(*run);
-        progress_bar(ui, &format!("run {name}: {} of {}, {}", progress.k, progress.n, progress.doing), progress.k, progress.n);
+        progress_bar(
+            ui,
+            &format!("run {name}: {} of {}, {}", progress.k, progress.n, progress.doing),
+            progress.k,
+            progress.n,
+        );
         if ui.small_button("Cancel").clicked() {
             out.push(Command::CancelRun { target: *target, run: *run });
         }
@@ -177,7 +184,7 @@ pub fn stages(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 }
 
 fn stage_button(ui: &mut Ui, state: &State, stage: Stage, out: &mut Vec<Command>) {
-    let reached = state.trace().map(|trace| inspector::record(trace, stage).is_some());
+    let reached = state.trace().map(|trace| inspector::is_reached(trace, stage));
     let colour = match (reached, has_failed(state.trace(), stage)) {
         (_, true) => theme::FAILED,
         (Some(true), _) => theme::TEXT,

@@ -49,7 +49,9 @@ fn transition(verdict: &Verdict, state: &State) -> String {
     let retries = state.setting("limits", "n_retry").and_then(|v| v.as_u64()).unwrap_or(2);
     let before = verdict.state_before.word();
     match verdict.state {
-        TrackingState::Lost { count } => format!("{before} → lost, bad update {count}; {retries} may follow the loss"),
+        TrackingState::Lost { count } => {
+            format!("{before} → lost, bad update {count}; {retries} may follow the loss")
+        }
         TrackingState::Failed if before != "failed" => format!("{before} → failed: no retries are left"),
         TrackingState::Failed => "stays failed until the target is picked again".to_owned(),
         other if other.word() == before => format!("stays {before}"),
@@ -65,16 +67,29 @@ fn show_gate(ui: &mut Ui, gate: &Gate) {
         ui.label(theme::note(gate.criterion.to_string()));
         ui.label(RichText::new(readable(&gate.name)).size(12.0).color(theme::TEXT));
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            ui.label(RichText::new(if gate.passed { "pass" } else { "FAIL" }).strong().color(colour));
-            let value = gate.value.map_or_else(|| "nothing".to_owned(), digits);
-            ui.label(theme::note(format!("{relation} {} {}", digits(gate.limit), gate.unit).trim_end().to_owned()));
-            ui.label(theme::number(value));
+            let word = if gate.passed { "pass" } else { "FAIL" };
+            column(ui, 32.0, RichText::new(word).strong().color(colour));
+            column(
+                ui,
+                62.0,
+                theme::note(format!("{relation} {:.3} {}", gate.limit, gate.unit).trim_end().to_owned()),
+            );
+            let value = gate.value.map_or_else(|| "nothing".to_owned(), |v| format!("{v:.3}"));
+            column(ui, 50.0, theme::number(value));
         });
     });
     bar(ui, gate, colour);
 }
 
-/// A bar with the value against its limit; the good side of the limit is to its right for scores, else to its left.
+/// A text in a column of its own, right aligned.
+fn column(ui: &mut Ui, width: f32, text: RichText) {
+    ui.allocate_ui_with_layout(vec2(width, 16.0), egui::Layout::right_to_left(egui::Align::Center), |ui| {
+        ui.set_width(width);
+        ui.label(text);
+    });
+}
+
+/// A bar with the value against its limit; the good side is right of the limit for scores, else left of it.
 fn bar(ui: &mut Ui, gate: &Gate, colour: egui::Color32) {
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), BAR + 4.0), Sense::hover());
     let rail = Rect::from_min_size(rect.min + vec2(0.0, 2.0), vec2(rect.width(), BAR));
@@ -83,8 +98,8 @@ fn bar(ui: &mut Ui, gate: &Gate, colour: egui::Color32) {
     let (value, limit) = fractions(gate);
     let at = |fraction: f32| rail.left() + rail.width() * fraction;
     if let Some(value) = value {
-        let (low, high) = if gate.at_least { (0.0, value) } else { (0.0, value) };
-        let fill = Rect::from_min_max(pos2(at(low), rail.top()), pos2(at(high).max(at(low) + 2.0), rail.bottom()));
+        let right = at(value).max(rail.left() + 2.0);
+        let fill = Rect::from_min_max(rail.min, pos2(right, rail.bottom()));
         painter.rect_filled(fill, 2.0, colour.gamma_multiply(0.85));
     }
     painter.vline(at(limit), rail.expand(2.0).y_range(), egui::Stroke::new(2.0, theme::STRONG));

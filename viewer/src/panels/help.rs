@@ -38,7 +38,9 @@ fn sheet(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         }
         ui.add_space(6.0);
         let (used, limit) = (state.cache.bytes() >> 20, cache::LIMIT_BYTES >> 20);
-        ui.label(theme::note(format!("This page keeps up to {limit} MiB of steps and images; it holds {used} MiB now.")));
+        ui.label(theme::note(format!(
+            "This page keeps up to {limit} MiB of steps and images; it holds {used} MiB now."
+        )));
         ui.button("Close").clicked()
     });
     if modal.inner || modal.should_close() {
@@ -52,7 +54,8 @@ fn go_to(ui: &mut Ui, state: &State, typed: &str, out: &mut Vec<Command>) {
     let modal = Modal::new(Id::unique("go to")).backdrop_color(theme::SHADE).show(ui.ctx(), |ui| {
         ui.set_width(240.0);
         ui.label(theme::title("Go to step"));
-        let field = ui.add(egui::TextEdit::singleline(&mut text).hint_text(format!("0 to {last}, or +5, -3")));
+        let field =
+            ui.add(egui::TextEdit::singleline(&mut text).hint_text(format!("0 to {last}, or +5, -3")));
         field.request_focus();
         if !text.is_empty() && target(&text, state.cursor.step).is_none() {
             ui.label(RichText::new("a step is a whole number").small().color(theme::LOST));

@@ -75,7 +75,8 @@ fn paint_marks(canvas: &Canvas, trace: &StepTrace, state: &State) {
         }
         paint_ticks(canvas, &overlay, curve);
     }
-    if trace.predict.is_some() && state.shows(Layer::Prediction)
+    if trace.predict.is_some()
+        && state.shows(Layer::Prediction)
         && let Some(pixel) = pointing.predicted_right
     {
         overlay.mark(pixel, Mark::Cross, theme::PREDICTION);
@@ -86,6 +87,9 @@ fn paint_marks(canvas: &Canvas, trace: &StepTrace, state: &State) {
             overlay.ellipse(pixel, &stereo.covariance_px2, 3.0, run, Line::Solid);
             let words = format!("{:.2} m, ncc {:.2}", stereo.range_m, stereo.score);
             overlay.words(pixel, vec2(12.0, -14.0), &words, run);
+            if stereo.at_end {
+                overlay.words(pixel, vec2(12.0, 4.0), "at the end of the searched ranges", theme::LOST);
+            }
         }
         overlay.mark(pixel, Mark::Ring, run);
     }
@@ -108,7 +112,9 @@ fn paint_ticks(canvas: &Canvas, overlay: &Overlay<'_>, curve: impl Fn(f64) -> Op
     for range_m in TICKS_M {
         let (Some(at), Some(beyond)) = (curve(range_m), curve(range_m * 1.01)) else { continue };
         let screen = canvas.transform.to_screen(at);
-        if !canvas.transform.rect.contains(screen) || last.is_some_and(|last| last.distance(screen) < TICK_GAP) {
+        if !canvas.transform.rect.contains(screen)
+            || last.is_some_and(|last| last.distance(screen) < TICK_GAP)
+        {
             continue;
         }
         let length = at.distance(beyond).max(1e-9);

@@ -15,11 +15,15 @@ use crate::view2d::Canvas;
 use crate::{overlay, panels, theme};
 
 /// Height of the status line below an image, points.
-pub const STATUS: f32 = 18.0;
+pub const STATUS: f32 = 24.0;
 
 /// Shows the left image. Returns its canvas' transform and size, from which a test can compute where to click.
-pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) -> Option<(crate::view2d::Transform, [u32; 2])> {
-    let Some(raster) = ready_image(ui, state, Eye::Left) else { return None };
+pub fn show(
+    ui: &mut Ui,
+    state: &State,
+    out: &mut Vec<Command>,
+) -> Option<(crate::view2d::Transform, [u32; 2])> {
+    let raster = ready_image(ui, state, Eye::Left)?;
     let [width, height] = raster.size();
     let region = PixelRect::whole(width, height);
     let canvas = Canvas::new(ui, state.view(Panel::Left), region, STATUS);
@@ -48,7 +52,10 @@ pub fn ready_image<'a>(ui: &mut Ui, state: &'a State, eye: Eye) -> Option<&'a Ra
     match state.image(eye) {
         Slot::Ready(raster) => return Some(raster),
         Slot::Failed(problem) => {
-            panels::missing(ui, &format!("The {word} image of step {step} cannot be shown: {}", problem.detail));
+            panels::missing(
+                ui,
+                &format!("The {word} image of step {step} cannot be shown: {}", problem.detail),
+            );
         }
         Slot::Absent if state.traverse.is_none() => panels::missing(ui, &state.missing_target()),
         Slot::Absent | Slot::Loading => panels::missing(ui, &waiting_words(state, word, step)),
@@ -61,9 +68,13 @@ fn waiting_words(state: &State, word: &str, step: usize) -> String {
     match (is_rendered, state.rendering) {
         (true, _) => format!("Loading the {word} image of step {step} …"),
         (false, Some((k, n))) => {
-            format!("The images of step {step} are being rendered: {k} of {n} stops are done. They appear here by themselves.")
+            format!(
+                "The images of step {step} are being rendered: {k} of {n} stops are done. They appear here by themselves."
+            )
         }
-        (false, None) => format!("The images of step {step} are being rendered. They appear here by themselves."),
+        (false, None) => {
+            format!("The images of step {step} are being rendered. They appear here by themselves.")
+        }
     }
 }
 
@@ -84,11 +95,26 @@ fn entries(state: &State) -> Vec<Entry> {
         entries.push(Entry::new(Layer::Match, Mark::Ring, run, word));
     }
     if trace.predict.is_some() && pointing.is_some_and(|p| p.predicted_left.is_some()) {
-        entries.push(Entry::new(Layer::Prediction, Mark::Stroke(Line::Dotted), theme::PREDICTION, "predicted, 3σ gate"));
+        entries.push(Entry::new(
+            Layer::Prediction,
+            Mark::Stroke(Line::Dotted),
+            theme::PREDICTION,
+            "predicted, 3σ gate",
+        ));
     }
     if matched.is_some() {
-        entries.push(Entry::new(Layer::Template, Mark::Stroke(Line::Solid), run, "template window (dotted: scaled, rolled)"));
-        entries.push(Entry::new(Layer::SearchWindow, Mark::Stroke(Line::Dashed), theme::SEARCH, "search window"));
+        entries.push(Entry::new(
+            Layer::Template,
+            Mark::Stroke(Line::Solid),
+            run,
+            "template window (dotted: scaled, rolled)",
+        ));
+        entries.push(Entry::new(
+            Layer::SearchWindow,
+            Mark::Stroke(Line::Dashed),
+            theme::SEARCH,
+            "search window",
+        ));
     }
     if trace.capture.as_ref().is_some_and(|c| c.subframe.is_some()) {
         entries.push(Entry::new(Layer::Subframe, Mark::Stroke(Line::Dotted), theme::SUBFRAME, "subframe"));
@@ -104,7 +130,9 @@ fn paint_marks(overlay: &Overlay<'_>, trace: &StepTrace, state: &State) {
     let run = theme::run(state.cursor.run);
     let evidence = trace.template();
     let matched = evidence.and_then(|e| e.match_template.as_ref());
-    if let Some(subframe) = trace.capture.as_ref().and_then(|c| c.subframe).filter(|_| state.shows(Layer::Subframe)) {
+    if let Some(subframe) =
+        trace.capture.as_ref().and_then(|c| c.subframe).filter(|_| state.shows(Layer::Subframe))
+    {
         overlay.rectangle(subframe, theme::SUBFRAME, Line::Dotted);
     }
     if let Some(found) = matched.filter(|_| state.shows(Layer::SearchWindow)) {
@@ -124,10 +152,18 @@ fn paint_marks(overlay: &Overlay<'_>, trace: &StepTrace, state: &State) {
     if let Some((located, pixel)) = trace.locate.as_ref().and_then(|l| Some((l, l.left_pixel?)))
         && state.shows(Layer::Match)
     {
-        overlay.ellipse(pixel, &located.left_covariance_px2, 3.0, run, Line::Solid);
+        let bias = located.left_bias_px;
+        overlay.ellipse(
+            pixel,
+            &(located.left_covariance_px2 + bias * bias.transpose()),
+            3.0,
+            run,
+            Line::Solid,
+        );
         overlay.mark(pixel, Mark::Ring, run);
     }
-    if let Some(pixel) = trace.truth.as_ref().and_then(|t| t.left_pixel).filter(|_| state.shows(Layer::Truth)) {
+    if let Some(pixel) = trace.truth.as_ref().and_then(|t| t.left_pixel).filter(|_| state.shows(Layer::Truth))
+    {
         overlay.mark(pixel, Mark::Plus, theme::TRUTH);
     }
 }
@@ -139,7 +175,9 @@ fn paint_prediction(overlay: &Overlay<'_>, trace: &StepTrace) {
         overlay.ellipse(pixel, covariance, 3.0, theme::PREDICTION, Line::Dotted);
         if let Some([long, _]) = crate::ellipse::axes(covariance) {
             let end = pixel.offset(3.0 * long.x.abs(), 3.0 * long.x.signum() * long.y);
-            overlay.words(end, vec2(6.0, 0.0), "3σ", theme::PREDICTION);
+            if overlay.length(pixel, end) > 24.0 {
+                overlay.words(end, vec2(6.0, 0.0), "3σ", theme::PREDICTION);
+            }
         }
     }
     overlay.mark(pixel, Mark::Cross, theme::PREDICTION);
@@ -195,13 +233,17 @@ fn paint_wrapped(canvas: &Canvas, at: egui::Pos2, words: &str) {
 
 /// In pick mode: the loupe, and the designation on a click.
 fn pick(ui: &Ui, canvas: &Canvas, raster: &Raster, state: &State, out: &mut Vec<Command>) {
+    let border = canvas.transform.rect.shrink(1.0);
+    let corner = border.left_bottom() + vec2(10.0, -14.0);
     if state.mode != Mode::Pick {
+        if state.session.as_ref().is_some_and(|session| session.targets.is_empty()) {
+            paint_words(&canvas.painter, corner, "Press T, then click the rock to track.", theme::ACCENT);
+        }
         return;
     }
-    let border = canvas.transform.rect.shrink(1.0);
     canvas.painter.rect_stroke(border, 0.0, egui::Stroke::new(2.0, theme::ACCENT), egui::StrokeKind::Inside);
     let hint = "Click the point to track. Esc cancels.";
-    paint_words(&canvas.painter, border.left_bottom() + vec2(10.0, -14.0), hint, theme::ACCENT);
+    paint_words(&canvas.painter, corner, hint, theme::ACCENT);
     let [width, height] = raster.size();
     let Some(pixel) = canvas.hovered(PixelRect::whole(width, height)) else { return };
     ui.ctx().set_cursor_icon(CursorIcon::Crosshair);
@@ -220,7 +262,11 @@ fn loupe(canvas: &Canvas, raster: &Raster, pixel: Pixel) {
         return;
     }
     let on_left = canvas.transform.to_screen(pixel).x > area.center().x;
-    let corner = if on_left { area.left_bottom() - vec2(0.0, SIDE + 20.0) } else { area.right_bottom() - vec2(SIDE, SIDE) };
+    let corner = if on_left {
+        area.left_bottom() - vec2(0.0, SIDE + 20.0)
+    } else {
+        area.right_bottom() - vec2(SIDE, SIDE)
+    };
     let frame = Rect::from_min_size(corner, vec2(SIDE, SIDE));
     let [width, height] = raster.size().map(|v| v as f32);
     let middle = pos2((pixel.x as f32 + 0.5) / width, (pixel.y as f32 + 0.5) / height);
@@ -233,7 +279,7 @@ fn loupe(canvas: &Canvas, raster: &Raster, pixel: Pixel) {
 /// Pixel and grey value under the pointer, magnification, and the convention.
 pub fn status_line(ui: &mut Ui, canvas: &Canvas, raster: &Raster, region: PixelRect) {
     ui.horizontal(|ui| {
-        ui.set_height(STATUS - 4.0);
+        ui.set_height(STATUS - 6.0);
         match canvas.hovered(region) {
             Some(pixel) => {
                 let value = raster.at(pixel.x.round() as i64, pixel.y.round() as i64);

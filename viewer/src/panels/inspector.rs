@@ -38,9 +38,28 @@ fn not_reached(trace: &StepTrace, state: &State) -> String {
     match (&trace.fault, trace.predict.is_none()) {
         (Some(fault), _) => format!("{word} was not reached: {fault}"),
         (None, true) => {
-            format!("{word} is not part of the designation. Go one step on (Right) to see it, or select `point_stereo`.")
+            format!(
+                "{word} is not part of the designation. Go one step on (Right) to see it, or select `point_stereo`."
+            )
         }
         (None, false) => format!("{word} was not reached: {}", state.missing_step()),
+    }
+}
+
+/// Whether a stage was reached.
+pub fn is_reached(trace: &StepTrace, stage: Stage) -> bool {
+    let evidence = trace.template();
+    match stage {
+        Stage::Predict => trace.predict.is_some(),
+        Stage::PointMast => trace.point_mast.is_some(),
+        Stage::Capture => trace.capture.is_some(),
+        Stage::Locate => trace.locate.is_some(),
+        Stage::ScaleRoll => evidence.is_some_and(|e| e.scale_roll.is_some()),
+        Stage::MatchTemplate => evidence.is_some_and(|e| e.match_template.is_some()),
+        Stage::PointStereo => evidence.is_some_and(|e| e.point_stereo.is_some()),
+        Stage::Triangulate => evidence.is_some_and(|e| e.triangulate.is_some()),
+        Stage::Judge => trace.judge.is_some(),
+        Stage::Update => true,
     }
 }
 
@@ -73,7 +92,8 @@ fn entries(ui: &mut Ui, record: &Value) {
         ui.label(theme::number(record.to_string()));
         return;
     };
-    let (plain, nested): (Vec<_>, Vec<_>) = fields.iter().partition(|(key, value)| words(key, value).is_some());
+    let (plain, nested): (Vec<_>, Vec<_>) =
+        fields.iter().partition(|(key, value)| words(key, value).is_some());
     egui::Grid::new(ui.next_auto_id()).num_columns(2).spacing([10.0, 2.0]).show(ui, |ui| {
         for (key, value) in plain {
             let (name, unit) = name_and_unit(key);
@@ -88,20 +108,29 @@ fn entries(ui: &mut Ui, record: &Value) {
     });
     for (key, value) in nested {
         let (name, unit) = name_and_unit(key);
-        let count = value.as_array().map(|list| format!(" ({})", list.len())).unwrap_or_default();
-        let header = RichText::new(format!("{name}{count} {unit}").trim_end().to_owned()).size(12.0).color(theme::TEXT);
-        CollapsingHeader::new(header).id_salt(key).default_open(is_small(value)).show(ui, |ui| children(ui, value));
+        let list = value.as_array().filter(|_| !is_matrix(key, value));
+        let count = list.map(|list| format!(" ({})", list.len())).unwrap_or_default();
+        let header = RichText::new(format!("{name}{count} {unit}").trim_end().to_owned())
+            .size(12.0)
+            .color(theme::TEXT);
+        CollapsingHeader::new(header)
+            .id_salt(key)
+            .default_open(is_small(key, value))
+            .show(ui, |ui| children(ui, key, value));
     }
 }
 
-fn children(ui: &mut Ui, value: &Value) {
+fn children(ui: &mut Ui, key: &str, value: &Value) {
     match value {
-        Value::Array(rows) if is_matrix(rows) => matrix(ui, rows),
+        Value::Array(list) if is_matrix(key, value) => matrix(ui, list),
         Value::Array(list) => {
             for (i, item) in list.iter().enumerate() {
-                let title = item.get("name").and_then(Value::as_str).map_or_else(|| i.to_string(), str::to_owned);
+                let title =
+                    item.get("name").and_then(Value::as_str).map_or_else(|| i.to_string(), str::to_owned);
                 if item.is_object() {
-                    CollapsingHeader::new(RichText::new(title).size(12.0)).id_salt(i).show(ui, |ui| entries(ui, item));
+                    CollapsingHeader::new(RichText::new(title).size(12.0))
+                        .id_salt(i)
+                        .show(ui, |ui| entries(ui, item));
                 } else {
                     ui.label(theme::number(item.to_string()));
                 }
@@ -112,26 +141,31 @@ fn children(ui: &mut Ui, value: &Value) {
 }
 
 /// Whether a record is short enough to be open from the start.
-fn is_small(value: &Value) -> bool {
+fn is_small(key: &str, value: &Value) -> bool {
     match value {
-        Value::Array(list) => is_matrix(list),
+        Value::Array(_) => is_matrix(key, value),
         Value::Object(fields) => fields.len() <= 8,
         _ => true,
     }
 }
 
-fn is_matrix(rows: &[Value]) -> bool {
-    rows.len() <= 4 && rows.iter().all(|row| row.as_array().is_some_and(|r| r.iter().all(Value::is_number)))
+/// Whether a list is a square matrix: they are written as one list, column by column.
+fn is_matrix(key: &str, value: &Value) -> bool {
+    let is_named = key.contains("covariance") || key.contains("_from_");
+    is_named
+        && value
+            .as_array()
+            .is_some_and(|list| matches!(list.len(), 4 | 9) && list.iter().all(Value::is_number))
 }
 
-/// A symmetric matrix: rows and columns are the same, whichever comes first in the document.
-fn matrix(ui: &mut Ui, rows: &[Value]) {
-    egui::Grid::new(ui.next_auto_id()).spacing([12.0, 1.0]).show(ui, |ui| {
-        let count = rows.first().and_then(Value::as_array).map_or(0, Vec::len);
-        for i in 0..count {
-            for column in rows {
-                let value = column.get(i).and_then(Value::as_f64).unwrap_or(f64::NAN);
-                ui.label(theme::number(format!("{value:+.3e}")).size(11.0));
+/// A square matrix in rows and columns.
+fn matrix(ui: &mut Ui, list: &[Value]) {
+    let side = if list.len() == 9 { 3 } else { 2 };
+    egui::Grid::new(ui.next_auto_id()).spacing([14.0, 1.0]).show(ui, |ui| {
+        for row in 0..side {
+            for column in 0..side {
+                let value = list[column * side + row].as_f64().unwrap_or(f64::NAN);
+                ui.label(theme::number(format!("{value:+.2e}")).size(11.0));
             }
             ui.end_row();
         }
@@ -151,10 +185,14 @@ fn words(key: &str, value: &Value) -> Option<String> {
             Some(digits(number))
         }
         Value::String(text) => Some(text.clone()),
-        Value::Array(list) if list.len() <= 4 && list.iter().all(Value::is_number) => {
+        Value::Array(list)
+            if list.len() <= 4 && !is_matrix(key, value) && list.iter().all(Value::is_number) =>
+        {
             Some(list.iter().filter_map(Value::as_f64).map(digits).collect::<Vec<_>>().join("  "))
         }
-        Value::Object(fields) if fields.len() == 2 && fields.contains_key("x") && fields.contains_key("y") => {
+        Value::Object(fields)
+            if fields.len() == 2 && fields.contains_key("x") && fields.contains_key("y") =>
+        {
             let [x, y] = ["x", "y"].map(|k| fields[k].as_f64().unwrap_or(f64::NAN));
             Some(format!("{x:.2}, {y:.2}"))
         }
@@ -180,7 +218,10 @@ fn name_and_unit(key: &str) -> (String, &'static str) {
     if let Some(name) = key.strip_suffix("_in_site") {
         return (name.replace('_', " "), "m, site");
     }
-    if matches!(key, "left_pixel" | "right_pixel" | "pixel" | "predicted_left" | "predicted_right" | "integer") {
+    if matches!(
+        key,
+        "left_pixel" | "right_pixel" | "pixel" | "predicted_left" | "predicted_right" | "integer"
+    ) {
         return (key.replace('_', " "), "px");
     }
     let found = UNITS.iter().find_map(|(suffix, unit)| Some((key.strip_suffix(suffix)?, *unit)));
@@ -209,5 +250,6 @@ mod tests {
         assert_eq!(words("position_in_rover", &json!([1.0, 2.5, -0.2])).unwrap(), "1  2.500  -0.200");
         assert_eq!(words("missing", &Value::Null).unwrap(), "none");
         assert!(words("peak", &json!({"score": 1, "x": 2})).is_none());
+        assert!(words("covariance_px2", &json!([1.0, 0.0, 0.0, 1.0])).is_none());
     }
 }

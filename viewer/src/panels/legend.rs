@@ -34,7 +34,11 @@ const ROW: f32 = 15.0;
 /// Paints the legend in the upper left corner of the canvas, where there is room for it.
 pub fn show(ui: &mut egui::Ui, canvas: &Canvas, entries: &[Entry], state: &State, out: &mut Vec<Command>) {
     let area = canvas.transform.rect;
-    if entries.is_empty() || !state.marks || area.height() < ROW * entries.len() as f32 + 60.0 || area.width() < 240.0 {
+    if entries.is_empty()
+        || !state.marks
+        || area.height() < ROW * entries.len() as f32 + 60.0
+        || area.width() < 240.0
+    {
         return;
     }
     let galleys = entries.iter().map(|entry| {

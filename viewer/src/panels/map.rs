@@ -3,11 +3,13 @@
 //! Site frame: +x north, +y east, +z down. On the map east is to the right, so a site point is drawn at (y, x).
 
 use egui::{Ui, vec2};
-use egui_plot::{Arrows, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotPoints, PlotUi, Points, Polygon, Text};
+use egui_plot::{
+    Arrows, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotPoints, PlotUi, Points, Polygon, Text,
+};
 use nalgebra::Matrix2;
 use sightline_core::frames::{Point3, Pose, PoseRecord, Vector3};
-use sightline_core::session::wire::StopView;
 use sightline_core::session::view::RunView;
+use sightline_core::session::wire::StopView;
 
 use crate::command::{Command, Go};
 use crate::state::{State, run_letter};
@@ -32,16 +34,19 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         .data_aspect(1.0)
         .set_margin_fraction(vec2(0.12, 0.12))
         .show_grid([true, true])
-        .x_axis_label(theme::note("east, m"))
-        .y_axis_label(theme::note("north, m"))
-        .y_axis_min_width(34.0)
+        .y_axis_min_width(24.0)
         .allow_boxed_zoom(false)
         .label_formatter(|_| None)
         .coordinates_formatter(
             egui_plot::Corner::RightBottom,
             egui_plot::CoordinatesFormatter::new(|at, _| format!("E {:.2}  N {:.2} m", at.x, at.y)),
         )
-        .legend(egui_plot::Legend::default().text_style(egui::TextStyle::Small).background_alpha(0.8));
+        .legend(
+            egui_plot::Legend::default()
+                .position(egui_plot::Corner::LeftTop)
+                .text_style(egui::TextStyle::Small)
+                .background_alpha(0.6),
+        );
     let response = plot.show(ui, |plot| {
         paint_paths(plot, stops, state.cursor.step);
         if let Some(run) = state.run() {
@@ -61,12 +66,17 @@ fn poses<'a>(stops: &'a [StopView], of: impl Fn(&StopView) -> Option<PoseRecord>
 fn paint_paths(plot: &mut PlotUi<'_>, stops: &[StopView], step: usize) {
     let truth = poses(stops, |stop| stop.true_site_from_rover);
     if !truth.is_empty() {
-        plot.line(Line::new("true path", truth).color(theme::TRUTH).style(LineStyle::dotted_loose()).width(1.5));
+        plot.line(
+            Line::new("true path", truth).color(theme::TRUTH).style(LineStyle::dotted_loose()).width(1.5),
+        );
     }
     let estimated = poses(stops, |stop| Some(stop.site_from_rover));
     plot.line(Line::new("estimated path", estimated.clone()).color(theme::PREDICTION).width(1.5));
     plot.points(
-        Points::new("estimated path", estimated).color(theme::PREDICTION).radius(2.0).shape(MarkerShape::Circle),
+        Points::new("estimated path", estimated)
+            .color(theme::PREDICTION)
+            .radius(2.0)
+            .shape(MarkerShape::Circle),
     );
     if let Some(stop) = stops.get(step) {
         paint_rover(plot, &stop.site_from_rover.to_pose(), stops);
@@ -78,9 +88,9 @@ fn paint_rover(plot: &mut PlotUi<'_>, site_from_rover: &Pose, stops: &[StopView]
     let length_m = (span_m(stops) * 0.12).clamp(0.4, 20.0);
     let nose = site_from_rover * Point3::new(length_m, 0.0, 0.0);
     let origin = on_map(&Point3::from(site_from_rover.translation.vector));
-    let arrow = Arrows::new("rover", PlotPoints::from(vec![origin]), PlotPoints::from(vec![on_map(&nose)]));
+    let arrow = Arrows::new("", PlotPoints::from(vec![origin]), PlotPoints::from(vec![on_map(&nose)]));
     plot.arrows(arrow.color(theme::ACCENT).tip_length(9.0));
-    plot.points(Points::new("rover", origin).color(theme::ACCENT).radius(5.0).shape(MarkerShape::Circle));
+    plot.points(Points::new("", origin).color(theme::ACCENT).radius(5.0).shape(MarkerShape::Circle));
 }
 
 /// The longer side of the box around the path, m.
@@ -117,10 +127,16 @@ fn paint_trail(plot: &mut PlotUi<'_>, state: &State, stops: &[StopView], run: &R
         let Some(outline) = ellipse::outline(&from_above, sigmas) else { continue };
         let [east, north] = on_map(&centre);
         let points: Vec<[f64; 2]> = outline.iter().map(|d| [east + d.x, north + d.y]).collect();
-        let polygon = Polygon::new(format!("{sigmas}σ"), points).style(style).allow_hover(false);
+        let polygon = Polygon::new("", points).style(style).allow_hover(false);
         plot.polygon(polygon.fill_color(egui::Color32::TRANSPARENT).stroke(egui::Stroke::new(1.5, colour)));
     }
-    plot.points(Points::new(&name, on_map(&centre)).color(colour).radius(5.0).shape(MarkerShape::Diamond).filled(false));
+    plot.points(
+        Points::new(&name, on_map(&centre))
+            .color(colour)
+            .radius(5.0)
+            .shape(MarkerShape::Diamond)
+            .filled(false),
+    );
     paint_truth(plot, state, &centre);
 }
 
@@ -136,7 +152,7 @@ fn paint_truth(plot: &mut PlotUi<'_>, state: &State, estimate_in_site: &Point3) 
     let [east, north] = on_map(estimate_in_site);
     let words = format!("  {:.0} cm off in the site frame", offset.norm() * 100.0);
     plot.text(
-        Text::new("offset", PlotPoint::new(east, north), theme::note(words))
+        Text::new("", PlotPoint::new(east, north), theme::note(words).color(theme::TEXT))
             .anchor(egui::Align2::LEFT_TOP)
             .allow_hover(false),
     );

@@ -10,7 +10,10 @@ use crate::{panels, theme};
 /// Shows the list.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     if state.messages.all().is_empty() {
-        panels::missing(ui, "No messages. Whatever is refused or fails is written here, with how to mend it.");
+        panels::missing(
+            ui,
+            "No messages. Whatever is refused or fails is written here, with how to mend it.",
+        );
         return;
     }
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {

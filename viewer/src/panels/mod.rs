@@ -34,9 +34,8 @@ pub fn title_row(ui: &mut Ui, title: &str, beside: impl FnOnce(&mut Ui)) -> Resp
 /// The sentence of a panel that has nothing to show.
 pub fn missing(ui: &mut Ui, sentence: &str) {
     let space = ui.available_rect_before_wrap();
-    let mut middle = ui.new_child(
-        UiBuilder::new().max_rect(space.shrink(6.0)).layout(Layout::top_down(Align::Center)),
-    );
+    let mut middle =
+        ui.new_child(UiBuilder::new().max_rect(space.shrink(6.0)).layout(Layout::top_down(Align::Center)));
     middle.add_space((space.height() / 2.0 - 20.0).clamp(2.0, 80.0));
     middle.add(egui::Label::new(RichText::new(sentence).color(theme::WEAK)).wrap());
     ui.advance_cursor_after_rect(space);
@@ -60,9 +59,9 @@ pub fn digits(value: f64) -> String {
     let size = value.abs();
     match size {
         _ if value == value.trunc() && size < 1e9 => format!("{value:.0}"),
-        _ if size >= 100.0 && size < 1e7 => format!("{value:.1}"),
-        _ if size >= 10.0 && size < 1e7 => format!("{value:.2}"),
-        _ if size >= 0.01 && size < 1e7 => format!("{value:.3}"),
+        _ if (100.0..1e7).contains(&size) => format!("{value:.1}"),
+        _ if (10.0..1e7).contains(&size) => format!("{value:.2}"),
+        _ if (0.01..1e7).contains(&size) => format!("{value:.3}"),
         _ => format!("{value:.2e}"),
     }
 }
@@ -76,7 +75,7 @@ mod tests {
         assert_eq!(digits(12.0), "12");
         assert_eq!(digits(123.456), "123.5");
         assert_eq!(digits(0.71234), "0.712");
-        assert_eq!(digits(-3.14159), "-3.142");
+        assert_eq!(digits(-2.71734), "-2.717");
         assert_eq!(digits(0.00012), "1.20e-4");
         assert_eq!(digits(f64::NAN), "NaN");
     }

@@ -1,15 +1,38 @@
 //! Plots over the steps of a run: scores, pixel error, and position error with its 1 σ.
 
-use egui::{Id, Ui};
+use egui::{Color32, Id, Sense, Ui, vec2};
 use egui_plot::{
-    Corner, GridMark, HLine, Legend, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotUi, Points, VLine,
+    GridMark, HLine, HoverPosition, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotUi, Points, VLine,
 };
 use sightline_core::session::view::RunView;
 use sightline_core::trace::StepRow;
 
 use crate::command::{Command, Go};
+use crate::overlay::{self, Mark, paint_mark};
 use crate::state::State;
 use crate::{panels, theme};
+
+/// Height of the row above a plot that names its lines, points.
+const NAMES: f32 = 15.0;
+
+/// A line of a plot: its name, colour and shape, and how a step's value is got.
+struct Series {
+    name: &'static str,
+    colour: Color32,
+    mark: Mark,
+    shape: MarkerShape,
+    value: fn(&StepRow) -> Option<f64>,
+}
+
+/// One plot with its lines and thresholds.
+struct Chart {
+    title: &'static str,
+    unit: &'static str,
+    series: Vec<Series>,
+    thresholds: Vec<f64>,
+    /// A value that is always in view.
+    anchor: f64,
+}
 
 /// Shows the plots, one below the other over the same steps.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
@@ -17,33 +40,79 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         panels::missing(ui, &state.missing_target());
         return;
     };
-    let limit = |group: &str, key: &str| state.setting(group, key).and_then(|v| v.as_f64());
-    let has_truth = run.rows.iter().any(|row| row.err_m.is_some());
-    let count = if has_truth { 3.0 } else { 2.0 };
-    let height = ((ui.available_height() - 4.0 * (count - 1.0)) / count).max(40.0);
-    let mut frame = |ui: &mut Ui, name: &str, unit: &str, is_last: bool, paint: &dyn Fn(&mut PlotUi<'_>)| {
-        if let Some(step) = plot(ui, state, (name, unit), height, is_last, paint) {
+    let charts = charts(state, run);
+    let count = charts.len() as f32;
+    ui.spacing_mut().item_spacing.y = 1.0;
+    let axis = 16.0;
+    let height = ((ui.available_height() - axis - count * (NAMES + 2.0)) / count).max(24.0);
+    for (i, chart) in charts.iter().enumerate() {
+        let is_last = i + 1 == charts.len();
+        names(ui, chart);
+        let height = if is_last { height + axis } else { height };
+        if let Some(step) = plot(ui, state, run, chart, height, is_last) {
             out.push(Command::Go(Go::Step(step)));
         }
-    };
-    let colour = theme::run(run.number);
-    frame(ui, "scores", "", false, &|plot| {
-        series(plot, run, "ncc", colour, MarkerShape::Circle, |row| row.ncc);
-        series(plot, run, "stereo", theme::PREDICTION, MarkerShape::Square, |row| row.stereo_score);
-        threshold(plot, "ncc_min", limit("limits", "ncc_min"));
-        threshold(plot, "stereo_ncc_min", limit("limits", "stereo_ncc_min"));
-        plot.hline(HLine::new("", 1.0).color(egui::Color32::TRANSPARENT).allow_hover(false));
-    });
-    if has_truth {
-        frame(ui, "pixel error", "px", false, &|plot| {
-            series(plot, run, "err_px", colour, MarkerShape::Circle, |row| row.err_px);
-            plot.hline(HLine::new("", 0.0).color(egui::Color32::TRANSPARENT).allow_hover(false));
-        });
     }
-    frame(ui, "position", "cm", true, &|plot| {
-        series(plot, run, "σ", theme::WEAK, MarkerShape::Diamond, |row| row.sigma_m.map(|v| v * 100.0));
-        series(plot, run, "err", colour, MarkerShape::Circle, |row| row.err_m.map(|v| v * 100.0));
-        plot.hline(HLine::new("", 0.0).color(egui::Color32::TRANSPARENT).allow_hover(false));
+}
+
+/// The plots that this run has data for.
+fn charts(state: &State, run: &RunView) -> Vec<Chart> {
+    let colour = theme::run(run.number);
+    let limit = |key: &str| state.setting("limits", key).and_then(|v| v.as_f64());
+    let series = |name, colour, mark, shape, value| Series { name, colour, mark, shape, value };
+    let (ring, square, diamond) = (Mark::Ring, Mark::Square, Mark::Diamond);
+    let mut charts = vec![Chart {
+        title: "scores",
+        unit: "",
+        series: vec![
+            series("ncc", colour, ring, MarkerShape::Circle, |row| row.ncc),
+            series("stereo", theme::PREDICTION, square, MarkerShape::Square, |row| row.stereo_score),
+        ],
+        thresholds: limit("ncc_min").into_iter().chain(limit("stereo_ncc_min")).collect(),
+        anchor: 1.0,
+    }];
+    let mut position =
+        vec![series("σ", theme::WEAK, diamond, MarkerShape::Diamond, |row| row.sigma_m.map(|v| v * 100.0))];
+    if run.rows.iter().any(|row| row.err_m.is_some()) {
+        let error = series("error", colour, ring, MarkerShape::Circle, |row| row.err_px);
+        charts.push(Chart {
+            title: "pixel",
+            unit: "px",
+            series: vec![error],
+            thresholds: Vec::new(),
+            anchor: 0.0,
+        });
+        position.push(series("error", colour, ring, MarkerShape::Circle, |row| row.err_m.map(|v| v * 100.0)));
+    }
+    charts.push(Chart {
+        title: "position",
+        unit: "cm",
+        series: position,
+        thresholds: Vec::new(),
+        anchor: 0.0,
+    });
+    charts
+}
+
+/// The row that names a plot's lines, each with its shape.
+fn names(ui: &mut Ui, chart: &Chart) {
+    ui.horizontal(|ui| {
+        ui.set_height(NAMES);
+        ui.spacing_mut().item_spacing.x = 4.0;
+        let unit = if chart.unit.is_empty() { String::new() } else { format!(", {}", chart.unit) };
+        ui.label(theme::note(format!("{}{unit}", chart.title)).color(theme::TEXT));
+        for series in &chart.series {
+            ui.add_space(6.0);
+            let (mark, _) = ui.allocate_exact_size(vec2(10.0, 10.0), Sense::hover());
+            paint_mark(ui.painter(), mark.center(), series.mark, series.colour, 4.0);
+            ui.label(theme::note(series.name));
+        }
+        if !chart.thresholds.is_empty() {
+            ui.add_space(6.0);
+            let (mark, _) = ui.allocate_exact_size(vec2(16.0, 10.0), Sense::hover());
+            paint_mark(ui.painter(), mark.center(), Mark::Stroke(overlay::Line::Dashed), theme::FAILED, 8.0);
+            ui.label(theme::note("least allowed"));
+        }
     });
 }
 
@@ -51,37 +120,47 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 fn plot(
     ui: &mut Ui,
     state: &State,
-    (name, unit): (&str, &str),
+    run: &RunView,
+    chart: &Chart,
     height: f32,
     is_last: bool,
-    paint: &dyn Fn(&mut PlotUi<'_>),
 ) -> Option<usize> {
-    let label = if unit.is_empty() { name.to_owned() } else { format!("{name}, {unit}") };
     let last = state.stop_count().saturating_sub(1) as f64;
-    let whole = |mark: GridMark| {
-        if mark.value.fract() == 0.0 { format!("{}", mark.value) } else { String::new() }
-    };
-    let mut plot = Plot::new((name, &state.traverse.as_ref().map(|t| t.id.clone())))
-        .height(height)
-        .allow_scroll(false)
-        .allow_drag(false)
-        .allow_zoom(false)
-        .allow_boxed_zoom(false)
-        .show_axes([is_last, true])
-        .include_x(-0.3)
-        .include_x(last + 0.3)
-        .y_axis_min_width(34.0)
-        .y_axis_label(theme::note(label))
-        .x_axis_formatter(move |mark, _| whole(mark))
-        .link_axis(Id::unique("steps"), [true, false])
-        .label_formatter(|_| None)
-        .legend(Legend::default().position(Corner::LeftBottom).text_style(egui::TextStyle::Small).background_alpha(0.7));
-    if is_last {
-        plot = plot.x_axis_label(theme::note("step"));
-    }
+    let plot =
+        Plot::new((chart.title, state.traverse.as_ref().map(|t| t.id.clone())))
+            .height(height)
+            .allow_scroll(false)
+            .allow_drag(false)
+            .allow_zoom(false)
+            .allow_boxed_zoom(false)
+            .allow_axis_zoom_drag(false)
+            .show_axes([is_last, true])
+            .include_x(-0.4)
+            .include_x(last + 0.4)
+            .include_y(chart.anchor)
+            .set_margin_fraction(vec2(0.0, 0.12))
+            .y_axis_min_width(30.0)
+            .x_axis_formatter(|mark: GridMark, _: &std::ops::RangeInclusive<f64>| {
+                if mark.value.fract() == 0.0 { format!("{}", mark.value) } else { String::new() }
+            })
+            .link_axis(Id::unique("steps"), [true, false])
+            .label_formatter(|near| match near {
+                HoverPosition::NearDataPoint { plot_name, position, .. } => {
+                    Some(format!("step {}\n{plot_name} {:.3}", position.x, position.y))
+                }
+                HoverPosition::Elsewhere { .. } => None,
+            });
     let response = plot.show(ui, |plot| {
-        plot.vline(VLine::new("", state.cursor.step as f64).color(theme::ACCENT).width(1.5).allow_hover(false));
-        paint(plot);
+        plot.vline(
+            VLine::new("", state.cursor.step as f64).color(theme::ACCENT).width(1.5).allow_hover(false),
+        );
+        for &value in &chart.thresholds {
+            let line = HLine::new("", value).color(theme::FAILED).style(LineStyle::dashed_dense());
+            plot.hline(line.width(1.0).allow_hover(false));
+        }
+        for line in &chart.series {
+            series(plot, run, line);
+        }
         let clicked = plot.response().clicked().then(|| plot.pointer_coordinate()).flatten();
         clicked.map(|at: PlotPoint| at.x.round().clamp(0.0, last) as usize)
     });
@@ -89,19 +168,12 @@ fn plot(
 }
 
 /// A line over the steps that have a value, broken where one has none.
-fn series(
-    plot: &mut PlotUi<'_>,
-    run: &RunView,
-    name: &str,
-    colour: egui::Color32,
-    shape: MarkerShape,
-    value: impl Fn(&StepRow) -> Option<f64>,
-) {
-    let points: Vec<Option<[f64; 2]>> =
-        run.rows.iter().map(|row| value(row).filter(|v| v.is_finite()).map(|v| [row.step as f64, v])).collect();
+fn series(plot: &mut PlotUi<'_>, run: &RunView, line: &Series) {
+    let point = |row: &StepRow| (line.value)(row).filter(|v| v.is_finite()).map(|v| [row.step as f64, v]);
+    let points: Vec<Option<[f64; 2]>> = run.rows.iter().map(point).collect();
     for piece in pieces(&points) {
-        plot.line(Line::new(name, piece.clone()).color(colour).width(1.5));
-        plot.points(Points::new(name, piece).color(colour).radius(2.5).shape(shape));
+        plot.line(Line::new(line.name, piece.clone()).color(line.colour).width(1.5).allow_hover(false));
+        plot.points(Points::new(line.name, piece).color(line.colour).radius(2.5).shape(line.shape));
     }
 }
 
@@ -109,13 +181,6 @@ fn series(
 fn pieces(points: &[Option<[f64; 2]>]) -> Vec<Vec<[f64; 2]>> {
     let runs = points.split(Option::is_none);
     runs.filter(|run| !run.is_empty()).map(|run| run.iter().copied().flatten().collect()).collect()
-}
-
-fn threshold(plot: &mut PlotUi<'_>, name: &str, value: Option<f64>) {
-    if let Some(value) = value {
-        let line = HLine::new(name, value).color(theme::FAILED).style(LineStyle::dashed_dense());
-        plot.hline(line.width(1.0).allow_hover(false));
-    }
 }
 
 #[cfg(test)]

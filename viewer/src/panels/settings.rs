@@ -39,7 +39,12 @@ fn foot(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         let words = format!("Run from here (step {step})");
         let wrong = state.settings.iter().find_map(|info| problem(state, info));
         let button = ui.add_enabled(wrong.is_none(), egui::Button::new(words).min_size(vec2(150.0, 24.0)));
-        if button.on_hover_text("Forks a new run with the changed settings; nothing recorded is overwritten. Key R").clicked() {
+        if button
+            .on_hover_text(
+                "Forks a new run with the changed settings; nothing recorded is overwritten. Key R",
+            )
+            .clicked()
+        {
             out.push(Command::RunFromHere(state.draft.clone()));
         }
         if ui.add_enabled(!state.draft.is_empty(), egui::Button::new("Discard")).clicked() {
@@ -70,7 +75,13 @@ fn show_setting(ui: &mut Ui, state: &State, info: &SettingInfo, out: &mut Vec<Co
     };
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        let mark = if drafted.is_some() { "● " } else if in_run != info.default { "○ " } else { "" };
+        let mark = if drafted.is_some() {
+            "● "
+        } else if in_run != info.default {
+            "○ "
+        } else {
+            ""
+        };
         let label = RichText::new(format!("{mark}{}", info.key)).size(12.0).color(colour);
         let room = (ui.available_width() - 118.0).max(60.0);
         ui.allocate_ui_with_layout(vec2(room, 20.0), Layout::left_to_right(Align::Center), |ui| {
@@ -98,25 +109,30 @@ fn edit(ui: &mut Ui, info: &SettingInfo, value: &Value) -> Option<Value> {
     match &info.domain {
         Domain::Switch => {
             let mut is_on = value.as_bool().unwrap_or_default();
-            let response = ui.checkbox(&mut is_on, "");
+            let response = ui.checkbox(&mut is_on, "").accessible_name(&info.key);
             response.changed().then(|| json!(is_on))
         }
         Domain::Choice(words) => {
             let mut chosen = value.as_str().unwrap_or_default().to_owned();
             let before = chosen.clone();
-            ComboBox::from_id_salt(&info.key).width(78.0).selected_text(RichText::new(&chosen).size(11.0)).show_ui(ui, |ui| {
+            let choice = ComboBox::from_id_salt(&info.key)
+                .width(78.0)
+                .selected_text(RichText::new(&chosen).size(11.0));
+            let shown = choice.show_ui(ui, |ui| {
                 for word in words {
                     ui.selectable_value(&mut chosen, word.clone(), word);
                 }
             });
+            shown.response.accessible_name(&info.key);
             (chosen != before).then(|| json!(chosen))
         }
         Domain::OddBetween(low, high) => {
             let mut number = value.as_u64().unwrap_or_default();
             let before = number;
-            ui.add(DragValue::new(&mut number).range(u64::from(*low)..=u64::from(*high)).speed(0.2));
+            ui.add(DragValue::new(&mut number).range(u64::from(*low)..=u64::from(*high)).speed(0.2))
+                .accessible_name(&info.key);
             // An even number cannot be meant: the odd one in the direction of the change is.
-            if number != before && number % 2 == 0 {
+            if number != before && number.is_multiple_of(2) {
                 number = if number > before { number + 1 } else { number - 1 };
             }
             (number != before).then(|| json!(number))
@@ -124,14 +140,16 @@ fn edit(ui: &mut Ui, info: &SettingInfo, value: &Value) -> Option<Value> {
         Domain::Between(low, high) if info.default.is_u64() => {
             let mut number = value.as_i64().unwrap_or_default();
             let before = number;
-            ui.add(DragValue::new(&mut number).range(low.ceil() as i64..=high.floor() as i64).speed(0.05));
+            ui.add(DragValue::new(&mut number).range(low.ceil() as i64..=high.floor() as i64).speed(0.05))
+                .accessible_name(&info.key);
             (number != before).then(|| json!(number))
         }
         Domain::Between(low, high) => {
             let mut number = value.as_f64().unwrap_or_default();
             let before = number;
             let speed = (before.abs() * 0.01).max(0.002);
-            ui.add(DragValue::new(&mut number).range(*low..=*high).speed(speed).max_decimals(4));
+            ui.add(DragValue::new(&mut number).range(*low..=*high).speed(speed).max_decimals(4))
+                .accessible_name(&info.key);
             (number != before).then(|| json!(number))
         }
     }

@@ -10,9 +10,9 @@ use crate::state::State;
 use crate::{panels, theme, view2d};
 
 /// Room for the arrow and the number between two patches, points.
-const BETWEEN: f32 = 52.0;
+const BETWEEN: f32 = 68.0;
 /// Room for the words above and below a patch, points.
-const WORDS: (f32, f32) = (17.0, 31.0);
+const WORDS: (f32, f32) = (16.0, 18.0);
 
 /// One patch of the strip.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,13 +31,20 @@ pub struct Patch {
 pub fn patches(trace: &StepTrace) -> Vec<Patch> {
     let Some(evidence) = trace.template() else { return Vec::new() };
     let mut patches = Vec::new();
-    let mut add = |array, title: String, step: String, stage| patches.push(Patch { array, title, step, stage });
+    let mut add =
+        |array, title: String, step: String, stage| patches.push(Patch { array, title, step, stage });
     if let Some(s) = &evidence.scale_roll {
         let applied = |is_on: bool, words: String| if is_on { words } else { "off".to_owned() };
-        add(ArrayName::Reference, format!("reference, step {}", s.template_step), String::new(), Stage::ScaleRoll);
+        add(
+            ArrayName::Reference,
+            format!("reference, step {}", s.template_step),
+            String::new(),
+            Stage::ScaleRoll,
+        );
         let scale = applied(s.applied_scale == s.scale, format!("×{:.3}", s.applied_scale));
         add(ArrayName::Scaled, "scaled".to_owned(), scale, Stage::ScaleRoll);
-        let roll = applied(s.applied_roll_rad == s.roll_rad, format!("{:+.2}°", s.applied_roll_rad.to_degrees()));
+        let roll =
+            applied(s.applied_roll_rad == s.roll_rad, format!("{:+.2}°", s.applied_roll_rad.to_degrees()));
         add(ArrayName::Rolled, "rolled".to_owned(), roll, Stage::ScaleRoll);
     }
     if let Some(m) = &evidence.match_template {
@@ -46,7 +53,12 @@ pub fn patches(trace: &StepTrace) -> Vec<Patch> {
         add(ArrayName::Difference, "difference".to_owned(), "−".to_owned(), Stage::MatchTemplate);
     }
     if let Some(s) = &evidence.point_stereo {
-        add(ArrayName::RightWindow, "right image".to_owned(), format!("ncc {:.2}", s.score), Stage::PointStereo);
+        add(
+            ArrayName::RightWindow,
+            "right image".to_owned(),
+            format!("ncc {:.2}", s.score),
+            Stage::PointStereo,
+        );
     }
     patches
 }
@@ -97,7 +109,7 @@ fn show_patch(ui: &mut Ui, state: &State, patch: &Patch, frame: Rect, out: &mut 
             view2d::checker(painter, frame);
             let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
             painter.image(raster.texture.id(), frame, whole, theme::UNTINTED);
-            statistics(ui, raster, patch.array, frame);
+            statistics(ui, raster, frame);
         }
         Slot::Failed(_) => {
             painter.rect_filled(frame, 0.0, theme::WELL);
@@ -105,43 +117,52 @@ fn show_patch(ui: &mut Ui, state: &State, patch: &Patch, frame: Rect, out: &mut 
         }
         Slot::Absent | Slot::Loading => {
             painter.rect_filled(frame, 0.0, theme::WELL);
-            painter.text(frame.center(), Align2::CENTER_CENTER, "loading …", theme::image_font(), theme::WEAK);
+            painter.text(
+                frame.center(),
+                Align2::CENTER_CENTER,
+                "loading …",
+                theme::image_font(),
+                theme::WEAK,
+            );
         }
     }
     ui.painter().rect_stroke(frame, 0.0, egui::Stroke::new(1.0, border), egui::StrokeKind::Outside);
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, format!("{} patch", patch.title)));
+    response.widget_info(|| {
+        egui::WidgetInfo::labeled(egui::Role::Button, true, format!("{} patch", patch.title))
+    });
     if response.on_hover_text(explain(patch.array)).clicked() {
         out.push(Command::SelectStage(patch.stage));
     }
 }
 
-/// Mean and standard deviation below a patch, and the limits of the difference.
-fn statistics(ui: &Ui, raster: &Raster, array: ArrayName, frame: Rect) {
-    let painter = ui.painter();
-    let below = frame.center_bottom() + vec2(0.0, 3.0);
-    let first = format!("mean {:.3}  σ {:.3}", raster.mean, raster.sigma);
-    painter.text(below, Align2::CENTER_TOP, first, theme::digit_font(), theme::TEXT);
-    let [width, height] = raster.size();
-    let second = match array {
-        ArrayName::Difference => format!("blue −{DIFFERENCE_LIMIT}  red +{DIFFERENCE_LIMIT}"),
-        _ => format!("{width} × {height} px"),
-    };
-    painter.text(below + vec2(0.0, 14.0), Align2::CENTER_TOP, second, theme::digit_font(), theme::WEAK);
+/// Mean and standard deviation below a patch.
+fn statistics(ui: &Ui, raster: &Raster, frame: Rect) {
+    let below = frame.center_bottom() + vec2(0.0, 4.0);
+    let words = format!("mean {:.3}  σ {:.3}", raster.mean, raster.sigma);
+    ui.painter().text(below, Align2::CENTER_TOP, words, theme::digit_font(), theme::TEXT);
 }
 
 fn explain(array: ArrayName) -> String {
     let what = match array {
         ArrayName::Reference => "The template as it was taken.",
-        ArrayName::Scaled => "The template magnified by the ratio of distances, so that it has the size expected now.",
+        ArrayName::Scaled => {
+            "The template magnified by the ratio of distances, so that it has the size expected now."
+        }
         ArrayName::Rolled => "Then turned by the roll of the camera: this is what was searched for.",
         ArrayName::Matched => "The left image at the match.",
-        ArrayName::Difference => "Matched minus rolled, both with mean 0 and deviation 1: blue darker, red brighter.",
-        ArrayName::RightWindow => "The right image at the stereo match, resampled as the left camera sees it.",
+        ArrayName::Difference => {
+            "Matched minus rolled, both with mean 0 and deviation 1: blue is darker, red brighter."
+        }
+        ArrayName::RightWindow => {
+            "The right image at the stereo match, resampled as the left camera sees it."
+        }
         ArrayName::Surface => "The scores of all positions.",
     };
     if array == ArrayName::Difference {
-        what.to_owned()
+        format!("{what}\nShown from −{DIFFERENCE_LIMIT} (blue) over 0 (white) to +{DIFFERENCE_LIMIT} (red).")
     } else {
-        format!("{what}\nShown from {PATCH_SIGMAS} σ below its mean to {PATCH_SIGMAS} σ above: correlation ignores both.")
+        format!(
+            "{what}\nShown from {PATCH_SIGMAS} σ below its mean to {PATCH_SIGMAS} σ above: correlation ignores both."
+        )
     }
 }

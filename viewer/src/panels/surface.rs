@@ -30,7 +30,9 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     };
     let raster = match state.array(ArrayName::Surface) {
         Slot::Ready(raster) => raster,
-        Slot::Failed(problem) => return panels::missing(ui, &format!("The scores cannot be shown: {}", problem.detail)),
+        Slot::Failed(problem) => {
+            return panels::missing(ui, &format!("The scores cannot be shown: {}", problem.detail));
+        }
         Slot::Absent | Slot::Loading => return panels::missing(ui, "Loading the scores …"),
     };
     let area = ui.available_rect_before_wrap();
@@ -79,7 +81,8 @@ fn paint_contour(canvas: &Canvas, raster: &Raster, region: PixelRect, threshold:
 fn paint_marks(canvas: &Canvas, trace: &StepTrace, matched: &TemplateMatch, run: egui::Color32) {
     let overlay = Overlay::new(&canvas.painter, &canvas.transform);
     if let Some(pixel) = trace.point_mast.as_ref().and_then(|p| p.predicted_left) {
-        if let Some(covariance) = trace.point_mast.as_ref().and_then(|p| p.predicted_covariance_px2.as_ref()) {
+        if let Some(covariance) = trace.point_mast.as_ref().and_then(|p| p.predicted_covariance_px2.as_ref())
+        {
             overlay.ellipse(pixel, covariance, 3.0, theme::PREDICTION, Line::Dotted);
         }
         overlay.mark(pixel, Mark::Cross, theme::PREDICTION);
@@ -103,7 +106,8 @@ fn warn_of_edge(canvas: &Canvas, matched: &TemplateMatch) {
         let area = canvas.transform.rect.shrink(1.0);
         canvas.painter.rect_stroke(area, 0.0, egui::Stroke::new(2.0, theme::LOST), egui::StrokeKind::Inside);
         let words = "The peak is at the edge: the true one may lie outside the search window.";
-        let galley = canvas.painter.layout(words.to_owned(), theme::image_font(), theme::LOST, area.width() - 16.0);
+        let galley =
+            canvas.painter.layout(words.to_owned(), theme::image_font(), theme::LOST, area.width() - 16.0);
         let frame = Rect::from_min_size(area.left_top() + vec2(8.0, 6.0), galley.size());
         canvas.painter.rect_filled(frame.expand(3.0), 2.0, theme::SCRIM);
         canvas.painter.galley(frame.min, galley, theme::LOST);
@@ -113,17 +117,26 @@ fn warn_of_edge(canvas: &Canvas, matched: &TemplateMatch) {
 /// Pixel and score under the pointer, else what the surface holds.
 fn status(ui: &mut Ui, canvas: &Canvas, raster: &Raster, region: PixelRect, matched: &TemplateMatch) {
     ui.horizontal(|ui| {
-        ui.set_height(STATUS - 4.0);
+        ui.set_height(STATUS - 6.0);
         let Some(pixel) = canvas.hovered(region) else {
-            let flat = if matched.flat_positions > 0 { format!(", {} flat", matched.flat_positions) } else { String::new() };
-            ui.label(theme::note(format!("{} positions{flat}; white line: threshold; checker: excluded", matched.positions)));
+            let flat = if matched.flat_positions > 0 {
+                format!(", {} flat", matched.flat_positions)
+            } else {
+                String::new()
+            };
+            ui.label(theme::note(format!(
+                "{} positions{flat}; white line: threshold; checker: excluded",
+                matched.positions
+            )));
             return;
         };
         let (x, y) = (pixel.x.round() as i64, pixel.y.round() as i64);
         let value = raster.at(x - i64::from(region.x), y - i64::from(region.y));
         ui.label(theme::number(format!("x {x}  y {y}")).size(11.0));
         ui.label(theme::note("ncc"));
-        ui.label(theme::number(value.map_or_else(|| "excluded".to_owned(), |v| format!("{v:+.3}"))).size(11.0));
+        ui.label(
+            theme::number(value.map_or_else(|| "excluded".to_owned(), |v| format!("{v:+.3}"))).size(11.0),
+        );
     });
 }
 

@@ -3,7 +3,6 @@
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui, vec2};
 use sightline_core::session::view::{RunView, TargetView};
 
-use super::digits;
 use crate::command::{Command, Mode};
 use crate::overlay::{Mark, paint_mark};
 use crate::state::{State, run_letter, state_of_word};
@@ -34,13 +33,21 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 fn show_target(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Command>) {
     let is_selected = state.cursor.target == Some(target.number);
     ui.horizontal(|ui| {
-        let text = RichText::new(&target.label).strong().color(if is_selected { theme::STRONG } else { theme::TEXT });
+        let text = RichText::new(&target.label).strong().color(if is_selected {
+            theme::STRONG
+        } else {
+            theme::TEXT
+        });
         if ui.add(egui::Label::new(text).sense(Sense::click())).clicked() {
             let run = target.runs.last().map_or(0, |run| run.number);
             out.push(Command::Look { target: target.number, run });
         }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            if ui.small_button("Remove").on_hover_text("Takes the target and its runs out of the session").clicked() {
+            if ui
+                .small_button("Remove")
+                .on_hover_text("Takes the target and its runs out of the session")
+                .clicked()
+            {
                 out.push(Command::RemoveTarget(target.number));
             }
             let at = target.designation;
@@ -74,7 +81,12 @@ fn show_run(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out:
     });
     let response = inside.response.interact(Sense::click());
     response.widget_info(|| {
-        egui::WidgetInfo::selected(egui::Role::Button, true, is_selected, format!("run {}", run_letter(run.number)))
+        egui::WidgetInfo::selected(
+            egui::Role::Button,
+            true,
+            is_selected,
+            format!("run {}", run_letter(run.number)),
+        )
     });
     if response.clicked() {
         out.push(Command::Look { target: target.number, run: run.number });
@@ -94,7 +106,10 @@ fn how_far(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: 
         }
         ui.label(theme::number(format!("{} of {}", progress.k, progress.n)).size(11.0));
     } else if let Some(why) = &run.stopped {
-        ui.label(RichText::new(why).small().color(theme::LOST));
+        if ui.small_button("Resume").clicked() {
+            out.push(Command::ResumeRun { target: target.number, run: run.number });
+        }
+        ui.add(egui::Label::new(RichText::new(why).small().color(theme::LOST)).truncate()).on_hover_text(why);
     } else if run.complete {
         ui.label(theme::note("complete"));
     } else {
@@ -130,7 +145,7 @@ fn summary(run: &RunView) -> String {
         words.push(format!("{false_tracked} false"));
     }
     if let Some(err_px) = summary.final_err_px {
-        words.push(format!("last {} px", digits((err_px * 100.0).round() / 100.0)));
+        words.push(format!("last {err_px:.1} px"));
     }
     if words.is_empty() { format!("{} steps", summary.steps) } else { words.join(", ") }
 }

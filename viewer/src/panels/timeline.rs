@@ -63,17 +63,27 @@ pub fn cell(state: &State, step: usize) -> Cell {
 /// Shows the timeline.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let count = state.stop_count();
-    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), HEIGHT), Sense::click_and_drag());
+    let (rect, response) =
+        ui.allocate_exact_size(vec2(ui.available_width(), HEIGHT), Sense::click_and_drag());
     let painter = ui.painter_at(rect);
     if count == 0 {
-        painter.text(rect.center(), Align2::CENTER_CENTER, state.missing_target(), theme::image_font(), theme::WEAK);
+        painter.text(
+            rect.center(),
+            Align2::CENTER_CENTER,
+            state.missing_target(),
+            theme::image_font(),
+            theme::WEAK,
+        );
         return;
     }
     let width = rect.width() / count as f32;
     let frame = |step: usize| {
         let left = rect.left() + width * step as f32;
         let gap = if width > 6.0 { 1.0 } else { 0.0 };
-        Rect::from_min_max(pos2(left + gap, rect.top() + 8.0), pos2(left + width - gap, rect.top() + 8.0 + BAND))
+        Rect::from_min_max(
+            pos2(left + gap, rect.top() + 8.0),
+            pos2(left + width - gap, rect.top() + 8.0 + BAND),
+        )
     };
     for step in 0..count {
         paint_cell(&painter, frame(step), cell(state, step));
@@ -90,7 +100,9 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     }
     paint_cursor(&painter, frame(state.cursor.step.min(count - 1)));
     let at = |x: f32| (((x - rect.left()) / width).max(0.0) as usize).min(count - 1);
-    if let Some(pointer) = response.interact_pointer_pos().filter(|_| response.clicked() || response.dragged()) {
+    if let Some(pointer) =
+        response.interact_pointer_pos().filter(|_| response.clicked() || response.dragged())
+    {
         let step = at(pointer.x);
         if step != state.cursor.step {
             out.push(Command::Go(Go::Step(step)));

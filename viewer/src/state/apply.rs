@@ -1,14 +1,13 @@
 //! Carrying out what the person asked for.
 
-use sightline_core::session::wire::{NewRun, NewTarget};
-use sightline_core::session::{Cursor, Fork};
-use sightline_core::settings::Changes;
 use sightline_core::frames::Pixel;
+use sightline_core::session::Cursor;
+use sightline_core::session::wire::{NewRun, NewTarget};
+use sightline_core::settings::Changes;
 
-use super::{Place, State, events, run_letter};
+use super::{Place, State, Views, events, run_letter};
 use crate::command::{Command, Go, Mode, Panel};
 use crate::net::Request;
-use crate::state::Views;
 
 impl State {
     /// Carries out one command.
@@ -33,6 +32,9 @@ impl State {
             Command::RunFromHere(changes) => self.run_from_here(changes),
             Command::CancelRun { target, run } => {
                 self.ask(|session| Request::CancelRun { session, target, run });
+            }
+            Command::ResumeRun { target, run } => {
+                self.ask(|session| Request::ResumeRun { session, target, run });
             }
             Command::View(panel, view) => match panel {
                 Panel::Left => self.views.left = view,
@@ -157,9 +159,4 @@ impl State {
             }
         }
     }
-}
-
-/// Where a run left another, in words.
-pub fn fork_words(fork: Fork) -> String {
-    format!("from {} at step {}", run_letter(fork.run), fork.from_step)
 }

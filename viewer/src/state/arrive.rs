@@ -2,12 +2,12 @@
 
 use sightline_core::session::Cursor;
 use sightline_core::session::view::{RunView, SessionView};
-use sightline_core::session::wire::{Event, NewSession, Problem};
+use sightline_core::session::wire::{Event, NewSession, Problem, SessionEntry, TraverseEntry};
 
 use super::{Connection, Progress, Refusal, State, run_letter};
 use crate::cache::Key;
 use crate::command::Mode;
-use crate::net::{Arrived, Reply, Request, SessionEntry, TraverseEntry};
+use crate::net::{Arrived, Reply, Request};
 
 impl State {
     /// Asks for what a page needs first.
@@ -193,7 +193,8 @@ impl State {
             self.traverse = None;
             self.outbox.push(Request::Traverse(view.traverse.clone()));
         }
-        let is_moved_elsewhere = !self.sync.cursor_asked && !moved_meanwhile && view.cursor != self.sync.server_cursor;
+        let is_moved_elsewhere =
+            !self.sync.cursor_asked && !moved_meanwhile && view.cursor != self.sync.server_cursor;
         if is_other || is_moved_elsewhere {
             self.cursor = view.cursor;
             self.sync.server_cursor = view.cursor;
@@ -224,7 +225,10 @@ impl State {
         self.draft.clear();
         self.keep_cursor_valid();
         if let Some(target) = self.target() {
-            let text = format!("{} is picked; the run goes on by itself. Step along with Right and Left.", target.label);
+            let text = format!(
+                "{} is picked; the run goes on by itself. Step along with Right and Left.",
+                target.label
+            );
             self.messages.note(text);
         }
     }

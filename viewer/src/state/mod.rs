@@ -14,7 +14,7 @@ use sightline_core::frames::Pixel;
 use sightline_core::limits::SettingInfo;
 use sightline_core::session::Cursor;
 use sightline_core::session::view::{RunView, SessionView, TargetView};
-use sightline_core::session::wire::{Problem, StopView, TraverseView};
+use sightline_core::session::wire::{Problem, StopView, TraverseEntry, TraverseView};
 use sightline_core::settings::Changes;
 use sightline_core::target::TrackingState;
 use sightline_core::trace::{ArrayName, StepRow, StepTrace};
@@ -22,7 +22,7 @@ use sightline_core::trace::{ArrayName, StepRow, StepTrace};
 use self::messages::Messages;
 use crate::cache::{Cache, Eye, Key, Slot, StepKey};
 use crate::command::{Layer, Mode, Panel, Stage};
-use crate::net::{Request, TraverseEntry};
+use crate::net::Request;
 use crate::raster::Raster;
 use crate::view2d::View2d;
 
@@ -275,13 +275,22 @@ impl State {
         let step = self.cursor.step;
         if step < target.designation.step {
             let first = target.designation.step;
-            return format!("{} was picked at step {first}. Go there, or press PgDn for the next event.", target.label);
+            return format!(
+                "{} was picked at step {first}. Go there, or press PgDn for the next event.",
+                target.label
+            );
         }
         if self.row().is_none() {
             return match (self.run_progress(), self.run().and_then(|run| run.stopped.as_deref())) {
-                (Some(p), _) => format!("Step {step} is not computed yet: the run has done {} of {}.", p.k, p.n),
-                (None, Some(why)) => format!("The run stopped before step {step} ({why}). Press “Run from here” at an earlier step."),
-                (None, None) => format!("Step {step} is not computed yet. It appears here as soon as the run reaches it."),
+                (Some(p), _) => {
+                    format!("Step {step} is not computed yet: the run has done {} of {}.", p.k, p.n)
+                }
+                (None, Some(why)) => format!(
+                    "The run stopped before step {step} ({why}). Press “Run from here” at an earlier step."
+                ),
+                (None, None) => {
+                    format!("Step {step} is not computed yet. It appears here as soon as the run reaches it.")
+                }
             };
         }
         match self.trace_at(step) {
@@ -340,6 +349,14 @@ impl State {
         keys
     }
 
+    /// Those of `keys` that are images which must be rendered first.
+    pub fn unrendered(&self, keys: &[Key]) -> Vec<Key> {
+        let is_ready =
+            |step: usize| self.traverse.as_ref().and_then(|t| t.stops.get(step)).is_some_and(|s| s.ready);
+        let is_slow = |key: &&Key| matches!(key, Key::Image { step, .. } if !is_ready(*step));
+        keys.iter().filter(is_slow).cloned().collect()
+    }
+
     fn want_step(&self, step: usize, is_neighbour: bool, keys: &mut Vec<Key>) {
         let computed = self.row_at(step).and_then(|_| self.step_key(step));
         keys.extend(computed.clone().map(Key::Trace));
@@ -368,7 +385,10 @@ impl State {
             self.sync.session_asked = Some(self.sync.cursor_moves);
             self.outbox.push(Request::Session(id.clone()));
         }
-        if self.cursor != self.sync.server_cursor && !self.sync.cursor_asked && self.connection == Connection::Live {
+        if self.cursor != self.sync.server_cursor
+            && !self.sync.cursor_asked
+            && self.connection == Connection::Live
+        {
             self.sync.cursor_asked = true;
             self.sync.cursor_moves += 1;
             self.outbox.push(Request::PutCursor { session: id, cursor: self.cursor });

@@ -51,9 +51,13 @@ pub struct MatchNoise {
 /// The error of the position of `matched` against `template`, patches of the same size, where the true map
 /// between them is `I + misfit`.
 pub fn match_noise(template: &Patch, matched: &Patch, misfit: &Matrix2<f64>) -> MatchNoise {
-    let undetermined =
-        MatchNoise { covariance_px2: Matrix2::identity() * UNDETERMINED_PX.powi(2), bias_px: Vector2::zeros() };
-    let (Some(template), Some(image)) = (normalise(template), normalise(matched)) else { return undetermined };
+    let undetermined = MatchNoise {
+        covariance_px2: Matrix2::identity() * UNDETERMINED_PX.powi(2),
+        bias_px: Vector2::zeros(),
+    };
+    let (Some(template), Some(image)) = (normalise(template), normalise(matched)) else {
+        return undetermined;
+    };
     let (gx, gy) = gradient::central(&image);
     let (width, height) = image.dimensions();
     let middle = Vector2::new(f64::from(width - 1), f64::from(height - 1)) / 2.0;
@@ -63,7 +67,8 @@ pub fn match_noise(template: &Patch, matched: &Patch, misfit: &Matrix2<f64>) -> 
     for y in 1..height - 1 {
         for x in 1..width - 1 {
             let g = Vector2::new(f64::from(gx.get_pixel(x, y)[0]), f64::from(gy.get_pixel(x, y)[0]));
-            let residual = f64::from(image.get_pixel(x, y)[0]) - score * f64::from(template.get_pixel(x, y)[0]);
+            let residual =
+                f64::from(image.get_pixel(x, y)[0]) - score * f64::from(template.get_pixel(x, y)[0]);
             if residual.is_finite() && g.iter().all(|v| v.is_finite()) {
                 let offset = Vector2::new(f64::from(x), f64::from(y)) - middle;
                 information += g * g.transpose();

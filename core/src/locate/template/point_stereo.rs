@@ -129,7 +129,9 @@ pub fn point_stereo(input: &StereoInput<'_>, settings: &TemplateSettings) -> Res
     let affine = curve.right_from_left(input.left, input.right, input.left_pixel, range_m);
     let right_window = window_through(input.right_image, right_pixel, &affine, half, settings.kernel);
     let right_from_left = surface_slope(&curve, &affine, best.along, input, settings).unwrap_or(affine);
-    let misfit = affine.try_inverse().map_or_else(Matrix2::zeros, |inverse| inverse * right_from_left - Matrix2::identity());
+    let misfit = affine
+        .try_inverse()
+        .map_or_else(Matrix2::zeros, |inverse| inverse * right_from_left - Matrix2::identity());
     let noise = match_noise(&template, &right_window, &misfit);
     let seen = noise.covariance_px2 + noise.bias_px * noise.bias_px.transpose();
     Ok(PointStereo {
@@ -232,7 +234,8 @@ fn refine(scores: &[f32], rows: usize, from: f64, spacing: f64, side: i32, sub_p
     };
     if sub_pixel && !at_end {
         // Rows of the fit lie across the curve, columns along it.
-        let neighbours = Matrix3::from_fn(|dy, dx| f64::from(scores[(column + dx - 1) * rows + row + dy - 1]));
+        let neighbours =
+            Matrix3::from_fn(|dy, dx| f64::from(scores[(column + dx - 1) * rows + row + dy - 1]));
         if let Some(fit) = Fit::quadratic(&neighbours) {
             best.along += fit.offset.x * spacing;
             best.across += fit.offset.y;

@@ -81,7 +81,8 @@ impl ScaleRoll {
 /// How offsets in the old image move on the target's surface: `∂pixel_new/∂p · R · ∂p/∂pixel_old`, px per px.
 fn surface_map(appearance: &Appearance, now_from_template: &Pose, left: &Camera) -> Option<Matrix2<f64>> {
     let slope = appearance.surface_by_pixel?;
-    let (_, jacobian) = left.model.project_with_jacobian(&(now_from_template * appearance.position_in_rover))?;
+    let (_, jacobian) =
+        left.model.project_with_jacobian(&(now_from_template * appearance.position_in_rover))?;
     Some(jacobian * now_from_template.rotation.to_rotation_matrix().matrix() * slope)
 }
 

@@ -115,22 +115,30 @@ fn targets_satisfy_the_rule_and_follow_from_the_seed() {
         let seen = last_camera.project(&point).unwrap();
         assert!(seen.is_inside(1024, 1024));
         assert!(demo.world.is_visible(&last_camera.model.centre(), &point));
+        let rock = demo.world.cast(&camera.ray(*pixel).unwrap()).unwrap().surface;
+        assert!(matches!(rock, SurfaceId::Rock(_)));
         let mut distances_m = Vec::new();
-        let mut shaded = 0;
+        let (mut shaded, mut same) = (0, 0);
         for k in 0..441 {
             let at = pixel.offset(f64::from(k % 21) - 10.0, f64::from(k / 21) - 10.0);
             let hit = demo.world.cast(&camera.ray(at).unwrap()).unwrap();
             distances_m.push(hit.distance_m);
             shaded += u32::from(demo.world.in_shadow(&hit.point));
+            same += u32::from(hit.surface == rock);
         }
+        assert!(f64::from(same) >= 0.90 * 441.0);
         distances_m.sort_by(f64::total_cmp);
         let distance_m = (point - camera.model.centre()).norm();
         assert!(distances_m[440] - distances_m[0] <= 0.10 * distance_m + 1e-9);
         assert!(f64::from(shaded) <= 0.20 * 441.0);
     }
     assert_eq!(targets, choose_targets(&demo.world, &demo.scenario, &demo.index));
+    let mut anywhere = demo.scenario.clone();
+    anywhere.targets.on_rocks = false;
+    let anywhere = choose_targets(&demo.world, &anywhere, &demo.index);
+    assert!(share_on_rocks(&demo.world, &demo.index, &anywhere) < 1.0);
     let other = Scenario { seed: 77, ..demo.scenario.clone() };
     assert_ne!(targets, choose_targets(&demo.world, &other, &demo.index));
     let share = share_on_rocks(&demo.world, &demo.index, &targets);
-    assert!((0.0..=1.0).contains(&share));
+    assert!((share - 1.0).abs() < 1e-12, "{share}");
 }

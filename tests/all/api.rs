@@ -1,0 +1,254 @@
+//! Sessions over HTTP: pick, run, go back, fork, cancel, restart.
+
+use std::time::Duration;
+
+use axum::http::{Method, header};
+use serde_json::{Value, json};
+use sightline_tests::server::{PIXEL, TestServer, request, small_drive, small_recording};
+
+/// Where the steps of a run are.
+fn step(session: &str, run: u64, step: u64) -> String {
+    format!("sessions/{session}/targets/0/runs/{run}/steps/{step}")
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_picked_target_is_tracked_to_the_last_stop() {
+    let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
+    let server = TestServer::open(drive.path(), folder.path());
+    let session = server.begin().await;
+    assert_eq!(server.pick(&session).await, 0);
+    let run = server.ended(&session, 0, 0).await;
+    let rows = run["rows"].as_array().unwrap();
+    assert_eq!((rows.len(), &run["complete"]), (5, &json!(true)));
+    assert_eq!(run["summary"]["run_tracked"], json!(true), "{run}");
+    let view = server.get(&format!("sessions/{session}")).await.expect(200);
+    assert_eq!(view["targets"][0]["runs"][0], run);
+    assert_eq!(view["cursor"], json!({ "target": 0, "run": 0, "step": 0 }));
+    let list = server.get("sessions").await.expect(200);
+    assert_eq!(list[0]["target_count"], json!(1));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn going_back_is_a_read_of_the_same_bytes() {
+    let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
+    let server = TestServer::open(drive.path(), folder.path());
+    let session = server.begin().await;
+    server.pick(&session).await;
+    server.ended(&session, 0, 0).await;
+    let first = server.get(&step(&session, 0, 2)).await;
+    let array = server.get(&format!("{}/arrays/surface.npy", step(&session, 0, 2))).await;
+    // Nothing can be computed again without images.
+    std::fs::remove_dir_all(drive.path()).unwrap();
+    for number in [4, 3, 2] {
+        let cursor = json!({ "target": 0, "run": 0, "step": number });
+        server.json(Method::PUT, &format!("sessions/{session}/cursor"), &cursor).await.expect(200);
+    }
+    assert_eq!(server.get(&step(&session, 0, 2)).await, first);
+    assert_eq!(server.get(&format!("{}/arrays/surface.npy", step(&session, 0, 2))).await, array);
+    let trace = first.expect(200);
+    for stage in ["predict", "point_mast", "capture", "locate", "judge", "update"] {
+        let alone = server.get(&format!("{}/stages/{stage}", step(&session, 0, 2))).await.expect(200);
+        assert_eq!(alone, trace[stage], "{stage}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_array_is_a_numpy_file_of_the_size_that_the_step_says() {
+    let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
+    let server = TestServer::open(drive.path(), folder.path());
+    let session = server.begin().await;
+    server.pick(&session).await;
+    server.ended(&session, 0, 0).await;
+    let trace = server.get(&step(&session, 0, 1)).await.expect(200);
+    for name in ["reference", "scaled", "rolled", "matched", "difference", "right_window", "surface"] {
+        let answer = server.get(&format!("{}/arrays/{name}.npy", step(&session, 0, 1))).await;
+        let image = sightline_core::image::npy::decode(&answer.bytes, name).unwrap();
+        // The surface has a score wherever the whole template lies in the search window.
+        let window = &trace["locate"]["evidence"]["match_template"]["search_window"];
+        let positions = |key: &str| window[key].as_u64().map(|side| side - 20);
+        let said = |key: &str| if name == "surface" { positions(key) } else { Some(21) };
+        let (width, height) = image.dimensions();
+        assert_eq!((Some(width.into()), Some(height.into())), (said("width"), said("height")), "{name}");
+    }
+    server.get(&format!("{}/arrays/surface.npy", step(&session, 0, 0))).await.problem(404, "not_found");
+    server.get(&format!("{}/arrays/nonsense.npy", step(&session, 0, 1))).await.problem(404, "not_found");
+    server.get(&format!("{}/arrays/surface", step(&session, 0, 1))).await.problem(404, "not_found");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_fork_shares_the_steps_before_it_and_changes_none_of_them() {
+    let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
+    let server = TestServer::open(drive.path(), folder.path());
+    let session = server.begin().await;
+    server.pick(&session).await;
+    let parent = server.ended(&session, 0, 0).await;
+    let new = json!({ "run": 0, "from_step": 3, "settings": { "ncc_min": 0.999 } });
+    let fork = server.post(&format!("sessions/{session}/targets/0/runs"), &new).await.expect(202);
+    assert_eq!((&fork["number"], &fork["changes"]), (&json!(1), &json!({ "ncc_min": 0.999 })));
+    let fork = server.ended(&session, 0, 1).await;
+    for number in 0..3 {
+        let (a, b) =
+            (server.get(&step(&session, 0, number)).await, server.get(&step(&session, 1, number)).await);
+        assert_eq!(a.bytes, b.bytes, "step {number}");
+    }
+    assert_eq!(fork["rows"][3]["state"], json!("lost"), "{fork}");
+    assert_eq!(server.ended(&session, 0, 0).await, parent);
+    // From the designation's own step on, the target is designated anew.
+    let again = json!({ "run": 1, "from_step": 0 });
+    server.post(&format!("sessions/{session}/targets/0/runs"), &again).await.expect(202);
+    let again = server.ended(&session, 0, 2).await;
+    assert_eq!(again["fork"], json!({ "run": 1, "from_step": 0 }));
+    assert_eq!(again["rows"].as_array().unwrap().len(), 5);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_stop_without_its_image_is_a_fault_of_that_step_alone() {
+    let (drive, folder) = (small_recording(), tempfile::tempdir().unwrap());
+    let server = TestServer::open(drive.path(), folder.path());
+    let view = server.get(&format!("traverses/{}", server.traverse)).await.expect(200);
+    assert_eq!(view["simulated"], json!(false));
+    let index = server.state.traverses()[0].traverse.index().clone();
+    std::fs::remove_file(drive.path().join(&index.stops[2].right.image)).unwrap();
+    let session = server.begin().await;
+    server.pick(&session).await;
+    let run = server.ended(&session, 0, 0).await;
+    assert_eq!(run["complete"], json!(true));
+    let fault = run["rows"][2]["reason"].as_str().unwrap();
+    assert!(fault.contains(&index.stops[2].right.image) && fault.contains("step 2"), "{fault}");
+    assert!(run["rows"][4]["ncc"].as_f64().unwrap() > 0.8, "{run}");
+    let image = format!("traverses/{}/steps/2/images/right.png", server.traverse);
+    assert!(server.get(&image).await.problem(422, "file").contains("step 2"));
+    assert_eq!(
+        server.get(&format!("traverses/{}/steps/3/images/right.png", server.traverse)).await.status,
+        200
+    );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_image_is_sent_once_and_then_known_by_its_tag() {
+    let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
+    std::fs::remove_dir_all(drive.path().join("images")).unwrap();
+    let server = TestServer::open(drive.path(), folder.path());
+    let path = format!("traverses/{}/steps/3/images/left.png", server.traverse);
+    let rendered = server.get(&path).await;
+    let image = image::load_from_memory(&rendered.bytes).unwrap();
+    assert_eq!((image.width(), image.height(), image.color()), (256, 256, image::ColorType::L8));
+    let tag = rendered.headers[header::ETAG].clone();
+    let again = request(Method::GET, &path).header(header::IF_NONE_MATCH, tag);
+    let again = server.send(again.body(axum::body::Body::empty()).unwrap()).await;
+    assert_eq!((again.status.as_u16(), again.bytes.len()), (304, 0));
+    let deep = server.get(&format!("{path}?bits=16")).await;
+    assert_eq!(image::load_from_memory(&deep.bytes).unwrap().color(), image::ColorType::L16);
+    server.get(&format!("{path}?bits=12")).await.problem(422, "query");
+    server.get(&format!("{path}?colour=red")).await.problem(422, "query");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn stops_ahead_of_the_cursor_are_rendered_unasked() {
+    let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
+    std::fs::remove_dir_all(drive.path().join("images")).unwrap();
+    let server = TestServer::open(drive.path(), folder.path());
+    let mut events = server.state.events().subscribe();
+    let path = format!("traverses/{}/prefetch?from=3", server.traverse);
+    assert_eq!(server.post(&path, &json!({})).await.status, 204);
+    let mut order = Vec::new();
+    while order.len() < 5 {
+        let event = tokio::time::timeout(Duration::from_secs(60), events.recv()).await.unwrap().unwrap();
+        let event = serde_json::to_value(event).unwrap();
+        order.extend(event["ready"].as_u64().filter(|_| event["event"] == json!("render_progress")));
+    }
+    // Stops 0 and 1 may have been under way already.
+    let place = |step: u64| order.iter().position(|done| *done == step);
+    assert!(place(3) < place(4) && place(4) < place(2), "{order:?}");
+    let view = server.get(&format!("traverses/{}", server.traverse)).await.expect(200);
+    assert!(view["stops"].as_array().unwrap().iter().all(|stop| stop["ready"] == json!(true)));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_cancelled_run_gains_no_step_until_it_is_resumed() {
+    let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
+    // Without images each step has to be rendered first, so the run is still under way.
+    std::fs::remove_dir_all(drive.path().join("images")).unwrap();
+    let server = TestServer::open(drive.path(), folder.path());
+    let session = server.begin().await;
+    server.pick(&session).await;
+    let cancelled =
+        server.post(&format!("sessions/{session}/targets/0/runs/0/cancel"), &json!({})).await.expect(200);
+    assert_eq!(cancelled["stopped"], json!("cancelled"));
+    assert!(cancelled["rows"].as_array().unwrap().len() < 5, "{cancelled}");
+    tokio::time::sleep(Duration::from_millis(1500)).await;
+    let path = format!("sessions/{session}/targets/0/runs/0");
+    assert_eq!(server.get(&path).await.expect(200), cancelled);
+    server.post(&format!("{path}/cancel"), &json!({})).await.problem(409, "conflict");
+
+    let restarted = TestServer::open(drive.path(), folder.path());
+    let rows = cancelled["rows"].as_array().unwrap().len();
+    assert_eq!(restarted.ended(&session, 0, 0).await["rows"].as_array().unwrap().len(), rows);
+
+    server.post(&format!("{path}/resume"), &json!({})).await.expect(202);
+    let run = server.ended(&session, 0, 0).await;
+    assert_eq!((run["rows"].as_array().unwrap().len(), &run["stopped"]), (5, &Value::Null));
+    server.post(&format!("{path}/resume"), &json!({})).await.problem(409, "conflict");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn sessions_survive_the_server() {
+    let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
+    let (session, before) = {
+        let server = TestServer::open(drive.path(), folder.path());
+        let session = server.begin().await;
+        for _ in 0..2 {
+            let target = server.pick(&session).await;
+            server.ended(&session, target, 0).await;
+        }
+        let new = json!({ "run": 0, "from_step": 2, "settings": { "search_window_px": 81 } });
+        server.post(&format!("sessions/{session}/targets/1/runs"), &new).await.expect(202);
+        server.ended(&session, 1, 1).await;
+        let path = format!("sessions/{session}/targets/0");
+        let removed = request(Method::DELETE, &path).body(axum::body::Body::empty()).unwrap();
+        server.send(removed).await.expect(200);
+        let cursor = json!({ "target": 1, "run": 1, "step": 4 });
+        server.json(Method::PUT, &format!("sessions/{session}/cursor"), &cursor).await.expect(200);
+        (session.clone(), server.get(&format!("sessions/{session}")).await.expect(200))
+    };
+    std::fs::write(folder.path().join("s5.json"), "{").unwrap();
+    let server = TestServer::open(drive.path(), folder.path());
+    server.get(&format!("sessions/{session}")).await.expect(200);
+    server.ended(&session, 1, 0).await;
+    server.ended(&session, 1, 1).await;
+    assert_eq!(server.get(&format!("sessions/{session}")).await.expect(200), before);
+    let notices = server.get("health").await.expect(200)["notices"].to_string();
+    assert!(notices.contains("s5.json") && folder.path().join("s5.damaged").is_file(), "{notices}");
+    assert_eq!(server.begin().await, "s6", "no name is used twice");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_removed_target_is_gone_and_its_number_is_not_used_again() {
+    let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
+    let server = TestServer::open(drive.path(), folder.path());
+    let session = server.begin().await;
+    server.pick(&session).await;
+    let remove =
+        || request(Method::DELETE, &format!("sessions/{session}/targets/0")).body(axum::body::Body::empty());
+    let view = server.send(remove().unwrap()).await.expect(200);
+    assert_eq!((&view["targets"], &view["cursor"]["target"]), (&json!([]), &Value::Null));
+    server.send(remove().unwrap()).await.problem(404, "not_found");
+    server.get(&step(&session, 0, 0)).await.problem(404, "not_found");
+    assert_eq!(server.pick(&session).await, 1);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_session_becomes_a_recording() {
+    let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
+    let server = TestServer::open(drive.path(), folder.path());
+    let session = server.begin().await;
+    server.pick(&session).await;
+    server.ended(&session, 0, 0).await;
+    let answer = server.get(&format!("sessions/{session}/export.rrd")).await;
+    assert_eq!((answer.status.as_u16(), &answer.bytes[..4]), (200, &b"RRF2"[..]));
+    assert!(answer.headers[header::CONTENT_DISPOSITION].to_str().unwrap().contains("sightline-s1.rrd"));
+    let csv = server.get(&format!("sessions/{session}/targets/0/runs/0/columns.csv")).await.text();
+    assert_eq!((csv.lines().count(), csv.lines().next().unwrap().starts_with("step,state,")), (6, true));
+    let [x, _] = PIXEL;
+    assert!(csv.lines().nth(1).unwrap().contains(&format!(",{x},")), "{csv}");
+}

@@ -1,0 +1,190 @@
+//! A server in this process: requests go to the router as a function, without a network.
+
+use std::path::Path;
+use std::sync::OnceLock;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+use axum::Router;
+use axum::body::Body;
+use axum::http::{HeaderMap, Method, Request, StatusCode, header};
+use serde_json::{Value, json};
+use sightline_core::sim::Scenario;
+use sightline_core::traverse::{Traverse, create_simulated};
+use sightline_server::app;
+use sightline_server::guard::Hosts;
+use sightline_server::state::AppState;
+use tempfile::TempDir;
+use tower::ServiceExt;
+
+/// The port by which the server in this process believes to be addressed.
+pub const PORT: u16 = 7700;
+
+/// A pixel on the ground in the middle of the first image of the small drive.
+pub const PIXEL: [f64; 2] = [128.0, 150.0];
+
+/// How long a test waits for something that should be quick.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// A server with its folders.
+pub struct TestServer {
+    /// The router.
+    pub app: Router,
+    /// Its state.
+    pub state: AppState,
+    /// The name of its only traverse.
+    pub traverse: String,
+}
+
+/// An answer, read to its end.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Answer {
+    /// Its status.
+    pub status: StatusCode,
+    /// Its headers.
+    pub headers: HeaderMap,
+    /// Its body.
+    pub bytes: Vec<u8>,
+}
+
+impl Answer {
+    /// The body as JSON.
+    pub fn json(&self) -> Value {
+        serde_json::from_slice(&self.bytes).unwrap_or_else(|_| panic!("no JSON: {}", self.text()))
+    }
+
+    /// The body as text.
+    pub fn text(&self) -> String {
+        String::from_utf8_lossy(&self.bytes).into_owned()
+    }
+
+    /// Asserts the status, and returns the body as JSON.
+    pub fn expect(&self, status: u16) -> Value {
+        assert_eq!(self.status.as_u16(), status, "{}", self.text());
+        self.json()
+    }
+
+    /// Asserts that it is a problem of that status and code, and returns its one sentence.
+    pub fn problem(&self, status: u16, code: &str) -> String {
+        assert_eq!(self.headers[header::CONTENT_TYPE], "application/problem+json", "{}", self.text());
+        let problem = self.expect(status);
+        assert_eq!((&problem["status"], &problem["code"]), (&json!(status), &json!(code)), "{problem}");
+        problem["detail"].as_str().expect("a sentence").to_owned()
+    }
+}
+
+impl TestServer {
+    /// A server with the traverse of `drive` that keeps its sessions in `sessions`.
+    pub fn open(drive: &Path, sessions: &Path) -> Self {
+        let traverse = Traverse::open(drive).expect("a traverse");
+        let state = AppState::new(vec![traverse], sessions, Hosts::new(PORT, &[])).expect("a server");
+        let traverse = state.traverses()[0].id.clone();
+        Self { app: app(state.clone()), state, traverse }
+    }
+
+    /// Sends a request as it is.
+    pub async fn send(&self, request: Request<Body>) -> Answer {
+        let response = self.app.clone().oneshot(request).await.expect("the router never fails");
+        let (parts, body) = response.into_parts();
+        let bytes = axum::body::to_bytes(body, 1 << 28).await.expect("a whole body");
+        Answer { status: parts.status, headers: parts.headers, bytes: bytes.to_vec() }
+    }
+
+    /// Reads a path below `/api/v1/`.
+    pub async fn get(&self, path: &str) -> Answer {
+        self.send(request(Method::GET, path).body(Body::empty()).expect("a request")).await
+    }
+
+    /// Sends JSON to a path below `/api/v1/`.
+    pub async fn post(&self, path: &str, body: &Value) -> Answer {
+        self.json(Method::POST, path, body).await
+    }
+
+    /// Sends JSON by any method.
+    pub async fn json(&self, method: Method, path: &str, body: &Value) -> Answer {
+        let request = request(method, path).header(header::CONTENT_TYPE, "application/json");
+        self.send(request.body(Body::from(body.to_string())).expect("a request")).await
+    }
+
+    /// Begins a session and returns its name.
+    pub async fn begin(&self) -> String {
+        let view = self.post("sessions", &json!({ "traverse": self.traverse })).await.expect(201);
+        view["id"].as_str().expect("a name").to_owned()
+    }
+
+    /// Designates [`PIXEL`] at the first stop and returns the target's number.
+    pub async fn pick(&self, session: &str) -> u64 {
+        let [x, y] = PIXEL;
+        let new = json!({ "step": 0, "pixel": { "x": x, "y": y } });
+        let designated = self.post(&format!("sessions/{session}/targets"), &new).await.expect(201);
+        designated["target"].as_u64().expect("a number")
+    }
+
+    /// Waits until a run has ended, and returns its view.
+    pub async fn ended(&self, session: &str, target: u64, run: u64) -> Value {
+        let path = format!("sessions/{session}/targets/{target}/runs/{run}");
+        let begun = std::time::Instant::now();
+        loop {
+            let view = self.get(&path).await.expect(200);
+            if view["complete"] == json!(true) || view["stopped"] != json!(null) {
+                return view;
+            }
+            assert!(begun.elapsed() < PATIENCE, "the run does not end: {view}");
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+    }
+}
+
+/// A request to a path below `/api/v1/` as our own page sends it.
+pub fn request(method: Method, path: &str) -> axum::http::request::Builder {
+    let uri = format!("/api/v1/{path}");
+    Request::builder().method(method).uri(uri).header(header::HOST, format!("127.0.0.1:{PORT}"))
+}
+
+/// The scenario of the small drive: five stops of 256 × 256 pixels.
+pub fn small_scenario() -> Scenario {
+    let mut scenario = Scenario { name: "small drive".to_owned(), ..Scenario::demo() };
+    (scenario.camera.image_size, scenario.camera.samples_per_axis) = (256, 1);
+    (scenario.drive.start_distance_m, scenario.drive.end_distance_m) = (6.0, 4.0);
+    scenario
+}
+
+/// A folder with the small drive, rendered; a copy, so that it may be damaged.
+pub fn small_drive() -> TempDir {
+    static RENDERED: OnceLock<TempDir> = OnceLock::new();
+    let rendered = RENDERED.get_or_init(|| {
+        let folder = tempfile::tempdir().expect("a folder");
+        let traverse = create_simulated(&small_scenario(), folder.path()).expect("a drive");
+        for step in 0..traverse.stop_count() {
+            traverse.render_step(step, &AtomicBool::new(false)).expect("a rendered stop");
+        }
+        folder
+    });
+    let copy = tempfile::tempdir().expect("a folder");
+    copy_folder(rendered.path(), copy.path());
+    copy
+}
+
+/// The small drive as a recording: without the scenario, so that a missing image stays missing.
+pub fn small_recording() -> TempDir {
+    let folder = small_drive();
+    let index = folder.path().join("traverse.toml");
+    let text = std::fs::read_to_string(&index).expect("an index");
+    let recorded: String =
+        text.lines().filter(|line| !line.starts_with("scenario")).map(|l| format!("{l}\n")).collect();
+    std::fs::write(&index, recorded).expect("an index");
+    folder
+}
+
+fn copy_folder(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).expect("a folder");
+    for entry in std::fs::read_dir(from).expect("a folder") {
+        let path = entry.expect("an entry").path();
+        let copy = to.join(path.file_name().expect("a name"));
+        if path.is_dir() {
+            copy_folder(&path, &copy);
+        } else {
+            std::fs::copy(&path, &copy).expect("a copy");
+        }
+    }
+}

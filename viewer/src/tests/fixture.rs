@@ -1,0 +1,354 @@
+//! A fixed drive of six stops with one target: tracked, then lost, then failed, and one step not computed.
+
+use std::sync::Arc;
+
+use nalgebra::{Matrix2, Matrix3, Vector2};
+use sightline_core::camera::{Camera, Mast};
+use sightline_core::correlate::peak::{Peak, SecondPeak};
+use sightline_core::frames::{Pixel, Point3, Pose, PoseRecord};
+use sightline_core::image::{GrayImage, PixelRect, npy};
+use sightline_core::locate::template::TemplateEvidence;
+use sightline_core::locate::template::match_template::TemplateMatch;
+use sightline_core::locate::template::point_stereo::{CurvePoint, PointStereo};
+use sightline_core::locate::template::scale_roll::ScaleRoll;
+use sightline_core::locate::template::triangulate::Triangulation;
+use sightline_core::locate::{Evidence, Located};
+use sightline_core::session::Cursor;
+use sightline_core::session::view::{RunView, SessionView, TargetView};
+use sightline_core::session::wire::{StopView, TraverseEntry, TraverseView};
+use sightline_core::settings::{Changes, Settings};
+use sightline_core::stages::capture::Capture;
+use sightline_core::stages::judge::{Gate, Verdict};
+use sightline_core::stages::point_mast::Pointing;
+use sightline_core::stages::predict::Prediction;
+use sightline_core::stages::update::Updated;
+use sightline_core::target::{Appearance, Designation, Target, TrackingState};
+use sightline_core::trace::{ArrayName, StepTrace, StepTruth, TruthKind, summarise};
+use sightline_core::traverse::StereoGeometry;
+
+use crate::cache::{Eye, Item, Key, StepKey};
+use crate::raster::Raster;
+use crate::state::{Connection, State};
+
+/// How many stops the drive has.
+pub(super) const STOPS: usize = 6;
+/// Where the target is seen at every stop, px.
+pub(super) const PIXEL: Pixel = Pixel::new(512.3, 480.6);
+const POSITION: [f64; 3] = [6.0, 0.4, 0.2];
+
+/// A server that said nothing yet.
+pub(super) fn nothing() -> State {
+    State::new("http://localhost".to_owned(), None)
+}
+
+/// The drive in the server's list.
+pub(super) fn entry() -> TraverseEntry {
+    TraverseEntry {
+        id: "drive".to_owned(),
+        name: "Six stops".to_owned(),
+        description: "A fixed drive.".to_owned(),
+        simulated: true,
+        stop_count: STOPS,
+    }
+}
+
+/// An open traverse and session without targets.
+pub(super) fn without_target() -> State {
+    let mut state = nothing();
+    state.connection = Connection::Live;
+    state.traverses = Some(vec![entry()]);
+    state.traverse = Some(traverse());
+    state.settings = Settings::table();
+    state.session = Some(SessionView {
+        id: "s1".to_owned(),
+        traverse: "drive".to_owned(),
+        stop_count: STOPS,
+        cursor: Cursor::default(),
+        targets: Vec::new(),
+    });
+    state
+}
+
+/// A session with one target and its run, at `step`, with everything of that step loaded.
+pub(super) fn at_step(context: &egui::Context, step: usize) -> State {
+    let mut state = without_target();
+    let traces: Vec<StepTrace> = (0..STOPS - 1).map(trace).collect();
+    let run = RunView {
+        number: 0,
+        fork: None,
+        changes: Changes::new(),
+        settings: Settings::default(),
+        rows: traces.iter().map(StepTrace::row).collect(),
+        complete: false,
+        stopped: None,
+        summary: summarise(&traces),
+    };
+    let designation = Designation { step: 0, pixel: PIXEL };
+    let target = TargetView { number: 0, label: "ridge".to_owned(), designation, runs: vec![run] };
+    if let Some(session) = &mut state.session {
+        session.targets.push(target);
+    }
+    state.cursor = Cursor { target: Some(0), run: 0, step };
+    let key = StepKey { session: "s1".to_owned(), target: 0, run: 0, step };
+    if let Some(trace) = traces.get(step) {
+        state.cache.arrived(Key::Trace(key.clone()), Ok(Item::Trace(Arc::new(trace.clone()))), 0.0);
+    }
+    for name in ArrayName::ALL {
+        let side = if name == ArrayName::Surface { 31 } else { 21 };
+        let raster = Raster::from_npy(context, name, &npy::encode(&bump(side)).unwrap()).unwrap();
+        state.cache.arrived(Key::Array(key.clone(), name), Ok(Item::Raster(Arc::new(raster))), 0.0);
+    }
+    for eye in [Eye::Left, Eye::Right] {
+        let bytes = sightline_core::image::io::encode_png_u8(&bump(64)).unwrap();
+        let raster = Raster::from_png(context, eye.word(), &bytes).unwrap();
+        let key = state.image_key(step, eye).unwrap();
+        state.cache.arrived(key, Ok(Item::Raster(Arc::new(raster))), 0.0);
+    }
+    state
+}
+
+/// A smooth hill with a hole.
+fn bump(side: u32) -> GrayImage {
+    GrayImage::from_fn(side, side, |x, y| {
+        let d = (f64::from(x) - f64::from(side) / 2.0).hypot(f64::from(y) - f64::from(side) / 2.0);
+        image::Luma([if x + y == 0 { f32::NAN } else { (1.0 - d / f64::from(side)) as f32 }])
+    })
+}
+
+fn pose(step: usize) -> Pose {
+    Pose::translation(step as f64, 0.1 * step as f64, 0.0)
+}
+
+fn traverse() -> TraverseView {
+    let stop = |step: usize| StopView {
+        time_s: 60.0 * step as f64,
+        site_from_rover: PoseRecord::from(&pose(step)),
+        true_site_from_rover: Some(PoseRecord::from(&pose(step))),
+        left_size: [1024, 1024],
+        right_size: [1024, 1024],
+        ready: step + 1 < STOPS,
+    };
+    TraverseView {
+        id: "drive".to_owned(),
+        name: "Six stops".to_owned(),
+        description: "A fixed drive.".to_owned(),
+        simulated: true,
+        stereo: StereoGeometry::Lateral,
+        warnings: Vec::new(),
+        stops: (0..STOPS).map(stop).collect(),
+    }
+}
+
+/// The record of a step: the designation, two good ones, one lost, one failed.
+pub(super) fn trace(step: usize) -> StepTrace {
+    let state = match step {
+        0..3 => TrackingState::Tracking,
+        3 => TrackingState::Lost { count: 1 },
+        _ => TrackingState::Failed,
+    };
+    let is_good = state == TrackingState::Tracking;
+    let is_designation = step == 0;
+    let (left, right) = cameras();
+    let covariance = Matrix3::from_diagonal(&nalgebra::Vector3::new(4e-4, 1e-4, 1e-4));
+    let prediction = Prediction {
+        position_in_rover: Point3::from(POSITION),
+        position_in_site: pose(step) * Point3::from(POSITION),
+        covariance_in_rover: covariance * 4.0,
+        step_length_m: 1.0,
+        travelled_since_update_m: 1.0,
+        travelled_m: step as f64,
+    };
+    StepTrace {
+        step,
+        time_s: 60.0 * step as f64,
+        fault: None,
+        predict: (!is_designation).then_some(prediction),
+        point_mast: Some(Pointing {
+            wanted: None,
+            used: None,
+            left: left.clone(),
+            right,
+            predicted_left: Some(PIXEL.offset(3.0, -2.0)),
+            predicted_right: Some(PIXEL.offset(-60.0, -2.0)),
+            predicted_covariance_px2: Some(Matrix2::new(60.0, 10.0, 10.0, 30.0)),
+        }),
+        capture: Some(Capture {
+            left_size: [1024, 1024],
+            right_size: [1024, 1024],
+            subframe: Some(PixelRect::centred(PIXEL, 161)),
+            subframe_mean: Some(0.4),
+            subframe_saturated: Some(0.0),
+            pair: Default::default(),
+        }),
+        locate: Some(located(is_designation, is_good, covariance)),
+        judge: (!is_designation).then(|| verdict(is_good, state)),
+        update: updated(step, state, is_good, covariance, left),
+        truth: Some(StepTruth {
+            kind: TruthKind::Surface,
+            position_in_rover: Point3::from(POSITION),
+            left_pixel: Some(PIXEL.offset(0.4, 0.3)),
+            err_m: 0.02,
+            err_px: Some(if is_good { 0.5 } else { 40.0 }),
+            nees: Some(2.1),
+            magnification: 1.0 + 0.1 * step as f64,
+            tolerance_px: 5.0,
+            tracked: Some(is_good),
+        }),
+    }
+}
+
+fn cameras() -> (Camera, Camera) {
+    let mast = Mast::spirit();
+    (mast.left_in_head, mast.right_in_head)
+}
+
+fn located(is_designation: bool, is_good: bool, covariance: Matrix3<f64>) -> Located {
+    let score = if is_good { 0.83 } else { 0.41 };
+    let mut evidence = TemplateEvidence { point_stereo: Some(point_stereo()), ..TemplateEvidence::default() };
+    evidence.triangulate = Some(Triangulation {
+        position_in_rover: Point3::from(POSITION),
+        covariance_in_rover: covariance,
+        surface_by_pixel: None,
+        range_m: 6.0,
+        gap_m: 0.001,
+        gap_px: 0.2,
+    });
+    if !is_designation {
+        evidence.scale_roll = Some(ScaleRoll {
+            scale: 1.13,
+            roll_rad: 0.02,
+            applied_scale: 1.13,
+            applied_roll_rad: 0.02,
+            old_distance_m: 6.8,
+            new_distance_m: 6.0,
+            template_step: 1,
+            image_from_template: Matrix2::identity() * 1.13,
+            reference: Default::default(),
+            scaled: Default::default(),
+            rolled: Default::default(),
+        });
+        evidence.match_template = Some(template_match(score));
+    }
+    Located {
+        left_pixel: Some(PIXEL),
+        right_pixel: Some(PIXEL.offset(-58.0, 0.5)),
+        left_covariance_px2: Matrix2::new(0.2, 0.05, 0.05, 0.1),
+        left_bias_px: Vector2::new(0.05, 0.0),
+        surface_by_pixel: None,
+        position_in_rover: Some(Point3::from(POSITION)),
+        covariance_in_rover: Some(covariance),
+        confidence: score,
+        missing: None,
+        evidence: Evidence::Template(Box::new(evidence)),
+    }
+}
+
+fn template_match(score: f64) -> TemplateMatch {
+    TemplateMatch {
+        search_window: PixelRect::centred(PIXEL, 51),
+        positions: 961,
+        flat_positions: 0,
+        peak: Peak {
+            pixel: PIXEL,
+            score,
+            integer: [512, 481],
+            integer_score: score - 0.01,
+            covariance_px2: Matrix2::identity() * 0.02,
+            at_edge: false,
+        },
+        second_peak: Some(SecondPeak {
+            pixel: PIXEL.offset(12.0, 9.0),
+            score: 0.4,
+            ratio: 0.48,
+            distance_px: 15.0,
+        }),
+        covariance_px2: Matrix2::identity() * 0.04,
+        bias_px: Vector2::zeros(),
+        surface: Default::default(),
+        matched: Default::default(),
+        difference: Default::default(),
+    }
+}
+
+fn point_stereo() -> PointStereo {
+    let point = |i: i32| CurvePoint {
+        pixel: PIXEL.offset(-20.0 - f64::from(i), 0.5),
+        range_m: 20.0 / f64::from(i + 1),
+        score: Some(0.5),
+    };
+    PointStereo {
+        curve: (0..80).map(point).collect(),
+        right_pixel: PIXEL.offset(-58.0, 0.5),
+        score: 0.91,
+        range_m: 6.0,
+        across_px: 0.1,
+        at_end: false,
+        covariance_px2: Matrix2::identity() * 0.05,
+        right_from_left: Matrix2::identity(),
+        right_window: Default::default(),
+    }
+}
+
+fn verdict(is_good: bool, state: TrackingState) -> Verdict {
+    let gate =
+        |criterion: u8, name: &str, unit: &str, value: f64, limit: f64, at_least: bool, passed: bool| Gate {
+            criterion,
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            value: Some(value),
+            limit,
+            at_least,
+            margin: Some(if at_least { value - limit } else { limit - value }),
+            passed,
+        };
+    let ncc = if is_good { 0.83 } else { 0.41 };
+    Verdict {
+        gates: vec![
+            gate(1, "ncc", "", ncc, 0.7, true, is_good),
+            gate(2, "stereo_ncc", "", 0.91, 0.7, true, true),
+            gate(3, "distance_correction_m", "m", 0.03, 0.12, false, true),
+            gate(4, "position_correction_m", "m", 0.05, 0.2, false, true),
+        ],
+        good: is_good,
+        accepted: is_good,
+        reason: (!is_good).then(|| "ncc 0.410 is below its limit 0.700".to_owned()),
+        state_before: TrackingState::Tracking,
+        state,
+    }
+}
+
+fn updated(
+    step: usize,
+    state: TrackingState,
+    renewed: bool,
+    covariance: Matrix3<f64>,
+    camera: Camera,
+) -> Updated {
+    Updated {
+        target: Target {
+            designation: Designation { step: 0, pixel: PIXEL },
+            step,
+            position_in_rover: Point3::from(POSITION),
+            covariance_in_rover: covariance,
+            initial_position_in_site: Point3::from(POSITION),
+            initial_distance_m: 6.0,
+            travelled_m: step as f64,
+            last_distance_m: 6.0,
+            travelled_since_update_m: 0.0,
+            drift_covariance_px2: Matrix2::zeros(),
+            drift_bias_px: Vector2::zeros(),
+            appearance: Appearance {
+                step,
+                pixel: PIXEL,
+                position_in_rover: Point3::from(POSITION),
+                camera,
+                surface_by_pixel: None,
+                image: Arc::default(),
+            },
+        },
+        state,
+        template_renewed: renewed,
+        correction_m: Some(0.03),
+        correction_px: Some(3.6),
+    }
+}

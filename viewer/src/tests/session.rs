@@ -1,0 +1,167 @@
+//! What commands and answers do to the state: cursor, targets, refusals and what is asked of the server.
+
+use sightline_core::frames::Pixel;
+use sightline_core::session::Cursor;
+use sightline_core::session::wire::{Event, Problem, SessionEntry};
+use sightline_core::trace::ArrayName;
+
+use super::fixture::{STOPS, at_step, nothing, without_target};
+use crate::cache::{Eye, Key, Slot};
+use crate::command::{Command, Go, Mode};
+use crate::net::{Arrived, Reply, Request};
+use crate::state::{Connection, State, events};
+
+fn loaded(step: usize) -> State {
+    at_step(&egui::Context::default(), step)
+}
+
+fn problem(status: u16) -> Problem {
+    Problem {
+        code: "target".to_owned(),
+        title: String::new(),
+        status,
+        detail: "no 3-D position".to_owned(),
+        hint: None,
+    }
+}
+
+#[test]
+fn the_cursor_stays_on_the_drive_and_jumps_between_events() {
+    let mut state = loaded(0);
+    let mut go = |go: Go| {
+        state.apply(Command::Go(go));
+        state.cursor.step
+    };
+    assert_eq!(go(Go::By(1)), 1);
+    assert_eq!(go(Go::By(-10)), 0);
+    assert_eq!(go(Go::Last), STOPS - 1);
+    assert_eq!(go(Go::By(1)), STOPS - 1);
+    assert_eq!(go(Go::First), 0);
+    assert_eq!(go(Go::NextEvent), 3, "tracking → lost");
+    assert_eq!(go(Go::NextEvent), 4, "lost → failed");
+    assert_eq!(go(Go::NextEvent), 4, "there is none after it");
+    assert_eq!(go(Go::PreviousEvent), 3);
+    assert_eq!(go(Go::PreviousEvent), 0, "the designation");
+    assert_eq!(events(state.run().unwrap()), vec![0, 3, 4]);
+}
+
+#[test]
+fn a_page_without_a_link_opens_the_latest_session_of_the_first_traverse() {
+    let mut state = nothing();
+    state.begin();
+    assert_eq!(state.take_requests(), vec![Request::Settings, Request::Traverses]);
+    let list = vec![super::fixture::entry()];
+    state.arrived(Arrived { request: Request::Traverses, outcome: Ok(Reply::Traverses(list)) }, 0.0);
+    assert_eq!(state.take_requests(), vec![Request::Sessions]);
+    let entry = |id: &str, traverse: &str| SessionEntry {
+        id: id.to_owned(),
+        traverse: traverse.to_owned(),
+        target_count: 1,
+    };
+    let list = vec![entry("a", "drive"), entry("b", "drive"), entry("c", "other")];
+    state.arrived(Arrived { request: Request::Sessions, outcome: Ok(Reply::Sessions(list)) }, 0.0);
+    assert_eq!(state.take_requests(), vec![Request::Session("b".to_owned())]);
+}
+
+#[test]
+fn a_refused_designation_is_shown_at_its_place_with_the_servers_sentence() {
+    let mut state = without_target();
+    state.apply(Command::SetMode(Mode::Pick));
+    state.apply(Command::Pick(Pixel::new(10.0, 20.0)));
+    assert!(state.designating.is_some());
+    let request = state.take_requests().into_iter().find(|r| matches!(r, Request::NewTarget { .. })).unwrap();
+    state.arrived(Arrived { request, outcome: Err(problem(422)) }, 0.0);
+    let refusal = state.refusal.as_ref().unwrap();
+    assert_eq!((refusal.place.pixel, refusal.sentence.as_str()), (Pixel::new(10.0, 20.0), "no 3-D position"));
+    assert_eq!(state.messages.newest().unwrap().text, "no 3-D position");
+    assert_eq!(state.mode, Mode::Pick, "another pixel can be tried at once");
+    state.apply(Command::SetMode(Mode::Look));
+    state.apply(Command::SetMode(Mode::Look));
+    assert!(state.refusal.is_none());
+}
+
+#[test]
+fn the_cursor_is_sent_once_at_a_time_and_an_older_answer_does_not_move_it_back() {
+    let mut state = loaded(0);
+    let [put] = state.take_requests().try_into().unwrap();
+    state.arrived(Arrived { request: put, outcome: Ok(Reply::Done) }, 0.0);
+    state.apply(Command::Go(Go::By(1)));
+    let first = state.take_requests();
+    assert!(state.take_requests().is_empty(), "nothing is sent while one is under way");
+    state.apply(Command::Go(Go::By(1)));
+    let mut view = state.session.clone().unwrap();
+    view.cursor = Cursor::default();
+    let request = Request::Session("s1".to_owned());
+    state.arrived(Arrived { request, outcome: Ok(Reply::Session(Box::new(view))) }, 0.0);
+    assert_eq!(state.cursor.step, 2);
+    let [put] = first.try_into().unwrap();
+    state.arrived(Arrived { request: put, outcome: Ok(Reply::Done) }, 0.0);
+    let [Request::PutCursor { cursor, .. }] = &state.take_requests()[..] else {
+        panic!("the newest cursor is sent")
+    };
+    assert_eq!(cursor.step, 2);
+}
+
+#[test]
+fn progress_of_a_run_reads_the_session_again_and_ends() {
+    let mut state = loaded(2);
+    state.take_requests();
+    let progress = |ended: bool| Event::RunProgress {
+        session: "s1".to_owned(),
+        target: 0,
+        run: 0,
+        k: 5,
+        n: 6,
+        ended,
+        doing: "step 5".to_owned(),
+    };
+    state.told(progress(false));
+    assert_eq!(state.run_progress().unwrap().k, 5);
+    assert!(state.take_requests().contains(&Request::Session("s1".to_owned())));
+    state.told(progress(true));
+    assert!(state.run_progress().is_none());
+}
+
+#[test]
+fn what_is_wanted_begins_with_the_cursors_step_and_reaches_to_its_neighbours() {
+    let state = loaded(2);
+    let wanted = state.wanted();
+    let key = state.step_key(2).unwrap();
+    assert_eq!(wanted[0], Key::Trace(key.clone()));
+    assert!(wanted[..12].contains(&Key::Array(key, ArrayName::Surface)));
+    assert!(wanted.contains(&Key::Trace(state.step_key(1).unwrap())));
+    assert!(wanted.contains(&Key::Trace(state.step_key(3).unwrap())));
+    let last = loaded(STOPS - 2).wanted();
+    let unrendered = state.image_key(STOPS - 1, Eye::Left).unwrap();
+    assert!(!last.contains(&unrendered), "rendering ahead is the server's to decide");
+    assert!(loaded(STOPS - 1).wanted().contains(&unrendered), "but what is looked at is asked for");
+}
+
+#[test]
+fn loaded_steps_stay_when_the_server_goes_and_all_is_asked_again_when_it_comes_back() {
+    let mut state = loaded(2);
+    state.connected(Connection::Gone { attempts: 1 });
+    assert!(state.messages.newest().unwrap().text.contains("does not answer"));
+    assert!(matches!(state.trace_at(2), Slot::Ready(_)));
+    state.apply(Command::Go(Go::By(1)));
+    assert_eq!(state.cursor.step, 3);
+    assert!(state.take_requests().is_empty());
+    state.connected(Connection::Live);
+    let requests = state.take_requests();
+    assert!(requests.contains(&Request::Session("s1".to_owned())));
+    assert!(requests.iter().any(|r| matches!(r, Request::PutCursor { cursor, .. } if cursor.step == 3)));
+}
+
+#[test]
+fn a_stop_that_was_rendered_is_asked_for_again() {
+    let mut state = without_target();
+    state.cursor.step = STOPS - 1;
+    let key = state.image_key(STOPS - 1, Eye::Left).unwrap();
+    state.cache.want(std::slice::from_ref(&key), |_| true, 0.0);
+    state.arrived(Arrived { request: Request::Item(key.clone()), outcome: Err(problem(503)) }, 0.0);
+    assert!(state.cache.want(std::slice::from_ref(&key), |_| true, 0.1).is_empty());
+    let (traverse, ready) = ("drive".to_owned(), Some(STOPS - 1));
+    state.told(Event::RenderProgress { traverse, k: STOPS, n: STOPS, ready });
+    assert_eq!(state.cache.want(std::slice::from_ref(&key), |_| true, 0.1), vec![key]);
+    assert!(state.stop().unwrap().ready && state.rendering.is_none());
+}
