@@ -52,7 +52,7 @@ pub fn read(path: &Path) -> Recording {
         match message.unwrap_or_else(|error| panic!("{}: {error}", path.display())) {
             LogMsg::SetStoreInfo(info) => recording.application = info.info.application_id().to_string(),
             LogMsg::BlueprintActivationCommand(command) => {
-                recording.blueprint_activated = command.make_active
+                recording.blueprint_activated = command.make_active;
             }
             LogMsg::ArrowMsg(store, message) => {
                 let chunk =
