@@ -48,9 +48,10 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     let unwritable = |source| Error::Write { path: path.to_owned(), source };
     let folder = path.parent().unwrap_or(Path::new(""));
     std::fs::create_dir_all(folder).map_err(unwritable)?;
-    let (mut file, temporary) = create_temporary(path).map_err(unwritable)?;
-    let written = file.write_all(bytes).and_then(|()| file.sync_all());
-    drop(file);
+    let (written, temporary) = {
+        let (mut file, temporary) = create_temporary(path).map_err(unwritable)?;
+        (file.write_all(bytes).and_then(|()| file.sync_all()), temporary)
+    };
     written.and_then(|()| std::fs::rename(&temporary, path)).map_err(|source| {
         // The first error is the one to tell; a temporary file that cannot be removed does no harm.
         let _ = std::fs::remove_file(&temporary);

@@ -13,7 +13,7 @@ use rerun::{
     Transform3D,
 };
 use sightline_core::frames::{Pixel, Point3, Pose};
-use sightline_core::image::GrayImage;
+use sightline_core::image::{GrayImage, PixelRect};
 
 use super::palette::{HALO, Rgb, color};
 
@@ -25,11 +25,17 @@ pub(super) fn point(pixel: Pixel) -> [f32; 2] {
     [(pixel.x + 0.5) as f32, (pixel.y + 0.5) as f32]
 }
 
+/// The frame of a rectangle of whole pixels: its top left corner is the origin.
+pub(super) fn corner_frame(rect: &PixelRect) -> Transform3D {
+    let [x, y] = point(Pixel::new(f64::from(rect.x) - 0.5, f64::from(rect.y) - 0.5));
+    Transform3D::from_translation([x, y, 0.0])
+}
+
 /// A dot on an image.
 pub(super) fn dot(pixel: Pixel, rgb: Rgb, label: &str) -> Points2D {
     Points2D::new([point(pixel)])
         .with_colors([color(rgb)])
-        .with_radii([Radius::new_ui_points(4.0)])
+        .with_radii([Radius::new_ui_points(3.0)])
         .with_labels([label])
         .with_show_labels(false)
         .with_draw_order(30.0)

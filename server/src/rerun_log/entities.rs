@@ -118,6 +118,7 @@ const EVIDENCE: &[Evidence] = &[
     ("/{target}/predict/right", "Points2D", "predicted in front of the right camera", predicted_right),
     ("/{target}/point_mast/gate", "LineStrips2D", "predicted in front of the left camera", predicted_left),
     ("/{target}/capture/subframe", "Boxes2D", "the subframe lies in the image", |t| t.capture.as_ref().is_some_and(|c| c.subframe.is_some())),
+    ("/{target}/capture/frame", "Transform3D", "the subframe lies in the image", |t| t.capture.as_ref().is_some_and(|c| c.subframe.is_some())),
     ("/{target}/locate/scale_roll/footprint", "LineStrips2D", "prepared", |t| prepared(t) && predicted_left(t)),
     ("/{target}/locate/scale_roll/reference", "DepthImage", "prepared", prepared),
     ("/{target}/locate/scale_roll/scaled", "DepthImage", "prepared", prepared),

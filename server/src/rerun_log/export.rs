@@ -58,7 +58,7 @@ fn write(
     let mut recorder = Recorder::new(stream, false);
     let mut file = RrdFile::create(path)?;
     recorder
-        .log_runs(runs)
+        .log_runs(runs, stops)
         .and_then(|()| recorder.log_traverse(traverse_name, stops))
         .map_err(|e| wrong(&e))?;
     let all: BTreeSet<usize> = runs.iter().flat_map(|run| run.steps).map(|trace| trace.step).collect();

@@ -8,7 +8,7 @@ use sightline_core::frames::Pixel;
 use sightline_core::image::PixelRect;
 
 use super::Logged;
-use super::border::{dot, ellipse, haloed, plus, png, point, square};
+use super::border::{corner_frame, dot, ellipse, haloed, plus, png, point, square};
 use super::palette::{MEASUREMENT, PREDICTION, Rgb, SECOND_PEAK, TRUTH, color, faint, of_score, of_state};
 use super::step::Step;
 
@@ -52,6 +52,12 @@ pub(super) fn log_gate(step: &Step<'_>) -> Logged {
 pub(super) fn log_subframe(step: &Step<'_>) -> Logged {
     let subframe = step.trace.capture.as_ref().and_then(|capture| capture.subframe);
     step.log("/{target}/capture/subframe", subframe.map(|rect| frame(&rect, TRUTH, "subframe")))
+}
+
+/// The frame of the subframe, from which the close-up looks.
+pub(super) fn log_subframe_frame(step: &Step<'_>) -> Logged {
+    let subframe = step.trace.capture.as_ref().and_then(|capture| capture.subframe);
+    step.log("/{target}/capture/frame", subframe.map(|rect| corner_frame(&rect)))
 }
 
 /// What the template's window became by scale and roll, where it is expected.

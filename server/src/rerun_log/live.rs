@@ -99,7 +99,7 @@ impl LiveStream {
         let mut recorder = self.recorder();
         let logged = recorder
             .log_traverse(traverse_name, stops)
-            .and_then(|()| recorder.log_runs(std::slice::from_ref(run)))
+            .and_then(|()| recorder.log_runs(std::slice::from_ref(run), stops))
             .and_then(|()| recorder.log_step(run, stops, trace));
         logged.map_err(|error| refused(&error))
     }

@@ -7,7 +7,7 @@
 use nalgebra::Matrix3;
 use rerun::{Color, Ellipsoids3D, LineStrips3D, Radius, RecordingStream, TransformAxes3D, ViewCoordinates};
 use sightline_core::camera::Camera;
-use sightline_core::frames::{Pixel, Point3};
+use sightline_core::frames::{Pixel, Point3, Vector3};
 use sightline_core::pipeline::Stops;
 
 use super::Logged;
@@ -23,6 +23,27 @@ const AXES_M: f32 = 0.5;
 
 /// Points along each edge of an image, so that a fisheye's pyramid has its curved base.
 const EDGE_POINTS: u32 = 8;
+
+/// From where a map is first seen.
+pub(super) struct Outlook {
+    /// Where the eye is, in the site frame.
+    pub(super) eye: Point3,
+    /// What it looks at, in the site frame.
+    pub(super) target: Point3,
+}
+
+impl Outlook {
+    /// From behind, above and beside the first stop, with way and target in the picture.
+    pub(super) fn over(stops: &dyn Stops, target_in_site: &Point3) -> Self {
+        let start = Point3::from(stops.site_from_rover(0).translation.vector);
+        let ahead = target_in_site - start;
+        let extent_m = ahead.norm().max(1.0);
+        let forward = Vector3::new(ahead.x, ahead.y, 0.0).try_normalize(1e-9).unwrap_or_else(Vector3::x);
+        let right = Vector3::new(-forward.y, forward.x, 0.0);
+        let eye = start + (right * 0.5 - forward * 0.15 - Vector3::z() * 0.5) * extent_m;
+        Self { eye, target: start + ahead * 0.6 }
+    }
+}
 
 /// The axes of the site frame: x north (forward), y east (right), z down.
 pub(super) fn log_site_axes(stream: &RecordingStream) -> Logged {

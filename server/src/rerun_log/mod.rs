@@ -1,6 +1,6 @@
 //! The Rerun side of the debugger: runs as an `.rrd` file ([`export`]) or as a live stream ([`LiveStream`]).
 //!
-//! Every entity has one `log_*` function, called in the order of the stages from [`log_step`]; the numbers are
+//! Every entity has one `log_*` function, called in the order of the stages from `log_step`; the numbers are
 //! one table in `scores`. `{target}` is the run's name: `target_1` for the first run of the first target,
 //! `target_1_run_1` for the first run that was forked from it.
 //!
@@ -30,6 +30,7 @@
 //! | `/{target}/predict/right` | `Points2D` | predicted in front of the right camera |
 //! | `/{target}/point_mast/gate` | `LineStrips2D` | predicted in front of the left camera |
 //! | `/{target}/capture/subframe` | `Boxes2D` | the subframe lies in the image |
+//! | `/{target}/capture/frame` | `Transform3D` | the subframe lies in the image |
 //! | `/{target}/locate/scale_roll/footprint` | `LineStrips2D` | prepared |
 //! | `/{target}/locate/scale_roll/reference` | `DepthImage` | prepared |
 //! | `/{target}/locate/scale_roll/scaled` | `DepthImage` | prepared |
@@ -87,6 +88,7 @@ mod border;
 mod entities;
 mod export;
 mod images;
+mod layout;
 mod live;
 mod map;
 mod page;
@@ -141,6 +143,7 @@ fn log_step(step: &Step<'_>, is_first_here: bool) -> Logged {
         images::log_right_image(step)?;
     }
     images::log_subframe(step)?;
+    images::log_subframe_frame(step)?;
 
     images::log_footprint(step)?;
     templates::log_reference(step)?;

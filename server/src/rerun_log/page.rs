@@ -27,6 +27,7 @@ pub(super) struct ViewerPage {
 /// The viewer's files and the policy they are served under.
 struct Files {
     data: WebViewerData,
+    page: String,
     policy: String,
 }
 
@@ -34,7 +35,8 @@ impl ViewerPage {
     /// Serves the page for a stream on `stream_port`, on a free port of the loopback address.
     pub(super) fn start(stream_port: u16) -> io::Result<Self> {
         let data = WebViewerData::load(None).map_err(io::Error::other)?;
-        let files = Arc::new(Files { data, policy: policy(stream_port) });
+        let page = without_foreign_links(&String::from_utf8_lossy(data.index_html()));
+        let files = Arc::new(Files { data, page, policy: policy(stream_port) });
         let listener = std::net::TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
         listener.set_nonblocking(true)?;
         let address = listener.local_addr()?;
@@ -93,6 +95,19 @@ fn policy(stream_port: u16) -> String {
     .join("; ")
 }
 
+/// The page without its links to other hosts, which the policy would refuse and the console would report.
+fn without_foreign_links(html: &str) -> String {
+    let mut parts = html.split("<link");
+    let mut page = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        match part.split_once('>') {
+            Some((link, rest)) if link.contains("https://") => page.push_str(rest),
+            _ => page.extend(["<link", part]),
+        }
+    }
+    page
+}
+
 fn router(files: Arc<Files>) -> Router {
     Router::new().fallback(file).with_state(files)
 }
@@ -100,7 +115,7 @@ fn router(files: Arc<Files>) -> Router {
 async fn file(State(files): State<Arc<Files>>, uri: Uri) -> Response {
     let data = &files.data;
     let (kind, bytes) = match uri.path() {
-        "/" | "/index.html" => ("text/html; charset=utf-8", data.index_html()),
+        "/" | "/index.html" => ("text/html; charset=utf-8", files.page.as_bytes()),
         "/favicon.ico" => ("image/x-icon", data.favicon()),
         "/apple-touch-icon.png" => ("image/png", data.apple_touch_icon()),
         "/re_viewer.js" => ("text/javascript", data.viewer_js()),
@@ -114,4 +129,19 @@ async fn file(State(files): State<Arc<Files>>, uri: Uri) -> Response {
         (REFERRER_POLICY, "no-referrer"),
     ];
     (headers.map(|(name, value)| (name, value.to_owned())), bytes.to_vec()).into_response()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn links_to_other_hosts_are_taken_out_and_own_ones_stay() {
+        let html =
+            r#"<head><link rel="icon" href="favicon.ico" /><link href="https://a.example/f.css" /><p>x</p>"#;
+        assert_eq!(without_foreign_links(html), r#"<head><link rel="icon" href="favicon.ico" /><p>x</p>"#);
+        let data = WebViewerData::load(None).unwrap();
+        let page = without_foreign_links(&String::from_utf8_lossy(data.index_html()));
+        assert!(page.contains("favicon.ico") && !page.contains("fonts.g"));
+    }
 }

@@ -28,6 +28,7 @@ pub(super) const TRUTH: Rgb = [0xFF, 0xFF, 0xFF];
 pub(super) const HALO: Rgb = [0x00, 0x00, 0x00];
 pub(super) const ROVER: Rgb = [0xBB, 0xBB, 0xBB];
 pub(super) const LIMIT: Rgb = [0x88, 0x88, 0x88];
+pub(super) const MAP_BACKGROUND: Rgb = [0x18, 0x1A, 0x1C];
 
 /// The colour as rerun takes it, opaque.
 pub(super) fn color([r, g, b]: Rgb) -> Color {

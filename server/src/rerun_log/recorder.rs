@@ -5,10 +5,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use rerun::{RecordingStream, RecordingStreamBuilder, TextDocument};
+use sightline_core::frames::Point3;
 use sightline_core::image::GrayImage;
 use sightline_core::pipeline::Stops;
 use sightline_core::trace::StepTrace;
 
+use super::blueprint::Lane;
+use super::map::Outlook;
 use super::step::Step;
 use super::{Logged, blueprint, log_step, log_stop, map, root, scores, states};
 
@@ -40,8 +43,29 @@ pub(super) struct Recorder {
     has_traverse: bool,
     /// Stops whose images are in the recording.
     captured: BTreeSet<usize>,
-    /// The runs by their names in paths, with the steps that are in the recording.
-    runs: BTreeMap<String, BTreeSet<usize>>,
+    /// The runs by their names in paths.
+    runs: BTreeMap<String, Known>,
+}
+
+/// A run that was made known.
+struct Known {
+    /// The steps that are in the recording.
+    steps: BTreeSet<usize>,
+    /// Where the target was designated, in the site frame.
+    position_in_site: Point3,
+    /// Width and height of the subframe, px.
+    close_up_px: [u32; 2],
+}
+
+impl Known {
+    fn new(first: &StepTrace) -> Self {
+        let subframe = first.capture.as_ref().and_then(|capture| capture.subframe);
+        Self {
+            steps: BTreeSet::new(),
+            position_in_site: first.update.target.initial_position_in_site,
+            close_up_px: subframe.map_or([161; 2], |rect| [rect.width, rect.height]),
+        }
+    }
 }
 
 /// What every recording of ours begins with. The environment cannot switch it off: a person asked for it.
@@ -73,7 +97,7 @@ impl Recorder {
     }
 
     /// Makes runs known, so that a viewer lays them out; those already known cost nothing.
-    pub(super) fn log_runs(&mut self, runs: &[RunLog<'_>]) -> Logged {
+    pub(super) fn log_runs(&mut self, runs: &[RunLog<'_>], stops: &dyn Stops) -> Logged {
         let known = self.runs.len();
         for run in runs {
             let root = root(run.target, run.run);
@@ -81,20 +105,22 @@ impl Recorder {
             states::log_run(&self.stream, &root, &run.title(), first)?;
             states::log_styles(&self.stream, &root)?;
             scores::log_styles(&self.stream, &root)?;
-            self.runs.insert(root, BTreeSet::new());
+            self.runs.insert(root, Known::new(first));
         }
         if self.runs.len() == known {
             return Ok(());
         }
-        let roots: Vec<_> = self.runs.keys().cloned().collect();
-        blueprint::blueprint(&roots, self.live)
-            .send(&self.stream, rerun::blueprint::BlueprintActivation::default())
+        let lanes = self.runs.iter().map(|(root, known)| Lane { root, close_up_px: known.close_up_px });
+        let lanes: Vec<_> = lanes.collect();
+        let Some(first) = self.runs.values().next() else { return Ok(()) };
+        let outlook = Outlook::over(stops, &first.position_in_site);
+        blueprint::send(&self.stream, &lanes, &outlook, self.live)
     }
 
     /// Logs one step of a run that was made known, unless it is in the recording already.
     pub(super) fn log_step(&mut self, run: &RunLog<'_>, stops: &dyn Stops, trace: &StepTrace) -> Logged {
         let root = root(run.target, run.run);
-        if !self.runs.get_mut(&root).is_some_and(|steps| steps.insert(trace.step)) {
+        if !self.runs.get_mut(&root).is_some_and(|known| known.steps.insert(trace.step)) {
             return Ok(());
         }
         self.set_time(trace.step, stops);

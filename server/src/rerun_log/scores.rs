@@ -10,7 +10,7 @@ use sightline_core::stages::judge::Gate;
 use sightline_core::trace::{StepTrace, StepTruth};
 
 use super::Logged;
-use super::palette::{LIMIT, LOST, MEASUREMENT, PREDICTION, Rgb, SECOND_PEAK, TRACKING, TRUTH, color};
+use super::palette::{FAILED, LIMIT, LOST, MEASUREMENT, PREDICTION, Rgb, SECOND_PEAK, TRACKING, color};
 use super::step::{Step, log_series, path};
 
 /// One number of a step.
@@ -60,9 +60,9 @@ pub(super) const SCORES: &[Score] = &[
     score("/{target}/update/sigma_m", "always", MEASUREMENT, |t| t.row().sigma_m),
     score("/{target}/update/correction_px", "matched and predicted in the left image", PREDICTION, |t| t.update.correction_px),
     score("/{target}/update/correction_m", "triangulated", PREDICTION, |t| t.update.correction_m),
-    score("/truth/{target}/err_px", "matched and the truth is visible", TRUTH, |t| truth(t)?.err_px),
+    score("/truth/{target}/err_px", "matched and the truth is visible", FAILED, |t| truth(t)?.err_px),
     score("/truth/{target}/tolerance_px", "the truth is known", LIMIT, |t| Some(truth(t)?.tolerance_px)),
-    score("/truth/{target}/err_m", "the truth is known", TRUTH, |t| Some(truth(t)?.err_m)),
+    score("/truth/{target}/err_m", "the truth is known", FAILED, |t| Some(truth(t)?.err_m)),
     score("/truth/{target}/nees", "the truth is known and there is a covariance", TRACKING, |t| truth(t)?.nees),
 ];
 

@@ -5,7 +5,7 @@ use sightline_core::target::TrackingState;
 use sightline_core::trace::StepTrace;
 
 use super::Logged;
-use super::palette::{color, of_state};
+use super::palette::{FAILED, color, of_state};
 use super::step::{Step, path};
 
 /// The state after the step.
@@ -15,9 +15,8 @@ pub(super) fn log_state(step: &Step<'_>) -> Logged {
 
 /// The verdict in words, with the reason of a rejection.
 pub(super) fn log_verdict(step: &Step<'_>) -> Logged {
-    let state = step.trace.update.state;
-    let line =
-        TextLog::new(sentence(step.trace)).with_level(level(step.trace)).with_color(color(of_state(state)));
+    let rgb = if step.trace.fault.is_some() { FAILED } else { of_state(step.trace.update.state) };
+    let line = TextLog::new(sentence(step.trace)).with_level(level(step.trace)).with_color(color(rgb));
     step.log("/{target}/judge/verdict", Some(line))
 }
 

@@ -1,6 +1,6 @@
 //! What is known and what is looked at: the one value of which every panel is a view.
 //!
-//! Three things change it: commands of the person ([`apply`]), answers of the server ([`arrive`]) and its events.
+//! Three things change it: commands of the person (`apply`), answers of the server (`arrive`) and its events.
 //! What it wants from the server it puts into an outbox; it does no input or output itself.
 
 mod apply;
