@@ -4,8 +4,8 @@
 Scores come from OpenCV's `matchTemplate(TM_CCOEFF_NORMED)`; scikit-image's `match_template` must agree at every
 position before anything is written, and K-Eq 11 written out in double precision must agree at the positions kept.
 
-    python -m venv /tmp/venv && /tmp/venv/bin/pip install numpy opencv-python-headless scikit-image
-    SIGHTLINE_DATA=../shared/data /tmp/venv/bin/python tests/reference/zncc_reference.py
+    python -m venv venv && venv/bin/pip install numpy opencv-python-headless scikit-image
+    SIGHTLINE_DATA=../shared/data venv/bin/python tests/reference/zncc_reference.py
 
 writes `zncc_reference.json` beside this file. The images themselves are not committed. A template is cut from one
 image at `template_centre` (odd side) and compared with every position of `search_region` (x, y, width, height)

@@ -74,7 +74,9 @@ fn errors(area: &Area<'_>, runs: &[ApproachRun]) -> std::result::Result<(), Stri
     let axes = ["largest 1σ axis of the covariance, cm", "error at the last stop, cm"];
     let mut chart = chart(area, "error against the covariance's own word", 0.0..x, 0.0..y, axes)?;
     for factor in [1.0, 3.0] {
-        let line = LineSeries::new([(0.0, 0.0), (x, factor * x)], EXPECTED.stroke_width(1));
+        // A line that left the frame would be bent at its border.
+        let end = x.min(y / factor);
+        let line = LineSeries::new([(0.0, 0.0), (end, factor * end)], EXPECTED.stroke_width(1));
         chart.draw_series(line).map_err(|e| e.to_string())?;
     }
     let dots = points.iter().map(|&point| Circle::new(point, 3, MEASURED.filled()));
