@@ -62,7 +62,14 @@ impl SightlineApp {
         for key in cache.want(&wanted, |key| net.take_place(key, slow.contains(key)), now) {
             self.net.send(Request::Item(key));
         }
-        if let Some(at) = self.state.cache.next_retry() {
+    }
+
+    /// Wakes the page when something is to be tried again: only from within a frame does egui keep that.
+    fn wake_for_retries(&self, context: &Context) {
+        let is_gone = matches!(self.state.connection, Connection::Gone { .. });
+        let item = self.state.cache.next_retry().filter(|_| !is_gone);
+        if let Some(at) = item.into_iter().chain(self.net.retry_at()).min_by(f64::total_cmp) {
+            let now = context.input(|input| input.time);
             context.request_repaint_after(std::time::Duration::from_secs_f64((at - now).max(0.05)));
         }
     }
@@ -136,6 +143,7 @@ impl eframe::App for SightlineApp {
             context.open_url(egui::OpenUrl::new_tab(url));
         }
         self.keep_link();
+        self.wake_for_retries(&context);
         self.publisher.publish(&self.state, &self.left_image, context.zoom_factor());
     }
 

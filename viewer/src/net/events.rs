@@ -33,6 +33,11 @@ impl Events {
         }
     }
 
+    /// When the next attempt is due, while there is no connection.
+    pub(super) fn retry_at(&self) -> Option<f64> {
+        self.socket.is_none().then_some(self.retry_at)
+    }
+
     /// What was told since the last time, and how the connection is.
     pub(super) fn poll(&mut self, now: f64) -> (Vec<Event>, Connection) {
         if self.socket.is_none() && now >= self.retry_at {
@@ -77,6 +82,5 @@ impl Events {
         self.attempts += 1;
         let pause = f64::from(1_u32 << self.attempts.min(4) >> 1).min(PATIENCE_S);
         self.retry_at = now + pause;
-        self.context.request_repaint_after(std::time::Duration::from_secs_f64(pause));
     }
 }

@@ -189,6 +189,11 @@ impl Net {
         arrived
     }
 
+    /// When the events want to be polled next although nothing arrived.
+    pub fn retry_at(&self) -> Option<f64> {
+        self.events.retry_at()
+    }
+
     /// The events since the last time, and how they come in.
     pub fn poll_events(&mut self, now: f64) -> (Vec<Event>, Connection) {
         self.events.poll(now)
