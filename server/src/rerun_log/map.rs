@@ -109,7 +109,7 @@ pub(super) fn log_triangulated_covariance(step: &Step<'_>) -> Logged {
 pub(super) fn log_position(step: &Step<'_>) -> Logged {
     let updated = &step.trace.update;
     let position = step.in_site(&updated.target.position_in_rover);
-    let point = dot_3d(position, of_state(updated.state), step.label).with_show_labels(true);
+    let point = dot_3d(position, of_state(updated.state), step.label);
     step.log("/{target}/update/position", Some(point))
 }
 

@@ -16,7 +16,8 @@ pub(super) fn log_state(step: &Step<'_>) -> Logged {
 /// The verdict in words, with the reason of a rejection.
 pub(super) fn log_verdict(step: &Step<'_>) -> Logged {
     let rgb = if step.trace.fault.is_some() { FAILED } else { of_state(step.trace.update.state) };
-    let line = TextLog::new(sentence(step.trace)).with_level(level(step.trace)).with_color(color(rgb));
+    let words = format!("{}, {}", step.label, sentence(step.trace));
+    let line = TextLog::new(words).with_level(level(step.trace)).with_color(color(rgb));
     step.log("/{target}/judge/verdict", Some(line))
 }
 

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use rerun::components::AggregationPolicy;
 use rerun::{AsComponents, Clear, RecordingStream, SeriesLines};
 use sightline_core::frames::{Point3, Pose};
 use sightline_core::image::GrayImage;
@@ -65,7 +66,8 @@ pub(super) fn path(entity: &str, root: &str) -> String {
     entity.replace("{target}", root)
 }
 
-/// Logs how a scalar is drawn, once and for all steps.
+/// Logs how a scalar is drawn, once and for all steps: every step by itself, because the viewer would otherwise
+/// draw the mean of neighbours where a plot is small, and a lost step between good ones would look half good.
 pub(super) fn log_series(
     stream: &RecordingStream,
     path: &str,
@@ -73,5 +75,6 @@ pub(super) fn log_series(
     color: rerun::Color,
     width: f32,
 ) -> Logged {
-    stream.log_static(path, &SeriesLines::new().with_names([name]).with_colors([color]).with_widths([width]))
+    let series = SeriesLines::new().with_names([name]).with_colors([color]).with_widths([width]);
+    stream.log_static(path, &series.with_aggregation_policy(AggregationPolicy::Off))
 }
