@@ -27,6 +27,7 @@ pub type Pose = Isometry3<f64>;
 
 /// A position in an image, in pixels; (0, 0) is the centre of the first pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
 pub struct Pixel {
     /// Column, to the right, px.
     pub x: f64,

@@ -190,8 +190,7 @@ fn first_target(
         travelled_m: 0.0,
         last_distance_m: distance_m,
         travelled_since_update_m: 0.0,
-        drift_covariance_px2: located.left_covariance_px2,
-        drift_bias_px: located.left_bias_px,
+        drift: located.left_error,
         appearance,
     })
 }

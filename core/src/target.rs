@@ -6,11 +6,12 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2};
+use nalgebra::{Matrix3, Matrix3x2};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::camera::Camera;
+use crate::estimate::drift::Drift;
 use crate::frames::{Pixel, Point3};
 use crate::image::GrayImage;
 
@@ -69,13 +70,9 @@ pub struct Target {
     pub last_distance_m: f64,
     /// Distance driven since the last accepted update, m: `L_step` of R87.
     pub travelled_since_update_m: f64,
-    /// Covariance of where the template's centre lies relative to the designated point, px² in the image
-    /// from which the template was taken: what the renewals of the template have added so far.
-    #[schema(value_type = Vec<f64>)]
-    pub drift_covariance_px2: Matrix2<f64>,
-    /// The part of that drift which points the same way step after step, px: the sum of the matches' biases.
-    #[schema(value_type = [f64; 2])]
-    pub drift_bias_px: Vector2<f64>,
+    /// The error of the template's centre against the designated point, in the image from which the template
+    /// was taken: what the renewals of the template have added so far.
+    pub drift: Drift,
     /// How it looked when the template was taken.
     pub appearance: Appearance,
 }

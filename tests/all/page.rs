@@ -18,6 +18,7 @@ use sightline_server::rerun_log::{Rows, documented_entities};
 use sightline_server::state::AppState;
 use sightline_tests::browser::Browser;
 use sightline_tests::rrd;
+use sightline_tests::scenario::short_approach;
 
 /// A server with one traverse, and a rock's pixel in its first left image.
 struct Bench {
@@ -108,20 +109,9 @@ async fn pick(bench: &Bench, browser: &Browser) {
     wait(browser, "the run", &format!("s.steps_done === {} && !s.running", bench.stop_count)).await;
 }
 
-/// A shorter, coarser approach than the demonstration's, to be rendered within a test.
-fn short() -> Scenario {
-    let mut scenario = Scenario { seed: 3, ..Scenario::demo() };
-    scenario.camera.image_size = 512;
-    scenario.camera.samples_per_axis = 2;
-    scenario.targets.window_px = 11;
-    scenario.drive.start_distance_m = 5.0;
-    scenario.drive.end_distance_m = 3.2;
-    scenario
-}
-
 #[tokio::test(flavor = "multi_thread")]
 async fn a_person_picks_a_rock_steps_to_the_end_and_back_and_exports() {
-    let bench = Bench::start(&short()).await;
+    let bench = Bench::start(&short_approach()).await;
     let browser = Browser::start().await;
     pick(&bench, &browser).await;
 

@@ -6,5 +6,6 @@
 pub mod browser;
 pub mod data;
 pub mod rrd;
+pub mod scenario;
 pub mod troubled;
 pub mod server;

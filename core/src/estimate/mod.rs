@@ -1,4 +1,5 @@
 //! Estimation that several trackers use.
 
+pub mod drift;
 pub mod triangulate;
 pub mod unscented;

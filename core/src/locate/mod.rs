@@ -10,10 +10,11 @@
 
 pub mod template;
 
-use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2};
+use nalgebra::{Matrix3, Matrix3x2};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::estimate::drift::Drift;
 use crate::frames::{Pixel, Point3, Pose};
 use crate::settings::{Settings, TrackerKind};
 use crate::stages::capture::Capture;
@@ -29,12 +30,8 @@ pub struct Located {
     pub left_pixel: Option<Pixel>,
     /// Position in the right image, px.
     pub right_pixel: Option<Pixel>,
-    /// Covariance of the left position against the designated point, px², template drift included.
-    #[schema(value_type = Vec<f64>)]
-    pub left_covariance_px2: Matrix2<f64>,
-    /// The error of the left position that points the same way step after step, px; not in the covariance.
-    #[schema(value_type = [f64; 2])]
-    pub left_bias_px: Vector2<f64>,
+    /// The error of the left position against the designated point, template drift included.
+    pub left_error: Drift,
     /// Position in the rover frame, m.
     #[schema(value_type = Option<[f64; 3]>)]
     pub position_in_rover: Option<Point3>,

@@ -241,6 +241,9 @@ pub struct TargetRule {
     pub on_rocks: bool,
     /// Least part of the window that lies on the same rock as the target (0.90, ours).
     pub same_rock_fraction: f64,
+    /// Greatest angle between normal and line of sight, at the first and at the last stop, in 90 % of the window,
+    /// degrees (70, ours): a face that turns its edge to the rover is no place to drive to.
+    pub incidence_deg: f64,
 }
 
 impl Default for TargetRule {
@@ -253,6 +256,7 @@ impl Default for TargetRule {
             depth_range_fraction: 0.10,
             on_rocks: true,
             same_rock_fraction: 0.90,
+            incidence_deg: 70.0,
         }
     }
 }

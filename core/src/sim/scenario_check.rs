@@ -91,6 +91,7 @@ impl Scenario {
         within("targets.window_px", f64::from(targets.window_px), 1.0, 201.0)?;
         within("targets.shadow_fraction", targets.shadow_fraction, 0.0, 1.0)?;
         within("targets.same_rock_fraction", targets.same_rock_fraction, 0.0, 1.0)?;
+        within("targets.incidence_deg", targets.incidence_deg, 0.0, 90.0)?;
         within("targets.depth_range_fraction", targets.depth_range_fraction, 0.0, 10.0)
     }
 }

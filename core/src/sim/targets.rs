@@ -11,7 +11,10 @@
 //!    distance inside the window (R21), the sky counting as infinitely far;
 //! 5. with `on_rocks`, it lies on a rock, and at least `same_rock_fraction` of the window's pixels lie on that
 //!    same rock: the papers' targets are on rocks and off their occluding boundaries (R20, R110);
-//! 6. it was not chosen before.
+//! 6. nine tenths of the window's surface are turned to the left camera, at the first stop and at the last: normal
+//!    and line of sight differ by at most `incidence_deg`. An undercut face turns its edge to a camera that comes
+//!    near and looks down, and the place one came for is hardly to be seen;
+//! 7. it was not chosen before.
 //!
 //! Nothing else is asked: not texture, not contrast, not how well anything tracks it. Drawing ends after 2000
 //! draws per target asked for; then there are fewer targets.
@@ -35,10 +38,13 @@ use super::index::true_camera_in_site;
 use super::render::{Eye, visible_pixel};
 use super::scenario::{Scenario, TargetRule};
 use super::texture::mix;
-use super::world::{SurfaceId, World};
+use super::world::{Hit, SurfaceId, World};
 
 /// Draws per target before the search is given up.
 const DRAWS_PER_TARGET: u32 = 2000;
+
+/// Least part of the window that must be turned to the camera.
+const FACING_FRACTION: f64 = 0.90;
 
 /// Chooses targets by the rule of the module's header; fewer than asked for if the draws run out.
 pub fn choose_targets(world: &World, scenario: &Scenario, index: &TraverseIndex) -> Vec<Pixel> {
@@ -112,7 +118,7 @@ fn is_target(world: &World, camera: &Camera, last: [&Camera; 2], rule: &TargetRu
         && last.iter().all(|eye| {
             visible_pixel(world, eye, &point).is_some_and(|seen| window_is_inside(eye, seen, rule))
         })
-        && window_is_even(world, camera, rule, pixel)
+        && window_is_even(world, camera, rule, pixel, &last[0].model.centre())
 }
 
 /// Whether the whole window around a pixel lies in the image.
@@ -127,11 +133,18 @@ fn is_on_rock(surface: SurfaceId, same_fraction: f64, rule: &TargetRule) -> bool
     matches!(surface, SurfaceId::Rock(_)) && same_fraction >= rule.same_rock_fraction
 }
 
-/// Whether the window around a pixel is lit and even enough (R21).
-fn window_is_even(world: &World, camera: &Camera, rule: &TargetRule, pixel: Pixel) -> bool {
+/// Whether a surface is turned to both places enough.
+fn faces(hit: &Hit, places: [&Point3; 2], rule: &TargetRule) -> bool {
+    places.iter().all(|place| hit.normal.angle(&(*place - hit.point)) <= rule.incidence_deg.to_radians())
+}
+
+/// Whether the window around a pixel is lit, even and turned to the camera enough, here and from the last stop.
+fn window_is_even(world: &World, camera: &Camera, rule: &TargetRule, pixel: Pixel, last: &Point3) -> bool {
     let half = i32::try_from(rule.window_px / 2).unwrap_or(i32::MAX);
-    let Some(middle) = camera.ray(pixel).and_then(|ray| world.cast(&ray)) else { return false };
-    let (mut nearest_m, mut farthest_m, mut shaded, mut same) = (f64::INFINITY, 0.0f64, 0u32, 0u32);
+    let Some(middle_ray) = camera.ray(pixel) else { return false };
+    let Some(middle) = world.cast(&middle_ray) else { return false };
+    let (mut nearest_m, mut farthest_m) = (f64::INFINITY, 0.0f64);
+    let (mut shaded, mut same, mut facing) = (0u32, 0u32, 0u32);
     for dy in -half..=half {
         for dx in -half..=half {
             let hit = camera.ray(pixel.offset(f64::from(dx), f64::from(dy))).and_then(|ray| world.cast(&ray));
@@ -140,10 +153,12 @@ fn window_is_even(world: &World, camera: &Camera, rule: &TargetRule, pixel: Pixe
             farthest_m = farthest_m.max(hit.distance_m);
             shaded += u32::from(world.in_shadow(&hit.point));
             same += u32::from(hit.surface == middle.surface);
+            facing += u32::from(faces(&hit, [&middle_ray.origin, last], rule));
         }
     }
     let pixels = f64::from((2 * half + 1).pow(2));
     f64::from(shaded) <= rule.shadow_fraction * pixels
         && farthest_m - nearest_m <= rule.depth_range_fraction * middle.distance_m
         && (!rule.on_rocks || is_on_rock(middle.surface, f64::from(same) / pixels, rule))
+        && f64::from(facing) >= FACING_FRACTION * pixels
 }

@@ -75,8 +75,7 @@ fn renew(carried: &Target, pointing: &Pointing, capture: &Capture, located: &Loc
         covariance_in_rover: located.covariance_in_rover?,
         last_distance_m: (position_in_rover - pointing.left.model.centre()).norm(),
         travelled_since_update_m: 0.0,
-        drift_covariance_px2: located.left_covariance_px2,
-        drift_bias_px: located.left_bias_px,
+        drift: located.left_error,
         appearance: Appearance {
             step: carried.step,
             pixel,

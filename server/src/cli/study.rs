@@ -12,6 +12,9 @@ use sightline_core::traverse::create_simulated;
 use super::figure;
 use super::{open, say};
 
+/// Seeds that are tried for each world asked for.
+const SEEDS_PER_WORLD: u64 = 10;
+
 /// Run a validation experiment.
 #[derive(Debug, Args)]
 pub struct Study {
@@ -28,8 +31,8 @@ enum Experiment {
 /// Straight approaches: each world is rendered once, each of its targets is one run.
 #[derive(Debug, Args)]
 struct Approach {
-    /// How many worlds.
-    #[arg(long, default_value_t = 5)]
+    /// How many worlds; one that offers fewer targets than the scenario asks for is passed over and named.
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
     worlds: u64,
     /// The seed of the first world; the others follow.
     #[arg(long, default_value_t = 1)]
@@ -63,9 +66,25 @@ impl Approach {
         let changes = self.set.iter().map(|text| parse_assignment(text)).collect::<Result<Changes>>()?;
         let settings = Settings::default().with(&changes)?;
         let mut runs = Vec::new();
-        for seed in self.first_seed..self.first_seed + self.worlds {
-            let world = Scenario { seed, ..scenario.clone() };
-            runs.extend(self.track_world(&world, &settings)?);
+        let mut worlds = 0;
+        let seeds = self.first_seed..self.first_seed.saturating_add(self.worlds * SEEDS_PER_WORLD);
+        for seed in seeds.clone() {
+            if worlds == self.worlds {
+                break;
+            }
+            if let Some(of_world) = self.track_world(&Scenario { seed, ..scenario.clone() }, &settings)? {
+                runs.extend(of_world);
+                worlds += 1;
+            }
+        }
+        if worlds < self.worlds {
+            return Err(Error::Request(format!(
+                "only {worlds} of {} worlds with seeds from {} to {} offer {} targets: lower targets.count or widen targets.radius_m in the scenario",
+                self.worlds,
+                seeds.start,
+                seeds.end - 1,
+                scenario.targets.count
+            )));
         }
         let summary = approach::summarise_runs(&runs);
         write(&self.out.join("runs.csv"), table(&runs).as_bytes())?;
@@ -75,15 +94,21 @@ impl Approach {
         say::line(&sentence(&summary))
     }
 
-    fn track_world(&self, scenario: &Scenario, settings: &Settings) -> Result<Vec<ApproachRun>> {
+    /// Renders a world and tracks all its targets; nothing if it offers fewer than the scenario asks for, which
+    /// depends on its surface and its light alone.
+    fn track_world(&self, scenario: &Scenario, settings: &Settings) -> Result<Option<Vec<ApproachRun>>> {
         let traverse = create_simulated(scenario, &self.out.join(format!("world-{}", scenario.seed)))?;
-        open::render(&traverse)?;
         let world =
             traverse.world().ok_or_else(|| Error::Request("a simulated world has no surface".to_owned()))?;
         let targets = sim::choose_targets(world, scenario, traverse.index());
+        if targets.len() < scenario.targets.count as usize {
+            say::line(&format!("world {}: {} targets, passed over", scenario.seed, targets.len()))?;
+            return Ok(None);
+        }
+        open::render(&traverse)?;
         let runs = approach::track_world(&traverse, scenario.seed, &targets, settings);
         say::line(&format!("world {}: {}", scenario.seed, sentence(&approach::summarise_runs(&runs))))?;
-        Ok(runs)
+        Ok(Some(runs))
     }
 }
 

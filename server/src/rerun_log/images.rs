@@ -95,11 +95,11 @@ pub(super) fn log_second_peak(step: &Step<'_>) -> Logged {
     step.log("/{target}/locate/match_template/second_peak", second)
 }
 
-/// The covariance of the located left position.
+/// The error of the located left position, bias included.
 pub(super) fn log_left_covariance(step: &Step<'_>) -> Logged {
     let located = step.trace.locate.as_ref();
-    let strip =
-        located.and_then(|located| ellipse(located.left_pixel?, &located.left_covariance_px2, SIGMAS));
+    let strip = located
+        .and_then(|located| ellipse(located.left_pixel?, &located.left_error.mean_square_px2(), SIGMAS));
     step.log("/{target}/locate/left_covariance", strip.map(|s| haloed(&[s], MEASUREMENT)))
 }
 

@@ -149,14 +149,7 @@ fn paint_marks(overlay: &Overlay<'_>, trace: &StepTrace, state: &State) {
     if let Some((located, pixel)) = trace.locate.as_ref().and_then(|l| Some((l, l.left_pixel?)))
         && state.shows(Layer::Match)
     {
-        let bias = located.left_bias_px;
-        overlay.ellipse(
-            pixel,
-            &(located.left_covariance_px2 + bias * bias.transpose()),
-            3.0,
-            run,
-            Line::Solid,
-        );
+        overlay.ellipse(pixel, &located.left_error.mean_square_px2(), 3.0, run, Line::Solid);
         overlay.mark(pixel, Mark::Ring, run);
     }
     if let Some(pixel) = trace.truth.as_ref().and_then(|t| t.left_pixel).filter(|_| state.shows(Layer::Truth))

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Matrix2, Matrix3, Vector2};
 use sightline_core::camera::{Camera, Mast};
 use sightline_core::correlate::peak::{Peak, SecondPeak};
+use sightline_core::estimate::drift::Drift;
 use sightline_core::frames::{Pixel, Point3, Pose, PoseRecord};
 use sightline_core::image::{GrayImage, PixelRect, npy};
 use sightline_core::locate::template::TemplateEvidence;
@@ -232,8 +233,11 @@ fn located(is_designation: bool, is_good: bool, covariance: Matrix3<f64>) -> Loc
     Located {
         left_pixel: Some(PIXEL),
         right_pixel: Some(PIXEL.offset(-58.0, 0.5)),
-        left_covariance_px2: Matrix2::new(0.2, 0.05, 0.05, 0.1),
-        left_bias_px: Vector2::new(0.05, 0.0),
+        left_error: Drift {
+            covariance_px2: Matrix2::new(0.2, 0.05, 0.05, 0.1),
+            bias_px: Vector2::new(0.05, 0.0),
+            with_last_match_px: Matrix2::zeros(),
+        },
         surface_by_pixel: None,
         position_in_rover: Some(Point3::from(POSITION)),
         covariance_in_rover: Some(covariance),
@@ -335,8 +339,7 @@ fn updated(
             travelled_m: step as f64,
             last_distance_m: 6.0,
             travelled_since_update_m: 0.0,
-            drift_covariance_px2: Matrix2::zeros(),
-            drift_bias_px: Vector2::zeros(),
+            drift: Drift::default(),
             appearance: Appearance {
                 step,
                 pixel: PIXEL,

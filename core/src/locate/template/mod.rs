@@ -21,7 +21,7 @@ pub use settings::TemplateSettings;
 #[cfg(test)]
 mod tests;
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::Matrix2;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -31,6 +31,7 @@ use self::scale_roll::ScaleRoll;
 use self::settings::NoiseModel;
 use self::triangulate::Triangulation;
 use super::{DesignateInput, Evidence, LocateInput, Located, Locator};
+use crate::estimate::drift::Drift;
 
 /// What the template locator saw; a step that was not reached is null.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -68,7 +69,7 @@ impl Locator for TemplateLocator {
             geometry: input.stereo,
             predicted_range_m: None,
         };
-        finish(TemplateEvidence::default(), &stereo, (covariance, Vector2::zeros()), &input.settings.template)
+        finish(TemplateEvidence::default(), &stereo, Drift::of_pixel(covariance), &input.settings.template)
     }
 
     fn locate(&self, input: &LocateInput<'_>) -> Located {
@@ -85,13 +86,14 @@ impl Locator for TemplateLocator {
             Err(missing) => return nothing(evidence, missing),
         };
         let left_pixel = matched.peak.pixel;
-        let carry = prepared.image_from_template;
         let error = match settings.noise_model {
-            NoiseModel::Measured => (
-                carry * input.target.drift_covariance_px2 * carry.transpose() + matched.covariance_px2,
-                carry * input.target.drift_bias_px + matched.bias_px,
+            NoiseModel::Measured => input.target.drift.after_match(
+                &prepared.image_from_template,
+                &matched.covariance_px2,
+                matched.bias_px,
+                settings.match_correlation,
             ),
-            NoiseModel::HalfPixel => (Matrix2::identity() * HALF_PIXEL_VARIANCE, Vector2::zeros()),
+            NoiseModel::HalfPixel => Drift::of_pixel(Matrix2::identity() * HALF_PIXEL_VARIANCE),
         };
         evidence.match_template = Some(matched);
         let stereo = StereoInput {
@@ -111,12 +113,12 @@ impl Locator for TemplateLocator {
 fn finish(
     mut evidence: TemplateEvidence,
     input: &StereoInput<'_>,
-    (left_covariance_px2, left_bias_px): (Matrix2<f64>, Vector2<f64>),
+    left_error: Drift,
     settings: &TemplateSettings,
 ) -> Located {
     let confidence = evidence.match_template.as_ref().map_or(1.0, |m| m.peak.score.clamp(0.0, 1.0));
     let left_pixel = Some(input.left_pixel);
-    let mut located = Located { left_pixel, left_covariance_px2, left_bias_px, confidence, ..empty() };
+    let mut located = Located { left_pixel, left_error, confidence, ..empty() };
     let stereo = match point_stereo::point_stereo(input, settings) {
         Ok(stereo) => stereo,
         Err(missing) => {
@@ -131,8 +133,7 @@ fn finish(
         let range_m = stereo.range_m;
         Err(format!("the best stereo match lies at the end of the searched ranges, at {range_m:.1} m"))
     } else {
-        let error_px2 = left_covariance_px2 + left_bias_px * left_bias_px.transpose();
-        triangulate::triangulate(input, &stereo, error_px2, settings.noise_model)
+        triangulate::triangulate(input, &stereo, left_error.mean_square_px2(), settings.noise_model)
     };
     match triangulated {
         Ok(triangulation) => {
@@ -156,8 +157,7 @@ fn empty() -> Located {
     Located {
         left_pixel: None,
         right_pixel: None,
-        left_covariance_px2: Matrix2::zeros(),
-        left_bias_px: Vector2::zeros(),
+        left_error: Drift::default(),
         surface_by_pixel: None,
         position_in_rover: None,
         covariance_in_rover: None,

@@ -86,5 +86,7 @@ settings_group! {
         range_max_m: f64 = 200.0, "m", Domain::Between(0.1, 100_000.0), "ours";
         /// Where the pixel noise of the covariance comes from.
         noise_model: NoiseModel = NoiseModel::Measured, "", Domain::choice(&["measured", "half_pixel"]), "ours; papers: R170";
+        /// How alike the errors of two matches in a row are, where they are measured.
+        match_correlation: f64 = 0.3, "", Domain::Between(0.0, 0.99), "ours; ARCHITECTURE.md";
     }
 }
