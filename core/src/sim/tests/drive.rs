@@ -118,14 +118,20 @@ fn targets_satisfy_the_rule_and_follow_from_the_seed() {
         let rock = demo.world.cast(&camera.ray(*pixel).unwrap()).unwrap().surface;
         assert!(matches!(rock, SurfaceId::Rock(_)));
         let mut distances_m = Vec::new();
-        let (mut shaded, mut same) = (0, 0);
+        let (mut shaded, mut same, mut facing) = (0, 0, 0);
         for k in 0..441 {
             let at = pixel.offset(f64::from(k % 21) - 10.0, f64::from(k / 21) - 10.0);
             let hit = demo.world.cast(&camera.ray(at).unwrap()).unwrap();
             distances_m.push(hit.distance_m);
             shaded += u32::from(demo.world.in_shadow(&hit.point));
             same += u32::from(hit.surface == rock);
+            let places = [camera.model.centre(), last_camera.model.centre()];
+            facing += u32::from(places.iter().all(|place| {
+                let to_place = (place - hit.point).normalize();
+                hit.normal.dot(&to_place) >= 70f64.to_radians().cos() - 1e-12
+            }));
         }
+        assert!(f64::from(facing) >= 0.90 * 441.0);
         assert!(f64::from(same) >= 0.90 * 441.0);
         distances_m.sort_by(f64::total_cmp);
         let distance_m = (point - camera.model.centre()).norm();
@@ -135,6 +141,7 @@ fn targets_satisfy_the_rule_and_follow_from_the_seed() {
     assert_eq!(targets, choose_targets(&demo.world, &demo.scenario, &demo.index));
     let mut anywhere = demo.scenario.clone();
     anywhere.targets.on_rocks = false;
+    anywhere.targets.incidence_deg = 90.0;
     let anywhere = choose_targets(&demo.world, &anywhere, &demo.index);
     assert!(share_on_rocks(&demo.world, &demo.index, &anywhere) < 1.0);
     let other = Scenario { seed: 77, ..demo.scenario.clone() };
