@@ -12,7 +12,7 @@
 
 use crate::frames::{Point3, Ray, Vector3};
 
-use super::rocks::Rock;
+use crate::sim::ground::rocks::Rock;
 
 /// A node of the tree: a box with either two children or a run of rocks.
 #[derive(Clone, Debug)]

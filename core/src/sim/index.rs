@@ -12,11 +12,11 @@ use crate::error::Result;
 use crate::frames::{Pose, PoseRecord};
 use crate::traverse::{CameraSource, FORMAT_VERSION, StereoGeometry, Stop, StopTruth, TraverseIndex, View};
 
-use super::camera_noise::FULL_SCALE_DN;
-use super::drive;
-use super::render::Eye;
-use super::scenario::Scenario;
-use super::world::World;
+use crate::sim::camera::noise::FULL_SCALE_DN;
+use crate::sim::camera::render::Eye;
+use crate::sim::rover::drive;
+use crate::sim::scenario::Scenario;
+use crate::sim::world::World;
 
 /// The name of the scenario's file within a traverse folder.
 pub const SCENARIO_FILE: &str = "scenario.toml";

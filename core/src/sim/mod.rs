@@ -28,28 +28,19 @@
 //! Sources: domain.md 5, 10, 11; papers.md R104–R106, R21, R227.
 
 pub mod scenario;
-mod scenario_check;
-pub mod texture;
-pub mod terrain;
-mod terrain_cast;
-pub mod rocks;
-pub mod rock_field;
+pub mod ground;
 pub mod culling;
 pub mod world;
-pub mod surface;
 pub mod light;
-pub mod openness;
-pub mod sampling;
-pub mod render;
-pub mod camera_noise;
-pub mod drive;
+pub mod camera;
+pub mod rover;
 pub mod index;
 pub mod targets;
 #[cfg(test)]
 mod tests;
 
+pub use camera::render::{Eye, NoiseSeed, Region, render, render_clean, render_region};
 pub use index::{SCENARIO_FILE, index, true_camera_in_site};
-pub use render::{Eye, NoiseSeed, Region, render, render_clean, render_region};
 pub use scenario::Scenario;
 pub use targets::{choose_targets, share_on_rocks, surface_point};
 pub use world::{Hit, SurfaceId, World};

@@ -34,11 +34,11 @@ use crate::camera::Camera;
 use crate::frames::{Pixel, Point3};
 use crate::traverse::TraverseIndex;
 
-use super::index::true_camera_in_site;
-use super::render::{Eye, visible_pixel};
-use super::scenario::{Scenario, TargetRule};
-use super::texture::mix;
-use super::world::{Hit, SurfaceId, World};
+use crate::sim::camera::render::{Eye, visible_pixel};
+use crate::sim::ground::texture::mix;
+use crate::sim::index::true_camera_in_site;
+use crate::sim::scenario::{Scenario, TargetRule};
+use crate::sim::world::{Hit, SurfaceId, World};
 
 /// Draws per target before the search is given up.
 const DRAWS_PER_TARGET: u32 = 2000;

@@ -10,16 +10,16 @@
 
 use crate::frames::{Point3, Ray, Vector3};
 
-use super::culling::{SunGrid, Tree};
-use super::drive;
-use super::light::Light;
-use super::openness::Openness;
-use super::render;
-use super::rock_field::{self, Approach};
-use super::rocks::Rock;
-use super::scenario::Scenario;
-use super::surface::Surfaces;
-use super::terrain::Terrain;
+use crate::sim::camera::render;
+use crate::sim::culling::{SunGrid, Tree};
+use crate::sim::ground::rock_field::{self, Approach};
+use crate::sim::ground::rocks::Rock;
+use crate::sim::ground::surface::Surfaces;
+use crate::sim::ground::terrain::Terrain;
+use crate::sim::light::openness::Openness;
+use crate::sim::light::reflection::Light;
+use crate::sim::rover::drive;
+use crate::sim::scenario::Scenario;
 
 /// How far off its surface a ray starts, m.
 const OFF_SURFACE_M: f64 = 1e-6;
@@ -49,13 +49,13 @@ pub struct Hit {
 /// The world of a scenario.
 #[derive(Clone, Debug)]
 pub struct World {
-    pub(super) terrain: Terrain,
-    pub(super) rocks: Vec<Rock>,
-    pub(super) surfaces: Surfaces,
-    pub(super) light: Light,
-    pub(super) openness: Openness,
+    pub(in crate::sim) terrain: Terrain,
+    pub(in crate::sim) rocks: Vec<Rock>,
+    pub(in crate::sim) surfaces: Surfaces,
+    pub(in crate::sim) light: Light,
+    pub(in crate::sim) openness: Openness,
     /// Fraction of full scale per unit of radiance.
-    pub(super) exposure: f64,
+    pub(in crate::sim) exposure: f64,
     tree: Tree,
     sun_grid: SunGrid,
     targets_centre: Point3,
@@ -152,7 +152,7 @@ impl World {
 
     /// Whether a rock, or the rock on which the ray starts, stands on a ray to the sun.
     #[inline(always)]
-    pub(super) fn is_blocked_by_rock(&self, to_sun: &Ray) -> bool {
+    pub(in crate::sim) fn is_blocked_by_rock(&self, to_sun: &Ray) -> bool {
         self.sun_grid.towards_sun(&to_sun.origin).iter().any(|&index| {
             let interval = self.rocks[index as usize].interval(to_sun);
             // Where the ray starts on a lit face it leaves at once.
@@ -163,7 +163,7 @@ impl World {
 
     /// Whether the ground stands on a ray to the sun.
     #[inline(always)]
-    pub(super) fn is_blocked_by_ground(&self, to_sun: &Ray) -> bool {
+    pub(in crate::sim) fn is_blocked_by_ground(&self, to_sun: &Ray) -> bool {
         // Most grounds are nowhere as steep as the sun is high.
         let rise = -to_sun.direction.z / to_sun.direction.xy().norm();
         rise <= self.terrain.steepest() && self.terrain.cast(to_sun, OFF_SURFACE_M, f64::INFINITY).is_some()

@@ -21,7 +21,7 @@ use super::{Stop, TraverseIndex};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::image::io;
-use crate::sim::camera_noise::expose;
+use crate::sim::camera::noise::expose;
 use crate::sim::{self, Eye, NoiseSeed, Region, SCENARIO_FILE, Scenario, World, render_region};
 
 /// The largest scenario file that is read, bytes.
@@ -84,7 +84,7 @@ impl Simulated {
         if self.scenario.camera.bit_depth == 8 {
             io::encode_png_u8(&image)
         } else {
-            io::encode_png_u16(&image, Some(sim::camera_noise::FULL_SCALE_DN))
+            io::encode_png_u16(&image, Some(sim::camera::noise::FULL_SCALE_DN))
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::frames::{Pixel, Pose};
-use crate::sim::drive::{distance_m, distances_m, estimates, mast, true_stops};
+use crate::sim::rover::drive::{distance_m, distances_m, estimates, mast, true_stops};
 use crate::sim::scenario::DriveSettings;
 
 #[test]

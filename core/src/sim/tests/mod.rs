@@ -30,5 +30,6 @@ fn demo() -> &'static Demo {
 
 /// A number in [0, 1) from two others.
 fn unit(a: u64, b: u64) -> f64 {
-    (texture::mix(texture::mix(a) ^ b) >> 11) as f64 / (1u64 << 53) as f64
+    (crate::sim::ground::texture::mix(crate::sim::ground::texture::mix(a) ^ b) >> 11) as f64
+        / (1u64 << 53) as f64
 }

@@ -107,7 +107,7 @@ fn silhouettes() -> (Scenario, World) {
     (scenario.camera.blur_px, scenario.camera.samples_per_axis) = (0.0, 4);
     let mut world = World::new(&scenario);
     // Without contact shadows, which lie beside the silhouettes.
-    world.openness = openness::Openness::new(&[], [0.0, 1.0], [0.0, 1.0]);
+    world.openness = crate::sim::light::openness::Openness::new(&[], [0.0, 1.0], [0.0, 1.0]);
     (scenario, world)
 }
 
@@ -163,7 +163,7 @@ fn the_same_seed_gives_the_same_bits_with_one_thread_and_with_four() {
             let world = World::new(&scenario);
             let clean = region(&world, &scenario, &camera, window);
             let seed = NoiseSeed { step: 9, eye: Eye::Left };
-            let noisy = camera_noise::expose(&clean, &scenario, seed, [window.x, window.y]);
+            let noisy = crate::sim::camera::noise::expose(&clean, &scenario, seed, [window.x, window.y]);
             (clean.into_raw(), noisy.into_raw())
         })
     };
@@ -182,7 +182,7 @@ fn a_region_has_the_bits_of_the_whole_picture() {
     let seed = NoiseSeed { step: 12, eye: Eye::Right };
     let record = |window: Region| {
         let clean = region(&demo.world, &demo.scenario, &camera, window);
-        camera_noise::expose(&clean, &demo.scenario, seed, [window.x, window.y])
+        crate::sim::camera::noise::expose(&clean, &demo.scenario, seed, [window.x, window.y])
     };
     let (whole, part) = (record(big), record(small));
     for (x, y, pixel) in part.enumerate_pixels() {

@@ -11,7 +11,7 @@
 //!
 //! Sources: ours, after domain.md 11.1 (ambient occlusion in shadows).
 
-use super::rocks::Rock;
+use crate::sim::ground::rocks::Rock;
 
 /// Side of a cell, m.
 const CELL_M: f64 = 0.04;

@@ -13,11 +13,11 @@
 
 use crate::frames::{Point3, Vector3};
 
-use super::light::Appearance;
-use super::rocks::Rock;
-use super::scenario::TextureSettings;
-use super::terrain::Terrain;
-use super::texture::{OctaveSettings, Octaves, mix};
+use crate::sim::ground::rocks::Rock;
+use crate::sim::ground::terrain::Terrain;
+use crate::sim::ground::texture::{OctaveSettings, Octaves, mix};
+use crate::sim::light::reflection::Appearance;
+use crate::sim::scenario::TextureSettings;
 
 /// The look of soil and rock.
 #[derive(Clone, Debug)]

@@ -5,7 +5,7 @@
 //!    a region of a picture has the same bits as the whole picture has there).
 //! 3. The exposure scales radiance to the detector: `level = bias/4095 + exposure · radiance`, at most 1.
 //!    This is the *clean* picture: the expectation of the recorded one, in fractions of full scale.
-//! 4. `camera_noise.rs` draws the noise and quantises.
+//! 4. `noise.rs` draws the noise and quantises.
 //!
 //! The exposure is fixed for a world: such that the mean of the first left picture is `mean_level`, taken
 //! on 64 × 64 rays. Rows of tiles are shared between threads; every pixel is a function of its place alone,
@@ -23,11 +23,11 @@ use crate::error::{Error, Result};
 use crate::frames::Pixel;
 use crate::image::GrayImage;
 
-use super::camera_noise;
-use super::drive;
-use super::sampling::{Sampler, TILE_PX};
-use super::scenario::Scenario;
-use super::world::World;
+use crate::sim::camera::noise;
+use crate::sim::camera::sampling::{Sampler, TILE_PX};
+use crate::sim::rover::drive;
+use crate::sim::scenario::Scenario;
+use crate::sim::world::World;
 
 /// Which camera of the pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -70,7 +70,7 @@ impl Region {
 /// The picture that a camera takes, with noise and quantisation.
 pub fn render(world: &World, scenario: &Scenario, camera_in_site: &Camera, seed: NoiseSeed) -> GrayImage {
     let clean = render_clean(world, scenario, camera_in_site);
-    camera_noise::expose(&clean, scenario, seed, [0, 0])
+    noise::expose(&clean, scenario, seed, [0, 0])
 }
 
 /// The noise-free picture: the expectation of the recorded one.
@@ -109,7 +109,7 @@ pub fn render_region(
         Ok(())
     })?;
     let blurred = blur(&radiance, [width, height], &kernel);
-    let bias = (scenario.camera.bias_dn / camera_noise::FULL_SCALE_DN) as f32;
+    let bias = (scenario.camera.bias_dn / noise::FULL_SCALE_DN) as f32;
     let exposure = world.exposure as f32;
     let levels = blurred.into_iter().map(|radiance| (bias + exposure * radiance).min(1.0)).collect();
     Ok(GrayImage::from_raw(region.width, region.height, levels).unwrap_or_default())
@@ -145,7 +145,7 @@ fn blur(values: &[f32], [width, height]: [usize; 2], kernel: &[f32]) -> Vec<f32>
 }
 
 /// Fraction of full scale per unit of radiance that gives the first left picture its mean level.
-pub(super) fn exposure(world: &World, scenario: &Scenario) -> f64 {
+pub(in crate::sim) fn exposure(world: &World, scenario: &Scenario) -> f64 {
     /// Rays along each side of the picture.
     const SIDE: u32 = 64;
     let mast = drive::mast(scenario);
@@ -163,7 +163,7 @@ pub(super) fn exposure(world: &World, scenario: &Scenario) -> f64 {
         }
     }
     let mean = sum / f64::from(SIDE * SIDE);
-    let level = scenario.camera.mean_level - scenario.camera.bias_dn / camera_noise::FULL_SCALE_DN;
+    let level = scenario.camera.mean_level - scenario.camera.bias_dn / noise::FULL_SCALE_DN;
     if mean > 0.0 { level / mean } else { 1.0 }
 }
 

@@ -224,7 +224,7 @@ fn meeting_point(planes: &[Plane], [i, j, k]: [usize; 3]) -> Option<Vector3> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::texture::mix;
+    use crate::sim::ground::texture::mix;
 
     fn rock(seed: u64, diameter_m: f64) -> Rock {
         let from = RockSeed { x_m: 3.0, y_m: -1.0, diameter_m, height_ratio: 0.5, seed };

@@ -28,9 +28,9 @@ use rayon::prelude::*;
 
 use crate::image::GrayImage;
 
-use super::render::{Eye, NoiseSeed};
-use super::scenario::{CameraSettings, Scenario};
-use super::texture::mix;
+use crate::sim::camera::render::{Eye, NoiseSeed};
+use crate::sim::ground::texture::mix;
+use crate::sim::scenario::{CameraSettings, Scenario};
 
 /// The largest number of the 12-bit converter.
 pub const FULL_SCALE_DN: f64 = 4095.0;

@@ -15,8 +15,8 @@
 
 use crate::frames::Vector3;
 
-use super::scenario::TerrainSettings;
-use super::texture::{OctaveSettings, Octaves, mix};
+use crate::sim::ground::texture::{OctaveSettings, Octaves, mix};
+use crate::sim::scenario::TerrainSettings;
 
 /// Height of the mean plane, m, site frame: flat ground in the rover frame (domain.md 1.3).
 pub const MEAN_GROUND_Z_M: f64 = 0.294;
@@ -25,7 +25,7 @@ pub const MEAN_GROUND_Z_M: f64 = 0.294;
 const FADE_M: f64 = 1.5;
 
 /// Blocks have 2^shift cells along a side: 64, 16, 4 and 1, from the coarsest walk to the finest.
-pub(super) const BLOCK_SHIFT: [usize; 4] = [6, 4, 2, 0];
+pub(in crate::sim) const BLOCK_SHIFT: [usize; 4] = [6, 4, 2, 0];
 
 /// The RMS difference over 1 m of a relief whose octave at 1 m has unit amplitude, for H = 0.8 and octaves
 /// from 6 m down; the amplitude is divided by it. Other exponents change it by less than 15 % (tested).
@@ -33,24 +33,24 @@ const UNIT_RMS_AT_1M: f64 = 3.15;
 
 /// Height of the highest point (least z) of every block of one size.
 #[derive(Clone, Debug)]
-pub(super) struct Tops {
-    pub(super) columns: usize,
-    pub(super) z_m: Vec<f32>,
+pub(in crate::sim) struct Tops {
+    pub(in crate::sim) columns: usize,
+    pub(in crate::sim) z_m: Vec<f32>,
 }
 
 /// The ground of the site.
 #[derive(Clone, Debug)]
 pub struct Terrain {
-    pub(super) origin_m: [f64; 2],
-    pub(super) cell_m: f64,
+    pub(in crate::sim) origin_m: [f64; 2],
+    pub(in crate::sim) cell_m: f64,
     /// Cells along x and y.
-    pub(super) cells: [usize; 2],
+    pub(in crate::sim) cells: [usize; 2],
     /// Heights of the (cells + 1)² vertices, rows along x.
     z_m: Vec<f32>,
     /// Gradient of the height at the vertices, for smooth shading.
     slope: Vec<[f32; 2]>,
-    pub(super) tops: Vec<Tops>,
-    pub(super) highest_z_m: f64,
+    pub(in crate::sim) tops: Vec<Tops>,
+    pub(in crate::sim) highest_z_m: f64,
     steepest: f64,
 }
 
@@ -102,7 +102,7 @@ impl Terrain {
 
     /// The four vertex heights of a cell: (0,0), (1,0), (0,1), (1,1).
     #[inline(always)]
-    pub(super) fn corners(&self, cell: [usize; 2]) -> [f64; 4] {
+    pub(in crate::sim) fn corners(&self, cell: [usize; 2]) -> [f64; 4] {
         let at = cell[1] * (self.cells[0] + 1) + cell[0];
         let below = at + self.cells[0] + 1;
         [self.z_m[at], self.z_m[at + 1], self.z_m[below], self.z_m[below + 1]].map(f64::from)

@@ -29,10 +29,10 @@ use crate::error::{Error, Result};
 use crate::frames::{Pose, Vector3, attitude_from_roll_pitch_yaw};
 use crate::traverse::OdometryError;
 
-use super::scenario::{DriveSettings, Scenario};
-use super::terrain::MEAN_GROUND_Z_M;
-use super::texture::mix;
-use super::world::World;
+use crate::sim::ground::terrain::MEAN_GROUND_Z_M;
+use crate::sim::ground::texture::mix;
+use crate::sim::scenario::{DriveSettings, Scenario};
+use crate::sim::world::World;
 
 /// Where the wheels stand in the rover frame, m (domain.md 5.4).
 const WHEELS_M: [[f64; 2]; 6] =

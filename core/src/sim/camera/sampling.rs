@@ -25,8 +25,8 @@
 use crate::camera::Camera;
 use crate::frames::{Pixel, Point3, Ray, Vector3};
 
-use super::culling::{Cone, in_cone};
-use super::world::World;
+use crate::sim::culling::{Cone, in_cone};
+use crate::sim::world::World;
 
 /// Side of a tile, px.
 pub const TILE_PX: usize = 16;

@@ -17,7 +17,7 @@
 
 use crate::frames::Ray;
 
-use super::terrain::{BLOCK_SHIFT, MEAN_GROUND_Z_M, Terrain};
+use crate::sim::ground::terrain::{BLOCK_SHIFT, MEAN_GROUND_Z_M, Terrain};
 
 /// A ray in units of cells: position (p + d t), t in metres.
 struct CellRay {
@@ -190,8 +190,8 @@ fn first_root(q0: f64, q1: f64, q2: f64) -> Option<f64> {
 mod tests {
     use super::*;
     use crate::frames::{Point3, Vector3};
+    use crate::sim::ground::texture::mix;
     use crate::sim::scenario::TerrainSettings;
-    use crate::sim::texture::mix;
 
     fn ground(seed: u64, rms_m: f64) -> Terrain {
         let settings = TerrainSettings { rms_at_1m_m: rms_m, ..TerrainSettings::default() };

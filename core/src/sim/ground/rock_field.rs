@@ -24,10 +24,10 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, Poisson};
 use rand_pcg::Pcg64;
 
-use super::rocks::{Rock, RockSeed};
-use super::scenario::RockSettings;
-use super::terrain::Terrain;
-use super::texture::mix;
+use crate::sim::ground::rocks::{Rock, RockSeed};
+use crate::sim::ground::terrain::Terrain;
+use crate::sim::ground::texture::mix;
+use crate::sim::scenario::RockSettings;
 
 /// Inner and outer edge of the wheels' tracks, m from the middle line (domain.md 5.4, wheel 16 cm wide).
 const TRACK_Y_M: [f64; 2] = [0.43, 0.70];

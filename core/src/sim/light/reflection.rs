@@ -22,7 +22,7 @@
 
 use crate::frames::Vector3;
 
-use super::scenario::SunSettings;
+use crate::sim::scenario::SunSettings;
 
 /// The light of a scenario.
 #[derive(Clone, Copy, Debug)]

@@ -1,0 +1,58 @@
+//! The rule that chooses the targets.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::within;
+use crate::error::Result;
+
+/// The rule that chooses targets; `targets.rs` states it in full.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct TargetRule {
+    /// How many targets.
+    pub count: u32,
+    /// Greatest distance of a target's surface point from the targets' centre, m.
+    pub radius_m: f64,
+    /// Side of the square window on which the rule is tested, px of this image (21: R21; reduce it together
+    /// with the image, 11 at 512 and 7 at 256, or few windows are even enough).
+    pub window_px: u32,
+    /// Greatest part of the window in shadow (0.20: R21).
+    pub shadow_fraction: f64,
+    /// Greatest range of depth inside the window, as a part of the distance (0.10: R21).
+    pub depth_range_fraction: f64,
+    /// Whether targets must lie on rocks, off their occluding boundaries (true: R20).
+    pub on_rocks: bool,
+    /// Least part of the window that lies on the same rock as the target (0.90, ours).
+    pub same_rock_fraction: f64,
+    /// Greatest angle between normal and line of sight, at the first and at the last stop, in 90 % of the window,
+    /// degrees (70, ours): a face that turns its edge to the rover is no place to drive to.
+    pub incidence_deg: f64,
+}
+
+impl Default for TargetRule {
+    fn default() -> Self {
+        Self {
+            count: 20,
+            radius_m: 1.6,
+            window_px: 21,
+            shadow_fraction: 0.20,
+            depth_range_fraction: 0.10,
+            on_rocks: true,
+            same_rock_fraction: 0.90,
+            incidence_deg: 70.0,
+        }
+    }
+}
+
+impl TargetRule {
+    pub(super) fn validate(&self) -> Result<()> {
+        within("targets.count", f64::from(self.count), 0.0, 10_000.0)?;
+        within("targets.radius_m", self.radius_m, 0.05, 20.0)?;
+        within("targets.window_px", f64::from(self.window_px), 1.0, 201.0)?;
+        within("targets.shadow_fraction", self.shadow_fraction, 0.0, 1.0)?;
+        within("targets.same_rock_fraction", self.same_rock_fraction, 0.0, 1.0)?;
+        within("targets.incidence_deg", self.incidence_deg, 0.0, 90.0)?;
+        within("targets.depth_range_fraction", self.depth_range_fraction, 0.0, 10.0)
+    }
+}
