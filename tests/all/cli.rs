@@ -85,15 +85,7 @@ fn a_simulated_traverse_is_rendered_described_and_tracked() {
     let home = tempfile::tempdir().unwrap();
     let (scenario, out) = (home.path().join("small.toml"), home.path().join("drive"));
     std::fs::write(&scenario, small_scenario().to_toml()).unwrap();
-    let made = run(&[
-        "simulate",
-        "--scenario",
-        text(&scenario),
-        "--out",
-        text(&out),
-        "--set",
-        "drive.end_distance_m=5",
-    ]);
+    let made = run(&["simulate", text(&scenario), "--out", text(&out), "--set", "drive.end_distance_m=5"]);
     assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
     let info = run(&["info", text(&out)]);
     let info = String::from_utf8(info.stdout).unwrap();

@@ -36,7 +36,7 @@ mod motion;
 pub mod mast;
 pub mod text;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 use nalgebra::Matrix2x3;
 use serde::{Deserialize, Serialize};

@@ -19,7 +19,7 @@ fn printed(reference: &Value, name: &Value) -> Camera {
 }
 
 /// One real camera of each model, O made unit.
-pub(super) fn all_kinds() -> [Camera; 3] {
+pub(crate) fn all_kinds() -> [Camera; 3] {
     ["mer2_navcam_l_lin", "mer2_navcam_l", "mer1_fhaz_l"]
         .map(|name| printed(&reference(), &Value::from(name)).normalised())
 }

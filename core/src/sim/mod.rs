@@ -30,12 +30,16 @@
 pub mod scenario;
 pub mod ground;
 pub mod culling;
+pub mod solids;
 pub mod world;
+pub mod moment;
 pub mod light;
 pub mod camera;
 pub mod rover;
 pub mod index;
+pub mod truth;
 pub mod targets;
+pub mod library;
 #[cfg(test)]
 mod tests;
 

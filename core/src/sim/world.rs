@@ -1,15 +1,18 @@
 //! The world of a scenario: what a ray meets, exactly; what is in shadow; what can be seen from where.
 //!
-//! The world follows from the scenario alone and never changes: it can be shared between threads. Geometry
-//! is `f64` throughout and exact: the ground's patches are met at the root of a quadratic
-//! (`terrain_cast.rs`), rocks at the ends of an interval (`rocks.rs`).
+//! A [`World`] is the scenery, which never changes and is shared, at one moment of the drive: where the sun
+//! stands, what stands in the way, where the rover is ([`World::at`], `moment.rs`). It follows from the scenario
+//! alone and can be shared between threads. Geometry is `f64` throughout and exact: the ground's patches are met
+//! at the root of a quadratic (`terrain_cast.rs`), rocks at the ends of an interval (`rocks.rs`), made things
+//! alike (`solids.rs`).
 //!
 //! Frame: site (level, x along the drive, +z down), m. A surface point is tested for shadow and visibility
 //! with rays that start 1 µm off it, so that it does not hide itself.
 //! Sources: domain.md 10, 11; the definition of a target's truth as the surface point under its pixel.
 
-use crate::frames::{Point3, Ray, Vector3};
+use std::sync::Arc;
 
+use crate::frames::{Point3, Ray, Vector3};
 use crate::sim::camera::render;
 use crate::sim::culling::{SunGrid, Tree};
 use crate::sim::ground::rock_field::{self, Approach};
@@ -18,8 +21,10 @@ use crate::sim::ground::surface::Surfaces;
 use crate::sim::ground::terrain::Terrain;
 use crate::sim::light::openness::Openness;
 use crate::sim::light::reflection::Light;
+use crate::sim::moment::fiducials;
 use crate::sim::rover::drive;
 use crate::sim::scenario::Scenario;
+use crate::sim::solids::{Solid, SolidKind};
 
 /// How far off its surface a ray starts, m.
 const OFF_SURFACE_M: f64 = 1e-6;
@@ -31,6 +36,8 @@ pub enum SurfaceId {
     Ground,
     /// The rock of this number.
     Rock(u32),
+    /// A made thing, by its kind and its number among those present.
+    Solid(SolidKind, u32),
 }
 
 /// Where a ray met a surface.
@@ -46,23 +53,31 @@ pub struct Hit {
     pub surface: SurfaceId,
 }
 
-/// The world of a scenario.
+/// What never changes: ground, rocks, and their look.
 #[derive(Clone, Debug)]
-pub struct World {
+pub(in crate::sim) struct Scenery {
     pub(in crate::sim) terrain: Terrain,
     pub(in crate::sim) rocks: Vec<Rock>,
     pub(in crate::sim) surfaces: Surfaces,
-    pub(in crate::sim) light: Light,
     pub(in crate::sim) openness: Openness,
-    /// Fraction of full scale per unit of radiance.
-    pub(in crate::sim) exposure: f64,
     tree: Tree,
-    sun_grid: SunGrid,
     targets_centre: Point3,
 }
 
+/// The scenery of a scenario at one moment of the drive.
+#[derive(Clone, Debug)]
+pub struct World {
+    pub(in crate::sim) scenery: Arc<Scenery>,
+    pub(in crate::sim) light: Light,
+    pub(in crate::sim) sun_grid: Arc<SunGrid>,
+    pub(in crate::sim) solids: Vec<Solid>,
+    /// Fraction of full scale per unit of radiance.
+    pub(in crate::sim) exposure: f64,
+}
+
 impl World {
-    /// Builds the world of a scenario; the scenario is taken as valid ([`Scenario::validate`]).
+    /// Builds the world of a scenario at the start of the drive, without the rover and what is in its way; the
+    /// scenario is taken as valid ([`Scenario::validate`]).
     pub fn new(scenario: &Scenario) -> Self {
         let approach = Approach {
             goal_m: drive::goal_m(&scenario.drive),
@@ -72,32 +87,39 @@ impl World {
         let terrain = Terrain::new(&scenario.terrain, x_m, [-7.0, 7.0], scenario.seed);
         let rocks = rock_field::scatter(&scenario.rocks, &approach, &terrain, scenario.seed);
         let light = Light::new(&scenario.sun, scenario.texture.soil_albedo);
-        let mut world = Self {
+        let sun_grid = Arc::new(SunGrid::new(&rocks, &light.to_sun));
+        let [x_m_goal, y_m_goal] = approach.goal_m;
+        let scenery = Scenery {
             tree: Tree::new(&rocks),
-            sun_grid: SunGrid::new(&rocks, &light.to_sun),
             openness: Openness::new(&rocks, x_m, [-7.0, 7.0]),
             surfaces: Surfaces::new(&scenario.texture, scenario.seed),
             terrain,
             rocks,
-            light,
-            exposure: 1.0,
             targets_centre: Point3::origin(),
         };
-        let [x_m, y_m] = approach.goal_m;
-        let down = Ray { origin: Point3::new(x_m, y_m, -100.0), direction: Vector3::z() };
-        world.targets_centre = world.cast(&down).map_or(Point3::new(x_m, y_m, 0.0), |hit| hit.point);
+        let mut world =
+            Self { scenery: Arc::new(scenery), light, sun_grid, solids: Vec::new(), exposure: 1.0 };
+        let down = Ray { origin: Point3::new(x_m_goal, y_m_goal, -100.0), direction: Vector3::z() };
+        let centre = world.cast(&down).map_or(Point3::new(x_m_goal, y_m_goal, 0.0), |hit| hit.point);
+        Arc::make_mut(&mut world.scenery).targets_centre = centre;
+        world.solids = fiducials(&scenario.fiducials, &centre);
         world.exposure = render::exposure(&world, scenario);
         world
     }
 
     /// The rocks of the world; `SurfaceId::Rock(n)` is the n-th.
     pub fn rocks(&self) -> &[Rock] {
-        &self.rocks
+        &self.scenery.rocks
+    }
+
+    /// The made things that are there now; `SurfaceId::Solid(_, n)` is the n-th.
+    pub fn solids(&self) -> &[Solid] {
+        &self.solids
     }
 
     /// The point that the rover approaches and the mast looks at, on the surface, site frame, m.
     pub fn targets_centre(&self) -> Point3 {
-        self.targets_centre
+        self.scenery.targets_centre
     }
 
     /// Unit direction towards the sun, site frame.
@@ -107,16 +129,17 @@ impl World {
 
     /// Height of the bare ground at a place, m down, site frame.
     pub fn ground_z_at(&self, x_m: f64, y_m: f64) -> f64 {
-        self.terrain.z_at(x_m, y_m)
+        self.scenery.terrain.z_at(x_m, y_m)
     }
 
     /// The first surface that a ray meets; the ray's direction is unit.
     pub fn cast(&self, ray_in_site: &Ray) -> Option<Hit> {
-        let ground_m = self.terrain.cast(ray_in_site, 0.0, f64::INFINITY);
+        let scenery = &*self.scenery;
+        let ground_m = scenery.terrain.cast(ray_in_site, 0.0, f64::INFINITY);
         let mut nearest_m = ground_m.unwrap_or(f64::INFINITY);
         let mut met = None;
-        self.tree.along(ray_in_site, nearest_m, |index| {
-            if let Some(interval) = self.rocks[index].interval(ray_in_site)
+        scenery.tree.along(ray_in_site, nearest_m, |index| {
+            if let Some(interval) = scenery.rocks[index].interval(ray_in_site)
                 && interval.enter_m > 0.0
                 && interval.enter_m < nearest_m
             {
@@ -125,47 +148,91 @@ impl World {
             }
             nearest_m
         });
+        if let Some((index, distance_m, normal)) = self.solid_on(ray_in_site, nearest_m) {
+            let surface = SurfaceId::Solid(self.solids[index].kind, index as u32);
+            return Some(Hit { point: ray_in_site.at(distance_m), normal, distance_m, surface });
+        }
         if nearest_m == f64::INFINITY {
             return None;
         }
         let point = ray_in_site.at(nearest_m);
         let (surface, normal) = match met {
-            Some((rock, plane)) => (SurfaceId::Rock(rock as u32), self.rocks[rock].normal(plane)),
-            None => (SurfaceId::Ground, self.terrain.normal_at(point.x, point.y)),
+            Some((rock, plane)) => (SurfaceId::Rock(rock as u32), scenery.rocks[rock].normal(plane)),
+            None => (SurfaceId::Ground, scenery.terrain.normal_at(point.x, point.y)),
         };
         Some(Hit { point, normal, distance_m: nearest_m, surface })
     }
 
-    /// Whether nothing stands between `from` and a point of a surface.
-    pub fn is_visible(&self, from: &Point3, point: &Point3) -> bool {
+    /// The first made thing that a camera's ray meets nearer than `to_m`: its number, distance (m) and normal.
+    pub(in crate::sim) fn solid_on(&self, ray_in_site: &Ray, to_m: f64) -> Option<(usize, f64, Vector3)> {
+        let seen = self.solids.iter().enumerate().filter(|(_, solid)| solid.is_seen);
+        let met = seen.filter_map(|(index, solid)| {
+            let passage = solid.passage(ray_in_site)?;
+            (passage.enter_m > 0.0 && passage.enter_m < to_m).then_some((
+                index,
+                passage.enter_m,
+                passage.normal,
+            ))
+        });
+        met.min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// What stands between `from` and a point of a surface, if anything does.
+    pub fn in_the_way(&self, from: &Point3, point: &Point3) -> Option<SurfaceId> {
         let way = point - from;
         let distance_m = way.norm();
         let ray = Ray { origin: *from, direction: way / distance_m };
-        self.cast(&ray).is_none_or(|hit| hit.distance_m > distance_m - OFF_SURFACE_M)
+        self.cast(&ray).filter(|hit| hit.distance_m <= distance_m - OFF_SURFACE_M).map(|hit| hit.surface)
+    }
+
+    /// Whether nothing stands between `from` and a point of a surface.
+    pub fn is_visible(&self, from: &Point3, point: &Point3) -> bool {
+        self.in_the_way(from, point).is_none()
     }
 
     /// Whether a point of a surface gets no sun: another surface, or its own, stands in the way.
     pub fn in_shadow(&self, point: &Point3) -> bool {
-        let ray = Ray { origin: *point, direction: self.light.to_sun };
-        self.is_blocked_by_rock(&ray) || self.is_blocked_by_ground(&ray)
+        self.is_blocked(&Ray { origin: *point, direction: self.light.to_sun })
+    }
+
+    /// Whether anything stands on a ray to the sun.
+    #[inline(always)]
+    pub(in crate::sim) fn is_blocked(&self, to_sun: &Ray) -> bool {
+        self.is_blocked_by_rock(to_sun)
+            || self.is_blocked_by_solid(to_sun)
+            || self.is_blocked_by_ground(to_sun)
     }
 
     /// Whether a rock, or the rock on which the ray starts, stands on a ray to the sun.
     #[inline(always)]
-    pub(in crate::sim) fn is_blocked_by_rock(&self, to_sun: &Ray) -> bool {
+    fn is_blocked_by_rock(&self, to_sun: &Ray) -> bool {
         self.sun_grid.towards_sun(&to_sun.origin).iter().any(|&index| {
-            let interval = self.rocks[index as usize].interval(to_sun);
+            let interval = self.scenery.rocks[index as usize].interval(to_sun);
             // Where the ray starts on a lit face it leaves at once.
-            interval
-                .is_some_and(|i| i.leave_m - i.enter_m.max(0.0) > OFF_SURFACE_M && i.leave_m > OFF_SURFACE_M)
+            interval.is_some_and(|i| leaves_behind(i.enter_m, i.leave_m))
         })
+    }
+
+    /// Whether a made thing, or the one on which the ray starts, stands on a ray to the sun.
+    #[inline(always)]
+    fn is_blocked_by_solid(&self, to_sun: &Ray) -> bool {
+        self.solids
+            .iter()
+            .any(|solid| solid.passage(to_sun).is_some_and(|p| leaves_behind(p.enter_m, p.leave_m)))
     }
 
     /// Whether the ground stands on a ray to the sun.
     #[inline(always)]
-    pub(in crate::sim) fn is_blocked_by_ground(&self, to_sun: &Ray) -> bool {
+    fn is_blocked_by_ground(&self, to_sun: &Ray) -> bool {
+        let terrain = &self.scenery.terrain;
         // Most grounds are nowhere as steep as the sun is high.
         let rise = -to_sun.direction.z / to_sun.direction.xy().norm();
-        rise <= self.terrain.steepest() && self.terrain.cast(to_sun, OFF_SURFACE_M, f64::INFINITY).is_some()
+        rise <= terrain.steepest() && terrain.cast(to_sun, OFF_SURFACE_M, f64::INFINITY).is_some()
     }
+}
+
+/// Whether a ray that is inside something over [enter, leave] goes through it after its start.
+#[inline(always)]
+fn leaves_behind(enter_m: f64, leave_m: f64) -> bool {
+    leave_m - enter_m.max(0.0) > OFF_SURFACE_M && leave_m > OFF_SURFACE_M
 }

@@ -4,6 +4,7 @@
 //! 2 the command was not written correctly, 3 bad input, said in one sentence.
 
 pub mod serve;
+pub mod scenarios;
 pub mod simulate;
 pub mod import;
 pub mod info;
@@ -34,6 +35,8 @@ struct Cli {
 enum Command {
     /// Open traverses in the browser; without any, a simulated demonstration.
     Serve(serve::Serve),
+    /// List the scenarios that come with the program, or print one.
+    Scenarios(scenarios::Scenarios),
     /// Render a simulated traverse into a folder.
     Simulate(simulate::Simulate),
     /// Turn a foreign recording (KITTI odometry, PDS3) into a traverse.
@@ -52,6 +55,7 @@ pub fn run() -> ExitCode {
     start_log();
     let outcome = match cli.command {
         Command::Serve(command) => command.run(),
+        Command::Scenarios(command) => command.run(),
         Command::Simulate(command) => command.run(),
         Command::Import(command) => command.run(),
         Command::Info(command) => command.run(),

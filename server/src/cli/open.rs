@@ -1,10 +1,11 @@
-//! Opening what a command was given: a folder, an index, or a scenario, from which a folder is made first.
+//! Opening what a command was given: a folder, an index, or a scenario (a file, or a name of the library), from
+//! which a folder is made first.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use sightline_core::error::{Error, Result};
-use sightline_core::sim::Scenario;
+use sightline_core::sim::{Scenario, library};
 use sightline_core::traverse::{Traverse, create_simulated};
 
 use super::say::{self, Progress};
@@ -32,6 +33,9 @@ pub(super) fn data_folder(given: Option<&Path>) -> Result<PathBuf> {
 /// # Errors
 /// As [`Traverse::open`] and [`create_simulated`].
 pub(super) fn open(path: &Path, data: Option<&Path>) -> Result<Traverse> {
+    if let Some(name) = library_name(path) {
+        return simulated(&library::scenario(name)?, &data_folder(data)?);
+    }
     match read_scenario_or_index(path)? {
         Some(scenario) => simulated(&scenario, &data_folder(data)?),
         None => Traverse::open(path),
@@ -51,12 +55,23 @@ pub(super) fn simulated(scenario: &Scenario, data: &Path) -> Result<Traverse> {
     create_simulated(scenario, &folder)
 }
 
-/// The scenario in a file.
+/// The scenario in a file, or the one of the library that goes by this name.
 ///
 /// # Errors
-/// A file that cannot be read or is no scenario.
+/// A file that cannot be read or is no scenario, or a name that is neither a file nor in the library.
 pub(super) fn scenario(path: &Path) -> Result<Scenario> {
+    if let Some(name) = library_name(path) {
+        return library::scenario(name);
+    }
+    if !path.exists() && path.extension().is_none() && path.components().count() == 1 {
+        return library::scenario(&path.to_string_lossy());
+    }
     Scenario::from_toml(&read(path)?, path)
+}
+
+/// The library's scenario that a bare word names, unless a file or folder goes by it.
+fn library_name(path: &Path) -> Option<&'static str> {
+    library::names().find(|name| path == Path::new(name) && !path.exists())
 }
 
 /// Renders what is missing of a simulated traverse, telling progress; recorded ones need nothing.

@@ -12,12 +12,12 @@ use super::{open, say};
 /// Render a simulated traverse into a folder.
 #[derive(Debug, Args)]
 pub struct Simulate {
+    /// The scenario: a file, or a name that `sightline scenarios` lists; by default that of the demonstration.
+    #[arg(value_name = "SCENARIO")]
+    scenario: Option<PathBuf>,
     /// The folder to make.
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
-    /// The scenario; by default that of the demonstration.
-    #[arg(long, value_name = "FILE")]
-    scenario: Option<PathBuf>,
     /// Another seed than the scenario's.
     #[arg(long)]
     seed: Option<u64>,

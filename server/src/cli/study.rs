@@ -37,8 +37,9 @@ struct Approach {
     /// The seed of the first world; the others follow.
     #[arg(long, default_value_t = 1)]
     first_seed: u64,
-    /// The scenario of which the worlds are made; by default that of the demonstration.
-    #[arg(long, value_name = "FILE")]
+    /// The scenario of which the worlds are made, a file or a name of the library; by default that of the
+    /// demonstration.
+    #[arg(long, value_name = "SCENARIO")]
     scenario: Option<PathBuf>,
     /// A setting of the tracker; can be given more than once.
     #[arg(long, value_name = "KEY=VALUE")]

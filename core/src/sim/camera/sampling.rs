@@ -26,6 +26,7 @@ use crate::camera::Camera;
 use crate::frames::{Pixel, Point3, Ray, Vector3};
 
 use crate::sim::culling::{Cone, in_cone};
+use crate::sim::light::reflection::Appearance;
 use crate::sim::world::World;
 
 /// Side of a tile, px.
@@ -105,7 +106,7 @@ impl<'a> Sampler<'a> {
             half_angle_cos: half_angle_rad.cos(),
             half_angle_sin: half_angle_rad.sin(),
         };
-        let rocks = self.world.rocks.iter().enumerate();
+        let rocks = self.world.scenery.rocks.iter().enumerate();
         let mut list: Vec<(f64, usize)> = rocks
             .filter(|(_, rock)| in_cone(&cone, &rock.centre, rock.radius_m))
             .map(|(index, rock)| {
@@ -136,14 +137,14 @@ impl<'a> Sampler<'a> {
     /// The radiance that comes down a ray.
     #[inline(always)]
     fn radiance(&self, ray: &Ray, rocks: &[(f64, usize)]) -> f32 {
-        let world = self.world;
+        let (world, scenery) = (self.world, &*self.world.scenery);
         let mut nearest_m = f64::INFINITY;
         let mut met = None;
         for &(least_m, index) in rocks {
             if least_m > nearest_m {
                 break;
             }
-            if let Some(interval) = world.rocks[index].interval(ray)
+            if let Some(interval) = scenery.rocks[index].interval(ray)
                 && interval.enter_m > 0.0
                 && interval.enter_m < nearest_m
             {
@@ -151,7 +152,13 @@ impl<'a> Sampler<'a> {
                 met = Some((index, interval.plane));
             }
         }
-        if let Some(ground_m) = world.terrain.cast(ray, 0.0, nearest_m) {
+        let ground_m = scenery.terrain.cast(ray, 0.0, nearest_m);
+        if !world.solids.is_empty()
+            && let Some((solid, distance_m, normal)) = world.solid_on(ray, ground_m.unwrap_or(nearest_m))
+        {
+            return self.solid(ray, distance_m, solid, &normal);
+        }
+        if let Some(ground_m) = ground_m {
             return self.ground(ray, ground_m);
         }
         match met {
@@ -172,22 +179,27 @@ impl<'a> Sampler<'a> {
     fn ground(&self, ray: &Ray, distance_m: f64) -> f32 {
         let (world, point) = (self.world, ray.at(distance_m));
         let cutoff_m = self.cutoff_m(distance_m, ray.direction.z);
-        let look = world.surfaces.soil(&world.terrain, &point, cutoff_m);
-        let to_sun = Ray { origin: point, direction: world.light.to_sun };
-        let in_sun = !world.is_blocked_by_rock(&to_sun) && !world.is_blocked_by_ground(&to_sun);
-        let open = world.openness.at(point.x, point.y);
+        let look = world.scenery.surfaces.soil(&world.scenery.terrain, &point, cutoff_m);
+        let in_sun = !world.in_shadow(&point);
+        let open = world.scenery.openness.at(point.x, point.y);
         world.light.reflected(&look, towards_camera(ray), in_sun, open)
     }
 
     #[inline(always)]
     fn rock(&self, ray: &Ray, distance_m: f64, rock: usize, plane: usize) -> f32 {
         let (world, point) = (self.world, ray.at(distance_m));
-        let normal = world.rocks[rock].normal(plane);
+        let normal = world.scenery.rocks[rock].normal(plane);
         let cutoff_m = self.cutoff_m(distance_m, -normal.dot(&ray.direction));
-        let look = world.surfaces.rock(&world.rocks[rock], &point, &normal, cutoff_m);
-        let to_sun = Ray { origin: point, direction: world.light.to_sun };
-        let faces_sun = normal.dot(&world.light.to_sun) > 0.0;
-        let in_sun = faces_sun && !world.is_blocked_by_rock(&to_sun) && !world.is_blocked_by_ground(&to_sun);
+        let look = world.scenery.surfaces.rock(&world.scenery.rocks[rock], &point, &normal, cutoff_m);
+        let in_sun = normal.dot(&world.light.to_sun) > 0.0 && !world.in_shadow(&point);
+        world.light.reflected(&look, towards_camera(ray), in_sun, 1.0)
+    }
+
+    fn solid(&self, ray: &Ray, distance_m: f64, solid: usize, normal: &Vector3) -> f32 {
+        let (world, point) = (self.world, ray.at(distance_m));
+        let albedo = world.solids[solid].albedo_at(&point, normal);
+        let look = Appearance { albedo, normal: [normal.x, normal.y, normal.z].map(|v| v as f32) };
+        let in_sun = normal.dot(&world.light.to_sun) > 0.0 && !world.in_shadow(&point);
         world.light.reflected(&look, towards_camera(ray), in_sun, 1.0)
     }
 }

@@ -67,6 +67,11 @@ impl Light {
         }
     }
 
+    /// The same light with a part of the direct light alone, 0 to 1: under a cloud.
+    pub fn with_direct(self, part: f64) -> Self {
+        Self { sun: self.sun * part as f32, ..self }
+    }
+
     /// The radiance of a surface towards `to_camera` (unit).
     #[inline(always)]
     pub fn reflected(&self, look: &Appearance, to_camera: [f32; 3], in_sun: bool, sky_open: f32) -> f32 {

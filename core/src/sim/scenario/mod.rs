@@ -12,6 +12,8 @@
 
 mod camera;
 mod drive;
+mod events;
+mod fiducials;
 mod ground;
 mod light;
 mod targets;
@@ -26,9 +28,11 @@ use crate::traverse::OdometryError;
 
 pub use camera::CameraSettings;
 pub use drive::DriveSettings;
+pub use events::{Cloud, EventSettings, Occluder};
+pub use fiducials::Fiducial;
 pub use ground::{RockSettings, TerrainSettings, TextureSettings};
 pub use light::SunSettings;
-pub use targets::TargetRule;
+pub use targets::{Arrangement, TargetRule};
 
 /// The largest seed that every reader of the file takes exactly (TOML has 63 bits, a browser 53).
 const MAX_SEED: u64 = 1 << 53;
@@ -47,6 +51,9 @@ fn within(key: &str, value: f64, low: f64, high: f64) -> Result<()> {
 pub struct Scenario {
     /// A short name.
     pub name: String,
+    /// What it stages, from which source, and what had to be assumed.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub description: String,
     /// The seed of everything random: relief, rocks, texture, pose errors, noise, choice of targets.
     pub seed: u64,
     /// The relief of the ground.
@@ -61,6 +68,11 @@ pub struct Scenario {
     pub camera: CameraSettings,
     /// The way that the rover drives.
     pub drive: DriveSettings,
+    /// What changes during the drive.
+    pub events: EventSettings,
+    /// Marks of known shape.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub fiducials: Vec<Fiducial>,
     /// 1σ errors of the pose estimate, step by step (default 1 % along, 0.5 % across, 0.1°: domain.md 5.5).
     pub odometry_error: OdometryError,
     /// The rule that chooses the targets.
@@ -71,6 +83,7 @@ impl Default for Scenario {
     fn default() -> Self {
         Self {
             name: "rocky plain".into(),
+            description: String::new(),
             seed: 1,
             terrain: TerrainSettings::default(),
             rocks: RockSettings::default(),
@@ -78,6 +91,8 @@ impl Default for Scenario {
             sun: SunSettings::default(),
             camera: CameraSettings::default(),
             drive: DriveSettings::default(),
+            events: EventSettings::default(),
+            fiducials: Vec::new(),
             odometry_error: OdometryError { along_fraction: 0.01, across_fraction: 0.005, attitude_deg: 0.1 },
             targets: TargetRule::default(),
         }
@@ -110,6 +125,8 @@ impl Scenario {
         self.sun.validate()?;
         self.camera.validate()?;
         self.drive.validate()?;
+        self.events.validate()?;
+        self.fiducials.iter().enumerate().try_for_each(|(index, fiducial)| fiducial.validate(index))?;
         let error = &self.odometry_error;
         within("odometry_error.along_fraction", error.along_fraction, 0.0, 1.0)?;
         within("odometry_error.across_fraction", error.across_fraction, 0.0, 1.0)?;

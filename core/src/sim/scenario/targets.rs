@@ -6,12 +6,33 @@ use utoipa::ToSchema;
 use super::within;
 use crate::error::Result;
 
-/// The rule that chooses targets; `targets.rs` states it in full.
+/// Which of the pixels that satisfy the rule of the window become targets; `sim/targets` states each in full.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Arrangement {
+    /// Drawn by the seed around the targets' centre.
+    #[default]
+    Drawn,
+    /// In straight, evenly spaced rows on the large rock (R110).
+    Rows,
+    /// On the large rock, some on an occluding boundary (R119).
+    Face,
+    /// The targets' centre alone.
+    Centre,
+}
+
+/// The rule that chooses targets; `sim/targets` states it in full.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TargetRule {
     /// How many targets.
     pub count: u32,
+    /// Which of the pixels that satisfy the rule become targets (drawn).
+    pub arrangement: Arrangement,
+    /// Rows of the arrangement `rows` (2: R110).
+    pub rows: u32,
+    /// Targets of the arrangement `face` that lie on an occluding boundary (1: R119).
+    pub boundary: u32,
     /// Greatest distance of a target's surface point from the targets' centre, m.
     pub radius_m: f64,
     /// Side of the square window on which the rule is tested, px of this image (21: R21; reduce it together
@@ -34,6 +55,9 @@ impl Default for TargetRule {
     fn default() -> Self {
         Self {
             count: 20,
+            arrangement: Arrangement::Drawn,
+            rows: 2,
+            boundary: 1,
             radius_m: 1.6,
             window_px: 21,
             shadow_fraction: 0.20,
@@ -47,6 +71,8 @@ impl Default for TargetRule {
 
 impl TargetRule {
     pub(super) fn validate(&self) -> Result<()> {
+        within("targets.rows", f64::from(self.rows), 1.0, 100.0)?;
+        within("targets.boundary", f64::from(self.boundary), 0.0, 10_000.0)?;
         within("targets.count", f64::from(self.count), 0.0, 10_000.0)?;
         within("targets.radius_m", self.radius_m, 0.05, 20.0)?;
         within("targets.window_px", f64::from(self.window_px), 1.0, 201.0)?;

@@ -7,7 +7,7 @@ use crate::frames::{Point3, Ray, Vector3};
 
 /// The first hit by asking every rock and marching over the ground, without tree, grid or pyramid.
 fn brute_force(world: &World, ray: &Ray, to_m: f64) -> Option<(f64, SurfaceId)> {
-    let rocks = world.rocks.iter().enumerate().filter_map(|(index, rock)| {
+    let rocks = world.rocks().iter().enumerate().filter_map(|(index, rock)| {
         let interval = rock.interval(ray)?;
         (interval.enter_m > 0.0).then_some((interval.enter_m, SurfaceId::Rock(index as u32)))
     });
@@ -72,7 +72,7 @@ fn a_hit_is_visible_from_where_the_ray_came_and_what_lies_behind_is_not() {
 fn behind_a_rock_along_the_sun_is_shadow_and_before_it_is_not() {
     let world = &demo().world;
     let mut tall = 0;
-    for rock in world.rocks.iter().filter(|rock| rock.diameter_m > 0.2 && rock.centre.x < 18.0) {
+    for rock in world.rocks().iter().filter(|rock| rock.diameter_m > 0.2 && rock.centre.x < 18.0) {
         // From a point inside the rock, 5 cm above the ground if it is tall enough, away from the sun.
         let top_z_m = rock.interval(&Ray { origin: rock.centre, direction: Vector3::z() }).unwrap().enter_m;
         let start = rock.centre + Vector3::z() * (0.5 * top_z_m);
@@ -81,7 +81,7 @@ fn behind_a_rock_along_the_sun_is_shadow_and_before_it_is_not() {
         }
         tall += 1;
         let from_sun = Ray { origin: start, direction: -world.to_sun() };
-        let ground_m = world.terrain.cast(&from_sun, 0.0, 10.0).unwrap();
+        let ground_m = world.scenery.terrain.cast(&from_sun, 0.0, 10.0).unwrap();
         assert!(world.in_shadow(&from_sun.at(ground_m)), "{rock:?}");
     }
     assert!(tall > 30, "{tall}");
@@ -97,7 +97,7 @@ fn shadows_agree_with_asking_every_rock() {
         let hit = world.cast(&down).unwrap();
         let to_sun = Ray { origin: hit.point, direction: world.to_sun() };
         let by_rock =
-            world.rocks.iter().filter_map(|rock| rock.interval(&to_sun)).any(|interval| {
+            world.rocks().iter().filter_map(|rock| rock.interval(&to_sun)).any(|interval| {
                 interval.leave_m > 1e-6 && interval.leave_m - interval.enter_m.max(0.0) > 1e-6
             });
         let by_ground =

@@ -3,6 +3,8 @@
 //! All tests share one world, that of the demonstration; it is built once.
 
 mod drive;
+mod fiducials;
+mod moments;
 mod geometry;
 mod pictures;
 

@@ -107,7 +107,8 @@ fn silhouettes() -> (Scenario, World) {
     (scenario.camera.blur_px, scenario.camera.samples_per_axis) = (0.0, 4);
     let mut world = World::new(&scenario);
     // Without contact shadows, which lie beside the silhouettes.
-    world.openness = crate::sim::light::openness::Openness::new(&[], [0.0, 1.0], [0.0, 1.0]);
+    std::sync::Arc::make_mut(&mut world.scenery).openness =
+        crate::sim::light::openness::Openness::new(&[], [0.0, 1.0], [0.0, 1.0]);
     (scenario, world)
 }
 

@@ -1,0 +1,63 @@
+//! The scenarios that come with the simulator, as readable TOML: the papers' experiments and their difficulties.
+//!
+//! Each file in `library/` is a scenario as a person would write it: only what differs from the defaults, with
+//! a description that names the requirement it stages (R…) and what had to be assumed. A scenario of the library
+//! goes by the name of its file.
+
+use std::path::Path;
+
+use crate::error::{Error, Result};
+use crate::sim::scenario::Scenario;
+
+/// A scenario's name and its TOML.
+const FILES: &[(&str, &str)] = &[
+    ("approach-10", include_str!("library/approach-10.toml")),
+    ("approach-5", include_str!("library/approach-5.toml")),
+];
+
+/// The names of the library's scenarios, in the order in which they are listed.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    FILES.iter().map(|(name, _)| *name)
+}
+
+/// The TOML of a scenario as it was written, with its comments.
+pub fn toml(name: &str) -> Option<&'static str> {
+    FILES.iter().find(|(known, _)| *known == name).map(|(_, toml)| *toml)
+}
+
+/// A scenario of the library.
+///
+/// # Errors
+/// A name that the library does not have; the sentence lists those that it has.
+pub fn scenario(name: &str) -> Result<Scenario> {
+    let text = toml(name).ok_or_else(|| {
+        let known = names().collect::<Vec<_>>().join(", ");
+        Error::setting("scenario", format!("{name} is not in the library, which has {known}"))
+    })?;
+    Scenario::from_toml(text, Path::new(&format!("{name}.toml")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_scenario_of_the_library_is_valid_described_and_named_apart() {
+        let mut known = std::collections::HashSet::new();
+        for name in names() {
+            let scenario = scenario(name).expect(name);
+            assert!(
+                known.insert(scenario.name.clone()),
+                "{name}: another scenario is called {}",
+                scenario.name
+            );
+            assert!(scenario.description.len() > 40, "{name}: say what it stages");
+        }
+    }
+
+    #[test]
+    fn a_name_that_is_not_there_is_refused_with_those_that_are() {
+        let message = scenario("mars").expect_err("refused").to_string();
+        assert!(message.contains("mars") && message.contains("approach-5"), "{message}");
+    }
+}

@@ -1,0 +1,33 @@
+//! `sightline scenarios`: the scenarios that come with the program.
+
+use clap::Args;
+use sightline_core::error::{Error, Result};
+use sightline_core::sim::library;
+
+use super::say;
+
+/// List the scenarios that come with the program, or print one.
+#[derive(Debug, Args)]
+pub struct Scenarios {
+    /// The scenario to print as TOML, a start for one of your own.
+    name: Option<String>,
+}
+
+impl Scenarios {
+    /// Lists the library, or prints one scenario of it.
+    ///
+    /// # Errors
+    /// A name that the library does not have.
+    pub fn run(self) -> Result<()> {
+        if let Some(name) = self.name {
+            library::scenario(&name)?;
+            let text = library::toml(&name).ok_or_else(|| Error::Request(name))?;
+            return say::line(text.trim_end());
+        }
+        for name in library::names() {
+            let scenario = library::scenario(name)?;
+            say::line(&format!("{name:22} {}", scenario.description))?;
+        }
+        Ok(())
+    }
+}
