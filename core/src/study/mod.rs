@@ -3,3 +3,5 @@
 pub mod truth;
 pub mod calibration;
 pub mod approach;
+pub mod skip;
+pub mod realism;

@@ -13,6 +13,7 @@ pub mod study;
 mod figure;
 mod open;
 mod say;
+mod sheet;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;

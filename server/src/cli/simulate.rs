@@ -7,7 +7,7 @@ use sightline_core::error::{Error, Result};
 use sightline_core::sim::Scenario;
 use sightline_core::traverse::create_simulated;
 
-use super::{open, say};
+use super::{open, say, sheet};
 
 /// Render a simulated traverse into a folder.
 #[derive(Debug, Args)]
@@ -24,6 +24,9 @@ pub struct Simulate {
     /// A setting of the scenario, for example sun.elevation_deg=20; can be given more than once.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Also write a contact sheet of the drive, a PNG.
+    #[arg(long, value_name = "FILE")]
+    sheet: Option<PathBuf>,
 }
 
 impl Simulate {
@@ -37,6 +40,9 @@ impl Simulate {
         let scenario = with(&scenario, &self.set)?;
         let traverse = create_simulated(&scenario, &self.out)?;
         open::render(&traverse)?;
+        if let Some(path) = &self.sheet {
+            sheet::write(&traverse, path)?;
+        }
         let (stops, folder) = (traverse.stop_count(), self.out.display());
         say::line(&format!("{folder}: {stops} stops"))
     }

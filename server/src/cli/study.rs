@@ -4,10 +4,12 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use sightline_core::error::{Error, Result};
+use sightline_core::frames::Pixel;
 use sightline_core::settings::{Changes, Settings, parse_assignment};
 use sightline_core::sim::{self, Scenario};
 use sightline_core::study::approach::{self, ApproachRun, ApproachSummary};
-use sightline_core::traverse::create_simulated;
+use sightline_core::study::realism::{self, Difficulty};
+use sightline_core::traverse::{Traverse, create_simulated};
 
 use super::figure;
 use super::{open, say};
@@ -25,20 +27,22 @@ pub struct Study {
 #[derive(Debug, Subcommand)]
 enum Experiment {
     /// Straight approaches from 10 m to 2 m: many targets in many worlds against the truth.
-    Approach(Approach),
+    Approach(Worlds),
+    /// How hard the simulated worlds are: plain correlation, without scale and roll, at steps of 5 % and 23 %.
+    Realism(Worlds),
 }
 
-/// Straight approaches: each world is rendered once, each of its targets is one run.
+/// The worlds of an experiment: each is rendered once, each of its targets is one run.
 #[derive(Debug, Args)]
-struct Approach {
+struct Worlds {
     /// How many worlds; one that offers fewer targets than the scenario asks for is passed over and named.
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
     worlds: u64,
     /// The seed of the first world; the others follow.
     #[arg(long, default_value_t = 1)]
     first_seed: u64,
-    /// The scenario of which the worlds are made, a file or a name of the library; by default that of the
-    /// demonstration.
+    /// The scenario of which the worlds are made, a file or a name that `sightline scenarios` lists; by default the
+    /// experiment's own.
     #[arg(long, value_name = "SCENARIO")]
     scenario: Option<PathBuf>,
     /// A setting of the tracker; can be given more than once.
@@ -53,63 +57,128 @@ impl Study {
     /// Runs the experiment.
     ///
     /// # Errors
-    /// A bad scenario or setting, or a folder that cannot be written.
+    /// A bad scenario or setting, too few worlds with targets enough, or a folder that cannot be written.
     pub fn run(self) -> Result<()> {
         match self.experiment {
-            Experiment::Approach(approach) => approach.run(),
+            Experiment::Approach(worlds) => study_approach(&worlds),
+            Experiment::Realism(worlds) => study_realism(&worlds),
         }
     }
 }
 
-impl Approach {
-    fn run(self) -> Result<()> {
-        let scenario = self.scenario.as_deref().map_or_else(|| Ok(Scenario::demo()), open::scenario)?;
-        let changes = self.set.iter().map(|text| parse_assignment(text)).collect::<Result<Changes>>()?;
-        let settings = Settings::default().with(&changes)?;
-        let mut runs = Vec::new();
-        let mut worlds = 0;
+fn study_approach(worlds: &Worlds) -> Result<()> {
+    let settings = worlds.settings(&[])?;
+    let mut runs = Vec::new();
+    worlds.each("approach-10", |traverse, seed, targets| {
+        let of_world = approach::track_world(traverse, seed, targets, &settings);
+        say::line(&format!("world {seed}: {}", sentence(&approach::summarise_runs(&of_world))))?;
+        runs.extend(of_world);
+        Ok(())
+    })?;
+    let summary = approach::summarise_runs(&runs);
+    write(&worlds.out.join("runs.csv"), table(&runs).as_bytes())?;
+    let document = serde_json::to_vec_pretty(&summary).map_err(|e| Error::Request(e.to_string()))?;
+    write(&worlds.out.join("summary.json"), &document)?;
+    figure::approach(&worlds.out.join("nees.svg"), &runs, &summary)?;
+    say::line(&sentence(&summary))
+}
+
+/// Strides over an approach in steps of 5 %: 5 % and 22.6 % (R111).
+const STRIDES: [usize; 2] = [1, 5];
+
+fn study_realism(worlds: &Worlds) -> Result<()> {
+    let settings = worlds.settings(&["scale=false", "roll=false"])?;
+    let mut found: Vec<Difficulty> = Vec::new();
+    worlds.each("approach-5", |traverse, seed, targets| {
+        let of_world = STRIDES.map(|stride| realism::difficulty(traverse, targets, &settings, stride));
+        for (index, difficulty) in of_world.into_iter().enumerate() {
+            say::line(&format!(
+                "world {seed}, every {} stops: {}",
+                difficulty.stride,
+                difficulty_words(&difficulty)
+            ))?;
+            match found.get_mut(index) {
+                Some(sum) => sum.add(&difficulty),
+                None => found.push(difficulty),
+            }
+        }
+        Ok(())
+    })?;
+    let document = serde_json::to_vec_pretty(&found).map_err(|e| Error::Request(e.to_string()))?;
+    write(&worlds.out.join("realism.json"), &document)?;
+    for difficulty in &found {
+        say::line(&format!("every {} stops: {}", difficulty.stride, difficulty_words(difficulty)))?;
+    }
+    Ok(())
+}
+
+/// What plain correlation made of the worlds, in one line.
+fn difficulty_words(difficulty: &Difficulty) -> String {
+    let near = realism::RANGES_M.iter().skip(1).chain(&[0.0]);
+    let ranges = realism::RANGES_M.iter().zip(near).zip(difficulty.mean_scores());
+    let scores: Vec<String> = ranges
+        .filter_map(|((far_m, near_m), score)| Some(format!("{far_m} to {near_m} m {:.3}", score?)))
+        .collect();
+    format!(
+        "{} of {} targets tracked ({:.0} %), {} refused; mean score {}",
+        difficulty.tracked,
+        difficulty.targets,
+        100.0 * difficulty.tracked_share(),
+        difficulty.refused,
+        scores.join(", ")
+    )
+}
+
+impl Worlds {
+    /// The tracker's settings: the experiment's own, then those that were asked for.
+    fn settings(&self, own: &[&str]) -> Result<Settings> {
+        let texts = own.iter().copied().chain(self.set.iter().map(String::as_str));
+        Settings::default().with(&texts.map(parse_assignment).collect::<Result<Changes>>()?)
+    }
+
+    /// Renders world after world and calls `study` with its traverse, its seed and its targets.
+    ///
+    /// A world that offers fewer targets than its scenario asks for is passed over: that depends on its surface and
+    /// its light alone.
+    fn each(
+        &self,
+        default: &str,
+        mut study: impl FnMut(&Traverse, u64, &[Pixel]) -> Result<()>,
+    ) -> Result<()> {
+        let scenario = open::scenario(self.scenario.as_deref().unwrap_or(Path::new(default)))?;
         let seeds = self.first_seed..self.first_seed.saturating_add(self.worlds * SEEDS_PER_WORLD);
+        let mut worlds = 0;
         for seed in seeds.clone() {
             if worlds == self.worlds {
                 break;
             }
-            if let Some(of_world) = self.track_world(&Scenario { seed, ..scenario.clone() }, &settings)? {
-                runs.extend(of_world);
-                worlds += 1;
+            let traverse = create_simulated(
+                &Scenario { seed, ..scenario.clone() },
+                &self.out.join(format!("world-{seed}")),
+            )?;
+            let world = traverse
+                .world()
+                .ok_or_else(|| Error::Request("a simulated world has no surface".to_owned()))?;
+            let targets =
+                sim::choose_targets(world, &Scenario { seed, ..scenario.clone() }, traverse.index());
+            if targets.len() < scenario.targets.count as usize {
+                say::line(&format!("world {seed}: {} targets, passed over", targets.len()))?;
+                continue;
             }
+            open::render(&traverse)?;
+            study(&traverse, seed, &targets)?;
+            worlds += 1;
         }
-        if worlds < self.worlds {
-            return Err(Error::Request(format!(
-                "only {worlds} of {} worlds with seeds from {} to {} offer {} targets: lower targets.count or widen targets.radius_m in the scenario",
-                self.worlds,
-                seeds.start,
-                seeds.end - 1,
-                scenario.targets.count
-            )));
+        if worlds == self.worlds {
+            return Ok(());
         }
-        let summary = approach::summarise_runs(&runs);
-        write(&self.out.join("runs.csv"), table(&runs).as_bytes())?;
-        let document = serde_json::to_vec_pretty(&summary).map_err(|e| Error::Request(e.to_string()))?;
-        write(&self.out.join("summary.json"), &document)?;
-        figure::approach(&self.out.join("nees.svg"), &runs, &summary)?;
-        say::line(&sentence(&summary))
-    }
-
-    /// Renders a world and tracks all its targets; nothing if it offers fewer than the scenario asks for, which
-    /// depends on its surface and its light alone.
-    fn track_world(&self, scenario: &Scenario, settings: &Settings) -> Result<Option<Vec<ApproachRun>>> {
-        let traverse = create_simulated(scenario, &self.out.join(format!("world-{}", scenario.seed)))?;
-        let world =
-            traverse.world().ok_or_else(|| Error::Request("a simulated world has no surface".to_owned()))?;
-        let targets = sim::choose_targets(world, scenario, traverse.index());
-        if targets.len() < scenario.targets.count as usize {
-            say::line(&format!("world {}: {} targets, passed over", scenario.seed, targets.len()))?;
-            return Ok(None);
-        }
-        open::render(&traverse)?;
-        let runs = approach::track_world(&traverse, scenario.seed, &targets, settings);
-        say::line(&format!("world {}: {}", scenario.seed, sentence(&approach::summarise_runs(&runs))))?;
-        Ok(Some(runs))
+        Err(Error::Request(format!(
+            "only {worlds} of {} worlds with seeds from {} to {} offer {} targets: lower targets.count or widen targets.radius_m in the scenario",
+            self.worlds,
+            seeds.start,
+            seeds.end - 1,
+            scenario.targets.count
+        )))
     }
 }
 
