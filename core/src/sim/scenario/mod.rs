@@ -14,6 +14,7 @@ mod camera;
 mod drive;
 mod ground;
 mod light;
+mod rover;
 mod targets;
 
 use std::path::Path;
@@ -25,9 +26,10 @@ use crate::error::{Error, Result};
 use crate::traverse::OdometryError;
 
 pub use camera::CameraSettings;
-pub use drive::DriveSettings;
+pub use drive::{Course, DriveSettings, Move};
 pub use ground::{RockSettings, TerrainSettings, TextureSettings};
 pub use light::SunSettings;
+pub use rover::{ForcedSlip, OdometryModel, RoverSettings, Soil};
 pub use targets::TargetRule;
 
 /// The largest seed that every reader of the file takes exactly (TOML has 63 bits, a browser 53).
@@ -61,6 +63,8 @@ pub struct Scenario {
     pub camera: CameraSettings,
     /// The way that the rover drives.
     pub drive: DriveSettings,
+    /// The rover's wheels, its sense of place and its tracks.
+    pub rover: RoverSettings,
     /// 1σ errors of the pose estimate, step by step (default 1 % along, 0.5 % across, 0.1°: domain.md 5.5).
     pub odometry_error: OdometryError,
     /// The rule that chooses the targets.
@@ -78,6 +82,7 @@ impl Default for Scenario {
             sun: SunSettings::default(),
             camera: CameraSettings::default(),
             drive: DriveSettings::default(),
+            rover: RoverSettings::default(),
             odometry_error: OdometryError { along_fraction: 0.01, across_fraction: 0.005, attitude_deg: 0.1 },
             targets: TargetRule::default(),
         }
@@ -110,6 +115,7 @@ impl Scenario {
         self.sun.validate()?;
         self.camera.validate()?;
         self.drive.validate()?;
+        self.rover.validate()?;
         let error = &self.odometry_error;
         within("odometry_error.along_fraction", error.along_fraction, 0.0, 1.0)?;
         within("odometry_error.across_fraction", error.across_fraction, 0.0, 1.0)?;

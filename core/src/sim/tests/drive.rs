@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::frames::{Pixel, Pose};
-use crate::sim::rover::drive::{distance_m, distances_m, estimates, mast, true_stops};
-use crate::sim::scenario::DriveSettings;
+use crate::sim::rover::drive::{distance_m, distances_m, mast, true_stops};
+use crate::sim::rover::odometry::estimates;
 
 #[test]
 fn seventeen_stops_follow_the_powers_of_nine_tenths() {
@@ -18,9 +18,10 @@ fn seventeen_stops_follow_the_powers_of_nine_tenths() {
         let pixel = left.moved(&stop.site_from_rover).project(&demo.world.targets_centre()).unwrap();
         assert!(pixel.distance(Pixel::new(511.5, 511.5)) < 1e-6, "{pixel:?}");
     }
-    let fives = DriveSettings { end_distance_m: 2.26, step_fraction: 0.05, ..DriveSettings::default() };
-    // R108: 29 steps of 5 % end at 2.26 m.
-    assert_eq!(distances_m(&fives).len(), 30);
+    // R108: 29 steps of 5 % end at 2.259 m.
+    let fives = distances_m(10.0, 2.26, 0.05);
+    assert_eq!(fives.len(), 30);
+    assert!((fives[29] - 2.259).abs() < 5e-4, "{}", fives[29]);
 }
 
 #[test]
