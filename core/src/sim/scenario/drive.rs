@@ -157,7 +157,7 @@ impl DriveSettings {
         for (index, one) in self.moves.iter().enumerate() {
             one.validate(index)?;
         }
-        // The drive on flat ground finds what only the way so far can tell: a rock run over, a place left.
+        // Whether a move is possible depends on where those before it led: the plan on flat ground tells.
         planned(self).map(|_| ())
     }
 }

@@ -2,9 +2,11 @@
 //!
 //! All tests share one world, that of the demonstration; it is built once.
 
+mod courses;
 mod drive;
 mod geometry;
 mod pictures;
+mod slip;
 
 use std::sync::OnceLock;
 
