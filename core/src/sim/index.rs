@@ -84,10 +84,8 @@ fn describe(scenario: &Scenario, stops: usize) -> String {
             100.0 * drive.step_fraction,
         ),
         Course::Moves => format!(
-            "{} moves from {:.1} m, the targets at {:.0}° to begin with, in {stops} stops",
-            drive.moves.len(),
-            drive.start_distance_m,
-            drive.start_bearing_deg,
+            "{stops} stops along a list of moves that starts at {:.1} m, the targets {:.0}° from straight ahead",
+            drive.start_distance_m, drive.start_bearing_deg,
         ),
     };
     format!(

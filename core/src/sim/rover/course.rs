@@ -54,6 +54,11 @@ struct Driver<'a> {
     drive: TrueDrive,
 }
 
+/// The first stop of a course.
+pub fn first_stop(scene: &Scene<'_>) -> Result<TrueStop> {
+    Driver::start(scene)?.look()
+}
+
 /// Drives the whole course; fails, naming the setting, where the rover cannot go or the mast cannot look.
 pub fn drive(scene: &Scene<'_>) -> Result<TrueDrive> {
     let settings = scene.drive;

@@ -123,15 +123,25 @@ pub fn distance_m(world: &World, mast: &Mast, stop: &TrueStop) -> f64 {
     (stop.site_from_rover * left.model.centre() - world.targets_centre()).norm()
 }
 
-/// The drive as it truly goes in the scenario's world.
-pub fn true_drive(world: &World, scenario: &Scenario) -> Result<TrueDrive> {
-    course::drive(&Scene {
+/// Does something with the scene of a scenario's world.
+fn in_scene<T>(world: &World, scenario: &Scenario, act: impl FnOnce(&Scene<'_>) -> T) -> T {
+    act(&Scene {
         ground_z_m: &|x_m, y_m| world.ground_z_at(x_m, y_m),
         centre: world.targets_centre(),
         mast: &mast(scenario),
         drive: &scenario.drive,
         rover: &scenario.rover,
     })
+}
+
+/// The drive as it truly goes in the scenario's world.
+pub fn true_drive(world: &World, scenario: &Scenario) -> Result<TrueDrive> {
+    in_scene(world, scenario, course::drive)
+}
+
+/// The first stop of the scenario.
+pub fn first_stop(world: &World, scenario: &Scenario) -> Result<TrueStop> {
+    in_scene(world, scenario, course::first_stop)
 }
 
 /// The true stops of the scenario, in the order of the drive.

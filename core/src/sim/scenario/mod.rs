@@ -4,7 +4,8 @@
 //! scenarios give the same bits. Defaults describe a Spirit-like rover on a plain with the rock abundance
 //! of Gusev's rockier places; none may be chosen by looking at a tracker's result.
 //!
-//! Frames: the site frame is level (+z down), its x axis is the direction of the drive, its origin lies on
+//! Frames: the site frame is level (+z down), its x axis is the direction of the drive (unless
+//! `drive.heading_deg` and `drive.start_bearing_deg` turn it away), its origin lies on
 //! the mean ground below which the first stop's middle wheels stand, 0.294 m above the mean plane: where the
 //! rover frame of a rover on flat ground would be. Angles of the sun are measured in it (domain.md 1.5).
 //! Sources: domain.md 2.1 (block average), 5.1 (detector), 5.5 (odometry), 10 (rocks, ground), 11 (light,

@@ -187,7 +187,7 @@ fn checkout_3_comes_out_of_its_moves() {
     };
     let mut list: Vec<Move> = (0..7).map(|k| turn(k % 2 == 0)).collect();
     list.push(Move::Forward { distance_m: -1.515, stops: 1 });
-    list.push(Move::Forward { distance_m: -3.14, stops: 10 });
+    list.push(Move::Forward { distance_m: -3.145, stops: 10 });
     list.push(Move::FaceTarget);
     list.push(Move::Forward { distance_m: 2.1, stops: 4 });
     list.push(Move::Forward { distance_m: 1.4, stops: 4 });
@@ -219,6 +219,19 @@ fn an_approach_among_moves_keeps_its_distances() {
     assert_eq!(views.len(), 1 + wanted.len());
     for ([distance, _], wanted) in views[1..].iter().zip(wanted) {
         close(*distance, wanted, 1e-9);
+    }
+}
+
+#[test]
+fn an_approach_runs_in_the_direction_of_its_heading() {
+    let turned = DriveSettings { heading_deg: 30.0, ..DriveSettings::default() };
+    let [ahead, aside] = [planned(&DriveSettings::default()).unwrap(), planned(&turned).unwrap()];
+    assert_eq!((ahead.stops.len(), aside.stops.len()), (17, 17));
+    let turn = nalgebra::Rotation3::from_axis_angle(&crate::frames::Vector3::z_axis(), 30f64.to_radians());
+    for (straight, turned) in ahead.stops.iter().zip(&aside.stops) {
+        close(yaw_deg(&turned.site_from_rover), 30.0, 1e-9);
+        let place = turn * straight.site_from_rover.translation.vector;
+        assert!((place - turned.site_from_rover.translation.vector).norm() < 1e-9, "{place}");
     }
 }
 

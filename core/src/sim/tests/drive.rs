@@ -103,6 +103,27 @@ fn a_pointing_error_shows_in_the_true_cameras_only() {
 }
 
 #[test]
+fn a_miscalibrated_mast_shows_in_the_true_cameras_only() {
+    let mut scenario = demo().scenario.clone();
+    scenario.drive.mast_offset_deg = [0.2, -0.1];
+    let index = crate::sim::index(&scenario, &demo().world).unwrap();
+    let mast = mast(&scenario);
+    for (stop, without) in index.stops.iter().zip(&demo().index.stops) {
+        assert_eq!((&stop.left, stop.mast_angles), (&without.left, without.mast_angles));
+        let mut angles = stop.mast_angles.unwrap();
+        angles.azimuth_rad += 0.2f64.to_radians();
+        angles.elevation_rad += -0.1f64.to_radians();
+        let (left, right) = mast.cameras_in_rover(angles);
+        let truth = stop.truth.as_ref().unwrap();
+        assert_eq!((&truth.left_camera, &truth.right_camera), (&Some(left), &Some(right)));
+        // The mast looks to the right of the targets and below them: they appear to the left and above.
+        let pixel =
+            true_camera_in_site(stop, Eye::Left).unwrap().project(&demo().world.targets_centre()).unwrap();
+        assert!(pixel.x < 510.0 && pixel.y < 510.0, "{pixel:?}");
+    }
+}
+
+#[test]
 fn targets_satisfy_the_rule_and_follow_from_the_seed() {
     let demo = demo();
     let targets = choose_targets(&demo.world, &demo.scenario, &demo.index);
