@@ -206,6 +206,8 @@ pub fn settle(ground_z_m: &dyn Fn(f64, f64) -> f64, x_m: f64, y_m: f64, yaw_rad:
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sim::ground::terrain::Terrain;
+    use crate::sim::scenario::TerrainSettings;
 
     fn roll_pitch(stand: &Stand) -> (f64, f64) {
         let (roll, pitch, _) = stand.site_from_rover.rotation.euler_angles();
@@ -274,6 +276,30 @@ mod tests {
         for side in 0..2 {
             assert!((stand.angles.bogie_rad[side] + pitch).abs() < 1e-9);
             assert!(stand.angles.rocker_rad[side].abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn on_rough_ground_every_wheel_touches_and_none_sinks_in() {
+        let settings = TerrainSettings { rms_at_1m_m: 0.1, ..TerrainSettings::default() };
+        let terrain = Terrain::new(&settings, [-3.0, 6.0], [-4.0, 4.0], 4);
+        let ground = |x: f64, y: f64| terrain.z_at(x, y);
+        for k in 0..24 {
+            let k = f64::from(k);
+            let stand = settle(&ground, 0.2 * k - 1.0, (k * 0.7).sin(), k).unwrap();
+            for (axle, contact) in axles_in_rover(&stand.angles).iter().zip(stand.contacts_in_site) {
+                assert!((contact.z - ground(contact.x, contact.y)).abs() < 1e-9);
+                let least_m = (-800..=800)
+                    .map(|tenth| {
+                        let (sine, cosine) = (f64::from(tenth) * 0.1).to_radians().sin_cos();
+                        let rim = axle + Vector3::new(sine, 0.0, cosine) * WHEEL_RADIUS_M;
+                        let point = stand.site_from_rover * rim;
+                        ground(point.x, point.y) - point.z
+                    })
+                    .fold(f64::INFINITY, f64::min);
+                // Cells of 2 cm let a second contact hide between two samples of the search, by less than this.
+                assert!(least_m > -2e-4, "{least_m}");
+            }
         }
     }
 

@@ -73,6 +73,52 @@ fn with_all_slipping_the_estimate_advances_and_the_truth_does_not() {
 }
 
 #[test]
+fn a_stuck_rover_makes_no_blind_move_either() {
+    let stuck = RoverSettings {
+        stuck_from_stop: Some(1),
+        gyro_walk_deg_per_root_hour: 0.0,
+        gyro_bias_deg_per_hour: 0.0,
+        ..RoverSettings::default()
+    };
+    let list = [
+        Move::Forward { distance_m: 0.6, stops: 1 },
+        Move::Turn { angle_deg: 30.0, stops: 1 },
+        Move::FaceTarget,
+    ];
+    let drive = on_plane(&moves(8.0, 20.0, 0.0, &list), &stuck, 0.0).unwrap();
+    let believed = wheels_and_imu(&drive, &NO_ERROR, &stuck, 3);
+    for (stop, advance_m) in [(1, 0.6), (2, 0.6), (3, 0.6)] {
+        assert_eq!(drive.stops[stop], drive.stops[0]);
+        close(believed[stop].translation.x - believed[0].translation.x, advance_m, 1e-9);
+        // The gyro knows that the rover did not turn.
+        close(yaw_deg(&believed[stop]), 0.0, 1e-9);
+    }
+    assert!(drive.legs.iter().all(|leg| leg.duration_s > 5.0));
+}
+
+#[test]
+fn on_a_slope_the_estimate_runs_ahead_by_the_slip() {
+    let sand = RoverSettings {
+        soil: Soil::LooseSand,
+        slip_scale: 1.0,
+        gyro_walk_deg_per_root_hour: 0.0,
+        gyro_bias_deg_per_hour: 0.0,
+        ..RoverSettings::default()
+    };
+    let settings = DriveSettings { end_distance_m: 8.5, ..DriveSettings::default() };
+    // Uphill 10° keeps 80 % of the wheels' advance; downhill 2 % − 18 %: 116 %.
+    for (up_deg, kept) in [(10.0f64, 0.80), (-10.0, 1.16)] {
+        let drive = on_plane(&settings, &sand, -up_deg.to_radians().tan()).unwrap();
+        let believed = wheels_and_imu(&drive, &NO_ERROR, &sand, 1);
+        let truth = drive.stops[2].site_from_rover.translation.vector
+            - drive.stops[0].site_from_rover.translation.vector;
+        let seen = believed[2].translation.vector - believed[0].translation.vector;
+        close(truth.norm() / seen.norm(), kept, 1e-6);
+        close(truth.normalize().dot(&seen.normalize()), 1.0, 1e-9);
+    }
+}
+
+#[test]
 fn without_noise_and_slip_wheels_and_imu_find_the_truth() {
     let list = [
         Move::Arc { radius_m: 3.0, angle_deg: 40.0, stops: 2 },
