@@ -4,40 +4,39 @@
 //! follow from them) and, apart from it, the truth. The true cameras stand in the truth only where they
 //! differ from the ones that the tracker is given, which is when the scenario has a pointing error.
 //!
-//! Time: the rover drives at 3.75 cm/s and stands for 60 s at each stop (domain.md 5.4; the pause is ours).
+//! Time: the rover drives at 3.75 cm/s and turns at 2.1°/s along its wheels' way (domain.md 5.4) and stands
+//! for 60 s at each stop (the pause is ours).
 //! Frames: poses in the site frame, cameras in the rover frame. Sources: domain.md 4, 5; R104–R106.
 
-use crate::camera::Camera;
+use crate::camera::{Camera, MastAngles};
 use crate::error::Result;
-use crate::frames::{Pose, PoseRecord};
+use crate::frames::PoseRecord;
 use crate::traverse::{CameraSource, FORMAT_VERSION, StereoGeometry, Stop, StopTruth, TraverseIndex, View};
 
 use crate::sim::camera::noise::FULL_SCALE_DN;
 use crate::sim::camera::render::Eye;
-use crate::sim::rover::drive;
-use crate::sim::scenario::Scenario;
+use crate::sim::rover::{drive, mast_error, odometry};
+use crate::sim::scenario::{Course, Scenario};
 use crate::sim::world::World;
 
 /// The name of the scenario's file within a traverse folder.
 pub const SCENARIO_FILE: &str = "scenario.toml";
 
-/// Speed of the drive, m/s (domain.md 5.4).
-const SPEED_M_S: f64 = 0.0375;
 /// Time spent at a stop, s (ours).
 const PAUSE_S: f64 = 60.0;
 
 /// Builds the index of a scenario's traverse; fails where the drive is impossible on this ground.
 pub fn index(scenario: &Scenario, world: &World) -> Result<TraverseIndex> {
     let mast = drive::mast(scenario);
-    let true_stops = drive::true_stops(world, scenario)?;
-    let true_poses: Vec<Pose> = true_stops.iter().map(|stop| stop.site_from_rover).collect();
-    let estimates = drive::estimates(&true_poses, &scenario.odometry_error, scenario.seed);
-    let mut stops = Vec::with_capacity(true_stops.len());
+    let drive = drive::true_drive(world, scenario)?;
+    let estimates = odometry::believed(&drive, scenario);
+    let told: Vec<MastAngles> = drive.stops.iter().map(|stop| stop.angles).collect();
+    let true_angles = mast_error::true_angles(&told, scenario);
+    let mut stops = Vec::with_capacity(drive.stops.len());
     let mut time_s = 0.0;
-    for (number, (truth, estimate)) in true_stops.iter().zip(&estimates).enumerate() {
-        if number > 0 {
-            let way = truth.site_from_rover.translation.vector - true_poses[number - 1].translation.vector;
-            time_s += PAUSE_S + way.norm() / SPEED_M_S;
+    for (number, (truth, estimate)) in drive.stops.iter().zip(&estimates).enumerate() {
+        if let Some(leg) = number.checked_sub(1).and_then(|before| drive.legs.get(before)) {
+            time_s += PAUSE_S + leg.duration_s;
         }
         let (left, right) = mast.cameras_in_rover(truth.angles);
         let view = |eye: &str, camera: Camera| View {
@@ -49,9 +48,8 @@ pub fn index(scenario: &Scenario, world: &World) -> Result<TraverseIndex> {
             left_camera: None,
             right_camera: None,
         };
-        if scenario.drive.pointing_error_deg > 0.0 {
-            let angles = drive::angles_with_error(truth.angles, scenario, number);
-            let (left, right) = mast.cameras_in_rover(angles);
+        if mast_error::is_present(&scenario.drive) {
+            let (left, right) = mast.cameras_in_rover(true_angles[number]);
             (stop_truth.left_camera, stop_truth.right_camera) = (Some(left), Some(right));
         }
         stops.push(Stop {
@@ -79,11 +77,19 @@ pub fn index(scenario: &Scenario, world: &World) -> Result<TraverseIndex> {
 /// One sentence for people.
 fn describe(scenario: &Scenario, stops: usize) -> String {
     let drive = &scenario.drive;
+    let course = match drive.course {
+        Course::Approach => format!(
+            "straight approach from {:.1} m in {stops} stops, steps of {:.0} % of the distance",
+            drive.start_distance_m,
+            100.0 * drive.step_fraction,
+        ),
+        Course::Moves => format!(
+            "{stops} stops along a list of moves that starts at {:.1} m, the targets {:.0}° from straight ahead",
+            drive.start_distance_m, drive.start_bearing_deg,
+        ),
+    };
     format!(
-        "Simulated: straight approach from {:.1} m in {stops} stops, steps of {:.0} % of the distance, \
-         Spirit's navcams at {size} × {size} px, seed {}.",
-        drive.start_distance_m,
-        100.0 * drive.step_fraction,
+        "Simulated: {course}, Spirit's navcams at {size} × {size} px, seed {}.",
         scenario.seed,
         size = scenario.camera.image_size,
     )

@@ -1,4 +1,4 @@
-//! The simulator: a rocky plain, a straight approach, and the pictures that a rover takes on the way.
+//! The simulator: a rocky plain, the rover that drives over it, and the pictures that a rover takes on the way.
 //!
 //! The scenery is simple, the geometry is not: the ground is a height field, rocks are solids, both are met
 //! by rays of the true camera models exactly; shadows are cast; pixels average over their area; noise is
@@ -16,7 +16,7 @@
 //! culling        which rocks a ray can meet            world                   cast, shadow, visibility
 //! surface        albedo and shading normal             light, openness         sun, sky, contact shadows
 //! sampling       rays of a tile, their radiance        render                  blur, exposure, regions
-//! camera_noise   electrons, numbers                    drive                   true poses, estimates
+//! camera_noise   electrons, numbers                    rover/                  stand, slip, course, estimates
 //! index          the traverse's index                  targets                 the rule that chooses them
 //! ```
 //!

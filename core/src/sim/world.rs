@@ -83,15 +83,15 @@ impl World {
             goal_m: drive::goal_m(&scenario.drive),
             wheels_reach_m: drive::wheels_reach_m(&scenario.drive),
         };
-        let x_m = [-2.5, approach.goal_m[0] + 9.0];
-        let terrain = Terrain::new(&scenario.terrain, x_m, [-7.0, 7.0], scenario.seed);
+        let [x_m, y_m] = drive::ground_extent_m(&scenario.drive);
+        let terrain = Terrain::new(&scenario.terrain, x_m, y_m, scenario.seed);
         let rocks = rock_field::scatter(&scenario.rocks, &approach, &terrain, scenario.seed);
         let light = Light::new(&scenario.sun, scenario.texture.soil_albedo);
         let sun_grid = Arc::new(SunGrid::new(&rocks, &light.to_sun));
         let [x_m_goal, y_m_goal] = approach.goal_m;
         let scenery = Scenery {
             tree: Tree::new(&rocks),
-            openness: Openness::new(&rocks, x_m, [-7.0, 7.0]),
+            openness: Openness::new(&rocks, x_m, y_m),
             surfaces: Surfaces::new(&scenario.texture, scenario.seed),
             terrain,
             rocks,

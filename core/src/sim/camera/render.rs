@@ -149,9 +149,7 @@ pub(in crate::sim) fn exposure(world: &World, scenario: &Scenario) -> f64 {
     /// Rays along each side of the picture.
     const SIDE: u32 = 64;
     let mast = drive::mast(scenario);
-    let Some(stop) = drive::true_stops(world, scenario).ok().and_then(|stops| stops.first().copied()) else {
-        return 1.0;
-    };
+    let Ok(stop) = drive::first_stop(world, scenario) else { return 1.0 };
     let camera = mast.cameras_in_rover(stop.angles).0.moved(&stop.site_from_rover);
     let sampler = Sampler::new(world, &camera, 1);
     let stride = (camera.width() / SIDE).max(1);

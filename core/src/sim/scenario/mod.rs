@@ -4,7 +4,8 @@
 //! scenarios give the same bits. Defaults describe a Spirit-like rover on a plain with the rock abundance
 //! of Gusev's rockier places; none may be chosen by looking at a tracker's result.
 //!
-//! Frames: the site frame is level (+z down), its x axis is the direction of the drive, its origin lies on
+//! Frames: the site frame is level (+z down), its x axis is the direction of the drive (unless
+//! `drive.heading_deg` and `drive.start_bearing_deg` turn it away), its origin lies on
 //! the mean ground below which the first stop's middle wheels stand, 0.294 m above the mean plane: where the
 //! rover frame of a rover on flat ground would be. Angles of the sun are measured in it (domain.md 1.5).
 //! Sources: domain.md 2.1 (block average), 5.1 (detector), 5.5 (odometry), 10 (rocks, ground), 11 (light,
@@ -16,6 +17,7 @@ mod events;
 mod fiducials;
 mod ground;
 mod light;
+mod rover;
 mod targets;
 
 use std::path::Path;
@@ -27,11 +29,12 @@ use crate::error::{Error, Result};
 use crate::traverse::OdometryError;
 
 pub use camera::CameraSettings;
-pub use drive::DriveSettings;
+pub use drive::{Course, DriveSettings, Move};
 pub use events::{Cloud, EventSettings, Occluder};
 pub use fiducials::Fiducial;
 pub use ground::{RockSettings, TerrainSettings, TextureSettings};
 pub use light::SunSettings;
+pub use rover::{ForcedSlip, OdometryModel, RoverSettings, Soil};
 pub use targets::{Arrangement, TargetRule};
 
 /// The largest seed that every reader of the file takes exactly (TOML has 63 bits, a browser 53).
@@ -68,6 +71,8 @@ pub struct Scenario {
     pub camera: CameraSettings,
     /// The way that the rover drives.
     pub drive: DriveSettings,
+    /// The rover's wheels, its sense of place and its tracks.
+    pub rover: RoverSettings,
     /// What changes during the drive.
     pub events: EventSettings,
     /// Marks of known shape.
@@ -91,6 +96,7 @@ impl Default for Scenario {
             sun: SunSettings::default(),
             camera: CameraSettings::default(),
             drive: DriveSettings::default(),
+            rover: RoverSettings::default(),
             events: EventSettings::default(),
             fiducials: Vec::new(),
             odometry_error: OdometryError { along_fraction: 0.01, across_fraction: 0.005, attitude_deg: 0.1 },
@@ -125,6 +131,7 @@ impl Scenario {
         self.sun.validate()?;
         self.camera.validate()?;
         self.drive.validate()?;
+        self.rover.validate()?;
         self.events.validate()?;
         self.fiducials.iter().enumerate().try_for_each(|(index, fiducial)| fiducial.validate(index))?;
         let error = &self.odometry_error;

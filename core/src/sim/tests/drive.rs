@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::frames::{Pixel, Pose};
-use crate::sim::rover::drive::{distance_m, distances_m, estimates, mast, true_stops};
-use crate::sim::scenario::DriveSettings;
+use crate::sim::rover::drive::{distance_m, distances_m, mast, true_stops};
+use crate::sim::rover::odometry::estimates;
 
 #[test]
 fn seventeen_stops_follow_the_powers_of_nine_tenths() {
@@ -18,9 +18,10 @@ fn seventeen_stops_follow_the_powers_of_nine_tenths() {
         let pixel = left.moved(&stop.site_from_rover).project(&demo.world.targets_centre()).unwrap();
         assert!(pixel.distance(Pixel::new(511.5, 511.5)) < 1e-6, "{pixel:?}");
     }
-    let fives = DriveSettings { end_distance_m: 2.26, step_fraction: 0.05, ..DriveSettings::default() };
-    // R108: 29 steps of 5 % end at 2.26 m.
-    assert_eq!(distances_m(&fives).len(), 30);
+    // R108: 29 steps of 5 % end at 2.259 m.
+    let fives = distances_m(10.0, 2.26, 0.05);
+    assert_eq!(fives.len(), 30);
+    assert!((fives[29] - 2.259).abs() < 5e-4, "{}", fives[29]);
 }
 
 #[test]
@@ -99,6 +100,27 @@ fn a_pointing_error_shows_in_the_true_cameras_only() {
     // 0.05° is 1.06 px at 1211 px/rad, on each of two axes.
     let rms = (offsets.iter().map(|d| d * d).sum::<f64>() / offsets.len() as f64).sqrt();
     assert!((0.8..2.4).contains(&rms), "{rms}");
+}
+
+#[test]
+fn a_miscalibrated_mast_shows_in_the_true_cameras_only() {
+    let mut scenario = demo().scenario.clone();
+    scenario.drive.mast_offset_deg = [0.2, -0.1];
+    let index = crate::sim::index(&scenario, &demo().world).unwrap();
+    let mast = mast(&scenario);
+    for (stop, without) in index.stops.iter().zip(&demo().index.stops) {
+        assert_eq!((&stop.left, stop.mast_angles), (&without.left, without.mast_angles));
+        let mut angles = stop.mast_angles.unwrap();
+        angles.azimuth_rad += 0.2f64.to_radians();
+        angles.elevation_rad += -0.1f64.to_radians();
+        let (left, right) = mast.cameras_in_rover(angles);
+        let truth = stop.truth.as_ref().unwrap();
+        assert_eq!((&truth.left_camera, &truth.right_camera), (&Some(left), &Some(right)));
+        // The mast looks to the right of the targets and below them: they appear to the left and above.
+        let pixel =
+            true_camera_in_site(stop, Eye::Left).unwrap().project(&demo().world.targets_centre()).unwrap();
+        assert!(pixel.x < 510.0 && pixel.y < 510.0, "{pixel:?}");
+    }
 }
 
 #[test]

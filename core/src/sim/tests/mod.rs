@@ -2,11 +2,13 @@
 //!
 //! All tests share one world, that of the demonstration; it is built once.
 
+mod courses;
 mod drive;
 mod fiducials;
 mod moments;
 mod geometry;
 mod pictures;
+mod slip;
 
 use std::sync::OnceLock;
 

@@ -14,7 +14,7 @@
 //! model with A, H, V = third, first, second row of M and C = −M⁻¹ p.
 //!
 //! **The poses are true**, so the estimate that the tracker is given is made from them as odometry would make
-//! it, by the simulator's model ([`crate::sim::rover::drive::estimates`]): with T_k the true and E_k the estimated
+//! it, by the simulator's model ([`crate::sim::rover::odometry::estimates`]): with T_k the true and E_k the estimated
 //! pose (`site_from_rover`) at stop k,
 //!
 //! ```text
@@ -33,7 +33,7 @@ use crate::camera::{Cahv, Camera, CameraModel};
 use crate::error::{Error, Result};
 use crate::frames::{Point3, Pose, PoseRecord, Vector3};
 use crate::image::io;
-use crate::sim::rover::drive;
+use crate::sim::rover::odometry;
 use crate::traverse::{
     CameraSource, FORMAT_VERSION, OdometryError, StereoGeometry, Stop, StopTruth, TraverseIndex, View,
 };
@@ -74,7 +74,7 @@ impl ImportFormat for Kitti {
             across_fraction: options.odometry_fraction,
             attitude_deg: options.attitude_deg,
         };
-        let estimates = drive::estimates(&truth, &odometry_error, options.seed);
+        let estimates = odometry::estimates(&truth, &odometry_error, options.seed);
         let time = |frame: usize| times.get(frame).copied().unwrap_or(frame as f64 * FRAME_TIME_S);
         let mut stops = Vec::with_capacity(frames.len());
         for (((frame, file), truth), estimate) in frames.iter().zip(&truth).zip(&estimates) {
