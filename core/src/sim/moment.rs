@@ -15,8 +15,13 @@ use std::sync::Arc;
 use crate::frames::{Point3, Pose, Vector3};
 use crate::sim::camera::render::Eye;
 use crate::sim::culling::SunGrid;
+use crate::sim::ground::imprint::Imprint;
 use crate::sim::index::true_camera_in_site;
 use crate::sim::light::reflection::Light;
+use crate::sim::rover::body::{BodyPart, parts};
+use crate::sim::rover::drive::true_drive;
+use crate::sim::rover::suspension::settle;
+use crate::sim::rover::tracks::Tracks;
 use crate::sim::scenario::{EventSettings, Fiducial, Occluder, Scenario, SunSettings};
 use crate::sim::solids::{Look, Shape, Solid, SolidKind};
 use crate::sim::world::World;
@@ -24,6 +29,8 @@ use crate::traverse::Stop;
 
 /// Albedo of what stands in the way.
 const OCCLUDER_ALBEDO: f32 = 0.25;
+/// Albedo of the rover.
+const ROVER_ALBEDO: f32 = 0.4;
 /// Half the thickness of boards and occluders, m.
 const HALF_THICKNESS_M: f64 = 0.005;
 /// The sun is not let below this elevation, deg: where the light of a scenario is defined.
@@ -68,9 +75,42 @@ impl World {
             Arc::clone(&self.sun_grid)
         };
         let mut solids = self.solids.clone();
+        if events.rover_body {
+            solids.extend(self.rover_at(&moment.site_from_rover));
+        }
         let present = events.occluders.iter().filter(|o| covers(o.from_stop, o.to_stop, moment.stop));
         solids.extend(present.map(|o| occluder(o, &moment.left_camera, &self.targets_centre())));
-        Self { scenery: Arc::clone(&self.scenery), light, sun_grid, solids, exposure: self.exposure }
+        let imprint = self.imprint_at(moment.stop, scenario);
+        Self { scenery: Arc::clone(&self.scenery), light, sun_grid, solids, imprint, exposure: self.exposure }
+    }
+
+    /// The parts of the rover where it stands, its suspension settled there.
+    fn rover_at(&self, site_from_rover: &Pose) -> Vec<Solid> {
+        let place = site_from_rover.translation.vector;
+        let yaw_rad = site_from_rover.rotation.euler_angles().2;
+        let ground_z_m = |x_m: f64, y_m: f64| self.ground_z_at(x_m, y_m);
+        // Where no stand is found there is no such stop either.
+        let angles =
+            settle(&ground_z_m, place.x, place.y, yaw_rad).map_or_else(Default::default, |s| s.angles);
+        let solid = |part: BodyPart| Solid {
+            kind: SolidKind::Rover,
+            middle: site_from_rover * part.centre,
+            shape: Shape::Box(part.half_axes.map(|axis| site_from_rover * axis)),
+            look: Look::Plain(ROVER_ALBEDO),
+            is_seen: part.is_seen,
+        };
+        parts(&angles).into_iter().map(solid).collect()
+    }
+
+    /// The wheel tracks that lie on the ground when the rover stands at a stop.
+    fn imprint_at(&self, stop: u32, scenario: &Scenario) -> Option<Arc<Imprint>> {
+        if !scenario.rover.tracks || stop == 0 {
+            return None;
+        }
+        // A drive that is impossible has no stops at which this could be asked.
+        let drive = true_drive(self, scenario).ok()?;
+        let tracks = Tracks::new(&drive, &scenario.rover);
+        Some(Arc::new(Imprint::new(&tracks.tracks_until(stop as usize))))
     }
 }
 

@@ -15,6 +15,7 @@ use std::sync::Arc;
 use crate::frames::{Point3, Ray, Vector3};
 use crate::sim::camera::render;
 use crate::sim::culling::{SunGrid, Tree};
+use crate::sim::ground::imprint::Imprint;
 use crate::sim::ground::rock_field::{self, Approach};
 use crate::sim::ground::rocks::Rock;
 use crate::sim::ground::surface::Surfaces;
@@ -71,6 +72,8 @@ pub struct World {
     pub(in crate::sim) light: Light,
     pub(in crate::sim) sun_grid: Arc<SunGrid>,
     pub(in crate::sim) solids: Vec<Solid>,
+    /// Wheel tracks; nothing where the wheels leave none.
+    pub(in crate::sim) imprint: Option<Arc<Imprint>>,
     /// Fraction of full scale per unit of radiance.
     pub(in crate::sim) exposure: f64,
 }
@@ -97,8 +100,14 @@ impl World {
             rocks,
             targets_centre: Point3::origin(),
         };
-        let mut world =
-            Self { scenery: Arc::new(scenery), light, sun_grid, solids: Vec::new(), exposure: 1.0 };
+        let mut world = Self {
+            scenery: Arc::new(scenery),
+            light,
+            sun_grid,
+            solids: Vec::new(),
+            imprint: None,
+            exposure: 1.0,
+        };
         let down = Ray { origin: Point3::new(x_m_goal, y_m_goal, -100.0), direction: Vector3::z() };
         let centre = world.cast(&down).map_or(Point3::new(x_m_goal, y_m_goal, 0.0), |hit| hit.point);
         Arc::make_mut(&mut world.scenery).targets_centre = centre;

@@ -179,7 +179,10 @@ impl<'a> Sampler<'a> {
     fn ground(&self, ray: &Ray, distance_m: f64) -> f32 {
         let (world, point) = (self.world, ray.at(distance_m));
         let cutoff_m = self.cutoff_m(distance_m, ray.direction.z);
-        let look = world.scenery.surfaces.soil(&world.scenery.terrain, &point, cutoff_m);
+        let mut look = world.scenery.surfaces.soil(&world.scenery.terrain, &point, cutoff_m);
+        if let Some(imprint) = &world.imprint {
+            look = imprint.on_soil(look, point.x, point.y);
+        }
         let in_sun = !world.in_shadow(&point);
         let open = world.scenery.openness.at(point.x, point.y);
         world.light.reflected(&look, towards_camera(ray), in_sun, open)

@@ -6,3 +6,4 @@ mod terrain_cast;
 pub mod rocks;
 pub mod rock_field;
 pub mod surface;
+pub mod imprint;
