@@ -8,7 +8,7 @@
 //! | part | size, m | source |
 //! |---|---|---|
 //! | deck with panels | 1.6 × 2.3 | domain.md 5.4 |
-//! | wheels | ⌀ 0.26 × 0.16 | domain.md 5.4, R142 |
+//! | wheels | ⌀ 0.26 × 0.16 | domain.md 5.4; the width is ours |
 //! | mast, camera bar | axes at (0.458, 0.028, −1.097), cameras 0.15 above | domain.md 4.1 |
 //! | height of deck and body, their thickness, arms | as below | ours |
 //!

@@ -35,7 +35,7 @@ use crate::sim::ground::terrain::MEAN_GROUND_Z_M;
 
 /// Radius of a wheel, m (domain.md 5.4).
 pub const WHEEL_RADIUS_M: f64 = 0.13;
-/// Width of a wheel, m (papers.md R142: what its track is wide).
+/// Width of a wheel, m (ours; only its body and its track have it, the contact is that of a thin disc).
 pub const WHEEL_WIDTH_M: f64 = 0.16;
 /// Where the wheels stand in the rover frame (x, y), m: front, middle, rear, each left and right
 /// (domain.md 5.4).

@@ -48,9 +48,8 @@ pub struct RoverSettings {
     pub soil: Soil,
     /// Factor on the slip of the soil: 1 takes domain.md 5.5 as it is, 0 means none (0, ours).
     pub slip_scale: f64,
-    /// From the way to this stop on, 1 or more, nothing but the wheels turns: 100 % of slip (none; R126).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub stuck_from_stop: Option<u32>,
+    /// From the way to this stop on nothing but the wheels turns: 100 % of slip; 0 means never (0; R126).
+    pub stuck_from_stop: u32,
     /// Where the pose estimate comes from (`stated`).
     pub odometry: OdometryModel,
     /// Angle random walk of the gyro, deg/√h, for `wheels_and_imu` (0.1: domain.md 5.5).
@@ -59,7 +58,7 @@ pub struct RoverSettings {
     pub gyro_bias_deg_per_hour: f64,
     /// Whether the wheels leave tracks (false: the demonstration shows untouched ground; R142).
     pub tracks: bool,
-    /// Width of a wheel's track, m (0.16).
+    /// Width of a wheel's track, m (0.16, as wide as a wheel; ours).
     pub track_width_m: f64,
     /// How deep a wheel sinks in, m (0.01, ours).
     pub track_depth_m: f64,
@@ -72,7 +71,7 @@ impl Default for RoverSettings {
         Self {
             soil: Soil::FirmSoil,
             slip_scale: 0.0,
-            stuck_from_stop: None,
+            stuck_from_stop: 0,
             odometry: OdometryModel::Stated,
             gyro_walk_deg_per_root_hour: 0.1,
             gyro_bias_deg_per_hour: 1.0,
@@ -87,9 +86,7 @@ impl Default for RoverSettings {
 impl RoverSettings {
     pub(super) fn validate(&self) -> Result<()> {
         within("rover.slip_scale", self.slip_scale, 0.0, 5.0)?;
-        if let Some(stop) = self.stuck_from_stop {
-            within("rover.stuck_from_stop", f64::from(stop), 1.0, 10_000.0)?;
-        }
+        within("rover.stuck_from_stop", f64::from(self.stuck_from_stop), 0.0, 10_000.0)?;
         for (index, forced) in self.forced_slip.iter().enumerate() {
             within(&format!("rover.forced_slip[{index}].stop"), f64::from(forced.stop), 1.0, 10_000.0)?;
             within(&format!("rover.forced_slip[{index}].slip"), forced.slip, 0.0, 1.25)?;
@@ -102,7 +99,7 @@ impl RoverSettings {
 
     /// The slip staged for the way to a stop, if any.
     pub fn forced_slip_to(&self, stop: usize) -> Option<f64> {
-        if self.stuck_from_stop.is_some_and(|first| stop >= first as usize) {
+        if self.stuck_from_stop > 0 && stop >= self.stuck_from_stop as usize {
             return Some(1.0);
         }
         self.forced_slip.iter().find(|forced| forced.stop as usize == stop).map(|forced| forced.slip)

@@ -50,7 +50,7 @@ fn blind_moves_fall_short_uphill_and_an_approach_turns_its_wheels_more() {
 
 #[test]
 fn with_all_slipping_the_estimate_advances_and_the_truth_does_not() {
-    let stuck = RoverSettings { stuck_from_stop: Some(2), ..RoverSettings::default() };
+    let stuck = RoverSettings { stuck_from_stop: 2, ..RoverSettings::default() };
     let settings = DriveSettings { end_distance_m: 7.0, ..DriveSettings::default() };
     let drive = on_plane(&settings, &stuck, 0.0).unwrap();
     let still = RoverSettings { gyro_walk_deg_per_root_hour: 0.0, gyro_bias_deg_per_hour: 0.0, ..stuck };
@@ -75,7 +75,7 @@ fn with_all_slipping_the_estimate_advances_and_the_truth_does_not() {
 #[test]
 fn a_stuck_rover_makes_no_blind_move_either() {
     let stuck = RoverSettings {
-        stuck_from_stop: Some(1),
+        stuck_from_stop: 1,
         gyro_walk_deg_per_root_hour: 0.0,
         gyro_bias_deg_per_hour: 0.0,
         ..RoverSettings::default()
