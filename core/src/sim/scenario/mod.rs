@@ -26,8 +26,8 @@ use crate::traverse::OdometryError;
 
 pub use camera::CameraSettings;
 pub use drive::DriveSettings;
-pub use ground::{RockSettings, TerrainSettings, TextureSettings};
-pub use light::SunSettings;
+pub use ground::{PlacedRock, RockSettings, RockShape, TerrainSettings, TextureSettings};
+pub use light::{Reflectance, SunSettings};
 pub use targets::TargetRule;
 
 /// The largest seed that every reader of the file takes exactly (TOML has 63 bits, a browser 53).
