@@ -7,8 +7,12 @@
 //! lattice numbers joined by the quintic, s apart along a line. So the stated roughness holds for every cell,
 //! exponent and longest wavelength, and ripples come on top of it.
 //!
+//! The octaves longer than the longest would each add to the difference over a short distance as a tilt does, by
+//! λ^{2H−2}: a geometric series with ratio q = 1.8^{2H−2}, whose sum q/(1 − q) would be missing and would flatten the
+//! power law. For H < 1 one more octave of the longest wavelength, the swell, carries it.
+//!
 //! **Ripples.** `z = −h/2 · m · p(2π s/λ_r + φ)`, s along the ripples' azimuth, `p(x) = cos x + cos(2x)/4`: sharp
-//! crests, flat troughs, h from trough to crest. The phase φ is noise of 0.8 rad (1σ) over four to eight
+//! crests, flat troughs, h from trough to crest. The phase φ is noise of 1.6 rad (1σ) over four to eight
 //! wavelengths, which makes crests wind and meet; m is noise about 1 that leaves gaps and stays within 0.4 and 1.6.
 //! They are not strictly periodic.
 //!
@@ -27,11 +31,12 @@ use crate::sim::scenario::TerrainSettings;
 /// Ratio of neighbouring wavelengths of the fractal.
 const RATIO: f64 = 1.8;
 /// 1σ of the ripples' phase, rad.
-const PHASE_STD_RAD: f64 = 0.8;
+const PHASE_STD_RAD: f64 = 1.6;
 
 /// Heights relative to the mean plane.
 pub(super) struct Relief {
     fractal: Octaves<2>,
+    swell: Octaves<2>,
     amplitude_m: f64,
     ripples: Option<Ripples>,
 }
@@ -49,16 +54,22 @@ impl Relief {
     pub(super) fn new(settings: &TerrainSettings, seed: u64) -> Self {
         let octaves = fractal_octaves(settings);
         let amplitude_m = settings.rms_at_1m_m / rms_difference(&octaves, 1.0);
+        let swell = OctaveSettings {
+            shortest_m: octaves.longest_m,
+            albedo_std: swell_variance(&octaves).sqrt(),
+            ..octaves
+        };
+        let swell = Octaves::new(&swell, mix(seed ^ 0x53e1_1000));
         let fractal = Octaves::new(&octaves, mix(seed ^ 0x7e44_a170));
         let ripples = (settings.ripple_height_m > 0.0).then(|| Ripples::new(settings, seed));
-        Self { fractal, amplitude_m, ripples }
+        Self { fractal, swell, amplitude_m, ripples }
     }
 
     /// Height over the mean plane at a place, m down.
     pub(super) fn z_m(&self, x_m: f64, y_m: f64) -> f64 {
-        let noise = f64::from(self.fractal.at(x_m, y_m, 1e-6).albedo);
+        let noise = [&self.fractal, &self.swell].map(|octaves| f64::from(octaves.at(x_m, y_m, 1e-6).albedo));
         let ripples_m = self.ripples.as_ref().map_or(0.0, |ripples| ripples.z_m(x_m, y_m));
-        self.amplitude_m * noise + ripples_m
+        self.amplitude_m * (noise[0] + noise[1]) + ripples_m
     }
 }
 
@@ -106,17 +117,32 @@ fn fractal_octaves(settings: &TerrainSettings) -> OctaveSettings {
     }
 }
 
-/// The expected RMS difference of a sum of octaves between two places a distance apart.
-fn rms_difference(octaves: &OctaveSettings, distance_m: f64) -> f64 {
-    let wavelengths_m = std::iter::successors(Some(octaves.longest_m), |w| Some(w / octaves.ratio))
-        .take_while(|w| *w >= octaves.shortest_m * 0.999);
-    let (mut difference, mut variance) = (0.0, 0.0);
-    for wavelength_m in wavelengths_m {
-        let own = (wavelength_m / octaves.longest_m).powf(2.0 * octaves.albedo_exponent);
-        variance += own;
-        difference += 2.0 * own * (1.0 - correlation(distance_m / wavelength_m));
+/// The wavelengths of the octaves, m, and their variances relative to that of the longest.
+fn variances(octaves: &OctaveSettings) -> impl Iterator<Item = (f64, f64)> {
+    let OctaveSettings { longest_m, shortest_m, ratio, albedo_exponent, .. } = *octaves;
+    std::iter::successors(Some(longest_m), move |w| Some(w / ratio))
+        .take_while(move |w| *w >= shortest_m * 0.999)
+        .map(move |w| (w, (w / longest_m).powf(2.0 * albedo_exponent)))
+}
+
+/// Variance of the swell, where all octaves together have the variance 1 (header).
+fn swell_variance(octaves: &OctaveSettings) -> f64 {
+    let q = octaves.ratio.powf(2.0 * octaves.albedo_exponent - 2.0);
+    if q >= 0.999 {
+        return 0.0;
     }
-    octaves.albedo_std * (difference / variance).sqrt()
+    q / (1.0 - q) / variances(octaves).map(|(_, variance)| variance).sum::<f64>()
+}
+
+/// The expected RMS difference of the fractal between two places a distance apart, where all octaves together
+/// have the variance 1.
+fn rms_difference(octaves: &OctaveSettings, distance_m: f64) -> f64 {
+    let all: f64 = variances(octaves).map(|(_, variance)| variance).sum();
+    let part =
+        |wavelength_m: f64, variance: f64| 2.0 * variance * (1.0 - correlation(distance_m / wavelength_m));
+    let octaves_sum: f64 =
+        variances(octaves).map(|(wavelength_m, variance)| part(wavelength_m, variance / all)).sum();
+    (octaves_sum + part(octaves.longest_m, swell_variance(octaves))).sqrt()
 }
 
 /// Correlation of two-dimensional value noise between places `s` lattice constants apart, over all directions.

@@ -19,7 +19,7 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Matrix3, Rotation3};
+use nalgebra::Rotation3;
 use rand::RngExt;
 use rand_pcg::Pcg64;
 
@@ -60,10 +60,17 @@ impl Polyhedron {
     /// The body of these half-spaces, without those that touch no vertex.
     pub(super) fn of(planes: Vec<Plane>) -> Self {
         let (mut used, mut vertices) = (vec![false; planes.len()], Vec::new());
-        for i in 0..planes.len() {
-            for j in i + 1..planes.len() {
-                for k in j + 1..planes.len() {
-                    let Some(vertex) = meeting_point(&planes, [i, j, k]) else { continue };
+        for (i, a) in planes.iter().enumerate() {
+            for (j, b) in planes.iter().enumerate().skip(i + 1) {
+                let edge = a.normal.cross(&b.normal);
+                for (k, c) in planes.iter().enumerate().skip(j + 1) {
+                    let determinant = edge.dot(&c.normal);
+                    // Two of the three are nearly parallel.
+                    if determinant.abs() < 1e-9 {
+                        continue;
+                    }
+                    let across = (b.normal * a.offset_m - a.normal * b.offset_m).cross(&c.normal);
+                    let vertex = (across + edge * c.offset_m) / determinant;
                     let room = 1e-9 * vertex.norm();
                     if planes.iter().all(|p| p.normal.dot(&vertex) <= p.offset_m + room) {
                         vertices.push(vertex);
@@ -185,20 +192,6 @@ fn around_box(axes: &Vector3, lean: f64, diameter_m: f64, random: &mut Pcg64) ->
         }
     }
     planes
-}
-
-/// Where three planes meet, unless two of them are nearly parallel.
-fn meeting_point(planes: &[Plane], [i, j, k]: [usize; 3]) -> Option<Vector3> {
-    let (a, b, c) = (&planes[i], &planes[j], &planes[k]);
-    let rows = Matrix3::from_rows(&[a.normal.transpose(), b.normal.transpose(), c.normal.transpose()]);
-    let determinant = rows.determinant();
-    if determinant.abs() < 1e-9 {
-        return None;
-    }
-    let sum = b.normal.cross(&c.normal) * a.offset_m
-        + c.normal.cross(&a.normal) * b.offset_m
-        + a.normal.cross(&b.normal) * c.offset_m;
-    Some(sum / determinant)
 }
 
 #[cfg(test)]

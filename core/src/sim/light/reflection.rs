@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn undercut_faces_get_the_ground_s_light_and_shaded_faces_less_than_those_that_look_to_the_sun() {
+    fn undercut_faces_get_the_light_of_the_ground() {
         let light = Light::new(&lambert(), 0.26);
         let ambient = |normal: [f32; 3]| {
             light.reflected(&Appearance { albedo: 1.0, normal }, [0.0, 0.0, -1.0], false, 1.0)
@@ -181,7 +181,28 @@ mod tests {
         let below = ambient([0.0, 0.0, 1.0]);
         // All of the ground's 0.26 and hardly any of the glow, whose softened cosine nearly vanishes.
         assert!((below - 0.26).abs() < 2e-3, "{below}");
-        let level = (light.to_sun.xy() / light.to_sun.xy().norm()).map(|v| v as f32);
-        assert!(ambient([level.x, level.y, 0.0]) > 1.2 * ambient([-level.x, -level.y, 0.0]));
+    }
+
+    #[test]
+    fn upright_faces_get_the_light_of_the_half_dome_that_they_see() {
+        let light = Light::new(&lambert(), 0.0);
+        let level = light.to_sun.xy().normalize();
+        for (turn, side) in [(1.0, "towards the sun"), (-1.0, "away from it")] {
+            let normal = [turn * level.x as f32, turn * level.y as f32, 0.0];
+            // Evenly spread directions of the upper half, each standing for the same solid angle.
+            let count = 40_000u32;
+            let seen: f64 = (0..count)
+                .map(|k| {
+                    let up = (f64::from(k) + 0.5) / f64::from(count);
+                    let (sin, cos) = (2.399_963_229_728_653 * f64::from(k)).sin_cos();
+                    let flat = (1.0 - up * up).sqrt();
+                    let direction = [(flat * cos) as f32, (flat * sin) as f32, -up as f32];
+                    f64::from(dot(direction, normal).max(0.0) * light.sky(direction)) * 2.0 / f64::from(count)
+                })
+                .sum();
+            let white = Appearance { albedo: 1.0, normal };
+            let drawn = f64::from(light.reflected(&white, [0.0, 0.0, -1.0], false, 1.0));
+            assert!((drawn / seen - 1.0).abs() < 0.05, "{side}: {drawn} {seen}");
+        }
     }
 }
