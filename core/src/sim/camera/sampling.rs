@@ -171,7 +171,7 @@ impl<'a> Sampler<'a> {
     #[inline(always)]
     fn ground(&self, ray: &Ray, distance_m: f64) -> f32 {
         let (world, point) = (self.world, ray.at(distance_m));
-        let cutoff_m = self.cutoff_m(distance_m, ray.direction.z);
+        let cutoff_m = self.cutoff_m(distance_m, -world.terrain.mean_normal().dot(&ray.direction));
         let look = world.surfaces.soil(&world.terrain, &point, cutoff_m);
         let to_sun = Ray { origin: point, direction: world.light.to_sun };
         let in_sun = !world.is_blocked_by_rock(&to_sun) && !world.is_blocked_by_ground(&to_sun);

@@ -129,16 +129,14 @@ pub fn scatter(settings: &RockSettings, approach: &Approach, terrain: &Terrain, 
     for candidate in &candidates {
         let (shape, height_m) = draw_shape(settings, candidate.diameter_m, &mut random);
         let reach_m = REACH * candidate.diameter_m;
-        for _ in 0..DRAWS {
+        for draw in 0..DRAWS {
             let [x_m, y_m] = draw_place(&candidate.place, approach, &mut random);
-            if is_in_the_way(approach, x_m, y_m, reach_m, height_m) {
-                match candidate.place {
-                    // Drawing again would crowd what lies beside the tracks.
-                    Place::Strip { .. } => break,
-                    Place::Disc { .. } => continue,
-                }
+            let in_the_way = is_in_the_way(approach, x_m, y_m, reach_m, height_m);
+            if in_the_way && draw == 0 && matches!(candidate.place, Place::Strip { .. }) {
+                // Drawing again would crowd what lies beside the tracks; a rock of the cluster must find a place.
+                break;
             }
-            if taken.overlaps(x_m, y_m, reach_m) {
+            if in_the_way || taken.overlaps(x_m, y_m, reach_m) {
                 continue;
             }
             taken.add(x_m, y_m, reach_m);
