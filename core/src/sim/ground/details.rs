@@ -1,10 +1,10 @@
 //! What makes surfaces look natural beside noise: grains and drifts on soil, veins and pits in rock.
 //!
-//! * **Grains** are small stones below the size of the geometric pebbles: flat domes in the cells of jittered square
-//!   lattices, at most one to a cell and wholly inside it, so that one hash finds it. A dome of radius r tilts the normal
-//!   by up to 1.2 at its rim and has its own albedo.
-//! * **Drifts** are smooth patches of fine bright dust: where noise of 0.4 and 0.8 m exceeds a level, grains
-//!   vanish and the soil's micro-relief is flattened.
+//! * **Grains** are small stones below the size of the geometric pebbles: five-sided frusta in the cells of jittered
+//!   square lattices, at most one to a cell and wholly inside it, so that one hash finds it. Their sides lie
+//!   within a circle of radius r, have the slope 0.8 and a flat top, and each grain has its own albedo.
+//! * **Drifts** are smooth patches of fine bright dust: where noise of 0.4 and 0.8 m exceeds a level, most
+//!   grains vanish and the soil's micro-relief is flattened.
 //! * **Veins** are thin bright sheets through a rock: where noise of 6 and 12 cm crosses zero.
 //! * **Pits** are small dark hollows, spheres in the cells of a lattice cut by the surface.
 //!
@@ -25,8 +25,10 @@ use crate::sim::ground::texture::{OctaveSettings, Octaves, cell_hash, mix, weigh
 const GRAIN_CELLS_M: [f64; 3] = [0.026, 0.012, 0.006];
 /// Side of the cells of the pits' lattice, m.
 const PIT_CELL_M: f64 = 0.016;
-/// Mean of (r/cell)² π for r/cell even in 0.15 to 0.35: the part of its cell that a grain covers.
-const GRAIN_PART: f64 = 0.207;
+/// Mean of 2.378 (r/cell)² for r/cell even in 0.20 to 0.45: the part of its cell that a pentagon covers.
+const GRAIN_PART: f64 = 0.2636;
+/// Distance of a pentagon's sides from its middle, over the radius of the circle around it: cos 36°.
+const PENTAGON: f32 = 0.809_017;
 
 /// A deviation of albedo (relative) and slope.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,6 +79,24 @@ fn byte(hash: u32, index: u32) -> f32 {
     ((hash >> (8 * index)) & 0xff) as f32 / 255.0
 }
 
+/// The slope of a five-sided frustum inside the unit circle, turned by its hash; nothing beside it.
+#[inline(always)]
+fn frustum_slope(d: [f32; 2], hash: u32) -> Option<[f32; 2]> {
+    let (mut sin, mut cos) = (std::f32::consts::TAU / 5.0 * byte(hash, 3)).sin_cos();
+    let (step_sin, step_cos) = (0.951_056_5, 0.309_017);
+    let (mut outmost, mut side) = (f32::NEG_INFINITY, [0.0; 2]);
+    for _ in 0..5 {
+        let out = d[0] * cos + d[1] * sin;
+        if out > outmost {
+            (outmost, side) = (out, [cos, sin]);
+        }
+        (cos, sin) = (cos * step_cos - sin * step_sin, sin * step_cos + cos * step_sin);
+    }
+    // Down is positive: the ground rises (z falls) towards the middle.
+    let top = 0.25 + 0.3 * byte(hash, 2);
+    (outmost < PENTAGON).then(|| if outmost > top { side.map(|c| 0.8 * c) } else { [0.0; 2] })
+}
+
 impl SoilDetails {
     /// Details whose grains cover the part `grain_cover` of the soil, and drifts about `drift_cover`.
     pub(super) fn new(grain_cover: f64, drift_cover: f64, albedo_std: f64, seed: u64) -> Self {
@@ -117,16 +137,17 @@ impl SoilDetails {
             if byte(hash, 0) >= self.grains {
                 continue;
             }
-            let radius = 0.15 + 0.20 * byte(hash, 1);
+            let radius = 0.20 + 0.25 * byte(hash, 1);
             let room = 1.0 - 2.0 * radius;
-            let (du, dv) = (u - radius - room * byte(hash, 2), v - radius - room * byte(hash, 3));
-            let square = (du * du + dv * dv) / (radius * radius);
-            if square < 1.0 {
-                let tone = byte(hash.wrapping_mul(0x9e37_79b1), 3) - 0.65;
-                sum.albedo += weight * 3.0 * self.contrast * tone;
-                // Down is positive: the ground rises (z falls) towards the middle of the dome.
-                sum.slope[0] += weight * 1.2 * du / radius;
-                sum.slope[1] += weight * 1.2 * dv / radius;
+            let d =
+                [u - radius - room * byte(hash, 2), v - radius - room * byte(hash, 3)].map(|c| c / radius);
+            if d[0] * d[0] + d[1] * d[1] < 1.0
+                && let Some(slope) = frustum_slope(d, hash.wrapping_mul(0x85eb_ca77))
+            {
+                let tone = byte(hash.wrapping_mul(0x9e37_79b1), 3) - 0.5;
+                sum.albedo += weight * 5.0 * self.contrast * tone;
+                sum.slope[0] += weight * slope[0];
+                sum.slope[1] += weight * slope[1];
             }
         }
         sum
@@ -190,34 +211,38 @@ mod tests {
         let (mut grains, mut drifts, mut count) = (0.0, 0.0, 0.0);
         for k in 0..200_000 {
             let (x, y) = (f64::from(k) * 0.003_71, f64::from(k % 997) * 0.0131);
-            let covered = details.grains(x, y, 1e-4).slope != [0.0; 2];
-            grains += f64::from(covered);
+            grains += f64::from(details.grains(x, y, 1e-4) != Detail::NONE);
             drifts += f64::from(details.drift(x, y));
             count += 1.0;
             assert_eq!(details.grains(x, y, 0.03), Detail::NONE);
         }
-        // Of the domes of three lattices few overlap.
-        assert!((grains / count / 0.12 - 1.0f64).abs() < 0.08, "{}", grains / count);
+        // Of the grains of three lattices few overlap: (1 − 0.04)³ is left bare.
+        assert!((grains / count / 0.115 - 1.0f64).abs() < 0.05, "{}", grains / count);
         assert!((drifts / count / 0.3 - 1.0f64).abs() < 0.2, "{}", drifts / count);
     }
 
     #[test]
-    fn a_grain_is_a_dome_that_rises_towards_its_middle() {
-        let details = SoilDetails::new(0.3, 0.0, 0.0, 3);
-        let (mut outwards, mut found) = (0.0, 0);
-        for k in 0..4000 {
-            let (x, y) = (f64::from(k) * 1.7e-3, 0.4);
-            let [sx, sy] = details.grains(x, y, 1e-4).slope.map(f64::from);
-            let size = sx.hypot(sy);
-            if size > 0.3 {
-                // A step against the slope leads up the dome (less z), where it is flatter.
-                let [tx, ty] =
-                    details.grains(x - 2e-4 * sx / size, y - 2e-4 * sy / size, 1e-4).slope.map(f64::from);
-                outwards += f64::from(tx.hypot(ty) < size);
-                found += 1;
+    fn the_sides_of_a_grain_fall_outwards_from_its_flat_top() {
+        for hash in (0..50u32).map(|k| mix(u64::from(k)) as u32) {
+            let (mut flat, mut falling, mut beside) = (0, 0, 0);
+            for k in 0..2000 {
+                let (r, angle) = ((k as f32 / 2000.0).sqrt(), 2.399_963 * k as f32);
+                let d = [r * angle.cos(), r * angle.sin()];
+                match frustum_slope(d, hash) {
+                    None => beside += 1,
+                    Some([0.0, 0.0]) => flat += 1,
+                    // z grows outwards, where it points down.
+                    Some(slope) => {
+                        falling += 1;
+                        assert!(slope[0] * d[0] + slope[1] * d[1] > 0.0);
+                        assert!((slope[0].hypot(slope[1]) - 0.8).abs() < 1e-5);
+                    }
+                }
             }
+            // A pentagon fills 2.378/π of the circle around it.
+            assert!((f64::from(beside) / 2000.0 - 0.243).abs() < 0.01, "{beside}");
+            assert!(flat > 100 && falling > 500, "{flat} {falling}");
         }
-        assert!(found > 200 && outwards > 0.95 * f64::from(found), "{outwards} of {found}");
     }
 
     #[test]

@@ -4,8 +4,9 @@
 //! q = 1.79 + 0.152/k; from −dF/dD = (π D²/4) n(D) follows their number per m² (domain.md 10.1):
 //! `N(≥D) = (4 k q/π) [e^{−qD}/D − q E1(qD)]`. The number in an area is Poisson; diameters are drawn by
 //! inverting N. Rocks are placed from the largest to the smallest; a place that overlaps one that is taken
-//! is drawn again, and a rock that finds no place in 60 draws is left out. A rock whose place lies in the rover's way
-//! is left out at once, so that beside the tracks the law holds. Rocks that the scenario places come first.
+//! is drawn again near by (elsewhere, small rocks would crowd the bare tracks), and a rock that finds no place in
+//! 60 draws is left out. A rock whose place lies in the rover's way is left out at once, so that beside the tracks the
+//! law holds. Rocks that the scenario places come first.
 //!
 //! Heights are `ratio · D + offset` on average (domain.md 10.3); four kinds of rocks differ about it.
 //!
@@ -43,6 +44,8 @@ const NEAREST_M: f64 = 1.5;
 const PRESSED_M: f64 = 0.025;
 /// Radius of a rock over its diameter: an outline is longer than its disc.
 const REACH: f64 = 0.6;
+/// By how much the surroundings in which a rock looks for a free place grow with every draw, m.
+const NUDGE_M: f64 = 0.02;
 /// Draws of a place before a rock is left out.
 const DRAWS: usize = 60;
 
@@ -129,14 +132,22 @@ pub fn scatter(settings: &RockSettings, approach: &Approach, terrain: &Terrain, 
     for candidate in &candidates {
         let (shape, height_m) = draw_shape(settings, candidate.diameter_m, &mut random);
         let reach_m = REACH * candidate.diameter_m;
+        let mut place = draw_place(&candidate.place, approach, &mut random);
+        let scattered = matches!(candidate.place, Place::Strip { .. });
+        if scattered && is_in_the_way(approach, place[0], place[1], reach_m, height_m) {
+            // Drawing again would crowd what lies beside the tracks; a rock of the cluster must find a place.
+            continue;
+        }
+        let first = place;
         for draw in 0..DRAWS {
-            let [x_m, y_m] = draw_place(&candidate.place, approach, &mut random);
-            let in_the_way = is_in_the_way(approach, x_m, y_m, reach_m, height_m);
-            if in_the_way && draw == 0 && matches!(candidate.place, Place::Strip { .. }) {
-                // Drawing again would crowd what lies beside the tracks; a rock of the cluster must find a place.
-                break;
+            if draw > 0 {
+                place = match candidate.place {
+                    Place::Strip { .. } => beside(first, reach_m + NUDGE_M * draw as f64, &mut random),
+                    Place::Disc { .. } => draw_place(&candidate.place, approach, &mut random),
+                };
             }
-            if in_the_way || taken.overlaps(x_m, y_m, reach_m) {
+            let [x_m, y_m] = place;
+            if is_in_the_way(approach, x_m, y_m, reach_m, height_m) || taken.overlaps(x_m, y_m, reach_m) {
                 continue;
             }
             taken.add(x_m, y_m, reach_m);
@@ -222,6 +233,11 @@ fn draw_place(place: &Place, approach: &Approach, random: &mut Pcg64) -> [f64; 2
             [approach.goal_m[0] + r * angle.cos(), approach.goal_m[1] + r * angle.sin()]
         }
     }
+}
+
+/// A place within a square around another.
+fn beside([x_m, y_m]: [f64; 2], by_m: f64, random: &mut Pcg64) -> [f64; 2] {
+    [x_m + random.random_range(-by_m..by_m), y_m + random.random_range(-by_m..by_m)]
 }
 
 /// Whether a rock would stand in a wheel's track or touch the belly.

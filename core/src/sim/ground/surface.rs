@@ -77,7 +77,7 @@ impl Surfaces {
         let drift = self.soil_details.drift(point.x, point.y);
         let grains = self.soil_details.grains(point.x, point.y, cutoff_m);
         let slope = terrain.smooth_slope_at(point.x, point.y);
-        let (bare, rough) = (1.0 - drift, 1.0 - 0.7 * drift);
+        let (bare, rough) = (1.0 - 0.7 * drift, 1.0 - 0.4 * drift);
         let albedo = texture.albedo * rough + bare * grains.albedo + 0.7 * self.albedo_std * drift;
         let [dx, dy]: [f32; 2] =
             std::array::from_fn(|k| slope[k] + rough * texture.slope[k] + bare * grains.slope[k]);

@@ -143,7 +143,7 @@ mod tests {
     }
 
     fn lambert() -> SunSettings {
-        SunSettings { lunar_lambert: 0.0, ..SunSettings::default() }
+        SunSettings { lunar_lambert: 0.0, diffuse_fraction: 0.35, ..SunSettings::default() }
     }
 
     #[test]

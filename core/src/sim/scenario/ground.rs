@@ -133,7 +133,11 @@ impl Default for RockSettings {
     }
 }
 
-/// Albedo and micro-relief. Contrast on Mars is low: about one part in eight (ours).
+/// Albedo and micro-relief.
+///
+/// Contrast on Mars is low: in windows of 21 × 21 px, standard deviation over mean has the median 0.04 to 0.05 in
+/// Opportunity's navcam frames of sol 4087 and 0.045 to 0.085 in Spirit's of sols 1869 and 1907; power falls as f^−1.7 to
+/// f^−2.8 (`study/picture.rs`). The defaults put pictures of soil among them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TextureSettings {
@@ -165,12 +169,12 @@ impl Default for TextureSettings {
     fn default() -> Self {
         Self {
             soil_albedo: 0.26,
-            rock_albedo: 0.19,
-            albedo_std: 0.12,
+            rock_albedo: 0.23,
+            albedo_std: 0.05,
             spectrum_slope: 2.1,
-            grain_cover: 0.10,
+            grain_cover: 0.15,
             drift_cover: 0.25,
-            soil_slope_std: 0.12,
+            soil_slope_std: 0.08,
             rock_slope_std: 0.25,
             dust: 0.45,
             longest_m: 0.4,

@@ -25,7 +25,8 @@ pub struct SunSettings {
     pub azimuth_deg: f64,
     /// Its height above the horizon, deg.
     pub elevation_deg: f64,
-    /// The sky's part of the light on level ground (0.35: optical depth 0.4, sun at 45°, domain.md 11.1).
+    /// The sky's part of the light on level ground (0.45: optical depth 0.55, sun at 45°, domain.md 11.1; shadows in
+    /// Spirit's frames of sol 1869 keep half of the mean level).
     pub diffuse_fraction: f64,
     /// Optical depth of the dust in the air; when set, it gives the sky's part from the sun's height instead of
     /// `diffuse_fraction` (0.3 to 0.5 in the clear season, 1 when dusty: domain.md 11.1).
@@ -55,7 +56,7 @@ impl Default for SunSettings {
         Self {
             azimuth_deg: 115.0,
             elevation_deg: 42.0,
-            diffuse_fraction: 0.35,
+            diffuse_fraction: 0.45,
             optical_depth: None,
             aureole: 2.0,
             reflectance: Reflectance::LunarLambert,
