@@ -13,6 +13,26 @@ use crate::sim::scenario::Scenario;
 const FILES: &[(&str, &str)] = &[
     ("approach-10", include_str!("library/approach-10.toml")),
     ("approach-5", include_str!("library/approach-5.toml")),
+    ("sideways-70", include_str!("library/sideways-70.toml")),
+    ("turn-in-place", include_str!("library/turn-in-place.toml")),
+    ("slope-flat", include_str!("library/slope-flat.toml")),
+    ("slope-shallow", include_str!("library/slope-shallow.toml")),
+    ("slope-steep", include_str!("library/slope-steep.toml")),
+    ("slope-oblique", include_str!("library/slope-oblique.toml")),
+    ("stuck", include_str!("library/stuck.toml")),
+    ("passing-roll-30", include_str!("library/passing-roll-30.toml")),
+    ("checkout-1", include_str!("library/checkout-1.toml")),
+    ("checkout-2", include_str!("library/checkout-2.toml")),
+    ("checkout-3", include_str!("library/checkout-3.toml")),
+    ("checkout-4", include_str!("library/checkout-4.toml")),
+    ("occlusion", include_str!("library/occlusion.toml")),
+    ("self-shadow", include_str!("library/self-shadow.toml")),
+    ("clouds", include_str!("library/clouds.toml")),
+    ("moving-sun", include_str!("library/moving-sun.toml")),
+    ("five-targets", include_str!("library/five-targets.toml")),
+    ("k9-5", include_str!("library/k9-5.toml")),
+    ("k9-7.5", include_str!("library/k9-7.5.toml")),
+    ("k9-10", include_str!("library/k9-10.toml")),
 ];
 
 /// The names of the library's scenarios, in the order in which they are listed.

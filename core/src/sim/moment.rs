@@ -64,10 +64,10 @@ impl World {
     /// This world's scenery at a moment of the drive.
     pub fn at(&self, moment: &Moment, scenario: &Scenario) -> Self {
         let events = &scenario.events;
-        let sun = sun_at(&scenario.sun, events, moment.time_s);
+        let to_sun = sun_at(&scenario.sun, events, moment.time_s);
         let direct = events.clouds.iter().filter(|cloud| covers(cloud.from_stop, cloud.to_stop, moment.stop));
         let direct: f64 = direct.map(|cloud| cloud.direct).product();
-        let light = Light::new(&sun, scenario.texture.soil_albedo).with_direct(direct);
+        let light = Light::under(&scenario.sun, scenario.texture.soil_albedo, to_sun, direct);
         let moved = (light.to_sun - self.light.to_sun).norm() > 0.0;
         let sun_grid = if moved {
             Arc::new(SunGrid::new(self.rocks(), &light.to_sun))
@@ -114,15 +114,14 @@ impl World {
     }
 }
 
-/// Where the sun stands some time after the first stop, s.
-fn sun_at(sun: &SunSettings, events: &EventSettings, time_s: f64) -> SunSettings {
+/// Where the sun stands some time after the first stop, s: unit direction, site frame.
+fn sun_at(sun: &SunSettings, events: &EventSettings, time_s: f64) -> Vector3 {
     let hours = time_s / 3600.0;
+    let azimuth_rad = (sun.azimuth_deg + events.sun_azimuth_deg_per_h * hours).to_radians();
     let elevation_deg = sun.elevation_deg + events.sun_elevation_deg_per_h * hours;
-    SunSettings {
-        azimuth_deg: sun.azimuth_deg + events.sun_azimuth_deg_per_h * hours,
-        elevation_deg: elevation_deg.clamp(LOWEST_SUN_DEG.min(sun.elevation_deg), 90.0),
-        ..*sun
-    }
+    let elevation_rad = elevation_deg.clamp(LOWEST_SUN_DEG.min(sun.elevation_deg), 90.0).to_radians();
+    let (level, up) = (elevation_rad.cos(), elevation_rad.sin());
+    Vector3::new(level * azimuth_rad.cos(), level * azimuth_rad.sin(), -up)
 }
 
 fn covers(from_stop: u32, to_stop: u32, stop: u32) -> bool {

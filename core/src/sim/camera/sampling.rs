@@ -178,7 +178,7 @@ impl<'a> Sampler<'a> {
     #[inline(always)]
     fn ground(&self, ray: &Ray, distance_m: f64) -> f32 {
         let (world, point) = (self.world, ray.at(distance_m));
-        let cutoff_m = self.cutoff_m(distance_m, ray.direction.z);
+        let cutoff_m = self.cutoff_m(distance_m, -world.scenery.terrain.mean_normal().dot(&ray.direction));
         let mut look = world.scenery.surfaces.soil(&world.scenery.terrain, &point, cutoff_m);
         if let Some(imprint) = &world.imprint {
             look = imprint.on_soil(look, point.x, point.y);

@@ -1,9 +1,12 @@
 //! What there is to see: the ground, its rocks, and how their surfaces look.
 
 pub mod texture;
+mod relief;
 pub mod terrain;
 mod terrain_cast;
 pub mod rocks;
+mod shape;
 pub mod rock_field;
+mod details;
 pub mod surface;
 pub mod imprint;

@@ -1,30 +1,35 @@
 //! Rocks: convex polyhedra, met by rays exactly.
 //!
-//! **Shape** (domain.md 10.4, in half-spaces instead of hulls). A rock is the intersection of at least 14
-//! half-spaces n·p ≤ h: planes tangent to an ellipsoid with semi-axes D/2 · (1, 0.8 ± 0.15, H'/D), each
-//! pushed inwards by up to 18 %, their normals spread over the sphere and jittered, the whole turned by a
-//! random yaw and a tilt of up to 15°. Large rocks get more planes. Six planes of a box that is 8 % larger
-//! than the ellipsoid bound every rock for certain. Planes that touch no vertex are dropped.
+//! **Size.** D is the diameter of the disc that covers as much ground as the rock's outline seen from above, so that
+//! the area that rocks cover is that of the size distribution; the visible height is H. A shape (`shape.rs`) is
+//! tilted by up to 15°, turned by any yaw and stretched to D and H exactly. A placed rock is not tilted, and D is its
+//! width across the direction in which its face looks.
 //!
-//! **Burial.** A part β of the full height 2c lies below the ground, so the visible height is
-//! H = 2c (1 − β) and the centre lies c (1 − 2β) above the ground.
+//! **Burial.** A part β of the full height lies below the ground, so the full height is H/(1 − β). On a slope the
+//! rock stands along the normal of the mean plane, as if it had been buried before the ground was tilted.
 //!
 //! **Intersection.** Along a ray, n·(o + t d) ≤ h is a half-line in t for each plane; their intersection is
 //! an interval [enter, leave], empty when the ray misses. Nothing is approximated.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
-//! | D | `diameter_m` | m, longest horizontal axis of the ellipsoid |
+//! | D | `diameter_m` | m |
+//! | H | `height_m` | m, above the ground |
+//! | β | burial | – (0.1 to 0.4: domain.md 10.4) |
 //! | n, h | `Plane` | unit normal, m; relative to the rock's centre, axes of the site frame |
 //! | t | `enter_m`, `leave_m` | m along the ray |
+//!
+//! Sources: domain.md 10.3, 10.4.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
-use nalgebra::{Matrix3, Rotation3};
+use nalgebra::Rotation3;
 use rand::RngExt;
 use rand_pcg::Pcg64;
 
 use crate::frames::{Point3, Ray, Vector3};
+use crate::sim::ground::shape::Polyhedron;
+use crate::sim::scenario::RockShape;
 
 /// A half-space n·p ≤ h, p relative to the centre of the rock.
 #[derive(Clone, Copy, Debug)]
@@ -38,17 +43,32 @@ pub struct Plane {
 /// A rock standing in the site.
 #[derive(Clone, Debug)]
 pub struct Rock {
-    /// Centre of the ellipsoid, site frame, m.
+    /// Origin of the planes, inside the rock, site frame, m.
     pub centre: Point3,
-    /// Length of the longest horizontal axis, m.
+    /// Diameter of the disc of the same area seen from above; of a placed rock its width, m.
     pub diameter_m: f64,
+    /// Height above the ground at the rock's place, m.
+    pub height_m: f64,
     /// Radius of a sphere about the centre that holds the rock, m.
     pub radius_m: f64,
+    /// The kind of polyhedron.
+    pub shape: RockShape,
+    /// How its surface differs from that of other rocks.
+    pub look: RockLook,
+    planes: Vec<Plane>,
+}
+
+/// How the surface of one rock differs from that of others.
+#[derive(Clone, Copy, Debug)]
+pub struct RockLook {
     /// Albedo relative to the mean of all rocks.
     pub brightness: f32,
+    /// Strength of veins, 0 to 1; most rocks have none.
+    pub veins: f32,
+    /// Strength of pits, 0 to 1; most rocks have none.
+    pub pits: f32,
     /// Where in the noise the rock's texture is taken, m.
     pub texture_shift_m: [f64; 3],
-    planes: Vec<Plane>,
 }
 
 /// Where a ray is inside a rock.
@@ -69,38 +89,44 @@ pub struct RockSeed {
     pub x_m: f64,
     /// Place in the site frame, m.
     pub y_m: f64,
-    /// Longest horizontal axis, m.
+    /// Diameter, or width of a placed rock, m.
     pub diameter_m: f64,
-    /// Visible height over the diameter.
-    pub height_ratio: f64,
+    /// Visible height, m.
+    pub height_m: f64,
+    /// The kind of polyhedron.
+    pub shape: RockShape,
+    /// Where the face of a placed rock looks, rad clockwise from above, 0 ahead; nothing for scattered rocks.
+    pub face_yaw_rad: Option<f64>,
     /// Where the rock's own stream of random numbers starts.
     pub seed: u64,
 }
 
 impl Rock {
-    /// Grows a rock on ground of height `ground_z_m` (m down).
-    pub fn grow(from: &RockSeed, ground_z_m: f64) -> Self {
+    /// Grows a rock on ground of height `ground_z_m` (m down) whose mean plane has the unit normal `up` (site).
+    pub fn grow(from: &RockSeed, ground_z_m: f64, up: &Vector3) -> Self {
         let mut random = Pcg64::new(u128::from(from.seed), 0x0a02_bdbf_7bb3_c0a7);
-        let half_m = from.diameter_m / 2.0;
         let burial = random.random_range(0.10..0.40);
+        let full_m = from.height_m / (1.0 - burial);
         let width = (0.8 + 0.15 * random.random_range(-1.7..1.7f64)).clamp(0.5, 1.0);
-        let ratio = from.height_ratio * random.random_range(0.75..1.25);
-        let height_m = ratio * from.diameter_m / (2.0 * (1.0 - burial));
-        let axes_m = Vector3::new(half_m, half_m * width, height_m);
-        let turn = Rotation3::from_euler_angles(
-            random.random_range(-0.26..0.26),
-            random.random_range(-0.26..0.26),
-            random.random_range(0.0..TAU),
-        );
-        let planes = tangent_planes(&axes_m, plane_count(from.diameter_m), &turn, &mut random);
-        let (planes, radius_m) = without_idle_planes(planes);
+        let axes = Vector3::new(1.0, width, full_m / from.diameter_m);
+        let body = match from.face_yaw_rad {
+            Some(yaw_rad) => placed_body(from, &axes, full_m, yaw_rad, &mut random),
+            None => scattered_body(from, &axes, full_m, &mut random),
+        };
+        let top_m = body.extent(2)[0];
+        let stand = Rotation3::rotation_between(&-Vector3::z(), up).unwrap_or_else(Rotation3::identity);
+        let body = body.turned(&stand);
+        let from_base = stand * Vector3::new(0.0, 0.0, -from.height_m - top_m);
+        // Room for rounding: a ray through the farthest vertex must pass the test against the sphere.
+        let radius_m = body.vertices.iter().map(Vector3::norm).fold(0.0, f64::max) * (1.0 + 1e-9);
         Self {
-            centre: Point3::new(from.x_m, from.y_m, ground_z_m - height_m * (1.0 - 2.0 * burial)),
+            centre: Point3::new(from.x_m, from.y_m, ground_z_m) + from_base,
             diameter_m: from.diameter_m,
+            height_m: from.height_m,
             radius_m,
-            brightness: (1.0 + 0.15 * random.random_range(-1.7..1.7f32)).max(0.5),
-            texture_shift_m: std::array::from_fn(|_| random.random_range(-50.0..50.0)),
-            planes,
+            shape: from.shape,
+            look: RockLook::draw(&mut random),
+            planes: body.planes,
         }
     }
 
@@ -150,75 +176,47 @@ impl Rock {
     }
 }
 
-/// More faces on larger rocks, so that none looks like a crystal.
-fn plane_count(diameter_m: f64) -> usize {
-    14 + (40.0 * diameter_m).min(18.0) as usize
+impl RockLook {
+    /// Brightness 15 % (1σ); veins in three rocks of ten, pits in three others of ten (ours).
+    fn draw(random: &mut Pcg64) -> Self {
+        let kind: f32 = random.random();
+        let strength = random.random_range(0.4..1.0f32);
+        Self {
+            brightness: (1.0 + 0.15 * random.random_range(-1.7..1.7f32)).max(0.5),
+            veins: if kind < 0.3 { strength } else { 0.0 },
+            pits: if kind > 0.7 { strength } else { 0.0 },
+            texture_shift_m: std::array::from_fn(|_| random.random_range(-50.0..50.0)),
+        }
+    }
 }
 
-/// Planes tangent to the ellipsoid, pushed in at random, and the six of a box around it.
-fn tangent_planes(axes_m: &Vector3, count: usize, turn: &Rotation3<f64>, random: &mut Pcg64) -> Vec<Plane> {
-    let golden_rad = TAU * 0.381_966_011_250_105;
-    let support_m = |n: &Vector3| n.component_mul(axes_m).norm();
-    let spread = (0..count).map(|k| {
-        // Points on a spiral are nearly even over the sphere; the jitter breaks the pattern.
-        let z = 1.0 - (2.0 * k as f64 + 1.0) / count as f64;
-        let (r, angle) = ((1.0 - z * z).sqrt(), golden_rad * k as f64);
-        Vector3::new(r * angle.cos(), r * angle.sin(), z)
-    });
-    let spread: Vec<Vector3> = spread.collect();
-    let spin = Rotation3::from_euler_angles(
-        random.random_range(0.0..TAU),
-        random.random_range(0.0..TAU),
+/// A shape tilted, turned and stretched so that its outline covers a disc of the diameter; z is centred by its planes.
+fn scattered_body(from: &RockSeed, axes: &Vector3, full_m: f64, random: &mut Pcg64) -> Polyhedron {
+    let body = Polyhedron::grow(from.shape, axes, from.diameter_m, random);
+    let tilt_rad = if from.shape == RockShape::Slab { 0.12 } else { 0.26 };
+    let turn = Rotation3::from_euler_angles(
+        random.random_range(-tilt_rad..tilt_rad),
+        random.random_range(-tilt_rad..tilt_rad),
         random.random_range(0.0..TAU),
     );
-    let mut planes = Vec::with_capacity(count + 6);
-    for direction in spread {
-        let jitter = Vector3::from_fn(|_, _| random.random_range(-0.35..0.35));
-        let normal = (spin * direction + jitter).normalize();
-        let offset_m = support_m(&normal) * random.random_range(0.82..1.0);
-        planes.push(Plane { normal: turn * normal, offset_m });
-    }
-    for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
-        for side in [-1.0, 1.0] {
-            planes.push(Plane { normal: turn * (axis * side), offset_m: 1.08 * support_m(&axis) });
-        }
-    }
-    planes
+    let body = body.turned(&turn);
+    let level = 0.5 * from.diameter_m * (PI / body.area_from_above()).sqrt();
+    let [top, bottom] = body.extent(2);
+    body.stretched(&Vector3::new(level, level, full_m / (bottom - top)))
 }
 
-/// Keeps the planes that carry a vertex; also gives the distance of the farthest vertex, m.
-fn without_idle_planes(planes: Vec<Plane>) -> (Vec<Plane>, f64) {
-    let (mut used, mut radius_m) = (vec![false; planes.len()], 0.0f64);
-    for i in 0..planes.len() {
-        for j in i + 1..planes.len() {
-            for k in j + 1..planes.len() {
-                let Some(vertex) = meeting_point(&planes, [i, j, k]) else { continue };
-                let size_m = vertex.norm();
-                let inside = planes.iter().all(|p| p.normal.dot(&vertex) <= p.offset_m + 1e-9 * size_m);
-                if inside {
-                    radius_m = radius_m.max(size_m);
-                    [i, j, k].into_iter().for_each(|index| used[index] = true);
-                }
-            }
-        }
-    }
-    let kept = planes.into_iter().zip(used).filter_map(|(plane, used)| used.then_some(plane)).collect();
-    // Room for rounding: a ray through the farthest vertex must pass the test against the sphere.
-    (kept, radius_m * (1.0 + 1e-9))
-}
-
-/// Where three planes meet, unless two of them are nearly parallel.
-fn meeting_point(planes: &[Plane], [i, j, k]: [usize; 3]) -> Option<Vector3> {
-    let (a, b, c) = (&planes[i], &planes[j], &planes[k]);
-    let rows = Matrix3::from_rows(&[a.normal.transpose(), b.normal.transpose(), c.normal.transpose()]);
-    let determinant = rows.determinant();
-    if determinant.abs() < 1e-9 {
-        return None;
-    }
-    let sum = b.normal.cross(&c.normal) * a.offset_m
-        + c.normal.cross(&a.normal) * b.offset_m
-        + a.normal.cross(&b.normal) * c.offset_m;
-    Some(sum / determinant)
+/// A shape whose +x side looks along the yaw and whose width across it is the diameter.
+fn placed_body(from: &RockSeed, axes: &Vector3, full_m: f64, yaw_rad: f64, random: &mut Pcg64) -> Polyhedron {
+    let across = Vector3::new(0.7, 1.0, axes.z);
+    let body = match from.shape {
+        RockShape::Block => Polyhedron::with_face(&across, random),
+        _ => Polyhedron::grow(from.shape, &across, from.diameter_m, random),
+    };
+    let [left, right] = body.extent(1);
+    let [top, bottom] = body.extent(2);
+    let level = from.diameter_m / (right - left);
+    body.stretched(&Vector3::new(level, level, full_m / (bottom - top)))
+        .turned(&Rotation3::from_euler_angles(0.0, 0.0, yaw_rad))
 }
 
 #[cfg(test)]
@@ -227,8 +225,11 @@ mod tests {
     use crate::sim::ground::texture::mix;
 
     fn rock(seed: u64, diameter_m: f64) -> Rock {
-        let from = RockSeed { x_m: 3.0, y_m: -1.0, diameter_m, height_ratio: 0.5, seed };
-        Rock::grow(&from, 0.3)
+        let shape =
+            [RockShape::Angular, RockShape::Block, RockShape::Cobble, RockShape::Slab][seed as usize % 4];
+        let height_m = 0.5 * diameter_m;
+        let from = RockSeed { x_m: 3.0, y_m: -1.0, diameter_m, height_m, shape, face_yaw_rad: None, seed };
+        Rock::grow(&from, 0.3, &-Vector3::z())
     }
 
     #[test]
@@ -263,17 +264,76 @@ mod tests {
     }
 
     #[test]
-    fn rocks_have_faces_enough_stand_on_the_ground_and_are_partly_buried() {
+    fn rocks_cover_their_disc_have_their_height_and_are_partly_buried() {
         for seed in 0..40 {
             let rock = rock(seed, 0.3);
-            assert!(rock.planes.len() >= 14, "{}", rock.planes.len());
-            let top = Ray { origin: Point3::new(3.0, -1.0, -5.0), direction: Vector3::z() };
-            let interval = rock.interval(&top).unwrap();
-            let (top_z_m, bottom_z_m) = (interval.enter_m - 5.0, interval.leave_m - 5.0);
-            let height_m = 0.3 - top_z_m;
-            assert!(height_m > 0.08 && height_m < 0.21, "{height_m}");
-            assert!(bottom_z_m > 0.3, "{bottom_z_m}");
-            assert!(rock.radius_m < 0.3, "{}", rock.radius_m);
+            let down = |x: f64, y: f64| {
+                rock.interval(&Ray { origin: Point3::new(x, y, -5.0), direction: Vector3::z() })
+            };
+            let (mut top_z_m, mut bottom_z_m, mut area_m2) = (f64::INFINITY, f64::NEG_INFINITY, 0.0);
+            let cell_m = 0.002;
+            for k in 0..300 * 300 {
+                let (x, y) = (f64::from(k % 300) - 149.5, f64::from(k / 300) - 149.5);
+                if let Some(interval) = down(3.0 + cell_m * x, -1.0 + cell_m * y) {
+                    top_z_m = top_z_m.min(interval.enter_m - 5.0);
+                    bottom_z_m = bottom_z_m.max(interval.leave_m - 5.0);
+                    area_m2 += cell_m * cell_m;
+                }
+            }
+            assert!((area_m2 / (PI * 0.15 * 0.15) - 1.0).abs() < 0.01, "{seed}: {area_m2}");
+            assert!((0.3 - top_z_m - 0.15).abs() < 0.0015, "{seed}: {top_z_m}");
+            let buried = (bottom_z_m - 0.3) / (bottom_z_m - top_z_m);
+            assert!((0.09..0.41).contains(&buried), "{seed}: {buried}");
+            assert!(rock.radius_m < 0.36, "{}", rock.radius_m);
+        }
+    }
+
+    #[test]
+    fn a_placed_block_shows_a_flat_face_of_its_width_to_where_it_looks() {
+        let shape = RockShape::Block;
+        let face_yaw_rad = Some(PI);
+        let from =
+            RockSeed { x_m: 3.0, y_m: -1.0, diameter_m: 0.5, height_m: 0.4, shape, face_yaw_rad, seed: 8 };
+        let rock = Rock::grow(&from, 0.3, &-Vector3::z());
+        let ahead =
+            |y: f64, z: f64| rock.interval(&Ray { origin: Point3::new(0.0, y, z), direction: Vector3::x() });
+        let (mut faces, mut widest_m) =
+            (std::collections::HashMap::new(), [f64::INFINITY, f64::NEG_INFINITY]);
+        for k in 0..200 * 100 {
+            let (y, z) = (-1.5 + f64::from(k % 200) * 0.005, 0.3 - f64::from(k / 200) * 0.004);
+            if let Some(interval) = ahead(y, z) {
+                *faces.entry(interval.plane).or_insert(0u32) += 1;
+                widest_m = [widest_m[0].min(y), widest_m[1].max(y)];
+            }
+        }
+        let all: u32 = faces.values().sum();
+        let (&plane, &most) = faces.iter().max_by_key(|(_, count)| **count).unwrap();
+        assert!(f64::from(most) > 0.6 * f64::from(all), "{faces:?}");
+        let lean_deg = rock.normal(plane).angle(&-Vector3::x()).to_degrees();
+        // The stretch to the wanted height bends the lean of 12°.
+        assert!(lean_deg < 20.0, "{lean_deg}");
+        let width_m = widest_m[1] - widest_m[0];
+        assert!(width_m > 0.44 && width_m < 0.501, "{width_m}");
+    }
+
+    #[test]
+    fn on_a_slope_rocks_stand_along_its_normal() {
+        let up = Vector3::new(-0.3, 0.1, -1.0).normalize();
+        for seed in 0..20 {
+            let from = RockSeed {
+                x_m: 3.0,
+                y_m: -1.0,
+                diameter_m: 0.3,
+                height_m: 0.15,
+                shape: RockShape::Block,
+                face_yaw_rad: None,
+                seed,
+            };
+            let (level, tilted) = (Rock::grow(&from, 0.3, &-Vector3::z()), Rock::grow(&from, 0.3, &up));
+            let base = Point3::new(3.0, -1.0, 0.3);
+            let height_of = |rock: &Rock, up: &Vector3| (rock.centre - base).dot(up);
+            assert!((height_of(&level, &-Vector3::z()) - height_of(&tilted, &up)).abs() < 1e-12);
+            assert!((level.radius_m - tilted.radius_m).abs() < 1e-12);
         }
     }
 }

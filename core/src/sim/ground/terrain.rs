@@ -1,24 +1,26 @@
 //! The ground: a fractal height field of bilinear patches on a regular grid, and a plane beyond it.
 //!
-//! **Relief.** Heights at the grid's vertices are a sum of octaves of value noise (`texture.rs`), amplitude
-//! ∝ λ^H with the Hurst exponent H, so that the RMS difference of height grows as distance^H
-//! (domain.md 10.4: H = 0.8, 2 cm at 1 m). They fade to the mean plane over the outer 1.5 m of the grid,
-//! so that the plane beyond continues the surface without a step. A vertex is stored as `f32`; that number
-//! *is* the surface, all geometry on it is done in `f64`.
+//! **Relief.** Heights at the grid's vertices come from `relief.rs`. They fade to the mean plane over the outer
+//! 1.5 m of the grid, so that the plane beyond continues the surface without a step. A vertex is stored as
+//! `f32`; that number *is* the surface, all geometry on it is done in `f64`.
 //!
-//! The intersection with a ray is in `terrain_cast.rs`.
+//! **Tilt.** The mean plane may rise: `z = z_level(x, y) + a x + b y`, (a, b) = −tan(slope) (cos, sin)(azimuth of
+//! steepest ascent). The grid holds z_level, and the sum is exact in `f64`; the ground is a shear of level ground, and
+//! so is its intersection with a ray (`terrain_cast.rs`). Heights are measured along z, not along the plane's normal:
+//! at 20° the relief's amplitude across the slope is 6 % smaller.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
 //! | z | `z_m` | m, site frame, down |
+//! | a, b | `tilt` | m/m |
 //! | u, v | position within a cell, 0 to 1 along x and y | – |
 
 use crate::frames::Vector3;
 
-use crate::sim::ground::texture::{OctaveSettings, Octaves, mix};
+use crate::sim::ground::relief::Relief;
 use crate::sim::scenario::TerrainSettings;
 
-/// Height of the mean plane, m, site frame: flat ground in the rover frame (domain.md 1.3).
+/// Height of the mean plane at the origin, m, site frame: flat ground in the rover frame (domain.md 1.3).
 pub const MEAN_GROUND_Z_M: f64 = 0.294;
 
 /// Over which width the relief fades to the plane at the edges of the grid, m.
@@ -26,10 +28,6 @@ const FADE_M: f64 = 1.5;
 
 /// Blocks have 2^shift cells along a side: 64, 16, 4 and 1, from the coarsest walk to the finest.
 pub(in crate::sim) const BLOCK_SHIFT: [usize; 4] = [6, 4, 2, 0];
-
-/// The RMS difference over 1 m of a relief whose octave at 1 m has unit amplitude, for H = 0.8 and octaves
-/// from 6 m down; the amplitude is divided by it. Other exponents change it by less than 15 % (tested).
-const UNIT_RMS_AT_1M: f64 = 3.15;
 
 /// Height of the highest point (least z) of every block of one size.
 #[derive(Clone, Debug)]
@@ -52,6 +50,8 @@ pub struct Terrain {
     pub(in crate::sim) tops: Vec<Tops>,
     pub(in crate::sim) highest_z_m: f64,
     steepest: f64,
+    /// Gradient of the mean plane, m/m; heights above are those of the ground without it.
+    pub(in crate::sim) tilt: [f64; 2],
 }
 
 impl Terrain {
@@ -59,28 +59,36 @@ impl Terrain {
     pub fn new(settings: &TerrainSettings, x_m: [f64; 2], y_m: [f64; 2], seed: u64) -> Self {
         let cell_m = settings.cell_m;
         let cells = [x_m, y_m].map(|[from, to]| (((to - from) / cell_m).ceil() as usize).max(1));
-        let relief = Octaves::<2>::new(&relief_octaves(settings), mix(seed ^ 0x7e44_a170));
-        let amplitude_m = settings.rms_at_1m_m / UNIT_RMS_AT_1M;
+        let relief = Relief::new(settings, seed);
         let mut z_m = Vec::with_capacity((cells[0] + 1) * (cells[1] + 1));
         for iy in 0..=cells[1] {
             for ix in 0..=cells[0] {
                 let (x, y) = (x_m[0] + ix as f64 * cell_m, y_m[0] + iy as f64 * cell_m);
                 let edge_cells = ix.min(cells[0] - ix).min(iy).min(cells[1] - iy);
                 let t = (edge_cells as f64 * cell_m / FADE_M).min(1.0);
-                let noise = f64::from(relief.at(x, y, 1e-6).albedo);
-                z_m.push((MEAN_GROUND_Z_M + amplitude_m * t * t * (3.0 - 2.0 * t) * noise) as f32);
+                z_m.push((MEAN_GROUND_Z_M + t * t * (3.0 - 2.0 * t) * relief.z_m(x, y)) as f32);
             }
         }
-        Self::from_heights([x_m[0], y_m[0]], cell_m, cells, z_m)
+        let (sin, cos) = settings.slope_azimuth_deg.to_radians().sin_cos();
+        let tangent = settings.slope_deg.to_radians().tan();
+        // Level ground must not get a sum of −0 and 0 that differs between directions.
+        let tilt = if tangent == 0.0 { [0.0; 2] } else { [-tangent * cos, -tangent * sin] };
+        Self::from_heights([x_m[0], y_m[0]], cell_m, cells, z_m, tilt)
     }
 
     /// A ground of given vertex heights, m down; `z_m` holds (cells + 1) vertices along each axis.
-    fn from_heights(origin_m: [f64; 2], cell_m: f64, cells: [usize; 2], z_m: Vec<f32>) -> Self {
+    fn from_heights(
+        origin_m: [f64; 2],
+        cell_m: f64,
+        cells: [usize; 2],
+        z_m: Vec<f32>,
+        tilt: [f64; 2],
+    ) -> Self {
         let tops: Vec<Tops> = BLOCK_SHIFT.iter().map(|&shift| tops(&z_m, cells, 1 << shift)).collect();
         let highest_z_m = tops[0].z_m.iter().copied().fold(MEAN_GROUND_Z_M, |a, b| a.min(f64::from(b)));
         let slope = vertex_slopes(&z_m, cells, cell_m);
-        let steepest = steepest(&z_m, cells) / cell_m;
-        Self { origin_m, cell_m, cells, z_m, slope, tops, highest_z_m, steepest }
+        let steepest = steepest(&z_m, cells) / cell_m + tilt[0].hypot(tilt[1]);
+        Self { origin_m, cell_m, cells, z_m, slope, tops, highest_z_m, steepest, tilt }
     }
 
     /// No part of the ground is steeper than this, m/m.
@@ -88,6 +96,17 @@ impl Terrain {
     /// A ray that rises more steeply never meets the ground again after leaving it.
     pub fn steepest(&self) -> f64 {
         self.steepest
+    }
+
+    /// Height of the mean plane over that of level ground at a place, m down.
+    #[inline(always)]
+    pub(in crate::sim) fn tilt_m(&self, x_m: f64, y_m: f64) -> f64 {
+        self.tilt[0] * x_m + self.tilt[1] * y_m
+    }
+
+    /// The unit normal of the mean plane, pointing up (negative z), site frame.
+    pub fn mean_normal(&self) -> Vector3 {
+        Vector3::new(self.tilt[0], self.tilt[1], -1.0).normalize()
     }
 
     /// The cell of a place and the position within it, or nothing beyond the grid.
@@ -100,7 +119,7 @@ impl Terrain {
         Some((cell, p[0] - cell[0] as f64, p[1] - cell[1] as f64))
     }
 
-    /// The four vertex heights of a cell: (0,0), (1,0), (0,1), (1,1).
+    /// The four vertex heights of a cell without the tilt: (0,0), (1,0), (0,1), (1,1).
     #[inline(always)]
     pub(in crate::sim) fn corners(&self, cell: [usize; 2]) -> [f64; 4] {
         let at = cell[1] * (self.cells[0] + 1) + cell[0];
@@ -110,18 +129,19 @@ impl Terrain {
 
     /// Height of the ground at a place, m down.
     pub fn z_at(&self, x_m: f64, y_m: f64) -> f64 {
-        let Some((cell, u, v)) = self.locate(x_m, y_m) else { return MEAN_GROUND_Z_M };
+        let tilt_m = self.tilt_m(x_m, y_m);
+        let Some((cell, u, v)) = self.locate(x_m, y_m) else { return MEAN_GROUND_Z_M + tilt_m };
         let [z00, z10, z01, z11] = self.corners(cell);
-        z00 + (z10 - z00) * u + (z01 - z00) * v + (z00 - z10 - z01 + z11) * u * v
+        z00 + (z10 - z00) * u + (z01 - z00) * v + (z00 - z10 - z01 + z11) * u * v + tilt_m
     }
 
     /// The unit normal of the surface itself at a place, pointing up (negative z).
     pub fn normal_at(&self, x_m: f64, y_m: f64) -> Vector3 {
-        let Some((cell, u, v)) = self.locate(x_m, y_m) else { return -Vector3::z() };
+        let Some((cell, u, v)) = self.locate(x_m, y_m) else { return self.mean_normal() };
         let [z00, z10, z01, z11] = self.corners(cell);
         let twist = z00 - z10 - z01 + z11;
         let (zx, zy) = ((z10 - z00 + twist * v) / self.cell_m, (z01 - z00 + twist * u) / self.cell_m);
-        Vector3::new(zx, zy, -1.0).normalize()
+        Vector3::new(zx + self.tilt[0], zy + self.tilt[1], -1.0).normalize()
     }
 
     /// The gradient (∂z/∂x, ∂z/∂y) used for shading: that of the vertices, joined smoothly.
@@ -129,7 +149,7 @@ impl Terrain {
     /// The true gradient jumps from cell to cell; shading with it would show the grid.
     #[inline(always)]
     pub fn smooth_slope_at(&self, x_m: f64, y_m: f64) -> [f32; 2] {
-        let Some((cell, u, v)) = self.locate(x_m, y_m) else { return [0.0; 2] };
+        let Some((cell, u, v)) = self.locate(x_m, y_m) else { return self.tilt.map(|v| v as f32) };
         let at = cell[1] * (self.cells[0] + 1) + cell[0];
         let below = at + self.cells[0] + 1;
         let (u, v) = (u as f32, v as f32);
@@ -137,28 +157,8 @@ impl Terrain {
         std::array::from_fn(|k| {
             let near = corner[0][k] + u * (corner[1][k] - corner[0][k]);
             let far = corner[2][k] + u * (corner[3][k] - corner[2][k]);
-            near + v * (far - near)
+            near + v * (far - near) + self.tilt[k] as f32
         })
-    }
-}
-
-/// The octaves of the relief, with unit amplitude at 1 m wavelength (in units of its standard deviation).
-fn relief_octaves(settings: &TerrainSettings) -> OctaveSettings {
-    let ratio = 1.8;
-    let shortest_m = 3.0 * settings.cell_m;
-    let exponent = settings.hurst;
-    let norm = std::iter::successors(Some(settings.longest_wavelength_m), |w: &f64| Some(w / ratio))
-        .take_while(|w| *w >= shortest_m * 0.999)
-        .map(|w| w.powf(2.0 * exponent))
-        .sum::<f64>()
-        .sqrt();
-    OctaveSettings {
-        longest_m: settings.longest_wavelength_m.max(shortest_m),
-        shortest_m,
-        ratio,
-        albedo_exponent: exponent,
-        albedo_std: norm,
-        slope_std: 0.0,
     }
 }
 
@@ -223,21 +223,23 @@ mod tests {
     }
 
     #[test]
-    fn relief_has_the_stated_rms_difference_and_exponent() {
-        let (mut at_1m, mut at_4cm) = (Vec::new(), Vec::new());
-        for seed in 0..12 {
-            let terrain = ground(seed, 0.02);
-            for k in 0..4000u32 {
-                let (x, y) = (0.0 + f64::from(k % 63) * 0.11, -2.0 + f64::from(k / 63) * 0.06);
-                at_1m.push(terrain.z_at(x + 1.0, y) - terrain.z_at(x, y));
-                at_4cm.push(terrain.z_at(x, y + 0.08) - terrain.z_at(x, y));
-            }
+    fn tilted_ground_rises_by_its_slope_along_its_azimuth_and_nowhere_else() {
+        let level = ground(3, 0.02);
+        let settings =
+            TerrainSettings { slope_deg: 18.0, slope_azimuth_deg: 120.0, ..TerrainSettings::default() };
+        let tilted = Terrain::new(&settings, [-2.0, 10.0], [-4.0, 4.0], 3);
+        let rise = 18f64.to_radians().tan();
+        let (sin, cos) = 120f64.to_radians().sin_cos();
+        for (x, y) in [(0.0, 0.0), (3.3, 1.7), (8.1, -3.2), (40.0, -9.0)] {
+            let expected_m = level.z_at(x, y) - rise * (x * cos + y * sin);
+            assert!((tilted.z_at(x, y) - expected_m).abs() < 1e-12);
+            let (a, b) = (level.normal_at(x, y), tilted.normal_at(x, y));
+            assert!((b.x / -b.z - (a.x / -a.z - rise * cos)).abs() < 1e-12);
+            assert!((b.y / -b.z - (a.y / -a.z - rise * sin)).abs() < 1e-12);
         }
-        let rms = |d: &[f64]| (d.iter().map(|v| v * v).sum::<f64>() / d.len() as f64).sqrt();
-        println!("rms {}", rms(&at_1m));
-        assert!((rms(&at_1m) / 0.02 - 1.0).abs() < 0.1, "{}", rms(&at_1m));
-        let exponent = (rms(&at_1m) / rms(&at_4cm)).ln() / (1.0 / 0.08f64).ln();
-        assert!((exponent - 0.8).abs() < 0.12, "{exponent}");
+        // On the right (y > 0) the ground of this azimuth is higher: less z.
+        assert!(tilted.z_at(0.0, 3.0) < tilted.z_at(0.0, -3.0));
+        assert!((tilted.mean_normal().angle(&-Vector3::z()).to_degrees() - 18.0).abs() < 1e-9);
     }
 
     #[test]

@@ -6,6 +6,9 @@
 //! skipped while the ray stays above its highest point. A ray that enters a cell already below the ground
 //! is taken as hit where it enters, which closes the rounding gap between neighbouring cells.
 //!
+//! Tilted ground is level ground sheared along z, `z = z_level + a x + b y`. The ray is sheared back, which leaves it
+//! a straight line with the same t, so that everything below happens over level ground.
+//!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
 //! | t | distance along the ray, `_m` | m |
@@ -35,6 +38,15 @@ impl Terrain {
     /// A ray that is below ground at `from_m` hits there.
     #[inline(always)]
     pub fn cast(&self, ray: &Ray, from_m: f64, to_m: f64) -> Option<f64> {
+        let mut ray = *ray;
+        ray.origin.z -= self.tilt_m(ray.origin.x, ray.origin.y);
+        ray.direction.z -= self.tilt_m(ray.direction.x, ray.direction.y);
+        self.cast_level(&ray, from_m, to_m)
+    }
+
+    /// The same over the ground without its tilt; the ray's direction need not be unit.
+    #[inline(always)]
+    fn cast_level(&self, ray: &Ray, from_m: f64, to_m: f64) -> Option<f64> {
         // Nothing can be hit where the ray is above the highest point; most of a camera's ray is.
         let (mut from_m, mut to_m) = (from_m, to_m);
         let above_m = self.highest_z_m - ray.origin.z;
@@ -237,6 +249,39 @@ mod tests {
             }
             assert!(grazing_misses <= 2, "{grazing_misses}");
         }
+    }
+
+    #[test]
+    fn cast_agrees_with_a_march_on_slopes_with_ripples() {
+        let settings = TerrainSettings {
+            slope_deg: 18.0,
+            slope_azimuth_deg: 140.0,
+            ripple_height_m: 0.05,
+            ..TerrainSettings::default()
+        };
+        let terrain = Terrain::new(&settings, [-2.0, 10.0], [-4.0, 4.0], 5);
+        let (mut on_grid, mut beyond, mut missed) = (0, 0, 0);
+        for k in 0..150u32 {
+            let unit = |n: u64| (mix(u64::from(k) * 8 + n) >> 11) as f64 / (1u64 << 53) as f64;
+            let (x, y) = (-1.0 + 9.0 * unit(0), -3.0 + 6.0 * unit(1));
+            let origin = Point3::new(x, y, terrain.z_at(x, y) - 0.1 - unit(2));
+            let heading = std::f64::consts::TAU * unit(3);
+            let direction = Vector3::new(heading.cos(), heading.sin(), 0.7 * unit(4) - 0.3).normalize();
+            let ray = Ray { origin, direction };
+            match (terrain.cast(&ray, 0.0, 20.0), march(&terrain, &ray, 20.0)) {
+                (Some(cast), Some(marched)) if (cast - marched).abs() < 1e-9 => {
+                    let inside = terrain.origin_m[0] < ray.at(cast).x && ray.at(cast).x < 10.0;
+                    if inside && ray.at(cast).y.abs() < 4.0 { on_grid += 1 } else { beyond += 1 }
+                }
+                (Some(cast), marched) if marched.is_none_or(|m| cast < m) => {
+                    let p = ray.at(cast);
+                    assert!((p.z - terrain.z_at(p.x, p.y)).abs() < 1e-9);
+                }
+                (None, None) => missed += 1,
+                other => panic!("{other:?} for {ray:?}"),
+            }
+        }
+        assert!(on_grid > 50 && beyond > 5 && missed > 20, "{on_grid} {beyond} {missed}");
     }
 
     #[test]

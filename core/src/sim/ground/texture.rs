@@ -115,6 +115,21 @@ fn split(coordinate: f64) -> (u32, f32) {
     (whole as u32, (coordinate - f64::from(whole)) as f32)
 }
 
+/// A hash of the lattice cell that holds a point, and the position in the cell, 0 to 1.
+#[inline(always)]
+pub(super) fn cell_hash<const DIMENSIONS: usize>(
+    lattice: [f64; DIMENSIONS],
+    seed: u32,
+) -> (u32, [f32; DIMENSIONS]) {
+    let mut hash = seed;
+    let place = std::array::from_fn(|k| {
+        let (whole, part) = split(lattice[k]);
+        hash = scramble(hash ^ whole.wrapping_mul(PRIME[k % PRIME.len()]));
+        part
+    });
+    (hash, place)
+}
+
 const PRIME: [u32; 3] = [0x9e37_79b1, 0x85eb_ca77, 0xc2b2_ae3d];
 
 /// One octave of two-dimensional noise: value of the first channel, gradient of the second.
@@ -162,7 +177,7 @@ fn value_noise_3d(p: [f64; 3], seed: u32) -> (f32, [f32; 3]) {
 
 /// How much of an octave is left above the cutoff: 0 below it, 1 from twice the cutoff.
 #[inline(always)]
-fn weight(wavelength_m: f32, cutoff_m: f32) -> f32 {
+pub(super) fn weight(wavelength_m: f32, cutoff_m: f32) -> f32 {
     let t = ((wavelength_m - cutoff_m) / cutoff_m).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }

@@ -32,8 +32,8 @@ pub use camera::CameraSettings;
 pub use drive::{Course, DriveSettings, Move};
 pub use events::{Cloud, EventSettings, Occluder};
 pub use fiducials::Fiducial;
-pub use ground::{RockSettings, TerrainSettings, TextureSettings};
-pub use light::SunSettings;
+pub use ground::{PlacedRock, RockSettings, RockShape, TerrainSettings, TextureSettings};
+pub use light::{Reflectance, SunSettings};
 pub use rover::{ForcedSlip, OdometryModel, RoverSettings, Soil};
 pub use targets::{Arrangement, TargetRule};
 

@@ -134,3 +134,57 @@ fn a_low_sun_makes_the_ground_shade_itself() {
     }
     assert!(dark > 100, "{dark}");
 }
+
+#[test]
+fn the_rover_drives_up_down_and_across_slopes_and_leans_as_they_do() {
+    for (slope_deg, azimuth_deg) in [(18.0, 0.0), (18.0, 180.0), (10.0, 90.0), (16.0, -45.0)] {
+        let mut scenario = demo().scenario.clone();
+        (scenario.terrain.cell_m, scenario.terrain.rms_at_1m_m) = (0.05, 0.005);
+        (scenario.terrain.slope_deg, scenario.terrain.slope_azimuth_deg) = (slope_deg, azimuth_deg);
+        scenario.rocks.farthest_m = 8.0;
+        let world = World::new(&scenario);
+        let stops = crate::sim::rover::drive::true_stops(&world, &scenario).unwrap();
+        let angle = f64::to_radians(azimuth_deg);
+        let uphill = Vector3::new(angle.cos(), angle.sin(), 0.0);
+        for stop in &stops {
+            let down = stop.site_from_rover * Vector3::z();
+            // The wheels stand on a relief of 5 mm over a metre, which tilts the rover by some tenths of a degree.
+            let lean_deg = down.dot(&uphill).asin().to_degrees();
+            assert!((lean_deg - slope_deg).abs() < 0.8, "{slope_deg} {azimuth_deg}: {lean_deg}");
+            assert!(down.cross(&uphill).norm() > 0.9);
+        }
+        // Far beyond the grid the plane goes on.
+        let far = Point3::new(60.0, 20.0, -80.0);
+        let hit = world.cast(&Ray { origin: far, direction: Vector3::z() }).unwrap();
+        let rise_m = slope_deg.to_radians().tan() * (60.0 * angle.cos() + 20.0 * angle.sin());
+        assert!((hit.point.z - (0.294 - rise_m)).abs() < 1e-9, "{hit:?}");
+    }
+}
+
+#[test]
+fn bad_settings_of_ground_rocks_and_light_are_named() {
+    let refused = |text: &str| {
+        let read = crate::sim::Scenario::from_toml(text, std::path::Path::new("s.toml"));
+        read.expect_err("refused").to_string()
+    };
+    for (text, name) in [
+        ("[terrain]\nslope_deg = 50.0\n", "terrain.slope_deg"),
+        ("[terrain]\nripple_height_m = 0.05\nripple_wavelength_m = 0.1\n", "terrain.ripple_wavelength_m"),
+        ("[texture]\ngrain_cover = 0.9\n", "texture.grain_cover"),
+        ("[sun]\noptical_depth = 9.0\n", "sun.optical_depth"),
+        ("[sun]\nhapke_lobe = 1.0\n", "sun.hapke_lobe"),
+        ("[sun]\nreflectance = \"mirror\"\n", "reflectance"),
+        (
+            "[[rocks.placed]]\nx_m = 0.0\ny_m = 0.0\ndiameter_m = 5.0\nheight_m = 0.1\n",
+            "rocks.placed.diameter_m",
+        ),
+        ("[[rocks.placed]]\nx_m = 0.0\ny_m = 0.0\nheight_m = 0.1\n", "diameter_m"),
+    ] {
+        assert!(refused(text).contains(name), "{}", refused(text));
+    }
+    let placed = "[sun]\noptical_depth = 0.5\nreflectance = \"hapke\"\n[[rocks.placed]]\nx_m = 0.1\ny_m = 0.0\ndiameter_m = 0.07\nheight_m = 0.05\nshape = \"cobble\"\n";
+    let read = crate::sim::Scenario::from_toml(placed, std::path::Path::new("s.toml")).unwrap();
+    let again = crate::sim::Scenario::from_toml(&read.to_toml(), std::path::Path::new("s.toml")).unwrap();
+    assert_eq!(read, again);
+    assert_eq!((read.rocks.placed[0].yaw_deg, read.sun.optical_depth), (180.0, Some(0.5)));
+}

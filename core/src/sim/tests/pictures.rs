@@ -103,8 +103,9 @@ fn silhouettes() -> (Scenario, World) {
     (scenario.texture.soil_albedo, scenario.texture.rock_albedo) = (0.9, 0.02);
     (scenario.texture.albedo_std, scenario.texture.soil_slope_std, scenario.texture.rock_slope_std) =
         (0.0, 0.0, 0.0);
-    (scenario.texture.dust, scenario.sun.diffuse_fraction) = (0.0, 1.0);
-    (scenario.camera.blur_px, scenario.camera.samples_per_axis) = (0.0, 4);
+    (scenario.texture.grain_cover, scenario.texture.drift_cover) = (0.0, 0.0);
+    (scenario.texture.dust, scenario.sun.diffuse_fraction, scenario.sun.aureole) = (0.0, 1.0, 0.0);
+    (scenario.camera.blur_px, scenario.camera.samples_per_axis) = (0.0, 8);
     let mut world = World::new(&scenario);
     // Without contact shadows, which lie beside the silhouettes.
     std::sync::Arc::make_mut(&mut world.scenery).openness =
