@@ -16,7 +16,7 @@
 //! 16 samples a pixel is 16.8 million samples: 4 to 6 s on one core, and 17 stereo pairs about three minutes.
 //! The goal is 2 million on one thread; measured by processor time on a shared two-core machine (AMD EPYC):
 //! 4.3 million at the first stop and 3.1 million at the last one. Building the world (0.8 million vertices,
-//! 4000 rocks) takes less than a second and is not counted.
+//! 5900 rocks) takes one to two seconds and is not counted; that measurement is older than grains and drifts.
 //!
 //! Run with `cargo bench -p sightline-core --profile dev --bench render` (the profile `dev` is optimised).
 

@@ -1,8 +1,9 @@
 //! The simulator: a rocky plain, the rover that drives over it, and the pictures that a rover takes on the way.
 //!
-//! The scenery is simple, the geometry is not: the ground is a height field, rocks are solids, both are met
-//! by rays of the true camera models exactly; shadows are cast; pixels average over their area; noise is
-//! that of a detector. Everything follows from a [`Scenario`] with a seed: equal scenarios give equal bits,
+//! The geometry is exact: the ground is a tilted, rippled height field, rocks are solids from pebbles to boulders,
+//! both are met by rays of the true camera models exactly; shadows are cast; pixels average over their area; noise
+//! is that of a detector. Sizes, slopes, light and texture follow published laws or statistics of real frames.
+//! Everything follows from a [`Scenario`] with a seed: equal scenarios give equal bits,
 //! whatever the number of threads. The truth is exact: poses to rounding, surface points in `f64`.
 //!
 //! Nothing here knows of any tracker, and no number may be chosen by looking at what one makes of it.
@@ -10,14 +11,24 @@
 //! In the order in which to read:
 //!
 //! ```text
-//! scenario, scenario_check                     every number, from and to TOML, and its range
-//! texture        seeded noise                          terrain, terrain_cast   the ground
-//! rocks          one rock                              rock_field              where they lie
-//! culling        which rocks a ray can meet            world                   cast, shadow, visibility
-//! surface        albedo and shading normal             light, openness         sun, sky, contact shadows
-//! sampling       rays of a tile, their radiance        render                  blur, exposure, regions
-//! camera_noise   electrons, numbers                    rover/                  stand, slip, course, estimates
-//! index          the traverse's index                  targets                 the rule that chooses them
+//! scenario       every number, from and to TOML, and its range; library: those that come with it
+//! ground         texture         seeded noise
+//!                relief          the fractal and its ripples
+//!                terrain, terrain_cast   the ground, tilted, and rays on it
+//!                rocks, shape    one rock                    rock_field  where they lie
+//!                details         grains, drifts, veins, pits
+//!                surface         albedo and shading normal   imprint     wheel tracks
+//! culling        which rocks a ray can meet                  solids      made things
+//! world          cast, shadow, visibility                    moment      sun, clouds, rover at a stop
+//! light          sky             direct and diffuse light    law         laws of reflection
+//!                reflection      what a surface sends        openness    contact shadows
+//! camera         rig             the pairs of cameras        sampling    rays of a tile, their radiance
+//!                render          blur, regions               exposure    the time of exposure
+//!                noise           electrons, numbers
+//! rover          drive, course   where it truly stands       odometry    where it believes to stand
+//!                suspension      how its wheels stand        body        what casts its shadow
+//! index          the traverse's index                        truth       ranges, surfaces, visibility
+//! targets        the rules that choose targets
 //! ```
 //!
 //! Use: `let world = World::new(&scenario); let index = index(&scenario, &world)?;` then, for a stop and an

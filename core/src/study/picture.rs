@@ -264,7 +264,7 @@ mod tests {
 
     #[test]
     fn invalid_pixels_and_what_lies_outside_do_not_count() {
-        let level = |x: u32, y: u32| if (x + y) % 2 == 0 { 0.3 } else { 0.5 };
+        let level = |x: u32, y: u32| if (x + y).is_multiple_of(2) { 0.3 } else { 0.5 };
         let (plain, all) = picture(64, level);
         let (wide, _) = picture(128, |x, y| if x < 64 && y < 64 { level(x, y) } else { f32::NAN });
         let everything = PixelRect::whole(500, 500);

@@ -182,7 +182,7 @@ mod tests {
 
     /// RMS difference over `distance_m`, over many seeds, places and directions.
     fn measured(settings: &TerrainSettings, distance_m: f64) -> f64 {
-        let (mut sum, mut count) = (0.0, 0.0);
+        let (mut sum, mut count) = (0.0f64, 0.0);
         for seed in 0..60 {
             let relief = Relief::new(settings, seed);
             for k in 0..400 {
@@ -193,7 +193,7 @@ mod tests {
                 count += 1.0;
             }
         }
-        (sum / count as f64).sqrt()
+        (sum / count).sqrt()
     }
 
     #[test]

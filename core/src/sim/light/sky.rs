@@ -111,7 +111,7 @@ mod tests {
             (1.0, 75.0, 0.021, 0.415),
             (4.0, 30.0, 0.010, 0.347),
         ] {
-            let [sun, sky] = split(depth, (90.0 - zenith_deg as f64).to_radians());
+            let [sun, sky] = split(depth, f64::to_radians(90.0 - zenith_deg));
             assert!(
                 (sun - direct).abs() < 6e-4 && (sky - diffuse).abs() < 1e-9,
                 "{depth} {zenith_deg}: {sun} {sky}"
