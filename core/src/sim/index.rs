@@ -12,7 +12,6 @@ use crate::error::Result;
 use crate::frames::{Pose, PoseRecord};
 use crate::traverse::{CameraSource, FORMAT_VERSION, StereoGeometry, Stop, StopTruth, TraverseIndex, View};
 
-use crate::sim::camera::noise::FULL_SCALE_DN;
 use crate::sim::camera::render::Eye;
 use crate::sim::rover::drive;
 use crate::sim::scenario::Scenario;
@@ -67,7 +66,7 @@ pub fn index(scenario: &Scenario, world: &World) -> Result<TraverseIndex> {
         format: FORMAT_VERSION,
         name: scenario.name.clone(),
         description: describe(scenario, stops.len()),
-        full_scale_dn: Some(if scenario.camera.bit_depth == 8 { 255.0 } else { FULL_SCALE_DN }),
+        full_scale_dn: Some(scenario.camera.recorded_full_scale_dn()),
         stereo: StereoGeometry::Lateral,
         odometry_error: scenario.odometry_error,
         mast: Some(mast),

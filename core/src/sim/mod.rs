@@ -15,9 +15,11 @@
 //! rocks          one rock                              rock_field              where they lie
 //! culling        which rocks a ray can meet            world                   cast, shadow, visibility
 //! surface        albedo and shading normal             light, openness         sun, sky, contact shadows
-//! sampling       rays of a tile, their radiance        render                  blur, exposure, regions
-//! camera_noise   electrons, numbers                    drive                   true poses, estimates
-//! index          the traverse's index                  targets                 the rule that chooses them
+//! rig            which cameras, and where              sampling                rays of a tile, their radiance
+//! optics         point spread, flat field              render                  clean radiance, development
+//! exposure       electrons, automatic exposure         noise                   detector, numbers
+//! drive          true poses, estimates                 index                   the traverse's index
+//! targets        the rule that chooses them
 //! ```
 //!
 //! Use: `let world = World::new(&scenario); let index = index(&scenario, &world)?;` then, for a stop and an
@@ -39,7 +41,8 @@ pub mod targets;
 #[cfg(test)]
 mod tests;
 
-pub use camera::render::{Eye, NoiseSeed, Region, render, render_clean, render_region};
+pub use camera::render::{Eye, NoiseSeed, Region, clean_radiance, develop, render};
+pub use camera::rig::Rig;
 pub use index::{SCENARIO_FILE, index, true_camera_in_site};
 pub use scenario::Scenario;
 pub use targets::{choose_targets, share_on_rocks, surface_point};

@@ -24,7 +24,7 @@ use utoipa::ToSchema;
 use crate::error::{Error, Result};
 use crate::traverse::OdometryError;
 
-pub use camera::CameraSettings;
+pub use camera::{AutoExposureSettings, CameraRig, CameraSettings, ExposureMode, Quantisation};
 pub use drive::DriveSettings;
 pub use ground::{RockSettings, TerrainSettings, TextureSettings};
 pub use light::SunSettings;
