@@ -267,11 +267,14 @@ mod tests {
     }
 
     #[test]
-    fn every_pixel_of_the_hazcams_and_of_the_blurs_margin_has_a_ray() {
-        let (left, right) = rig(CameraRig::MerFrontHazcam, 128).cameras_in_rover(None);
-        for camera in [left, right] {
-            for (x, y) in [(-4.0, -4.0), (131.0, -4.0), (-4.0, 131.0), (131.0, 131.0), (64.0, -4.0)] {
-                assert!(camera.ray(Pixel::new(x, y)).is_some(), "{x} {y}");
+    fn every_pixel_of_the_hazcams_and_of_the_blurs_reach_has_a_ray() {
+        // Corners of pixels two (at 128 px) and three (at 1024 px) beyond the picture: what a blur of 0.6 px
+        // brings in from farther away is below 1e-5.
+        for (size, margin) in [(128, 2.5), (1024, 3.5)] {
+            let (left, right) = rig(CameraRig::MerFrontHazcam, size).cameras_in_rover(None);
+            let ends = [-margin, f64::from(size) - 1.0 + margin];
+            for (x, y) in ends.iter().flat_map(|x| ends.iter().map(move |y| (*x, *y))) {
+                assert!(left.ray(Pixel::new(x, y)).is_some() && right.ray(Pixel::new(x, y)).is_some());
             }
         }
     }
