@@ -4,7 +4,7 @@
 //!
 //! ```text
 //! key     = SHA-256 of (version of this program, scenario without what the radiance does not depend on,
-//!           camera in the site), as JSON with exact numbers
+//!           moment of the drive, camera in the site), as JSON with exact numbers
 //! file    = .npy array of f32 (rows from the top), then the 32 bytes of its SHA-256
 //! ```
 //!
@@ -21,6 +21,7 @@
 
 use std::path::{Path, PathBuf};
 
+use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use super::files::write_atomically;
@@ -118,8 +119,9 @@ fn is_ours(name: &str) -> bool {
     digits.len() == 2 * DIGEST_BYTES && digits.bytes().all(|byte| byte.is_ascii_hexdigit())
 }
 
-/// What the clean radiance of a picture depends on, as 64 hexadecimal digits.
-pub(super) fn key(scenario: &Scenario, camera_in_site: &Camera) -> String {
+/// What the clean radiance of a picture depends on, as 64 hexadecimal digits; `moment` is what is particular to
+/// its stop besides the camera: number, time, true pose.
+pub(super) fn key(scenario: &Scenario, moment: &impl Serialize, camera_in_site: &Camera) -> String {
     let default = Scenario::default();
     let of_radiance = Scenario {
         name: String::new(),
@@ -128,8 +130,8 @@ pub(super) fn key(scenario: &Scenario, camera_in_site: &Camera) -> String {
         camera: scenario.camera.of_radiance(),
         ..scenario.clone()
     };
-    let all = (env!("CARGO_PKG_VERSION"), of_radiance, camera_in_site);
-    // Both are plain numbers and names, which JSON can always write.
+    let all = (env!("CARGO_PKG_VERSION"), of_radiance, moment, camera_in_site);
+    // All of it is plain numbers and names, which JSON can always write.
     let text = serde_json::to_vec(&all).unwrap_or_default();
     Sha256::digest(&text).iter().map(|byte| format!("{byte:02x}")).collect()
 }
@@ -149,7 +151,7 @@ mod tests {
     }
 
     fn keys() -> [String; 3] {
-        [1, 2, 3].map(|seed| key(&Scenario { seed, ..Scenario::demo() }, &camera()))
+        [1, 2, 3].map(|seed| key(&Scenario { seed, ..Scenario::demo() }, &0, &camera()))
     }
 
     #[test]
@@ -211,7 +213,7 @@ mod tests {
     #[test]
     fn the_key_follows_what_is_seen_and_not_how_it_is_recorded() {
         let scenario = Scenario::demo();
-        let plain = key(&scenario, &camera());
+        let plain = key(&scenario, &0, &camera());
         let mut other = scenario.clone();
         other.name = "another name".into();
         other.odometry_error.attitude_deg = 1.0;
@@ -221,7 +223,7 @@ mod tests {
         other.camera.auto_exposure.start_s = 1.0;
         (other.camera.bit_depth, other.camera.quantisation) = (8, Quantisation::SquareRoot);
         (other.camera.vignetting, other.camera.smear_s, other.camera.mean_level) = (1.0, 0.005, 0.3);
-        assert_eq!(key(&other, &camera()), plain);
+        assert_eq!(key(&other, &0, &camera()), plain);
         let changes: [fn(&mut Scenario); 6] = [
             |scenario| scenario.seed += 1,
             |scenario| scenario.sun.azimuth_deg += 1e-9,
@@ -233,9 +235,10 @@ mod tests {
         for change in changes {
             let mut other = scenario.clone();
             change(&mut other);
-            assert_ne!(key(&other, &camera()), plain);
+            assert_ne!(key(&other, &0, &camera()), plain);
         }
         let nudge = crate::frames::Pose::translation(1e-12, 0.0, 0.0);
-        assert_ne!(key(&scenario, &camera().moved(&nudge)), plain);
+        assert_ne!(key(&scenario, &0, &camera().moved(&nudge)), plain);
+        assert_ne!(key(&scenario, &1, &camera()), plain);
     }
 }

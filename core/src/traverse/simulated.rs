@@ -22,6 +22,8 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError, TryLockError};
 
+use serde::Serialize;
+
 use super::files::{resolve, write_atomically};
 use super::index_file::{self, Existing, IndexFormat};
 use super::native::{Traverse, write};
@@ -80,8 +82,7 @@ impl Simulated {
             let path = resolve(folder, name).map_err(|problem| Error::format(folder, problem))?;
             if !path.exists() {
                 let time_s = self.exposure_s(traverse, step, cancel)?;
-                let camera = camera_in_site(traverse, step, eye)?;
-                let radiance = self.radiance(&camera, cancel)?;
+                let (camera, radiance) = self.radiance(traverse, step, eye, cancel)?;
                 let seed = NoiseSeed { step: step as u32, eye };
                 let image = develop(&radiance, &self.scenario, &camera, time_s, seed);
                 write_atomically(&path, &self.encode(&image)?)?;
@@ -104,8 +105,7 @@ impl Simulated {
             (known.len(), known.last().copied().unwrap_or(settings.auto_exposure.start_s))
         };
         for stop in first..=step {
-            let camera = camera_in_site(traverse, stop, Eye::Left)?;
-            let radiance = self.radiance(&camera, cancel)?;
+            let (camera, radiance) = self.radiance(traverse, stop, Eye::Left, cancel)?;
             let rates = Rates::new(&radiance, &self.scenario, &camera, Eye::Left, [0, 0]);
             time_s = automatic(&rates, settings, time_s).time_s;
             let mut known = self.exposures_s.lock().unwrap_or_else(PoisonError::into_inner);
@@ -117,40 +117,29 @@ impl Simulated {
         Ok(time_s)
     }
 
-    /// Clean radiance of a whole picture: the one that was kept, or else rendered and kept.
-    fn radiance(&self, camera_in_site: &Camera, cancel: &AtomicBool) -> Result<GrayImage> {
+    /// The camera of a picture in the site and its clean radiance: what was kept, or else rendered and kept.
+    fn radiance(
+        &self,
+        traverse: &Traverse,
+        step: usize,
+        eye: Eye,
+        cancel: &AtomicBool,
+    ) -> Result<(Camera, GrayImage)> {
         if cancel.load(Ordering::Relaxed) {
             return Err(Error::Cancelled);
         }
-        let key = render_cache::key(&self.scenario, camera_in_site);
-        if let Some(kept) = self.cache.load(&key, camera_in_site)
-            && self.renders_alike(&kept, camera_in_site, cancel)?
+        let camera = camera_in_site(traverse, step, eye)?;
+        let render = |region: Region| clean_radiance(self.world(), &self.scenario, &camera, region, cancel);
+        let key = render_cache::key(&self.scenario, &moment(traverse, step), &camera);
+        if let Some(kept) = self.cache.load(&key, &camera)
+            && renders_alike(&kept, render)?
         {
-            return Ok(kept);
+            return Ok((camera, kept));
         }
-        let whole = Region::whole(camera_in_site);
-        let radiance = clean_radiance(self.world(), &self.scenario, camera_in_site, whole, cancel)?;
+        let radiance = render(Region::whole(&camera))?;
         self.rendered.fetch_add(1, Ordering::Relaxed);
         self.cache.store(&key, &radiance);
-        Ok(radiance)
-    }
-
-    /// Whether sixteen pixels, spread over a kept picture, are rendered with the same bits.
-    fn renders_alike(&self, kept: &GrayImage, camera_in_site: &Camera, cancel: &AtomicBool) -> Result<bool> {
-        for probe in 0..PROBES {
-            // Multiples of these two numbers fill a square evenly (Roberts' sequence).
-            let at = |step: f64, side: u32| {
-                let place = (0.5 + step * f64::from(probe)).fract() * f64::from(side);
-                (place as u32).min(side.saturating_sub(1))
-            };
-            let (x, y) = (at(0.754_877_67, kept.width()), at(0.569_840_29, kept.height()));
-            let pixel = Region { x, y, width: 1, height: 1 };
-            let anew = clean_radiance(self.world(), &self.scenario, camera_in_site, pixel, cancel)?;
-            if anew.get_pixel(0, 0).0[0].to_bits() != kept.get_pixel(x, y).0[0].to_bits() {
-                return Ok(false);
-            }
-        }
-        Ok(true)
+        Ok((camera, radiance))
     }
 
     /// One image as the bytes of its file.
@@ -162,6 +151,29 @@ impl Simulated {
             io::encode_png_u16(image, Some(full_scale_dn))
         }
     }
+}
+
+/// Whether sixteen pixels, spread over a kept picture, are rendered with the same bits.
+fn renders_alike(kept: &GrayImage, render: impl Fn(Region) -> Result<GrayImage>) -> Result<bool> {
+    for probe in 0..PROBES {
+        // Multiples of these two numbers fill a square evenly (Roberts' sequence).
+        let at = |step: f64, side: u32| {
+            let place = (0.5 + step * f64::from(probe)).fract() * f64::from(side);
+            (place as u32).min(side.saturating_sub(1))
+        };
+        let (x, y) = (at(0.754_877_67, kept.width()), at(0.569_840_29, kept.height()));
+        let anew = render(Region { x, y, width: 1, height: 1 })?;
+        if anew.get_pixel(0, 0).0[0].to_bits() != kept.get_pixel(x, y).0[0].to_bits() {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// What a stop's light and scenery can depend on besides the scenario: its number, time and truth.
+fn moment(traverse: &Traverse, step: usize) -> impl Serialize {
+    let stop = &traverse.index().stops[step];
+    (step, stop.time_s, stop.truth.clone())
 }
 
 /// The camera that truly takes a picture of a stop, in the site frame.

@@ -214,7 +214,7 @@ fn radiance_that_is_damaged_or_of_another_renderer_is_rendered_anew() {
 
     let cache = RenderCache::new(folder.path().join("cache"), 1 << 24);
     let camera = camera_in_site(&from_own_cache, 0, Eye::Left).unwrap();
-    let key = render_cache::key(&scenario(), &camera);
+    let key = render_cache::key(&scenario(), &moment(&from_own_cache, 0), &camera);
     let mut brighter = cache.load(&key, &camera).unwrap();
     brighter.iter_mut().for_each(|value| *value *= 1.01);
     cache.store(&key, &brighter);

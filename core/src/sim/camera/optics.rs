@@ -7,7 +7,8 @@
 //! ```
 //!
 //! The Gaussian is taken at whole pixels, so its variance falls short of σ²: by 14 % at 0.5 px, 2.3 % at 0.6 px,
-//! 0.2 % at 0.7 px. The point spread belongs to the clean radiance; the flat field multiplies it when the picture is developed.
+//! 0.2 % at 0.7 px. The point spread belongs to the clean radiance; the flat field multiplies it when the
+//! picture is developed.
 //! The functions b are orthonormal over the picture and Σ c² = 1, so ρ is the rms of the pattern; c is drawn
 //! once for each camera of a scenario. ψ is the angle θ between the pixel's ray and A: A and not O, which in
 //! a label may lie degrees from the lens's own axis (domain.md 2.6). A CAHVORE lens maps θ to tan(Lθ)/L, so
