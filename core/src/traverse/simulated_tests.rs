@@ -173,7 +173,8 @@ fn another_noise_or_exposure_renders_nothing_and_gives_the_bits_of_rendering() {
     let first = sharing(&scenario(), folder.path(), "first");
     let pairs = [0, 1].map(|step| first.capture(step).unwrap());
     assert_eq!(first.rendered_count(), 4);
-    let changes: [(&str, fn(&mut Scenario)); 4] = [
+    type Change = fn(&mut Scenario);
+    let changes: [(&str, Change); 4] = [
         ("noise", |scenario| scenario.camera.noise_seed = Some(77)),
         ("level", |scenario| (scenario.camera.mean_level, scenario.camera.vignetting) = (0.2, 1.0)),
         ("full", |scenario| scenario.camera.exposure = ExposureMode::FullFrame),
