@@ -66,7 +66,7 @@ fn bench(bencher: Bencher<'_, '_>, threads: usize, camera: &Camera) {
     let region = Region { x: first, y: first, width: SIDE_PX, height: SIDE_PX };
     let never = AtomicBool::new(false);
     bencher.counter(ItemsCount::new(SIDE_PX * SIDE_PX * 16)).bench_local(|| {
-        pool.install(|| sim::render_region(&scene.world, &scene.scenario, camera, region, &never))
+        pool.install(|| sim::clean_radiance(&scene.world, &scene.scenario, camera, region, &never))
     });
 }
 

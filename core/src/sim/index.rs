@@ -13,10 +13,10 @@ use crate::error::Result;
 use crate::frames::PoseRecord;
 use crate::traverse::{CameraSource, FORMAT_VERSION, StereoGeometry, Stop, StopTruth, TraverseIndex, View};
 
-use crate::sim::camera::noise::FULL_SCALE_DN;
 use crate::sim::camera::render::Eye;
+use crate::sim::camera::rig::Rig;
 use crate::sim::rover::{drive, mast_error, odometry};
-use crate::sim::scenario::{Course, Scenario};
+use crate::sim::scenario::{CameraRig, Course, Scenario};
 use crate::sim::world::World;
 
 /// The name of the scenario's file within a traverse folder.
@@ -27,10 +27,10 @@ const PAUSE_S: f64 = 60.0;
 
 /// Builds the index of a scenario's traverse; fails where the drive is impossible on this ground.
 pub fn index(scenario: &Scenario, world: &World) -> Result<TraverseIndex> {
-    let mast = drive::mast(scenario);
+    let rig = Rig::new(&scenario.camera);
     let drive = drive::true_drive(world, scenario)?;
     let estimates = odometry::believed(&drive, scenario);
-    let told: Vec<MastAngles> = drive.stops.iter().map(|stop| stop.angles).collect();
+    let told: Vec<MastAngles> = drive.stops.iter().filter_map(|stop| stop.angles).collect();
     let true_angles = mast_error::true_angles(&told, scenario);
     let mut stops = Vec::with_capacity(drive.stops.len());
     let mut time_s = 0.0;
@@ -38,7 +38,7 @@ pub fn index(scenario: &Scenario, world: &World) -> Result<TraverseIndex> {
         if let Some(leg) = number.checked_sub(1).and_then(|before| drive.legs.get(before)) {
             time_s += PAUSE_S + leg.duration_s;
         }
-        let (left, right) = mast.cameras_in_rover(truth.angles);
+        let (left, right) = rig.cameras_in_rover(truth.angles);
         let view = |eye: &str, camera: Camera| View {
             image: format!("images/{eye}_{number:04}.png"),
             camera: CameraSource::Inline(camera),
@@ -48,14 +48,14 @@ pub fn index(scenario: &Scenario, world: &World) -> Result<TraverseIndex> {
             left_camera: None,
             right_camera: None,
         };
-        if mast_error::is_present(&scenario.drive) {
-            let (left, right) = mast.cameras_in_rover(true_angles[number]);
+        if let Some(angles) = true_angles.get(number).filter(|_| mast_error::is_present(&scenario.drive)) {
+            let (left, right) = rig.cameras_in_rover(Some(*angles));
             (stop_truth.left_camera, stop_truth.right_camera) = (Some(left), Some(right));
         }
         stops.push(Stop {
             time_s,
             site_from_rover: PoseRecord::from(estimate),
-            mast_angles: Some(truth.angles),
+            mast_angles: truth.angles,
             left: view("left", left),
             right: view("right", right),
             truth: Some(stop_truth),
@@ -65,10 +65,13 @@ pub fn index(scenario: &Scenario, world: &World) -> Result<TraverseIndex> {
         format: FORMAT_VERSION,
         name: scenario.name.clone(),
         description: describe(scenario, stops.len()),
-        full_scale_dn: Some(if scenario.camera.bit_depth == 8 { 255.0 } else { FULL_SCALE_DN }),
+        full_scale_dn: Some(scenario.camera.recorded_full_scale_dn()),
         stereo: StereoGeometry::Lateral,
         odometry_error: scenario.odometry_error,
-        mast: Some(mast),
+        mast: match rig {
+            Rig::Mast(mast) => Some(mast),
+            Rig::Body { .. } => None,
+        },
         scenario: Some(SCENARIO_FILE.into()),
         stops,
     })
@@ -88,8 +91,15 @@ fn describe(scenario: &Scenario, stops: usize) -> String {
             drive.start_distance_m, drive.start_bearing_deg,
         ),
     };
+    let cameras = match scenario.camera.rig {
+        CameraRig::MerNavcam => "Spirit's navcams",
+        CameraRig::MerPancam => "Opportunity's pancams",
+        CameraRig::MerFrontHazcam => "Opportunity's front hazcams",
+        CameraRig::Table1Pancam => "the paper's f = 16 mm pair",
+        CameraRig::Table1Navcam => "the paper's f = 6 mm pair",
+    };
     format!(
-        "Simulated: {course}, Spirit's navcams at {size} × {size} px, seed {}.",
+        "Simulated: {course}, {cameras}, images {size} px wide, seed {}.",
         scenario.seed,
         size = scenario.camera.image_size,
     )

@@ -23,8 +23,8 @@
 //! light          sky             direct and diffuse light    law         laws of reflection
 //!                reflection      what a surface sends        openness    contact shadows
 //! camera         rig             the pairs of cameras        sampling    rays of a tile, their radiance
-//!                render          blur, regions               exposure    the time of exposure
-//!                noise           electrons, numbers
+//!                optics          point spread, flat field    render      clean radiance, development
+//!                exposure        electrons, automatic time   noise       detector, numbers
 //! rover          drive, course   where it truly stands       odometry    where it believes to stand
 //!                suspension      how its wheels stand        body        what casts its shadow
 //! index          the traverse's index                        truth       ranges, surfaces, visibility
@@ -54,7 +54,8 @@ pub mod library;
 #[cfg(test)]
 mod tests;
 
-pub use camera::render::{Eye, NoiseSeed, Region, render, render_clean, render_region};
+pub use camera::render::{Eye, NoiseSeed, Region, clean_radiance, develop, render};
+pub use camera::rig::Rig;
 pub use index::{SCENARIO_FILE, index, true_camera_in_site};
 pub use scenario::Scenario;
 pub use targets::{choose_targets, share_on_rocks, surface_point};

@@ -10,6 +10,7 @@ mod image_cache;
 pub mod import;
 mod index_file;
 pub mod native;
+pub mod render_cache;
 mod simulated;
 mod stops;
 
@@ -21,6 +22,7 @@ use crate::frames::PoseRecord;
 
 pub use index_file::{Existing, IndexFormat};
 pub use native::{Traverse, write};
+pub use render_cache::RenderCache;
 pub use simulated::create_simulated;
 
 /// The version of the folder format that this code writes.

@@ -43,6 +43,8 @@
 //!
 //! Optional besides: `[mast]` (origin and head cameras) and `stops.mast_angles` (azimuth and elevation, rad).
 //!
+//! A simulated folder also gets `cache/`, from which nothing but time is lost when it is removed.
+//!
 //! Opening reads the index and the cameras, never an image: a traverse with missing images opens, and the
 //! stops that have theirs can be used. Images are decoded when asked for; the pairs used last are kept, up to
 //! [`CACHE_LIMIT_BYTES`].
@@ -178,11 +180,9 @@ impl Traverse {
     /// # Errors
     /// No such stop, images that cannot be written, or [`Error::Cancelled`] soon after `cancel` is set.
     pub fn render_step(&self, step: usize, cancel: &AtomicBool) -> Result<()> {
-        let stop = self.stop(step)?;
+        self.stop(step)?;
         match &self.simulated {
-            Some(simulated) if !self.is_ready(step) => {
-                simulated.render_missing(step, stop, &self.cameras[step], &self.folder, cancel)
-            }
+            Some(simulated) if !self.is_ready(step) => simulated.render_missing(self, step, cancel),
             _ => Ok(()),
         }
     }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::*;
 use crate::frames::{Pixel, Vector3};
 use crate::image::GrayImage;
+use crate::sim::scenario::Quantisation;
 use crate::study::truth::TruthSource;
 
 /// Two stops, 128 × 128 px, one sample a pixel.
@@ -153,4 +154,100 @@ fn an_index_that_cannot_be_rendered_names_the_field() {
     std::fs::write(folder.path().join("scenario.toml"), "[sun]\nelevation_deg = -3.0\n").unwrap();
     let message = refusal(&good);
     assert!(message.contains("scenario.toml: setting sun.elevation_deg"), "{message}");
+}
+
+/// A traverse of a scenario in a new folder below `folder`, with its radiance in the shared folder `renders`.
+fn sharing(scenario: &Scenario, folder: &Path, name: &str) -> Traverse {
+    let shared = RenderCache::new(folder.join("renders"), 1 << 24);
+    create_simulated(scenario, &folder.join(name)).unwrap().with_render_cache(shared)
+}
+
+/// The same traverse with nothing kept.
+fn alone(scenario: &Scenario, folder: &Path) -> Traverse {
+    create_simulated(scenario, folder).unwrap().with_render_cache(RenderCache::new(folder, 0))
+}
+
+#[test]
+fn another_noise_or_exposure_renders_nothing_and_gives_the_bits_of_rendering() {
+    let folder = tempfile::tempdir().unwrap();
+    let first = sharing(&scenario(), folder.path(), "first");
+    let pairs = [0, 1].map(|step| first.capture(step).unwrap());
+    assert_eq!(first.rendered_count(), 4);
+    type Change = fn(&mut Scenario);
+    let changes: [(&str, Change); 4] = [
+        ("noise", |scenario| scenario.camera.noise_seed = Some(77)),
+        ("level", |scenario| (scenario.camera.mean_level, scenario.camera.vignetting) = (0.2, 1.0)),
+        ("full", |scenario| scenario.camera.exposure = ExposureMode::FullFrame),
+        ("eight", |scenario| {
+            scenario.camera.exposure = ExposureMode::Subframe;
+            (scenario.camera.bit_depth, scenario.camera.quantisation) = (8, Quantisation::SquareRoot);
+        }),
+    ];
+    for (name, change) in changes {
+        let mut other = scenario();
+        change(&mut other);
+        let kept = sharing(&other, folder.path(), name);
+        let anew = alone(&other, &folder.path().join(format!("{name} anew")));
+        for step in [1, 0] {
+            let (kept, anew) = (kept.capture(step).unwrap(), anew.capture(step).unwrap());
+            assert_eq!((&kept.left, &kept.right), (&anew.left, &anew.right), "{name} {step}");
+            assert_ne!(kept.left, pairs[step].left, "{name} {step}");
+        }
+        assert_eq!(kept.rendered_count(), 0, "{name}");
+        assert!(anew.rendered_count() >= 4, "{name}");
+    }
+    let again = sharing(&scenario(), folder.path(), "again");
+    assert_eq!(again.capture(1).unwrap().right, pairs[1].right);
+    assert_eq!(again.rendered_count(), 0);
+}
+
+#[test]
+fn radiance_that_is_damaged_or_of_another_renderer_is_rendered_anew() {
+    let folder = tempfile::tempdir().unwrap();
+    let first = create_simulated(&scenario(), folder.path()).unwrap().capture(0).unwrap();
+    let reopened = || {
+        std::fs::remove_dir_all(folder.path().join("images")).unwrap();
+        Traverse::open(folder.path()).unwrap()
+    };
+    let from_own_cache = reopened();
+    assert_eq!(from_own_cache.capture(0).unwrap().left, first.left);
+    assert_eq!(from_own_cache.rendered_count(), 0);
+
+    let cache = RenderCache::new(folder.path().join("cache"), 1 << 24);
+    let camera = camera_in_site(&from_own_cache, 0, Eye::Left).unwrap();
+    let key = render_cache::key(&scenario(), &stop_key(&from_own_cache.index().stops[0], 0), &camera);
+    let mut brighter = cache.load(&key, &camera).unwrap();
+    brighter.iter_mut().for_each(|value| *value *= 1.01);
+    cache.store(&key, &brighter);
+    let doubting = reopened();
+    assert_eq!(doubting.capture(0).unwrap().left, first.left);
+    assert_eq!(doubting.rendered_count(), 1);
+
+    std::fs::write(folder.path().join(format!("cache/{key}.npy")), b"half").unwrap();
+    let mending = reopened();
+    assert_eq!(mending.capture(0).unwrap().left, first.left);
+    assert_eq!(mending.rendered_count(), 1);
+}
+
+#[test]
+fn both_eyes_share_an_exposure_that_does_not_depend_on_the_order_of_asking() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut auto = scenario();
+    auto.camera.exposure = ExposureMode::FullFrame;
+    (auto.camera.auto_exposure.start_s, auto.camera.auto_exposure.change_percent) = (5.0, 30.0);
+    let never = AtomicBool::new(false);
+    let forward = sharing(&auto, folder.path(), "forward");
+    let times = [0, 1].map(|step| forward.exposure_s(step, &never).unwrap().unwrap());
+    let backward = sharing(&auto, folder.path(), "backward");
+    let last = backward.capture(1).unwrap();
+    assert_eq!(backward.exposure_s(0, &never).unwrap(), Some(times[0]));
+    assert!(times[0] < 2.0, "{times:?}");
+    for (eye, picture) in [(Eye::Left, &last.left), (Eye::Right, &last.right)] {
+        let camera = camera_in_site(&forward, 1, eye).unwrap();
+        let whole = Region::whole(&camera);
+        let radiance = clean_radiance(forward.world().unwrap(), &auto, &camera, whole, &never).unwrap();
+        let seed = NoiseSeed { step: 1, eye };
+        assert_eq!(**picture, develop(&radiance, &auto, &camera, times[1], seed));
+    }
+    assert!(forward.exposure_s(2, &never).is_err());
 }

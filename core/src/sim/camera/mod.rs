@@ -1,5 +1,8 @@
-//! The cameras that see it: samples of a pixel's area, the optics' blur, the exposure and the detector.
+//! The cameras that see it: which pair, samples of a pixel's area, the optics, the exposure, the detector.
 
+pub mod rig;
 pub mod sampling;
+pub mod optics;
 pub mod render;
+pub mod exposure;
 pub mod noise;

@@ -1,26 +1,32 @@
-//! The sensor chain: from the clean picture to the recorded numbers.
+//! The detector: from the electrons of a picture to its recorded numbers.
 //!
 //! ```text
-//! S  = g (4095 · level − bias) · (1 + response)        electrons; level: fraction of full scale
-//! N  = Poisson(S) + Normal(0, σ_read)
-//! DN = clip(round(N/g + bias), 0, 4095),  value = DN/4095                        12 bit
-//! DN8 = round(DN · 255/4095),             value = DN8/255                         8 bit
+//! S   = light · (1 + response) + smear + dark                     electrons (`exposure.rs`)
+//! N   = min(Poisson(S), full well) + Normal(0, σ_read)
+//! DN  = clip(round(N/g + bias), 0, 4095),       value = DN/4095                          12 bit
+//! DN8 = round(DN · 255/4095),                   value = DN8/255                          8 bit, linear
+//! DN8 = round(255 √(DN/4095)),                  value = round(4095 (DN8/255)²)/4095      8 bit, square root
 //! ```
 //!
-//! `response` is a pixel's own deviation, Gaussian and fixed for each camera of a scenario; the scene moves
-//! over it from stop to stop. Dark current and smear are left out (below −55 °C the one is negligible, the
-//! other is corrected on board). Var(DN) = S/g² + (σ_read/g)² + 1/12 for a fixed scene without `response`.
+//! The last line's inverse keeps the recorded value linear in the light, as ground products do (ILF): shot
+//! noise then has about the same width in DN8 everywhere, and steps of the value grow with the light.
 //!
-//! Each pixel has its own stream of random numbers, started from (scenario, step, eye, place), so that the
-//! noise of a region equals that of the whole picture, whatever the number of threads.
+//! `response` is a pixel's own deviation, Gaussian and fixed for each camera of a scenario; the scene moves
+//! over it from stop to stop. It follows the scenario's seed; shot and read noise follow `noise_seed`.
+//! Var(DN) = S/g² + (σ_read/g)² + 1/12 for a fixed scene without `response`, so the slope of the variance over
+//! the mean is 1/g.
+//!
+//! Each pixel has its own stream of random numbers, started from (seed, step, eye, place), so that the noise
+//! of a region equals that of the whole picture, whatever the number of threads.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
 //! | g | `gain_electrons_per_dn` | e⁻/DN |
 //! | σ_read | `read_noise_electrons` | e⁻ |
+//! | full well | `full_well_electrons` | e⁻ |
 //! | bias | `bias_dn` | DN |
 //!
-//! Frame: pixels. Sources: domain.md 5.1, 11.3; R227.
+//! Frame: pixels. Sources: domain.md 5.1, 5.3, 11.3; R227.
 
 use rand_distr::{Distribution, Poisson, StandardNormal};
 use rand_pcg::Pcg32;
@@ -28,28 +34,38 @@ use rayon::prelude::*;
 
 use crate::image::GrayImage;
 
-use crate::sim::camera::render::{Eye, NoiseSeed};
+use crate::sim::camera::exposure::Rates;
+use crate::sim::camera::render::NoiseSeed;
 use crate::sim::ground::texture::mix;
-use crate::sim::scenario::{CameraSettings, Scenario};
+use crate::sim::scenario::{CameraSettings, Quantisation, Scenario};
 
 /// The largest number of the 12-bit converter.
 pub const FULL_SCALE_DN: f64 = 4095.0;
+/// The largest number of 8 bits.
+const BYTE_DN: f64 = 255.0;
 
-/// Records a clean picture whose first pixel is `first` of the whole picture.
-pub fn expose(clean: &GrayImage, scenario: &Scenario, seed: NoiseSeed, first: [u32; 2]) -> GrayImage {
-    let width = clean.width() as usize;
-    let eye = match seed.eye {
-        Eye::Left => 1,
-        Eye::Right => 2,
-    };
-    let camera_key = mix(scenario.seed ^ mix(0xca3e_0000 + eye));
-    let exposure_key = mix(camera_key ^ (u64::from(seed.step) + 1));
-    let mut recorded = clean.clone();
-    recorded.par_chunks_mut(width.max(1)).enumerate().for_each(|(y, line)| {
+/// Records what a picture collects in `time_s`; `first` is its first pixel in the whole picture.
+pub fn record(
+    rates: &Rates,
+    scenario: &Scenario,
+    time_s: f64,
+    seed: NoiseSeed,
+    first: [u32; 2],
+) -> GrayImage {
+    let camera = &scenario.camera;
+    let key_of = |seed_of_key: u64| mix(seed_of_key ^ mix(0xca3e_0000 + seed.eye.number()));
+    let response_key = key_of(scenario.seed);
+    let noise_key = mix(key_of(camera.noise_seed.unwrap_or(scenario.seed)) ^ (u64::from(seed.step) + 1));
+    let mut recorded = rates.per_s().clone();
+    let width = recorded.width().max(1) as usize;
+    recorded.par_chunks_mut(width).enumerate().for_each(|(y, line)| {
         for (x, value) in line.iter_mut().enumerate() {
             let place = ((u64::from(first[1]) + y as u64) << 32) | (u64::from(first[0]) + x as u64);
-            let response = normal(&mut stream(camera_key, place)) * scenario.camera.response_spread;
-            *value = record(f64::from(*value), response, &scenario.camera, &mut stream(exposure_key, place));
+            let response = normal(&mut stream(response_key, place)) * camera.response_spread;
+            let light = f64::from(*value) * time_s * (1.0 + response);
+            let electrons = light.max(0.0) + rates.others(x, time_s, camera);
+            let dn = converted(electrons, camera, &mut stream(noise_key, place));
+            *value = quantised(dn, camera);
         }
     });
     recorded
@@ -65,82 +81,27 @@ fn normal(random: &mut Pcg32) -> f64 {
     StandardNormal.sample(random)
 }
 
-/// One pixel: its recorded value as a fraction of full scale.
-fn record(level: f64, response: f64, camera: &CameraSettings, random: &mut Pcg32) -> f32 {
-    let gain = camera.gain_electrons_per_dn;
-    let electrons = (gain * (FULL_SCALE_DN * level - camera.bias_dn) * (1.0 + response)).max(0.0);
+/// The whole number of the 12-bit converter for a mean charge, DN.
+fn converted(electrons: f64, camera: &CameraSettings, random: &mut Pcg32) -> f64 {
     let counted = Poisson::new(electrons).map_or(0.0, |poisson| poisson.sample(random));
-    let read = counted + camera.read_noise_electrons * normal(random);
-    let dn = (read / gain + camera.bias_dn).round().clamp(0.0, FULL_SCALE_DN);
-    if camera.bit_depth == 8 {
-        return ((dn * 255.0 / FULL_SCALE_DN).round() / 255.0) as f32;
-    }
-    (dn / FULL_SCALE_DN) as f32
+    let read = counted.min(camera.full_well_electrons) + camera.read_noise_electrons * normal(random);
+    (read / camera.gain_electrons_per_dn + camera.bias_dn).round().clamp(0.0, FULL_SCALE_DN)
+}
+
+/// The recorded value of a number of the 12-bit converter, fraction of full scale.
+fn quantised(dn: f64, camera: &CameraSettings) -> f32 {
+    let level = dn / FULL_SCALE_DN;
+    let value = match (camera.bit_depth, camera.quantisation) {
+        (8, Quantisation::Linear) => (level * BYTE_DN).round() / BYTE_DN,
+        (8, Quantisation::SquareRoot) => {
+            let byte = (level.sqrt() * BYTE_DN).round() / BYTE_DN;
+            (byte * byte * FULL_SCALE_DN).round() / FULL_SCALE_DN
+        }
+        _ => level,
+    };
+    value as f32
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn recorded(level: f32, change: impl Fn(&mut CameraSettings)) -> GrayImage {
-        let mut scenario = Scenario::demo();
-        scenario.camera.response_spread = 0.0;
-        change(&mut scenario.camera);
-        let clean = GrayImage::from_pixel(256, 256, image::Luma([level]));
-        expose(&clean, &scenario, NoiseSeed { step: 3, eye: Eye::Left }, [0, 0])
-    }
-
-    fn mean_and_variance_dn(image: &GrayImage) -> (f64, f64) {
-        let dn: Vec<f64> = image.pixels().map(|p| f64::from(p.0[0]) * FULL_SCALE_DN).collect();
-        let mean = dn.iter().sum::<f64>() / dn.len() as f64;
-        (mean, dn.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / dn.len() as f64)
-    }
-
-    #[test]
-    fn variance_is_that_of_shot_and_read_noise() {
-        for (level, gain, read) in
-            [(0.05f32, 42.0, 30.0), (0.4, 42.0, 30.0), (0.8, 42.0, 30.0), (0.3, 8.0, 60.0)]
-        {
-            let image = recorded(level, |camera| {
-                camera.gain_electrons_per_dn = gain;
-                camera.read_noise_electrons = read;
-            });
-            let (mean, variance) = mean_and_variance_dn(&image);
-            let level_dn = f64::from(level) * FULL_SCALE_DN;
-            let expected = (level_dn - 20.0) / gain + (read / gain).powi(2) + 1.0 / 12.0;
-            assert!((mean - level_dn).abs() < 5.0 * (expected / 65_536.0).sqrt(), "{mean} {level_dn}");
-            assert!((variance / expected - 1.0).abs() < 0.05, "{variance} {expected}");
-        }
-    }
-
-    #[test]
-    fn values_are_whole_numbers_of_the_converter() {
-        for (depth, steps) in [(12, 4095.0f64), (8, 255.0)] {
-            for pixel in recorded(0.37, |camera| camera.bit_depth = depth).pixels() {
-                let dn = f64::from(pixel.0[0]) * steps;
-                assert!((dn - dn.round()).abs() < 1e-3, "{dn}");
-            }
-        }
-    }
-
-    #[test]
-    fn the_response_of_a_pixel_stays_from_one_exposure_to_the_next() {
-        let scenario = Scenario::demo();
-        let clean = GrayImage::from_pixel(256, 256, image::Luma([0.5]));
-        let take = |step, eye| expose(&clean, &scenario, NoiseSeed { step, eye }, [0, 0]);
-        let correlation = |a: &GrayImage, b: &GrayImage| {
-            let (ma, va) = mean_and_variance_dn(a);
-            let (mb, vb) = mean_and_variance_dn(b);
-            let sum: f64 = (a.pixels().zip(b.pixels()))
-                .map(|(p, q)| {
-                    (f64::from(p.0[0]) * FULL_SCALE_DN - ma) * (f64::from(q.0[0]) * FULL_SCALE_DN - mb)
-                })
-                .sum();
-            sum / 65_536.0 / (va * vb).sqrt()
-        };
-        let first = take(0, Eye::Left);
-        // Response 1 % of 2028 DN against a shot and read noise of 7 DN.
-        assert!(correlation(&first, &take(1, Eye::Left)) > 0.85);
-        assert!(correlation(&first, &take(0, Eye::Right)).abs() < 0.02);
-    }
-}
+#[path = "noise_tests.rs"]
+mod tests;

@@ -1,18 +1,26 @@
-//! Rendering: from a camera in the site to the picture that it takes.
+//! Rendering: from a camera in the site to the picture that it takes, in two halves.
+//!
+//! **Clean radiance** ([`clean_radiance`]) follows from world, light and camera model alone:
 //!
 //! 1. `sampling.rs` averages the radiance over each pixel's area, for the pixels asked for and a margin.
-//! 2. The optics blur it by a Gaussian of σ = `blur_px` (kernel cut at 4σ, sum 1; the margin is as wide, so
-//!    a region of a picture has the same bits as the whole picture has there).
-//! 3. The exposure scales radiance to the detector: `level = bias/4095 + exposure · radiance`, at most 1.
-//!    This is the *clean* picture: the expectation of the recorded one, in fractions of full scale.
-//! 4. `noise.rs` draws the noise and quantises.
+//! 2. The optics blur it (`optics.rs`; the margin is as wide as the kernel, so a region of a picture has the
+//!    same bits as the whole picture has there).
 //!
-//! The exposure is fixed for a world: such that the mean of the first left picture is `mean_level`, taken
-//! on 64 × 64 rays. Rows of tiles are shared between threads; every pixel is a function of its place alone,
-//! so the bits do not depend on the number of threads.
+//! **Development** ([`develop`]) makes the picture of it and renders nothing, so that exposure, detector and
+//! noise can be changed, or noise drawn again, on radiance that was kept:
 //!
-//! Units: pixel values are fractions of full scale (4095 DN). Frame: the camera is given in the site frame.
-//! Sources: domain.md 11.3.
+//! 3. Flat field, time of exposure, smear and dark give electrons (`exposure.rs`).
+//! 4. Response, noise, converter and quantisation give the recorded numbers (`noise.rs`).
+//!
+//! Without 4 it is the *clean* picture ([`Rates::levels`]): the expectation of the recorded one without
+//! response, in fractions of full scale.
+//!
+//! The fixed exposure is such that the mean of the first left picture is `mean_level`, taken on 64 rays along
+//! each side. Rows of tiles are shared between threads; every pixel is a function of its place alone, so the
+//! bits do not depend on the number of threads.
+//!
+//! Units: radiance as in `light/reflection.rs`; levels are fractions of full scale (4095 DN); time in s.
+//! Frame: the camera is given in the site frame. Sources: domain.md 11.3.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -23,7 +31,10 @@ use crate::error::{Error, Result};
 use crate::frames::Pixel;
 use crate::image::GrayImage;
 
+use crate::sim::camera::exposure::{Rates, fixed_s};
 use crate::sim::camera::noise;
+use crate::sim::camera::optics::{FlatField, blur, gaussian};
+use crate::sim::camera::rig::Rig;
 use crate::sim::camera::sampling::{Sampler, TILE_PX};
 use crate::sim::rover::drive;
 use crate::sim::scenario::Scenario;
@@ -36,6 +47,16 @@ pub enum Eye {
     Left,
     /// The right camera.
     Right,
+}
+
+impl Eye {
+    /// The number that stands for it in seeds.
+    pub(in crate::sim) fn number(self) -> u64 {
+        match self {
+            Self::Left => 1,
+            Self::Right => 2,
+        }
+    }
 }
 
 /// Whose noise it is: two pictures with the same seed have the same noise.
@@ -67,20 +88,35 @@ impl Region {
     }
 }
 
-/// The picture that a camera takes, with noise and quantisation.
+/// The picture that a camera takes under the fixed exposure, with noise and quantisation.
 pub fn render(world: &World, scenario: &Scenario, camera_in_site: &Camera, seed: NoiseSeed) -> GrayImage {
-    let clean = render_clean(world, scenario, camera_in_site);
-    noise::expose(&clean, scenario, seed, [0, 0])
-}
-
-/// The noise-free picture: the expectation of the recorded one.
-pub fn render_clean(world: &World, scenario: &Scenario, camera_in_site: &Camera) -> GrayImage {
     let never = AtomicBool::new(false);
-    render_region(world, scenario, camera_in_site, Region::whole(camera_in_site), &never).unwrap_or_default()
+    let whole = Region::whole(camera_in_site);
+    let radiance = clean_radiance(world, scenario, camera_in_site, whole, &never)
+        .unwrap_or_else(|_| GrayImage::default());
+    develop(&radiance, scenario, camera_in_site, fixed_s(world, scenario), seed)
 }
 
-/// A part of the noise-free picture; stops soon after `cancel` is set.
-pub fn render_region(
+/// The recorded picture of a whole picture of clean radiance; renders nothing.
+///
+/// `camera` is the one that the radiance was rendered for, in any frame; `time_s` the time of exposure, s.
+pub fn develop(
+    radiance: &GrayImage,
+    scenario: &Scenario,
+    camera: &Camera,
+    time_s: f64,
+    seed: NoiseSeed,
+) -> GrayImage {
+    let rates = Rates::new(radiance, scenario, camera, seed.eye, [0, 0]);
+    noise::record(&rates, scenario, time_s, seed, [0, 0])
+}
+
+/// Radiance behind the optics of a part of a picture, before exposure and detector; stops soon after `cancel`
+/// is set.
+///
+/// # Errors
+/// [`Error::Cancelled`].
+pub fn clean_radiance(
     world: &World,
     scenario: &Scenario,
     camera_in_site: &Camera,
@@ -109,55 +145,25 @@ pub fn render_region(
         Ok(())
     })?;
     let blurred = blur(&radiance, [width, height], &kernel);
-    let bias = (scenario.camera.bias_dn / noise::FULL_SCALE_DN) as f32;
-    let exposure = world.exposure as f32;
-    let levels = blurred.into_iter().map(|radiance| (bias + exposure * radiance).min(1.0)).collect();
-    Ok(GrayImage::from_raw(region.width, region.height, levels).unwrap_or_default())
-}
-
-/// A Gaussian of σ `sigma_px`, cut at 4σ, with the sum 1.
-fn gaussian(sigma_px: f64) -> Vec<f32> {
-    let reach = (4.0 * sigma_px).ceil() as i32;
-    let value = |k: i32| if sigma_px > 0.0 { (-0.5 * (f64::from(k) / sigma_px).powi(2)).exp() } else { 1.0 };
-    let values: Vec<f64> = (-reach..=reach).map(value).collect();
-    let sum: f64 = values.iter().sum();
-    values.into_iter().map(|v| (v / sum) as f32).collect()
-}
-
-/// Convolves rows, then columns, keeping only where the whole kernel fits.
-fn blur(values: &[f32], [width, height]: [usize; 2], kernel: &[f32]) -> Vec<f32> {
-    let lost = kernel.len() - 1;
-    let (inner_width, inner_height) = (width - lost, height - lost);
-    let mut along_rows = vec![0.0f32; inner_width * height];
-    for (line, out) in values.chunks(width).zip(along_rows.chunks_mut(inner_width)) {
-        for (k, weight) in kernel.iter().enumerate() {
-            out.iter_mut().zip(&line[k..]).for_each(|(sum, value)| *sum += weight * value);
-        }
-    }
-    let mut blurred = vec![0.0f32; inner_width * inner_height];
-    for (y, out) in blurred.chunks_mut(inner_width).enumerate() {
-        for (k, weight) in kernel.iter().enumerate() {
-            let line = &along_rows[(y + k) * inner_width..(y + k + 1) * inner_width];
-            out.iter_mut().zip(line).for_each(|(sum, value)| *sum += weight * value);
-        }
-    }
-    blurred
+    Ok(GrayImage::from_raw(region.width, region.height, blurred).unwrap_or_default())
 }
 
 /// Fraction of full scale per unit of radiance that gives the first left picture its mean level.
 pub(in crate::sim) fn exposure(world: &World, scenario: &Scenario) -> f64 {
     /// Rays along each side of the picture.
     const SIDE: u32 = 64;
-    let mast = drive::mast(scenario);
     let Ok(stop) = drive::first_stop(world, scenario) else { return 1.0 };
-    let camera = mast.cameras_in_rover(stop.angles).0.moved(&stop.site_from_rover);
+    let rig = Rig::new(&scenario.camera);
+    let camera = rig.cameras_in_rover(stop.angles).0.moved(&stop.site_from_rover);
     let sampler = Sampler::new(world, &camera, 1);
-    let stride = (camera.width() / SIDE).max(1);
+    let flat = FlatField::new(scenario, &camera, Eye::Left);
+    let middle = |k: u32, side: u32| ((2 * k + 1) * side) / (2 * SIDE);
     let mut sum = 0.0;
     for row in 0..SIDE {
         for column in 0..SIDE {
-            let [x, y] = [column, row].map(|k| i64::from(k * stride + stride / 2));
-            sum += sampler.tile(x, y, 1, 1).iter().copied().map(f64::from).sum::<f64>();
+            let (x, y) = (middle(column, camera.width()), middle(row, camera.height()));
+            let radiance = sampler.tile(i64::from(x), i64::from(y), 1, 1);
+            sum += flat.at(x, y) * radiance.iter().copied().map(f64::from).sum::<f64>();
         }
     }
     let mean = sum / f64::from(SIDE * SIDE);

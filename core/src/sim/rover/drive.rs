@@ -17,6 +17,7 @@
 use crate::camera::Mast;
 use crate::error::Result;
 use crate::frames::Point3;
+use crate::sim::camera::rig::Rig;
 
 use crate::sim::ground::terrain::MEAN_GROUND_Z_M;
 use crate::sim::rover::course;
@@ -55,7 +56,7 @@ pub fn planned(drive: &DriveSettings) -> Result<TrueDrive> {
     course::drive(&Scene {
         ground_z_m: &|_, _| MEAN_GROUND_Z_M,
         centre: Point3::new(x_m, y_m, MEAN_GROUND_Z_M),
-        mast: &Mast::spirit(),
+        rig: &Rig::Mast(Mast::spirit()),
         drive,
         rover: &RoverSettings::default(),
     })
@@ -106,20 +107,9 @@ pub fn ground_extent_m(drive: &DriveSettings) -> [[f64; 2]; 2] {
     extent_m
 }
 
-/// The mast of the scenario: Spirit's navcams, reduced to the scenario's image size by block averages.
-pub fn mast(scenario: &Scenario) -> Mast {
-    let mut mast = Mast::spirit();
-    let factor = (mast.left_in_head.width() / scenario.camera.image_size.max(1)).max(1);
-    if factor > 1 {
-        mast.left_in_head = mast.left_in_head.downsampled(factor);
-        mast.right_in_head = mast.right_in_head.downsampled(factor);
-    }
-    mast
-}
-
 /// Distance from the centre of the left camera to the targets' centre, m.
-pub fn distance_m(world: &World, mast: &Mast, stop: &TrueStop) -> f64 {
-    let (left, _) = mast.cameras_in_rover(stop.angles);
+pub fn distance_m(world: &World, rig: &Rig, stop: &TrueStop) -> f64 {
+    let (left, _) = rig.cameras_in_rover(stop.angles);
     (stop.site_from_rover * left.model.centre() - world.targets_centre()).norm()
 }
 
@@ -128,7 +118,7 @@ fn in_scene<T>(world: &World, scenario: &Scenario, act: impl FnOnce(&Scene<'_>) 
     act(&Scene {
         ground_z_m: &|x_m, y_m| world.ground_z_at(x_m, y_m),
         centre: world.targets_centre(),
-        mast: &mast(scenario),
+        rig: &Rig::new(&scenario.camera),
         drive: &scenario.drive,
         rover: &scenario.rover,
     })

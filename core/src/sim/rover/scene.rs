@@ -12,9 +12,10 @@
 //!
 //! Frames: site and rover. Source: papers.md R25, R104.
 
-use crate::camera::{Mast, MastAngles};
+use crate::camera::MastAngles;
 use crate::frames::{Point3, Pose};
 
+use crate::sim::camera::rig::Rig;
 use crate::sim::rover::suspension::{Stand, SuspensionAngles, settle};
 use crate::sim::scenario::{DriveSettings, RoverSettings};
 
@@ -33,8 +34,8 @@ pub struct Scene<'a> {
     pub ground_z_m: &'a dyn Fn(f64, f64) -> f64,
     /// The targets' centre, site frame, m.
     pub centre: Point3,
-    /// The mast that looks at it.
-    pub mast: &'a Mast,
+    /// The cameras, of which the left one looks at it where they can be pointed.
+    pub rig: &'a Rig,
     /// How the rover drives.
     pub drive: &'a DriveSettings,
     /// How its wheels slip.
@@ -46,8 +47,9 @@ pub struct Scene<'a> {
 pub struct TrueStop {
     /// The rover in the site frame.
     pub site_from_rover: Pose,
-    /// The angles that put the targets' centre on the centre of the left image.
-    pub angles: MastAngles,
+    /// The angles that put the targets' centre on the centre of the left image; nothing where cameras are fixed to
+    /// the body.
+    pub angles: Option<MastAngles>,
     /// The angles of the suspension.
     pub suspension: SuspensionAngles,
 }
@@ -126,10 +128,9 @@ pub(super) fn pieces(length_m: f64, turn_rad: f64) -> u32 {
 
 impl Scene<'_> {
     /// The angles that point the mast of a standing rover at the targets' centre, and the distance D, m.
-    pub(super) fn look(&self, site_from_rover: &Pose) -> Option<(MastAngles, f64)> {
-        let angles =
-            self.mast.point_left_centre_at(&site_from_rover.inverse_transform_point(&self.centre))?;
-        let (left, _) = self.mast.cameras_in_rover(angles);
+    pub(super) fn look(&self, site_from_rover: &Pose) -> Option<(Option<MastAngles>, f64)> {
+        let angles = self.rig.point_at(&site_from_rover.inverse_transform_point(&self.centre)).ok()?;
+        let (left, _) = self.rig.cameras_in_rover(angles);
         Some((angles, (site_from_rover * left.model.centre() - self.centre).norm()))
     }
 

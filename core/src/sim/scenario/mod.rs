@@ -28,7 +28,7 @@ use utoipa::ToSchema;
 use crate::error::{Error, Result};
 use crate::traverse::OdometryError;
 
-pub use camera::CameraSettings;
+pub use camera::{AutoExposureSettings, CameraRig, CameraSettings, ExposureMode, Quantisation};
 pub use drive::{Course, DriveSettings, Move};
 pub use events::{Cloud, EventSettings, Occluder};
 pub use fiducials::Fiducial;

@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::frames::{Pixel, Pose};
-use crate::sim::rover::drive::{distance_m, distances_m, mast, true_stops};
+use crate::sim::camera::rig::Rig;
+use crate::sim::rover::drive::{distance_m, distances_m, true_stops};
 use crate::sim::rover::odometry::estimates;
 
 #[test]
@@ -10,11 +11,11 @@ fn seventeen_stops_follow_the_powers_of_nine_tenths() {
     let demo = demo();
     let stops = true_stops(&demo.world, &demo.scenario).unwrap();
     assert_eq!((stops.len(), demo.index.stops.len()), (17, 17));
-    let mast = mast(&demo.scenario);
+    let rig = Rig::new(&demo.scenario.camera);
     for (step, stop) in stops.iter().enumerate() {
         let wanted_m = 10.0 * 0.9f64.powi(step as i32);
-        assert!((distance_m(&demo.world, &mast, stop) - wanted_m).abs() < 1e-9);
-        let (left, _) = mast.cameras_in_rover(stop.angles);
+        assert!((distance_m(&demo.world, &rig, stop) - wanted_m).abs() < 1e-9);
+        let (left, _) = rig.cameras_in_rover(stop.angles);
         let pixel = left.moved(&stop.site_from_rover).project(&demo.world.targets_centre()).unwrap();
         assert!(pixel.distance(Pixel::new(511.5, 511.5)) < 1e-6, "{pixel:?}");
     }
@@ -107,13 +108,13 @@ fn a_miscalibrated_mast_shows_in_the_true_cameras_only() {
     let mut scenario = demo().scenario.clone();
     scenario.drive.mast_offset_deg = [0.2, -0.1];
     let index = crate::sim::index(&scenario, &demo().world).unwrap();
-    let mast = mast(&scenario);
+    let rig = Rig::new(&scenario.camera);
     for (stop, without) in index.stops.iter().zip(&demo().index.stops) {
         assert_eq!((&stop.left, stop.mast_angles), (&without.left, without.mast_angles));
         let mut angles = stop.mast_angles.unwrap();
         angles.azimuth_rad += 0.2f64.to_radians();
         angles.elevation_rad += -0.1f64.to_radians();
-        let (left, right) = mast.cameras_in_rover(angles);
+        let (left, right) = rig.cameras_in_rover(Some(angles));
         let truth = stop.truth.as_ref().unwrap();
         assert_eq!((&truth.left_camera, &truth.right_camera), (&Some(left), &Some(right)));
         // The mast looks to the right of the targets and below them: they appear to the left and above.

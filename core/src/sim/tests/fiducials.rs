@@ -46,8 +46,10 @@ fn cameras() -> Vec<(&'static str, Camera)> {
 fn picture(scenario: &Scenario, world: &World, camera: &Camera, pixel: Pixel) -> (Region, GrayImage) {
     let first = |v: f64| (v.round() as u32).saturating_sub(56);
     let region = Region { x: first(pixel.x), y: first(pixel.y), width: 112, height: 112 };
-    let never = std::sync::atomic::AtomicBool::new(false);
-    (region, render_region(world, scenario, camera, region, &never).unwrap())
+    (
+        region,
+        clean_radiance(world, scenario, camera, region, &std::sync::atomic::AtomicBool::new(false)).unwrap(),
+    )
 }
 
 /// The picture's value between pixels, bilinear; px of the region.

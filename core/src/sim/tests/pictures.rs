@@ -7,9 +7,27 @@ use crate::camera::Camera;
 use crate::error::Error;
 use crate::frames::Pixel;
 use crate::image::{GrayImage, sample::bicubic};
+use crate::sim::camera::exposure::{Rates, automatic, fixed_s};
+use crate::sim::camera::noise;
+use crate::sim::scenario::{CameraRig, ExposureMode};
 
 fn region(world: &World, scenario: &Scenario, camera: &Camera, region: Region) -> GrayImage {
-    render_region(world, scenario, camera, region, &AtomicBool::new(false)).unwrap()
+    clean_radiance(world, scenario, camera, region, &AtomicBool::new(false)).unwrap()
+}
+
+/// What is recorded of a part of a picture under the fixed exposure.
+fn recorded(
+    world: &World,
+    scenario: &Scenario,
+    camera: &Camera,
+    window: Region,
+    seed: NoiseSeed,
+) -> (GrayImage, GrayImage) {
+    let clean = region(world, scenario, camera, window);
+    let first = [window.x, window.y];
+    let rates = Rates::new(&clean, scenario, camera, seed.eye, first);
+    let noisy = noise::record(&rates, scenario, fixed_s(world, scenario), seed, first);
+    (clean, noisy)
 }
 
 fn camera(index: &TraverseIndex, stop: usize, eye: Eye) -> Camera {
@@ -123,22 +141,19 @@ fn rock_part(world: &World, camera: &Camera, x: f64, y: f64) -> f64 {
     hits.iter().filter(|rock| **rock).count() as f64 / hits.len().max(1) as f64
 }
 
-#[test]
-fn silhouettes_lie_where_exact_rays_of_the_camera_model_put_them() {
-    let (scenario, world) = silhouettes();
-    let index = &demo().index;
-    // Least squares: level = a + b part + c ∂part/∂x + d ∂part/∂y; a shift of s px gives c = −b s.
+/// How far (px) the silhouettes of rendered windows lie from where exact rays of their cameras put them.
+///
+/// Least squares: radiance = a + b part + c ∂part/∂x + d ∂part/∂y; a shift of s px gives c = −b s.
+fn silhouette_shift((scenario, world): &(Scenario, World), windows: &[(Camera, Region)]) -> [f64; 2] {
     let (mut matrix, mut right_side) = (nalgebra::Matrix4::zeros(), nalgebra::Vector4::zeros());
-    for (stop, eye, x) in [(2, Eye::Left, 480), (10, Eye::Right, 420), (14, Eye::Left, 480)] {
-        let camera = camera(index, stop, eye);
-        let window = Region { x, y: 470, width: 72, height: 72 };
-        let image = region(&world, &scenario, &camera, window);
-        let part =
-            |x: u32, y: u32| rock_part(&world, &camera, f64::from(window.x + x), f64::from(window.y + y));
-        let parts: Vec<f64> = (0..72 * 72).map(|k| part(k % 72, k / 72)).collect();
-        let at = |x: usize, y: usize| parts[y * 72 + x];
-        for y in 1..71usize {
-            for x in 1..71usize {
+    for (camera, window) in windows {
+        let (w, h) = (window.width as usize, window.height as usize);
+        let image = region(world, scenario, camera, *window);
+        let place = |k: usize| (f64::from(window.x) + (k % w) as f64, f64::from(window.y) + (k / w) as f64);
+        let parts: Vec<f64> = (0..w * h).map(place).map(|(x, y)| rock_part(world, camera, x, y)).collect();
+        let at = |x: usize, y: usize| parts[y * w + x];
+        for y in 1..h - 1 {
+            for x in 1..w - 1 {
                 let slope = [0.5 * (at(x + 1, y) - at(x - 1, y)), 0.5 * (at(x, y + 1) - at(x, y - 1))];
                 let row = nalgebra::Vector4::new(1.0, at(x, y), slope[0], slope[1]);
                 matrix += row * row.transpose();
@@ -147,9 +162,104 @@ fn silhouettes_lie_where_exact_rays_of_the_camera_model_put_them() {
         }
     }
     let fit = matrix.try_inverse().unwrap() * right_side;
-    let shift = [-fit[2] / fit[1], -fit[3] / fit[1]];
     assert!(fit[1] < -0.1, "rocks are dark: {fit:?}");
+    [-fit[2] / fit[1], -fit[3] / fit[1]]
+}
+
+#[test]
+fn silhouettes_lie_where_exact_rays_of_the_camera_model_put_them() {
+    let window = |x: u32| Region { x, y: 470, width: 72, height: 72 };
+    let windows = [(2, Eye::Left, 480), (10, Eye::Right, 420), (14, Eye::Left, 480)]
+        .map(|(stop, eye, x)| (camera(&demo().index, stop, eye), window(x)));
+    let shift = silhouette_shift(&silhouettes(), &windows);
     assert!(shift.iter().all(|s| s.abs() < 0.005), "{shift:?}");
+}
+
+/// The cameras of a rig in the site, with the rover at a stop of the demonstration and the mast at its target.
+fn rig_in_site(rig: CameraRig, image_size: u32, stop: usize) -> (Camera, Camera) {
+    let mut settings = demo().scenario.camera;
+    (settings.rig, settings.image_size) = (rig, image_size);
+    let site_from_rover = demo().index.stops[stop].truth.as_ref().unwrap().site_from_rover.to_pose();
+    let rig = Rig::new(&settings);
+    let centre_in_rover = site_from_rover.inverse_transform_point(&demo().world.targets_centre());
+    let (left, right) = rig.cameras_in_rover(rig.point_at(&centre_in_rover).unwrap());
+    (left.moved(&site_from_rover), right.moved(&site_from_rover))
+}
+
+/// The window of 60 × 60 px, without sky, in which rock and ground share the pixels most evenly.
+fn window_with_most_rock(world: &World, camera: &Camera) -> Region {
+    let evenness = |window: &Region| {
+        let pixels = (0..225).map(|k| (window.x + 4 * (k % 15), window.y + 4 * (k / 15)));
+        let rays = pixels.filter_map(|(x, y)| camera.ray(Pixel::new(f64::from(x), f64::from(y))));
+        let surfaces: Vec<_> = rays.filter_map(|ray| Some(world.cast(&ray)?.surface)).collect();
+        let rocks = surfaces.iter().filter(|surface| **surface != SurfaceId::Ground).count();
+        if surfaces.len() == 225 { rocks.min(225 - rocks) } else { 0 }
+    };
+    let [columns, rows] = camera.size.map(|side| (side - 60) / 20);
+    let windows = (0..=columns * rows).map(|k| (20 * (k % columns), 20 * (k / columns)));
+    let windows = windows.map(|(x, y)| Region { x, y, width: 60, height: 60 });
+    windows.max_by_key(evenness).unwrap()
+}
+
+#[test]
+fn silhouettes_of_every_rig_lie_where_exact_rays_of_its_models_put_them() {
+    let mut scene = silhouettes();
+    scene.0.camera.samples_per_axis = 8;
+    for rig in [CameraRig::MerPancam, CameraRig::MerFrontHazcam, CameraRig::Table1Pancam] {
+        let (left, right) = rig_in_site(rig, 256, 13);
+        let camera = if rig == CameraRig::MerPancam { left } else { right };
+        let window = window_with_most_rock(&scene.1, &camera);
+        let shift = silhouette_shift(&scene, &[(camera, window)]);
+        assert!(shift.iter().all(|s| s.abs() < 0.01), "{rig:?} {window:?} {shift:?}");
+    }
+}
+
+#[test]
+fn a_picture_that_is_not_square_is_rendered_and_developed_whole() {
+    let mut scenario = demo().scenario.clone();
+    (scenario.camera.rig, scenario.camera.image_size) = (CameraRig::Table1Navcam, 128);
+    let (left, _) = rig_in_site(CameraRig::Table1Navcam, 128, 8);
+    let picture = render(&demo().world, &scenario, &left, NoiseSeed { step: 8, eye: Eye::Left });
+    assert_eq!(picture.dimensions(), (128, 96));
+    let window = Region { x: 90, y: 70, width: 30, height: 20 };
+    let (_, part) = recorded(&demo().world, &scenario, &left, window, NoiseSeed { step: 8, eye: Eye::Left });
+    for (x, y, pixel) in part.enumerate_pixels() {
+        assert_eq!(picture.get_pixel(x + 90, y + 70), pixel);
+    }
+}
+
+#[test]
+fn sky_that_enters_the_frame_darkens_the_target_unless_a_subframe_is_metered() {
+    let mut scenario = demo().scenario.clone();
+    // An optical depth of 1 with the sun at 45° (domain.md 11.1).
+    scenario.sun.diffuse_fraction = 0.66;
+    (scenario.camera.samples_per_axis, scenario.camera.auto_exposure.subframe_px) = (1, 21);
+    // Its pattern belongs to the place in the frame, which is another one in each of them.
+    scenario.camera.flat_field_residue = 0.0;
+    let world = World::new(&scenario);
+    let (camera, _) = rig_in_site(CameraRig::MerNavcam, 128, 0);
+    // The part of a frame that shows sky, and the mean number (DN) of the 21 × 21 px around the target.
+    let frame = |side: u32, mode: ExposureMode| {
+        let mut scenario = scenario.clone();
+        scenario.camera.exposure = mode;
+        let camera = camera.subframe(64 - side / 2, 64 - side / 2, [side, side]);
+        let radiance = region(&world, &scenario, &camera, Region::whole(&camera));
+        let rays =
+            (0..side * side).filter_map(|k| camera.ray(Pixel::new(f64::from(k % side), f64::from(k / side))));
+        let sky = rays.filter(|ray| world.cast(ray).is_none()).count() as f64 / f64::from(side * side);
+        let rates = Rates::new(&radiance, &scenario, &camera, Eye::Left, [0, 0]);
+        let time_s = automatic(&rates, &scenario.camera, scenario.camera.auto_exposure.start_s).time_s;
+        let picture = rates.levels(time_s, &scenario.camera);
+        let corner = side / 2 - 10;
+        let window = (0..21 * 21).map(|k| picture.get_pixel(corner + k % 21, corner + k / 21).0[0]);
+        (sky, 4095.0 / 441.0 * window.map(f64::from).sum::<f64>())
+    };
+    let of_mode = |mode: ExposureMode| [36, 60, 90, 128].map(|side| frame(side, mode));
+    let (full, sub) = (of_mode(ExposureMode::FullFrame), of_mode(ExposureMode::Subframe));
+    assert!(full[0].0 == 0.0 && full[3].0 > 0.25, "{full:?}");
+    // From 1514 DN without sky to 643 DN with 10, 23 and 31 % of it: the target gets 58 % darker.
+    assert!(full[1..].iter().all(|(_, dn)| dn / full[0].1 < 0.6), "{full:?}");
+    assert!(sub.iter().all(|(_, dn)| (dn / sub[0].1 - 1.0).abs() < 1e-3), "{sub:?}");
 }
 
 #[test]
@@ -163,9 +273,8 @@ fn the_same_seed_gives_the_same_bits_with_one_thread_and_with_four() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let world = World::new(&scenario);
-            let clean = region(&world, &scenario, &camera, window);
             let seed = NoiseSeed { step: 9, eye: Eye::Left };
-            let noisy = crate::sim::camera::noise::expose(&clean, &scenario, seed, [window.x, window.y]);
+            let (clean, noisy) = recorded(&world, &scenario, &camera, window, seed);
             (clean.into_raw(), noisy.into_raw())
         })
     };
@@ -182,13 +291,12 @@ fn a_region_has_the_bits_of_the_whole_picture() {
     let big = Region { x: 400, y: 500, width: 90, height: 70 };
     let small = Region { x: 423, y: 517, width: 31, height: 29 };
     let seed = NoiseSeed { step: 12, eye: Eye::Right };
-    let record = |window: Region| {
-        let clean = region(&demo.world, &demo.scenario, &camera, window);
-        crate::sim::camera::noise::expose(&clean, &demo.scenario, seed, [window.x, window.y])
-    };
+    let record = |window: Region| recorded(&demo.world, &demo.scenario, &camera, window, seed);
     let (whole, part) = (record(big), record(small));
-    for (x, y, pixel) in part.enumerate_pixels() {
-        assert_eq!(whole.get_pixel(x + 23, y + 17), pixel);
+    for (whole, part) in [(whole.0, part.0), (whole.1, part.1)] {
+        for (x, y, pixel) in part.enumerate_pixels() {
+            assert_eq!(whole.get_pixel(x + 23, y + 17), pixel);
+        }
     }
 }
 
@@ -200,7 +308,9 @@ fn the_clean_picture_is_the_mean_of_noisy_ones_and_the_first_has_the_stated_leve
     let world = World::new(&scenario);
     let index = index(&scenario, &world).unwrap();
     let camera = camera(&index, 0, Eye::Left);
-    let clean = render_clean(&world, &scenario, &camera);
+    let radiance = region(&world, &scenario, &camera, Region::whole(&camera));
+    let rates = Rates::new(&radiance, &scenario, &camera, Eye::Left, [0, 0]);
+    let clean = rates.levels(fixed_s(&world, &scenario), &scenario.camera);
     let mean = |image: &GrayImage| image.iter().map(|v| f64::from(*v)).sum::<f64>() / image.len() as f64;
     assert!((mean(&clean) - 0.4).abs() < 0.01, "{}", mean(&clean));
     let noisy = render(&world, &scenario, &camera, NoiseSeed { step: 0, eye: Eye::Left });
@@ -213,6 +323,6 @@ fn rendering_stops_when_it_is_cancelled() {
     let demo = demo();
     let camera = camera(&demo.index, 0, Eye::Left);
     let cancelled = AtomicBool::new(true);
-    let result = render_region(&demo.world, &demo.scenario, &camera, Region::whole(&camera), &cancelled);
+    let result = clean_radiance(&demo.world, &demo.scenario, &camera, Region::whole(&camera), &cancelled);
     assert!(matches!(result, Err(Error::Cancelled)));
 }

@@ -3,6 +3,7 @@
 use super::courses::{close, moves, yaw_deg};
 use crate::camera::Mast;
 use crate::frames::Point3;
+use crate::sim::camera::rig::Rig;
 use crate::sim::rover::course;
 use crate::sim::rover::drive::{Scene, TrueDrive, planned};
 use crate::sim::rover::odometry::wheels_and_imu;
@@ -19,7 +20,7 @@ fn on_plane(drive: &DriveSettings, rover: &RoverSettings, a: f64) -> crate::erro
     course::drive(&Scene {
         ground_z_m: &|x, _| a * x + 0.294,
         centre: Point3::new(x, y, a * x + 0.294),
-        mast: &Mast::spirit(),
+        rig: &Rig::Mast(Mast::spirit()),
         drive,
         rover,
     })
