@@ -115,8 +115,10 @@ impl RenderCache {
 
 /// Whether a file is one of a cache, finished or left behind by a process that was ended while writing.
 fn is_ours(name: &str) -> bool {
-    let digits = name.trim_start_matches('.').split('.').next().unwrap_or_default();
-    digits.len() == 2 * DIGEST_BYTES && digits.bytes().all(|byte| byte.is_ascii_hexdigit())
+    let mut parts = name.trim_start_matches('.').split('.');
+    let digits = parts.next().unwrap_or_default();
+    let is_key = digits.len() == 2 * DIGEST_BYTES && digits.bytes().all(|byte| byte.is_ascii_hexdigit());
+    is_key && parts.next() == Some("npy")
 }
 
 /// What the clean radiance of a picture depends on, as 64 hexadecimal digits; `moment` is what is particular to
@@ -209,6 +211,30 @@ mod tests {
         let nothing = RenderCache::new(folder.path().join("none"), 0);
         nothing.store(&one, &picture(0.1));
         assert!(nothing.load(&one, &camera()).is_none() && !folder.path().join("none").exists());
+    }
+
+    #[test]
+    fn many_who_write_the_same_picture_never_read_half_of_it() {
+        use rayon::prelude::*;
+        let folder = tempfile::tempdir().unwrap();
+        let [one, two, _] = keys();
+        (0..64).into_par_iter().for_each(|k| {
+            // Each with a cache of its own, as processes have; one picture fits, the other one is removed.
+            let cache = RenderCache::new(folder.path(), 1500);
+            let (key, value) = if k % 2 == 0 { (&one, 0.1) } else { (&two, 0.2) };
+            cache.store(key, &picture(value));
+            assert!(cache.load(key, &camera()).is_none_or(|read| read == picture(value)));
+        });
+        assert!(std::fs::read_dir(folder.path()).unwrap().count() <= 2);
+    }
+
+    #[test]
+    fn only_files_of_a_cache_are_taken_for_its_own() {
+        let [one, ..] = keys();
+        assert!(is_ours(&format!("{one}.npy")) && is_ours(&format!(".{one}.npy.3.part")));
+        for stranger in [format!("{one}.png"), "notes.npy".into(), format!("{}.npy", &one[1..]), one] {
+            assert!(!is_ours(&stranger), "{stranger}");
+        }
     }
 
     #[test]
