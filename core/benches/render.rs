@@ -6,17 +6,19 @@
 //! | part | instructions | cycles |
 //! |---|---|---|
 //! | texture: 8 octaves of 4 hashed lattice points, two channels, gradient, turn | 8 × 110 | 440 |
+//! | drifts: 2 octaves; grains: 3 cells, few of them with a grain | 2 × 110 + 3 × 40 | 170 |
 //! | ground: 4 levels of blocks, about two blocks each, and one quadratic | 4 × 90 + 60 | 210 |
 //! | branches of the walk that cannot be foreseen | 6 × 15 cycles | 90 |
 //! | ray, light, openness, sun grid | 150 | 75 |
 //! | rocks in view and towards the sun: about one interval of 15 planes | 15 × 8 | 60 |
 //!
-//! together about 875 cycles, 3.1 million samples a second on a core at 2.7 GHz near the rocks; at 10 m half
-//! of the octaves are too fine for the picture and the bound is 4.5 million. A 1024 × 1024 picture with
-//! 16 samples a pixel is 16.8 million samples: 4 to 6 s on one core, and 17 stereo pairs about three minutes.
-//! The goal is 2 million on one thread; measured by processor time on a shared two-core machine (AMD EPYC):
-//! 4.3 million at the first stop and 3.1 million at the last one. Building the world (0.8 million vertices,
-//! 5900 rocks) takes one to two seconds and is not counted; that measurement is older than grains and drifts.
+//! together about 1045 cycles, 2.6 million samples a second on a core at 2.7 GHz near the rocks; at 10 m half
+//! of the octaves are too fine for the picture and the bound is 3.6 million. A 1024 × 1024 picture with
+//! 16 samples a pixel is 16.8 million samples: 7 s on one core, and 17 stereo pairs about four minutes.
+//! The goal is 2 million on one thread; measured on a busy two-core machine (AMD EPYC): 2.3 million at the first stop and
+//! at the last one, 4.1 million on both cores. Between 3900 and 15 400 rocks (k from 0.05 to 0.30) the time of a
+//! picture does not grow. Building the world (0.8 million vertices, 5900 rocks) takes one to two seconds and is not
+//! counted.
 //!
 //! Run with `cargo bench -p sightline-core --profile dev --bench render` (the profile `dev` is optimised).
 

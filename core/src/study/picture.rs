@@ -274,4 +274,24 @@ mod tests {
         assert!((a.contrast - 0.25).abs() < 1e-6 && a.local_contrast.is_some());
         assert_eq!(picture_report(&wide, &PixelRect::new(70, 70, 9, 9)), None);
     }
+
+    #[test]
+    fn simulated_soil_looks_like_that_of_opportunity_and_spirit() {
+        use crate::sim::{self, Eye, Region, Scenario, World};
+        let scenario = Scenario::demo();
+        let world = World::new(&scenario);
+        let index = sim::index(&scenario, &world).unwrap();
+        let camera = sim::true_camera_in_site(&index.stops[8], Eye::Left).unwrap();
+        // Soil with pebbles, 6 m away, beside the drive.
+        let region = Region { x: 100, y: 700, width: 256, height: 256 };
+        let stop = std::sync::atomic::AtomicBool::new(false);
+        let image = sim::clean_radiance(&world, &scenario, &camera, region, &stop).unwrap();
+        let report = picture_report(&image, &PixelRect::whole(256, 256)).unwrap();
+        // Medians of five squares of 256 px of soil in each of six real frames.
+        let local = report.local_contrast.unwrap();
+        assert!((0.037..0.085).contains(&local.p50), "{local:?}");
+        assert!((0.06..0.18).contains(&report.contrast), "{}", report.contrast);
+        let slope = report.spectrum_slope.unwrap();
+        assert!((1.7..2.8).contains(&slope), "{slope}");
+    }
 }

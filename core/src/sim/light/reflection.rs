@@ -205,4 +205,19 @@ mod tests {
             assert!((drawn / seen - 1.0).abs() < 0.05, "{side}: {drawn} {seen}");
         }
     }
+
+    #[test]
+    fn opposite_a_low_sun_neither_sky_nor_plain_outshines_the_ground_at_one_s_feet_by_far() {
+        for elevation_deg in [5.0, 8.0, 12.0] {
+            let settings = SunSettings { elevation_deg, azimuth_deg: 180.0, ..SunSettings::default() };
+            let light = Light::new(&settings, 0.26);
+            let soil = Appearance { albedo: 0.26, normal: [0.0, 0.0, -1.0] };
+            let feet = light.reflected(&soil, [0.0, 0.0, -1.0], true, 1.0);
+            let horizon = light.reflected(&soil, [-0.999_8, 0.0, -0.02], true, 1.0);
+            let sky = light.sky([1.0, 0.0, 0.0]);
+            assert!(horizon < 2.0 * feet && sky < 2.0 * feet, "{elevation_deg}: {feet} {horizon} {sky}");
+            // Towards the sun the sky does shine.
+            assert!(light.sky([-1.0, 0.0, 0.0]) > 2.0 * sky);
+        }
+    }
 }
