@@ -10,6 +10,7 @@ use axum::body::Body;
 use axum::http::{HeaderMap, Method, Request, StatusCode, header};
 use serde_json::{Value, json};
 use sightline_core::sim::Scenario;
+use sightline_core::sim::scenario::{PlacedRock, RockShape};
 use sightline_core::traverse::{Traverse, create_simulated};
 use sightline_server::app;
 use sightline_server::guard::Hosts;
@@ -20,7 +21,7 @@ use tower::ServiceExt;
 /// The port by which the server in this process believes to be addressed.
 pub const PORT: u16 = 7700;
 
-/// A pixel on the ground in the middle of the first image of the small drive.
+/// A pixel on the face of the large rock in the first image of the small drive.
 pub const PIXEL: [f64; 2] = [128.0, 150.0];
 
 /// How long a test waits for something that should be quick.
@@ -146,6 +147,9 @@ pub fn small_scenario() -> Scenario {
     let mut scenario = Scenario { name: "small drive".to_owned(), ..Scenario::demo() };
     (scenario.camera.image_size, scenario.camera.samples_per_axis) = (256, 1);
     (scenario.drive.start_distance_m, scenario.drive.end_distance_m) = (6.0, 4.0);
+    let (diameter_m, height_m, shape) = (1.2, 0.9, RockShape::Block);
+    scenario.rocks.placed =
+        vec![PlacedRock { x_m: 0.0, y_m: 0.0, diameter_m, height_m, yaw_deg: 180.0, shape }];
     scenario
 }
 

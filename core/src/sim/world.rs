@@ -15,6 +15,7 @@ use std::sync::Arc;
 use crate::frames::{Point3, Ray, Vector3};
 use crate::sim::camera::render;
 use crate::sim::culling::{SunGrid, Tree};
+use crate::sim::ground::around::Around;
 use crate::sim::ground::imprint::Imprint;
 use crate::sim::ground::rock_field::{self, Approach};
 use crate::sim::ground::rocks::Rock;
@@ -85,6 +86,7 @@ impl World {
         let approach = Approach {
             goal_m: drive::goal_m(&scenario.drive),
             wheels_reach_m: drive::wheels_reach_m(&scenario.drive),
+            around: Around::new(&scenario.drive),
         };
         let [x_m, y_m] = drive::ground_extent_m(&scenario.drive);
         let terrain = Terrain::new(&scenario.terrain, x_m, y_m, scenario.seed);

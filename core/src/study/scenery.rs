@@ -23,7 +23,7 @@ use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::sim::World;
-use crate::sim::ground::rock_field::number_per_m2;
+use crate::sim::ground::rock_law::number_per_m2;
 use crate::sim::scenario::{RockSettings, TerrainSettings};
 
 /// A rectangle of the site.

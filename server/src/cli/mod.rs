@@ -11,6 +11,8 @@ pub mod info;
 pub mod track;
 pub mod study;
 mod figure;
+mod scenery;
+mod scenery_figure;
 mod open;
 mod say;
 mod sheet;

@@ -1,6 +1,6 @@
 //! The contact sheet of a traverse: its left images, reduced, row by row, so that a drive is seen at a glance.
 //!
-//! At most twelve stops, evenly spaced, the first and the last among them. Levels are drawn as their square root,
+//! At most eight stops, evenly spaced, the first and the last among them. Levels are drawn as their square root,
 //! near what a screen shows for linear light, with one scale for the whole sheet.
 
 use std::path::Path;
@@ -13,9 +13,9 @@ use sightline_core::traverse::Traverse;
 /// Images in a row.
 const COLUMNS: u32 = 4;
 /// Most images on a sheet.
-const MOST: usize = 12;
+const MOST: usize = 8;
 /// Width of an image on the sheet, px.
-const WIDTH_PX: u32 = 240;
+const WIDTH_PX: u32 = 160;
 /// Space between images, px.
 const GAP_PX: u32 = 4;
 
@@ -64,7 +64,7 @@ mod tests {
 
     #[test]
     fn the_sheet_begins_with_the_first_stop_and_ends_with_the_last() {
-        assert_eq!(evenly_spaced(30), [0, 2, 5, 7, 10, 13, 15, 18, 21, 23, 26, 29]);
+        assert_eq!(evenly_spaced(30), [0, 4, 8, 12, 16, 20, 24, 29]);
         assert_eq!(evenly_spaced(3), [0, 1, 2]);
         assert_eq!(evenly_spaced(1), [0]);
     }

@@ -12,6 +12,7 @@ use sightline_core::study::realism::{self, Difficulty};
 use sightline_core::traverse::{Traverse, create_simulated};
 
 use super::figure;
+use super::scenery;
 use super::{open, say};
 
 /// Seeds that are tried for each world asked for.
@@ -30,6 +31,8 @@ enum Experiment {
     Approach(Worlds),
     /// How hard the simulated worlds are: plain correlation, without scale and roll, at steps of 5 % and 23 %.
     Realism(Worlds),
+    /// The simulated scenery in numbers: rocks, ground, noise and texture against their laws and real frames.
+    Scenery(scenery::Scenery),
 }
 
 /// The worlds of an experiment: each is rendered once, each of its targets is one run.
@@ -62,6 +65,7 @@ impl Study {
         match self.experiment {
             Experiment::Approach(worlds) => study_approach(&worlds),
             Experiment::Realism(worlds) => study_realism(&worlds),
+            Experiment::Scenery(scenery) => scenery.run(),
         }
     }
 }

@@ -6,6 +6,8 @@ pub mod terrain;
 mod terrain_cast;
 pub mod rocks;
 mod shape;
+pub mod rock_law;
+pub mod around;
 pub mod rock_field;
 mod details;
 pub mod surface;

@@ -1,0 +1,218 @@
+//! `sightline study scenery`: the simulated world in numbers, against the laws it follows and against real frames.
+//!
+//! Rocks against their size–frequency law, ground against its fractal, the noise's mean–variance line against the
+//! gain, and pictures of soil (simulated, and of recorded traverses) by contrast, histogram and spectrum. Tables
+//! go to the standard output, all numbers to `scenery.json`, figures beside it.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde::Serialize;
+use sightline_core::error::{Error, Result};
+use sightline_core::image::{GrayImage, PixelRect};
+use sightline_core::sim::scenario::RockSettings;
+use sightline_core::sim::{self, Eye, NoiseSeed, Region, Scenario, World};
+use sightline_core::study::picture::{PictureReport, picture_report};
+use sightline_core::study::scenery::{GroundReport, Rectangle, RockReport, ground_report, rock_report};
+use sightline_core::traverse::Traverse;
+
+use super::{open, say, scenery_figure};
+
+/// Abundances of rocks that are compared with their law.
+const ABUNDANCES: [f64; 3] = [0.05, 0.10, 0.30];
+/// Least diameters of the table of rocks, m.
+const DIAMETERS_M: [f64; 7] = [0.02, 0.03, 0.05, 0.1, 0.2, 0.3, 0.5];
+/// Distances of the table of the ground, m.
+const DISTANCES_M: [f64; 7] = [0.04, 0.08, 0.16, 0.32, 0.64, 1.0, 2.0];
+/// Beside the drive, clear of tracks and cluster, where no rock was moved out of the way.
+const BESIDE: [Rectangle; 2] =
+    [Rectangle { x_m: [2.5, 8.0], y_m: [1.3, 2.6] }, Rectangle { x_m: [2.5, 8.0], y_m: [-2.6, -1.3] }];
+/// The bare ground that is measured.
+const GROUND: Rectangle = Rectangle { x_m: [0.0, 12.0], y_m: [-5.0, 5.0] };
+/// Side of a square of soil, px.
+const SOIL_PX: u32 = 256;
+
+/// Measure the simulated scenery.
+#[derive(Debug, Args)]
+pub(super) struct Scenery {
+    /// How many worlds of each abundance.
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=100))]
+    worlds: u64,
+    /// A recorded traverse to compare with: the squares of its first left image that are named by `--soil`.
+    #[arg(long, value_name = "TRAVERSE")]
+    compare: Vec<PathBuf>,
+    /// The upper left corner of a square of 256 px of soil in the recorded images, px; can be given more than once.
+    #[arg(long, value_name = "X,Y", value_parser = corner, default_value = "400,700")]
+    soil: Vec<[i32; 2]>,
+    /// The folder for numbers and figures.
+    #[arg(long, value_name = "FOLDER")]
+    out: PathBuf,
+}
+
+/// A level of the mean–variance line, DN.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(super) struct NoiseRow {
+    /// Mean over the pixels, without the bias.
+    pub(super) mean_dn: f64,
+    /// Variance of one pixel between exposures, DN².
+    pub(super) variance_dn2: f64,
+}
+
+/// Everything that is measured.
+#[derive(Debug, Serialize)]
+pub(super) struct Report {
+    pub(super) rocks: Vec<(f64, RockReport)>,
+    pub(super) ground: GroundReport,
+    pub(super) noise: Vec<NoiseRow>,
+    /// Electrons per DN: stated, and as the slope of the mean–variance line gives them back.
+    pub(super) gain: [f64; 2],
+    pub(super) pictures: Vec<(String, PictureReport)>,
+}
+
+impl Scenery {
+    /// Measures, prints and draws.
+    ///
+    /// # Errors
+    /// A traverse that cannot be read, or a folder that cannot be written.
+    pub(super) fn run(self) -> Result<()> {
+        let scenario = Scenario::demo();
+        let rocks = ABUNDANCES.map(|area_fraction| self.rocks(&scenario, area_fraction));
+        let worlds = self.worlds_of(&scenario);
+        let noise = noise(&scenario);
+        let mut pictures = vec![("simulated".to_owned(), simulated_soil(&scenario, &worlds[0])?)];
+        for path in &self.compare {
+            pictures.extend(self.recorded_soil(path)?);
+        }
+        let report = Report {
+            rocks: ABUNDANCES.into_iter().zip(rocks).collect(),
+            ground: ground_report(
+                &worlds.iter().collect::<Vec<_>>(),
+                &scenario.terrain,
+                &GROUND,
+                &DISTANCES_M,
+            ),
+            gain: [scenario.camera.gain_electrons_per_dn, 1.0 / slope(&noise)],
+            noise,
+            pictures,
+        };
+        std::fs::create_dir_all(&self.out)
+            .map_err(|source| Error::Write { path: self.out.clone(), source })?;
+        let path = self.out.join("scenery.json");
+        let document = serde_json::to_vec_pretty(&report).map_err(|e| Error::Request(e.to_string()))?;
+        std::fs::write(&path, document).map_err(|source| Error::Write { path, source })?;
+        scenery_figure::draw(&self.out, &report)?;
+        print(&report)
+    }
+
+    fn worlds_of(&self, scenario: &Scenario) -> Vec<World> {
+        (1..=self.worlds).map(|seed| World::new(&Scenario { seed, ..scenario.clone() })).collect()
+    }
+
+    fn rocks(&self, scenario: &Scenario, area_fraction: f64) -> RockReport {
+        let rocks = RockSettings { area_fraction, ..scenario.rocks.clone() };
+        let worlds = self.worlds_of(&Scenario { rocks: rocks.clone(), ..scenario.clone() });
+        rock_report(&worlds.iter().collect::<Vec<_>>(), &rocks, &BESIDE, &DIAMETERS_M)
+    }
+
+    fn recorded_soil(&self, path: &Path) -> Result<Vec<(String, PictureReport)>> {
+        let traverse = open::open(path, None)?;
+        let image = traverse.capture(0)?.left;
+        let of_square = |[x, y]: &[i32; 2]| {
+            let report = picture_report(&image, &PixelRect::new(*x, *y, SOIL_PX, SOIL_PX))?;
+            Some((format!("{} at {x}, {y}", name(&traverse)), report))
+        };
+        Ok(self.soil.iter().filter_map(of_square).collect())
+    }
+}
+
+fn name(traverse: &Traverse) -> &str {
+    &traverse.index().name
+}
+
+fn corner(text: &str) -> std::result::Result<[i32; 2], String> {
+    let (x, y) = text.split_once(',').ok_or("write it as X,Y")?;
+    let number = |text: &str| text.trim().parse().map_err(|_| format!("{text} is no whole number"));
+    Ok([number(x)?, number(y)?])
+}
+
+/// A square of soil beside the drive, as the ninth stop's left camera records it.
+fn simulated_soil(scenario: &Scenario, world: &World) -> Result<PictureReport> {
+    let index = sim::index(scenario, world)?;
+    let camera = index
+        .stops
+        .get(8)
+        .and_then(|stop| sim::true_camera_in_site(stop, Eye::Left))
+        .ok_or_else(|| Error::Request("the demonstration has no ninth stop".to_owned()))?;
+    let picture = sim::render(world, scenario, &camera, NoiseSeed { step: 8, eye: Eye::Left });
+    let square = PixelRect::new(100, 700, SOIL_PX, SOIL_PX);
+    picture_report(&picture, &square).ok_or_else(|| Error::Request("the square of soil is black".to_owned()))
+}
+
+/// Mean and variance of evenly lit pictures, level by level, from the difference of two exposures.
+fn noise(scenario: &Scenario) -> Vec<NoiseRow> {
+    const SIDE: u32 = 256;
+    let mut scenario = scenario.clone();
+    (scenario.camera.response_spread, scenario.camera.flat_field_residue) = (0.0, 0.0);
+    let camera = sim::Rig::new(&scenario.camera).cameras_in_rover(None).0;
+    let region = Region { x: 0, y: 0, width: SIDE, height: SIDE };
+    let full_scale_dn = scenario.camera.recorded_full_scale_dn();
+    let level = |part: f64| {
+        let radiance = GrayImage::from_pixel(region.width, region.height, image::Luma([1.0]));
+        let electrons = part * full_scale_dn * scenario.camera.gain_electrons_per_dn;
+        let time_s = electrons / scenario.camera.electrons_per_s;
+        let expose = |step: u32| {
+            sim::develop(&radiance, &scenario, &camera, time_s, NoiseSeed { step, eye: Eye::Left })
+        };
+        let (one, two) = (expose(0), expose(1));
+        let pairs = || one.iter().zip(two.iter()).map(|(a, b)| (f64::from(*a), f64::from(*b)));
+        let count = f64::from(SIDE * SIDE);
+        let mean = pairs().map(|(a, b)| 0.5 * (a + b)).sum::<f64>() / count;
+        let variance = pairs().map(|(a, b)| 0.5 * (a - b).powi(2)).sum::<f64>() / count;
+        NoiseRow {
+            mean_dn: mean * full_scale_dn - scenario.camera.bias_dn,
+            variance_dn2: variance * full_scale_dn * full_scale_dn,
+        }
+    };
+    [0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9].map(level).to_vec()
+}
+
+/// Slope of the least-squares line of variance over mean, DN: 1/gain for shot noise.
+fn slope(rows: &[NoiseRow]) -> f64 {
+    let count = rows.len() as f64;
+    let mean = |of: fn(&NoiseRow) -> f64| rows.iter().map(of).sum::<f64>() / count;
+    let (x, y) = (mean(|row| row.mean_dn), mean(|row| row.variance_dn2));
+    let products = rows.iter().map(|row| (row.mean_dn - x) * (row.variance_dn2 - y)).sum::<f64>();
+    products / rows.iter().map(|row| (row.mean_dn - x).powi(2)).sum::<f64>()
+}
+
+fn print(report: &Report) -> Result<()> {
+    for (abundance, rocks) in &report.rocks {
+        say::line(&format!(
+            "rocks, k = {abundance}: {:.0} a world; cover {:.4} of {:.4} expected",
+            rocks.rocks_per_world, rocks.covered, rocks.covered_expected
+        ))?;
+        for row in &rocks.rows {
+            say::line(&format!(
+                "  D ≥ {:.2} m: {} counted, {:.1} ± {:.1} expected",
+                row.diameter_m, row.counted, row.expected, row.sigma
+            ))?;
+        }
+    }
+    for row in &report.ground.rows {
+        say::line(&format!(
+            "ground over {:.2} m: {:.4} m rms, {:.4} expected; slope {:.1}° rms",
+            row.distance_m, row.rms_difference_m, row.expected_m, row.slope_deg
+        ))?;
+    }
+    say::line(&format!("gain {:.1} e⁻/DN stated, {:.1} measured", report.gain[0], report.gain[1]))?;
+    for (name, picture) in &report.pictures {
+        let contrast = picture.local_contrast.map_or(f64::NAN, |c| c.p50);
+        let slope = picture.spectrum_slope.unwrap_or(f64::NAN);
+        let levels = picture.levels;
+        say::line(&format!(
+            "soil, {name}: contrast {:.3}, local {contrast:.3}, spectrum slope {slope:.2}, levels over the mean 1 % {:.2}, 99 % {:.2}",
+            picture.contrast, levels.p1, levels.p99
+        ))?;
+    }
+    Ok(())
+}
