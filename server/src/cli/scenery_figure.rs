@@ -163,6 +163,14 @@ fn chart(area: &Area<'_>, title: &str, axes: [&str; 2], all: &[Series]) -> Drawn
                 .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(2)));
         }
     }
-    let labels = chart.configure_series_labels().background_style(WHITE.mix(0.8)).border_style(BLACK).draw();
+    // The legend stands where a falling, or a rising, curve leaves the corner free.
+    let falls = all.iter().filter_map(|s| Some(s.points.last()?.1 - s.points.first()?.1)).sum::<f64>() <= 0.0;
+    let corner = if falls { SeriesLabelPosition::UpperRight } else { SeriesLabelPosition::LowerRight };
+    let labels = chart
+        .configure_series_labels()
+        .position(corner)
+        .background_style(WHITE.mix(0.8))
+        .border_style(BLACK)
+        .draw();
     labels.map_err(|e| e.to_string())
 }

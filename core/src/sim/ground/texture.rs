@@ -107,12 +107,13 @@ fn fade(t: f32) -> (f32, f32) {
     (t * t * t * (t * (t * 6.0 - 15.0) + 10.0), 30.0 * t * t * (t * (t - 2.0) + 1.0))
 }
 
-/// Splits a lattice coordinate into its integer and its fraction in [0, 1).
+/// Splits a lattice coordinate into its integer, of which the last 32 bits count, and its fraction in [0, 1).
 #[inline(always)]
 fn split(coordinate: f64) -> (u32, f32) {
-    let whole = coordinate as i32;
-    let whole = if f64::from(whole) > coordinate { whole - 1 } else { whole };
-    (whole as u32, (coordinate - f64::from(whole)) as f32)
+    // 64 bits hold the millimetres of the horizon, where a ray along the plain may end.
+    let whole = coordinate as i64;
+    let whole = if whole as f64 > coordinate { whole.wrapping_sub(1) } else { whole };
+    (whole as u32, (coordinate - whole as f64) as f32)
 }
 
 /// A hash of the lattice cell that holds a point, and the position in the cell, 0 to 1.
@@ -281,6 +282,18 @@ mod tests {
     fn std_of(values: &[f64]) -> f64 {
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
+    }
+
+    #[test]
+    fn coordinates_split_into_floor_and_fraction_as_far_as_the_horizon() {
+        for (coordinate, whole, fraction) in
+            [(2.25, 2u32, 0.25), (-0.75, u32::MAX, 0.25), (-3.0, -3i32 as u32, 0.0)]
+        {
+            assert_eq!(split(coordinate), (whole, fraction));
+        }
+        // 2^40 lattice cells away only the fraction's bits are fewer.
+        let far = -(1u64 << 40) as f64 - 0.25;
+        assert_eq!(split(far), ((-(1i64 << 40) - 1) as u32, 0.75));
     }
 
     #[test]
