@@ -1,7 +1,7 @@
 //! `sightline scenarios`: the scenarios that come with the program.
 
 use clap::Args;
-use sightline_core::error::{Error, Result};
+use sightline_core::error::Result;
 use sightline_core::sim::library;
 
 use super::say;
@@ -21,8 +21,7 @@ impl Scenarios {
     pub fn run(self) -> Result<()> {
         if let Some(name) = self.name {
             library::scenario(&name)?;
-            let text = library::toml(&name).ok_or_else(|| Error::Request(name))?;
-            return say::line(text.trim_end());
+            return say::line(library::toml(&name).unwrap_or_default().trim_end());
         }
         for name in library::names() {
             let scenario = library::scenario(name)?;

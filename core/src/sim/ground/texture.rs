@@ -292,7 +292,7 @@ mod tests {
             assert_eq!(split(coordinate), (whole, fraction));
         }
         // 2^40 lattice cells away only the fraction's bits are fewer.
-        let far = -(1u64 << 40) as f64 - 0.25;
+        let far = -((1i64 << 40) as f64) - 0.25;
         assert_eq!(split(far), ((-(1i64 << 40) - 1) as u32, 0.75));
     }
 
