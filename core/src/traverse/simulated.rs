@@ -206,10 +206,7 @@ fn read_scenario(path: &Path) -> Result<Scenario> {
         return Err(Error::format(path, "is too large for a scenario"));
     }
     let text = std::fs::read_to_string(path).map_err(unreadable)?;
-    Scenario::from_toml(&text, path).map_err(|error| match error {
-        Error::Setting { .. } => Error::format(path, error.to_string()),
-        other => other,
-    })
+    Scenario::from_toml(&text, path)
 }
 
 fn needs_truth(step: usize) -> String {

@@ -50,7 +50,7 @@ impl Fiducial {
         let place = |x_m: f64, y_m: f64, height_m: f64| -> Result<()> {
             within(&key("x_m"), x_m, -100.0, 100.0)?;
             within(&key("y_m"), y_m, -100.0, 100.0)?;
-            within(&key("height_m"), height_m, -10.0, 100.0)
+            within(&key("height_m"), height_m, 0.0, 100.0)
         };
         match *self {
             Self::Checkerboard { x_m, y_m, height_m, yaw_deg, tilt_deg, square_m, columns, rows } => {

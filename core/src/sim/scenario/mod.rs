@@ -111,11 +111,11 @@ impl Scenario {
         Self { name: "straight approach, rocky plain".into(), ..Self::default() }
     }
 
-    /// Reads and checks a scenario; `path` only names the culprit in the message.
+    /// Reads and checks a scenario; `path` only names the culprit in the message, beside key and allowed range.
     pub fn from_toml(text: &str, path: &Path) -> Result<Self> {
         let scenario: Self =
             toml::from_str(text).map_err(|problem| Error::format(path, problem.to_string()))?;
-        scenario.validate()?;
+        scenario.validate().map_err(|problem| Error::format(path, problem.to_string()))?;
         Ok(scenario)
     }
 
@@ -175,5 +175,13 @@ mod tests {
         assert!(refused("[sun]\nelevation_deg = -3.0\n").contains("sun.elevation_deg"));
         assert!(refused("[camera]\nimage_size = 1000\n").contains("camera.image_size"));
         assert!(refused("[drive]\nend_distance_m = nan\n").contains("drive.end_distance_m"));
+        let cover = refused("[rocks]\narea_fraction = -0.1\n");
+        assert!(
+            ["s.toml", "rocks.area_fraction", "0 to 0.4"].iter().all(|part| cover.contains(part)),
+            "{cover}"
+        );
+        let below =
+            "[[fiducials]]\nkind = \"sphere\"\nx_m = 0.0\ny_m = 0.0\nheight_m = -1.0\nradius_m = 0.1\n";
+        assert!(refused(below).contains("fiducials[0].height_m"));
     }
 }
