@@ -98,11 +98,12 @@ fn describe(scenario: &Scenario, stops: usize) -> String {
         CameraRig::Table1Pancam => "the paper's f = 16 mm pair",
         CameraRig::Table1Navcam => "the paper's f = 6 mm pair",
     };
-    format!(
+    let made = format!(
         "Simulated: {course}, {cameras}, images {size} px wide, seed {}.",
         scenario.seed,
         size = scenario.camera.image_size,
-    )
+    );
+    format!("{} {made}", scenario.description).trim_start().to_owned()
 }
 
 /// The camera that truly takes an image of a simulated stop, in the site frame.
