@@ -17,7 +17,7 @@ use crate::sim::camera::render::Eye;
 use crate::sim::culling::SunGrid;
 use crate::sim::ground::imprint::Imprint;
 use crate::sim::index::true_camera_in_site;
-use crate::sim::light::reflection::Light;
+use crate::sim::light::reflection::{Light, to_sun};
 use crate::sim::rover::body::{BodyPart, parts};
 use crate::sim::rover::drive::true_drive;
 use crate::sim::rover::suspension::settle;
@@ -117,11 +117,9 @@ impl World {
 /// Where the sun stands some time after the first stop, s: unit direction, site frame.
 fn sun_at(sun: &SunSettings, events: &EventSettings, time_s: f64) -> Vector3 {
     let hours = time_s / 3600.0;
-    let azimuth_rad = (sun.azimuth_deg + events.sun_azimuth_deg_per_h * hours).to_radians();
+    let azimuth_deg = sun.azimuth_deg + events.sun_azimuth_deg_per_h * hours;
     let elevation_deg = sun.elevation_deg + events.sun_elevation_deg_per_h * hours;
-    let elevation_rad = elevation_deg.clamp(LOWEST_SUN_DEG.min(sun.elevation_deg), 90.0).to_radians();
-    let (level, up) = (elevation_rad.cos(), elevation_rad.sin());
-    Vector3::new(level * azimuth_rad.cos(), level * azimuth_rad.sin(), -up)
+    to_sun(azimuth_deg, elevation_deg.clamp(LOWEST_SUN_DEG.min(sun.elevation_deg), 90.0))
 }
 
 fn covers(from_stop: u32, to_stop: u32, stop: u32) -> bool {

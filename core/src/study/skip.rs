@@ -71,3 +71,24 @@ impl<D: Drive> TruthSource for Skipping<'_, D> {
         self.drive.is_visible(step * self.stride, point_in_site)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::PlaneWorld;
+
+    #[test]
+    fn every_third_stop_of_seven_is_three_stops_and_the_last_is_met() {
+        let poses = (0..7).map(|stop| Pose::translation(0.1 * f64::from(stop), 0.0, 0.0)).collect();
+        let drive = PlaneWorld::new(poses);
+        let skipping = Skipping::new(&drive, 3);
+        assert_eq!(skipping.stop_count(), 3);
+        for (step, stop) in [(0, 0), (1, 3), (2, 6)] {
+            assert_eq!(skipping.site_from_rover(step), drive.site_from_rover(stop));
+            assert_eq!(skipping.true_site_from_rover(step), drive.true_site_from_rover(stop));
+        }
+        // Every fourth stop passes the last one by.
+        assert_eq!(Skipping::new(&drive, 4).stop_count(), 2);
+        assert_eq!(Skipping::new(&drive, 0).stop_count(), 7);
+    }
+}

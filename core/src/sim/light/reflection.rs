@@ -79,13 +79,17 @@ fn on_level_ground(settings: &SunSettings, elevation_rad: f64) -> [f64; 2] {
     split(optical_depth, elevation_rad).map(|part| part * factor)
 }
 
+/// The unit direction towards a sun of this azimuth and elevation, site frame (domain.md 1.5).
+pub fn to_sun(azimuth_deg: f64, elevation_deg: f64) -> Vector3 {
+    let (azimuth_rad, elevation_rad) = (azimuth_deg.to_radians(), elevation_deg.to_radians());
+    let (level, up) = (elevation_rad.cos(), elevation_rad.sin());
+    Vector3::new(level * azimuth_rad.cos(), level * azimuth_rad.sin(), -up)
+}
+
 impl Light {
     /// The light of the scenario over ground of the given mean albedo.
     pub fn new(settings: &SunSettings, ground_albedo: f64) -> Self {
-        let (azimuth_rad, elevation_rad) =
-            (settings.azimuth_deg.to_radians(), settings.elevation_deg.to_radians());
-        let (level, up) = (elevation_rad.cos(), elevation_rad.sin());
-        let to_sun = Vector3::new(level * azimuth_rad.cos(), level * azimuth_rad.sin(), -up);
+        let to_sun = to_sun(settings.azimuth_deg, settings.elevation_deg);
         Self::under(settings, ground_albedo, to_sun, 1.0)
     }
 
