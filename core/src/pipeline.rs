@@ -145,8 +145,16 @@ pub fn run_step(stops: &dyn Stops, last: &Updated, settings: &Settings) -> StepT
                 last.state,
                 &settings.limits,
             );
-            trace.update =
-                update::update(target, step, &prediction, &pointing, &captured, &located, &verdict);
+            trace.update = update::update(
+                target,
+                step,
+                &prediction,
+                &pointing,
+                &captured,
+                &located,
+                &verdict,
+                &settings.template,
+            );
             (trace.capture, trace.locate, trace.judge) = (Some(captured), Some(located), Some(verdict));
         }
     }

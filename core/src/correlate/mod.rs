@@ -10,14 +10,17 @@
 //! | `dot` | the numerators, in SIMD registers: nearly all the work |
 //! | `exact` | one position in double precision: windows too flat for the fast sums |
 //! | `peak` | the best match below the pixel, its covariance, and the second best |
+//! | `focus` | a match refined through a Gaussian window, which counts its centre most |
 
 pub mod zncc;
 pub mod surface;
 mod dot;
 mod exact;
 pub mod peak;
+pub mod focus;
 
 pub use crate::image::PixelRect;
+pub use focus::Focus;
 pub use peak::{Peak, SecondPeak, find_peak, second_peak};
 pub use surface::Surface;
 pub use zncc::{zncc, zncc_surface};

@@ -171,7 +171,7 @@ impl Fit {
 
     /// The maximum of the polynomial through 5 × 5 scores nearest to this fit; `None` when Newton's method does
     /// not settle within a pixel of the highest score.
-    fn refined(&self, f: &SMatrix<f64, 5, 5>) -> Option<Self> {
+    pub(crate) fn refined(&self, f: &SMatrix<f64, 5, 5>) -> Option<Self> {
         let coefficients = QUARTIC * f * QUARTIC.transpose();
         let mut offset = self.offset;
         for _ in 0..NEWTON_STEPS {

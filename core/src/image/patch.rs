@@ -4,7 +4,8 @@
 //! ```text
 //! centre + (1/s) [[cos ρ, sin ρ], [−sin ρ, cos ρ]] (u, v)ᵀ
 //! ```
-//! so content grows with s and turns clockwise on screen with ρ. When s < 1 the source is first smoothed
+//! so content grows with s and turns clockwise on screen with ρ. A warp takes any linear map F in place of s R(ρ), and
+//! s is then √|det F|: foreshortening differs little from one stop to the next. When s < 1 the source is first smoothed
 //! (R58), otherwise detail finer than the new pixel grid would fold into false texture. The width of the Gaussian is
 //! ```text
 //! σ = 0.5 · sqrt(1/s² − 1)   source px
@@ -22,6 +23,7 @@
 use std::ops::{Deref, DerefMut};
 
 use image::Luma;
+use nalgebra::{Matrix2, Rotation2, Vector2};
 
 use super::sample::Kernel;
 use super::{GrayImage, PixelRect};
@@ -116,22 +118,36 @@ pub fn scale_roll(
     size: u32,
     kernel: Kernel,
 ) -> Patch {
-    if !(scale > 0.0 && scale.is_finite()) {
+    if !(scale > 0.0) {
         return resample(size, |_, _| None);
     }
+    warp(source, centre, &(Rotation2::new(roll_rad).into_inner() * scale), size, kernel)
+}
+
+/// The window of `size` × `size` px about `centre`, its content mapped by `map`, px per px.
+///
+/// Where the map shrinks, by the square root of its determinant, the source is smoothed first. `size` is odd. NaN
+/// where the source lies outside or touches an invalid pixel, and everywhere unless the map can be inverted.
+pub fn warp(source: &GrayImage, centre: Pixel, map: &Matrix2<f64>, size: u32, kernel: Kernel) -> Patch {
+    let scale = map.determinant().abs().sqrt();
+    let Some(inverse) = map.try_inverse().filter(|_| scale.is_finite()) else {
+        return resample(size, |_, _| None);
+    };
     let half = (f64::from(size) - 1.0) / 2.0;
-    let (sin, cos) = roll_rad.sin_cos();
     let read = |image: &GrayImage, centre: Pixel| {
         resample(size, |u, v| {
-            let (u, v) = ((u - half) / scale, (v - half) / scale);
-            kernel.sample(image, centre.offset(cos * u + sin * v, cos * v - sin * u))
+            let from = inverse * Vector2::new(u - half, v - half);
+            kernel.sample(image, centre.offset(from.x, from.y))
         })
     };
-    if scale >= 1.0 {
+    // Rounding may leave the scale of a pure rotation a little below one.
+    if scale >= 1.0 - 1e-12 {
         return read(source, centre);
     }
     let sigma_px = NATURAL_BLUR_PX * (1.0 / (scale * scale) - 1.0).sqrt();
-    let reach = half * std::f64::consts::SQRT_2 / scale + 3.0 + (3.0 * sigma_px).ceil();
+    let corners = [Vector2::new(half, half), Vector2::new(half, -half)];
+    let farthest = corners.map(|corner| (inverse * corner).norm()).into_iter().fold(0.0, f64::max);
+    let reach = farthest + 3.0 + (3.0 * sigma_px).ceil();
     let needed = PixelRect::centred(centre, 2 * reach.ceil() as u32 + 1);
     match needed.intersect(&PixelRect::whole(source.width(), source.height())) {
         Some(part) => {

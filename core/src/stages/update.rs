@@ -10,6 +10,8 @@ use utoipa::ToSchema;
 
 use crate::frames::Pixel;
 use crate::locate::Located;
+use crate::locate::template::TemplateSettings;
+use crate::locate::template::settings::TemplateUpdate;
 use crate::stages::capture::Capture;
 use crate::stages::judge::Verdict;
 use crate::stages::point_mast::Pointing;
@@ -40,18 +42,41 @@ pub fn update(
     capture: &Capture,
     located: &Located,
     verdict: &Verdict,
+    settings: &TemplateSettings,
 ) -> Updated {
     let correction_m = located.position_in_rover.map(|p| (p - prediction.position_in_rover).norm());
     let correction_px =
         located.left_pixel.zip(pointing.predicted_left).map(|(a, b): (Pixel, Pixel)| a.distance(b));
     let carried = carry(target, step, prediction);
     let renewed = verdict.accepted.then(|| renew(&carried, pointing, capture, located)).flatten();
+    let keep = !asks_for_a_new_template(located, settings);
+    let renewed = renewed.map(|new| {
+        if keep {
+            Target { drift: target.drift, appearance: target.appearance.clone(), ..new }
+        } else {
+            new
+        }
+    });
     Updated {
-        template_renewed: renewed.is_some(),
+        template_renewed: renewed.is_some() && !keep,
         target: renewed.unwrap_or(carried),
         state: verdict.state,
         correction_m,
         correction_px,
+    }
+}
+
+/// Whether an accepted update renews the template.
+fn asks_for_a_new_template(located: &Located, settings: &TemplateSettings) -> bool {
+    let evidence = located.evidence.template();
+    let scale = evidence.and_then(|e| e.scale_roll.as_ref()).map_or(f64::INFINITY, |s| s.scale);
+    let score = evidence.and_then(|e| e.match_template.as_ref()).map_or(-1.0, |m| m.peak.score);
+    match settings.template_update {
+        TemplateUpdate::EveryUpdate => true,
+        TemplateUpdate::Never => false,
+        TemplateUpdate::OnCondition => {
+            scale.max(1.0 / scale) >= settings.renew_scale || score < settings.renew_ncc
+        }
     }
 }
 

@@ -1,11 +1,12 @@
 //! How well one match fixes its position, measured from the match itself (ours).
 //!
 //! Least squares of the normalised patches: with the residual r = Ĵ − ncc·Î and the gradients g of the matched
-//! patch (per px), a displacement error is `δ = A⁻¹ Σ g r`, `A = Σ g gᵀ`. Residuals of neighbouring pixels are
+//! patch (per px), a displacement error is `δ = A⁻¹ Σ w g r`, `A = Σ w g gᵀ`, with the weights w through which the
+//! match was refined (`correlate::focus`). Residuals of neighbouring pixels are
 //! alike (both patches were resampled, and what perspective changes is smooth), so their covariance is taken
 //! with its spatial correlation (White 1980; Newey & West 1987, with Bartlett weights in two dimensions):
 //! ```text
-//! Σ_δ = A⁻¹ B A⁻¹,   B = Σ_ij w(i − j) r_i r_j g_i g_jᵀ,   w = (1 − |Δx|/(L+1)) (1 − |Δy|/(L+1))
+//! Σ_δ = A⁻¹ B A⁻¹,   B = Σ_ij c(i − j) w_i w_j r_i r_j g_i g_jᵀ,   c = (1 − |Δx|/(L+1)) (1 − |Δy|/(L+1))
 //! ```
 //! so no noise level has to be assumed. To this comes a floor for the sub-pixel fit itself, whose error does
 //! not show in the residual.
@@ -13,7 +14,7 @@
 //! Where the template was prepared by scale and roll alone, the surface's slope stretches the image by another
 //! map, F = I + E. The best shift of a patch that is stretched by E and yet compared unstretched is not zero:
 //! ```text
-//! b = A⁻¹ Σ g gᵀ E o        o: offset of a pixel from the patch's middle
+//! b = A⁻¹ Σ w g gᵀ E o      o: offset of a pixel from the patch's middle
 //! ```
 //! This bias depends on where the patch has its texture, points the same way step after step, and is therefore
 //! returned apart from the covariance.
@@ -27,8 +28,9 @@
 
 use nalgebra::{Matrix2, Vector2};
 
+use crate::correlate::Focus;
 use crate::image::gradient;
-use crate::image::patch::{Patch, normalise};
+use crate::image::patch::Patch;
 
 /// Over how many pixels residuals are taken as correlated.
 const CORRELATION_REACH_PX: i64 = 4;
@@ -48,20 +50,20 @@ pub struct MatchNoise {
     pub bias_px: Vector2<f64>,
 }
 
-/// The error of the position of `matched` against `template`, patches of the same size, where the true map
+/// The error of the position of `matched` against `template`, patches of the size of `focus`, where the true map
 /// between them is `I + misfit`.
-pub fn match_noise(template: &Patch, matched: &Patch, misfit: &Matrix2<f64>) -> MatchNoise {
+pub fn match_noise(template: &Patch, matched: &Patch, misfit: &Matrix2<f64>, focus: &Focus) -> MatchNoise {
     let undetermined = MatchNoise {
         covariance_px2: Matrix2::identity() * UNDETERMINED_PX.powi(2),
         bias_px: Vector2::zeros(),
     };
-    let (Some(template), Some(image)) = (normalise(template), normalise(matched)) else {
+    let (Some(template), Some(image)) = (focus.normalise(template), focus.normalise(matched)) else {
         return undetermined;
     };
     let (gx, gy) = gradient::central(&image);
     let (width, height) = image.dimensions();
     let middle = Vector2::new(f64::from(width - 1), f64::from(height - 1)) / 2.0;
-    let score = mean_product(&template, &image);
+    let score = weighted_product(&template, &image, focus);
     let mut influence = vec![Vector2::zeros(); (width * height) as usize];
     let (mut information, mut stretched) = (Matrix2::zeros(), Vector2::zeros());
     for y in 1..height - 1 {
@@ -71,9 +73,11 @@ pub fn match_noise(template: &Patch, matched: &Patch, misfit: &Matrix2<f64>) -> 
                 f64::from(image.get_pixel(x, y)[0]) - score * f64::from(template.get_pixel(x, y)[0]);
             if residual.is_finite() && g.iter().all(|v| v.is_finite()) {
                 let offset = Vector2::new(f64::from(x), f64::from(y)) - middle;
-                information += g * g.transpose();
-                stretched += g * g.dot(&(misfit * offset));
-                influence[(y * width + x) as usize] = g * residual;
+                let index = (y * width + x) as usize;
+                let weight = focus.weights()[index];
+                information += g * g.transpose() * weight;
+                stretched += g * g.dot(&(misfit * offset)) * weight;
+                influence[index] = g * residual * weight;
             }
         }
     }
@@ -104,9 +108,11 @@ fn correlated_sum(vectors: &[Vector2<f64>], width: i64, height: i64) -> Matrix2<
     (sum + sum.transpose()) * 0.5
 }
 
-fn mean_product(a: &Patch, b: &Patch) -> f64 {
-    let products =
-        a.iter().zip(b.iter()).map(|(a, b)| f64::from(*a) * f64::from(*b)).filter(|p| p.is_finite());
-    let (sum, count) = products.fold((0.0, 0_u32), |(sum, count), p| (sum + p, count + 1));
-    sum / f64::from(count.max(1))
+fn weighted_product(a: &Patch, b: &Patch, focus: &Focus) -> f64 {
+    let products = a.iter().zip(b.iter()).zip(focus.weights());
+    let valid = products.filter(|((a, b), _)| a.is_finite() && b.is_finite());
+    let (sum, total) = valid.fold((0.0, 0.0), |(sum, total), ((a, b), w)| {
+        (sum + w * f64::from(*a) * f64::from(*b), total + w)
+    });
+    if total > 0.0 { sum / total } else { 0.0 }
 }

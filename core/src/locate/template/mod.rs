@@ -85,7 +85,7 @@ impl Locator for TemplateLocator {
             Ok(matched) => matched,
             Err(missing) => return nothing(evidence, missing),
         };
-        let left_pixel = matched.peak.pixel;
+        let left_pixel = matched.pixel;
         let error = match settings.noise_model {
             NoiseModel::Measured => input.target.drift.after_match(
                 &prepared.image_from_template,

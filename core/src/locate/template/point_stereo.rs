@@ -5,19 +5,22 @@
 //! compared with right windows by normalised correlation (R76). Each right window is resampled through
 //! `A = ∂right/∂left` at the candidate's range, so that cameras which are turned against each other still see
 //! the same patch; for two parallel eyes A is the identity. The best position is refined by a quadratic fit
-//! along and across the curve.
+//! along and across the curve, and then followed to the next maximum of scores that count the window's centre
+//! most (`correlate::focus`).
 //!
 //! The interval searched is one of disparity for two eyes side by side: as wide as half the search window,
 //! centred on the predicted range (R74, R75, E13), and the whole of the curve at designation or where the two
 //! views are free. The slope of the surface (how the right position moves when the left one does) comes from
-//! the same search at four neighbours: it turns an error of the left pixel into one of range.
+//! the same search at four neighbours: it turns an error of the left pixel into one of range, and with
+//! `surface_warp` the windows near the best position are compared once more, resampled as on that surface; the
+//! better score stands.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
 //! | curve parameter | arc length from the far end | px in the right image |
 //! | A | `right_from_left` | px per px |
 
-use nalgebra::{Matrix2, Matrix3};
+use nalgebra::{Matrix2, Matrix3, RowVector2};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -25,6 +28,7 @@ use super::match_noise::match_noise;
 use super::settings::{DisparityInterval, StereoReference, TemplateSettings};
 use super::stereo_curve::{Curve, window_through};
 use crate::camera::Camera;
+use crate::correlate::Focus;
 use crate::correlate::peak::Fit;
 use crate::correlate::zncc::zncc;
 use crate::frames::Pixel;
@@ -98,7 +102,11 @@ pub struct PointStereo {
     pub right_window: Patch,
 }
 
+/// A slope that stretches the window by more than this is not believed, px per px.
+const STRETCH_LIMIT: f64 = 0.5;
+
 /// A score at a place along and across the curve.
+#[derive(Clone, Copy)]
 struct Best {
     along: f64,
     across: f64,
@@ -123,16 +131,24 @@ pub fn point_stereo(input: &StereoInput<'_>, settings: &TemplateSettings) -> Res
         curve.flatten_to_row(input.left_pixel.y);
     }
     let interval = search_interval(&curve, input, settings)?;
-    let (points, best) = search(&curve, &template, input, interval, settings);
-    let best = best.ok_or("no window of the right image fits on the searched part of the epipolar curve")?;
+    let facing = Windows { curve: &curve, template: &template, input, slope: RowVector2::zeros(), settings };
+    let (points, best) = facing.search(interval);
+    let best = best.map(|best| facing.in_focus(interval, best)).ok_or(
+        "no window of the right image fits on the searched part of the epipolar curve",
+    )?;
+    let slope = surface_slope(&curve, best.along, input, settings);
+    let (windows, best) = facing.on_surface(interval, best, slope);
     let (right_pixel, range_m) = curve.at(best.along, best.across);
-    let affine = curve.right_from_left(input.left, input.right, input.left_pixel, range_m);
-    let right_window = window_through(input.right_image, right_pixel, &affine, half, settings.kernel);
-    let right_from_left = surface_slope(&curve, &affine, best.along, input, settings).unwrap_or(affine);
-    let misfit = affine
+    let prepared = windows.right_from_left(best.along);
+    let right_window = window_through(input.right_image, right_pixel, &prepared, half, settings.kernel);
+    let right_from_left = slope.map_or(prepared, |slope| {
+        Windows { slope, ..facing }.right_from_left(best.along)
+    });
+    let misfit = prepared
         .try_inverse()
         .map_or_else(Matrix2::zeros, |inverse| inverse * right_from_left - Matrix2::identity());
-    let noise = match_noise(&template, &right_window, &misfit);
+    let focus = Focus::new(settings.template_size_px, settings.focus_px);
+    let noise = match_noise(&template, &right_window, &misfit, &focus);
     let seen = noise.covariance_px2 + noise.bias_px * noise.bias_px.transpose();
     Ok(PointStereo {
         curve: points,
@@ -141,7 +157,7 @@ pub fn point_stereo(input: &StereoInput<'_>, settings: &TemplateSettings) -> Res
         range_m,
         across_px: best.across,
         at_end: best.at_end,
-        covariance_px2: affine * seen * affine.transpose(),
+        covariance_px2: prepared * seen * prepared.transpose(),
         right_from_left,
         right_window,
     })
@@ -170,47 +186,95 @@ fn search_interval(
     if cut.0 < cut.1 { Ok(cut) } else { Err("the disparity interval lies off the epipolar curve".to_owned()) }
 }
 
-/// Compares windows about a pixel apart along the interval and up to the tolerance across it.
-fn search(
-    curve: &Curve,
-    template: &Patch,
-    input: &StereoInput<'_>,
-    (from, to): (f64, f64),
-    settings: &TemplateSettings,
-) -> (Vec<CurvePoint>, Option<Best>) {
-    let steps = (to - from).ceil().max(1.0) as usize;
-    let spacing = (to - from) / steps as f64;
-    let side = settings.epipolar_tolerance_px.floor() as i32;
-    // One more to either side, so that the quadratic fit across the curve has neighbours.
-    let rows = (2 * (side + 1) + 1) as usize;
-    let mut scores = vec![f32::NAN; (steps + 1) * rows];
-    let mut points = Vec::with_capacity(steps + 1);
-    for i in 0..=steps {
-        let along = from + spacing * i as f64;
-        let (pixel, range_m) = curve.at(along, 0.0);
-        let affine = curve.right_from_left(input.left, input.right, input.left_pixel, range_m);
-        let mut best: Option<f32> = None;
-        for row in 0..rows {
-            let across = row as i32 - side - 1;
-            let (at, _) = curve.at(along, f64::from(across));
-            let window = window_through(
-                input.right_image,
-                at,
-                &affine,
-                settings.template_size_px / 2,
-                settings.kernel,
-            );
-            if let Some(score) = zncc(template, &window) {
-                scores[i * rows + row] = score;
-                if across.abs() <= side {
-                    best = Some(best.map_or(score, |b| b.max(score)));
+/// The windows of the right image that a template is compared with, each resampled as the left camera sees it on
+/// a surface of one slope.
+#[derive(Clone, Copy)]
+struct Windows<'a> {
+    curve: &'a Curve,
+    template: &'a Patch,
+    input: &'a StereoInput<'a>,
+    /// How the place on the curve moves with the left pixel beside what a facing surface makes it, px per px.
+    slope: RowVector2<f64>,
+    settings: &'a TemplateSettings,
+}
+
+impl Windows<'_> {
+    /// `∂right/∂left` on the surface at an arc length, px per px.
+    fn right_from_left(&self, along: f64) -> Matrix2<f64> {
+        let (_, range_m) = self.curve.at(along, 0.0);
+        let StereoInput { left, right, left_pixel, .. } = *self.input;
+        self.curve.right_from_left(left, right, left_pixel, range_m) + self.curve.tangent(along) * self.slope
+    }
+
+    /// The window at a place of the curve, resampled through `map`.
+    fn at(&self, along: f64, across: f64, map: &Matrix2<f64>) -> Patch {
+        let (pixel, _) = self.curve.at(along, across);
+        let half = self.settings.template_size_px / 2;
+        window_through(self.input.right_image, pixel, map, half, self.settings.kernel)
+    }
+
+    /// Compares windows about a pixel apart along the interval and up to the tolerance across it.
+    fn search(&self, (from, to): (f64, f64)) -> (Vec<CurvePoint>, Option<Best>) {
+        let steps = (to - from).ceil().max(1.0) as usize;
+        let spacing = (to - from) / steps as f64;
+        let side = self.settings.epipolar_tolerance_px.floor() as i32;
+        // One more to either side, so that the quadratic fit across the curve has neighbours.
+        let rows = (2 * (side + 1) + 1) as usize;
+        let mut scores = vec![f32::NAN; (steps + 1) * rows];
+        let mut points = Vec::with_capacity(steps + 1);
+        for i in 0..=steps {
+            let along = from + spacing * i as f64;
+            let (pixel, range_m) = self.curve.at(along, 0.0);
+            let map = self.right_from_left(along);
+            let mut best: Option<f32> = None;
+            for row in 0..rows {
+                let across = row as i32 - side - 1;
+                if let Some(score) = zncc(self.template, &self.at(along, f64::from(across), &map)) {
+                    scores[i * rows + row] = score;
+                    if across.abs() <= side {
+                        best = Some(best.map_or(score, |b| b.max(score)));
+                    }
                 }
             }
+            points.push(CurvePoint { pixel, range_m, score: best });
         }
-        points.push(CurvePoint { pixel, range_m, score: best });
+        (points, refine(&scores, rows, from, spacing, side, self.settings.sub_pixel))
     }
-    let best = refine(&scores, rows, from, spacing, side, settings.sub_pixel);
-    (points, best)
+
+    /// The best position moved to the next maximum in focus, where there is one inside the interval and the
+    /// tolerance; its score stays that of the whole window.
+    fn in_focus(&self, (from, to): (f64, f64), best: Best) -> Best {
+        let focus = Focus::new(self.settings.template_size_px, self.settings.focus_px);
+        if focus.is_even() || best.at_end {
+            return best;
+        }
+        let window_at = |x: i32, y: i32| {
+            let along = best.along + f64::from(x);
+            let is_inside = (from..=to).contains(&along);
+            is_inside.then(|| self.at(along, best.across + f64::from(y), &self.right_from_left(along)))
+        };
+        let Some(found) = focus.climb(self.template, self.settings.sub_pixel, window_at) else { return best };
+        let across = best.across + found.offset_px.y;
+        // The same half pixel more that the fit of the whole window may take.
+        if across.abs() > self.settings.epipolar_tolerance_px + 0.5 {
+            return best;
+        }
+        Best { along: best.along + found.offset_px.x, across, ..best }
+    }
+
+    /// The best position once more, near where it was, with windows resampled as on a surface of this slope; what
+    /// was found before stands unless that scores better.
+    fn on_surface(self, (from, to): (f64, f64), best: Best, slope: Option<RowVector2<f64>>) -> (Self, Best) {
+        let believed = slope.filter(|slope| self.settings.surface_warp && slope.norm() <= STRETCH_LIMIT);
+        let Some(slope) = believed.filter(|_| !best.at_end) else { return (self, best) };
+        let windows = Self { slope, ..self };
+        let near = ((best.along - SLOPE_REACH_PX).max(from), (best.along + SLOPE_REACH_PX).min(to));
+        let (_, again) = windows.search(near);
+        match again.filter(|again| !again.at_end && again.score >= best.score) {
+            Some(again) => (windows, windows.in_focus(near, again)),
+            None => (self, best),
+        }
+    }
 }
 
 /// The highest score within the tolerance, refined by a quadratic fit along and across.
@@ -245,35 +309,38 @@ fn refine(scores: &[f32], rows: usize, from: f64, spacing: f64, side: i32, sub_p
     Some(best)
 }
 
-/// How the right position moves with the left one, from the matches of four neighbours of the target.
+/// How the place on the curve moves with the left pixel, from the matches of four neighbours of the target, px per
+/// px; beside what a surface that faces the camera makes it.
 fn surface_slope(
     curve: &Curve,
-    affine: &Matrix2<f64>,
     along: f64,
     input: &StereoInput<'_>,
     settings: &TemplateSettings,
-) -> Option<Matrix2<f64>> {
+) -> Option<RowVector2<f64>> {
     let (_, range_m) = curve.at(along, 0.0);
+    let narrow = TemplateSettings { epipolar_tolerance_px: 0.0, ..settings.clone() };
     let neighbour = |dx: f64, dy: f64| -> Option<f64> {
         let left_pixel = input.left_pixel.offset(dx, dy);
-        let half = settings.template_size_px / 2;
-        let template = patch::extract(input.left_image, left_pixel, half, settings.kernel);
+        let template =
+            patch::extract(input.left_image, left_pixel, settings.template_size_px / 2, settings.kernel);
         let own =
             Curve::new(input.left, input.right, left_pixel, settings.range_min_m, settings.range_max_m)?;
         let expected = own.along_of_range(range_m);
         let interval =
             ((expected - SLOPE_REACH_PX).max(0.0), (expected + SLOPE_REACH_PX).min(own.length_px()));
         let shifted = StereoInput { left_pixel, ..*input };
-        let narrow = TemplateSettings { epipolar_tolerance_px: 0.0, ..settings.clone() };
-        let (_, best) = search(&own, &template, &shifted, interval, &narrow);
-        best.filter(|b| b.score as f32 >= SLOPE_SCORE_MIN && !b.at_end).map(|b| b.along - expected)
+        let windows = Windows {
+            curve: &own,
+            template: &template,
+            input: &shifted,
+            slope: RowVector2::zeros(),
+            settings: &narrow,
+        };
+        let best = windows.in_focus(interval, windows.search(interval).1?);
+        (best.score as f32 >= SLOPE_SCORE_MIN && !best.at_end).then_some(best.along - expected)
     };
-    let slope = |a: Option<f64>, b: Option<f64>| match (a, b) {
-        (Some(a), Some(b)) => Some((b - a) / (2.0 * SLOPE_BASE_PX)),
-        _ => None,
-    };
+    let slope = |a: Option<f64>, b: Option<f64>| Some((b? - a?) / (2.0 * SLOPE_BASE_PX));
     let du = slope(neighbour(-SLOPE_BASE_PX, 0.0), neighbour(SLOPE_BASE_PX, 0.0))?;
     let dv = slope(neighbour(0.0, -SLOPE_BASE_PX), neighbour(0.0, SLOPE_BASE_PX))?;
-    let tangent = curve.tangent(along);
-    Some(affine + tangent * nalgebra::RowVector2::new(du, dv))
+    Some(RowVector2::new(du, dv))
 }

@@ -7,9 +7,15 @@
 //! ρ     = atan2(dy, dx) of p_0 → p_adj in the new left image, clockwise on screen positive (R56)
 //! ```
 //! The window keeps its size in pixels; the image content is magnified by s and turned by ρ (R51, R58).
-//! Only the prediction is used, never the stereo result to come (R50). Out-of-plane change is not
-//! compensated (R60), but known where stereo measured the surface's slope: `image_from_template` is the map that
-//! carries the uncertainty of the target's position in the image.
+//! Only the prediction is used, never the stereo result to come (R50). Scale and roll do not compensate
+//! out-of-plane change (R60). Where stereo measured the slope of the target's surface, the map between the two
+//! images is known to first order,
+//! ```text
+//! F = ∂pixel_new/∂p · R · ∂p/∂pixel_old
+//! ```
+//! and with `surface_warp` the window is resampled through F instead: foreshortening changes with the line of
+//! sight, most on surfaces seen at a grazing angle. `image_from_template` is F (or s R(ρ) where the slope is not
+//! known), which also carries the uncertainty of the target's position in the image.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
@@ -17,6 +23,8 @@
 //! | p_new, C_new | `now_from_template * p_old`, `left` | m, present rover frame |
 //! | s | `scale` | – |
 //! | ρ | `roll_rad` | rad |
+//! | R | rotation of `now_from_template` | – |
+//! | ∂p/∂pixel_old | `appearance.surface_by_pixel` | m/px |
 
 use nalgebra::{Matrix2, Rotation2};
 use serde::{Deserialize, Serialize};
@@ -31,7 +39,10 @@ use crate::target::Appearance;
 /// Length of the helper vector, m (K-Eq 10).
 const HELPER_LENGTH_M: f64 = 0.05;
 
-/// The template, scaled and rolled.
+/// A slope that stretches the template by more than this beside scale and roll is not believed, px per px.
+const STRETCH_LIMIT: f64 = 0.5;
+
+/// The template, scaled and rolled, or warped by the target's surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ScaleRoll {
     /// Scale by the ratio of distances; applied only where the setting `scale` is on.
@@ -42,6 +53,8 @@ pub struct ScaleRoll {
     pub applied_scale: f64,
     /// Roll that was applied, rad.
     pub applied_roll_rad: f64,
+    /// Whether the window was warped by the surface's slope instead: through `image_from_template`.
+    pub warped: bool,
     /// Distance from the left camera when the template was taken, m.
     pub old_distance_m: f64,
     /// Predicted distance from the left camera now, m.
@@ -59,19 +72,23 @@ pub struct ScaleRoll {
     #[serde(skip)]
     #[schema(ignore)]
     pub scaled: Patch,
-    /// The window after scaling and rolling: what is matched.
+    /// The window after scaling and rolling, or after warping: what is matched.
     #[serde(skip)]
     #[schema(ignore)]
     pub rolled: Patch,
 }
 
 impl ScaleRoll {
-    /// How the template was prepared: `s R(ρ)`, px per px.
+    /// How the template was prepared: `s R(ρ)`, or F where it was warped, px per px.
     pub fn prepared_from_template(&self) -> Matrix2<f64> {
+        if self.warped {
+            return self.image_from_template;
+        }
         Rotation2::new(self.applied_roll_rad).into_inner() * self.applied_scale
     }
 
-    /// By how much the surface stretches the prepared template further: `F (s R)⁻¹ − I`, px per px.
+    /// By how much the surface stretches the prepared template further: `F (s R)⁻¹ − I`, px per px; 0 where it
+    /// was warped.
     pub fn misfit(&self) -> Matrix2<f64> {
         let inverse = self.prepared_from_template().try_inverse().unwrap_or_else(Matrix2::identity);
         self.image_from_template * inverse - Matrix2::identity()
@@ -114,7 +131,7 @@ pub fn geometry(
     Ok((old_distance_m / new_distance_m, now - then, old_distance_m, new_distance_m))
 }
 
-/// Scales and rolls the template of `appearance` for the present left camera.
+/// Scales and rolls the template of `appearance` for the present left camera, or warps it by its surface.
 ///
 /// # Errors
 /// A sentence saying why there is no template.
@@ -135,10 +152,20 @@ pub fn scale_roll(
     let applied_roll_rad = if settings.roll { roll_rad } else { 0.0 };
     let (image, pixel) = (appearance.image.as_ref(), appearance.pixel);
     let (size, kernel) = (settings.template_size_px, settings.kernel);
-    let rolled = patch::scale_roll(image, pixel, applied_scale, applied_roll_rad, size, kernel);
     let similarity = Rotation2::new(roll_rad).into_inner() * scale;
+    let surface = surface_map(appearance, now_from_template, left).filter(|map| {
+        similarity.try_inverse().is_some_and(|inverse| {
+            (map * inverse - Matrix2::identity()).norm() <= STRETCH_LIMIT
+        })
+    });
+    let warp = surface.filter(|_| settings.surface_warp && settings.scale && settings.roll);
+    let rolled = match &warp {
+        Some(map) => patch::warp(image, pixel, map, size, kernel),
+        None => patch::scale_roll(image, pixel, applied_scale, applied_roll_rad, size, kernel),
+    };
     Ok(ScaleRoll {
-        image_from_template: surface_map(appearance, now_from_template, left).unwrap_or(similarity),
+        image_from_template: surface.unwrap_or(similarity),
+        warped: warp.is_some(),
         scale,
         roll_rad,
         applied_scale,

@@ -40,6 +40,19 @@ pub enum DisparityInterval {
     FromZero,
 }
 
+/// When an accepted update renews the template (R70, R71).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum TemplateUpdate {
+    /// At every accepted update, as in flight.
+    EveryUpdate,
+    /// Once it must be magnified too much, or matches badly: errors of matches are chained more seldom.
+    #[default]
+    OnCondition,
+    /// Never: the designated window is looked for at every stop.
+    Never,
+}
+
 /// Where the pixel noise comes from that the position covariance propagates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
@@ -66,6 +79,17 @@ settings_group! {
         scale: bool = true, "", Domain::Switch, "K§4.3.1, R49";
         /// Roll the template by the camera geometry.
         roll: bool = true, "", Domain::Switch, "K§4.3.1, R52";
+        /// Warp the template by the slope of the target's surface, as stereo measured it, instead of scale and roll
+        /// alone; where both of these are on.
+        surface_warp: bool = true, "", Domain::Switch, "ours; beyond R60";
+        /// 1σ of the Gaussian through which a match is refined; 0: all of the window counts alike, as in the paper.
+        focus_px: f64 = 4.0, "px", Domain::Between(0.0, 100.0), "ours; correlate/focus.rs";
+        /// When an accepted update renews the template.
+        template_update: TemplateUpdate = TemplateUpdate::OnCondition, "", Domain::choice(&["every_update", "on_condition", "never"]), "K§4.3.3, R70; ours";
+        /// On condition: renewed once it must be magnified by this, or shrunk by its inverse.
+        renew_scale: f64 = 1.3, "", Domain::Between(1.0, 100.0), "ours";
+        /// On condition: renewed once its match scores less.
+        renew_ncc: f64 = 0.95, "", Domain::Between(-1.0, 1.0), "ours";
         /// What the roll is measured against.
         roll_reference: RollReference = RollReference::Horizontal, "", Domain::choice(&["horizontal", "old_image"]), "R57";
         /// Interpolation kernel of the template.

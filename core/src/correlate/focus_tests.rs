@@ -1,0 +1,3 @@
+//! Tests of the refinement through a Gaussian window.
+
+use super::*;
