@@ -7,6 +7,7 @@ mod drive;
 mod fiducials;
 mod moments;
 mod geometry;
+mod hand_over;
 mod pictures;
 mod slip;
 
