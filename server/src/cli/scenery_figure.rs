@@ -1,4 +1,5 @@
-//! The figures of the scenery study, drawn by `plotters` as SVG: rocks, ground, noise, and spectra of soil.
+//! The figures of the scenery study, drawn by `plotters` as SVG: rocks, ground, noise, spectra and levels of soil, and
+//! exposure under a changing share of sky.
 //!
 //! Where laws are powers both axes are logarithms to the base of ten.
 
@@ -7,17 +8,20 @@ use std::path::Path;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use sightline_core::error::{Error, Result};
+use sightline_core::study::exposure::ExposureRow;
 
 use super::scenery::Report;
 
 /// Okabe and Ito's colours: told apart by everyone.
-const COLOURS: [RGBColor; 6] = [
+const COLOURS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
     RGBColor(204, 121, 167),
     RGBColor(230, 159, 0),
     RGBColor(86, 180, 233),
+    RGBColor(0, 0, 0),
+    RGBColor(240, 228, 66),
 ];
 
 type Drawn = std::result::Result<(), String>;
@@ -49,7 +53,8 @@ pub(super) fn draw(folder: &Path, report: &Report) -> Result<()> {
     file("ground.svg", &|area| ground(area, report))?;
     file("noise.svg", &|area| noise(area, report))?;
     file("spectrum.svg", &|area| spectrum(area, report))?;
-    file("histogram.svg", &|area| histogram(area, report))
+    file("histogram.svg", &|area| histogram(area, report))?;
+    file("exposure.svg", &|area| exposure(area, report))
 }
 
 fn rocks(area: &Area<'_>, report: &Report) -> Drawn {
@@ -127,6 +132,20 @@ fn histogram(area: &Area<'_>, report: &Report) -> Drawn {
         })
         .collect();
     chart(area, "soil: levels", ["level over the mean", "part of the pixels"], &all)
+}
+
+fn exposure(area: &Area<'_>, report: &Report) -> Drawn {
+    let of = |value: fn(&ExposureRow) -> f64| {
+        report.exposure.iter().map(|row| (100.0 * row.sky_share, value(row))).collect::<Vec<_>>()
+    };
+    let ways: [(&str, fn(&ExposureRow) -> f64); 2] =
+        [("full frame", |row| row.full_frame_dn), ("subframe", |row| row.subframe_dn)];
+    let mut all = Vec::new();
+    for ((name, value), colour) in ways.into_iter().zip(COLOURS) {
+        all.push(Series { name: name.into(), colour, points: of(value), is_line: false });
+        all.push(Series { name: String::new(), colour, points: of(value), is_line: true });
+    }
+    chart(area, "exposure: level of the targets", ["sky in the frame, %", "mean level, DN"], &all)
 }
 
 /// A chart whose axes hold all points.

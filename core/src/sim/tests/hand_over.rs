@@ -12,7 +12,8 @@ use crate::traverse::create_simulated;
 
 #[test]
 fn k9_takes_its_last_stop_twice_and_both_pairs_see_the_target() {
-    for name in ["k9-5", "k9-7.5", "k9-10"] {
+    // R209: three targets, at the start 5, 7.5 and 10 m away.
+    for (name, distance_m) in [("k9-5", 5.0), ("k9-7.5", 7.5), ("k9-10", 10.0)] {
         let scenario = library::scenario(name).unwrap();
         let world = World::new(&scenario);
         let index = index(&scenario, &world).unwrap();
@@ -25,6 +26,8 @@ fn k9_takes_its_last_stop_twice_and_both_pairs_see_the_target() {
         );
         assert!(before.mast_angles.is_some() && last.mast_angles.is_none() && last.time_s > before.time_s);
         let centre = world.targets_centre();
+        let first = true_camera_in_site(&index.stops[0], Eye::Left).unwrap();
+        assert!(((centre - first.model.centre()).norm() - distance_m).abs() < 1e-6);
         for (step, stop) in [(number - 1, before), (number, last)] {
             let here = world.at(&Moment::of(step, stop).unwrap(), &scenario);
             for eye in [Eye::Left, Eye::Right] {

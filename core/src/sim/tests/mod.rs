@@ -8,6 +8,7 @@ mod fiducials;
 mod moments;
 mod geometry;
 mod hand_over;
+mod papers;
 mod pictures;
 mod slip;
 
