@@ -73,6 +73,7 @@ fn rocks(area: &Area<'_>, report: &Report) -> Drawn {
         "rocks: counted (dots) and the law (lines)",
         ["log10 of diameter, m", "log10 of number per m²"],
         &all,
+        SeriesLabelPosition::UpperRight,
     )
 }
 
@@ -90,7 +91,13 @@ fn ground(area: &Area<'_>, report: &Report) -> Drawn {
             is_line: false,
         },
     ];
-    chart(area, "ground: RMS difference of height", ["log10 of distance, m", "log10 of difference, m"], &all)
+    chart(
+        area,
+        "ground: RMS difference of height",
+        ["log10 of distance, m", "log10 of difference, m"],
+        &all,
+        SeriesLabelPosition::LowerRight,
+    )
 }
 
 fn noise(area: &Area<'_>, report: &Report) -> Drawn {
@@ -102,7 +109,7 @@ fn noise(area: &Area<'_>, report: &Report) -> Drawn {
         Series { name: "measured".into(), colour: COLOURS[0], points, is_line: false },
     ];
     let title = format!("noise: {:.1} e⁻/DN stated, {:.1} from the slope", report.gain[0], report.gain[1]);
-    chart(area, &title, ["mean, DN", "variance, DN²"], &all)
+    chart(area, &title, ["mean, DN", "variance, DN²"], &all, SeriesLabelPosition::LowerRight)
 }
 
 fn spectrum(area: &Area<'_>, report: &Report) -> Drawn {
@@ -116,7 +123,13 @@ fn spectrum(area: &Area<'_>, report: &Report) -> Drawn {
             Series { name: name.clone(), colour, points, is_line: true }
         })
         .collect();
-    chart(area, "soil: power of its texture", ["log10 of cycles per px", "log10 of power"], &all)
+    chart(
+        area,
+        "soil: power of its texture",
+        ["log10 of cycles per px", "log10 of power"],
+        &all,
+        SeriesLabelPosition::UpperRight,
+    )
 }
 
 fn histogram(area: &Area<'_>, report: &Report) -> Drawn {
@@ -131,7 +144,13 @@ fn histogram(area: &Area<'_>, report: &Report) -> Drawn {
             Series { name: name.clone(), colour, points, is_line: true }
         })
         .collect();
-    chart(area, "soil: levels", ["level over the mean", "part of the pixels"], &all)
+    chart(
+        area,
+        "soil: levels",
+        ["level over the mean", "part of the pixels"],
+        &all,
+        SeriesLabelPosition::UpperRight,
+    )
 }
 
 fn exposure(area: &Area<'_>, report: &Report) -> Drawn {
@@ -145,11 +164,23 @@ fn exposure(area: &Area<'_>, report: &Report) -> Drawn {
         all.push(Series { name: name.into(), colour, points: of(value), is_line: false });
         all.push(Series { name: String::new(), colour, points: of(value), is_line: true });
     }
-    chart(area, "exposure: level of the targets", ["sky in the frame, %", "mean level, DN"], &all)
+    chart(
+        area,
+        "exposure: level of the targets",
+        ["sky in the frame, %", "mean level, DN"],
+        &all,
+        SeriesLabelPosition::MiddleRight,
+    )
 }
 
-/// A chart whose axes hold all points.
-fn chart(area: &Area<'_>, title: &str, axes: [&str; 2], all: &[Series]) -> Drawn {
+/// A chart whose axes hold all points; the legend stands in the corner that the curves leave free.
+fn chart(
+    area: &Area<'_>,
+    title: &str,
+    axes: [&str; 2],
+    all: &[Series],
+    corner: SeriesLabelPosition,
+) -> Drawn {
     let points = || all.iter().flat_map(|series| series.points.iter().copied());
     let range = |of: fn((f64, f64)) -> f64| {
         let (low, high) = points()
@@ -182,9 +213,6 @@ fn chart(area: &Area<'_>, title: &str, axes: [&str; 2], all: &[Series]) -> Drawn
                 .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(2)));
         }
     }
-    // The legend stands where a falling, or a rising, curve leaves the corner free.
-    let falls = all.iter().filter_map(|s| Some(s.points.last()?.1 - s.points.first()?.1)).sum::<f64>() <= 0.0;
-    let corner = if falls { SeriesLabelPosition::UpperRight } else { SeriesLabelPosition::LowerRight };
     let labels = chart
         .configure_series_labels()
         .position(corner)

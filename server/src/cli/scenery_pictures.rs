@@ -2,8 +2,8 @@
 //!
 //! A recorded square is written `FILE@X,Y` or `FILE@X,Y,SIDE`: a PDS3 product, or a traverse, whose first left image
 //! it is, and the upper left corner and the side of the square, px. Where squares lie is a person's choice, made by
-//! looking at the frame; simulated squares of rock are found by the truth: wholly on one face of
-//! a rock, lit, one a rock.
+//! looking at the frame; simulated squares of rock are found by the truth: wholly on one face of a rock, lit, one a
+//! rock.
 //!
 //! Levels are those of the file, bias included; what the file was compressed with is not undone.
 
@@ -84,7 +84,9 @@ fn frame(path: &Path) -> Result<(String, GrayImage)> {
     let raster = product.read_raster()?;
     let image = GrayImage::from_raw(raster.width, raster.height, raster.samples);
     let image = image.ok_or_else(|| Error::format(path, "its size and its samples disagree"))?;
-    Ok((product.id(), image))
+    let host = product.label.text("INSTRUMENT_HOST_ID").unwrap_or_default();
+    let sol = product.label.number("PLANET_DAY_NUMBER");
+    Ok((sol.map_or_else(|| product.id(), |sol| format!("{host} sol {sol}")), image))
 }
 
 /// The left camera of a stop of the demonstration, and its recorded picture.
