@@ -154,15 +154,14 @@ fn histogram(area: &Area<'_>, report: &Report) -> Drawn {
 }
 
 fn exposure(area: &Area<'_>, report: &Report) -> Drawn {
-    let of = |value: fn(&ExposureRow) -> f64| {
-        report.exposure.iter().map(|row| (100.0 * row.sky_share, value(row))).collect::<Vec<_>>()
+    let points = |value: fn(&ExposureRow) -> f64| -> Vec<(f64, f64)> {
+        report.exposure.iter().map(|row| (100.0 * row.sky_share, value(row))).collect()
     };
-    let ways: [(&str, fn(&ExposureRow) -> f64); 2] =
-        [("full frame", |row| row.full_frame_dn), ("subframe", |row| row.subframe_dn)];
+    let ways = [("full frame", points(|row| row.full_frame_dn)), ("subframe", points(|row| row.subframe_dn))];
     let mut all = Vec::new();
-    for ((name, value), colour) in ways.into_iter().zip(COLOURS) {
-        all.push(Series { name: name.into(), colour, points: of(value), is_line: false });
-        all.push(Series { name: String::new(), colour, points: of(value), is_line: true });
+    for ((name, points), colour) in ways.into_iter().zip(COLOURS) {
+        all.push(Series { name: name.into(), colour, points: points.clone(), is_line: false });
+        all.push(Series { name: String::new(), colour, points, is_line: true });
     }
     chart(
         area,
