@@ -16,6 +16,7 @@
 //!                relief          the fractal and its ripples
 //!                terrain, terrain_cast   the ground, tilted, and rays on it
 //!                rocks, shape    one rock                    rock_field  where they lie
+//!                footing         what wheels stand on
 //!                details         grains, drifts, veins, pits
 //!                surface         albedo and shading normal   imprint     wheel tracks
 //! culling        which rocks a ray can meet                  solids      made things

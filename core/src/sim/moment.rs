@@ -88,7 +88,7 @@ impl World {
     fn rover_at(&self, site_from_rover: &Pose) -> Vec<Solid> {
         let place = site_from_rover.translation.vector;
         let yaw_rad = site_from_rover.rotation.euler_angles().2;
-        let ground_z_m = |x_m: f64, y_m: f64| self.ground_z_at(x_m, y_m);
+        let ground_z_m = |x_m: f64, y_m: f64| self.footing_z_at(x_m, y_m);
         // Where no stand is found there is no such stop either.
         let angles =
             settle(&ground_z_m, place.x, place.y, yaw_rad).map_or_else(Default::default, |s| s.angles);

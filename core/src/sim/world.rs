@@ -16,6 +16,7 @@ use crate::frames::{Point3, Ray, Vector3};
 use crate::sim::camera::render;
 use crate::sim::culling::{SunGrid, Tree};
 use crate::sim::ground::around::Around;
+use crate::sim::ground::footing::Footing;
 use crate::sim::ground::imprint::Imprint;
 use crate::sim::ground::rock_field::{self, Approach};
 use crate::sim::ground::rocks::Rock;
@@ -62,6 +63,7 @@ pub(in crate::sim) struct Scenery {
     pub(in crate::sim) rocks: Vec<Rock>,
     pub(in crate::sim) surfaces: Surfaces,
     pub(in crate::sim) openness: Openness,
+    footing: Footing,
     tree: Tree,
     targets_centre: Point3,
 }
@@ -97,6 +99,7 @@ impl World {
         let scenery = Scenery {
             tree: Tree::new(&rocks),
             openness: Openness::new(&rocks, x_m, y_m),
+            footing: Footing::new(&rocks, x_m, y_m),
             surfaces: Surfaces::new(&scenario.texture, scenario.seed),
             terrain,
             rocks,
@@ -141,6 +144,16 @@ impl World {
     /// Height of the bare ground at a place, m down, site frame.
     pub fn ground_z_at(&self, x_m: f64, y_m: f64) -> f64 {
         self.scenery.terrain.z_at(x_m, y_m)
+    }
+
+    /// Height of what a wheel stands on at a place, ground or rock, m down, site frame.
+    pub fn footing_z_at(&self, x_m: f64, y_m: f64) -> f64 {
+        self.scenery.footing.z_at(&self.scenery.terrain, x_m, y_m)
+    }
+
+    /// The height of the rock, m, that stands at a place and is too high for a wheel to climb, if one does.
+    pub fn blocked_by_m(&self, x_m: f64, y_m: f64) -> Option<f64> {
+        self.scenery.footing.blocked_by_m(&self.scenery.rocks, x_m, y_m)
     }
 
     /// The first surface that a ray meets; the ray's direction is unit.

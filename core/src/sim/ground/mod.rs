@@ -9,6 +9,7 @@ mod shape;
 pub mod rock_law;
 pub mod around;
 pub mod rock_field;
+pub mod footing;
 mod details;
 pub mod surface;
 pub mod imprint;

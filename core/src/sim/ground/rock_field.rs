@@ -42,8 +42,8 @@ const TRACK_Y_M: [f64; 2] = [0.43, 0.70];
 const BELLY_M: f64 = 0.20;
 /// Where the scatter of rocks starts, m ahead of the first stop: nearer ground is never seen.
 const NEAREST_M: f64 = 1.5;
-/// The highest stone that a wheel presses into the soil, m (ours).
-const PRESSED_M: f64 = 0.025;
+/// The highest stone that is left in the wheels' way: they roll over it (`footing.rs`), m (ours).
+const ROLLED_OVER_M: f64 = 0.025;
 /// Radius of a rock over its diameter: an outline is longer than its disc.
 const REACH: f64 = 0.6;
 /// By how much the surroundings in which a rock looks for a free place grow with every draw, m.
@@ -235,12 +235,12 @@ fn beside([x_m, y_m]: [f64; 2], by_m: f64, random: &mut Pcg64) -> [f64; 2] {
 /// Whether a rock would stand in a wheel's track or touch the belly.
 fn is_in_the_way(approach: &Approach, x_m: f64, y_m: f64, reach_m: f64, height_m: f64) -> bool {
     if let Some(around) = &approach.around {
-        return height_m > PRESSED_M && around.is_in_the_way(x_m, y_m, reach_m, height_m > BELLY_M);
+        return height_m > ROLLED_OVER_M && around.is_in_the_way(x_m, y_m, reach_m, height_m > BELLY_M);
     }
     let aside_m = (y_m - approach.goal_m[1]).abs();
     let beside = aside_m - reach_m > TRACK_Y_M[1];
     let between = aside_m + reach_m < TRACK_Y_M[0] && height_m < BELLY_M;
-    x_m - reach_m < approach.wheels_reach_m && !beside && !between && height_m > PRESSED_M
+    x_m - reach_m < approach.wheels_reach_m && !beside && !between && height_m > ROLLED_OVER_M
 }
 
 /// The places that are taken, in a coarse grid so that a look-up stays short.

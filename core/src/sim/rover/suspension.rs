@@ -1,4 +1,4 @@
-//! The suspension: six wheels on rockers and bogies, settled on the ground.
+//! The suspension: six wheels on rockers and bogies, settled on the ground and its rocks (`footing.rs`).
 //!
 //! **Mechanism.** On each side a rocker carries the front wheel and, behind, the pivot of a bogie with the
 //! middle and the rear wheel. The differential holds the body at the mean of the two rockers' pitch: the

@@ -7,6 +7,7 @@ use crate::sim::rover::tracks::Tracks;
 use crate::sim::scenario::{
     Course, DriveSettings, ForcedSlip, Move, OdometryModel, RoverSettings, Scenario, Soil,
 };
+use crate::sim::world::World;
 
 /// A drive of moves.
 pub(super) fn moves(
@@ -314,4 +315,35 @@ fn the_ground_reaches_behind_the_targets_from_every_stop() {
     let [[x_from, x_to], [y_from, y_to]] = ground_extent_m(&crab);
     // From the last stop the view runs on 9 m beyond the centre in the direction of 70°.
     assert!(x_from <= -2.5 && x_to >= 16.3 && y_to > 9.0 * 70f64.to_radians().sin() && y_from < -8.5);
+}
+
+#[test]
+fn wheels_climb_a_rock_of_15_cm_and_a_drive_over_one_of_30_cm_is_refused() {
+    let rock_m = |height_m: f64| {
+        let mut scenario = Scenario::default();
+        (scenario.rocks.area_fraction, scenario.rocks.cluster_count) = (0.0, 0);
+        (scenario.terrain.rms_at_1m_m, scenario.camera.image_size) = (0.0, 128);
+        let text =
+            format!("x_m = -5.0\ny_m = 0.53\ndiameter_m = 0.4\nheight_m = {height_m}\nshape = \"slab\"");
+        scenario.rocks.placed.push(toml::from_str(&text).unwrap());
+        let world = World::new(&scenario);
+        (crate::sim::rover::drive::true_drive(&world, &scenario), world)
+    };
+    let (drive, world) = rock_m(0.15);
+    let stands: Vec<_> = drive.unwrap().legs.into_iter().flat_map(|leg| leg.stands).collect();
+    let height_m =
+        |wheel: usize| stands.iter().map(|stand| 0.294 - stand.contacts_in_site[wheel].z).fold(0.0, f64::max);
+    // The right front and rear wheels go over its top, which is 0.15 m high; the left ones stay on the plain.
+    for wheel in [1, 5] {
+        assert!((height_m(wheel) / 0.15 - 1.0).abs() < 0.01, "{wheel}: {}", height_m(wheel));
+    }
+    assert!([0, 2, 4].into_iter().all(|wheel| height_m(wheel) < 1e-6));
+    assert_eq!(world.blocked_by_m(5.3, 0.53), None);
+    let (refused, world) = rock_m(0.3);
+    let sentence = refused.expect_err("a wheel's radius is 0.13 m").to_string();
+    assert!(
+        sentence.contains("drive.end_distance_m") && sentence.contains("a rock 0.30 m high"),
+        "{sentence}"
+    );
+    assert_eq!(world.blocked_by_m(5.3, 0.53), Some(0.3));
 }
