@@ -88,7 +88,7 @@ impl World {
         let approach = Approach {
             goal_m: drive::goal_m(&scenario.drive),
             wheels_reach_m: drive::wheels_reach_m(&scenario.drive),
-            around: Around::new(&scenario.drive),
+            around: Around::new(&scenario.drive, &scenario.camera),
         };
         let [x_m, y_m] = drive::ground_extent_m(&scenario.drive);
         let terrain = Terrain::new(&scenario.terrain, x_m, y_m, scenario.seed);
