@@ -10,14 +10,14 @@
 //! with rays that start 1 µm off it, so that it does not hide itself.
 //! Sources: domain.md 10, 11; the definition of a target's truth as the surface point under its pixel.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use crate::frames::{Point3, Ray, Vector3};
 use crate::sim::camera::render;
 use crate::sim::culling::{SunGrid, Tree};
 use crate::sim::ground::around::Around;
 use crate::sim::ground::footing::Footing;
-use crate::sim::ground::imprint::Imprint;
+use crate::sim::ground::imprint::{Imprint, Laid};
 use crate::sim::ground::rock_field::{self, Approach};
 use crate::sim::ground::rocks::Rock;
 use crate::sim::ground::surface::Surfaces;
@@ -66,6 +66,8 @@ pub(in crate::sim) struct Scenery {
     footing: Footing,
     tree: Tree,
     targets_centre: Point3,
+    /// The wheel tracks of the whole drive, driven when they are first asked for; nothing where it fails.
+    pub(in crate::sim) laid: OnceLock<Option<Arc<Laid>>>,
 }
 
 /// The scenery of a scenario at one moment of the drive.
@@ -76,7 +78,7 @@ pub struct World {
     pub(in crate::sim) sun_grid: Arc<SunGrid>,
     pub(in crate::sim) solids: Vec<Solid>,
     /// Wheel tracks; nothing where the wheels leave none.
-    pub(in crate::sim) imprint: Option<Arc<Imprint>>,
+    pub(in crate::sim) imprint: Option<Imprint>,
     /// Fraction of full scale per unit of radiance.
     pub(in crate::sim) exposure: f64,
 }
@@ -104,6 +106,7 @@ impl World {
             terrain,
             rocks,
             targets_centre: Point3::origin(),
+            laid: OnceLock::new(),
         };
         let mut world = Self {
             scenery: Arc::new(scenery),
