@@ -43,6 +43,10 @@ const BORDER_RAYS: u32 = 16;
 /// By how much a real stop looks elsewhere than the plan's because of the ground under its wheels, rad (ours).
 const UNEVEN_RAD: f64 = 0.03;
 
+/// How badly the mast may point for the wedge of a straight approach to hold what it shows, rad: 0.46 less the 0.41 of
+/// half a picture.
+const STRAIGHT_POINTING_RAD: f64 = 0.04;
+
 /// What one eye sees of the ground at one stop.
 #[derive(Clone, Debug, PartialEq)]
 struct Wedge {
@@ -57,17 +61,20 @@ struct Wedge {
 /// Where a drive of moves looks and goes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Around {
+    goal_m: [f64; 2],
     wedges: Vec<Wedge>,
     wheels_m: Vec<[f64; 2]>,
     middles_m: Vec<[f64; 2]>,
 }
 
 impl Around {
-    /// Of a drive with its cameras; nothing for a straight approach along x with cameras on the mast, whose
-    /// wedge and lane are known without it.
+    /// Of a drive with its cameras; nothing for a straight approach along x with well-pointed cameras on the mast,
+    /// whose wedge and lane are known without it.
     pub fn new(drive: &DriveSettings, camera: &CameraSettings) -> Option<Self> {
         let is_straight = drive.course == Course::Approach && drive.heading_deg == 0.0;
-        if is_straight && camera.rig != CameraRig::MerFrontHazcam {
+        let is_narrow =
+            camera.rig != CameraRig::MerFrontHazcam && pointing_rad(drive) <= STRAIGHT_POINTING_RAD;
+        if is_straight && is_narrow {
             return None;
         }
         let TrueDrive { stops, legs } = planned(drive).ok()?;
@@ -75,7 +82,11 @@ impl Around {
         let (rig, [x_m, y_m]) = (Rig::new(camera), goal_m(drive));
         let goal = Point3::new(x_m, y_m, MEAN_GROUND_Z_M);
         Some(Self {
-            wedges: stops.iter().flat_map(|stop| wedges(&rig, stop, &goal, off_by_rad(drive))).collect(),
+            goal_m: [x_m, y_m],
+            wedges: stops
+                .iter()
+                .flat_map(|stop| wedges(&rig, stop, &goal, pointing_rad(drive) + UNEVEN_RAD))
+                .collect(),
             wheels_m: stands()
                 .flat_map(|stand| stand.contacts_in_site.map(|point| [point.x, point.y]))
                 .collect(),
@@ -83,6 +94,13 @@ impl Around {
                 .map(|stand| [stand.site_from_rover.translation.x, stand.site_from_rover.translation.y])
                 .collect(),
         })
+    }
+
+    /// How far from the targets' centre the cameras stand at the farthest stop, with a margin, m.
+    pub fn reach_m(&self) -> f64 {
+        let [x_m, y_m] = self.goal_m;
+        let off_m = |wedge: &Wedge| (wedge.from_m[0] - x_m).hypot(wedge.from_m[1] - y_m);
+        self.wedges.iter().map(off_m).fold(0.0, f64::max) + ASIDE_M
     }
 
     /// Whether some stop looks at a place.
@@ -100,11 +118,11 @@ impl Around {
     }
 }
 
-/// By how much the head may be turned elsewhere than the plan's, rad.
-fn off_by_rad(drive: &DriveSettings) -> f64 {
-    let told_deg =
+/// By how much the head may be turned elsewhere than where it is told, rad.
+fn pointing_rad(drive: &DriveSettings) -> f64 {
+    let off_deg =
         3.0 * drive.pointing_error_deg + 0.5 * drive.mast_backlash_deg + drive.mast_offset_deg[0].abs();
-    told_deg.to_radians() + UNEVEN_RAD
+    off_deg.to_radians()
 }
 
 /// What both eyes see at a stop of the plan, the mast pointed at the targets' centre.

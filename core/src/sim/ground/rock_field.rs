@@ -185,7 +185,10 @@ fn candidates(settings: &RockSettings, approach: &Approach, random: &mut Pcg64) 
     for strip in 0..strips {
         let from_m = nearest_m + strip as f64;
         let to_m = from_m + 1.0;
-        let beyond_goal_m = if is_around { from_m } else { from_m - approach.goal_m[0] };
+        let beyond_goal_m = approach.around.as_ref().map_or(from_m - approach.goal_m[0], |around| {
+            // Among the stops pebbles lie as near as at the goal; twice as far the rule of the distance holds.
+            from_m.min(2.0 * (from_m - around.reach_m()))
+        });
         let smallest = smallest_m(settings, beyond_goal_m);
         if smallest >= settings.largest_m {
             break;
