@@ -4,6 +4,7 @@ pub mod texture;
 mod relief;
 pub mod terrain;
 mod terrain_cast;
+mod far;
 pub mod rocks;
 mod shape;
 pub mod rock_law;

@@ -135,8 +135,11 @@ pub fn scatter(settings: &RockSettings, approach: &Approach, terrain: &Terrain, 
             break;
         }
     }
-    let up = terrain.mean_normal();
-    seeds.par_iter().map(|rock| Rock::grow(rock, terrain.z_at(rock.x_m, rock.y_m), &up)).collect()
+    let grow = |rock: &RockSeed| {
+        let up = terrain.mean_normal_at(rock.x_m, rock.y_m);
+        Rock::grow(rock, terrain.z_at(rock.x_m, rock.y_m), &up)
+    };
+    seeds.par_iter().map(grow).collect()
 }
 
 /// The rocks that the scenario places by hand.
