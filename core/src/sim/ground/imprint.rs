@@ -6,8 +6,8 @@
 //! **Groove.** All tracks together press the soil once: at a place at distance r from the nearest point of a
 //! wheel's line the groove has the depth below, and where tracks overlap the deepest counts. A line is drawn as a
 //! smooth curve (Catmull–Rom) through the places that the wheel passed, in pieces that bend by little; a corner
-//! sharper than 30° (the wheel stood and was steered) stays one. **Cleats.** The wheel that passed last leaves its marks
-//! along its line. They fade where a picture's samples cannot carry them.
+//! sharper than 30° (the wheel stood and was steered) stays one.
+//! **Cleats.** The wheel that passed last leaves its marks along its line. They fade where a picture's samples cannot carry them.
 //! ```text
 //! z(r, l) = depth · step((w/2 − r)/EDGE_M) + a CLEAT_M/2 · cos(2π l / CLEAT_SPACING_M),   step(t) = t²(3 − 2t)
 //! a = clamp(2 − c/CLEAT_SPACING_M, 0, 1)

@@ -104,7 +104,7 @@ impl<'a> Driver<'a> {
     fn check_way(&self, stand: &Stand) -> Result<()> {
         self.scene.blocked(stand).map_or(Ok(()), |(at, height_m)| {
             let problem = format!(
-                "a wheel meets a rock {height_m:.2} m high at x {:.2} m, y {:.2} m, above the {CLIMB_M} m that it climbs",
+                "a wheel meets a rock {height_m:.2} m high at x {:.2} m, y {:.2} m; it climbs {CLIMB_M} m",
                 at.x, at.y
             );
             Err(self.wrong(problem))
