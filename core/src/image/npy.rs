@@ -1,10 +1,11 @@
-//! Two-dimensional `f32` arrays as NumPy files (`.npy`, format version 1.0): dense evidence such as score surfaces.
+//! Arrays as NumPy files (`.npy`, format version 1.0): dense evidence such as score surfaces, and the truth of pictures.
 //!
-//! Rows are image rows (C order, `<f4`); NaN stays NaN. Arrays of `f64` and in column order are read too.
+//! Images are two-dimensional `f32`; rows are image rows (C order, `<f4`); NaN stays NaN. Arrays of `f64` and in
+//! column order are read too. Arrays of other numbers and shapes are written by [`encode_array`].
 
 use std::path::Path;
 
-use npyz::{DType, NpyFile, Order, WriterBuilder};
+use npyz::{AutoSerialize, DType, NpyFile, Order, WriterBuilder};
 
 use super::GrayImage;
 use super::io::MAX_PIXELS;
@@ -15,17 +16,25 @@ use crate::error::{Error, Result};
 /// # Errors
 /// [`Error::Format`] when the writer fails, which memory alone can cause.
 pub fn encode(image: &GrayImage) -> Result<Vec<u8>> {
+    encode_array(image.as_raw(), &[image.height(), image.width()])
+}
+
+/// The bytes of a `.npy` file with an array of any shape, its last axis running fastest.
+///
+/// # Errors
+/// [`Error::Format`] when the shape does not hold as many values, or as [`encode`].
+pub fn encode_array<T: AutoSerialize + Copy>(values: &[T], shape: &[u32]) -> Result<Vec<u8>> {
     let failed =
         |error: std::io::Error| Error::format("array", format!("cannot be written as .npy ({error})"));
-    let mut bytes = Vec::with_capacity(128 + 4 * image.as_raw().len());
-    let shape = [u64::from(image.height()), u64::from(image.width())];
-    let mut writer = npyz::WriteOptions::<f32>::new()
+    let mut bytes = Vec::with_capacity(128 + size_of_val(values));
+    let shape: Vec<u64> = shape.iter().copied().map(u64::from).collect();
+    let mut writer = npyz::WriteOptions::<T>::new()
         .default_dtype()
         .shape(&shape)
         .writer(&mut bytes)
         .begin_nd()
         .map_err(failed)?;
-    writer.extend(image.iter().copied()).map_err(failed)?;
+    writer.extend(values.iter().copied()).map_err(failed)?;
     writer.finish().map_err(failed)?;
     Ok(bytes)
 }

@@ -4,9 +4,12 @@
 //! follow from them) and, apart from it, the truth. The true cameras stand in the truth only where they
 //! differ from the ones that the tracker is given, which is when the scenario has a pointing error.
 //!
+//! With `camera.hand_over` one more stop follows the last: the same poses, true and estimated, and the other pair of
+//! cameras, which is fixed to the body and therefore has no mast angles (R205, R209).
+//!
 //! Time: the rover drives at 3.75 cm/s and turns at 2.1°/s along its wheels' way (domain.md 5.4) and stands
 //! for 60 s at each stop (the pause is ours).
-//! Frames: poses in the site frame, cameras in the rover frame. Sources: domain.md 4, 5; R104–R106.
+//! Frames: poses in the site frame, cameras in the rover frame. Sources: domain.md 4, 5; R104–R106, R205.
 
 use crate::camera::{Camera, MastAngles};
 use crate::error::Result;
@@ -16,7 +19,7 @@ use crate::traverse::{CameraSource, FORMAT_VERSION, StereoGeometry, Stop, StopTr
 use crate::sim::camera::render::Eye;
 use crate::sim::camera::rig::Rig;
 use crate::sim::rover::{drive, mast_error, odometry};
-use crate::sim::scenario::{CameraRig, Course, Scenario};
+use crate::sim::scenario::{CameraRig, CameraSettings, Course, Scenario};
 use crate::sim::world::World;
 
 /// The name of the scenario's file within a traverse folder.
@@ -39,10 +42,6 @@ pub fn index(scenario: &Scenario, world: &World) -> Result<TraverseIndex> {
             time_s += PAUSE_S + leg.duration_s;
         }
         let (left, right) = rig.cameras_in_rover(truth.angles);
-        let view = |eye: &str, camera: Camera| View {
-            image: format!("images/{eye}_{number:04}.png"),
-            camera: CameraSource::Inline(camera),
-        };
         let mut stop_truth = StopTruth {
             site_from_rover: PoseRecord::from(&truth.site_from_rover),
             left_camera: None,
@@ -56,11 +55,13 @@ pub fn index(scenario: &Scenario, world: &World) -> Result<TraverseIndex> {
             time_s,
             site_from_rover: PoseRecord::from(estimate),
             mast_angles: truth.angles,
-            left: view("left", left),
-            right: view("right", right),
+            left: view("left", number, left),
+            right: view("right", number, right),
             truth: Some(stop_truth),
         });
     }
+    let handed_over = stops.last().and_then(|last| handed_over(last, stops.len(), &scenario.camera));
+    stops.extend(handed_over);
     Ok(TraverseIndex {
         format: FORMAT_VERSION,
         name: scenario.name.clone(),
@@ -74,6 +75,30 @@ pub fn index(scenario: &Scenario, world: &World) -> Result<TraverseIndex> {
         },
         scenario: Some(SCENARIO_FILE.into()),
         stops,
+    })
+}
+
+/// An image of a stop by its eye and number, with its camera.
+fn view(eye: &str, number: usize, camera: Camera) -> View {
+    View { image: format!("images/{eye}_{number:04}.png"), camera: CameraSource::Inline(camera) }
+}
+
+/// The stop `number` at which the rover stands as at the last one and looks with the other pair; nothing where the
+/// target is not handed over.
+fn handed_over(last: &Stop, number: usize, settings: &CameraSettings) -> Option<Stop> {
+    let (left, right) = Rig::of(settings.hand_over?, settings.image_size).cameras_in_rover(None);
+    let truth = last.truth.as_ref()?;
+    Some(Stop {
+        time_s: last.time_s + PAUSE_S,
+        site_from_rover: last.site_from_rover,
+        mast_angles: None,
+        left: view("left", number, left),
+        right: view("right", number, right),
+        truth: Some(StopTruth {
+            site_from_rover: truth.site_from_rover,
+            left_camera: None,
+            right_camera: None,
+        }),
     })
 }
 
@@ -91,19 +116,28 @@ fn describe(scenario: &Scenario, stops: usize) -> String {
             drive.start_distance_m, drive.start_bearing_deg,
         ),
     };
-    let cameras = match scenario.camera.rig {
+    let cameras = cameras_of(scenario.camera.rig);
+    let then = match scenario.camera.hand_over {
+        Some(rig) => format!(", at the last stop {}", cameras_of(rig)),
+        None => String::new(),
+    };
+    let made = format!(
+        "Simulated: {course}, {cameras}{then}, images {size} px wide, seed {}.",
+        scenario.seed,
+        size = scenario.camera.image_size,
+    );
+    format!("{} {made}", scenario.description).trim_start().to_owned()
+}
+
+/// A pair of cameras in words.
+fn cameras_of(rig: CameraRig) -> &'static str {
+    match rig {
         CameraRig::MerNavcam => "Spirit's navcams",
         CameraRig::MerPancam => "Opportunity's pancams",
         CameraRig::MerFrontHazcam => "Opportunity's front hazcams",
         CameraRig::Table1Pancam => "the paper's f = 16 mm pair",
         CameraRig::Table1Navcam => "the paper's f = 6 mm pair",
-    };
-    let made = format!(
-        "Simulated: {course}, {cameras}, images {size} px wide, seed {}.",
-        scenario.seed,
-        size = scenario.camera.image_size,
-    );
-    format!("{} {made}", scenario.description).trim_start().to_owned()
+    }
 }
 
 /// The camera that truly takes an image of a simulated stop, in the site frame.

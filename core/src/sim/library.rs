@@ -29,6 +29,8 @@ const FILES: &[(&str, &str)] = &[
     ("self-shadow", include_str!("library/self-shadow.toml")),
     ("clouds", include_str!("library/clouds.toml")),
     ("moving-sun", include_str!("library/moving-sun.toml")),
+    ("sky-full-frame", include_str!("library/sky-full-frame.toml")),
+    ("sky-subframe", include_str!("library/sky-subframe.toml")),
     ("five-targets", include_str!("library/five-targets.toml")),
     ("k9-5", include_str!("library/k9-5.toml")),
     ("k9-7.5", include_str!("library/k9-7.5.toml")),

@@ -15,7 +15,9 @@
 //! ground         texture         seeded noise
 //!                relief          the fractal and its ripples
 //!                terrain, terrain_cast   the ground, tilted, and rays on it
+//!                far             where a slope ends
 //!                rocks, shape    one rock                    rock_field  where they lie
+//!                footing         what wheels stand on
 //!                details         grains, drifts, veins, pits
 //!                surface         albedo and shading normal   imprint     wheel tracks
 //! culling        which rocks a ray can meet                  solids      made things

@@ -15,7 +15,7 @@ use std::sync::Arc;
 use crate::frames::{Point3, Pose, Vector3};
 use crate::sim::camera::render::Eye;
 use crate::sim::culling::SunGrid;
-use crate::sim::ground::imprint::Imprint;
+use crate::sim::ground::imprint::{Imprint, Laid};
 use crate::sim::index::true_camera_in_site;
 use crate::sim::light::reflection::{Light, to_sun};
 use crate::sim::rover::body::{BodyPart, parts};
@@ -61,7 +61,7 @@ impl Moment {
 }
 
 impl World {
-    /// This world's scenery at a moment of the drive.
+    /// This world's scenery at a moment of the drive, `scenario` being that from which it was built.
     pub fn at(&self, moment: &Moment, scenario: &Scenario) -> Self {
         let events = &scenario.events;
         let to_sun = sun_at(&scenario.sun, events, moment.time_s);
@@ -88,7 +88,7 @@ impl World {
     fn rover_at(&self, site_from_rover: &Pose) -> Vec<Solid> {
         let place = site_from_rover.translation.vector;
         let yaw_rad = site_from_rover.rotation.euler_angles().2;
-        let ground_z_m = |x_m: f64, y_m: f64| self.ground_z_at(x_m, y_m);
+        let ground_z_m = |x_m: f64, y_m: f64| self.footing_z_at(x_m, y_m);
         // Where no stand is found there is no such stop either.
         let angles =
             settle(&ground_z_m, place.x, place.y, yaw_rad).map_or_else(Default::default, |s| s.angles);
@@ -103,14 +103,16 @@ impl World {
     }
 
     /// The wheel tracks that lie on the ground when the rover stands at a stop.
-    fn imprint_at(&self, stop: u32, scenario: &Scenario) -> Option<Arc<Imprint>> {
+    fn imprint_at(&self, stop: u32, scenario: &Scenario) -> Option<Imprint> {
         if !scenario.rover.tracks || stop == 0 {
             return None;
         }
-        // A drive that is impossible has no stops at which this could be asked.
-        let drive = true_drive(self, scenario).ok()?;
-        let tracks = Tracks::new(&drive, &scenario.rover);
-        Some(Arc::new(Imprint::new(&tracks.tracks_until(stop as usize))))
+        let laid = self.scenery.laid.get_or_init(|| {
+            // A drive that is impossible has no stops at which this could be asked.
+            let drive = true_drive(self, scenario).ok()?;
+            Some(Arc::new(Laid::new(&Tracks::new(&drive, &scenario.rover))))
+        });
+        Imprint::at_stop(laid.as_ref()?, stop as usize)
     }
 }
 

@@ -10,13 +10,14 @@
 //! with rays that start 1 µm off it, so that it does not hide itself.
 //! Sources: domain.md 10, 11; the definition of a target's truth as the surface point under its pixel.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use crate::frames::{Point3, Ray, Vector3};
 use crate::sim::camera::render;
 use crate::sim::culling::{SunGrid, Tree};
 use crate::sim::ground::around::Around;
-use crate::sim::ground::imprint::Imprint;
+use crate::sim::ground::footing::Footing;
+use crate::sim::ground::imprint::{Imprint, Laid};
 use crate::sim::ground::rock_field::{self, Approach};
 use crate::sim::ground::rocks::Rock;
 use crate::sim::ground::surface::Surfaces;
@@ -62,8 +63,11 @@ pub(in crate::sim) struct Scenery {
     pub(in crate::sim) rocks: Vec<Rock>,
     pub(in crate::sim) surfaces: Surfaces,
     pub(in crate::sim) openness: Openness,
+    footing: Footing,
     tree: Tree,
     targets_centre: Point3,
+    /// The wheel tracks of the whole drive, driven when they are first asked for; nothing where it fails.
+    pub(in crate::sim) laid: OnceLock<Option<Arc<Laid>>>,
 }
 
 /// The scenery of a scenario at one moment of the drive.
@@ -74,7 +78,7 @@ pub struct World {
     pub(in crate::sim) sun_grid: Arc<SunGrid>,
     pub(in crate::sim) solids: Vec<Solid>,
     /// Wheel tracks; nothing where the wheels leave none.
-    pub(in crate::sim) imprint: Option<Arc<Imprint>>,
+    pub(in crate::sim) imprint: Option<Imprint>,
     /// Fraction of full scale per unit of radiance.
     pub(in crate::sim) exposure: f64,
 }
@@ -86,7 +90,7 @@ impl World {
         let approach = Approach {
             goal_m: drive::goal_m(&scenario.drive),
             wheels_reach_m: drive::wheels_reach_m(&scenario.drive),
-            around: Around::new(&scenario.drive),
+            around: Around::new(&scenario.drive, &scenario.camera),
         };
         let [x_m, y_m] = drive::ground_extent_m(&scenario.drive);
         let terrain = Terrain::new(&scenario.terrain, x_m, y_m, scenario.seed);
@@ -97,10 +101,12 @@ impl World {
         let scenery = Scenery {
             tree: Tree::new(&rocks),
             openness: Openness::new(&rocks, x_m, y_m),
+            footing: Footing::new(&rocks, x_m, y_m),
             surfaces: Surfaces::new(&scenario.texture, scenario.seed),
             terrain,
             rocks,
             targets_centre: Point3::origin(),
+            laid: OnceLock::new(),
         };
         let mut world = Self {
             scenery: Arc::new(scenery),
@@ -141,6 +147,16 @@ impl World {
     /// Height of the bare ground at a place, m down, site frame.
     pub fn ground_z_at(&self, x_m: f64, y_m: f64) -> f64 {
         self.scenery.terrain.z_at(x_m, y_m)
+    }
+
+    /// Height of what a wheel stands on at a place, ground or rock, m down, site frame.
+    pub fn footing_z_at(&self, x_m: f64, y_m: f64) -> f64 {
+        self.scenery.footing.z_at(&self.scenery.terrain, x_m, y_m)
+    }
+
+    /// The height of the rock, m, that stands at a place and is too high for a wheel to climb, if one does.
+    pub fn blocked_by_m(&self, x_m: f64, y_m: f64) -> Option<f64> {
+        self.scenery.footing.blocked_by_m(&self.scenery.rocks, x_m, y_m)
     }
 
     /// The first surface that a ray meets; the ray's direction is unit.

@@ -7,3 +7,4 @@ pub mod calibration;
 pub mod approach;
 pub mod skip;
 pub mod realism;
+pub mod exposure;

@@ -13,6 +13,7 @@ pub mod native;
 pub mod render_cache;
 mod simulated;
 mod stops;
+pub mod truth_files;
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;

@@ -43,7 +43,8 @@
 //!
 //! Optional besides: `[mast]` (origin and head cameras) and `stops.mast_angles` (azimuth and elevation, rad).
 //!
-//! A simulated folder also gets `cache/`, from which nothing but time is lost when it is removed.
+//! A simulated folder also gets `cache/`, from which nothing but time is lost when it is removed, and on demand
+//! `truth/`, the truth of every pixel (`truth_files.rs` documents it).
 //!
 //! Opening reads the index and the cameras, never an image: a traverse with missing images opens, and the
 //! stops that have theirs can be used. Images are decoded when asked for; the pairs used last are kept, up to

@@ -295,6 +295,20 @@ impl Traverse {
         simulated.exposure_s(self, step, cancel).map(Some)
     }
 
+    /// The world as it is when the rover stands at a stop: sun, what is in the way, the rover itself.
+    ///
+    /// # Errors
+    /// No such stop, or a recorded traverse, whose world nobody knows.
+    pub fn world_at(&self, step: usize) -> Result<World> {
+        let simulated = self.simulated.as_ref();
+        let simulated = simulated
+            .ok_or_else(|| Error::Request("a recorded traverse has no simulated world".to_owned()))?;
+        let stop = self.index().stops.get(step);
+        let stop = stop.ok_or_else(|| Error::Request(format!("there is no step {step}")))?;
+        let moment = Moment::of(step, stop).ok_or_else(|| Error::Request(needs_truth(step)))?;
+        Ok(simulated.world().at(&moment, &simulated.scenario))
+    }
+
     /// Saves building the world again; one that is there already is the same.
     fn keep_world(&self, world: World) {
         if let Some(simulated) = &self.simulated {

@@ -13,6 +13,7 @@ pub mod study;
 mod figure;
 mod scenery;
 mod scenery_figure;
+mod scenery_pictures;
 mod open;
 mod say;
 mod sheet;

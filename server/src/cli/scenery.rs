@@ -1,22 +1,24 @@
 //! `sightline study scenery`: the simulated world in numbers, against the laws it follows and against real frames.
 //!
 //! Rocks against their size–frequency law, ground against its fractal, the noise's mean–variance line against the
-//! gain, and pictures of soil (simulated, and of recorded traverses) by contrast, histogram and spectrum. Tables
-//! go to the standard output, all numbers to `scenery.json`, figures beside it.
+//! gain, squares of soil and of rock (simulated, and of recorded frames) by contrast, histogram and spectrum, and
+//! the level of targets under a changing share of sky, the whole frame or a subframe being metered. Tables go to the
+//! standard output, all numbers to `scenery.json`, figures beside it.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use serde::Serialize;
 use sightline_core::error::{Error, Result};
-use sightline_core::image::{GrayImage, PixelRect};
+use sightline_core::image::GrayImage;
 use sightline_core::sim::scenario::RockSettings;
-use sightline_core::sim::{self, Eye, NoiseSeed, Region, Scenario, World};
-use sightline_core::study::picture::{PictureReport, picture_report};
+use sightline_core::sim::{self, Eye, NoiseSeed, Region, Scenario, World, library};
+use sightline_core::study::exposure::{ExposureRow, exposure_report};
+use sightline_core::study::picture::PictureReport;
 use sightline_core::study::scenery::{GroundReport, Rectangle, RockReport, ground_report, rock_report};
-use sightline_core::traverse::Traverse;
 
-use super::{open, say, scenery_figure};
+use super::scenery_pictures::{Square, simulated_rocks, simulated_soil};
+use super::{say, scenery_figure};
 
 /// Abundances of rocks that are compared with their law.
 const ABUNDANCES: [f64; 3] = [0.05, 0.10, 0.30];
@@ -29,8 +31,8 @@ const BESIDE: [Rectangle; 2] =
     [Rectangle { x_m: [2.5, 8.0], y_m: [1.3, 2.6] }, Rectangle { x_m: [2.5, 8.0], y_m: [-2.6, -1.3] }];
 /// The bare ground that is measured.
 const GROUND: Rectangle = Rectangle { x_m: [0.0, 12.0], y_m: [-5.0, 5.0] };
-/// Side of a square of soil, px.
-const SOIL_PX: u32 = 256;
+/// The scenario whose sky leaves the frame on the way.
+const SKY: &str = "sky-full-frame";
 
 /// Measure the simulated scenery.
 #[derive(Debug, Args)]
@@ -38,12 +40,13 @@ pub(super) struct Scenery {
     /// How many worlds of each abundance.
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=100))]
     worlds: u64,
-    /// A recorded traverse to compare with: the squares of its first left image that are named by `--soil`.
-    #[arg(long, value_name = "TRAVERSE")]
-    compare: Vec<PathBuf>,
-    /// The upper left corner of a square of 256 px of soil in the recorded images, px; can be given more than once.
-    #[arg(long, value_name = "X,Y", value_parser = corner, default_value = "400,700")]
-    soil: Vec<[i32; 2]>,
+    /// A square of soil in a recorded frame to compare with: a PDS3 picture or a traverse, the square's upper left
+    /// corner and, if it is not 256, its side, px; can be given more than once.
+    #[arg(long, value_name = "FILE@X,Y")]
+    soil: Vec<Square>,
+    /// The same for a face of a rock.
+    #[arg(long, value_name = "FILE@X,Y,SIDE")]
+    rock: Vec<Square>,
     /// The folder for numbers and figures.
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
@@ -67,6 +70,8 @@ pub(super) struct Report {
     /// Electrons per DN: stated, and as the slope of the mean–variance line gives them back.
     pub(super) gain: [f64; 2],
     pub(super) pictures: Vec<(String, PictureReport)>,
+    pub(super) rock_faces: Vec<(String, PictureReport)>,
+    pub(super) exposure: Vec<ExposureRow>,
 }
 
 impl Scenery {
@@ -80,9 +85,11 @@ impl Scenery {
         let worlds = self.worlds_of(&scenario);
         let noise = noise(&scenario);
         let mut pictures = vec![("simulated".to_owned(), simulated_soil(&scenario, &worlds[0])?)];
-        for path in &self.compare {
-            pictures.extend(self.recorded_soil(path)?);
-        }
+        pictures.extend(self.soil.iter().map(Square::report).collect::<Result<Vec<_>>>()?);
+        let mut rock_faces = simulated_rocks(&scenario, &worlds[0])?;
+        rock_faces.extend(self.rock.iter().map(Square::report).collect::<Result<Vec<_>>>()?);
+        let sky = library::scenario(SKY)?;
+        let exposure = exposure_report(&sky, &World::new(&sky))?;
         let report = Report {
             rocks: ABUNDANCES.into_iter().zip(rocks).collect(),
             ground: ground_report(
@@ -94,6 +101,8 @@ impl Scenery {
             gain: [scenario.camera.gain_electrons_per_dn, 1.0 / slope(&noise)],
             noise,
             pictures,
+            rock_faces,
+            exposure,
         };
         std::fs::create_dir_all(&self.out)
             .map_err(|source| Error::Write { path: self.out.clone(), source })?;
@@ -113,39 +122,6 @@ impl Scenery {
         let worlds = self.worlds_of(&Scenario { rocks: rocks.clone(), ..scenario.clone() });
         rock_report(&worlds.iter().collect::<Vec<_>>(), &rocks, &BESIDE, &DIAMETERS_M)
     }
-
-    fn recorded_soil(&self, path: &Path) -> Result<Vec<(String, PictureReport)>> {
-        let traverse = open::open(path, None)?;
-        let image = traverse.capture(0)?.left;
-        let of_square = |[x, y]: &[i32; 2]| {
-            let report = picture_report(&image, &PixelRect::new(*x, *y, SOIL_PX, SOIL_PX))?;
-            Some((format!("{} at {x}, {y}", name(&traverse)), report))
-        };
-        Ok(self.soil.iter().filter_map(of_square).collect())
-    }
-}
-
-fn name(traverse: &Traverse) -> &str {
-    &traverse.index().name
-}
-
-fn corner(text: &str) -> std::result::Result<[i32; 2], String> {
-    let (x, y) = text.split_once(',').ok_or("write it as X,Y")?;
-    let number = |text: &str| text.trim().parse().map_err(|_| format!("{text} is no whole number"));
-    Ok([number(x)?, number(y)?])
-}
-
-/// A square of soil beside the drive, as the ninth stop's left camera records it.
-fn simulated_soil(scenario: &Scenario, world: &World) -> Result<PictureReport> {
-    let index = sim::index(scenario, world)?;
-    let camera = index
-        .stops
-        .get(8)
-        .and_then(|stop| sim::true_camera_in_site(stop, Eye::Left))
-        .ok_or_else(|| Error::Request("the demonstration has no ninth stop".to_owned()))?;
-    let picture = sim::render(world, scenario, &camera, NoiseSeed { step: 8, eye: Eye::Left });
-    let square = PixelRect::new(100, 700, SOIL_PX, SOIL_PX);
-    picture_report(&picture, &square).ok_or_else(|| Error::Request("the square of soil is black".to_owned()))
 }
 
 /// Mean and variance of evenly lit pictures, level by level, from the difference of two exposures.
@@ -205,13 +181,26 @@ fn print(report: &Report) -> Result<()> {
         ))?;
     }
     say::line(&format!("gain {:.1} e⁻/DN stated, {:.1} measured", report.gain[0], report.gain[1]))?;
-    for (name, picture) in &report.pictures {
+    let soil = report.pictures.iter().map(|named| ("soil", named));
+    let rock = report.rock_faces.iter().map(|named| ("rock", named));
+    for (what, (name, picture)) in soil.chain(rock) {
         let contrast = picture.local_contrast.map_or(f64::NAN, |c| c.p50);
-        let slope = picture.spectrum_slope.unwrap_or(f64::NAN);
+        // A square smaller than 64 px has no spectrum.
+        let slope = picture.spectrum_slope.map_or_else(|| "–".to_owned(), |slope| format!("{slope:.2}"));
         let levels = picture.levels;
         say::line(&format!(
-            "soil, {name}: contrast {:.3}, local {contrast:.3}, spectrum slope {slope:.2}, levels over the mean 1 % {:.2}, 99 % {:.2}",
+            "{what}, {name}: contrast {:.3}, local {contrast:.3}, spectrum slope {slope}, levels over the mean 1 % {:.2}, 99 % {:.2}",
             picture.contrast, levels.p1, levels.p99
+        ))?;
+    }
+    for row in &report.exposure {
+        say::line(&format!(
+            "stop {}: {:.1} % sky, {} targets at {:.0} DN by the whole frame, {:.0} DN by the subframe",
+            row.stop,
+            100.0 * row.sky_share,
+            row.targets,
+            row.full_frame_dn,
+            row.subframe_dn
         ))?;
     }
     Ok(())

@@ -1,4 +1,5 @@
-//! The figures of the scenery study, drawn by `plotters` as SVG: rocks, ground, noise, and spectra of soil.
+//! The figures of the scenery study, drawn by `plotters` as SVG: rocks, ground, noise, spectra and levels of soil, and
+//! exposure under a changing share of sky.
 //!
 //! Where laws are powers both axes are logarithms to the base of ten.
 
@@ -7,17 +8,20 @@ use std::path::Path;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use sightline_core::error::{Error, Result};
+use sightline_core::study::exposure::ExposureRow;
 
 use super::scenery::Report;
 
 /// Okabe and Ito's colours: told apart by everyone.
-const COLOURS: [RGBColor; 6] = [
+const COLOURS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
     RGBColor(204, 121, 167),
     RGBColor(230, 159, 0),
     RGBColor(86, 180, 233),
+    RGBColor(0, 0, 0),
+    RGBColor(240, 228, 66),
 ];
 
 type Drawn = std::result::Result<(), String>;
@@ -49,7 +53,8 @@ pub(super) fn draw(folder: &Path, report: &Report) -> Result<()> {
     file("ground.svg", &|area| ground(area, report))?;
     file("noise.svg", &|area| noise(area, report))?;
     file("spectrum.svg", &|area| spectrum(area, report))?;
-    file("histogram.svg", &|area| histogram(area, report))
+    file("histogram.svg", &|area| histogram(area, report))?;
+    file("exposure.svg", &|area| exposure(area, report))
 }
 
 fn rocks(area: &Area<'_>, report: &Report) -> Drawn {
@@ -68,6 +73,7 @@ fn rocks(area: &Area<'_>, report: &Report) -> Drawn {
         "rocks: counted (dots) and the law (lines)",
         ["log10 of diameter, m", "log10 of number per m²"],
         &all,
+        SeriesLabelPosition::UpperRight,
     )
 }
 
@@ -85,7 +91,13 @@ fn ground(area: &Area<'_>, report: &Report) -> Drawn {
             is_line: false,
         },
     ];
-    chart(area, "ground: RMS difference of height", ["log10 of distance, m", "log10 of difference, m"], &all)
+    chart(
+        area,
+        "ground: RMS difference of height",
+        ["log10 of distance, m", "log10 of difference, m"],
+        &all,
+        SeriesLabelPosition::LowerRight,
+    )
 }
 
 fn noise(area: &Area<'_>, report: &Report) -> Drawn {
@@ -97,7 +109,7 @@ fn noise(area: &Area<'_>, report: &Report) -> Drawn {
         Series { name: "measured".into(), colour: COLOURS[0], points, is_line: false },
     ];
     let title = format!("noise: {:.1} e⁻/DN stated, {:.1} from the slope", report.gain[0], report.gain[1]);
-    chart(area, &title, ["mean, DN", "variance, DN²"], &all)
+    chart(area, &title, ["mean, DN", "variance, DN²"], &all, SeriesLabelPosition::LowerRight)
 }
 
 fn spectrum(area: &Area<'_>, report: &Report) -> Drawn {
@@ -111,7 +123,13 @@ fn spectrum(area: &Area<'_>, report: &Report) -> Drawn {
             Series { name: name.clone(), colour, points, is_line: true }
         })
         .collect();
-    chart(area, "soil: power of its texture", ["log10 of cycles per px", "log10 of power"], &all)
+    chart(
+        area,
+        "soil: power of its texture",
+        ["log10 of cycles per px", "log10 of power"],
+        &all,
+        SeriesLabelPosition::UpperRight,
+    )
 }
 
 fn histogram(area: &Area<'_>, report: &Report) -> Drawn {
@@ -126,11 +144,42 @@ fn histogram(area: &Area<'_>, report: &Report) -> Drawn {
             Series { name: name.clone(), colour, points, is_line: true }
         })
         .collect();
-    chart(area, "soil: levels", ["level over the mean", "part of the pixels"], &all)
+    chart(
+        area,
+        "soil: levels",
+        ["level over the mean", "part of the pixels"],
+        &all,
+        SeriesLabelPosition::UpperRight,
+    )
 }
 
-/// A chart whose axes hold all points.
-fn chart(area: &Area<'_>, title: &str, axes: [&str; 2], all: &[Series]) -> Drawn {
+fn exposure(area: &Area<'_>, report: &Report) -> Drawn {
+    let points = |value: fn(&ExposureRow) -> f64| -> Vec<(f64, f64)> {
+        report.exposure.iter().map(|row| (100.0 * row.sky_share, value(row))).collect()
+    };
+    let ways = [("full frame", points(|row| row.full_frame_dn)), ("subframe", points(|row| row.subframe_dn))];
+    let mut all = Vec::new();
+    for ((name, points), colour) in ways.into_iter().zip(COLOURS) {
+        all.push(Series { name: name.into(), colour, points: points.clone(), is_line: false });
+        all.push(Series { name: String::new(), colour, points, is_line: true });
+    }
+    chart(
+        area,
+        "exposure: level of the targets",
+        ["sky in the frame, %", "mean level, DN"],
+        &all,
+        SeriesLabelPosition::MiddleRight,
+    )
+}
+
+/// A chart whose axes hold all points; the legend stands in the corner that the curves leave free.
+fn chart(
+    area: &Area<'_>,
+    title: &str,
+    axes: [&str; 2],
+    all: &[Series],
+    corner: SeriesLabelPosition,
+) -> Drawn {
     let points = || all.iter().flat_map(|series| series.points.iter().copied());
     let range = |of: fn((f64, f64)) -> f64| {
         let (low, high) = points()
@@ -163,9 +212,6 @@ fn chart(area: &Area<'_>, title: &str, axes: [&str; 2], all: &[Series]) -> Drawn
                 .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(2)));
         }
     }
-    // The legend stands where a falling, or a rising, curve leaves the corner free.
-    let falls = all.iter().filter_map(|s| Some(s.points.last()?.1 - s.points.first()?.1)).sum::<f64>() <= 0.0;
-    let corner = if falls { SeriesLabelPosition::UpperRight } else { SeriesLabelPosition::LowerRight };
     let labels = chart
         .configure_series_labels()
         .position(corner)

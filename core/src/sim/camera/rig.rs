@@ -61,11 +61,16 @@ pub enum Rig {
 impl Rig {
     /// The rig of the settings, at their image size.
     pub fn new(settings: &CameraSettings) -> Self {
+        Self::of(settings.rig, settings.image_size)
+    }
+
+    /// A rig at an image size, px of width.
+    pub fn of(rig: CameraRig, image_size: u32) -> Self {
         let smaller = |camera: Camera| {
-            let factor = (camera.width() / settings.image_size.max(1)).max(1);
+            let factor = (camera.width() / image_size.max(1)).max(1);
             if factor > 1 { camera.downsampled(factor) } else { camera }
         };
-        match settings.rig {
+        match rig {
             CameraRig::MerFrontHazcam => {
                 let (left, right) = front_hazcams();
                 Self::Body { left: smaller(left), right: smaller(right) }

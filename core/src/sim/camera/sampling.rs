@@ -181,7 +181,7 @@ impl<'a> Sampler<'a> {
         let cutoff_m = self.cutoff_m(distance_m, -world.scenery.terrain.mean_normal().dot(&ray.direction));
         let mut look = world.scenery.surfaces.soil(&world.scenery.terrain, &point, cutoff_m);
         if let Some(imprint) = &world.imprint {
-            look = imprint.on_soil(look, point.x, point.y);
+            look = imprint.on_soil(look, point.x, point.y, cutoff_m);
         }
         let in_sun = !world.in_shadow(&point);
         let open = world.scenery.openness.at(point.x, point.y);

@@ -42,8 +42,8 @@ const TRACK_Y_M: [f64; 2] = [0.43, 0.70];
 const BELLY_M: f64 = 0.20;
 /// Where the scatter of rocks starts, m ahead of the first stop: nearer ground is never seen.
 const NEAREST_M: f64 = 1.5;
-/// The highest stone that a wheel presses into the soil, m (ours).
-const PRESSED_M: f64 = 0.025;
+/// The highest stone that is left in the wheels' way: they roll over it (`footing.rs`), m (ours).
+const ROLLED_OVER_M: f64 = 0.025;
 /// Radius of a rock over its diameter: an outline is longer than its disc.
 const REACH: f64 = 0.6;
 /// By how much the surroundings in which a rock looks for a free place grow with every draw, m.
@@ -135,8 +135,11 @@ pub fn scatter(settings: &RockSettings, approach: &Approach, terrain: &Terrain, 
             break;
         }
     }
-    let up = terrain.mean_normal();
-    seeds.par_iter().map(|rock| Rock::grow(rock, terrain.z_at(rock.x_m, rock.y_m), &up)).collect()
+    let grow = |rock: &RockSeed| {
+        let up = terrain.mean_normal_at(rock.x_m, rock.y_m);
+        Rock::grow(rock, terrain.z_at(rock.x_m, rock.y_m), &up)
+    };
+    seeds.par_iter().map(grow).collect()
 }
 
 /// The rocks that the scenario places by hand.
@@ -185,7 +188,10 @@ fn candidates(settings: &RockSettings, approach: &Approach, random: &mut Pcg64) 
     for strip in 0..strips {
         let from_m = nearest_m + strip as f64;
         let to_m = from_m + 1.0;
-        let beyond_goal_m = if is_around { from_m } else { from_m - approach.goal_m[0] };
+        let beyond_goal_m = approach.around.as_ref().map_or(from_m - approach.goal_m[0], |around| {
+            // Among the stops pebbles lie as near as at the goal; twice as far the rule of the distance holds.
+            from_m.min(2.0 * (from_m - around.reach_m()))
+        });
         let smallest = smallest_m(settings, beyond_goal_m);
         if smallest >= settings.largest_m {
             break;
@@ -235,12 +241,12 @@ fn beside([x_m, y_m]: [f64; 2], by_m: f64, random: &mut Pcg64) -> [f64; 2] {
 /// Whether a rock would stand in a wheel's track or touch the belly.
 fn is_in_the_way(approach: &Approach, x_m: f64, y_m: f64, reach_m: f64, height_m: f64) -> bool {
     if let Some(around) = &approach.around {
-        return height_m > PRESSED_M && around.is_in_the_way(x_m, y_m, reach_m, height_m > BELLY_M);
+        return height_m > ROLLED_OVER_M && around.is_in_the_way(x_m, y_m, reach_m, height_m > BELLY_M);
     }
     let aside_m = (y_m - approach.goal_m[1]).abs();
     let beside = aside_m - reach_m > TRACK_Y_M[1];
     let between = aside_m + reach_m < TRACK_Y_M[0] && height_m < BELLY_M;
-    x_m - reach_m < approach.wheels_reach_m && !beside && !between && height_m > PRESSED_M
+    x_m - reach_m < approach.wheels_reach_m && !beside && !between && height_m > ROLLED_OVER_M
 }
 
 /// The places that are taken, in a coarse grid so that a look-up stays short.

@@ -56,6 +56,7 @@ pub struct Rock {
     /// How its surface differs from that of other rocks.
     pub look: RockLook,
     planes: Vec<Plane>,
+    vertices: Vec<Vector3>,
 }
 
 /// How the surface of one rock differs from that of others.
@@ -127,6 +128,7 @@ impl Rock {
             shape: from.shape,
             look: RockLook::draw(&mut random),
             planes: body.planes,
+            vertices: body.vertices,
         }
     }
 
@@ -167,6 +169,16 @@ impl Rock {
     /// The outward unit normal of a plane of the rock.
     pub fn normal(&self, plane: usize) -> Vector3 {
         self.planes[plane].normal
+    }
+
+    /// The planes that bound it.
+    pub fn planes(&self) -> &[Plane] {
+        &self.planes
+    }
+
+    /// Its corners, relative to its centre, axes of the site, m.
+    pub fn vertices(&self) -> &[Vector3] {
+        &self.vertices
     }
 
     /// Whether a point of the site lies inside the rock, or nearer to it than `margin_m`'s planes.

@@ -7,7 +7,8 @@
 //! **Tilt.** The mean plane may rise: `z = z_level(x, y) + a x + b y`, (a, b) = −tan(slope) (cos, sin)(azimuth of
 //! steepest ascent). The grid holds z_level, and the sum is exact in `f64`; the ground is a shear of level ground, and
 //! so is its intersection with a ray (`terrain_cast.rs`). Heights are measured along z, not along the plane's normal:
-//! at 20° the relief's amplitude across the slope is 6 % smaller.
+//! at 20° the relief's amplitude across the slope is 6 % smaller. Far from the site a slope turns back to the level
+//! (`far.rs`).
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
@@ -17,6 +18,7 @@
 
 use crate::frames::Vector3;
 
+use crate::sim::ground::far::Far;
 use crate::sim::ground::relief::Relief;
 use crate::sim::scenario::TerrainSettings;
 
@@ -52,6 +54,8 @@ pub struct Terrain {
     steepest: f64,
     /// Gradient of the mean plane, m/m; heights above are those of the ground without it.
     pub(in crate::sim) tilt: [f64; 2],
+    /// What lies beyond a slope; nothing where the ground is level.
+    pub(in crate::sim) far: Option<Far>,
 }
 
 impl Terrain {
@@ -73,7 +77,12 @@ impl Terrain {
         let tangent = settings.slope_deg.to_radians().tan();
         // Level ground must not get a sum of −0 and 0 that differs between directions.
         let tilt = if tangent == 0.0 { [0.0; 2] } else { [-tangent * cos, -tangent * sin] };
-        Self::from_heights([x_m[0], y_m[0]], cell_m, cells, z_m, tilt)
+        let mut terrain = Self::from_heights([x_m[0], y_m[0]], cell_m, cells, z_m, tilt);
+        // The grid lies on the slope whatever the setting.
+        let corner_m = x_m[0].abs().max(x_m[1].abs()).hypot(y_m[0].abs().max(y_m[1].abs()));
+        let radius_m = settings.slope_reach_m.max(corner_m + 1.0);
+        terrain.far = (tangent != 0.0).then(|| Far::new(radius_m, tilt));
+        terrain
     }
 
     /// A ground of given vertex heights, m down; `z_m` holds (cells + 1) vertices along each axis.
@@ -88,7 +97,7 @@ impl Terrain {
         let highest_z_m = tops[0].z_m.iter().copied().fold(MEAN_GROUND_Z_M, |a, b| a.min(f64::from(b)));
         let slope = vertex_slopes(&z_m, cells, cell_m);
         let steepest = steepest(&z_m, cells) / cell_m + tilt[0].hypot(tilt[1]);
-        Self { origin_m, cell_m, cells, z_m, slope, tops, highest_z_m, steepest, tilt }
+        Self { origin_m, cell_m, cells, z_m, slope, tops, highest_z_m, steepest, tilt, far: None }
     }
 
     /// No part of the ground is steeper than this, m/m.
@@ -107,6 +116,14 @@ impl Terrain {
     /// The unit normal of the mean plane, pointing up (negative z), site frame.
     pub fn mean_normal(&self) -> Vector3 {
         Vector3::new(self.tilt[0], self.tilt[1], -1.0).normalize()
+    }
+
+    /// The unit normal of the mean ground at a place, pointing up (negative z), site frame.
+    pub fn mean_normal_at(&self, x_m: f64, y_m: f64) -> Vector3 {
+        match self.far.and_then(|far| far.gradient_at(x_m, y_m)) {
+            Some([zx, zy]) => Vector3::new(zx, zy, -1.0).normalize(),
+            None => self.mean_normal(),
+        }
     }
 
     /// The cell of a place and the position within it, or nothing beyond the grid.
@@ -130,14 +147,16 @@ impl Terrain {
     /// Height of the ground at a place, m down.
     pub fn z_at(&self, x_m: f64, y_m: f64) -> f64 {
         let tilt_m = self.tilt_m(x_m, y_m);
-        let Some((cell, u, v)) = self.locate(x_m, y_m) else { return MEAN_GROUND_Z_M + tilt_m };
+        let Some((cell, u, v)) = self.locate(x_m, y_m) else {
+            return self.far.and_then(|far| far.z_at(x_m, y_m)).unwrap_or(MEAN_GROUND_Z_M + tilt_m);
+        };
         let [z00, z10, z01, z11] = self.corners(cell);
         z00 + (z10 - z00) * u + (z01 - z00) * v + (z00 - z10 - z01 + z11) * u * v + tilt_m
     }
 
     /// The unit normal of the surface itself at a place, pointing up (negative z).
     pub fn normal_at(&self, x_m: f64, y_m: f64) -> Vector3 {
-        let Some((cell, u, v)) = self.locate(x_m, y_m) else { return self.mean_normal() };
+        let Some((cell, u, v)) = self.locate(x_m, y_m) else { return self.mean_normal_at(x_m, y_m) };
         let [z00, z10, z01, z11] = self.corners(cell);
         let twist = z00 - z10 - z01 + z11;
         let (zx, zy) = ((z10 - z00 + twist * v) / self.cell_m, (z01 - z00 + twist * u) / self.cell_m);
@@ -149,7 +168,10 @@ impl Terrain {
     /// The true gradient jumps from cell to cell; shading with it would show the grid.
     #[inline(always)]
     pub fn smooth_slope_at(&self, x_m: f64, y_m: f64) -> [f32; 2] {
-        let Some((cell, u, v)) = self.locate(x_m, y_m) else { return self.tilt.map(|v| v as f32) };
+        let Some((cell, u, v)) = self.locate(x_m, y_m) else {
+            let gradient = self.far.and_then(|far| far.gradient_at(x_m, y_m)).unwrap_or(self.tilt);
+            return gradient.map(|v| v as f32);
+        };
         let at = cell[1] * (self.cells[0] + 1) + cell[0];
         let below = at + self.cells[0] + 1;
         let (u, v) = (u as f32, v as f32);

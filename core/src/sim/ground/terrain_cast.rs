@@ -7,7 +7,8 @@
 //! is taken as hit where it enters, which closes the rounding gap between neighbouring cells.
 //!
 //! Tilted ground is level ground sheared along z, `z = z_level + a x + b y`. The ray is sheared back, which leaves it
-//! a straight line with the same t, so that everything below happens over level ground.
+//! a straight line with the same t, so that everything below happens over level ground. What lies beyond the slope is
+//! met in its own way (`far.rs`).
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
@@ -38,6 +39,16 @@ impl Terrain {
     /// A ray that is below ground at `from_m` hits there.
     #[inline(always)]
     pub fn cast(&self, ray: &Ray, from_m: f64, to_m: f64) -> Option<f64> {
+        let Some(far) = &self.far else { return self.cast_slope(ray, from_m, to_m) };
+        let [enter_m, leave_m] = far.over_slope(ray);
+        far.cast(ray, from_m, to_m.min(enter_m))
+            .or_else(|| self.cast_slope(ray, from_m.max(enter_m), to_m.min(leave_m)))
+            .or_else(|| far.cast(ray, from_m.max(leave_m), to_m))
+    }
+
+    /// The same where the mean ground is a plane.
+    #[inline(always)]
+    fn cast_slope(&self, ray: &Ray, from_m: f64, to_m: f64) -> Option<f64> {
         let mut ray = *ray;
         ray.origin.z -= self.tilt_m(ray.origin.x, ray.origin.y);
         ray.direction.z -= self.tilt_m(ray.direction.x, ray.direction.y);

@@ -31,6 +31,7 @@ use nalgebra::Rotation3;
 use crate::error::{Error, Result};
 use crate::frames::Vector3;
 
+use crate::sim::ground::footing::CLIMB_M;
 use crate::sim::rover::drive::distances_m;
 use crate::sim::rover::scene::{Leg, Place, Scene, TrueDrive, TrueStop, pieces, wrapped};
 use crate::sim::rover::slip::{self, Slip};
@@ -93,9 +94,21 @@ impl<'a> Driver<'a> {
         let leg = Leg { stands: vec![stand], wheels_m: Vec::new(), driven_m: 0.0, duration_s: 0.0 };
         let drive = TrueDrive { stops: Vec::new(), legs: Vec::new() };
         let mut driver = Self { scene, key: key.to_owned(), place, leg, drive };
+        driver.check_way(&stand)?;
         let stop = driver.look()?;
         driver.drive.stops.push(stop);
         Ok(driver)
+    }
+
+    /// Fails where a wheel stands against a rock that it cannot climb.
+    fn check_way(&self, stand: &Stand) -> Result<()> {
+        self.scene.blocked(stand).map_or(Ok(()), |(at, height_m)| {
+            let problem = format!(
+                "a wheel meets a rock {height_m:.2} m high at x {:.2} m, y {:.2} m; it climbs {CLIMB_M} m",
+                at.x, at.y
+            );
+            Err(self.wrong(problem))
+        })
     }
 
     fn wrong(&self, problem: impl Into<String>) -> Error {
@@ -144,6 +157,7 @@ impl<'a> Driver<'a> {
         let stand = self.scene.settle(place).ok_or_else(|| {
             self.wrong(format!("the wheels find no stand at x {:.2} m, y {:.2} m", place.x_m, place.y_m))
         })?;
+        self.check_way(&stand)?;
         let length_m = wheels_m[0].hypot(wheels_m[1]);
         self.leg.stands.push(stand);
         self.leg.wheels_m.push(wheels_m);

@@ -55,6 +55,7 @@ pub fn planned(drive: &DriveSettings) -> Result<TrueDrive> {
     let [x_m, y_m] = goal_m(drive);
     course::drive(&Scene {
         ground_z_m: &|_, _| MEAN_GROUND_Z_M,
+        blocked_by_m: &|_, _| None,
         centre: Point3::new(x_m, y_m, MEAN_GROUND_Z_M),
         rig: &Rig::Mast(Mast::spirit()),
         drive,
@@ -116,7 +117,8 @@ pub fn distance_m(world: &World, rig: &Rig, stop: &TrueStop) -> f64 {
 /// Does something with the scene of a scenario's world.
 fn in_scene<T>(world: &World, scenario: &Scenario, act: impl FnOnce(&Scene<'_>) -> T) -> T {
     act(&Scene {
-        ground_z_m: &|x_m, y_m| world.ground_z_at(x_m, y_m),
+        ground_z_m: &|x_m, y_m| world.footing_z_at(x_m, y_m),
+        blocked_by_m: &|x_m, y_m| world.blocked_by_m(x_m, y_m),
         centre: world.targets_centre(),
         rig: &Rig::new(&scenario.camera),
         drive: &scenario.drive,

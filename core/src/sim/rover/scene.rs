@@ -13,10 +13,10 @@
 //! Frames: site and rover. Source: papers.md R25, R104.
 
 use crate::camera::MastAngles;
-use crate::frames::{Point3, Pose};
+use crate::frames::{Point3, Pose, Vector3};
 
 use crate::sim::camera::rig::Rig;
-use crate::sim::rover::suspension::{Stand, SuspensionAngles, settle};
+use crate::sim::rover::suspension::{Stand, SuspensionAngles, WHEEL_RADIUS_M, axles_in_rover, settle};
 use crate::sim::scenario::{DriveSettings, RoverSettings};
 
 /// The longest piece of a leg, m.
@@ -30,8 +30,10 @@ const ACCEPTED_M: f64 = 1e-6;
 
 /// What a drive needs to know of the world.
 pub struct Scene<'a> {
-    /// Height of the ground at a place of the site frame (x, y, m), m down.
+    /// Height of what wheels stand on at a place of the site frame (x, y, m), m down.
     pub ground_z_m: &'a dyn Fn(f64, f64) -> f64,
+    /// Height of a rock at a place that is too high for a wheel to climb, m.
+    pub blocked_by_m: &'a dyn Fn(f64, f64) -> Option<f64>,
     /// The targets' centre, site frame, m.
     pub centre: Point3,
     /// The cameras, of which the left one looks at it where they can be pointed.
@@ -141,6 +143,18 @@ impl Scene<'_> {
 
     pub(super) fn settle(&self, place: Place) -> Option<Stand> {
         settle(self.ground_z_m, place.x_m, place.y_m, place.yaw_rad)
+    }
+
+    /// The first wheel that a rock stands in the way of: where, site frame, m, and how high the rock is, m.
+    ///
+    /// A wheel is asked for at its axle and at the front and the rear of its rim.
+    pub(super) fn blocked(&self, stand: &Stand) -> Option<(Point3, f64)> {
+        axles_in_rover(&stand.angles).into_iter().find_map(|axle| {
+            [-WHEEL_RADIUS_M, 0.0, WHEEL_RADIUS_M].into_iter().find_map(|ahead_m| {
+                let point = stand.site_from_rover * (axle + ahead_m * Vector3::x());
+                Some((point, (self.blocked_by_m)(point.x, point.y)?))
+            })
+        })
     }
 
     /// The place at a distance D, the targets' centre lying in the direction `azimuth_rad` from it.

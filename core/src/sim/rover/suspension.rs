@@ -1,4 +1,4 @@
-//! The suspension: six wheels on rockers and bogies, settled on the ground.
+//! The suspension: six wheels on rockers and bogies, settled on the ground and its rocks (`footing.rs`).
 //!
 //! **Mechanism.** On each side a rocker carries the front wheel and, behind, the pivot of a bogie with the
 //! middle and the rear wheel. The differential holds the body at the mean of the two rockers' pitch: the
@@ -15,7 +15,8 @@
 //! every two degrees, refined by golden section between that sample's neighbours. A disc bridges what
 //! is narrower than itself and meets a step before its axle does. Six clearances vanish for six unknowns:
 //! lift, roll, pitch, ρ, β_left, β_right. They are found by `u ← u − γ J⁻¹ c` with the lifts J of a level
-//! rover; γ = 1 at first, and less where the ground is so rough that full steps swing.
+//! rover; γ = 1 at first, and less where the ground is so rough that full steps swing. The least clearances met are
+//! taken; where a wheel swings between two stones they may stay below 1 mm instead of vanishing.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
@@ -58,11 +59,13 @@ const NARROWINGS: usize = 28;
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 /// A stand is found when no wheel is farther than this off the ground, m.
 const SETTLED_M: f64 = 1e-12;
-/// A stand is good enough when no wheel is farther than this off the ground, m: below what rounding of the
-/// ground's heights leaves.
-const ACCEPTED_M: f64 = 1e-7;
+/// Where a wheel swings between two contacts for ever, the nearest that it comes is taken if no wheel is farther off
+/// than this, m: what may hide between two samples of an underside, a stone's edge included.
+const SWINGING_M: f64 = 1e-3;
 /// Corrections before the search is given up.
 const MOST_STEPS: usize = 300;
+/// γ from some correction on: less where a wheel swings between two contacts, as beside stones on a slope.
+const PARTS: [(usize, f64); 3] = [(0, 1.0), (40, 0.4), (140, 0.15)];
 
 /// The angles of the suspension's joints, left and right, rad; positive lifts the front of the arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -185,6 +188,7 @@ pub fn settle(ground_z_m: &dyn Fn(f64, f64) -> f64, x_m: f64, y_m: f64, yaw_rad:
     let unknowns_from_clearances = lifts().try_inverse()?;
     let mut unknowns = Unknowns::zeros();
     unknowns[0] = MEAN_GROUND_Z_M - ground_z_m(x_m, y_m);
+    let mut nearest: Option<(f64, Stand)> = None;
     for step in 0..MOST_STEPS {
         let attitude = attitude_from_roll_pitch_yaw(unknowns[1], unknowns[2], yaw_rad);
         let site_from_rover = Pose::from_parts(Translation3::new(x_m, y_m, -unknowns[0]), attitude);
@@ -192,15 +196,17 @@ pub fn settle(ground_z_m: &dyn Fn(f64, f64) -> f64, x_m: f64, y_m: f64, yaw_rad:
         let touched = axles_in_rover(&angles).map(|axle| contact(ground_z_m, &site_from_rover, &axle));
         let clearances = Vector6::from_fn(|wheel, _| touched[wheel].0);
         let worst_m = clearances.amax();
-        let is_last = step + 1 == MOST_STEPS;
-        if worst_m <= SETTLED_M || (is_last && worst_m <= ACCEPTED_M) {
+        if nearest.as_ref().is_none_or(|(least_m, _)| worst_m < *least_m) {
             let contacts_in_site = touched.map(|(_, point)| point);
-            return Some(Stand { site_from_rover, angles, contacts_in_site });
+            nearest = Some((worst_m, Stand { site_from_rover, angles, contacts_in_site }));
         }
-        let part = if step < 40 { 1.0 } else { 0.4 };
+        if worst_m <= SETTLED_M {
+            break;
+        }
+        let part = PARTS.iter().rfind(|(from, _)| step >= *from).map_or(1.0, |(_, part)| *part);
         unknowns -= unknowns_from_clearances * clearances * part;
     }
-    None
+    nearest.filter(|(worst_m, _)| *worst_m <= SWINGING_M).map(|(_, stand)| stand)
 }
 
 #[cfg(test)]

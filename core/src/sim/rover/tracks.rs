@@ -1,15 +1,17 @@
 //! The wheel tracks that a drive leaves on the ground.
 //!
-//! Each wheel draws one line: the points where it touched the ground, piece after piece of every leg
-//! (`course.rs`). Where slip was staged the wheels turned on the spot, and the line stands still there.
+//! Each wheel draws one line: the places over which its axle passed, piece after piece of every leg
+//! (`course.rs`), as high as the ground that it touched. (Where it touches hops from stone to stone; where it
+//! goes does not.) Where slip was staged the wheels turned on the spot, and the line stands still there.
 //! The six lines lie on the ground as it was before the wheels sank in; how wide and how deep they are is with
-//! them, drawing them is the ground's part.
+//! them, drawing them is the ground's part (`imprint.rs`).
 //!
 //! Frame: site, m. Sources: papers.md R142; domain.md 5.4 (wheels).
 
 use crate::frames::Point3;
 
 use crate::sim::rover::scene::TrueDrive;
+use crate::sim::rover::suspension::{Stand, axles_in_rover};
 use crate::sim::scenario::RoverSettings;
 
 /// The track of one wheel.
@@ -29,7 +31,6 @@ pub struct Polyline {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tracks {
     lines: Vec<Polyline>,
-    /// How many points of each line are laid when the rover stands at each stop.
     laid: Vec<usize>,
 }
 
@@ -40,11 +41,12 @@ impl Tracks {
         if !settings.tracks {
             return tracks;
         }
-        let stands = || drive.legs.iter().flat_map(|leg| &leg.stands);
+        let stands = drive.legs.iter().flat_map(|leg| &leg.stands);
+        let places: Vec<[Point3; 6]> = stands.map(below_axles).collect();
         tracks.lines = (0..6)
             .map(|wheel| Polyline {
                 wheel,
-                points_in_site: stands().map(|stand| stand.contacts_in_site[wheel]).collect(),
+                points_in_site: places.iter().map(|place| place[wheel]).collect(),
                 width_m: settings.track_width_m,
                 depth_m: settings.track_depth_m,
             })
@@ -57,16 +59,19 @@ impl Tracks {
         tracks
     }
 
-    /// The tracks that lie on the ground when the rover stands at a stop; none at the first.
-    pub fn tracks_until(&self, stop: usize) -> Vec<Polyline> {
-        let points = self.laid.get(stop).or(self.laid.last()).copied().unwrap_or(0);
-        if points == 0 {
-            return Vec::new();
-        }
-        let until = |line: &Polyline| Polyline {
-            points_in_site: line.points_in_site[..points].to_vec(),
-            ..line.clone()
-        };
-        self.lines.iter().map(until).collect()
+    /// The lines of the whole drive.
+    pub fn lines(&self) -> &[Polyline] {
+        &self.lines
     }
+
+    /// How many points of each line are laid when the rover stands at each stop; none at the first.
+    pub fn laid(&self) -> &[usize] {
+        &self.laid
+    }
+}
+
+/// The places below a rover's axles, as high as what each wheel touches.
+fn below_axles(stand: &Stand) -> [Point3; 6] {
+    let axles = axles_in_rover(&stand.angles).map(|axle| stand.site_from_rover * axle);
+    std::array::from_fn(|wheel| Point3::new(axles[wheel].x, axles[wheel].y, stand.contacts_in_site[wheel].z))
 }

@@ -89,6 +89,10 @@ impl Default for AutoExposureSettings {
 pub struct CameraSettings {
     /// Which pair of cameras.
     pub rig: CameraRig,
+    /// A pair on the body to which the target is handed over: after the last stop the rover stays where it is and
+    /// this pair takes one more stop (none; `mer_front_hazcam`: R205, R209).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hand_over: Option<CameraRig>,
     /// Width of the image, px: 1024, 512, 256 or 128; smaller ones are block averages (domain.md 2.1). The
     /// height is the same for the square cameras and three quarters of it for those of 1024 × 768 px.
     pub image_size: u32,
@@ -138,6 +142,7 @@ impl Default for CameraSettings {
     fn default() -> Self {
         Self {
             rig: CameraRig::default(),
+            hand_over: None,
             image_size: 1024,
             blur_px: 0.6,
             samples_per_axis: 4,
@@ -184,6 +189,10 @@ impl CameraSettings {
     pub(super) fn validate(&self) -> Result<()> {
         if ![1024, 512, 256, 128].contains(&self.image_size) {
             return Err(Error::setting("camera.image_size", "choose 1024, 512, 256 or 128"));
+        }
+        if self.hand_over.is_some_and(|rig| rig != CameraRig::MerFrontHazcam || rig == self.rig) {
+            let problem = "choose mer_front_hazcam, beside a camera.rig on the mast";
+            return Err(Error::setting("camera.hand_over", problem));
         }
         if ![12, 8].contains(&self.bit_depth) {
             return Err(Error::setting("camera.bit_depth", "choose 12 or 8"));
@@ -238,6 +247,8 @@ mod tests {
             ("smear_s = nan", "camera.smear_s"),
             ("[camera.auto_exposure]\niterations = 0", "camera.auto_exposure.iterations"),
             ("rig = \"mer_rear_hazcam\"", "mer_front_hazcam"),
+            ("hand_over = \"mer_pancam\"", "camera.hand_over"),
+            ("rig = \"mer_front_hazcam\"\nhand_over = \"mer_front_hazcam\"", "camera.hand_over"),
         ] {
             let error = Scenario::from_toml(&format!("[camera]\n{text}\n"), Path::new("s.toml")).unwrap_err();
             assert!(error.to_string().contains(key), "{error}");

@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 use super::within;
 use crate::error::Result;
 
-/// The relief of the ground: a fractal height field on a regular grid, and a plane beyond it.
+/// The relief of the ground: a fractal height field on a regular grid, a plane beyond it, and level ground far away.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TerrainSettings {
@@ -22,6 +22,9 @@ pub struct TerrainSettings {
     pub slope_deg: f64,
     /// Direction of steepest ascent, deg clockwise from above: 0 ahead, 90 to the right, 180 behind.
     pub slope_azimuth_deg: f64,
+    /// How far from the first stop the slope reaches, m; beyond, the ground returns to the level of the planet, so that the
+    /// horizon is level (60, ours: outside of what surrounds a target at 10 m).
+    pub slope_reach_m: f64,
     /// Height of ripples of sand from trough to crest, m; 0 = none (ours; on Meridiani 0.01 to 0.05).
     pub ripple_height_m: f64,
     /// Mean distance of their crests, m (ours).
@@ -39,6 +42,7 @@ impl Default for TerrainSettings {
             longest_wavelength_m: 6.0,
             slope_deg: 0.0,
             slope_azimuth_deg: 0.0,
+            slope_reach_m: 60.0,
             ripple_height_m: 0.0,
             ripple_wavelength_m: 0.5,
             ripple_azimuth_deg: 0.0,
@@ -191,6 +195,7 @@ impl TerrainSettings {
         within("terrain.longest_wavelength_m", self.longest_wavelength_m, 0.1, 50.0)?;
         within("terrain.slope_deg", self.slope_deg, 0.0, 30.0)?;
         within("terrain.slope_azimuth_deg", self.slope_azimuth_deg, -360.0, 360.0)?;
+        within("terrain.slope_reach_m", self.slope_reach_m, 30.0, 10_000.0)?;
         within("terrain.ripple_height_m", self.ripple_height_m, 0.0, 0.3)?;
         // A crest needs eight vertices, or the grid would shape it.
         let least_m = if self.ripple_height_m > 0.0 { 8.0 * self.cell_m } else { 0.01 };

@@ -1,12 +1,13 @@
 //! Drives of moves: the papers' drives come out of the settings, and impossible ones are refused.
 
 use crate::camera::Mast;
-use crate::frames::{Point3, Pose};
+use crate::frames::{Point3, Pose, Ray, Vector3};
 use crate::sim::rover::drive::{TrueDrive, distances_m, ground_extent_m, planned};
 use crate::sim::rover::tracks::Tracks;
 use crate::sim::scenario::{
     Course, DriveSettings, ForcedSlip, Move, OdometryModel, RoverSettings, Scenario, Soil,
 };
+use crate::sim::world::World;
 
 /// A drive of moves.
 pub(super) fn moves(
@@ -287,23 +288,19 @@ fn tracks_follow_the_wheels_stop_by_stop() {
     let drive = planned(&settings).unwrap();
     let rover = RoverSettings { tracks: true, ..RoverSettings::default() };
     let tracks = Tracks::new(&drive, &rover);
-    assert!(tracks.tracks_until(0).is_empty());
-    assert!(Tracks::new(&drive, &RoverSettings::default()).tracks_until(3).is_empty());
+    assert!(Tracks::new(&drive, &RoverSettings::default()).lines().is_empty());
     let start = drive.stops[0].site_from_rover.translation.vector;
-    let first = tracks.tracks_until(1);
-    assert_eq!(first.len(), 6);
-    let (from, to) = (first[1].points_in_site[0], *first[1].points_in_site.last().unwrap());
+    let (lines, laid) = (tracks.lines(), tracks.laid());
+    assert_eq!((lines.len(), laid.len(), laid[0], laid[3]), (6, 4, 0, lines[0].points_in_site.len()));
+    let (from, to) = (lines[1].points_in_site[0], lines[1].points_in_site[laid[1] - 1]);
     assert!((from - Point3::new(start.x + 0.7, 0.53, 0.294)).norm() < 1e-12, "{from}");
-    assert!((to - from - crate::frames::Vector3::new(0.5, 0.0, 0.0)).norm() < 1e-9, "{to}");
-    // Turning about the middle, each wheel stays on its circle, and the first part of its track stays as it was.
-    let last = tracks.tracks_until(3);
-    for (line, before) in last.iter().zip(&first) {
-        let laid = before.points_in_site.len();
-        assert_eq!(line.points_in_site[..laid], before.points_in_site[..]);
+    assert!((to - from - Vector3::new(0.5, 0.0, 0.0)).norm() < 1e-9, "{to}");
+    // Turning about the middle, each wheel stays on its circle.
+    for line in lines {
         let radius = |point: &Point3| (point.x - start.x - 0.5).hypot(point.y);
-        let radius_m = radius(&line.points_in_site[laid]);
-        assert!(line.points_in_site[laid..].iter().all(|point| (radius(point) - radius_m).abs() < 1e-9));
-        assert_eq!((line.width_m, line.points_in_site.len()), (0.16, last[0].points_in_site.len()));
+        let radius_m = radius(&line.points_in_site[laid[1]]);
+        assert!(line.points_in_site[laid[1]..].iter().all(|point| (radius(point) - radius_m).abs() < 1e-9));
+        assert_eq!((line.width_m, line.points_in_site.len()), (0.16, laid[3]));
     }
 }
 
@@ -314,4 +311,40 @@ fn the_ground_reaches_behind_the_targets_from_every_stop() {
     let [[x_from, x_to], [y_from, y_to]] = ground_extent_m(&crab);
     // From the last stop the view runs on 9 m beyond the centre in the direction of 70°.
     assert!(x_from <= -2.5 && x_to >= 16.3 && y_to > 9.0 * 70f64.to_radians().sin() && y_from < -8.5);
+}
+
+#[test]
+fn wheels_climb_a_rock_of_15_cm_and_a_drive_over_one_of_30_cm_is_refused() {
+    let rock_m = |height_m: f64| {
+        let mut scenario = Scenario::default();
+        (scenario.rocks.area_fraction, scenario.rocks.cluster_count) = (0.0, 0);
+        (scenario.terrain.rms_at_1m_m, scenario.camera.image_size) = (0.0, 128);
+        let text =
+            format!("x_m = -5.0\ny_m = 0.53\ndiameter_m = 0.4\nheight_m = {height_m}\nshape = \"slab\"");
+        scenario.rocks.placed.push(toml::from_str(&text).unwrap());
+        let world = World::new(&scenario);
+        (crate::sim::rover::drive::true_drive(&world, &scenario), world)
+    };
+    let (drive, world) = rock_m(0.15);
+    let stands: Vec<_> = drive.unwrap().legs.into_iter().flat_map(|leg| leg.stands).collect();
+    let highest = |wheel: usize| {
+        let touched = stands.iter().map(|stand| stand.contacts_in_site[wheel]);
+        touched.min_by(|a, b| a.z.total_cmp(&b.z)).unwrap()
+    };
+    // The right front and rear wheels go over the rock and touch its very surface; the left ones stay on the plain.
+    for top in [1, 5].map(highest) {
+        let down = Ray { origin: Point3::new(top.x, top.y, -2.0), direction: Vector3::z() };
+        let surface = world.cast(&down).unwrap();
+        assert_eq!(surface.surface, crate::sim::world::SurfaceId::Rock(0));
+        assert!((surface.point.z - top.z).abs() < 1e-6 && 0.294 - top.z > 0.14, "{top}");
+    }
+    assert!([0, 2, 4].into_iter().all(|wheel| 0.294 - highest(wheel).z < 1e-6));
+    assert_eq!(world.blocked_by_m(5.3, 0.53), None);
+    let (refused, world) = rock_m(0.3);
+    let sentence = refused.expect_err("a wheel's radius is 0.13 m").to_string();
+    assert!(
+        sentence.contains("drive.end_distance_m") && sentence.contains("a rock 0.30 m high"),
+        "{sentence}"
+    );
+    assert_eq!(world.blocked_by_m(5.3, 0.53), Some(0.3));
 }

@@ -7,6 +7,8 @@ mod drive;
 mod fiducials;
 mod moments;
 mod geometry;
+mod hand_over;
+mod papers;
 mod pictures;
 mod slip;
 

@@ -19,6 +19,7 @@ fn on_plane(drive: &DriveSettings, rover: &RoverSettings, a: f64) -> crate::erro
     let [x, y] = crate::sim::rover::drive::goal_m(drive);
     course::drive(&Scene {
         ground_z_m: &|x, _| a * x + 0.294,
+        blocked_by_m: &|_, _| None,
         centre: Point3::new(x, y, a * x + 0.294),
         rig: &Rig::Mast(Mast::spirit()),
         drive,
