@@ -113,7 +113,7 @@ pub fn run_step(stops: &dyn Stops, last: &Updated, settings: &Settings) -> StepT
         locate: None,
         judge: None,
         update: Updated {
-            target: carried,
+            target: carried.clone(),
             state: last.state,
             template_renewed: false,
             correction_m: None,
@@ -145,16 +145,8 @@ pub fn run_step(stops: &dyn Stops, last: &Updated, settings: &Settings) -> StepT
                 last.state,
                 &settings.limits,
             );
-            trace.update = update::update(
-                target,
-                step,
-                &prediction,
-                &pointing,
-                &captured,
-                &located,
-                &verdict,
-                &settings.template,
-            );
+            trace.update =
+                update::update(carried, &pointing, &captured, &located, &verdict, &settings.template);
             (trace.capture, trace.locate, trace.judge) = (Some(captured), Some(located), Some(verdict));
         }
     }

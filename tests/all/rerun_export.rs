@@ -157,10 +157,7 @@ fn numbers_and_positions_come_back_as_the_trace_has_them_half_a_pixel_further() 
         let ncc = number("/target_1/judge/ncc", "Scalars:scalars", trace.step);
         assert_eq!(ncc, [found.peak.score]);
         let peak = number("/target_1/locate/match_template/peak", "Points2D:positions", trace.step);
-        assert_eq!(
-            peak,
-            [(found.peak.pixel.x + 0.5) as f32, (found.peak.pixel.y + 0.5) as f32].map(f64::from)
-        );
+        assert_eq!(peak, [(found.pixel.x + 0.5) as f32, (found.pixel.y + 0.5) as f32].map(f64::from));
         let site = FIXTURE.drive.traverse.site_from_rover(trace.step) * trace.update.target.position_in_rover;
         let position = number("/target_1/update/position", "Points3D:positions", trace.step);
         assert_eq!(position, [site.x as f32, site.y as f32, site.z as f32].map(f64::from));

@@ -1,7 +1,10 @@
 //! Stage 6, `update`: the next target (K§4.1 step 5, R28, R70, R78, R92).
 //!
-//! An accepted update renews the position, its covariance and the template, which is taken anew around the
-//! sub-pixel match. Otherwise the position is carried by the prediction alone and the template stays.
+//! An accepted update renews the position and its covariance, and the template where the setting
+//! `template_update` asks for it: taken anew around the sub-pixel match, the template chains the errors of all
+//! matches so far, so that by default it stays as long as it need not be magnified much and still matches well. In
+//! flight it was renewed at every update (R70). Otherwise the position is carried by the prediction alone and the
+//! template stays.
 
 use std::sync::Arc;
 
@@ -33,37 +36,29 @@ pub struct Updated {
     pub correction_px: Option<f64>,
 }
 
-/// The next target from an update that was judged.
+/// The next target from an update that was judged; `carried` is the target as [`carry`] brought it to this stop.
 pub fn update(
-    target: &Target,
-    step: usize,
-    prediction: &Prediction,
+    carried: Target,
     pointing: &Pointing,
     capture: &Capture,
     located: &Located,
     verdict: &Verdict,
     settings: &TemplateSettings,
 ) -> Updated {
-    let correction_m = located.position_in_rover.map(|p| (p - prediction.position_in_rover).norm());
+    let correction_m = located.position_in_rover.map(|p| (p - carried.position_in_rover).norm());
     let correction_px =
         located.left_pixel.zip(pointing.predicted_left).map(|(a, b): (Pixel, Pixel)| a.distance(b));
-    let carried = carry(target, step, prediction);
-    let renewed = verdict.accepted.then(|| renew(&carried, pointing, capture, located)).flatten();
-    let keep = !asks_for_a_new_template(located, settings);
-    let renewed = renewed.map(|new| {
-        if keep {
-            Target { drift: target.drift, appearance: target.appearance.clone(), ..new }
-        } else {
-            new
-        }
-    });
-    Updated {
-        template_renewed: renewed.is_some() && !keep,
-        target: renewed.unwrap_or(carried),
-        state: verdict.state,
-        correction_m,
-        correction_px,
+    let found = verdict.accepted.then(|| found_again(&carried, pointing, located)).flatten();
+    let appearance = found
+        .as_ref()
+        .filter(|_| asks_for_a_new_template(located, settings))
+        .and_then(|target| new_appearance(target, pointing, capture, located));
+    let template_renewed = appearance.is_some();
+    let mut target = found.unwrap_or(carried);
+    if let Some(appearance) = appearance {
+        (target.appearance, target.drift) = (appearance, located.left_error);
     }
+    Updated { target, state: verdict.state, template_renewed, correction_m, correction_px }
 }
 
 /// Whether an accepted update renews the template.
@@ -92,23 +87,31 @@ pub fn carry(target: &Target, step: usize, prediction: &Prediction) -> Target {
     }
 }
 
-/// The carried target with position and template as located.
-fn renew(carried: &Target, pointing: &Pointing, capture: &Capture, located: &Located) -> Option<Target> {
-    let (position_in_rover, pixel) = (located.position_in_rover?, located.left_pixel?);
+/// The carried target with the position as located.
+fn found_again(carried: &Target, pointing: &Pointing, located: &Located) -> Option<Target> {
+    let position_in_rover = located.position_in_rover?;
     Some(Target {
         position_in_rover,
         covariance_in_rover: located.covariance_in_rover?,
         last_distance_m: (position_in_rover - pointing.left.model.centre()).norm(),
         travelled_since_update_m: 0.0,
-        drift: located.left_error,
-        appearance: Appearance {
-            step: carried.step,
-            pixel,
-            position_in_rover,
-            surface_by_pixel: located.surface_by_pixel,
-            camera: pointing.left.clone(),
-            image: Arc::clone(&capture.pair.left),
-        },
         ..carried.clone()
+    })
+}
+
+/// How the target looks now, around the sub-pixel match.
+fn new_appearance(
+    target: &Target,
+    pointing: &Pointing,
+    capture: &Capture,
+    located: &Located,
+) -> Option<Appearance> {
+    Some(Appearance {
+        step: target.step,
+        pixel: located.left_pixel?,
+        position_in_rover: target.position_in_rover,
+        surface_by_pixel: located.surface_by_pixel,
+        camera: pointing.left.clone(),
+        image: Arc::clone(&capture.pair.left),
     })
 }

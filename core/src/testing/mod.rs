@@ -29,9 +29,11 @@ pub(crate) enum Trouble {
     Covered,
 }
 
-/// A textured plane `x = const` of the site frame, facing a rover that drives towards it.
+/// A textured plane of the site frame, `x = const` unless it is turned, before a rover that drives towards it.
 pub(crate) struct PlaneWorld {
-    /// Distance of the plane along the site's x axis, m.
+    /// The plane's normal, site frame; its texture is painted along the site's x axis.
+    pub normal: Vector3,
+    /// Where the plane meets the site's x axis, m.
     pub plane_x_m: f64,
     /// The true poses.
     pub true_poses: Vec<Pose>,
@@ -56,6 +58,7 @@ impl PlaneWorld {
         };
         let troubles = vec![Trouble::None; poses.len()];
         Self {
+            normal: Vector3::x(),
             plane_x_m: 8.0,
             estimates: poses.clone(),
             true_poses: poses,
@@ -70,7 +73,8 @@ impl PlaneWorld {
         let ray = camera.ray(pixel)?;
         let site_from_rover = &self.true_poses[step];
         let (origin, direction) = (site_from_rover * ray.origin, site_from_rover * ray.direction);
-        let distance_m = (self.plane_x_m - origin.x) / direction.x;
+        let foot = Point3::new(self.plane_x_m, 0.0, 0.0);
+        let distance_m = (foot - origin).dot(&self.normal) / direction.dot(&self.normal);
         (distance_m > 0.0).then(|| origin + direction * distance_m)
     }
 

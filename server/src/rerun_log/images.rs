@@ -78,13 +78,13 @@ pub(super) fn log_search_window(step: &Step<'_>) -> Logged {
 /// The window that was compared with the template, in the colour of the state.
 pub(super) fn log_matched_window(step: &Step<'_>) -> Logged {
     let rgb = of_state(step.trace.update.state);
-    let strip = step.matched().map(|m| square(m.peak.pixel, m.matched.width(), &Matrix2::identity()));
+    let strip = step.matched().map(|m| square(m.pixel, m.matched.width(), &Matrix2::identity()));
     step.log("/{target}/locate/match_template/matched_window", strip.map(|s| haloed(&[s], rgb)))
 }
 
 /// The match.
 pub(super) fn log_peak(step: &Step<'_>) -> Logged {
-    let peak = step.matched().map(|matched| dot(matched.peak.pixel, MEASUREMENT, step.label));
+    let peak = step.matched().map(|matched| dot(matched.pixel, MEASUREMENT, step.label));
     step.log("/{target}/locate/match_template/peak", peak)
 }
 

@@ -142,7 +142,7 @@ fn paint_marks(overlay: &Overlay<'_>, trace: &StepTrace, state: &State) {
         && state.shows(Layer::Template)
     {
         // What was compared is an upright square; the quad is where the reference's own window went.
-        let (at, side) = (found.peak.pixel, template_side(state));
+        let (at, side) = (found.pixel, template_side(state));
         overlay.outline(&template_quad(at, side, &nalgebra::Matrix2::identity()), run, Line::Solid);
         overlay.outline(&template_quad(at, side, &prepared.prepared_from_template()), run, Line::Dotted);
     }

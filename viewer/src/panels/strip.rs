@@ -46,9 +46,13 @@ pub fn patches(trace: &StepTrace) -> Vec<Patch> {
         );
         let scale = applied(s.applied_scale == s.scale, format!("×{:.3}", s.applied_scale));
         add(ArrayName::Scaled, "scaled".to_owned(), scale, Stage::ScaleRoll);
-        let roll =
-            applied(s.applied_roll_rad == s.roll_rad, format!("{:+.2}°", s.applied_roll_rad.to_degrees()));
-        add(ArrayName::Rolled, "rolled".to_owned(), roll, Stage::ScaleRoll);
+        if s.warped {
+            add(ArrayName::Rolled, "warped".to_owned(), "by the surface".to_owned(), Stage::ScaleRoll);
+        } else {
+            let roll = format!("{:+.2}°", s.applied_roll_rad.to_degrees());
+            let roll = applied(s.applied_roll_rad == s.roll_rad, roll);
+            add(ArrayName::Rolled, "rolled".to_owned(), roll, Stage::ScaleRoll);
+        }
     }
     if let Some(m) = &evidence.match_template {
         let score = format!("ncc {:.2}", m.peak.score);

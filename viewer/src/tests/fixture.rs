@@ -223,6 +223,7 @@ fn located(is_designation: bool, is_good: bool, covariance: Matrix3<f64>) -> Loc
             old_distance_m: 6.8,
             new_distance_m: 6.0,
             template_step: 1,
+            warped: false,
             image_from_template: Matrix2::identity() * 1.13,
             reference: Default::default(),
             scaled: Default::default(),
@@ -260,6 +261,8 @@ fn template_match(score: f64) -> TemplateMatch {
             covariance_px2: Matrix2::identity() * 0.02,
             at_edge: false,
         },
+        pixel: PIXEL,
+        focused_score: Some(score),
         second_peak: Some(SecondPeak {
             pixel: PIXEL.offset(12.0, 9.0),
             score: 0.4,

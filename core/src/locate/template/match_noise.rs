@@ -6,9 +6,11 @@
 //! alike (both patches were resampled, and what perspective changes is smooth), so their covariance is taken
 //! with its spatial correlation (White 1980; Newey & West 1987, with Bartlett weights in two dimensions):
 //! ```text
-//! Σ_δ = A⁻¹ B A⁻¹,   B = Σ_ij c(i − j) w_i w_j r_i r_j g_i g_jᵀ,   c = (1 − |Δx|/(L+1)) (1 − |Δy|/(L+1))
+//! Σ_δ = n/(n − 4) A⁻¹ B A⁻¹,   B = Σ_ij c(i − j) w_i w_j r_i r_j g_i g_jᵀ,   c = (1 − |Δx|/(L+1)) (1 − |Δy|/(L+1))
 //! ```
-//! so no noise level has to be assumed. To this comes a floor for the sub-pixel fit itself, whose error does
+//! so no noise level has to be assumed. The fit has taken four numbers (two shifts, gain, level) out of the residual,
+//! which holds only `n = (Σw)² / Σw² / Σc` independent ones, so that it is smaller than what disturbed the match:
+//! hence the factor (as HC1 of MacKinnon & White 1985). To this comes a floor for the sub-pixel fit itself, whose error does
 //! not show in the residual.
 //!
 //! Where the template was prepared by scale and roll alone, the surface's slope stretches the image by another
@@ -21,6 +23,7 @@
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
+//! | n | independent residuals in the window, at least 5 | – |
 //! | L | `CORRELATION_REACH_PX` | px |
 //! | Σ_δ | `covariance_px2` | px² |
 //! | E | `misfit` | px per px |
@@ -34,6 +37,9 @@ use crate::image::patch::Patch;
 
 /// Over how many pixels residuals are taken as correlated.
 const CORRELATION_REACH_PX: i64 = 4;
+
+/// Numbers that a match fits: two shifts, gain and level.
+const FITTED: f64 = 4.0;
 
 /// 1σ error of the quadratic fit of a peak and of resampling, px.
 const FIT_FLOOR_PX: f64 = 0.03;
@@ -83,12 +89,21 @@ pub fn match_noise(template: &Patch, matched: &Patch, misfit: &Matrix2<f64>, foc
     }
     let meat = correlated_sum(&influence, i64::from(width), i64::from(height));
     information.try_inverse().map_or(undetermined, |inverse| MatchNoise {
-        covariance_px2: inverse * meat * inverse + Matrix2::identity() * FIT_FLOOR_PX.powi(2),
+        covariance_px2: inverse * meat * inverse * freedom(focus)
+            + Matrix2::identity() * FIT_FLOOR_PX.powi(2),
         bias_px: inverse * stretched,
     })
 }
 
-/// `Σ_ij w(i − j) v_i v_jᵀ` over a grid of vectors.
+/// `n / (n − 4)`.
+fn freedom(focus: &Focus) -> f64 {
+    let squares: f64 = focus.weights().iter().map(|w| w * w).sum();
+    let alike = ((CORRELATION_REACH_PX + 1) as f64).powi(2);
+    let independent = (1.0 / (squares * alike)).max(FITTED + 1.0);
+    independent / (independent - FITTED)
+}
+
+/// `Σ_ij c(i − j) v_i v_jᵀ` over a grid of vectors.
 fn correlated_sum(vectors: &[Vector2<f64>], width: i64, height: i64) -> Matrix2<f64> {
     let reach = CORRELATION_REACH_PX;
     let weight = |d: i64| 1.0 - d.abs() as f64 / (reach + 1) as f64;
@@ -111,8 +126,7 @@ fn correlated_sum(vectors: &[Vector2<f64>], width: i64, height: i64) -> Matrix2<
 fn weighted_product(a: &Patch, b: &Patch, focus: &Focus) -> f64 {
     let products = a.iter().zip(b.iter()).zip(focus.weights());
     let valid = products.filter(|((a, b), _)| a.is_finite() && b.is_finite());
-    let (sum, total) = valid.fold((0.0, 0.0), |(sum, total), ((a, b), w)| {
-        (sum + w * f64::from(*a) * f64::from(*b), total + w)
-    });
+    let (sum, total) = valid
+        .fold((0.0, 0.0), |(sum, total), ((a, b), w)| (sum + w * f64::from(*a) * f64::from(*b), total + w));
     if total > 0.0 { sum / total } else { 0.0 }
 }

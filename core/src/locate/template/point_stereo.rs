@@ -133,17 +133,16 @@ pub fn point_stereo(input: &StereoInput<'_>, settings: &TemplateSettings) -> Res
     let interval = search_interval(&curve, input, settings)?;
     let facing = Windows { curve: &curve, template: &template, input, slope: RowVector2::zeros(), settings };
     let (points, best) = facing.search(interval);
-    let best = best.map(|best| facing.in_focus(interval, best)).ok_or(
-        "no window of the right image fits on the searched part of the epipolar curve",
-    )?;
+    let best = best
+        .map(|best| facing.in_focus(interval, best))
+        .ok_or("no window of the right image fits on the searched part of the epipolar curve")?;
     let slope = surface_slope(&curve, best.along, input, settings);
     let (windows, best) = facing.on_surface(interval, best, slope);
     let (right_pixel, range_m) = curve.at(best.along, best.across);
     let prepared = windows.right_from_left(best.along);
     let right_window = window_through(input.right_image, right_pixel, &prepared, half, settings.kernel);
-    let right_from_left = slope.map_or(prepared, |slope| {
-        Windows { slope, ..facing }.right_from_left(best.along)
-    });
+    let right_from_left =
+        slope.map_or(prepared, |slope| Windows { slope, ..facing }.right_from_left(best.along));
     let misfit = prepared
         .try_inverse()
         .map_or_else(Matrix2::zeros, |inverse| inverse * right_from_left - Matrix2::identity());

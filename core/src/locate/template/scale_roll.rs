@@ -154,9 +154,9 @@ pub fn scale_roll(
     let (size, kernel) = (settings.template_size_px, settings.kernel);
     let similarity = Rotation2::new(roll_rad).into_inner() * scale;
     let surface = surface_map(appearance, now_from_template, left).filter(|map| {
-        similarity.try_inverse().is_some_and(|inverse| {
-            (map * inverse - Matrix2::identity()).norm() <= STRETCH_LIMIT
-        })
+        similarity
+            .try_inverse()
+            .is_some_and(|inverse| (map * inverse - Matrix2::identity()).norm() <= STRETCH_LIMIT)
     });
     let warp = surface.filter(|_| settings.surface_warp && settings.scale && settings.roll);
     let rolled = match &warp {
