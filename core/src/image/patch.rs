@@ -118,10 +118,9 @@ pub fn scale_roll(
     size: u32,
     kernel: Kernel,
 ) -> Patch {
-    if !(scale > 0.0) {
-        return resample(size, |_, _| None);
-    }
-    warp(source, centre, &(Rotation2::new(roll_rad).into_inner() * scale), size, kernel)
+    // Any other number gives a map without inverse, or one that turns the patch over.
+    let map = Rotation2::new(roll_rad).into_inner() * if scale > 0.0 { scale } else { 0.0 };
+    warp(source, centre, &map, size, kernel)
 }
 
 /// The window of `size` × `size` px about `centre`, its content mapped by `map`, px per px.
