@@ -5,8 +5,8 @@
 //! at its centre C and opens along its axis in the level: places a ahead and s aside with a > 0 and
 //! `s ≤ 2 m + w a`, the 2 m being for what throws its shadow into the picture; a camera that looks down also sees
 //! what lies beside and behind C, as far as its picture shows it. The widening w is the least that holds every ray
-//! of the picture's border where it meets the plan's flat ground, up to [`FARTHEST_M`], the head turned to either
-//! side by what it may be off; it is at least 0.46 (tan 25°). A fisheye's wedge ends after [`FISHEYE_M`] where it is
+//! of the picture's border where it meets the plan's flat ground, up to `FARTHEST_M`, the head turned to either
+//! side by what it may be off; it is at least 0.46 (tan 25°). A fisheye's wedge ends after `FISHEYE_M` where it is
 //! wider than 0.6. Rocks keep clear of the wheels' lines on flat ground, and high ones of the belly.
 //!
 //! | symbol | name | unit, frame |
