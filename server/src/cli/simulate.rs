@@ -82,28 +82,42 @@ fn with(scenario: &Scenario, changes: &[String]) -> Result<Scenario> {
     Scenario::from_toml(&document.to_string(), Path::new("--set"))
 }
 
-/// Replaces a value that the scenario has; a whole number may stand for one with a fraction.
+/// Gives a setting a value; a whole number may stand for one with a fraction.
+///
+/// A setting that a scenario may leave out is not in its document: whether there is one of that name is seen by reading
+/// the document again.
 fn set(document: &mut toml::Table, key: &str, value: &str) -> Result<()> {
-    let mut path = key.split('.');
-    let mut place = path.next().and_then(|first| document.get_mut(first));
-    for part in path {
-        place = place.and_then(|table| table.get_mut(part));
+    let unknown = || Error::setting(key, "the scenario has no such setting");
+    let (sections, name) =
+        key.rsplit_once('.').map_or((None, key), |(sections, name)| (Some(sections), name));
+    let mut section = &mut *document;
+    for part in sections.into_iter().flat_map(|sections| sections.split('.')) {
+        section = section.get_mut(part).and_then(toml::Value::as_table_mut).ok_or_else(unknown)?;
     }
-    let place = place.filter(|place| !place.is_table());
-    let place = place.ok_or_else(|| Error::setting(key, "the scenario has no such setting"))?;
+    let old = section.get(name);
+    if old.is_some_and(toml::Value::is_table) {
+        return Err(unknown());
+    }
+    let is_new = old.is_none();
     let written: Option<toml::Value> = toml::from_str::<toml::Table>(&format!("value = {value}"))
         .ok()
         .and_then(|mut table| table.remove("value"));
-    *place = match (place.is_float(), written) {
+    let new = match (old.is_some_and(toml::Value::is_float), written) {
         (true, Some(toml::Value::Integer(whole))) => toml::Value::Float(whole as f64),
         (_, Some(written)) => written,
         (_, None) => toml::Value::String(value.to_owned()),
     };
-    Ok(())
+    section.insert(name.to_owned(), new);
+    match toml::from_str::<Scenario>(&document.to_string()) {
+        Err(problem) if is_new && problem.message().contains("unknown field") => Err(unknown()),
+        _ => Ok(()),
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use sightline_core::sim::scenario::CameraRig;
+
     use super::*;
 
     #[test]
@@ -112,11 +126,16 @@ mod tests {
         let changed = with(&Scenario::demo(), &changes).unwrap();
         assert_eq!((changed.sun.elevation_deg, changed.name.as_str()), (20.0, "two words"));
         assert_eq!(changed.rocks, Scenario::demo().rocks);
+        // The demonstration hands nothing over, so that its document does not name the setting.
+        let handed_over = with(&Scenario::demo(), &["camera.hand_over=mer_front_hazcam".to_owned()]).unwrap();
+        assert_eq!(handed_over.camera.hand_over, Some(CameraRig::MerFrontHazcam));
     }
 
     #[test]
     fn what_no_scenario_has_is_refused_by_name() {
-        for (change, named) in [("sun.height=3", "sun.height"), ("sun=3", "sun"), ("seed", "key=value")] {
+        for (change, named) in
+            [("sun.height=3", "sun.height"), ("sun=3", "sun"), ("a.b=1", "a.b"), ("seed", "key=value")]
+        {
             let message = with(&Scenario::demo(), &[change.to_owned()]).unwrap_err().to_string();
             assert!(message.contains(named), "{message}");
         }
