@@ -90,8 +90,12 @@ fn study_approach(worlds: &Worlds) -> Result<()> {
 /// Strides over an approach in steps of 5 %: 5 % and 22.6 % (R111).
 const STRIDES: [usize; 2] = [1, 5];
 
+/// Plain correlation, as the paper's first configuration: nothing follows the surface, every update renews.
+const PLAIN: [&str; 5] =
+    ["scale=false", "roll=false", "surface_warp=false", "focus_px=0", "template_update=every_update"];
+
 fn study_realism(worlds: &Worlds) -> Result<()> {
-    let settings = worlds.settings(&["scale=false", "roll=false"])?;
+    let settings = worlds.settings(&PLAIN)?;
     let mut found: Vec<Difficulty> = Vec::new();
     worlds.each("approach-5", |traverse, seed, targets| {
         let of_world = STRIDES.map(|stride| realism::difficulty(traverse, targets, &settings, stride));
