@@ -12,9 +12,9 @@ use sightline_core::trace::{StepTrace, TruthKind};
 use sightline_core::traverse::{Traverse, import};
 use sightline_tests::data;
 
-/// Pixels of the first frame on a scaffold (66 m), a parked car (37 m), a window of a house (25 m), a hoarding (17 m)
-/// and a near car (13 m): five depths, all off the sky and off outlines.
-const STREET: [(f64, f64); 5] = [(727.0, 60.0), (665.0, 186.0), (957.0, 57.0), (204.0, 80.0), (790.0, 200.0)];
+/// Pixels of the first frame on a scaffold (66 m), a parked car (37 m), a tree before a house (26 m), a hoarding (17 m)
+/// and a near car (13 m): five depths, all off the sky.
+const STREET: [(f64, f64); 5] = [(727.0, 60.0), (665.0, 186.0), (880.0, 85.0), (204.0, 80.0), (790.0, 200.0)];
 
 fn imported(set: &Path, folder: &Path) -> Traverse {
     let never = AtomicBool::new(false);
@@ -25,6 +25,10 @@ fn imported(set: &Path, folder: &Path) -> Traverse {
 fn designate(traverse: &Traverse, x: f64, y: f64) -> sightline_core::error::Result<Vec<StepTrace>> {
     track::run(traverse, Designation { step: 0, pixel: Pixel::new(x, y) }, &Settings::default())
 }
+
+/// The target in the tree: its branches are outlines before a wall, a target against R20. It may be lost, not falsely
+/// tracked.
+const TREE: usize = 2;
 
 /// Located minus true pixel, where both are there and the target is tracked.
 fn error_px(step: &StepTrace) -> Option<(f64, f64)> {
@@ -47,14 +51,18 @@ fn far_street_targets_move_alike_within_a_pixel_and_a_half_for_three_frames() {
         // The true poses of so short a sequence err by up to 0.16° a frame (the set's README), which moves all
         // targets alike; their translation errs by 1.5 % of the way, which moves the near ones more. So the far
         // ones, after their common motion, show the tracker's own error.
-        let errors: Vec<(f64, f64)> = runs.iter().filter_map(|run| error_px(&run[step])).collect();
-        assert_eq!(errors.len(), STREET.len(), "all are tracked at step {step}");
+        let found: Vec<Option<(f64, f64)>> = runs.iter().map(|run| error_px(&run[step])).collect();
+        let is_kept = |(target, error): (usize, &Option<_>)| target == TREE || error.is_some();
+        assert!(found.iter().enumerate().all(is_kept), "all but the tree are tracked at step {step}");
+        let errors: Vec<(f64, f64)> = found.iter().flatten().copied().collect();
         let common =
             |axis: fn(&(f64, f64)) -> f64| median(&errors.iter().map(axis).collect::<Vec<_>>()).unwrap();
         let (x, y) = (common(|e| e.0), common(|e| e.1));
-        let own: Vec<f64> = errors.iter().map(|e| (e.0 - x).hypot(e.1 - y)).collect();
-        println!("step {step}: common ({x:.2}, {y:.2}) px, own {own:.2?} px");
-        assert!(median(&own).unwrap() < 1.0 && own[..3].iter().all(|&e| e < 1.5), "step {step}: {own:?}");
+        let own = |error: &(f64, f64)| (error.0 - x).hypot(error.1 - y);
+        let all: Vec<f64> = errors.iter().map(own).collect();
+        println!("step {step}: common ({x:.2}, {y:.2}) px, own {all:.2?} px");
+        let far: Vec<f64> = found[..3].iter().flatten().map(own).collect();
+        assert!(median(&all).unwrap() < 1.0 && far.iter().all(|&e| e < 1.5), "step {step}: {all:?}");
     }
     assert!(
         runs.iter().flatten().all(|step| step.truth.as_ref().is_none_or(|t| t.kind == TruthKind::Carried))
