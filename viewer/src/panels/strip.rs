@@ -47,7 +47,7 @@ pub fn patches(trace: &StepTrace) -> Vec<Patch> {
         let scale = applied(s.applied_scale == s.scale, format!("×{:.3}", s.applied_scale));
         add(ArrayName::Scaled, "scaled".to_owned(), scale, Stage::ScaleRoll);
         if s.warped {
-            add(ArrayName::Rolled, "warped".to_owned(), "by the surface".to_owned(), Stage::ScaleRoll);
+            add(ArrayName::Rolled, "warped".to_owned(), "slope".to_owned(), Stage::ScaleRoll);
         } else {
             let roll = format!("{:+.2}°", s.applied_roll_rad.to_degrees());
             let roll = applied(s.applied_roll_rad == s.roll_rad, roll);
