@@ -142,8 +142,11 @@ fn a_template_that_is_kept_chains_no_errors() {
     let steps = run(&PlaneWorld::new(approach()), &[("template_update", json!("never"))]);
     let drift = steps[5].update.target.drift;
     assert_eq!(drift.covariance_px2, nalgebra::Matrix2::zeros());
-    // The located position still carries the error of its own match.
-    assert!(steps[5].locate.as_ref().unwrap().left_error.covariance_px2.trace() > 0.0);
+    // The located position carries the error of its own match, and of no other.
+    let matched = steps[5].template().and_then(|e| e.match_template.as_ref()).unwrap();
+    let left_error = steps[5].locate.as_ref().unwrap().left_error;
+    assert!((left_error.covariance_px2 - matched.covariance_px2).norm() < 1e-12);
+    assert!(matched.covariance_px2.trace().sqrt() < 1.0, "{}", matched.covariance_px2);
 }
 
 #[test]
