@@ -25,6 +25,7 @@ pub mod frames;
 pub mod error;
 pub mod limits;
 pub mod settings;
+pub mod presets;
 pub mod camera;
 pub mod image;
 pub mod correlate;

@@ -1,0 +1,130 @@
+//! Named configurations of the tracker: the eight of the paper's comparison and those beside them (R129, R216–R225).
+//!
+//! A preset is a list of changes to the default settings and nothing else; whatever it leaves out keeps its default.
+//! What the papers flew comes first, so that a default of ours never slips into a configuration that is called theirs:
+//! the presets named `ncc…` all begin with [`AS_PUBLISHED`].
+
+use crate::error::{Error, Result};
+use crate::settings::{Changes, Settings, parse_assignment};
+
+/// A named configuration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Preset {
+    /// Its name: words joined by hyphens.
+    pub name: &'static str,
+    /// One sentence that says what it does, with its source.
+    pub description: &'static str,
+    /// Whether it begins with [`AS_PUBLISHED`].
+    as_published: bool,
+    /// What it changes, as `key=value`.
+    changes: &'static [&'static str],
+}
+
+/// What the paper leaves out and the defaults switch on (K§4.3, K§4.4).
+pub const AS_PUBLISHED: [&str; 3] = ["surface_warp=false", "focus_px=0", "template_update=every_update"];
+
+const fn published(
+    name: &'static str,
+    description: &'static str,
+    changes: &'static [&'static str],
+) -> Preset {
+    Preset { name, description, as_published: true, changes }
+}
+
+const fn ours(name: &'static str, description: &'static str, changes: &'static [&'static str]) -> Preset {
+    Preset { name, description, as_published: false, changes }
+}
+
+/// Every preset, in the order in which they are listed.
+pub const PRESETS: &[Preset] = &[
+    ours(
+        "sightline",
+        "The defaults: scale, roll and the surface's slope, in focus, renewed on condition.",
+        &[],
+    ),
+    published("ncc", "Correlation of the unchanged window (R112).", &["scale=false", "roll=false"]),
+    published(
+        "ncc-scale",
+        "Correlation of the scaled window, the paper's best (R112, R128).",
+        &["roll=false"],
+    ),
+    published("ncc-roll", "Correlation of the rolled window (R129).", &["scale=false"]),
+    published(
+        "ncc-scale-roll",
+        "Correlation of the scaled and rolled window, as flown (K§4.3.1, R129).",
+        &[],
+    ),
+    published(
+        "integer-peak",
+        "As flown, with peaks in whole pixels: shows the random walk of rounding (R67).",
+        &["sub_pixel=false"],
+    ),
+    published(
+        "never-update",
+        "As flown, but the first window is kept for the whole run (R71).",
+        &["template_update=never"],
+    ),
+    ours(
+        "half-pixel",
+        "The defaults with the papers' noise of half a pixel (R170).",
+        &["noise_model=half_pixel"],
+    ),
+];
+
+impl Preset {
+    /// What it changes, by setting.
+    ///
+    /// # Errors
+    /// None for a preset of [`PRESETS`]; a test holds that.
+    pub fn changes(&self) -> Result<Changes> {
+        let published: &[&str] = if self.as_published { &AS_PUBLISHED } else { &[] };
+        published.iter().chain(self.changes).map(|text| parse_assignment(text)).collect()
+    }
+
+    /// The settings it stands for.
+    ///
+    /// # Errors
+    /// As [`Preset::changes`].
+    pub fn settings(&self) -> Result<Settings> {
+        Settings::default().with(&self.changes()?)
+    }
+}
+
+/// The preset of that name.
+///
+/// # Errors
+/// A name that is not listed; the sentence lists those that are.
+pub fn preset(name: &str) -> Result<&'static Preset> {
+    PRESETS.iter().find(|preset| preset.name == name).ok_or_else(|| {
+        let known = PRESETS.iter().map(|preset| preset.name).collect::<Vec<_>>().join(", ");
+        Error::setting("preset", format!("there is no configuration {name}; known are {known}"))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_preset_makes_settings_and_has_a_name_of_its_own() {
+        for preset in PRESETS {
+            assert!(preset.settings().is_ok(), "{}", preset.name);
+            assert_eq!(
+                PRESETS.iter().filter(|other| other.name == preset.name).count(),
+                1,
+                "{}",
+                preset.name
+            );
+        }
+        let all: Vec<Settings> = PRESETS.iter().map(|preset| preset.settings().unwrap()).collect();
+        for (index, settings) in all.iter().enumerate() {
+            assert!(!all[..index].contains(settings), "{} repeats another", PRESETS[index].name);
+        }
+    }
+
+    #[test]
+    fn an_unknown_preset_is_refused_with_the_known_ones() {
+        let message = preset("ncc-scalee").unwrap_err().to_string();
+        assert!(message.contains("ncc-scalee") && message.contains("ncc-scale-roll"), "{message}");
+    }
+}
