@@ -35,6 +35,7 @@ pub mod stages;
 pub mod locate;
 pub mod trace;
 pub mod pipeline;
+pub mod designate;
 pub mod traverse;
 pub mod sim;
 pub mod session;

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::correlate::zncc::Surface;
+use crate::estimate::error_budget::{Approach, ErrorBudget, StereoPair};
 use crate::frames::{Pixel, Point3};
 use crate::image::patch::Patch;
 use crate::locate::Located;
@@ -106,6 +107,20 @@ pub struct StepRow {
     pub position_in_rover: [f64; 3],
     /// Located position in the left image, px.
     pub left_pixel: Option<Pixel>,
+    /// Estimated distance from the left camera, m.
+    pub range_m: Option<f64>,
+    /// Correction of the distance, m: criterion 3.
+    pub distance_correction_m: Option<f64>,
+    /// Its tolerance at this step, m.
+    pub distance_tolerance_m: Option<f64>,
+    /// Correction of the position since the designation, m: criterion 4.
+    pub position_correction_m: Option<f64>,
+    /// Its tolerance at this step, m.
+    pub position_tolerance_m: Option<f64>,
+    /// What the paper's budget grants a drive without tracking at this range, m, 3σ (K-Eq 3).
+    pub budget_without_m: Option<f64>,
+    /// What it grants tracking that drifts by half a pixel of the first image, m, 3σ (K-Eq 5, R40).
+    pub budget_with_m: Option<f64>,
     /// Why an update was rejected, or what is wrong with the stop's files.
     pub reason: Option<String>,
 }
@@ -143,6 +158,9 @@ impl StepTrace {
         let scale_roll = evidence.and_then(|e| e.scale_roll.as_ref());
         let covariance = self.update.target.covariance_in_rover;
         let largest = covariance.symmetric_eigenvalues().max();
+        let gate = |name: &str| self.judge.as_ref()?.gates.iter().find(|gate| gate.name == name);
+        let (distance, position) = (gate("distance_correction_m"), gate("position_correction_m"));
+        let budget = self.budget();
         StepRow {
             step: self.step,
             state: self.update.state.word().to_owned(),
@@ -157,8 +175,31 @@ impl StepTrace {
             tracked: self.truth.as_ref().and_then(|t| t.tracked),
             position_in_rover: self.update.target.position_in_rover.coords.into(),
             left_pixel: self.locate.as_ref().and_then(|l| l.left_pixel),
+            range_m: self.range_m(),
+            distance_correction_m: distance.and_then(|gate| gate.value),
+            distance_tolerance_m: distance.map(|gate| gate.limit),
+            position_correction_m: position.and_then(|gate| gate.value),
+            position_tolerance_m: position.map(|gate| gate.limit),
+            budget_without_m: budget.map(|budget| budget.without_tracking_m),
+            budget_with_m: budget.map(|budget| budget.with_tracking_m),
             reason: self.fault.clone().or_else(|| self.judge.as_ref().and_then(|v| v.reason.clone())),
         }
+    }
+
+    /// Estimated distance from the left camera, m; null where the camera is not known.
+    pub fn range_m(&self) -> Option<f64> {
+        let centre = self.point_mast.as_ref()?.left.model.centre();
+        Some((self.update.target.position_in_rover - centre).norm())
+    }
+
+    /// The paper's budget at this step's range, for tracking that drifts by half a pixel of the first image (R40).
+    pub fn budget(&self) -> Option<ErrorBudget> {
+        let pointing = self.point_mast.as_ref()?;
+        let pixel = pointing.predicted_left.unwrap_or_else(|| pointing.left.centre_pixel());
+        let pair = StereoPair::from_cameras(&pointing.left, &pointing.right, pixel)?;
+        let (start_m, end_m) = (self.update.target.initial_distance_m, self.range_m()?);
+        let drift_px = 0.5 * start_m / end_m;
+        Some(pair.budget(&Approach { start_m, end_m, drift_px, ..Approach::default() }))
     }
 
     /// Whether the step was lost although its evidence was right.

@@ -10,7 +10,9 @@ use sightline_core::trace::StepRow;
 /// The header of the CSV table.
 const HEADER: &str = "step,state,scale,roll_deg,ncc,stereo_score,err_px,err_m,sigma_m,nees,tracked,\
                       position_in_rover_x_m,position_in_rover_y_m,position_in_rover_z_m,\
-                      left_pixel_x_px,left_pixel_y_px,reason";
+                      left_pixel_x_px,left_pixel_y_px,range_m,\
+                      distance_correction_m,distance_tolerance_m,position_correction_m,position_tolerance_m,\
+                      budget_without_m,budget_with_m,reason";
 
 /// One JSON object a line.
 pub fn jsonl(rows: &[StepRow]) -> String {
@@ -42,6 +44,16 @@ pub fn csv_line(row: &StepRow) -> String {
     row.position_in_rover.into_iter().for_each(|number| push(&mut line, Some(number)));
     push(&mut line, row.left_pixel.map(|pixel| pixel.x));
     push(&mut line, row.left_pixel.map(|pixel| pixel.y));
+    let judged = [
+        row.range_m,
+        row.distance_correction_m,
+        row.distance_tolerance_m,
+        row.position_correction_m,
+        row.position_tolerance_m,
+        row.budget_without_m,
+        row.budget_with_m,
+    ];
+    judged.into_iter().for_each(|number| push(&mut line, number));
     push(&mut line, row.reason.as_deref().map(text_cell));
     line + "\n"
 }

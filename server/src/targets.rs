@@ -9,7 +9,6 @@ use axum::response::{IntoResponse, Response};
 use sightline_core::session::view::SessionView;
 use sightline_core::session::wire::{Designated, NewTarget};
 use sightline_core::settings::Settings;
-use sightline_core::target::Designation;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
@@ -71,8 +70,10 @@ fn add(state: &AppState, live: &Arc<LiveSession>, new: NewTarget, settings: Sett
         (count < TARGET_LIMIT).then_some(()).ok_or_else(full)
     };
     has_room(live.with(|session| session.targets.len()))?;
-    let designation = Designation { step: new.step, pixel: new.pixel };
+    let named = new.place().name(&live.traverse.traverse, new.step)?;
+    let designation = named.designation;
     let first = Arc::new(runner::designate(&live.traverse, designation, &settings)?);
+    let gap_m = named.gap_m(&first);
     let (target, view) = live.with(|session| {
         has_room(session.targets.len())?;
         let target = session.add_target(new.label, settings, first);
@@ -82,7 +83,7 @@ fn add(state: &AppState, live: &Arc<LiveSession>, new: NewTarget, settings: Sett
     state.changed(live)?;
     start_or_say(state, live, target, 0);
     let location = [(header::LOCATION, format!("/api/v1/sessions/{}/targets/{target}", live.id))];
-    Ok((StatusCode::CREATED, location, Json(Designated { target, session: view })).into_response())
+    Ok((StatusCode::CREATED, location, Json(Designated { target, gap_m, session: view })).into_response())
 }
 
 /// Continues a run; when too much is waiting, the run says so and can be resumed.

@@ -1,5 +1,6 @@
 //! Estimation that several trackers use.
 
 pub mod drift;
+pub mod error_budget;
 pub mod triangulate;
 pub mod unscented;

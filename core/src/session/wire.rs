@@ -5,6 +5,8 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::camera::MastAngles;
+use crate::designate::Place;
 use crate::frames::{Pixel, PoseRecord};
 use crate::session::view::SessionView;
 use crate::settings::Changes;
@@ -80,14 +82,24 @@ pub struct NewSession {
     pub traverse: String,
 }
 
-/// Designates a target.
+/// Designates a target in one of three ways: exactly one of `pixel`, `point_in_rover` and `point_in_site`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewTarget {
-    /// The stop whose left image was clicked.
+    /// The stop at which it is designated.
     pub step: usize,
-    /// The position in it, px.
-    pub pixel: Pixel,
+    /// Its position in the left image, px.
+    #[serde(default)]
+    pub pixel: Option<Pixel>,
+    /// The mast angles at which that image was taken; left out: those of the stop.
+    #[serde(default)]
+    pub mast: Option<MastAngles>,
+    /// Its position in the rover frame of the stop, m.
+    #[serde(default)]
+    pub point_in_rover: Option<[f64; 3]>,
+    /// Its position in the site frame, m.
+    #[serde(default)]
+    pub point_in_site: Option<[f64; 3]>,
     /// What to call it.
     #[serde(default)]
     pub label: Option<String>,
@@ -97,11 +109,38 @@ pub struct NewTarget {
     pub settings: Changes,
 }
 
+impl NewTarget {
+    /// A pixel of the left image of a stop, with the default settings.
+    pub fn at_pixel(step: usize, pixel: Pixel) -> Self {
+        Self {
+            step,
+            pixel: Some(pixel),
+            mast: None,
+            point_in_rover: None,
+            point_in_site: None,
+            label: None,
+            settings: Changes::new(),
+        }
+    }
+
+    /// What was said of the target.
+    pub fn place(&self) -> Place {
+        Place {
+            pixel: self.pixel,
+            mast: self.mast,
+            point_in_rover: self.point_in_rover,
+            point_in_site: self.point_in_site,
+        }
+    }
+}
+
 /// A target that was designated, with the session that now has it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Designated {
     /// The target's number in paths.
     pub target: usize,
+    /// How far the surface that stereo found lies from the point that was given, m; null for a pixel.
+    pub gap_m: Option<f64>,
     /// The session with it.
     pub session: SessionView,
 }

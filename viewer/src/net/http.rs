@@ -108,7 +108,7 @@ fn read(request: &Request, response: &ehttp::Response, context: &egui::Context) 
         Request::Sessions => Reply::Sessions(parse(bytes)?),
         Request::Session(_) | Request::NewSession(_) => Reply::Session(Box::new(parse(bytes)?)),
         Request::NewTarget { .. } => {
-            let Designated { target, session } = parse(bytes)?;
+            let Designated { target, session, .. } = parse(bytes)?;
             Reply::Designated { target, session: Box::new(session) }
         }
         Request::NewRun { .. } => Reply::Run(Box::new(parse(bytes)?)),

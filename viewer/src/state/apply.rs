@@ -116,7 +116,7 @@ impl State {
             return;
         }
         let place = Place { step: self.cursor.step, pixel };
-        let target = NewTarget { step: place.step, pixel, label: None, settings: Changes::new() };
+        let target = NewTarget::at_pixel(place.step, pixel);
         if self.ask(|session| Request::NewTarget { session, target }) {
             (self.designating, self.refusal) = (Some(place), None);
         }
