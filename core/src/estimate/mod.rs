@@ -2,5 +2,6 @@
 
 pub mod drift;
 pub mod error_budget;
+pub mod photometry;
 pub mod triangulate;
 pub mod unscented;

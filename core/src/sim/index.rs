@@ -57,6 +57,7 @@ pub fn index(scenario: &Scenario, world: &World) -> Result<TraverseIndex> {
             mast_angles: truth.angles,
             left: view("left", number, left),
             right: view("right", number, right),
+            light: None,
             truth: Some(stop_truth),
         });
     }
@@ -94,6 +95,7 @@ fn handed_over(last: &Stop, number: usize, settings: &CameraSettings) -> Option<
         mast_angles: None,
         left: view("left", number, left),
         right: view("right", number, right),
+        light: None,
         truth: Some(StopTruth {
             site_from_rover: truth.site_from_rover,
             left_camera: None,

@@ -117,7 +117,7 @@ impl World {
 }
 
 /// Where the sun stands some time after the first stop, s: unit direction, site frame.
-fn sun_at(sun: &SunSettings, events: &EventSettings, time_s: f64) -> Vector3 {
+pub(crate) fn sun_at(sun: &SunSettings, events: &EventSettings, time_s: f64) -> Vector3 {
     let hours = time_s / 3600.0;
     let azimuth_deg = sun.azimuth_deg + events.sun_azimuth_deg_per_h * hours;
     let elevation_deg = sun.elevation_deg + events.sun_elevation_deg_per_h * hours;

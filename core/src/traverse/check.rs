@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use super::files::resolve;
-use super::{CameraSource, FORMAT_VERSION, Stop, TraverseIndex, View};
+use super::{CameraSource, FORMAT_VERSION, Stop, StopLight, TraverseIndex, View};
 use crate::camera::{Camera, text};
 use crate::frames::PoseRecord;
 
@@ -69,8 +69,23 @@ pub(super) fn check_stop_numbers(stop: &Stop) -> Result<(), String> {
     {
         return Err("mast_angles: must be finite numbers".to_owned());
     }
+    if let Some(light) = &stop.light {
+        check_light(light)?;
+    }
     match &stop.truth {
         Some(truth) => check_pose("truth.site_from_rover", &truth.site_from_rover),
+        None => Ok(()),
+    }
+}
+
+fn check_light(light: &StopLight) -> Result<(), String> {
+    if !light.sun_azimuth_deg.is_finite() || !(-90.0..=90.0).contains(&light.sun_elevation_deg) {
+        return Err(
+            "light: the sun's azimuth must be a number, and its elevation from -90 to 90 deg".to_owned()
+        );
+    }
+    match light.exposure_s.filter(|time_s| !(time_s.is_finite() && *time_s > 0.0)) {
+        Some(time_s) => Err(format!("light.exposure_s: is {time_s}, but it must be greater than 0")),
         None => Ok(()),
     }
 }

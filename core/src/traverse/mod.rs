@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::camera::{Camera, Mast, MastAngles};
-use crate::frames::PoseRecord;
+use crate::frames::{PoseRecord, Vector3};
 
 pub use index_file::{Existing, IndexFormat};
 pub use native::{Traverse, write};
@@ -103,9 +103,33 @@ pub struct Stop {
     pub left: View,
     /// The right (or second) image.
     pub right: View,
+    /// How the pair was lit and exposed, where the recording says so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub light: Option<StopLight>,
     /// What is known to be true, where anything is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truth: Option<StopTruth>,
+}
+
+/// The light of one stop.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StopLight {
+    /// Where the sun stands, clockwise from the site frame's +x seen from above, deg.
+    pub sun_azimuth_deg: f64,
+    /// Its height over the level, deg.
+    pub sun_elevation_deg: f64,
+    /// For how long the left image was exposed, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exposure_s: Option<f64>,
+}
+
+impl StopLight {
+    /// The unit direction to the sun, site frame.
+    pub fn to_sun_in_site(&self) -> Vector3 {
+        let (azimuth, elevation) = (self.sun_azimuth_deg.to_radians(), self.sun_elevation_deg.to_radians());
+        Vector3::new(elevation.cos() * azimuth.cos(), elevation.cos() * azimuth.sin(), -elevation.sin())
+    }
 }
 
 /// One image with its camera model in the rover frame.

@@ -41,7 +41,8 @@
 //! quaternion_sxyz = [1.0, 0.0, 0.0, 0.0]
 //! ```
 //!
-//! Optional besides: `[mast]` (origin and head cameras) and `stops.mast_angles` (azimuth and elevation, rad).
+//! Optional besides: `[mast]` (origin and head cameras), `stops.mast_angles` (azimuth and elevation, rad) and
+//! `stops.light` (`sun_azimuth_deg`, `sun_elevation_deg` in the site frame, `exposure_s` of the left image).
 //!
 //! A simulated folder also gets `cache/`, from which nothing but time is lost when it is removed, and on demand
 //! `truth/`, the truth of every pixel (`truth_files.rs` documents it).

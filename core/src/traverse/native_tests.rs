@@ -32,6 +32,7 @@ fn stop(step: usize) -> Stop {
         mast_angles: None,
         left: view("left", 0.0),
         right: view("right", 1.0),
+        light: None,
         truth: (step == 1).then(|| StopTruth {
             site_from_rover: PoseRecord::from(&pose.inverse()),
             left_camera: Some(camera(0.3)),

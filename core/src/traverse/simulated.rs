@@ -33,9 +33,10 @@ use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::image::{GrayImage, io};
 use crate::sim::camera::exposure::{Rates, automatic, fixed_s};
-use crate::sim::moment::Moment;
+use crate::sim::moment::{Moment, sun_at};
 use crate::sim::scenario::ExposureMode;
 use crate::sim::{self, Eye, NoiseSeed, Region, SCENARIO_FILE, Scenario, World, clean_radiance, develop};
+use crate::traverse::StopLight;
 
 /// Pixels of a kept picture that are rendered anew before it is believed.
 const PROBES: u32 = 16;
@@ -293,6 +294,24 @@ impl Traverse {
             return Err(Error::Request(format!("there is no step {step}")));
         }
         simulated.exposure_s(self, step, cancel).map(Some)
+    }
+
+    /// How a stop was lit and exposed: as recorded, or as the scenario says; nothing where neither is known.
+    ///
+    /// # Errors
+    /// As [`Traverse::exposure_s`].
+    pub fn light(&self, step: usize, cancel: &AtomicBool) -> Result<Option<StopLight>> {
+        let exposure_s = self.exposure_s(step, cancel)?;
+        let stop = self.index().stops.get(step);
+        let stop = stop.ok_or_else(|| Error::Request(format!("there is no step {step}")))?;
+        let Some(simulated) = &self.simulated else { return Ok(stop.light) };
+        let scenario = &simulated.scenario;
+        let to_sun = sun_at(&scenario.sun, &scenario.events, stop.time_s);
+        Ok(Some(StopLight {
+            sun_azimuth_deg: to_sun.y.atan2(to_sun.x).to_degrees(),
+            sun_elevation_deg: (-to_sun.z).asin().to_degrees(),
+            exposure_s,
+        }))
     }
 
     /// The world as it is when the rover stands at a stop: sun, what is in the way, the rover itself.

@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use crate::camera::{Cahv, Cahvor, Cahvore, Camera, CameraModel, Imaging};
 use crate::error::{Error, Result};
 use crate::frames::{Point3, PoseRecord, Vector3};
+use crate::traverse::StopLight;
 use crate::traverse::import::odl::Group;
 
 /// The largest file that is read, bytes.
@@ -119,6 +120,19 @@ impl Product {
         let model = camera_model(&self.label).map_err(|problem| self.problem(problem))?;
         let [width, height] = self.size()?;
         Ok(Camera::new(model, width, height))
+    }
+
+    /// Sun and exposure, where the label has them.
+    ///
+    /// Opportunity's labels count the sun's elevation downwards, the others upwards; pictures are taken by day.
+    pub fn light(&self) -> Option<StopLight> {
+        let site = self.label.last_group(|name| name.starts_with("SITE_DERIVED_GEOMETRY"))?;
+        let state = self.label.last_group(|name| name.starts_with("INSTRUMENT_STATE"));
+        Some(StopLight {
+            sun_azimuth_deg: site.number("SOLAR_AZIMUTH")?,
+            sun_elevation_deg: site.number("SOLAR_ELEVATION")?.abs(),
+            exposure_s: state.and_then(|group| group.number("EXPOSURE_DURATION")).map(|ms| ms / 1000.0),
+        })
     }
 
     /// The pose of the rover in the site frame.
