@@ -30,6 +30,7 @@ pub mod targets;
 pub mod runs;
 pub mod steps;
 pub mod columns;
+pub mod photometry;
 pub mod exports;
 pub mod events;
 pub mod openapi;

@@ -10,7 +10,7 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use crate::state::AppState;
-use crate::{about, events, exports, runs, sessions, settings, steps, targets, traverses};
+use crate::{about, events, exports, photometry, runs, sessions, settings, steps, targets, traverses};
 
 #[derive(OpenApi)]
 #[openapi(
@@ -35,6 +35,7 @@ pub fn router() -> OpenApiRouter<AppState> {
         .merge(sessions::router())
         .merge(targets::router())
         .merge(runs::router())
+        .merge(photometry::router())
         .merge(steps::router())
         .merge(exports::router())
         .merge(events::router())

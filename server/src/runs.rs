@@ -181,7 +181,7 @@ fn named(state: &AppState, (session, target, run): RunPath, ending: &str) -> Api
 }
 
 /// An answer that browsers save under `name`, which is made of our own names.
-fn download(media_type: &'static str, name: &str, text: String) -> Response {
+pub fn download(media_type: &'static str, name: &str, text: String) -> Response {
     let disposition = format!("attachment; filename=\"{name}\"");
     let headers = [(header::CONTENT_TYPE, media_type.to_owned()), (header::CONTENT_DISPOSITION, disposition)];
     (headers, text).into_response()

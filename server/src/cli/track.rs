@@ -12,17 +12,19 @@ use std::sync::atomic::AtomicBool;
 
 use clap::{Args, ValueEnum};
 use serde::Serialize;
+use sightline_core::camera::MastAngles;
+use sightline_core::designate::Place;
 use sightline_core::error::{Error, Result};
 use sightline_core::frames::Pixel;
 use sightline_core::session::track;
 use sightline_core::settings::{Changes, Settings, TrackerKind, parse_assignment};
-use sightline_core::target::Designation;
 use sightline_core::trace::{StepRow, StepTrace, Summary, summarise};
 use sightline_core::traverse::Traverse;
 
 use super::open;
 use super::say::{self, Progress};
 use crate::columns;
+use crate::photometry;
 use crate::rerun_log::{self, RunLog};
 
 /// Track targets without a browser.
@@ -31,8 +33,18 @@ pub struct Track {
     /// The traverse: a folder, an index or a scenario.
     traverse: PathBuf,
     /// The position of a target in the left image, px; can be given more than once.
-    #[arg(long, value_name = "X,Y", required = true, value_parser = pixel, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y", value_parser = pixel, allow_hyphen_values = true,
+        required_unless_present_any = ["target_in_rover", "target_in_site"])]
     target: Vec<Pixel>,
+    /// The mast angles at which that image was taken, deg; a pixel of another image is refused.
+    #[arg(long, value_name = "AZ,EL", value_parser = angles, allow_hyphen_values = true, requires = "target")]
+    mast: Option<MastAngles>,
+    /// A target by its point in the rover frame of that stop, m; can be given more than once.
+    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
+    target_in_rover: Vec<[f64; 3]>,
+    /// A target by its point in the site frame, m; can be given more than once.
+    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
+    target_in_site: Vec<[f64; 3]>,
     /// The stop in whose left image the targets are designated.
     #[arg(long, value_name = "N", default_value_t = 0)]
     from_step: usize,
@@ -51,6 +63,9 @@ pub struct Track {
     /// Also write a CSV table; with several targets they follow each other.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+    /// Also write a CSV table of the target's light: level, exposure, incidence, emission, phase; for one target.
+    #[arg(long, value_name = "FILE")]
+    photometry: Option<PathBuf>,
 }
 
 /// How the steps are written.
@@ -92,25 +107,46 @@ impl Track {
     pub fn run(self) -> Result<()> {
         let settings = self.settings()?;
         let traverse = open::open(&self.traverse, None)?;
-        if let Some(path) = [&self.rrd, &self.csv].into_iter().flatten().find(|path| path.exists()) {
+        if let Some(path) =
+            [&self.rrd, &self.csv, &self.photometry].into_iter().flatten().find(|path| path.exists())
+        {
             return Err(Error::format(path, "exists already; choose another name"));
         }
         let mut runs = Vec::new();
         // All targets are designated first, so that a bad one is told before anything long begins.
-        for pixel in &self.target {
-            runs.push(vec![Arc::new(designate(&traverse, self.from_step, *pixel, &settings)?)]);
+        for place in self.places() {
+            runs.push(vec![Arc::new(designate(&traverse, self.from_step, &place, &settings)?)]);
         }
+        if self.photometry.is_some() && runs.len() > 1 {
+            return Err(Error::Request("--photometry is for one target at a time".to_owned()));
+        }
+        let several = runs.len() > 1;
         for (number, steps) in runs.iter_mut().enumerate() {
-            let target = (self.target.len() > 1).then_some(number);
+            let target = several.then_some(number);
             follow(&traverse, target, steps, &settings)?;
         }
         if let Some(path) = &self.csv {
             write_csv(path, &runs)?;
         }
+        if let Some(path) = &self.photometry {
+            let table = photometry::table(&traverse, &runs[0], &settings, &AtomicBool::new(false))?;
+            std::fs::write(path, table).map_err(|source| Error::Write { path: path.clone(), source })?;
+        }
         if let Some(path) = &self.rrd {
             write_rrd(path, &traverse, &runs)?;
         }
         Ok(())
+    }
+
+    /// The targets: pixels first, then points.
+    fn places(&self) -> Vec<Place> {
+        let pixels = self.target.iter().map(|pixel| Place { mast: self.mast, ..Place::of_pixel(*pixel) });
+        let in_rover = |point: &[f64; 3]| Place { point_in_rover: Some(*point), ..Place::default() };
+        let in_site = |point: &[f64; 3]| Place { point_in_site: Some(*point), ..Place::default() };
+        pixels
+            .chain(self.target_in_rover.iter().map(in_rover))
+            .chain(self.target_in_site.iter().map(in_site))
+            .collect()
     }
 
     fn settings(&self) -> Result<Settings> {
@@ -122,9 +158,17 @@ impl Track {
     }
 }
 
-/// The first step of a run.
-fn designate(traverse: &Traverse, step: usize, pixel: Pixel, settings: &Settings) -> Result<StepTrace> {
-    track::designate(traverse, Designation { step, pixel }, settings)
+/// The first step of a run; says how far the surface lies from a point that was given.
+fn designate(traverse: &Traverse, step: usize, place: &Place, settings: &Settings) -> Result<StepTrace> {
+    let named = place.name(traverse, step)?;
+    let first = track::designate(traverse, named.designation, settings)?;
+    if let Some(gap_m) = named.gap_m(&first) {
+        say::error(&format!(
+            "the surface that stereo finds lies {:.1} cm from the given point",
+            100.0 * gap_m
+        ));
+    }
+    Ok(first)
 }
 
 /// Computes and writes the steps of one run.
@@ -204,10 +248,30 @@ fn write_rrd(path: &Path, traverse: &Traverse, runs: &[Vec<Arc<StepTrace>>]) -> 
     rerun_log::export(path, &traverse.index().name, traverse, &logs, &mut tell)
 }
 
+/// Reads `azimuth,elevation` in degrees.
+fn angles(text: &str) -> Result<MastAngles, String> {
+    match numbers(text).as_deref() {
+        Some([azimuth_deg, elevation_deg]) => Ok(MastAngles {
+            azimuth_rad: azimuth_deg.to_radians(),
+            elevation_rad: elevation_deg.to_radians(),
+        }),
+        _ => Err("write it as azimuth,elevation in degrees, for example 12.5,-20".to_owned()),
+    }
+}
+
+/// Reads `x,y,z`.
+fn point(text: &str) -> Result<[f64; 3], String> {
+    let point = numbers(text).and_then(|numbers| numbers.try_into().ok());
+    point.ok_or_else(|| "write it as x,y,z in metres, for example 8,-1.2,0.1".to_owned())
+}
+
+fn numbers(text: &str) -> Option<Vec<f64>> {
+    text.split(',').map(|part| part.trim().parse().ok()).collect()
+}
+
 /// Reads `x,y`.
 fn pixel(text: &str) -> Result<Pixel, String> {
-    let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
-    match numbers.as_deref() {
+    match numbers(text).as_deref() {
         Some([x, y]) => Ok(Pixel::new(*x, *y)),
         _ => Err("write it as x,y in pixels, for example 512.5,300".to_owned()),
     }
