@@ -3,6 +3,7 @@
 //! The debugger is a view of this record. The fields bear the stages' names; arrays are left out of the
 //! serialised form and fetched one by one under the names of [`ArrayName`].
 
+use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -105,6 +106,9 @@ pub struct StepRow {
     pub tracked: Option<bool>,
     /// Estimated position in the rover frame, m.
     pub position_in_rover: [f64; 3],
+    /// Covariance of that position, m².
+    #[schema(value_type = Vec<f64>)]
+    pub covariance_in_rover: Matrix3<f64>,
     /// Located position in the left image, px.
     pub left_pixel: Option<Pixel>,
     /// Estimated distance from the left camera, m.
@@ -174,6 +178,7 @@ impl StepTrace {
             nees: self.truth.as_ref().and_then(|t| t.nees),
             tracked: self.truth.as_ref().and_then(|t| t.tracked),
             position_in_rover: self.update.target.position_in_rover.coords.into(),
+            covariance_in_rover: covariance,
             left_pixel: self.locate.as_ref().and_then(|l| l.left_pixel),
             range_m: self.range_m(),
             distance_correction_m: distance.and_then(|gate| gate.value),

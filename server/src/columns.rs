@@ -95,6 +95,6 @@ mod tests {
     }
 
     fn empty() -> StepRow {
-        serde_json::from_str(r#"{"step": 0, "state": "", "position_in_rover": [1, 2, 3]}"#).unwrap()
+        serde_json::from_str(r#"{"step": 0, "state": "", "position_in_rover": [1, 2, 3], "covariance_in_rover": [1, 0, 0, 0, 1, 0, 0, 0, 1]}"#).unwrap()
     }
 }
