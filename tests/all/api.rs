@@ -29,6 +29,62 @@ async fn a_picked_target_is_tracked_to_the_last_stop() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn the_same_target_can_be_named_by_pixel_by_rover_point_and_by_site_point() {
+    let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
+    let server = TestServer::open(drive.path(), folder.path());
+    let session = server.begin().await;
+    server.pick(&session).await;
+    let picked = server.ended(&session, 0, 0).await;
+    let in_rover = &picked["rows"][0]["position_in_rover"];
+    let pose = server.state.traverses()[0].traverse.site_from_rover(0);
+    let coordinates = [0, 1, 2].map(|k| in_rover[k].as_f64().unwrap());
+    let in_site = pose * sightline_core::frames::Point3::from(coordinates);
+    let path = format!("sessions/{session}/targets");
+    for place in [json!({ "point_in_rover": in_rover }), json!({ "point_in_site": in_site })] {
+        let mut new = place.clone();
+        new["step"] = json!(0);
+        let made = server.post(&path, &new).await.expect(201);
+        let designation =
+            &made["session"]["targets"][made["target"].as_u64().unwrap() as usize]["designation"];
+        for (axis, expected) in [("x", PIXEL[0]), ("y", PIXEL[1])] {
+            let found = designation["pixel"][axis].as_f64().unwrap();
+            assert!((found - expected).abs() < 0.05, "{place}: {designation}");
+        }
+        assert!(made["gap_m"].as_f64().unwrap() < 0.02, "{made}");
+    }
+    let nothing = json!({ "step": 0 });
+    server.post(&path, &nothing).await.problem(422, "target");
+    let elsewhere = json!({ "step": 0, "pixel": { "x": 10.0, "y": 10.0 },
+        "mast": { "azimuth_rad": 3.0, "elevation_rad": 0.0 } });
+    server.post(&path, &elsewhere).await.problem(422, "target");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_light_of_a_target_is_a_table_with_a_line_for_every_accepted_update() {
+    let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
+    let server = TestServer::open(drive.path(), folder.path());
+    let session = server.begin().await;
+    server.pick(&session).await;
+    let run = server.ended(&session, 0, 0).await;
+    let answer = server.get(&format!("sessions/{session}/targets/0/runs/0/photometry.csv")).await;
+    let text = String::from_utf8(answer.bytes.to_vec()).unwrap();
+    let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+    let accepted = run["rows"].as_array().unwrap().iter().filter(|row| row["state"] == "tracking").count();
+    assert_eq!((lines.len(), lines[0][7]), (accepted + 1, "phase_deg"));
+    let index = &server.state.traverses()[0].traverse;
+    for line in &lines[1..] {
+        let number = |column: usize| line[column].parse::<f64>().unwrap();
+        let light = index.light(line[0].parse().unwrap(), &std::sync::atomic::AtomicBool::new(false));
+        let exposure_s = light.unwrap().unwrap().exposure_s.unwrap();
+        assert!((number(4) * exposure_s - number(1)).abs() < 1e-9, "{line:?}");
+        // Incidence, emission and phase are the sides of a spherical triangle.
+        let (incidence, emission, phase) = (number(5), number(6), number(7));
+        assert!(phase <= incidence + emission + 1e-6 && phase >= (incidence - emission).abs() - 1e-6);
+        assert!(emission < 90.0, "the surface is seen from in front: {line:?}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn going_back_is_a_read_of_the_same_bytes() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), folder.path());

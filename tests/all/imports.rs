@@ -69,6 +69,10 @@ fn the_navcam_pair_opens_as_one_convergent_stop() {
     assert_eq!(stop.site_from_rover.position_m, [73.9193, 65.9703, 6.56288]);
     assert_eq!(stop.site_from_rover.quaternion_sxyz, [0.580525, 0.0333603, -0.128929, 0.803278]);
     assert_eq!(traverse.index().full_scale_dn, Some(4095.0));
+    // The label counts the sun's elevation downwards: -41.7863.
+    let light = traverse.light(0, &AtomicBool::new(false)).unwrap().unwrap();
+    assert_eq!([light.sun_azimuth_deg, light.sun_elevation_deg], [281.703, 41.7863]);
+    assert_eq!(light.exposure_s, Some(0.41984));
     let views =
         [(stop.left.image.as_str(), traverse.left_camera(0)), (&stop.right.image, traverse.right_camera(0))];
     assert!(views[0].0.starts_with("1N491020376") && views[1].0.starts_with("1N491020519"));
