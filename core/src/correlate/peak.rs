@@ -68,7 +68,8 @@ pub struct SecondPeak {
     pub pixel: Pixel,
     /// Its score.
     pub score: f64,
-    /// Its score over the best whole-pixel score: near 1 the match is ambiguous.
+    /// Its score over the best whole-pixel score, or the inverse where scores are negative: near 1 the match is
+    /// ambiguous.
     pub ratio: f64,
     /// Distance from the best match, px.
     pub distance_px: f64,
@@ -115,10 +116,21 @@ pub fn second_peak(surface: &Surface, best: &Peak, min_distance_px: f64) -> Opti
         let distance_px = pixel.distance(best.pixel);
         let is_higher = second.as_ref().is_none_or(|second| score > second.score);
         if is_higher && distance_px >= min_distance_px && is_local_maximum(surface, ix, iy) {
-            second = Some(SecondPeak { pixel, score, ratio: score / best.integer_score, distance_px });
+            second = Some(SecondPeak { pixel, score, ratio: ratio(score, best.integer_score), distance_px });
         }
     }
     second
+}
+
+/// The lesser of two scores over the larger, so that it grows with their likeness whatever their sign.
+fn ratio(second: f64, best: f64) -> f64 {
+    if second == best {
+        1.0
+    } else if best > 0.0 {
+        second / best
+    } else {
+        best / second
+    }
 }
 
 /// Whether no neighbour is higher; of a plateau of two or more the first in reading order counts.

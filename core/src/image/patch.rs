@@ -182,8 +182,16 @@ pub fn normalised_difference(a: &Patch, b: &Patch) -> Patch {
     }))
 }
 
+/// The middle `size` × `size` px of a square patch; `None` when it is smaller, or the two have no common middle.
+pub fn middle(patch: &Patch, size: u32) -> Option<Patch> {
+    let inset = patch.width().checked_sub(size)?;
+    let is_centred = patch.width() == patch.height() && inset.is_multiple_of(2);
+    let part = PixelRect::new(inset as i32 / 2, inset as i32 / 2, size, size);
+    is_centred.then(|| Patch(crop(patch, &part)))
+}
+
 /// The pixels of `part`, which lies inside the image.
-fn crop(image: &GrayImage, part: &PixelRect) -> GrayImage {
+pub fn crop(image: &GrayImage, part: &PixelRect) -> GrayImage {
     GrayImage::from_fn(part.width, part.height, |x, y| *image.get_pixel(x + part.x as u32, y + part.y as u32))
 }
 
