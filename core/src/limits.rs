@@ -113,6 +113,20 @@ settings_group! {
         disparity_error_px: f64 = 1.0, "px", Domain::Between(0.01, 20.0), "K§4.2, R35";
         /// Navigation error that the tolerances assume, as a fraction of the distance driven.
         navigation_error_fraction: f64 = 0.02, "", Domain::Between(0.0, 1.0), "K§4.2, R38";
+        /// A match is a loss whose second peak scores more than this share of the best (near 1: it may be the other one);
+        /// 1: off.
+        second_peak_ratio_max: f64 = 1.0, "", Domain::Between(0.0, 1.0), "ours, R68; off";
+        /// A match is a loss whose position is less sharply known, 1σ along its worst direction; 0: off.
+        match_sigma_max_px: f64 = 0.0, "px", Domain::Between(0.0, 100.0), "ours; off";
+        /// A match is a loss that lies nearer to the edge of the search window: the true one may lie beyond it; 0: off.
+        edge_distance_min_px: f64 = 0.0, "px", Domain::Between(0.0, 100.0), "ours; off";
+        /// A designation is warned of when the ranges in its window differ by a larger share of the distance.
+        warn_depth_range: f64 = 0.1, "", Domain::Between(0.0, 10.0), "ours, R21";
+        /// A designation is warned of when its window's standard deviation is a smaller share of full scale.
+        warn_contrast: f64 = 0.01, "", Domain::Between(0.0, 1.0), "ours, R21";
+        /// A designation is warned of when the ranges in its window leave a plane by a larger share of the distance:
+        /// an occluding boundary runs through it.
+        warn_boundary: f64 = 0.03, "", Domain::Between(0.0, 10.0), "ours, R119";
         /// Updates that may follow a loss before failure is declared.
         n_retry: u32 = 2, "updates", Domain::Between(0.0, 100.0), "K§4.6, R90";
         /// Whether the update that detects the loss counts among them (the stricter reading).

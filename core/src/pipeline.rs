@@ -20,7 +20,7 @@ use crate::stages::judge::{self, Verdict};
 use crate::stages::point_mast::{self, Pointing, UsedPointing};
 use crate::stages::predict;
 use crate::stages::update::{self, Updated};
-use crate::target::{Appearance, Designation, Target, TrackingState};
+use crate::target::{Appearance, Designation, Memory, Target, TrackingState};
 use crate::trace::StepTrace;
 use crate::traverse::{OdometryError, StereoGeometry};
 
@@ -146,7 +146,7 @@ pub fn run_step(stops: &dyn Stops, last: &Updated, settings: &Settings) -> StepT
                 &settings.limits,
             );
             trace.update =
-                update::update(carried, &pointing, &captured, &located, &verdict, &settings.template);
+                update::update(carried, &pointing, &captured, &located, &verdict, &site_from_rover, settings);
             (trace.capture, trace.locate, trace.judge) = (Some(captured), Some(located), Some(verdict));
         }
     }
@@ -177,7 +177,9 @@ fn first_target(
         pixel,
         position_in_rover,
         surface_by_pixel: located.surface_by_pixel,
+        relief: located.evidence.template().and_then(|e| e.relief.clone()),
         camera: left.clone(),
+        site_from_rover: stops.site_from_rover(step),
         image: Arc::clone(&capture.pair.left),
     };
     Ok(Target {
@@ -192,6 +194,7 @@ fn first_target(
         travelled_since_update_m: 0.0,
         drift: located.left_error,
         appearance,
+        memory: Memory::default(),
     })
 }
 

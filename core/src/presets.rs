@@ -55,6 +55,58 @@ pub const PRESETS: &[Preset] = &[
         &[],
     ),
     published(
+        "ncc-affine",
+        "Correlation of the unchanged window, then the affine second stage (R129, R221).",
+        &["scale=false", "roll=false", "refine=affine"],
+    ),
+    published(
+        "ncc-scale-affine",
+        "Correlation of the scaled window, then the affine second stage (R129, R221).",
+        &["roll=false", "refine=affine"],
+    ),
+    published(
+        "ncc-roll-affine",
+        "Correlation of the rolled window, then the affine second stage (R129, R221).",
+        &["scale=false", "refine=affine"],
+    ),
+    published(
+        "ncc-scale-roll-affine",
+        "Correlation of the scaled and rolled window, then the affine second stage (R129, R221).",
+        &["refine=affine"],
+    ),
+    published(
+        "coarse-to-fine",
+        "As flown, searched coarse to fine over two halvings (K§4.3.2, R64, R65).",
+        &["search=coarse_to_fine"],
+    ),
+    published("sad", "As flown, by sums of absolute differences (R216).", &["measure=sad"]),
+    published("ssd", "As flown, by sums of squared differences (R216).", &["measure=ssd"]),
+    published(
+        "sdog",
+        "As flown, by the sign of the difference of Gaussians, Marsokhod's tracker (R219).",
+        &["measure=sdog"],
+    ),
+    published(
+        "klt-translation",
+        "Pyramidal Lucas-Kanade by shift of the unchanged window, from the prediction (R217, R218).",
+        &["scale=false", "roll=false", "first_stage=klt_translation"],
+    ),
+    published(
+        "klt-affine",
+        "Pyramidal Lucas-Kanade by affine map of the unchanged window, from the prediction (R217, R218).",
+        &["scale=false", "roll=false", "first_stage=klt_affine"],
+    ),
+    published(
+        "scale-roll-search",
+        "Correlation over a brute-force grid of scales and rolls, without the geometry (R224).",
+        &["transform=search"],
+    ),
+    published(
+        "drift-correction",
+        "As flown, and every match corrected against the first window (R71).",
+        &["template_update=drift_corrected"],
+    ),
+    published(
         "integer-peak",
         "As flown, with peaks in whole pixels: shows the random walk of rounding (R67).",
         &["sub_pixel=false"],
@@ -63,6 +115,16 @@ pub const PRESETS: &[Preset] = &[
         "never-update",
         "As flown, but the first window is kept for the whole run (R71).",
         &["template_update=never"],
+    ),
+    ours(
+        "homography",
+        "The defaults, warped through the surface's plane and both camera models pixel by pixel (beyond R60).",
+        &["warp_model=homography"],
+    ),
+    ours(
+        "three-templates",
+        "The defaults, and of the template and the two before it the one that scores best.",
+        &["reference_templates=3"],
     ),
     ours(
         "half-pixel",

@@ -12,8 +12,9 @@ use utoipa::ToSchema;
 
 use crate::camera::Camera;
 use crate::estimate::drift::Drift;
-use crate::frames::{Pixel, Point3};
+use crate::frames::{Pixel, Point3, Pose};
 use crate::image::GrayImage;
+use crate::locate::template::height::Relief;
 
 /// How a person names a target: a position in the left image of a stop.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -38,8 +39,16 @@ pub struct Appearance {
     /// How the surface point moves with that pixel, m per px, where stereo told.
     #[schema(value_type = Option<Vec<f64>>)]
     pub surface_by_pixel: Option<Matrix3x2<f64>>,
+    /// The heights around it, where they are weighed.
+    #[serde(skip)]
+    #[schema(ignore)]
+    pub relief: Option<Relief>,
     /// The left camera in the rover frame of that stop.
     pub camera: Camera,
+    /// The estimated pose at that stop.
+    #[serde(skip)]
+    #[schema(ignore)]
+    pub site_from_rover: Pose,
     /// The whole left image of that stop, so that rolled and shrunk templates have no empty corners (R59).
     #[serde(skip)]
     #[schema(ignore)]
@@ -75,6 +84,45 @@ pub struct Target {
     pub drift: Drift,
     /// How it looked when the template was taken.
     pub appearance: Appearance,
+    /// The appearances that renewals replaced, oldest first.
+    #[serde(skip)]
+    #[schema(ignore)]
+    pub memory: Memory,
+}
+
+/// An appearance that was replaced, with the error of its centre.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Kept {
+    /// How the target looked.
+    pub appearance: Appearance,
+    /// The error of its centre against the designated point, in its own image.
+    pub drift: Drift,
+}
+
+/// The appearances that renewals replaced: the designated one, and the newest ones.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Memory(Vec<Kept>);
+
+impl Memory {
+    /// Adds an appearance, and forgets all but the first and the newest `count`.
+    #[must_use]
+    pub fn with(mut self, kept: Kept, count: usize) -> Self {
+        self.0.push(kept);
+        let newest = self.0.len().saturating_sub(count);
+        self.0 =
+            self.0.into_iter().enumerate().filter(|(i, _)| *i == 0 || *i >= newest).map(|(_, k)| k).collect();
+        self
+    }
+
+    /// The designated appearance, once it was replaced.
+    pub fn first(&self) -> Option<&Kept> {
+        self.0.first()
+    }
+
+    /// The replaced appearances, newest first.
+    pub fn newest(&self) -> impl Iterator<Item = &Kept> {
+        self.0.iter().rev()
+    }
 }
 
 /// Where tracking stands (R89): the words of the house, of which `tracking` is the papers' "normal".

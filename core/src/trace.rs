@@ -170,7 +170,7 @@ impl StepTrace {
             state: self.update.state.word().to_owned(),
             scale: scale_roll.map(|s| s.scale),
             roll_deg: scale_roll.map(|s| s.roll_rad.to_degrees()),
-            ncc: evidence.and_then(|e| e.match_template.as_ref()).map(|m| m.peak.score),
+            ncc: evidence.and_then(|e| e.match_template.as_ref()).map(|m| m.score),
             stereo_score: evidence.and_then(|e| e.point_stereo.as_ref()).map(|s| s.score),
             err_px: self.truth.as_ref().and_then(|t| t.err_px),
             err_m: self.truth.as_ref().map(|t| t.err_m),
@@ -224,7 +224,7 @@ impl StepTrace {
             ArrayName::Rolled => scale_roll.map(|s| ArrayView::Patch(&s.rolled)),
             ArrayName::Matched => matched.map(|m| ArrayView::Patch(&m.matched)),
             ArrayName::Difference => matched.map(|m| ArrayView::Patch(&m.difference)),
-            ArrayName::Surface => matched.map(|m| ArrayView::Surface(&m.surface)),
+            ArrayName::Surface => matched.map(|m| &m.surface).filter(|s| s.width > 0).map(ArrayView::Surface),
             ArrayName::RightWindow => {
                 evidence.point_stereo.as_ref().map(|s| ArrayView::Patch(&s.right_window))
             }

@@ -68,7 +68,8 @@ pub struct SecondPeak {
     pub pixel: Pixel,
     /// Its score.
     pub score: f64,
-    /// Its score over the best whole-pixel score: near 1 the match is ambiguous.
+    /// Its score over the best whole-pixel score, or the inverse where scores are negative: near 1 the match is
+    /// ambiguous.
     pub ratio: f64,
     /// Distance from the best match, px.
     pub distance_px: f64,
@@ -78,7 +79,13 @@ pub struct SecondPeak {
 ///
 /// `None` when every position is excluded. Among equal scores the first in reading order is taken.
 pub fn find_peak(surface: &Surface, sub_pixel: bool) -> Option<Peak> {
-    let (ix, iy, highest) = surface.maximum()?;
+    let (ix, iy, _) = surface.maximum()?;
+    peak_at(surface, ix, iy, sub_pixel)
+}
+
+/// The match at an index of the surface, fitted below the pixel as the best one is.
+pub(crate) fn peak_at(surface: &Surface, ix: u32, iy: u32, sub_pixel: bool) -> Option<Peak> {
+    let highest = surface.at(ix, iy)?;
     let whole = surface.pixel_of(ix, iy);
     let near = neighbours::<3>(surface, ix, iy);
     let fit = near
@@ -115,10 +122,37 @@ pub fn second_peak(surface: &Surface, best: &Peak, min_distance_px: f64) -> Opti
         let distance_px = pixel.distance(best.pixel);
         let is_higher = second.as_ref().is_none_or(|second| score > second.score);
         if is_higher && distance_px >= min_distance_px && is_local_maximum(surface, ix, iy) {
-            second = Some(SecondPeak { pixel, score, ratio: score / best.integer_score, distance_px });
+            second = Some(SecondPeak { pixel, score, ratio: ratio(score, best.integer_score), distance_px });
         }
     }
     second
+}
+
+/// The highest local maxima: places in px of the surface's level, and scores.
+pub(crate) fn highest_maxima(surface: &Surface, count: usize) -> Vec<([i32; 2], f32)> {
+    let places = (0..surface.height).flat_map(|iy| (0..surface.width).map(move |ix| (ix, iy)));
+    let mut maxima: Vec<([i32; 2], f32)> = places
+        .filter(|(ix, iy)| is_local_maximum(surface, *ix, *iy))
+        .filter_map(|(ix, iy)| {
+            let place = [surface.origin[0] + ix as i32, surface.origin[1] + iy as i32];
+            Some((place, surface.at(ix, iy)?))
+        })
+        .collect();
+    // A stable sort: equal scores stay in reading order.
+    maxima.sort_by(|a, b| b.1.total_cmp(&a.1));
+    maxima.truncate(count);
+    maxima
+}
+
+/// The lesser of two scores over the larger, so that it grows with their likeness whatever their sign.
+fn ratio(second: f64, best: f64) -> f64 {
+    if second == best {
+        1.0
+    } else if best > 0.0 {
+        second / best
+    } else {
+        best / second
+    }
 }
 
 /// Whether no neighbour is higher; of a plateau of two or more the first in reading order counts.

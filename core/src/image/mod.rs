@@ -6,6 +6,7 @@
 pub mod rect;
 pub mod sample;
 pub mod patch;
+pub mod pyramid;
 pub mod gradient;
 pub mod integral;
 pub mod io;

@@ -132,29 +132,55 @@ pub fn warp(source: &GrayImage, centre: Pixel, map: &Matrix2<f64>, size: u32, ke
     let Some(inverse) = map.try_inverse().filter(|_| scale.is_finite()) else {
         return resample(size, |_, _| None);
     };
-    let half = (f64::from(size) - 1.0) / 2.0;
-    let read = |image: &GrayImage, centre: Pixel| {
-        resample(size, |u, v| {
-            let from = inverse * Vector2::new(u - half, v - half);
-            kernel.sample(image, centre.offset(from.x, from.y))
-        })
-    };
+    warp_by(source, scale, size, kernel, |o| {
+        let from = inverse * o;
+        Some(centre.offset(from.x, from.y))
+    })
+}
+
+/// The window of `size` × `size` px whose pixel at offset o from its middle shows the source at `from(o)`, a map that is
+/// nearly linear over the window and magnifies by `scale`.
+///
+/// Where it shrinks the source is smoothed first. NaN where `from` gives nothing, and as for [`warp`].
+pub fn warp_by(
+    source: &GrayImage,
+    scale: f64,
+    size: u32,
+    kernel: Kernel,
+    from: impl Fn(Vector2<f64>) -> Option<Pixel>,
+) -> Patch {
     // Rounding may leave the scale of a pure rotation a little below one.
     if scale >= 1.0 - 1e-12 {
-        return read(source, centre);
+        return resample_through(source, size, kernel, from);
     }
     let sigma_px = NATURAL_BLUR_PX * (1.0 / (scale * scale) - 1.0).sqrt();
-    let corners = [Vector2::new(half, half), Vector2::new(half, -half)];
-    let farthest = corners.map(|corner| (inverse * corner).norm()).into_iter().fold(0.0, f64::max);
+    let half = (f64::from(size) - 1.0) / 2.0;
+    let corners = [(half, half), (half, -half), (-half, half), (-half, -half)];
+    let places = || corners.iter().filter_map(|(u, v)| from(Vector2::new(*u, *v)));
+    let Some(centre) = from(Vector2::zeros()) else { return resample(size, |_, _| None) };
+    let farthest = places().map(|place| place.distance(centre)).fold(0.0, f64::max);
     let reach = farthest + 3.0 + (3.0 * sigma_px).ceil();
     let needed = PixelRect::centred(centre, 2 * reach.ceil() as u32 + 1);
     match needed.intersect(&PixelRect::whole(source.width(), source.height())) {
         Some(part) => {
             let smooth = blurred(&crop(source, &part), sigma_px);
-            read(&smooth, centre.offset(-f64::from(part.x), -f64::from(part.y)))
+            let (x, y) = (f64::from(part.x), f64::from(part.y));
+            resample_through(&smooth, size, kernel, |o| from(o).map(|place| place.offset(-x, -y)))
         }
         None => resample(size, |_, _| None),
     }
+}
+
+/// The window of `size` × `size` px whose pixel at offset o from its middle shows the source at `from(o)`; NaN where
+/// that is nothing, outside, or touches an invalid pixel.
+pub fn resample_through(
+    source: &GrayImage,
+    size: u32,
+    kernel: Kernel,
+    from: impl Fn(Vector2<f64>) -> Option<Pixel>,
+) -> Patch {
+    let half = (f64::from(size) - 1.0) / 2.0;
+    resample(size, |u, v| kernel.sample(source, from(Vector2::new(u - half, v - half))?))
 }
 
 /// The patch with zero mean and unit standard deviation (over its valid pixels); `None` when it is flat.
@@ -182,8 +208,16 @@ pub fn normalised_difference(a: &Patch, b: &Patch) -> Patch {
     }))
 }
 
+/// The middle `size` × `size` px of a square patch; `None` when it is smaller, or the two have no common middle.
+pub fn middle(patch: &Patch, size: u32) -> Option<Patch> {
+    let inset = patch.width().checked_sub(size)?;
+    let is_centred = patch.width() == patch.height() && inset.is_multiple_of(2);
+    let part = PixelRect::new(inset as i32 / 2, inset as i32 / 2, size, size);
+    is_centred.then(|| Patch(crop(patch, &part)))
+}
+
 /// The pixels of `part`, which lies inside the image.
-fn crop(image: &GrayImage, part: &PixelRect) -> GrayImage {
+pub fn crop(image: &GrayImage, part: &PixelRect) -> GrayImage {
     GrayImage::from_fn(part.width, part.height, |x, y| *image.get_pixel(x + part.x as u32, y + part.y as u32))
 }
 

@@ -7,6 +7,14 @@
 //! | 3 `distance_correction_m` | `│ │p − C│ − │p_pred − C│ │` | ≤ tol_dist |
 //! | 4 `position_correction_m` | `│p_site − p_initial,site│` | ≤ tol_pos |
 //!
+//! Three more of ours ask how good the peak of the match is; each is a criterion only where its limit switches it on:
+//!
+//! | criterion | value | limit |
+//! |---|---|---|
+//! | 5 `second_peak_ratio` | second peak over the best; 0 without one (R68) | ≤ `second_peak_ratio_max` |
+//! | 6 `match_sigma_px` | largest 1σ axis of the match's own covariance | ≤ `match_sigma_max_px` |
+//! | 7 `edge_distance_px` | from the best whole pixel to the rim of the positions compared | ≥ `edge_distance_min_px` |
+//!
 //! The tolerances are recomputed at every update (R86, R87, ours):
 //! ```text
 //! tol_dist = g √( ΔR(D_old)² + ΔR(D_new)² + (f L_step)² )
@@ -27,6 +35,7 @@ use utoipa::ToSchema;
 use crate::frames::{Point3, Pose};
 use crate::limits::Limits;
 use crate::locate::Located;
+use crate::locate::template::match_template::TemplateMatch;
 use crate::stages::point_mast::Pointing;
 use crate::stages::predict::Prediction;
 use crate::target::{Target, TrackingState};
@@ -34,7 +43,7 @@ use crate::target::{Target, TrackingState};
 /// One criterion with its value and limit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Gate {
-    /// The criterion's number in K§4.6.
+    /// The criterion's number: 1 to 4 as in K§4.6, from 5 on ours.
     pub criterion: u8,
     /// Its name.
     pub name: String,
@@ -117,7 +126,7 @@ fn gates(
     limits: &Limits,
 ) -> Vec<Gate> {
     let evidence = located.evidence.template();
-    let ncc = evidence.and_then(|e| e.match_template.as_ref()).map(|m| m.peak.score);
+    let ncc = evidence.and_then(|e| e.match_template.as_ref()).map(|m| m.score);
     let stereo = evidence.and_then(|e| e.point_stereo.as_ref()).map(|s| s.score);
     let centre = pointing.left.model.centre();
     let predicted_m = (prediction.position_in_rover - centre).norm();
@@ -126,7 +135,7 @@ fn gates(
     let position = found.map(|p: Point3| (site_from_rover * p - target.initial_position_in_site).norm());
     let new_m = found.map_or(predicted_m, |p| (p - centre).norm());
     let tolerance = Tolerance::new(pointing, predicted_m, limits);
-    vec![
+    let mut gates = vec![
         Gate::new(1, "ncc", "", ncc, limits.ncc_min, true),
         Gate::new(2, "stereo_ncc", "", stereo, limits.stereo_ncc_min, true),
         Gate::new(
@@ -145,7 +154,28 @@ fn gates(
             tolerance.position_m(target, prediction, new_m),
             false,
         ),
-    ]
+    ];
+    gates.extend(peak_gates(evidence.and_then(|e| e.match_template.as_ref()), limits));
+    gates
+}
+
+/// The criteria of the peak that are switched on.
+fn peak_gates(matched: Option<&TemplateMatch>, limits: &Limits) -> Vec<Gate> {
+    let mut gates = Vec::new();
+    let ratio = matched.map(|m| m.second_peak.as_ref().map_or(0.0, |second| second.ratio));
+    if limits.second_peak_ratio_max < 1.0 {
+        gates.push(Gate::new(5, "second_peak_ratio", "", ratio, limits.second_peak_ratio_max, false));
+    }
+    let sigma_px = matched.map(|m| m.covariance_px2.symmetric_eigenvalues().max().max(0.0).sqrt());
+    if limits.match_sigma_max_px > 0.0 {
+        gates.push(Gate::new(6, "match_sigma_px", "px", sigma_px, limits.match_sigma_max_px, false));
+    }
+    // A descent by gradient compares no window of positions, and has no rim.
+    let edge_px = matched.map(|m| m.edge_distance_px().unwrap_or(f64::INFINITY));
+    if limits.edge_distance_min_px > 0.0 {
+        gates.push(Gate::new(7, "edge_distance_px", "px", edge_px, limits.edge_distance_min_px, true));
+    }
+    gates
 }
 
 /// The two tolerances of R87.

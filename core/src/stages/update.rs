@@ -3,7 +3,8 @@
 //! An accepted update renews the position and its covariance, and the template where the setting
 //! `template_update` asks for it: taken anew around the sub-pixel match, the template chains the errors of all
 //! matches so far, so that by default it stays as long as it need not be magnified much and still matches well. In
-//! flight it was renewed at every update (R70). Otherwise the position is carried by the prediction alone and the
+//! flight it was renewed at every update (R70). What a renewal replaces is remembered, so that it can be looked for again
+//! (`reference_templates`, `template_update = drift_corrected`). Otherwise the position is carried by the prediction alone and the
 //! template stays.
 
 use std::sync::Arc;
@@ -11,15 +12,16 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::frames::Pixel;
+use crate::frames::{Pixel, Pose};
 use crate::locate::Located;
 use crate::locate::template::TemplateSettings;
 use crate::locate::template::settings::TemplateUpdate;
+use crate::settings::Settings;
 use crate::stages::capture::Capture;
 use crate::stages::judge::Verdict;
 use crate::stages::point_mast::Pointing;
 use crate::stages::predict::Prediction;
-use crate::target::{Appearance, Target, TrackingState};
+use crate::target::{Appearance, Kept, Target, TrackingState};
 
 /// What this stop leaves to the next.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -43,8 +45,10 @@ pub fn update(
     capture: &Capture,
     located: &Located,
     verdict: &Verdict,
-    settings: &TemplateSettings,
+    site_from_rover: &Pose,
+    settings: &Settings,
 ) -> Updated {
+    let settings = &settings.template;
     let correction_m = located.position_in_rover.map(|p| (p - carried.position_in_rover).norm());
     let correction_px =
         located.left_pixel.zip(pointing.predicted_left).map(|(a, b): (Pixel, Pixel)| a.distance(b));
@@ -52,10 +56,13 @@ pub fn update(
     let appearance = found
         .as_ref()
         .filter(|_| asks_for_a_new_template(located, settings))
-        .and_then(|target| new_appearance(target, pointing, capture, located));
+        .and_then(|target| new_appearance(target, pointing, capture, located, site_from_rover));
     let template_renewed = appearance.is_some();
     let mut target = found.unwrap_or(carried);
     if let Some(appearance) = appearance {
+        let old = Kept { appearance: target.appearance, drift: target.drift };
+        let others = settings.reference_templates.saturating_sub(1) as usize;
+        target.memory = target.memory.with(old, others);
         (target.appearance, target.drift) = (appearance, located.left_error);
     }
     Updated { target, state: verdict.state, template_renewed, correction_m, correction_px }
@@ -65,9 +72,9 @@ pub fn update(
 fn asks_for_a_new_template(located: &Located, settings: &TemplateSettings) -> bool {
     let evidence = located.evidence.template();
     let scale = evidence.and_then(|e| e.scale_roll.as_ref()).map_or(f64::INFINITY, |s| s.scale);
-    let score = evidence.and_then(|e| e.match_template.as_ref()).map_or(-1.0, |m| m.peak.score);
+    let score = evidence.and_then(|e| e.match_template.as_ref()).map_or(-1.0, |m| m.score);
     match settings.template_update {
-        TemplateUpdate::EveryUpdate => true,
+        TemplateUpdate::EveryUpdate | TemplateUpdate::DriftCorrected => true,
         TemplateUpdate::Never => false,
         TemplateUpdate::OnCondition => {
             scale.max(1.0 / scale) >= settings.renew_scale || score < settings.renew_ncc
@@ -105,13 +112,16 @@ fn new_appearance(
     pointing: &Pointing,
     capture: &Capture,
     located: &Located,
+    site_from_rover: &Pose,
 ) -> Option<Appearance> {
     Some(Appearance {
         step: target.step,
         pixel: located.left_pixel?,
         position_in_rover: target.position_in_rover,
         surface_by_pixel: located.surface_by_pixel,
+        relief: located.evidence.template().and_then(|e| e.relief.clone()),
         camera: pointing.left.clone(),
+        site_from_rover: *site_from_rover,
         image: Arc::clone(&capture.pair.left),
     })
 }

@@ -8,38 +8,63 @@
 //! that of this match; what biases the matches is carried as `F B + b` and enters the position as `B Bᵀ`.
 //! `point_stereo` sees the same left position, so both eyes share its error.
 
+mod choices;
 pub mod settings;
+mod window_map;
 pub mod scale_roll;
+mod choose;
 pub mod match_template;
+pub mod klt;
+pub mod affine;
+pub mod drift_correction;
 pub mod match_noise;
 pub mod stereo_curve;
 pub mod point_stereo;
 pub mod triangulate;
+mod relief;
+pub mod warnings;
+pub mod height;
+pub mod history;
+pub mod compare_searches;
 
 pub use settings::TemplateSettings;
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod configuration_tests;
 
 use nalgebra::Matrix2;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use self::choose::Chosen;
+use self::drift_correction::DriftCorrection;
+use self::height::Relief;
 use self::match_template::TemplateMatch;
 use self::point_stereo::{PointStereo, StereoInput};
 use self::scale_roll::ScaleRoll;
-use self::settings::NoiseModel;
+use self::settings::{NoiseModel, TemplateUpdate};
 use self::triangulate::Triangulation;
+use self::warnings::Warning;
 use super::{DesignateInput, Evidence, LocateInput, Located, Locator};
 use crate::estimate::drift::Drift;
+use crate::frames::Pixel;
+use crate::image::patch;
 
 /// What the template locator saw; a step that was not reached is null.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TemplateEvidence {
+    /// Why the target may be badly picked; at the designation only.
+    pub warnings: Vec<Warning>,
     /// The template, scaled and rolled.
     pub scale_roll: Option<ScaleRoll>,
     /// Its match in the left image.
     pub match_template: Option<TemplateMatch>,
+    /// The match of the designated window, where matches are corrected by it.
+    pub drift_correction: Option<DriftCorrection>,
+    /// The heights around the target, where they are weighed.
+    pub relief: Option<Relief>,
     /// The corresponding point in the right image.
     pub point_stereo: Option<PointStereo>,
     /// The position from both.
@@ -55,7 +80,11 @@ pub struct TemplateLocator;
 
 impl Locator for TemplateLocator {
     fn designate(&self, input: &DesignateInput<'_>) -> Located {
-        let covariance = match input.settings.template.noise_model {
+        let settings = &input.settings.template;
+        if let Some(missing) = settings.contradiction().or_else(|| without_contrast(input, settings)) {
+            return nothing(TemplateEvidence::default(), missing);
+        }
+        let covariance = match settings.noise_model {
             // The click defines the target: it has no error of its own.
             NoiseModel::Measured => Matrix2::zeros(),
             NoiseModel::HalfPixel => Matrix2::identity() * HALF_PIXEL_VARIANCE,
@@ -69,44 +98,83 @@ impl Locator for TemplateLocator {
             geometry: input.stereo,
             predicted_range_m: None,
         };
-        finish(TemplateEvidence::default(), &stereo, Drift::of_pixel(covariance), &input.settings.template)
+        let mut located = finish(TemplateEvidence::default(), &stereo, Drift::of_pixel(covariance), settings);
+        let Evidence::Template(evidence) = &mut located.evidence;
+        evidence.warnings = evidence
+            .triangulate
+            .as_ref()
+            .map_or_else(Vec::new, |found| warnings::look(&stereo, found.range_m, input.settings));
+        located
     }
 
     fn locate(&self, input: &LocateInput<'_>) -> Located {
         let settings = &input.settings.template;
         let mut evidence = TemplateEvidence::default();
-        let left = &input.pointing.left;
-        let prepared =
-            match scale_roll::scale_roll(&input.target.appearance, input.now_from_template, left, settings) {
-                Ok(prepared) => evidence.scale_roll.insert(prepared),
-                Err(missing) => return nothing(evidence, missing),
-            };
-        let matched = match match_template::match_template(prepared, input, settings) {
-            Ok(matched) => matched,
-            Err(missing) => return nothing(evidence, missing),
+        if let Some(missing) = settings.contradiction() {
+            return nothing(evidence, missing);
+        }
+        let chosen = match choose::choose(input, settings) {
+            Ok(chosen) => chosen,
+            Err(unmatched) => {
+                evidence.scale_roll = unmatched.scale_roll.map(|prepared| *prepared);
+                return nothing(evidence, unmatched.missing);
+            }
         };
-        let left_pixel = matched.pixel;
-        let error = match settings.noise_model {
-            NoiseModel::Measured => input.target.drift.after_match(
-                &prepared.image_from_template,
-                &matched.covariance_px2,
-                matched.bias_px,
-                settings.match_correlation,
-            ),
-            NoiseModel::HalfPixel => Drift::of_pixel(Matrix2::identity() * HALF_PIXEL_VARIANCE),
-        };
+        let image = input.capture.pair.left.as_ref();
+        let Chosen { prepared, now_from_template, mut first, drift, tried, comparisons } = chosen;
+        if let Some(relief) = prepared.appearance().relief.as_ref().filter(|_| settings.height_weight > 0.0) {
+            let stereo = stereo_input(input, first.peak.pixel);
+            first.weighed = height::weigh(&mut first, relief, &now_from_template, &stereo, settings);
+        }
+        let matched = match_template::finish(&prepared, first, tried, comparisons, image, settings);
+        let mut left_pixel = matched.pixel;
+        let mut error = drift.after_match(
+            &prepared.record.image_from_template,
+            &matched.covariance_px2,
+            matched.bias_px,
+            settings.match_correlation,
+        );
+        evidence.scale_roll = Some(prepared.record);
         evidence.match_template = Some(matched);
-        let stereo = StereoInput {
-            left_pixel,
-            left_image: &input.capture.pair.left,
-            right_image: &input.capture.pair.right,
-            left,
-            right: &input.pointing.right,
-            geometry: input.stereo,
-            predicted_range_m: Some((input.prediction.position_in_rover - left.model.centre()).norm()),
-        };
+        if settings.template_update == TemplateUpdate::DriftCorrected
+            && let Some((correction, its_error)) = drift_correction::correct(input, left_pixel, settings)
+        {
+            if correction.accepted {
+                (left_pixel, error) = (correction.pixel, its_error);
+            }
+            evidence.drift_correction = Some(correction);
+        }
+        if settings.noise_model == NoiseModel::HalfPixel {
+            error = Drift::of_pixel(Matrix2::identity() * HALF_PIXEL_VARIANCE);
+        }
+        let stereo = stereo_input(input, left_pixel);
         finish(evidence, &stereo, error, settings)
     }
+}
+
+/// What point stereo is given at a later stop.
+fn stereo_input<'a>(input: &LocateInput<'a>, left_pixel: Pixel) -> StereoInput<'a> {
+    let left = &input.pointing.left;
+    StereoInput {
+        left_pixel,
+        left_image: &input.capture.pair.left,
+        right_image: &input.capture.pair.right,
+        left,
+        right: &input.pointing.right,
+        geometry: input.stereo,
+        predicted_range_m: Some((input.prediction.position_in_rover - left.model.centre()).norm()),
+    }
+}
+
+/// Why a designated window cannot be found again, as one sentence, where all its pixels are alike.
+fn without_contrast(input: &DesignateInput<'_>, settings: &TemplateSettings) -> Option<String> {
+    let size = settings.template_size_px;
+    let window = patch::extract(&input.capture.pair.left, input.pixel, size / 2, settings.kernel);
+    (window.is_complete() && window.is_flat()).then(|| {
+        format!(
+            "the window of template_size_px {size} around it has no contrast: choose a target with texture"
+        )
+    })
 }
 
 /// The two steps that designation and tracking share: point stereo and triangulation.
@@ -116,7 +184,7 @@ fn finish(
     left_error: Drift,
     settings: &TemplateSettings,
 ) -> Located {
-    let confidence = evidence.match_template.as_ref().map_or(1.0, |m| m.peak.score.clamp(0.0, 1.0));
+    let confidence = evidence.match_template.as_ref().map_or(1.0, |m| m.score.clamp(0.0, 1.0));
     let left_pixel = Some(input.left_pixel);
     let mut located = Located { left_pixel, left_error, confidence, ..empty() };
     let stereo = match point_stereo::point_stereo(input, settings) {
@@ -140,6 +208,9 @@ fn finish(
             located.position_in_rover = Some(triangulation.position_in_rover);
             located.covariance_in_rover = Some(triangulation.covariance_in_rover);
             located.surface_by_pixel = triangulation.surface_by_pixel;
+            if settings.height_weight > 0.0 {
+                evidence.relief = height::relief(input, triangulation.range_m, settings);
+            }
             evidence.triangulate = Some(triangulation);
         }
         Err(missing) => located.missing = Some(missing),

@@ -14,7 +14,8 @@
 //! F = ∂pixel_new/∂p · R · ∂p/∂pixel_old
 //! ```
 //! and with `surface_warp` the window is resampled through F instead: foreshortening changes with the line of
-//! sight, most on surfaces seen at a grazing angle. `image_from_template` is F (or s R(ρ) where the slope is not
+//! sight, most on surfaces seen at a grazing angle. With `warp_model = homography` each pixel goes through the plane of the
+//! surface and both camera models instead (`window_map`). `image_from_template` is F (or s R(ρ) where the slope is not
 //! known), which also carries the uncertainty of the target's position in the image.
 //!
 //! | symbol | name | unit, frame |
@@ -30,7 +31,8 @@ use nalgebra::{Matrix2, Rotation2};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::settings::{RollReference, TemplateSettings};
+use super::settings::{RollReference, TemplateSettings, WarpModel};
+use super::window_map::{PlaneMap, WindowMap, WindowSource};
 use crate::camera::Camera;
 use crate::frames::{Pixel, Point3, Pose};
 use crate::image::patch::{self, Patch};
@@ -133,14 +135,17 @@ pub fn geometry(
 
 /// Scales and rolls the template of `appearance` for the present left camera, or warps it by its surface.
 ///
+/// `tried` is a scale and a roll (rad) to take instead of what the geometry and the switches say (R224).
+///
 /// # Errors
 /// A sentence saying why there is no template.
-pub fn scale_roll(
-    appearance: &Appearance,
+pub fn scale_roll<'a>(
+    appearance: &'a Appearance,
     now_from_template: &Pose,
-    left: &Camera,
+    left: &'a Camera,
     settings: &TemplateSettings,
-) -> Result<ScaleRoll, String> {
+    tried: Option<(f64, f64)>,
+) -> Result<Prepared<'a>, String> {
     let (scale, roll_rad, old_distance_m, new_distance_m) = geometry(
         &appearance.position_in_rover,
         &appearance.camera,
@@ -148,8 +153,8 @@ pub fn scale_roll(
         left,
         settings.roll_reference,
     )?;
-    let applied_scale = if settings.scale { scale } else { 1.0 };
-    let applied_roll_rad = if settings.roll { roll_rad } else { 0.0 };
+    let by_geometry = (if settings.scale { scale } else { 1.0 }, if settings.roll { roll_rad } else { 0.0 });
+    let (applied_scale, applied_roll_rad) = tried.unwrap_or(by_geometry);
     let (image, pixel) = (appearance.image.as_ref(), appearance.pixel);
     let (size, kernel) = (settings.template_size_px, settings.kernel);
     let similarity = Rotation2::new(roll_rad).into_inner() * scale;
@@ -158,25 +163,54 @@ pub fn scale_roll(
             .try_inverse()
             .is_some_and(|inverse| (map * inverse - Matrix2::identity()).norm() <= STRETCH_LIMIT)
     });
-    let warp = surface.filter(|_| settings.surface_warp && settings.scale && settings.roll);
-    let rolled = match &warp {
-        Some(map) => patch::warp(image, pixel, map, size, kernel),
-        None => patch::scale_roll(image, pixel, applied_scale, applied_roll_rad, size, kernel),
+    let is_wanted = settings.surface_warp && settings.scale && settings.roll && tried.is_none();
+    let warp = surface.filter(|_| is_wanted);
+    let plane = warp
+        .filter(|_| settings.warp_model == WarpModel::Homography)
+        .and_then(|map| PlaneMap::new(appearance, now_from_template, left, &map));
+    let map = match (plane, &warp) {
+        (Some(plane), _) => WindowMap::Plane(Box::new(plane)),
+        (None, Some(map)) => WindowMap::Linear(*map),
+        (None, None) => WindowMap::Linear(Rotation2::new(applied_roll_rad).into_inner() * applied_scale),
     };
-    Ok(ScaleRoll {
-        image_from_template: surface.unwrap_or(similarity),
-        warped: warp.is_some(),
-        scale,
-        roll_rad,
-        applied_scale,
-        applied_roll_rad,
-        old_distance_m,
-        new_distance_m,
-        template_step: appearance.step,
-        reference: patch::extract(image, pixel, size / 2, kernel),
-        scaled: patch::scale_roll(image, pixel, applied_scale, 0.0, size, kernel),
-        rolled,
+    let source = WindowSource { appearance, map, kernel };
+    Ok(Prepared {
+        record: ScaleRoll {
+            image_from_template: surface.unwrap_or(similarity),
+            warped: warp.is_some(),
+            scale,
+            roll_rad,
+            applied_scale,
+            applied_roll_rad,
+            old_distance_m,
+            new_distance_m,
+            template_step: appearance.step,
+            reference: patch::extract(image, pixel, size / 2, kernel),
+            scaled: patch::scale_roll(image, pixel, applied_scale, 0.0, size, kernel),
+            rolled: source.window(size),
+        },
+        source,
     })
+}
+
+/// The prepared template with where it comes from, so that its surroundings can be prepared as it was.
+#[derive(Clone, Debug)]
+pub struct Prepared<'a> {
+    /// What the trace keeps.
+    pub record: ScaleRoll,
+    source: WindowSource<'a>,
+}
+
+impl Prepared<'_> {
+    /// The appearance from which it was prepared.
+    pub(super) fn appearance(&self) -> &Appearance {
+        self.source.appearance
+    }
+
+    /// The template with its surroundings: a window of `size` × `size` px with the same middle.
+    pub fn window(&self, size: u32) -> Patch {
+        if size == self.record.rolled.width() { self.record.rolled.clone() } else { self.source.window(size) }
+    }
 }
 
 #[cfg(test)]

@@ -1,68 +1,15 @@
 //! The settings of the template locator, with unit, default and source.
 
-use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
-
+pub use super::choices::{
+    DisparityInterval, FirstStage, Measure, NoiseModel, Refine, RollReference, Search, StereoReference,
+    TemplateUpdate, Transform, WarpModel,
+};
+use crate::correlate::Descent;
+use crate::correlate::sdog::Sdog;
+use crate::correlate::similarity::Similarity;
 use crate::image::sample::Kernel;
 use crate::limits::Domain;
 use crate::settings_group;
-
-/// What the roll of the template is measured against (R57).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum RollReference {
-    /// The horizontal of the old image, taken as exactly horizontal, as the paper does.
-    #[default]
-    Horizontal,
-    /// The helper point's true direction in the old image, which distortion tilts a little.
-    OldImage,
-}
-
-/// From where the vertical tolerance of point stereo is measured (R73, E38).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum StereoReference {
-    /// The epipolar curve of the camera models.
-    #[default]
-    EpipolarCurve,
-    /// The same image row, which fails on real unrectified pairs.
-    ImageRow,
-}
-
-/// Where the interval of disparities lies (R75, E13).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum DisparityInterval {
-    /// Around the disparity of the predicted range.
-    #[default]
-    Centred,
-    /// From zero, the literal reading, which excludes near targets.
-    FromZero,
-}
-
-/// When an accepted update renews the template (R70, R71).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum TemplateUpdate {
-    /// At every accepted update, as in flight.
-    EveryUpdate,
-    /// Once it must be magnified too much, or matches badly: errors of matches are chained more seldom.
-    #[default]
-    OnCondition,
-    /// Never: the designated window is looked for at every stop.
-    Never,
-}
-
-/// Where the pixel noise comes from that the position covariance propagates.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum NoiseModel {
-    /// Measured from each match: residual, gradients and template drift.
-    #[default]
-    Measured,
-    /// Half a pixel in each coordinate of each eye, as the papers assume.
-    HalfPixel,
-}
 
 settings_group! {
     /// The settings of the template locator (Kim et al. 2009).
@@ -82,10 +29,66 @@ settings_group! {
         /// Warp the template by the slope of the target's surface, as stereo measured it, instead of scale and roll
         /// alone; where both of these are on.
         surface_warp: bool = true, "", Domain::Switch, "ours; beyond R60";
+        /// How: to first order, or through the plane of the surface pixel by pixel.
+        warp_model: WarpModel = WarpModel::Slope, "", Domain::choice(&["slope", "homography"]), "ours; beyond R60";
+        /// What finds the template first. Descents by gradient (klt) start from the prediction and bear only small errors of it.
+        first_stage: FirstStage = FirstStage::Correlation, "", Domain::choice(&["correlation", "klt_translation", "klt_affine"]), "K§2, R217, R218";
+        /// By what template and image are compared. Differences (sad, ssd) see a change of light as one of the scene.
+        measure: Measure = Measure::Ncc, "", Domain::choice(&["ncc", "sad", "ssd", "sdog"]), "K§4.3.2, R216, R219";
+        /// Of sdog: 1σ of the narrower Gaussian.
+        sdog_sigma_px: f64 = 1.5, "px", Domain::Between(0.3, 10.0), "ours, R219";
+        /// Of sdog: how much wider the other is.
+        sdog_ratio: f64 = 1.6, "", Domain::Between(1.1, 4.0), "ours, R219";
+        /// Which positions of the search window are compared.
+        search: Search = Search::Exhaustive, "", Domain::choice(&["exhaustive", "coarse_to_fine"]), "K§4.3.2, R63, R64";
+        /// Coarse to fine: how often template and image are halved.
+        coarse_levels: u32 = 2, "", Domain::Between(1.0, 4.0), "ours, R65";
+        /// Coarse to fine: how many maxima of the coarsest level are followed.
+        coarse_candidates: u32 = 5, "", Domain::Between(1.0, 100.0), "ours, R65";
+        /// Coarse to fine: how far each is looked for at a finer level, in pixels of that level.
+        coarse_reach_px: u32 = 2, "px", Domain::Between(1.0, 10.0), "ours, R65";
+        /// Second stage after the match: an affine map by gradient descent over gain, level and six parameters.
+        refine: Refine = Refine::None, "", Domain::choice(&["none", "affine"]), "K§2, R221, R222";
+        /// Second stage: levels of its pyramid, the finest included.
+        refine_levels: u32 = 2, "", Domain::Between(1.0, 4.0), "ours, R222";
+        /// Second stage: it is rejected when it moves the match farther.
+        refine_max_shift_px: f64 = 5.0, "px", Domain::Between(0.0, 100.0), "ours, R222";
+        /// Second stage: it is rejected when it changes the window's area by a larger share.
+        refine_max_area_change: f64 = 0.2, "", Domain::Between(0.0, 10.0), "ours, R222";
+        /// Gradient descents (klt and second stage): most steps at each level.
+        descent_iterations: u32 = 30, "", Domain::Between(1.0, 1000.0), "ours, R218";
+        /// Gradient descents: a step shorter than this ends a level.
+        descent_stop_px: f64 = 0.01, "px", Domain::Between(1e-6, 1.0), "ours, R218";
+        /// klt: levels of the pyramid, the finest included.
+        klt_levels: u32 = 3, "", Domain::Between(1.0, 6.0), "ours, R218";
+        /// Where scale and roll come from: the geometry, or a brute-force search over a grid.
+        transform: Transform = Transform::Geometry, "", Domain::choice(&["geometry", "search"]), "K§2, R224";
+        /// Brute force: largest scale tried; the smallest is its inverse.
+        search_scale_max: f64 = 1.25, "", Domain::Between(1.0, 4.0), "ours, R224";
+        /// Brute force: ratio of one scale to the next.
+        search_scale_ratio: f64 = 1.05, "", Domain::Between(1.005, 2.0), "ours, R224";
+        /// Brute force: largest roll tried, to either side.
+        search_roll_deg: f64 = 10.0, "deg", Domain::Between(0.0, 180.0), "ours, R224";
+        /// Brute force: step of the roll.
+        search_roll_step_deg: f64 = 2.5, "deg", Domain::Between(0.1, 90.0), "ours, R224";
+        /// Weight of the height term: how far the relief around a maximum, by stereo, decides between it and others; 0: off.
+        height_weight: f64 = 0.0, "", Domain::Between(0.0, 1.0), "K§2, R220; off";
+        /// Height term: difference of relief at which nothing agrees.
+        height_scale_m: f64 = 0.05, "m", Domain::Between(0.001, 10.0), "ours, R220";
+        /// How many appearances of the target are tried: the template, and those it replaced, newest first. The best
+        /// score wins.
+        reference_templates: u32 = 1, "", Domain::Between(1.0, 20.0), "ours";
         /// 1σ of the Gaussian through which a match is refined; 0: all of the window counts alike, as in the paper.
         focus_px: f64 = 4.0, "px", Domain::Between(0.0, 100.0), "ours; correlate/focus.rs";
         /// When an accepted update renews the template.
-        template_update: TemplateUpdate = TemplateUpdate::OnCondition, "", Domain::choice(&["every_update", "on_condition", "never"]), "K§4.3.3, R70; ours";
+        template_update: TemplateUpdate = TemplateUpdate::OnCondition, "", Domain::choice(&["every_update", "on_condition", "never", "drift_corrected"]), "K§4.3.3, R70, R71; ours";
+        /// Drift corrected: a match of the designated window farther away than this is not used.
+        drift_reach_px: f64 = 3.0, "px", Domain::Between(0.0, 50.0), "ours, R71";
+        /// Drift corrected: not used once the designated window must be magnified by more, or shrunk by its inverse: few of
+        /// its pixels are left in the template then, and a smooth ramp matches anywhere.
+        drift_scale_max: f64 = 2.0, "", Domain::Between(1.0, 100.0), "ours, R71";
+        /// Drift corrected: one that scores less is not used.
+        drift_ncc_min: f64 = 0.7, "", Domain::Between(-1.0, 1.0), "ours, R71";
         /// On condition: renewed once it must be magnified by this, or shrunk by its inverse.
         renew_scale: f64 = 1.3, "", Domain::Between(1.0, 100.0), "ours";
         /// On condition: renewed once its match scores less.
@@ -112,5 +115,50 @@ settings_group! {
         noise_model: NoiseModel = NoiseModel::Measured, "", Domain::choice(&["measured", "half_pixel"]), "ours; papers: R170";
         /// How alike the errors of two matches in a row are, where they are measured.
         match_correlation: f64 = 0.4, "", Domain::Between(0.0, 0.99), "ours; ARCHITECTURE.md";
+    }
+}
+
+impl TemplateSettings {
+    /// The measure with its parameters.
+    pub fn similarity(&self) -> Similarity {
+        match self.measure {
+            Measure::Ncc => Similarity::Ncc,
+            Measure::Sad => Similarity::Sad,
+            Measure::Ssd => Similarity::Ssd,
+            Measure::Sdog => Similarity::Sdog(Sdog { sigma_px: self.sdog_sigma_px, ratio: self.sdog_ratio }),
+        }
+    }
+
+    /// How a coarse-to-fine search descends.
+    pub fn descent(&self) -> Descent {
+        Descent {
+            levels: self.coarse_levels,
+            candidates: self.coarse_candidates as usize,
+            reach_px: self.coarse_reach_px,
+        }
+    }
+
+    /// Why these settings cannot find anything, as one sentence that names the fields and the way out.
+    pub fn contradiction(&self) -> Option<String> {
+        let (template, window) = (self.template_size_px, self.search_window_px);
+        if template.is_multiple_of(2) || window.is_multiple_of(2) {
+            return Some(format!(
+                "template_size_px and search_window_px must be odd, not {template} and {window}: an even window has \
+                 no middle pixel"
+            ));
+        }
+        if template > window {
+            return Some(format!(
+                "template_size_px {template} is larger than search_window_px {window}, in which the whole template \
+                 must lie: make the window larger or the template smaller"
+            ));
+        }
+        if self.range_min_m >= self.range_max_m {
+            return Some(format!(
+                "range_min_m {} must be less than range_max_m {}",
+                self.range_min_m, self.range_max_m
+            ));
+        }
+        None
     }
 }

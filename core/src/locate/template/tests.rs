@@ -8,13 +8,13 @@ use crate::testing::{PlaneWorld, Trouble};
 use crate::trace::{StepTrace, summarise};
 use serde_json::json;
 
-fn pose(x: f64, roll_deg: f64) -> Pose {
+pub(super) fn pose(x: f64, roll_deg: f64) -> Pose {
     let attitude = attitude_from_roll_pitch_yaw(roll_deg.to_radians(), 0.0, 0.0);
     Pose::from_parts(Vector3::new(x, 0.0, 0.0).into(), attitude)
 }
 
 /// Steps of a tenth of the distance, from 7.7 m to about 4.5 m.
-fn approach() -> Vec<Pose> {
+pub(super) fn approach() -> Vec<Pose> {
     let mut x = 0.0;
     (0..6)
         .map(|_| {
@@ -25,11 +25,11 @@ fn approach() -> Vec<Pose> {
         .collect()
 }
 
-fn designation(x: f64, y: f64) -> Designation {
+pub(super) fn designation(x: f64, y: f64) -> Designation {
     Designation { step: 0, pixel: Pixel::new(x, y) }
 }
 
-fn run(world: &PlaneWorld, changes: &[(&str, serde_json::Value)]) -> Vec<StepTrace> {
+pub(super) fn run(world: &PlaneWorld, changes: &[(&str, serde_json::Value)]) -> Vec<StepTrace> {
     let changes: Changes = changes.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect();
     let settings = Settings::default().with(&changes).unwrap();
     track::run(world, designation(118.3, 131.6), &settings).unwrap()
@@ -87,7 +87,7 @@ fn scaling_matters_for_a_step_of_a_quarter_of_the_distance() {
 }
 
 /// A plane turned away by 65°, seen from two places 1.2 m apart across, both of which look at its middle.
-fn turned_plane() -> PlaneWorld {
+pub(super) fn turned_plane() -> PlaneWorld {
     let attitude = attitude_from_roll_pitch_yaw(0.0, 0.0, (-1.2_f64).atan2(7.2));
     let aside = Pose::from_parts(Vector3::new(0.8, 1.2, 0.0).into(), attitude);
     let mut world = PlaneWorld::new(vec![pose(0.0, 0.0), aside]);

@@ -1,0 +1,66 @@
+//! Sums of differences: the measures that do not normalise (R216).
+//!
+//! ```text
+//! sad = −(1/N) Σ |I − J|          ssd = −(1/N) Σ (I − J)²          larger = better, 0 = equal
+//! ```
+//! A change of brightness or contrast moves every score, so that no fixed limit can tell a match from a false one;
+//! who judges takes the normalised correlation at the place found. Sums run in `f32` over one row of the
+//! template, rows add up in `f64`: scores err by less than 1e-6 of themselves. A window with an invalid pixel sums to
+//! NaN and is excluded by that (R66).
+//!
+//! | symbol | name | unit |
+//! |---|---|---|
+//! | I | `template` | fraction of full scale |
+//! | J | window of `image` | fraction of full scale |
+//! | N | pixels of the template | – |
+
+use rayon::prelude::*;
+
+use super::grid::Grid;
+use super::surface::Surface;
+use crate::image::patch::Patch;
+use crate::image::{GrayImage, PixelRect};
+
+/// Mean absolute difference, negated, at every position of `region` that holds the template.
+///
+/// `None` as for [`super::zncc_surface`].
+pub fn sad_surface(template: &Patch, image: &GrayImage, region: PixelRect) -> Option<Surface> {
+    surface(template, image, region, f32::abs)
+}
+
+/// Mean squared difference, negated, at every position of `region` that holds the template.
+///
+/// `None` as for [`super::zncc_surface`].
+pub fn ssd_surface(template: &Patch, image: &GrayImage, region: PixelRect) -> Option<Surface> {
+    surface(template, image, region, |d| d * d)
+}
+
+fn surface(
+    template: &Patch,
+    image: &GrayImage,
+    region: PixelRect,
+    cost: impl Fn(f32) -> f32 + Sync,
+) -> Option<Surface> {
+    if !template.is_complete() {
+        return None;
+    }
+    let grid = Grid::new(template.dimensions(), image, region)?;
+    let (size, stride) = (template.width() as usize, image.width() as usize);
+    let count = (size * size) as f64;
+    let mut scores = vec![0.0; grid.len()];
+    scores.par_chunks_mut(grid.width as usize).enumerate().for_each(|(iy, out)| {
+        let mut total = vec![0.0_f64; out.len()];
+        let mut row_sum = vec![0.0_f32; out.len()];
+        for (v, weights) in template.as_raw().chunks_exact(size).enumerate() {
+            row_sum.fill(0.0);
+            let start = (grid.region.y as usize + iy + v) * stride + grid.region.x as usize;
+            for (u, t) in weights.iter().enumerate() {
+                let pixels = &image.as_raw()[start + u..][..row_sum.len()];
+                row_sum.iter_mut().zip(pixels).for_each(|(sum, j)| *sum += cost(j - t));
+            }
+            total.iter_mut().zip(&row_sum).for_each(|(total, sum)| *total += f64::from(*sum));
+        }
+        out.iter_mut().zip(&total).for_each(|(out, total)| *out = (-total / count) as f32);
+    });
+    Some(grid.surface(scores, 0))
+}

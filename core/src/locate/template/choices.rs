@@ -1,0 +1,136 @@
+//! The words that the choices among the template locator's settings take.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// What the roll of the template is measured against (R57).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RollReference {
+    /// The horizontal of the old image, taken as exactly horizontal, as the paper does.
+    #[default]
+    Horizontal,
+    /// The helper point's true direction in the old image, which distortion tilts a little.
+    OldImage,
+}
+
+/// From where the vertical tolerance of point stereo is measured (R73, E38).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum StereoReference {
+    /// The epipolar curve of the camera models.
+    #[default]
+    EpipolarCurve,
+    /// The same image row, which fails on real unrectified pairs.
+    ImageRow,
+}
+
+/// Where the interval of disparities lies (R75, E13).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum DisparityInterval {
+    /// Around the disparity of the predicted range.
+    #[default]
+    Centred,
+    /// From zero, the literal reading, which excludes near targets.
+    FromZero,
+}
+
+/// When an accepted update renews the template (R70, R71).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum TemplateUpdate {
+    /// At every accepted update, as in flight.
+    EveryUpdate,
+    /// Once it must be magnified too much, or matches badly: errors of matches are chained more seldom.
+    #[default]
+    OnCondition,
+    /// Never: the designated window is looked for at every stop.
+    Never,
+    /// At every accepted update, and every match is then corrected against the designated window, where that is found
+    /// near it.
+    DriftCorrected,
+}
+
+/// Where the pixel noise comes from that the position covariance propagates.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum NoiseModel {
+    /// Measured from each match: residual, gradients and template drift.
+    #[default]
+    Measured,
+    /// Half a pixel in each coordinate of each eye, as the papers assume.
+    HalfPixel,
+}
+
+/// What finds the template first (R217, R218).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FirstStage {
+    /// Comparison at the positions of the search window.
+    #[default]
+    Correlation,
+    /// Pyramidal Lucas–Kanade from the prediction, by shift alone.
+    KltTranslation,
+    /// The same by affine map.
+    KltAffine,
+}
+
+/// By what the template and the image are compared (R216, R219).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Measure {
+    /// Normalised cross-correlation.
+    #[default]
+    Ncc,
+    /// Sum of absolute differences.
+    Sad,
+    /// Sum of squared differences.
+    Ssd,
+    /// Sign of the difference of Gaussians.
+    Sdog,
+}
+
+/// Which positions are compared (R64, R65).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Search {
+    /// All of them.
+    #[default]
+    Exhaustive,
+    /// All at a coarse level, and those near the best at finer ones.
+    CoarseToFine,
+}
+
+/// The second stage (R221, R222).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Refine {
+    /// None: the first stage's match stands.
+    #[default]
+    None,
+    /// An affine map by gradient descent.
+    Affine,
+}
+
+/// Where the template's scale and roll come from (R224).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Transform {
+    /// The geometry of the two views.
+    #[default]
+    Geometry,
+    /// Brute force: every pair of a grid is compared, the best score wins.
+    Search,
+}
+
+/// How the template is warped by the target's surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum WarpModel {
+    /// The map of first order at the target.
+    #[default]
+    Slope,
+    /// Pixel by pixel through the surface's plane and both camera models.
+    Homography,
+}

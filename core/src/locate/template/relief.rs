@@ -1,0 +1,37 @@
+//! Relief: the ranges of the target's neighbours, each by point stereo (R21, R220).
+//!
+//! Neighbours lie on a grid of three by three over the window; each is matched with a window of half the template's side, so
+//! that they see little of each other. One whose match is not sure has no range.
+
+use super::point_stereo::{StereoInput, point_stereo};
+use super::settings::TemplateSettings;
+use crate::frames::Pixel;
+
+/// Neighbours that score less say nothing about the range.
+const SCORE_MIN: f64 = 0.6;
+
+/// The offsets of the eight neighbours on the rim of a window of `size` px, row by row, px.
+pub(super) fn rim(size: u32) -> Vec<[f64; 2]> {
+    let reach_px = f64::from(size / 2);
+    let offsets = [-reach_px, 0.0, reach_px];
+    let all = offsets.iter().flat_map(|v| offsets.iter().map(move |u| [*u, *v]));
+    all.filter(|offset| *offset != [0.0, 0.0]).collect()
+}
+
+/// The range at a pixel of the left image, m, near `range_m`; `None` where its match is not sure.
+pub(super) fn range_at(
+    input: &StereoInput<'_>,
+    left_pixel: Pixel,
+    range_m: f64,
+    settings: &TemplateSettings,
+) -> Option<f64> {
+    let narrow = TemplateSettings {
+        template_size_px: (settings.template_size_px / 2) | 1,
+        surface_warp: false,
+        focus_px: 0.0,
+        ..settings.clone()
+    };
+    let near = StereoInput { left_pixel, predicted_range_m: Some(range_m), ..*input };
+    let found = point_stereo(&near, &narrow).ok()?;
+    (found.score >= SCORE_MIN && !found.at_end).then_some(found.range_m)
+}
