@@ -26,7 +26,7 @@ use image::Luma;
 use nalgebra::{Matrix2, Rotation2, Vector2};
 
 use super::sample::Kernel;
-use super::{GrayImage, PixelRect};
+use super::{GrayImage, PixelRect, resample};
 use crate::frames::Pixel;
 
 /// Blur that a sampled image is taken to have, px.
@@ -102,8 +102,7 @@ impl DerefMut for Patch {
 
 /// The (2·half + 1)² window about the sub-pixel `centre`; NaN where it lies outside or touches an invalid pixel.
 pub fn extract(image: &GrayImage, centre: Pixel, half: u32, kernel: Kernel) -> Patch {
-    let half_px = f64::from(half);
-    resample(2 * half + 1, |u, v| kernel.sample(image, centre.offset(u - half_px, v - half_px)))
+    resample::window(image, centre, &Matrix2::identity(), half, kernel).into()
 }
 
 /// The window of `size` × `size` px about `centre`, its content magnified by `scale` and rolled by `roll_rad` (R58).
@@ -130,20 +129,17 @@ pub fn scale_roll(
 pub fn warp(source: &GrayImage, centre: Pixel, map: &Matrix2<f64>, size: u32, kernel: Kernel) -> Patch {
     let scale = map.determinant().abs().sqrt();
     let Some(inverse) = map.try_inverse().filter(|_| scale.is_finite()) else {
-        return resample(size, |_, _| None);
+        return invalid(size);
     };
-    let half = (f64::from(size) - 1.0) / 2.0;
-    let read = |image: &GrayImage, centre: Pixel| {
-        resample(size, |u, v| {
-            let from = inverse * Vector2::new(u - half, v - half);
-            kernel.sample(image, centre.offset(from.x, from.y))
-        })
+    let read = |image: &GrayImage, centre: Pixel| -> Patch {
+        resample::window(image, centre, &inverse, size / 2, kernel).into()
     };
     // Rounding may leave the scale of a pure rotation a little below one.
     if scale >= 1.0 - 1e-12 {
         return read(source, centre);
     }
     let sigma_px = NATURAL_BLUR_PX * (1.0 / (scale * scale) - 1.0).sqrt();
+    let half = (f64::from(size) - 1.0) / 2.0;
     let corners = [Vector2::new(half, half), Vector2::new(half, -half)];
     let farthest = corners.map(|corner| (inverse * corner).norm()).into_iter().fold(0.0, f64::max);
     let reach = farthest + 3.0 + (3.0 * sigma_px).ceil();
@@ -153,7 +149,7 @@ pub fn warp(source: &GrayImage, centre: Pixel, map: &Matrix2<f64>, size: u32, ke
             let smooth = blurred(&crop(source, &part), sigma_px);
             read(&smooth, centre.offset(-f64::from(part.x), -f64::from(part.y)))
         }
-        None => resample(size, |_, _| None),
+        None => invalid(size),
     }
 }
 
@@ -222,10 +218,9 @@ pub fn blurred(image: &GrayImage, sigma_px: f64) -> GrayImage {
     out
 }
 
-/// A patch of `size` × `size` px whose pixel (u, v) is `read(u, v)`, NaN for `None`.
-fn resample(size: u32, read: impl Fn(f64, f64) -> Option<f32>) -> Patch {
-    let pixel = |x, y| Luma([read(f64::from(x), f64::from(y)).unwrap_or(f32::NAN)]);
-    Patch(GrayImage::from_fn(size, size, pixel))
+/// A patch without a valid pixel.
+fn invalid(size: u32) -> Patch {
+    Patch(GrayImage::from_pixel(size, size, Luma([f32::NAN])))
 }
 
 fn valid(image: &GrayImage) -> impl Iterator<Item = f64> {

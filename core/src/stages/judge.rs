@@ -6,6 +6,7 @@
 //! | 2 `stereo_ncc` | score of point stereo | ≥ `stereo_ncc_min` |
 //! | 3 `distance_correction_m` | `│ │p − C│ − │p_pred − C│ │` | ≤ tol_dist |
 //! | 4 `position_correction_m` | `│p_site − p_initial,site│` | ≤ tol_pos |
+//! | 5 `left_right_px` (ours, off unless its limit is set) | way from the left pixel to the right one and back | ≤ `left_right_max_px` |
 //!
 //! The tolerances are recomputed at every update (R86, R87, ours):
 //! ```text
@@ -126,7 +127,10 @@ fn gates(
     let position = found.map(|p: Point3| (site_from_rover * p - target.initial_position_in_site).norm());
     let new_m = found.map_or(predicted_m, |p| (p - centre).norm());
     let tolerance = Tolerance::new(pointing, predicted_m, limits);
-    vec![
+    let back = evidence.and_then(|e| e.point_stereo.as_ref()).and_then(|s| s.left_right_px);
+    let back_max_px = Some(limits.left_right_max_px).filter(|limit| *limit > 0.0);
+    let left_right = back_max_px.map(|limit| Gate::new(5, "left_right_px", "px", back, limit, false));
+    let mut gates = vec![
         Gate::new(1, "ncc", "", ncc, limits.ncc_min, true),
         Gate::new(2, "stereo_ncc", "", stereo, limits.stereo_ncc_min, true),
         Gate::new(
@@ -145,7 +149,9 @@ fn gates(
             tolerance.position_m(target, prediction, new_m),
             false,
         ),
-    ]
+    ];
+    gates.extend(left_right);
+    gates
 }
 
 /// The two tolerances of R87.

@@ -13,6 +13,7 @@ pub mod scale_roll;
 pub mod match_template;
 pub mod match_noise;
 pub mod stereo_curve;
+mod stereo_search;
 pub mod point_stereo;
 pub mod triangulate;
 
