@@ -107,6 +107,8 @@ settings_group! {
         ncc_min: f64 = 0.7, "", Domain::Between(-1.0, 1.0), "K§4.6, R81";
         /// Criterion 2: a point-stereo match below this score is a loss.
         stereo_ncc_min: f64 = 0.7, "", Domain::Between(-1.0, 1.0), "K§4.6, R82";
+        /// A point-stereo match that leads back farther than this from the left pixel is a loss; 0: not judged.
+        left_right_max_px: f64 = 0.0, "px", Domain::Between(0.0, 100.0), "ours, domain.md 7";
         /// Safety factor on the distance and position tolerances (criteria 3 and 4).
         tolerance_factor: f64 = 1.5, "", Domain::Between(0.1, 100.0), "ours, R87";
         /// Disparity error that the tolerances assume, as a 3σ value.

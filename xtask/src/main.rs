@@ -15,6 +15,7 @@ mod check;
 mod house_rules;
 mod imports;
 mod bench;
+mod peers;
 mod dist;
 
 use std::io::Write;
@@ -52,6 +53,12 @@ enum Task {
     Bench {
         /// Run only the benchmarks whose names contain this.
         filter: Option<String>,
+        /// Compare the correlation with OpenCV's instead, on the same pixels and in turn.
+        #[arg(long, conflicts_with = "filter")]
+        peers: bool,
+        /// Print the comparison as one JSON object a line.
+        #[arg(long, requires = "peers")]
+        json: bool,
     },
     /// Build the program to hand out, with the viewer inside, as `target/dist/sightline`.
     Dist,
@@ -65,7 +72,8 @@ fn main() -> ExitCode {
         Task::Test { filter } => test::test(filter.as_deref()),
         Task::Check => check::check(),
         Task::Web => web::web(),
-        Task::Bench { filter } => bench::bench(filter.as_deref()),
+        Task::Bench { peers: true, json, .. } => peers::peers(json),
+        Task::Bench { filter, .. } => bench::bench(filter.as_deref()),
         Task::Dist => dist::dist(),
         Task::Screenshot => test::screenshot(),
     };

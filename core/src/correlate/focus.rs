@@ -87,10 +87,44 @@ impl Focus {
 
     /// The weighted score of two patches, of which the first is normalised; `None` for a flat or an incomplete one.
     pub fn score(&self, normalised: &Patch, window: &Patch) -> Option<f64> {
-        let window = self.normalise(window).filter(Patch::is_complete)?;
-        let products = normalised.as_raw().iter().zip(window.as_raw()).zip(&self.weights);
-        let score: f64 = products.map(|((a, b), w)| w * f64::from(*a) * f64::from(*b)).sum();
-        score.is_finite().then_some(score)
+        self.score_weighted(&self.weighted(normalised)?, window)
+    }
+
+    /// `w t` of a normalised template; `None` when it has another size or an invalid pixel.
+    fn weighted(&self, normalised: &Patch) -> Option<Vec<f64>> {
+        let is_usable = normalised.dimensions() == (self.size, self.size) && normalised.is_complete();
+        is_usable
+            .then(|| normalised.as_raw().iter().zip(&self.weights).map(|(t, w)| w * f64::from(*t)).collect())
+    }
+
+    /// The score of a window against `weighted`, in one pass over values less the window's first, so that a small
+    /// contrast keeps its digits; columns are summed side by side, in an order that never changes.
+    fn score_weighted(&self, weighted: &[f64], window: &Patch) -> Option<f64> {
+        if window.dimensions() != (self.size, self.size) {
+            return None;
+        }
+        let (size, first) = (self.size as usize, f64::from(*window.as_raw().first()?));
+        let mut columns = vec![0.0; 4 * size];
+        let (means, rest) = columns.split_at_mut(size);
+        let (squares, rest) = rest.split_at_mut(size);
+        let (products, totals) = rest.split_at_mut(size);
+        let rows = window.as_raw().chunks_exact(size);
+        for ((row, weights), template) in
+            rows.zip(self.weights.chunks_exact(size)).zip(weighted.chunks_exact(size))
+        {
+            for x in 0..size {
+                let value = f64::from(row[x]) - first;
+                means[x] += weights[x] * value;
+                squares[x] += weights[x] * value * value;
+                products[x] += template[x] * value;
+                totals[x] += template[x];
+            }
+        }
+        let [mean, squares, product, total] =
+            [means, squares, products, totals].map(|columns| columns.iter().sum::<f64>());
+        // An invalid pixel leaves no finite sum, and so no score.
+        let std = Some((squares - mean * mean).max(0.0).sqrt()).filter(|std| *std >= FLAT_STD)?;
+        Some((product - mean * total) / std).filter(|score| score.is_finite())
     }
 
     /// Climbs from offset (0, 0) over the weighted scores of windows at whole-pixel offsets to their next
@@ -104,12 +138,12 @@ impl Focus {
         sub_pixel: bool,
         window_at: impl Fn(i32, i32) -> Option<Patch>,
     ) -> Option<FocusedPeak> {
-        let template = self.normalise(template).filter(Patch::is_complete)?;
+        let template = self.weighted(&self.normalise(template)?)?;
         let mut scores: BTreeMap<[i32; 2], Option<f64>> = BTreeMap::new();
         let mut score = |x: i32, y: i32| -> Option<f64> {
             *scores
                 .entry([x, y])
-                .or_insert_with(|| window_at(x, y).and_then(|window| self.score(&template, &window)))
+                .or_insert_with(|| window_at(x, y).and_then(|window| self.score_weighted(&template, &window)))
         };
         let [mut x, mut y] = [0, 0];
         for _ in 0..CLIMB_LIMIT {

@@ -73,11 +73,28 @@ pub fn zncc_surface(template: &Patch, image: &GrayImage, region: PixelRect) -> O
 ///
 /// 0 when either has no contrast; `None` when the sizes differ, or either is empty or has an invalid pixel.
 pub fn zncc(template: &Patch, window: &Patch) -> Option<f32> {
-    if template.dimensions() != window.dimensions() || !window.is_complete() {
-        return None;
+    Reference::new(template)?.score(window)
+}
+
+/// A patch prepared for many single scores in double precision.
+pub struct Reference(Template);
+
+impl Reference {
+    /// `None` when the patch is empty or has an invalid pixel.
+    pub fn new(patch: &Patch) -> Option<Self> {
+        Template::new(patch).map(Self)
     }
-    let template = Template::new(template)?;
-    Some(template.score(window.as_raw(), template.width, 0).unwrap_or(0.0) as f32)
+
+    /// The score of a window; 0 when either has no contrast, `None` when the sizes differ or a pixel is invalid.
+    pub fn score(&self, window: &Patch) -> Option<f32> {
+        let template = &self.0;
+        let same_size =
+            window.width() as usize == template.width && window.as_raw().len() == template.values.len();
+        if !same_size || !window.is_complete() {
+            return None;
+        }
+        Some(template.score(window.as_raw(), template.width, 0).unwrap_or(0.0) as f32)
+    }
 }
 
 /// What all positions share.

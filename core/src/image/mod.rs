@@ -5,6 +5,7 @@
 
 pub mod rect;
 pub mod sample;
+pub mod resample;
 pub mod patch;
 pub mod pyramid;
 pub mod gradient;

@@ -26,7 +26,7 @@ use image::Luma;
 use nalgebra::{Matrix2, Rotation2, Vector2};
 
 use super::sample::Kernel;
-use super::{GrayImage, PixelRect};
+use super::{GrayImage, PixelRect, resample};
 use crate::frames::Pixel;
 
 /// Blur that a sampled image is taken to have, px.
@@ -102,8 +102,7 @@ impl DerefMut for Patch {
 
 /// The (2·half + 1)² window about the sub-pixel `centre`; NaN where it lies outside or touches an invalid pixel.
 pub fn extract(image: &GrayImage, centre: Pixel, half: u32, kernel: Kernel) -> Patch {
-    let half_px = f64::from(half);
-    resample(2 * half + 1, |u, v| kernel.sample(image, centre.offset(u - half_px, v - half_px)))
+    resample::window(image, centre, &Matrix2::identity(), half, kernel).into()
 }
 
 /// The window of `size` × `size` px about `centre`, its content magnified by `scale` and rolled by `roll_rad` (R58).
@@ -130,12 +129,21 @@ pub fn scale_roll(
 pub fn warp(source: &GrayImage, centre: Pixel, map: &Matrix2<f64>, size: u32, kernel: Kernel) -> Patch {
     let scale = map.determinant().abs().sqrt();
     let Some(inverse) = map.try_inverse().filter(|_| scale.is_finite()) else {
-        return resample(size, |_, _| None);
+        return invalid(size);
     };
-    warp_by(source, scale, size, kernel, |o| {
-        let from = inverse * o;
-        Some(centre.offset(from.x, from.y))
-    })
+    let read = |image: &GrayImage, centre: Pixel| -> Patch {
+        resample::window(image, centre, &inverse, size / 2, kernel).into()
+    };
+    if !shrinks(scale) {
+        return read(source, centre);
+    }
+    let half = (f64::from(size) - 1.0) / 2.0;
+    let corners = [Vector2::new(half, half), Vector2::new(half, -half)];
+    let farthest = corners.map(|corner| (inverse * corner).norm()).into_iter().fold(0.0, f64::max);
+    match smoothed(source, centre, farthest, scale) {
+        Some((smooth, corner)) => read(&smooth, centre.offset(-corner.x, -corner.y)),
+        None => invalid(size),
+    }
 }
 
 /// The window of `size` × `size` px whose pixel at offset o from its middle shows the source at `from(o)`, a map that is
@@ -149,26 +157,41 @@ pub fn warp_by(
     kernel: Kernel,
     from: impl Fn(Vector2<f64>) -> Option<Pixel>,
 ) -> Patch {
-    // Rounding may leave the scale of a pure rotation a little below one.
-    if scale >= 1.0 - 1e-12 {
+    if !shrinks(scale) {
         return resample_through(source, size, kernel, from);
     }
-    let sigma_px = NATURAL_BLUR_PX * (1.0 / (scale * scale) - 1.0).sqrt();
     let half = (f64::from(size) - 1.0) / 2.0;
+    let Some(centre) = from(Vector2::zeros()) else { return invalid(size) };
     let corners = [(half, half), (half, -half), (-half, half), (-half, -half)];
-    let places = || corners.iter().filter_map(|(u, v)| from(Vector2::new(*u, *v)));
-    let Some(centre) = from(Vector2::zeros()) else { return resample(size, |_, _| None) };
-    let farthest = places().map(|place| place.distance(centre)).fold(0.0, f64::max);
+    let places = corners.iter().filter_map(|(u, v)| from(Vector2::new(*u, *v)));
+    let farthest = places.map(|place| place.distance(centre)).fold(0.0, f64::max);
+    match smoothed(source, centre, farthest, scale) {
+        Some((smooth, corner)) => {
+            resample_through(&smooth, size, kernel, |o| Some(from(o)?.offset(-corner.x, -corner.y)))
+        }
+        None => invalid(size),
+    }
+}
+
+/// Whether content is shrunk; rounding may leave the scale of a pure rotation a little below one.
+fn shrinks(scale: f64) -> bool {
+    scale < 1.0 - 1e-12
+}
+
+/// The source up to `farthest` px from `centre`, smoothed for `scale` < 1, and the offset of its first pixel; nothing
+/// where that lies outside the source.
+fn smoothed(
+    source: &GrayImage,
+    centre: Pixel,
+    farthest: f64,
+    scale: f64,
+) -> Option<(GrayImage, Vector2<f64>)> {
+    let sigma_px = NATURAL_BLUR_PX * (1.0 / (scale * scale) - 1.0).sqrt();
     let reach = farthest + 3.0 + (3.0 * sigma_px).ceil();
     let needed = PixelRect::centred(centre, 2 * reach.ceil() as u32 + 1);
-    match needed.intersect(&PixelRect::whole(source.width(), source.height())) {
-        Some(part) => {
-            let smooth = blurred(&crop(source, &part), sigma_px);
-            let (x, y) = (f64::from(part.x), f64::from(part.y));
-            resample_through(&smooth, size, kernel, |o| from(o).map(|place| place.offset(-x, -y)))
-        }
-        None => resample(size, |_, _| None),
-    }
+    let part = needed.intersect(&PixelRect::whole(source.width(), source.height()))?;
+    let corner = Vector2::new(f64::from(part.x), f64::from(part.y));
+    Some((blurred(&crop(source, &part), sigma_px), corner))
 }
 
 /// The window of `size` × `size` px whose pixel at offset o from its middle shows the source at `from(o)`; NaN where
@@ -256,10 +279,9 @@ pub fn blurred(image: &GrayImage, sigma_px: f64) -> GrayImage {
     out
 }
 
-/// A patch of `size` × `size` px whose pixel (u, v) is `read(u, v)`, NaN for `None`.
-fn resample(size: u32, read: impl Fn(f64, f64) -> Option<f32>) -> Patch {
-    let pixel = |x, y| Luma([read(f64::from(x), f64::from(y)).unwrap_or(f32::NAN)]);
-    Patch(GrayImage::from_fn(size, size, pixel))
+/// A patch without a valid pixel.
+fn invalid(size: u32) -> Patch {
+    Patch(GrayImage::from_pixel(size, size, Luma([f32::NAN])))
 }
 
 fn valid(image: &GrayImage) -> impl Iterator<Item = f64> {

@@ -69,16 +69,22 @@ fn cell(position: f64, length: u32) -> Option<(u32, f64)> {
     Some((before, position - f64::from(before)))
 }
 
-/// First tap and weights of the cubic along one axis, continued over the border by Keys' condition.
-fn cubic_taps(position: f64, length: u32) -> Option<(u32, [f64; 4])> {
-    let (before, t) = cell(position, length)?;
+/// Weights of the four taps of the cubic around a position that is the fraction `t` beyond the second one.
+#[inline(always)]
+pub(super) fn cubic_weights(t: f64) -> [f64; 4] {
     let (t2, t3) = (t * t, t * t * t);
-    let mut w = [
+    [
         0.5 * (-t + 2.0 * t2 - t3),
         0.5 * (2.0 - 5.0 * t2 + 3.0 * t3),
         0.5 * (t + 4.0 * t2 - 3.0 * t3),
         0.5 * (t3 - t2),
-    ];
+    ]
+}
+
+/// First tap and weights of the cubic along one axis, continued over the border by Keys' condition.
+fn cubic_taps(position: f64, length: u32) -> Option<(u32, [f64; 4])> {
+    let (before, t) = cell(position, length)?;
+    let mut w = cubic_weights(t);
     let mut first = i64::from(before) - 1;
     if first < 0 {
         w = [w[1] + 3.0 * w[0], w[2] - 3.0 * w[0], w[3] + w[0], 0.0];

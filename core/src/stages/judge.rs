@@ -6,14 +6,15 @@
 //! | 2 `stereo_ncc` | score of point stereo | ≥ `stereo_ncc_min` |
 //! | 3 `distance_correction_m` | `│ │p − C│ − │p_pred − C│ │` | ≤ tol_dist |
 //! | 4 `position_correction_m` | `│p_site − p_initial,site│` | ≤ tol_pos |
+//! | 5 `left_right_px` (ours, off unless its limit is set) | way from the left pixel to the right one and back | ≤ `left_right_max_px` |
 //!
 //! Three more of ours ask how good the peak of the match is; each is a criterion only where its limit switches it on:
 //!
 //! | criterion | value | limit |
 //! |---|---|---|
-//! | 5 `second_peak_ratio` | second peak over the best; 0 without one (R68) | ≤ `second_peak_ratio_max` |
-//! | 6 `match_sigma_px` | largest 1σ axis of the match's own covariance | ≤ `match_sigma_max_px` |
-//! | 7 `edge_distance_px` | from the best whole pixel to the rim of the positions compared | ≥ `edge_distance_min_px` |
+//! | 6 `second_peak_ratio` | second peak over the best; 0 without one (R68) | ≤ `second_peak_ratio_max` |
+//! | 7 `match_sigma_px` | largest 1σ axis of the match's own covariance | ≤ `match_sigma_max_px` |
+//! | 8 `edge_distance_px` | from the best whole pixel to the rim of the positions compared | ≥ `edge_distance_min_px` |
 //!
 //! The tolerances are recomputed at every update (R86, R87, ours):
 //! ```text
@@ -135,6 +136,9 @@ fn gates(
     let position = found.map(|p: Point3| (site_from_rover * p - target.initial_position_in_site).norm());
     let new_m = found.map_or(predicted_m, |p| (p - centre).norm());
     let tolerance = Tolerance::new(pointing, predicted_m, limits);
+    let back = evidence.and_then(|e| e.point_stereo.as_ref()).and_then(|s| s.left_right_px);
+    let back_max_px = Some(limits.left_right_max_px).filter(|limit| *limit > 0.0);
+    let left_right = back_max_px.map(|limit| Gate::new(5, "left_right_px", "px", back, limit, false));
     let mut gates = vec![
         Gate::new(1, "ncc", "", ncc, limits.ncc_min, true),
         Gate::new(2, "stereo_ncc", "", stereo, limits.stereo_ncc_min, true),
@@ -155,6 +159,7 @@ fn gates(
             false,
         ),
     ];
+    gates.extend(left_right);
     gates.extend(peak_gates(evidence.and_then(|e| e.match_template.as_ref()), limits));
     gates
 }
@@ -164,16 +169,16 @@ fn peak_gates(matched: Option<&TemplateMatch>, limits: &Limits) -> Vec<Gate> {
     let mut gates = Vec::new();
     let ratio = matched.map(|m| m.second_peak.as_ref().map_or(0.0, |second| second.ratio));
     if limits.second_peak_ratio_max < 1.0 {
-        gates.push(Gate::new(5, "second_peak_ratio", "", ratio, limits.second_peak_ratio_max, false));
+        gates.push(Gate::new(6, "second_peak_ratio", "", ratio, limits.second_peak_ratio_max, false));
     }
     let sigma_px = matched.map(|m| m.covariance_px2.symmetric_eigenvalues().max().max(0.0).sqrt());
     if limits.match_sigma_max_px > 0.0 {
-        gates.push(Gate::new(6, "match_sigma_px", "px", sigma_px, limits.match_sigma_max_px, false));
+        gates.push(Gate::new(7, "match_sigma_px", "px", sigma_px, limits.match_sigma_max_px, false));
     }
     // A descent by gradient compares no window of positions, and has no rim.
     let edge_px = matched.map(|m| m.edge_distance_px().unwrap_or(f64::INFINITY));
     if limits.edge_distance_min_px > 0.0 {
-        gates.push(Gate::new(7, "edge_distance_px", "px", edge_px, limits.edge_distance_min_px, true));
+        gates.push(Gate::new(8, "edge_distance_px", "px", edge_px, limits.edge_distance_min_px, true));
     }
     gates
 }

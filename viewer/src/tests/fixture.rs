@@ -295,6 +295,8 @@ fn point_stereo() -> PointStereo {
         right_pixel: PIXEL.offset(-58.0, 0.5),
         score: 0.91,
         range_m: 6.0,
+        disparity_px: Some(61.0),
+        left_right_px: Some(0.1),
         across_px: 0.1,
         at_end: false,
         covariance_px2: Matrix2::identity() * 0.05,

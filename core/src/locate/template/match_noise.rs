@@ -103,23 +103,24 @@ fn freedom(focus: &Focus) -> f64 {
     independent / (independent - FITTED)
 }
 
-/// `Σ_ij c(i − j) v_i v_jᵀ` over a grid of vectors.
+/// `Σ_ij c(i − j) v_i v_jᵀ` over a grid of vectors: c is a product of one factor a direction, so that the sum over
+/// the neighbours is taken along rows first, then along columns.
 fn correlated_sum(vectors: &[Vector2<f64>], width: i64, height: i64) -> Matrix2<f64> {
     let reach = CORRELATION_REACH_PX;
-    let weight = |d: i64| 1.0 - d.abs() as f64 / (reach + 1) as f64;
-    let mut sum = Matrix2::zeros();
-    for y in 0..height {
-        for x in 0..width {
-            let here = vectors[(y * width + x) as usize];
-            let mut around = Vector2::zeros();
-            for v in (y - reach).max(0)..=(y + reach).min(height - 1) {
-                for u in (x - reach).max(0)..=(x + reach).min(width - 1) {
-                    around += vectors[(v * width + u) as usize] * (weight(u - x) * weight(v - y));
-                }
+    let around = |from: &[Vector2<f64>], [x, y]: [i64; 2], [dx, dy]: [i64; 2]| {
+        let mut sum = Vector2::zeros();
+        for d in -reach..=reach {
+            let (u, v) = (x + d * dx, y + d * dy);
+            if (0..width).contains(&u) && (0..height).contains(&v) {
+                sum += from[(v * width + u) as usize] * (1.0 - d.abs() as f64 / (reach + 1) as f64);
             }
-            sum += here * around.transpose();
         }
-    }
+        sum
+    };
+    let places = || (0..height).flat_map(|y| (0..width).map(move |x| [x, y]));
+    let rows: Vec<_> = places().map(|place| around(vectors, place, [1, 0])).collect();
+    let sums = places().map(|place| around(&rows, place, [0, 1]));
+    let sum = vectors.iter().zip(sums).fold(Matrix2::zeros(), |sum, (v, near)| sum + v * near.transpose());
     (sum + sum.transpose()) * 0.5
 }
 

@@ -19,6 +19,7 @@ pub mod affine;
 pub mod drift_correction;
 pub mod match_noise;
 pub mod stereo_curve;
+mod stereo_search;
 pub mod point_stereo;
 pub mod triangulate;
 mod relief;

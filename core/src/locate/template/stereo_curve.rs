@@ -1,4 +1,4 @@
-//! The epipolar curve of one left pixel in the right image, by arc length, and windows seen through it.
+//! The epipolar curve of one left pixel in the right image, by arc length.
 //!
 //! The curve is sampled at equal steps of inverse range (which are nearly equal steps of disparity), far end
 //! first, and parameterised by its arc length in the right image. `∂right/∂left` at a range is taken by central
@@ -8,10 +8,10 @@
 use nalgebra::{Matrix2, Vector2};
 
 use crate::camera::Camera;
-use crate::frames::Pixel;
-use crate::image::GrayImage;
-use crate::image::patch::Patch;
-use crate::image::sample::Kernel;
+use crate::frames::{Pixel, Ray};
+
+/// A range that no disparity tells from infinity, m.
+const INFINITY_M: f64 = 1e9;
 
 /// Samples of the curve; between them it is taken as straight, which errs by less than 1e-3 px.
 const SAMPLES: usize = 256;
@@ -22,23 +22,90 @@ pub struct Curve {
     pixels: Vec<Pixel>,
     inverse_ranges: Vec<f64>,
     arc_px: Vec<f64>,
+    /// Where a point without end of range would lie, px.
+    infinity: Option<Pixel>,
+    /// Rays of the four neighbours of the left pixel, a pixel away: left, right, above, below.
+    around: Option<[Ray; 4]>,
+}
+
+/// What a curve is made from.
+#[derive(Clone, Copy, Debug)]
+pub struct CurveInput<'a> {
+    /// The camera of the pixel.
+    pub left: &'a Camera,
+    /// The camera in whose image the curve lies, same frame.
+    pub right: &'a Camera,
+    /// The pixel, px.
+    pub left_pixel: Pixel,
+    /// Nearest and farthest range, m.
+    pub ranges_m: [f64; 2],
+}
+
+impl CurveInput<'_> {
+    fn inverse_range(&self, sample: usize) -> f64 {
+        let (far, near) = (1.0 / self.ranges_m[1], 1.0 / self.ranges_m[0]);
+        far + (near - far) * sample as f64 / (SAMPLES - 1) as f64
+    }
+
+    /// Inverse range and pixel of a sample, where it is visible.
+    fn sample(&self, ray: &Ray, sample: usize) -> Option<(f64, Pixel)> {
+        let inverse = self.inverse_range(sample);
+        Some((inverse, self.right.project(&ray.at(1.0 / inverse))?))
+    }
 }
 
 impl Curve {
-    /// The curve of `left_pixel` between two ranges (m); none when fewer than two samples are visible.
-    pub fn new(
-        left: &Camera,
-        right: &Camera,
-        left_pixel: Pixel,
-        range_min_m: f64,
-        range_max_m: f64,
+    /// The curve of a left pixel between two ranges; none when fewer than two samples are visible.
+    pub fn new(input: &CurveInput<'_>) -> Option<Self> {
+        let ray = input.left.ray(input.left_pixel)?;
+        Self::through(input, &ray, (0..SAMPLES).filter_map(|sample| input.sample(&ray, sample)))
+    }
+
+    /// The part of the curve around one range, at least `reach_px` to either side where there is so much of it; none
+    /// when that range is not visible.
+    pub fn near(input: &CurveInput<'_>, range_m: f64, reach_px: f64) -> Option<Self> {
+        let ray = input.left.ray(input.left_pixel)?;
+        let (far, step) = (input.inverse_range(0), input.inverse_range(1) - input.inverse_range(0));
+        let middle = (((1.0 / range_m - far) / step) as usize).min(SAMPLES - 2);
+        let (_, before) = input.sample(&ray, middle)?;
+        let (_, after) = input.sample(&ray, middle + 1)?;
+        let reach = |from: Pixel, samples: &mut dyn Iterator<Item = usize>| -> Vec<(f64, Pixel)> {
+            let (mut last, mut length, mut found) = (from, 0.0, Vec::new());
+            for sample in samples {
+                let Some((inverse, pixel)) = input.sample(&ray, sample).filter(|_| length < reach_px) else {
+                    break;
+                };
+                length += last.distance(pixel);
+                last = pixel;
+                found.push((inverse, pixel));
+            }
+            found
+        };
+        let (farther, nearer) =
+            (reach(before, &mut (0..=middle).rev()), reach(after, &mut (middle + 1..SAMPLES)));
+        Self::through(input, &ray, farther.into_iter().rev().chain(nearer))
+    }
+
+    /// The curve through visible samples, far end first.
+    fn through(
+        input: &CurveInput<'_>,
+        ray: &Ray,
+        samples: impl Iterator<Item = (f64, Pixel)>,
     ) -> Option<Self> {
-        let ray = left.ray(left_pixel)?;
-        let (far, near) = (1.0 / range_max_m, 1.0 / range_min_m);
-        let mut curve = Self { pixels: Vec::new(), inverse_ranges: Vec::new(), arc_px: Vec::new() };
-        for i in 0..SAMPLES {
-            let inverse = far + (near - far) * i as f64 / (SAMPLES - 1) as f64;
-            let Some(pixel) = right.project(&ray.at(1.0 / inverse)) else { continue };
+        let around = [(-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)]
+            .map(|(dx, dy)| input.left.ray(input.left_pixel.offset(dx, dy)));
+        let around = match around {
+            [Some(a), Some(b), Some(c), Some(d)] => Some([a, b, c, d]),
+            _ => None,
+        };
+        let mut curve = Self {
+            pixels: Vec::new(),
+            inverse_ranges: Vec::new(),
+            arc_px: Vec::new(),
+            infinity: input.right.project(&ray.at(INFINITY_M)),
+            around,
+        };
+        for (inverse, pixel) in samples {
             let arc = match (curve.pixels.last(), curve.arc_px.last()) {
                 (Some(last), Some(arc)) => arc + last.distance(pixel),
                 _ => 0.0,
@@ -52,7 +119,7 @@ impl Curve {
 
     /// Lays the curve on one image row: the literal reading of the paper (E38).
     pub fn flatten_to_row(&mut self, y: f64) {
-        for pixel in &mut self.pixels {
+        for pixel in self.pixels.iter_mut().chain(&mut self.infinity) {
             pixel.y = y;
         }
         for i in 1..self.pixels.len() {
@@ -63,6 +130,11 @@ impl Curve {
     /// Its length, px.
     pub fn length_px(&self) -> f64 {
         self.arc_px.last().copied().unwrap_or(0.0)
+    }
+
+    /// Arc length of disparity zero, px: negative, because it lies beyond the far end; `None` where it is not visible.
+    pub fn along_of_infinity(&self) -> Option<f64> {
+        Some(-self.infinity?.distance(*self.pixels.first()?))
     }
 
     /// The pixel and the range (m) at an arc length, moved across the curve by `across` px.
@@ -92,24 +164,13 @@ impl Curve {
     }
 
     /// `∂right/∂left` of a patch at `range_m` that faces the left camera, px per px.
-    pub fn right_from_left(
-        &self,
-        left: &Camera,
-        right: &Camera,
-        left_pixel: Pixel,
-        range_m: f64,
-    ) -> Matrix2<f64> {
-        let through = |dx: f64, dy: f64| -> Option<Pixel> {
-            right.project(&left.ray(left_pixel.offset(dx, dy))?.at(range_m))
-        };
-        let column = |dx: f64, dy: f64| -> Option<Vector2<f64>> {
-            let (a, b) = (through(-dx, -dy)?, through(dx, dy)?);
+    pub fn right_from_left(&self, right: &Camera, range_m: f64) -> Matrix2<f64> {
+        let column = |a: &Ray, b: &Ray| -> Option<Vector2<f64>> {
+            let (a, b) = (right.project(&a.at(range_m))?, right.project(&b.at(range_m))?);
             Some(Vector2::new(b.x - a.x, b.y - a.y) / 2.0)
         };
-        match (column(1.0, 0.0), column(0.0, 1.0)) {
-            (Some(u), Some(v)) => Matrix2::from_columns(&[u, v]),
-            _ => Matrix2::identity(),
-        }
+        let columns = self.around.as_ref().and_then(|[a, b, c, d]| Some([column(a, b)?, column(c, d)?]));
+        columns.map_or_else(Matrix2::identity, |columns| Matrix2::from_columns(&columns))
     }
 
     /// The segment that holds an arc length, and the fraction within it.
@@ -118,21 +179,4 @@ impl Curve {
         let length = self.arc_px[i + 1] - self.arc_px[i];
         (i, if length > 0.0 { (along - self.arc_px[i]) / length } else { 0.0 })
     }
-}
-
-/// The window of `image` around `centre` as seen through `right_from_left`: offset o takes `centre + A o`.
-pub fn window_through(
-    image: &GrayImage,
-    centre: Pixel,
-    right_from_left: &Matrix2<f64>,
-    half: u32,
-    kernel: Kernel,
-) -> Patch {
-    let size = 2 * half + 1;
-    GrayImage::from_fn(size, size, |x, y| {
-        let offset =
-            right_from_left * Vector2::new(f64::from(x) - f64::from(half), f64::from(y) - f64::from(half));
-        image::Luma([kernel.sample(image, centre.offset(offset.x, offset.y)).unwrap_or(f32::NAN)])
-    })
-    .into()
 }

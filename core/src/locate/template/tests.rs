@@ -231,3 +231,13 @@ fn half_pixel_noise_is_the_papers_covariance_of_a_stereo_point() {
     let sigma_x = target.covariance_in_rover[(0, 0)].sqrt();
     assert!((sigma_x / expected - 1.0).abs() < 0.02, "{sigma_x} against {expected}");
 }
+
+#[test]
+fn the_left_right_check_is_a_criterion_only_where_its_limit_is_set() {
+    let world = PlaneWorld::new(approach());
+    let gates =
+        |limit: f64| run(&world, &[("left_right_max_px", json!(limit))])[1].judge.clone().unwrap().gates;
+    assert_eq!(gates(0.0).len(), 4);
+    let [strict, wide] = [1e-6, 0.5].map(|limit| gates(limit).pop().unwrap());
+    assert!(strict.name == "left_right_px" && !strict.passed && wide.passed, "{strict:?} {wide:?}");
+}

@@ -1,0 +1,64 @@
+//! Our half of `cargo xtask bench --peers`: runs the work it is told, on the pixels it is given, and says how long it took.
+//!
+//! One line in, one line out, so that the two sides can be run in turn. The first argument is a file of square `f32`
+//! images, little endian, one after the other: the side as a `u32`, then the pixels row by row.
+//!
+//! ```text
+//! in:   zncc <index of the image> <side of the template> <left> <top> <repetitions>
+//! out:  <seconds of each repetition, the quickest of them> <score> <score> …
+//! ```
+//! The scores are those of every 97th position, for the comparison with the other side's. Everything runs on this one
+//! thread. Without an argument (as a plain bench) there is nothing to do.
+
+use std::hint::black_box;
+use std::io::{BufRead, Write};
+use std::time::Instant;
+
+use sightline_core::correlate::{PixelRect, zncc_surface};
+use sightline_core::image::{GrayImage, Patch};
+
+fn main() {
+    let Some(path) = std::env::args().nth(1).filter(|argument| !argument.starts_with('-')) else { return };
+    let images = read_images(&std::fs::read(path).expect("the file of pixels can be read"));
+    // The pool of one is this thread itself, so that no time goes into handing over.
+    let _pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
+    for line in std::io::stdin().lock().lines().map_while(Result::ok) {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let numbers: Vec<u32> = words.iter().skip(1).filter_map(|word| word.parse().ok()).collect();
+        let (Some(&"zncc"), [image, size, left, top, repetitions]) = (words.first(), numbers.as_slice())
+        else {
+            panic!("not a line of the protocol: {line}");
+        };
+        let answer = run(&images[*image as usize], [*size, *left, *top], *repetitions);
+        let mut out = std::io::stdout().lock();
+        writeln!(out, "{answer}").and_then(|()| out.flush()).expect("the answer can be written");
+    }
+}
+
+fn read_images(mut bytes: &[u8]) -> Vec<GrayImage> {
+    let mut images = Vec::new();
+    while let Some((side, rest)) = bytes.split_first_chunk::<4>() {
+        let side = u32::from_le_bytes(*side);
+        let (pixels, rest) = rest.split_at(4 * side as usize * side as usize);
+        let values = pixels.as_chunks::<4>().0.iter().map(|value| f32::from_le_bytes(*value)).collect();
+        images.push(GrayImage::from_raw(side, side, values).expect("a square image"));
+        bytes = rest;
+    }
+    images
+}
+
+/// Seconds of the quickest repetition, and scores of some positions.
+fn run(image: &GrayImage, [size, left, top]: [u32; 3], repetitions: u32) -> String {
+    let template: Patch = GrayImage::from_fn(size, size, |x, y| *image.get_pixel(left + x, top + y)).into();
+    let region = PixelRect::whole(image.width(), image.height());
+    let mut quickest = f64::INFINITY;
+    let mut scores = Vec::new();
+    for _ in 0..repetitions {
+        let start = Instant::now();
+        let surface = zncc_surface(black_box(&template), black_box(image), region);
+        quickest = quickest.min(start.elapsed().as_secs_f64());
+        scores = surface.expect("the image holds the template").scores;
+    }
+    let shown = scores.iter().step_by(97).map(|score| format!(" {score:.7}"));
+    format!("{quickest:.9}{}", shown.collect::<String>())
+}
