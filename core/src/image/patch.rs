@@ -203,7 +203,11 @@ pub fn resample_through(
     from: impl Fn(Vector2<f64>) -> Option<Pixel>,
 ) -> Patch {
     let half = (f64::from(size) - 1.0) / 2.0;
-    resample(size, |u, v| kernel.sample(source, from(Vector2::new(u - half, v - half))?))
+    let read = |x: u32, y: u32| {
+        let offset = Vector2::new(f64::from(x) - half, f64::from(y) - half);
+        from(offset).and_then(|place| kernel.sample(source, place))
+    };
+    Patch(GrayImage::from_fn(size, size, |x, y| Luma([read(x, y).unwrap_or(f32::NAN)])))
 }
 
 /// The patch with zero mean and unit standard deviation (over its valid pixels); `None` when it is flat.
