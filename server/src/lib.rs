@@ -36,6 +36,7 @@ pub mod events;
 pub mod openapi;
 pub mod page;
 pub mod rerun_log;
+pub mod study;
 pub mod cli;
 
 use axum::Router;

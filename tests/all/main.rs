@@ -5,7 +5,6 @@
 
 mod api;
 mod api_security;
-mod approach;
 mod cli;
 mod imports;
 mod page;

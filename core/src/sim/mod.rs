@@ -60,5 +60,5 @@ pub use camera::render::{Eye, NoiseSeed, Region, clean_radiance, develop, render
 pub use camera::rig::Rig;
 pub use index::{SCENARIO_FILE, index, true_camera_in_site};
 pub use scenario::Scenario;
-pub use targets::{choose_targets, share_on_rocks, surface_point};
+pub use targets::{Special, choose_special, choose_targets, is_on_boundary, share_on_rocks, surface_point};
 pub use world::{Hit, SurfaceId, World};

@@ -1,10 +1,26 @@
 //! The validation experiments: grid in, table and figure out; and the truth they are measured against.
+//!
+//! ```text
+//! catalogue   the studies by name        point       one point of a grid
+//! plan        what is to be done, keys   staged      a drive as a study stages it
+//! picks       which pixels, and faults   run         one target tracked and judged     step_record   one step of it
+//! row         the table's rows           evenness    rows of targets                   calibration   NEES
+//! scenery, picture, exposure             the simulated scenery against its laws
+//! realism     how hard a world is for plain correlation
+//! ```
 
 pub mod scenery;
 pub mod picture;
 pub mod truth;
 pub mod calibration;
-pub mod approach;
-pub mod skip;
+pub mod staged;
+pub mod point;
+pub mod catalogue;
+pub mod plan;
+pub mod picks;
+pub mod step_record;
+pub mod run;
+pub mod evenness;
+pub mod row;
 pub mod realism;
 pub mod exposure;

@@ -9,8 +9,9 @@ pub mod simulate;
 pub mod import;
 pub mod info;
 pub mod track;
+pub mod presets;
 pub mod study;
-mod figure;
+mod realism;
 mod scenery;
 mod scenery_figure;
 mod scenery_pictures;
@@ -47,6 +48,8 @@ enum Command {
     Import(import::Import),
     /// Say what a traverse holds.
     Info(info::Info),
+    /// List the named configurations of the tracker, or print one.
+    Presets(presets::Presets),
     /// Track targets without a browser; one JSON object a step.
     Track(track::Track),
     /// Run a validation experiment: many targets in many worlds against the truth.
@@ -63,6 +66,7 @@ pub fn run() -> ExitCode {
         Command::Simulate(command) => command.run(),
         Command::Import(command) => command.run(),
         Command::Info(command) => command.run(),
+        Command::Presets(command) => command.run(),
         Command::Track(command) => command.run(),
         Command::Study(command) => command.run(),
     };

@@ -1,22 +1,22 @@
-//! `sightline study`: the validation experiments, from a grid of worlds to a table and a figure.
+//! `sightline study`: the validation experiments, from a grid of worlds to a table and a report.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+use std::sync::Mutex;
+use std::sync::atomic::AtomicBool;
 
-use clap::{Args, Subcommand};
+use clap::{Args, Subcommand, ValueEnum};
+use serde::Serialize;
 use sightline_core::error::{Error, Result};
-use sightline_core::frames::Pixel;
-use sightline_core::settings::{Changes, Settings, parse_assignment};
-use sightline_core::sim::{self, Scenario};
-use sightline_core::study::approach::{self, ApproachRun, ApproachSummary};
-use sightline_core::study::realism::{self, Difficulty};
-use sightline_core::traverse::{Traverse, create_simulated};
+use sightline_core::study::plan::Plan;
+use sightline_core::study::row::Row;
 
-use super::figure;
+use super::open;
+use super::realism;
+use super::say::{self, Progress};
 use super::scenery;
-use super::{open, say};
-
-/// Seeds that are tried for each world asked for.
-const SEEDS_PER_WORLD: u64 = 10;
+use crate::jobs::lock;
+use crate::state::slug;
+use crate::study::{self, Order, Seeds, tables};
 
 /// Run a validation experiment.
 #[derive(Debug, Args)]
@@ -27,226 +27,225 @@ pub struct Study {
 
 #[derive(Debug, Subcommand)]
 enum Experiment {
-    /// Straight approaches from 10 m to 2 m: many targets in many worlds against the truth.
-    Approach(Worlds),
+    /// Straight approaches in steps of 5 to 23 %, by skipping pictures (the paper's Figure 8).
+    Straight(Experimental),
+    /// Crab motion around a target in steps of 5 to 60°, two search windows (the paper's Figure 10).
+    Sideways(Experimental),
+    /// Turning in place in steps of 5 to 45°.
+    TurnInPlace(Experimental),
+    /// Approaches over 10 m in steps of 10 %: the paper's overall claim.
+    Claim(Experimental),
+    /// Approaches from 10 m to 2 m: the error at the end and whether the covariance says so.
+    Approach(Experimental),
+    /// Slopes and slip with wheels and gyro as the only sense of place (the paper's Table II).
+    Terrain(Experimental),
+    /// Around a rock, step by step (the paper's Table III).
+    #[command(name = "checkout-1")]
+    Checkout1(Experimental),
+    /// From 9.65 m to 1.92 m, step by step.
+    #[command(name = "checkout-2")]
+    Checkout2(Experimental),
+    /// Turn, back up and return, step by step.
+    #[command(name = "checkout-3")]
+    Checkout3(Experimental),
+    /// Occlusion, cloud, shadow, boundary, jumps: still tracked, or declared lost within the step?
+    Faults(Experimental),
     /// How hard the simulated worlds are: plain correlation, without scale and roll, at steps of 5 % and 23 %.
-    Realism(Worlds),
+    Realism(realism::Worlds),
     /// The simulated scenery in numbers: rocks, ground, noise and texture against their laws and real frames.
     Scenery(scenery::Scenery),
 }
 
-/// The worlds of an experiment: each is rendered once, each of its targets is one run.
+/// What a study over worlds, configurations and a grid takes.
 #[derive(Debug, Args)]
-struct Worlds {
+struct Experimental {
+    /// The seeds of the worlds, each with however many targets it offers.
+    #[arg(long, value_delimiter = ',', value_name = "SEEDS", conflicts_with_all = ["worlds", "first_seed"])]
+    seeds: Vec<u64>,
     /// How many worlds; one that offers fewer targets than the scenario asks for is passed over and named.
-    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..=1000))]
     worlds: u64,
     /// The seed of the first world; the others follow.
     #[arg(long, default_value_t = 1)]
     first_seed: u64,
-    /// The scenario of which the worlds are made, a file or a name that `sightline scenarios` lists; by default the
-    /// experiment's own.
+    /// The configurations: names that `sightline presets` lists, each with changes such as ncc+ncc_min=0.6; by default
+    /// the study's own.
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    configurations: Vec<String>,
+    /// Values of the study's variable; by default its own.
+    #[arg(long, value_delimiter = ',', value_name = "VALUES")]
+    grid: Vec<String>,
+    /// The scenario of which the worlds are made, a file or a name that `sightline scenarios` lists, in place of the
+    /// study's own.
     #[arg(long, value_name = "SCENARIO")]
     scenario: Option<PathBuf>,
-    /// A setting of the tracker; can be given more than once.
-    #[arg(long, value_name = "KEY=VALUE")]
-    set: Vec<String>,
-    /// The folder for worlds, table, summary and figure; worlds that are there already are used again.
+    /// The folder for worlds and results, by default one of the program's own; what is there already is used again.
     #[arg(long, value_name = "FOLDER")]
-    out: PathBuf,
+    out: Option<PathBuf>,
+    /// What is written to the standard output.
+    #[arg(long, default_value = "text")]
+    format: Format,
+}
+
+/// What is written to the standard output.
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+enum Format {
+    /// One sentence a row.
+    Text,
+    /// One JSON object with all rows.
+    Json,
+    /// A CSV table of all rows.
+    Csv,
+}
+
+/// The rows as JSON.
+#[derive(Serialize)]
+struct Document<'a> {
+    rows: &'a [Row],
 }
 
 impl Study {
     /// Runs the experiment.
     ///
     /// # Errors
-    /// A bad scenario or setting, too few worlds with targets enough, or a folder that cannot be written.
+    /// A bad scenario, configuration or grid, too few worlds with targets enough, or a folder that cannot be written.
     pub fn run(self) -> Result<()> {
         match self.experiment {
-            Experiment::Approach(worlds) => study_approach(&worlds),
-            Experiment::Realism(worlds) => study_realism(&worlds),
+            Experiment::Straight(arguments) => arguments.run("straight"),
+            Experiment::Sideways(arguments) => arguments.run("sideways"),
+            Experiment::TurnInPlace(arguments) => arguments.run("turn-in-place"),
+            Experiment::Claim(arguments) => arguments.run("claim"),
+            Experiment::Approach(arguments) => arguments.run("approach"),
+            Experiment::Terrain(arguments) => arguments.run("terrain"),
+            Experiment::Checkout1(arguments) => arguments.run("checkout-1"),
+            Experiment::Checkout2(arguments) => arguments.run("checkout-2"),
+            Experiment::Checkout3(arguments) => arguments.run("checkout-3"),
+            Experiment::Faults(arguments) => arguments.run("faults"),
+            Experiment::Realism(worlds) => worlds.run(),
             Experiment::Scenery(scenery) => scenery.run(),
         }
     }
 }
 
-fn study_approach(worlds: &Worlds) -> Result<()> {
-    let settings = worlds.settings(&[])?;
-    let mut runs = Vec::new();
-    worlds.each("approach-10", |traverse, seed, targets| {
-        let of_world = approach::track_world(traverse, seed, targets, &settings);
-        say::line(&format!("world {seed}: {}", sentence(&approach::summarise_runs(&of_world))))?;
-        runs.extend(of_world);
-        Ok(())
-    })?;
-    let summary = approach::summarise_runs(&runs);
-    write(&worlds.out.join("runs.csv"), table(&runs).as_bytes())?;
-    let document = serde_json::to_vec_pretty(&summary).map_err(|e| Error::Request(e.to_string()))?;
-    write(&worlds.out.join("summary.json"), &document)?;
-    figure::approach(&worlds.out.join("nees.svg"), &runs, &summary)?;
-    say::line(&sentence(&summary))
-}
-
-/// Strides over an approach in steps of 5 %: 5 % and 22.6 % (R111).
-const STRIDES: [usize; 2] = [1, 5];
-
-/// Plain correlation, as the paper's first configuration: nothing follows the surface, every update renews.
-const PLAIN: [&str; 5] =
-    ["scale=false", "roll=false", "surface_warp=false", "focus_px=0", "template_update=every_update"];
-
-fn study_realism(worlds: &Worlds) -> Result<()> {
-    let settings = worlds.settings(&PLAIN)?;
-    let mut found: Vec<Difficulty> = Vec::new();
-    worlds.each("approach-5", |traverse, seed, targets| {
-        let of_world = STRIDES.map(|stride| realism::difficulty(traverse, targets, &settings, stride));
-        for (index, difficulty) in of_world.into_iter().enumerate() {
-            say::line(&format!(
-                "world {seed}, every {} stops: {}",
-                difficulty.stride,
-                difficulty_words(&difficulty)
-            ))?;
-            match found.get_mut(index) {
-                Some(sum) => sum.add(&difficulty),
-                None => found.push(difficulty),
+impl Experimental {
+    fn run(self, name: &str) -> Result<()> {
+        // Everything is checked before anything is rendered.
+        let order = self.order(name)?;
+        let folder = order.folder.join(order.plan.study.name);
+        let told = Mutex::new(Teller::new());
+        let outcome =
+            study::carry_out(order, &AtomicBool::new(false), &|progress| lock(&told).tell(progress))?;
+        say::error(&format!(
+            "{} units, {} of them found now; the report is {}",
+            outcome.units.len(),
+            outcome.found,
+            folder.join(study::report::NAME).display()
+        ));
+        match self.format {
+            Format::Json => {
+                let document = serde_json::to_string(&Document { rows: &outcome.rows });
+                say::line(&document.map_err(|error| Error::Request(error.to_string()))?)
             }
+            Format::Csv => say::line(tables::rows_csv(&outcome.rows).trim_end()),
+            Format::Text => outcome.rows.iter().try_for_each(|row| say::line(&sentence(row))),
         }
-        Ok(())
-    })?;
-    let document = serde_json::to_vec_pretty(&found).map_err(|e| Error::Request(e.to_string()))?;
-    write(&worlds.out.join("realism.json"), &document)?;
-    for difficulty in &found {
-        say::line(&format!("every {} stops: {}", difficulty.stride, difficulty_words(difficulty)))?;
-    }
-    Ok(())
-}
-
-/// What plain correlation made of the worlds, in one line.
-fn difficulty_words(difficulty: &Difficulty) -> String {
-    let near = realism::RANGES_M.iter().skip(1).chain(&[0.0]);
-    let ranges = realism::RANGES_M.iter().zip(near).zip(difficulty.mean_scores());
-    let scores: Vec<String> = ranges
-        .filter_map(|((far_m, near_m), score)| Some(format!("{far_m} to {near_m} m {:.3}", score?)))
-        .collect();
-    format!(
-        "{} of {} targets tracked ({:.0} %), {} refused; mean score {}",
-        difficulty.tracked,
-        difficulty.targets,
-        100.0 * difficulty.tracked_share(),
-        difficulty.refused,
-        scores.join(", ")
-    )
-}
-
-impl Worlds {
-    /// The tracker's settings: the experiment's own, then those that were asked for.
-    fn settings(&self, own: &[&str]) -> Result<Settings> {
-        let texts = own.iter().copied().chain(self.set.iter().map(String::as_str));
-        Settings::default().with(&texts.map(parse_assignment).collect::<Result<Changes>>()?)
     }
 
-    /// Renders world after world and calls `study` with its traverse, its seed and its targets.
-    ///
-    /// A world that offers fewer targets than its scenario asks for is passed over: that depends on its surface and
-    /// its light alone.
-    fn each(
-        &self,
-        default: &str,
-        mut study: impl FnMut(&Traverse, u64, &[Pixel]) -> Result<()>,
-    ) -> Result<()> {
-        let scenario = open::scenario(self.scenario.as_deref().unwrap_or(Path::new(default)))?;
-        let seeds = self.first_seed..self.first_seed.saturating_add(self.worlds * SEEDS_PER_WORLD);
-        let mut worlds = 0;
-        for seed in seeds.clone() {
-            if worlds == self.worlds {
-                break;
+    fn order(&self, name: &str) -> Result<Order> {
+        let plan = Plan::new(name, &self.configurations, &self.grid)?;
+        let scenario = match &self.scenario {
+            Some(path) => {
+                let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+                Some((slug(&stem), open::scenario(path)?))
             }
-            let traverse = create_simulated(
-                &Scenario { seed, ..scenario.clone() },
-                &self.out.join(format!("world-{seed}")),
-            )?;
-            let world = traverse
-                .world()
-                .ok_or_else(|| Error::Request("a simulated world has no surface".to_owned()))?;
-            let targets =
-                sim::choose_targets(world, &Scenario { seed, ..scenario.clone() }, traverse.index());
-            if targets.len() < scenario.targets.count as usize {
-                say::line(&format!("world {seed}: {} targets, passed over", targets.len()))?;
-                continue;
-            }
-            open::render(&traverse)?;
-            study(&traverse, seed, &targets)?;
-            worlds += 1;
+            None => None,
+        };
+        let seeds = if self.seeds.is_empty() {
+            Seeds::Count { worlds: self.worlds, first: self.first_seed }
+        } else {
+            Seeds::Named(self.seeds.clone())
+        };
+        let folder = match &self.out {
+            Some(folder) => folder.clone(),
+            None => open::data_folder(None)?.join("studies"),
+        };
+        Ok(Order { command: self.command(name, &plan), plan, seeds, scenario, folder })
+    }
+
+    /// The command line that does the same.
+    fn command(&self, name: &str, plan: &Plan) -> String {
+        let mut words = vec![format!("sightline study {name}")];
+        if self.seeds.is_empty() {
+            words.push(format!("--worlds {} --first-seed {}", self.worlds, self.first_seed));
+        } else {
+            words.push(format!("--seeds {}", join(&self.seeds)));
         }
-        if worlds == self.worlds {
-            return Ok(());
+        let names: Vec<&str> = plan.configurations.iter().map(|c| c.name.as_str()).collect();
+        words.push(format!("--configurations {}", names.join(",")));
+        if !self.grid.is_empty() {
+            words.push(format!("--grid {}", self.grid.join(",")));
         }
-        Err(Error::Request(format!(
-            "only {worlds} of {} worlds with seeds from {} to {} offer {} targets: lower targets.count or widen targets.radius_m in the scenario",
-            self.worlds,
-            seeds.start,
-            seeds.end - 1,
-            scenario.targets.count
-        )))
+        if let Some(path) = &self.scenario {
+            words.push(format!("--scenario {}", path.display()));
+        }
+        words.join(" ")
     }
 }
 
-/// The summary in one line.
-fn sentence(summary: &ApproachSummary) -> String {
-    let centimetres = |m: Option<f64>| m.map_or_else(|| "–".to_owned(), |m| format!("{:.2} cm", 100.0 * m));
-    let calibration = summary.calibration.as_ref().map_or_else(String::new, |c| {
-        format!(
-            "; mean NEES {:.2} (bands {:.2} to {:.2} for {} runs, {:.2} to {:.2} for {} worlds), {:.0} % inside 3 sigma",
-            c.mean_nees,
-            c.band[0],
-            c.band[1],
-            c.count,
-            c.band_of_worlds[0],
-            c.band_of_worlds[1],
-            summary.worlds,
-            100.0 * c.inside_3_sigma
-        )
+fn join(seeds: &[u64]) -> String {
+    seeds.iter().map(u64::to_string).collect::<Vec<_>>().join(",")
+}
+
+/// A row as one line for people.
+fn sentence(row: &Row) -> String {
+    let number = |column: &str| row.number(column);
+    let whole = |column: &str| number(column).map_or_else(|| "?".to_owned(), |v| format!("{v:.0}"));
+    let own =
+        ["n_skip", "azimuth_step_deg", "search_window_px", "turn_step_deg", "terrain", "fault", "position"];
+    let variables: Vec<String> =
+        own.iter().filter_map(|name| Some(format!("{name} {}", row.columns.get(*name)?))).collect();
+    let error = number("err_m_median")
+        .or_else(|| number("err_m"))
+        .map_or_else(String::new, |m| format!(", error {:.2} cm", 100.0 * m));
+    let fault = number("cases").map_or_else(String::new, |cases| {
+        let [tracked, lost, wrong] = ["fault_tracked", "fault_lost", "fault_false"].map(whole);
+        format!(", {cases:.0} cases: {tracked} tracked, {lost} lost, {wrong} false at the fault")
     });
     format!(
-        "{} targets, {:.0} % tracked, median error {} (all runs {}), median sigma {}, false tracking {}, false loss {}{}",
-        summary.targets,
-        100.0 * summary.tracked_share,
-        centimetres(summary.median_err_m),
-        centimetres(summary.median_err_of_all_m),
-        centimetres(summary.median_sigma_m),
-        summary.false_tracked,
-        summary.false_lost,
-        calibration
+        "{} seed {} {}: {} of {} targets tracked, {} false tracking, {} false loss{error}{fault}",
+        row.configuration,
+        row.seed,
+        variables.join(" "),
+        whole("tracked"),
+        whole("targets"),
+        whole("false_tracked"),
+        whole("false_lost"),
     )
 }
 
-/// The runs as comma separated values, one a line.
-fn table(runs: &[ApproachRun]) -> String {
-    let number = |v: Option<f64>| v.map_or_else(String::new, |v| v.to_string());
-    let mut text =
-        "world,target,x_px,y_px,distance_m,run_tracked,steps_lost,err_px,err_m,err_range_m,sigma_m,nees\n"
-            .to_owned();
-    for run in runs {
-        let tracked = run.summary.run_tracked.map_or_else(String::new, |t| t.to_string());
-        let columns = [
-            run.world.to_string(),
-            run.target.to_string(),
-            run.pixel.x.to_string(),
-            run.pixel.y.to_string(),
-            number(run.distance_m),
-            tracked,
-            run.summary.steps_lost.to_string(),
-            number(run.summary.final_err_px),
-            number(run.summary.final_err_m),
-            number(run.err_range_m),
-            number(run.sigma_m),
-            number(run.nees),
-        ];
-        text.push_str(&columns.join(","));
-        text.push('\n');
-    }
-    text
+/// Tells the progress of a study on the standard error.
+struct Teller {
+    units: Progress,
+    rendering: Option<(String, Progress)>,
 }
 
-fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    std::fs::write(path, bytes).map_err(|source| Error::Write { path: path.to_owned(), source })
+impl Teller {
+    fn new() -> Self {
+        Self { units: Progress::new("study: unit"), rendering: None }
+    }
+
+    fn tell(&mut self, progress: study::Progress) {
+        match progress {
+            study::Progress::Units { k, n } => self.units.tell(k, n),
+            study::Progress::Notice(text) => say::error(&text),
+            study::Progress::Rendering { world, k, n } => {
+                if self.rendering.as_ref().is_none_or(|(known, _)| *known != world) {
+                    self.rendering = Some((world.clone(), Progress::new(format!("{world}: rendered stop"))));
+                }
+                if let Some((_, progress)) = &mut self.rendering {
+                    progress.tell(k, n);
+                }
+            }
+        }
+    }
 }

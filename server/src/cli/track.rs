@@ -16,6 +16,7 @@ use sightline_core::camera::MastAngles;
 use sightline_core::designate::Place;
 use sightline_core::error::{Error, Result};
 use sightline_core::frames::Pixel;
+use sightline_core::presets::preset;
 use sightline_core::session::track;
 use sightline_core::settings::{Changes, Settings, TrackerKind, parse_assignment};
 use sightline_core::trace::{StepRow, StepTrace, Summary, summarise};
@@ -51,6 +52,9 @@ pub struct Track {
     /// The tracker.
     #[arg(long, default_value = "template")]
     tracker: Tracker,
+    /// A named configuration, as `sightline presets` lists them; --set changes it further.
+    #[arg(long, value_name = "NAME")]
+    preset: Option<String>,
     /// A setting of the tracker, for example ncc_min=0.6; can be given more than once.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
@@ -154,7 +158,11 @@ impl Track {
             Tracker::Template => TrackerKind::Template,
         };
         let changes = self.set.iter().map(|text| parse_assignment(text)).collect::<Result<Changes>>()?;
-        Settings { tracker, ..Settings::default() }.with(&changes)
+        let own = match &self.preset {
+            Some(name) => preset(name)?.settings()?,
+            None => Settings::default(),
+        };
+        Settings { tracker, ..own }.with(&changes)
     }
 }
 

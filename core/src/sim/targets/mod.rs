@@ -24,6 +24,7 @@
 //! R110, R119, R209.
 
 mod arranged;
+mod special;
 mod window;
 
 use rand::{RngExt, SeedableRng};
@@ -38,6 +39,8 @@ use crate::sim::moment::Moment;
 use crate::sim::scenario::{Arrangement, Scenario, TargetRule};
 use crate::sim::world::{SurfaceId, World};
 use crate::traverse::TraverseIndex;
+
+pub use special::{Special, choose_special, is_on_boundary};
 
 /// Draws per target before the search is given up.
 const DRAWS_PER_TARGET: u32 = 2000;

@@ -42,6 +42,8 @@ struct Window {
     same: f64,
     facing: f64,
     behind: f64,
+    /// The same for any surface behind.
+    behind_any: f64,
 }
 
 impl View<'_> {
@@ -88,7 +90,27 @@ impl View<'_> {
                 .is_some_and(|window| !window.is_even(self.rule) && window.behind >= BEHIND_FRACTION)
     }
 
-    fn is_near_and_seen_again(&self, pixel: Pixel) -> bool {
+    /// Whether a pixel's window is uneven in depth and shows another surface farther behind.
+    pub(super) fn is_before_something(&self, pixel: Pixel) -> bool {
+        self.window(pixel).is_some_and(|window| {
+            let on_rock = matches!(window.middle.surface, SurfaceId::Rock(_));
+            on_rock && !window.is_even(self.rule) && window.behind_any >= BEHIND_FRACTION
+        })
+    }
+
+    /// Whether a pixel's window lies in the first image, lit, even and on one rock, wherever it is later.
+    pub(super) fn is_even_window(&self, pixel: Pixel) -> bool {
+        let rule = self.rule;
+        window_is_inside(&self.camera, pixel, rule)
+            && self.window(pixel).is_some_and(|window| {
+                let on_rock = matches!(window.middle.surface, SurfaceId::Rock(_));
+                window.shaded <= rule.shadow_fraction
+                    && window.is_even(rule)
+                    && (!rule.on_rocks || on_rock && window.same >= rule.same_rock_fraction)
+            })
+    }
+
+    pub(super) fn is_near_and_seen_again(&self, pixel: Pixel) -> bool {
         let Some(point) = surface_point(&self.world, &self.camera, pixel) else { return false };
         let seen_again = |eye: &Camera| {
             visible_pixel(&self.world, eye, &point).is_some_and(|seen| window_is_inside(eye, seen, self.rule))
@@ -105,7 +127,7 @@ impl View<'_> {
         let middle = self.world.cast(&middle_ray)?;
         let places = [middle_ray.origin, self.last[0].model.centre()];
         let (mut nearest_m, mut farthest_m) = (f64::INFINITY, 0.0f64);
-        let (mut shaded, mut same, mut facing, mut behind) = (0u32, 0u32, 0u32, 0u32);
+        let (mut shaded, mut same, mut facing, mut behind, mut behind_any) = (0u32, 0u32, 0u32, 0u32, 0u32);
         for dy in -half..=half {
             for dx in -half..=half {
                 let ray = self.camera.ray(pixel.offset(f64::from(dx), f64::from(dy)))?;
@@ -115,13 +137,14 @@ impl View<'_> {
                 shaded += u32::from(self.world.in_shadow(&hit.point));
                 same += u32::from(hit.surface == middle.surface);
                 facing += u32::from(faces(&hit, &places, self.rule));
-                let another = matches!(hit.surface, SurfaceId::Rock(_)) && hit.surface != middle.surface;
-                behind += u32::from(another && hit.distance_m > middle.distance_m);
+                let another = hit.surface != middle.surface && hit.distance_m > middle.distance_m;
+                behind += u32::from(another && matches!(hit.surface, SurfaceId::Rock(_)));
+                behind_any += u32::from(another);
             }
         }
         let part = |count: u32| f64::from(count) / f64::from((2 * half + 1).pow(2));
-        let [shaded, same, facing, behind] = [shaded, same, facing, behind].map(part);
-        Some(Window { middle, nearest_m, farthest_m, shaded, same, facing, behind })
+        let [shaded, same, facing, behind, behind_any] = [shaded, same, facing, behind, behind_any].map(part);
+        Some(Window { middle, nearest_m, farthest_m, shaded, same, facing, behind, behind_any })
     }
 }
 

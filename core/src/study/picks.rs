@@ -1,0 +1,115 @@
+//! Which pixels of a world are tracked at a point of the grid, what they belong to, and when something happens to them.
+//!
+//! The step of a fault is found in the truth, target by target: the first visited step at which the point is hidden, in
+//! shadow, or out of the left image. A target to which nothing happens is no case and has none.
+
+use super::point::{Fault, Picks, Point, Visit};
+use super::row::BOUNDARY;
+use super::run::Chosen;
+use super::truth::TruthSource;
+use crate::error::{Error, Result};
+use crate::frames::{Pixel, Point3};
+use crate::sim::scenario::Arrangement;
+use crate::sim::{Scenario, Special, World, choose_special, choose_targets, is_on_boundary};
+use crate::traverse::Traverse;
+
+/// Targets on boundaries, and targets that leave the image, that are asked for in each world.
+const SPECIAL_COUNT: u32 = 6;
+
+/// The targets of a point in a simulated world.
+///
+/// # Errors
+/// A recorded traverse, whose surface nobody knows.
+pub fn choose(traverse: &Traverse, scenario: &Scenario, point: &Point) -> Result<Vec<Chosen>> {
+    let world = traverse
+        .world()
+        .ok_or_else(|| Error::Request("a study needs simulated worlds, whose surface is known".to_owned()))?;
+    let special = |kind| choose_special(world, scenario, traverse.index(), kind, SPECIAL_COUNT);
+    let pixels = match point.picks {
+        Picks::Rule => choose_targets(world, scenario, traverse.index()),
+        Picks::Boundary => special(Special::Boundary),
+        Picks::Leaving => special(Special::Leaving),
+    };
+    let groups = groups(world, scenario, traverse, point, &pixels);
+    let mut chosen: Vec<Chosen> = pixels
+        .into_iter()
+        .zip(groups)
+        .map(|(pixel, group)| Chosen { pixel, group, fault_step: None })
+        .collect();
+    if let Some(fault) = point.fault {
+        find_fault_steps(traverse, point, fault, &mut chosen)?;
+    }
+    Ok(chosen)
+}
+
+/// What each pixel belongs to.
+fn groups(
+    world: &World,
+    scenario: &Scenario,
+    traverse: &Traverse,
+    point: &Point,
+    pixels: &[Pixel],
+) -> Vec<String> {
+    let rule = &scenario.targets;
+    let of = |(number, pixel): (usize, &Pixel)| match (point.picks, rule.arrangement) {
+        (Picks::Boundary, _) => BOUNDARY.to_owned(),
+        (Picks::Rule, Arrangement::Rows) => {
+            let per_row = (rule.count / rule.rows.max(1)).max(1) as usize;
+            format!("row-{}", number / per_row + 1)
+        }
+        (Picks::Rule, Arrangement::Face) if is_on_boundary(world, scenario, traverse.index(), *pixel) => {
+            BOUNDARY.to_owned()
+        }
+        _ => "all".to_owned(),
+    };
+    pixels.iter().enumerate().map(of).collect()
+}
+
+/// Finds, in the truth, the step at which the fault meets each target.
+fn find_fault_steps(traverse: &Traverse, point: &Point, fault: Fault, chosen: &mut [Chosen]) -> Result<()> {
+    let fixed = match fault {
+        Fault::Cloud(step) | Fault::AzimuthJump(step) | Fault::HeadingJump { step, .. } => Some(step),
+        Fault::Boundary => Some(1),
+        Fault::Occlusion | Fault::Shadow | Fault::OutOfFrame => None,
+    };
+    if fixed.is_some() {
+        chosen.iter_mut().for_each(|target| target.fault_step = fixed);
+        return Ok(());
+    }
+    let points: Vec<Option<Point3>> =
+        chosen.iter().map(|target| traverse.surface_point_in_site(0, target.pixel)).collect();
+    let stops = traverse.stop_count();
+    let visited: Vec<usize> = match point.visit {
+        Visit::Every(stride) => (0..stops).step_by(stride.max(1)).collect(),
+        Visit::LeavingOut { first, count } => {
+            (0..stops).filter(|stop| !(first..first + count).contains(stop)).collect()
+        }
+    };
+    for (step, &stop) in visited.iter().enumerate() {
+        let world = traverse.world_at(stop)?;
+        for (target, surface) in chosen.iter_mut().zip(&points) {
+            let Some(surface) = surface else { continue };
+            if target.fault_step.is_none() && is_met(traverse, &world, stop, surface, fault) {
+                target.fault_step = Some(step);
+            }
+        }
+    }
+    // What is so from the beginning does not happen on the way.
+    chosen.iter_mut().for_each(|target| target.fault_step = target.fault_step.filter(|&step| step > 0));
+    Ok(())
+}
+
+/// Whether a fault meets a surface point at a stop.
+fn is_met(traverse: &Traverse, world: &World, stop: usize, point: &Point3, fault: Fault) -> bool {
+    let Some(site_from_rover) = traverse.true_site_from_rover(stop) else { return false };
+    let camera_in_site = traverse.true_left_camera(stop).moved(&site_from_rover);
+    let is_seen = camera_in_site.sees(point);
+    match fault {
+        Fault::Shadow => world.in_shadow(point),
+        Fault::OutOfFrame => !is_seen,
+        _ => {
+            let ray = camera_in_site.project(point).and_then(|pixel| camera_in_site.ray(pixel));
+            is_seen && ray.is_some_and(|ray| !world.is_visible(&ray.origin, point))
+        }
+    }
+}

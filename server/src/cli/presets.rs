@@ -1,0 +1,53 @@
+//! `sightline presets`: the named configurations of the tracker, with what each changes.
+
+use clap::{Args, ValueEnum};
+use sightline_core::error::{Error, Result};
+use sightline_core::presets::{PRESETS, Preset, preset};
+
+use super::say;
+
+/// List the named configurations of the tracker, or print one.
+#[derive(Debug, Args)]
+pub struct Presets {
+    /// The configuration to print as TOML; without it all are listed.
+    name: Option<String>,
+    /// How they are written.
+    #[arg(long, default_value = "text")]
+    format: Format,
+}
+
+/// How presets are written.
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+enum Format {
+    /// One line each: the name and what it does.
+    Text,
+    /// One TOML table each, with the settings that it changes.
+    Toml,
+}
+
+impl Presets {
+    /// Lists them, or prints one.
+    ///
+    /// # Errors
+    /// A name that is not listed.
+    pub fn run(self) -> Result<()> {
+        if let Some(name) = &self.name {
+            return say::line(table(preset(name)?)?.trim_end());
+        }
+        let width = PRESETS.iter().map(|preset| preset.name.len()).max().unwrap_or_default();
+        for preset in PRESETS {
+            match self.format {
+                Format::Text => say::line(&format!("{:width$}  {}", preset.name, preset.description))?,
+                Format::Toml => say::line(&table(preset)?)?,
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A preset as a TOML table: what it does, and the settings that it changes.
+fn table(preset: &Preset) -> Result<String> {
+    let changes = preset.settings()?.changes();
+    let text = toml::to_string(&changes).map_err(|error| Error::Request(error.to_string()))?;
+    Ok(format!("# {}\n[{}]\n{text}", preset.description, preset.name))
+}

@@ -1,0 +1,427 @@
+//! Which figures a study has, and the sentence under each that says what it shows.
+//!
+//! A *series* is one configuration at one value of all variables but the first. Its points pool the runs of all worlds; the
+//! bars reach from the least to the greatest value of a single world. Values of the paper stand beside them as squares.
+
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+use sightline_core::study::catalogue::PaperValue;
+use sightline_core::study::plan::{Plan, Unit};
+use sightline_core::study::row::{columns, is_tracked, rows};
+use sightline_core::study::run::Run;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::drawn::{Chart, Line};
+
+/// A figure of a report.
+#[derive(Clone, Debug)]
+pub struct Figure {
+    /// Its name, of which that of its file is made.
+    pub name: &'static str,
+    /// The picture.
+    pub svg: String,
+    /// What it shows, as a sentence.
+    pub sentence: String,
+}
+
+/// One configuration over the study's first variable.
+pub struct Series {
+    /// The configuration, and the values of the other variables.
+    pub label: String,
+    /// The configuration's name.
+    pub configuration: String,
+    /// The points, in the order of the grid.
+    pub points: Vec<SeriesPoint>,
+}
+
+/// A series at one value of the first variable.
+pub struct SeriesPoint {
+    /// Where it stands on the horizontal axis.
+    pub x: f64,
+    /// The value as words.
+    pub word: String,
+    /// The columns over all worlds.
+    pub pooled: BTreeMap<String, Value>,
+    /// The columns of each world, with its seed.
+    pub worlds: Vec<(u64, BTreeMap<String, Value>)>,
+}
+
+impl SeriesPoint {
+    /// A column over all worlds.
+    pub fn value(&self, column: &str) -> Option<f64> {
+        self.pooled.get(column)?.as_f64()
+    }
+
+    /// The least and the greatest value of a column in a single world.
+    pub fn range(&self, column: &str) -> Option<[f64; 2]> {
+        let values = self.worlds.iter().filter_map(|(_, columns)| columns.get(column)?.as_f64());
+        values.fold(None, |range, v| {
+            let [low, high] = range.unwrap_or([v, v]);
+            Some([f64::min(low, v), f64::max(high, v)])
+        })
+    }
+}
+
+/// The series of a study whose rows are points of a grid.
+pub fn series(plan: &Plan, units: &[Unit]) -> Vec<Series> {
+    let mut found: Vec<Series> = Vec::new();
+    let mut words: Vec<String> = Vec::new();
+    for configuration in &plan.configurations {
+        for point in &plan.points {
+            let of_point: Vec<&Unit> = units
+                .iter()
+                .filter(|unit| unit.configuration == configuration.name && unit.point == *point)
+                .collect();
+            let others: Vec<String> =
+                point.variables.iter().skip(1).map(|(name, value)| format!(", {name} {value}")).collect();
+            let label = format!("{}{}", configuration.name, others.concat());
+            let (x, word) = place(point.variables.first().map(|(_, value)| value), &mut words);
+            let runs: Vec<&Run> = of_point.iter().flat_map(|unit| &unit.runs).collect();
+            let worlds = of_point
+                .iter()
+                .map(|unit| (unit.seed, columns(&unit.runs.iter().collect::<Vec<_>>(), 1)))
+                .collect();
+            let here = SeriesPoint { x, word, pooled: columns(&runs, of_point.len()), worlds };
+            match found.iter_mut().find(|series| series.label == label) {
+                Some(series) => series.points.push(here),
+                None => found.push(Series {
+                    label,
+                    configuration: configuration.name.clone(),
+                    points: vec![here],
+                }),
+            }
+        }
+    }
+    found
+}
+
+/// Where a value stands on the horizontal axis: a number where it is, a word in the order of the grid.
+fn place(value: Option<&Value>, words: &mut Vec<String>) -> (f64, String) {
+    if let Some(number) = value.and_then(Value::as_f64) {
+        return (number, number.to_string());
+    }
+    let word = value.and_then(Value::as_str).unwrap_or_default().to_owned();
+    let known = words.iter().position(|other| *other == word).unwrap_or_else(|| {
+        words.push(word.clone());
+        words.len() - 1
+    });
+    (known as f64, word)
+}
+
+/// The figures of a study.
+///
+/// # Errors
+/// What the drawing library says.
+pub fn figures(plan: &Plan, units: &[Unit]) -> Result<Vec<Figure>, String> {
+    if plan.study.is_by_step {
+        return checkout(plan, units);
+    }
+    let series = series(plan, units);
+    let variable = plan.study.variable;
+    let shares: (f64, f64) = (1.0, 100.0);
+    let mut drawn = Vec::new();
+    let mut add = |name, column: &str, title: &str, unit: (f64, &str)| -> Result<(), String> {
+        drawn.push(over_grid(plan, &series, (name, column), title, unit)?);
+        Ok(())
+    };
+    match plan.study.name {
+        "faults" => {
+            add(
+                "false",
+                "false_share",
+                "cases that say tracked at the fault and are not",
+                (shares.1, "share of cases, %"),
+            )?;
+            add(
+                "kept",
+                "kept_share",
+                "cases that are still tracked at the fault",
+                (shares.1, "share of cases, %"),
+            )?;
+        }
+        "claim" | "approach" => {
+            add("tracked", "tracked_share", "targets tracked to the end", (shares.1, "share of targets, %"))?;
+            drawn.push(nees(plan, units)?);
+        }
+        _ => {
+            let title = format!("targets tracked to the end, over {variable}");
+            add("tracked", "tracked_share", &title, (shares.1, "share of targets, %"))?;
+            add(
+                "error",
+                "err_px_median",
+                "median error of the tracked targets at the end",
+                (1.0, "error, px"),
+            )?;
+            add(
+                "drift",
+                "drift_m_median",
+                "median drift of the tracked targets at the end",
+                (shares.1, "drift, cm"),
+            )?;
+        }
+    }
+    if plan.study.name == "straight" {
+        drawn.push(over_grid(
+            plan,
+            &series,
+            ("evenness", "uneven_px"),
+            "unevenness of the two rows at the end (R115)",
+            (1.0, "residual of a cubic, px"),
+        )?);
+    }
+    Ok(drawn)
+}
+
+/// A column over the grid, one line a series.
+fn over_grid(
+    plan: &Plan,
+    series: &[Series],
+    (name, column): (&'static str, &str),
+    title: &str,
+    (factor, unit): (f64, &str),
+) -> Result<Figure, String> {
+    let is_share = column.ends_with("share");
+    let words = words_of(series);
+    let mut lines: Vec<Line> = Vec::new();
+    for (colour, series) in series.iter().enumerate() {
+        let value =
+            |point: &SeriesPoint| share_or_column(&point.pooled, column).map(|v| (point.x, factor * v));
+        let range = |point: &SeriesPoint| {
+            let values = point.worlds.iter().filter_map(|(_, columns)| share_or_column(columns, column));
+            let ends = values.fold(None, |range: Option<[f64; 2]>, v| {
+                let [low, high] = range.unwrap_or([v, v]);
+                Some([low.min(v), high.max(v)])
+            });
+            ends.map(|[low, high]| (point.x, [factor * low, factor * high]))
+        };
+        lines.push(Line {
+            label: series.label.clone(),
+            colour,
+            points: series.points.iter().filter_map(value).collect(),
+            ranges: series.points.iter().filter_map(range).collect(),
+            ..Line::default()
+        });
+    }
+    let paper = plan.study.paper();
+    lines.extend(paper_lines(&paper, column, factor, series));
+    let sentence = sentence(series, column, factor, unit, &paper);
+    let chart = Chart {
+        title: title.to_owned(),
+        axes: [axis(plan), unit.to_owned()],
+        words,
+        y_range: is_share.then_some([0.0, 104.0]),
+        lines,
+    };
+    Ok(Figure { name, svg: chart.svg()?, sentence })
+}
+
+/// A column, or a share that is made of two.
+fn share_or_column(columns: &BTreeMap<String, Value>, column: &str) -> Option<f64> {
+    let number = |name: &str| columns.get(name).and_then(Value::as_f64);
+    match column {
+        "false_share" => Some(number("fault_false")? / number("cases")?),
+        "kept_share" => Some(number("fault_tracked")? / number("cases")?),
+        _ => number(column),
+    }
+}
+
+fn words_of(series: &[Series]) -> Vec<String> {
+    let mut words: Vec<String> = Vec::new();
+    for point in series.iter().flat_map(|series| &series.points) {
+        if point.word.parse::<f64>().is_err() && !words.contains(&point.word) {
+            words.push(point.word.clone());
+        }
+    }
+    words
+}
+
+fn axis(plan: &Plan) -> String {
+    let unit = if plan.study.unit.is_empty() { String::new() } else { format!(", {}", plan.study.unit) };
+    format!("{}{unit}", plan.study.variable)
+}
+
+/// The paper's values, each in the colour of its configuration.
+fn paper_lines(paper: &[PaperValue], column: &str, factor: f64, series: &[Series]) -> Vec<Line> {
+    let mut lines: Vec<Line> = Vec::new();
+    for (colour, series) in series.iter().enumerate() {
+        let label = format!("paper: {}", series.configuration);
+        let of = paper
+            .iter()
+            .filter(|value| value.configuration == series.configuration && value.column == column);
+        let points: Vec<(f64, f64)> = of.map(|value| (value.at, factor * value.value)).collect();
+        if !points.is_empty() && lines.iter().all(|line| line.label != label) {
+            lines.push(Line { label, colour, points, is_marks: true, ..Line::default() });
+        }
+    }
+    lines
+}
+
+/// What a column is at both ends of the grid, series by series, with the paper's value where it prints one.
+fn sentence(series: &[Series], column: &str, factor: f64, unit: &str, paper: &[PaperValue]) -> String {
+    let unit = unit.rsplit(", ").next().unwrap_or_default();
+    let at = |series: &Series, point: &SeriesPoint| {
+        let value = factor * share_or_column(&point.pooled, column)?;
+        let printed = paper.iter().find(|value| {
+            value.configuration == series.configuration && value.column == column && value.at == point.x
+        });
+        let printed = printed.map_or_else(String::new, |p| format!(" (paper {:.0})", factor * p.value));
+        let digits = if value.abs() < 10.0 { 2 } else { 0 };
+        Some(format!("{value:.digits$} {unit}{printed} at {}", point.word))
+    };
+    let parts = series.iter().filter_map(|series| {
+        let mut ends: Vec<&SeriesPoint> = series.points.iter().take(1).collect();
+        ends.extend(series.points.last().filter(|_| series.points.len() > 1));
+        let said: Vec<String> = ends.into_iter().filter_map(|point| at(series, point)).collect();
+        (!said.is_empty()).then(|| format!("{}: {}", series.label, said.join(", ")))
+    });
+    let parts: Vec<String> = parts.collect();
+    if parts.is_empty() {
+        "No target was left to measure.".to_owned()
+    } else {
+        format!("{}.", parts.join("; "))
+    }
+}
+
+/// The distribution of NEES over the tracked runs of each configuration, against χ² with three degrees of freedom.
+fn nees(plan: &Plan, units: &[Unit]) -> Result<Figure, String> {
+    let mut lines: Vec<Line> = Vec::new();
+    let mut said: Vec<String> = Vec::new();
+    for (colour, configuration) in plan.configurations.iter().enumerate() {
+        let own: Vec<&Unit> = units.iter().filter(|unit| unit.configuration == configuration.name).collect();
+        let runs: Vec<&Run> = own.iter().flat_map(|unit| &unit.runs).collect();
+        let mut values: Vec<f64> =
+            runs.iter().filter(|run| is_tracked(run)).filter_map(|run| run.nees).collect();
+        values.sort_by(f64::total_cmp);
+        let count = values.len() as f64;
+        let steps = values.iter().enumerate().map(|(i, &v)| (v, (i + 1) as f64 / count));
+        lines.push(Line {
+            label: configuration.name.clone(),
+            colour,
+            points: steps.filter(|(v, _)| *v <= 16.0).collect(),
+            ..Line::default()
+        });
+        let pooled = columns(&runs, own.len());
+        let number = |name: &str| pooled.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
+        said.push(format!(
+            "{}: mean NEES {:.2} (95 % band {:.2} to {:.2} for {} runs), {:.0} % inside 3σ, 3 × RMS of the error of all \
+             targets {:.2} cm",
+            configuration.name,
+            number("nees_mean"),
+            number("nees_low"),
+            number("nees_high"),
+            values.len(),
+            100.0 * number("inside_3_sigma"),
+            300.0 * number("err_all_m_rms"),
+        ));
+    }
+    let chi_squared = ChiSquared::new(3.0).map_err(|e| e.to_string())?;
+    let points = (0..=160).map(|i| f64::from(i) / 10.0).map(|x| (x, chi_squared.cdf(x))).collect();
+    lines.push(Line {
+        label: "χ² with 3 d.o.f.".to_owned(),
+        colour: 6,
+        points,
+        is_thin: true,
+        ..Line::default()
+    });
+    let chart = Chart {
+        title: "NEES of the tracked targets at the end".to_owned(),
+        axes: ["NEES".to_owned(), "share of runs below".to_owned()],
+        y_range: Some([0.0, 1.02]),
+        lines,
+        ..Chart::default()
+    };
+    let sentence = format!(
+        "A right covariance follows the thin line. {}. The paper's formula (R41, 3σ, its navcam) gives 1.60 cm with a drift of \
+         2.5 px and 2.19 cm with 10 px at 2 m.",
+        said.join("; ")
+    );
+    Ok(Figure { name: "nees", svg: chart.svg()?, sentence })
+}
+
+/// Columns of a checkout over the rover's positions: each configuration, the truth of the staged drive, the paper.
+fn checkout(plan: &Plan, units: &[Unit]) -> Result<Vec<Figure>, String> {
+    let columns: &[(&'static str, &str, &str)] = match plan.study.name {
+        "checkout-1" => &[
+            ("magnification", "magnification_true", "magnification of one update"),
+            ("roll_deg", "roll_true_deg", "roll of one update, °"),
+            ("azimuth_change_deg", "azimuth_change_true_deg", "change of the viewing azimuth, °"),
+            ("ncc", "", "score of the match"),
+        ],
+        _ => &[
+            ("magnification", "magnification_true", "magnification of one update"),
+            ("correction_px", "", "correction of the prediction, px"),
+            ("total_correction_m", "", "correction of the target since its designation, m"),
+            ("ncc", "", "score of the match"),
+            ("err_px", "", "error against the truth, px"),
+        ],
+    };
+    let draw = |&(column, truth, words): &(&'static str, &str, &str)| {
+        step_figure(plan, units, (column, truth), words)
+    };
+    columns.iter().map(draw).collect()
+}
+
+fn step_figure(
+    plan: &Plan,
+    units: &[Unit],
+    (column, truth): (&'static str, &str),
+    words: &str,
+) -> Result<Figure, String> {
+    let mut lines: Vec<Line> = Vec::new();
+    let mut said: Vec<String> = Vec::new();
+    for (colour, configuration) in plan.configurations.iter().enumerate() {
+        let own = units.iter().filter(|unit| unit.configuration == configuration.name);
+        let rows: Vec<_> = own.flat_map(|unit| rows(plan.study, unit)).collect();
+        let line = |column: &str| {
+            let mut at: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
+            for row in &rows {
+                if let (Some(position), Some(value)) = (row.number("position"), row.number(column)) {
+                    at.entry(position as u64).or_default().push(value);
+                }
+            }
+            let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+            let ends = |values: &[f64]| {
+                values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(*v), h.max(*v)])
+            };
+            let points: Vec<_> = at.iter().map(|(x, values)| (*x as f64, mean(values))).collect();
+            let ranges: Vec<_> = at.iter().map(|(x, values)| (*x as f64, ends(values))).collect();
+            (points, ranges)
+        };
+        let (points, ranges) = line(column);
+        let [low, high] =
+            points.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], p| [l.min(p.1), h.max(p.1)]);
+        said.push(format!("{}: {low:.2} to {high:.2}", configuration.name));
+        lines.push(Line { label: configuration.name.clone(), colour, points, ranges, ..Line::default() });
+        if colour == 0 && !truth.is_empty() {
+            let (points, _) = line(truth);
+            lines.push(Line {
+                label: "by the true geometry".to_owned(),
+                colour: 6,
+                points,
+                is_thin: true,
+                ..Line::default()
+            });
+        }
+    }
+    let printed: Vec<(f64, f64)> = plan
+        .study
+        .paper()
+        .iter()
+        .filter(|value| value.column == column)
+        .map(|value| (value.at, value.value))
+        .collect();
+    if !printed.is_empty() {
+        lines.push(Line {
+            label: "paper, Table III".to_owned(),
+            colour: 6,
+            points: printed,
+            is_marks: true,
+            ..Line::default()
+        });
+    }
+    let chart =
+        Chart { title: words.to_owned(), axes: [axis(plan), words.to_owned()], lines, ..Chart::default() };
+    let sentence = format!("Means over the worlds, {words}: {}.", said.join("; "));
+    Ok(Figure { name: column, svg: chart.svg()?, sentence })
+}
