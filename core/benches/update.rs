@@ -13,6 +13,9 @@
 //! A bicubic sample has 16 taps and two sets of weights, about 60 instructions in double precision, 5 ns when three or
 //! four go at once; an update takes about 35 000 of them. Memory is no limit: all that is read fits a cache of 1 MB.
 //!
+//! **Reached.** 1.4 ms for an update and 1.05 ms for `point_stereo` (quickest; medians 1.8 and 1.1) on a virtual machine
+//! that was busy with other work: the goal is missed. Half of it is reading samples, at about 20 ns each instead of 5.
+//!
 //! The pair is a textured plane before Spirit's navcams, 1024 × 1024 px, whose right eye sees it with a true disparity.
 //! Run with `cargo bench -p sightline-core --profile dev --bench update` (the profile `dev` is optimised).
 

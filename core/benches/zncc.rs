@@ -16,6 +16,10 @@
 //! copying tiles, running sums, square roots and divisions, about 3 ns for each. `dense_one_thread` is the
 //! number to hold against the bound; `dense` is what the tracker sees with the threads it has.
 //!
+//! **Reached.** 0.155 ms for 161 × 161 (57 billion a second) and 2.5 ms for 621 × 621 (64 billion), one thread, on a
+//! virtual machine whose clock is not known: at its nominal 2.6 GHz the bound is 83 billion. OpenCV correlates windows of
+//! this size by Fourier transforms, whose time does not grow with the template: `cargo xtask bench --peers`.
+//!
 //! Run with `cargo bench -p sightline-core --profile dev --bench zncc` (the profile `dev` is optimised).
 
 use divan::Bencher;
