@@ -44,11 +44,8 @@ fn targets_on_a_plane_are_tracked_and_their_drift_is_what_is_left_of_the_error()
 
 #[test]
 fn a_tracker_whose_every_match_is_refused_loses_all_targets_although_its_evidence_is_right() {
-    let refusing = settings(&[
-        ("ncc_min", 1.0.into()),
-        ("stereo_ncc_min", 1.0.into()),
-        ("tolerance_factor", 0.1.into()),
-    ]);
+    // No match is as sharp as a thousandth of a pixel.
+    let refusing = settings(&[("match_sigma_max_px", 0.001.into())]);
     let runs = track(&drive(), &plain(), &chosen(), &refusing);
     for run in &runs {
         assert_eq!((run.end, run.state.as_deref()), (Some(Fate::Lost), Some("failed")));
