@@ -117,6 +117,11 @@ pub const PRESETS: &[Preset] = &[
         &["template_update=never"],
     ),
     ours(
+        "sightline-affine",
+        "The defaults, then the affine second stage from the match in focus.",
+        &["refine=affine"],
+    ),
+    ours(
         "homography",
         "The defaults, warped through the surface's plane and both camera models pixel by pixel (beyond R60).",
         &["warp_model=homography"],

@@ -176,8 +176,9 @@ fn peak_gates(matched: Option<&TemplateMatch>, limits: &Limits) -> Vec<Gate> {
         gates.push(Gate::new(7, "match_sigma_px", "px", sigma_px, limits.match_sigma_max_px, false));
     }
     // A descent by gradient compares no window of positions, and has no rim.
-    let edge_px = matched.map(|m| m.edge_distance_px().unwrap_or(f64::INFINITY));
-    if limits.edge_distance_min_px > 0.0 {
+    let is_searched = matched.is_none_or(|m| m.descent.is_none());
+    if limits.edge_distance_min_px > 0.0 && is_searched {
+        let edge_px = matched.and_then(TemplateMatch::edge_distance_px);
         gates.push(Gate::new(8, "edge_distance_px", "px", edge_px, limits.edge_distance_min_px, true));
     }
     gates

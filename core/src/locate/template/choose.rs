@@ -112,10 +112,7 @@ fn transforms(settings: &TemplateSettings) -> Vec<Option<(f64, f64)>> {
     if settings.transform == Transform::Geometry {
         return vec![None];
     }
-    // A hair more, so that a range which is a whole number of steps keeps its last.
-    let count = |range: f64, step: f64| (range / step + 1e-9).floor() as i32;
-    let scales = count(settings.search_scale_max.ln(), settings.search_scale_ratio.ln());
-    let rolls = count(settings.search_roll_deg, settings.search_roll_step_deg);
+    let [scales, rolls] = settings.search_steps();
     let pair = |i: i32, j: i32| {
         let roll_rad = (settings.search_roll_step_deg * f64::from(j)).to_radians();
         Some((settings.search_scale_ratio.powi(i), roll_rad))

@@ -233,6 +233,14 @@ fn settings_that_contradict_each_other_are_refused_by_name() {
     settings.template.template_size_px = 20;
     let refused = track::run(&one_step(), designation(118.3, 131.6), &settings).unwrap_err().to_string();
     assert!(refused.contains("template_size_px") && refused.contains("odd"), "{refused}");
+    let mut settings = preset("coarse-to-fine").unwrap().settings().unwrap();
+    settings.template.template_size_px = 11;
+    let refused = track::run(&one_step(), designation(118.3, 131.6), &settings).unwrap_err().to_string();
+    assert!(refused.contains("coarse_levels 2") && refused.contains("template_size_px 11"), "{refused}");
+    let mut settings = preset("scale-roll-search").unwrap().settings().unwrap();
+    (settings.template.search_roll_deg, settings.template.search_roll_step_deg) = (20.0, 0.1);
+    let refused = track::run(&one_step(), designation(118.3, 131.6), &settings).unwrap_err().to_string();
+    assert!(refused.contains("search_roll_step_deg") && refused.contains("3609 pairs"), "{refused}");
 }
 
 #[test]

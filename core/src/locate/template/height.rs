@@ -21,7 +21,7 @@ use utoipa::ToSchema;
 
 use super::match_template::FirstMatch;
 use super::point_stereo::StereoInput;
-use super::relief::{range_at, rim};
+use super::relief::{around, range_at};
 use super::settings::TemplateSettings;
 use crate::correlate::peak;
 use crate::frames::{Pixel, Point3, Pose};
@@ -38,7 +38,7 @@ pub struct Relief {
     /// The target in the rover frame of its stop, m.
     #[schema(value_type = [f64; 3])]
     pub middle: Point3,
-    /// Its neighbours on the rim of the window, as far as stereo was sure, m.
+    /// Its neighbours in the window, as far as stereo was sure, m.
     #[schema(value_type = Vec<[f64; 3]>)]
     pub neighbours: Vec<Point3>,
 }
@@ -61,7 +61,7 @@ pub(super) fn relief(input: &StereoInput<'_>, range_m: f64, settings: &TemplateS
     let point = |pixel: Pixel, near_m: f64| -> Option<Point3> {
         Some(input.left.ray(pixel)?.at(range_at(input, pixel, near_m, settings)?))
     };
-    let neighbours = rim(settings.template_size_px)
+    let neighbours = around(settings.template_size_px)
         .into_iter()
         .filter_map(|[u, v]| point(input.left_pixel.offset(u, v), range_m))
         .collect();

@@ -10,7 +10,7 @@
 //! ```
 //! so no noise level has to be assumed. The fit has taken four numbers (two shifts, gain, level) out of the residual,
 //! which holds only `n = (Σw)² / Σw² / Σc` independent ones, so that it is smaller than what disturbed the match:
-//! hence the factor (as HC1 of MacKinnon & White 1985). To this comes a floor for the sub-pixel fit itself, whose error does
+//! hence the factor (as HC1 of MacKinnon & White 1985); an affine map takes eight. To this comes a floor for the sub-pixel fit itself, whose error does
 //! not show in the residual.
 //!
 //! Where the template was prepared by scale and roll alone, the surface's slope stretches the image by another
@@ -41,6 +41,9 @@ const CORRELATION_REACH_PX: i64 = 4;
 /// Numbers that a match fits: two shifts, gain and level.
 const FITTED: f64 = 4.0;
 
+/// Numbers that an affine map fits beside them.
+const FITTED_BY_MAP: f64 = 4.0;
+
 /// 1σ error of the quadratic fit of a peak and of resampling, px.
 const FIT_FLOOR_PX: f64 = 0.03;
 
@@ -59,6 +62,16 @@ pub struct MatchNoise {
 /// The error of the position of `matched` against `template`, patches of the size of `focus`, where the true map
 /// between them is `I + misfit`.
 pub fn match_noise(template: &Patch, matched: &Patch, misfit: &Matrix2<f64>, focus: &Focus) -> MatchNoise {
+    noise(template, matched, misfit, focus, FITTED)
+}
+
+/// The error of the position of `matched`, read through an affine map that was fitted to `template`, all pixels alike.
+pub fn affine_noise(template: &Patch, matched: &Patch) -> MatchNoise {
+    let focus = Focus::new(template.width(), 0.0);
+    noise(template, matched, &Matrix2::zeros(), &focus, FITTED + FITTED_BY_MAP)
+}
+
+fn noise(template: &Patch, matched: &Patch, misfit: &Matrix2<f64>, focus: &Focus, fitted: f64) -> MatchNoise {
     let undetermined = MatchNoise {
         covariance_px2: Matrix2::identity() * UNDETERMINED_PX.powi(2),
         bias_px: Vector2::zeros(),
@@ -89,18 +102,18 @@ pub fn match_noise(template: &Patch, matched: &Patch, misfit: &Matrix2<f64>, foc
     }
     let meat = correlated_sum(&influence, i64::from(width), i64::from(height));
     information.try_inverse().map_or(undetermined, |inverse| MatchNoise {
-        covariance_px2: inverse * meat * inverse * freedom(focus)
+        covariance_px2: inverse * meat * inverse * freedom(focus, fitted)
             + Matrix2::identity() * FIT_FLOOR_PX.powi(2),
         bias_px: inverse * stretched,
     })
 }
 
-/// `n / (n − 4)`.
-fn freedom(focus: &Focus) -> f64 {
+/// `n / (n − fitted)`.
+fn freedom(focus: &Focus, fitted: f64) -> f64 {
     let squares: f64 = focus.weights().iter().map(|w| w * w).sum();
     let alike = ((CORRELATION_REACH_PX + 1) as f64).powi(2);
-    let independent = (1.0 / (squares * alike)).max(FITTED + 1.0);
-    independent / (independent - FITTED)
+    let independent = (1.0 / (squares * alike)).max(fitted + 1.0);
+    independent / (independent - fitted)
 }
 
 /// `Σ_ij c(i − j) v_i v_jᵀ` over a grid of vectors: c is a product of one factor a direction, so that the sum over

@@ -20,7 +20,7 @@ use utoipa::ToSchema;
 use super::affine::{self, AffineRefinement};
 use super::height::WeighedPeak;
 use super::klt::{self, Descent};
-use super::match_noise::match_noise;
+use super::match_noise::{affine_noise, match_noise};
 use super::scale_roll::Prepared;
 use super::settings::{FirstStage, Measure, Refine, Search, TemplateSettings};
 use crate::correlate::coarse_to_fine::{CoarseSearch, coarse_to_fine};
@@ -208,10 +208,11 @@ pub fn finish(
         true => peak.score,
         false => zncc(template, &matched).map_or(0.0, f64::from),
     };
-    // A map that was measured leaves no stretch to be corrected for, and no weights were used to find it.
-    let misfit = if is_straight { prepared.record.misfit() } else { Matrix2::zeros() };
-    let focus = if is_straight { focus } else { Focus::new(size, 0.0) };
-    let noise = match_noise(template, &matched, &misfit, &focus);
+    // A map that was measured leaves no stretch to be corrected for.
+    let noise = match is_straight {
+        true => match_noise(template, &matched, &prepared.record.misfit(), &focus),
+        false => affine_noise(template, &matched),
+    };
     let covariance_px2 = placed.map * noise.covariance_px2 * placed.map.transpose();
     if !is_correlated {
         peak.covariance_px2 = covariance_px2;

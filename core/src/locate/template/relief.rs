@@ -1,7 +1,7 @@
 //! Relief: the ranges of the target's neighbours, each by point stereo (R21, R220).
 //!
-//! Neighbours lie on a grid of three by three over the window; each is matched with a window of half the template's side, so
-//! that they see little of each other. One whose match is not sure has no range.
+//! Neighbours lie on a grid of three by three. Each is matched with a window of half the template's side that lies wholly
+//! inside the template's, so that nothing beside the target is taken for it. One whose match is not sure has no range.
 
 use super::point_stereo::{StereoInput, point_stereo};
 use super::settings::TemplateSettings;
@@ -10,9 +10,14 @@ use crate::frames::Pixel;
 /// Neighbours that score less say nothing about the range.
 const SCORE_MIN: f64 = 0.6;
 
-/// The offsets of the eight neighbours on the rim of a window of `size` px, row by row, px.
-pub(super) fn rim(size: u32) -> Vec<[f64; 2]> {
-    let reach_px = f64::from(size / 2);
+/// Half the side of a neighbour's window, px.
+fn half_window(size: u32) -> u32 {
+    ((size / 2) | 1) / 2
+}
+
+/// The offsets of the eight neighbours in a template of `size` px, row by row, px.
+pub(super) fn around(size: u32) -> Vec<[f64; 2]> {
+    let reach_px = f64::from(size / 2 - half_window(size));
     let offsets = [-reach_px, 0.0, reach_px];
     let all = offsets.iter().flat_map(|v| offsets.iter().map(move |u| [*u, *v]));
     all.filter(|offset| *offset != [0.0, 0.0]).collect()
@@ -26,7 +31,7 @@ pub(super) fn range_at(
     settings: &TemplateSettings,
 ) -> Option<f64> {
     let narrow = TemplateSettings {
-        template_size_px: (settings.template_size_px / 2) | 1,
+        template_size_px: 2 * half_window(settings.template_size_px) + 1,
         surface_warp: false,
         focus_px: 0.0,
         ..settings.clone()

@@ -11,6 +11,12 @@ use crate::image::sample::Kernel;
 use crate::limits::Domain;
 use crate::settings_group;
 
+/// Side below which a template at the coarsest level tells nothing apart, px.
+const COARSEST_MIN_PX: u32 = 5;
+
+/// Most pairs of a scale and a roll that a brute-force search tries.
+const PAIRS_MAX: u64 = 2000;
+
 settings_group! {
     /// The settings of the template locator (Kim et al. 2009).
     TemplateSettings as "template" {
@@ -138,6 +144,21 @@ impl TemplateSettings {
         }
     }
 
+    /// How many scales and how many rolls a brute-force search tries to either side of none.
+    pub fn search_steps(&self) -> [i32; 2] {
+        // A hair more, so that a range which is a whole number of steps keeps its last.
+        let count = |range: f64, step: f64| (range / step + 1e-9).floor() as i32;
+        [
+            count(self.search_scale_max.ln(), self.search_scale_ratio.ln()),
+            count(self.search_roll_deg, self.search_roll_step_deg),
+        ]
+    }
+
+    /// How many pairs of a scale and a roll it tries.
+    fn pairs(&self) -> u64 {
+        self.search_steps().iter().map(|steps| 2 * u64::from(steps.unsigned_abs()) + 1).product()
+    }
+
     /// Why these settings cannot find anything, as one sentence that names the fields and the way out.
     pub fn contradiction(&self) -> Option<String> {
         let (template, window) = (self.template_size_px, self.search_window_px);
@@ -151,6 +172,21 @@ impl TemplateSettings {
             return Some(format!(
                 "template_size_px {template} is larger than search_window_px {window}, in which the whole template \
                  must lie: make the window larger or the template smaller"
+            ));
+        }
+        let coarsest = ((template / 2) >> self.coarse_levels) * 2 + 1;
+        if self.search == Search::CoarseToFine && coarsest < COARSEST_MIN_PX {
+            return Some(format!(
+                "coarse_levels {} leaves {coarsest} px of template_size_px {template} at the coarsest level, at least \
+                 {COARSEST_MIN_PX} are needed: take fewer levels or a larger template",
+                self.coarse_levels
+            ));
+        }
+        let pairs = self.pairs();
+        if self.transform == Transform::Search && pairs > PAIRS_MAX {
+            return Some(format!(
+                "search_scale_max, search_scale_ratio, search_roll_deg and search_roll_step_deg make {pairs} pairs of \
+                 scale and roll, at most {PAIRS_MAX} are tried: narrow a range or widen a step"
             ));
         }
         if self.range_min_m >= self.range_max_m {

@@ -6,13 +6,14 @@
 //! | `depth_range` | (farthest − nearest) / distance in the window | ≤ `warn_depth_range` |
 //! | `occluding_boundary` | largest departure from a plane / distance | ≤ `warn_boundary` |
 //!
-//! Ranges are those of the target and of eight neighbours on the rim of the window (`relief`). Where fewer than five remain nothing is said of the ranges. A plane in space has an inverse range that is
-//! linear over the image,
+//! Ranges are those of the target and of eight neighbours in the window (`relief`). Where fewer than five remain nothing is
+//! said of them. A plane in space has an inverse range that is linear over the image,
 //! ```text
 //! 1/R ≈ a + b u + c v
 //! ```
-//! so that its least-squares fit is free of the slope of the surface: what is left over is relief, and where two
-//! surfaces meet in the window a step, of which the fit leaves a third.
+//! and fills the window to its corners: the depth range is that of the plane over the whole window, or of the points
+//! where that is more. What the fit leaves over is free of the slope of the surface: it is relief, and where two
+//! surfaces meet in the window a step, of which it keeps a third.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -78,7 +79,8 @@ pub(super) fn look(input: &StereoInput<'_>, range_m: f64, settings: &Settings) -
     }
     let ranges = ranges(input, range_m, template);
     if ranges.len() >= POINTS_MIN {
-        found.extend(of_ranges(&ranges, range_m, limits));
+        let half_px = f64::from(template.template_size_px / 2);
+        found.extend(of_ranges(&ranges, range_m, half_px, limits));
     }
     found
 }
@@ -91,10 +93,14 @@ struct Ranged {
     range_m: f64,
 }
 
-fn of_ranges(ranges: &[Ranged], distance_m: f64, limits: &Limits) -> Vec<Warning> {
+fn of_ranges(ranges: &[Ranged], distance_m: f64, half_px: f64, limits: &Limits) -> Vec<Warning> {
     let mut found = Vec::new();
-    let nearest = ranges.iter().map(|r| r.range_m).fold(f64::INFINITY, f64::min);
-    let farthest = ranges.iter().map(|r| r.range_m).fold(0.0, f64::max);
+    let Some(plane) = plane(ranges) else { return found };
+    let reach = half_px * (plane[1].abs() + plane[2].abs());
+    let nearest = ranges.iter().map(|r| r.range_m).fold(1.0 / (plane[0] + reach), f64::min);
+    // A plane seen so grazingly that it leaves the window at infinity is as far as the points are.
+    let corner_m = Some(1.0 / (plane[0] - reach)).filter(|r| *r > 0.0).unwrap_or(0.0);
+    let farthest = ranges.iter().map(|r| r.range_m).fold(corner_m, f64::max);
     let spread = (farthest - nearest) / distance_m;
     if spread > limits.warn_depth_range {
         let sentence = format!(
@@ -107,7 +113,8 @@ fn of_ranges(ranges: &[Ranged], distance_m: f64, limits: &Limits) -> Vec<Warning
             sentence,
         });
     }
-    if let Some(step) = departure_from_a_plane(ranges, distance_m).filter(|step| *step > limits.warn_boundary)
+    if let Some(step) =
+        Some(departure(&plane, ranges, distance_m)).filter(|step| *step > limits.warn_boundary)
     {
         let sentence = format!(
             "an occluding boundary runs through the window, or deep relief: ranges leave a plane by {:.0} % of the \
@@ -124,27 +131,34 @@ fn of_ranges(ranges: &[Ranged], distance_m: f64, limits: &Limits) -> Vec<Warning
     found
 }
 
-/// The largest residual of a plane through the ranges, as a share of the distance.
-fn departure_from_a_plane(ranges: &[Ranged], distance_m: f64) -> Option<f64> {
+fn row(r: &Ranged) -> Vector3<f64> {
+    Vector3::new(1.0, r.u_px, r.v_px)
+}
+
+/// The plane through the ranges: a, b and c of the inverse range.
+fn plane(ranges: &[Ranged]) -> Option<Vector3<f64>> {
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
-    let row = |r: &Ranged| Vector3::new(1.0, r.u_px, r.v_px);
     for point in ranges {
         normal += row(point) * row(point).transpose();
         right += row(point) / point.range_m;
     }
-    let plane = normal.try_inverse()? * right;
-    let residual = |r: &Ranged| (1.0 / r.range_m - plane.dot(&row(r))).abs() * distance_m;
-    Some(ranges.iter().map(residual).fold(0.0, f64::max))
+    Some(normal.try_inverse()? * right)
 }
 
-/// The ranges of the target and of its neighbours on the rim of the window.
+/// The largest residual of a plane, as a share of the distance.
+fn departure(plane: &Vector3<f64>, ranges: &[Ranged], distance_m: f64) -> f64 {
+    let residual = |r: &Ranged| (1.0 / r.range_m - plane.dot(&row(r))).abs() * distance_m;
+    ranges.iter().map(residual).fold(0.0, f64::max)
+}
+
+/// The ranges of the target and of its neighbours in the window.
 fn ranges(input: &StereoInput<'_>, range_m: f64, settings: &TemplateSettings) -> Vec<Ranged> {
     let middle = Ranged { u_px: 0.0, v_px: 0.0, range_m };
-    let around = relief::rim(settings.template_size_px).into_iter().filter_map(|[u_px, v_px]| {
+    let neighbours = relief::around(settings.template_size_px).into_iter().filter_map(|[u_px, v_px]| {
         let range_m = relief::range_at(input, input.left_pixel.offset(u_px, v_px), range_m, settings)?;
         Some(Ranged { u_px, v_px, range_m })
     });
-    std::iter::once(middle).chain(around).collect()
+    std::iter::once(middle).chain(neighbours).collect()
 }
 
 #[cfg(test)]
@@ -162,18 +176,18 @@ mod tests {
     }
 
     fn kinds(ranges: &[Ranged]) -> Vec<WarningKind> {
-        of_ranges(ranges, 5.0, &Limits::default()).into_iter().map(|w| w.kind).collect()
+        of_ranges(ranges, 5.0, 10.0, &Limits::default()).into_iter().map(|w| w.kind).collect()
     }
 
     #[test]
     fn a_plane_however_steep_is_no_boundary_and_a_step_is() {
         let steep = grid(|u, v| 1.0 / (0.2 + 0.001 * u - 0.0004 * v));
         assert_eq!(kinds(&steep), [WarningKind::DepthRange]);
-        assert!(departure_from_a_plane(&steep, 5.0).unwrap() < 1e-12);
+        assert!(departure(&plane(&steep).unwrap(), &steep, 5.0) < 1e-12);
         let step = grid(|u, _| if u > 0.0 { 6.0 } else { 5.0 });
         assert_eq!(kinds(&step), [WarningKind::DepthRange, WarningKind::OccludingBoundary]);
         // A third of the step of the inverse range, 1/5 − 1/6.
-        assert!((departure_from_a_plane(&step, 5.0).unwrap() - 5.0 / 90.0).abs() < 1e-12);
+        assert!((departure(&plane(&step).unwrap(), &step, 5.0) - 5.0 / 90.0).abs() < 1e-12);
         assert!(kinds(&grid(|u, v| 5.0 + 0.005 * u + 0.002 * v)).is_empty());
     }
 }
