@@ -169,7 +169,7 @@ fn series(plot: &mut PlotUi<'_>, run: &RunView, line: &Series) {
 }
 
 /// The runs of consecutive points.
-fn pieces(points: &[Option<[f64; 2]>]) -> Vec<Vec<[f64; 2]>> {
+pub(super) fn pieces(points: &[Option<[f64; 2]>]) -> Vec<Vec<[f64; 2]>> {
     let runs = points.split(Option::is_none);
     runs.filter(|run| !run.is_empty()).map(|run| run.iter().copied().flatten().collect()).collect()
 }

@@ -72,13 +72,19 @@ fn show_run(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out:
             let (mark, _) = ui.allocate_exact_size(vec2(14.0, 14.0), Sense::hover());
             paint_mark(ui.painter(), mark.center(), run_mark(run.number), theme::run(run.number), 6.0);
             ui.label(RichText::new(format!("run {}", run_letter(run.number))).color(theme::STRONG));
-            let from = run.fork.map(|f| format!("{} › step {}", run_letter(f.run), f.from_step));
-            ui.label(theme::note(from.unwrap_or_default()));
+            if let Some(preset) = state.configurations.named(&run.settings) {
+                ui.label(RichText::new(preset.name).color(theme::ACCENT)).on_hover_text(preset.description);
+            }
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| how_far(ui, state, target, run, out));
         });
         sparkline(ui, run, state.stop_count());
+        if let Some(fork) = run.fork {
+            ui.label(theme::note(format!("from run {} at step {}", run_letter(fork.run), fork.from_step)));
+        }
         ui.label(theme::note(summary(run)));
-        for (key, value) in &run.changes {
+        // A preset's name says them all.
+        let unnamed = state.configurations.named(&run.settings).is_none();
+        for (key, value) in run.changes.iter().filter(|_| unnamed) {
             ui.label(theme::note(format!("{key} = {value}")).monospace());
         }
     });
