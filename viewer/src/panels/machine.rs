@@ -174,7 +174,10 @@ fn history(ui: &mut Ui, state: &State, run: &RunView, row: &StepRow, out: &mut V
             out.push(Command::Go(Go::Step(row.step)));
         }
         let colour = theme::state(state_of_word(&row.state));
-        ui.label(RichText::new(&row.state).size(12.0).color(colour));
+        let state_word = ui.label(RichText::new(&row.state).size(12.0).color(colour));
+        if let Some(reason) = &row.reason {
+            state_word.on_hover_text(reason);
+        }
         let fired = fired(state, row);
         if run.rows.first().is_some_and(|first| first.step == row.step) {
             ui.label(theme::note("picked here"));

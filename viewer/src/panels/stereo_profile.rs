@@ -82,12 +82,17 @@ fn names_of(run: Color32, is_predicted: bool) -> Vec<(Mark, Color32, String)> {
 }
 
 /// The best position and the interval, in words.
-fn sentences(stereo: &PointStereo, predicted: Option<(f64, f64)>) -> [RichText; 2] {
+fn sentences(stereo: &PointStereo, predicted: Option<(f64, f64)>) -> [RichText; 3] {
     let at_end = if stereo.at_end { ", AT THE END of the interval" } else { "" };
+    let disparity = stereo.disparity_px.map_or_else(String::new, |px| format!(", disparity {px:.2} px"));
     let best = format!(
-        "best {:.3} m, score {:.3}, {:+.2} px beside the curve{at_end}",
+        "best {:.3} m, score {:.3}{disparity}, {:+.2} px beside the curve{at_end}",
         stereo.range_m, stereo.score, stereo.across_px
     );
+    let back = match stereo.left_right_px {
+        Some(px) => format!("left to right and back: {px:.2} px off"),
+        None => "left to right and back: nothing was found there".to_owned(),
+    };
     let colour = if stereo.at_end { theme::LOST } else { theme::TEXT };
     let ranges = stereo.curve.iter().map(|point| point.range_m);
     let (near, far) = ranges.fold((f64::INFINITY, 0.0_f64), |(near, far), r| (near.min(r), far.max(r)));
@@ -96,7 +101,7 @@ fn sentences(stereo: &PointStereo, predicted: Option<(f64, f64)>) -> [RichText; 
         |(range_m, sigma_m)| format!("predicted {range_m:.3} m ± {:.3} m (3σ)", 3.0 * sigma_m),
     );
     let interval = format!("searched {near:.2} to {far:.2} m, {} positions; {prior}", stereo.curve.len());
-    [theme::note(best).color(colour), theme::note(interval)]
+    [theme::note(best).color(colour), theme::note(back), theme::note(interval)]
 }
 
 /// Predicted distance from the left camera and its 1 σ along the line of sight, m.

@@ -57,9 +57,21 @@ fn show_target(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Co
     });
     let at = target.designation;
     ui.label(theme::note(format!("picked at step {}, pixel {:.1}, {:.1}", at.step, at.pixel.x, at.pixel.y)));
+    for sentence in warnings(state, target) {
+        ui.add(egui::Label::new(RichText::new(format!("! {sentence}")).small().color(theme::LOST)).wrap())
+            .on_hover_text("A warning about the pick; it can be tracked all the same.");
+    }
     for run in &target.runs {
         show_run(ui, state, target, run, out);
     }
+}
+
+/// Why the target that is looked at may be badly picked (R21).
+fn warnings<'a>(state: &'a State, target: &TargetView) -> Vec<&'a str> {
+    let is_selected = state.cursor.target == Some(target.number);
+    let pick = state.trace_at(target.designation.step).ready().filter(|_| is_selected);
+    let evidence = pick.and_then(sightline_core::trace::StepTrace::template);
+    evidence.map_or_else(Vec::new, |e| e.warnings.iter().map(|warning| warning.sentence.as_str()).collect())
 }
 
 fn show_run(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: &mut Vec<Command>) {

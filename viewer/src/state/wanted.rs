@@ -16,6 +16,9 @@ impl State {
                 self.want_step(step, near, &mut keys);
             }
         }
+        // The record of the pick has the warnings about it.
+        let pick = self.run().and_then(|run| run.rows.first()).map(|row| row.step);
+        keys.extend(pick.and_then(|step| self.step_key(step)).map(Key::Trace));
         if let Some(run) = self.run().filter(|_| self.wants_history) {
             for row in &run.rows {
                 keys.extend(self.step_key(row.step).map(Key::Trace));

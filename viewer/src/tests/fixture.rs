@@ -119,13 +119,19 @@ pub(crate) fn with_history(context: &egui::Context, step: usize) -> State {
             (prepared.image_from_template, prepared.template_step) = (Matrix2::identity(), other - 1);
         }
         let key = StepKey { session: "s1".to_owned(), target: 0, run: 0, step: other };
-        state.cache.arrived(Key::Trace(key.clone()), Ok(Item::Trace(Arc::new(trace))), 0.0);
+        load(&mut state, trace);
         for name in [ArrayName::Reference, ArrayName::Matched] {
             let raster = Raster::from_npy(context, name, &npy::encode(&bump(21)).unwrap()).unwrap();
             state.cache.arrived(Key::Array(key.clone(), name), Ok(Item::Raster(Arc::new(raster))), 0.0);
         }
     }
     state
+}
+
+/// Loads the record of a step of the first run.
+pub(crate) fn load(state: &mut State, trace: StepTrace) {
+    let key = StepKey { session: "s1".to_owned(), target: 0, run: 0, step: trace.step };
+    state.cache.arrived(Key::Trace(key), Ok(Item::Trace(Arc::new(trace))), 0.0);
 }
 
 /// A smooth hill with a hole.

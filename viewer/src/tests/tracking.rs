@@ -75,3 +75,21 @@ fn the_state_machine_shows_state_counter_and_what_fired() {
     assert_eq!(lost.click("step   2"), vec![Command::Go(Go::Step(2))]);
     Shown::pane(Pane::Machine, |context| fixture::at_step(context, 4)).says("no retry is left");
 }
+
+#[test]
+fn the_warnings_about_a_pick_stand_under_its_target() {
+    use sightline_core::locate::Evidence;
+    use sightline_core::locate::template::warnings::{Warning, WarningKind};
+    let shown = Shown::pane(Pane::Targets, |context| {
+        let mut state = fixture::at_step(context, 2);
+        let mut trace = fixture::trace(0);
+        if let Some(Evidence::Template(evidence)) = trace.locate.as_mut().map(|l| &mut l.evidence) {
+            let sentence = "The window ranges over 14 % of its distance.".to_owned();
+            evidence.warnings =
+                vec![Warning { kind: WarningKind::DepthRange, value: 0.14, limit: 0.1, sentence }];
+        }
+        fixture::load(&mut state, trace);
+        state
+    });
+    shown.says("! The window ranges over 14 % of its distance.");
+}

@@ -11,7 +11,7 @@ use sightline_core::session::view::RunView;
 use sightline_core::trace::StepRow;
 
 use self::drift::Comparison;
-use super::plots::pieces;
+use super::plots::{few_marks, pieces};
 use crate::cache::Slot;
 use crate::command::{Command, Go};
 use crate::raster::Raster;
@@ -127,9 +127,9 @@ fn comparisons(ui: &mut Ui, state: &State, run: &RunView) {
     let colour = theme::run(run.number);
     ui.horizontal_top(|ui| {
         let score = |c: &Comparison| [c.step as f64, c.score];
-        chart(ui, "score with the window of step …", size, [0.0, 1.0], &points(&all, score), colour);
+        chart(ui, "score, by earlier step", size, [0.0, 1.0], &points(&all, score), colour);
         let shift = |c: &Comparison| [c.step as f64, c.shift_px];
-        chart(ui, "shift against it, px", size, [0.0, 1.0], &points(&all, shift), theme::LOST);
+        chart(ui, "shift, px, by earlier step", size, [0.0, 1.0], &points(&all, shift), theme::LOST);
     });
 }
 
@@ -190,6 +190,7 @@ fn chart(
             .include_y(in_view[0])
             .include_y(in_view[1])
             .set_margin_fraction(vec2(0.04, 0.1))
+            .y_grid_spacer(few_marks)
             .y_axis_min_width(22.0)
             .x_axis_formatter(|mark: GridMark, _: &std::ops::RangeInclusive<f64>| {
                 if mark.value.fract() == 0.0 { format!("{}", mark.value) } else { String::new() }
