@@ -32,6 +32,7 @@ pub mod steps;
 pub mod columns;
 pub mod photometry;
 pub mod exports;
+pub mod studies;
 pub mod events;
 pub mod openapi;
 pub mod page;

@@ -10,7 +10,7 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use crate::state::AppState;
-use crate::{about, events, exports, photometry, runs, sessions, settings, steps, targets, traverses};
+use crate::{about, events, exports, photometry, runs, sessions, settings, steps, studies, targets, traverses};
 
 #[derive(OpenApi)]
 #[openapi(
@@ -38,6 +38,7 @@ pub fn router() -> OpenApiRouter<AppState> {
         .merge(photometry::router())
         .merge(steps::router())
         .merge(exports::router())
+        .merge(studies::router())
         .merge(events::router())
 }
 

@@ -95,12 +95,15 @@ impl SightlineApp {
             bars::transport(ui, state, &mut out);
             timeline::show(ui, state, &mut out);
         });
-        let mut panels = Panels { state, out: &mut out, left_image: None };
+        let mut panels = Panels { state, out: &mut out, left_image: None, seen: Vec::new() };
         CentralPanel::default()
             .frame(Frame::new().fill(theme::PAGE))
             .show(ui, |ui| self.tree.ui(&mut panels, ui));
         self.left_image = panels.left_image;
+        let is_history_seen = panels.seen.contains(&Pane::History);
         help::show(ui, state, &mut out);
+        // Every step's window is worth fetching only while the panel that shows them is on the screen.
+        self.state.wants_history = is_history_seen;
         out
     }
 

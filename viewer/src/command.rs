@@ -3,6 +3,8 @@
 use sightline_core::frames::Pixel;
 use sightline_core::settings::Changes;
 
+use crate::state::calculator::Calculator;
+use crate::stretch::Stretch;
 use crate::view2d::View2d;
 
 /// Where to go along the drive.
@@ -175,6 +177,8 @@ pub enum Command {
         /// The new value.
         value: Option<serde_json::Value>,
     },
+    /// Makes the draft what takes the run to the named configuration.
+    UsePreset(&'static str),
     /// Takes all changes of the draft back.
     ClearDraft,
     /// Runs from the cursor's step with these changes.
@@ -195,6 +199,10 @@ pub enum Command {
     },
     /// Changes what a panel shows.
     View(Panel, View2d),
+    /// Changes what the calculator of the error budget is given.
+    SetCalculator(Calculator),
+    /// Stretches the grey values of the images on the screen.
+    SetStretch(Stretch),
     /// Fits every image to its panel.
     FitAll,
     /// Shows or hides a layer of marks.

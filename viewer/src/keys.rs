@@ -4,9 +4,10 @@ use egui::{Context, Event, Key, Modifiers};
 
 use crate::command::{Command, Go, Mode, Stage};
 use crate::state::State;
+use crate::stretch::Stretch;
 
 /// Every key with its meaning, as the help sheet lists them.
-pub const SHEET: [(&str, &str); 15] = [
+pub const SHEET: [(&str, &str); 16] = [
     ("Right  Left", "next, previous step"),
     ("Shift+Right  Shift+Left", "ten steps on, back"),
     ("Home  End", "first, last step"),
@@ -17,6 +18,7 @@ pub const SHEET: [(&str, &str); 15] = [
     ("R", "run from this step with the changed settings"),
     ("F", "fit all images to their panels"),
     ("H", "hide or show all marks"),
+    ("I", "stretch dark images automatically, or show them as recorded"),
     ("Esc", "cancel what was begun"),
     ("?", "this sheet"),
     ("Wheel", "zoom at the pointer"),
@@ -62,6 +64,8 @@ pub fn command(key: Key, modifiers: Modifiers, state: &State) -> Option<Command>
         Key::R => Command::RunFromHere(state.draft.clone()),
         Key::F => Command::FitAll,
         Key::H => Command::ToggleMarks,
+        Key::I if state.stretch == Stretch::None => Command::SetStretch(Stretch::Auto),
+        Key::I => Command::SetStretch(Stretch::None),
         Key::Escape => Command::SetMode(Mode::Look),
         Key::Questionmark => Command::SetMode(Mode::Help),
         Key::Slash if shift => Command::SetMode(Mode::Help),
@@ -99,6 +103,7 @@ mod tests {
         assert_eq!(press(Key::G, &state), Some(Command::SetMode(Mode::GoTo(String::new()))));
         assert_eq!(press(Key::T, &state), Some(Command::SetMode(Mode::Pick)));
         assert_eq!(press(Key::F, &state), Some(Command::FitAll));
+        assert_eq!(press(Key::I, &state), Some(Command::SetStretch(Stretch::Auto)));
         assert_eq!(press(Key::Escape, &state), Some(Command::SetMode(Mode::Look)));
         assert_eq!(press(Key::Questionmark, &state), Some(Command::SetMode(Mode::Help)));
         assert_eq!(press(Key::Q, &state), None);

@@ -25,14 +25,24 @@ pub enum Pane {
     Right,
     /// The template strip.
     Strip,
+    /// The template's history.
+    History,
     /// The surface of scores.
     Surface,
+    /// The error budget.
+    Budget,
+    /// The stereo scores along the epipolar curve.
+    StereoProfile,
     /// The map.
     Map,
     /// Plots over steps.
     Plots,
+    /// The growing tolerances.
+    Tolerances,
     /// The gates.
     Gates,
+    /// The state machine of loss.
+    Machine,
     /// The selected stage's record.
     Inspector,
     /// Messages.
@@ -41,16 +51,21 @@ pub enum Pane {
 
 impl Pane {
     /// All of them.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 16] = [
         Self::Targets,
         Self::Settings,
         Self::Left,
         Self::Right,
+        Self::Budget,
         Self::Strip,
+        Self::History,
         Self::Surface,
+        Self::StereoProfile,
         Self::Map,
         Self::Plots,
+        Self::Tolerances,
         Self::Gates,
+        Self::Machine,
         Self::Inspector,
         Self::Messages,
     ];
@@ -62,11 +77,16 @@ impl Pane {
             Self::Settings => "Settings",
             Self::Left => "Left image",
             Self::Right => "Right image",
+            Self::Budget => "Error budget",
             Self::Strip => "Template strip",
+            Self::History => "Template history",
             Self::Surface => "Match scores",
+            Self::StereoProfile => "Stereo scores",
             Self::Map => "Map, site frame",
             Self::Plots => "Over the steps",
+            Self::Tolerances => "Tolerances",
             Self::Gates => "Gates",
+            Self::Machine => "State machine",
             Self::Inspector => "Inspector",
             Self::Messages => "Messages",
         }
@@ -84,9 +104,14 @@ pub fn show_pane(ui: &mut Ui, pane: Pane, state: &State, out: &mut Vec<Command>)
         Pane::Settings => panels::settings::show(ui, state, out),
         Pane::Right => panels::image_right::show(ui, state, out),
         Pane::Strip => panels::strip::show(ui, state, out),
+        Pane::History => panels::history::show(ui, state, out),
         Pane::Surface => panels::surface::show(ui, state, out),
+        Pane::Budget => panels::budget::show(ui, state, out),
+        Pane::StereoProfile => panels::stereo_profile::show(ui, state, out),
         Pane::Map => panels::map::show(ui, state, out),
         Pane::Plots => panels::plots::show(ui, state, out),
+        Pane::Tolerances => panels::tolerances::show(ui, state, out),
+        Pane::Machine => panels::machine::show(ui, state, out),
         Pane::Gates => panels::gates::show(ui, state, out),
         Pane::Inspector => panels::inspector::show(ui, state, out),
         Pane::Messages => panels::messages::show(ui, state, out),
@@ -103,12 +128,12 @@ pub fn overview() -> Tree<Pane> {
     };
     let side = tabs(&mut tiles, &[Pane::Targets, Pane::Settings]);
     let left = tabs(&mut tiles, &[Pane::Left]);
-    let right = tabs(&mut tiles, &[Pane::Right]);
-    let strip = tabs(&mut tiles, &[Pane::Strip]);
-    let surface = tabs(&mut tiles, &[Pane::Surface]);
+    let right = tabs(&mut tiles, &[Pane::Right, Pane::Budget]);
+    let strip = tabs(&mut tiles, &[Pane::Strip, Pane::History]);
+    let surface = tabs(&mut tiles, &[Pane::Surface, Pane::StereoProfile]);
     let map = tabs(&mut tiles, &[Pane::Map]);
-    let plots = tabs(&mut tiles, &[Pane::Plots]);
-    let gates = tabs(&mut tiles, &[Pane::Gates]);
+    let plots = tabs(&mut tiles, &[Pane::Plots, Pane::Tolerances]);
+    let gates = tabs(&mut tiles, &[Pane::Gates, Pane::Machine]);
     let inspector = tabs(&mut tiles, &[Pane::Inspector, Pane::Messages]);
     let images = linear(&mut tiles, LinearDir::Horizontal, &[(left, 1.0), (right, 1.0)]);
     let charts = linear(&mut tiles, LinearDir::Horizontal, &[(surface, 1.0), (map, 1.1), (plots, 1.1)]);
@@ -134,12 +159,15 @@ pub struct Panels<'a> {
     pub out: &'a mut Vec<Command>,
     /// Where the left image is.
     pub left_image: LeftImage,
+    /// The panels that are on the screen.
+    pub seen: Vec<Pane>,
 }
 
 impl Behavior<Pane> for Panels<'_> {
     fn pane_ui(&mut self, ui: &mut Ui, _tile: TileId, pane: &mut Pane) -> UiResponse {
+        self.seen.push(*pane);
         let margin = match pane {
-            Pane::Strip => Margin::symmetric(theme::MARGIN, 3),
+            Pane::Strip | Pane::History => Margin::symmetric(theme::MARGIN, 3),
             Pane::Left | Pane::Right | Pane::Surface => Margin { left: 4, right: 4, top: 4, bottom: 0 },
             _ => Margin::same(theme::MARGIN),
         };

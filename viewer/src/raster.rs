@@ -4,6 +4,7 @@ use egui::{Color32, ColorImage, TextureFilter, TextureHandle, TextureOptions};
 use sightline_core::image::{GrayImage, npy};
 use sightline_core::trace::ArrayName;
 
+use crate::stretch::{Stretch, levels};
 use crate::theme;
 
 /// The difference of two normalised patches is shown between ± this many standard deviations.
@@ -25,6 +26,11 @@ pub struct Raster {
     pub mean: f32,
     /// Standard deviation of the values that exist.
     pub sigma: f32,
+    /// Dark and bright end of the values, from which the automatic stretch is made.
+    pub levels: [f32; 2],
+    options: TextureOptions,
+    /// The stretch that the texture has.
+    stretched: egui::mutex::Mutex<Stretch>,
 }
 
 impl Raster {
@@ -77,7 +83,20 @@ impl Raster {
         let size = [values.width() as usize, values.height() as usize];
         let texture = context.load_texture(name, ColorImage::new(size, colours), options);
         let (mean, sigma) = statistics(&values);
-        Self { values, texture, mean, sigma }
+        let (levels, stretched) = (levels(&values), egui::mutex::Mutex::default());
+        Self { values, texture, mean, sigma, levels, options, stretched }
+    }
+
+    /// Gives the texture of an image a stretch, where it does not have it yet.
+    pub fn stretch(&self, stretch: Stretch) {
+        let mut present = self.stretched.lock();
+        if *present == stretch {
+            return;
+        }
+        *present = stretch;
+        let size = self.size().map(|side| side as usize);
+        let colours = self.values.iter().map(|&v| theme::grey(stretch.apply(v, self.levels))).collect();
+        self.texture.clone().set(ColorImage::new(size, colours), self.options);
     }
 
     /// Width and height.

@@ -10,6 +10,7 @@ use crate::designate::Place;
 use crate::frames::{Pixel, PoseRecord};
 use crate::session::view::SessionView;
 use crate::settings::Changes;
+use crate::study::wire::StudyJob;
 use crate::traverse::StereoGeometry;
 
 /// A traverse in the server's list.
@@ -204,6 +205,11 @@ pub enum Event {
         n: usize,
         /// The stop that became ready, where one did.
         ready: Option<usize>,
+    },
+    /// A study went on.
+    StudyProgress {
+        /// How it stands.
+        job: StudyJob,
     },
 }
 

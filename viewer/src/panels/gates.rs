@@ -1,4 +1,4 @@
-//! The gates: the four loss criteria with value, limit and margin, and the verdict as a sentence.
+//! The gates: the loss criteria with value, limit and margin, and the verdict as a sentence.
 
 use egui::{Align2, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
 use sightline_core::stages::judge::{Gate, Verdict};
@@ -124,6 +124,10 @@ fn readable(name: &str) -> &str {
         "stereo_ncc" => "stereo score",
         "distance_correction_m" => "range change",
         "position_correction_m" => "site position",
+        "left_right_px" => "left–right check",
+        "second_peak_ratio" => "second peak",
+        "match_sigma_px" => "match σ",
+        "edge_distance_px" => "from the edge",
         other => other,
     }
 }

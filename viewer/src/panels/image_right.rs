@@ -11,6 +11,7 @@ use super::legend::{self, Entry};
 use crate::cache::Eye;
 use crate::command::{Command, Layer, Panel};
 use crate::overlay::{Line, Mark, Overlay};
+use crate::raster::Raster;
 use crate::state::{State, run_letter};
 use crate::theme;
 use crate::view2d::Canvas;
@@ -30,6 +31,14 @@ const TICK_GAP: f32 = 34.0;
 /// Shows the right image.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let Some(raster) = ready_image(ui, state, Eye::Right) else { return };
+    raster.stretch(state.stretch);
+    let [width, height] = raster.size();
+    let shape = (width as f32 / height.max(1) as f32, STATUS);
+    legend::beside(ui, &entries(state), shape, state, out, |ui, out| picture(ui, state, raster, out));
+}
+
+/// The image itself with its marks and the line below it.
+fn picture(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) {
     let [width, height] = raster.size();
     let region = PixelRect::whole(width, height);
     let canvas = Canvas::new(ui, state.view(Panel::Right), region, STATUS);
@@ -38,8 +47,6 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     if let Some(trace) = state.trace().filter(|_| state.marks) {
         paint_marks(&canvas, trace, state);
     }
-    let target = state.trace().and_then(|trace| trace.locate.as_ref()?.right_pixel);
-    legend::show(ui, &canvas, &entries(state), target, state, out);
     status_line(ui, &canvas, raster, region);
     if let Some(view) = canvas.moved {
         out.push(Command::View(Panel::Right, view));

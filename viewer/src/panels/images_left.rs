@@ -5,6 +5,7 @@ use sightline_core::frames::Pixel;
 use sightline_core::image::PixelRect;
 use sightline_core::trace::StepTrace;
 
+use super::exposure;
 use super::legend::{self, Entry};
 use crate::cache::{Eye, Slot};
 use crate::command::{Command, Layer, Mode, Panel};
@@ -24,6 +25,17 @@ pub fn show(
     out: &mut Vec<Command>,
 ) -> Option<(crate::view2d::Transform, [u32; 2])> {
     let raster = ready_image(ui, state, Eye::Left)?;
+    raster.stretch(state.stretch);
+    exposure::show(ui, state, raster, out);
+    let [width, height] = raster.size();
+    let shape = (width as f32 / height.max(1) as f32, STATUS);
+    let transform =
+        legend::beside(ui, &entries(state), shape, state, out, |ui, out| picture(ui, state, raster, out));
+    Some((transform, raster.size()))
+}
+
+/// The image itself with its marks and the line below it.
+fn picture(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) -> crate::view2d::Transform {
     let [width, height] = raster.size();
     let region = PixelRect::whole(width, height);
     let canvas = Canvas::new(ui, state.view(Panel::Left), region, STATUS);
@@ -35,15 +47,13 @@ pub fn show(
             paint_marks(&Overlay::new(&canvas.painter, &canvas.transform), trace, state);
         }
     }
-    let target = state.trace().and_then(|trace| trace.locate.as_ref()?.left_pixel);
-    legend::show(ui, &canvas, &entries(state), target, state, out);
     paint_designation(&canvas, state);
     pick(ui, &canvas, raster, state, out);
     status_line(ui, &canvas, raster, region);
     if let Some(view) = canvas.moved {
         out.push(Command::View(Panel::Left, view));
     }
-    Some((canvas.transform, raster.size()))
+    canvas.transform
 }
 
 /// An image of the cursor's stop, or the sentence that says why it is not there yet.

@@ -1,14 +1,13 @@
 //! The legend of an image: each mark with its shape and its word; a click hides or shows it.
+//!
+//! It never covers the image: it stands beside it where the image's shape leaves room there, else in rows above it.
 
-use egui::{Align2, Pos2, Rect, Sense, Vec2, pos2, vec2};
-
-use sightline_core::frames::Pixel;
+use egui::{Rect, Sense, Ui, UiBuilder, vec2};
 
 use crate::command::{Command, Layer};
 use crate::overlay::{Mark, paint_legend_row};
 use crate::state::State;
 use crate::theme;
-use crate::view2d::Canvas;
 
 /// One entry of a legend.
 #[derive(Clone, Debug)]
@@ -30,58 +29,79 @@ impl Entry {
     }
 }
 
-/// How far the legend stays away from what it must not cover, points.
-const CLEARANCE: f32 = 24.0;
-
 /// Height of a row, points.
 const ROW: f32 = 15.0;
 
-/// Paints the legend in a corner of the canvas away from the pixel `keep_free`, where there is room for it.
-pub fn show(
-    ui: &mut egui::Ui,
-    canvas: &Canvas,
+/// What a row's mark and margins take beside its word, points.
+const MARK: f32 = 32.0;
+
+/// Lays the legend out and gives the rest of the room to `show`: the image, `width_by_height` in shape, with
+/// `below` points under it.
+pub fn beside<R>(
+    ui: &mut Ui,
     entries: &[Entry],
-    keep_free: Option<Pixel>,
+    (width_by_height, below): (f32, f32),
     state: &State,
     out: &mut Vec<Command>,
-) {
-    let area = canvas.transform.rect;
-    if entries.is_empty()
-        || !state.marks
-        || area.height() < ROW * entries.len() as f32 + 60.0
-        || area.width() < 240.0
-    {
-        return;
+    show: impl FnOnce(&mut Ui, &mut Vec<Command>) -> R,
+) -> R {
+    if entries.is_empty() || !state.marks {
+        return show(ui, out);
     }
-    let galleys = entries.iter().map(|entry| {
-        canvas.painter.layout_no_wrap(entry.word.clone(), theme::image_font(), theme::TEXT).size().x
-    });
-    let width = galleys.fold(0.0_f32, f32::max) + 32.0;
-    let size = vec2(width, ROW * entries.len() as f32 + 6.0);
-    let frame = free_corner(area.shrink(6.0), size, keep_free.map(|pixel| canvas.transform.to_screen(pixel)));
-    canvas.painter.rect_filled(frame, 4.0, theme::SCRIM);
+    let widths: Vec<f32> = entries.iter().map(|entry| width_of(ui, entry)).collect();
+    let widest = widths.iter().copied().fold(0.0_f32, f32::max);
+    let area = ui.available_rect_before_wrap();
+    let legend_height = ROW * entries.len() as f32;
+    if !has_column(area, widest, legend_height, width_by_height, below) {
+        rows(ui, entries, &widths, state, out);
+        return show(ui, out);
+    }
+    let (left, rest) = area.split_left_right_at_x(area.left() + widest);
     for (i, entry) in entries.iter().enumerate() {
-        let at = pos2(frame.left() + 5.0, frame.top() + 3.0 + ROW * i as f32);
-        let row = Rect::from_min_size(at, vec2(width - 8.0, ROW));
-        let shown = !state.hidden.contains(&entry.layer);
-        paint_legend_row(&canvas.painter, at, entry.mark, entry.colour, &entry.word, shown);
-        let response = ui.interact(row, ui.scope_id().with(("legend", entry.layer)), Sense::click());
-        let action = if shown { "hide" } else { "show" };
-        response.widget_info(|| {
-            egui::WidgetInfo::selected(egui::Role::CheckBox, true, shown, format!("{} (legend)", entry.word))
-        });
-        if response.on_hover_text(format!("Click to {action} “{}”", entry.word)).clicked() {
-            out.push(Command::ToggleLayer(entry.layer));
-        }
+        let top = left.left_top() + vec2(0.0, 3.0 + ROW * i as f32);
+        row(ui, Rect::from_min_size(top, vec2(widest, ROW)), entry, state, out);
     }
+    let shown = show(&mut ui.new_child(UiBuilder::new().max_rect(rest).id_salt("beside")), out);
+    ui.advance_cursor_after_rect(area);
+    shown
 }
 
-/// The first corner, beginning at the upper left, in which a box of `size` stays clear of `keep_free`.
-fn free_corner(area: Rect, size: Vec2, keep_free: Option<Pos2>) -> Rect {
-    let corners = [Align2::LEFT_TOP, Align2::LEFT_BOTTOM, Align2::RIGHT_TOP, Align2::RIGHT_BOTTOM];
-    let frames = corners.map(|corner| corner.align_size_within_rect(size, area));
-    let is_free = |frame: &&Rect| keep_free.is_none_or(|at| !frame.expand(CLEARANCE).contains(at));
-    *frames.iter().find(is_free).unwrap_or(&frames[0])
+/// Whether a column for the legend takes nothing from the image.
+fn has_column(area: Rect, widest: f32, height: f32, width_by_height: f32, below: f32) -> bool {
+    let room = area.height() - below;
+    room >= height && area.width() - widest >= room * width_by_height
+}
+
+fn width_of(ui: &Ui, entry: &Entry) -> f32 {
+    let galley = ui.painter().layout_no_wrap(entry.word.clone(), theme::image_font(), theme::TEXT);
+    galley.size().x + MARK
+}
+
+/// The entries one after the other, in as many rows as they need.
+fn rows(ui: &mut Ui, entries: &[Entry], widths: &[f32], state: &State, out: &mut Vec<Command>) {
+    let area = ui.available_rect_before_wrap();
+    let mut at = area.left_top();
+    for (entry, width) in entries.iter().zip(widths) {
+        if at.x > area.left() && at.x + width > area.right() {
+            at = egui::pos2(area.left(), at.y + ROW);
+        }
+        row(ui, Rect::from_min_size(at, vec2(*width, ROW)), entry, state, out);
+        at.x += width;
+    }
+    ui.add_space(at.y + ROW - area.top());
+}
+
+fn row(ui: &Ui, row: Rect, entry: &Entry, state: &State, out: &mut Vec<Command>) {
+    let shown = !state.hidden.contains(&entry.layer);
+    paint_legend_row(ui.painter(), row.min, entry.mark, entry.colour, &entry.word, shown);
+    let response = ui.interact(row, ui.scope_id().with(("legend", entry.layer)), Sense::click());
+    let action = if shown { "hide" } else { "show" };
+    response.widget_info(|| {
+        egui::WidgetInfo::selected(egui::Role::CheckBox, true, shown, format!("{} (legend)", entry.word))
+    });
+    if response.on_hover_text(format!("Click to {action} “{}”", entry.word)).clicked() {
+        out.push(Command::ToggleLayer(entry.layer));
+    }
 }
 
 #[cfg(test)]
@@ -89,12 +109,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_legend_keeps_clear_of_the_target() {
-        let area = Rect::from_min_size(pos2(0.0, 0.0), vec2(400.0, 300.0));
-        let size = vec2(150.0, 80.0);
-        let corner = |at: Option<Pos2>| free_corner(area, size, at).min;
-        assert_eq!(corner(None), pos2(0.0, 0.0));
-        assert_eq!(corner(Some(pos2(300.0, 200.0))), pos2(0.0, 0.0));
-        assert_eq!(corner(Some(pos2(100.0, 50.0))), pos2(0.0, 220.0));
+    fn the_legend_stands_beside_the_image_only_where_that_makes_it_no_smaller() {
+        let area = |width: f32| Rect::from_min_size(egui::Pos2::ZERO, vec2(width, 324.0));
+        // A square image of 300 points and a legend of 150.
+        assert!(has_column(area(450.0), 150.0, 100.0, 1.0, 24.0));
+        assert!(!has_column(area(449.0), 150.0, 100.0, 1.0, 24.0));
+        assert!(!has_column(area(450.0), 150.0, 301.0, 1.0, 24.0), "the legend itself must fit");
     }
 }

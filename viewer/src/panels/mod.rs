@@ -1,21 +1,27 @@
 //! The panels: read-only data in, commands out. Each file shows one thing.
 
 pub mod bars;
+pub mod budget;
+pub mod exposure;
 pub mod gates;
 pub mod help;
+pub mod history;
 pub mod image_right;
 pub mod images_left;
 pub mod inspector;
 pub mod legend;
+pub mod machine;
 pub mod map;
 pub mod messages;
 pub mod names;
 pub mod plots;
 pub mod settings;
+pub mod stereo_profile;
 pub mod strip;
 pub mod surface;
 pub mod targets;
 pub mod timeline;
+pub mod tolerances;
 
 use egui::{Align, Layout, RichText, Ui, UiBuilder};
 
@@ -34,10 +40,14 @@ pub fn missing(ui: &mut Ui, purpose: &str, sentence: &str) {
     ui.advance_cursor_after_rect(space);
 }
 
+/// What is smaller than this is the rounding of a computation in metres or pixels, not a measurement.
+const ROUNDING: f64 = 1e-12;
+
 /// A number with as many digits as make sense for its size.
 pub fn digits(value: f64) -> String {
     let size = value.abs();
     match size {
+        _ if size < ROUNDING => "0".to_owned(),
         _ if value == value.trunc() && size < 1e9 => format!("{value:.0}"),
         _ if (100.0..1e7).contains(&size) => format!("{value:.1}"),
         _ if (10.0..1e7).contains(&size) => format!("{value:.2}"),
@@ -57,6 +67,7 @@ mod tests {
         assert_eq!(digits(0.71234), "0.712");
         assert_eq!(digits(-2.71734), "-2.717");
         assert_eq!(digits(0.00012), "1.20e-4");
+        assert_eq!(digits(-6.2e-18), "0", "the rounding of a difference is no bias");
         assert_eq!(digits(f64::NAN), "NaN");
     }
 }

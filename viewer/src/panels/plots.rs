@@ -2,7 +2,8 @@
 
 use egui::{Color32, Id, Ui, vec2};
 use egui_plot::{
-    GridMark, HLine, HoverPosition, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotUi, Points, VLine,
+    GridInput, GridMark, HLine, HoverPosition, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotUi, Points,
+    VLine,
 };
 use sightline_core::session::view::RunView;
 use sightline_core::trace::StepRow;
@@ -168,8 +169,19 @@ fn series(plot: &mut PlotUi<'_>, run: &RunView, line: &Series) {
     }
 }
 
+/// Two to four ticks at round numbers, however low a plot is.
+pub(super) fn few_marks(input: GridInput) -> Vec<GridMark> {
+    let (low, high) = input.bounds;
+    let wanted = (high - low).max(1e-9) / 2.5;
+    let decade = 10_f64.powf(wanted.log10().floor());
+    let step = [1.0, 2.0, 5.0, 10.0].map(|m| m * decade).into_iter().find(|step| *step >= wanted);
+    let step = step.unwrap_or(10.0 * decade);
+    let (first, last) = ((low / step).ceil() as i64, (high / step).floor() as i64);
+    (first..=last).map(|i| GridMark { value: i as f64 * step, step_size: high - low }).collect()
+}
+
 /// The runs of consecutive points.
-fn pieces(points: &[Option<[f64; 2]>]) -> Vec<Vec<[f64; 2]>> {
+pub(super) fn pieces(points: &[Option<[f64; 2]>]) -> Vec<Vec<[f64; 2]>> {
     let runs = points.split(Option::is_none);
     runs.filter(|run| !run.is_empty()).map(|run| run.iter().copied().flatten().collect()).collect()
 }
@@ -177,6 +189,19 @@ fn pieces(points: &[Option<[f64; 2]>]) -> Vec<Vec<[f64; 2]>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn ticks_stand_at_few_round_numbers() {
+        let values = |low: f64, high: f64| -> Vec<f64> {
+            few_marks(GridInput { bounds: (low, high), base_step_size: 1.0 })
+                .iter()
+                .map(|m| m.value)
+                .collect()
+        };
+        assert_eq!(values(-1.0, 12.3), vec![0.0, 10.0]);
+        assert_eq!(values(0.0, 1.1), vec![0.0, 0.5, 1.0]);
+        assert_eq!(values(-2.0, 43.0), vec![0.0, 20.0, 40.0]);
+    }
 
     #[test]
     fn a_line_is_broken_where_there_is_no_value() {

@@ -21,6 +21,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         panels::missing(ui, "Thresholds and parameters of a run", &state.missing_target());
         return;
     }
+    presets(ui, state, out);
     foot(ui, state, out);
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let mut group = "";
@@ -33,6 +34,30 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             show_setting(ui, state, info, out);
         }
     });
+}
+
+/// The named configurations: choosing one makes the changes that lead to it, which the next run then uses.
+fn presets(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let now = state.pending().and_then(|settings| state.configurations.named(&settings));
+    let name = now.map_or("no preset", |preset| preset.name);
+    ui.horizontal(|ui| {
+        ui.label(theme::label("preset"));
+        let choice = ComboBox::from_id_salt("preset").width(ui.available_width()).height(420.0);
+        let shown = choice.selected_text(RichText::new(name).color(theme::STRONG)).show_ui(ui, |ui| {
+            ui.set_min_width(300.0);
+            for preset in state.configurations.all() {
+                let is_chosen = now.is_some_and(|now| now.name == preset.name);
+                if ui.selectable_label(is_chosen, preset.name).clicked() {
+                    out.push(Command::UsePreset(preset.name));
+                }
+                ui.add(egui::Label::new(theme::note(preset.description)).wrap());
+                ui.add_space(3.0);
+            }
+        });
+        shown.response.accessible_name("configuration preset");
+    });
+    let sentence = now.map_or("Settings that no preset has.", |preset| preset.description);
+    ui.add(egui::Label::new(theme::note(sentence)).wrap());
 }
 
 /// What is changed, and the buttons that use or drop it.

@@ -57,9 +57,21 @@ fn show_target(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Co
     });
     let at = target.designation;
     ui.label(theme::note(format!("picked at step {}, pixel {:.1}, {:.1}", at.step, at.pixel.x, at.pixel.y)));
+    for sentence in warnings(state, target) {
+        ui.add(egui::Label::new(RichText::new(format!("! {sentence}")).small().color(theme::LOST)).wrap())
+            .on_hover_text("A warning about the pick; it can be tracked all the same.");
+    }
     for run in &target.runs {
         show_run(ui, state, target, run, out);
     }
+}
+
+/// Why the target that is looked at may be badly picked (R21).
+fn warnings<'a>(state: &'a State, target: &TargetView) -> Vec<&'a str> {
+    let is_selected = state.cursor.target == Some(target.number);
+    let pick = state.trace_at(target.designation.step).ready().filter(|_| is_selected);
+    let evidence = pick.and_then(sightline_core::trace::StepTrace::template);
+    evidence.map_or_else(Vec::new, |e| e.warnings.iter().map(|warning| warning.sentence.as_str()).collect())
 }
 
 fn show_run(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: &mut Vec<Command>) {
@@ -72,13 +84,19 @@ fn show_run(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out:
             let (mark, _) = ui.allocate_exact_size(vec2(14.0, 14.0), Sense::hover());
             paint_mark(ui.painter(), mark.center(), run_mark(run.number), theme::run(run.number), 6.0);
             ui.label(RichText::new(format!("run {}", run_letter(run.number))).color(theme::STRONG));
-            let from = run.fork.map(|f| format!("{} › step {}", run_letter(f.run), f.from_step));
-            ui.label(theme::note(from.unwrap_or_default()));
+            if let Some(preset) = state.configurations.named(&run.settings) {
+                ui.label(RichText::new(preset.name).color(theme::ACCENT)).on_hover_text(preset.description);
+            }
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| how_far(ui, state, target, run, out));
         });
         sparkline(ui, run, state.stop_count());
+        if let Some(fork) = run.fork {
+            ui.label(theme::note(format!("from run {} at step {}", run_letter(fork.run), fork.from_step)));
+        }
         ui.label(theme::note(summary(run)));
-        for (key, value) in &run.changes {
+        // A preset's name says them all.
+        let unnamed = state.configurations.named(&run.settings).is_none();
+        for (key, value) in run.changes.iter().filter(|_| unnamed) {
             ui.label(theme::note(format!("{key} = {value}")).monospace());
         }
     });

@@ -28,6 +28,7 @@ impl State {
                     None => self.draft.remove(&key),
                 };
             }
+            Command::UsePreset(name) => self.draft = self.changes_to(name).unwrap_or_default(),
             Command::ClearDraft => self.draft.clear(),
             Command::RunFromHere(changes) => self.run_from_here(changes),
             Command::CancelRun { target, run } => {
@@ -41,6 +42,8 @@ impl State {
                 Panel::Right => self.views.right = view,
                 Panel::Surface => self.views.surface = view,
             },
+            Command::SetCalculator(calculator) => self.calculator = calculator,
+            Command::SetStretch(stretch) => self.stretch = stretch,
             Command::FitAll => self.views = Views::default(),
             Command::ToggleLayer(layer) => {
                 if !self.hidden.remove(&layer) {

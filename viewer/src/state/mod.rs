@@ -5,7 +5,11 @@
 
 mod apply;
 mod arrive;
+pub mod calculator;
+mod configurations;
 pub mod messages;
+mod missing;
+mod wanted;
 
 use std::collections::{BTreeMap, HashSet};
 
@@ -19,11 +23,14 @@ use sightline_core::settings::Changes;
 use sightline_core::target::TrackingState;
 use sightline_core::trace::{ArrayName, StepRow, StepTrace};
 
+use self::calculator::Calculator;
+use self::configurations::Configurations;
 use self::messages::Messages;
 use crate::cache::{Cache, Eye, Key, Slot, StepKey};
 use crate::command::{Layer, Mode, Panel, Stage};
 use crate::net::Request;
 use crate::raster::Raster;
+use crate::stretch::Stretch;
 use crate::view2d::View2d;
 
 /// How the server's events come in.
@@ -101,6 +108,8 @@ pub struct State {
     pub session: Option<SessionView>,
     /// Every setting.
     pub settings: Vec<SettingInfo>,
+    /// The named configurations.
+    pub configurations: Configurations,
     /// What is looked at; ahead of the server's cursor by the time of a request.
     pub cursor: Cursor,
     /// The stage that is looked at.
@@ -123,6 +132,12 @@ pub struct State {
     pub messages: Messages,
     /// What each panel shows.
     pub views: Views,
+    /// How the images' grey values become brightness on the screen.
+    pub stretch: Stretch,
+    /// What the calculator of the error budget is given.
+    pub calculator: Calculator,
+    /// Whether the windows of all steps are on the screen.
+    pub wants_history: bool,
     /// Layers of marks that are switched off.
     pub hidden: HashSet<Layer>,
     /// Whether marks are shown at all.
@@ -162,6 +177,7 @@ impl State {
             traverse: None,
             session: None,
             settings: Vec::new(),
+            configurations: Configurations::default(),
             cursor: Cursor::default(),
             stage: Stage::MatchTemplate,
             mode: Mode::default(),
@@ -173,6 +189,9 @@ impl State {
             refusal: None,
             messages: Messages::default(),
             views: Views::default(),
+            stretch: Stretch::default(),
+            calculator: Calculator::default(),
+            wants_history: false,
             hidden: HashSet::new(),
             marks: true,
             open_url: None,
@@ -269,58 +288,6 @@ impl State {
         }
     }
 
-    /// Why the panels of a step have nothing to show, as a sentence that says how to get it.
-    pub fn missing_step(&self) -> String {
-        let Some(target) = self.target() else { return self.missing_target() };
-        let step = self.cursor.step;
-        if step < target.designation.step {
-            let first = target.designation.step;
-            return format!(
-                "{} was picked at step {first}. Go there, or press PgDn for the next event.",
-                target.label
-            );
-        }
-        if self.row().is_none() {
-            return match (self.run_progress(), self.run().and_then(|run| run.stopped.as_deref())) {
-                (Some(p), _) => {
-                    format!("Step {step} is not computed yet: the run has done {} of {}.", p.k, p.n)
-                }
-                (None, Some(why)) => format!(
-                    "The run stopped before step {step} ({why}). Press “Run from here” at an earlier step."
-                ),
-                (None, None) => {
-                    format!("Step {step} is not computed yet. It appears here as soon as the run reaches it.")
-                }
-            };
-        }
-        match self.trace_at(step) {
-            Slot::Failed(problem) => format!("Step {step} cannot be shown: {}", problem.detail),
-            Slot::Ready(trace) => match (&trace.fault, &trace.locate) {
-                (Some(fault), _) => format!("The files of step {step} are at fault: {fault}"),
-                (None, Some(located)) if located.missing.is_some() => {
-                    located.missing.clone().unwrap_or_default()
-                }
-                _ if trace.predict.is_none() => {
-                    "Here the target was picked: nothing had to be matched. Go one step on (Right) to see a match.".to_owned()
-                }
-                _ => "This stage was not reached at this step.".to_owned(),
-            },
-            Slot::Absent | Slot::Loading => format!("Loading step {step} …"),
-        }
-    }
-
-    /// Why there is no target, as a sentence that says how to get one.
-    pub fn missing_target(&self) -> String {
-        match (&self.traverse, &self.traverses) {
-            (None, None) => "Asking the server for its traverses …".to_owned(),
-            (None, Some(list)) if list.is_empty() => {
-                "The server has no traverse. Import one with `sightline import`, or simulate one with `sightline simulate`.".to_owned()
-            }
-            (None, Some(_)) => "Opening the traverse …".to_owned(),
-            (Some(_), _) => "No target yet. Press T, then click a rock in the left image.".to_owned(),
-        }
-    }
-
     /// The latest tracking state of the cursor's step.
     pub fn tracking(&self) -> Option<TrackingState> {
         if let Some(trace) = self.trace() {
@@ -334,40 +301,6 @@ impl State {
         match self.image(eye) {
             Slot::Failed(problem) => Some(problem),
             _ => None,
-        }
-    }
-
-    /// What the page wants loaded, most urgent first: the cursor's step, then the next and the previous one.
-    pub fn wanted(&self) -> Vec<Key> {
-        let step = self.cursor.step;
-        let mut keys = Vec::new();
-        for (near, step) in [(false, Some(step)), (true, step.checked_add(1)), (true, step.checked_sub(1))] {
-            if let Some(step) = step.filter(|&step| step < self.stop_count()) {
-                self.want_step(step, near, &mut keys);
-            }
-        }
-        keys
-    }
-
-    /// Those of `keys` that are images which must be rendered first.
-    pub fn unrendered(&self, keys: &[Key]) -> Vec<Key> {
-        let is_ready =
-            |step: usize| self.traverse.as_ref().and_then(|t| t.stops.get(step)).is_some_and(|s| s.ready);
-        let is_slow = |key: &&Key| matches!(key, Key::Image { step, .. } if !is_ready(*step));
-        keys.iter().filter(is_slow).cloned().collect()
-    }
-
-    fn want_step(&self, step: usize, is_neighbour: bool, keys: &mut Vec<Key>) {
-        let computed = self.row_at(step).and_then(|_| self.step_key(step));
-        keys.extend(computed.clone().map(Key::Trace));
-        // The images of a simulated stop take a while: only the one that is looked at is worth that.
-        let is_ready = self.traverse.as_ref().and_then(|t| t.stops.get(step)).is_some_and(|stop| stop.ready);
-        if is_ready || !is_neighbour {
-            keys.extend([Eye::Left, Eye::Right].into_iter().filter_map(|eye| self.image_key(step, eye)));
-        }
-        if let Some((trace, key)) = self.trace_at(step).ready().zip(computed) {
-            let there = ArrayName::ALL.into_iter().filter(|&name| has_array(trace, name));
-            keys.extend(there.map(|name| Key::Array(key.clone(), name)));
         }
     }
 
@@ -393,16 +326,6 @@ impl State {
             self.sync.cursor_messages += 1;
             self.outbox.push(Request::PutCursor { session: id, cursor: self.cursor });
         }
-    }
-}
-
-/// Whether the stage that makes an array was reached.
-fn has_array(trace: &StepTrace, name: ArrayName) -> bool {
-    let Some(evidence) = trace.template() else { return false };
-    match name {
-        ArrayName::Reference | ArrayName::Scaled | ArrayName::Rolled => evidence.scale_roll.is_some(),
-        ArrayName::Matched | ArrayName::Difference | ArrayName::Surface => evidence.match_template.is_some(),
-        ArrayName::RightWindow => evidence.point_stereo.is_some(),
     }
 }
 

@@ -32,18 +32,18 @@ use crate::raster::Raster;
 use crate::state::{Connection, State};
 
 /// How many stops the drive has.
-pub(super) const STOPS: usize = 6;
+pub(crate) const STOPS: usize = 6;
 /// Where the target is seen at every stop, px.
-pub(super) const PIXEL: Pixel = Pixel::new(512.3, 480.6);
+pub(crate) const PIXEL: Pixel = Pixel::new(512.3, 480.6);
 const POSITION: [f64; 3] = [6.0, 0.4, 0.2];
 
 /// A server that said nothing yet.
-pub(super) fn nothing() -> State {
+pub(crate) fn nothing() -> State {
     State::new("http://localhost".to_owned(), None)
 }
 
 /// The drive in the server's list.
-pub(super) fn entry() -> TraverseEntry {
+pub(crate) fn entry() -> TraverseEntry {
     TraverseEntry {
         id: "drive".to_owned(),
         name: "Six stops".to_owned(),
@@ -54,7 +54,7 @@ pub(super) fn entry() -> TraverseEntry {
 }
 
 /// An open traverse and session without targets.
-pub(super) fn without_target() -> State {
+pub(crate) fn without_target() -> State {
     let mut state = nothing();
     state.connection = Connection::Live;
     state.traverses = Some(vec![entry()]);
@@ -71,7 +71,7 @@ pub(super) fn without_target() -> State {
 }
 
 /// A session with one target and its run, at `step`, with everything of that step loaded.
-pub(super) fn at_step(context: &egui::Context, step: usize) -> State {
+pub(crate) fn at_step(context: &egui::Context, step: usize) -> State {
     let mut state = without_target();
     let traces: Vec<StepTrace> = (0..STOPS - 1).map(trace).collect();
     let run = RunView {
@@ -108,6 +108,32 @@ pub(super) fn at_step(context: &egui::Context, step: usize) -> State {
     state
 }
 
+/// As [`at_step`], with the records and windows of all steps loaded; every step saw the same from the same distance.
+pub(crate) fn with_history(context: &egui::Context, step: usize) -> State {
+    let mut state = at_step(context, step);
+    for other in 0..STOPS - 1 {
+        let mut trace = trace(other);
+        if let Some(Evidence::Template(evidence)) = trace.locate.as_mut().map(|located| &mut located.evidence)
+            && let Some(prepared) = &mut evidence.scale_roll
+        {
+            (prepared.image_from_template, prepared.template_step) = (Matrix2::identity(), other - 1);
+        }
+        let key = StepKey { session: "s1".to_owned(), target: 0, run: 0, step: other };
+        load(&mut state, trace);
+        for name in [ArrayName::Reference, ArrayName::Matched] {
+            let raster = Raster::from_npy(context, name, &npy::encode(&bump(21)).unwrap()).unwrap();
+            state.cache.arrived(Key::Array(key.clone(), name), Ok(Item::Raster(Arc::new(raster))), 0.0);
+        }
+    }
+    state
+}
+
+/// Loads the record of a step of the first run.
+pub(crate) fn load(state: &mut State, trace: StepTrace) {
+    let key = StepKey { session: "s1".to_owned(), target: 0, run: 0, step: trace.step };
+    state.cache.arrived(Key::Trace(key), Ok(Item::Trace(Arc::new(trace))), 0.0);
+}
+
 /// A smooth hill with a hole.
 fn bump(side: u32) -> GrayImage {
     GrayImage::from_fn(side, side, |x, y| {
@@ -141,7 +167,7 @@ fn traverse() -> TraverseView {
 }
 
 /// The record of a step: the designation, two good ones, one lost, one failed.
-pub(super) fn trace(step: usize) -> StepTrace {
+pub(crate) fn trace(step: usize) -> StepTrace {
     let state = match step {
         0..3 => TrackingState::Tracking,
         3 => TrackingState::Lost { count: 1 },

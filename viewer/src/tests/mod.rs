@@ -1,7 +1,10 @@
 //! Smoke tests of the panels from a fixed drive: what each says when it has data, and when it has none.
 
-mod fixture;
+mod accuracy;
+pub(crate) mod fixture;
+mod history;
 mod session;
+mod tracking;
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
@@ -49,11 +52,14 @@ impl<'a> Shown<'a> {
     }
 
     fn says(&self, words: &str) -> &Self {
+        let texts = std::cell::RefCell::new(Vec::new());
         let found = self.harness.query_all_by(|node| {
-            let has = |text: Option<String>| text.is_some_and(|text| text.contains(words));
-            has(node.label()) || has(node.value())
+            let all: Vec<String> = [node.label(), node.value()].into_iter().flatten().collect();
+            let has = all.iter().any(|text| text.contains(words));
+            texts.borrow_mut().extend(all);
+            has
         });
-        assert!(found.count() > 0, "“{words}” is not on the screen");
+        assert!(found.count() > 0, "“{words}” is not on the screen, but {:?}", texts.take());
         self
     }
 

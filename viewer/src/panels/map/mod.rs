@@ -1,10 +1,12 @@
 //! The map: the rover's path and the target's trail in the site frame, seen from above, north up.
 //!
 //! Site frame: +x north, +y east, +z down. On the map east is to the right, so a site point is drawn at (y, x).
+//! Beside the whole drive stands the target's neighbourhood, where the positions converge (`convergence`).
 
-use egui::{Color32, Ui, vec2};
-use egui_plot::{Arrows, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotPoints, PlotUi, Points, Polygon};
-use nalgebra::Matrix2;
+mod convergence;
+
+use egui::{Color32, Rect, Ui, UiBuilder, vec2};
+use egui_plot::{Arrows, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotPoints, PlotUi, Points};
 use sightline_core::frames::{Point3, Pose, PoseRecord};
 use sightline_core::session::view::RunView;
 use sightline_core::session::wire::StopView;
@@ -13,13 +15,16 @@ use super::names;
 use crate::command::{Command, Go};
 use crate::overlay::{self, Mark};
 use crate::state::{State, run_letter};
-use crate::{ellipse, panels, theme};
+use crate::{panels, theme};
 
 /// What the panel is for.
 const PURPOSE: &str = "The rover’s path and the target, seen from above.";
 
 /// How near to a stop a click must be to go there, points.
 const CLICK_REACH: f32 = 14.0;
+
+/// Room between the two maps, points.
+const GAP: f32 = 8.0;
 
 /// East and north of a point of the site frame.
 fn on_map(point_in_site: &Point3) -> [f64; 2] {
@@ -33,14 +38,54 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         return;
     };
     let stops = &traverse.stops;
-    names::show(ui, "", &names_of(state, stops));
-    let plot = Plot::new(("map", &traverse.id))
+    names::wrapped(ui, "", &names_of(state, stops));
+    let run = state.run().filter(|run| !run.rows.is_empty());
+    let Some(run) = run else {
+        drive(ui, state, stops, None, out);
+        return;
+    };
+    // The drive keeps its shape, so that a long narrow one takes a strip; the target's neighbourhood gets the rest.
+    let area = ui.available_rect_before_wrap();
+    let (first, second) = split(area, aspect(stops, run));
+    let part = |rect: Rect, salt: &str| UiBuilder::new().max_rect(rect).id_salt(salt.to_owned());
+    drive(&mut ui.new_child(part(first, "drive")), state, stops, Some(run), out);
+    let second = second.with_min_x(second.left() + GAP);
+    convergence::show(&mut ui.new_child(part(second, "target")), state, stops, run);
+    ui.advance_cursor_after_rect(area);
+}
+
+/// Width over height of what the map of the drive must hold.
+fn aspect(stops: &[StopView], run: &RunView) -> f32 {
+    let path = poses(stops, |stop| Some(stop.site_from_rover));
+    let trail = convergence::positions(run, stops).into_iter().map(|at| on_map(&at.point_in_site));
+    let all: Vec<[f64; 2]> = path.into_iter().chain(trail).collect();
+    let side = |k: usize| {
+        let values = || all.iter().map(|point| point[k]);
+        values().fold(f64::MIN, f64::max) - values().fold(f64::MAX, f64::min)
+    };
+    (side(0).max(0.1) / side(1).max(0.1)) as f32
+}
+
+/// The drive's part and the target's: side by side where the drive is narrow, one above the other where it is wide.
+fn split(area: Rect, width_by_height: f32) -> (Rect, Rect) {
+    if width_by_height * area.height() <= area.width() {
+        let share = (width_by_height * area.height() / area.width() * 1.3 + 0.12).clamp(0.3, 0.5);
+        area.split_left_right_at_fraction(share)
+    } else {
+        let share = (area.width() / width_by_height / area.height() * 1.3 + 0.12).clamp(0.35, 0.5);
+        area.split_top_bottom_at_fraction(share)
+    }
+}
+
+/// The whole drive.
+fn drive(ui: &mut Ui, state: &State, stops: &[StopView], run: Option<&RunView>, out: &mut Vec<Command>) {
+    let plot = Plot::new(("map", state.traverse.as_ref().map(|traverse| &traverse.id)))
         .data_aspect(1.0)
-        .set_margin_fraction(vec2(0.12, 0.12))
+        .set_margin_fraction(vec2(0.12, 0.08))
         .show_grid([true, true])
         .x_axis_label(theme::note("east, m"))
         .y_axis_label(theme::note("north, m"))
-        .y_axis_min_width(24.0)
+        .y_axis_min_width(22.0)
         .allow_boxed_zoom(false)
         .label_formatter(|_| None)
         .coordinates_formatter(
@@ -49,8 +94,12 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         );
     let response = plot.show(ui, |plot| {
         paint_paths(plot, stops, state.cursor.step);
-        if let Some(run) = state.run() {
-            paint_trail(plot, state, stops, run);
+        if let Some(run) = run {
+            paint_trail(plot, stops, run);
+        }
+        if let Some((truth, _)) = truth_in_site(state) {
+            let points = Points::new("", on_map(&truth)).color(theme::TRUTH).radius(6.0);
+            plot.points(points.shape(MarkerShape::Plus));
         }
         plot.response().clicked().then(|| nearest_stop(plot, stops)).flatten()
     });
@@ -115,45 +164,13 @@ fn span_m(stops: &[StopView]) -> f64 {
     side(0).max(side(1))
 }
 
-/// Where the run placed the target from each stop, and what is known of it at the cursor's.
-fn paint_trail(plot: &mut PlotUi<'_>, state: &State, stops: &[StopView], run: &RunView) {
+/// Where the run placed the target from each stop.
+fn paint_trail(plot: &mut PlotUi<'_>, stops: &[StopView], run: &RunView) {
     let colour = theme::run(run.number);
-    let trail: Vec<[f64; 2]> = run
-        .rows
-        .iter()
-        .filter_map(|row| {
-            let stop = stops.get(row.step)?;
-            Some(on_map(&(stop.site_from_rover.to_pose() * Point3::from(row.position_in_rover))))
-        })
-        .collect();
-    let name = format!("target, run {}", run_letter(run.number));
-    plot.line(Line::new(&name, trail.clone()).color(colour).width(1.0));
-    plot.points(Points::new(&name, trail).color(colour).radius(2.5).shape(MarkerShape::Diamond));
-    let (Some(trace), Some(stop)) = (state.trace(), state.stop()) else { return };
-    let site_from_rover = stop.site_from_rover.to_pose();
-    let target = &trace.update.target;
-    let centre = site_from_rover * target.position_in_rover;
-    let rotation = site_from_rover.rotation.to_rotation_matrix();
-    let in_site = rotation.matrix() * target.covariance_in_rover * rotation.matrix().transpose();
-    let from_above = Matrix2::new(in_site[(1, 1)], in_site[(1, 0)], in_site[(0, 1)], in_site[(0, 0)]);
-    for (sigmas, style) in [(1.0, LineStyle::Solid), (3.0, LineStyle::dashed_dense())] {
-        let Some(outline) = ellipse::outline(&from_above, sigmas) else { continue };
-        let [east, north] = on_map(&centre);
-        let points: Vec<[f64; 2]> = outline.iter().map(|d| [east + d.x, north + d.y]).collect();
-        let polygon = Polygon::new("", points).style(style).allow_hover(false);
-        plot.polygon(polygon.fill_color(Color32::TRANSPARENT).stroke(egui::Stroke::new(1.5, colour)));
-    }
-    plot.points(
-        Points::new(&name, on_map(&centre))
-            .color(colour)
-            .radius(5.0)
-            .shape(MarkerShape::Diamond)
-            .filled(false),
-    );
-    if let Some((truth, _)) = truth_in_site(state) {
-        let points = Points::new("truth", on_map(&truth)).color(theme::TRUTH).radius(6.0);
-        plot.points(points.shape(MarkerShape::Plus));
-    }
+    let trail: Vec<[f64; 2]> =
+        convergence::positions(run, stops).iter().map(|at| on_map(&at.point_in_site)).collect();
+    plot.line(Line::new("", trail.clone()).color(colour).width(1.0));
+    plot.points(Points::new("", trail).color(colour).radius(2.5).shape(MarkerShape::Diamond));
 }
 
 /// The true position, carried by the true pose, and the estimate's distance from it in the site frame, m.
@@ -178,6 +195,15 @@ fn nearest_stop(plot: &PlotUi<'_>, stops: &[StopView]) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_drive_takes_a_strip_and_the_target_the_rest() {
+        let area = Rect::from_min_size(egui::Pos2::ZERO, vec2(400.0, 300.0));
+        let (drive, target) = split(area, 0.1);
+        assert!(drive.height() == 300.0 && drive.width() <= 0.31 * 400.0 && target.width() > 0.6 * 400.0);
+        let (drive, target) = split(area, 8.0);
+        assert!(drive.width() == 400.0 && drive.height() < target.height());
+    }
 
     #[test]
     fn north_is_up_and_east_is_right() {

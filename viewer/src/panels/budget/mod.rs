@@ -1,0 +1,158 @@
+//! The error budget: a calculator over K-Eq 1 to 5 for a pair of cameras, the paper's Table I computed beside printed,
+//! and what was predicted against what was achieved (R43–R47). The equations are in `core::estimate::error_budget`.
+
+mod plot;
+mod table;
+
+use egui::{ComboBox, DragValue, Grid, RichText, ScrollArea, Ui};
+use sightline_core::estimate::error_budget::{Approach, ErrorBudget, PLACEMENT_NEED_M, StereoPair};
+
+use crate::command::Command;
+use crate::state::State;
+use crate::state::calculator::Pair;
+use crate::{panels, theme};
+
+/// What the panel is for.
+const PURPOSE: &str = "What accuracy stereo, driving and drift leave.";
+
+/// Shows the calculator, the overlay and the table.
+pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    if state.traverse.is_none() {
+        panels::missing(ui, PURPOSE, &state.missing_target());
+        return;
+    }
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        inputs(ui, state, out);
+        let stereo = state.calculator.pair.stereo(state);
+        match stereo {
+            Some(pair) => results(ui, &pair, &state.calculator.approach),
+            None => {
+                let sentence =
+                    "The present cameras are known once a step with a target is loaded: pick one, or choose another pair.";
+                ui.add(egui::Label::new(RichText::new(sentence).color(theme::LOST)).wrap());
+            }
+        }
+        ui.separator();
+        plot::show(ui, state, stereo.as_ref());
+        ui.separator();
+        table::show(ui);
+    });
+}
+
+fn inputs(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let mut calculator = state.calculator;
+    ui.horizontal_wrapped(|ui| {
+        ui.label(theme::label("cameras"));
+        let choice = ComboBox::from_id_salt("pair").width(160.0).selected_text(calculator.pair.name());
+        let shown = choice.show_ui(ui, |ui| {
+            for pair in Pair::all() {
+                ui.selectable_value(&mut calculator.pair, pair, pair.name());
+            }
+        });
+        shown.response.accessible_name("cameras");
+        let approach = &mut calculator.approach;
+        let mut percent = approach.navigation_fraction * 100.0;
+        for (name, unit, value, range, help) in [
+            ("from", " m", &mut approach.start_m, 0.5..=100.0, "Distance at the designation"),
+            ("to", " m", &mut approach.end_m, 0.3..=100.0, "Distance at the end of the approach"),
+            (
+                "disparity ±",
+                " px",
+                &mut approach.disparity_error_px,
+                0.01..=10.0,
+                "3σ error of a disparity (R35)",
+            ),
+            (
+                "driving ±",
+                " %",
+                &mut percent,
+                0.0..=50.0,
+                "Error of navigation, per cent of the distance driven (R38)",
+            ),
+            ("drift", " px", &mut approach.drift_px, 0.0..=100.0, "Drift of the track in the last image"),
+        ] {
+            let drag = DragValue::new(value).range(range).speed(0.02).max_decimals(2);
+            let drag = drag.prefix(format!("{name} ")).suffix(unit);
+            ui.add(drag).accessible_name(name).on_hover_text(help);
+        }
+        if percent != approach.navigation_fraction * 100.0 {
+            approach.navigation_fraction = percent / 100.0;
+        }
+    });
+    if calculator != state.calculator {
+        out.push(Command::SetCalculator(calculator));
+    }
+}
+
+fn results(ui: &mut Ui, pair: &StereoPair, approach: &Approach) {
+    let budget = pair.budget(approach);
+    let optics =
+        format!("focal length {:.1} px, baseline {:.3} m; every error is 3σ", pair.focal_px, pair.baseline_m);
+    ui.label(theme::note(optics));
+    let rows = [
+        ("K-Eq 1", format!("stereo at {} m", approach.start_m), centimetres(budget.designation_m)),
+        (
+            "K-Eq 3",
+            format!("at {} m without tracking", approach.end_m),
+            centimetres(budget.without_tracking_m),
+        ),
+        ("K-Eq 1", format!("stereo at {} m", approach.end_m), centimetres(budget.stereo_m)),
+        ("K-Eq 4", "one pixel of drift there".to_owned(), centimetres(budget.drift_per_px_m)),
+        ("K-Eq 5", format!("at {} m with tracking", approach.end_m), centimetres(budget.with_tracking_m)),
+        (
+            "R40",
+            "least drift, ± half a pixel of the first image".to_owned(),
+            format!("{:.2} px", budget.least_drift_px),
+        ),
+    ];
+    Grid::new("budget values").num_columns(3).spacing([12.0, 2.0]).show(ui, |ui| {
+        for (source, name, value) in rows {
+            ui.label(theme::note(source));
+            ui.label(theme::label(name).size(12.0));
+            ui.label(theme::number(value));
+            ui.end_row();
+        }
+    });
+    let (words, is_enough) = verdict(&budget);
+    ui.add(egui::Label::new(RichText::new(words).color(theme::verdict(is_enough))).wrap());
+}
+
+/// Whether tracking is enough for placing an instrument (R46), and by how much it improves.
+fn verdict(budget: &ErrorBudget) -> (String, bool) {
+    let is_enough = budget.with_tracking_m < PLACEMENT_NEED_M;
+    let word = if is_enough { "below" } else { "NOT below" };
+    let gain = budget.without_tracking_m / budget.with_tracking_m.max(1e-9);
+    let need = PLACEMENT_NEED_M * 100.0;
+    (
+        format!(
+            "With tracking {word} the {need:.0} cm that placing an instrument needs; ×{gain:.1} better than without."
+        ),
+        is_enough,
+    )
+}
+
+/// A length in centimetres with the digits of Table I, and one more.
+fn centimetres(length_m: f64) -> String {
+    let length_cm = length_m * 100.0;
+    if length_cm < 1.0 { format!("{length_cm:.3} cm") } else { format!("{length_cm:.2} cm") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_verdict_compares_with_the_three_centimetres_of_instrument_placement() {
+        let navcam = Pair::TableOne(1).stereo(&State::new(String::new(), None)).unwrap();
+        let (words, is_enough) = verdict(&navcam.budget(&Approach::default()));
+        assert!(is_enough && words.contains("×19.1"), "{words}");
+        let (words, is_enough) = verdict(&navcam.budget(&Approach { drift_px: 20.0, ..Approach::default() }));
+        assert!(!is_enough && words.contains("NOT below"), "{words}");
+    }
+
+    #[test]
+    fn lengths_have_one_digit_more_than_the_paper() {
+        assert_eq!(centimetres(0.3875), "38.75 cm");
+        assert_eq!(centimetres(0.00155), "0.155 cm");
+    }
+}

@@ -1,0 +1,209 @@
+//! The state machine of loss: where tracking stands, and which criterion fired at each past update (R89–R93).
+//!
+//! ```text
+//! CLEARED → TRACKING ⇄ LOST (k of n_retry) → FAILED          clear leads to CLEARED from every state
+//! ```
+//! The papers call `tracking` NORMAL and `failed` FAILURE. While lost, up to `n_retry` further updates are tried; the
+//! one that detects the loss does not count among them unless `count_detecting_update` says so (R91).
+
+use egui::{Align2, Color32, Pos2, Rect, RichText, ScrollArea, Sense, Stroke, StrokeKind, Ui, pos2, vec2};
+use sightline_core::session::view::RunView;
+use sightline_core::target::TrackingState;
+use sightline_core::trace::StepRow;
+
+use crate::command::{Command, Go};
+use crate::state::{State, state_of_word};
+use crate::{panels, theme};
+
+/// What the panel is for.
+const PURPOSE: &str = "Where tracking stands, and which criterion fired at each past update.";
+
+/// Height of the diagram, points.
+const DIAGRAM: f32 = 96.0;
+/// Height of a state's box, points.
+const BOX: f32 = 34.0;
+
+/// A criterion that fired at an update.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fired {
+    /// Its number in K§4.6.
+    pub criterion: u8,
+    /// Its name, value and threshold.
+    pub words: String,
+}
+
+/// Shows diagram and history.
+pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let Some(run) = state.run() else {
+        panels::missing(ui, PURPOSE, &state.missing_target());
+        return;
+    };
+    let now = state.tracking().unwrap_or_default();
+    let count = bad_in_a_row(run, state.cursor.step);
+    diagram(ui, state, now, count);
+    ui.label(RichText::new(sentence(state, now, count)).color(theme::TEXT));
+    ui.separator();
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        let past = run.rows.iter().filter(|row| row.step <= state.cursor.step).rev();
+        for row in past {
+            history(ui, state, run, row, out);
+        }
+    });
+}
+
+/// How many updates in a row, up to a step, were bad.
+fn bad_in_a_row(run: &RunView, step: usize) -> u32 {
+    let past = run.rows.iter().filter(|row| row.step <= step).rev();
+    past.take_while(|row| state_of_word(&row.state).is_lost()).count() as u32
+}
+
+/// How many updates may follow the one that detects a loss.
+fn retries(state: &State) -> u32 {
+    let allowed = state.setting("limits", "n_retry").and_then(|v| v.as_u64()).unwrap_or(2) as u32;
+    let counts = state.setting("limits", "count_detecting_update").and_then(|v| v.as_bool()) == Some(true);
+    allowed.saturating_sub(u32::from(counts))
+}
+
+/// The present state in words, with what comes next.
+fn sentence(state: &State, now: TrackingState, count: u32) -> String {
+    let n = retries(state);
+    match now {
+        TrackingState::Cleared => "Nothing is tracked at this step.".to_owned(),
+        TrackingState::Tracking => format!("Tracking; a bad update leads to lost, with {n} retries."),
+        TrackingState::Lost { .. } => {
+            let k = count.saturating_sub(1).min(n);
+            format!("Lost: retry {k} of {n} is used. A good update leads back to tracking.")
+        }
+        TrackingState::Failed => "Failed until the target is cleared: no retry is left.".to_owned(),
+    }
+}
+
+/// The four states with their transitions.
+fn diagram(ui: &mut Ui, state: &State, now: TrackingState, count: u32) {
+    let (area, response) = ui.allocate_exact_size(vec2(ui.available_width(), DIAGRAM), Sense::hover());
+    let lost = match now {
+        TrackingState::Lost { .. } => {
+            format!("{} of {}", count.saturating_sub(1).min(retries(state)), retries(state))
+        }
+        _ => format!("k of {}", retries(state)),
+    };
+    let boxes = [
+        ("CLEARED", String::new(), TrackingState::Cleared),
+        ("TRACKING", "normal".to_owned(), TrackingState::Tracking),
+        ("LOST", lost, TrackingState::Lost { count: 1 }),
+        ("FAILED", "failure".to_owned(), TrackingState::Failed),
+    ];
+    let gap = (area.width() * 0.06).clamp(12.0, 40.0);
+    let width = (area.width() - 3.0 * gap - 4.0) / 4.0;
+    let frame = |i: usize| {
+        let left = area.left() + 2.0 + i as f32 * (width + gap);
+        Rect::from_min_size(pos2(left, area.center().y - BOX / 2.0), vec2(width, BOX))
+    };
+    for (i, (word, below, of)) in boxes.iter().enumerate() {
+        paint_state(ui, frame(i), word, below, theme::state(*of), now.word() == of.word());
+    }
+    paint_transitions(ui, [frame(0), frame(1), frame(2), frame(3)]);
+    let words = format!("state {}: {}", now.word(), sentence(state, now, count));
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, &words));
+    response.on_hover_text("Clear leads to CLEARED from every state: remove the target.");
+}
+
+fn paint_state(ui: &Ui, frame: Rect, word: &str, below: &str, colour: Color32, is_present: bool) {
+    let painter = ui.painter();
+    // The present state is filled and has a thick border, the others are outlines.
+    let fill = if is_present { colour.gamma_multiply(0.35) } else { Color32::TRANSPARENT };
+    let stroke = Stroke::new(if is_present { 3.0 } else { 1.0 }, colour);
+    painter.rect(frame, 6.0, fill, stroke, StrokeKind::Inside);
+    let text = if is_present { theme::STRONG } else { theme::TEXT };
+    let font = |of: egui::FontId| egui::FontId::new(of.size.min(frame.width() / 5.8), of.family);
+    if below.is_empty() {
+        painter.text(frame.center(), Align2::CENTER_CENTER, word, font(theme::image_font()), text);
+        return;
+    }
+    let middle = frame.center();
+    painter.text(middle - vec2(0.0, 7.0), Align2::CENTER_CENTER, word, font(theme::image_font()), text);
+    painter.text(
+        middle + vec2(0.0, 7.0),
+        Align2::CENTER_CENTER,
+        below,
+        font(theme::digit_font()),
+        theme::TEXT,
+    );
+}
+
+/// The arrows: pick, bad and good updates, retries without end, and clear.
+fn paint_transitions(ui: &Ui, [cleared, tracking, lost, failed]: [Rect; 4]) {
+    let above = |a: Rect, b: Rect, word: &str| {
+        let (from, to) = (a.right_top() + vec2(-8.0, 0.0), b.left_top() + vec2(8.0, 0.0));
+        bent(ui, from, to, -12.0, word);
+    };
+    above(cleared, tracking, "pick");
+    above(tracking, lost, "bad");
+    above(lost, failed, "k = n, bad");
+    let below = |a: Rect, b: Rect, word: &str| {
+        let (from, to) = (a.left_bottom() + vec2(8.0, 0.0), b.right_bottom() + vec2(-8.0, 0.0));
+        bent(ui, from, to, 12.0, word);
+    };
+    below(lost, tracking, "good");
+}
+
+/// An arrow that leaves and enters a box from above (`rise` < 0) or from below, with a word.
+fn bent(ui: &Ui, from: Pos2, to: Pos2, rise: f32, word: &str) {
+    let painter = ui.painter();
+    let stroke = Stroke::new(1.5, theme::WEAK);
+    let (up, over) = (from + vec2(0.0, rise), to + vec2(0.0, rise));
+    painter.line(vec![from, up, over, to], stroke);
+    let back = rise.signum() * 4.0;
+    painter.line(vec![to + vec2(-3.0, back), to, to + vec2(3.0, back)], stroke);
+    let middle = up + (over - up) * 0.5;
+    let (at, align) = if rise < 0.0 {
+        (middle - vec2(0.0, 2.0), Align2::CENTER_BOTTOM)
+    } else {
+        (middle + vec2(0.0, 2.0), Align2::CENTER_TOP)
+    };
+    painter.text(at, align, word, theme::digit_font(), theme::TEXT);
+}
+
+/// One past update: its step, its state, and what fired.
+fn history(ui: &mut Ui, state: &State, run: &RunView, row: &StepRow, out: &mut Vec<Command>) {
+    let is_here = row.step == state.cursor.step;
+    ui.horizontal_wrapped(|ui| {
+        let step = RichText::new(format!("step {:>3}", row.step)).monospace().size(11.0);
+        let button = egui::Button::selectable(is_here, step);
+        if ui.add(button).clicked() {
+            out.push(Command::Go(Go::Step(row.step)));
+        }
+        let colour = theme::state(state_of_word(&row.state));
+        let state_word = ui.label(RichText::new(&row.state).size(12.0).color(colour));
+        if let Some(reason) = &row.reason {
+            state_word.on_hover_text(reason);
+        }
+        let fired = fired(state, row);
+        if run.rows.first().is_some_and(|first| first.step == row.step) {
+            ui.label(theme::note("picked here"));
+        } else if fired.is_empty() {
+            ui.label(theme::note(row.reason.as_deref().unwrap_or("no criterion fired")));
+        }
+        for fired in fired {
+            let words = format!("criterion {}: {}", fired.criterion, fired.words);
+            ui.add(egui::Label::new(RichText::new(words).size(11.5).color(theme::LOST)).wrap());
+        }
+    });
+}
+
+/// The criteria that fired at an update, with value and threshold.
+pub fn fired(state: &State, row: &StepRow) -> Vec<Fired> {
+    let limit = |key: &str| state.setting("limits", key).and_then(|v| v.as_f64());
+    let below = |value: Option<f64>, limit: Option<f64>| value.zip(limit).filter(|(v, l)| v < l);
+    let above = |value: Option<f64>, limit: Option<f64>| value.zip(limit).filter(|(v, l)| v > l);
+    let score = |name: &str, (v, l): (f64, f64)| format!("{name} {v:.3} < {l:.3}");
+    let length = |name: &str, (v, l): (f64, f64)| format!("{name} {:.1} > {:.1} cm", v * 100.0, l * 100.0);
+    let all = [
+        below(row.ncc, limit("ncc_min")).map(|pair| score("match score", pair)),
+        below(row.stereo_score, limit("stereo_ncc_min")).map(|pair| score("stereo score", pair)),
+        above(row.distance_correction_m, row.distance_tolerance_m).map(|pair| length("range change", pair)),
+        above(row.position_correction_m, row.position_tolerance_m).map(|pair| length("site position", pair)),
+    ];
+    let numbered = (1..).zip(all);
+    numbered.filter_map(|(criterion, words)| Some(Fired { criterion, words: words? })).collect()
+}

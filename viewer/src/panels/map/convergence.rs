@@ -1,0 +1,154 @@
+//! Successive positions of the target in the site frame, each with its 3 σ ellipse, converging to the last one (R139).
+//!
+//! Seen from above and drawn about the last position, in centimetres. The ellipse is that of the horizontal part of
+//! the covariance, turned from the rover frame into the site frame: `R Σ Rᵀ`; stereo makes it shrink with the square
+//! of the range.
+
+use egui::{Align2, Color32, Ui, vec2};
+use egui_plot::{Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotUi, Points, Polygon, Text};
+use nalgebra::Matrix2;
+use sightline_core::frames::Point3;
+use sightline_core::session::view::RunView;
+use sightline_core::session::wire::StopView;
+
+use super::{on_map, truth_in_site};
+use crate::state::State;
+use crate::{ellipse, theme};
+
+/// The view reaches at least this far to either side, cm: no smaller error is worth magnifying.
+const LEAST_HALF_CM: f64 = 0.5;
+
+/// Where a step placed the target.
+pub(super) struct Position {
+    /// The step.
+    pub step: usize,
+    /// The position in the site frame, m.
+    pub point_in_site: Point3,
+    /// Its covariance seen from above, m²: east, north; none where it is not finite.
+    pub from_above: Option<Matrix2<f64>>,
+}
+
+/// The positions of a run, step by step.
+pub(super) fn positions(run: &RunView, stops: &[StopView]) -> Vec<Position> {
+    let of_row = |row: &sightline_core::trace::StepRow| {
+        let site_from_rover = stops.get(row.step)?.site_from_rover.to_pose();
+        let rotation = *site_from_rover.rotation.to_rotation_matrix().matrix();
+        let in_site = rotation * row.covariance_in_rover * rotation.transpose();
+        let from_above = Matrix2::new(in_site[(1, 1)], in_site[(1, 0)], in_site[(0, 1)], in_site[(0, 0)]);
+        Some(Position {
+            step: row.step,
+            point_in_site: site_from_rover * Point3::from(row.position_in_rover),
+            from_above: from_above.iter().all(|v| v.is_finite()).then_some(from_above),
+        })
+    };
+    run.rows.iter().filter_map(of_row).collect()
+}
+
+/// Shows the target's neighbourhood.
+pub(super) fn show(ui: &mut Ui, state: &State, stops: &[StopView], run: &RunView) {
+    let positions = positions(run, stops);
+    let Some(last) = positions.last() else { return };
+    let origin = on_map(&last.point_in_site);
+    let here = positions.iter().find(|at| at.step == state.cursor.step);
+    ui.add(egui::Label::new(theme::note(sentence(&positions, here))).truncate());
+    let plot = Plot::new(("convergence", run.number, positions.len()))
+        .data_aspect(1.0)
+        .include_x(-LEAST_HALF_CM)
+        .include_x(LEAST_HALF_CM)
+        .include_y(-LEAST_HALF_CM)
+        .include_y(LEAST_HALF_CM)
+        .set_margin_fraction(vec2(0.06, 0.06))
+        .x_axis_label(theme::note("east of the last position, cm"))
+        .y_axis_label(theme::note("north, cm"))
+        .y_axis_min_width(22.0)
+        .allow_boxed_zoom(false)
+        .label_formatter(|_| None)
+        .coordinates_formatter(
+            egui_plot::Corner::RightBottom,
+            egui_plot::CoordinatesFormatter::new(|at, _| format!("E {:+.1}  N {:+.1} cm", at.x, at.y)),
+        );
+    plot.show(ui, |plot| paint(plot, state, run, &positions, origin));
+}
+
+/// How the ellipses shrank, in words.
+fn sentence(positions: &[Position], here: Option<&Position>) -> String {
+    let width = |at: Option<&Position>| {
+        at.and_then(long_axis_cm).map_or_else(|| "none".to_owned(), |cm| format!("{cm:.1}"))
+    };
+    let (first, last) = (width(positions.first()), width(positions.last()));
+    let here = here.map_or_else(String::new, |here| format!(", here {}", width(Some(here))));
+    format!("3σ, cm: pick {first}{here}, end {last}")
+}
+
+/// The longer half axis of the 3 σ ellipse, cm.
+fn long_axis_cm(at: &Position) -> Option<f64> {
+    let [long, _] = ellipse::axes(at.from_above.as_ref()?)?;
+    Some(300.0 * long.norm())
+}
+
+fn paint(plot: &mut PlotUi<'_>, state: &State, run: &RunView, positions: &[Position], origin: [f64; 2]) {
+    let colour = theme::run(run.number);
+    let place = |point: &Point3| {
+        let [east, north] = on_map(point);
+        [(east - origin[0]) * 100.0, (north - origin[1]) * 100.0]
+    };
+    let trail: Vec<[f64; 2]> = positions.iter().map(|at| place(&at.point_in_site)).collect();
+    plot.line(Line::new("", trail.clone()).color(colour.gamma_multiply(0.6)).width(1.0));
+    plot.points(Points::new("", trail).color(colour).radius(2.0).shape(MarkerShape::Diamond));
+    let count = positions.len().max(2) as f32 - 1.0;
+    for (i, at) in positions.iter().enumerate() {
+        let is_here = at.step == state.cursor.step;
+        // Later ellipses are stronger; the cursor's is the thick one.
+        let strength = 0.4 + 0.6 * i as f32 / count;
+        let (tint, width) =
+            if is_here { (theme::ACCENT, 2.5) } else { (colour.gamma_multiply(strength), 1.0) };
+        outline(plot, at, place(&at.point_in_site), tint, width);
+    }
+    if let Some(here) = positions.iter().find(|at| at.step == state.cursor.step) {
+        let [east, north] = place(&here.point_in_site);
+        plot.points(
+            Points::new("", [east, north]).color(theme::ACCENT).radius(5.0).shape(MarkerShape::Diamond),
+        );
+        let words = theme::note(format!("   step {}", here.step)).color(theme::ACCENT);
+        plot.text(Text::new("", PlotPoint::new(east, north), words).anchor(Align2::LEFT_BOTTOM));
+    }
+    if let Some((truth, _)) = truth_in_site(state) {
+        let points = Points::new("", place(&truth)).color(theme::TRUTH).radius(6.0);
+        plot.points(points.shape(MarkerShape::Plus));
+    }
+}
+
+/// The 3 σ ellipse of a position.
+fn outline(plot: &mut PlotUi<'_>, at: &Position, centre_cm: [f64; 2], colour: Color32, width: f32) {
+    let Some(outline) = at.from_above.as_ref().and_then(|covariance| ellipse::outline(covariance, 3.0))
+    else {
+        return;
+    };
+    let points: Vec<[f64; 2]> =
+        outline.iter().map(|d| [centre_cm[0] + d.x * 100.0, centre_cm[1] + d.y * 100.0]).collect();
+    let polygon = Polygon::new("", points).style(LineStyle::Solid).allow_hover(false);
+    plot.polygon(polygon.fill_color(Color32::TRANSPARENT).stroke(egui::Stroke::new(width, colour)));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::fixture;
+
+    #[test]
+    fn a_covariance_is_turned_into_the_site_frame_and_seen_from_above() {
+        let state = fixture::at_step(&egui::Context::default(), 2);
+        let mut stops = state.traverse.as_ref().unwrap().stops.clone();
+        let mut run = state.run().unwrap().clone();
+        // A rover that heads east: its forward axis, along which the target is uncertain, is the map's east.
+        let heading = nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.0, std::f64::consts::FRAC_PI_2);
+        let pose = sightline_core::frames::Pose::from_parts(Default::default(), heading);
+        stops[0].site_from_rover = sightline_core::frames::PoseRecord::from(&pose);
+        run.rows[0].covariance_in_rover =
+            nalgebra::Matrix3::from_diagonal(&nalgebra::Vector3::new(4e-4, 1e-4, 0.0));
+        let positions = positions(&run, &stops);
+        let from_above = positions[0].from_above.unwrap();
+        assert!((from_above[(0, 0)] - 4e-4).abs() < 1e-12 && (from_above[(1, 1)] - 1e-4).abs() < 1e-12);
+        assert!((long_axis_cm(&positions[0]).unwrap() - 6.0).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,192 @@
+//! The tolerances of criteria 3 and 4 over the steps, each with the value that is held against it (R86, K-Fig 5).
+//!
+//! Both grow with what was driven and with the range of the stereo measurements that they compare; `stages::judge`
+//! has the equations. Where a value exceeds its tolerance the criterion fires: a cross in vermilion with the word.
+
+use egui::{Align2, Color32, Id, RichText, Ui, vec2};
+use egui_plot::{GridMark, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotUi, Points, Text, VLine};
+use sightline_core::session::view::RunView;
+use sightline_core::trace::StepRow;
+
+use super::names;
+use super::plots::{few_marks, pieces};
+use crate::command::{Command, Go};
+use crate::overlay::{self, Mark};
+use crate::state::State;
+use crate::{panels, theme};
+
+/// What the panel is for.
+const PURPOSE: &str = "Criteria 3 and 4: each correction against its tolerance, step by step.";
+
+/// Room for the numbers of the steps below the lower plot, points.
+const AXIS: f32 = 16.0;
+
+/// Height of the sentence above a plot, points.
+const SENTENCE: f32 = 15.0;
+
+/// A criterion with a tolerance.
+struct Criterion {
+    number: u8,
+    title: &'static str,
+    value_m: fn(&StepRow) -> Option<f64>,
+    tolerance_m: fn(&StepRow) -> Option<f64>,
+}
+
+const CRITERIA: [Criterion; 2] = [
+    Criterion {
+        number: 3,
+        title: "3 range change, cm",
+        value_m: |row| row.distance_correction_m,
+        tolerance_m: |row| row.distance_tolerance_m,
+    },
+    Criterion {
+        number: 4,
+        title: "4 site position since the pick, cm",
+        value_m: |row| row.position_correction_m,
+        tolerance_m: |row| row.position_tolerance_m,
+    },
+];
+
+impl Criterion {
+    /// The steps at which the value exceeds the tolerance, with the value in cm.
+    fn fired(&self, run: &RunView) -> Vec<[f64; 2]> {
+        let fires = |row: &StepRow| {
+            let value_m = (self.value_m)(row)?;
+            (value_m > (self.tolerance_m)(row)?).then_some([row.step as f64, value_m * 100.0])
+        };
+        run.rows.iter().filter_map(fires).collect()
+    }
+}
+
+/// Shows both criteria, one below the other over the same steps.
+pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let Some(run) = state.run() else {
+        panels::missing(ui, PURPOSE, &state.missing_target());
+        return;
+    };
+    if run.rows.iter().all(|row| row.distance_tolerance_m.is_none()) {
+        let sentence = "No update was judged yet: tolerances belong to the steps after the pick.";
+        panels::missing(ui, PURPOSE, sentence);
+        return;
+    }
+    names::wrapped(ui, "", &names_of(run.number));
+    ui.spacing_mut().item_spacing.y = 1.0;
+    let count = CRITERIA.len() as f32;
+    let height = (ui.available_height() - AXIS - count * (SENTENCE + 4.0)) / count;
+    for (i, criterion) in CRITERIA.iter().enumerate() {
+        let is_last = i + 1 == CRITERIA.len();
+        let sentence = sentence(criterion, run, state.cursor.step);
+        let label = ui.add(egui::Label::new(sentence.size(11.0)).truncate());
+        label.on_hover_text("The correction against its tolerance, which is computed anew at every update.");
+        let height = height.max(30.0) + if is_last { AXIS } else { 0.0 };
+        if let Some(step) = plot(ui, state, run, criterion, height, is_last) {
+            out.push(Command::Go(Go::Step(step)));
+        }
+    }
+}
+
+fn names_of(run: usize) -> Vec<(Mark, Color32, String)> {
+    vec![
+        (Mark::Ring, theme::run(run), "value".to_owned()),
+        (Mark::Stroke(overlay::Line::Dashed), theme::LOST, "tolerance".to_owned()),
+        (Mark::Cross, theme::FAILED, "fired".to_owned()),
+    ]
+}
+
+/// Value and tolerance of the cursor's step, and where the criterion fired, in words.
+fn sentence(criterion: &Criterion, run: &RunView, step: usize) -> RichText {
+    let here = crate::state::row_of(run, step);
+    let pair = here.and_then(|row| Some(((criterion.value_m)(row)?, (criterion.tolerance_m)(row)?)));
+    let title = criterion.title;
+    let now = match pair {
+        Some((value_m, tolerance_m)) => {
+            format!("{title}: {:.1} of {:.1} at step {step}", value_m * 100.0, tolerance_m * 100.0)
+        }
+        None => format!("{title}: nothing to judge at step {step}"),
+    };
+    let fired: Vec<String> = criterion.fired(run).iter().map(|[step, _]| format!("{step}")).collect();
+    if fired.is_empty() {
+        return theme::note(format!("{now}; never fired")).color(theme::TEXT);
+    }
+    theme::note(format!("{now}; fired at {}", fired.join(", "))).color(theme::LOST)
+}
+
+/// One plot. Returns the step that was clicked.
+fn plot(
+    ui: &mut Ui,
+    state: &State,
+    run: &RunView,
+    criterion: &Criterion,
+    height: f32,
+    is_last: bool,
+) -> Option<usize> {
+    let last = state.stop_count().saturating_sub(1) as f64;
+    let plot =
+        Plot::new(("tolerance", criterion.number))
+            .height(height)
+            .allow_scroll(false)
+            .allow_drag(false)
+            .allow_zoom(false)
+            .allow_boxed_zoom(false)
+            .allow_axis_zoom_drag(false)
+            .show_axes([is_last, true])
+            .include_x(-0.4)
+            .include_x(last + 0.4)
+            .include_y(0.0)
+            .set_margin_fraction(vec2(0.0, 0.14))
+            .y_grid_spacer(few_marks)
+            .y_axis_min_width(30.0)
+            .x_axis_formatter(|mark: GridMark, _: &std::ops::RangeInclusive<f64>| {
+                if mark.value.fract() == 0.0 { format!("{}", mark.value) } else { String::new() }
+            })
+            .link_axis(Id::unique("steps"), [true, false])
+            .label_formatter(|_| None);
+    let response = plot.show(ui, |plot| {
+        let cursor = VLine::new("", state.cursor.step as f64).color(theme::ACCENT).width(1.5);
+        plot.vline(cursor.allow_hover(false));
+        paint(plot, run, criterion);
+        let clicked = plot.response().clicked().then(|| plot.pointer_coordinate()).flatten();
+        clicked.map(|at: PlotPoint| at.x.round().clamp(0.0, last) as usize)
+    });
+    response.inner
+}
+
+fn paint(plot: &mut PlotUi<'_>, run: &RunView, criterion: &Criterion) {
+    let line = |of: fn(&StepRow) -> Option<f64>| -> Vec<Vec<[f64; 2]>> {
+        let point = |row: &StepRow| of(row).map(|v| [row.step as f64, v * 100.0]);
+        pieces(&run.rows.iter().map(point).collect::<Vec<_>>())
+    };
+    for piece in line(criterion.tolerance_m) {
+        plot.line(Line::new("", piece).color(theme::LOST).style(LineStyle::dashed_dense()).width(1.5));
+    }
+    for piece in line(criterion.value_m) {
+        let colour = theme::run(run.number);
+        plot.line(Line::new("", piece.clone()).color(colour).width(1.5));
+        plot.points(Points::new("", piece).color(colour).radius(2.5).shape(MarkerShape::Circle));
+    }
+    for [step, value_cm] in criterion.fired(run) {
+        let mark = Points::new("", [step, value_cm]).color(theme::FAILED).radius(6.0);
+        plot.points(mark.shape(MarkerShape::Cross));
+        let word = Text::new("", PlotPoint::new(step, value_cm), theme::note("fired").color(theme::FAILED));
+        plot.text(word.anchor(Align2::CENTER_BOTTOM));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::fixture;
+
+    #[test]
+    fn a_criterion_fires_where_its_value_exceeds_its_tolerance_and_nowhere_else() {
+        let state = fixture::at_step(&egui::Context::default(), 2);
+        let mut run = state.run().unwrap().clone();
+        assert!(CRITERIA.iter().all(|criterion| criterion.fired(&run).is_empty()));
+        run.rows[3].distance_correction_m = run.rows[3].distance_tolerance_m.map(|m| m + 0.001);
+        run.rows[4].position_correction_m = run.rows[4].position_tolerance_m;
+        let fired = CRITERIA[0].fired(&run);
+        assert_eq!(fired.len(), 1);
+        assert_eq!(fired[0][0], 3.0);
+        assert!(CRITERIA[1].fired(&run).is_empty(), "a value at its tolerance is within it");
+    }
+}

@@ -1,0 +1,58 @@
+//! Why there is nothing to show, as sentences that say how to get it.
+
+use super::State;
+use crate::cache::Slot;
+
+impl State {
+    /// Why the panels of a step have nothing to show, as a sentence that says how to get it.
+    pub fn missing_step(&self) -> String {
+        let Some(target) = self.target() else { return self.missing_target() };
+        let step = self.cursor.step;
+        if step < target.designation.step {
+            let first = target.designation.step;
+            return format!(
+                "{} was picked at step {first}. Go there, or press PgDn for the next event.",
+                target.label
+            );
+        }
+        if self.row().is_none() {
+            return match (self.run_progress(), self.run().and_then(|run| run.stopped.as_deref())) {
+                (Some(p), _) => {
+                    format!("Step {step} is not computed yet: the run has done {} of {}.", p.k, p.n)
+                }
+                (None, Some(why)) => format!(
+                    "The run stopped before step {step} ({why}). Press “Run from here” at an earlier step."
+                ),
+                (None, None) => {
+                    format!("Step {step} is not computed yet. It appears here as soon as the run reaches it.")
+                }
+            };
+        }
+        match self.trace_at(step) {
+            Slot::Failed(problem) => format!("Step {step} cannot be shown: {}", problem.detail),
+            Slot::Ready(trace) => match (&trace.fault, &trace.locate) {
+                (Some(fault), _) => format!("The files of step {step} are at fault: {fault}"),
+                (None, Some(located)) if located.missing.is_some() => {
+                    located.missing.clone().unwrap_or_default()
+                }
+                _ if trace.predict.is_none() => {
+                    "Here the target was picked: nothing had to be matched. Go one step on (Right) to see a match.".to_owned()
+                }
+                _ => "This stage was not reached at this step.".to_owned(),
+            },
+            Slot::Absent | Slot::Loading => format!("Loading step {step} …"),
+        }
+    }
+
+    /// Why there is no target, as a sentence that says how to get one.
+    pub fn missing_target(&self) -> String {
+        match (&self.traverse, &self.traverses) {
+            (None, None) => "Asking the server for its traverses …".to_owned(),
+            (None, Some(list)) if list.is_empty() => {
+                "The server has no traverse. Import one with `sightline import`, or simulate one with `sightline simulate`.".to_owned()
+            }
+            (None, Some(_)) => "Opening the traverse …".to_owned(),
+            (Some(_), _) => "No target yet. Press T, then click a rock in the left image.".to_owned(),
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! What the page wants loaded for what it shows.
+
+use sightline_core::session::view::RunView;
+use sightline_core::trace::{ArrayName, StepRow, StepTrace};
+
+use super::State;
+use crate::cache::{Eye, Key};
+
+impl State {
+    /// What the page wants loaded, most urgent first: the cursor's step, then the next and the previous one.
+    pub fn wanted(&self) -> Vec<Key> {
+        let step = self.cursor.step;
+        let mut keys = Vec::new();
+        for (near, step) in [(false, Some(step)), (true, step.checked_add(1)), (true, step.checked_sub(1))] {
+            if let Some(step) = step.filter(|&step| step < self.stop_count()) {
+                self.want_step(step, near, &mut keys);
+            }
+        }
+        // The record of the pick has the warnings about it.
+        let pick = self.run().and_then(|run| run.rows.first()).map(|row| row.step);
+        keys.extend(pick.and_then(|step| self.step_key(step)).map(Key::Trace));
+        if let Some(run) = self.run().filter(|_| self.wants_history) {
+            for row in &run.rows {
+                keys.extend(self.step_key(row.step).map(Key::Trace));
+                keys.extend(self.window_key(run, row));
+            }
+        }
+        keys
+    }
+
+    /// The name of the window that a step matched: at the pick, the template that the next step took from there.
+    pub fn window_key(&self, run: &RunView, row: &StepRow) -> Option<Key> {
+        let is_pick = run.rows.first().is_some_and(|first| first.step == row.step);
+        let (step, name) =
+            if is_pick { (row.step + 1, ArrayName::Reference) } else { (row.step, ArrayName::Matched) };
+        let has_window = run.rows.iter().any(|row| row.step == step && row.ncc.is_some());
+        has_window.then(|| self.step_key(step)).flatten().map(|key| Key::Array(key, name))
+    }
+
+    /// Those of `keys` that are images which must be rendered first.
+    pub fn unrendered(&self, keys: &[Key]) -> Vec<Key> {
+        let is_ready =
+            |step: usize| self.traverse.as_ref().and_then(|t| t.stops.get(step)).is_some_and(|s| s.ready);
+        let is_slow = |key: &&Key| matches!(key, Key::Image { step, .. } if !is_ready(*step));
+        keys.iter().filter(is_slow).cloned().collect()
+    }
+
+    fn want_step(&self, step: usize, is_neighbour: bool, keys: &mut Vec<Key>) {
+        let computed = self.row_at(step).and_then(|_| self.step_key(step));
+        keys.extend(computed.clone().map(Key::Trace));
+        // The images of a simulated stop take a while: only the one that is looked at is worth that.
+        let is_ready = self.traverse.as_ref().and_then(|t| t.stops.get(step)).is_some_and(|stop| stop.ready);
+        if is_ready || !is_neighbour {
+            keys.extend([Eye::Left, Eye::Right].into_iter().filter_map(|eye| self.image_key(step, eye)));
+        }
+        if let Some((trace, key)) = self.trace_at(step).ready().zip(computed) {
+            let there = ArrayName::ALL.into_iter().filter(|&name| has_array(trace, name));
+            keys.extend(there.map(|name| Key::Array(key.clone(), name)));
+        }
+    }
+}
+
+/// Whether the stage that makes an array was reached.
+fn has_array(trace: &StepTrace, name: ArrayName) -> bool {
+    let Some(evidence) = trace.template() else { return false };
+    match name {
+        ArrayName::Reference | ArrayName::Scaled | ArrayName::Rolled => evidence.scale_roll.is_some(),
+        ArrayName::Matched | ArrayName::Difference | ArrayName::Surface => evidence.match_template.is_some(),
+        ArrayName::RightWindow => evidence.point_stereo.is_some(),
+    }
+}

@@ -1,0 +1,58 @@
+//! The panels of exposure, stereo score and error budget.
+
+use super::{Shown, fixture};
+use crate::command::Command;
+use crate::layout::Pane;
+use crate::state::calculator::{Calculator, Pair};
+use crate::stretch::Stretch;
+
+#[test]
+fn the_left_image_says_how_the_subframe_is_exposed_and_which_stretch_is_on() {
+    let shown = Shown::pane(Pane::Left, |context| fixture::at_step(context, 2));
+    shown.says("subframe 161 × 161 px: mean 0.40, 0.0 % saturated").says("as recorded: 0 is black");
+    let stretched = Shown::pane(Pane::Left, |context| {
+        let mut state = fixture::at_step(context, 2);
+        state.apply(Command::SetStretch(Stretch::Auto));
+        state
+    });
+    stretched.says("is black").says("automatic");
+    let by_hand = Shown::pane(Pane::Left, |context| {
+        let mut state = fixture::at_step(context, 2);
+        state.apply(Command::SetStretch(Stretch::NEUTRAL));
+        state
+    });
+    by_hand.says("brightness").says("contrast").says("gamma");
+}
+
+#[test]
+fn a_stretch_is_chosen_from_the_list() {
+    let mut shown = Shown::pane(Pane::Left, |context| fixture::at_step(context, 2));
+    shown.click("stretch, as recorded: 0 is black, 1 is white");
+    assert_eq!(shown.click("automatic"), vec![Command::SetStretch(Stretch::Auto)]);
+}
+
+#[test]
+fn the_stereo_profile_says_best_interval_and_prediction() {
+    let shown = Shown::pane(Pane::StereoProfile, |context| fixture::at_step(context, 2));
+    shown.says("best 6.000 m, score 0.910, disparity 61.00 px").says("and back: 0.10 px off");
+    shown.says("searched 0.25 to 20.00 m, 80 positions; predicted");
+    Shown::pane(Pane::StereoProfile, |context| fixture::at_step(context, 0))
+        .says("no prediction: the whole curve");
+}
+
+#[test]
+fn the_budget_of_the_test_beds_navcam_is_that_of_the_paper() {
+    let shown = Shown::pane(Pane::Budget, |context| {
+        let mut state = fixture::at_step(context, 2);
+        let calculator = Calculator { pair: Pair::TableOne(1), ..Calculator::default() };
+        state.apply(Command::SetCalculator(calculator));
+        state
+    });
+    shown.says("38.75 cm").says("41.92 cm").says("2.19 cm").says("below the 3 cm").says("2.50 px");
+    shown.says("of 5 errors lie within").says("errata").says("18.7");
+}
+
+#[test]
+fn the_budget_says_what_it_lacks() {
+    Shown::pane(Pane::Budget, |_| fixture::without_target()).says("The present cameras are known once");
+}

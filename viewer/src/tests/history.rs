@@ -1,0 +1,48 @@
+//! The panels that look back along the run: the template's history and the converging map.
+
+use super::{Shown, fixture};
+use crate::cache::Key;
+use crate::command::{Command, Go};
+use crate::layout::Pane;
+
+#[test]
+fn the_history_lists_every_window_and_says_what_is_loading() {
+    let mut shown = Shown::new(
+        [1000.0, 160.0],
+        |context| fixture::at_step(context, 2),
+        |ui, state, out| {
+            crate::layout::show_pane(ui, Pane::History, state, out);
+        },
+    );
+    shown.says("window of step 1: ×1.13 +1.1°, ncc 0.83");
+    shown.says("loading the windows before step 2: 0 of 2 are here");
+    assert_eq!(shown.click("window of step 3: ×1.13 +1.1°, ncc 0.41"), vec![Command::Go(Go::Step(3))]);
+    Shown::pane(Pane::History, |context| fixture::at_step(context, 0)).says("no earlier window");
+}
+
+#[test]
+fn a_loaded_history_says_score_and_shift_against_the_first_window() {
+    let shown = Shown::pane(Pane::History, |context| fixture::with_history(context, 3));
+    shown.says("step 3 against step 0: score 1.00, shift 0.0");
+}
+
+#[test]
+fn all_windows_are_fetched_only_while_they_are_looked_at() {
+    let mut state = fixture::at_step(&egui::Context::default(), 1);
+    let far = |key: &Key| matches!(key, Key::Array(step, _) if step.step == 4);
+    assert!(!state.wanted().iter().any(far));
+    state.wants_history = true;
+    assert!(state.wanted().iter().any(far));
+}
+
+#[test]
+fn the_map_says_how_the_ellipses_shrink() {
+    let shown = Shown::pane(Pane::Map, |context| {
+        let mut state = fixture::at_step(context, 2);
+        for row in &mut state.session.as_mut().unwrap().targets[0].runs[0].rows {
+            row.covariance_in_rover /= 4.0_f64.powi(row.step as i32);
+        }
+        state
+    });
+    shown.says("3σ, cm: pick 6.0, here 1.5, end 0.4");
+}

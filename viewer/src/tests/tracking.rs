@@ -1,0 +1,95 @@
+//! The panels of configurations, tolerances and the state machine.
+
+use serde_json::json;
+
+use super::{Shown, fixture};
+use crate::command::{Command, Go};
+use crate::layout::Pane;
+use crate::state::State;
+
+/// The fixed drive at step 3, where criterion 3 fires besides criterion 1.
+fn fires_at_three(context: &egui::Context) -> State {
+    let mut state = fixture::at_step(context, 3);
+    let session = state.session.as_mut().unwrap();
+    session.targets[0].runs[0].rows[3].distance_correction_m = Some(0.25);
+    state
+}
+
+#[test]
+fn a_run_is_named_by_its_preset_and_a_draft_shows_the_preset_that_it_leads_to() {
+    Shown::pane(Pane::Targets, |context| fixture::at_step(context, 2)).says("sightline");
+    let shown = Shown::pane(Pane::Settings, |context| fixture::at_step(context, 2));
+    shown.says("The defaults: scale, roll");
+    let chosen = Shown::pane(Pane::Settings, |context| {
+        let mut state = fixture::at_step(context, 2);
+        state.apply(Command::UsePreset("ncc-scale"));
+        state
+    });
+    chosen.says("Correlation of the scaled window");
+}
+
+#[test]
+fn a_preset_becomes_the_changes_that_lead_from_the_run_to_it() {
+    let mut state = fixture::at_step(&egui::Context::default(), 2);
+    state.apply(Command::UsePreset("half-pixel"));
+    assert_eq!(state.draft, [("noise_model".to_owned(), json!("half_pixel"))].into());
+    // From another run the way back to the defaults is the opposite change.
+    let settings = state.pending().unwrap();
+    state.session.as_mut().unwrap().targets[0].runs[0].settings = settings;
+    state.apply(Command::UsePreset("sightline"));
+    assert_eq!(state.draft, [("noise_model".to_owned(), json!("measured"))].into());
+}
+
+#[test]
+fn the_list_of_presets_has_a_sentence_for_each_and_a_choice_drafts_it() {
+    let mut shown = Shown::new(
+        [420.0, 900.0],
+        |context| fixture::at_step(context, 2),
+        |ui, state, out| {
+            crate::layout::show_pane(ui, Pane::Settings, state, out);
+        },
+    );
+    shown.click("configuration preset");
+    for preset in sightline_core::presets::PRESETS {
+        shown.says(preset.name).says(preset.description);
+    }
+    assert_eq!(shown.click("ncc-roll"), vec![Command::UsePreset("ncc-roll")]);
+}
+
+#[test]
+fn the_tolerances_say_value_tolerance_and_where_they_fired() {
+    let calm = Shown::pane(Pane::Tolerances, |context| fixture::at_step(context, 2));
+    calm.says("3 range change, cm: 3.0 of 12.0 at step 2; never fired")
+        .says("5.0 of 20.0 at step 2; never fired");
+    let fired = Shown::pane(Pane::Tolerances, fires_at_three);
+    fired.says("25.0 of 12.0 at step 3; fired at 3");
+}
+
+#[test]
+fn the_state_machine_shows_state_counter_and_what_fired() {
+    let tracking = Shown::pane(Pane::Machine, |context| fixture::at_step(context, 2));
+    tracking.says("state tracking").says("with 2 retries").says("picked here").says("no criterion fired");
+    let mut lost = Shown::pane(Pane::Machine, fires_at_three);
+    lost.says("retry 0 of 2").says("criterion 1: match score 0.410 < 0.700");
+    lost.says("criterion 3: range change 25.0 > 12.0 cm");
+    assert_eq!(lost.click("step   2"), vec![Command::Go(Go::Step(2))]);
+    Shown::pane(Pane::Machine, |context| fixture::at_step(context, 4)).says("no retry is left");
+}
+
+#[test]
+fn the_warnings_about_a_pick_stand_under_its_target() {
+    use sightline_core::locate::Evidence;
+    use sightline_core::locate::template::warnings::{Warning, WarningKind};
+    let shown = Shown::pane(Pane::Targets, |context| {
+        let mut state = fixture::at_step(context, 2);
+        let mut trace = fixture::trace(0);
+        if let Some(Evidence::Template(evidence)) = trace.locate.as_mut().map(|l| &mut l.evidence) {
+            let sentence = "The window ranges over 14 % of its distance.".to_owned();
+            evidence.warnings =
+                vec![Warning { kind: WarningKind::DepthRange, value: 0.14, limit: 0.1, sentence }];
+        }
+        fixture::load(&mut state, trace);
+        state
+    });
+    shown.says("! The window ranges over 14 % of its distance.");
+}
