@@ -10,7 +10,7 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use crate::state::AppState;
-use crate::{about, events, exports, runs, sessions, settings, steps, targets, traverses};
+use crate::{about, events, exports, runs, sessions, settings, steps, studies, targets, traverses};
 
 #[derive(OpenApi)]
 #[openapi(
@@ -37,6 +37,7 @@ pub fn router() -> OpenApiRouter<AppState> {
         .merge(runs::router())
         .merge(steps::router())
         .merge(exports::router())
+        .merge(studies::router())
         .merge(events::router())
 }
 

@@ -1,7 +1,7 @@
 //! What the handlers share: the open traverses, the sessions, and the ways to compute, to save and to tell.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 use sha2::{Digest, Sha256};
@@ -19,6 +19,7 @@ use crate::rendering::{Ahead, OpenTraverse};
 use crate::rerun_log::LiveStream;
 use crate::runner;
 use crate::store::{self, Store};
+use crate::study::shelf::Shelf;
 
 /// Events that a slow page may be behind before it is told to read everything again.
 const EVENT_BACKLOG: usize = 256;
@@ -28,6 +29,15 @@ const RUNS_AT_A_TIME: usize = 2;
 const RUNS_WAITING: usize = 256;
 /// How many sessions there may be.
 const SESSION_LIMIT: usize = 1000;
+
+/// Where the server keeps what it makes.
+#[derive(Clone, Debug)]
+pub struct Folders {
+    /// Sessions.
+    pub sessions: PathBuf,
+    /// Studies, with their worlds.
+    pub studies: PathBuf,
+}
 
 /// What the handlers share.
 #[derive(Clone)]
@@ -45,6 +55,7 @@ struct Inner {
     designations: Lane,
     pictures: Lane,
     exports: Lane,
+    studies: Shelf,
     streams: Mutex<BTreeMap<String, Arc<LiveStream>>>,
 }
 
@@ -57,15 +68,25 @@ struct Sessions {
 impl Drop for Inner {
     fn drop(&mut self) {
         self.ahead.close();
+        self.studies.close();
     }
 }
 
 impl AppState {
-    /// Opens the state: sessions are kept in `folder` and read back from it.
+    /// Opens the state: sessions are kept in `folder` and read back from it, studies in a folder inside.
+    ///
+    /// # Errors
+    /// As [`Self::with_folders`].
+    pub fn new(traverses: Vec<Traverse>, folder: &Path, hosts: Hosts) -> Result<Self> {
+        let folders = Folders { sessions: folder.to_owned(), studies: folder.join("studies") };
+        Self::with_folders(traverses, &folders, hosts)
+    }
+
+    /// Opens the state on its folders.
     ///
     /// # Errors
     /// A folder that cannot be read or made, or a system without threads.
-    pub fn new(traverses: Vec<Traverse>, folder: &Path, hosts: Hosts) -> Result<Self> {
+    pub fn with_folders(traverses: Vec<Traverse>, folders: &Folders, hosts: Hosts) -> Result<Self> {
         let no_threads = |error: std::io::Error| Error::Request(format!("cannot start a thread: {error}"));
         let events = broadcast::Sender::new(EVENT_BACKLOG);
         let mut open: Vec<Arc<OpenTraverse>> = Vec::new();
@@ -76,7 +97,7 @@ impl AppState {
                 open.push(Arc::new(OpenTraverse::new(id, traverse, events.clone())));
             }
         }
-        let store = Store::open(folder)?;
+        let store = Store::open(&folders.sessions)?;
         let (sessions, notices) = read_back(&store, &open)?;
         for notice in &notices {
             tracing::warn!("{}", crate::plain(notice));
@@ -85,6 +106,7 @@ impl AppState {
         if let Some(first) = open.first() {
             ahead.look_at(first, 0);
         }
+        let studies = Shelf::start(folders.studies.clone(), events.clone()).map_err(no_threads)?;
         Ok(Self(Arc::new(Inner {
             hosts,
             traverses: open,
@@ -97,6 +119,7 @@ impl AppState {
             designations: Lane::new(2, 16),
             pictures: Lane::new(8, 256),
             exports: Lane::new(1, 8),
+            studies,
             streams: Mutex::default(),
         })))
     }
@@ -213,6 +236,11 @@ impl AppState {
     /// Where recordings are written.
     pub fn exports(&self) -> &Lane {
         &self.0.exports
+    }
+
+    /// The studies that were started.
+    pub fn studies(&self) -> &Shelf {
+        &self.0.studies
     }
 
     /// The live Rerun streams, by session.

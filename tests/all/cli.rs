@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use sightline_tests::server::{PIXEL, TestServer, small_drive, small_scenario};
 
 /// The program: the one named by `SIGHTLINE_BIN`, else the one beside this test.
-fn program() -> PathBuf {
+pub(crate) fn program() -> PathBuf {
     if let Some(named) = std::env::var_os("SIGHTLINE_BIN") {
         return named.into();
     }

@@ -11,4 +11,5 @@ mod page;
 mod recorded_cameras;
 mod recorded_tracking;
 mod rerun_export;
+mod studies;
 mod zncc_reference;

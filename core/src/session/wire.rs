@@ -8,6 +8,7 @@ use utoipa::ToSchema;
 use crate::frames::{Pixel, PoseRecord};
 use crate::session::view::SessionView;
 use crate::settings::Changes;
+use crate::study::wire::StudyJob;
 use crate::traverse::StereoGeometry;
 
 /// A traverse in the server's list.
@@ -165,6 +166,11 @@ pub enum Event {
         n: usize,
         /// The stop that became ready, where one did.
         ready: Option<usize>,
+    },
+    /// A study went on.
+    StudyProgress {
+        /// How it stands.
+        job: StudyJob,
     },
 }
 

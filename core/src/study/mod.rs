@@ -5,6 +5,7 @@
 //! plan        what is to be done, keys   staged      a drive as a study stages it
 //! picks       which pixels, and faults   run         one target tracked and judged     step_record   one step of it
 //! row         the table's rows           evenness    rows of targets                   calibration   NEES
+//! wire        what page and server say to each other about studies
 //! scenery, picture, exposure             the simulated scenery against its laws
 //! realism     how hard a world is for plain correlation
 //! ```
@@ -22,5 +23,6 @@ pub mod step_record;
 pub mod run;
 pub mod evenness;
 pub mod row;
+pub mod wire;
 pub mod realism;
 pub mod exposure;

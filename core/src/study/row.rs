@@ -12,6 +12,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use utoipa::ToSchema;
 
 use super::calibration::{Calibration, median};
 use super::catalogue::Study;
@@ -23,7 +24,7 @@ use super::run::{Fate, Run};
 pub const BOUNDARY: &str = "boundary";
 
 /// One row; it is flat when it is written.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Row {
     /// The study.
     pub study: String,
@@ -35,6 +36,7 @@ pub struct Row {
     pub seed: u64,
     /// The study's variables and everything that was counted and measured, by name.
     #[serde(flatten)]
+    #[schema(additional_properties, value_type = Object)]
     pub columns: BTreeMap<String, Value>,
 }
 

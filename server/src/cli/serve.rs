@@ -11,7 +11,7 @@ use sightline_core::traverse::Traverse;
 
 use super::{open, say};
 use crate::guard::Hosts;
-use crate::state::AppState;
+use crate::state::{AppState, Folders};
 
 /// Open traverses in the browser.
 #[derive(Debug, Args)]
@@ -48,8 +48,9 @@ impl Serve {
         let address = listener.local_addr().map_err(|error| Error::Request(error.to_string()))?;
         let _lock = lock(&data)?;
         let traverses = self.open_traverses(&data)?;
+        let folders = Folders { sessions: data.join("sessions"), studies: data.join("studies") };
         let state =
-            AppState::new(traverses, &data.join("sessions"), Hosts::new(address.port(), &self.allow_host))?;
+            AppState::with_folders(traverses, &folders, Hosts::new(address.port(), &self.allow_host))?;
         if !self.listen.is_loopback() {
             say::error("warning: anyone who reaches this address can use the server");
         }

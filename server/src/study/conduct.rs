@@ -71,6 +71,8 @@ pub enum Progress {
         /// All.
         n: usize,
     },
+    /// Rows that were found or kept.
+    Rows(Vec<Row>),
     /// Something that a person should know, as a sentence.
     Notice(String),
 }
@@ -82,6 +84,8 @@ pub struct Outcome {
     pub units: Vec<Unit>,
     /// The table.
     pub rows: Vec<Row>,
+    /// The report, a whole HTML page.
+    pub report: String,
     /// How many units were found in this run; the others were kept.
     pub found: usize,
 }
@@ -108,8 +112,8 @@ pub fn carry_out(mut order: Order, cancel: &AtomicBool, tell: &(dyn Fn(Progress)
     units.sort_by_key(place);
     let rows: Vec<Row> = units.iter().flat_map(|unit| rows(order.plan.study, unit)).collect();
     tables::write(&folder, &rows, &units)?;
-    report::write(&folder, &order, &units)?;
-    Ok(Outcome { units, rows, found: conduct.found.load(Ordering::Relaxed) })
+    let report = report::write(&folder, &order, &units)?;
+    Ok(Outcome { units, rows, report, found: conduct.found.load(Ordering::Relaxed) })
 }
 
 /// Puts another scenario in the place of the study's own.
@@ -199,8 +203,8 @@ impl Conduct<'_> {
             self.log.get(&task.key).map(|unit| Unit { configuration, ..unit.clone() })
         };
         let kept: Vec<Unit> = tasks.iter().filter_map(kept_of).collect();
-        self.count(kept.len());
         if kept.len() == tasks.len() {
+            self.count(&kept);
             return Ok(Some(kept));
         }
         let world = format!("{name}/world-{}", scenario.seed);
@@ -219,12 +223,12 @@ impl Conduct<'_> {
                 let outcome = if is_named { "taken as they are" } else { "passed over" };
                 (self.tell)(Progress::Notice(format!("{world}: {} targets, {outcome}", of_point.len())));
                 if !is_named {
-                    self.uncount(kept.len());
                     return Ok(None);
                 }
             }
             chosen.push((point, of_point));
         }
+        self.count(&kept);
         self.render(&traverse, &world)?;
         let missing: Vec<&Task<'_>> = tasks.iter().filter(|task| self.log.get(&task.key).is_none()).collect();
         let found: Result<Vec<Unit>> = missing
@@ -269,7 +273,7 @@ impl Conduct<'_> {
         };
         self.log.add(&unit)?;
         self.found.fetch_add(1, Ordering::Relaxed);
-        self.count(1);
+        self.count(std::slice::from_ref(&unit));
         Ok(unit)
     }
 
@@ -282,16 +286,16 @@ impl Conduct<'_> {
         Ok(())
     }
 
-    /// Tells that so many more units are done.
-    fn count(&self, more: usize) {
-        let k = self.done.fetch_add(more, Ordering::Relaxed) + more;
-        if more > 0 {
-            (self.tell)(Progress::Units { k, n: self.all() });
+    /// Tells that these units are done.
+    fn count(&self, units: &[Unit]) {
+        if units.is_empty() {
+            return;
         }
-    }
-
-    fn uncount(&self, fewer: usize) {
-        self.done.fetch_sub(fewer, Ordering::Relaxed);
+        let k = self.done.fetch_add(units.len(), Ordering::Relaxed) + units.len();
+        (self.tell)(Progress::Rows(
+            units.iter().flat_map(|unit| rows(self.order.plan.study, unit)).collect(),
+        ));
+        (self.tell)(Progress::Units { k, n: self.all() });
     }
 
     /// How many units the study has.

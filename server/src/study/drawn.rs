@@ -17,6 +17,9 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(90, 90, 90),
 ];
 
+/// More words than these along the axis stand upright.
+const MOST_LEVEL_WORDS: usize = 5;
+
 /// Width and height of a chart, px.
 const SIZE: (u32, u32) = (900, 420);
 
@@ -35,6 +38,8 @@ pub struct Line {
     pub is_thin: bool,
     /// Whether only its marks are drawn: hollow squares.
     pub is_marks: bool,
+    /// Whether its points are not joined, because nothing lies between them.
+    pub is_apart: bool,
 }
 
 /// A chart.
@@ -75,7 +80,7 @@ impl Chart {
         let mut chart = ChartBuilder::on(area)
             .caption(&self.title, ("sans-serif", 16))
             .margin(12)
-            .x_label_area_size(if self.words.is_empty() { 40 } else { 56 })
+            .x_label_area_size(self.label_height())
             .y_label_area_size(58)
             .build_cartesian_2d(x[0]..x[1], y[0]..y[1])
             .map_err(|e| e.to_string())?;
@@ -84,6 +89,9 @@ impl Chart {
             whole.then(|| self.words.get(x.round() as usize).cloned()).flatten().unwrap_or_default()
         };
         let mut mesh = chart.configure_mesh();
+        if self.words.len() > MOST_LEVEL_WORDS {
+            mesh.x_label_style(("sans-serif", 12).into_font().transform(FontTransform::Rotate90));
+        }
         mesh.x_desc(self.axes[0].as_str()).y_desc(self.axes[1].as_str()).light_line_style(TRANSPARENT);
         if !self.words.is_empty() {
             mesh.x_label_formatter(&word).x_labels(2 * self.words.len() + 1);
@@ -107,6 +115,15 @@ impl Chart {
             area.draw(&text).map_err(|e| e.to_string())?;
         }
         Ok(())
+    }
+
+    /// Room below the plot, px.
+    fn label_height(&self) -> u32 {
+        match self.words.len() {
+            0 => 40,
+            count if count > MOST_LEVEL_WORDS => 130,
+            _ => 56,
+        }
     }
 
     /// The ranges of both axes, with some air.
@@ -147,9 +164,10 @@ fn draw(chart: &mut Plot<'_, '_>, line: &Line, [x, y]: [[f64; 2]; 2]) -> Result<
         return chart.draw_series(squares).map(|_| ()).map_err(|e| e.to_string());
     }
     let width = if line.is_thin { 1 } else { 2 };
-    chart
-        .draw_series(LineSeries::new(points.iter().copied(), colour.stroke_width(width)))
-        .map_err(|e| e.to_string())?;
+    if !line.is_apart {
+        let joined = LineSeries::new(points.iter().copied(), colour.stroke_width(width));
+        chart.draw_series(joined).map_err(|e| e.to_string())?;
+    }
     if !line.is_thin {
         let dots = points.iter().map(|&point| Circle::new(point, 4, colour.filled()));
         chart.draw_series(dots).map_err(|e| e.to_string())?;
@@ -159,4 +177,34 @@ fn draw(chart: &mut Plot<'_, '_>, line: &Line, [x, y]: [[f64; 2]; 2]) -> Result<
         PathElement::new([(px, clip(low)), (px, clip(high))], colour.mix(0.45).stroke_width(3))
     });
     chart.draw_series(bars).map(|_| ()).map_err(|e| e.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_chart_draws_lines_ranges_words_and_the_papers_squares() {
+        let line = Line {
+            label: "ncc-scale".to_owned(),
+            points: vec![(0.0, 100.0), (1.0, 95.0)],
+            ranges: vec![(0.0, [90.0, 100.0])],
+            ..Line::default()
+        };
+        let paper = Line { label: "paper".to_owned(), is_marks: true, ..line.clone() };
+        let words = vec!["flat".to_owned(), "steep".to_owned()];
+        let chart = Chart { lines: vec![line.clone(), paper], words, ..Chart::default() };
+        let svg = chart.svg().unwrap();
+        for word in ["ncc-scale", "paper", "flat", "steep", "<circle", "<polyline", "<rect"] {
+            assert!(svg.contains(word), "{word}");
+        }
+        assert!(
+            Chart {
+                lines: vec![Line { points: Vec::new(), ranges: Vec::new(), ..line }],
+                ..Chart::default()
+            }
+            .svg()
+            .is_ok()
+        );
+    }
 }

@@ -8,11 +8,12 @@ use std::collections::BTreeMap;
 use serde_json::Value;
 use sightline_core::study::catalogue::PaperValue;
 use sightline_core::study::plan::{Plan, Unit};
-use sightline_core::study::row::{columns, is_tracked, rows};
+use sightline_core::study::row::{columns, is_tracked};
 use sightline_core::study::run::Run;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::drawn::{Chart, Line};
+use super::step_figure::checkout;
 
 /// A figure of a report.
 #[derive(Clone, Debug)]
@@ -184,22 +185,27 @@ fn over_grid(
     let is_share = column.ends_with("share");
     let words = words_of(series);
     let mut lines: Vec<Line> = Vec::new();
+    let all = series.len() as f64;
     for (colour, series) in series.iter().enumerate() {
-        let value =
-            |point: &SeriesPoint| share_or_column(&point.pooled, column).map(|v| (point.x, factor * v));
+        // Points at the same word stand beside each other.
+        let aside = if words.is_empty() { 0.0 } else { 0.6 * ((colour as f64 + 0.5) / all - 0.5) };
+        let value = |point: &SeriesPoint| {
+            share_or_column(&point.pooled, column).map(|v| (point.x + aside, factor * v))
+        };
         let range = |point: &SeriesPoint| {
             let values = point.worlds.iter().filter_map(|(_, columns)| share_or_column(columns, column));
             let ends = values.fold(None, |range: Option<[f64; 2]>, v| {
                 let [low, high] = range.unwrap_or([v, v]);
                 Some([low.min(v), high.max(v)])
             });
-            ends.map(|[low, high]| (point.x, [factor * low, factor * high]))
+            ends.map(|[low, high]| (point.x + aside, [factor * low, factor * high]))
         };
         lines.push(Line {
             label: series.label.clone(),
             colour,
             points: series.points.iter().filter_map(value).collect(),
             ranges: series.points.iter().filter_map(range).collect(),
+            is_apart: !words.is_empty(),
             ..Line::default()
         });
     }
@@ -236,7 +242,7 @@ fn words_of(series: &[Series]) -> Vec<String> {
     words
 }
 
-fn axis(plan: &Plan) -> String {
+pub(super) fn axis(plan: &Plan) -> String {
     let unit = if plan.study.unit.is_empty() { String::new() } else { format!(", {}", plan.study.unit) };
     format!("{}{unit}", plan.study.variable)
 }
@@ -266,13 +272,22 @@ fn sentence(series: &[Series], column: &str, factor: f64, unit: &str, paper: &[P
             value.configuration == series.configuration && value.column == column && value.at == point.x
         });
         let printed = printed.map_or_else(String::new, |p| format!(" (paper {:.0})", factor * p.value));
-        let digits = if value.abs() < 10.0 { 2 } else { 0 };
+        let digits = if unit == "%" || value.abs() >= 10.0 { 0 } else { 2 };
         Some(format!("{value:.digits$} {unit}{printed} at {}", point.word))
     };
     let parts = series.iter().filter_map(|series| {
-        let mut ends: Vec<&SeriesPoint> = series.points.iter().take(1).collect();
-        ends.extend(series.points.last().filter(|_| series.points.len() > 1));
-        let said: Vec<String> = ends.into_iter().filter_map(|point| at(series, point)).collect();
+        // Of numbers both ends of the grid, of words all.
+        let last = series.points.len().saturating_sub(1);
+        let is_said = |&(place, point): &(usize, &SeriesPoint)| {
+            place == 0 || place == last || point.word.parse::<f64>().is_err()
+        };
+        let said: Vec<String> = series
+            .points
+            .iter()
+            .enumerate()
+            .filter(is_said)
+            .filter_map(|(_, point)| at(series, point))
+            .collect();
         (!said.is_empty()).then(|| format!("{}: {}", series.label, said.join(", ")))
     });
     let parts: Vec<String> = parts.collect();
@@ -337,91 +352,4 @@ fn nees(plan: &Plan, units: &[Unit]) -> Result<Figure, String> {
         said.join("; ")
     );
     Ok(Figure { name: "nees", svg: chart.svg()?, sentence })
-}
-
-/// Columns of a checkout over the rover's positions: each configuration, the truth of the staged drive, the paper.
-fn checkout(plan: &Plan, units: &[Unit]) -> Result<Vec<Figure>, String> {
-    let columns: &[(&'static str, &str, &str)] = match plan.study.name {
-        "checkout-1" => &[
-            ("magnification", "magnification_true", "magnification of one update"),
-            ("roll_deg", "roll_true_deg", "roll of one update, °"),
-            ("azimuth_change_deg", "azimuth_change_true_deg", "change of the viewing azimuth, °"),
-            ("ncc", "", "score of the match"),
-        ],
-        _ => &[
-            ("magnification", "magnification_true", "magnification of one update"),
-            ("correction_px", "", "correction of the prediction, px"),
-            ("total_correction_m", "", "correction of the target since its designation, m"),
-            ("ncc", "", "score of the match"),
-            ("err_px", "", "error against the truth, px"),
-        ],
-    };
-    let draw = |&(column, truth, words): &(&'static str, &str, &str)| {
-        step_figure(plan, units, (column, truth), words)
-    };
-    columns.iter().map(draw).collect()
-}
-
-fn step_figure(
-    plan: &Plan,
-    units: &[Unit],
-    (column, truth): (&'static str, &str),
-    words: &str,
-) -> Result<Figure, String> {
-    let mut lines: Vec<Line> = Vec::new();
-    let mut said: Vec<String> = Vec::new();
-    for (colour, configuration) in plan.configurations.iter().enumerate() {
-        let own = units.iter().filter(|unit| unit.configuration == configuration.name);
-        let rows: Vec<_> = own.flat_map(|unit| rows(plan.study, unit)).collect();
-        let line = |column: &str| {
-            let mut at: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
-            for row in &rows {
-                if let (Some(position), Some(value)) = (row.number("position"), row.number(column)) {
-                    at.entry(position as u64).or_default().push(value);
-                }
-            }
-            let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-            let ends = |values: &[f64]| {
-                values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(*v), h.max(*v)])
-            };
-            let points: Vec<_> = at.iter().map(|(x, values)| (*x as f64, mean(values))).collect();
-            let ranges: Vec<_> = at.iter().map(|(x, values)| (*x as f64, ends(values))).collect();
-            (points, ranges)
-        };
-        let (points, ranges) = line(column);
-        let [low, high] =
-            points.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], p| [l.min(p.1), h.max(p.1)]);
-        said.push(format!("{}: {low:.2} to {high:.2}", configuration.name));
-        lines.push(Line { label: configuration.name.clone(), colour, points, ranges, ..Line::default() });
-        if colour == 0 && !truth.is_empty() {
-            let (points, _) = line(truth);
-            lines.push(Line {
-                label: "by the true geometry".to_owned(),
-                colour: 6,
-                points,
-                is_thin: true,
-                ..Line::default()
-            });
-        }
-    }
-    let printed: Vec<(f64, f64)> = plan
-        .study
-        .paper()
-        .iter()
-        .filter(|value| value.column == column)
-        .map(|value| (value.at, value.value))
-        .collect();
-    if !printed.is_empty() {
-        lines.push(Line {
-            label: "paper, Table III".to_owned(),
-            colour: 6,
-            points: printed,
-            is_marks: true,
-            ..Line::default()
-        });
-    }
-    let chart =
-        Chart { title: words.to_owned(), axes: [axis(plan), words.to_owned()], lines, ..Chart::default() };
-    let sentence = format!("Means over the worlds, {words}: {}.", said.join("; "));
-    Ok(Figure { name: column, svg: chart.svg()?, sentence })
 }

@@ -14,7 +14,9 @@ pub mod conduct;
 pub mod log;
 pub mod tables;
 pub mod figure;
+pub mod step_figure;
 pub mod drawn;
 pub mod report;
+pub mod shelf;
 
 pub use conduct::{Order, Outcome, Progress, Seeds, carry_out};

@@ -23,14 +23,16 @@ background:#f5f5f5;padding:.1rem .3rem;overflow-wrap:anywhere;white-space:pre-wr
 ///
 /// # Errors
 /// A folder that cannot be written, or a figure that cannot be drawn.
-pub fn write(folder: &Path, order: &Order, units: &[Unit]) -> Result<()> {
+pub fn write(folder: &Path, order: &Order, units: &[Unit]) -> Result<String> {
     let path = folder.join(NAME);
     let figures = figures(&order.plan, units)
         .map_err(|problem| Error::format(&path, format!("a figure: {problem}")))?;
     for figure in &figures {
         write_atomically(&folder.join(format!("{}.svg", figure.name)), figure.svg.as_bytes())?;
     }
-    write_atomically(&path, html(order, units, &figures).as_bytes())
+    let html = html(order, units, &figures);
+    write_atomically(&path, html.as_bytes())?;
+    Ok(html)
 }
 
 fn html(order: &Order, units: &[Unit], figures: &[Figure]) -> String {
@@ -69,15 +71,18 @@ fn extent(units: &[Unit]) -> String {
     let runs: usize = units.iter().map(|unit| unit.runs.len()).sum();
     let named: Vec<String> = worlds.iter().map(|(scenario, seed)| format!("{scenario} {seed}")).collect();
     format!(
-        "{} worlds, {runs} runs. Points pool all worlds; bars reach from the least to the greatest value of a single \
-         world, whose targets are not independent. Worlds: {}.",
+        "Worlds: {}; runs: {runs}. Points pool all worlds; bars reach from the least to the greatest value of a single \
+         world, whose targets are not independent. They are {}.",
         worlds.len(),
         named.join(", ")
     )
 }
 
-/// The pooled columns of the table: name, words, factor, digits.
-const COLUMNS: [(&str, &str, f64, usize); 14] = [
+/// A column of the table: name, words, factor, digits.
+type Column = (&'static str, &'static str, f64, usize);
+
+/// The pooled columns of the table.
+const COLUMNS: [Column; 14] = [
     ("targets", "targets", 1.0, 0),
     ("refused", "refused", 1.0, 0),
     ("tracked_share", "tracked, %", 100.0, 1),
@@ -95,7 +100,7 @@ const COLUMNS: [(&str, &str, f64, usize); 14] = [
 ];
 
 /// The columns of faults and of boundary targets, where there are any.
-const MORE: [(&str, &str, f64, usize); 10] = [
+const MORE: [Column; 10] = [
     ("uneven_true_px", "of the truth, px", 1.0, 2),
     ("boundary_targets", "boundary targets", 1.0, 0),
     ("boundary_tracked", "tracked", 1.0, 0),
@@ -110,9 +115,15 @@ const MORE: [(&str, &str, f64, usize); 10] = [
 
 fn table(plan: &Plan, series: &[Series]) -> String {
     let points = || series.iter().flat_map(|series| &series.points);
-    let known: Vec<_> = COLUMNS
+    // What a fault did comes before what else there is.
+    let (first, then): (&[Column], &[Column]) = if points().any(|point| point.value("cases").is_some()) {
+        (&MORE, &COLUMNS)
+    } else {
+        (&COLUMNS, &MORE)
+    };
+    let known: Vec<_> = first
         .iter()
-        .chain(&MORE)
+        .chain(then)
         .filter(|(name, ..)| points().any(|point| point.value(name).is_some()))
         .collect();
     let head: Vec<String> =
@@ -124,7 +135,7 @@ fn table(plan: &Plan, series: &[Series]) -> String {
     );
     for series in series {
         for point in &series.points {
-            let cell = |(name, _, factor, digits): &(&str, &str, f64, usize)| {
+            let cell = |(name, _, factor, digits): &Column| {
                 point.value(name).map_or_else(String::new, |v| format!("{:.digits$}", factor * v))
             };
             let cells: Vec<String> =

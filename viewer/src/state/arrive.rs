@@ -43,6 +43,7 @@ impl State {
             }
             Event::RunProgress { .. } => {}
             Event::RenderProgress { traverse, k, n, ready } => self.rendered(&traverse, k, n, ready),
+            Event::StudyProgress { .. } => {}
         }
     }
 

@@ -1,0 +1,53 @@
+//! What the catalogue promises: points in scenarios that exist, configurations that are known, grids that refuse.
+
+use super::*;
+use crate::sim::library;
+use crate::study::plan::Configuration;
+
+#[test]
+fn every_study_has_points_in_scenarios_of_the_library_and_known_configurations() {
+    for study in STUDIES {
+        let points = study.points(&[]).unwrap();
+        assert!(!points.is_empty(), "{}", study.name);
+        for point in &points {
+            assert!(library::toml(&point.scenario).is_some(), "{}: {}", study.name, point.scenario);
+        }
+        for name in study.default_configurations() {
+            assert!(Configuration::parse(name).is_ok(), "{}: {name}", study.name);
+        }
+        for value in study.paper() {
+            assert!(
+                study.default_configurations().contains(&value.configuration),
+                "{}: the paper's {} does not run",
+                study.name,
+                value.configuration
+            );
+        }
+    }
+}
+
+#[test]
+fn four_skipped_images_are_every_fifth_stop() {
+    let points = Study::named("straight").unwrap().points(&["4".to_owned()]).unwrap();
+    assert_eq!((points.len(), points[0].visit), (1, Visit::Every(5)));
+}
+
+#[test]
+fn fifteen_degrees_sideways_are_every_third_picture_in_both_windows() {
+    let points = Study::named("sideways").unwrap().points(&["15".to_owned()]).unwrap();
+    assert_eq!(points.len(), 2);
+    assert!(points.iter().all(|point| point.visit == Visit::Every(3)));
+    assert_eq!(points[1].changes, ["search_window_px=601"]);
+}
+
+#[test]
+fn a_value_outside_the_grid_is_refused_with_what_may_stand_there() {
+    let refusal = |study: &str, value: &str| {
+        Study::named(study).unwrap().points(&[value.to_owned()]).unwrap_err().to_string()
+    };
+    assert!(refusal("straight", "-1").contains("0 to 28"));
+    assert!(refusal("sideways", "12").contains("multiple of 5"));
+    assert!(refusal("faults", "rain").contains("occlusion"));
+    assert!(refusal("approach", "3").contains("no grid"));
+    assert!(Study::named("curved").unwrap_err().to_string().contains("straight"));
+}

@@ -1,0 +1,228 @@
+//! The studies that were started over REST: one is carried out at a time, the others wait.
+//!
+//! The list lives as long as the server; what a study found lives in its folder, from which the same study, started
+//! again, goes on.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+
+use sightline_core::error::Error;
+use sightline_core::session::wire::Event;
+use sightline_core::study::row::Row;
+use sightline_core::study::wire::{StudyJob, StudyState};
+use tokio::sync::broadcast;
+
+use super::{Order, Progress, carry_out};
+use crate::jobs::{Jobs, lock};
+use crate::problem::{ApiError, ApiResult};
+
+/// How many studies the list holds.
+const STUDY_LIMIT: usize = 64;
+/// How many may wait.
+const WAITING_LIMIT: usize = 16;
+
+/// The studies of a server.
+pub struct Shelf {
+    folder: PathBuf,
+    events: broadcast::Sender<Event>,
+    jobs: Jobs,
+    works: Mutex<Vec<Arc<Work>>>,
+}
+
+/// A study that was started.
+pub struct Work {
+    order: Order,
+    events: broadcast::Sender<Event>,
+    inside: Mutex<Inside>,
+}
+
+struct Inside {
+    view: StudyJob,
+    rows: Vec<Row>,
+    report: Option<String>,
+    cancel: Arc<AtomicBool>,
+}
+
+impl Shelf {
+    /// An empty shelf whose studies are kept in `folder`.
+    ///
+    /// # Errors
+    /// When the system starts no thread.
+    pub fn start(folder: PathBuf, events: broadcast::Sender<Event>) -> std::io::Result<Self> {
+        Ok(Self { folder, events, jobs: Jobs::start(1, WAITING_LIMIT)?, works: Mutex::default() })
+    }
+
+    /// The folder of all studies.
+    pub fn folder(&self) -> &PathBuf {
+        &self.folder
+    }
+
+    /// The studies, in the order in which they were started.
+    pub fn all(&self) -> Vec<StudyJob> {
+        lock(&self.works).iter().map(|work| work.view()).collect()
+    }
+
+    /// The study of that name in paths.
+    ///
+    /// # Errors
+    /// A problem when there is none.
+    pub fn work(&self, id: &str) -> ApiResult<Arc<Work>> {
+        let found = lock(&self.works).iter().find(|work| work.view().id == id).cloned();
+        found.ok_or_else(|| ApiError::not_found("There is no such study."))
+    }
+
+    /// Adds a study, which begins when those before it are done.
+    ///
+    /// # Errors
+    /// A problem when there are too many already.
+    pub fn add(&self, order: Order) -> ApiResult<StudyJob> {
+        let work = {
+            let mut works = lock(&self.works);
+            if works.len() >= STUDY_LIMIT {
+                return Err(ApiError::conflict(format!("There are {STUDY_LIMIT} studies already."))
+                    .hint("Start the server again; what they found is kept."));
+            }
+            let view = StudyJob {
+                id: format!("study-{}", works.len() + 1),
+                study: order.plan.study.name.to_owned(),
+                state: StudyState::Waiting,
+                k: 0,
+                n: 0,
+                doing: "waiting".to_owned(),
+                notices: Vec::new(),
+                command: order.command.clone(),
+            };
+            let inside = Inside { view, rows: Vec::new(), report: None, cancel: Arc::default() };
+            let work = Arc::new(Work { order, events: self.events.clone(), inside: Mutex::new(inside) });
+            works.push(Arc::clone(&work));
+            work
+        };
+        if let Err(problem) = self.submit(&work) {
+            work.change(|inside| end(inside, StudyState::Failed, "too many studies were waiting"));
+            return Err(problem);
+        }
+        Ok(work.view())
+    }
+
+    /// Lets a study go on that was cancelled or failed.
+    ///
+    /// # Errors
+    /// A problem when it is neither.
+    pub fn resume(&self, id: &str) -> ApiResult<StudyJob> {
+        let work = self.work(id)?;
+        let may = work.change(|inside| {
+            let may = matches!(inside.view.state, StudyState::Cancelled | StudyState::Failed);
+            if may {
+                (inside.cancel, inside.rows) = (Arc::default(), Vec::new());
+                (inside.view.state, inside.view.k) = (StudyState::Waiting, 0);
+                "waiting".clone_into(&mut inside.view.doing);
+            }
+            may
+        });
+        if !may {
+            return Err(ApiError::conflict("The study was not stopped."));
+        }
+        self.submit(&work)?;
+        Ok(work.view())
+    }
+
+    /// Stops a study; what it found is kept.
+    ///
+    /// # Errors
+    /// A problem when it has ended already.
+    pub fn cancel(&self, id: &str) -> ApiResult<StudyJob> {
+        let work = self.work(id)?;
+        let was_going = work.change(|inside| {
+            inside.cancel.store(true, Ordering::Relaxed);
+            matches!(inside.view.state, StudyState::Waiting | StudyState::Running)
+        });
+        if was_going { Ok(work.view()) } else { Err(ApiError::conflict("The study has ended already.")) }
+    }
+
+    /// Stops all studies.
+    pub fn close(&self) {
+        for work in lock(&self.works).iter() {
+            lock(&work.inside).cancel.store(true, Ordering::Relaxed);
+        }
+    }
+
+    fn submit(&self, work: &Arc<Work>) -> ApiResult<()> {
+        let work = Arc::clone(work);
+        self.jobs.submit(move || work.carry_out())
+    }
+}
+
+impl Work {
+    /// How it stands.
+    pub fn view(&self) -> StudyJob {
+        lock(&self.inside).view.clone()
+    }
+
+    /// The rows so far.
+    pub fn rows(&self) -> Vec<Row> {
+        lock(&self.inside).rows.clone()
+    }
+
+    /// The report, once it is done.
+    pub fn report(&self) -> Option<String> {
+        lock(&self.inside).report.clone()
+    }
+
+    /// Changes it and tells every page.
+    fn change<T>(&self, change: impl FnOnce(&mut Inside) -> T) -> T {
+        let (result, job) = {
+            let mut inside = lock(&self.inside);
+            let result = change(&mut inside);
+            (result, inside.view.clone())
+        };
+        // Nobody may be listening.
+        let _ = self.events.send(Event::StudyProgress { job });
+        result
+    }
+
+    fn carry_out(&self) {
+        let cancel = Arc::clone(&lock(&self.inside).cancel);
+        if cancel.load(Ordering::Relaxed) {
+            self.change(|inside| end(inside, StudyState::Cancelled, "cancelled"));
+            return;
+        }
+        self.change(|inside| inside.view.state = StudyState::Running);
+        let work = std::panic::AssertUnwindSafe(|| {
+            carry_out(self.order.clone(), &cancel, &|progress| self.hear(progress))
+        });
+        match std::panic::catch_unwind(work) {
+            Ok(Ok(outcome)) => self.change(|inside| {
+                (inside.rows, inside.report) = (outcome.rows, Some(outcome.report));
+                end(inside, StudyState::Done, "done");
+            }),
+            Ok(Err(Error::Cancelled)) => {
+                self.change(|inside| end(inside, StudyState::Cancelled, "cancelled"));
+            }
+            Ok(Err(error)) => self.change(|inside| end(inside, StudyState::Failed, &error.to_string())),
+            Err(_) => {
+                let why = "the server met a fault of its own; its log says more";
+                self.change(|inside| end(inside, StudyState::Failed, why));
+            }
+        }
+    }
+
+    fn hear(&self, progress: Progress) {
+        match progress {
+            Progress::Rows(rows) => lock(&self.inside).rows.extend(rows),
+            Progress::Units { k, n } => self.change(|inside| {
+                (inside.view.k, inside.view.n) = (k, n);
+                "tracking".clone_into(&mut inside.view.doing);
+            }),
+            Progress::Rendering { world, k, n } => self.change(|inside| {
+                inside.view.doing = format!("rendering stop {} of {n} of {world}", k + 1);
+            }),
+            Progress::Notice(text) => self.change(|inside| inside.view.notices.push(text)),
+        }
+    }
+}
+
+fn end(inside: &mut Inside, state: StudyState, doing: &str) {
+    inside.view.state = state;
+    doing.clone_into(&mut inside.view.doing);
+}
