@@ -78,12 +78,7 @@ pub(super) fn choose<'a>(
                 }
             };
             comparisons += first.positions;
-            tried.push(TriedTemplate {
-                template_step: appearance.step,
-                scale: prepared.record.applied_scale,
-                roll_rad: prepared.record.applied_roll_rad,
-                score: first.peak.score,
-            });
+            tried.push(describe(&prepared, &first));
             if best.as_ref().is_none_or(|best| first.peak.score > best.first.peak.score) {
                 let (tried, comparisons) = (Vec::new(), 0);
                 best = Some(Chosen {
@@ -104,6 +99,15 @@ pub(super) fn choose<'a>(
         }
         (None, Some(unmatched)) => Err(unmatched),
         (None, None) => Err(Unmatched { scale_roll: None, missing: "there is no template".to_owned() }),
+    }
+}
+
+fn describe(prepared: &Prepared<'_>, first: &FirstMatch) -> TriedTemplate {
+    TriedTemplate {
+        template_step: prepared.record.template_step,
+        scale: prepared.record.applied_scale,
+        roll_rad: prepared.record.applied_roll_rad,
+        score: first.peak.score,
     }
 }
 

@@ -186,15 +186,14 @@ pub fn finish(
     image: &GrayImage,
     settings: &TemplateSettings,
 ) -> TemplateMatch {
-    let size = settings.template_size_px;
-    let template = &prepared.record.rolled;
+    let (size, template) = (settings.template_size_px, &prepared.record.rolled);
     let mut peak = first.peak;
     let second_peak = peak::second_peak(&first.surface, &peak, f64::from(size) / 2.0);
     let is_correlated = first.descent.is_none() && settings.measure == Measure::Ncc;
     let focus = Focus::new(size, if is_correlated { settings.focus_px } else { 0.0 });
     let focused = refine(&focus, template, image, &peak, settings);
-    let pixel = focused.map_or(peak.pixel, |(pixel, _)| pixel);
-    let start = first.descent.map_or(Placed::at(pixel), |(_, placed)| placed);
+    let correlated = Placed::at(focused.map_or(peak.pixel, |(pixel, _)| pixel));
+    let start = first.descent.map_or(correlated, |(_, placed)| placed);
     let affine =
         (settings.refine == Refine::Affine).then(|| affine::refine(prepared, start, image, settings));
     let refined = affine.as_ref().filter(|record| record.accepted).map(AffineRefinement::placed);
