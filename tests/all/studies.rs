@@ -84,7 +84,7 @@ fn a_study_that_cannot_be_is_refused_before_anything_is_made() {
     for (arguments, culprit) in [
         (&["study", "straight", "--configurations", "best"][..], "ncc-scale"),
         (&["study", "straight", "--configurations", "ncc+ncc_mim=1"], "ncc_min"),
-        (&["study", "straight", "--grid", "-1"], "0 to 28"),
+        (&["study", "straight", "--grid", "29"], "0 to 28"),
         (&["study", "faults", "--scenario", "approach-10"], "several scenarios"),
     ] {
         let output = Command::new(program()).args(arguments).arg("--out").arg(&out).output().unwrap();
