@@ -10,7 +10,9 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use crate::state::AppState;
-use crate::{about, events, exports, photometry, runs, sessions, settings, steps, studies, targets, traverses};
+use crate::{
+    about, events, exports, photometry, runs, sessions, settings, steps, studies, targets, traverses,
+};
 
 #[derive(OpenApi)]
 #[openapi(
