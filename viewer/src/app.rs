@@ -100,10 +100,14 @@ impl SightlineApp {
             .frame(Frame::new().fill(theme::PAGE))
             .show(ui, |ui| self.tree.ui(&mut panels, ui));
         self.left_image = panels.left_image;
-        let is_history_seen = panels.seen.contains(&Pane::History);
+        let [is_history_seen, is_studies_seen] =
+            [Pane::History, Pane::Studies].map(|pane| panels.seen.contains(&pane));
         help::show(ui, state, &mut out);
         // Every step's window is worth fetching only while the panel that shows them is on the screen.
         self.state.wants_history = is_history_seen;
+        if is_studies_seen {
+            self.state.want_studies();
+        }
         out
     }
 

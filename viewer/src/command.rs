@@ -4,6 +4,7 @@ use sightline_core::frames::Pixel;
 use sightline_core::settings::Changes;
 
 use crate::state::calculator::Calculator;
+use crate::state::studies::Order;
 use crate::stretch::Stretch;
 use crate::view2d::View2d;
 
@@ -203,6 +204,18 @@ pub enum Command {
     SetCalculator(Calculator),
     /// Stretches the grey values of the images on the screen.
     SetStretch(Stretch),
+    /// Changes what the next study is made of.
+    OrderStudy(Order),
+    /// Starts that study.
+    StartStudy,
+    /// Stops a study.
+    CancelStudy(String),
+    /// Lets a stopped study go on.
+    ResumeStudy(String),
+    /// Looks at a study's table.
+    LookAtStudy(String),
+    /// Opens a study's report.
+    OpenReport(String),
     /// Fits every image to its panel.
     FitAll,
     /// Shows or hides a layer of marks.

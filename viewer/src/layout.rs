@@ -31,6 +31,8 @@ pub enum Pane {
     Surface,
     /// The error budget.
     Budget,
+    /// The validation experiments.
+    Studies,
     /// The stereo scores along the epipolar curve.
     StereoProfile,
     /// The map.
@@ -51,12 +53,13 @@ pub enum Pane {
 
 impl Pane {
     /// All of them.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::Targets,
         Self::Settings,
         Self::Left,
         Self::Right,
         Self::Budget,
+        Self::Studies,
         Self::Strip,
         Self::History,
         Self::Surface,
@@ -78,6 +81,7 @@ impl Pane {
             Self::Left => "Left image",
             Self::Right => "Right image",
             Self::Budget => "Error budget",
+            Self::Studies => "Studies",
             Self::Strip => "Template strip",
             Self::History => "Template history",
             Self::Surface => "Match scores",
@@ -107,6 +111,7 @@ pub fn show_pane(ui: &mut Ui, pane: Pane, state: &State, out: &mut Vec<Command>)
         Pane::History => panels::history::show(ui, state, out),
         Pane::Surface => panels::surface::show(ui, state, out),
         Pane::Budget => panels::budget::show(ui, state, out),
+        Pane::Studies => panels::studies::show(ui, state, out),
         Pane::StereoProfile => panels::stereo_profile::show(ui, state, out),
         Pane::Map => panels::map::show(ui, state, out),
         Pane::Plots => panels::plots::show(ui, state, out),
@@ -128,7 +133,7 @@ pub fn overview() -> Tree<Pane> {
     };
     let side = tabs(&mut tiles, &[Pane::Targets, Pane::Settings]);
     let left = tabs(&mut tiles, &[Pane::Left]);
-    let right = tabs(&mut tiles, &[Pane::Right, Pane::Budget]);
+    let right = tabs(&mut tiles, &[Pane::Right, Pane::Budget, Pane::Studies]);
     let strip = tabs(&mut tiles, &[Pane::Strip, Pane::History]);
     let surface = tabs(&mut tiles, &[Pane::Surface, Pane::StereoProfile]);
     let map = tabs(&mut tiles, &[Pane::Map]);

@@ -6,6 +6,7 @@ use ehttp::{Headers, Method};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use sightline_core::session::wire::{Designated, Problem};
+use sightline_core::study::wire::StudyRows;
 
 use super::{Arrived, Reply, Request};
 use crate::cache::{Item, Key, StepKey};
@@ -76,6 +77,16 @@ fn describe(request: &Request) -> (Method, String, Option<Vec<u8>>) {
         Request::OpenRerun(session) => {
             (Method::POST, format!("sessions/{session}/rerun"), json(&serde_json::json!({})))
         }
+        Request::Studies => get("studies".to_owned()),
+        Request::StudyJobs => get("studies/jobs".to_owned()),
+        Request::StartStudy(new) => (Method::POST, "studies/jobs".to_owned(), json(new)),
+        Request::CancelStudy(job) => {
+            (Method::POST, format!("studies/jobs/{job}/cancel"), json(&serde_json::json!({})))
+        }
+        Request::ResumeStudy(job) => {
+            (Method::POST, format!("studies/jobs/{job}/resume"), json(&serde_json::json!({})))
+        }
+        Request::StudyRows(job) => get(format!("studies/jobs/{job}/rows")),
         Request::Item(key) => get(item_path(key)),
         Request::Reconnect => get(String::new()),
     }
@@ -113,6 +124,15 @@ fn read(request: &Request, response: &ehttp::Response, context: &egui::Context) 
         }
         Request::NewRun { .. } => Reply::Run(Box::new(parse(bytes)?)),
         Request::OpenRerun(_) => Reply::Rerun(parse(bytes)?),
+        Request::Studies => Reply::Studies(parse(bytes)?),
+        Request::StudyJobs => Reply::StudyJobs(parse(bytes)?),
+        Request::StartStudy(_) | Request::CancelStudy(_) | Request::ResumeStudy(_) => {
+            Reply::StudyJob(parse(bytes)?)
+        }
+        Request::StudyRows(_) => {
+            let StudyRows { rows } = parse(bytes)?;
+            Reply::StudyRows(rows)
+        }
         Request::Item(key) => Reply::Item(read_item(key, bytes, context)?),
         Request::PutCursor { .. }
         | Request::RemoveTarget { .. }

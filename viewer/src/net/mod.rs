@@ -13,6 +13,9 @@ use sightline_core::session::wire::{
     Event, NewRun, NewSession, NewTarget, Problem, RerunStream, SessionEntry, TraverseEntry, TraverseView,
 };
 
+use sightline_core::study::row::Row;
+use sightline_core::study::wire::{NewStudy, StudyInfo, StudyJob};
+
 use self::events::Events;
 use crate::cache::{Item, Key};
 use crate::state::Connection;
@@ -88,6 +91,18 @@ pub enum Request {
     },
     /// To stream a session to Rerun.
     OpenRerun(String),
+    /// The studies that can be started.
+    Studies,
+    /// The studies that were started.
+    StudyJobs,
+    /// To start a study.
+    StartStudy(Box<NewStudy>),
+    /// To stop a study.
+    CancelStudy(String),
+    /// To let a study go on.
+    ResumeStudy(String),
+    /// The table of a study.
+    StudyRows(String),
     /// An image, an array or a record.
     Item(Key),
     /// To connect to the events again at once.
@@ -117,6 +132,14 @@ pub enum Reply {
     Run(Box<RunView>),
     /// A stream to Rerun.
     Rerun(RerunStream),
+    /// The studies that can be started.
+    Studies(Vec<StudyInfo>),
+    /// The studies that were started.
+    StudyJobs(Vec<StudyJob>),
+    /// How a study stands.
+    StudyJob(StudyJob),
+    /// The table of a study.
+    StudyRows(Vec<Row>),
     /// An image, an array or a record.
     Item(Item),
     /// It is done.

@@ -18,6 +18,7 @@ pub mod plots;
 pub mod settings;
 pub mod stereo_profile;
 pub mod strip;
+pub mod studies;
 pub mod surface;
 pub mod targets;
 pub mod timeline;

@@ -44,6 +44,14 @@ impl State {
             },
             Command::SetCalculator(calculator) => self.calculator = calculator,
             Command::SetStretch(stretch) => self.stretch = stretch,
+            Command::OrderStudy(order) => self.studies.order = order,
+            Command::StartStudy => self.start_study(),
+            Command::CancelStudy(job) => self.outbox.push(Request::CancelStudy(job)),
+            Command::ResumeStudy(job) => self.outbox.push(Request::ResumeStudy(job)),
+            Command::LookAtStudy(job) => self.look_at_study(job),
+            Command::OpenReport(job) => {
+                self.open_url = Some(format!("{}/api/v1/studies/jobs/{job}/report.html", self.origin));
+            }
             Command::FitAll => self.views = Views::default(),
             Command::ToggleLayer(layer) => {
                 if !self.hidden.remove(&layer) {

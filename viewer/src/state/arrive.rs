@@ -43,7 +43,7 @@ impl State {
             }
             Event::RunProgress { .. } => {}
             Event::RenderProgress { traverse, k, n, ready } => self.rendered(&traverse, k, n, ready),
-            Event::StudyProgress { .. } => {}
+            Event::StudyProgress { job } => self.study_went_on(job),
         }
     }
 
@@ -116,6 +116,14 @@ impl State {
                 Request::PutCursor { cursor, .. } => self.put_cursor(cursor),
                 _ => self.sync.session_stale = true,
             },
+            Reply::Studies(infos) => self.studies.infos = Some(infos),
+            Reply::StudyJobs(jobs) => self.studies.jobs = jobs,
+            Reply::StudyJob(job) => self.studies.took(job),
+            Reply::StudyRows(rows) => {
+                if let Request::StudyRows(job) = request {
+                    self.studies.rows.insert(job, rows);
+                }
+            }
             Reply::Item(_) => {}
         }
     }
@@ -139,6 +147,7 @@ impl State {
                     self.refusal = Some(Refusal { place, sentence: problem.detail.clone() });
                 }
             }
+            Request::Studies => self.studies.infos = Some(Vec::new()),
             Request::Session(_) => {
                 self.sync.session_asked = None;
                 if self.session.is_none() && problem.status != 0 {

@@ -9,6 +9,7 @@ pub mod calculator;
 mod configurations;
 pub mod messages;
 mod missing;
+pub mod studies;
 mod wanted;
 
 use std::collections::{BTreeMap, HashSet};
@@ -26,6 +27,7 @@ use sightline_core::trace::{ArrayName, StepRow, StepTrace};
 use self::calculator::Calculator;
 use self::configurations::Configurations;
 use self::messages::Messages;
+use self::studies::Studies;
 use crate::cache::{Cache, Eye, Key, Slot, StepKey};
 use crate::command::{Layer, Mode, Panel, Stage};
 use crate::net::Request;
@@ -136,6 +138,8 @@ pub struct State {
     pub stretch: Stretch,
     /// What the calculator of the error budget is given.
     pub calculator: Calculator,
+    /// The validation experiments.
+    pub studies: Studies,
     /// Whether the windows of all steps are on the screen.
     pub wants_history: bool,
     /// Layers of marks that are switched off.
@@ -191,6 +195,7 @@ impl State {
             views: Views::default(),
             stretch: Stretch::default(),
             calculator: Calculator::default(),
+            studies: Studies::default(),
             wants_history: false,
             hidden: HashSet::new(),
             marks: true,

@@ -4,6 +4,7 @@ mod accuracy;
 pub(crate) mod fixture;
 mod history;
 mod session;
+mod studies;
 mod tracking;
 
 use egui_kittest::Harness;
