@@ -126,6 +126,8 @@ settings_group! {
         warn_depth_range: f64 = 0.1, "", Domain::Between(0.0, 10.0), "ours, R21";
         /// A designation is warned of when its window's standard deviation is a smaller share of full scale.
         warn_contrast: f64 = 0.01, "", Domain::Between(0.0, 1.0), "ours, R21";
+        /// A designation is warned of when a larger share of its window lies in shadow, where the light is known.
+        warn_shadow_share: f64 = 0.2, "", Domain::Between(0.0, 1.0), "ours, R21";
         /// A designation is warned of when the ranges in its window leave a plane by a larger share of the distance:
         /// an occluding boundary runs through it.
         warn_boundary: f64 = 0.03, "", Domain::Between(0.0, 10.0), "ours, R119";

@@ -58,6 +58,13 @@ pub enum Evidence {
 }
 
 impl Evidence {
+    /// The evidence of the template locator, to be added to.
+    pub fn template_mut(&mut self) -> Option<&mut template::TemplateEvidence> {
+        match self {
+            Self::Template(evidence) => Some(evidence),
+        }
+    }
+
     /// The evidence of the template locator.
     pub fn template(&self) -> Option<&template::TemplateEvidence> {
         match self {

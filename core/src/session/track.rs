@@ -3,6 +3,7 @@
 //! Page, REST and command line all come through these two functions, so that they show the same numbers.
 
 use crate::error::Result;
+use crate::locate::template::warnings;
 use crate::pipeline::{self, Stops};
 use crate::settings::Settings;
 use crate::study::truth::{TargetTruth, TruthSource};
@@ -20,7 +21,20 @@ impl<T: Stops + TruthSource> Drive for T {}
 pub fn designate<D: Drive>(drive: &D, designation: Designation, settings: &Settings) -> Result<StepTrace> {
     let mut trace = pipeline::designate(drive, designation, settings)?;
     compare(drive, &mut trace, None);
+    warn_of_shadow(drive, &mut trace, settings);
     Ok(trace)
+}
+
+/// Adds the warning of a shadow on the window (R21), which only a source of truth knows.
+fn warn_of_shadow<D: Drive>(drive: &D, trace: &mut StepTrace, settings: &Settings) {
+    let Designation { step, pixel } = trace.update.target.designation;
+    let warning = drive
+        .shadow_share(step, pixel, settings.template.template_size_px)
+        .and_then(|share| warnings::of_shadow(share, &settings.limits));
+    let evidence = trace.locate.as_mut().and_then(|located| located.evidence.template_mut());
+    if let (Some(evidence), Some(warning)) = (evidence, warning) {
+        evidence.warnings.push(warning);
+    }
 }
 
 /// The step after `last`; `first` is the run's designation.

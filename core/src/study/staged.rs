@@ -94,6 +94,9 @@ impl<D: Drive> TruthSource for Staged<'_, D> {
     fn is_visible(&self, step: usize, point_in_site: &Point3) -> bool {
         self.drive.is_visible(self.stops[step], point_in_site)
     }
+    fn shadow_share(&self, step: usize, centre: Pixel, size_px: u32) -> Option<f64> {
+        self.drive.shadow_share(self.stops[step], centre, size_px)
+    }
 }
 
 #[cfg(test)]

@@ -23,6 +23,10 @@ pub trait TruthSource: Send + Sync {
     fn surface_point_in_site(&self, step: usize, pixel: crate::frames::Pixel) -> Option<Point3>;
     /// Whether a point of the site frame is unoccluded in the left image of a stop.
     fn is_visible(&self, step: usize, point_in_site: &Point3) -> bool;
+    /// The share of a square window of the left image that lies in shadow, 0 to 1; none where no light is known.
+    fn shadow_share(&self, _step: usize, _centre: crate::frames::Pixel, _size_px: u32) -> Option<f64> {
+        None
+    }
 }
 
 /// The truth of one target.

@@ -328,6 +328,11 @@ impl Traverse {
         Ok(simulated.world().at(&moment, &simulated.scenario))
     }
 
+    /// Whether something stands in the way at some of the stops.
+    pub(super) fn has_occluders(&self) -> bool {
+        self.simulated.as_ref().is_some_and(|simulated| !simulated.scenario.events.occluders.is_empty())
+    }
+
     /// Saves building the world again; one that is there already is the same.
     fn keep_world(&self, world: World) {
         if let Some(simulated) = &self.simulated {

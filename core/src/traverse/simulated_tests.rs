@@ -48,6 +48,51 @@ fn a_simulated_traverse_renders_what_is_asked_for_and_only_that() {
 }
 
 #[test]
+fn a_block_in_the_way_hides_a_point_at_its_own_stops_only() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut blocked = scenario();
+    blocked.events.occluders = vec![crate::sim::scenario::Occluder {
+        from_stop: 1,
+        to_stop: 1,
+        width_m: 1.0,
+        height_m: 1.0,
+        at: 0.5,
+        aside_m: 0.0,
+    }];
+    let traverse = create_simulated(&blocked, folder.path()).unwrap();
+    let point = traverse.surface_point_in_site(0, Pixel::new(63.5, 63.5)).unwrap();
+    assert!(traverse.is_visible(0, &point));
+    assert!(!traverse.is_visible(1, &point));
+}
+
+#[test]
+fn the_shadow_on_a_window_is_that_of_its_points_and_is_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let traverse = create_simulated(&scenario(), folder.path()).unwrap();
+    let (world, stop) = (traverse.world().unwrap(), &traverse.index().stops[0]);
+    let camera = sim::true_camera_in_site(stop, Eye::Left).unwrap();
+    let is_dark = |x: u32, y: u32| {
+        let point = sim::surface_point(world, &camera, Pixel::new(f64::from(x), f64::from(y)));
+        point.is_some_and(|point| world.in_shadow(&point))
+    };
+    let dark: Vec<(u32, u32)> =
+        (30..98).flat_map(|y| (30..98).map(move |x| (x, y))).filter(|(x, y)| is_dark(*x, *y)).collect();
+    // Deep in a shadow, and where there is none for ten pixels around.
+    let count =
+        |x: u32, y: u32| dark.iter().filter(|d| d.0.abs_diff(x) <= 10 && d.1.abs_diff(y) <= 10).count();
+    let places = || (40..88).flat_map(|y| (40..88).map(move |x| (x, y)));
+    let darkest = places().max_by_key(|(x, y)| count(*x, *y)).unwrap();
+    let lit = places().min_by_key(|(x, y)| count(*x, *y)).unwrap();
+    let share =
+        |(x, y): (u32, u32)| traverse.shadow_share(0, Pixel::new(f64::from(x), f64::from(y)), 21).unwrap();
+    for place in [darkest, lit] {
+        let truth = count(place.0, place.1) as f64 / 441.0;
+        assert!((share(place) - truth).abs() < 0.1, "{place:?}: {} of {truth}", share(place));
+    }
+    assert!(share(darkest) > share(lit) + 0.1, "{darkest:?} {lit:?}");
+}
+
+#[test]
 fn the_surface_under_a_pixel_is_seen_there_again_from_the_next_stop() {
     let folder = tempfile::tempdir().unwrap();
     let traverse = create_simulated(&scenario(), folder.path()).unwrap();

@@ -14,6 +14,9 @@ use crate::study::truth::TruthSource;
 
 use super::{OdometryError, StereoGeometry, Traverse};
 
+/// Rays along each side of a window by which its shadow is measured.
+const SHADOW_SAMPLES: u32 = 9;
+
 impl Stops for Traverse {
     fn stop_count(&self) -> usize {
         self.stop_count()
@@ -56,12 +59,29 @@ impl TruthSource for Traverse {
         surface_point(self.world()?, &self.true_left_camera(step).moved(&site_from_rover), pixel)
     }
     fn is_visible(&self, step: usize, point_in_site: &Point3) -> bool {
-        let (Some(world), Some(site_from_rover)) = (self.world(), self.true_site_from_rover(step)) else {
+        // What an event puts in the way stands there at some stops only.
+        let at_stop = if self.has_occluders() { self.world_at(step).ok() } else { None };
+        let (Some(world), Some(site_from_rover)) =
+            (at_stop.as_ref().or_else(|| self.world()), self.true_site_from_rover(step))
+        else {
             return true;
         };
         let camera_in_site = self.true_left_camera(step).moved(&site_from_rover);
         // The ray of the point's pixel starts where the light enters, which is not C in a fisheye lens.
         let ray = camera_in_site.project(point_in_site).and_then(|pixel| camera_in_site.ray(pixel));
         ray.is_some_and(|ray| world.is_visible(&ray.origin, point_in_site))
+    }
+    fn shadow_share(&self, step: usize, centre: Pixel, size_px: u32) -> Option<f64> {
+        let site_from_rover = self.true_site_from_rover(step)?;
+        let world = self.world_at(step).ok()?;
+        let camera_in_site = self.true_left_camera(step).moved(&site_from_rover);
+        let half_px = f64::from(size_px / 2);
+        let offset = |k: u32| half_px * (2.0 * f64::from(k) / f64::from(SHADOW_SAMPLES - 1) - 1.0);
+        let places = (0..SHADOW_SAMPLES * SHADOW_SAMPLES)
+            .map(|k| centre.offset(offset(k % SHADOW_SAMPLES), offset(k / SHADOW_SAMPLES)));
+        let points: Vec<Point3> =
+            places.filter_map(|pixel| surface_point(&world, &camera_in_site, pixel)).collect();
+        let dark = points.iter().filter(|point| world.in_shadow(point)).count();
+        (!points.is_empty()).then(|| dark as f64 / points.len() as f64)
     }
 }

@@ -5,6 +5,7 @@
 //! | `low_contrast` | standard deviation of the window | ≥ `warn_contrast` |
 //! | `depth_range` | (farthest − nearest) / distance in the window | ≤ `warn_depth_range` |
 //! | `occluding_boundary` | largest departure from a plane / distance | ≤ `warn_boundary` |
+//! | `shadow` | share of the window in shadow, where the simulator knows the light | ≤ `warn_shadow_share` |
 //!
 //! Ranges are those of the target and of eight neighbours in the window (`relief`). Where fewer than five remain nothing is
 //! said of them. A plane in space has an inverse range that is linear over the image,
@@ -44,6 +45,8 @@ pub enum WarningKind {
     DepthRange,
     /// Two surfaces meet in the window.
     OccludingBoundary,
+    /// Much of the window lies in shadow.
+    Shadow,
 }
 
 /// One warning.
@@ -83,6 +86,19 @@ pub(super) fn look(input: &StereoInput<'_>, range_m: f64, settings: &Settings) -
         found.extend(of_ranges(&ranges, range_m, half_px, limits));
     }
     found
+}
+
+/// The warning for a window of which `share` lies in shadow.
+pub fn of_shadow(share: f64, limits: &Limits) -> Option<Warning> {
+    (share > limits.warn_shadow_share).then(|| Warning {
+        kind: WarningKind::Shadow,
+        value: share,
+        limit: limits.warn_shadow_share,
+        sentence: format!(
+            "{:.0} % of the window lie in shadow, which moves on and takes the texture along",
+            100.0 * share
+        ),
+    })
 }
 
 /// A range at an offset from the target.
