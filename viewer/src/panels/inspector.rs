@@ -185,6 +185,7 @@ fn words(key: &str, value: &Value) -> Option<String> {
             Some(digits(number))
         }
         Value::String(text) => Some(text.clone()),
+        Value::Array(list) if list.is_empty() => Some("none".to_owned()),
         Value::Array(list)
             if list.len() <= 4 && !is_matrix(key, value) && list.iter().all(Value::is_number) =>
         {
@@ -249,6 +250,7 @@ mod tests {
         assert_eq!(words("pixel", &json!({"x": 1.25, "y": 2.0})).unwrap(), "1.25, 2.00");
         assert_eq!(words("position_in_rover", &json!([1.0, 2.5, -0.2])).unwrap(), "1  2.500  -0.200");
         assert_eq!(words("missing", &Value::Null).unwrap(), "none");
+        assert_eq!(words("tried", &json!([])).unwrap(), "none");
         assert!(words("peak", &json!({"score": 1, "x": 2})).is_none());
         assert!(words("covariance_px2", &json!([1.0, 0.0, 0.0, 1.0])).is_none());
     }

@@ -20,6 +20,7 @@ pub fn show(ui: &mut Ui, title: &str, names: &[(Mark, Color32, String)]) {
 pub fn wrapped(ui: &mut Ui, title: &str, names: &[(Mark, Color32, String)]) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.y = 1.0;
+        ui.spacing_mut().interact_size.y = HEIGHT;
         contents(ui, title, names);
     });
 }

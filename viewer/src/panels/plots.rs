@@ -180,6 +180,11 @@ pub(super) fn few_marks(input: GridInput) -> Vec<GridMark> {
     (first..=last).map(|i| GridMark { value: i as f64 * step, step_size: high - low }).collect()
 }
 
+/// A tick's number with the digits that it needs.
+pub(super) fn plain(mark: GridMark, _: &std::ops::RangeInclusive<f64>) -> String {
+    format!("{}", (mark.value * 1e6).round() / 1e6)
+}
+
 /// The runs of consecutive points.
 pub(super) fn pieces(points: &[Option<[f64; 2]>]) -> Vec<Vec<[f64; 2]>> {
     let runs = points.split(Option::is_none);

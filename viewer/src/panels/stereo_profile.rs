@@ -42,7 +42,7 @@ pub fn show(ui: &mut Ui, state: &State, _out: &mut Vec<Command>) {
     let run = theme::run(state.cursor.run);
     names::wrapped(ui, "", &names_of(run, predicted.is_some()));
     for words in sentences(stereo, predicted) {
-        ui.add(egui::Label::new(words).wrap());
+        ui.add(egui::Label::new(words).truncate());
     }
     let plot = Plot::new("stereo profile")
         .height(ui.available_height() - 2.0)

@@ -9,7 +9,7 @@ use sightline_core::session::view::RunView;
 use sightline_core::trace::StepRow;
 
 use super::names;
-use super::plots::{few_marks, pieces};
+use super::plots::{few_marks, pieces, plain};
 use crate::command::{Command, Go};
 use crate::overlay::{self, Mark};
 use crate::state::State;
@@ -135,6 +135,7 @@ fn plot(
             .include_y(0.0)
             .set_margin_fraction(vec2(0.0, 0.14))
             .y_grid_spacer(few_marks)
+            .y_axis_formatter(plain)
             .y_axis_min_width(30.0)
             .x_axis_formatter(|mark: GridMark, _: &std::ops::RangeInclusive<f64>| {
                 if mark.value.fract() == 0.0 { format!("{}", mark.value) } else { String::new() }

@@ -11,6 +11,7 @@ use sightline_core::trace::StepRow;
 
 use crate::overlay::{self, Mark};
 use crate::panels::names;
+use crate::panels::plots::{few_marks, plain};
 use crate::state::{State, run_letter};
 use crate::theme;
 
@@ -62,6 +63,8 @@ pub(super) fn show(ui: &mut Ui, state: &State, pair: Option<&StereoPair>) {
         .set_margin_fraction(vec2(0.03, 0.06))
         .y_axis_min_width(34.0)
         .x_axis_label(theme::note("range, m"))
+        .x_grid_spacer(few_marks)
+        .x_axis_formatter(plain)
         .y_grid_spacer(marks)
         .y_axis_formatter(|mark: GridMark, _: &std::ops::RangeInclusive<f64>| {
             let tick_cm = 10_f64.powf(mark.value);

@@ -1,6 +1,6 @@
 //! The paper's Table I, printed and computed with both pixel sizes (R43, R44).
 
-use egui::{Grid, RichText, Ui};
+use egui::{Grid, RichText, ScrollArea, Ui};
 use sightline_core::estimate::error_budget::{
     Approach, DERIVED_PIXEL_UM, ErrorBudget, MAKER_PIXEL_UM, TABLE_ONE, TableOneRow,
 };
@@ -63,6 +63,11 @@ pub(super) fn show(ui: &mut Ui) {
         ui.label(theme::title("Table I of the paper, cm"));
         ui.label(RichText::new("errata").small().underline().color(theme::ACCENT)).on_hover_text(ERRATA);
     });
+    ScrollArea::horizontal().id_salt("table one").auto_shrink([false, true]).show(ui, grid);
+    ui.label(theme::note("Printed under the camera's name; computed under the pixel size that was taken."));
+}
+
+fn grid(ui: &mut Ui) {
     Grid::new("table one").num_columns(7).spacing([10.0, 2.0]).striped(true).show(ui, |ui| {
         ui.label("");
         for row in &TABLE_ONE {
@@ -80,7 +85,6 @@ pub(super) fn show(ui: &mut Ui) {
         }
         views(ui);
     });
-    ui.label(theme::note("Printed under the camera's name; computed under the pixel size that was taken."));
 }
 
 /// Printed, then computed with either pixel.

@@ -14,7 +14,7 @@ use sightline_core::correlate::zncc::zncc_surface;
 use sightline_core::frames::Pixel;
 use sightline_core::image::patch::warp;
 use sightline_core::image::sample::Kernel;
-use sightline_core::image::{GrayImage, PixelRect};
+use sightline_core::image::{GrayImage, Patch, PixelRect};
 use sightline_core::session::view::RunView;
 
 use crate::state::State;
@@ -63,7 +63,7 @@ pub fn compare(
     };
     let fitting =
         SIDES_PX.iter().map(|&side| warp(then, middle(then), now_from_then, side, Kernel::Bilinear));
-    let inner = fitting.into_iter().find(|patch| patch.is_complete())?;
+    let inner = fitting.into_iter().find(Patch::is_complete)?;
     let surface = zncc_surface(&inner, now, PixelRect::whole(now.width(), now.height()))?;
     let peak = find_peak(&surface, true)?;
     Some(Comparison { step, score: peak.score, shift_px: peak.pixel.distance(middle(now)) })

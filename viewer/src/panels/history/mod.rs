@@ -11,7 +11,7 @@ use sightline_core::session::view::RunView;
 use sightline_core::trace::StepRow;
 
 use self::drift::Comparison;
-use super::plots::{few_marks, pieces};
+use super::plots::{few_marks, pieces, plain};
 use crate::cache::Slot;
 use crate::command::{Command, Go};
 use crate::raster::Raster;
@@ -191,6 +191,7 @@ fn chart(
             .include_y(in_view[1])
             .set_margin_fraction(vec2(0.04, 0.1))
             .y_grid_spacer(few_marks)
+            .y_axis_formatter(plain)
             .y_axis_min_width(22.0)
             .x_axis_formatter(|mark: GridMark, _: &std::ops::RangeInclusive<f64>| {
                 if mark.value.fract() == 0.0 { format!("{}", mark.value) } else { String::new() }

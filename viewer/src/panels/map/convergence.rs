@@ -12,6 +12,7 @@ use sightline_core::session::view::RunView;
 use sightline_core::session::wire::StopView;
 
 use super::{on_map, truth_in_site};
+use crate::panels::plots::{few_marks, plain};
 use crate::state::State;
 use crate::{ellipse, theme};
 
@@ -61,6 +62,10 @@ pub(super) fn show(ui: &mut Ui, state: &State, stops: &[StopView], run: &RunView
         .x_axis_label(theme::note("east of the last position, cm"))
         .y_axis_label(theme::note("north, cm"))
         .y_axis_min_width(22.0)
+        .x_grid_spacer(few_marks)
+        .x_axis_formatter(plain)
+        .y_grid_spacer(few_marks)
+        .y_axis_formatter(plain)
         .allow_boxed_zoom(false)
         .label_formatter(|_| None)
         .coordinates_formatter(

@@ -12,6 +12,7 @@ use sightline_core::session::view::RunView;
 use sightline_core::session::wire::StopView;
 
 use super::names;
+use super::plots::{few_marks, plain};
 use crate::command::{Command, Go};
 use crate::overlay::{self, Mark};
 use crate::state::{State, run_letter};
@@ -86,6 +87,10 @@ fn drive(ui: &mut Ui, state: &State, stops: &[StopView], run: Option<&RunView>, 
         .x_axis_label(theme::note("east, m"))
         .y_axis_label(theme::note("north, m"))
         .y_axis_min_width(22.0)
+        .x_grid_spacer(few_marks)
+        .x_axis_formatter(plain)
+        .y_grid_spacer(few_marks)
+        .y_axis_formatter(plain)
         .allow_boxed_zoom(false)
         .label_formatter(|_| None)
         .coordinates_formatter(
