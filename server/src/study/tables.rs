@@ -56,14 +56,13 @@ impl Table {
         let mut names: Vec<&String> = rows.iter().flat_map(|row| row.columns.keys()).collect();
         names.sort();
         names.dedup();
-        let fixed: [(&str, fn(&Row) -> Value); 4] = [
-            ("study", |row| row.study.clone().into()),
-            ("configuration", |row| row.configuration.clone().into()),
-            ("scenario", |row| row.scenario.clone().into()),
-            ("seed", |row| row.seed.into()),
+        let word = |of: fn(&Row) -> &String| rows.iter().map(|row| of(row).clone().into()).collect();
+        let mut columns: Vec<(String, Vec<Value>)> = vec![
+            ("study".to_owned(), word(|row| &row.study)),
+            ("configuration".to_owned(), word(|row| &row.configuration)),
+            ("scenario".to_owned(), word(|row| &row.scenario)),
+            ("seed".to_owned(), rows.iter().map(|row| row.seed.into()).collect()),
         ];
-        let mut columns: Vec<(String, Vec<Value>)> =
-            fixed.iter().map(|(name, of)| ((*name).to_owned(), rows.iter().map(of).collect())).collect();
         let value = |row: &Row, name: &str| row.columns.get(name).cloned().unwrap_or(Value::Null);
         // A study without a variable of its own names its scenario once.
         let own = names.into_iter().filter(|name| *name != "scenario");
