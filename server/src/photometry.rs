@@ -52,6 +52,18 @@ async fn photometry_csv(
     Ok(download("text/csv; charset=utf-8", &name, text))
 }
 
+/// The step with the image of its template, which a run lets go of once the next step is there.
+fn with_image(traverse: &Traverse, trace: &Arc<StepTrace>) -> Result<Arc<StepTrace>> {
+    let mut trace = Arc::clone(trace);
+    let appearance = &trace.update.target.appearance;
+    // Only the designation's window is read from the image; later steps keep theirs.
+    if trace.judge.is_none() && appearance.step == trace.step && appearance.image.is_empty() {
+        let image = traverse.capture(appearance.step)?.left;
+        Arc::make_mut(&mut trace).update.target.appearance.image = image;
+    }
+    Ok(trace)
+}
+
 /// The light of all accepted updates of a run, as comma separated values; what is not known is empty.
 ///
 /// # Errors
@@ -66,7 +78,8 @@ pub fn table(
     for trace in steps {
         let light = traverse.light(trace.step, cancel)?;
         let pose = traverse.site_from_rover(trace.step);
-        let Some(found) = photometry(trace, &pose, light.as_ref(), &settings.template) else { continue };
+        let trace = with_image(traverse, trace)?;
+        let Some(found) = photometry(&trace, &pose, light.as_ref(), &settings.template) else { continue };
         let optional =
             [found.exposure_s, found.rate_per_s, found.incidence_deg, found.emission_deg, found.phase_deg]
                 .map(|value| value.map_or_else(String::new, |value| value.to_string()))

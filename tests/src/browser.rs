@@ -100,6 +100,8 @@ impl Browser {
 
     /// Clicks with the left button at a place on the canvas, in CSS pixels from its upper left corner.
     pub async fn click(&self, x: f64, y: f64) {
+        // The browser cuts fractions of a pixel off.
+        let (x, y) = (x.round(), y.round());
         let pause = PointerAction::Pause { duration: Duration::from_millis(50) };
         let down = PointerAction::Down { button: MOUSE_BUTTON_LEFT };
         let up = PointerAction::Up { button: MOUSE_BUTTON_LEFT };

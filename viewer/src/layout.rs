@@ -142,7 +142,7 @@ pub fn overview() -> Tree<Pane> {
     let inspector = tabs(&mut tiles, &[Pane::Inspector, Pane::Messages]);
     let images = linear(&mut tiles, LinearDir::Horizontal, &[(left, 1.0), (right, 1.0)]);
     let charts = linear(&mut tiles, LinearDir::Horizontal, &[(surface, 1.0), (map, 1.1), (plots, 1.1)]);
-    let middle = linear(&mut tiles, LinearDir::Vertical, &[(images, 0.465), (strip, 0.205), (charts, 0.33)]);
+    let middle = linear(&mut tiles, LinearDir::Vertical, &[(images, 0.53), (strip, 0.175), (charts, 0.295)]);
     let record = linear(&mut tiles, LinearDir::Vertical, &[(gates, 0.38), (inspector, 0.62)]);
     let root = linear(&mut tiles, LinearDir::Horizontal, &[(side, 0.17), (middle, 0.63), (record, 0.2)]);
     Tree::new(egui::Id::unique("panels"), root, tiles)

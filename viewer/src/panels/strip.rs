@@ -55,7 +55,7 @@ pub fn patches(trace: &StepTrace) -> Vec<Patch> {
         }
     }
     if let Some(m) = &evidence.match_template {
-        let score = format!("ncc {:.2}", m.peak.score);
+        let score = format!("ncc {:.2}", m.score);
         add(ArrayName::Matched, "matched".to_owned(), score, Stage::MatchTemplate);
         add(ArrayName::Difference, "difference".to_owned(), "−".to_owned(), Stage::MatchTemplate);
     }

@@ -31,6 +31,11 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         panels::missing(ui, PURPOSE, &state.missing_step());
         return;
     };
+    if matched.descent.is_some() {
+        let why = "This configuration descends along the gradient from the prediction: it compares no window of \
+                   positions. The Inspector has its steps.";
+        return panels::missing(ui, PURPOSE, why);
+    }
     let raster = match state.array(ArrayName::Surface) {
         Slot::Ready(raster) => raster,
         Slot::Failed(problem) => {

@@ -65,7 +65,9 @@ fn has_array(trace: &StepTrace, name: ArrayName) -> bool {
     let Some(evidence) = trace.template() else { return false };
     match name {
         ArrayName::Reference | ArrayName::Scaled | ArrayName::Rolled => evidence.scale_roll.is_some(),
-        ArrayName::Matched | ArrayName::Difference | ArrayName::Surface => evidence.match_template.is_some(),
+        ArrayName::Matched | ArrayName::Difference => evidence.match_template.is_some(),
+        // A descent along the gradient compares no window of positions.
+        ArrayName::Surface => evidence.match_template.as_ref().is_some_and(|m| m.descent.is_none()),
         ArrayName::RightWindow => evidence.point_stereo.is_some(),
     }
 }
