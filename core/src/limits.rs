@@ -115,6 +115,10 @@ settings_group! {
         disparity_error_px: f64 = 1.0, "px", Domain::Between(0.01, 20.0), "K§4.2, R35";
         /// Navigation error that the tolerances assume, as a fraction of the distance driven.
         navigation_error_fraction: f64 = 0.02, "", Domain::Between(0.0, 1.0), "K§4.2, R38";
+        /// A match far from the prediction is a loss below this score; -1: judged like any other.
+        far_ncc_min: f64 = 0.85, "", Domain::Between(-1.0, 1.0), "ours; docs/tracking.md";
+        /// What is far: standard deviations of the prediction and the match together.
+        far_sigma: f64 = 3.0, "", Domain::Between(0.0, 1000.0), "ours; docs/tracking.md";
         /// A match is a loss whose second peak scores more than this share of the best (near 1: it may be the other one);
         /// 1: off.
         second_peak_ratio_max: f64 = 1.0, "", Domain::Between(0.0, 1.0), "ours, R68; off";

@@ -16,6 +16,10 @@
 //! | 7 `match_sigma_px` | largest 1σ axis of the match's own covariance | ≤ `match_sigma_max_px` |
 //! | 8 `edge_distance_px` | from the best whole pixel to the rim of the positions compared | ≥ `edge_distance_min_px` |
 //!
+//! A match far from the prediction was found in a larger area, in which a wrong one is likelier: beyond `far_sigma`
+//! standard deviations of `ν = pixel − predicted`, that is `νᵀ (Σ_pred + Σ_match)⁻¹ ν > far_sigma²`, it must score more
+//! (ours, criterion 9 `far_ncc` ≥ `far_ncc_min`; −1: off).
+//!
 //! The tolerances are recomputed at every update (R86, R87, ours):
 //! ```text
 //! tol_dist = g √( ΔR(D_old)² + ΔR(D_new)² + (f L_step)² )
@@ -30,6 +34,7 @@
 //! | f_p, B | effective focal length at the target, distance of the camera centres | px, m |
 //! | L_step, L_total | driven since the last accepted update, since designation | m |
 
+use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -160,8 +165,24 @@ fn gates(
         ),
     ];
     gates.extend(left_right);
+    if limits.far_ncc_min > -1.0 && is_far(pointing, located, limits.far_sigma) {
+        gates.push(Gate::new(9, "far_ncc", "", ncc, limits.far_ncc_min, true));
+    }
     gates.extend(peak_gates(evidence.and_then(|e| e.match_template.as_ref()), limits));
     gates
+}
+
+/// Whether the match lies beyond `sigmas` standard deviations of the prediction.
+fn is_far(pointing: &Pointing, located: &Located, sigmas: f64) -> bool {
+    let matched = located.evidence.template().and_then(|e| e.match_template.as_ref());
+    let (Some(predicted), Some(covariance), Some(matched)) =
+        (pointing.predicted_left, pointing.predicted_covariance_px2, matched)
+    else {
+        return false;
+    };
+    let innovation = Vector2::new(matched.pixel.x - predicted.x, matched.pixel.y - predicted.y);
+    let inverse = (covariance + matched.covariance_px2).try_inverse();
+    inverse.is_some_and(|inverse| innovation.dot(&(inverse * innovation)) > sigmas * sigmas)
 }
 
 /// The criteria of the peak that are switched on.

@@ -263,7 +263,12 @@ fn surface_slope(
         let best = windows.place(interval)?;
         (best.score as f32 >= SLOPE_SCORE_MIN && !best.at_end).then_some(best.along - expected)
     };
-    let slope = |a: Option<f64>, b: Option<f64>| Some((b? - a?) / (2.0 * SLOPE_BASE_PX));
+    // Opposite neighbours of a plane lie as far on either side of the target, which is at 0; at an edge they do not.
+    let slope = |a: Option<f64>, b: Option<f64>| {
+        let (a, b) = (a?, b?);
+        let bend_px = (a + b).abs() / 2.0;
+        (bend_px <= settings.slope_bend_px).then_some((b - a) / (2.0 * SLOPE_BASE_PX))
+    };
     let du = slope(neighbour(-SLOPE_BASE_PX, 0.0), neighbour(SLOPE_BASE_PX, 0.0))?;
     let dv = slope(neighbour(0.0, -SLOPE_BASE_PX), neighbour(0.0, SLOPE_BASE_PX))?;
     Some(RowVector2::new(du, dv))

@@ -35,6 +35,9 @@ settings_group! {
         /// Warp the template by the slope of the target's surface, as stereo measured it, instead of scale and roll
         /// alone; where both of these are on.
         surface_warp: bool = true, "", Domain::Switch, "ours; beyond R60";
+        /// A slope is believed where the neighbours on either side of the target lie within this of one plane, as a
+        /// disparity; elsewhere two surfaces meet, or the surface is bent.
+        slope_bend_px: f64 = 1.0, "px", Domain::Between(0.0, 100.0), "ours";
         /// How: to first order, or through the plane of the surface pixel by pixel.
         warp_model: WarpModel = WarpModel::Slope, "", Domain::choice(&["slope", "homography"]), "ours; beyond R60";
         /// What finds the template first. Descents by gradient (klt) start from the prediction and bear only small errors of it.

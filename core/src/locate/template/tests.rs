@@ -150,6 +150,25 @@ fn a_template_that_is_kept_chains_no_errors() {
 }
 
 #[test]
+fn a_match_far_from_the_prediction_must_score_more() {
+    let mut world = PlaneWorld::new(approach());
+    // The estimate turns by 3° at the third stop: 31 px, where the prediction is known to some 4 px.
+    let jump = pose(0.0, 0.0).rotation * attitude_from_roll_pitch_yaw(0.0, 0.0, 3_f64.to_radians());
+    world.estimates[2] = Pose::from_parts(world.estimates[2].translation, jump);
+    let reason = |steps: &[StepTrace]| steps[2].row().reason.unwrap_or_default();
+    let believed = run(&world, &[]);
+    assert_eq!(believed[2].update.state, TrackingState::Tracking, "{}", reason(&believed));
+    let doubted = run(&world, &[("far_ncc_min", json!(1.0))]);
+    assert!(
+        doubted[2].update.state.is_lost() && reason(&doubted).contains("far_ncc"),
+        "{}",
+        reason(&doubted)
+    );
+    // Where the prediction is right, the criterion is not asked.
+    assert_eq!(doubted[1].update.state, TrackingState::Tracking);
+}
+
+#[test]
 fn a_missing_image_spoils_its_own_step_and_tracking_goes_on() {
     let mut world = PlaneWorld::new(approach());
     world.troubles[2] = Trouble::Missing;
