@@ -5,7 +5,7 @@
 //! | `straight` | K§5.1, R108–R117 | approach-5 | `n_skip`: steps of 5 to 22.6 % |
 //! | `sideways` | K§5.2, R118–R122, E19 | sideways-70 | `azimuth_step_deg` × `search_window_px` |
 //! | `turn-in-place` | K§5.3, R123 | turn-in-place | `turn_step_deg` |
-//! | `claim` | abstract, R127 | approach-10 | none: worlds, targets, light and pose errors are drawn by the seed |
+//! | `claim` | abstract, R127 | claim (`randomised`) | none: the seed draws drive and light as well |
 //! | `approach` | K§4.2, R41, R46 | approach-10 | none |
 //! | `terrain` | K§5.5, R124–R126 | slope-…, stuck | `terrain` |
 //! | `checkout-1`, `-2`, `-3` | K§7.1–7.3, R130–R143 | checkout-… | `position`: one row a step |
@@ -133,8 +133,7 @@ pub const STUDIES: &[Study] = &[
     study(
         "claim",
         "Is a target on natural rock tracked within several pixels, or a few centimetres, over a 10-m approach in \
-         steps of 10 % (K abstract, R127)? The seed draws world, texture, targets and pose errors; start, heading and \
-         sun are the scenario's.",
+         steps of 10 % (K abstract, R127)? The seed draws the world, where the drive starts, where it heads, and the sun.",
         &["ncc", "ncc-scale", "ncc-scale-roll", "sightline"],
     ),
     study(
@@ -267,7 +266,7 @@ impl Study {
     /// The only point of a study without a grid.
     fn single(&self) -> Point {
         let scenario = match self.name {
-            "claim" | "approach" => "approach-10",
+            "approach" => "approach-10",
             name => name,
         };
         let mut point = Point::plain(scenario, "scenario", scenario);

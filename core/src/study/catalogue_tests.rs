@@ -1,8 +1,8 @@
 //! What the catalogue promises: points in scenarios that exist, configurations that are known, grids that refuse.
 
 use super::*;
-use crate::sim::library;
 use crate::study::plan::Configuration;
+use crate::study::randomised;
 
 #[test]
 fn every_study_has_points_in_scenarios_of_the_library_and_known_configurations() {
@@ -10,7 +10,7 @@ fn every_study_has_points_in_scenarios_of_the_library_and_known_configurations()
         let points = study.points(&[]).unwrap();
         assert!(!points.is_empty(), "{}", study.name);
         for point in &points {
-            assert!(library::toml(&point.scenario).is_some(), "{}: {}", study.name, point.scenario);
+            assert!(randomised::base(&point.scenario).is_ok(), "{}: {}", study.name, point.scenario);
         }
         for name in study.default_configurations() {
             assert!(Configuration::parse(name).is_ok(), "{}: {name}", study.name);

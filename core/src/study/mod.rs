@@ -6,6 +6,7 @@
 //! picks       which pixels, and faults   run         one target tracked and judged     step_record   one step of it
 //! row         the table's rows           evenness    rows of targets                   calibration   NEES
 //! wire        what page and server say to each other about studies
+//! randomised  approaches that the seed draws
 //! scenery, picture, exposure             the simulated scenery against its laws
 //! realism     how hard a world is for plain correlation
 //! ```
@@ -17,6 +18,7 @@ pub mod calibration;
 pub mod staged;
 pub mod point;
 pub mod catalogue;
+pub mod randomised;
 pub mod plan;
 pub mod picks;
 pub mod step_record;

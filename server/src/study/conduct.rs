@@ -8,10 +8,11 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 use sightline_core::error::{Error, Result};
-use sightline_core::sim::{Scenario, library};
+use sightline_core::sim::Scenario;
 use sightline_core::study::picks;
 use sightline_core::study::plan::{Configuration, Plan, Unit, key};
 use sightline_core::study::point::{Picks, Point};
+use sightline_core::study::randomised;
 use sightline_core::study::row::{Row, rows};
 use sightline_core::study::run::{Chosen, Watch, measure};
 use sightline_core::traverse::{Traverse, create_simulated};
@@ -148,7 +149,7 @@ impl Conduct<'_> {
     fn scenario(&self, name: &str) -> Result<Vec<Unit>> {
         let scenario = match &self.order.scenario {
             Some((_, scenario)) => scenario.clone(),
-            None => library::scenario(name)?,
+            None => randomised::base(name)?,
         };
         let points: Vec<&Point> =
             self.order.plan.points.iter().filter(|point| point.scenario == name).collect();
@@ -157,7 +158,7 @@ impl Conduct<'_> {
                 let mut units = Vec::new();
                 for &seed in seeds {
                     units.extend(
-                        self.world(name, &Scenario { seed, ..scenario.clone() }, &points, true)?
+                        self.world(name, &randomised::world(name, &scenario, seed), &points, true)?
                             .unwrap_or_default(),
                     );
                 }
@@ -171,7 +172,7 @@ impl Conduct<'_> {
                         break;
                     }
                     let of_world =
-                        self.world(name, &Scenario { seed, ..scenario.clone() }, &points, false)?;
+                        self.world(name, &randomised::world(name, &scenario, seed), &points, false)?;
                     count += u64::from(of_world.is_some());
                     units.extend(of_world.unwrap_or_default());
                 }
