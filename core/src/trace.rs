@@ -127,6 +127,9 @@ pub struct StepRow {
     pub budget_with_m: Option<f64>,
     /// Why an update was rejected, or what is wrong with the stop's files.
     pub reason: Option<String>,
+    /// Whether the stop's files are damaged, so that nothing could be done.
+    #[serde(default)]
+    pub fault: bool,
 }
 
 /// The verdict on a whole run against the truth.
@@ -187,6 +190,7 @@ impl StepTrace {
             position_tolerance_m: position.map(|gate| gate.limit),
             budget_without_m: budget.map(|budget| budget.without_tracking_m),
             budget_with_m: budget.map(|budget| budget.with_tracking_m),
+            fault: self.fault.is_some(),
             reason: self.fault.clone().or_else(|| self.judge.as_ref().and_then(|v| v.reason.clone())),
         }
     }

@@ -118,24 +118,11 @@ fn plot(
 ) -> Option<usize> {
     let last = state.stop_count().saturating_sub(1) as f64;
     let plot =
-        Plot::new((chart.title, state.traverse.as_ref().map(|t| t.id.clone())))
+        over_steps(Plot::new((chart.title, state.traverse.as_ref().map(|t| t.id.clone()))), last, is_last)
             .height(height)
-            .allow_scroll(false)
-            .allow_drag(false)
-            .allow_zoom(false)
-            .allow_boxed_zoom(false)
-            .allow_axis_zoom_drag(false)
-            .show_axes([is_last, true])
-            .include_x(-0.4)
-            .include_x(last + 0.4)
             .include_y(chart.in_view[0])
             .include_y(chart.in_view[1])
             .set_margin_fraction(vec2(0.0, 0.12))
-            .y_axis_min_width(30.0)
-            .x_axis_formatter(|mark: GridMark, _: &std::ops::RangeInclusive<f64>| {
-                if mark.value.fract() == 0.0 { format!("{}", mark.value) } else { String::new() }
-            })
-            .link_axis(Id::unique("steps"), [true, false])
             .label_formatter(|near| match near {
                 HoverPosition::NearDataPoint { plot_name, position, .. } => {
                     Some(format!("step {}\n{plot_name} {:.3}", position.x, position.y))
@@ -157,6 +144,25 @@ fn plot(
         clicked.map(|at: PlotPoint| at.x.round().clamp(0.0, last) as usize)
     });
     response.inner
+}
+
+/// A plot over the steps, which moves with its neighbours; only the lowest one has numbers of steps.
+pub fn over_steps<'a>(plot: Plot<'a>, last: f64, is_last: bool) -> Plot<'a> {
+    plot.allow_scroll(false)
+        .allow_drag(false)
+        .allow_zoom(false)
+        .allow_boxed_zoom(false)
+        .allow_axis_zoom_drag(false)
+        .show_axes([is_last, true])
+        .include_x(-0.4)
+        .include_x(last + 0.4)
+        .y_axis_min_width(30.0)
+        .x_axis_formatter(
+            |mark: GridMark, _: &std::ops::RangeInclusive<f64>| {
+                if mark.value.fract() == 0.0 { format!("{}", mark.value) } else { String::new() }
+            },
+        )
+        .link_axis(Id::unique("steps"), [true, false])
 }
 
 /// A line over the steps that have a value, broken where one has none.

@@ -3,7 +3,7 @@
 use egui::{Align2, Painter, Rect, Sense, Stroke, Ui, pos2, vec2};
 
 use crate::command::{Command, Go};
-use crate::state::{State, events, is_fault};
+use crate::state::{State, events};
 use crate::theme;
 
 /// Height of the cells, points.
@@ -50,7 +50,7 @@ pub fn cell(state: &State, step: usize) -> Cell {
     }
     match state.row_at(step) {
         None => Cell::Unknown,
-        Some(row) if is_fault(row) => Cell::Fault,
+        Some(row) if row.fault => Cell::Fault,
         Some(row) => match row.state.as_str() {
             "tracking" => Cell::Tracking,
             "lost" => Cell::Lost,

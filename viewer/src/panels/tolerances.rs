@@ -3,13 +3,13 @@
 //! Both grow with what was driven and with the range of the stereo measurements that they compare; `stages::judge`
 //! has the equations. Where a value exceeds its tolerance the criterion fires: a cross in vermilion with the word.
 
-use egui::{Align2, Color32, Id, RichText, Ui, vec2};
-use egui_plot::{GridMark, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotUi, Points, Text, VLine};
+use egui::{Align2, Color32, RichText, Ui, vec2};
+use egui_plot::{Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotUi, Points, Text, VLine};
 use sightline_core::session::view::RunView;
 use sightline_core::trace::StepRow;
 
 use super::names;
-use super::plots::{few_marks, pieces, plain};
+use super::plots::{few_marks, over_steps, pieces, plain};
 use crate::command::{Command, Go};
 use crate::overlay::{self, Mark};
 use crate::state::State;
@@ -121,27 +121,13 @@ fn plot(
     is_last: bool,
 ) -> Option<usize> {
     let last = state.stop_count().saturating_sub(1) as f64;
-    let plot =
-        Plot::new(("tolerance", criterion.number))
-            .height(height)
-            .allow_scroll(false)
-            .allow_drag(false)
-            .allow_zoom(false)
-            .allow_boxed_zoom(false)
-            .allow_axis_zoom_drag(false)
-            .show_axes([is_last, true])
-            .include_x(-0.4)
-            .include_x(last + 0.4)
-            .include_y(0.0)
-            .set_margin_fraction(vec2(0.0, 0.14))
-            .y_grid_spacer(few_marks)
-            .y_axis_formatter(plain)
-            .y_axis_min_width(30.0)
-            .x_axis_formatter(|mark: GridMark, _: &std::ops::RangeInclusive<f64>| {
-                if mark.value.fract() == 0.0 { format!("{}", mark.value) } else { String::new() }
-            })
-            .link_axis(Id::unique("steps"), [true, false])
-            .label_formatter(|_| None);
+    let plot = over_steps(Plot::new(("tolerance", criterion.number)), last, is_last)
+        .height(height)
+        .include_y(0.0)
+        .set_margin_fraction(vec2(0.0, 0.14))
+        .y_grid_spacer(few_marks)
+        .y_axis_formatter(plain)
+        .label_formatter(|_| None);
     let response = plot.show(ui, |plot| {
         let cursor = VLine::new("", state.cursor.step as f64).color(theme::ACCENT).width(1.5);
         plot.vline(cursor.allow_hover(false));

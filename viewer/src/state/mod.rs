@@ -344,16 +344,11 @@ pub fn row_of(run: &RunView, step: usize) -> Option<&StepRow> {
 pub fn events(run: &RunView) -> Vec<usize> {
     let mut events: Vec<usize> = run.rows.first().map(|row| row.step).into_iter().collect();
     for pair in run.rows.windows(2) {
-        if pair[0].state != pair[1].state || is_fault(&pair[1]) {
+        if pair[0].state != pair[1].state || pair[1].fault {
             events.push(pair[1].step);
         }
     }
     events
-}
-
-/// Whether nothing at all could be done at a step: its files are damaged.
-pub fn is_fault(row: &StepRow) -> bool {
-    row.reason.is_some() && row.scale.is_none() && row.left_pixel.is_none()
 }
 
 /// The state that a row's word names.

@@ -101,10 +101,9 @@ impl Locator for TemplateLocator {
         };
         let mut located = finish(TemplateEvidence::default(), &stereo, Drift::of_pixel(covariance), settings);
         let Evidence::Template(evidence) = &mut located.evidence;
-        evidence.warnings = evidence
-            .triangulate
-            .as_ref()
-            .map_or_else(Vec::new, |found| warnings::look(&stereo, found.range_m, input.settings));
+        if let (Some(found), Some(matched)) = (&evidence.triangulate, &evidence.point_stereo) {
+            evidence.warnings = warnings::look(&stereo, found.range_m, matched.score, input.settings);
+        }
         located
     }
 

@@ -169,11 +169,23 @@ fn a_match_far_from_the_prediction_must_score_more() {
 }
 
 #[test]
+fn a_pick_whose_stereo_match_is_below_its_limit_is_warned_of() {
+    use super::warnings::WarningKind;
+    let kinds = |limit: f64| -> Vec<WarningKind> {
+        let steps = run(&PlaneWorld::new(vec![pose(0.0, 0.0)]), &[("stereo_ncc_min", json!(limit))]);
+        assert!(!steps[0].row().fault);
+        steps[0].template().unwrap().warnings.iter().map(|warning| warning.kind).collect()
+    };
+    assert_eq!(kinds(0.7), []);
+    assert_eq!(kinds(1.0), [WarningKind::WeakStereo]);
+}
+
+#[test]
 fn a_missing_image_spoils_its_own_step_and_tracking_goes_on() {
     let mut world = PlaneWorld::new(approach());
     world.troubles[2] = Trouble::Missing;
     let steps = run(&world, &[("template_update", json!("every_update"))]);
-    assert!(steps[2].fault.as_ref().unwrap().contains("left_0002.png"));
+    assert!(steps[2].fault.as_ref().unwrap().contains("left_0002.png") && steps[2].row().fault);
     assert_eq!(steps[2].update.state, TrackingState::Tracking);
     assert_eq!(steps[3].update.target.appearance.step, 3);
     assert!(steps[3].truth.as_ref().unwrap().err_px.unwrap() < 0.3);

@@ -5,6 +5,7 @@
 //! | `low_contrast` | standard deviation of the window | ≥ `warn_contrast` |
 //! | `depth_range` | (farthest − nearest) / distance in the window | ≤ `warn_depth_range` |
 //! | `occluding_boundary` | largest departure from a plane / distance | ≤ `warn_boundary` |
+//! | `weak_stereo` | score of point stereo | ≥ `stereo_ncc_min` |
 //! | `shadow` | share of the window in shadow, where the simulator knows the light | ≤ `warn_shadow_share` |
 //!
 //! Ranges are those of the target and of eight neighbours in the window (`relief`). Where fewer than five remain nothing is
@@ -47,6 +48,8 @@ pub enum WarningKind {
     OccludingBoundary,
     /// Much of the window lies in shadow.
     Shadow,
+    /// Point stereo found nothing alike, so that the range may be any.
+    WeakStereo,
 }
 
 /// One warning.
@@ -62,12 +65,27 @@ pub struct Warning {
     pub sentence: String,
 }
 
-/// Looks at the window of a designated target at `range_m`.
-pub(super) fn look(input: &StereoInput<'_>, range_m: f64, settings: &Settings) -> Vec<Warning> {
+/// Looks at the window of a designated target at `range_m`, which a stereo match of that score gave.
+pub(super) fn look(
+    input: &StereoInput<'_>,
+    range_m: f64,
+    stereo_score: f64,
+    settings: &Settings,
+) -> Vec<Warning> {
     let (limits, template) = (&settings.limits, &settings.template);
     let window =
         patch::extract(input.left_image, input.left_pixel, template.template_size_px / 2, template.kernel);
     let mut found = Vec::new();
+    if stereo_score < limits.stereo_ncc_min {
+        found.push(Warning {
+            kind: WarningKind::WeakStereo,
+            value: stereo_score,
+            limit: limits.stereo_ncc_min,
+            sentence: format!(
+                "the two eyes do not see the same here: stereo scores {stereo_score:.2}, so that the range may be wrong"
+            ),
+        });
+    }
     if let Some(contrast) = window.std().filter(|std| *std < limits.warn_contrast) {
         let sentence = format!(
             "the window has little texture: its standard deviation is {:.2} % of full scale",

@@ -11,8 +11,7 @@ use sightline_core::frames::Point3;
 use sightline_core::session::view::RunView;
 use sightline_core::session::wire::StopView;
 
-use super::{on_map, truth_in_site};
-use crate::panels::plots::{few_marks, plain};
+use super::{in_site, on_map, truth_in_site};
 use crate::state::State;
 use crate::{ellipse, theme};
 
@@ -60,18 +59,8 @@ pub(super) fn show(ui: &mut Ui, state: &State, stops: &[StopView], run: &RunView
         .include_y(LEAST_HALF_CM)
         .set_margin_fraction(vec2(0.06, 0.06))
         .x_axis_label(theme::note("east of the last position, cm"))
-        .y_axis_label(theme::note("north, cm"))
-        .y_axis_min_width(22.0)
-        .x_grid_spacer(few_marks)
-        .x_axis_formatter(plain)
-        .y_grid_spacer(few_marks)
-        .y_axis_formatter(plain)
-        .allow_boxed_zoom(false)
-        .label_formatter(|_| None)
-        .coordinates_formatter(
-            egui_plot::Corner::RightBottom,
-            egui_plot::CoordinatesFormatter::new(|at, _| format!("E {:+.1}  N {:+.1} cm", at.x, at.y)),
-        );
+        .y_axis_label(theme::note("north, cm"));
+    let plot = in_site(plot, |at| format!("E {:+.1}  N {:+.1} cm", at.x, at.y));
     plot.show(ui, |plot| paint(plot, state, run, &positions, origin));
 }
 

@@ -78,15 +78,9 @@ fn split(area: Rect, width_by_height: f32) -> (Rect, Rect) {
     }
 }
 
-/// The whole drive.
-fn drive(ui: &mut Ui, state: &State, stops: &[StopView], run: Option<&RunView>, out: &mut Vec<Command>) {
-    let plot = Plot::new(("map", state.traverse.as_ref().map(|traverse| &traverse.id)))
-        .data_aspect(1.0)
-        .set_margin_fraction(vec2(0.12, 0.08))
-        .show_grid([true, true])
-        .x_axis_label(theme::note("east, m"))
-        .y_axis_label(theme::note("north, m"))
-        .y_axis_min_width(22.0)
+/// A plot seen from above: few marks, and the place under the pointer in words.
+fn in_site<'a>(plot: Plot<'a>, words: fn(&PlotPoint) -> String) -> Plot<'a> {
+    plot.y_axis_min_width(22.0)
         .x_grid_spacer(few_marks)
         .x_axis_formatter(plain)
         .y_grid_spacer(few_marks)
@@ -95,8 +89,19 @@ fn drive(ui: &mut Ui, state: &State, stops: &[StopView], run: Option<&RunView>, 
         .label_formatter(|_| None)
         .coordinates_formatter(
             egui_plot::Corner::RightBottom,
-            egui_plot::CoordinatesFormatter::new(|at, _| format!("E {:.2}  N {:.2} m", at.x, at.y)),
-        );
+            egui_plot::CoordinatesFormatter::new(move |at, _| words(at)),
+        )
+}
+
+/// The whole drive.
+fn drive(ui: &mut Ui, state: &State, stops: &[StopView], run: Option<&RunView>, out: &mut Vec<Command>) {
+    let plot = Plot::new(("map", state.traverse.as_ref().map(|traverse| &traverse.id)))
+        .data_aspect(1.0)
+        .set_margin_fraction(vec2(0.12, 0.08))
+        .show_grid([true, true])
+        .x_axis_label(theme::note("east, m"))
+        .y_axis_label(theme::note("north, m"));
+    let plot = in_site(plot, |at| format!("E {:.2}  N {:.2} m", at.x, at.y));
     let response = plot.show(ui, |plot| {
         paint_paths(plot, stops, state.cursor.step);
         if let Some(run) = run {
