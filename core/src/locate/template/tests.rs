@@ -172,12 +172,13 @@ fn a_match_far_from_the_prediction_must_score_more() {
 fn a_pick_whose_stereo_match_is_below_its_limit_is_warned_of() {
     use super::warnings::WarningKind;
     let kinds = |limit: f64| -> Vec<WarningKind> {
-        let steps = run(&PlaneWorld::new(vec![pose(0.0, 0.0)]), &[("stereo_ncc_min", json!(limit))]);
+        // Without its slope the two views of a turned plane are a little unlike.
+        let steps = run(&turned_plane(), &[("stereo_ncc_min", json!(limit)), ("surface_warp", json!(false))]);
         assert!(!steps[0].row().fault);
         steps[0].template().unwrap().warnings.iter().map(|warning| warning.kind).collect()
     };
-    assert_eq!(kinds(0.7), []);
-    assert_eq!(kinds(1.0), [WarningKind::WeakStereo]);
+    assert!(!kinds(0.7).contains(&WarningKind::WeakStereo));
+    assert!(kinds(1.0).contains(&WarningKind::WeakStereo));
 }
 
 #[test]
