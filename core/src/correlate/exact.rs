@@ -1,7 +1,10 @@
-//! One score in double precision and two passes (K-Eq 11, R62, R66): the definition, written out.
+//! One score in two passes (K-Eq 11, R62, R66): the definition, written out.
 //!
-//! It serves single scores, and the positions of a surface where the fast sums lose too many digits.
-//! The sums run over columns first, side by side, in an order that never changes.
+//! [`Template`] serves single scores, in double precision; its sums run over columns first, side by side, in an order
+//! that never changes. [`Alone`] serves the positions of a surface where the sums of a whole tile lose too many digits:
+//! about the window's own mean the differences are exact in `f32`, and their sums good to 1e-7.
+
+use pulp::{Simd, WithSimd};
 
 use crate::image::patch::{FLAT_STD, Patch};
 
@@ -26,12 +29,10 @@ impl Template {
         Some(Self { width: patch.width() as usize, values, is_flat })
     }
 
-    /// The score of the window whose first pixel is `start` in `pixels` of `stride` columns; `None` for a
-    /// window without contrast. All its pixels are valid.
-    pub(super) fn score(&self, pixels: &[f32], stride: usize, start: usize) -> Option<f64> {
-        let height = self.values.len() / self.width;
-        let rows = || (0..height).map(|row| &pixels[start + row * stride..][..self.width]);
-        if self.is_flat || rows().all(|row| row.iter().all(|v| *v == pixels[start])) {
+    /// The score of a window of the template's size, all of whose pixels are valid; `None` for one without contrast.
+    pub(super) fn score(&self, pixels: &[f32]) -> Option<f64> {
+        let rows = || pixels.chunks_exact(self.width);
+        if self.is_flat || pixels.iter().all(|v| *v == pixels[0]) {
             return None;
         }
         let mut columns = vec![0.0; self.width];
@@ -49,5 +50,58 @@ impl Template {
         }
         let [product, squares] = columns.iter().fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
         (squares >= count * FLAT_STD * FLAT_STD).then(|| (product / squares.sqrt()).clamp(-1.0, 1.0))
+    }
+}
+
+/// A window of a surface by itself.
+pub(super) struct Alone<'a> {
+    /// The template as rounded to `f32`, row-major; its side; sum and norm of it.
+    pub(super) template: &'a [f32],
+    pub(super) size: usize,
+    pub(super) sum: f32,
+    pub(super) norm: f32,
+    /// Pixels from the window's first on, all those of the window valid.
+    pub(super) pixels: &'a [f32],
+    /// Columns of the image.
+    pub(super) stride: usize,
+    /// Takes the window: as many numbers as the template.
+    pub(super) window: &'a mut [f32],
+}
+
+impl WithSimd for Alone<'_> {
+    type Output = Option<f32>;
+
+    /// The score; `None` for a window without contrast.
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Option<f32> {
+        let Self { template, size, window, .. } = self;
+        for row in 0..size {
+            window[row * size..][..size].copy_from_slice(&self.pixels[row * self.stride..][..size]);
+        }
+        let count = window.len() as f32;
+        let (window, window_rest) = S::as_simd_f32s(window);
+        let (template, template_rest) = S::as_simd_f32s(template);
+        let mut total = simd.splat_f32s(0.0);
+        for v in window {
+            total = simd.add_f32s(total, *v);
+        }
+        let mean = (simd.reduce_sum_f32s(total) + window_rest.iter().sum::<f32>()) / count;
+        let (shift, zero) = (simd.splat_f32s(mean), simd.splat_f32s(0.0));
+        let (mut products, mut sums, mut squares) = (zero, zero, zero);
+        for (t, v) in template.iter().zip(window) {
+            let d = simd.sub_f32s(*v, shift);
+            products = simd.mul_add_e_f32s(*t, d, products);
+            sums = simd.add_f32s(sums, d);
+            squares = simd.mul_add_e_f32s(d, d, squares);
+        }
+        let mut product = simd.reduce_sum_f32s(products);
+        let (mut sum, mut square) = (simd.reduce_sum_f32s(sums), simd.reduce_sum_f32s(squares));
+        for (t, v) in template_rest.iter().zip(window_rest) {
+            let d = v - mean;
+            (product, sum, square) = (product + t * d, sum + d, square + d * d);
+        }
+        let variance = square - sum * sum / count;
+        let score = (product - self.sum * sum / count) / (variance.sqrt() * self.norm);
+        (variance >= count * (FLAT_STD * FLAT_STD) as f32).then(|| score.clamp(-1.0, 1.0))
     }
 }

@@ -7,7 +7,9 @@
 //! |---|---|
 //! | `zncc` | the dense surface of scores of one template over a region, and one score of two patches |
 //! | `surface` | the scores and which pixel each belongs to |
-//! | `dot` | the numerators, in SIMD registers: nearly all the work |
+//! | `toom_cook` | the numerators, in SIMD registers, with half of the multiplications: nearly all the work |
+//! | `moments` | sums and sums of squares over every window |
+//! | `dot` | the numerators of a few rows, as the formula stands |
 //! | `difference` | the surface of sums of absolute or squared differences |
 //! | `sdog` | the surface of agreeing signs of a difference of Gaussians |
 //! | `similarity` | these measures behind one name |
@@ -21,6 +23,8 @@ pub mod zncc;
 pub mod surface;
 mod grid;
 mod dot;
+mod toom_cook;
+mod moments;
 mod exact;
 pub mod difference;
 pub mod sdog;

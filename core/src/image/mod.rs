@@ -9,7 +9,7 @@ pub mod resample;
 pub mod patch;
 pub mod pyramid;
 pub mod gradient;
-pub mod integral;
+pub mod invalid;
 pub mod io;
 pub mod npy;
 
