@@ -197,13 +197,13 @@ fn gather<S: Simd, const N: usize>(
 ) -> usize {
     let count = out.len();
     let mut parts = [row_of::<S>(from, offset, count); N];
-    for n in 1..N {
-        parts[n] = row_of::<S>(from, offset + n * step, count);
+    for (n, part) in parts.iter_mut().enumerate() {
+        *part = row_of::<S>(from, offset + n * step, count);
     }
     for x in 0..count {
         let mut sum = if adds { out[x] } else { simd.splat_f32s(0.0) };
-        for n in 0..N {
-            sum = simd.add_f32s(sum, parts[n][x]);
+        for part in &parts {
+            sum = simd.add_f32s(sum, part[x]);
         }
         out[x] = sum;
     }

@@ -324,7 +324,7 @@ impl<const A: usize, const V: usize> WithSimd for Block<'_, A, V> {
                         let (upper, lower) = (S::as_simd_f32s(upper).0, S::as_simd_f32s(lower).0);
                         for_each!(N in [0 1 2 3 4 5 6] {
                             if N < A {
-                                let pixels = if N <= ROW { upper } else { lower };
+                                let pixels = if ROW + 1 > N { upper } else { lower };
                                 let weight = simd.splat_f32s(filter[column][(ROW + A - N) % A]);
                                 for_each!(X in [0 1 2] {
                                     if X < V {
