@@ -125,6 +125,14 @@ fn windows_that_touch_an_invalid_pixel_are_excluded_and_no_other() {
 }
 
 #[test]
+fn the_papers_window_has_19_881_positions() {
+    // R226: 141² of a template of 21 in a window of 161.
+    let image = noise(161, 161, 0.5, 0.3, 12);
+    let surface = zncc_surface(&patch_at(&image, 70, 70, 21), &image, PixelRect::whole(161, 161)).unwrap();
+    assert_eq!((surface.width, surface.height, surface.scores.len()), (141, 141, 19_881));
+}
+
+#[test]
 fn the_whole_window_lies_in_the_region_and_in_the_image() {
     let image = noise(40, 30, 0.5, 0.3, 9);
     let template = patch_at(&image, 3, 4, 7);

@@ -33,6 +33,15 @@ fn four_skipped_images_are_every_fifth_stop() {
 }
 
 #[test]
+fn the_azimuths_of_table_three_add_up_to_what_is_printed_of_them() {
+    // R226.
+    let table = Study::named("checkout-1").unwrap().paper();
+    let of = |column: &str| -> f64 { table.iter().filter(|v| v.column == column).map(|v| v.value).sum() };
+    assert!((of("azimuth_change_deg") - 53.56).abs() < 1e-9);
+    assert!((of("roll_deg") - 20.69).abs() < 1e-9);
+}
+
+#[test]
 fn fifteen_degrees_sideways_are_every_third_picture_in_both_windows() {
     let points = Study::named("sideways").unwrap().points(&["15".to_owned()]).unwrap();
     assert_eq!(points.len(), 2);

@@ -10,7 +10,7 @@
 //! rock's width    how far the placed rock reaches across the line of sight of the stop halfway, above the ground, m
 //! ```
 //!
-//! Frames: site; pixels. Sources: papers.md R52, R118, R119, R131–R134, R137, R138, R140–R145, R209.
+//! Frames: site; pixels. Sources: papers.md R52, R118, R119, R131–R134, R137, R138, R140–R145, R209, R226.
 
 use super::*;
 use crate::camera::Camera;
@@ -293,6 +293,34 @@ fn sideways_as_shipped_circles_at_7_m_and_its_face_is_seen_first_and_last() {
         on_boundary += u32::from(far_m - near_m > 0.1 * hit.distance_m);
     }
     assert_eq!(on_boundary, 1, "R119: one of the twelve lies on an occluding boundary");
+}
+
+#[test]
+fn approaches_as_shipped_stop_where_the_papers_arithmetic_puts_them() {
+    // R226: what is left after skipping n images is a step of 1 − 0.95ⁿ⁺¹.
+    let of_stop = |s: &Staged, stop: usize| 1.0 - s.distance_m(stop) / s.distance_m(0);
+    let staged = check(
+        "approach-5",
+        &[
+            claim("R226", "stops", 30.0, 0.0, Staged::stops),
+            claim("R226", "distance after 29 steps of 5 %, m", 2.259_355_4, 1e-6, |s| s.distance_m(s.last())),
+            claim("R226", "distance travelled, m", 7.740_644_6, 1e-6, |s| {
+                s.distance_m(0) - s.distance_m(s.last())
+            }),
+        ],
+    );
+    let skipped = [0.05, 0.0975, 0.142_625, 0.185_493_75, 0.226_219_062_5];
+    for (n_skip, share) in skipped.into_iter().enumerate() {
+        let ours = of_stop(&staged, n_skip + 1);
+        assert!((ours - share).abs() < 1e-7, "{n_skip} images skipped: {ours}");
+    }
+    check(
+        "approach-10",
+        &[
+            claim("R226", "steps of 10 % from 10 m to 2 m", 16.0, 0.0, |s| s.stops() - 1.0),
+            claim("R226", "first distance, m", 10.0, 1e-6, |s| s.distance_m(0)),
+        ],
+    );
 }
 
 #[test]
