@@ -33,7 +33,7 @@ pub(super) fn data_folder(given: Option<&Path>) -> Result<PathBuf> {
 /// # Errors
 /// As [`Traverse::open`] and [`create_simulated`].
 pub(super) fn open(path: &Path, data: Option<&Path>) -> Result<Traverse> {
-    if let Some(name) = library_name(path) {
+    if let Some(name) = library_name(path).filter(|_| !path.exists()) {
         return simulated(&library::scenario(name)?, &data_folder(data)?);
     }
     match read_scenario_or_index(path)? {
@@ -60,7 +60,8 @@ pub(super) fn simulated(scenario: &Scenario, data: &Path) -> Result<Traverse> {
 /// # Errors
 /// A file that cannot be read or is no scenario, or a name that is neither a file nor in the library.
 pub(super) fn scenario(path: &Path) -> Result<Scenario> {
-    if let Some(name) = library_name(path) {
+    // A folder of that name is no scenario: a study keeps its worlds in one.
+    if let Some(name) = library_name(path).filter(|_| !path.is_file()) {
         return library::scenario(name);
     }
     if !path.exists() && path.extension().is_none() && path.components().count() == 1 {
@@ -69,9 +70,9 @@ pub(super) fn scenario(path: &Path) -> Result<Scenario> {
     Scenario::from_toml(&read(path)?, path)
 }
 
-/// The library's scenario that a bare word names, unless a file or folder goes by it.
+/// The library's scenario that a bare word names.
 fn library_name(path: &Path) -> Option<&'static str> {
-    library::names().find(|name| path == Path::new(name) && !path.exists())
+    library::names().find(|name| path == Path::new(name))
 }
 
 /// Renders what is missing of a simulated traverse, telling progress; recorded ones need nothing.
