@@ -2,15 +2,18 @@
 //!
 //! The step of a fault is found in the truth, target by target: the first visited step at which the point is hidden, in
 //! shadow, or out of the left image. A target to which nothing happens is no case and has none.
+//!
+//! On a face that is circled, two kinds of targets stand apart from the others: one chosen on an occluding boundary
+//! (R119), and those before which another rock passes on the way, which then have such a boundary too.
 
 use super::point::{Fault, Picks, Point, Visit};
-use super::row::BOUNDARY;
+use super::row::{BOUNDARY, PASSED};
 use super::run::Chosen;
 use super::truth::TruthSource;
 use crate::error::{Error, Result};
 use crate::frames::{Pixel, Point3};
 use crate::sim::scenario::Arrangement;
-use crate::sim::{Scenario, Special, World, choose_special, choose_targets, is_on_boundary};
+use crate::sim::{Scenario, Special, SurfaceId, World, choose_special, choose_targets, is_on_boundary};
 use crate::traverse::Traverse;
 
 /// Targets on boundaries, and targets that leave the image, that are asked for in each world.
@@ -60,9 +63,37 @@ fn groups(
         (Picks::Rule, Arrangement::Face) if is_on_boundary(world, scenario, traverse.index(), *pixel) => {
             BOUNDARY.to_owned()
         }
+        (Picks::Rule, Arrangement::Face) if is_passed(world, traverse, *pixel, rule.window_px) => {
+            PASSED.to_owned()
+        }
         _ => "all".to_owned(),
     };
     pixels.iter().enumerate().map(of).collect()
+}
+
+/// Whether, at any stop, another rock stands nearer in the window around the target, or hides it.
+fn is_passed(world: &World, traverse: &Traverse, pixel: Pixel, window_px: u32) -> bool {
+    let surface_at = |stop: usize, pixel: Pixel| {
+        let site_from_rover = traverse.true_site_from_rover(stop)?;
+        let ray = traverse.true_left_camera(stop).moved(&site_from_rover).ray(pixel)?;
+        world.cast(&ray).map(|hit| (hit.surface, hit.distance_m))
+    };
+    let Some((own, _)) = surface_at(0, pixel) else { return false };
+    let Some(point) = traverse.surface_point_in_site(0, pixel) else { return false };
+    (0..traverse.stop_count()).any(|stop| {
+        let camera = traverse.true_left_camera(stop);
+        let Some(site_from_rover) = traverse.true_site_from_rover(stop) else { return false };
+        let camera = camera.moved(&site_from_rover);
+        let Some(middle) = camera.project(&point) else { return false };
+        let distance_m = (point - camera.model.centre()).norm();
+        let half = f64::from(window_px / 2);
+        let offsets = || (-2..=2).map(|i| f64::from(i) / 2.0 * half);
+        offsets().flat_map(|dy| offsets().map(move |dx| middle.offset(dx, dy))).any(|pixel| {
+            surface_at(stop, pixel).is_some_and(|(surface, hit_m)| {
+                matches!(surface, SurfaceId::Rock(_)) && surface != own && hit_m < distance_m
+            })
+        })
+    })
 }
 
 /// Finds, in the truth, the step at which the fault meets each target.

@@ -1,7 +1,8 @@
 //! The rows of a study's table: one for each configuration, seed and point of the grid.
 //!
 //! Counts are of runs, one a target, judged at the last step (R116), unless they end in `_steps`. Targets on an occluding
-//! boundary that stand among others are counted apart, as the paper does (R119). A refused designation is a target that
+//! boundary that stand among others are counted apart, as the paper does (R119), and so are those before which another
+//! rock passes on the way. A refused designation is a target that
 //! was not tracked. *False tracking*: state `tracking` while not tracked. *False loss*: lost or failed while the
 //! evidence, had it been accepted, was right. Where the truth is hidden at the last step the run is `unjudged`.
 //!
@@ -22,6 +23,9 @@ use super::run::{Fate, Run};
 
 /// The group of targets on an occluding boundary.
 pub const BOUNDARY: &str = "boundary";
+
+/// The group of targets before which another rock passes on the way.
+pub const PASSED: &str = "passed";
 
 /// One row; it is flat when it is written.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -65,14 +69,17 @@ pub fn rows(study: &Study, unit: &Unit) -> Vec<Row> {
 
 /// Counts and errors of runs in so many worlds.
 pub fn columns(runs: &[&Run], worlds: usize) -> BTreeMap<String, Value> {
-    let among_others = runs.iter().any(|run| run.group != BOUNDARY);
-    let (apart, own): (Vec<&Run>, Vec<&Run>) =
-        runs.iter().partition(|run| among_others && run.group == BOUNDARY);
+    let is_apart = |run: &Run| run.group == BOUNDARY || run.group == PASSED;
+    let among_others = runs.iter().any(|run| !is_apart(run));
+    let (apart, own): (Vec<&Run>, Vec<&Run>) = runs.iter().partition(|run| among_others && is_apart(run));
     let mut columns = counts(&own);
-    if !apart.is_empty() {
-        let boundary = counts(&apart);
-        for name in ["targets", "tracked", "false_tracked", "false_lost"] {
-            columns.insert(format!("boundary_{name}"), boundary[name].clone());
+    for group in [BOUNDARY, PASSED] {
+        let of_group: Vec<&Run> = apart.iter().copied().filter(|run| run.group == group).collect();
+        if !of_group.is_empty() {
+            let counted = counts(&of_group);
+            for name in ["targets", "tracked", "false_tracked", "false_lost"] {
+                columns.insert(format!("{group}_{name}"), counted[name].clone());
+            }
         }
     }
     let tracked: Vec<&Run> = own.iter().copied().filter(|run| is_tracked(run)).collect();

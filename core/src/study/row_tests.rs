@@ -49,6 +49,12 @@ fn a_boundary_target_stands_apart_from_the_others() {
     let columns = columns_of(&runs);
     assert_eq!((columns["targets"].clone(), columns["tracked_share"].clone()), (1.into(), 1.0.into()));
     assert_eq!(columns["boundary_false_tracked"], 1);
+    let runs = [runs[0].clone(), run(PASSED, None, "lost", 0.4), run(BOUNDARY, Some(true), "tracking", 0.1)];
+    let columns = columns_of(&runs);
+    assert_eq!(
+        ["targets", "passed_targets", "boundary_tracked"].map(|name| columns[name].as_u64()),
+        [Some(1); 3]
+    );
     // Alone they are what the point is about.
     assert_eq!(columns_of(&runs[1..])["targets"], 1);
 }

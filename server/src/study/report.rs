@@ -99,12 +99,15 @@ const COLUMNS: [Column; 14] = [
     ("uneven_px", "unevenness, px", 1.0, 2),
 ];
 
-/// The columns of faults and of boundary targets, where there are any.
-const MORE: [Column; 10] = [
+/// The columns of faults and of targets that are counted apart, where there are any.
+const MORE: [Column; 13] = [
     ("uneven_true_px", "of the truth, px", 1.0, 2),
     ("boundary_targets", "boundary targets", 1.0, 0),
     ("boundary_tracked", "tracked", 1.0, 0),
     ("boundary_false_tracked", "false", 1.0, 0),
+    ("passed_targets", "passed targets", 1.0, 0),
+    ("passed_tracked", "tracked", 1.0, 0),
+    ("passed_false_tracked", "false", 1.0, 0),
     ("cases", "cases", 1.0, 0),
     ("fault_tracked", "tracked at the fault", 1.0, 0),
     ("fault_lost", "lost at the fault", 1.0, 0),
