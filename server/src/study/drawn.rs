@@ -1,7 +1,7 @@
 //! Charts as SVG text, drawn by `plotters`: lines with their range over the worlds, and values of the paper beside them.
 //!
-//! Colours are those of Okabe and Ito, told apart by everyone; the paper's values are hollow squares in the colour of the
-//! configuration that they belong to.
+//! Colours are those of Okabe and Ito, told apart by everyone, and each goes with a shape; the paper's values are hollow
+//! squares in the colour of the configuration that they belong to. Lines that lie upon each other are one, with all names.
 
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
@@ -20,8 +20,21 @@ const COLOURS: [RGBColor; 7] = [
 /// More words than these along the axis stand upright.
 const MOST_LEVEL_WORDS: usize = 5;
 
-/// Width and height of a chart, px.
-const SIZE: (u32, u32) = (900, 420);
+/// Width of a chart and its least height, px.
+const SIZE: (u32, u32) = (1000, 420);
+
+/// Width of the plot, px; the legend has the rest.
+const PLOT_WIDTH: u32 = 640;
+
+/// Letters that fit into a row of the legend.
+const LEGEND_LETTERS: usize = 46;
+
+/// From one row of the legend to the next, and from the top to the first, px.
+const LEGEND_ROW: i32 = 18;
+const LEGEND_TOP: i32 = 44;
+
+/// A line of more points than these is drawn without marks.
+const MOST_MARKS: usize = 40;
 
 /// A line with its points.
 #[derive(Clone, Debug, Default)]
@@ -65,9 +78,12 @@ impl Chart {
     pub fn svg(&self) -> Result<String, String> {
         let mut text = String::new();
         {
-            let area = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
+            let rows: usize = self.lines.iter().map(|line| rows_of(&line.label).len()).sum();
+            let height = SIZE.1.max((2 * LEGEND_TOP + LEGEND_ROW * rows as i32) as u32);
+            let area = SVGBackend::with_string(&mut text, (SIZE.0, height)).into_drawing_area();
             area.fill(&WHITE).map_err(|e| e.to_string())?;
-            let (plot, legend) = area.split_horizontally(640);
+            let (plot, legend) = area.split_horizontally(PLOT_WIDTH);
+            let (plot, _) = plot.split_vertically(SIZE.1);
             self.plot(&plot)?;
             self.legend(&legend)?;
             area.present().map_err(|e| e.to_string())?;
@@ -93,6 +109,8 @@ impl Chart {
             mesh.x_label_style(("sans-serif", 12).into_font().transform(FontTransform::Rotate90));
         }
         mesh.x_desc(self.axes[0].as_str()).y_desc(self.axes[1].as_str()).light_line_style(TRANSPARENT);
+        let short = |v: &f64| number(*v);
+        mesh.x_label_formatter(&short).y_label_formatter(&short);
         if !self.words.is_empty() {
             mesh.x_label_formatter(&word).x_labels(2 * self.words.len() + 1);
         }
@@ -102,17 +120,26 @@ impl Chart {
 
     /// What the colours mean, beside the plot so that it hides nothing.
     fn legend(&self, area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>) -> Result<(), String> {
-        for (index, line) in self.lines.iter().enumerate() {
-            let (y, colour) = (44 + 18 * index as i32, COLOURS[line.colour % COLOURS.len()]);
-            let said = if line.is_marks {
-                area.draw(&Rectangle::new([(6, y - 4), (14, y + 4)], colour.stroke_width(2)))
+        let mut y = LEGEND_TOP;
+        for line in &self.lines {
+            let colour = COLOURS[line.colour % COLOURS.len()];
+            if line.is_marks {
+                let square = Rectangle::new([(6, y - 4), (14, y + 4)], colour.stroke_width(2));
+                area.draw(&square).map_err(|e| e.to_string())?;
             } else {
                 let width = if line.is_thin { 1 } else { 3 };
-                area.draw(&PathElement::new([(0, y), (20, y)], colour.stroke_width(width)))
-            };
-            said.map_err(|e| e.to_string())?;
-            let text = Text::new(line.label.clone(), (26, y - 7), ("sans-serif", 13));
-            area.draw(&text).map_err(|e| e.to_string())?;
+                let stroke = PathElement::new([(0, y), (20, y)], colour.stroke_width(width));
+                area.draw(&stroke).map_err(|e| e.to_string())?;
+                if line.has_marks() {
+                    let mark = Polygon::new(mark(line.colour, (10, y)), colour.filled());
+                    area.draw(&mark).map_err(|e| e.to_string())?;
+                }
+            }
+            for row in rows_of(&line.label) {
+                let text = Text::new(row, (26, y - 7), ("sans-serif", 13));
+                area.draw(&text).map_err(|e| e.to_string())?;
+                y += LEGEND_ROW;
+            }
         }
         Ok(())
     }
@@ -147,6 +174,68 @@ impl Chart {
     }
 }
 
+impl Line {
+    fn has_marks(&self) -> bool {
+        !self.is_thin && self.points.len() <= MOST_MARKS
+    }
+
+    /// Whether another line is drawn over this one, point by point.
+    fn coincides(&self, other: &Self) -> bool {
+        let same = |a: f64, b: f64| (a - b).abs() <= 1e-9 * a.abs().max(1.0);
+        !self.points.is_empty()
+            && self.points.len() == other.points.len()
+            && self.points.iter().zip(&other.points).all(|(a, b)| same(a.0, b.0) && same(a.1, b.1))
+    }
+}
+
+/// The lines with those that lie upon each other made one, called by all their names.
+pub fn merged(lines: Vec<Line>) -> Vec<Line> {
+    let mut found: Vec<Line> = Vec::new();
+    for line in lines {
+        match found.iter_mut().find(|other| other.coincides(&line)) {
+            Some(other) => other.label = format!("{}, {}", other.label, line.label),
+            None => found.push(line),
+        }
+    }
+    for (colour, line) in found.iter_mut().enumerate() {
+        line.colour = colour;
+    }
+    found
+}
+
+/// A label in rows that fit into the legend, broken between words.
+fn rows_of(label: &str) -> Vec<String> {
+    let mut rows: Vec<String> = vec![String::new()];
+    for word in label.split(' ') {
+        let Some(row) = rows.last_mut() else { break };
+        if !row.is_empty() && row.len() + word.len() >= LEGEND_LETTERS {
+            rows.push(word.to_owned());
+        } else {
+            let space = if row.is_empty() { "" } else { " " };
+            row.push_str(&format!("{space}{word}"));
+        }
+    }
+    rows
+}
+
+/// A number along an axis, without decimals where it has none.
+fn number(value: f64) -> String {
+    let rounded = (value * 1000.0).round() / 1000.0;
+    if rounded == 0.0 { "0".to_owned() } else { rounded.to_string() }
+}
+
+/// The corners of a line's mark about a point, px: a hexagon, a square, a triangle, a diamond, and so on.
+fn mark(colour: usize, (x, y): (i32, i32)) -> Vec<(i32, i32)> {
+    let corners: &[(i32, i32)] = match colour % 5 {
+        0 => &[(-5, 0), (-3, -4), (3, -4), (5, 0), (3, 4), (-3, 4)],
+        1 => &[(-4, -4), (4, -4), (4, 4), (-4, 4)],
+        2 => &[(0, -5), (5, 4), (-5, 4)],
+        3 => &[(0, -6), (6, 0), (0, 6), (-6, 0)],
+        _ => &[(-5, -4), (5, -4), (0, 5)],
+    };
+    corners.iter().map(|(dx, dy)| (x + dx, y + dy)).collect()
+}
+
 type Plot<'a, 'b> = ChartContext<'b, SVGBackend<'a>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
 fn draw(chart: &mut Plot<'_, '_>, line: &Line, [x, y]: [[f64; 2]; 2]) -> Result<(), String> {
@@ -168,9 +257,11 @@ fn draw(chart: &mut Plot<'_, '_>, line: &Line, [x, y]: [[f64; 2]; 2]) -> Result<
         let joined = LineSeries::new(points.iter().copied(), colour.stroke_width(width));
         chart.draw_series(joined).map_err(|e| e.to_string())?;
     }
-    if !line.is_thin {
-        let dots = points.iter().map(|&point| Circle::new(point, 4, colour.filled()));
-        chart.draw_series(dots).map_err(|e| e.to_string())?;
+    if line.has_marks() {
+        let marks = points
+            .iter()
+            .map(|&point| EmptyElement::at(point) + Polygon::new(mark(line.colour, (0, 0)), colour.filled()));
+        chart.draw_series(marks).map_err(|e| e.to_string())?;
     }
     let bars = line.ranges.iter().map(|&(px, [low, high])| {
         let clip = |v: f64| v.clamp(y[0], y[1]);
@@ -195,7 +286,7 @@ mod tests {
         let words = vec!["flat".to_owned(), "steep".to_owned()];
         let chart = Chart { lines: vec![line.clone(), paper], words, ..Chart::default() };
         let svg = chart.svg().unwrap();
-        for word in ["ncc-scale", "paper", "flat", "steep", "<circle", "<polyline", "<rect"] {
+        for word in ["ncc-scale", "paper", "flat", "steep", "<polygon", "<polyline", "<rect"] {
             assert!(svg.contains(word), "{word}");
         }
         assert!(

@@ -12,7 +12,7 @@ use sightline_core::study::row::{columns, is_tracked};
 use sightline_core::study::run::Run;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::drawn::{Chart, Line};
+use super::drawn::{Chart, Line, merged};
 use super::step_figure::checkout;
 
 /// A figure of a report.
@@ -209,8 +209,12 @@ fn over_grid(
             ..Line::default()
         });
     }
+    if words.is_empty() {
+        lines = merged(lines);
+    }
     let paper = plan.study.paper();
-    lines.extend(paper_lines(&paper, column, factor, series));
+    let marks = paper_lines(&paper, column, factor, &lines);
+    lines.extend(marks);
     let sentence = sentence(series, column, factor, unit, &paper);
     let chart = Chart {
         title: title.to_owned(),
@@ -247,20 +251,23 @@ pub(super) fn axis(plan: &Plan) -> String {
     format!("{}{unit}", plan.study.variable)
 }
 
-/// The paper's values, each in the colour of its configuration.
-fn paper_lines(paper: &[PaperValue], column: &str, factor: f64, series: &[Series]) -> Vec<Line> {
-    let mut lines: Vec<Line> = Vec::new();
-    for (colour, series) in series.iter().enumerate() {
-        let label = format!("paper: {}", series.configuration);
-        let of = paper
-            .iter()
-            .filter(|value| value.configuration == series.configuration && value.column == column);
-        let points: Vec<(f64, f64)> = of.map(|value| (value.at, factor * value.value)).collect();
-        if !points.is_empty() && lines.iter().all(|line| line.label != label) {
-            lines.push(Line { label, colour, points, is_marks: true, ..Line::default() });
+/// The paper's values, each in the colour of the line on which its configuration lies.
+fn paper_lines(paper: &[PaperValue], column: &str, factor: f64, lines: &[Line]) -> Vec<Line> {
+    let mut marks: Vec<Line> = Vec::new();
+    for value in paper.iter().filter(|value| value.column == column) {
+        let point = (value.at, factor * value.value);
+        let label = format!("paper: {}", value.configuration);
+        match marks.iter_mut().find(|line| line.label == label) {
+            Some(line) => line.points.push(point),
+            None => {
+                let is_own =
+                    |line: &&Line| line.label.split([',', ' ']).any(|name| name == value.configuration);
+                let colour = lines.iter().find(is_own).map_or(0, |line| line.colour);
+                marks.push(Line { label, colour, points: vec![point], is_marks: true, ..Line::default() });
+            }
         }
     }
-    lines
+    marks
 }
 
 /// What a column is at both ends of the grid, series by series, with the paper's value where it prints one.
