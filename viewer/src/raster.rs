@@ -31,6 +31,8 @@ pub struct Raster {
     options: TextureOptions,
     /// The stretch that the texture has.
     stretched: egui::mutex::Mutex<Stretch>,
+    /// Between which scores the colours of a surface run.
+    limits: egui::mutex::Mutex<[f32; 2]>,
 }
 
 impl Raster {
@@ -65,7 +67,7 @@ impl Raster {
         let values = npy::decode(bytes, array.word()).map_err(|e| e.to_string())?;
         let (mean, sigma) = statistics(&values);
         let colour = |v: f32| match array {
-            ArrayName::Surface => theme::score(v),
+            ArrayName::Surface => theme::score((v + 1.0) / 2.0),
             ArrayName::Difference => theme::signed(v, DIFFERENCE_LIMIT),
             _ => theme::grey(0.5 + (v - mean) / (2.0 * PATCH_SIGMAS * sigma.max(1e-6))),
         };
@@ -84,7 +86,8 @@ impl Raster {
         let texture = context.load_texture(name, ColorImage::new(size, colours), options);
         let (mean, sigma) = statistics(&values);
         let (levels, stretched) = (levels(&values), egui::mutex::Mutex::default());
-        Self { values, texture, mean, sigma, levels, options, stretched }
+        let limits = egui::mutex::Mutex::new([-1.0, 1.0]);
+        Self { values, texture, mean, sigma, levels, options, stretched, limits }
     }
 
     /// Gives the texture of an image a stretch, where it does not have it yet.
@@ -96,6 +99,19 @@ impl Raster {
         *present = stretch;
         let size = self.size().map(|side| side as usize);
         let colours = self.values.iter().map(|&v| theme::grey(stretch.apply(v, self.levels))).collect();
+        self.texture.clone().set(ColorImage::new(size, colours), self.options);
+    }
+
+    /// Gives the texture of a surface of scores these limits of its colours, where it has others.
+    pub fn score_limits(&self, limits: [f32; 2]) {
+        let mut present = self.limits.lock();
+        if *present == limits {
+            return;
+        }
+        *present = limits;
+        let size = self.size().map(|side| side as usize);
+        let [low, high] = limits;
+        let colours = self.values.iter().map(|&v| theme::score((v - low) / (high - low))).collect();
         self.texture.clone().set(ColorImage::new(size, colours), self.options);
     }
 

@@ -97,9 +97,9 @@ pub fn checker(odd: bool) -> Color32 {
     CHECKER[usize::from(odd)]
 }
 
-/// Viridis over scores from −1 to 1; transparent where there is none.
-pub fn score(score: f32) -> Color32 {
-    ramp(colorous::VIRIDIS, (f64::from(score) + 1.0) / 2.0)
+/// Viridis, from 0 for the least score that is shown to 1 for the greatest; transparent where there is none.
+pub fn score(share: f32) -> Color32 {
+    ramp(colorous::VIRIDIS, f64::from(share))
 }
 
 /// Blue–white–red over signed values from −`limit` to `limit`.

@@ -2,7 +2,7 @@
 //! template is one pixel.
 //!
 //! It is what rerun calls a depth image, because that archetype keeps the scores and shows them under a colour
-//! map with fixed limits: viridis from −1 to 1 at every step.
+//! map with fixed limits: viridis, at every step between the same limits of the measure (−1 and 1 for a correlation).
 
 use rerun::components::Colormap;
 use sightline_core::correlate::zncc::Surface;
@@ -13,13 +13,12 @@ use super::border::{dot, mapped};
 use super::palette::{MEASUREMENT, SECOND_PEAK};
 use super::step::Step;
 
-/// Limits of the colours.
-const LIMITS: [f64; 2] = [-1.0, 1.0];
-
 /// The scores of all positions.
 pub(super) fn log_surface(step: &Step<'_>) -> Logged {
-    let surface = step.matched().map(|m| &m.surface);
-    let image = surface.and_then(|s| mapped([s.width, s.height], &s.scores, LIMITS, Colormap::Viridis));
+    let image = step.matched().and_then(|m| {
+        let (size, limits) = ([m.surface.width, m.surface.height], m.measure.shown_limits().map(f64::from));
+        mapped(size, &m.surface.scores, limits, Colormap::Viridis)
+    });
     step.log("/{target}/locate/match_template/surface", image)
 }
 

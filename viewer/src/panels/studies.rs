@@ -100,7 +100,9 @@ fn show_job(ui: &mut Ui, state: &State, job: &StudyJob, out: &mut Vec<Command>) 
     ui.horizontal_wrapped(|ui| {
         ui.label(RichText::new(&job.study).strong().color(theme::STRONG)).on_hover_text(&job.command);
         ui.label(RichText::new(word).color(colour));
-        ui.label(theme::number(format!("{} of {}", job.k, job.n)).size(11.0));
+        if job.n > 0 {
+            ui.label(theme::number(format!("{} of {}", job.k, job.n)).size(11.0));
+        }
         match job.state {
             StudyState::Waiting | StudyState::Running => {
                 if ui.small_button("Cancel").clicked() {

@@ -4,6 +4,7 @@ use egui::{Align2, Rect, Ui, pos2, vec2};
 use sightline_core::frames::Pixel;
 use sightline_core::image::PixelRect;
 use sightline_core::locate::template::match_template::TemplateMatch;
+use sightline_core::locate::template::settings::Measure;
 use sightline_core::trace::{ArrayName, StepTrace};
 
 use super::images_left::STATUS;
@@ -21,8 +22,8 @@ const PURPOSE: &str = "The match score of every position in the search window.";
 
 /// Width of the colour bar with its numbers, points.
 const BAR: f32 = 46.0;
-/// Scores with a tick.
-const TICKS: [f32; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
+/// Ticks of the colour bar, both ends among them.
+const TICKS: u32 = 5;
 
 /// Shows the surface.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
@@ -43,6 +44,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         }
         Slot::Absent | Slot::Loading => return panels::missing(ui, PURPOSE, "Loading the scores …"),
     };
+    raster.score_limits(matched.measure.shown_limits());
     let area = ui.available_rect_before_wrap();
     let (rest, bar) = area.split_left_right_at_x(area.right() - BAR);
     let mut left = ui.new_child(egui::UiBuilder::new().max_rect(rest).id_salt("scores"));
@@ -51,14 +53,18 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     canvas.checker(region);
     canvas.texture(&raster.texture, region);
     let threshold = state.setting("limits", "ncc_min").and_then(|v| v.as_f64()).unwrap_or(0.7) as f32;
+    // The threshold is one of correlation.
+    let threshold = (matched.measure == Measure::Ncc).then_some(threshold);
     if state.marks {
-        paint_contour(&canvas, raster, region, threshold);
+        if let Some(threshold) = threshold {
+            paint_contour(&canvas, raster, region, threshold);
+        }
         paint_marks(&canvas, trace, matched, theme::run(state.cursor.run));
     }
     warn_of_edge(&canvas, matched);
     status(&mut left, &canvas, raster, region, matched);
     let bar = bar.shrink2(vec2(4.0, 2.0)).with_max_y(bar.bottom() - STATUS);
-    colour_bar(ui, bar, threshold, matched.peak.score as f32, theme::run(state.cursor.run));
+    colour_bar(ui, bar, matched, threshold, theme::run(state.cursor.run));
     ui.advance_cursor_after_rect(area);
     if let Some(view) = canvas.moved {
         out.push(Command::View(Panel::Surface, view));
@@ -132,40 +138,47 @@ fn status(ui: &mut Ui, canvas: &Canvas, raster: &Raster, region: PixelRect, matc
             } else {
                 String::new()
             };
-            ui.label(theme::note(format!("{} positions{flat}; white line: threshold", matched.positions)));
+            let line = if matched.measure == Measure::Ncc { "; white line: threshold" } else { "" };
+            ui.label(theme::note(format!("{} positions{flat}{line}", matched.positions)));
             return;
         };
         let (x, y) = (pixel.x.round() as i64, pixel.y.round() as i64);
         let value = raster.at(x - i64::from(region.x), y - i64::from(region.y));
         ui.label(theme::number(format!("x {x}  y {y}")).size(11.0));
-        ui.label(theme::note("ncc"));
+        ui.label(theme::note(matched.measure.word()));
         ui.label(
             theme::number(value.map_or_else(|| "excluded".to_owned(), |v| format!("{v:+.3}"))).size(11.0),
         );
     });
 }
 
-/// The colour bar from −1 to 1 with ticks, the threshold and the peak.
-fn colour_bar(ui: &Ui, area: Rect, threshold: f32, peak: f32, run: egui::Color32) {
+/// The colour bar between the measure's limits with ticks, the threshold and the peak.
+fn colour_bar(ui: &Ui, area: Rect, matched: &TemplateMatch, threshold: Option<f32>, run: egui::Color32) {
     let painter = ui.painter();
     let strip = Rect::from_min_max(area.min + vec2(2.0, 8.0), pos2(area.left() + 13.0, area.bottom() - 8.0));
-    let at = |score: f32| strip.bottom() - (score.clamp(-1.0, 1.0) + 1.0) / 2.0 * strip.height();
+    let [least, greatest] = matched.measure.shown_limits();
+    let share = |score: f32| (score.clamp(least, greatest) - least) / (greatest - least);
+    let at = |score: f32| strip.bottom() - share(score) * strip.height();
+    let of = |share: f32| least + (greatest - least) * share;
     let mut mesh = egui::Mesh::default();
     let steps = 64;
     for i in 0..steps {
-        let [low, high] = [i, i + 1].map(|i| -1.0 + 2.0 * i as f32 / steps as f32);
-        let row = Rect::from_min_max(pos2(strip.left(), at(high)), pos2(strip.right(), at(low)));
+        let [low, high] = [i, i + 1].map(|i| i as f32 / steps as f32);
+        let row = Rect::from_min_max(pos2(strip.left(), at(of(high))), pos2(strip.right(), at(of(low))));
         mesh.add_colored_rect(row, theme::score((low + high) / 2.0));
     }
     painter.add(egui::Shape::mesh(mesh));
-    for tick in TICKS {
+    for tick in (0..TICKS).map(|i| of(i as f32 / (TICKS - 1) as f32)) {
         let end = pos2(strip.right() + 4.0, at(tick));
         painter.line_segment([pos2(strip.right(), at(tick)), end], egui::Stroke::new(1.0, theme::WEAK));
-        let words = if tick == 0.0 { "0".to_owned() } else { format!("{tick:+}") };
+        let words =
+            if tick == 0.0 { "0".to_owned() } else { format!("{:+}", (tick * 1000.0).round() / 1000.0) };
         painter.text(end + vec2(2.0, 0.0), Align2::LEFT_CENTER, words, theme::digit_font(), theme::WEAK);
     }
-    painter.hline(strip.x_range(), at(threshold), egui::Stroke::new(2.0, theme::STRONG));
-    let tip = pos2(strip.left() - 1.0, at(peak));
+    if let Some(threshold) = threshold {
+        painter.hline(strip.x_range(), at(threshold), egui::Stroke::new(2.0, theme::STRONG));
+    }
+    let tip = pos2(strip.left() - 1.0, at(matched.peak.score as f32));
     let arrow = vec![tip, tip + vec2(-5.0, -4.0), tip + vec2(-5.0, 4.0)];
     painter.add(egui::Shape::convex_polygon(arrow, run, egui::Stroke::NONE));
 }

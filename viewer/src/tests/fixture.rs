@@ -12,6 +12,7 @@ use sightline_core::locate::template::TemplateEvidence;
 use sightline_core::locate::template::match_template::TemplateMatch;
 use sightline_core::locate::template::point_stereo::{CurvePoint, PointStereo};
 use sightline_core::locate::template::scale_roll::ScaleRoll;
+use sightline_core::locate::template::settings::Measure;
 use sightline_core::locate::template::triangulate::Triangulation;
 use sightline_core::locate::{Evidence, Located};
 use sightline_core::session::Cursor;
@@ -280,6 +281,7 @@ fn template_match(score: f64) -> TemplateMatch {
         positions: 961,
         comparisons: 961,
         flat_positions: 0,
+        measure: Measure::Ncc,
         peak: Peak {
             pixel: PIXEL,
             score,

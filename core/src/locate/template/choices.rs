@@ -91,6 +91,28 @@ pub enum Measure {
     Sdog,
 }
 
+impl Measure {
+    /// Its name, as in the settings.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Ncc => "ncc",
+            Self::Sad => "sad",
+            Self::Ssd => "ssd",
+            Self::Sdog => "sdog",
+        }
+    }
+
+    /// Between what its scores are shown, the same at every step: −1 and 1 where it has these bounds; negated differences
+    /// from a quarter of full scale (squared: an eighth) up to 0, beyond which nothing is alike.
+    pub fn shown_limits(self) -> [f32; 2] {
+        match self {
+            Self::Ncc | Self::Sdog => [-1.0, 1.0],
+            Self::Sad => [-0.25, 0.0],
+            Self::Ssd => [-1.0 / 64.0, 0.0],
+        }
+    }
+}
+
 /// Which positions are compared (R64, R65).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]

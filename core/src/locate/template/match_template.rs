@@ -57,6 +57,8 @@ pub struct TemplateMatch {
     pub comparisons: u64,
     /// How many of the positions had no contrast.
     pub flat_positions: u32,
+    /// The measure by which `surface`, `peak` and `second_peak` score.
+    pub measure: Measure,
     /// The best match of the whole window by the measure.
     pub peak: Peak,
     /// Where the target is: the best match in focus or of the second stage, or `peak` where there is neither, px.
@@ -199,10 +201,7 @@ pub fn finish(
     let refined = affine.as_ref().filter(|record| record.accepted).map(AffineRefinement::placed);
     let placed = refined.unwrap_or(start);
     let is_straight = placed.map == Matrix2::identity();
-    let matched = match is_straight {
-        true => patch::extract(image, placed.centre, size / 2, settings.kernel),
-        false => placed.window(image, size, settings.kernel),
-    };
+    let matched = window_at(&placed, image, settings);
     let score = match is_correlated && is_straight {
         true => peak.score,
         false => zncc(template, &matched).map_or(0.0, f64::from),
@@ -221,6 +220,7 @@ pub fn finish(
         positions: first.positions as u32,
         comparisons,
         flat_positions: first.surface.flat_positions,
+        measure: settings.measure,
         peak,
         pixel: placed.centre,
         score,
@@ -236,6 +236,15 @@ pub fn finish(
         surface: first.surface,
         difference: patch::normalised_difference(&matched, template),
         matched,
+    }
+}
+
+/// The window of the image at a match; where it is only shifted, its pixels are those of the image's grid.
+fn window_at(placed: &Placed, image: &GrayImage, settings: &TemplateSettings) -> Patch {
+    let size = settings.template_size_px;
+    match placed.map == Matrix2::identity() {
+        true => patch::extract(image, placed.centre, size / 2, settings.kernel),
+        false => placed.window(image, size, settings.kernel),
     }
 }
 
