@@ -56,7 +56,7 @@ fn a_boundary_target_stands_apart_from_the_others() {
         [Some(1); 3]
     );
     // Alone they are what the point is about.
-    assert_eq!(columns_of(&runs[1..])["targets"], 1);
+    assert_eq!(columns_of(&runs[1..])["targets"], 2);
 }
 
 #[test]
