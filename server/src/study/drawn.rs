@@ -5,6 +5,7 @@
 
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 /// Okabe and Ito's colours, without yellow, which vanishes on white.
 const COLOURS: [RGBColor; 7] = [
@@ -17,8 +18,11 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(90, 90, 90),
 ];
 
-/// More words than these along the axis stand upright.
+/// More words than these along the axis stand in two rows in turn.
 const MOST_LEVEL_WORDS: usize = 5;
+
+/// From one row of words along the axis to the next, px.
+const WORD_ROW: i32 = 15;
 
 /// Width of a chart and its least height, px.
 const SIZE: (u32, u32) = (1000, 420);
@@ -105,16 +109,27 @@ impl Chart {
             whole.then(|| self.words.get(x.round() as usize).cloned()).flatten().unwrap_or_default()
         };
         let mut mesh = chart.configure_mesh();
-        if self.words.len() > MOST_LEVEL_WORDS {
-            mesh.x_label_style(("sans-serif", 12).into_font().transform(FontTransform::Rotate90));
-        }
         mesh.x_desc(self.axes[0].as_str()).y_desc(self.axes[1].as_str()).light_line_style(TRANSPARENT);
         let short = |v: &f64| number(*v);
         mesh.x_label_formatter(&short).y_label_formatter(&short);
         if !self.words.is_empty() {
             mesh.x_label_formatter(&word).x_labels(2 * self.words.len() + 1);
         }
+        let in_two_rows = self.words.len() > MOST_LEVEL_WORDS;
+        if in_two_rows {
+            mesh.x_labels(0);
+        }
         mesh.draw().map_err(|e| e.to_string())?;
+        if in_two_rows {
+            let style =
+                TextStyle::from(("sans-serif", 12).into_font()).pos(Pos::new(HPos::Center, VPos::Top));
+            for (i, word) in self.words.iter().enumerate() {
+                let (column, row) = chart.backend_coord(&(i as f64, y[0]));
+                let place = (column, row + 6 + WORD_ROW * (i % 2) as i32);
+                let text = Text::new(word.as_str(), place, style.clone());
+                area.draw(&text).map_err(|e| e.to_string())?;
+            }
+        }
         self.lines.iter().try_for_each(|line| draw(&mut chart, line, [x, y])).map_err(|e| e.to_string())
     }
 
@@ -148,7 +163,7 @@ impl Chart {
     fn label_height(&self) -> u32 {
         match self.words.len() {
             0 => 40,
-            count if count > MOST_LEVEL_WORDS => 130,
+            count if count > MOST_LEVEL_WORDS => 76,
             _ => 56,
         }
     }
