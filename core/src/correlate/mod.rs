@@ -9,6 +9,7 @@
 //! | `surface` | the scores and which pixel each belongs to |
 //! | `toom_cook` | the numerators, in SIMD registers, with half of the multiplications: nearly all the work |
 //! | `moments` | sums and sums of squares over every window |
+//! | `lanes` | slices of numbers as the processor's vectors |
 //! | `dot` | the numerators of a few rows, as the formula stands |
 //! | `difference` | the surface of sums of absolute or squared differences |
 //! | `sdog` | the surface of agreeing signs of a difference of Gaussians |
@@ -25,6 +26,7 @@ mod grid;
 mod dot;
 mod toom_cook;
 mod moments;
+mod lanes;
 mod exact;
 pub mod difference;
 pub mod sdog;

@@ -12,7 +12,7 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::toom_cook::{row_of, row_of_mut};
+use super::lanes::{row_of, row_of_mut};
 
 /// Neighbours that are summed first.
 const QUAD: usize = 4;

@@ -29,6 +29,8 @@
 
 use pulp::{Simd, WithSimd};
 
+use super::lanes::{row_of, row_of_mut};
+
 /// The points at which the polynomials are valued, besides 0 and ∞: ±1/√2 and ±√2.
 const ALPHA: f32 = std::f32::consts::FRAC_1_SQRT_2;
 const GAMMA: f32 = std::f32::consts::SQRT_2;
@@ -219,18 +221,6 @@ pub(super) struct Scratch {
 #[inline(always)]
 const fn widest<S: Simd>() -> usize {
     if S::REGISTER_COUNT >= 32 { 3 } else { 1 }
-}
-
-/// The `count` vectors from `start` on.
-#[inline(always)]
-pub(super) fn row_of<S: Simd>(values: &[f32], start: usize, count: usize) -> &[S::f32s] {
-    &S::as_simd_f32s(&values[start..start + count * S::F32_LANES]).0[..count]
-}
-
-/// The `count` vectors from `start` on.
-#[inline(always)]
-pub(super) fn row_of_mut<S: Simd>(values: &mut [f32], start: usize, count: usize) -> &mut [S::f32s] {
-    &mut S::as_mut_simd_f32s(&mut values[start..start + count * S::F32_LANES]).0[..count]
 }
 
 /// Makes rows of T from rows of pixels.

@@ -23,9 +23,10 @@ use rayon::prelude::*;
 
 use super::dot;
 use super::exact::{Alone, Template};
+use super::lanes::{row_of, row_of_mut};
 use super::moments::{GROUP, Moments};
 pub use super::surface::Surface;
-use super::toom_cook::{self, Filters, TILE_COLUMNS, row_of, row_of_mut};
+use super::toom_cook::{self, Filters, TILE_COLUMNS};
 use crate::image::invalid::InvalidCounts;
 use crate::image::patch::{FLAT_STD, Patch};
 use crate::image::{GrayImage, PixelRect};
@@ -107,7 +108,7 @@ struct Job<'a> {
     /// The template as rounded to `f32`.
     rounded: Vec<f32>,
     filters: Filters,
-    /// Its sum and norm.
+    /// Sum and norm of `rounded`.
     weights_sum: f32,
     weights_norm: f32,
     image: &'a GrayImage,

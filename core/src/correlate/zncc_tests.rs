@@ -82,6 +82,23 @@ fn low_contrast_beside_a_bright_edge_keeps_its_digits() {
 }
 
 #[test]
+fn a_quiet_patch_among_loud_ones_keeps_its_digits_up_to_where_it_is_scored_by_itself() {
+    // Tiles err with their loudest pixels: windows up to 24 times quieter are left to them.
+    let loud = noise(200, 110, 0.5, 0.45, 21);
+    for quieter in [6.0, 12.0, 18.0, 23.0, 40.0] {
+        let image = GrayImage::from_fn(200, 110, |x, y| {
+            let v = loud.get_pixel(x, y)[0];
+            let is_quiet = (40..90).contains(&x) && (20..75).contains(&y);
+            Luma([if is_quiet { 0.5 + (v - 0.5) / quieter } else { v }])
+        });
+        for size in [11, 21, 31] {
+            let template = patch_at(&noise(60, 60, 0.4, 0.3, 22), 5, 5, size);
+            assert_exact(&template, &image, PixelRect::whole(200, 110), 1e-5);
+        }
+    }
+}
+
+#[test]
 fn the_template_itself_scores_one_at_its_place() {
     let image = noise(90, 70, 0.5, 0.3, 5);
     let surface = zncc_surface(&patch_at(&image, 31, 22, 21), &image, PixelRect::whole(90, 70)).unwrap();
