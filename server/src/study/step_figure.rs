@@ -13,7 +13,7 @@ pub(super) fn checkout(plan: &Plan, units: &[Unit]) -> Result<Vec<Figure>, Strin
     let columns: &[(&'static str, &str, &str)] = match plan.study.name {
         "checkout-1" => &[
             ("magnification", "magnification_true", "magnification of one update"),
-            ("roll_deg", "roll_true_deg", "roll of one update, °"),
+            ("roll_deg", "roll_true_deg", "size of the roll of one update, °"),
             ("azimuth_change_deg", "azimuth_change_true_deg", "change of the viewing azimuth, °"),
             ("ncc", "", "score of the match"),
         ],
@@ -83,11 +83,12 @@ fn step_figure(
 /// Points of a line, and for each the least and greatest value of a single world.
 type PointsAndRanges = (Vec<(f64, f64)>, Vec<(f64, [f64; 2])>);
 
-/// The mean of a column over the worlds at each position, and its range.
+/// The mean of a column over the worlds at each position, and its range; of rolls their sizes, as Table III prints them.
 fn over_positions(rows: &[Row], column: &str) -> PointsAndRanges {
     let mut at: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
     for row in rows {
         if let (Some(position), Some(value)) = (row.number("position"), row.number(column)) {
+            let value = if column.starts_with("roll") { value.abs() } else { value };
             at.entry(position as u64).or_default().push(value);
         }
     }
