@@ -21,7 +21,7 @@ use crate::{panels, theme};
 const PURPOSE: &str = "The match score of every position in the search window.";
 
 /// Width of the colour bar with its numbers, points.
-const BAR: f32 = 46.0;
+const BAR: f32 = 62.0;
 /// Ticks of the colour bar, both ends among them.
 const TICKS: u32 = 5;
 

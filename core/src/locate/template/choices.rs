@@ -103,12 +103,12 @@ impl Measure {
     }
 
     /// Between what its scores are shown, the same at every step: −1 and 1 where it has these bounds; negated differences
-    /// from a quarter of full scale (squared: an eighth) up to 0, beyond which nothing is alike.
+    /// of a fifth of full scale (squared: of a seventh) up to none.
     pub fn shown_limits(self) -> [f32; 2] {
         match self {
             Self::Ncc | Self::Sdog => [-1.0, 1.0],
-            Self::Sad => [-0.25, 0.0],
-            Self::Ssd => [-1.0 / 64.0, 0.0],
+            Self::Sad => [-0.2, 0.0],
+            Self::Ssd => [-0.02, 0.0],
         }
     }
 }
