@@ -10,15 +10,15 @@
 //! | 21 × 21 in 600 × 600 | 580² = 336 400 | 148.4 M |
 //!
 //! A core with two 512-bit multiply-add units does 32 of them a cycle: 8.77 M take 274 000 cycles, 67 µs at
-//! 4.1 GHz (131 billion a second); with 256-bit units twice as long. `correlate::toom_cook` needs half of the
-//! multiplications (10.5 of 21 for each column of the template), 34 µs, and what it adds for that is small: a row of
-//! transformed pixels serves seven rows of sums. The rest goes into work that grows with the positions and not with the
-//! template: copying tiles, transforms, sums and squares of windows, square roots and divisions, about 2 ns for each.
+//! 4.1 GHz (131 billion a second); with 256-bit units twice as long. `correlate::toom_cook` needs 5/18 of the
+//! multiplications, 19 µs. The rest goes into work that grows with the positions and not with the template: copying
+//! pixels, values at points, sums and squares of windows, roots. It touches some 1.2 MB in the second cache for 161 × 161,
+//! which alone take 10 µs at the 28 bytes a cycle that were seen.
 //! `dense_one_thread` is the number to hold against the bound; `dense` is what the tracker sees with its threads.
 //!
-//! **Reached.** 0.082 ms for 161 × 161 and 1.5 ms for 621 × 621, one thread: the products run at 36 µs, near their bound,
-//! and 46 µs go into the rest. OpenCV correlates windows of this size by Fourier transforms, whose time does not grow with
-//! the template: `cargo xtask bench --peers` (0.233 and 5.8 ms on the same machine).
+//! **Reached.** 0.057 ms for 161 × 161 and 1.15 ms for 621 × 621, one thread: the products run at 20 µs, near their bound,
+//! and 37 µs go into the rest. OpenCV correlates windows of this size by Fourier transforms, whose time does not grow with
+//! the template: `cargo xtask bench --peers` (0.23 and 5.8 ms on the same machine).
 //!
 //! Run with `cargo bench -p sightline-core --profile dev --bench zncc` (the profile `dev` is optimised).
 

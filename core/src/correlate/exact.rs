@@ -21,11 +21,17 @@ pub(super) struct Template {
 impl Template {
     /// The template of a patch; `None` when it is empty or holds an invalid pixel.
     pub(super) fn new(patch: &Patch) -> Option<Self> {
-        let mean = patch.mean().filter(|_| patch.is_complete())?;
-        let is_flat = patch.is_flat();
-        let mut values: Vec<f64> = patch.as_raw().iter().map(|v| f64::from(*v) - mean).collect();
-        let norm = values.iter().map(|t| t * t).sum::<f64>().sqrt();
-        values.iter_mut().for_each(|t| *t = if is_flat { 0.0 } else { *t / norm });
+        let pixels = patch.as_raw();
+        let sum = sum_of(pixels, |v| v);
+        if pixels.is_empty() || !sum.is_finite() {
+            return None;
+        }
+        let count = pixels.len() as f64;
+        let mean = sum / count;
+        let squares = sum_of(pixels, |v| (v - mean) * (v - mean));
+        let is_flat = squares < count * FLAT_STD * FLAT_STD;
+        let scale = if is_flat { 0.0 } else { 1.0 / squares.sqrt() };
+        let values = pixels.iter().map(|v| (f64::from(*v) - mean) * scale).collect();
         Some(Self { width: patch.width() as usize, values, is_flat })
     }
 
@@ -51,6 +57,22 @@ impl Template {
         let [product, squares] = columns.iter().fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
         (squares >= count * FLAT_STD * FLAT_STD).then(|| (product / squares.sqrt()).clamp(-1.0, 1.0))
     }
+}
+
+/// Numbers that [`sum_of`] sums side by side.
+const LANES: usize = 8;
+
+/// The sum of what `term` makes of numbers, in an order that never changes.
+#[inline(always)]
+pub(super) fn sum_of(numbers: &[f32], term: impl Fn(f64) -> f64) -> f64 {
+    let (lanes, rest) = numbers.as_chunks::<LANES>();
+    let mut sums = [0.0; LANES];
+    for numbers in lanes {
+        for i in 0..LANES {
+            sums[i] += term(f64::from(numbers[i]));
+        }
+    }
+    sums.iter().sum::<f64>() + rest.iter().map(|v| term(f64::from(*v))).sum::<f64>()
 }
 
 /// A window of a surface by itself.

@@ -7,8 +7,13 @@
 //! |---|---|
 //! | `zncc` | the dense surface of scores of one template over a region, and one score of two patches |
 //! | `surface` | the scores and which pixel each belongs to |
-//! | `toom_cook` | the numerators, in SIMD registers, with half of the multiplications: nearly all the work |
+//! | `toom_cook` | the numerators, in SIMD registers, with 5/18 of the multiplications: half of the work |
+//! | `tile` | a tile of positions and its pixels, by column modulo three |
+//! | `phases` | from rows of neighbours to that order and back |
 //! | `moments` | sums and sums of squares over every window |
+//! | `load` | the pixels of a tile, brought near |
+//! | `score` | scores from the sums, and which of them are doubtful |
+//! | `buffer` | numbers that begin at a cache line |
 //! | `lanes` | slices of numbers as the processor's vectors |
 //! | `dot` | the numerators of a few rows, as the formula stands |
 //! | `difference` | the surface of sums of absolute or squared differences |
@@ -24,8 +29,13 @@ pub mod zncc;
 pub mod surface;
 mod grid;
 mod dot;
+mod tile;
+mod phases;
 mod toom_cook;
 mod moments;
+mod load;
+mod score;
+mod buffer;
 mod lanes;
 mod exact;
 pub mod difference;

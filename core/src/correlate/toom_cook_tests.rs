@@ -1,15 +1,24 @@
 //! Tests of the sums of a tile: every instruction set of this processor against the definition in `f64`.
 
 use super::super::dot;
-use super::super::moments::{GROUP, Moments};
+use super::super::moments::Moments;
+use super::super::phases::{self, Part};
 use super::*;
+
+/// Groups of rows of the tiles.
+const GROUPS: usize = 2;
+
+/// What the pixels are taken less.
+const LEVEL: f32 = 0.125;
 
 /// A tile of hashed pixels between −0.5 and 0.5 and a hashed template.
 struct Case {
     size: usize,
     template: Vec<f32>,
     filters: Filters,
-    input: Vec<f32>,
+    /// Pixels, rows of `input_columns`.
+    pixels: Vec<f32>,
+    input_columns: usize,
 }
 
 impl Case {
@@ -17,64 +26,105 @@ impl Case {
         let value = |i: usize| ((i * 7919 + size) % 101) as f32 / 101.0 - 0.5;
         let template: Vec<f32> = (0..size * size).map(value).collect();
         let filters = Filters::new(&template, size);
-        let input = (0..filters.input_rows() * filters.input_columns()).map(|i| value(3 * i + 1)).collect();
-        Self { size, template, filters, input }
+        let input_columns = TILE_COLUMNS + size - 1;
+        let pixels = (0..filters.pixel_rows(GROUPS) * input_columns).map(|i| value(3 * i + 1)).collect();
+        Self { size, template, filters, pixels, input_columns }
+    }
+
+    /// The pixels of a tile, in phases.
+    fn input<S: Simd>(&self, simd: S, tile: Tile, columns: usize) -> Vec<f32> {
+        let (rows, stride) = (tile.pixel_rows, tile.pixels);
+        let mut planes = [0; PHASES].map(|_| vec![0.0; rows * stride]);
+        for (y, row) in self.pixels.chunks_exact(self.input_columns).enumerate() {
+            let mut row = row[..columns + self.size - 1].to_vec();
+            row.resize(tile.row_pixels(), 0.0);
+            let phases = planes.each_mut().map(|plane| &mut plane[y * stride..][..stride]);
+            simd.vectorize(Part { row: &row, phases });
+        }
+        planes.concat()
     }
 
     /// Σ over a window of what `term` makes of template and pixel.
     fn expected(&self, [x, y]: [usize; 2], term: impl Fn(f64, f64) -> f64) -> f64 {
-        let stride = self.filters.input_columns();
         let values = self.template.iter().enumerate();
         values
             .map(|(i, t)| {
-                let pixel = self.input[(y + i / self.size) * stride + x + i % self.size];
+                let pixel = self.pixels[(y + i / self.size) * self.input_columns + x + i % self.size];
                 term(f64::from(*t), f64::from(pixel))
             })
             .sum()
     }
 
-    /// Compares the first `rows` × `columns` sums in rows of `stride` with the definition.
-    fn assert_sums(&self, found: &[f32], stride: usize, size: [usize; 2], term: impl Fn(f64, f64) -> f64) {
-        for (y, x) in (0..size[0]).flat_map(|y| (0..size[1]).map(move |x| (y, x))) {
-            let (found, expected) = (f64::from(found[y * stride + x]), self.expected([x, y], &term));
-            let tolerance = 2e-6 * (self.size * self.size) as f64;
-            assert!(
-                (found - expected).abs() < tolerance,
-                "template of {} at ({x}, {y}): {found} instead of {expected}",
-                self.size
-            );
+    /// Compares the first `rows` × `columns` sums of a tile with the definition.
+    fn assert_sums<S: Simd>(
+        &self,
+        simd: S,
+        found: &[f32],
+        tile: Tile,
+        [rows, columns]: [usize; 2],
+        term: impl Fn(f64, f64) -> f64,
+    ) {
+        let mut row = vec![0.0; tile.row_columns()];
+        for y in 0..rows {
+            let phases = tile.phases(&found[y * tile.row_columns()..]);
+            simd.vectorize(phases::Join { phases, row: &mut row });
+            for (x, found) in row[..columns].iter().enumerate() {
+                let (found, expected) = (f64::from(*found), self.expected([x, y], &term));
+                let tolerance = 2e-6 * (self.size * self.size) as f64;
+                assert!(
+                    (found - expected).abs() < tolerance,
+                    "template of {} at ({x}, {y}): {found} instead of {expected}",
+                    self.size
+                );
+            }
         }
     }
 }
 
 fn assert_all<S: Simd>(simd: S) {
     for size in [1, 3, 5, 7, 9, 11, 15, 21, 23, 31, 41] {
-        let case = Case::new(size);
-        let rows = case.filters.tile_rows();
-        let mut sums = vec![0.0; rows * TILE_COLUMNS];
         for columns in [1, 17, 50, TILE_COLUMNS] {
-            let (filters, input) = (&case.filters, case.input.as_slice());
-            filters.sum(simd, &mut filters.scratch(), input, columns, &mut sums);
-            case.assert_sums(&sums, TILE_COLUMNS, [rows, columns], |t, v| t * v);
-            let (template, input_stride) = (case.template.as_slice(), filters.input_columns());
-            let few = dot::Rows { template, size, input, input_stride };
-            few.sum(simd, [3, columns], &mut sums, TILE_COLUMNS);
-            case.assert_sums(&sums, TILE_COLUMNS, [3, columns], |t, v| t * v);
+            assert_tile(simd, &Case::new(size), columns);
         }
-        let mut moments = Moments::new(size, rows, case.filters.input_columns());
-        moments.down(simd, &case.input, rows);
-        let (mut all_sums, mut all_squares) = (Vec::new(), Vec::new());
-        for y in 0..rows {
-            if y % GROUP == 0 {
-                moments.across(simd, y, GROUP.min(rows - y));
-            }
-            let [sums, squares] = moments.row::<S>(y % GROUP, TILE_COLUMNS / S::F32_LANES);
-            all_sums.extend_from_slice(bytemuck::cast_slice(sums));
-            all_squares.extend_from_slice(bytemuck::cast_slice(squares));
-        }
-        case.assert_sums(&all_sums, TILE_COLUMNS, [rows, TILE_COLUMNS], |_, v| v);
-        case.assert_sums(&all_squares, TILE_COLUMNS, [rows, TILE_COLUMNS], |_, v| v * v);
     }
+}
+
+fn assert_tile<S: Simd>(simd: S, case: &Case, columns: usize) {
+    let Case { size, template, filters, .. } = case;
+    let (size, rows) = (*size, GROUPS * filters.group_rows());
+    let tile = Tile::new(size, columns, filters.pixel_rows(GROUPS));
+    let (input, level) = (case.input(simd, tile, columns), f64::from(LEVEL));
+    let mut sums = vec![0.0; rows * tile.row_columns()];
+    let mut scratch = filters.scratch(tile);
+    filters.begin(simd, &mut scratch, tile, &input, [0, tile.pixel_rows]);
+    for (group, sums) in sums.chunks_exact_mut(filters.group_rows() * tile.row_columns()).enumerate() {
+        filters.sum(simd, &mut scratch, tile, (group * filters.group_rows(), LEVEL), sums);
+    }
+    case.assert_sums(simd, &sums, tile, [rows, columns], |t, v| t * (v - level));
+    sums.fill(0.0);
+    simd.vectorize(dot::Rows {
+        template,
+        size,
+        tile,
+        input: &input,
+        level: LEVEL,
+        rows: [0, 3],
+        output: &mut sums,
+    });
+    case.assert_sums(simd, &sums, tile, [3, columns], |t, v| t * (v - level));
+    if size < 3 {
+        return;
+    }
+    let mut moments = Moments::new(size, rows, tile);
+    moments.down(simd, tile, &input, [0, rows], LEVEL);
+    let (mut sums, mut squares) = (Vec::new(), Vec::new());
+    for y in 0..rows {
+        let [row_sums, row_squares] = moments.across(simd, tile, y);
+        sums.extend_from_slice(bytemuck::cast_slice(row_sums));
+        squares.extend_from_slice(bytemuck::cast_slice(row_squares));
+    }
+    case.assert_sums(simd, &sums, tile, [rows, columns], |_, v| v - level);
+    case.assert_sums(simd, &squares, tile, [rows, columns], |_, v| (v - level).powi(2));
 }
 
 #[test]

@@ -18,29 +18,30 @@
 //! | j' | window of the image, shifted | fraction of full scale |
 //! | N | `count`: pixels of the template | – |
 
+use std::cell::Cell;
+use std::sync::OnceLock;
+
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
+use super::buffer::Buffer;
 use super::dot;
-use super::exact::{Alone, Template};
-use super::lanes::{row_of, row_of_mut};
-use super::moments::{GROUP, Moments};
+use super::exact::{Alone, Template, sum_of};
+use super::load::{Load, rough_mean};
+use super::moments::Moments;
+use super::score::{DOUBTFUL, Limits, ScoreRow};
 pub use super::surface::Surface;
-use super::toom_cook::{self, Filters, TILE_COLUMNS};
+use super::tile::{PHASES, TILE_COLUMNS, Tile};
+use super::toom_cook::{self, Filters};
 use crate::image::invalid::InvalidCounts;
-use crate::image::patch::{FLAT_STD, Patch};
+use crate::image::patch::Patch;
 use crate::image::{GrayImage, PixelRect};
 
-/// A window's mean may differ from its tile's by this many of its standard deviations: the difference of Σ j'² and
-/// (Σ j')²/N errs by about 1e-7 of Σ j'², so that the score errs by 2e-6 at this limit.
-const MAX_OFFSET_STD: f32 = 6.0;
+/// Rows of positions that a band has, about.
+const BAND_ROWS: usize = 140;
 
-/// The root mean square of a tile, less its mean, may be this many of a window's standard deviations: the sums of
-/// `toom_cook` err by at most 1.2e-6 of it, most by 1e-7.
-const MAX_TILE_STD: f32 = 24.0;
-
-/// In the place of a score that has to be computed by itself.
-const DOUBTFUL: f32 = 2.0;
+/// Rows of pixels that are copied and prepared at once: few enough to stay in the nearest cache.
+const LOADED_ROWS: usize = 16;
 
 /// Multiply-adds from which a second thread pays for being woken.
 const PARALLEL_WORK: usize = 2_000_000;
@@ -58,16 +59,16 @@ pub fn zncc_surface(template: &Patch, image: &GrayImage, region: PixelRect) -> O
     let region = region.intersect(&PixelRect::whole(image.width(), image.height()))?;
     let width = (region.width + 1).checked_sub(size).filter(|w| *w > 0)?;
     let height = (region.height + 1).checked_sub(size).filter(|h| *h > 0)?;
-    let job = Job::new(exact, image, region, width as usize);
+    let job = Job::new(exact, image, region, [width as usize, height as usize]);
     let mut scores = vec![0.0; width as usize * height as usize];
-    let (rows, work) = (job.filters.tile_rows(), scores.len() * job.exact.values.len());
+    let (rows, work) = (job.band_rows(), scores.len() * job.exact.values.len());
     let band = rows * width as usize;
-    let flat_positions = if work < PARALLEL_WORK {
-        let mut scratch = job.scratch();
+    let flat_positions = if work < PARALLEL_WORK || scores.len() <= band {
+        let mut scratch = Kept::of(&job);
         scores.chunks_mut(band).enumerate().map(|(i, band)| job.band(&mut scratch, i * rows, band)).sum()
     } else {
         let bands = scores.par_chunks_mut(band).enumerate();
-        bands.map_init(|| job.scratch(), |scratch, (i, band)| job.band(scratch, i * rows, band)).sum()
+        bands.map_init(|| Kept::of(&job), |scratch, (i, band)| job.band(scratch, i * rows, band)).sum()
     };
     let half = (size / 2) as i32;
     let origin = [region.x + half, region.y + half];
@@ -113,34 +114,59 @@ struct Job<'a> {
     weights_norm: f32,
     image: &'a GrayImage,
     region: PixelRect,
-    /// Nothing when every pixel of the region is valid, which is nearly always.
-    invalid: Option<InvalidCounts>,
-    /// Positions per row.
+    /// Made for the first tile with an invalid pixel, which nearly never comes.
+    invalid: OnceLock<Option<InvalidCounts>>,
+    /// Positions per row, and rows of them.
     width: usize,
+    height: usize,
     size: usize,
-    count: f32,
 }
 
 /// Buffers of a tile, used again for the next.
 struct Scratch {
-    /// Pixels less their mean.
-    input: Vec<f32>,
-    /// Numerators, rows of `TILE_COLUMNS`.
-    numerators: Vec<f32>,
+    /// Side of the templates that they serve.
+    size: usize,
+    /// Pixels less about their mean, in phases.
+    input: Buffer,
+    /// Numerators, in phases.
+    numerators: Buffer,
     moments: Moments,
     toom_cook: toom_cook::Scratch,
-    /// Scores of a row.
-    scores: Vec<f32>,
+    /// A row of pixels with what makes it whole vectors, or of scores.
+    row: Buffer,
+    /// Scores of a row, in phases.
+    scores: Buffer,
     /// A window by itself.
     window: Vec<f32>,
 }
 
+thread_local! {
+    /// The buffers that the thread used last: making them anew would cost a tenth of a small surface.
+    static KEPT: Cell<Option<Box<Scratch>>> = const { Cell::new(None) };
+}
+
+/// Buffers that go back to their thread when they are done with.
+struct Kept(Option<Box<Scratch>>);
+
+impl Kept {
+    fn of(job: &Job<'_>) -> Self {
+        let kept = KEPT.take().filter(|scratch| scratch.size == job.size);
+        Self(Some(kept.unwrap_or_else(|| Box::new(job.scratch()))))
+    }
+}
+
+impl Drop for Kept {
+    fn drop(&mut self) {
+        KEPT.set(self.0.take());
+    }
+}
+
 impl<'a> Job<'a> {
-    fn new(exact: Template, image: &'a GrayImage, region: PixelRect, width: usize) -> Self {
+    fn new(exact: Template, image: &'a GrayImage, region: PixelRect, [width, height]: [usize; 2]) -> Self {
         let rounded: Vec<f32> = exact.values.iter().map(|t| *t as f32).collect();
         let count = rounded.len() as f64;
-        let weights_sum: f64 = rounded.iter().map(|t| f64::from(*t)).sum();
-        let squares: f64 = rounded.iter().map(|t| f64::from(*t).powi(2)).sum();
+        let weights_sum = sum_of(&rounded, |t| t);
+        let squares = sum_of(&rounded, |t| t * t);
         Self {
             filters: Filters::new(&rounded, exact.width),
             rounded,
@@ -150,40 +176,73 @@ impl<'a> Job<'a> {
             exact,
             image,
             region,
-            invalid: InvalidCounts::of(image, region),
+            invalid: OnceLock::new(),
             width,
-            count: count as f32,
+            height,
         }
     }
 
     /// Scores the band of positions that starts at row `top`; gives the number of positions without contrast.
-    fn band(&self, scratch: &mut Scratch, top: usize, scores: &mut [f32]) -> u32 {
+    fn band(&self, kept: &mut Kept, top: usize, scores: &mut [f32]) -> u32 {
+        let Some(scratch) = kept.0.as_deref_mut() else { return 0 };
         Arch::new().dispatch(Band { job: self, scratch, top, scores })
     }
 
+    /// Rows of positions of a band: about as many as keep what is made of them in the second cache.
+    fn band_rows(&self) -> usize {
+        let group = self.filters.group_rows();
+        let rows = (BAND_ROWS / group).max(1) * group;
+        // A few rows more are no band of their own.
+        if self.height <= rows + self.few_rows() { self.height } else { rows }
+    }
+
+    /// Rows of positions up to which `dot` is quicker.
+    fn few_rows(&self) -> usize {
+        self.size / 3
+    }
+
+    /// Rows of pixels that `rows` rows of positions need, and the one below, which `moments` looks at.
+    fn pixel_rows(&self, rows: usize) -> usize {
+        let group = self.filters.group_rows();
+        let rest = rows % group;
+        if rest <= self.few_rows() && rows > rest {
+            self.filters.pixel_rows(rows / group).max(rows + self.size)
+        } else {
+            self.filters.pixel_rows(rows.div_ceil(group))
+        }
+    }
+
     fn scratch(&self) -> Scratch {
-        let (rows, columns) = (self.filters.tile_rows(), self.filters.input_columns());
+        let rows =
+            (BAND_ROWS / self.filters.group_rows()).max(1) * self.filters.group_rows() + self.few_rows();
+        let tile = Tile::new(self.size, TILE_COLUMNS, self.pixel_rows(rows));
         Scratch {
-            input: vec![0.0; self.filters.input_rows() * columns],
-            numerators: vec![0.0; rows * TILE_COLUMNS],
-            moments: Moments::new(self.size, rows, columns),
-            toom_cook: self.filters.scratch(),
-            scores: vec![0.0; TILE_COLUMNS],
+            size: self.size,
+            input: Buffer::new(tile.pixel_rows * tile.row_pixels()),
+            numerators: Buffer::new(self.filters.group_rows() * TILE_COLUMNS),
+            moments: Moments::new(self.size, self.filters.group_rows(), tile),
+            toom_cook: self.filters.scratch(tile),
+            row: Buffer::new(tile.row_pixels()),
+            scores: Buffer::new(TILE_COLUMNS),
             window: vec![0.0; self.rounded.len()],
         }
     }
 
-    /// The numerators of a tile of rows × columns positions.
+    /// The numerators of up to a group of rows of a tile, from the first of `rows` to one before the last.
     #[inline(always)]
-    fn numerators<S: Simd>(&self, simd: S, scratch: &mut Scratch, [rows, columns]: [usize; 2]) {
-        let Scratch { input, numerators, toom_cook, .. } = scratch;
-        if 3 * rows <= self.size {
-            let (template, input_stride) = (self.rounded.as_slice(), self.filters.input_columns());
-            let rest = dot::Rows { template, size: self.size, input, input_stride };
-            rest.sum(simd, [rows, columns], numerators, TILE_COLUMNS);
+    fn numerators<S: Simd>(&self, simd: S, scratch: &mut Scratch, tile: Tile, rows: [usize; 2], level: f32) {
+        let Scratch { input, numerators: output, toom_cook, .. } = scratch;
+        if rows[1] - rows[0] <= self.few_rows() {
+            let (template, size) = (self.rounded.as_slice(), self.size);
+            simd.vectorize(dot::Rows { template, size, tile, input, level, rows, output });
         } else {
-            self.filters.sum(simd, toom_cook, input, columns, numerators);
+            self.filters.sum(simd, toom_cook, tile, (rows[0], level), output);
         }
+    }
+
+    /// The invalid pixels of the region.
+    fn invalid(&self) -> Option<&InvalidCounts> {
+        self.invalid.get_or_init(|| InvalidCounts::of(self.image, self.region)).as_ref()
     }
 
     /// Excludes positions with invalid pixels and computes the doubtful ones by themselves; counts those without contrast.
@@ -194,12 +253,13 @@ impl<'a> Job<'a> {
         window: &mut [f32],
         [left, y]: [usize; 2],
         scores: &mut [f32],
+        invalid: Option<&InvalidCounts>,
     ) -> u32 {
         let stride = self.image.width() as usize;
         let start = (self.region.y as usize + y) * stride + self.region.x as usize + left;
         let mut flat = 0;
         for (x, score) in scores.iter_mut().enumerate() {
-            if self.invalid.as_ref().is_some_and(|counts| !counts.none_in([left + x, y], self.size)) {
+            if invalid.is_some_and(|counts| !counts.none_in([left + x, y], self.size)) {
                 *score = f32::NAN;
             } else if *score == DOUBTFUL {
                 let alone = simd.vectorize(Alone {
@@ -218,6 +278,49 @@ impl<'a> Job<'a> {
         }
         flat
     }
+
+    /// Copies the pixels of a tile of `rows` × `columns` positions and prepares them; gives the region's invalid pixels
+    /// where the tile has any.
+    #[inline(always)]
+    fn load<S: Simd>(
+        &self,
+        simd: S,
+        scratch: &mut Scratch,
+        tile: Tile,
+        at: [usize; 2],
+        extent: [usize; 2],
+    ) -> Option<&InvalidCounts> {
+        if self.load_rows::<S, false>(simd, scratch, tile, at, extent) {
+            return None;
+        }
+        self.load_rows::<S, true>(simd, scratch, tile, at, extent);
+        self.invalid()
+    }
+
+    /// Whether all pixels that were copied are valid.
+    #[inline(always)]
+    fn load_rows<S: Simd, const CHECKED: bool>(
+        &self,
+        simd: S,
+        scratch: &mut Scratch,
+        tile: Tile,
+        [left, top]: [usize; 2],
+        [rows, columns]: [usize; 2],
+    ) -> bool {
+        let pitch = self.image.width() as usize;
+        let pixels =
+            &self.image.as_raw()[(self.region.y as usize + top) * pitch + self.region.x as usize + left..];
+        let size = [rows + self.size - 1, columns + self.size - 1];
+        let mean = rough_mean(pixels, pitch, size);
+        let Scratch { row, input, toom_cook, .. } = scratch;
+        let mut sum = 0.0;
+        for first in (0..tile.pixel_rows).step_by(LOADED_ROWS) {
+            let rows = [first, (first + LOADED_ROWS).min(tile.pixel_rows)];
+            sum += simd.vectorize(Load::<CHECKED> { pixels, pitch, size, tile, mean, rows, row, input });
+            self.filters.begin(simd, toom_cook, tile, input, rows);
+        }
+        sum.is_finite()
+    }
 }
 
 /// The scores of a band of rows: all of it runs with the widest vectors of the processor.
@@ -232,143 +335,41 @@ impl WithSimd for Band<'_, '_> {
     type Output = u32;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> u32 {
+    fn with_simd<S: Simd>(mut self, simd: S) -> u32 {
+        (0..self.job.width).step_by(TILE_COLUMNS).map(|left| self.tile(simd, left)).sum()
+    }
+}
+
+impl Band<'_, '_> {
+    /// Scores the tile from column `left` on; gives the number of positions without contrast.
+    #[inline(always)]
+    fn tile<S: Simd>(&mut self, simd: S, left: usize) -> u32 {
         let Self { job, scratch, top, scores } = self;
-        let (rows, mut flat) = (scores.len() / job.width, 0);
-        for left in (0..job.width).step_by(TILE_COLUMNS) {
-            let columns = TILE_COLUMNS.min(job.width - left);
-            let mean_square = simd.vectorize(Load { job, at: [left, top], size: [rows, columns], scratch });
-            job.numerators(simd, scratch, [rows, columns]);
-            scratch.moments.down(simd, &scratch.input, rows);
-            for y in 0..rows {
-                if y % GROUP == 0 {
-                    scratch.moments.across(simd, y, GROUP.min(rows - y));
-                }
-                let any = simd.vectorize(ScoreRow { job, mean_square, y, columns, scratch });
-                let scores = &mut scores[y * job.width + left..][..columns];
-                scores.copy_from_slice(&scratch.scores[..columns]);
-                if any || job.invalid.is_some() {
-                    flat += job.repair_row(simd, &mut scratch.window, [left, top + y], scores);
+        let rows = scores.len() / job.width;
+        let columns = TILE_COLUMNS.min(job.width - left);
+        let tile = Tile::new(job.size, columns, job.pixel_rows(rows));
+        let invalid = job.load(simd, scratch, tile, [left, *top], [rows, columns]);
+        let (group, mut flat) = (job.filters.group_rows(), 0);
+        for first in (0..rows).step_by(group) {
+            let last = (first + group).min(rows);
+            // The brightness nearby, not that of the whole tile: what a window differs from it costs digits.
+            let extent = [last - first + job.size - 1, (columns + job.size - 1) / PHASES];
+            let level = rough_mean(&scratch.input[first * tile.pixels..], tile.pixels, extent);
+            scratch.moments.down(simd, tile, &scratch.input, [first, last], level);
+            job.numerators(simd, scratch, tile, [first, last], level);
+            let Scratch { numerators, moments, scores: phases, row, window, .. } = &mut **scratch;
+            let mean_square = moments.mean_square(simd, tile);
+            let limits = Limits::of(&job.exact, mean_square, [job.weights_sum, job.weights_norm]);
+            let numerators = numerators.chunks_exact(tile.row_columns());
+            for (y, numerators) in (0..last - first).zip(numerators) {
+                let scores = &mut scores[(first + y) * job.width + left..][..columns];
+                let scored = ScoreRow { limits: &limits, tile, y, numerators, moments, phases, row, scores };
+                if simd.vectorize(scored) || invalid.is_some() {
+                    flat += job.repair_row(simd, window, [left, *top + first + y], scores, invalid);
                 }
             }
         }
         flat
-    }
-}
-
-/// Copies the pixels of a tile, less about their mean; gives the mean square of what was copied (its whole vectors).
-struct Load<'s, 'a> {
-    job: &'s Job<'a>,
-    /// First column and row of positions.
-    at: [usize; 2],
-    /// Rows and columns of positions.
-    size: [usize; 2],
-    scratch: &'s mut Scratch,
-}
-
-impl WithSimd for Load<'_, '_> {
-    type Output = f32;
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> f32 {
-        let (job, [left, top], [rows, columns]) = (self.job, self.at, self.size);
-        let (width, height) = (columns + job.size - 1, rows + job.size - 1);
-        let (stride, pitch) = (job.filters.input_columns(), job.image.width() as usize);
-        let first = (job.region.y as usize + top) * pitch + job.region.x as usize + left;
-        let pixels = job.image.as_raw().as_slice();
-        let mean = self.rough_mean(pixels, first, pitch, [width, height]);
-        let input = &mut self.scratch.input;
-        let (shift, whole) = (simd.splat_f32s(mean), width / S::F32_LANES);
-        let mut squares = simd.splat_f32s(0.0);
-        for y in 0..height {
-            let row = &pixels[first + y * pitch..][..width];
-            let out = &mut input[y * stride..][..stride];
-            if job.invalid.is_some() {
-                for x in 0..width {
-                    out[x] = if row[x].is_finite() { row[x] - mean } else { 0.0 };
-                }
-                for d in row_of::<S>(out, 0, whole) {
-                    squares = simd.mul_add_e_f32s(*d, *d, squares);
-                }
-            } else {
-                let (vectors, shifted) = (row_of::<S>(row, 0, whole), row_of_mut::<S>(out, 0, whole));
-                for x in 0..whole {
-                    let d = simd.sub_f32s(vectors[x], shift);
-                    squares = simd.mul_add_e_f32s(d, d, squares);
-                    shifted[x] = d;
-                }
-                for x in whole * S::F32_LANES..width {
-                    out[x] = row[x] - mean;
-                }
-            }
-            out[width..].fill(0.0);
-        }
-        input[height * stride..].fill(0.0);
-        simd.reduce_sum_f32s(squares) / (whole.max(1) * S::F32_LANES * height) as f32
-    }
-}
-
-impl Load<'_, '_> {
-    /// The mean of 8 × 8 of the pixels, spread evenly: any value nearby serves.
-    #[inline(always)]
-    fn rough_mean(&self, pixels: &[f32], first: usize, pitch: usize, [width, height]: [usize; 2]) -> f32 {
-        let (mut sum, mut count) = (0.0, 0.0);
-        for v in 0..8 {
-            for u in 0..8 {
-                let value = pixels[first + v * (height - 1) / 7 * pitch + u * (width - 1) / 7];
-                if value.is_finite() {
-                    sum += value;
-                    count += 1.0;
-                }
-            }
-        }
-        if count > 0.0 { sum / count } else { 0.0 }
-    }
-}
-
-/// Scores of one row of a tile from its sums; says whether any of them is doubtful.
-struct ScoreRow<'s, 'a> {
-    job: &'s Job<'a>,
-    mean_square: f32,
-    y: usize,
-    columns: usize,
-    scratch: &'s mut Scratch,
-}
-
-impl WithSimd for ScoreRow<'_, '_> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> bool {
-        let Self { job, mean_square, y, columns, scratch } = self;
-        let Scratch { numerators, moments, scores, .. } = scratch;
-        let vectors = columns.div_ceil(S::F32_LANES);
-        let numerators = row_of::<S>(numerators, y * TILE_COLUMNS, vectors);
-        let [sums, squares] = moments.row::<S>(y % GROUP, vectors);
-        let scores = row_of_mut::<S>(scores, 0, vectors);
-        // Without contrast in the template every position takes the exact way, which counts it.
-        let floor = job.count * (mean_square / MAX_TILE_STD.powi(2)).max((FLAT_STD * FLAT_STD) as f32);
-        let floor = simd.splat_f32s(if job.exact.is_flat { f32::INFINITY } else { floor });
-        let (one, doubtful) = (simd.splat_f32s(1.0), simd.splat_f32s(DOUBTFUL));
-        let (minus_one, mut highest) = (simd.splat_f32s(-1.0), simd.splat_f32s(-1.0));
-        let per_count = simd.splat_f32s(1.0 / job.count);
-        let weights_sum = simd.splat_f32s(-job.weights_sum);
-        let weights_norm = simd.splat_f32s(job.weights_norm);
-        let offset_limit = simd.splat_f32s(job.count / MAX_OFFSET_STD.powi(2));
-        for x in 0..vectors {
-            let mean = simd.mul_f32s(sums[x], per_count);
-            let square = simd.mul_f32s(mean, sums[x]);
-            let variance = simd.sub_f32s(squares[x], square);
-            let numerator = simd.mul_add_e_f32s(weights_sum, mean, numerators[x]);
-            let score = simd.div_f32s(numerator, simd.mul_f32s(simd.sqrt_f32s(variance), weights_norm));
-            let score = simd.max_f32s(simd.min_f32s(score, one), minus_one);
-            let limit = simd.mul_f32s(simd.mul_f32s(mean, mean), offset_limit);
-            let is_sure = simd.less_than_f32s(simd.max_f32s(floor, limit), variance);
-            let score = simd.select_f32s(is_sure, score, doubtful);
-            scores[x] = score;
-            highest = simd.max_f32s(highest, score);
-        }
-        simd.reduce_max_f32s(highest) >= DOUBTFUL
     }
 }
 

@@ -6,6 +6,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use super::*;
+use crate::image::patch::FLAT_STD;
 
 /// An image of independent values: `level` plus or minus `contrast`.
 fn noise(width: u32, height: u32, level: f32, contrast: f32, seed: u64) -> GrayImage {
