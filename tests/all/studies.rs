@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 use sightline_core::sim::Scenario;
+use sightline_core::sim::scenario::Arrangement;
 use sightline_tests::scenario::short_approach;
 use sightline_tests::server::{TestServer, small_drive};
 
@@ -75,6 +76,20 @@ fn a_study_resumes_where_it_was_stopped_and_prints_its_rows_alone() {
     assert_eq!(std::fs::read_to_string(out.join("approach/rows.csv")).unwrap().lines().count(), 3);
     assert_eq!(std::fs::read_to_string(out.join("approach/runs.csv")).unwrap().lines().count(), 7);
     assert_eq!(&std::fs::read(out.join("approach/rows.parquet")).unwrap()[..4], b"PAR1");
+}
+
+#[test]
+fn a_world_whose_one_target_lies_in_its_centre_counts_as_one_of_those_asked_for() {
+    let home = tempfile::tempdir().unwrap();
+    let (scenario, out) = (home.path().join("centre.toml"), home.path().join("out"));
+    let mut centre = small();
+    centre.targets.count = 20;
+    centre.targets.arrangement = Arrangement::Centre;
+    std::fs::write(&scenario, centre.to_toml()).unwrap();
+    let arguments =
+        ["--worlds", "1", "--first-seed", "3", "--format", "json", "--configurations", "sightline"];
+    let rows = rows(&study(&arguments, &scenario, &out));
+    assert_eq!((rows.len(), &rows[0]["seed"], &rows[0]["targets"]), (1, &json!(3), &json!(1)), "{rows:?}");
 }
 
 #[test]

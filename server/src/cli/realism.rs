@@ -105,7 +105,7 @@ impl Worlds {
                 .ok_or_else(|| Error::Request("a simulated world has no surface".to_owned()))?;
             let targets =
                 sim::choose_targets(world, &Scenario { seed, ..scenario.clone() }, traverse.index());
-            if targets.len() < scenario.targets.count as usize {
+            if targets.len() < scenario.targets.wanted() as usize {
                 say::line(&format!("world {seed}: {} targets, passed over", targets.len()))?;
                 continue;
             }
@@ -121,7 +121,7 @@ impl Worlds {
             self.worlds,
             seeds.start,
             seeds.end - 1,
-            scenario.targets.count
+            scenario.targets.wanted()
         )))
     }
 }

@@ -181,7 +181,7 @@ impl Conduct<'_> {
                         "only {count} of {worlds} worlds of {name} with seeds from {first} to {} offer {} targets: \
                          name the seeds, or change targets.count in the scenario",
                         seeds.end - 1,
-                        scenario.targets.count
+                        scenario.targets.wanted()
                     )));
                 }
                 Ok(units)
@@ -220,7 +220,7 @@ impl Conduct<'_> {
                 Some((_, known)) => known.clone(),
                 None => picks::choose(&traverse, scenario, point)?,
             };
-            if point.picks == Picks::Rule && of_point.len() < scenario.targets.count as usize {
+            if point.picks == Picks::Rule && of_point.len() < scenario.targets.wanted() as usize {
                 let outcome = if is_named { "taken as they are" } else { "passed over" };
                 (self.tell)(Progress::Notice(format!("{world}: {} targets, {outcome}", of_point.len())));
                 if !is_named {

@@ -70,6 +70,11 @@ impl Default for TargetRule {
 }
 
 impl TargetRule {
+    /// How many targets a world has to offer to serve: `count`, or the one that lies in the centre.
+    pub fn wanted(&self) -> u32 {
+        if self.arrangement == Arrangement::Centre { self.count.min(1) } else { self.count }
+    }
+
     pub(super) fn validate(&self) -> Result<()> {
         within("targets.rows", f64::from(self.rows), 1.0, 100.0)?;
         within("targets.boundary", f64::from(self.boundary), 0.0, 10_000.0)?;
