@@ -201,15 +201,15 @@ impl<'a> Job<'a> {
         self.size / 3
     }
 
+    /// Groups that `toom_cook` takes of `rows` rows of positions: what is left over, or all, may be few.
+    fn groups(&self, rows: usize) -> usize {
+        let group = self.filters.group_rows();
+        rows / group + usize::from(rows % group > self.few_rows())
+    }
+
     /// Rows of pixels that `rows` rows of positions need, and the one below, which `moments` looks at.
     fn pixel_rows(&self, rows: usize) -> usize {
-        let group = self.filters.group_rows();
-        let rest = rows % group;
-        if rest <= self.few_rows() && rows > rest {
-            self.filters.pixel_rows(rows / group).max(rows + self.size)
-        } else {
-            self.filters.pixel_rows(rows.div_ceil(group))
-        }
+        self.filters.pixel_rows(self.groups(rows)).max(rows + self.size)
     }
 
     fn scratch(&self) -> Scratch {
@@ -305,19 +305,21 @@ impl<'a> Job<'a> {
         scratch: &mut Scratch,
         tile: Tile,
         [left, top]: [usize; 2],
-        [rows, columns]: [usize; 2],
+        extent: [usize; 2],
     ) -> bool {
         let pitch = self.image.width() as usize;
         let pixels =
             &self.image.as_raw()[(self.region.y as usize + top) * pitch + self.region.x as usize + left..];
-        let size = [rows + self.size - 1, columns + self.size - 1];
+        let size = extent.map(|positions| positions + self.size - 1);
         let mean = rough_mean(pixels, pitch, size);
         let Scratch { row, input, toom_cook, .. } = scratch;
-        let mut sum = 0.0;
+        let (mut sum, is_grouped) = (0.0, self.groups(extent[0]) > 0);
         for first in (0..tile.pixel_rows).step_by(LOADED_ROWS) {
             let rows = [first, (first + LOADED_ROWS).min(tile.pixel_rows)];
             sum += simd.vectorize(Load::<CHECKED> { pixels, pitch, size, tile, mean, rows, row, input });
-            self.filters.begin(simd, toom_cook, tile, input, rows);
+            if is_grouped {
+                self.filters.begin(simd, toom_cook, tile, input, rows);
+            }
         }
         sum.is_finite()
     }
