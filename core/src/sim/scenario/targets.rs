@@ -17,7 +17,7 @@ pub enum Arrangement {
     Rows,
     /// On the large rock, some on an occluding boundary (R119).
     Face,
-    /// The targets' centre alone.
+    /// The middle of what is seen of the rock on which the targets' centre lies.
     Centre,
 }
 

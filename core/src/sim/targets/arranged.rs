@@ -1,4 +1,4 @@
-//! Targets on the large rock: in straight rows, or all over it with some on its boundary.
+//! Targets on the large rock: in straight rows, or all over it with some on its boundary; or the middle of one rock.
 //!
 //! **The large rock** is the one that most pixels near the targets' centre show, counted on a grid of every
 //! third pixel.
@@ -8,19 +8,26 @@
 //! height away from those taken. Each row gets its share of the targets at equal spacing from end to end of its
 //! stretch, in whole pixels, so that in a true track both rows stay straight and even.
 //!
+//! **Centre.** Of all pixels that show the rock on which the targets' centre lies, the one nearest to their mean. The centre
+//! itself lies on top of the rock, and from afar that is the rock's upper edge, where nobody would pick a target (R20).
+//!
 //! Units: px. Frame: pixels of the first left image. Sources: papers.md R110, R115, R119.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::ops::RangeInclusive;
 
+use nalgebra::Vector3;
 use rand_pcg::Pcg64;
 
-use crate::frames::Pixel;
+use crate::frames::{Pixel, Ray};
 use crate::sim::targets::View;
 use crate::sim::world::SurfaceId;
 
 /// Distance of the grid on which pixels are counted, px.
 const STRIDE_PX: u32 = 3;
+
+/// How far the rock on which the targets' centre lies may be seen from it: it is cut by the edge there, px.
+const EDGE_PX: i32 = 16;
 
 /// A stretch of an image row whose pixels satisfy the window rule.
 struct Stretch {
@@ -65,6 +72,40 @@ impl View<'_> {
         let on_edge = |pixel: Pixel| self.shows(rock, pixel) && self.is_on_boundary(pixel);
         chosen.extend(self.drawn(boundary, random, &on_edge));
         chosen
+    }
+
+    /// The target of the arrangement `centre`; the targets' centre where it does not lie on a rock, or none is seen of it.
+    pub(super) fn centre(&self) -> Option<Pixel> {
+        let above = self.world.targets_centre() - Vector3::z();
+        let below = self.world.cast(&Ray { origin: above, direction: Vector3::z() });
+        let centre = self.camera.project(&self.world.targets_centre())?;
+        let Some(SurfaceId::Rock(rock)) = below.map(|hit| hit.surface) else { return Some(centre) };
+        let seen = self.seen_of(rock, [centre.x.round() as i32, centre.y.round() as i32]);
+        let mean = |k: usize| seen.iter().map(|at| f64::from(at[k])).sum::<f64>() / seen.len() as f64;
+        let middle = Pixel::new(mean(0), mean(1));
+        let pixels = seen.iter().map(|at| Pixel::new(at[0].into(), at[1].into()));
+        pixels.min_by(|a, b| a.distance(middle).total_cmp(&b.distance(middle))).or(Some(centre))
+    }
+
+    /// The pixels that show a rock and hang together, from the one nearest to `near` on, which is at most
+    /// [`EDGE_PX`] away.
+    fn seen_of(&self, rock: u32, near: [i32; 2]) -> BTreeSet<[i32; 2]> {
+        let shows = |at: &[i32; 2]| self.shows(rock, Pixel::new(at[0].into(), at[1].into()));
+        let offsets = (-EDGE_PX..=EDGE_PX).flat_map(|y| (-EDGE_PX..=EDGE_PX).map(move |x| [x, y]));
+        let mut around: Vec<[i32; 2]> = offsets.collect();
+        around.sort_by_key(|[x, y]| x * x + y * y);
+        let mut open: Vec<[i32; 2]> =
+            around.iter().map(|[x, y]| [near[0] + x, near[1] + y]).find(shows).into_iter().collect();
+        let mut seen: BTreeSet<[i32; 2]> = open.iter().copied().collect();
+        while let Some([x, y]) = open.pop() {
+            for at in [[x - 1, y], [x + 1, y], [x, y - 1], [x, y + 1]] {
+                if !seen.contains(&at) && shows(&at) {
+                    seen.insert(at);
+                    open.push(at);
+                }
+            }
+        }
+        seen
     }
 
     fn shows(&self, rock: u32, pixel: Pixel) -> bool {

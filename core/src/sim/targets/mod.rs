@@ -7,7 +7,7 @@
 //!   image whose surface point lies within `radius_m` of the targets' centre.
 //! * `rows`: on the large rock, in `rows` straight rows of equal spacing (R110; `arranged.rs`).
 //! * `face`: on the large rock, `boundary` of them on an occluding boundary with another rock behind (R119).
-//! * `centre`: the targets' centre alone.
+//! * `centre`: the middle of what is seen of the rock on which the targets' centre lies (`arranged.rs`).
 //!
 //! The *large rock* is the one that most pixels near the targets' centre show.
 //!
@@ -61,7 +61,7 @@ pub fn choose_targets(world: &World, scenario: &Scenario, index: &TraverseIndex)
         Arrangement::Drawn => view.drawn(scenario.targets.count, &mut random, &|pixel| view.is_target(pixel)),
         Arrangement::Rows => view.rows(),
         Arrangement::Face => view.face(&mut random),
-        Arrangement::Centre => view.camera.project(&world.targets_centre()).into_iter().collect(),
+        Arrangement::Centre => view.centre().into_iter().collect(),
     }
 }
 

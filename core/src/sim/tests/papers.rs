@@ -296,6 +296,24 @@ fn sideways_as_shipped_circles_at_7_m_and_its_face_is_seen_first_and_last() {
 }
 
 #[test]
+fn the_rock_of_a_checkout_is_picked_in_the_middle_of_what_is_seen_of_it() {
+    for name in ["checkout-1", "checkout-2", "checkout-3"] {
+        let staged = Staged::new(name);
+        let targets = choose_targets(&staged.world, &staged.scenario, &staged.index);
+        let [target] = targets.as_slice() else { panic!("{name}: {} targets", targets.len()) };
+        let shown = |dx: f64, dy: f64| {
+            let pixel = crate::frames::Pixel::new(target.x + dx, target.y + dy);
+            staged.world.cast(&staged.cameras[0].ray(pixel).unwrap()).map(|hit| hit.surface)
+        };
+        let rock = shown(0.0, 0.0);
+        assert!(matches!(rock, Some(SurfaceId::Rock(_))), "{name}");
+        for (dx, dy) in [(-3.0, 0.0), (3.0, 0.0), (0.0, -3.0), (0.0, 3.0)] {
+            assert_eq!(shown(dx, dy), rock, "{name}: ({dx}, {dy}) px beside the target");
+        }
+    }
+}
+
+#[test]
 fn approaches_as_shipped_stop_where_the_papers_arithmetic_puts_them() {
     // R226: what is left after skipping n images is a step of 1 − 0.95ⁿ⁺¹.
     let of_stop = |s: &Staged, stop: usize| 1.0 - s.distance_m(stop) / s.distance_m(0);
