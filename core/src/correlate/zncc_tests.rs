@@ -67,6 +67,22 @@ fn scores_equal_the_definition_for_odd_sizes_from_5_to_41() {
 }
 
 #[test]
+fn scores_equal_the_definition_over_several_bands_and_tiles_and_for_large_templates() {
+    let (image, other) = (noise(340, 330, 0.5, 0.4, 5), noise(160, 160, 0.3, 0.2, 6));
+    // 11: rest of one row; 21: three bands, the last of two groups; 101: less than a group.
+    for (size, region) in [
+        (3, PixelRect::new(3, 1, 150, 140)),
+        (11, PixelRect::new(1, 2, 300, 155)),
+        (21, PixelRect::whole(340, 330)),
+        (65, PixelRect::new(10, 20, 230, 240)),
+        (101, PixelRect::new(40, 5, 170, 160)),
+        (101, PixelRect::new(40, 5, 101, 101)),
+    ] {
+        assert_exact(&patch_at(&other, 20, 30, size), &image, region, 1e-6);
+    }
+}
+
+#[test]
 fn low_contrast_beside_a_bright_edge_keeps_its_digits() {
     // Quantised sky of one or two levels beside bright ground: the hardest case for sums in f32.
     for (contrast, quantum) in [(2e-3_f32, 255.0_f32), (1e-4, 4095.0), (3e-5, 65_535.0)] {
