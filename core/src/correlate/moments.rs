@@ -150,24 +150,18 @@ impl<const X: usize> WithSimd for Down<'_, X> {
         for top in (0..self.rows).step_by(size) {
             let wanted = size.min(self.rows - top);
             let (mut sum, mut square) = ([simd.splat_f32s(0.0); X], [simd.splat_f32s(0.0); X]);
-            let mut from = (top + size) * vectors + x;
-            for _ in wanted..size {
-                from -= vectors;
-                let d = &input[from..from + X];
+            for row in (0..size).rev() {
+                let d = &input[(top + row) * vectors + x..][..X];
                 for i in 0..X {
                     let d = simd.sub_f32s(d[i], level);
                     sum[i] = simd.add_f32s(sum[i], d);
                     square[i] = simd.mul_add_e_f32s(d, d, square[i]);
                 }
-            }
-            for ends in ends[..2 * X * wanted].chunks_exact_mut(2 * X).rev() {
-                from -= vectors;
-                let d = &input[from..from + X];
-                for i in 0..X {
-                    let d = simd.sub_f32s(d[i], level);
-                    sum[i] = simd.add_f32s(sum[i], d);
-                    square[i] = simd.mul_add_e_f32s(d, d, square[i]);
-                    (ends[i], ends[X + i]) = (sum[i], square[i]);
+                if row < wanted {
+                    let ends = &mut ends[2 * X * row..][..2 * X];
+                    for i in 0..X {
+                        (ends[i], ends[X + i]) = (sum[i], square[i]);
+                    }
                 }
             }
             (sum, square) = ([simd.splat_f32s(0.0); X], [simd.splat_f32s(0.0); X]);

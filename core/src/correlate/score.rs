@@ -1,4 +1,9 @@
 //! Scores of a row of positions from its sums (K-Eq 11), and which of them these sums are too coarse for.
+//!
+//! ```text
+//! ncc = (Σ t j' − Σ t · Σ j'/N) / (|t| sqrt(Σ j'² − (Σ j')²/N))          t: the template as rounded to f32
+//! ```
+//! Pixels are fractions of full scale, less the level of their group of rows; scores have no unit.
 
 use pulp::{Simd, WithSimd};
 
@@ -9,18 +14,18 @@ use super::phases::Join;
 use super::tile::Tile;
 use crate::image::patch::FLAT_STD;
 
-/// A window's mean may differ from its tile's by this many of its standard deviations: the difference of Σ j'² and
+/// A window's mean may differ from its group's level by this many of its standard deviations: the difference of Σ j'² and
 /// (Σ j')²/N errs by about 1e-7 of Σ j'², so that the score errs by 2e-6 at this limit.
 const MAX_OFFSET_STD: f32 = 6.0;
 
-/// The root mean square of a tile, less its mean, may be this many of a window's standard deviations: the sums of
+/// The root mean square of a group of rows, less its level, may be this many of a window's standard deviations: the sums of
 /// `toom_cook` err by at most 1.2e-6 of it, most by 1e-7.
 const MAX_TILE_STD: f32 = 24.0;
 
 /// In the place of a score that has to be computed by itself.
 pub(super) const DOUBTFUL: f32 = 2.0;
 
-/// What turns the sums of a tile into scores.
+/// What turns the sums of a group of rows into scores.
 pub(super) struct Limits {
     /// 1 / N.
     per_count: f32,
@@ -34,7 +39,7 @@ pub(super) struct Limits {
 }
 
 impl Limits {
-    /// For a template, its sum and norm as rounded, and a tile of this mean square.
+    /// For a template, its sum and norm as rounded, and a group of this mean square.
     pub(super) fn of(template: &Template, mean_square: f32, [weights_sum, weights_norm]: [f32; 2]) -> Self {
         let count = template.values.len() as f32;
         let floor = count * (mean_square / MAX_TILE_STD.powi(2)).max((FLAT_STD * FLAT_STD) as f32);

@@ -3,20 +3,23 @@
 //! ```text
 //! ncc = Σ t j' / sqrt(Σ j'² − (Σ j')²/N)      t: template, zero mean and unit norm;  j': shifted window
 //! ```
-//! Because t has zero mean, the shift of the window is free; it is the mean of the tile of positions at hand, and
-//! everything is summed in `f32`: numerators by `toom_cook`, Σ j' and Σ j'² by `moments`. What the rounded template
-//! lacks of zero mean is put right afterwards. Where a window is so flat, or so far from its tile's mean, that these
-//! sums would lose digits, the position is computed again by itself, in two passes (`exact`). Every score is within 1e-5
-//! of the definition in exact numbers.
+//! Because t has zero mean, the shift of the window is free; it is about the mean of the pixels near, and everything is
+//! summed in `f32`: numerators by `toom_cook`, Σ j' and Σ j'² by `moments`. What the rounded template lacks of zero mean
+//! is put right afterwards. Where a window is so flat, or so far from that mean, that these sums would lose digits, the
+//! position is computed again by itself, in two passes (`exact`). Every score is within 1e-5 of the definition in exact
+//! numbers.
+//!
+//! A surface is cut into bands of rows, a band into tiles of columns, whose pixels are copied and prepared at once; the
+//! rows of a tile are scored in groups as `toom_cook` takes them, each with a level and limits of its own.
 //!
 //! Windows without contrast score 0 and are counted; windows that touch an invalid pixel are excluded (R66).
-//! Each score depends on the region and its own tile only, so the number of threads changes nothing.
+//! Each score depends on the region and its own band only, so the number of threads changes nothing.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
-//! | t | `Template::values`, `Weights` | – |
+//! | t | `Template::values`, `rounded` | – |
 //! | j' | window of the image, shifted | fraction of full scale |
-//! | N | `count`: pixels of the template | – |
+//! | N | `size`²: pixels of the template | – |
 
 use std::cell::Cell;
 use std::sync::OnceLock;
