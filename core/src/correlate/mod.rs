@@ -15,7 +15,6 @@
 //! | `score` | scores from the sums, and which of them are doubtful |
 //! | `buffer` | numbers that begin at a cache line |
 //! | `lanes` | slices of numbers as the processor's vectors |
-//! | `dot` | the numerators of a few rows, as the formula stands |
 //! | `difference` | the surface of sums of absolute or squared differences |
 //! | `sdog` | the surface of agreeing signs of a difference of Gaussians |
 //! | `similarity` | these measures behind one name |
@@ -28,7 +27,6 @@
 pub mod zncc;
 pub mod surface;
 mod grid;
-mod dot;
 mod tile;
 mod phases;
 mod toom_cook;

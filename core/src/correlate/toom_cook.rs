@@ -36,6 +36,7 @@
 
 mod block;
 mod points;
+mod rows;
 
 use pulp::{Arch, Simd, WithSimd};
 
@@ -44,6 +45,7 @@ use super::lanes::{WIDEST, widest};
 use super::tile::{PHASES, TILE_COLUMNS, Tile};
 use block::{Block, MAX_SIDE};
 use points::{COLUMN_POINTS, ColumnValues, Join, Lanes, PRODUCTS, ROW_POINTS, RowValues, Spacing};
+use rows::Rows;
 
 /// A template as the thirty filters G, in the order in which a block reads them.
 pub(super) struct Filters {
@@ -55,6 +57,8 @@ pub(super) struct Filters {
     chunks: usize,
     /// `[product][chunk][column][row of the chunk]`.
     values: Vec<[f32; MAX_SIDE + 1]>,
+    /// H for rows of sums that are too few for all this: `[chunk][column][point][row of the chunk]`.
+    rows: Vec<[[f32; MAX_SIDE + 1]; COLUMN_POINTS]>,
 }
 
 impl Filters {
@@ -62,9 +66,11 @@ impl Filters {
     pub(super) fn new(template: &[f32], size: usize) -> Self {
         let chunks = size.div_ceil(3).div_ceil(MAX_SIDE);
         let side = size.div_ceil(3).div_ceil(chunks);
-        let mut values = vec![[0.0; MAX_SIDE + 1]; PRODUCTS * chunks * size.div_ceil(PHASES)];
-        Arch::new().dispatch(Fill { template, size, side, chunks, values: &mut values });
-        Self { size, side, chunks, values }
+        let taps = size.div_ceil(PHASES);
+        let mut values = vec![[0.0; MAX_SIDE + 1]; PRODUCTS * chunks * taps];
+        let mut rows = vec![[[0.0; MAX_SIDE + 1]; COLUMN_POINTS]; 3 * chunks * taps];
+        Arch::new().dispatch(Fill { template, size, side, chunks, values: &mut values, rows: &mut rows });
+        Self { size, side, chunks, values, rows }
     }
 
     /// D.
@@ -131,6 +137,22 @@ impl Filters {
         simd.vectorize(Join { spacing, products, output });
     }
 
+    /// The sums of some rows of positions, from the first to one before the last: each by itself, with 5/9 of the
+    /// multiplications.
+    #[inline(always)]
+    pub(super) fn sum_rows<S: Simd>(
+        &self,
+        simd: S,
+        scratch: &Scratch,
+        tile: Tile,
+        (rows, level): ([usize; 2], f32),
+        output: &mut [f32],
+    ) {
+        let Self { size, side, .. } = *self;
+        let (filter, planes) = (self.rows.as_slice(), &scratch.planes);
+        simd.vectorize(Rows { filter, size, side, tile, planes, level, rows, output });
+    }
+
     /// P of a point of the rows and one of the columns, whose values are `plane`.
     #[inline(always)]
     fn product<S: Simd>(
@@ -191,24 +213,27 @@ struct Fill<'a> {
     side: usize,
     chunks: usize,
     values: &'a mut [[f32; MAX_SIDE + 1]],
+    rows: &'a mut [[[f32; MAX_SIDE + 1]; COLUMN_POINTS]],
 }
 
 impl WithSimd for Fill<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
+    fn with_simd<S: Simd>(mut self, _: S) {
         let taps = self.size.div_ceil(PHASES);
         for chunk in 0..self.chunks {
             for tap in 0..taps {
-                let mut product = 0;
-                for g in self.row_points(chunk, tap) {
-                    for h in points::of_column_taps(g) {
+                let (h0, h1) = (self.column_points(chunk, tap), self.column_points(self.chunks + chunk, tap));
+                let h2 = self.column_points(2 * self.chunks + chunk, tap);
+                for column_point in 0..COLUMN_POINTS {
+                    let g = points::of_row_taps([h0[column_point], h1[column_point], h2[column_point]]);
+                    for (point, g) in g.iter().enumerate() {
+                        let product = point * COLUMN_POINTS + column_point;
                         let to = &mut self.values[(product * self.chunks + chunk) * taps + tap];
-                        for (to, h) in to.iter_mut().zip(h) {
-                            *to = h as f32;
+                        for (to, g) in to.iter_mut().zip(g) {
+                            *to = *g as f32;
                         }
-                        product += 1;
                     }
                 }
             }
@@ -217,22 +242,25 @@ impl WithSimd for Fill<'_> {
 }
 
 impl Fill<'_> {
-    /// G for the three columns of a tap, with the rows of a chunk side by side.
+    /// H for the three columns of a tap, with the rows of a chunk side by side; those of the template are kept.
     #[inline(always)]
-    fn row_points(&self, chunk: usize, tap: usize) -> [[Lanes; PHASES]; ROW_POINTS] {
-        let mut points = [[Lanes::default(); PHASES]; ROW_POINTS];
-        for phase in 0..PHASES {
-            let (column, mut taps) = (PHASES * tap + phase, [Lanes::default(); 3]);
-            for (k, taps) in taps.iter_mut().enumerate() {
-                for (i, value) in taps[..self.side].iter_mut().enumerate() {
-                    let row = (k * self.chunks + chunk) * self.side + i;
-                    if row < self.size && column < self.size {
-                        *value = f64::from(self.template[row * self.size + column]);
-                    }
+    fn column_points(&mut self, chunk: usize, tap: usize) -> [Lanes; COLUMN_POINTS] {
+        let mut taps = [Lanes::default(); PHASES];
+        let top = chunk * self.side;
+        let rows = self.side.min(self.size.saturating_sub(top));
+        for (phase, taps) in taps.iter_mut().enumerate() {
+            let column = PHASES * tap + phase;
+            if column < self.size {
+                for (i, value) in taps[..rows].iter_mut().enumerate() {
+                    *value = f64::from(self.template[(top + i) * self.size + column]);
                 }
             }
-            for (point, value) in points.iter_mut().zip(points::of_row_taps(taps)) {
-                point[phase] = value;
+        }
+        let points = points::of_column_taps(taps);
+        let to = &mut self.rows[chunk * self.size.div_ceil(PHASES) + tap];
+        for (to, values) in to.iter_mut().zip(&points) {
+            for (to, value) in to.iter_mut().zip(values) {
+                *to = *value as f32;
             }
         }
         points

@@ -28,7 +28,6 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::buffer::Buffer;
-use super::dot;
 use super::exact::{Alone, Template, sum_of};
 use super::load::{Load, rough_mean};
 use super::moments::Moments;
@@ -199,7 +198,7 @@ impl<'a> Job<'a> {
         if self.height <= rows + self.few_rows() { self.height } else { rows }
     }
 
-    /// Rows of positions up to which `dot` is quicker.
+    /// Rows of positions that are quicker one by one.
     fn few_rows(&self) -> usize {
         self.size / 3
     }
@@ -234,10 +233,9 @@ impl<'a> Job<'a> {
     /// The numerators of up to a group of rows of a tile, from the first of `rows` to one before the last.
     #[inline(always)]
     fn numerators<S: Simd>(&self, simd: S, scratch: &mut Scratch, tile: Tile, rows: [usize; 2], level: f32) {
-        let Scratch { input, numerators: output, toom_cook, .. } = scratch;
+        let Scratch { numerators: output, toom_cook, .. } = scratch;
         if rows[1] - rows[0] <= self.few_rows() {
-            let (template, size) = (self.rounded.as_slice(), self.size);
-            simd.vectorize(dot::Rows { template, size, tile, input, level, rows, output });
+            self.filters.sum_rows(simd, toom_cook, tile, (rows, level), output);
         } else {
             self.filters.sum(simd, toom_cook, tile, (rows[0], level), output);
         }
@@ -316,13 +314,11 @@ impl<'a> Job<'a> {
         let size = extent.map(|positions| positions + self.size - 1);
         let mean = rough_mean(pixels, pitch, size);
         let Scratch { row, input, toom_cook, .. } = scratch;
-        let (mut sum, is_grouped) = (0.0, self.groups(extent[0]) > 0);
+        let mut sum = 0.0;
         for first in (0..tile.pixel_rows).step_by(LOADED_ROWS) {
             let rows = [first, (first + LOADED_ROWS).min(tile.pixel_rows)];
             sum += simd.vectorize(Load::<CHECKED> { pixels, pitch, size, tile, mean, rows, row, input });
-            if is_grouped {
-                self.filters.begin(simd, toom_cook, tile, input, rows);
-            }
+            self.filters.begin(simd, toom_cook, tile, input, rows);
         }
         sum.is_finite()
     }
@@ -341,7 +337,12 @@ impl WithSimd for Band<'_, '_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) -> u32 {
-        (0..self.job.width).step_by(TILE_COLUMNS).map(|left| self.tile(simd, left)).sum()
+        // A loop: what a closure calls would not be compiled for these vectors.
+        let mut flat = 0;
+        for left in (0..self.job.width).step_by(TILE_COLUMNS) {
+            flat += self.tile(simd, left);
+        }
+        flat
     }
 }
 

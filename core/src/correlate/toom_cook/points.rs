@@ -205,7 +205,10 @@ impl WithSimd for Join<'_> {
 
 /// Three columns of sums from their five products.
 #[inline(always)]
-fn join_columns<S: Simd>(simd: S, [p0, p1, p2, p3, p4]: [S::f32s; COLUMN_POINTS]) -> [S::f32s; PHASES] {
+pub(super) fn join_columns<S: Simd>(
+    simd: S,
+    [p0, p1, p2, p3, p4]: [S::f32s; COLUMN_POINTS],
+) -> [S::f32s; PHASES] {
     let (even, odd) = (simd.add_f32s(p1, p2), simd.sub_f32s(p1, p2));
     let (minus_two, four) = (simd.splat_f32s(-2.0), simd.splat_f32s(4.0));
     [
