@@ -1,0 +1,84 @@
+//! Length and direction of the gradient of many pixels at once, and weights that fall off as a Gaussian.
+//!
+//! ```text
+//! dx = I(x + 1, y) − I(x − 1, y)     dy = I(x, y + 1) − I(x, y − 1)
+//! length = sqrt(dx² + dy²)           direction = atan2(dy, dx), from −π to π
+//! ```
+//! The arc tangent of q = min(|dx|, |dy|)/max(|dx|, |dy|) is an odd polynomial of degree 11, right to 2e-6 rad; the
+//! bins that it falls into are 0.17 rad wide and wider.
+
+use std::f32::consts::{FRAC_PI_2, PI};
+
+use pulp::Simd;
+
+use super::lanes::load;
+use super::plane::Plane;
+
+/// Coefficients of q¹¹, q⁹ … q: the least greatest error over 0 … 1.
+const ARC_TANGENT: [f32; 6] =
+    [-0.011_719_135, 0.052_647_35, -0.116_432_87, 0.193_543_46, -0.332_623_48, 0.999_977_2];
+/// Keeps the division of a flat place from being 0/0.
+const TINY: f32 = 1e-30;
+
+/// A pixel's row and those above and below it, from their first column on.
+pub(super) fn rows_around(plane: &Plane, y: usize) -> [&[f32]; 3] {
+    [plane.from_row(y - 1), plane.from_row(y), plane.from_row(y + 1)]
+}
+
+/// Length and direction at the vector of pixels from column `x` on, which is not the first.
+#[inline(always)]
+pub(super) fn polar<S: Simd>(simd: S, [above, here, below]: [&[f32]; 3], x: usize) -> (S::f32s, S::f32s) {
+    let dx = simd.sub_f32s(load::<S>(here, x + 1), load::<S>(here, x - 1));
+    let dy = simd.sub_f32s(load::<S>(below, x), load::<S>(above, x));
+    let length = simd.sqrt_f32s(simd.mul_add_e_f32s(dx, dx, simd.mul_f32s(dy, dy)));
+    (length, direction(simd, dx, dy))
+}
+
+/// atan2(dy, dx).
+#[inline(always)]
+fn direction<S: Simd>(simd: S, dx: S::f32s, dy: S::f32s) -> S::f32s {
+    let (wide, high) = (simd.abs_f32s(dx), simd.abs_f32s(dy));
+    let longer = simd.max_f32s(simd.max_f32s(wide, high), simd.splat_f32s(TINY));
+    let q = simd.div_f32s(simd.min_f32s(wide, high), longer);
+    let square = simd.mul_f32s(q, q);
+    let mut value = simd.splat_f32s(ARC_TANGENT[0]);
+    for coefficient in &ARC_TANGENT[1..] {
+        value = simd.mul_add_e_f32s(value, square, simd.splat_f32s(*coefficient));
+    }
+    let first = simd.mul_f32s(value, q);
+    let is_steep = simd.greater_than_f32s(high, wide);
+    let quarter = simd.select_f32s(is_steep, simd.sub_f32s(simd.splat_f32s(FRAC_PI_2), first), first);
+    let is_left = simd.less_than_f32s(dx, simd.splat_f32s(0.0));
+    let half = simd.select_f32s(is_left, simd.sub_f32s(simd.splat_f32s(PI), quarter), quarter);
+    simd.xor_f32s(half, simd.and_f32s(dy, simd.splat_f32s(-0.0)))
+}
+
+/// exp(−(i − centre)²/(2σ²)) of the whole numbers `pixels`, then `after` zeros.
+pub(super) fn gaussian_weights(
+    pixels: std::ops::RangeInclusive<usize>,
+    centre: f32,
+    sigma: f32,
+    after: usize,
+    weights: &mut Vec<f32>,
+) {
+    weights.clear();
+    let sharpness = 0.5 / (f64::from(sigma) * f64::from(sigma));
+    let from = *pixels.start() as f64 - f64::from(centre);
+    // From one weight to the next is a factor, which itself changes by a factor.
+    let mut weight = (-sharpness * from * from).exp();
+    let mut factor = (-sharpness * (2.0 * from + 1.0)).exp();
+    let change = (-2.0 * sharpness).exp();
+    for _ in pixels {
+        weights.push(weight as f32);
+        weight *= factor;
+        factor *= change;
+    }
+    weights.resize(weights.len() + after, 0.0);
+}
+
+/// The pixels of a side that lie within `reach` of `centre`, without the first and the last of the side.
+pub(super) fn inner(centre: f32, reach: f32, side: usize) -> std::ops::RangeInclusive<usize> {
+    let first = (centre - reach).ceil().max(1.0) as usize;
+    let last = ((centre + reach).floor().max(0.0) as usize).min(side.saturating_sub(2));
+    first..=last
+}

@@ -1,0 +1,176 @@
+//! Pixels whose difference of Gaussians is greater, or less, than that of all 26 neighbours.
+//!
+//! ```text
+//! D_l = G_(l+1) − G_l,   l = 0 … s + 1        extrema of l = 1 … s:   ± D_l(x, y) > T   and
+//! ± D_l(x, y) > its 13 neighbours before it, ≥ the 13 after it, in the order of layer, row, column
+//! ```
+//! Of several equal pixels side by side exactly one is found so. The differences of three rows at a time are held.
+
+use pulp::{Arch, Simd, WithSimd};
+use rayon::prelude::*;
+
+use super::lanes::{Line, WIDEST, load, store};
+use super::scale_space::{BORDER, Octave};
+
+/// Rows of a task of its own.
+const BAND: usize = 64;
+/// Rows held.
+const HELD: usize = 3;
+
+/// A pixel of an octave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Candidate {
+    /// l.
+    pub(super) layer: usize,
+    pub(super) y: usize,
+    pub(super) x: usize,
+}
+
+/// The extrema of all layers with |D| above `threshold`, in the order of layer, row and column.
+pub(super) fn extrema(octave: &Octave, threshold: f32) -> Vec<Candidate> {
+    let end = octave.layers[0].height - BORDER;
+    let tops: Vec<usize> = (BORDER..end).step_by(BAND).collect();
+    let band = |&top: &usize| {
+        let mut found = Vec::new();
+        Arch::new().dispatch(Band {
+            octave,
+            threshold,
+            rows: [top, (top + BAND).min(end)],
+            found: &mut found,
+        });
+        found
+    };
+    let mut found: Vec<Candidate> = tops.par_iter().flat_map_iter(band).collect();
+    found.sort_unstable();
+    found
+}
+
+/// The extrema of some rows.
+struct Band<'a> {
+    octave: &'a Octave,
+    threshold: f32,
+    rows: [usize; 2],
+    found: &'a mut Vec<Candidate>,
+}
+
+impl WithSimd for Band<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { octave, threshold, rows: [first, end], found } = self;
+        let (layers, stride) = (octave.scales() + 2, octave.layers[0].stride);
+        let line = stride + 2 * WIDEST;
+        let mut lines = vec![Line::ZERO; layers * HELD * line / WIDEST];
+        let lines: &mut [f32] = bytemuck::cast_slice_mut(&mut lines);
+        let mut next = first - 1;
+        for y in first..end {
+            while next <= y + 1 {
+                for layer in 0..layers {
+                    let at = (layer * HELD + next % HELD) * line;
+                    let row = next * stride;
+                    let (finer, coarser) = (octave.layers[layer].values(), octave.layers[layer + 1].values());
+                    simd.vectorize(Difference {
+                        finer: &finer[row..row + stride],
+                        coarser: &coarser[row..row + stride],
+                        difference: &mut lines[at..at + stride],
+                    });
+                }
+                next += 1;
+            }
+            for layer in 1..layers - 1 {
+                // Above, here and below, in the layer before, this one and the one after.
+                let around = NEIGHBOURS.map(|[l, v]| {
+                    let at = ((layer + l - 1) * HELD + (y + v - 1) % HELD) * line;
+                    &lines[at..at + line]
+                });
+                let width = octave.layers[0].width;
+                simd.vectorize(Row { around, threshold, width, layer, y, found });
+            }
+        }
+    }
+}
+
+/// Layers and rows of the neighbours, plus one.
+const NEIGHBOURS: [[usize; 2]; 9] = [[0, 0], [0, 1], [0, 2], [1, 0], [1, 1], [1, 2], [2, 0], [2, 1], [2, 2]];
+
+/// A row of D.
+struct Difference<'a> {
+    finer: &'a [f32],
+    coarser: &'a [f32],
+    difference: &'a mut [f32],
+}
+
+impl WithSimd for Difference<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let (finer, coarser) = (S::as_simd_f32s(self.finer).0, S::as_simd_f32s(self.coarser).0);
+        let difference = S::as_mut_simd_f32s(self.difference).0;
+        for ((difference, finer), coarser) in difference.iter_mut().zip(finer).zip(coarser) {
+            *difference = simd.sub_f32s(*coarser, *finer);
+        }
+    }
+}
+
+/// The extrema of a row of a layer.
+struct Row<'a> {
+    around: [&'a [f32]; 9],
+    threshold: f32,
+    width: usize,
+    layer: usize,
+    y: usize,
+    found: &'a mut Vec<Candidate>,
+}
+
+/// Whether the vector at `$x` is, times `$sign`, beyond those of a row at `$x` plus each offset.
+macro_rules! and_beyond {
+    ($simd:ident, $mask:ident, $sign:ident, $value:ident, $row:expr, $x:ident, [$($compare:ident $offset:literal),*]) => {
+        $(
+            let other = $simd.xor_f32s($sign, load::<S>($row, $x + $offset - 1));
+            $mask = $simd.and_m32s($mask, $simd.$compare($value, other));
+        )*
+    };
+}
+
+impl WithSimd for Row<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { around, threshold, width, layer, y, found } = self;
+        let end = width - BORDER;
+        let (least, minus) = (simd.splat_f32s(threshold), simd.splat_f32s(-0.0));
+        let mut x = BORDER;
+        while x < end {
+            let here = load::<S>(around[4], x);
+            // Minima are maxima of −D.
+            let sign = simd.and_f32s(minus, here);
+            let value = simd.xor_f32s(sign, here);
+            let mut mask = simd.greater_than_f32s(value, least);
+            if simd.first_true_m32s(mask) < S::F32_LANES {
+                and_beyond!(simd, mask, sign, value, around[4], x, [greater_than_f32s 0, greater_than_or_equal_f32s 2]);
+                and_beyond!(simd, mask, sign, value, around[3], x, [greater_than_f32s 0, greater_than_f32s 1, greater_than_f32s 2]);
+                and_beyond!(simd, mask, sign, value, around[5], x, [greater_than_or_equal_f32s 0, greater_than_or_equal_f32s 1, greater_than_or_equal_f32s 2]);
+                if simd.first_true_m32s(mask) < S::F32_LANES {
+                    and_beyond!(simd, mask, sign, value, around[0], x, [greater_than_f32s 0, greater_than_f32s 1, greater_than_f32s 2]);
+                    and_beyond!(simd, mask, sign, value, around[1], x, [greater_than_f32s 0, greater_than_f32s 1, greater_than_f32s 2]);
+                    and_beyond!(simd, mask, sign, value, around[2], x, [greater_than_f32s 0, greater_than_f32s 1, greater_than_f32s 2]);
+                    and_beyond!(simd, mask, sign, value, around[6], x, [greater_than_or_equal_f32s 0, greater_than_or_equal_f32s 1, greater_than_or_equal_f32s 2]);
+                    and_beyond!(simd, mask, sign, value, around[7], x, [greater_than_or_equal_f32s 0, greater_than_or_equal_f32s 1, greater_than_or_equal_f32s 2]);
+                    and_beyond!(simd, mask, sign, value, around[8], x, [greater_than_or_equal_f32s 0, greater_than_or_equal_f32s 1, greater_than_or_equal_f32s 2]);
+                    if simd.first_true_m32s(mask) < S::F32_LANES {
+                        let mut are = [0.0; WIDEST];
+                        let ones = simd.select_f32s(mask, simd.splat_f32s(1.0), simd.splat_f32s(0.0));
+                        store::<S>(&mut are, 0, ones);
+                        for (i, _) in are.iter().enumerate().filter(|(i, is)| **is > 0.0 && x + i < end) {
+                            found.push(Candidate { layer, y, x: x + i });
+                        }
+                    }
+                }
+            }
+            x += S::F32_LANES;
+        }
+    }
+}
