@@ -135,6 +135,10 @@ settings_group! {
         /// A designation is warned of when the ranges in its window leave a plane by a larger share of the distance:
         /// an occluding boundary runs through it.
         warn_boundary: f64 = 0.03, "", Domain::Between(0.0, 10.0), "ours, R119";
+        /// The feature tracker loses the target below this confidence, and dead reckoning takes over.
+        confidence_min: f64 = 0.5, "", Domain::Between(0.0, 1.0), "ours, R185";
+        /// Once lost, it returns at this confidence.
+        confidence_return: f64 = 0.7, "", Domain::Between(0.0, 1.0), "ours, R185";
         /// Updates that may follow a loss before failure is declared.
         n_retry: u32 = 2, "updates", Domain::Between(0.0, 100.0), "K§4.6, R90";
         /// Whether the update that detects the loss counts among them (the stricter reading).

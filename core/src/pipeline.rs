@@ -13,6 +13,8 @@ use std::sync::Arc;
 use crate::camera::{Camera, Mast, MastAngles};
 use crate::error::{Error, Result};
 use crate::frames::{Pixel, Pose};
+use crate::locate::features::anchor::Anchors;
+use crate::locate::features::store::Shared;
 use crate::locate::{DesignateInput, LocateInput, Located, locator};
 use crate::settings::Settings;
 use crate::stages::capture::{self, Capture, StereoPair};
@@ -42,6 +44,10 @@ pub trait Stops {
     fn odometry_error(&self) -> OdometryError;
     /// How the two images of a stop relate.
     fn stereo(&self) -> StereoGeometry;
+    /// Where the targets of the traverse keep what they share, and which stop of the recording this one is.
+    fn shared(&self, _step: usize) -> Option<Shared<'_>> {
+        None
+    }
     /// The stereo pair.
     ///
     /// # Errors
@@ -65,8 +71,8 @@ pub fn designate(stops: &dyn Stops, designation: Designation, settings: &Setting
     let pixel = check_pixel(designation, left)?;
     let pair = stops.capture(step)?;
     let capture = capture::capture(pair, Some(pixel), settings.template.subframe_px);
-    let stereo = stops.stereo();
-    let input = DesignateInput { pixel, capture: &capture, left, right, stereo, settings };
+    let (stereo, shared) = (stops.stereo(), stops.shared(step));
+    let input = DesignateInput { pixel, capture: &capture, left, right, stereo, shared, settings };
     let located = locator(settings.tracker).designate(&input);
     let target = first_target(stops, designation, &capture, &located)?;
     let pointing = pointing(stops, step, &target);
@@ -132,7 +138,9 @@ pub fn run_step(stops: &dyn Stops, last: &Updated, settings: &Settings) -> StepT
                 pointing: &pointing,
                 capture: &captured,
                 now_from_template: &now_from_template,
+                site_from_rover: &site_from_rover,
                 stereo: stops.stereo(),
+                shared: stops.shared(step),
                 lost_count: lost_count(last.state),
                 settings,
             });
@@ -182,7 +190,7 @@ fn first_target(
         site_from_rover: stops.site_from_rover(step),
         image: Arc::clone(&capture.pair.left),
     };
-    Ok(Target {
+    let mut target = Target {
         designation,
         step,
         position_in_rover,
@@ -195,7 +203,12 @@ fn first_target(
         drift: located.left_error,
         appearance,
         memory: Memory::default(),
-    })
+        anchors: Anchors::default(),
+    };
+    if let Some(anchor) = update::anchor(&target, located, &target.appearance.site_from_rover) {
+        target.anchors = target.anchors.with(anchor, 1);
+    }
+    Ok(target)
 }
 
 /// The designated pixel, if the left image has it.

@@ -133,6 +133,26 @@ pub const PRESETS: &[Preset] = &[
         &["reference_templates=3"],
     ),
     ours(
+        "features",
+        "The motion of the whole scene by its features, weighed by range, over the last three good stops.",
+        &["tracker=features", "sift_contrast_min=0.01", "n_retry=100"],
+    ),
+    ours(
+        "features-paper",
+        "Features as the K9 rover had them: no constraint on matches, 3 cm, half a pixel, one stop (D§2).",
+        &[
+            "tracker=features",
+            "sift_contrast_min=0.01",
+            "n_retry=100",
+            "stereo_along_curve=false",
+            "ratio_max=1",
+            "mutual_matches=false",
+            "motion_weighting=none",
+            "feature_memory=1",
+            "noise_model=half_pixel",
+        ],
+    ),
+    ours(
         "half-pixel",
         "The defaults with the papers' noise of half a pixel (R170).",
         &["noise_model=half_pixel"],

@@ -7,7 +7,8 @@ use serde_json::Value;
 use utoipa::ToSchema;
 
 use crate::error::{Error, Result};
-use crate::limits::{Limits, SettingInfo};
+use crate::limits::{Domain, Limits, SettingInfo};
+use crate::locate::features::FeatureSettings;
 use crate::locate::template::TemplateSettings;
 
 /// Changes to settings by name, as a person writes them.
@@ -20,6 +21,8 @@ pub enum TrackerKind {
     /// Normalised correlation of a scaled and rolled template (Kim et al. 2009).
     #[default]
     Template,
+    /// The motion of the whole scene by its features (Deans et al. 2005).
+    Features,
 }
 
 /// One tracker configuration.
@@ -32,13 +35,34 @@ pub struct Settings {
     pub limits: Limits,
     /// The settings of the template locator.
     pub template: TemplateSettings,
+    /// The settings of the feature locator.
+    pub features: FeatureSettings,
 }
 
+/// The name of the setting that chooses the locator; it is a group of its own.
+const TRACKER: &str = "tracker";
+
 impl Settings {
+    /// The description of the choice of the locator.
+    fn tracker_info() -> SettingInfo {
+        SettingInfo {
+            key: TRACKER.to_owned(),
+            group: TRACKER.to_owned(),
+            unit: String::new(),
+            default: serde_json::to_value(TrackerKind::default()).unwrap_or_default(),
+            domain: Domain::choice(&["template", "features"]),
+            source: "Kim et al. 2009, Deans et al. 2005".to_owned(),
+            help: "How the target is found again: by its own window, or by the motion of the whole scene."
+                .to_owned(),
+        }
+    }
+
     /// The description of every setting, group by group.
     pub fn table() -> Vec<SettingInfo> {
-        let mut table = Limits::table();
+        let mut table = vec![Self::tracker_info()];
+        table.extend(Limits::table());
         table.extend(TemplateSettings::table());
+        table.extend(FeatureSettings::table());
         table
     }
 
@@ -54,9 +78,15 @@ impl Settings {
             if let Some(problem) = info.domain.problem_with(value) {
                 return Err(Error::setting(key, problem));
             }
-            document[&info.group][key] = value.clone();
+            let place = if info.group == TRACKER { &mut document } else { &mut document[&info.group] };
+            place[key] = value.clone();
         }
         serde_json::from_value(document).map_err(|e| Error::setting(join_keys(changes), e.to_string()))
+    }
+
+    /// The value of a setting, by its group and name.
+    pub fn value(&self, group: &str, key: &str) -> Option<Value> {
+        value_in(&serde_json::to_value(self).ok()?, group, key).cloned()
     }
 
     /// The settings that differ from the defaults, by name.
@@ -65,11 +95,16 @@ impl Settings {
         Self::table()
             .into_iter()
             .filter_map(|info| {
-                let value = document.get(&info.group)?.get(&info.key)?.clone();
+                let value = value_in(&document, &info.group, &info.key)?.clone();
                 (value != info.default).then_some((info.key, value))
             })
             .collect()
     }
+}
+
+fn value_in<'a>(document: &'a Value, group: &str, key: &str) -> Option<&'a Value> {
+    let place = if group == TRACKER { document } else { document.get(group)? };
+    place.get(key)
 }
 
 /// Reads `key=value`; the value is JSON where it can be (numbers, `true`), else a word.

@@ -14,6 +14,7 @@ use crate::camera::Camera;
 use crate::estimate::drift::Drift;
 use crate::frames::{Pixel, Point3, Pose};
 use crate::image::GrayImage;
+use crate::locate::features::anchor::Anchors;
 use crate::locate::template::height::Relief;
 
 /// How a person names a target: a position in the left image of a stop.
@@ -88,6 +89,10 @@ pub struct Target {
     #[serde(skip)]
     #[schema(ignore)]
     pub memory: Memory,
+    /// The last good stops with their features, for the tracker that follows those.
+    #[serde(skip)]
+    #[schema(ignore)]
+    pub anchors: Anchors,
 }
 
 /// An appearance that was replaced, with the error of its centre.

@@ -12,6 +12,8 @@ use crate::estimate::error_budget::{Approach, ErrorBudget, StereoPair};
 use crate::frames::{Pixel, Point3};
 use crate::image::patch::Patch;
 use crate::locate::Located;
+use crate::locate::features::FeatureEvidence;
+use crate::locate::features::evidence::Table;
 use crate::locate::template::TemplateEvidence;
 use crate::stages::capture::Capture;
 use crate::stages::judge::Verdict;
@@ -94,6 +96,10 @@ pub struct StepRow {
     pub ncc: Option<f64>,
     /// Score of point stereo.
     pub stereo_score: Option<f64>,
+    /// Features whose match agrees with the motion.
+    pub inliers: Option<usize>,
+    /// Confidence of the locator, 0 to 1.
+    pub confidence: Option<f64>,
     /// Error against the truth in the left image, px.
     pub err_px: Option<f64>,
     /// Error against the truth, m.
@@ -159,6 +165,11 @@ impl StepTrace {
         self.locate.as_ref().and_then(|located| located.evidence.template())
     }
 
+    /// The evidence of the feature locator, where something was located.
+    pub fn features(&self) -> Option<&FeatureEvidence> {
+        self.locate.as_ref().and_then(|located| located.evidence.features())
+    }
+
     /// This step as one line.
     pub fn row(&self) -> StepRow {
         let evidence = self.template();
@@ -175,6 +186,8 @@ impl StepTrace {
             roll_deg: scale_roll.map(|s| s.roll_rad.to_degrees()),
             ncc: evidence.and_then(|e| e.match_template.as_ref()).map(|m| m.score),
             stereo_score: evidence.and_then(|e| e.point_stereo.as_ref()).map(|s| s.score),
+            inliers: self.features().and_then(|e| e.fit_motion.as_ref()).map(|motion| motion.inliers),
+            confidence: self.locate.as_ref().map(|located| located.confidence),
             err_px: self.truth.as_ref().and_then(|t| t.err_px),
             err_m: self.truth.as_ref().map(|t| t.err_m),
             sigma_m: largest.is_finite().then(|| largest.max(0.0).sqrt()),
@@ -219,10 +232,15 @@ impl StepTrace {
 
     /// An array of this step, where the stage that makes it was reached.
     pub fn array(&self, name: ArrayName) -> Option<ArrayView<'_>> {
-        let evidence = self.template()?;
-        let scale_roll = evidence.scale_roll.as_ref();
-        let matched = evidence.match_template.as_ref();
+        let table = |table: fn(&FeatureEvidence) -> &Table| {
+            self.features().map(table).filter(|table| table.columns > 0).map(ArrayView::Table)
+        };
+        let evidence = self.template();
+        let scale_roll = evidence.and_then(|e| e.scale_roll.as_ref());
+        let matched = evidence.and_then(|e| e.match_template.as_ref());
         match name {
+            ArrayName::Features => table(|evidence| &evidence.table),
+            ArrayName::Cloud => table(|evidence| &evidence.cloud),
             ArrayName::Reference => scale_roll.map(|s| ArrayView::Patch(&s.reference)),
             ArrayName::Scaled => scale_roll.map(|s| ArrayView::Patch(&s.scaled)),
             ArrayName::Rolled => scale_roll.map(|s| ArrayView::Patch(&s.rolled)),
@@ -230,7 +248,7 @@ impl StepTrace {
             ArrayName::Difference => matched.map(|m| ArrayView::Patch(&m.difference)),
             ArrayName::Surface => matched.map(|m| &m.surface).filter(|s| s.width > 0).map(ArrayView::Surface),
             ArrayName::RightWindow => {
-                evidence.point_stereo.as_ref().map(|s| ArrayView::Patch(&s.right_window))
+                evidence.and_then(|e| e.point_stereo.as_ref()).map(|s| ArrayView::Patch(&s.right_window))
             }
         }
     }
@@ -254,11 +272,15 @@ pub enum ArrayName {
     Surface,
     /// The right image at the stereo match.
     RightWindow,
+    /// The features of the left image: a row each, with the columns of `FeatureColumn`.
+    Features,
+    /// Where the bootstrap puts the target: a row each, position and pixel.
+    Cloud,
 }
 
 impl ArrayName {
     /// All arrays, in the order of the strip.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 9] = [
         Self::Reference,
         Self::Scaled,
         Self::Rolled,
@@ -266,6 +288,8 @@ impl ArrayName {
         Self::Difference,
         Self::Surface,
         Self::RightWindow,
+        Self::Features,
+        Self::Cloud,
     ];
 
     /// The name as paths and files write it.
@@ -278,6 +302,8 @@ impl ArrayName {
             Self::Difference => "difference",
             Self::Surface => "surface",
             Self::RightWindow => "right_window",
+            Self::Features => "features",
+            Self::Cloud => "cloud",
         }
     }
 
@@ -294,6 +320,8 @@ pub enum ArrayView<'a> {
     Patch(&'a Patch),
     /// A surface of scores; NaN where excluded.
     Surface(&'a Surface),
+    /// Rows of numbers; NaN where one does not exist.
+    Table(&'a Table),
 }
 
 impl<'a> ArrayView<'a> {
@@ -302,6 +330,9 @@ impl<'a> ArrayView<'a> {
         match self {
             Self::Patch(patch) => patch.dimensions().into(),
             Self::Surface(surface) => [surface.width, surface.height],
+            Self::Table(table) => {
+                [table.columns, (table.values.len() / table.columns.max(1) as usize) as u32]
+            }
         }
     }
 
@@ -310,6 +341,7 @@ impl<'a> ArrayView<'a> {
         match self {
             Self::Patch(patch) => patch.as_raw(),
             Self::Surface(surface) => &surface.scores,
+            Self::Table(table) => &table.values,
         }
     }
 }

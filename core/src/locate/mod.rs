@@ -3,17 +3,20 @@
 //! | tracker | steps |
 //! |---|---|
 //! | `template` (Kim et al. 2009) | `scale_roll` → `match_template` → `point_stereo` → `triangulate` |
+//! | `features` (Deans et al. 2005) | `detect` → `match_features` → `triangulate` → `fit_motion` → `bootstrap` |
 //!
 //! A locator never fails: where it finds nothing it says so in `Located::missing`, and `judge` rejects it.
 //! Two contracts hold for all of them: the same input gives the same bits, and whatever was seen on the way
 //! is in the evidence.
 
+pub mod features;
 pub mod template;
 
 use nalgebra::{Matrix3, Matrix3x2};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use self::features::store::Shared;
 use crate::estimate::drift::Drift;
 use crate::frames::{Pixel, Point3, Pose};
 use crate::settings::{Settings, TrackerKind};
@@ -23,8 +26,8 @@ use crate::stages::predict::Prediction;
 use crate::target::Target;
 use crate::traverse::StereoGeometry;
 
-/// Where the target is now, and how that was found.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+/// Where the target is now, and how that was found; by default nowhere.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Located {
     /// Position in the left image, px.
     pub left_pixel: Option<Pixel>,
@@ -41,7 +44,7 @@ pub struct Located {
     /// How the surface point moves with the left pixel, m per px.
     #[schema(value_type = Option<Vec<f64>>)]
     pub surface_by_pixel: Option<Matrix3x2<f64>>,
-    /// Confidence, from 0 to 1: for `template` the score of the match, cut at 0.
+    /// Confidence, from 0 to 1: for `template` the score of the match, cut at 0; for `features` D-Eq 7.
     pub confidence: f64,
     /// What could not be found and why, as one sentence.
     pub missing: Option<String>,
@@ -55,20 +58,39 @@ pub struct Located {
 pub enum Evidence {
     /// Of the template locator.
     Template(Box<template::TemplateEvidence>),
+    /// Of the feature locator.
+    Features(Box<features::FeatureEvidence>),
+}
+
+impl Default for Evidence {
+    fn default() -> Self {
+        Self::Template(Box::default())
+    }
 }
 
 impl Evidence {
-    /// The evidence of the template locator, to be added to.
+    /// The evidence of the template locator, to be added to: of every step, or of the designation, which all trackers
+    /// leave to point stereo.
     pub fn template_mut(&mut self) -> Option<&mut template::TemplateEvidence> {
         match self {
             Self::Template(evidence) => Some(evidence),
+            Self::Features(evidence) => evidence.designation.as_deref_mut(),
         }
     }
 
-    /// The evidence of the template locator.
+    /// The evidence of the template locator, alike.
     pub fn template(&self) -> Option<&template::TemplateEvidence> {
         match self {
             Self::Template(evidence) => Some(evidence),
+            Self::Features(evidence) => evidence.designation.as_deref(),
+        }
+    }
+
+    /// The evidence of the feature locator.
+    pub fn features(&self) -> Option<&features::FeatureEvidence> {
+        match self {
+            Self::Template(_) => None,
+            Self::Features(evidence) => Some(evidence),
         }
     }
 }
@@ -86,6 +108,8 @@ pub struct DesignateInput<'a> {
     pub right: &'a crate::camera::Camera,
     /// How the two images relate.
     pub stereo: StereoGeometry,
+    /// What the targets of the traverse share.
+    pub shared: Option<Shared<'a>>,
     /// The configuration.
     pub settings: &'a Settings,
 }
@@ -103,8 +127,12 @@ pub struct LocateInput<'a> {
     pub capture: &'a Capture,
     /// Takes points of the rover frame at which the template was taken into the present rover frame.
     pub now_from_template: &'a Pose,
+    /// The estimated pose at this stop.
+    pub site_from_rover: &'a Pose,
     /// How the two images relate.
     pub stereo: StereoGeometry,
+    /// What the targets of the traverse share.
+    pub shared: Option<Shared<'a>>,
     /// Updates in a row that were bad so far.
     pub lost_count: u32,
     /// The configuration.
@@ -123,5 +151,6 @@ pub trait Locator: Send + Sync {
 pub fn locator(kind: TrackerKind) -> &'static dyn Locator {
     match kind {
         TrackerKind::Template => &template::TemplateLocator,
+        TrackerKind::Features => &features::FeatureLocator,
     }
 }

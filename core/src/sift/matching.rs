@@ -75,7 +75,7 @@ pub fn nearest_where(
 }
 
 /// |a − b|².
-fn distance2(a: &Descriptor, b: &Descriptor) -> u32 {
+pub fn distance2(a: &Descriptor, b: &Descriptor) -> u32 {
     a.iter().zip(b).map(|(&a, &b)| u32::from(a.abs_diff(b)).pow(2)).sum()
 }
 

@@ -27,6 +27,8 @@ const FILES: &[(&str, &str)] = &[
     ("checkout-4", include_str!("library/checkout-4.toml")),
     ("occlusion", include_str!("library/occlusion.toml")),
     ("self-shadow", include_str!("library/self-shadow.toml")),
+    ("moving-object", include_str!("library/moving-object.toml")),
+    ("low-texture", include_str!("library/low-texture.toml")),
     ("clouds", include_str!("library/clouds.toml")),
     ("moving-sun", include_str!("library/moving-sun.toml")),
     ("sky-full-frame", include_str!("library/sky-full-frame.toml")),

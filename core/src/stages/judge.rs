@@ -20,6 +20,9 @@
 //! standard deviations of `ν = pixel − predicted`, that is `νᵀ (Σ_pred + Σ_match)⁻¹ ν > far_sigma²`, it must score more
 //! (ours, criterion 9 `far_ncc` ≥ `far_ncc_min`; −1: off).
 //!
+//! The feature tracker makes no use of scores or of the prediction, whose errors may be large (R156); it is judged by its
+//! confidence alone (D§2, R185): criterion 10 `confidence` ≥ `confidence_min`, and ≥ `confidence_return` once it is lost.
+//!
 //! The tolerances are recomputed at every update (R86, R87, ours):
 //! ```text
 //! tol_dist = g √( ΔR(D_old)² + ΔR(D_new)² + (f L_step)² )
@@ -40,8 +43,8 @@ use utoipa::ToSchema;
 
 use crate::frames::{Point3, Pose};
 use crate::limits::Limits;
-use crate::locate::Located;
 use crate::locate::template::match_template::TemplateMatch;
+use crate::locate::{Evidence, Located};
 use crate::stages::point_mast::Pointing;
 use crate::stages::predict::Prediction;
 use crate::target::{Target, TrackingState};
@@ -110,7 +113,12 @@ pub fn judge(
     state_before: TrackingState,
     limits: &Limits,
 ) -> Verdict {
-    let gates = gates(target, prediction, pointing, located, site_from_rover, limits);
+    let gates = match located.evidence {
+        Evidence::Template(_) => {
+            template_gates(target, prediction, pointing, located, site_from_rover, limits)
+        }
+        Evidence::Features(_) => feature_gates(located, state_before, limits),
+    };
     let good = gates.iter().all(|gate| gate.passed);
     let state = next_state(state_before, good, limits);
     Verdict {
@@ -123,7 +131,14 @@ pub fn judge(
     }
 }
 
-fn gates(
+/// The one criterion of the feature tracker: once lost, it must be surer to return (R185).
+fn feature_gates(located: &Located, state_before: TrackingState, limits: &Limits) -> Vec<Gate> {
+    let limit = if state_before.is_lost() { limits.confidence_return } else { limits.confidence_min };
+    let confidence = located.position_in_rover.map(|_| located.confidence);
+    vec![Gate::new(10, "confidence", "", confidence, limit, true)]
+}
+
+fn template_gates(
     target: &Target,
     prediction: &Prediction,
     pointing: &Pointing,

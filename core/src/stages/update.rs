@@ -5,7 +5,7 @@
 //! matches so far, so that by default it stays as long as it need not be magnified much and still matches well. In
 //! flight it was renewed at every update (R70). What a renewal replaces is remembered, so that it can be looked for again
 //! (`reference_templates`, `template_update = drift_corrected`). Otherwise the position is carried by the prediction alone and the
-//! template stays.
+//! template stays. The feature tracker has no template: it remembers the stop with its features instead (R186).
 
 use std::sync::Arc;
 
@@ -14,6 +14,7 @@ use utoipa::ToSchema;
 
 use crate::frames::{Pixel, Pose};
 use crate::locate::Located;
+use crate::locate::features::anchor::Anchor;
 use crate::locate::template::TemplateSettings;
 use crate::locate::template::settings::TemplateUpdate;
 use crate::settings::Settings;
@@ -48,20 +49,23 @@ pub fn update(
     site_from_rover: &Pose,
     settings: &Settings,
 ) -> Updated {
-    let settings = &settings.template;
     let correction_m = located.position_in_rover.map(|p| (p - carried.position_in_rover).norm());
     let correction_px =
         located.left_pixel.zip(pointing.predicted_left).map(|(a, b): (Pixel, Pixel)| a.distance(b));
     let found = verdict.accepted.then(|| found_again(&carried, pointing, located)).flatten();
     let appearance = found
         .as_ref()
-        .filter(|_| asks_for_a_new_template(located, settings))
+        .filter(|_| asks_for_a_new_template(located, &settings.template))
         .and_then(|target| new_appearance(target, pointing, capture, located, site_from_rover));
     let template_renewed = appearance.is_some();
+    let anchor = found.as_ref().and_then(|target| anchor(target, located, site_from_rover));
     let mut target = found.unwrap_or(carried);
+    if let Some(anchor) = anchor {
+        target.anchors = target.anchors.with(anchor, settings.features.feature_memory as usize);
+    }
     if let Some(appearance) = appearance {
         let old = Kept { appearance: target.appearance, drift: target.drift };
-        let others = settings.reference_templates.saturating_sub(1) as usize;
+        let others = settings.template.reference_templates.saturating_sub(1) as usize;
         target.memory = target.memory.with(old, others);
         (target.appearance, target.drift) = (appearance, located.left_error);
     }
@@ -70,9 +74,9 @@ pub fn update(
 
 /// Whether an accepted update renews the template.
 fn asks_for_a_new_template(located: &Located, settings: &TemplateSettings) -> bool {
-    let evidence = located.evidence.template();
-    let scale = evidence.and_then(|e| e.scale_roll.as_ref()).map_or(f64::INFINITY, |s| s.scale);
-    let score = evidence.and_then(|e| e.match_template.as_ref()).map_or(-1.0, |m| m.score);
+    let Some(evidence) = located.evidence.template() else { return false };
+    let scale = evidence.scale_roll.as_ref().map_or(f64::INFINITY, |s| s.scale);
+    let score = evidence.match_template.as_ref().map_or(-1.0, |m| m.score);
     match settings.template_update {
         TemplateUpdate::EveryUpdate | TemplateUpdate::DriftCorrected => true,
         TemplateUpdate::Never => false,
@@ -103,6 +107,19 @@ fn found_again(carried: &Target, pointing: &Pointing, located: &Located) -> Opti
         last_distance_m: (position_in_rover - pointing.left.model.centre()).norm(),
         travelled_since_update_m: 0.0,
         ..carried.clone()
+    })
+}
+
+/// This stop with its features and where the target is, for the tracker that follows those.
+pub fn anchor(target: &Target, located: &Located, site_from_rover: &Pose) -> Option<Anchor> {
+    let evidence = located.evidence.features()?;
+    Some(Anchor {
+        step: target.step,
+        stop: evidence.stop,
+        features: Arc::clone(evidence.features.as_ref()?),
+        site_from_rover: *site_from_rover,
+        position_in_rover: target.position_in_rover,
+        covariance_in_rover: target.covariance_in_rover,
     })
 }
 

@@ -10,31 +10,17 @@
 //! | `terrain` | K§5.5, R124–R126 | slope-…, stuck | `terrain` |
 //! | `checkout-1`, `-2`, `-3` | K§7.1–7.3, R130–R143 | checkout-… | `position`: one row a step |
 //! | `faults` | K§4.6, R88, R126 | several | `fault` |
+//! | `k9` | D§4, R209–R215 | k9-5, k9-7.5, k9-10 | `scenario` |
+//! | `feature-covariance` | D§2, R172–R177 | approach-10 | none |
+//! | `feature-faults` | D§1, D§4, R156, R185, R208 | several | `fault` |
 //!
 //! The sideways study skips images; 70° is no multiple of 15°, 20° and more, whose last full step ends earlier (E19).
-//! Printed values are shares of targets tracked unless the column says otherwise.
 
-use serde::Serialize;
 use serde_json::Value;
 
 use super::point::{Fault, Picks, Point, Visit};
 use crate::error::{Error, Result};
 use crate::presets::PRESETS;
-
-/// A value that the paper prints.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct PaperValue {
-    /// The configuration of ours that is the paper's.
-    pub configuration: &'static str,
-    /// The value of the study's first variable.
-    pub at: f64,
-    /// The value.
-    pub value: f64,
-    /// The column of ours that it stands beside.
-    pub column: &'static str,
-    /// Where it is printed.
-    pub source: &'static str,
-}
 
 /// What the grid of a study may hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -88,6 +74,22 @@ const FAULTS: &[&str] = &[
     "out-of-frame",
     "heading-jump-2",
     "heading-jump-6",
+];
+
+const K9: &[&str] = &["k9-5", "k9-7.5", "k9-10"];
+
+/// What happens to features; the last four are no faults of the world but claims of the tracker (R156).
+const FEATURE_FAULTS: &[&str] = &[
+    "occlusion",
+    "cloud",
+    "shadow",
+    "starvation",
+    "moving-object",
+    "low-texture",
+    "heading-jump-6",
+    "heading-jump-20",
+    "wrong-prior",
+    "every-third-stop",
 ];
 
 const fn study(name: &'static str, question: &'static str, configurations: &'static [&'static str]) -> Study {
@@ -188,6 +190,30 @@ pub const STUDIES: &[Study] = &[
             &["sightline", "ncc-scale-roll"],
         )
     },
+    Study {
+        grid: Grid::Words(K9),
+        default_grid: K9,
+        ..study(
+            "k9",
+            "How much error does tracking by features add over the K9 rover's three drives (D§4, R209–R215)?",
+            &["features", "features-paper", "sightline"],
+        )
+    },
+    study(
+        "feature-covariance",
+        "Does the covariance of a target that follows the features say how far off it is (D§2, R172–R177)?",
+        &["features", "features-paper"],
+    ),
+    Study {
+        variable: "fault",
+        grid: Grid::Words(FEATURE_FAULTS),
+        default_grid: FEATURE_FAULTS,
+        ..study(
+            "feature-faults",
+            "Does the confidence fall before the drift grows, and is the target found again (D§1, R185, R208)?",
+            &["features", "features-paper"],
+        )
+    },
 ];
 
 impl Study {
@@ -216,35 +242,6 @@ impl Study {
         self.default_grid
     }
 
-    /// What the paper prints.
-    pub fn paper(&self) -> Vec<PaperValue> {
-        let share = |configuration, at, value, source| PaperValue {
-            configuration,
-            at,
-            value,
-            column: "tracked_share",
-            source,
-        };
-        match self.name {
-            "straight" => vec![
-                share("ncc", 0.0, 0.80, "R113"),
-                share("ncc", 4.0, 0.15, "R113"),
-                share("ncc-scale", 0.0, 1.00, "R113"),
-                share("ncc-scale", 4.0, 0.95, "R113"),
-            ],
-            "sideways" => vec![
-                share("ncc-scale", 5.0, 1.00, "R121"),
-                share("ncc-scale", 10.0, 1.00, "R121"),
-                share("ncc-scale", 15.0, 0.82, "R121"),
-            ],
-            "turn-in-place" => {
-                (1..=9).map(|step| share("ncc-scale", f64::from(5 * step), 1.0, "R123")).collect()
-            }
-            "checkout-1" => checkout_1(),
-            _ => Vec::new(),
-        }
-    }
-
     /// The points of the grid: the study's own, or those that were asked for.
     ///
     /// # Errors
@@ -266,7 +263,7 @@ impl Study {
     /// The only point of a study without a grid.
     fn single(&self) -> Point {
         let scenario = match self.name {
-            "approach" => "approach-10",
+            "approach" | "feature-covariance" => "approach-10",
             name => name,
         };
         let mut point = Point::plain(scenario, "scenario", scenario);
@@ -309,6 +306,10 @@ impl Study {
             ..Point::plain(scenario, self.variable, word)
         };
         let heading = |yaw_deg: f64| on("approach-10", Fault::HeadingJump { step: 2 * JUMP_STEP, yaw_deg });
+        let changed = |change: &str| Point {
+            changes: vec![change.to_owned()],
+            ..on("approach-10", Fault::FromTheStart)
+        };
         let azimuth = |count: usize| Point {
             visit: Visit::LeavingOut { first: JUMP_STEP, count },
             ..on("sideways-70", Fault::AzimuthJump(JUMP_STEP))
@@ -323,6 +324,15 @@ impl Study {
             "out-of-frame" => Point { picks: Picks::Leaving, ..on("approach-10", Fault::OutOfFrame) },
             "heading-jump-2" => heading(2.0),
             "heading-jump-6" => heading(6.0),
+            "heading-jump-20" => heading(20.0),
+            "starvation" => changed("features_max=40"),
+            "moving-object" => on("moving-object", Fault::FromTheStart),
+            "low-texture" => on("low-texture", Fault::FromTheStart),
+            "wrong-prior" => Point { changes: vec!["prior_radius_px=60".to_owned()], ..heading(6.0) },
+            "every-third-stop" => Point { visit: Visit::Every(3), ..on("approach-10", Fault::FromTheStart) },
+            k9 if self.name == "k9" => {
+                Point { visit: Visit::AllButLast, ..Point::plain(k9, self.variable, word) }
+            }
             terrain => Point::plain(terrain, self.variable, word),
         }
     }
@@ -337,26 +347,6 @@ fn with_windows(point: &Point) -> Vec<Point> {
         point
     };
     SIDEWAYS_WINDOWS_PX.map(with).to_vec()
-}
-
-/// Table III (R133), by position.
-fn checkout_1() -> Vec<PaperValue> {
-    let table: [(&'static str, [f64; 7]); 4] = [
-        ("magnification", [1.04, 1.03, 1.03, 1.01, 1.00, 0.97, 1.04]),
-        ("roll_deg", [2.46, 2.46, 2.92, 3.27, 3.27, 0.06, 6.25]),
-        ("azimuth_change_deg", [6.01, 6.38, 8.53, 8.58, 8.62, 0.00, 15.44]),
-        ("ncc", [0.88, 0.88, 0.85, 0.87, 0.87, 0.94, 0.79]),
-    ];
-    let rows = table.into_iter().flat_map(|(column, values)| {
-        (2_u32..).zip(values).map(move |(position, value)| PaperValue {
-            configuration: "ncc-scale-roll",
-            at: f64::from(position),
-            value,
-            column,
-            source: "R133",
-        })
-    });
-    rows.collect()
 }
 
 #[cfg(test)]

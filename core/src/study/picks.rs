@@ -6,7 +6,7 @@
 //! On a face that is circled, two kinds of targets stand apart from the others: one chosen on an occluding boundary
 //! (R119), and those before which another rock passes on the way, which then have such a boundary too.
 
-use super::point::{Fault, Picks, Point, Visit};
+use super::point::{Fault, Picks, Point};
 use super::row::{BOUNDARY, PASSED};
 use super::run::Chosen;
 use super::truth::TruthSource;
@@ -100,7 +100,7 @@ fn is_passed(world: &World, traverse: &Traverse, pixel: Pixel, window_px: u32) -
 fn find_fault_steps(traverse: &Traverse, point: &Point, fault: Fault, chosen: &mut [Chosen]) -> Result<()> {
     let fixed = match fault {
         Fault::Cloud(step) | Fault::AzimuthJump(step) | Fault::HeadingJump { step, .. } => Some(step),
-        Fault::Boundary => Some(1),
+        Fault::Boundary | Fault::FromTheStart => Some(1),
         Fault::Occlusion | Fault::Shadow | Fault::OutOfFrame => None,
     };
     if fixed.is_some() {
@@ -109,14 +109,7 @@ fn find_fault_steps(traverse: &Traverse, point: &Point, fault: Fault, chosen: &m
     }
     let points: Vec<Option<Point3>> =
         chosen.iter().map(|target| traverse.surface_point_in_site(0, target.pixel)).collect();
-    let stops = traverse.stop_count();
-    let visited: Vec<usize> = match point.visit {
-        Visit::Every(stride) => (0..stops).step_by(stride.max(1)).collect(),
-        Visit::LeavingOut { first, count } => {
-            (0..stops).filter(|stop| !(first..first + count).contains(stop)).collect()
-        }
-    };
-    for (step, &stop) in visited.iter().enumerate() {
+    for (step, stop) in point.visit.stops(traverse.stop_count()).into_iter().enumerate() {
         let world = traverse.world_at(stop)?;
         for (target, surface) in chosen.iter_mut().zip(&points) {
             let Some(surface) = surface else { continue };

@@ -16,6 +16,21 @@ pub enum Visit {
         /// How many stops are left out.
         count: usize,
     },
+    /// All stops but the last, at which other cameras take over.
+    AllButLast,
+}
+
+impl Visit {
+    /// The stops that are visited of `count`.
+    pub fn stops(self, count: usize) -> Vec<usize> {
+        match self {
+            Self::Every(stride) => (0..count).step_by(stride.max(1)).collect(),
+            Self::LeavingOut { first, count: left_out } => {
+                (0..count).filter(|stop| !(first..first + left_out).contains(stop)).collect()
+            }
+            Self::AllButLast => (0..count.saturating_sub(1)).collect(),
+        }
+    }
 }
 
 /// Which pixels of the first left image become targets.
@@ -53,6 +68,8 @@ pub enum Fault {
         /// By how much, degrees.
         yaw_deg: f64,
     },
+    /// Nothing but what the point itself changes: the first step.
+    FromTheStart,
 }
 
 /// One point of a study's grid.

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::frames::Pixel;
 use crate::session::track::{self, Drive};
 use crate::settings::Settings;
+use crate::study::point::Visit;
 use crate::study::staged::Staged;
 use crate::target::Designation;
 use crate::trace::{StepTrace, summarise};
@@ -59,7 +60,7 @@ impl Difficulty {
 
 /// Tracks every target over every `stride`-th stop of a drive.
 pub fn difficulty<D: Drive>(drive: &D, targets: &[Pixel], settings: &Settings, stride: usize) -> Difficulty {
-    let drive = Staged::every(drive, stride);
+    let drive = Staged::new(drive, Visit::Every(stride));
     let run = |&pixel: &Pixel| track::run(&drive, Designation { step: 0, pixel }, settings).ok();
     let runs: Vec<Option<Vec<StepTrace>>> = targets.par_iter().map(run).collect();
     let mut found = Difficulty {

@@ -7,7 +7,7 @@
 //! evidence, had it been accepted, was right. Where the truth is hidden at the last step the run is `unjudged`.
 //!
 //! Errors at the last step come with their number: `err_px`, `err_m` and `drift_m` of the runs that are tracked, and
-//! `err_all_m` of all runs that were not refused.
+//! `err_all_m` and `drift_all_m` of all runs that were not refused.
 
 use std::collections::BTreeMap;
 
@@ -17,6 +17,7 @@ use utoipa::ToSchema;
 
 use super::calibration::{Calibration, median};
 use super::catalogue::Study;
+use super::confidence::Trust;
 use super::evenness;
 use super::plan::Unit;
 use super::run::{Fate, Run};
@@ -91,6 +92,9 @@ pub fn columns(runs: &[&Run], worlds: usize) -> BTreeMap<String, Value> {
     spread(&mut columns, "drift_m", &of(|run| run.drift_m));
     let all: Vec<f64> = own.iter().filter_map(|run| run.summary.final_err_m).collect();
     spread(&mut columns, "err_all_m", &all);
+    let all: Vec<f64> = own.iter().filter_map(|run| run.drift_m).collect();
+    spread(&mut columns, "drift_all_m", &all);
+    columns.extend(trust(&own));
     columns.insert("sigma_m_median".to_owned(), median(&of(|run| run.sigma_m)).into());
     if let Some(calibration) = Calibration::of(&of(|run| run.nees), worlds) {
         columns.insert("nees_mean".to_owned(), calibration.mean_nees.into());
@@ -151,6 +155,28 @@ pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     let (below, part) = (place.floor() as usize, place.fract());
     let above = sorted[(below + 1).min(sorted.len() - 1)];
     Some(sorted[below] + part * (above - sorted[below]))
+}
+
+/// What the confidence was worth, and the errors of the measured motions, where any were measured.
+fn trust(runs: &[&Run]) -> BTreeMap<String, Value> {
+    let mut columns = BTreeMap::new();
+    let of = |values: fn(&Trust) -> &Vec<f64>| -> Vec<f64> {
+        runs.iter().flat_map(|run| values(&run.trust).iter().copied()).collect()
+    };
+    let metres = of(|trust| &trust.motion_errors_m);
+    if metres.is_empty() {
+        return columns;
+    }
+    spread(&mut columns, "motion_err_m", &metres);
+    spread(&mut columns, "motion_err_rad", &of(|trust| &trust.motion_errors_rad));
+    let sum = |of: fn(&Trust) -> usize| runs.iter().map(|run| of(&run.trust)).sum::<usize>();
+    let counts = [
+        ("confident_steps", sum(|trust| trust.sure)),
+        ("confident_wrong_steps", sum(|trust| trust.surely_wrong)),
+        ("confident_wrong", runs.iter().filter(|run| run.trust.surely_wrong > 0).count()),
+    ];
+    columns.extend(counts.map(|(name, count)| (name.to_owned(), count.into())));
+    columns
 }
 
 /// What became of the cases of a fault: at its step, and at the end.

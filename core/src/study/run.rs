@@ -16,7 +16,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::point::{Fault, Point, Visit};
+use super::confidence::Trust;
+use super::point::{Fault, Point};
 use super::staged::Staged;
 use super::step_record::StepRecord;
 use crate::error::{Error, Result};
@@ -78,6 +79,9 @@ pub struct Run {
     pub sigma_m: Option<f64>,
     /// Squared Mahalanobis distance of the error at the last step.
     pub nees: Option<f64>,
+    /// What the confidence was worth, and how far the measured motions were off.
+    #[serde(default)]
+    pub trust: Trust,
     /// What became of it at the last step; null without truth.
     pub end: Option<Fate>,
     /// Whether the last step was lost although its evidence was right.
@@ -113,10 +117,7 @@ pub fn measure<D: Drive>(
     keep_steps: bool,
     watch: &Watch<'_>,
 ) -> Result<Vec<Run>> {
-    let staged = match point.visit {
-        Visit::Every(stride) => Staged::every(drive, stride),
-        Visit::LeavingOut { first, count } => Staged::leaving_out(drive, first, count),
-    };
+    let staged = Staged::new(drive, point.visit);
     let staged = match point.fault {
         Some(Fault::HeadingJump { step, yaw_deg }) => staged.with_heading_jump(step, yaw_deg.to_radians()),
         _ => staged,
@@ -152,6 +153,7 @@ impl Follower {
             err_range_m: None,
             sigma_m: None,
             nees: None,
+            trust: Trust::default(),
             end: None,
             end_is_false_loss: false,
             fault_step: chosen.fault_step,
@@ -172,20 +174,29 @@ impl Follower {
             }
         };
         let mut last = first.clone();
-        self.record(drive, None, &last);
+        self.record(drive, None, &first, &last);
         while last.step + 1 < drive.stop_count() {
             if cancel.load(Ordering::Relaxed) {
                 return Err(Error::Cancelled);
             }
             let next = track::advance(drive, &first, &last, settings);
-            self.record(drive, Some(&last), &next);
+            self.record(drive, Some(&last), &first, &next);
             last = next;
         }
         self.conclude(drive, &first, &last);
         Ok(())
     }
 
-    fn record<D: Drive>(&mut self, drive: &D, before: Option<&StepTrace>, trace: &StepTrace) {
+    fn record<D: Drive>(
+        &mut self,
+        drive: &D,
+        before: Option<&StepTrace>,
+        first: &StepTrace,
+        trace: &StepTrace,
+    ) {
+        if before.is_some() {
+            self.run.trust.add(drive, trace, drift_m(drive, first, trace));
+        }
         add(&mut self.run.summary, &summarise([trace]));
         let fate = fate(drive, trace);
         if let Some(at) = self.run.fault_step.filter(|at| trace.step >= *at) {

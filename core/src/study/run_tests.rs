@@ -1,6 +1,7 @@
 //! The engine on a world whose truth is a formula: a tracker that works, one that is made to fail, and faults.
 
 use super::*;
+use crate::study::point::Visit;
 use crate::frames::Pose;
 use crate::settings::Changes;
 use crate::testing::{PlaneWorld, Trouble};

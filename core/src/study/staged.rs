@@ -13,9 +13,11 @@ use nalgebra::UnitQuaternion;
 use crate::camera::{Camera, Mast, MastAngles};
 use crate::error::Result;
 use crate::frames::{Pixel, Point3, Pose, Vector3};
+use crate::locate::features::store::Shared;
 use crate::pipeline::Stops;
 use crate::session::track::Drive;
 use crate::stages::capture::StereoPair;
+use crate::study::point::Visit;
 use crate::study::truth::TruthSource;
 use crate::traverse::{OdometryError, StereoGeometry};
 
@@ -27,15 +29,9 @@ pub struct Staged<'a, D: Drive> {
 }
 
 impl<'a, D: Drive> Staged<'a, D> {
-    /// Visits every `stride`-th stop from the first on; 1 visits all, and 0 counts as 1.
-    pub fn every(drive: &'a D, stride: usize) -> Self {
-        Self { drive, stops: (0..drive.stop_count()).step_by(stride.max(1)).collect(), jump: None }
-    }
-
-    /// Visits every stop but those from `first` on, `count` of them.
-    pub fn leaving_out(drive: &'a D, first: usize, count: usize) -> Self {
-        let stops = (0..drive.stop_count()).filter(|stop| !(first..first + count).contains(stop)).collect();
-        Self { drive, stops, jump: None }
+    /// Visits the stops that `visit` names.
+    pub fn new(drive: &'a D, visit: Visit) -> Self {
+        Self { drive, stops: visit.stops(drive.stop_count()), jump: None }
     }
 
     /// The same with an estimated heading that jumps by `yaw_rad` (clockwise seen from above) at a visited stop.
@@ -76,6 +72,9 @@ impl<D: Drive> Stops for Staged<'_, D> {
     fn stereo(&self) -> StereoGeometry {
         self.drive.stereo()
     }
+    fn shared(&self, step: usize) -> Option<Shared<'_>> {
+        self.drive.shared(self.stops[step])
+    }
     fn capture(&self, step: usize) -> Result<StereoPair> {
         self.drive.capture(self.stops[step])
     }
@@ -111,29 +110,30 @@ mod tests {
     #[test]
     fn every_third_stop_of_seven_is_three_stops_and_the_last_is_met() {
         let drive = drive();
-        let staged = Staged::every(&drive, 3);
+        let staged = Staged::new(&drive, Visit::Every(3));
         assert_eq!(staged.stop_count(), 3);
         for (step, stop) in [(0, 0), (1, 3), (2, 6)] {
             assert_eq!(staged.site_from_rover(step), drive.site_from_rover(stop));
             assert_eq!(staged.true_site_from_rover(step), drive.true_site_from_rover(stop));
         }
         // Every fourth stop passes the last one by.
-        assert_eq!(Staged::every(&drive, 4).stop_count(), 2);
-        assert_eq!(Staged::every(&drive, 0).stop_count(), 7);
+        assert_eq!(Staged::new(&drive, Visit::Every(4)).stop_count(), 2);
+        assert_eq!(Staged::new(&drive, Visit::Every(0)).stop_count(), 7);
     }
 
     #[test]
     fn stops_that_are_left_out_are_stepped_over() {
         let drive = drive();
-        let staged = Staged::leaving_out(&drive, 2, 3);
+        let staged = Staged::new(&drive, Visit::LeavingOut { first: 2, count: 3 });
         assert_eq!(staged.stop_count(), 4);
         assert_eq!(staged.site_from_rover(2), drive.site_from_rover(5));
+        assert_eq!(Staged::new(&drive, Visit::AllButLast).stop_count(), 6);
     }
 
     #[test]
     fn a_jump_turns_the_estimate_from_its_stop_on_and_leaves_the_truth() {
         let drive = drive();
-        let staged = Staged::every(&drive, 1).with_heading_jump(3, 0.1);
+        let staged = Staged::new(&drive, Visit::Every(1)).with_heading_jump(3, 0.1);
         let turned = |step: usize| staged.site_from_rover(step).rotation.angle();
         assert_eq!((turned(2), staged.true_site_from_rover(4)), (0.0, drive.true_site_from_rover(4)));
         assert!((turned(3) - 0.1).abs() < 1e-12 && (turned(6) - 0.1).abs() < 1e-12);

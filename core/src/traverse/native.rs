@@ -65,6 +65,7 @@ use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::frames::Pose;
 use crate::image::{GrayImage, io};
+use crate::locate::features::store::FeatureStore;
 use crate::sim::World;
 use crate::stages::capture::StereoPair;
 
@@ -79,6 +80,7 @@ pub struct Traverse {
     cameras: Vec<StopCameras>,
     warnings: Vec<String>,
     cache: Mutex<ImageCache>,
+    pub(super) features: FeatureStore,
     pub(super) simulated: Option<Simulated>,
 }
 
@@ -106,7 +108,8 @@ impl Traverse {
         let simulated = index.scenario.as_ref().map(read_scenario).transpose().map_err(problem)?;
         let warnings = check::warnings(&index, &folder);
         let cache = Mutex::new(ImageCache::new(CACHE_LIMIT_BYTES));
-        Ok(Self { folder, index_path, index, cameras, warnings, cache, simulated })
+        let features = FeatureStore::default();
+        Ok(Self { folder, index_path, index, cameras, warnings, cache, features, simulated })
     }
 
     /// The index as it was read.

@@ -7,6 +7,7 @@
 use crate::camera::{Camera, Mast, MastAngles};
 use crate::error::Result;
 use crate::frames::{Pixel, Point3, Pose};
+use crate::locate::features::store::Shared;
 use crate::pipeline::Stops;
 use crate::sim::surface_point;
 use crate::stages::capture::StereoPair;
@@ -41,6 +42,9 @@ impl Stops for Traverse {
     }
     fn stereo(&self) -> StereoGeometry {
         self.index().stereo
+    }
+    fn shared(&self, step: usize) -> Option<Shared<'_>> {
+        Some(Shared { store: &self.features, stop: step })
     }
     fn capture(&self, step: usize) -> Result<StereoPair> {
         self.capture(step)

@@ -49,9 +49,9 @@ pub struct Track {
     /// The stop in whose left image the targets are designated.
     #[arg(long, value_name = "N", default_value_t = 0)]
     from_step: usize,
-    /// The tracker.
-    #[arg(long, default_value = "template")]
-    tracker: Tracker,
+    /// The tracker; by default the preset's, or else the template tracker.
+    #[arg(long)]
+    tracker: Option<Tracker>,
     /// A named configuration, as `sightline presets` lists them; --set changes it further.
     #[arg(long, value_name = "NAME")]
     preset: Option<String>,
@@ -84,6 +84,8 @@ enum Format {
 enum Tracker {
     /// Normalised correlation of a scaled and rolled template.
     Template,
+    /// The motion of the whole scene by its features.
+    Features,
 }
 
 /// A line of a step.
@@ -154,13 +156,15 @@ impl Track {
     }
 
     fn settings(&self) -> Result<Settings> {
-        let tracker = match self.tracker {
-            Tracker::Template => TrackerKind::Template,
-        };
         let changes = self.set.iter().map(|text| parse_assignment(text)).collect::<Result<Changes>>()?;
         let own = match &self.preset {
             Some(name) => preset(name)?.settings()?,
             None => Settings::default(),
+        };
+        let tracker = match self.tracker {
+            None => own.tracker,
+            Some(Tracker::Template) => TrackerKind::Template,
+            Some(Tracker::Features) => TrackerKind::Features,
         };
         Settings { tracker, ..own }.with(&changes)
     }

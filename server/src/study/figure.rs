@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use serde_json::Value;
-use sightline_core::study::catalogue::PaperValue;
+use sightline_core::study::paper::PaperValue;
 use sightline_core::study::plan::{Plan, Unit};
 use sightline_core::study::row::{columns, is_tracked};
 use sightline_core::study::run::Run;

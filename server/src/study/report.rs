@@ -211,7 +211,7 @@ fn step_table(plan: &Plan, units: &[Unit]) -> String {
     text
 }
 
-fn is_at(value: &sightline_core::study::catalogue::PaperValue, column: &str, position: usize) -> bool {
+fn is_at(value: &sightline_core::study::paper::PaperValue, column: &str, position: usize) -> bool {
     value.column == column && value.at == position as f64
 }
 

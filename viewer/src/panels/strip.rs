@@ -167,6 +167,8 @@ fn explain(array: ArrayName) -> String {
             "The right image at the stereo match, resampled as the left camera sees it."
         }
         ArrayName::Surface => "The scores of all positions.",
+        ArrayName::Features => "The features of the left image.",
+        ArrayName::Cloud => "Where the bootstrap puts the target.",
     };
     if array == ArrayName::Difference {
         format!("{what}\nShown from −{DIFFERENCE_LIMIT} (blue) over 0 (white) to +{DIFFERENCE_LIMIT} (red).")

@@ -275,8 +275,7 @@ impl State {
 
     /// A setting of the run that is looked at.
     pub fn setting(&self, group: &str, key: &str) -> Option<Value> {
-        let document = serde_json::to_value(&self.run()?.settings).ok()?;
-        document.get(group)?.get(key).cloned()
+        self.run()?.settings.value(group, key)
     }
 
     /// Whether a layer of marks is shown.

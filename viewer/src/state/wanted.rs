@@ -62,12 +62,17 @@ impl State {
 
 /// Whether the stage that makes an array was reached.
 fn has_array(trace: &StepTrace, name: ArrayName) -> bool {
-    let Some(evidence) = trace.template() else { return false };
+    let (template, features) = (trace.template(), trace.features());
+    let matched = template.and_then(|e| e.match_template.as_ref());
     match name {
-        ArrayName::Reference | ArrayName::Scaled | ArrayName::Rolled => evidence.scale_roll.is_some(),
-        ArrayName::Matched | ArrayName::Difference => evidence.match_template.is_some(),
+        ArrayName::Reference | ArrayName::Scaled | ArrayName::Rolled => {
+            template.is_some_and(|e| e.scale_roll.is_some())
+        }
+        ArrayName::Matched | ArrayName::Difference => matched.is_some(),
         // A descent along the gradient compares no window of positions.
-        ArrayName::Surface => evidence.match_template.as_ref().is_some_and(|m| m.descent.is_none()),
-        ArrayName::RightWindow => evidence.point_stereo.is_some(),
+        ArrayName::Surface => matched.is_some_and(|m| m.descent.is_none()),
+        ArrayName::RightWindow => template.is_some_and(|e| e.point_stereo.is_some()),
+        ArrayName::Features => features.is_some_and(|e| e.detect.is_some()),
+        ArrayName::Cloud => features.is_some_and(|e| e.bootstrap.is_some()),
     }
 }

@@ -100,7 +100,7 @@ impl Locator for TemplateLocator {
             predicted_range_m: None,
         };
         let mut located = finish(TemplateEvidence::default(), &stereo, Drift::of_pixel(covariance), settings);
-        let Evidence::Template(evidence) = &mut located.evidence;
+        let Some(evidence) = located.evidence.template_mut() else { return located };
         if let (Some(found), Some(matched)) = (&evidence.triangulate, &evidence.point_stereo) {
             evidence.warnings = warnings::look(&stereo, found.range_m, matched.score, input.settings);
         }
@@ -186,7 +186,7 @@ fn finish(
 ) -> Located {
     let confidence = evidence.match_template.as_ref().map_or(1.0, |m| m.score.clamp(0.0, 1.0));
     let left_pixel = Some(input.left_pixel);
-    let mut located = Located { left_pixel, left_error, confidence, ..empty() };
+    let mut located = Located { left_pixel, left_error, confidence, ..Located::default() };
     let stereo = match point_stereo::point_stereo(input, settings) {
         Ok(stereo) => stereo,
         Err(missing) => {
@@ -221,19 +221,5 @@ fn finish(
 }
 
 fn nothing(evidence: TemplateEvidence, missing: String) -> Located {
-    Located { missing: Some(missing), evidence: Evidence::Template(Box::new(evidence)), ..empty() }
-}
-
-fn empty() -> Located {
-    Located {
-        left_pixel: None,
-        right_pixel: None,
-        left_error: Drift::default(),
-        surface_by_pixel: None,
-        position_in_rover: None,
-        covariance_in_rover: None,
-        confidence: 0.0,
-        missing: None,
-        evidence: Evidence::Template(Box::default()),
-    }
+    Located { missing: Some(missing), evidence: Evidence::Template(Box::new(evidence)), ..Located::default() }
 }

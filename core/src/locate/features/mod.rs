@@ -1,0 +1,240 @@
+//! The feature locator: `detect` → `match_features` → `triangulate` → `fit_motion` → `bootstrap` (Deans et al. 2005, D§2).
+//!
+//! The target needs no feature on it (R168): the features of the whole scene give the rigid motion between two stops, and
+//! that moves the target,
+//! ```text
+//! x_now = T(θ*) x_then                                                                          D-Eq 3
+//! (x, P_xx)_now = unscented transform of T(θ) x over (x, P_xx)_then and (θ*, P_θθ)               D-Eq 6
+//! ```
+//! Positions are never measured again, so that errors add up from motion to motion: drift. The designation alone is a
+//! measurement, by point stereo (R172).
+//!
+//! Beyond the paper, the last good stops are remembered; the motion is measured from each of them, and the one is taken that
+//! leaves the target most certain. The same memory finds the target again when an occlusion ends (R186).
+//!
+//! | symbol | name | unit, frame |
+//! |---|---|---|
+//! | x_then, x_now | `Anchor::position_in_rover`, `Located::position_in_rover` | m, rover frame of either stop |
+//! | θ*, T | `MotionFit::after_from_before` | m, rad |
+//! | P_θθ | `Bootstrap::covariance` | m², m rad, rad² |
+
+pub mod anchor;
+pub mod detect;
+pub mod evidence;
+mod match_stereo;
+pub mod motion;
+pub mod settings;
+pub mod store;
+mod tables;
+
+pub use evidence::FeatureEvidence;
+pub use settings::FeatureSettings;
+
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
+use nalgebra::Matrix3;
+
+use self::anchor::Anchor;
+use self::detect::StopFeatures;
+use self::evidence::{AnchorTried, Bootstrapped, Detected, FittedMotion, MatchedFeatures};
+use self::motion::{Motion, MotionInput, motion};
+use super::template::TemplateLocator;
+use super::{DesignateInput, Evidence, LocateInput, Located, Locator};
+use crate::estimate::carry::carry;
+use crate::estimate::confidence::confidence;
+use crate::estimate::motion_parameters::MotionParameters;
+use crate::frames::Point3;
+
+/// The motion of the whole scene by its features (Deans et al. 2005).
+#[derive(Clone, Copy, Debug)]
+pub struct FeatureLocator;
+
+impl Locator for FeatureLocator {
+    fn designate(&self, input: &DesignateInput<'_>) -> Located {
+        let mut located = TemplateLocator.designate(input);
+        let settings = &input.settings.features;
+        let designation = match std::mem::take(&mut located.evidence) {
+            Evidence::Template(evidence) => Some(evidence),
+            Evidence::Features(_) => None,
+        };
+        let stop = input.shared.map(|shared| shared.stop);
+        let mut evidence = FeatureEvidence { designation, stop, ..FeatureEvidence::default() };
+        if let Some(missing) = settings.contradiction() {
+            located = Located { missing: Some(missing), ..Located::default() };
+        } else if located.position_in_rover.is_some() {
+            see(&mut evidence, || {
+                let cameras = [input.left, input.right];
+                store::features(input.shared, settings, || {
+                    detect::detect(&input.capture.pair, cameras, settings)
+                })
+            });
+        }
+        located.evidence = Evidence::Features(Box::new(evidence));
+        located
+    }
+
+    fn locate(&self, input: &LocateInput<'_>) -> Located {
+        let settings = &input.settings.features;
+        let mut evidence = FeatureEvidence::default();
+        if let Some(missing) = settings.contradiction() {
+            let evidence = Evidence::Features(Box::new(evidence));
+            return Located { missing: Some(missing), evidence, ..Located::default() };
+        }
+        let cameras = [&input.pointing.left, &input.pointing.right];
+        let now = see(&mut evidence, || {
+            store::features(input.shared, settings, || detect::detect(&input.capture.pair, cameras, settings))
+        });
+        let candidates: Vec<Candidate<'_>> =
+            input.target.anchors.newest().map(|anchor| Candidate::new(anchor, &now, input)).collect();
+        let chosen = choose(&candidates, input.settings.limits.confidence_min);
+        evidence.stop = input.shared.map(|shared| shared.stop);
+        evidence.anchors = candidates.iter().enumerate().map(|(i, c)| c.tried(Some(i) == chosen)).collect();
+        let located = match chosen.map(|index| &candidates[index]) {
+            Some(candidate) => candidate.located(&now, input, &mut evidence),
+            None => Located { missing: Some(missing(&candidates)), ..Located::default() },
+        };
+        Located { evidence: Evidence::Features(Box::new(evidence)), ..located }
+    }
+}
+
+/// Finds the features of a stop and notes them.
+fn see(evidence: &mut FeatureEvidence, find: impl FnOnce() -> Arc<StopFeatures>) -> Arc<StopFeatures> {
+    let features = find();
+    let mut ranges: Vec<f64> = features.points.iter().map(|point| point.range_m).collect();
+    ranges.sort_by(f64::total_cmp);
+    evidence.detect = Some(Detected {
+        left: features.left.keypoints.len(),
+        right: features.right.keypoints.len(),
+        stereo_matches: features.points.len() + features.out_of_range,
+        points: features.points.len(),
+        median_range_m: ranges.get(ranges.len() / 2).copied(),
+    });
+    evidence.table = tables::features(&features);
+    evidence.features = Some(Arc::clone(&features));
+    features
+}
+
+/// The motion from one remembered stop, and where it puts the target.
+struct Candidate<'a> {
+    anchor: &'a Anchor,
+    motion: Arc<Motion>,
+    confidence: f64,
+    /// Position and covariance in the present rover frame, m and m².
+    target: Option<(Point3, Matrix3<f64>)>,
+}
+
+impl<'a> Candidate<'a> {
+    fn new(anchor: &'a Anchor, now: &StopFeatures, input: &LocateInput<'_>) -> Self {
+        let settings = &input.settings.features;
+        let expected = input.site_from_rover.inverse() * anchor.site_from_rover;
+        let motion = store::motion(input.shared, anchor.stop, settings, || {
+            let (then, left) = (anchor.features.as_ref(), &input.pointing.left);
+            motion(&MotionInput { then, now, expected_now_from_then: &expected, left, settings })
+        });
+        let target = motion.bootstrap.as_ref().and_then(|bootstrap| {
+            let (position, covariance) = (&anchor.position_in_rover, &anchor.covariance_in_rover);
+            carry(position, covariance, bootstrap.parameters, &bootstrap.covariance)
+        });
+        let confidence = confidence(motion.fit.inliers.len(), settings.confidence());
+        Self { anchor, confidence, motion, target }
+    }
+
+    /// Largest 1σ axis of the target's position, m.
+    fn sigma_m(&self) -> Option<f64> {
+        let (_, covariance) = self.target.as_ref()?;
+        Some(covariance.symmetric_eigenvalues().max().max(0.0).sqrt())
+    }
+
+    fn tried(&self, chosen: bool) -> AnchorTried {
+        AnchorTried {
+            step: self.anchor.step,
+            matches: self.motion.matches.len(),
+            inliers: self.motion.fit.inliers.len(),
+            confidence: self.confidence,
+            sigma_m: self.sigma_m(),
+            missing: self.motion.fit.missing.clone(),
+            chosen,
+        }
+    }
+
+    /// The target by this motion; `evidence` takes what led to it.
+    fn located(
+        &self,
+        now: &StopFeatures,
+        input: &LocateInput<'_>,
+        evidence: &mut FeatureEvidence,
+    ) -> Located {
+        let (anchor, motion, left) = (self.anchor, &self.motion, &input.pointing.left);
+        evidence.match_features = Some(MatchedFeatures {
+            from_step: anchor.step,
+            then: anchor.features.points.len(),
+            now: now.points.len(),
+            matches: motion.matches.len(),
+        });
+        tables::add_motion(&mut evidence.table, motion, &anchor.features, now, left);
+        let Some((position, covariance)) = self.target else { return Located::default() };
+        evidence.fit_motion = self.fitted(&position, input);
+        if let Some(bootstrap) = &motion.bootstrap {
+            evidence.bootstrap = Some(bootstrapped(bootstrap));
+            let poses = bootstrap.samples.iter().map(|theta| MotionParameters::from_vector(&(*theta).into()).to_pose());
+            evidence.cloud = tables::cloud(poses, &anchor.position_in_rover, left);
+        }
+        Located {
+            left_pixel: left.project(&position),
+            right_pixel: input.pointing.right.project(&position),
+            position_in_rover: Some(position),
+            covariance_in_rover: Some(covariance),
+            confidence: self.confidence,
+            ..Located::default()
+        }
+    }
+
+    fn fitted(&self, position: &Point3, input: &LocateInput<'_>) -> Option<FittedMotion> {
+        let fit = &self.motion.fit;
+        let theta = MotionParameters::from(&fit.motion()?);
+        Some(FittedMotion {
+            translation_m: theta.translation_m,
+            roll_pitch_yaw_deg: [theta.roll_rad, theta.pitch_rad, theta.yaw_rad].map(f64::to_degrees),
+            inliers: fit.inliers.len(),
+            rms_m: fit.rms_m,
+            median_m: fit.median_m,
+            consensus_by_draw: fit.consensus_by_draw.clone(),
+            refits: fit.refits.clone(),
+            correction_m: (position - input.prediction.position_in_rover).norm(),
+        })
+    }
+}
+
+/// Of the motions that can be trusted the one that leaves the target most certain; where none can, the one that most
+/// matches agree with.
+fn choose(candidates: &[Candidate<'_>], confidence_min: f64) -> Option<usize> {
+    let with_target = || candidates.iter().enumerate().filter(|(_, c)| c.target.is_some());
+    let trusted = with_target()
+        .filter(|(_, c)| c.confidence >= confidence_min)
+        .filter_map(|(index, c)| Some((index, c.sigma_m()?)))
+        .min_by(|a, b| a.1.total_cmp(&b.1));
+    let most = || with_target().max_by_key(|(index, c)| (c.motion.fit.inliers.len(), usize::MAX - index));
+    trusted.map(|(index, _)| index).or_else(|| most().map(|(index, _)| index))
+}
+
+/// Why there is no motion at all, as one sentence.
+fn missing(candidates: &[Candidate<'_>]) -> String {
+    let why = candidates.iter().find_map(|c| Some((c.anchor.step, c.motion.fit.missing.as_ref()?)));
+    why.map_or_else(
+        || "no earlier stop with features is remembered".to_owned(),
+        |(step, why)| format!("no motion since step {step}: {why}"),
+    )
+}
+
+fn bootstrapped(bootstrap: &crate::estimate::bootstrap::Bootstrap) -> Bootstrapped {
+    let sigma = |i: usize| bootstrap.covariance[(i, i)].max(0.0).sqrt();
+    Bootstrapped {
+        sets: bootstrap.samples.len(),
+        covariance: bootstrap.covariance,
+        sigma_translation_m: [sigma(0), sigma(1), sigma(2)],
+        sigma_rotation_deg: [sigma(3), sigma(4), sigma(5)].map(f64::to_degrees),
+    }
+}

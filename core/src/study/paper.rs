@@ -1,0 +1,73 @@
+//! What the papers print for the studies of the catalogue, beside which ours stand.
+//!
+//! Printed values are shares of targets tracked unless the column says otherwise.
+
+use serde::Serialize;
+
+use super::catalogue::Study;
+
+/// A value that the paper prints.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PaperValue {
+    /// The configuration of ours that is the paper's.
+    pub configuration: &'static str,
+    /// The value of the study's first variable.
+    pub at: f64,
+    /// The value.
+    pub value: f64,
+    /// The column of ours that it stands beside.
+    pub column: &'static str,
+    /// Where it is printed.
+    pub source: &'static str,
+}
+
+impl Study {
+    /// What the paper prints.
+    pub fn paper(&self) -> Vec<PaperValue> {
+        let share = |configuration, at, value, source| PaperValue {
+            configuration,
+            at,
+            value,
+            column: "tracked_share",
+            source,
+        };
+        match self.name {
+            "straight" => vec![
+                share("ncc", 0.0, 0.80, "R113"),
+                share("ncc", 4.0, 0.15, "R113"),
+                share("ncc-scale", 0.0, 1.00, "R113"),
+                share("ncc-scale", 4.0, 0.95, "R113"),
+            ],
+            "sideways" => vec![
+                share("ncc-scale", 5.0, 1.00, "R121"),
+                share("ncc-scale", 10.0, 1.00, "R121"),
+                share("ncc-scale", 15.0, 0.82, "R121"),
+            ],
+            "turn-in-place" => {
+                (1..=9).map(|step| share("ncc-scale", f64::from(5 * step), 1.0, "R123")).collect()
+            }
+            "checkout-1" => checkout_1(),
+            _ => Vec::new(),
+        }
+    }
+}
+
+/// Table III (R133), by position.
+fn checkout_1() -> Vec<PaperValue> {
+    let table: [(&'static str, [f64; 7]); 4] = [
+        ("magnification", [1.04, 1.03, 1.03, 1.01, 1.00, 0.97, 1.04]),
+        ("roll_deg", [2.46, 2.46, 2.92, 3.27, 3.27, 0.06, 6.25]),
+        ("azimuth_change_deg", [6.01, 6.38, 8.53, 8.58, 8.62, 0.00, 15.44]),
+        ("ncc", [0.88, 0.88, 0.85, 0.87, 0.87, 0.94, 0.79]),
+    ];
+    let rows = table.into_iter().flat_map(|(column, values)| {
+        (2_u32..).zip(values).map(move |(position, value)| PaperValue {
+            configuration: "ncc-scale-roll",
+            at: f64::from(position),
+            value,
+            column,
+            source: "R133",
+        })
+    });
+    rows.collect()
+}
