@@ -127,15 +127,36 @@ pub fn bootstrap(
     after_from_before: &Pose,
     settings: &BootstrapSettings,
 ) -> Option<Bootstrap> {
+    let blocks: Vec<u32> = (0..inliers.len() as u32).collect();
+    block_bootstrap(inliers, &blocks, after_from_before, settings)
+}
+
+/// The same where the errors of neighbours are alike: whole blocks are drawn, `blocks` says to which a match belongs.
+///
+/// Features of one stone err alike, so that they are fewer observations than they seem (the block bootstrap of Künsch
+/// 1989, in the plane). The number of matches in a set then varies about theirs. None as for [`bootstrap`].
+pub fn block_bootstrap(
+    inliers: &[Correspondence],
+    blocks: &[u32],
+    after_from_before: &Pose,
+    settings: &BootstrapSettings,
+) -> Option<Bootstrap> {
     let refitter = Refitter::new(inliers, after_from_before, settings)?;
     let parameters = MotionParameters::from(after_from_before);
     let mut random = Pcg64::seed_from_u64(settings.seed);
-    let mut times = vec![0; inliers.len()];
+    let mut names = blocks.to_vec();
+    names.sort_unstable();
+    names.dedup();
+    let blocks: Vec<usize> = blocks.iter().map(|name| names.partition_point(|other| other < name)).collect();
+    let (mut drawn, mut times) = (vec![0; names.len()], vec![0; inliers.len()]);
     let mut covariance = Matrix6::zeros();
     let mut samples = Vec::with_capacity(settings.sets as usize);
     for _ in 0..settings.sets {
         let motion = (0..TRIES).find_map(|_| {
-            draw(&mut times, &mut random);
+            draw(&mut drawn, &mut random);
+            for (times, &block) in times.iter_mut().zip(&blocks) {
+                *times = drawn[block];
+            }
             let different = times.iter().filter(|&&times| times > 0).count();
             if different < 3 { None } else { refitter.refit(&times) }
         })?;
@@ -148,7 +169,7 @@ pub fn bootstrap(
     Some(Bootstrap { parameters, covariance, samples })
 }
 
-/// Draws as many matches as there are, with replacement: how often each was drawn.
+/// Draws as many blocks as there are, with replacement: how often each was drawn.
 fn draw(times: &mut [u32], random: &mut Pcg64) {
     times.fill(0);
     for _ in 0..times.len() {

@@ -1,9 +1,9 @@
 //! The engine on a world whose truth is a formula: a tracker that works, one that is made to fail, and faults.
 
 use super::*;
-use crate::study::point::Visit;
 use crate::frames::Pose;
 use crate::settings::Changes;
+use crate::study::point::Visit;
 use crate::testing::{PlaneWorld, Trouble};
 
 /// Seven stops of 0.3 m towards the plane.

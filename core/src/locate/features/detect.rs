@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! z_i = (l_iᵀ, r_iᵀ)ᵀ          x_i = f(z_i)                                                     D-Eq 1
-//! P_i = σ² J Jᵀ,  J = ∂f/∂z    by differences of one pixel
+//! P_i = (σ² + (σ_s s_i)²) J Jᵀ,  J = ∂f/∂z    by differences of one pixel
 //! ```
 //! f is the midpoint of the two rays. The left feature's descriptor stands for the point (R160).
 //!
@@ -10,7 +10,8 @@
 //! |---|---|---|
 //! | l, r | keypoints of `left` and `right` | px |
 //! | x | `Point::position_in_rover` | m, rover frame of the stop |
-//! | σ | `feature_sigma_px` | px |
+//! | σ, σ_s | `feature_sigma_px`, `feature_sigma_per_scale` | px, 1 |
+//! | s | `Keypoint::sigma_px` of the left feature | px |
 
 use nalgebra::{Matrix3, SMatrix};
 
@@ -18,7 +19,7 @@ use super::match_stereo::{StereoMatch, match_stereo};
 use super::settings::FeatureSettings;
 use crate::camera::Camera;
 use crate::estimate::triangulate::midpoint;
-use crate::frames::{Pixel, Point3};
+use crate::frames::{Pixel, Point3, Vector3};
 use crate::sift::{self, Features, Keypoint};
 use crate::stages::capture::StereoPair;
 
@@ -33,6 +34,8 @@ pub struct Point {
     pub covariance_in_rover: Matrix3<f64>,
     /// Distance from the left camera, m.
     pub range_m: f64,
+    /// How it moves with the right pixel's column, m per px.
+    pub by_disparity_m: Vector3,
 }
 
 /// What one stop offers: all features of both eyes, and those that became points.
@@ -71,7 +74,8 @@ pub fn detect(pair: &StereoPair, cameras: [&Camera; 2], settings: &FeatureSettin
         .filter_map(|stereo| {
             let l = StopFeatures::pixel(&left.keypoints[stereo.left as usize]);
             let r = StopFeatures::pixel(&right.keypoints[stereo.right as usize]);
-            triangulate(stereo, [l, r], cameras, settings)
+            let scale_px = f64::from(left.keypoints[stereo.left as usize].sigma_px);
+            triangulate(stereo, [l, r], scale_px, cameras, settings)
         })
         .collect();
     let out_of_range = found - points.len();
@@ -82,6 +86,7 @@ pub fn detect(pair: &StereoPair, cameras: [&Camera; 2], settings: &FeatureSettin
 fn triangulate(
     stereo: StereoMatch,
     [l, r]: [Pixel; 2],
+    scale_px: f64,
     [left, right]: [&Camera; 2],
     settings: &FeatureSettings,
 ) -> Option<Point> {
@@ -100,11 +105,12 @@ fn triangulate(
         along([l, l], to_both_sides(r, 1.0, 0.0))?,
         along([l, l], to_both_sides(r, 0.0, 1.0))?,
     ]);
-    let variance_px2 = settings.feature_sigma_px * settings.feature_sigma_px;
+    let sigma_px = settings.feature_sigma_px.hypot(settings.feature_sigma_per_scale * scale_px);
     Some(Point {
         stereo,
         position_in_rover: found.point,
-        covariance_in_rover: jacobian * jacobian.transpose() * variance_px2,
+        covariance_in_rover: jacobian * jacobian.transpose() * (sigma_px * sigma_px),
         range_m: found.range_left_m,
+        by_disparity_m: jacobian.column(2).into(),
     })
 }

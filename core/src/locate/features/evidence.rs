@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::detect::StopFeatures;
-use crate::estimate::ransac::Refit;
 use crate::estimate::motion_parameters::MotionParameters;
+use crate::estimate::ransac::Refit;
 use crate::frames::Pose;
 use crate::locate::template::TemplateEvidence;
 

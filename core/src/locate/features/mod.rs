@@ -179,7 +179,10 @@ impl<'a> Candidate<'a> {
         evidence.fit_motion = self.fitted(&position, input);
         if let Some(bootstrap) = &motion.bootstrap {
             evidence.bootstrap = Some(bootstrapped(bootstrap));
-            let poses = bootstrap.samples.iter().map(|theta| MotionParameters::from_vector(&(*theta).into()).to_pose());
+            let poses = bootstrap
+                .samples
+                .iter()
+                .map(|theta| MotionParameters::from_vector(&(*theta).into()).to_pose());
             evidence.cloud = tables::cloud(poses, &anchor.position_in_rover, left);
         }
         Located {

@@ -4,16 +4,23 @@
 //! It is a motion of the whole scene and knows no target: all targets share it (R168, R207). With a prior, a feature is
 //! looked for only near where the pose estimates expect it.
 
+use nalgebra::Vector6;
+
 use crate::camera::Camera;
-use crate::estimate::bootstrap::{Bootstrap, bootstrap};
-use crate::estimate::ransac::{MotionFit, fit_motion};
-use crate::estimate::weighted_motion::Correspondence;
+use crate::estimate::bootstrap::{Bootstrap, block_bootstrap};
+use crate::estimate::horn::rigid_motion;
+use crate::estimate::motion_parameters::MotionParameters;
+use crate::estimate::ransac::{MotionFit, RansacSettings, Weighting, fit_motion};
+use crate::estimate::weighted_motion::{Correspondence, rigid_motion_by_covariance};
 use crate::frames::{Pixel, Pose};
 use crate::sift::Descriptor;
 use crate::sift::matching::{self, Match};
 
 use super::detect::StopFeatures;
 use super::settings::FeatureSettings;
+
+/// Shift of the disparities by which their common error is propagated, px: small against what bends the motion.
+const SHIFT_PX: f64 = 0.05;
 
 /// The motion between two stops, with all that led to it.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,22 +52,65 @@ pub struct MotionInput<'a> {
 pub fn motion(input: &MotionInput<'_>) -> Motion {
     let MotionInput { then, now, settings, .. } = *input;
     let matches = match_points(input);
-    let correspondences: Vec<Correspondence> = matches
-        .iter()
-        .map(|m| {
-            let (before, after) = (&then.points[m.query as usize], &now.points[m.train as usize]);
-            Correspondence {
-                before: before.position_in_rover,
-                after: after.position_in_rover,
-                before_covariance: before.covariance_in_rover,
-                after_covariance: after.covariance_in_rover,
-            }
-        })
-        .collect();
+    let correspondence = |m: &Match| {
+        let (before, after) = (&then.points[m.query as usize], &now.points[m.train as usize]);
+        Correspondence {
+            before: before.position_in_rover,
+            after: after.position_in_rover,
+            before_covariance: before.covariance_in_rover,
+            after_covariance: after.covariance_in_rover,
+        }
+    };
+    let correspondences: Vec<Correspondence> = matches.iter().map(correspondence).collect();
     let fit = fit_motion(&correspondences, &settings.ransac());
-    let agreeing: Vec<Correspondence> = fit.inliers.iter().map(|index| correspondences[*index]).collect();
-    let bootstrap = fit.motion().and_then(|pose| bootstrap(&agreeing, &pose, &settings.bootstrap()));
+    let agreeing: Vec<Match> = fit.inliers.iter().map(|index| matches[*index]).collect();
+    let scatter = |pose| scatter(input, &agreeing, &fit, &correspondences, &pose);
+    let bootstrap = fit.motion().and_then(scatter);
     Motion { matches, fit, bootstrap }
+}
+
+/// The covariance of a motion: the bootstrap's, and what a common error of the disparities of either stop does to it.
+fn scatter(
+    input: &MotionInput<'_>,
+    agreeing: &[Match],
+    fit: &MotionFit,
+    correspondences: &[Correspondence],
+    pose: &Pose,
+) -> Option<Bootstrap> {
+    let settings = input.settings;
+    let pairs: Vec<Correspondence> = fit.inliers.iter().map(|index| correspondences[*index]).collect();
+    let blocks: Vec<u32> = fit.inliers.iter().zip(agreeing).map(|(i, m)| block(input, *i, m)).collect();
+    let mut bootstrap = block_bootstrap(&pairs, &blocks, pose, &settings.bootstrap())?;
+    if settings.feature_common_px > 0.0 {
+        let unmoved = MotionParameters::from(&refit(&pairs, settings)?);
+        for is_now in [false, true] {
+            let mut moved = pairs.clone();
+            for (pair, matched) in moved.iter_mut().zip(agreeing) {
+                if is_now {
+                    pair.after += input.now.points[matched.train as usize].by_disparity_m * SHIFT_PX;
+                } else {
+                    pair.before += input.then.points[matched.query as usize].by_disparity_m * SHIFT_PX;
+                }
+            }
+            let moved = MotionParameters::from(&refit(&moved, settings)?);
+            let by_pixel: Vector6<f64> = moved.minus(unmoved) / SHIFT_PX;
+            bootstrap.covariance += by_pixel * by_pixel.transpose() * settings.feature_common_px.powi(2);
+        }
+    }
+    Some(bootstrap)
+}
+
+/// The motion of matches that agree, as the fit weights them.
+fn refit(pairs: &[Correspondence], settings: &FeatureSettings) -> Option<Pose> {
+    let RansacSettings { weighting, loss, .. } = settings.ransac();
+    match weighting {
+        Weighting::None => {
+            let (before, after): (Vec<_>, Vec<_>) =
+                pairs.iter().map(|pair| (pair.before, pair.after)).unzip();
+            rigid_motion(&before, &after, None).ok()
+        }
+        Weighting::Range => Some(rigid_motion_by_covariance(pairs, loss).ok()?.after_from_before),
+    }
 }
 
 /// Matches of points by the descriptors of their left features (R160, R161).
@@ -80,6 +130,17 @@ fn match_points(input: &MotionInput<'_>) -> Vec<Match> {
         expected[query].is_some_and(|pixel| pixel.distance(pixels[train]) <= settings.prior_radius_px)
     };
     matching::matches_where(&before, &after, &settings.matching(), is_near)
+}
+
+/// Which features err alike: those of one square of the present image, or else each by itself.
+fn block(input: &MotionInput<'_>, index: usize, matched: &Match) -> u32 {
+    let cell_px = input.settings.bootstrap_cell_px;
+    if cell_px <= 0.0 {
+        return index as u32;
+    }
+    let keypoint = input.now.left_of(&input.now.points[matched.train as usize]);
+    let cell = |v: f32| (f64::from(v).max(0.0) / cell_px) as u32;
+    (cell(keypoint.y) << 16) | cell(keypoint.x)
 }
 
 fn descriptors(features: &StopFeatures) -> Vec<Descriptor> {

@@ -69,6 +69,10 @@ settings_group! {
         prior_radius_px: f64 = 0.0, "px", Domain::Between(0.0, 2000.0), "ours; off";
         /// Noise of each coordinate of a feature, from which the covariances of the points follow.
         feature_sigma_px: f64 = 0.5, "px", Domain::Between(0.01, 10.0), "D§2, R172";
+        /// What that grows by for every pixel of a feature's scale: large features lie on no surface point in particular.
+        feature_sigma_per_scale: f64 = 0.0, "", Domain::Between(0.0, 10.0), "ours; off";
+        /// Error that the disparities of all features of a stop share: what sees a stone from two sides sees it shifted.
+        feature_common_px: f64 = 0.0, "px", Domain::Between(0.0, 5.0), "ours; off";
         /// Random draws of three matches.
         motion_draws: u32 = 100, "", Domain::Between(1.0, 100_000.0), "D§2, R164";
         /// Draw on until a good draw is nearly sure.
@@ -87,6 +91,9 @@ settings_group! {
         motion_seed: u32 = 1, "", Domain::Between(0.0, 1e9), "ours";
         /// Sets that the bootstrap draws.
         bootstrap_sets: u32 = 200, "", Domain::Between(10.0, 10_000.0), "ours, R173";
+        /// Side of the squares of the image within which features err alike, so that the bootstrap draws them together; 0:
+        /// each by itself, as the paper has it.
+        bootstrap_cell_px: f64 = 0.0, "px", Domain::Between(0.0, 1024.0), "ours; off";
         /// Matches that agree with the motion at which the confidence is one half.
         confidence_matches: f64 = 30.0, "", Domain::Between(1.0, 1000.0), "D-Eq 7, R182";
         /// How steeply it rises.

@@ -25,7 +25,10 @@ fn drive() -> PlaneWorld {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.01 * f64::from(i));
         Pose::from_parts(Vector3::new(0.4 * f64::from(i), 0.02 * f64::from(i), 0.0).into(), turn)
     };
-    PlaneWorld { normal: Vector3::new(0.9, 0.3, 0.3).normalize(), ..PlaneWorld::new((0..6).map(stop).collect()) }
+    PlaneWorld {
+        normal: Vector3::new(0.9, 0.3, 0.3).normalize(),
+        ..PlaneWorld::new((0..6).map(stop).collect())
+    }
 }
 
 fn run(world: &PlaneWorld, settings: &Settings) -> Vec<StepTrace> {
