@@ -20,7 +20,7 @@ use super::plane::Plane;
 /// Rows filtered at a time.
 const ROWS: usize = 4;
 /// Rows of a task of its own, a multiple of [`ROWS`].
-const BAND: usize = 32;
+const BAND: usize = 16;
 /// Vectors of a strip downwards, and along.
 const DOWN: usize = 4;
 const ALONG: usize = 8;
@@ -46,18 +46,26 @@ impl Kernel {
     }
 
     /// r.
-    fn radius(&self) -> usize {
+    pub(super) fn radius(&self) -> usize {
         (self.taps.len() - 2 * (ROWS - 1)) / 2
     }
 }
 
-/// B of an image.
-pub(super) fn blur(source: &Plane, kernel: &Kernel, blurred: &mut Plane) {
-    blurred.resize(source.width, source.height);
+/// Makes the rows of B above `end` for which the image's rows are there.
+pub(super) fn blur(source: &Plane, kernel: &Kernel, blurred: &mut Plane, end: usize) {
+    let radius = kernel.radius();
+    let possible =
+        if source.made == source.height { source.height } else { source.made.saturating_sub(radius) };
     let stride = blurred.stride;
-    blurred.rows_mut().par_chunks_mut(BAND * stride).enumerate().for_each(|(band, rows)| {
-        Arch::new().dispatch(Band { source, kernel, top: band * BAND, rows });
-    });
+    for (first, rows) in blurred.make(end.min(possible)) {
+        rows.par_chunks_mut(BAND * stride).enumerate().for_each_init(
+            Scratch::default,
+            |scratch, (band, rows)| {
+                let top = first + band * BAND;
+                Arch::new().dispatch(Band { source, kernel, top, rows, scratch });
+            },
+        );
+    }
 }
 
 /// The pixel that pixel `at` of a mirrored row of `side` pixels shows.
@@ -67,6 +75,13 @@ fn mirrored(at: isize, side: usize) -> usize {
     at.min(period - at) as usize
 }
 
+/// Room for a few lines, and where the rows that count for them begin.
+#[derive(Default)]
+struct Scratch {
+    lines: Vec<Line>,
+    starts: Vec<usize>,
+}
+
 /// Some rows of B.
 struct Band<'a> {
     source: &'a Plane,
@@ -74,6 +89,7 @@ struct Band<'a> {
     /// The first row.
     top: usize,
     rows: &'a mut [f32],
+    scratch: &'a mut Scratch,
 }
 
 impl WithSimd for Band<'_> {
@@ -81,19 +97,20 @@ impl WithSimd for Band<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { source, kernel, top, rows } = self;
+        let Self { source, kernel, top, rows, scratch } = self;
         let (radius, width, stride) = (kernel.radius(), source.width, source.stride);
         let margin = radius.next_multiple_of(WIDEST);
         let length = margin + stride + margin + WIDEST;
-        let mut lines = vec![Line::ZERO; ROWS * length / WIDEST];
-        let lines: &mut [f32] = bytemuck::cast_slice_mut(&mut lines);
-        let mut starts = vec![0; 2 * radius + ROWS];
+        let Scratch { lines, starts } = scratch;
+        lines.resize(ROWS * length / WIDEST, Line::ZERO);
+        starts.resize(2 * radius + ROWS, 0);
+        let lines: &mut [f32] = bytemuck::cast_slice_mut(lines);
         for (block, rows) in rows.chunks_mut(ROWS * stride).enumerate() {
             let first = (top + block * ROWS) as isize - radius as isize;
             for (k, start) in starts.iter_mut().enumerate() {
-                *start = mirrored(first + k as isize, source.height) * stride;
+                *start = source.start(mirrored(first + k as isize, source.height));
             }
-            down_all(simd, source, &starts, &kernel.taps, (lines, margin, length));
+            down_all(simd, source, starts, &kernel.taps, (lines, margin, length));
             for (line, row) in lines.chunks_exact_mut(length).zip(rows.chunks_exact_mut(stride)) {
                 for i in 1..=radius {
                     line[margin - i] = line[margin + mirrored(-(i as isize), width)];

@@ -27,11 +27,11 @@ use std::f32::consts::TAU;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::Keypoint;
 use super::gradient::{gaussian_weights, inner, polar, rows_around};
 use super::lanes::{Line, WIDEST, load, places};
 use super::plane::Plane;
 use super::scale_space::Octave;
+use super::{Keypoint, Place};
 
 /// h as bytes.
 pub type Descriptor = [u8; NUMBERS];
@@ -58,9 +58,9 @@ const LENGTH: f32 = 512.0;
 const PARTS: usize = CELLS + CELLS + DIRECTIONS;
 
 /// The descriptors of keypoints of an octave.
-pub(super) fn describe(octave: &Octave, keypoints: &[Keypoint]) -> Vec<Descriptor> {
+pub(super) fn describe(octave: &Octave, keypoints: &[(Place, Keypoint)]) -> Vec<Descriptor> {
     let scale = octave.input_px() as f32;
-    let describe_one = |samples: &mut Samples, keypoint: &Keypoint| {
+    let describe_one = |samples: &mut Samples, (_, keypoint): &(Place, Keypoint)| {
         let window = Window {
             layer: &octave.layers[usize::from(keypoint.layer)],
             place: [keypoint.x / scale, keypoint.y / scale],
@@ -153,11 +153,12 @@ fn take<S: Simd>(simd: S, window: &Window<'_>, samples: &mut Samples) {
         let [low, high] = span(frame, dy);
         let first = ((x + low).ceil().max(*columns.start() as f32)) as usize;
         let last = ((x + high).floor().max(0.0) as usize).min(*columns.end());
+        let around = rows_around(layer, row);
         let mut column = first;
         while column <= last {
             let dx = column as f32 - x;
             let part = &mut parts[taken * PARTS * S::F32_LANES..][..PARTS * S::F32_LANES];
-            let (length, direction) = polar(simd, rows_around(layer, row), column);
+            let (length, direction) = polar(simd, around, column);
             let weights = load::<S>(across, column - columns.start());
             let weights = simd.mul_f32s(weights, simd.splat_f32s(*weight));
             factors(simd, [length, direction, weights], frame, orientation_rad, [dx, dy], part);
@@ -207,28 +208,34 @@ fn factors<S: Simd>(
     part: &mut [f32],
 ) {
     let part = S::as_mut_simd_f32s(part).0;
-    let (zero, one) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0));
+    let zero = simd.splat_f32s(0.0);
     let dx = simd.add_f32s(simd.splat_f32s(dx), places::<S>());
     let middle = 0.5 * (CELLS as f32 - 1.0);
     let column = simd.mul_add_e_f32s(dx, simd.splat_f32s(cos), simd.splat_f32s(dy * sin + middle));
     let row = simd.mul_add_e_f32s(dx, simd.splat_f32s(-sin), simd.splat_f32s(dy * cos + middle));
-    let circle = simd.splat_f32s(DIRECTIONS as f32);
     let turn = simd.sub_f32s(simd.splat_f32s(orientation_rad), direction);
     let turn = simd.mul_f32s(turn, simd.splat_f32s(DIRECTIONS as f32 / TAU));
-    let is_behind = simd.less_than_f32s(turn, zero);
-    let turn = simd.select_f32s(is_behind, simd.add_f32s(turn, circle), turn);
+    // A full circle is added to what is negative: 4 less 4 with its sign.
+    let half = simd.splat_f32s(HALF as f32);
+    let signed = simd.or_f32s(half, simd.and_f32s(turn, simd.splat_f32s(-0.0)));
+    let turn = simd.add_f32s(turn, simd.sub_f32s(half, signed));
     let mass = simd.mul_f32s(length, weights);
     for i in 0..CELLS {
-        let cell = simd.splat_f32s(i as f32);
-        let tent = simd.sub_f32s(one, simd.abs_f32s(simd.sub_f32s(row, cell)));
+        // 1 − |a| is the lesser of 1 − a and 1 + a.
+        let (below, above) = (simd.splat_f32s(1.0 - i as f32), simd.splat_f32s(1.0 + i as f32));
+        let tent = simd.min_f32s(simd.add_f32s(row, below), simd.sub_f32s(above, row));
         part[i] = simd.mul_f32s(mass, simd.max_f32s(tent, zero));
-        let tent = simd.sub_f32s(one, simd.abs_f32s(simd.sub_f32s(column, cell)));
+        let tent = simd.min_f32s(simd.add_f32s(column, below), simd.sub_f32s(above, column));
         part[CELLS + i] = simd.max_f32s(tent, zero);
     }
     for k in 0..DIRECTIONS {
-        let away = simd.abs_f32s(simd.sub_f32s(turn, simd.splat_f32s(k as f32)));
-        let away = simd.min_f32s(away, simd.sub_f32s(circle, away));
-        part[2 * CELLS + k] = simd.max_f32s(simd.sub_f32s(one, away), zero);
+        let (below, above) = (simd.splat_f32s(1.0 - k as f32), simd.splat_f32s(1.0 + k as f32));
+        let mut tent = simd.min_f32s(simd.add_f32s(turn, below), simd.sub_f32s(above, turn));
+        if k == 0 {
+            // A little less than a full circle is near it as well.
+            tent = simd.max_f32s(tent, simd.sub_f32s(turn, simd.splat_f32s(DIRECTIONS as f32 - 1.0)));
+        }
+        part[2 * CELLS + k] = simd.max_f32s(tent, zero);
     }
 }
 

@@ -11,17 +11,22 @@
 //! | x̂ | [`Extremum::offset`] | px of the octave, layers |
 //! | r | `edge_ratio_max` of the settings | – |
 //!
-//! Two neighbouring pixels can lead to one and the same place: it counts once.
+//! Two neighbouring pixels can lead to one and the same place, which is then found twice.
+
+use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::SiftSettings;
+use super::plane::Plane;
 use super::scale_space::{BORDER, Octave};
 use super::scan::{self, Candidate};
 
 /// Moves to a neighbour at most.
 const STEPS_MAX: usize = 5;
+/// Pixels from where it began at most: what lies farther away is another extremum.
+pub(super) const MOVE_MAX: usize = 5;
 /// Share of the least contrast that the pixel itself must have.
 const PIXEL_SHARE: f64 = 0.5;
 
@@ -29,9 +34,7 @@ const PIXEL_SHARE: f64 = 0.5;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Extremum {
     /// The nearest layer and pixel.
-    pub(super) layer: usize,
-    x: usize,
-    y: usize,
+    pub(super) pixel: Candidate,
     /// From there, along (x, y, layer).
     offset: [f64; 3],
     /// D(x̂).
@@ -41,36 +44,35 @@ pub(super) struct Extremum {
 impl Extremum {
     /// Its place (x, y), px of the octave.
     pub(super) fn place(&self) -> [f64; 2] {
-        [self.x as f64 + self.offset[0], self.y as f64 + self.offset[1]]
+        [self.pixel.x as f64 + self.offset[0], self.pixel.y as f64 + self.offset[1]]
     }
 
     /// Its scale as a layer and a fraction.
     pub(super) fn layer_exact(&self) -> f64 {
-        self.layer as f64 + self.offset[2]
+        self.pixel.layer as f64 + self.offset[2]
     }
 }
 
-/// The extrema of an octave, in the order of layer, row and column.
-pub(super) fn find(octave: &Octave, settings: &SiftSettings) -> Vec<Extremum> {
+/// The extrema of some rows of an octave, in the order of layer, row and column.
+pub(super) fn find(octave: &Octave, rows: Range<usize>, settings: &SiftSettings) -> Vec<Extremum> {
     let threshold = (PIXEL_SHARE * settings.contrast_min) as f32;
-    let candidates = scan::extrema(octave, threshold);
+    let candidates = scan::extrema(octave, rows, threshold);
     let mut extrema: Vec<Extremum> =
         candidates.par_iter().filter_map(|&candidate| refine(octave, candidate, settings)).collect();
-    let place = |extremum: &Extremum| (extremum.layer, extremum.y, extremum.x);
-    extrema.sort_by_key(place);
-    extrema.dedup_by_key(|extremum| place(extremum));
+    extrema.sort_by_key(|extremum| extremum.pixel);
     extrema
 }
 
 /// The extremum near a pixel.
 fn refine(octave: &Octave, candidate: Candidate, settings: &SiftSettings) -> Option<Extremum> {
     let Candidate { layer, y, x } = candidate;
-    let (width, height) = (octave.layers[0].width, octave.layers[0].height);
+    let [width, height] = octave.size();
     let mut at = [x, y, layer];
     let is_inside = |[x, y, layer]: [usize; 3]| {
         (BORDER..width - BORDER).contains(&x)
             && (BORDER..height - BORDER).contains(&y)
             && (1..=octave.scales()).contains(&layer)
+            && x.abs_diff(candidate.x).max(y.abs_diff(candidate.y)) <= MOVE_MAX
     };
     for _ in 0..STEPS_MAX {
         let around = Around::of(octave, at);
@@ -89,7 +91,11 @@ fn refine(octave: &Octave, candidate: Candidate, settings: &SiftSettings) -> Opt
         let contrast = around.value(0, 0, 0) + 0.5 * gradient.dot(&offset);
         let is_kept = contrast.abs() >= settings.contrast_min && !is_edge(&hessian, settings.edge_ratio_max);
         let [x, y, layer] = at;
-        return is_kept.then_some(Extremum { layer, x, y, offset: offset.into(), contrast });
+        return is_kept.then_some(Extremum {
+            pixel: Candidate { layer, y, x },
+            offset: offset.into(),
+            contrast,
+        });
     }
     None
 }
@@ -110,10 +116,12 @@ impl Around {
         for (l, layer_values) in values.iter_mut().enumerate() {
             let (finer, coarser) = (&octave.layers[layer + l - 1], &octave.layers[layer + l]);
             for (v, row) in layer_values.iter_mut().enumerate() {
-                for (u, value) in row.iter_mut().enumerate() {
-                    let (x, y) = (x + u - 1, y + v - 1);
-                    *value = f64::from(coarser.at(x, y)) - f64::from(finer.at(x, y));
-                }
+                let pixels = |plane: &Plane| -> [f64; 3] {
+                    let row = &plane.from_row(y + v - 1)[x - 1..x + 2];
+                    [f64::from(row[0]), f64::from(row[1]), f64::from(row[2])]
+                };
+                let (finer, coarser) = (pixels(finer), pixels(coarser));
+                *row = [coarser[0] - finer[0], coarser[1] - finer[1], coarser[2] - finer[2]];
             }
         }
         Self(values)

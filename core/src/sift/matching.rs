@@ -1,13 +1,15 @@
 //! Nearest descriptors (R158, R161).
 //!
 //! ```text
-//! |a − b|² = |a|² + |b|² − 2 a·b          ratio = |q − nearest| / |q − second nearest|
+//! |a − b|² = Σ (a_i − b_i)²               ratio = |q − nearest| / |q − second nearest|
 //! ```
-//! All numbers are whole and below 2²⁴: the distances are exact.
+//! Distances are exact: whole numbers. Without a constraint they come from a product of matrices (`products`); with one,
+//! which mostly leaves few, one after the other.
 
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::Descriptor;
+use super::{Descriptor, products};
 
 /// The two nearest of a set; squared Euclidean distances. Of equal ones the lower index counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,7 +47,7 @@ pub struct MatchSettings {
 
 /// The nearest neighbours in `train` of each of `query`; none where `train` is empty.
 pub fn nearest(query: &[Descriptor], train: &[Descriptor]) -> Vec<Option<Neighbours>> {
-    nearest_where(query, train, |_, _| true)
+    products::nearest(query, train)
 }
 
 /// The nearest neighbours among those that `allowed` (index into `query`, index into `train`) lets through.
@@ -54,29 +56,51 @@ pub fn nearest_where(
     train: &[Descriptor],
     allowed: impl Fn(usize, usize) -> bool + Sync,
 ) -> Vec<Option<Neighbours>> {
-    let of_one = |(q, descriptor): (usize, &Descriptor)| {
-        let mut best: Option<Neighbours> = None;
-        for (t, other) in train.iter().enumerate().filter(|(t, _)| allowed(q, *t)) {
-            let distance2 = distance2(descriptor, other);
-            best = Some(match best {
-                None => Neighbours { nearest: t as u32, distance2, second_distance2: None },
-                Some(best) if distance2 < best.distance2 => {
-                    Neighbours { nearest: t as u32, distance2, second_distance2: Some(best.distance2) }
-                }
-                Some(best) => {
-                    let second = best.second_distance2.map_or(distance2, |second| second.min(distance2));
-                    Neighbours { second_distance2: Some(second), ..best }
-                }
-            });
-        }
-        best
+    let of_one = |(q, query): (usize, &Descriptor)| {
+        let among: Vec<usize> = (0..train.len()).filter(|&t| allowed(q, t)).collect();
+        Arch::new().dispatch(Among { query, train, among: &among })
     };
     query.par_iter().enumerate().map(of_one).collect()
 }
 
-/// |a − b|².
+/// The nearest neighbours of a query among some of the others, one after the other.
+struct Among<'a> {
+    query: &'a Descriptor,
+    train: &'a [Descriptor],
+    among: &'a [usize],
+}
+
+impl WithSimd for Among<'_> {
+    type Output = Option<Neighbours>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+        let Self { query, train, among } = self;
+        let mut found: Option<Neighbours> = None;
+        for &t in among {
+            let distance2 = distance2(query, &train[t]);
+            let (nearest, second) = (t as u32, found.map(|found| found.distance2));
+            found = Some(match found {
+                Some(found) if distance2 >= found.distance2 => {
+                    let second = found.second_distance2.map_or(distance2, |second| second.min(distance2));
+                    Neighbours { second_distance2: Some(second), ..found }
+                }
+                _ => Neighbours { nearest, distance2, second_distance2: second },
+            });
+        }
+        found
+    }
+}
+
+/// |a − b|², at most 128 · 255². (Checks for an overflow that cannot be would keep the sum from being taken many at once.)
+#[inline(always)]
 pub fn distance2(a: &Descriptor, b: &Descriptor) -> u32 {
-    a.iter().zip(b).map(|(&a, &b)| u32::from(a.abs_diff(b)).pow(2)).sum()
+    let mut sum = 0_i32;
+    for (&a, &b) in a.iter().zip(b) {
+        let difference = i32::from(i16::from(a).wrapping_sub(i16::from(b)));
+        sum = sum.wrapping_add(difference.wrapping_mul(difference));
+    }
+    sum.cast_unsigned()
 }
 
 /// The matches of two sets, in the order of `query`.

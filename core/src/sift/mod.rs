@@ -28,6 +28,7 @@
 //! | `orientation` | the directions that most gradients around a keypoint share |
 //! | `descriptor` | the 4 × 4 histograms of gradients around it |
 //! | `matching` | nearest descriptors |
+//! | `products` | those of all by a product of matrices |
 //! | `lanes` | slices of numbers as the processor's vectors |
 //!
 //! Pixel (x, y) of octave o lies on pixel (2^o x, 2^o y) of the input image, with no half pixel between: the doubled
@@ -47,13 +48,17 @@ mod extrema;
 mod gradient;
 mod orientation;
 mod descriptor;
+mod products;
 pub mod matching;
+
+use std::collections::BTreeSet;
 
 use rayon::prelude::*;
 
 use crate::image::GrayImage;
 use extrema::Extremum;
 use scale_space::{Octave, ScaleSpace};
+use scan::Candidate;
 use validity::Validity;
 
 pub use descriptor::Descriptor;
@@ -129,34 +134,34 @@ pub struct Features {
 /// change. An image too small for a single octave, or flat, has no features; nor has any with settings that
 /// describe no scale space (a σ or a number of scales that is not positive).
 pub fn detect(image: &GrayImage, settings: &SiftSettings) -> Features {
-    let mut features = Features::default();
-    let Some(validity) = Validity::of(image) else { return features };
-    let Some(mut space) = ScaleSpace::new(&validity.mended(image), settings) else { return features };
-    while let Some(octave) = space.next_octave() {
-        let extrema = extrema::find(octave, settings);
-        let mut keypoints: Vec<Keypoint> = extrema
-            .par_iter()
-            .flat_map_iter(|extremum| orient(octave, extremum, settings))
-            .filter(|keypoint| validity.allows(keypoint))
-            .collect();
-        keep_strongest(&mut keypoints, settings.features_max, |keypoint| keypoint.contrast);
-        let described = descriptor::describe(octave, &keypoints);
-        features.keypoints.append(&mut keypoints);
-        features.descriptors.extend(described);
+    let Some(validity) = Validity::of(image) else { return Features::default() };
+    let mended = validity.mended(image);
+    let Some(mut space) = ScaleSpace::new(&mended, settings) else { return Features::default() };
+    let mut strongest = Strongest::new(settings.features_max);
+    while space.next_octave() {
+        let mut seen = BTreeSet::new();
+        while let Some((octave, rows)) = space.slide() {
+            let mut extrema = extrema::find(octave, rows, settings);
+            extrema.retain(|extremum| seen.insert(extremum.pixel) && strongest.may_keep(extremum.contrast));
+            let orient_one = |extremum: &Extremum| orient(octave, extremum, settings);
+            let mut found: Vec<(Place, Keypoint)> = extrema.par_iter().flat_map_iter(orient_one).collect();
+            found.retain(|(_, keypoint)| validity.allows(keypoint));
+            let described = descriptor::describe(octave, &found);
+            strongest.add(found.into_iter().zip(described));
+        }
     }
-    let Features { keypoints, descriptors } = features;
-    let mut both: Vec<(Keypoint, Descriptor)> = keypoints.into_iter().zip(descriptors).collect();
-    keep_strongest(&mut both, settings.features_max, |(keypoint, _)| keypoint.contrast);
-    let (keypoints, descriptors) = both.into_iter().unzip();
-    Features { keypoints, descriptors }
+    strongest.features()
 }
 
+/// Where a feature stands among all: octave, layer, row and column.
+type Place = (i32, Candidate);
+
 /// The keypoints of an extremum: one for each direction.
-fn orient(octave: &Octave, extremum: &Extremum, settings: &SiftSettings) -> Vec<Keypoint> {
+fn orient(octave: &Octave, extremum: &Extremum, settings: &SiftSettings) -> Vec<(Place, Keypoint)> {
     let scale = octave.input_px();
     let sigma_in_octave = octave.sigma_at(extremum.layer_exact());
     let [x, y] = extremum.place();
-    let layer = &octave.layers[extremum.layer];
+    let layer = &octave.layers[extremum.pixel.layer];
     let directions =
         orientation::directions(layer, [x, y], sigma_in_octave as f32, settings.orientation_peak as f32);
     let keypoint = |orientation_rad| Keypoint {
@@ -166,26 +171,52 @@ fn orient(octave: &Octave, extremum: &Extremum, settings: &SiftSettings) -> Vec<
         orientation_rad,
         contrast: extremum.contrast as f32,
         octave: octave.exponent as i8,
-        layer: extremum.layer as u8,
+        layer: extremum.pixel.layer as u8,
     };
-    directions.into_iter().map(keypoint).collect()
+    let place = (octave.exponent, extremum.pixel);
+    directions.into_iter().map(|direction| (place, keypoint(direction))).collect()
 }
 
-/// Keeps the `count` of largest magnitude (0: all) in their order; of equal ones the earlier.
-fn keep_strongest<T>(all: &mut Vec<T>, count: u32, contrast: impl Fn(&T) -> f32) {
-    let count = count as usize;
-    if count == 0 || all.len() <= count {
-        return;
+/// The features found so far, or as many of them as are wanted.
+struct Strongest {
+    /// How many; 0: all.
+    count: usize,
+    /// What one more must exceed, once there are so many.
+    floor: f32,
+    features: Vec<((Place, Keypoint), Descriptor)>,
+}
+
+impl Strongest {
+    fn new(count: u32) -> Self {
+        Self { count: count as usize, floor: -1.0, features: Vec::new() }
     }
-    let mut order: Vec<usize> = (0..all.len()).collect();
-    order.sort_by(|&a, &b| contrast(&all[b]).abs().total_cmp(&contrast(&all[a]).abs()));
-    let mut is_kept = vec![false; all.len()];
-    for &kept in &order[..count] {
-        is_kept[kept] = true;
+
+    /// Whether a feature of this contrast would be kept, as far as is known.
+    fn may_keep(&self, contrast: f64) -> bool {
+        contrast.abs() as f32 > self.floor
     }
-    let mut kept = is_kept.into_iter();
-    all.retain(|_| kept.next().unwrap_or(false));
+
+    /// Adds features; of equally strong ones the earlier stay.
+    fn add(&mut self, features: impl Iterator<Item = ((Place, Keypoint), Descriptor)>) {
+        self.features.extend(features);
+        if self.count > 0 && self.features.len() > self.count {
+            let strength = |feature: &((Place, Keypoint), Descriptor)| feature.0.1.contrast.abs();
+            self.features.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
+            self.features.truncate(self.count);
+            self.floor = self.features.last().map_or(-1.0, strength);
+        }
+    }
+
+    /// All that are kept, in order.
+    fn features(mut self) -> Features {
+        self.features.sort_by_key(|((place, _), _)| *place);
+        let (keypoints, descriptors) =
+            self.features.into_iter().map(|((_, keypoint), descriptor)| (keypoint, descriptor)).unzip();
+        Features { keypoints, descriptors }
+    }
 }
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod recorded_tests;

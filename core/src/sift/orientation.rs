@@ -19,13 +19,17 @@ use super::plane::Plane;
 
 /// Bins of the full circle.
 const BINS: usize = 36;
+/// Room for the bins: a power of two.
+const ROOM: usize = 64;
+/// From here on numbers have no fraction.
+const WHOLE: f32 = 8_388_608.0;
 /// The weights' standard deviation, and where they end, in σ.
 const WEIGHT_SIGMA: f32 = 1.5;
 const REACH: f32 = 3.0 * WEIGHT_SIGMA;
 
 /// The directions at a place (x, y), rad from −π to π; none where all is flat.
 pub(super) fn directions(layer: &Plane, [x, y]: [f64; 2], sigma: f32, peak_share: f32) -> Vec<f32> {
-    let mut histogram = [0.0; BINS + 1];
+    let mut histogram = [0.0; ROOM];
     Arch::new().dispatch(Fill { layer, place: [x as f32, y as f32], sigma, histogram: &mut histogram });
     // The last bin is the first, after a full turn.
     histogram[0] += histogram[BINS];
@@ -59,7 +63,7 @@ struct Fill<'a> {
     layer: &'a Plane,
     place: [f32; 2],
     sigma: f32,
-    histogram: &'a mut [f32; BINS + 1],
+    histogram: &'a mut [f32; ROOM],
 }
 
 impl WithSimd for Fill<'_> {
@@ -75,8 +79,8 @@ impl WithSimd for Fill<'_> {
         gaussian_weights(columns.clone(), x, WEIGHT_SIGMA * sigma, WIDEST, &mut across);
         gaussian_weights(rows.clone(), y, WEIGHT_SIGMA * sigma, 0, &mut down);
         let count = across.len() - WIDEST;
-        // Half a bin is added, so that the whole number below is the nearest bin.
-        let (scale, start) = (simd.splat_f32s(BINS as f32 / TAU), simd.splat_f32s(0.5 * BINS as f32 + 0.5));
+        // The sum with 2²³ is rounded to a whole number, which its lowest bits hold.
+        let (scale, start) = (simd.splat_f32s(BINS as f32 / TAU), simd.splat_f32s(0.5 * BINS as f32 + WHOLE));
         let (mut bins, mut weights) = ([0.0_f32; WIDEST], [0.0_f32; WIDEST]);
         for (row, weight) in rows.zip(&down) {
             let around = rows_around(layer, row);
@@ -87,7 +91,7 @@ impl WithSimd for Fill<'_> {
                 store::<S>(&mut bins, 0, simd.mul_add_e_f32s(direction, scale, start));
                 store::<S>(&mut weights, 0, simd.mul_f32s(length, weight));
                 for (bin, weight) in bins.iter().zip(&weights).take(S::F32_LANES) {
-                    histogram[(*bin as usize).min(BINS)] += weight;
+                    histogram[bin.to_bits() as usize % ROOM] += weight;
                 }
                 i += S::F32_LANES;
             }

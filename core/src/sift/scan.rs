@@ -6,6 +6,8 @@
 //! ```
 //! Of several equal pixels side by side exactly one is found so. The differences of three rows at a time are held.
 
+use std::ops::Range;
+
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
@@ -13,7 +15,7 @@ use super::lanes::{Line, WIDEST, load, store};
 use super::scale_space::{BORDER, Octave};
 
 /// Rows of a task of its own.
-const BAND: usize = 64;
+const BAND: usize = 32;
 /// Rows held.
 const HELD: usize = 3;
 
@@ -26,10 +28,10 @@ pub(super) struct Candidate {
     pub(super) x: usize,
 }
 
-/// The extrema of all layers with |D| above `threshold`, in the order of layer, row and column.
-pub(super) fn extrema(octave: &Octave, threshold: f32) -> Vec<Candidate> {
-    let end = octave.layers[0].height - BORDER;
-    let tops: Vec<usize> = (BORDER..end).step_by(BAND).collect();
+/// The extrema of some rows of all layers with |D| above `threshold`, in the order of layer, row and column.
+pub(super) fn extrema(octave: &Octave, rows: Range<usize>, threshold: f32) -> Vec<Candidate> {
+    let end = rows.end;
+    let tops: Vec<usize> = rows.step_by(BAND).collect();
     let band = |&top: &usize| {
         let mut found = Vec::new();
         Arch::new().dispatch(Band {
@@ -68,11 +70,9 @@ impl WithSimd for Band<'_> {
             while next <= y + 1 {
                 for layer in 0..layers {
                     let at = (layer * HELD + next % HELD) * line;
-                    let row = next * stride;
-                    let (finer, coarser) = (octave.layers[layer].values(), octave.layers[layer + 1].values());
                     simd.vectorize(Difference {
-                        finer: &finer[row..row + stride],
-                        coarser: &coarser[row..row + stride],
+                        finer: &octave.layers[layer].from_row(next)[..stride],
+                        coarser: &octave.layers[layer + 1].from_row(next)[..stride],
                         difference: &mut lines[at..at + stride],
                     });
                 }
@@ -84,7 +84,7 @@ impl WithSimd for Band<'_> {
                     let at = ((layer + l - 1) * HELD + (y + v - 1) % HELD) * line;
                     &lines[at..at + line]
                 });
-                let width = octave.layers[0].width;
+                let width = octave.size()[0];
                 simd.vectorize(Row { around, threshold, width, layer, y, found });
             }
         }
