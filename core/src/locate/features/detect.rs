@@ -34,8 +34,8 @@ pub struct Point {
     pub covariance_in_rover: Matrix3<f64>,
     /// Distance from the left camera, m.
     pub range_m: f64,
-    /// How it moves with the right pixel's column, m per px.
-    pub by_disparity_m: Vector3,
+    /// How it moves when both pixels go right, when both go down, and when the right one alone goes right, m per px.
+    pub by_shift_m: [Vector3; 3],
 }
 
 /// What one stop offers: all features of both eyes, and those that became points.
@@ -111,6 +111,10 @@ fn triangulate(
         position_in_rover: found.point,
         covariance_in_rover: jacobian * jacobian.transpose() * (sigma_px * sigma_px),
         range_m: found.range_left_m,
-        by_disparity_m: jacobian.column(2).into(),
+        by_shift_m: [
+            jacobian.column(0) + jacobian.column(2),
+            jacobian.column(1) + jacobian.column(3),
+            jacobian.column(2).into(),
+        ],
     })
 }

@@ -4,7 +4,7 @@
 //! It is a motion of the whole scene and knows no target: all targets share it (R168, R207). With a prior, a feature is
 //! looked for only near where the pose estimates expect it.
 
-use nalgebra::Vector6;
+use nalgebra::{Matrix6, Vector6};
 
 use crate::camera::Camera;
 use crate::estimate::bootstrap::{Bootstrap, block_bootstrap};
@@ -19,7 +19,7 @@ use crate::sift::matching::{self, Match};
 use super::detect::StopFeatures;
 use super::settings::FeatureSettings;
 
-/// Shift of the disparities by which their common error is propagated, px: small against what bends the motion.
+/// Shift of the pixels by which their common error is propagated, px: small against what bends the motion.
 const SHIFT_PX: f64 = 0.05;
 
 /// The motion between two stops, with all that led to it.
@@ -82,22 +82,34 @@ fn scatter(
     let blocks: Vec<u32> = fit.inliers.iter().zip(agreeing).map(|(i, m)| block(input, *i, m)).collect();
     let mut bootstrap = block_bootstrap(&pairs, &blocks, pose, &settings.bootstrap())?;
     if settings.feature_common_px > 0.0 {
-        let unmoved = MotionParameters::from(&refit(&pairs, settings)?);
-        for is_now in [false, true] {
-            let mut moved = pairs.clone();
-            for (pair, matched) in moved.iter_mut().zip(agreeing) {
-                if is_now {
-                    pair.after += input.now.points[matched.train as usize].by_disparity_m * SHIFT_PX;
-                } else {
-                    pair.before += input.then.points[matched.query as usize].by_disparity_m * SHIFT_PX;
-                }
-            }
-            let moved = MotionParameters::from(&refit(&moved, settings)?);
-            let by_pixel: Vector6<f64> = moved.minus(unmoved) / SHIFT_PX;
-            bootstrap.covariance += by_pixel * by_pixel.transpose() * settings.feature_common_px.powi(2);
-        }
+        bootstrap.covariance += common_error(input, agreeing, &pairs)? * settings.feature_common_px.powi(2);
     }
     Some(bootstrap)
+}
+
+/// What an error of one pixel does to the motion that all features of a stop share: of both pixels, which counts once for
+/// the two stops together, and of the disparities of either stop.
+fn common_error(
+    input: &MotionInput<'_>,
+    agreeing: &[Match],
+    pairs: &[Correspondence],
+) -> Option<Matrix6<f64>> {
+    let unmoved = MotionParameters::from(&refit(pairs, input.settings)?);
+    let mut covariance = Matrix6::zeros();
+    for (is_now, shift) in [(true, 0), (true, 1), (true, 2), (false, 2)] {
+        let mut moved = pairs.to_vec();
+        for (pair, matched) in moved.iter_mut().zip(agreeing) {
+            if is_now {
+                pair.after += input.now.points[matched.train as usize].by_shift_m[shift] * SHIFT_PX;
+            } else {
+                pair.before += input.then.points[matched.query as usize].by_shift_m[shift] * SHIFT_PX;
+            }
+        }
+        let moved = MotionParameters::from(&refit(&moved, input.settings)?);
+        let by_pixel: Vector6<f64> = moved.minus(unmoved) / SHIFT_PX;
+        covariance += by_pixel * by_pixel.transpose();
+    }
+    Some(covariance)
 }
 
 /// The motion of matches that agree, as the fit weights them.
