@@ -6,9 +6,14 @@
 //! ```text
 //! in:   zncc <index of the image> <side of the template> <left> <top> <repetitions>
 //! out:  <seconds of each repetition, the quickest of them> <score> <score> …
+//! in:   sift <index of the image> <repetitions>
+//! out:  <seconds> <keypoints>
+//! in:   match <file of descriptors> <queries> <repetitions>
+//! out:  <seconds> <nearest> <its distance> <that of the second nearest> <nearest> …
 //! ```
-//! The scores are those of every 97th position, for the comparison with the other side's. Everything runs on this one
-//! thread. Without an argument (as a plain bench) there is nothing to do.
+//! The scores are those of every 97th position, the neighbours those of every 97th query, for the comparison with the
+//! other side's. Descriptors are 128 bytes each: first the queries, then those they are compared with. Everything runs
+//! on this one thread. Without an argument (as a plain bench) there is nothing to do.
 
 use std::hint::black_box;
 use std::io::{BufRead, Write};
@@ -16,6 +21,7 @@ use std::time::Instant;
 
 use sightline_core::correlate::{PixelRect, zncc_surface};
 use sightline_core::image::{GrayImage, Patch};
+use sightline_core::sift::{Descriptor, SiftSettings, detect, nearest};
 
 fn main() {
     let Some(path) = std::env::args().nth(1).filter(|argument| !argument.starts_with('-')) else { return };
@@ -25,11 +31,14 @@ fn main() {
     for line in std::io::stdin().lock().lines().map_while(Result::ok) {
         let words: Vec<&str> = line.split_whitespace().collect();
         let numbers: Vec<u32> = words.iter().skip(1).filter_map(|word| word.parse().ok()).collect();
-        let (Some(&"zncc"), [image, size, left, top, repetitions]) = (words.first(), numbers.as_slice())
-        else {
-            panic!("not a line of the protocol: {line}");
+        let answer = match (words.as_slice(), numbers.as_slice()) {
+            (["zncc", ..], [image, size, left, top, repetitions]) => {
+                run(&images[*image as usize], [*size, *left, *top], *repetitions)
+            }
+            (["sift", ..], [image, repetitions]) => run_sift(&images[*image as usize], *repetitions),
+            (["match", path, ..], [queries, repetitions]) => run_match(path, *queries, *repetitions),
+            _ => panic!("not a line of the protocol: {line}"),
         };
-        let answer = run(&images[*image as usize], [*size, *left, *top], *repetitions);
         let mut out = std::io::stdout().lock();
         writeln!(out, "{answer}").and_then(|()| out.flush()).expect("the answer can be written");
     }
@@ -51,14 +60,44 @@ fn read_images(mut bytes: &[u8]) -> Vec<GrayImage> {
 fn run(image: &GrayImage, [size, left, top]: [u32; 3], repetitions: u32) -> String {
     let template: Patch = GrayImage::from_fn(size, size, |x, y| *image.get_pixel(left + x, top + y)).into();
     let region = PixelRect::whole(image.width(), image.height());
-    let mut quickest = f64::INFINITY;
-    let mut scores = Vec::new();
-    for _ in 0..repetitions {
-        let start = Instant::now();
-        let surface = zncc_surface(black_box(&template), black_box(image), region);
-        quickest = quickest.min(start.elapsed().as_secs_f64());
-        scores = surface.expect("the image holds the template").scores;
-    }
+    let (seconds, surface) =
+        quickest(repetitions, || zncc_surface(black_box(&template), black_box(image), region));
+    let scores = surface.expect("the image holds the template").scores;
     let shown = scores.iter().step_by(97).map(|score| format!(" {score:.7}"));
-    format!("{quickest:.9}{}", shown.collect::<String>())
+    format!("{seconds:.9}{}", shown.collect::<String>())
+}
+
+/// Seconds of the quickest repetition and what it gave.
+fn quickest<T>(repetitions: u32, mut work: impl FnMut() -> T) -> (f64, T) {
+    let mut timed = || {
+        let start = Instant::now();
+        let result = work();
+        (start.elapsed().as_secs_f64(), result)
+    };
+    let first = timed();
+    (1..repetitions).fold(first, |best, _| {
+        let next = timed();
+        if next.0 < best.0 { next } else { best }
+    })
+}
+
+/// Seconds of the quickest repetition, and how many keypoints.
+fn run_sift(image: &GrayImage, repetitions: u32) -> String {
+    let settings = SiftSettings::default();
+    let (seconds, features) = quickest(repetitions, || detect(black_box(image), &settings));
+    format!("{seconds:.9} {}", features.keypoints.len())
+}
+
+/// Seconds of the quickest repetition, and neighbours of some queries.
+fn run_match(path: &str, queries: u32, repetitions: u32) -> String {
+    let bytes = std::fs::read(path).expect("the file of descriptors can be read");
+    let (descriptors, _): (&[Descriptor], _) = bytes.as_chunks();
+    let (query, train) = descriptors.split_at(queries as usize);
+    let (seconds, neighbours) = quickest(repetitions, || nearest(black_box(query), black_box(train)));
+    let shown = neighbours.iter().step_by(97).flatten().map(|found| {
+        let distance = |square: u32| f64::from(square).sqrt();
+        let second = found.second_distance2.map_or(-1.0, distance);
+        format!(" {} {:.4} {second:.4}", found.nearest, distance(found.distance2))
+    });
+    format!("{seconds:.9}{}", shown.collect::<String>())
 }

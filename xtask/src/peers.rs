@@ -1,9 +1,10 @@
-//! `cargo xtask bench --peers`: our correlation and OpenCV's on the same pixels, in turn, in one run.
+//! `cargo xtask bench --peers`: our correlation, features and matches and OpenCV's, on the same pixels, in turn, in one run.
 //!
 //! Both sides are programs that stay open and answer one line with another (`core/benches/peer.rs`,
 //! `xtask/peers/opencv.py`): a few repetitions of one work, of which the quickest counts. They are asked in turn, ours,
 //! theirs, ours, theirs, so that whatever else the machine does meets both; of the rounds the median is reported. Each
-//! side has one thread. The scores of both must agree before any time is shown.
+//! side has one thread. What both find must agree before any time is shown: scores to 1e-4, the number of keypoints to
+//! 5 %, the nearest descriptors exactly.
 //!
 //! OpenCV comes from PyPI into a virtual environment in the target folder, once.
 
@@ -18,24 +19,46 @@ use crate::cmd;
 /// What is installed, exactly.
 const PACKAGES: [&str; 2] = ["numpy==2.4.6", "opencv-python-headless==5.0.0.93"];
 
-/// The name under which the other side is reported.
-const PEER: &str = "opencv matchTemplate(TM_CCOEFF_NORMED)";
+/// The names under which the other side is reported.
+const CORRELATION: &str = "opencv matchTemplate(TM_CCOEFF_NORMED)";
+const FEATURES: &str = "opencv SIFT.detectAndCompute";
+const MATCHES: &str = "opencv BFMatcher(NORM_L2).knnMatch(k=2)";
 
 /// How far two scores of one position may lie apart: OpenCV sums in single precision.
-const TOLERANCE: f64 = 1e-4;
+const SCORES_APART: f64 = 1e-4;
+
+/// How far the numbers of keypoints may lie apart, as a share of them.
+const KEYPOINTS_APART: f64 = 0.05;
+
+/// How far distances of descriptors, the roots of whole numbers written with four digits, may lie apart.
+const DISTANCES_APART: f64 = 2e-4;
 
 /// How often each side is asked for one work.
 const ROUNDS: usize = 15;
 
-/// Sides of the images searched, px.
+/// Sides of the images: two that are searched, and a scene whose features are looked for.
 const IMAGES: [u32; 2] = [161, 621];
+const SCENE: u32 = 1024;
 
-/// One work: a template of a side over an image of `IMAGES`, so often in a row.
-const WORKS: [(u32, usize, u32); 4] = [(11, 0, 20), (21, 0, 20), (31, 0, 20), (21, 1, 3)];
+/// A template of a side over an image of `IMAGES`, so often in a row.
+const TEMPLATES: [(u32, usize, u32); 4] = [(11, 0, 20), (21, 0, 20), (31, 0, 20), (21, 1, 3)];
+
+/// Descriptors that are compared with as many others.
+const QUERIES: u32 = 2000;
+
+/// One work, as both sides are asked for it.
+struct Work {
+    name: String,
+    request: String,
+    peer: &'static str,
+    /// How far the numbers of both sides may lie apart: by themselves, and as a share of them.
+    apart: [f64; 2],
+}
 
 /// The comparison of one work.
 struct Compared {
     work: String,
+    peer: &'static str,
     ours_ms: f64,
     peer_ms: f64,
 }
@@ -52,18 +75,43 @@ pub(crate) fn peers(json: bool) -> Result<()> {
     let mut peer = Side::start(Command::new(python).arg(script).arg(&pixels), "opencv.py")?;
     if !json {
         cmd::say(format!(
-            "{:<24} {:>10} {:>10} {:>7}   {PEER}, one thread each",
+            "{:<24} {:>10} {:>10} {:>7}   one thread each",
             "work", "ours ms", "peer ms", "ratio"
         ));
     }
-    for (size, image, repetitions) in WORKS {
-        let side = IMAGES[image];
-        let work = format!("zncc {size}x{size} over {side}x{side}");
-        let request = format!("zncc {image} {size} {} {} {repetitions}", side / 3, side / 4);
-        let compared = compare(work, &request, &mut ours, &mut peer)?;
+    let descriptors = folder.join("descriptors.u8");
+    peer.ask(&format!("describe {} {} {}", IMAGES.len(), 2 * QUERIES, descriptors.display()))?;
+    for work in works(&descriptors.display().to_string()) {
+        let compared = compare(work, &mut ours, &mut peer)?;
         cmd::say(if json { compared.json() } else { compared.row() });
     }
     Ok(())
+}
+
+/// All works; `descriptors` is the file of those that are compared.
+fn works(descriptors: &str) -> Vec<Work> {
+    let correlation = |(size, image, repetitions): (u32, usize, u32)| {
+        let side = IMAGES[image];
+        Work {
+            name: format!("zncc {size}x{size} over {side}x{side}"),
+            request: format!("zncc {image} {size} {} {} {repetitions}", side / 3, side / 4),
+            peer: CORRELATION,
+            apart: [SCORES_APART, 0.0],
+        }
+    };
+    let features = Work {
+        name: format!("sift {SCENE}x{SCENE}"),
+        request: format!("sift {} 1", IMAGES.len()),
+        peer: FEATURES,
+        apart: [0.0, KEYPOINTS_APART],
+    };
+    let matches = Work {
+        name: format!("match {QUERIES}x{QUERIES} of sift"),
+        request: format!("match {descriptors} {QUERIES} 3"),
+        peer: MATCHES,
+        apart: [DISTANCES_APART, 0.0],
+    };
+    TEMPLATES.into_iter().map(correlation).chain([features, matches]).collect()
 }
 
 impl Compared {
@@ -72,35 +120,39 @@ impl Compared {
     }
 
     fn row(&self) -> String {
-        let Self { work, ours_ms, peer_ms } = self;
-        format!("{work:<24} {ours_ms:>10.3} {peer_ms:>10.3} {:>7.2}", self.ratio())
+        let Self { work, peer, ours_ms, peer_ms } = self;
+        format!("{work:<24} {ours_ms:>10.3} {peer_ms:>10.3} {:>7.2}   {peer}", self.ratio())
     }
 
     fn json(&self) -> String {
-        let Self { work, ours_ms, peer_ms } = self;
+        let Self { work, peer, ours_ms, peer_ms } = self;
         format!(
-            "{{\"work\": \"{work}\", \"ours_ms\": {ours_ms:.4}, \"peer\": \"{PEER}\", \"peer_ms\": {peer_ms:.4}, \"ratio\": {:.3}}}",
+            "{{\"work\": \"{work}\", \"ours_ms\": {ours_ms:.4}, \"peer\": \"{peer}\", \"peer_ms\": {peer_ms:.4}, \"ratio\": {:.3}}}",
             self.ratio()
         )
     }
 }
 
 /// Asks both sides in turn.
-fn compare(work: String, request: &str, ours: &mut Side, peer: &mut Side) -> Result<Compared> {
+fn compare(work: Work, ours: &mut Side, peer: &mut Side) -> Result<Compared> {
+    let Work { name, request, peer: peer_name, apart: [absolute, share] } = work;
     let (mut our_times, mut peer_times) = (Vec::new(), Vec::new());
     for _ in 0..ROUNDS {
-        let (our_time, our_scores) = ours.ask(request)?;
-        let (peer_time, peer_scores) = peer.ask(request)?;
-        let difference = our_scores.iter().zip(&peer_scores).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        if our_scores.len() != peer_scores.len() || difference > TOLERANCE {
-            bail!(
-                "{work}: the two sides do not agree: scores differ by up to {difference:.1e}; mend this first"
-            );
+        let (our_time, our_numbers) = ours.ask(&request)?;
+        let (peer_time, peer_numbers) = peer.ask(&request)?;
+        let mut pairs = our_numbers.iter().zip(&peer_numbers);
+        let apart = pairs.find(|(a, b)| (*a - *b).abs() > absolute + share * b.abs());
+        if let Some((a, b)) = apart {
+            bail!("{name}: the two sides do not agree: {a} and {b}; mend this first");
+        }
+        if our_numbers.len() != peer_numbers.len() || our_numbers.is_empty() {
+            bail!("{name}: the two sides do not find as much; mend this first");
         }
         our_times.push(our_time);
         peer_times.push(peer_time);
     }
-    Ok(Compared { work, ours_ms: 1e3 * median(our_times), peer_ms: 1e3 * median(peer_times) })
+    let (ours_ms, peer_ms) = (1e3 * median(our_times), 1e3 * median(peer_times));
+    Ok(Compared { work: name, peer: peer_name, ours_ms, peer_ms })
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
@@ -128,7 +180,7 @@ impl Side {
         Ok(Self { name, child, requests, answers })
     }
 
-    /// Seconds, and the scores of some positions.
+    /// Seconds, and what was found.
     fn ask(&mut self, request: &str) -> Result<(f64, Vec<f64>)> {
         let mut line = String::new();
         let asked = writeln!(self.requests, "{request}").and_then(|()| self.requests.flush());
@@ -190,22 +242,41 @@ fn executable(messages: &str) -> Option<PathBuf> {
     Some(PathBuf::from(path.replace("\\\\", "\\")))
 }
 
-/// Textured squares without repetition, always the same: hashed values, smoothed by a 3 × 3 mean.
+/// A number from 0 to 1 for each pixel, without repetition.
+fn hash(x: u32, y: u32) -> f64 {
+    let mut h = x.wrapping_mul(0x9E37_79B1) ^ y.wrapping_mul(0x85EB_CA77);
+    h = (h ^ (h >> 15)).wrapping_mul(0x2C1B_3C6D);
+    f64::from(h ^ (h >> 13)) / f64::from(u32::MAX)
+}
+
+/// The squares that both sides read, always the same: hashed values smoothed by a 3 × 3 mean, and the scene.
 fn images() -> Vec<u8> {
-    let hash = |x: u32, y: u32| {
-        let mut h = x.wrapping_mul(0x9E37_79B1) ^ y.wrapping_mul(0x85EB_CA77);
-        h = (h ^ (h >> 15)).wrapping_mul(0x2C1B_3C6D);
-        f64::from(h ^ (h >> 13)) / f64::from(u32::MAX)
-    };
     let mut bytes = Vec::new();
-    for side in IMAGES {
+    let mut add = |side: u32, value: &dyn Fn(u32, u32) -> f64| {
         bytes.extend(side.to_le_bytes());
         for (y, x) in (0..side).flat_map(|y| (0..side).map(move |x| (y, x))) {
-            let around = (0..9).map(|i| hash(x + i % 3, y + i / 3));
-            bytes.extend(((around.sum::<f64>() / 9.0) as f32).to_le_bytes());
+            bytes.extend((value(x, y) as f32).to_le_bytes());
         }
+    };
+    for side in IMAGES {
+        add(side, &|x, y| (0..9).map(|i| hash(x + i % 3, y + i / 3)).sum::<f64>() / 9.0);
     }
+    add(SCENE, &scene);
     bytes
+}
+
+/// Hashed values between which is interpolated, every 4, 8 … 64 pixels, with some 6000 features; whole numbers of 255,
+/// because OpenCV looks for them in 8 bits.
+fn scene(x: u32, y: u32) -> f64 {
+    let noise = |spacing: u32| {
+        let (u, v) = (f64::from(x % spacing), f64::from(y % spacing));
+        let (u, v) = (u / f64::from(spacing), v / f64::from(spacing));
+        let at = |i: u32, j: u32| hash((x / spacing + i) * 97 + spacing, y / spacing + j) - 0.5;
+        let along = |j: u32| at(0, j) * (1.0 - u) + at(1, j) * u;
+        along(0) * (1.0 - v) + along(1) * v
+    };
+    let value = 0.5 + (2..7).map(|octave| 0.45 * noise(1 << octave)).sum::<f64>();
+    (value.clamp(0.0, 1.0) * 255.0).round() / 255.0
 }
 
 #[cfg(test)]
@@ -223,8 +294,13 @@ mod tests {
 
     #[test]
     fn a_comparison_reads_as_a_row_and_as_an_object() {
-        let compared = Compared { work: "zncc 21x21 over 161x161".to_owned(), ours_ms: 0.125, peer_ms: 0.5 };
-        assert!(compared.row().ends_with("4.00"), "{}", compared.row());
+        let compared = Compared {
+            work: "zncc 21x21 over 161x161".to_owned(),
+            peer: CORRELATION,
+            ours_ms: 0.125,
+            peer_ms: 0.5,
+        };
+        assert!(compared.row().contains(" 4.00   opencv"), "{}", compared.row());
         let expected = "{\"work\": \"zncc 21x21 over 161x161\", \"ours_ms\": 0.1250, \"peer\": ";
         assert!(compared.json().starts_with(expected) && compared.json().ends_with("\"ratio\": 4.000}"));
     }

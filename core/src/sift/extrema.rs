@@ -11,7 +11,8 @@
 //! | x̂ | [`Extremum::offset`] | px of the octave, layers |
 //! | r | `edge_ratio_max` of the settings | – |
 //!
-//! Two neighbouring pixels can lead to one and the same place, which is then found twice.
+//! Two neighbouring pixels can lead to one and the same place, which is then found twice. And two can lead to each other,
+//! when the extremum lies just between them: it is lost then, here as in Lowe's recipe and OpenCV.
 
 use std::ops::Range;
 
@@ -117,7 +118,7 @@ impl Around {
             let (finer, coarser) = (&octave.layers[layer + l - 1], &octave.layers[layer + l]);
             for (v, row) in layer_values.iter_mut().enumerate() {
                 let pixels = |plane: &Plane| -> [f64; 3] {
-                    let row = &plane.from_row(y + v - 1)[x - 1..x + 2];
+                    let row = &plane.row(y + v - 1)[x - 1..x + 2];
                     [f64::from(row[0]), f64::from(row[1]), f64::from(row[2])]
                 };
                 let (finer, coarser) = (pixels(finer), pixels(coarser));

@@ -220,3 +220,5 @@ impl Strongest {
 mod tests;
 #[cfg(test)]
 mod recorded_tests;
+#[cfg(test)]
+mod parts_tests;

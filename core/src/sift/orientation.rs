@@ -14,7 +14,7 @@ use std::f32::consts::{PI, TAU};
 use pulp::{Arch, Simd, WithSimd};
 
 use super::gradient::{gaussian_weights, inner, polar, rows_around};
-use super::lanes::{WIDEST, store};
+use super::lanes::{WIDEST, load, store};
 use super::plane::Plane;
 
 /// Bins of the full circle.
@@ -40,7 +40,8 @@ pub(super) fn directions(layer: &Plane, [x, y]: [f64; 2], sigma: f32, peak_share
     let highest = smooth.iter().copied().fold(0.0, f32::max);
     let direction = |bin: usize| {
         let (left, here, right) = (smooth[(bin + BINS - 1) % BINS], smooth[bin], smooth[(bin + 1) % BINS]);
-        let is_peak = here > left && here > right && here >= peak_share * highest;
+        // Of two equal bins side by side the first is the peak, and the parabola leads half-way to the other.
+        let is_peak = here > left && here >= right && here >= peak_share * highest;
         let exact = bin as f32 + 0.5 * (left - right) / (left - 2.0 * here + right);
         is_peak.then(|| wrapped(exact * (TAU / BINS as f32) - PI))
     };
@@ -87,7 +88,7 @@ impl WithSimd for Fill<'_> {
             let mut i = 0;
             while i < count {
                 let (length, direction) = polar(simd, around, columns.start() + i);
-                let weight = simd.mul_f32s(simd.splat_f32s(*weight), super::lanes::load::<S>(&across, i));
+                let weight = simd.mul_f32s(simd.splat_f32s(*weight), load::<S>(&across, i));
                 store::<S>(&mut bins, 0, simd.mul_add_e_f32s(direction, scale, start));
                 store::<S>(&mut weights, 0, simd.mul_f32s(length, weight));
                 for (bin, weight) in bins.iter().zip(&weights).take(S::F32_LANES) {

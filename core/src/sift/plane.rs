@@ -51,7 +51,7 @@ impl Plane {
 
     /// The numbers of a row and whatever follows.
     #[inline(always)]
-    pub(super) fn from_row(&self, y: usize) -> &[f32] {
+    pub(super) fn row(&self, y: usize) -> &[f32] {
         &self.values()[self.start(y)..]
     }
 

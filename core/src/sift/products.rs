@@ -96,10 +96,10 @@ impl Found {
         let second = others.chain(self.second).fold(f32::INFINITY, f32::min);
         let square = square(query);
         let is_there = |less: f32| less < f32::INFINITY;
-        is_there(nearest).then(|| Neighbours {
+        is_there(nearest).then_some(Neighbours {
             nearest: index as u32,
             distance2: (square + nearest) as u32,
-            second_distance2: is_there(second).then(|| (square + second) as u32),
+            second_distance2: is_there(second).then_some((square + second) as u32),
         })
     }
 }

@@ -145,6 +145,12 @@ impl<'a> ScaleSpace<'a> {
         (first < last).then_some((&self.octave, first..self.searched))
     }
 
+    /// The octave as far as it is made.
+    #[cfg(test)]
+    pub(super) fn octave(&self) -> &Octave {
+        &self.octave
+    }
+
     /// Rows above and below an extremum's pixel that it may depend on.
     fn reach(&self) -> usize {
         let coarsest = self.octave.sigma_at(self.octave.scales() as f64 + 0.5);
@@ -221,7 +227,7 @@ fn halve(fine: &Plane, coarse: &mut Plane) {
     let end = fine.made.div_ceil(2).min(coarse.height);
     for (first, rows) in coarse.make(end) {
         for (i, row) in rows.chunks_exact_mut(stride).enumerate() {
-            let pairs = fine.from_row(2 * (first + i)).chunks_exact(2);
+            let pairs = fine.row(2 * (first + i)).chunks_exact(2);
             for (value, pair) in row[..width].iter_mut().zip(pairs) {
                 *value = pair[0];
             }

@@ -71,8 +71,8 @@ impl WithSimd for Band<'_> {
                 for layer in 0..layers {
                     let at = (layer * HELD + next % HELD) * line;
                     simd.vectorize(Difference {
-                        finer: &octave.layers[layer].from_row(next)[..stride],
-                        coarser: &octave.layers[layer + 1].from_row(next)[..stride],
+                        finer: &octave.layers[layer].row(next)[..stride],
+                        coarser: &octave.layers[layer + 1].row(next)[..stride],
                         difference: &mut lines[at..at + stride],
                     });
                 }

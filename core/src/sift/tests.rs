@@ -70,7 +70,7 @@ fn a_gaussian_blob_gives_a_keypoint_at_its_place_and_of_its_scale() {
         let pixel = 2_f64.powi(i32::from(strongest.octave)).max(1.0);
         assert!(dx.hypot(dy) < 0.05 * pixel, "σ = {sigma}: off by ({dx}, {dy})");
         let ratio = f64::from(strongest.sigma_px) / expected;
-        assert!((ratio - 1.0).abs() < 0.05, "σ = {sigma}: scale {} · {ratio}", expected);
+        assert!((ratio - 1.0).abs() < 0.05, "σ = {sigma}: scale {expected} · {ratio}");
     }
 }
 
