@@ -118,8 +118,7 @@ pub fn anchor(target: &Target, located: &Located, site_from_rover: &Pose) -> Opt
         stop: evidence.stop,
         features: Arc::clone(evidence.features.as_ref()?),
         site_from_rover: *site_from_rover,
-        position_in_rover: target.position_in_rover,
-        covariance_in_rover: target.covariance_in_rover,
+        carried: evidence.carried?,
     })
 }
 

@@ -5,9 +5,12 @@
 
 use std::sync::Arc;
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector6};
 
 use super::detect::StopFeatures;
+use crate::estimate::bootstrap::Bootstrap;
+use crate::estimate::carry::carry;
+use crate::estimate::motion_parameters::MotionParameters;
 use crate::frames::{Point3, Pose};
 
 /// A stop at which the target was found.
@@ -21,10 +24,53 @@ pub struct Anchor {
     pub features: Arc<StopFeatures>,
     /// The estimated pose there.
     pub site_from_rover: Pose,
-    /// Where the target was, in the rover frame of that stop, m.
+    /// Where the target was, in the rover frame of that stop.
+    pub carried: Carried,
+}
+
+/// A target's position as motions carried it from the designation to a stop.
+///
+/// What the features of one stop share (`feature_common_px`) they share with those of the next, since it is the same stones
+/// that are seen from nearly the same side: it adds up along a run, whereas what scatters from feature to feature adds up in
+/// squares.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Carried {
+    /// The position, m, rover frame.
     pub position_in_rover: Point3,
-    /// Its covariance, m².
-    pub covariance_in_rover: Matrix3<f64>,
+    /// The covariance of the designation and of what scatters, m².
+    pub scattered: Matrix3<f64>,
+    /// How the shared errors move it, one column each: 1σ, m.
+    pub shared_m: Matrix3<f64>,
+}
+
+impl Carried {
+    /// A designated position.
+    pub fn designated(position_in_rover: Point3, covariance_in_rover: Matrix3<f64>) -> Self {
+        Self { position_in_rover, scattered: covariance_in_rover, shared_m: Matrix3::zeros() }
+    }
+
+    /// The position after a motion; `by_shift` says how its parameters change with 1σ of each shared error.
+    ///
+    /// None where a covariance is not positive semidefinite.
+    pub fn after(&self, motion: &Bootstrap, by_shift: Option<[Vector6<f64>; 3]>) -> Option<Self> {
+        let (theta, point) = (motion.parameters, &self.position_in_rover);
+        let (position_in_rover, scattered) = carry(point, &self.scattered, theta, &motion.covariance)?;
+        let moved = |change: Vector6<f64>| {
+            let at = |sign: f64| {
+                MotionParameters::from_vector(&(theta.to_vector() + sign * change)).to_pose() * point
+            };
+            (at(1.0) - at(-1.0)) / 2.0
+        };
+        let turned = theta.to_pose().rotation.to_rotation_matrix() * self.shared_m;
+        let added =
+            by_shift.map_or_else(Matrix3::zeros, |changes| Matrix3::from_columns(&changes.map(moved)));
+        Some(Self { position_in_rover, scattered, shared_m: turned + added })
+    }
+
+    /// The covariance of the position, m².
+    pub fn covariance_in_rover(&self) -> Matrix3<f64> {
+        self.scattered + self.shared_m * self.shared_m.transpose()
+    }
 }
 
 /// The remembered stops, oldest first.

@@ -6,6 +6,7 @@ use nalgebra::SMatrix;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::anchor::Carried;
 use super::detect::StopFeatures;
 use crate::estimate::motion_parameters::MotionParameters;
 use crate::estimate::ransac::Refit;
@@ -31,6 +32,10 @@ pub struct FeatureEvidence {
     #[serde(skip)]
     #[schema(ignore)]
     pub stop: Option<usize>,
+    /// The target as the motions carried it here.
+    #[serde(skip)]
+    #[schema(ignore)]
+    pub carried: Option<Carried>,
     /// The features themselves.
     #[serde(skip)]
     #[schema(ignore)]

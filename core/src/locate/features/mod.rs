@@ -17,6 +17,7 @@
 //! | x_then, x_now | `Anchor::position_in_rover`, `Located::position_in_rover` | m, rover frame of either stop |
 //! | θ*, T | `MotionFit::after_from_before` | m, rad |
 //! | P_θθ | `Bootstrap::covariance` | m², m rad, rad² |
+//! | P_xx | `Carried::covariance_in_rover` | m² |
 
 pub mod anchor;
 pub mod detect;
@@ -35,15 +36,12 @@ mod tests;
 
 use std::sync::Arc;
 
-use nalgebra::Matrix3;
-
-use self::anchor::Anchor;
+use self::anchor::{Anchor, Carried};
 use self::detect::StopFeatures;
 use self::evidence::{AnchorTried, Bootstrapped, Detected, FittedMotion, MatchedFeatures};
 use self::motion::{Motion, MotionInput, motion};
 use super::template::TemplateLocator;
 use super::{DesignateInput, Evidence, LocateInput, Located, Locator};
-use crate::estimate::carry::carry;
 use crate::estimate::confidence::confidence;
 use crate::estimate::motion_parameters::MotionParameters;
 use crate::frames::Point3;
@@ -64,7 +62,10 @@ impl Locator for FeatureLocator {
         let mut evidence = FeatureEvidence { designation, stop, ..FeatureEvidence::default() };
         if let Some(missing) = settings.contradiction() {
             located = Located { missing: Some(missing), ..Located::default() };
-        } else if located.position_in_rover.is_some() {
+        } else if let Some((position, covariance)) =
+            located.position_in_rover.zip(located.covariance_in_rover)
+        {
+            evidence.carried = Some(Carried::designated(position, covariance));
             see(&mut evidence, || {
                 let cameras = [input.left, input.right];
                 store::features(input.shared, settings, || {
@@ -122,8 +123,8 @@ struct Candidate<'a> {
     anchor: &'a Anchor,
     motion: Arc<Motion>,
     confidence: f64,
-    /// Position and covariance in the present rover frame, m and m².
-    target: Option<(Point3, Matrix3<f64>)>,
+    /// The target in the present rover frame.
+    target: Option<Carried>,
 }
 
 impl<'a> Candidate<'a> {
@@ -134,17 +135,17 @@ impl<'a> Candidate<'a> {
             let (then, left) = (anchor.features.as_ref(), &input.pointing.left);
             motion(&MotionInput { then, now, expected_now_from_then: &expected, left, settings })
         });
-        let target = motion.bootstrap.as_ref().and_then(|bootstrap| {
-            let (position, covariance) = (&anchor.position_in_rover, &anchor.covariance_in_rover);
-            carry(position, covariance, bootstrap.parameters, &bootstrap.covariance)
-        });
+        let by_shift =
+            motion.by_shift.map(|changes| changes.map(|change| change * settings.feature_common_px));
+        let target =
+            motion.bootstrap.as_ref().and_then(|bootstrap| anchor.carried.after(bootstrap, by_shift));
         let confidence = confidence(motion.fit.inliers.len(), settings.confidence());
         Self { anchor, confidence, motion, target }
     }
 
     /// Largest 1σ axis of the target's position, m.
     fn sigma_m(&self) -> Option<f64> {
-        let (_, covariance) = self.target.as_ref()?;
+        let covariance = self.target.as_ref()?.covariance_in_rover();
         Some(covariance.symmetric_eigenvalues().max().max(0.0).sqrt())
     }
 
@@ -175,7 +176,9 @@ impl<'a> Candidate<'a> {
             matches: motion.matches.len(),
         });
         tables::add_motion(&mut evidence.table, motion, &anchor.features, now, left);
-        let Some((position, covariance)) = self.target else { return Located::default() };
+        let Some(carried) = self.target else { return Located::default() };
+        let position = carried.position_in_rover;
+        evidence.carried = Some(carried);
         evidence.fit_motion = self.fitted(&position, input);
         if let Some(bootstrap) = &motion.bootstrap {
             evidence.bootstrap = Some(bootstrapped(bootstrap));
@@ -183,13 +186,13 @@ impl<'a> Candidate<'a> {
                 .samples
                 .iter()
                 .map(|theta| MotionParameters::from_vector(&(*theta).into()).to_pose());
-            evidence.cloud = tables::cloud(poses, &anchor.position_in_rover, left);
+            evidence.cloud = tables::cloud(poses, &anchor.carried.position_in_rover, left);
         }
         Located {
             left_pixel: left.project(&position),
             right_pixel: input.pointing.right.project(&position),
             position_in_rover: Some(position),
-            covariance_in_rover: Some(covariance),
+            covariance_in_rover: Some(carried.covariance_in_rover()),
             confidence: self.confidence,
             ..Located::default()
         }

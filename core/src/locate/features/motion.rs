@@ -4,7 +4,7 @@
 //! It is a motion of the whole scene and knows no target: all targets share it (R168, R207). With a prior, a feature is
 //! looked for only near where the pose estimates expect it.
 
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::Vector6;
 
 use crate::camera::Camera;
 use crate::estimate::bootstrap::{Bootstrap, block_bootstrap};
@@ -22,6 +22,9 @@ use super::settings::FeatureSettings;
 /// Shift of the pixels by which their common error is propagated, px: small against what bends the motion.
 const SHIFT_PX: f64 = 0.05;
 
+/// The shift of the right pixels alone, of those in `Point::by_shift_m`.
+const DISPARITY: usize = 2;
+
 /// The motion between two stops, with all that led to it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motion {
@@ -31,6 +34,8 @@ pub struct Motion {
     pub fit: MotionFit,
     /// How certain it is; none where there is no motion.
     pub bootstrap: Option<Bootstrap>,
+    /// How it changes with a pixel's error that all features share: to the right, down, and of the disparities of both stops.
+    pub by_shift: Option<[Vector6<f64>; 3]>,
 }
 
 /// What a motion is measured from.
@@ -64,52 +69,34 @@ pub fn motion(input: &MotionInput<'_>) -> Motion {
     let correspondences: Vec<Correspondence> = matches.iter().map(correspondence).collect();
     let fit = fit_motion(&correspondences, &settings.ransac());
     let agreeing: Vec<Match> = fit.inliers.iter().map(|index| matches[*index]).collect();
-    let scatter = |pose| scatter(input, &agreeing, &fit, &correspondences, &pose);
-    let bootstrap = fit.motion().and_then(scatter);
-    Motion { matches, fit, bootstrap }
-}
-
-/// The covariance of a motion: the bootstrap's, and what a common error of the disparities of either stop does to it.
-fn scatter(
-    input: &MotionInput<'_>,
-    agreeing: &[Match],
-    fit: &MotionFit,
-    correspondences: &[Correspondence],
-    pose: &Pose,
-) -> Option<Bootstrap> {
-    let settings = input.settings;
     let pairs: Vec<Correspondence> = fit.inliers.iter().map(|index| correspondences[*index]).collect();
-    let blocks: Vec<u32> = fit.inliers.iter().zip(agreeing).map(|(i, m)| block(input, *i, m)).collect();
-    let mut bootstrap = block_bootstrap(&pairs, &blocks, pose, &settings.bootstrap())?;
-    if settings.feature_common_px > 0.0 {
-        bootstrap.covariance += common_error(input, agreeing, &pairs)? * settings.feature_common_px.powi(2);
-    }
-    Some(bootstrap)
+    let blocks: Vec<u32> = fit.inliers.iter().zip(&agreeing).map(|(i, m)| block(input, *i, m)).collect();
+    let scatter = |pose| block_bootstrap(&pairs, &blocks, &pose, &settings.bootstrap());
+    let bootstrap = fit.motion().and_then(scatter);
+    let is_shared = bootstrap.is_some() && settings.feature_common_px > 0.0;
+    let by_shift = if is_shared { by_shift(input, &agreeing, &pairs) } else { None };
+    Motion { matches, fit, bootstrap, by_shift }
 }
 
-/// What an error of one pixel does to the motion that all features of a stop share: of both pixels, which counts once for
-/// the two stops together, and of the disparities of either stop.
-fn common_error(
+/// How the motion changes when all pixels of this stop shift, and when all disparities of both stops do, per px.
+fn by_shift(
     input: &MotionInput<'_>,
     agreeing: &[Match],
     pairs: &[Correspondence],
-) -> Option<Matrix6<f64>> {
+) -> Option<[Vector6<f64>; 3]> {
     let unmoved = MotionParameters::from(&refit(pairs, input.settings)?);
-    let mut covariance = Matrix6::zeros();
-    for (is_now, shift) in [(true, 0), (true, 1), (true, 2), (false, 2)] {
+    let mut changes = [Vector6::zeros(); 3];
+    for (shift, change) in changes.iter_mut().enumerate() {
         let mut moved = pairs.to_vec();
         for (pair, matched) in moved.iter_mut().zip(agreeing) {
-            if is_now {
-                pair.after += input.now.points[matched.train as usize].by_shift_m[shift] * SHIFT_PX;
-            } else {
+            pair.after += input.now.points[matched.train as usize].by_shift_m[shift] * SHIFT_PX;
+            if shift == DISPARITY {
                 pair.before += input.then.points[matched.query as usize].by_shift_m[shift] * SHIFT_PX;
             }
         }
-        let moved = MotionParameters::from(&refit(&moved, input.settings)?);
-        let by_pixel: Vector6<f64> = moved.minus(unmoved) / SHIFT_PX;
-        covariance += by_pixel * by_pixel.transpose();
+        *change = MotionParameters::from(&refit(&moved, input.settings)?).minus(unmoved) / SHIFT_PX;
     }
-    Some(covariance)
+    Some(changes)
 }
 
 /// The motion of matches that agree, as the fit weights them.
