@@ -124,13 +124,27 @@ struct Row<'a> {
     found: &'a mut Vec<Candidate>,
 }
 
-/// Whether the vector at `$x` is, times `$sign`, beyond those of a row at `$x` plus each offset.
-macro_rules! and_beyond {
-    ($simd:ident, $mask:ident, $sign:ident, $value:ident, $row:expr, $x:ident, [$($compare:ident $offset:literal),*]) => {
+/// Leaves in the mask the lanes whose value is beyond its neighbours in rows of D, at the offsets from the column before.
+macro_rules! beyond {
+    ($simd:ident, $mask:ident, [$sign:ident, $value:ident, $x:ident], $compare:ident, $row:expr, [$($offset:literal)*]) => {
         $(
             let other = $simd.xor_f32s($sign, load::<S>($row, $x + $offset - 1));
             $mask = $simd.and_m32s($mask, $simd.$compare($value, other));
         )*
+    };
+}
+
+/// The same for neighbours that come before the pixel.
+macro_rules! beyond_before {
+    ($simd:ident, $mask:ident, $at:tt, $row:expr, $offsets:tt) => {
+        beyond!($simd, $mask, $at, greater_than_f32s, $row, $offsets)
+    };
+}
+
+/// The same for neighbours that come after it.
+macro_rules! beyond_after {
+    ($simd:ident, $mask:ident, $at:tt, $row:expr, $offsets:tt) => {
+        beyond!($simd, $mask, $at, greater_than_or_equal_f32s, $row, $offsets)
     };
 }
 
@@ -150,16 +164,17 @@ impl WithSimd for Row<'_> {
             let value = simd.xor_f32s(sign, here);
             let mut mask = simd.greater_than_f32s(value, least);
             if simd.first_true_m32s(mask) < S::F32_LANES {
-                and_beyond!(simd, mask, sign, value, around[4], x, [greater_than_f32s 0, greater_than_or_equal_f32s 2]);
-                and_beyond!(simd, mask, sign, value, around[3], x, [greater_than_f32s 0, greater_than_f32s 1, greater_than_f32s 2]);
-                and_beyond!(simd, mask, sign, value, around[5], x, [greater_than_or_equal_f32s 0, greater_than_or_equal_f32s 1, greater_than_or_equal_f32s 2]);
+                beyond_before!(simd, mask, [sign, value, x], around[4], [0]);
+                beyond_after!(simd, mask, [sign, value, x], around[4], [2]);
+                beyond_before!(simd, mask, [sign, value, x], around[3], [0 1 2]);
+                beyond_after!(simd, mask, [sign, value, x], around[5], [0 1 2]);
                 if simd.first_true_m32s(mask) < S::F32_LANES {
-                    and_beyond!(simd, mask, sign, value, around[0], x, [greater_than_f32s 0, greater_than_f32s 1, greater_than_f32s 2]);
-                    and_beyond!(simd, mask, sign, value, around[1], x, [greater_than_f32s 0, greater_than_f32s 1, greater_than_f32s 2]);
-                    and_beyond!(simd, mask, sign, value, around[2], x, [greater_than_f32s 0, greater_than_f32s 1, greater_than_f32s 2]);
-                    and_beyond!(simd, mask, sign, value, around[6], x, [greater_than_or_equal_f32s 0, greater_than_or_equal_f32s 1, greater_than_or_equal_f32s 2]);
-                    and_beyond!(simd, mask, sign, value, around[7], x, [greater_than_or_equal_f32s 0, greater_than_or_equal_f32s 1, greater_than_or_equal_f32s 2]);
-                    and_beyond!(simd, mask, sign, value, around[8], x, [greater_than_or_equal_f32s 0, greater_than_or_equal_f32s 1, greater_than_or_equal_f32s 2]);
+                    beyond_before!(simd, mask, [sign, value, x], around[0], [0 1 2]);
+                    beyond_before!(simd, mask, [sign, value, x], around[1], [0 1 2]);
+                    beyond_before!(simd, mask, [sign, value, x], around[2], [0 1 2]);
+                    beyond_after!(simd, mask, [sign, value, x], around[6], [0 1 2]);
+                    beyond_after!(simd, mask, [sign, value, x], around[7], [0 1 2]);
+                    beyond_after!(simd, mask, [sign, value, x], around[8], [0 1 2]);
                     if simd.first_true_m32s(mask) < S::F32_LANES {
                         let mut are = [0.0; WIDEST];
                         let ones = simd.select_f32s(mask, simd.splat_f32s(1.0), simd.splat_f32s(0.0));
