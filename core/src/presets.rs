@@ -135,14 +135,22 @@ pub const PRESETS: &[Preset] = &[
     ours(
         "features",
         "The motion of the whole scene by its features, weighed by range, over the last three good stops.",
-        &["tracker=features", "sift_contrast_min=0.01", "n_retry=100"],
+        &[
+            "tracker=features",
+            "sift_contrast_min=0.015",
+            "n_retry=100",
+            "motion_gate=mahalanobis",
+            "feature_sigma_px=0.15",
+            "feature_sigma_per_scale=0.08",
+            "feature_common_px=0.03",
+        ],
     ),
     ours(
         "features-paper",
         "Features as the K9 rover had them: no constraint on matches, 3 cm, half a pixel, one stop (D§2).",
         &[
             "tracker=features",
-            "sift_contrast_min=0.01",
+            "sift_contrast_min=0.015",
             "n_retry=100",
             "stereo_along_curve=false",
             "ratio_max=1",
