@@ -24,6 +24,7 @@ pub mod detect;
 pub mod evidence;
 mod match_stereo;
 pub mod motion;
+pub mod rows;
 pub mod settings;
 pub mod store;
 mod tables;
