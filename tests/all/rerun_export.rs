@@ -1,4 +1,5 @@
-//! The `.rrd` export and the live stream, on a short simulated drive with a missing image and covered eyes.
+//! The `.rrd` export and the live stream, on a short simulated drive with a missing image and covered eyes; and the
+//! entities of the feature tracker, from tables made up for the same drive.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -7,7 +8,13 @@ use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
 use sightline_core::error::Error;
+use sightline_core::estimate::ransac::Refit;
 use sightline_core::frames::Pixel;
+use sightline_core::locate::Evidence;
+use sightline_core::locate::features::FeatureEvidence;
+use sightline_core::locate::features::evidence::{
+    Bootstrapped, CLOUD_COLUMNS, Detected, FeatureColumn, FittedMotion, Table,
+};
 use sightline_core::session::{Session, track};
 use sightline_core::settings::Settings;
 use sightline_core::target::{Designation, TrackingState};
@@ -122,6 +129,76 @@ fn an_export_holds_every_documented_entity_with_the_documented_rows_and_no_other
     let others = recording.entities.keys().filter(|path| !path.starts_with("/__properties"));
     let undocumented: Vec<_> = others.filter(|path| !documented.contains(path)).collect();
     assert!(undocumented.is_empty(), "not in the documentation: {undocumented:?}");
+}
+
+/// Three features: one alone, an inlier and an outlier; a target moved by half a pixel of residual.
+fn by_features(trace: &StepTrace) -> StepTrace {
+    let mut trace = trace.clone();
+    let (is_pick, Some(located)) = (trace.predict.is_none(), trace.locate.as_mut()) else { return trace };
+    const NONE: f32 = f32::NAN;
+    let alone = [50.0, 60.0, 2.0, 0.5, NONE, NONE, NONE, NONE, NONE, NONE, NONE, NONE, NONE];
+    let inlier = [70.0, 80.0, 3.0, 1.5, 60.0, 80.0, 4.0, 65.0, 78.0, 69.5, 80.25, 0.01, 1.0];
+    let outlier = [90.0, 100.0, 1.0, -1.5, 80.0, 100.0, 5.0, 20.0, 30.0, 40.0, 50.0, 0.5, 0.0];
+    let columns = FeatureColumn::COUNT as u32;
+    let table = Table { columns, values: [alone, inlier, outlier].concat() };
+    let detect = Detected { left: 3, right: 3, stereo_matches: 2, points: 2, median_range_m: Some(4.5) };
+    let mut evidence = FeatureEvidence { detect: Some(detect), table, ..FeatureEvidence::default() };
+    if !is_pick {
+        evidence.fit_motion = Some(FittedMotion {
+            translation_m: [-0.3, 0.0, 0.0],
+            roll_pitch_yaw_deg: [0.0; 3],
+            inliers: 1,
+            rms_m: 0.01,
+            median_m: 0.01,
+            consensus_by_draw: vec![1],
+            refits: vec![Refit { inliers: 1, rms_m: 0.01 }],
+            correction_m: 0.0,
+        });
+        evidence.bootstrap = Some(Bootstrapped {
+            sets: 2,
+            covariance: Default::default(),
+            sigma_translation_m: [0.0; 3],
+            sigma_rotation_deg: [0.0; 3],
+        });
+        let values = vec![4.0, 0.1, 0.2, 200.0, 210.0, 4.1, 0.1, 0.2, NONE, NONE];
+        evidence.cloud = Table { columns: CLOUD_COLUMNS as u32, values };
+    }
+    located.evidence = Evidence::Features(Box::new(evidence));
+    trace
+}
+
+#[test]
+fn a_run_by_features_has_its_keypoints_matches_residuals_points_and_cloud() {
+    let steps: Vec<_> = FIXTURE.runs[0].iter().map(|trace| Arc::new(by_features(trace))).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("features.rrd");
+    let runs = [RunLog { target: 0, run: 0, label: "rock", steps: &steps }];
+    export(&path, "short", &FIXTURE.drive, &runs, &mut |_, _| ControlFlow::Continue(())).unwrap();
+    let recording = rrd::read(&path);
+    for doc in entities_of(&root(0, 0)) {
+        let (found, expected) = (&recording.entities[&doc.path], promised(doc.rows, &doc, &steps));
+        assert_eq!(sorted(found.data.clone()), expected.data, "steps with data of {}", doc.path);
+        assert_eq!(sorted(found.cleared.clone()), expected.cleared, "cleared steps of {}", doc.path);
+    }
+    let step = 1;
+    let numbers = |entity: &str, component: &str| {
+        let entity = &recording.entities[&format!("/target_1/locate/{entity}")];
+        entity.numbers[&(component.to_owned(), step)].clone()
+    };
+    assert_eq!(numbers("detect/keypoints", "Points2D:positions"), [50.5, 60.5, 70.5, 80.5, 90.5, 100.5]);
+    assert_eq!(numbers("detect/keypoints", "Points2D:radii"), [2.0, 3.0, 1.0]);
+    assert_eq!(numbers("match_features/partners", "Points2D:positions"), [60.5, 80.5, 80.5, 100.5]);
+    assert_eq!(numbers("triangulate/points", "Points3D:positions").len(), 2 * 3);
+    assert_eq!(numbers("fit_motion/residuals", "Arrows2D:vectors"), [5.0, -2.5], "ten times as long");
+    assert_eq!(numbers("fit_motion/residuals", "Arrows2D:origins"), [70.0, 80.75]);
+    assert_eq!(numbers("fit_motion/inliers", "Scalars:scalars"), [1.0]);
+    assert_eq!(numbers("bootstrap/cloud", "Points3D:positions").len(), 2 * 3);
+    assert_eq!(numbers("bootstrap/left", "Points2D:positions"), [200.5, 210.5]);
+    // Both kinds of matches are there, each in an entity and a colour of its own.
+    for kind in ["inliers", "outliers"] {
+        let path = format!("/target_1/locate/match_features/{kind}");
+        assert!(recording.entities[&path].data.contains(&step), "{kind}");
+    }
 }
 
 #[test]

@@ -31,7 +31,7 @@ use super::palette::{MAP_BACKGROUND, color};
 use super::step::path;
 
 /// What lies over the left image.
-const LEFT: [&str; 10] = [
+const LEFT: [&str; 15] = [
     "/{target}/predict/left",
     "/{target}/point_mast/gate",
     "/{target}/capture/subframe",
@@ -40,20 +40,33 @@ const LEFT: [&str; 10] = [
     "/{target}/locate/match_template/matched_window",
     "/{target}/locate/match_template/peak",
     "/{target}/locate/match_template/second_peak",
+    "/{target}/locate/detect/keypoints",
+    "/{target}/locate/match_features/inliers",
+    "/{target}/locate/match_features/outliers",
+    "/{target}/locate/fit_motion/residuals",
+    "/{target}/locate/bootstrap/left",
     "/{target}/locate/left_covariance",
     "/truth/{target}/left",
 ];
 
 /// What lies over the right image.
-const RIGHT: [&str; 3] =
-    ["/{target}/predict/right", "/{target}/locate/point_stereo/curve", "/{target}/locate/point_stereo/match"];
+const RIGHT: [&str; 4] = [
+    "/{target}/predict/right",
+    "/{target}/locate/point_stereo/curve",
+    "/{target}/locate/point_stereo/match",
+    "/{target}/locate/match_features/partners",
+];
 
 /// What of a target is on the map.
-const MAP: [&str; 6] = [
+const MAP: [&str; 10] = [
     "/{target}/predict/position",
     "/{target}/predict/covariance",
     "/{target}/locate/triangulate/position",
     "/{target}/locate/triangulate/covariance",
+    "/{target}/locate/triangulate/points",
+    "/{target}/locate/bootstrap/cloud",
+    "/{target}/locate/bootstrap/position",
+    "/{target}/locate/bootstrap/covariance",
     "/{target}/update/position",
     "/truth/{target}/position",
 ];
@@ -73,8 +86,10 @@ type Series = (&'static str, Corner2D, &'static [&'static str]);
 
 /// What the tracker decided on.
 #[rustfmt::skip]
-const DECISIONS: [Series; 5] = [
+const DECISIONS: [Series; 7] = [
     ("scores", Corner2D::LeftBottom, &["/{target}/judge/ncc/**", "/{target}/judge/stereo_ncc/**", "/{target}/locate/match_template/second_peak_ratio"]),
+    ("confidence", Corner2D::LeftBottom, &["/{target}/judge/confidence/**"]),
+    ("inliers", Corner2D::LeftBottom, &["/{target}/locate/fit_motion/inliers"]),
     ("gates, m", Corner2D::LeftTop, &["/{target}/judge/distance_correction_m/**", "/{target}/judge/position_correction_m/**"]),
     ("scale and roll", Corner2D::LeftTop, &["/{target}/locate/scale_roll/scale", "/{target}/locate/scale_roll/roll_deg"]),
     ("pointing, deg", Corner2D::LeftBottom, &["/{target}/point_mast/wanted_azimuth_deg", "/{target}/point_mast/used_azimuth_deg", "/{target}/point_mast/wanted_elevation_deg", "/{target}/point_mast/used_elevation_deg"]),

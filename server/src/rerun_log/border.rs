@@ -25,6 +25,11 @@ pub(super) fn point(pixel: Pixel) -> [f32; 2] {
     [(pixel.x + 0.5) as f32, (pixel.y + 0.5) as f32]
 }
 
+/// A difference of two positions, px: here there is no half pixel to add.
+pub(super) fn vector(along: &Vector2<f64>) -> [f32; 2] {
+    [along.x as f32, along.y as f32]
+}
+
 /// The frame of a rectangle of whole pixels: its top left corner is the origin.
 pub(super) fn corner_frame(rect: &PixelRect) -> Transform3D {
     let [x, y] = point(Pixel::new(f64::from(rect.x) - 0.5, f64::from(rect.y) - 0.5));

@@ -137,7 +137,17 @@ const EVIDENCE: &[Evidence] = &[
     ("/{target}/locate/point_stereo/right_window", "DepthImage", "stereo matched", stereo_matched),
     ("/{target}/locate/triangulate/position", "Points3D", "triangulated", triangulated),
     ("/{target}/locate/triangulate/covariance", "Ellipsoids3D", "triangulated", triangulated),
-    ("/{target}/locate/left_covariance", "LineStrips2D", "designated or matched", |t| t.locate.as_ref().is_some_and(|l| l.left_pixel.is_some())),
+    ("/{target}/locate/detect/keypoints", "Points2D", "features were looked for", detected),
+    ("/{target}/locate/match_features/partners", "Points2D", "features were looked for", detected),
+    ("/{target}/locate/triangulate/points", "Points3D", "features were looked for", detected),
+    ("/{target}/locate/match_features/inliers", "LineStrips2D", "a motion was fitted", fitted),
+    ("/{target}/locate/match_features/outliers", "LineStrips2D", "a motion was fitted", fitted),
+    ("/{target}/locate/fit_motion/residuals", "Arrows2D", "a motion was fitted", fitted),
+    ("/{target}/locate/bootstrap/cloud", "Points3D", "the motion has a covariance", bootstrapped),
+    ("/{target}/locate/bootstrap/left", "Points2D", "the motion has a covariance", bootstrapped),
+    ("/{target}/locate/bootstrap/position", "Points3D", "the target was moved", moved),
+    ("/{target}/locate/bootstrap/covariance", "Ellipsoids3D", "the target was moved", moved),
+    ("/{target}/locate/left_covariance", "LineStrips2D", "designated or located", |t| t.locate.as_ref().is_some_and(|l| l.left_pixel.is_some())),
     ("/{target}/judge/state", "StateChange", "always", |_| true),
     ("/{target}/judge/verdict", "TextLog", "always", |_| true),
     ("/{target}/update/position", "Points3D", "always", |_| true),
@@ -167,6 +177,24 @@ fn second_peak(trace: &StepTrace) -> bool {
 
 fn stereo_matched(trace: &StepTrace) -> bool {
     trace.template().is_some_and(|e| e.point_stereo.is_some())
+}
+
+fn detected(trace: &StepTrace) -> bool {
+    trace.features().is_some_and(|e| e.detect.is_some())
+}
+
+fn fitted(trace: &StepTrace) -> bool {
+    trace.features().is_some_and(|e| e.fit_motion.is_some())
+}
+
+fn bootstrapped(trace: &StepTrace) -> bool {
+    trace.features().is_some_and(|e| e.bootstrap.is_some())
+}
+
+fn moved(trace: &StepTrace) -> bool {
+    let located = trace.locate.as_ref();
+    bootstrapped(trace)
+        && located.is_some_and(|l| l.position_in_rover.is_some() && l.covariance_in_rover.is_some())
 }
 
 fn triangulated(trace: &StepTrace) -> bool {

@@ -6,6 +6,7 @@ use nalgebra::Matrix2;
 use rerun::{Boxes2D, LineStrips2D, Radius};
 use sightline_core::frames::Pixel;
 use sightline_core::image::PixelRect;
+use sightline_core::locate::features::rows::moved_covariance_px2;
 
 use super::Logged;
 use super::border::{corner_frame, dot, ellipse, haloed, plus, png, point, square};
@@ -95,12 +96,19 @@ pub(super) fn log_second_peak(step: &Step<'_>) -> Logged {
     step.log("/{target}/locate/match_template/second_peak", second)
 }
 
-/// The error of the located left position, bias included.
+/// The error of the located left position, bias included; that of a position by features at 1, 2 and 3 σ (R180).
 pub(super) fn log_left_covariance(step: &Step<'_>) -> Logged {
-    let located = step.trace.locate.as_ref();
-    let strip = located
-        .and_then(|located| ellipse(located.left_pixel?, &located.left_error.mean_square_px2(), SIGMAS));
-    step.log("/{target}/locate/left_covariance", strip.map(|s| haloed(&[s], MEASUREMENT)))
+    let strips = step.trace.locate.as_ref().and_then(|located| {
+        let pixel = located.left_pixel?;
+        let camera = step.trace.point_mast.as_ref().map(|pointing| &pointing.left);
+        match camera.and_then(|camera| moved_covariance_px2(located, camera)) {
+            Some(moved) => {
+                [1.0, 2.0, SIGMAS].map(|sigmas| ellipse(pixel, &moved, sigmas)).into_iter().collect()
+            }
+            None => Some(vec![ellipse(pixel, &located.left_error.mean_square_px2(), SIGMAS)?]),
+        }
+    });
+    step.log("/{target}/locate/left_covariance", strips.map(|s: Vec<_>| haloed(&s, MEASUREMENT)))
 }
 
 /// The searched part of the epipolar curve, coloured by score.

@@ -105,6 +105,24 @@ pub(super) fn log_triangulated_covariance(step: &Step<'_>) -> Logged {
     step.log("/{target}/locate/triangulate/covariance", found)
 }
 
+/// The position by the motion of the scene, accepted or not.
+pub(super) fn log_moved_position(step: &Step<'_>) -> Logged {
+    let point = moved(step).map(|(at, _)| dot_3d(step.in_site(&at), MEASUREMENT, "moved"));
+    step.log("/{target}/locate/bootstrap/position", point)
+}
+
+/// The covariance of that position.
+pub(super) fn log_moved_covariance(step: &Step<'_>) -> Logged {
+    let found = moved(step).and_then(|(at, covariance)| spread(step, &at, &covariance, MEASUREMENT));
+    step.log("/{target}/locate/bootstrap/covariance", found)
+}
+
+/// Position and covariance of a target that the motion moved, in the rover frame.
+fn moved(step: &Step<'_>) -> Option<(Point3, Matrix3<f64>)> {
+    let located = step.features()?.bootstrap.as_ref().and(step.trace.locate.as_ref())?;
+    located.position_in_rover.zip(located.covariance_in_rover)
+}
+
 /// The target as the step leaves it, in the colour of its state.
 pub(super) fn log_position(step: &Step<'_>) -> Logged {
     let updated = &step.trace.update;

@@ -49,7 +49,17 @@
 //! | `/{target}/locate/point_stereo/right_window` | `DepthImage` | stereo matched |
 //! | `/{target}/locate/triangulate/position` | `Points3D` | triangulated |
 //! | `/{target}/locate/triangulate/covariance` | `Ellipsoids3D` | triangulated |
-//! | `/{target}/locate/left_covariance` | `LineStrips2D` | designated or matched |
+//! | `/{target}/locate/detect/keypoints` | `Points2D` | features were looked for |
+//! | `/{target}/locate/match_features/partners` | `Points2D` | features were looked for |
+//! | `/{target}/locate/triangulate/points` | `Points3D` | features were looked for |
+//! | `/{target}/locate/match_features/inliers` | `LineStrips2D` | a motion was fitted |
+//! | `/{target}/locate/match_features/outliers` | `LineStrips2D` | a motion was fitted |
+//! | `/{target}/locate/fit_motion/residuals` | `Arrows2D` | a motion was fitted |
+//! | `/{target}/locate/bootstrap/cloud` | `Points3D` | the motion has a covariance |
+//! | `/{target}/locate/bootstrap/left` | `Points2D` | the motion has a covariance |
+//! | `/{target}/locate/bootstrap/position` | `Points3D` | the target was moved |
+//! | `/{target}/locate/bootstrap/covariance` | `Ellipsoids3D` | the target was moved |
+//! | `/{target}/locate/left_covariance` | `LineStrips2D` | designated or located |
 //! | `/{target}/judge/state` | `StateChange`, static `StateConfiguration` | always |
 //! | `/{target}/judge/verdict` | `TextLog` | always |
 //! | `/{target}/update/position` | `Points3D` | always |
@@ -67,6 +77,7 @@
 //! | `/{target}/locate/point_stereo/range_m` | `Scalars`, static `SeriesLines` | stereo matched |
 //! | `/{target}/locate/point_stereo/across_px` | `Scalars`, static `SeriesLines` | stereo matched |
 //! | `/{target}/locate/triangulate/gap_px` | `Scalars`, static `SeriesLines` | triangulated |
+//! | `/{target}/locate/fit_motion/inliers` | `Scalars`, static `SeriesLines` | a motion was fitted |
 //! | `/{target}/judge/ncc` | `Scalars`, static `SeriesLines` | judged and matched |
 //! | `/{target}/judge/ncc/limit` | `Scalars`, static `SeriesLines` | judged |
 //! | `/{target}/judge/stereo_ncc` | `Scalars`, static `SeriesLines` | judged and stereo matched |
@@ -75,6 +86,8 @@
 //! | `/{target}/judge/distance_correction_m/limit` | `Scalars`, static `SeriesLines` | judged |
 //! | `/{target}/judge/position_correction_m` | `Scalars`, static `SeriesLines` | judged and triangulated |
 //! | `/{target}/judge/position_correction_m/limit` | `Scalars`, static `SeriesLines` | judged |
+//! | `/{target}/judge/confidence` | `Scalars`, static `SeriesLines` | judged by confidence and located |
+//! | `/{target}/judge/confidence/limit` | `Scalars`, static `SeriesLines` | judged by confidence |
 //! | `/{target}/update/sigma_m` | `Scalars`, static `SeriesLines` | always |
 //! | `/{target}/update/correction_px` | `Scalars`, static `SeriesLines` | matched and predicted in the left image |
 //! | `/{target}/update/correction_m` | `Scalars`, static `SeriesLines` | triangulated |
@@ -87,6 +100,7 @@ mod blueprint;
 mod border;
 mod entities;
 mod export;
+mod features;
 mod images;
 mod layout;
 mod live;
@@ -163,6 +177,16 @@ fn log_step(step: &Step<'_>, is_first_here: bool) -> Logged {
     templates::log_right_window(step)?;
     map::log_triangulated_position(step)?;
     map::log_triangulated_covariance(step)?;
+    features::log_keypoints(step)?;
+    features::log_partners(step)?;
+    features::log_points(step)?;
+    features::log_inliers(step)?;
+    features::log_outliers(step)?;
+    features::log_residuals(step)?;
+    features::log_cloud(step)?;
+    features::log_cloud_left(step)?;
+    map::log_moved_position(step)?;
+    map::log_moved_covariance(step)?;
     images::log_left_covariance(step)?;
 
     states::log_state(step)?;

@@ -9,6 +9,9 @@
 //! | prediction | sky #56B4E9 |
 //! | measurement | blue #0072B2 |
 //! | second peak | purple #CC79A7 |
+//! | feature | grey #BFC4CC |
+//! | inlier, outlier | as tracking, as failed |
+//! | residual | yellow #F0E442 |
 //! | truth | white, on a black halo |
 
 use rerun::Color;
@@ -25,6 +28,10 @@ pub(super) const PREDICTION: Rgb = [0x56, 0xB4, 0xE9];
 pub(super) const MEASUREMENT: Rgb = [0x00, 0x72, 0xB2];
 pub(super) const SECOND_PEAK: Rgb = [0xCC, 0x79, 0xA7];
 pub(super) const TRUTH: Rgb = [0xFF, 0xFF, 0xFF];
+pub(super) const KEYPOINT: Rgb = [0xBF, 0xC4, 0xCC];
+pub(super) const INLIER: Rgb = TRACKING;
+pub(super) const OUTLIER: Rgb = FAILED;
+pub(super) const RESIDUAL: Rgb = [0xF0, 0xE4, 0x42];
 pub(super) const HALO: Rgb = [0x00, 0x00, 0x00];
 pub(super) const ROVER: Rgb = [0xBB, 0xBB, 0xBB];
 pub(super) const LIMIT: Rgb = [0x88, 0x88, 0x88];

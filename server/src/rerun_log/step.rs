@@ -6,6 +6,7 @@ use rerun::components::AggregationPolicy;
 use rerun::{AsComponents, Clear, RecordingStream, SeriesLines};
 use sightline_core::frames::{Point3, Pose};
 use sightline_core::image::GrayImage;
+use sightline_core::locate::features::FeatureEvidence;
 use sightline_core::locate::template::TemplateEvidence;
 use sightline_core::locate::template::match_template::TemplateMatch;
 use sightline_core::stages::point_mast::Pointing;
@@ -48,6 +49,11 @@ impl Step<'_> {
     /// The evidence of the template locator.
     pub(super) fn template(&self) -> Option<&TemplateEvidence> {
         self.trace.template()
+    }
+
+    /// The evidence of the feature locator.
+    pub(super) fn features(&self) -> Option<&FeatureEvidence> {
+        self.trace.features()
     }
 
     /// The match of the template.
