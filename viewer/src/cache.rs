@@ -9,6 +9,7 @@ use sightline_core::session::wire::Problem;
 use sightline_core::trace::{ArrayName, StepTrace};
 
 use crate::raster::Raster;
+use crate::tables::Table;
 
 /// Memory that loaded things may take, bytes.
 pub const LIMIT_BYTES: usize = 256 << 20;
@@ -74,8 +75,10 @@ pub enum Key {
 pub enum Item {
     /// Of [`Key::Trace`].
     Trace(Arc<StepTrace>),
-    /// Of [`Key::Image`] and [`Key::Array`].
+    /// Of [`Key::Image`] and of a [`Key::Array`] that is a picture.
     Raster(Arc<Raster>),
+    /// Of a [`Key::Array`] that is a table.
+    Table(Arc<Table>),
 }
 
 impl Item {
@@ -83,6 +86,7 @@ impl Item {
         match self {
             Self::Trace(_) => TRACE_BYTES,
             Self::Raster(raster) => raster.bytes(),
+            Self::Table(table) => table.bytes(),
         }
     }
 }
@@ -105,6 +109,16 @@ impl<'a, T> Slot<'a, T> {
         match self {
             Self::Ready(item) => Some(item),
             _ => None,
+        }
+    }
+
+    /// What `of` finds in it; absent where it finds nothing.
+    pub fn and<U>(self, of: impl FnOnce(&'a T) -> Option<&'a U>) -> Slot<'a, U> {
+        match self {
+            Self::Absent => Slot::Absent,
+            Self::Loading => Slot::Loading,
+            Self::Ready(item) => of(item).map_or(Slot::Absent, Slot::Ready),
+            Self::Failed(problem) => Slot::Failed(problem),
         }
     }
 }
@@ -182,22 +196,26 @@ impl Cache {
 
     /// A step's record.
     pub fn trace(&self, key: &StepKey) -> Slot<'_, StepTrace> {
-        match self.slot(&Key::Trace(key.clone())) {
-            Slot::Ready(Item::Trace(trace)) => Slot::Ready(trace),
-            Slot::Ready(Item::Raster(_)) | Slot::Absent => Slot::Absent,
-            Slot::Loading => Slot::Loading,
-            Slot::Failed(problem) => Slot::Failed(problem),
-        }
+        self.slot(&Key::Trace(key.clone())).and(|item| match item {
+            Item::Trace(trace) => Some(trace.as_ref()),
+            Item::Raster(_) | Item::Table(_) => None,
+        })
     }
 
-    /// An image or an array.
+    /// An image, or an array that is a picture.
     pub fn raster(&self, key: &Key) -> Slot<'_, Raster> {
-        match self.slot(key) {
-            Slot::Ready(Item::Raster(raster)) => Slot::Ready(raster),
-            Slot::Ready(Item::Trace(_)) | Slot::Absent => Slot::Absent,
-            Slot::Loading => Slot::Loading,
-            Slot::Failed(problem) => Slot::Failed(problem),
-        }
+        self.slot(key).and(|item| match item {
+            Item::Raster(raster) => Some(raster.as_ref()),
+            Item::Trace(_) | Item::Table(_) => None,
+        })
+    }
+
+    /// An array that is a table.
+    pub fn table(&self, key: &Key) -> Slot<'_, Table> {
+        self.slot(key).and(|item| match item {
+            Item::Table(table) => Some(table.as_ref()),
+            Item::Trace(_) | Item::Raster(_) => None,
+        })
     }
 
     fn slot(&self, key: &Key) -> Slot<'_, Item> {

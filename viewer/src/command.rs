@@ -1,11 +1,12 @@
 //! What a person can ask for. Panels and keys make commands; `state` carries them out.
 
 use sightline_core::frames::Pixel;
-use sightline_core::settings::Changes;
+use sightline_core::settings::{Changes, TrackerKind};
 
 use crate::state::calculator::Calculator;
 use crate::state::studies::Order;
 use crate::stretch::Stretch;
+use crate::tables::FeatureView;
 use crate::view2d::View2d;
 
 /// Where to go along the drive.
@@ -36,14 +37,22 @@ pub enum Stage {
     Capture,
     /// Stage 4.
     Locate,
-    /// First step of `locate`.
+    /// First step of `locate` by the template tracker.
     ScaleRoll,
-    /// Second step of `locate`.
+    /// Its second step.
     MatchTemplate,
-    /// Third step of `locate`.
+    /// Its third step.
     PointStereo,
-    /// Last step of `locate`.
+    /// First step of `locate` by the feature tracker.
+    Detect,
+    /// Its second step, between the eyes and between the stops.
+    MatchFeatures,
+    /// Last step of `locate` by the template tracker, third one of the feature tracker.
     Triangulate,
+    /// Fourth step of the feature tracker.
+    FitMotion,
+    /// Its last step.
+    Bootstrap,
     /// Stage 5.
     Judge,
     /// Stage 6.
@@ -51,19 +60,52 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// All of them, in running order.
-    pub const ALL: [Self; 10] = [
-        Self::Predict,
-        Self::PointMast,
-        Self::Capture,
-        Self::Locate,
-        Self::ScaleRoll,
-        Self::MatchTemplate,
-        Self::PointStereo,
-        Self::Triangulate,
-        Self::Judge,
-        Self::Update,
-    ];
+    /// Those of a tracker, in running order.
+    pub const fn of(tracker: TrackerKind) -> &'static [Self] {
+        use Stage::*;
+        match tracker {
+            TrackerKind::Template => &[
+                Predict,
+                PointMast,
+                Capture,
+                Locate,
+                ScaleRoll,
+                MatchTemplate,
+                PointStereo,
+                Triangulate,
+                Judge,
+                Update,
+            ],
+            TrackerKind::Features => &[
+                Predict,
+                PointMast,
+                Capture,
+                Locate,
+                Detect,
+                MatchFeatures,
+                Triangulate,
+                FitMotion,
+                Bootstrap,
+                Judge,
+                Update,
+            ],
+        }
+    }
+
+    /// The stage itself, or the one that stands in its place where `tracker` does not have it.
+    pub fn of_tracker(self, tracker: TrackerKind) -> Self {
+        if Self::of(tracker).contains(&self) {
+            return self;
+        }
+        match self {
+            Self::ScaleRoll => Self::Detect,
+            Self::MatchTemplate | Self::PointStereo => Self::MatchFeatures,
+            Self::Detect => Self::ScaleRoll,
+            Self::MatchFeatures => Self::MatchTemplate,
+            Self::FitMotion | Self::Bootstrap => Self::Triangulate,
+            other => other,
+        }
+    }
 
     /// The word of the house.
     pub const fn word(self) -> &'static str {
@@ -75,7 +117,11 @@ impl Stage {
             Self::ScaleRoll => "scale_roll",
             Self::MatchTemplate => "match_template",
             Self::PointStereo => "point_stereo",
+            Self::Detect => "detect",
+            Self::MatchFeatures => "match_features",
             Self::Triangulate => "triangulate",
+            Self::FitMotion => "fit_motion",
+            Self::Bootstrap => "bootstrap",
             Self::Judge => "judge",
             Self::Update => "update",
         }
@@ -91,7 +137,11 @@ impl Stage {
             Self::ScaleRoll => "How should the template look from here?",
             Self::MatchTemplate => "Where does the template fit best in the left image?",
             Self::PointStereo => "Which point of the right image is it?",
+            Self::Detect => "Which features do the two images have?",
+            Self::MatchFeatures => "Which features are the same, in the other eye and at an earlier stop?",
             Self::Triangulate => "Which point in space do both pixels see?",
+            Self::FitMotion => "Which rigid motion do most matches agree with?",
+            Self::Bootstrap => "How certain is that motion?",
             Self::Judge => "Can the match be trusted?",
             Self::Update => "What does this stop leave to the next?",
         }
@@ -99,7 +149,10 @@ impl Stage {
 
     /// Whether it is a step of `locate`.
     pub const fn is_step_of_locate(self) -> bool {
-        matches!(self, Self::ScaleRoll | Self::MatchTemplate | Self::PointStereo | Self::Triangulate)
+        !matches!(
+            self,
+            Self::Predict | Self::PointMast | Self::Capture | Self::Locate | Self::Judge | Self::Update
+        )
     }
 }
 
@@ -133,6 +186,25 @@ pub enum Layer {
     Curve,
     /// The other targets.
     Others,
+    /// Features without a match, with scale and orientation.
+    Keypoints,
+    /// Features whose match agrees with the motion.
+    Inliers,
+    /// Features whose match does not.
+    Outliers,
+    /// From where the inliers were at the earlier stop.
+    Flow,
+    /// From where the outliers were.
+    OutlierFlow,
+    /// From where the motion puts matched features to where they are, magnified.
+    Residuals,
+    /// Where the bootstrap puts the target.
+    Cloud,
+}
+
+impl Layer {
+    /// Those that would drown the picture: they are switched on by whoever wants them.
+    pub const HIDDEN_AT_FIRST: [Self; 3] = [Self::Keypoints, Self::OutlierFlow, Self::Residuals];
 }
 
 /// What the pointer and the keys mean at the moment.
@@ -204,6 +276,8 @@ pub enum Command {
     SetCalculator(Calculator),
     /// Stretches the grey values of the images on the screen.
     SetStretch(Stretch),
+    /// Filters the features and magnifies their residuals.
+    SetFeatureView(FeatureView),
     /// Changes what the next study is made of.
     OrderStudy(Order),
     /// Starts that study.

@@ -56,8 +56,8 @@ pub fn command(key: Key, modifiers: Modifiers, state: &State) -> Option<Command>
         Key::End => Command::Go(Go::Last),
         Key::PageDown => Command::Go(Go::NextEvent),
         Key::PageUp => Command::Go(Go::PreviousEvent),
-        Key::ArrowUp => Command::SelectStage(neighbour(state.stage, -1)),
-        Key::ArrowDown => Command::SelectStage(neighbour(state.stage, 1)),
+        Key::ArrowUp => Command::SelectStage(neighbour(state, -1)),
+        Key::ArrowDown => Command::SelectStage(neighbour(state, 1)),
         Key::G => Command::SetMode(Mode::GoTo(String::new())),
         Key::T if state.mode == Mode::Pick => Command::SetMode(Mode::Look),
         Key::T => Command::SetMode(Mode::Pick),
@@ -73,9 +73,10 @@ pub fn command(key: Key, modifiers: Modifiers, state: &State) -> Option<Command>
     })
 }
 
-fn neighbour(stage: Stage, by: isize) -> Stage {
-    let at = Stage::ALL.iter().position(|&s| s == stage).unwrap_or(0);
-    Stage::ALL[at.saturating_add_signed(by).min(Stage::ALL.len() - 1)]
+fn neighbour(state: &State, by: isize) -> Stage {
+    let (stages, stage) = (Stage::of(state.tracker()), state.stage());
+    let at = stages.iter().position(|&s| s == stage).unwrap_or(0);
+    stages[at.saturating_add_signed(by).min(stages.len() - 1)]
 }
 
 #[cfg(test)]
@@ -125,8 +126,15 @@ mod tests {
 
     #[test]
     fn stages_end_at_the_first_and_the_last() {
-        assert_eq!(neighbour(Stage::Predict, -1), Stage::Predict);
-        assert_eq!(neighbour(Stage::Predict, 1), Stage::PointMast);
-        assert_eq!(neighbour(Stage::Update, 1), Stage::Update);
+        let from = |stage: Stage, by: isize| {
+            let mut state = state();
+            state.stage = stage;
+            neighbour(&state, by)
+        };
+        assert_eq!(from(Stage::Predict, -1), Stage::Predict);
+        assert_eq!(from(Stage::Predict, 1), Stage::PointMast);
+        assert_eq!(from(Stage::Update, 1), Stage::Update);
+        // A stage of the other tracker counts as the one in its place.
+        assert_eq!(from(Stage::FitMotion, 1), Stage::Judge);
     }
 }

@@ -29,6 +29,8 @@ pub enum Pane {
     History,
     /// The surface of scores.
     Surface,
+    /// What the feature tracker saw.
+    Features,
     /// The error budget.
     Budget,
     /// The validation experiments.
@@ -53,11 +55,12 @@ pub enum Pane {
 
 impl Pane {
     /// All of them.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::Targets,
         Self::Settings,
         Self::Left,
         Self::Right,
+        Self::Features,
         Self::Budget,
         Self::Studies,
         Self::Strip,
@@ -85,6 +88,7 @@ impl Pane {
             Self::Strip => "Template strip",
             Self::History => "Template history",
             Self::Surface => "Match scores",
+            Self::Features => "Features",
             Self::StereoProfile => "Stereo scores",
             Self::Map => "Map, site frame",
             Self::Plots => "Over the steps",
@@ -110,6 +114,7 @@ pub fn show_pane(ui: &mut Ui, pane: Pane, state: &State, out: &mut Vec<Command>)
         Pane::Strip => panels::strip::show(ui, state, out),
         Pane::History => panels::history::show(ui, state, out),
         Pane::Surface => panels::surface::show(ui, state, out),
+        Pane::Features => panels::features::show(ui, state, out),
         Pane::Budget => panels::budget::show(ui, state, out),
         Pane::Studies => panels::studies::show(ui, state, out),
         Pane::StereoProfile => panels::stereo_profile::show(ui, state, out),
@@ -133,7 +138,7 @@ pub fn overview() -> Tree<Pane> {
     };
     let side = tabs(&mut tiles, &[Pane::Targets, Pane::Settings]);
     let left = tabs(&mut tiles, &[Pane::Left]);
-    let right = tabs(&mut tiles, &[Pane::Right, Pane::Budget, Pane::Studies]);
+    let right = tabs(&mut tiles, &[Pane::Right, Pane::Features, Pane::Budget, Pane::Studies]);
     let strip = tabs(&mut tiles, &[Pane::Strip, Pane::History]);
     let surface = tabs(&mut tiles, &[Pane::Surface, Pane::StereoProfile]);
     let map = tabs(&mut tiles, &[Pane::Map]);

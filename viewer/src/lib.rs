@@ -6,7 +6,7 @@
 //! | `state` | what is known and looked at: the one value of which every panel is a view |
 //! | `command`, `keys` | what a person can ask for, and by which key |
 //! | `net` | requests and events; nothing blocks |
-//! | `cache`, `raster`, `stretch` | what was loaded, with a limit of memory, and how pixels become a texture |
+//! | `cache`, `raster`, `stretch`, `tables` | what was loaded, with a limit of memory, and how pixels become a texture and tables rows |
 //! | `panels` | one file a panel: read-only data in, commands out |
 //! | `layout` | where the panels are |
 //! | `view2d`, `overlay`, `ellipse`, `contour` | the zoomable canvas and the marks on it |
@@ -21,6 +21,7 @@ pub mod net;
 pub mod cache;
 pub mod raster;
 pub mod stretch;
+pub mod tables;
 pub mod panels;
 pub mod layout;
 pub mod view2d;

@@ -10,6 +10,8 @@ use crate::{ellipse, theme};
 
 /// Width of a line, points.
 const WIDTH: f32 = 2.0;
+/// Width of a line that is one of many, points.
+const THIN: f32 = 1.0;
 /// Width of its halo on either side, points.
 const HALO: f32 = 1.0;
 /// Half the size of a mark, points.
@@ -39,6 +41,8 @@ pub enum Mark {
     Square,
     /// A diamond.
     Diamond,
+    /// A filled circle.
+    Dot,
     /// A short stretch of line.
     Stroke(Line),
 }
@@ -59,6 +63,12 @@ impl<'a> Overlay<'a> {
     pub fn line(&self, pixels: &[Pixel], colour: Color32, line: Line) {
         let points: Vec<Pos2> = pixels.iter().map(|&pixel| self.transform.to_screen(pixel)).collect();
         paint_line(self.painter, &points, colour, line, WIDTH);
+    }
+
+    /// A line through pixels that is one of many.
+    pub fn thin_line(&self, pixels: &[Pixel], colour: Color32, line: Line) {
+        let points: Vec<Pos2> = pixels.iter().map(|&pixel| self.transform.to_screen(pixel)).collect();
+        paint_line(self.painter, &points, colour, line, THIN);
     }
 
     /// A closed line through pixels.
@@ -135,6 +145,11 @@ pub fn paint_mark(painter: &Painter, at: Pos2, mark: Mark, colour: Color32, reac
         Mark::Ring => {
             painter.circle_stroke(at, reach * 0.75, Stroke::new(WIDTH + 2.0 * HALO, theme::HALO));
             painter.circle_stroke(at, reach * 0.75, Stroke::new(WIDTH, colour));
+            return;
+        }
+        Mark::Dot => {
+            painter.circle_filled(at, reach * 0.6 + HALO, theme::HALO);
+            painter.circle_filled(at, reach * 0.6, colour);
             return;
         }
         Mark::Plus => vec![vec![to(-1.0, 0.0), to(1.0, 0.0)], vec![to(0.0, -1.0), to(0.0, 1.0)]],

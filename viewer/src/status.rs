@@ -79,7 +79,7 @@ pub fn describe(state: &State, left_image: &LeftImage, zoom: f32) -> Value {
         "steps_done": state.run().map_or(0, |run| run.rows.len()),
         "running": state.run_progress().is_some(),
         "shown": left_image.is_some() && (state.row().is_none() || state.trace().is_some()),
-        "stage": state.stage.word(),
+        "stage": state.stage().word(),
         "pick_mode": state.mode == Mode::Pick,
         "designating": state.designating.is_some(),
         "problem": problem.map(|message| &message.text),

@@ -47,6 +47,12 @@ pub const PREDICTION: Color32 = Color32::from_rgb(0x56, 0xb4, 0xe9);
 pub const SEARCH: Color32 = Color32::from_rgb(0xf0, 0xe4, 0x42);
 /// The subframe.
 pub const SUBFRAME: Color32 = Color32::from_rgb(0xbf, 0xc4, 0xcc);
+/// A feature.
+pub const KEYPOINT: Color32 = Color32::from_rgb(0xbf, 0xc4, 0xcc);
+/// A match that agrees with the motion: a dot and solid lines.
+pub const INLIER: Color32 = TRACKING;
+/// A match that does not: a cross and dashed lines.
+pub const OUTLIER: Color32 = FAILED;
 /// What is true.
 pub const TRUTH: Color32 = Color32::WHITE;
 /// A texture in its own colours.

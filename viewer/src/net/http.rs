@@ -11,6 +11,7 @@ use sightline_core::study::wire::StudyRows;
 use super::{Arrived, Reply, Request};
 use crate::cache::{Item, Key, StepKey};
 use crate::raster::Raster;
+use crate::tables::Table;
 
 /// Sends `request` to the server at `origin` and hands the answer to `done`, perhaps on another thread.
 pub(super) fn send(
@@ -147,6 +148,10 @@ fn read_item(key: &Key, bytes: &[u8], context: &egui::Context) -> Result<Item, P
         Key::Trace(_) => return Ok(Item::Trace(Arc::new(parse(bytes)?))),
         Key::Image { step, eye, .. } => {
             Raster::from_png(context, &format!("the {} image of step {step}", eye.word()), bytes)
+        }
+        Key::Array(_, name) if Table::is_table(*name) => {
+            let table = Table::from_npy(*name, bytes).map_err(|why| misread(&why))?;
+            return Ok(Item::Table(Arc::new(table)));
         }
         Key::Array(_, name) => Raster::from_npy(context, *name, bytes),
     };

@@ -7,6 +7,7 @@ use sightline_core::trace::StepTrace;
 use super::inspector;
 use crate::command::{Command, Go, Mode, Stage};
 use crate::state::messages::Weight;
+use crate::state::tracker::confidence_of;
 use crate::state::{Connection, State, run_letter};
 use crate::theme;
 
@@ -78,8 +79,11 @@ pub fn status(ui: &mut Ui, state: &State) {
         other => other.word().to_uppercase(),
     };
     ui.label(RichText::new(word).strong().color(theme::state(tracking)));
+    let confidence = state.run().and_then(|run| confidence_of(run, row));
     for (name, value, unit) in [
         ("ncc", row.ncc.map(|v| format!("{v:.2}")), ""),
+        ("inliers", row.inliers.map(|n| n.to_string()), ""),
+        ("confidence", confidence.map(|v| format!("{v:.2}")), ""),
         ("err", row.err_px.map(|v| format!("{v:.1}")), "px"),
         ("σ", row.sigma_m.map(|v| format!("{:.1}", v * 100.0)), "cm"),
     ] {
@@ -169,10 +173,10 @@ fn newest_message(ui: &mut Ui, state: &State) {
 pub fn stages(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 3.0;
-        for (i, stage) in Stage::ALL.into_iter().enumerate() {
+        for (i, &stage) in Stage::of(state.tracker()).iter().enumerate() {
             if i > 0 {
                 let between = match stage {
-                    Stage::ScaleRoll => "(",
+                    Stage::ScaleRoll | Stage::Detect => "(",
                     Stage::Judge => ")  ›",
                     _ => "›",
                 };
@@ -192,7 +196,7 @@ fn stage_button(ui: &mut Ui, state: &State, stage: Stage, out: &mut Vec<Command>
     };
     let size = if stage.is_step_of_locate() { 11.5 } else { 12.5 };
     let words = RichText::new(stage.word()).size(size).color(colour);
-    let button = Button::selectable(state.stage == stage, words);
+    let button = Button::selectable(state.stage() == stage, words);
     let note = match reached {
         Some(false) => "\nNot reached at this step.",
         _ => "",

@@ -9,7 +9,7 @@ use crate::state::State;
 use crate::{panels, theme};
 
 /// What the panel is for.
-const PURPOSE: &str = "Whether the match can be trusted: four criteria with their limits.";
+const PURPOSE: &str = "Whether the match can be trusted: the criteria with their limits.";
 
 /// Room for the margin in digits, points.
 const MARGIN: f32 = 50.0;

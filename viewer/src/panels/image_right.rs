@@ -6,6 +6,7 @@ use sightline_core::frames::Pixel;
 use sightline_core::image::PixelRect;
 use sightline_core::trace::StepTrace;
 
+use super::features::marks;
 use super::images_left::{STATUS, ready_image, status_line};
 use super::legend::{self, Entry};
 use crate::cache::Eye;
@@ -44,6 +45,10 @@ fn picture(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) 
     let canvas = Canvas::new(ui, state.view(Panel::Right), region, STATUS);
     canvas.texture(&raster.texture, region);
     canvas.pixel_grid(region);
+    if state.marks {
+        marks::paint_right(&canvas, state);
+    }
+    marks::hover(&canvas, state, |feature| feature.right);
     if let Some(trace) = state.trace().filter(|_| state.marks) {
         paint_marks(&canvas, trace, state);
     }
@@ -57,7 +62,9 @@ fn entries(state: &State) -> Vec<Entry> {
     let Some(trace) = state.trace() else { return Vec::new() };
     let mut entries = Vec::new();
     if trace.locate.as_ref().is_some_and(|l| l.right_pixel.is_some()) {
-        let word = format!("stereo match · run {}", run_letter(state.cursor.run));
+        let is_moved = trace.predict.is_some() && trace.features().is_some();
+        let what = if is_moved { "moved here" } else { "stereo match" };
+        let word = format!("{what} · run {}", run_letter(state.cursor.run));
         entries.push(Entry::new(Layer::Match, Mark::Ring, theme::run(state.cursor.run), word));
     }
     if trace.predict.is_some() && trace.point_mast.as_ref().is_some_and(|p| p.predicted_right.is_some()) {
@@ -67,6 +74,7 @@ fn entries(state: &State) -> Vec<Entry> {
         let word = "epipolar curve, range in m";
         entries.push(Entry::new(Layer::Curve, Mark::Stroke(Line::Solid), theme::SEARCH, word));
     }
+    entries.extend(marks::right_entries(state));
     entries
 }
 

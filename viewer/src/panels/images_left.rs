@@ -3,9 +3,11 @@
 use egui::{Align, CursorIcon, Layout, Rect, Ui, pos2, vec2};
 use sightline_core::frames::Pixel;
 use sightline_core::image::PixelRect;
+use sightline_core::locate::features::rows::moved_covariance_px2;
 use sightline_core::trace::StepTrace;
 
 use super::exposure;
+use super::features::marks;
 use super::legend::{self, Entry};
 use crate::cache::{Eye, Slot};
 use crate::command::{Command, Layer, Mode, Panel};
@@ -43,12 +45,14 @@ fn picture(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) 
     canvas.pixel_grid(region);
     if state.marks {
         paint_others(&canvas, state);
+        marks::paint_left(&canvas, state);
         if let Some(trace) = state.trace() {
             paint_marks(&Overlay::new(&canvas.painter, &canvas.transform), trace, state);
         }
     }
     paint_designation(&canvas, state);
     pick(ui, &canvas, raster, state, out);
+    marks::hover(&canvas, state, |feature| Some(feature.pixel));
     status_line(ui, &canvas, raster, region);
     if let Some(view) = canvas.moved {
         out.push(Command::View(Panel::Left, view));
@@ -102,7 +106,11 @@ fn entries(state: &State) -> Vec<Entry> {
         entries.push(Entry::new(Layer::Truth, Mark::Plus, theme::TRUTH, "truth"));
     }
     if trace.locate.as_ref().is_some_and(|l| l.left_pixel.is_some()) {
-        let word = if trace.predict.is_some() { "match, 3σ" } else { "picked" };
+        let word = match (trace.predict.is_some(), trace.features().is_some()) {
+            (false, _) => "picked",
+            (true, false) => "match, 3σ",
+            (true, true) => "moved here, 1σ 2σ 3σ",
+        };
         let word = format!("{word} · run {}", run_letter(state.cursor.run));
         entries.push(Entry::new(Layer::Match, Mark::Ring, run, word));
     }
@@ -129,6 +137,7 @@ fn entries(state: &State) -> Vec<Entry> {
     if state.session.as_ref().is_some_and(|s| s.targets.len() > 1) {
         entries.push(Entry::new(Layer::Others, Mark::Diamond, theme::WEAK, "other targets"));
     }
+    entries.extend(marks::left_entries(state));
     entries
 }
 
@@ -159,7 +168,15 @@ fn paint_marks(overlay: &Overlay<'_>, trace: &StepTrace, state: &State) {
     if let Some((located, pixel)) = trace.locate.as_ref().and_then(|l| Some((l, l.left_pixel?)))
         && state.shows(Layer::Match)
     {
-        overlay.ellipse(pixel, &located.left_error.mean_square_px2(), 3.0, run, Line::Solid);
+        let moved = trace.point_mast.as_ref().and_then(|p| moved_covariance_px2(located, &p.left));
+        match moved {
+            Some(moved) => {
+                for sigmas in [1.0, 2.0, 3.0] {
+                    overlay.ellipse(pixel, &moved, sigmas, run, Line::Solid);
+                }
+            }
+            None => overlay.ellipse(pixel, &located.left_error.mean_square_px2(), 3.0, run, Line::Solid),
+        }
         overlay.mark(pixel, Mark::Ring, run);
     }
     if let Some(pixel) = trace.truth.as_ref().and_then(|t| t.left_pixel).filter(|_| state.shows(Layer::Truth))

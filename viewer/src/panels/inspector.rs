@@ -1,7 +1,9 @@
 //! The inspector: the selected stage's record as a tree of values with units.
 
 use egui::{CollapsingHeader, RichText, ScrollArea, Ui};
-use serde_json::Value;
+use serde_json::{Value, json};
+use sightline_core::locate::features::FeatureEvidence;
+use sightline_core::settings::TrackerKind;
 use sightline_core::trace::StepTrace;
 
 use super::digits;
@@ -12,18 +14,18 @@ use crate::{panels, theme};
 /// Shows the record.
 pub fn show(ui: &mut Ui, state: &State, _out: &mut Vec<Command>) {
     ui.horizontal_wrapped(|ui| {
-        ui.label(RichText::new(state.stage.word()).strong().color(theme::STRONG));
-        ui.label(theme::note(state.stage.question()));
+        ui.label(RichText::new(state.stage().word()).strong().color(theme::STRONG));
+        ui.label(theme::note(state.stage().question()));
     });
     let Some(trace) = state.trace() else {
         panels::missing(ui, "", &state.missing_step());
         return;
     };
-    let Some(record) = record(trace, state.stage) else {
+    let Some(record) = record(trace, state.stage()) else {
         panels::missing(ui, "", &not_reached(trace, state));
         return;
     };
-    ScrollArea::vertical().auto_shrink(false).id_salt(state.stage).show(ui, |ui| {
+    ScrollArea::vertical().auto_shrink(false).id_salt(state.stage()).show(ui, |ui| {
         entries(ui, &record);
         if let Some(truth) = trace.truth.as_ref().and_then(|truth| serde_json::to_value(truth).ok()) {
             ui.add_space(4.0);
@@ -34,12 +36,16 @@ pub fn show(ui: &mut Ui, state: &State, _out: &mut Vec<Command>) {
 }
 
 fn not_reached(trace: &StepTrace, state: &State) -> String {
-    let word = state.stage.word();
+    let word = state.stage().word();
     match (&trace.fault, trace.predict.is_none()) {
         (Some(fault), _) => format!("{word} was not reached: {fault}"),
         (None, true) => {
+            let other = match state.tracker() {
+                TrackerKind::Template => "point_stereo",
+                TrackerKind::Features => "triangulate",
+            };
             format!(
-                "{word} is not part of the designation. Go one step on (Right) to see it, or select `point_stereo`."
+                "{word} is not part of the designation. Go one step on (Right) to see it, or select `{other}`."
             )
         }
         (None, false) => format!("{word} was not reached: {}", state.missing_step()),
@@ -48,7 +54,7 @@ fn not_reached(trace: &StepTrace, state: &State) -> String {
 
 /// Whether a stage was reached.
 pub fn is_reached(trace: &StepTrace, stage: Stage) -> bool {
-    let evidence = trace.template();
+    let (evidence, features) = (trace.template(), trace.features());
     match stage {
         Stage::Predict => trace.predict.is_some(),
         Stage::PointMast => trace.point_mast.is_some(),
@@ -57,7 +63,13 @@ pub fn is_reached(trace: &StepTrace, stage: Stage) -> bool {
         Stage::ScaleRoll => evidence.is_some_and(|e| e.scale_roll.is_some()),
         Stage::MatchTemplate => evidence.is_some_and(|e| e.match_template.is_some()),
         Stage::PointStereo => evidence.is_some_and(|e| e.point_stereo.is_some()),
-        Stage::Triangulate => evidence.is_some_and(|e| e.triangulate.is_some()),
+        Stage::Detect => features.is_some_and(|e| e.detect.is_some()),
+        Stage::MatchFeatures => features.is_some_and(|e| e.match_features.is_some()),
+        Stage::Triangulate => {
+            features.map_or(evidence.is_some_and(|e| e.triangulate.is_some()), |e| e.detect.is_some())
+        }
+        Stage::FitMotion => features.is_some_and(|e| e.fit_motion.is_some()),
+        Stage::Bootstrap => features.is_some_and(|e| e.bootstrap.is_some()),
         Stage::Judge => trace.judge.is_some(),
         Stage::Update => true,
     }
@@ -65,6 +77,9 @@ pub fn is_reached(trace: &StepTrace, stage: Stage) -> bool {
 
 /// What a stage returned; none where it was not reached.
 pub fn record(trace: &StepTrace, stage: Stage) -> Option<Value> {
+    if let Some(features) = trace.features().filter(|_| stage.is_step_of_locate()) {
+        return feature_record(features, stage);
+    }
     let evidence = trace.template();
     let value = match stage {
         Stage::Predict => serde_json::to_value(trace.predict.as_ref()?),
@@ -75,6 +90,7 @@ pub fn record(trace: &StepTrace, stage: Stage) -> Option<Value> {
         Stage::MatchTemplate => serde_json::to_value(evidence?.match_template.as_ref()?),
         Stage::PointStereo => serde_json::to_value(evidence?.point_stereo.as_ref()?),
         Stage::Triangulate => serde_json::to_value(evidence?.triangulate.as_ref()?),
+        Stage::Detect | Stage::MatchFeatures | Stage::FitMotion | Stage::Bootstrap => return None,
         Stage::Judge => serde_json::to_value(trace.judge.as_ref()?),
         Stage::Update => serde_json::to_value(&trace.update),
     };
@@ -84,6 +100,34 @@ pub fn record(trace: &StepTrace, stage: Stage) -> Option<Value> {
         object.remove("evidence");
     }
     Some(value)
+}
+
+/// What a step of the feature tracker returned.
+fn feature_record(features: &FeatureEvidence, stage: Stage) -> Option<Value> {
+    let found = features.detect.as_ref();
+    let mut record = match stage {
+        Stage::Detect => found.map(|d| json!({ "left": d.left, "right": d.right }))?,
+        Stage::MatchFeatures => {
+            let mut record = serde_json::to_value(features.match_features.as_ref()).ok()?;
+            if record.is_null() {
+                record = json!({});
+            }
+            record["stereo_matches"] = found.map(|d| d.stereo_matches)?.into();
+            record["anchors"] = serde_json::to_value(&features.anchors).ok()?;
+            record
+        }
+        Stage::Triangulate => {
+            found.map(|d| json!({ "points": d.points, "median_range_m": d.median_range_m }))?
+        }
+        Stage::FitMotion => serde_json::to_value(features.fit_motion.as_ref()?).ok()?,
+        Stage::Bootstrap => serde_json::to_value(features.bootstrap.as_ref()?).ok()?,
+        _ => return None,
+    };
+    if let (Stage::Triangulate, Some(designation)) = (stage, &features.designation) {
+        // The pick is a measurement by point stereo, whose steps are no stages of this tracker.
+        record["pick_by_point_stereo"] = serde_json::to_value(designation).ok()?;
+    }
+    Some(record)
 }
 
 /// The fields of a record, plain values first.
@@ -125,8 +169,9 @@ fn children(ui: &mut Ui, key: &str, value: &Value) {
         Value::Array(list) if is_matrix(key, value) => matrix(ui, list),
         Value::Array(list) => {
             for (i, item) in list.iter().enumerate() {
-                let title =
-                    item.get("name").and_then(Value::as_str).map_or_else(|| i.to_string(), str::to_owned);
+                let step = || item.get("step").map(|step| format!("step {step}"));
+                let name = item.get("name").and_then(Value::as_str).map(str::to_owned);
+                let title = name.or_else(step).unwrap_or_else(|| i.to_string());
                 if item.is_object() {
                     CollapsingHeader::new(RichText::new(title).size(12.0))
                         .id_salt(i)
@@ -155,12 +200,12 @@ fn is_matrix(key: &str, value: &Value) -> bool {
     is_named
         && value
             .as_array()
-            .is_some_and(|list| matches!(list.len(), 4 | 9) && list.iter().all(Value::is_number))
+            .is_some_and(|list| matches!(list.len(), 4 | 9 | 36) && list.iter().all(Value::is_number))
 }
 
 /// A square matrix in rows and columns.
 fn matrix(ui: &mut Ui, list: &[Value]) {
-    let side = if list.len() == 9 { 3 } else { 2 };
+    let side = list.len().isqrt();
     egui::Grid::new(ui.next_auto_id()).spacing([14.0, 1.0]).show(ui, |ui| {
         for row in 0..side {
             for column in 0..side {

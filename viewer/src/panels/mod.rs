@@ -3,6 +3,7 @@
 pub mod bars;
 pub mod budget;
 pub mod exposure;
+pub mod features;
 pub mod gates;
 pub mod help;
 pub mod history;

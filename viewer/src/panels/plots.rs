@@ -1,4 +1,4 @@
-//! Plots over the steps of a run: scores, pixel error, and position error with its 1 σ.
+//! Plots over the steps of a run: scores, or confidence and inliers; pixel error; position error with its 1 σ.
 
 use egui::{Color32, Id, Ui, vec2};
 use egui_plot::{
@@ -6,16 +6,18 @@ use egui_plot::{
     VLine,
 };
 use sightline_core::session::view::RunView;
+use sightline_core::settings::TrackerKind;
 use sightline_core::trace::StepRow;
 
 use super::names::{self, HEIGHT as NAMES};
 use crate::command::{Command, Go};
 use crate::overlay::{self, Mark};
 use crate::state::State;
+use crate::state::tracker::confidence_of;
 use crate::{panels, theme};
 
 /// What the panel is for.
-const PURPOSE: &str = "Scores and errors of the run, step by step.";
+const PURPOSE: &str = "Scores or confidence, and errors of the run, step by step.";
 
 /// A line of a plot: its name, colour and shape, and how a step's value is got.
 struct Series {
@@ -23,7 +25,7 @@ struct Series {
     colour: Color32,
     mark: Mark,
     shape: MarkerShape,
-    value: fn(&StepRow) -> Option<f64>,
+    value: fn(&RunView, &StepRow) -> Option<f64>,
 }
 
 /// One plot with its lines and thresholds.
@@ -32,6 +34,8 @@ struct Chart {
     unit: &'static str,
     series: Vec<Series>,
     thresholds: Vec<f64>,
+    /// What the thresholds are.
+    threshold: String,
     /// Values that are always in view, so that nothing looks large that is not.
     in_view: [f64; 2],
 }
@@ -58,43 +62,94 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     }
 }
 
+fn series(
+    name: &'static str,
+    colour: Color32,
+    mark: Mark,
+    shape: MarkerShape,
+    value: fn(&RunView, &StepRow) -> Option<f64>,
+) -> Series {
+    Series { name, colour, mark, shape, value }
+}
+
 /// The plots that this run has data for.
 fn charts(state: &State, run: &RunView) -> Vec<Chart> {
     let colour = theme::run(run.number);
-    let limit = |key: &str| state.setting("limits", key).and_then(|v| v.as_f64());
-    let series = |name, colour, mark, shape, value| Series { name, colour, mark, shape, value };
-    let (ring, square, diamond) = (Mark::Ring, Mark::Square, Mark::Diamond);
-    let mut charts = vec![Chart {
-        title: "scores",
-        unit: "",
-        series: vec![
-            series("ncc", colour, ring, MarkerShape::Circle, |row| row.ncc),
-            series("stereo", theme::PREDICTION, square, MarkerShape::Square, |row| row.stereo_score),
-        ],
-        thresholds: limit("ncc_min").into_iter().chain(limit("stereo_ncc_min")).collect(),
-        in_view: [0.9, 1.0],
-    }];
-    let mut position =
-        vec![series("σ", theme::WEAK, diamond, MarkerShape::Diamond, |row| row.sigma_m.map(|v| v * 100.0))];
+    let (ring, diamond) = (Mark::Ring, Mark::Diamond);
+    let mut charts = match run.settings.tracker {
+        TrackerKind::Template => vec![scores(state, colour)],
+        TrackerKind::Features => vec![confidence(state, colour), inliers(state, colour)],
+    };
+    let mut position = vec![series("σ", theme::WEAK, diamond, MarkerShape::Diamond, |_, row| {
+        row.sigma_m.map(|v| v * 100.0)
+    })];
     if run.rows.iter().any(|row| row.err_m.is_some()) {
-        let error = series("error", colour, ring, MarkerShape::Circle, |row| row.err_px);
+        let error = series("error", colour, ring, MarkerShape::Circle, |_, row| row.err_px);
         charts.push(Chart {
             title: "pixel error",
             unit: "px",
             series: vec![error],
             thresholds: Vec::new(),
+            threshold: String::new(),
             in_view: [0.0, 1.0],
         });
-        position.push(series("error", colour, ring, MarkerShape::Circle, |row| row.err_m.map(|v| v * 100.0)));
+        position
+            .push(series("error", colour, ring, MarkerShape::Circle, |_, row| row.err_m.map(|v| v * 100.0)));
     }
     charts.push(Chart {
         title: "position error",
         unit: "cm",
         series: position,
         thresholds: Vec::new(),
+        threshold: String::new(),
         in_view: [0.0, 1.0],
     });
     charts
+}
+
+/// The scores of a template run with what is asked of them.
+fn scores(state: &State, colour: Color32) -> Chart {
+    let limit = |key: &str| state.setting("limits", key).and_then(|v| v.as_f64());
+    Chart {
+        title: "scores",
+        unit: "",
+        series: vec![
+            series("ncc", colour, Mark::Ring, MarkerShape::Circle, |_, row| row.ncc),
+            series("stereo", theme::PREDICTION, Mark::Square, MarkerShape::Square, |_, row| row.stereo_score),
+        ],
+        thresholds: limit("ncc_min").into_iter().chain(limit("stereo_ncc_min")).collect(),
+        threshold: "least allowed".to_owned(),
+        in_view: [0.9, 1.0],
+    }
+}
+
+/// The confidence of a run by features, with where the target is lost and where it returns (R184, R185).
+fn confidence(state: &State, colour: Color32) -> Chart {
+    let limit = |key: &str| state.setting("limits", key).and_then(|v| v.as_f64());
+    let [lost, back] = ["confidence_min", "confidence_return"].map(limit);
+    let name = |limit: Option<f64>| limit.map_or_else(|| "none".to_owned(), |v| v.to_string());
+    Chart {
+        title: "confidence",
+        unit: "",
+        series: vec![series("confidence", colour, Mark::Ring, MarkerShape::Circle, confidence_of)],
+        thresholds: lost.into_iter().chain(back).collect(),
+        threshold: format!("lost below {}, back at {}", name(lost), name(back)),
+        in_view: [0.0, 1.0],
+    }
+}
+
+/// Its matches that agree with the motion.
+fn inliers(state: &State, colour: Color32) -> Chart {
+    let half = state.setting("features", "confidence_matches").and_then(|v| v.as_f64());
+    let value = |_: &RunView, row: &StepRow| row.inliers.map(|count| count as f64);
+    Chart {
+        title: "inliers",
+        unit: "",
+        series: vec![series("inliers", colour, Mark::Dot, MarkerShape::Circle, value)],
+        thresholds: half.into_iter().collect(),
+        threshold: "confidence one half".to_owned(),
+        in_view: [0.0, half.unwrap_or_default()],
+    }
 }
 
 /// What the row above a plot names.
@@ -102,7 +157,7 @@ fn names_of(chart: &Chart) -> (String, Vec<(Mark, Color32, String)>) {
     let unit = if chart.unit.is_empty() { String::new() } else { format!(", {}", chart.unit) };
     let mut names: Vec<_> = chart.series.iter().map(|s| (s.mark, s.colour, s.name.to_owned())).collect();
     if !chart.thresholds.is_empty() {
-        names.push((Mark::Stroke(overlay::Line::Dashed), theme::FAILED, "least allowed".to_owned()));
+        names.push((Mark::Stroke(overlay::Line::Dashed), theme::FAILED, chart.threshold.clone()));
     }
     (format!("{}{unit}", chart.title), names)
 }
@@ -138,7 +193,7 @@ fn plot(
             plot.hline(line.width(1.0).allow_hover(false));
         }
         for line in &chart.series {
-            series(plot, run, line);
+            paint_series(plot, run, line);
         }
         let clicked = plot.response().clicked().then(|| plot.pointer_coordinate()).flatten();
         clicked.map(|at: PlotPoint| at.x.round().clamp(0.0, last) as usize)
@@ -166,8 +221,9 @@ pub fn over_steps<'a>(plot: Plot<'a>, last: f64, is_last: bool) -> Plot<'a> {
 }
 
 /// A line over the steps that have a value, broken where one has none.
-fn series(plot: &mut PlotUi<'_>, run: &RunView, line: &Series) {
-    let point = |row: &StepRow| (line.value)(row).filter(|v| v.is_finite()).map(|v| [row.step as f64, v]);
+fn paint_series(plot: &mut PlotUi<'_>, run: &RunView, line: &Series) {
+    let point =
+        |row: &StepRow| (line.value)(run, row).filter(|v| v.is_finite()).map(|v| [row.step as f64, v]);
     let points: Vec<Option<[f64; 2]>> = run.rows.iter().map(point).collect();
     for piece in pieces(&points) {
         plot.line(Line::new(line.name, piece.clone()).color(line.colour).width(1.5).allow_hover(false));

@@ -1,8 +1,9 @@
 //! The settings of the run, made from the table of settings: change some and run again from the cursor's step.
 
-use egui::{Align, ComboBox, DragValue, Layout, RichText, ScrollArea, Ui, vec2};
+use egui::{Align, CollapsingHeader, ComboBox, DragValue, Layout, RichText, ScrollArea, Ui, vec2};
 use serde_json::{Value, json};
 use sightline_core::limits::{Domain, SettingInfo};
+use sightline_core::settings::TrackerKind;
 
 use crate::command::Command;
 use crate::state::{State, run_letter};
@@ -24,16 +25,32 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     presets(ui, state, out);
     foot(ui, state, out);
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        let mut group = "";
-        for info in &state.settings {
-            if info.group != group {
-                group = &info.group;
-                ui.add_space(4.0);
-                ui.label(theme::title(group));
-            }
-            show_setting(ui, state, info, out);
+        for infos in state.settings.chunk_by(|a, b| a.group == b.group) {
+            show_group(ui, state, infos, out);
         }
     });
+}
+
+/// A group of settings; that of a tracker which the next run does not use is folded and says so.
+fn show_group(ui: &mut Ui, state: &State, infos: &[SettingInfo], out: &mut Vec<Command>) {
+    let Some(group) = infos.first().map(|info| info.group.as_str()) else { return };
+    let tracker = state.pending().map_or_else(|| state.tracker(), |settings| settings.tracker);
+    let is_used = match group {
+        "template" => tracker == TrackerKind::Template,
+        "features" => tracker == TrackerKind::Features,
+        _ => true,
+    };
+    ui.add_space(4.0);
+    let settings = |ui: &mut Ui, out: &mut Vec<Command>| {
+        infos.iter().for_each(|info| show_setting(ui, state, info, out));
+    };
+    if is_used {
+        ui.label(theme::title(group));
+        settings(ui, out);
+    } else {
+        let words = theme::title(&format!("{group}: not used by this tracker"));
+        CollapsingHeader::new(words).id_salt(group).show(ui, |ui| settings(ui, out));
+    }
 }
 
 /// The named configurations: choosing one makes the changes that lead to it, which the next run then uses.

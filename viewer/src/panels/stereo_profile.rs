@@ -34,7 +34,7 @@ const TICK_GAP: f64 = 0.09;
 pub fn show(ui: &mut Ui, state: &State, _out: &mut Vec<Command>) {
     let stereo = state.trace().and_then(StepTrace::template).and_then(|e| e.point_stereo.as_ref());
     let (Some(trace), Some(stereo)) = (state.trace(), stereo) else {
-        panels::missing(ui, PURPOSE, &state.missing_step());
+        panels::missing(ui, PURPOSE, &state.missing_template());
         return;
     };
     let threshold = state.setting("limits", "stereo_ncc_min").and_then(|v| v.as_f64());

@@ -74,7 +74,7 @@ pub fn patches(trace: &StepTrace) -> Vec<Patch> {
 pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let patches = state.trace().map(patches).unwrap_or_default();
     if patches.is_empty() {
-        panels::missing(ui, PURPOSE, &state.missing_step());
+        panels::missing(ui, PURPOSE, &state.missing_template());
         return;
     }
     let area = ui.available_rect_before_wrap();

@@ -29,7 +29,7 @@ const TICKS: u32 = 5;
 pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let matched = state.trace().and_then(StepTrace::template).and_then(|e| e.match_template.as_ref());
     let (Some(trace), Some(matched)) = (state.trace(), matched) else {
-        panels::missing(ui, PURPOSE, &state.missing_step());
+        panels::missing(ui, PURPOSE, &state.missing_template());
         return;
     };
     if matched.descent.is_some() {

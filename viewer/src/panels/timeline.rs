@@ -121,6 +121,9 @@ fn words(state: &State, step: usize) -> String {
         if let Some(ncc) = row.ncc {
             words += &format!("\nncc {ncc:.2}");
         }
+        if let Some(inliers) = row.inliers {
+            words += &format!("\n{inliers} inliers");
+        }
         if let Some(err_px) = row.err_px {
             words += &format!(", err {err_px:.2} px");
         }

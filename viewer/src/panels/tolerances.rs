@@ -6,6 +6,7 @@
 use egui::{Align2, Color32, RichText, Ui, vec2};
 use egui_plot::{Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotUi, Points, Text, VLine};
 use sightline_core::session::view::RunView;
+use sightline_core::settings::TrackerKind;
 use sightline_core::trace::StepRow;
 
 use super::names;
@@ -65,7 +66,15 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         return;
     };
     if run.rows.iter().all(|row| row.distance_tolerance_m.is_none()) {
-        let sentence = "No update was judged yet: tolerances belong to the steps after the pick.";
+        let sentence = match run.settings.tracker {
+            TrackerKind::Template => {
+                "No update was judged yet: tolerances belong to the steps after the pick."
+            }
+            TrackerKind::Features => {
+                "Criteria 3 and 4 belong to the template tracker. This run is judged by its confidence alone: see \
+                 “Gates” and “Over the steps”."
+            }
+        };
         panels::missing(ui, PURPOSE, sentence);
         return;
     }

@@ -40,11 +40,9 @@ impl State {
     /// The changes that take the run looked at to a named configuration.
     pub(super) fn changes_to(&self, name: &str) -> Option<Changes> {
         let (now, wanted) = (&self.run()?.settings, self.configurations.settings(name)?);
-        let documents = (serde_json::to_value(now).ok()?, serde_json::to_value(wanted).ok()?);
         let differing = Settings::table().into_iter().filter_map(|info| {
-            let value = |document: &serde_json::Value| document.get(&info.group)?.get(&info.key).cloned();
-            let (old, new) = (value(&documents.0)?, value(&documents.1)?);
-            (old != new).then_some((info.key.clone(), new))
+            let [old, new] = [now, wanted].map(|settings| settings.value(&info.group, &info.key));
+            (old != new).then_some((info.key, new?))
         });
         Some(differing.collect())
     }

@@ -10,6 +10,7 @@ mod configurations;
 pub mod messages;
 mod missing;
 pub mod studies;
+pub mod tracker;
 mod wanted;
 
 use std::collections::{BTreeMap, HashSet};
@@ -33,6 +34,7 @@ use crate::command::{Layer, Mode, Panel, Stage};
 use crate::net::Request;
 use crate::raster::Raster;
 use crate::stretch::Stretch;
+use crate::tables::FeatureView;
 use crate::view2d::View2d;
 
 /// How the server's events come in.
@@ -114,7 +116,7 @@ pub struct State {
     pub configurations: Configurations,
     /// What is looked at; ahead of the server's cursor by the time of a request.
     pub cursor: Cursor,
-    /// The stage that is looked at.
+    /// The stage that was chosen last, perhaps in a run of another tracker: what is looked at is [`State::stage`].
     pub stage: Stage,
     /// What pointer and keys mean.
     pub mode: Mode,
@@ -136,6 +138,8 @@ pub struct State {
     pub views: Views,
     /// How the images' grey values become brightness on the screen.
     pub stretch: Stretch,
+    /// Which features are shown, and how long their residuals are drawn.
+    pub feature_view: FeatureView,
     /// What the calculator of the error budget is given.
     pub calculator: Calculator,
     /// The validation experiments.
@@ -194,10 +198,11 @@ impl State {
             messages: Messages::default(),
             views: Views::default(),
             stretch: Stretch::default(),
+            feature_view: FeatureView::default(),
             calculator: Calculator::default(),
             studies: Studies::default(),
             wants_history: false,
-            hidden: HashSet::new(),
+            hidden: HashSet::from(Layer::HIDDEN_AT_FIRST),
             marks: true,
             open_url: None,
             outbox: Vec::new(),

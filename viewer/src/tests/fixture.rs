@@ -31,6 +31,7 @@ use sightline_core::traverse::StereoGeometry;
 use crate::cache::{Eye, Item, Key, StepKey};
 use crate::raster::Raster;
 use crate::state::{Connection, State};
+use crate::tables::Table;
 
 /// How many stops the drive has.
 pub(crate) const STOPS: usize = 6;
@@ -92,10 +93,8 @@ pub(crate) fn at_step(context: &egui::Context, step: usize) -> State {
     }
     state.cursor = Cursor { target: Some(0), run: 0, step };
     let key = StepKey { session: "s1".to_owned(), target: 0, run: 0, step };
-    if let Some(trace) = traces.get(step) {
-        state.cache.arrived(Key::Trace(key.clone()), Ok(Item::Trace(Arc::new(trace.clone()))), 0.0);
-    }
-    for name in ArrayName::ALL {
+    traces.get(step).cloned().into_iter().for_each(|trace| load(&mut state, trace));
+    for name in ArrayName::ALL.into_iter().filter(|name| !Table::is_table(*name)) {
         let side = if name == ArrayName::Surface { 31 } else { 21 };
         let raster = Raster::from_npy(context, name, &npy::encode(&bump(side)).unwrap()).unwrap();
         state.cache.arrived(Key::Array(key.clone(), name), Ok(Item::Raster(Arc::new(raster))), 0.0);
@@ -391,6 +390,7 @@ fn updated(
                 image: Arc::default(),
             },
             memory: Default::default(),
+            anchors: Default::default(),
         },
         state,
         template_renewed: renewed,

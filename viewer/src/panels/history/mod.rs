@@ -8,6 +8,7 @@ pub mod drift;
 use egui::{Align2, Rect, ScrollArea, Sense, Ui, UiBuilder, pos2, vec2};
 use egui_plot::{GridMark, Line, MarkerShape, Plot, Points};
 use sightline_core::session::view::RunView;
+use sightline_core::settings::TrackerKind;
 use sightline_core::trace::StepRow;
 
 use self::drift::Comparison;
@@ -34,6 +35,10 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         panels::missing(ui, PURPOSE, &state.missing_target());
         return;
     };
+    if run.settings.tracker != TrackerKind::Template {
+        panels::missing(ui, PURPOSE, &state.missing_template());
+        return;
+    }
     let area = ui.available_rect_before_wrap();
     let (film, plots) =
         area.split_left_right_at_x((area.right() - PLOTS).max(area.left() + area.width() * 0.4));

@@ -64,6 +64,13 @@ pub(super) fn show(ui: &mut Ui, state: &State, stops: &[StopView], run: &RunView
     plot.show(ui, |plot| paint(plot, state, run, &positions, origin));
 }
 
+/// Where the bootstrap of the cursor's step puts the target, in the site frame.
+fn cloud_in_site(state: &State) -> impl Iterator<Item = Point3> {
+    let pose = state.stop().map(|stop| stop.site_from_rover.to_pose());
+    let cloud = state.cloud().ready().map_or(&[][..], Vec::as_slice);
+    pose.into_iter().flat_map(|pose| cloud.iter().map(move |point| pose * point.position_in_rover))
+}
+
 /// How the ellipses shrank, in words.
 fn sentence(positions: &[Position], here: Option<&Position>) -> String {
     let width = |at: Option<&Position>| {
@@ -86,6 +93,8 @@ fn paint(plot: &mut PlotUi<'_>, state: &State, run: &RunView, positions: &[Posit
         let [east, north] = on_map(point);
         [(east - origin[0]) * 100.0, (north - origin[1]) * 100.0]
     };
+    let cloud = cloud_in_site(state).map(|point| place(&point)).collect::<Vec<_>>();
+    plot.points(Points::new("", cloud).color(colour).radius(1.0).allow_hover(false));
     let trail: Vec<[f64; 2]> = positions.iter().map(|at| place(&at.point_in_site)).collect();
     plot.line(Line::new("", trail.clone()).color(colour.gamma_multiply(0.6)).width(1.0));
     plot.points(Points::new("", trail).color(colour).radius(2.0).shape(MarkerShape::Diamond));

@@ -131,6 +131,9 @@ fn names_of(state: &State, stops: &[StopView]) -> Vec<(Mark, Color32, String)> {
     if let Some((_, off_m)) = truth_in_site(state) {
         names.push((Mark::Plus, theme::TRUTH, format!("truth, {:.0} cm off", off_m * 100.0)));
     }
+    if state.cloud().ready().is_some() {
+        names.push((Mark::Dot, theme::run(state.cursor.run), "bootstrap of this step".to_owned()));
+    }
     names
 }
 

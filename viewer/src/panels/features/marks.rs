@@ -1,0 +1,217 @@
+//! The features on the two images: circles as large as their scale, and what became of them (R170).
+//!
+//! | mark | meaning |
+//! |---|---|
+//! | circle with a tick | a feature: its radius is the scale, the tick points along its orientation |
+//! | dot, solid line | a match that agrees with the motion, and from where it came |
+//! | cross, dashed line | a match that does not |
+//! | arrow | from where the motion puts the feature to where it was found, magnified |
+//! | small dots about the target | where the sets of the bootstrap put it |
+
+use egui::{Color32, Stroke, vec2};
+use sightline_core::frames::Pixel;
+use sightline_core::locate::features::rows::{Feature, Matched};
+
+use super::super::legend::Entry;
+use crate::command::{Layer, Mode};
+use crate::overlay::{Line, Mark, Overlay, paint_mark};
+use crate::state::State;
+use crate::tables::Kind;
+use crate::theme;
+use crate::view2d::Canvas;
+
+/// Half the size of the mark of a match, points: many of them stand close together.
+const REACH: f32 = 4.0;
+/// How near to a feature the pointer must be to read it, points.
+const HOVER_REACH: f32 = 9.0;
+/// Length of the two strokes of an arrow's tip, points.
+const TIP: f32 = 4.0;
+
+/// What the legend of the left image lists of the features.
+pub fn left_entries(state: &State) -> Vec<Entry> {
+    let mut entries = kinds(state, "features with scale and orientation");
+    let matched = state.feature_evidence().and_then(|e| e.match_features.as_ref());
+    if let Some(matched) = matched.filter(|_| state.features().ready().is_some()) {
+        let from = format!("from step {}", matched.from_step);
+        let magnified = format!("residuals × {}", state.feature_view.magnification);
+        let (solid, dashed) = (Mark::Stroke(Line::Solid), Mark::Stroke(Line::Dashed));
+        entries.extend([
+            Entry::new(Layer::Flow, solid, theme::INLIER, format!("inliers {from}")),
+            Entry::new(Layer::OutlierFlow, dashed, theme::OUTLIER, format!("outliers {from}")),
+            Entry::new(Layer::Residuals, solid, theme::SEARCH, magnified),
+        ]);
+    }
+    if let Some(cloud) = state.cloud().ready() {
+        let word = format!("bootstrap, {} sets", cloud.len());
+        entries.push(Entry::new(Layer::Cloud, Mark::Dot, theme::run(state.cursor.run), word));
+    }
+    entries
+}
+
+/// What the legend of the right image lists of the features.
+pub fn right_entries(state: &State) -> Vec<Entry> {
+    kinds(state, "partners of features")
+}
+
+/// The three kinds with how many of each are shown.
+fn kinds(state: &State, all: &str) -> Vec<Entry> {
+    let Some(features) = state.features().ready() else { return Vec::new() };
+    let count = |kind: Kind| state.feature_view.count(features, kind);
+    let mut entries = Vec::new();
+    if features.iter().any(|feature| feature.matched.is_some()) {
+        let words = |kind: Kind, name: &str| format!("{name} {}", count(kind).words());
+        let word = words(Kind::Inlier, "inliers");
+        entries.push(Entry::new(Layer::Inliers, Mark::Dot, theme::INLIER, word));
+        let word = words(Kind::Outlier, "outliers");
+        entries.push(Entry::new(Layer::Outliers, Mark::Cross, theme::OUTLIER, word));
+    }
+    entries.push(Entry::new(Layer::Keypoints, Mark::Ring, theme::KEYPOINT, all));
+    entries
+}
+
+/// The layer and the looks of a kind.
+fn looks(kind: Kind) -> (Layer, Mark, Color32) {
+    match kind {
+        Kind::Unmatched => (Layer::Keypoints, Mark::Ring, theme::KEYPOINT),
+        Kind::Inlier => (Layer::Inliers, Mark::Dot, theme::INLIER),
+        Kind::Outlier => (Layer::Outliers, Mark::Cross, theme::OUTLIER),
+    }
+}
+
+/// Whether a feature has a mark: it passes the filters, and a layer that shows it is on.
+pub fn is_drawn(state: &State, feature: &Feature) -> bool {
+    let (layer, ..) = looks(Kind::of(feature));
+    (state.shows(layer) || state.shows(Layer::Keypoints)) && state.feature_view.shows(feature)
+}
+
+/// Paints the features of the left image and the cloud of the bootstrap.
+pub fn paint_left(canvas: &Canvas, state: &State) {
+    let features = state.features().ready().map_or(&[][..], Vec::as_slice);
+    let shown = || features.iter().filter(|feature| state.feature_view.shows(feature));
+    if state.shows(Layer::Keypoints) {
+        shown().for_each(|feature| keypoint(canvas, feature));
+    }
+    let overlay = Overlay::new(&canvas.painter, &canvas.transform);
+    for feature in shown() {
+        let Some(matched) = &feature.matched else { continue };
+        let (layer, mark, colour) = looks(Kind::of(feature));
+        let (flow, line) =
+            if matched.is_inlier { (Layer::Flow, Line::Solid) } else { (Layer::OutlierFlow, Line::Dashed) };
+        if state.shows(flow) {
+            overlay.thin_line(&[matched.then, feature.pixel], colour, line);
+        }
+        if state.shows(layer) {
+            if state.shows(Layer::Residuals) {
+                residual(canvas, feature, matched, state.feature_view.magnification);
+            }
+            dot(canvas, feature.pixel, mark, colour);
+        }
+    }
+    if let Some(cloud) = state.cloud().ready().filter(|_| state.shows(Layer::Cloud)) {
+        let colour = theme::run(state.cursor.run);
+        for pixel in cloud.iter().filter_map(|point| point.left_pixel) {
+            paint_mark(&canvas.painter, canvas.transform.to_screen(pixel), Mark::Dot, colour, 2.0);
+        }
+    }
+}
+
+/// Paints the partners of the features in the right image.
+pub fn paint_right(canvas: &Canvas, state: &State) {
+    let features = state.features().ready().map_or(&[][..], Vec::as_slice);
+    for feature in features.iter().filter(|feature| is_drawn(state, feature)) {
+        let (_, mark, colour) = looks(Kind::of(feature));
+        if let Some(pixel) = feature.right {
+            dot(canvas, pixel, mark, colour);
+        }
+    }
+}
+
+fn dot(canvas: &Canvas, pixel: Pixel, mark: Mark, colour: Color32) {
+    let at = canvas.transform.to_screen(pixel);
+    if canvas.transform.rect.contains(at) {
+        paint_mark(&canvas.painter, at, mark, colour, REACH);
+    }
+}
+
+/// A circle as large as the scale with a tick along the orientation; fainter where the feature became no point.
+fn keypoint(canvas: &Canvas, feature: &Feature) {
+    let at = canvas.transform.to_screen(feature.pixel);
+    let radius = ((feature.sigma_px * canvas.transform.scale) as f32).max(1.5);
+    if !canvas.transform.rect.expand(radius).contains(at) {
+        return;
+    }
+    let strength = if feature.range_m.is_some() { 1.0 } else { 0.5 };
+    let (sin, cos) = (feature.orientation_rad.sin() as f32, feature.orientation_rad.cos() as f32);
+    for (colour, width) in [(theme::HALO, 3.0), (theme::KEYPOINT.gamma_multiply(strength), 1.0)] {
+        let stroke = Stroke::new(width, colour);
+        canvas.painter.circle_stroke(at, radius, stroke);
+        canvas.painter.line_segment([at, at + vec2(cos, sin) * radius], stroke);
+    }
+}
+
+/// An arrow from where the motion puts a feature towards where it was found, magnified.
+fn residual(canvas: &Canvas, feature: &Feature, matched: &Matched, magnification: f64) {
+    let Some((moved, vector)) = matched.moved.zip(matched.residual_px(feature.pixel)) else { return };
+    let end = moved.offset(vector.x * magnification, vector.y * magnification);
+    let (line, colour) =
+        if matched.is_inlier { (Line::Solid, theme::SEARCH) } else { (Line::Dashed, theme::OUTLIER) };
+    let overlay = Overlay::new(&canvas.painter, &canvas.transform);
+    overlay.thin_line(&[moved, end], colour, line);
+    let [from, tip] = [moved, end].map(|pixel| canvas.transform.to_screen(pixel));
+    let along = (from - tip).normalized() * TIP;
+    for turn in [0.5_f32, -0.5] {
+        let side =
+            vec2(along.x * turn.cos() - along.y * turn.sin(), along.x * turn.sin() + along.y * turn.cos());
+        canvas.painter.line_segment([tip, tip + side], Stroke::new(1.0, colour));
+    }
+}
+
+/// Says what the feature under the pointer is; `place` is where it lies on this image.
+pub fn hover(canvas: &Canvas, state: &State, place: fn(&Feature) -> Option<Pixel>) {
+    let Some(pointer) = canvas.response.hover_pos().filter(|_| state.mode == Mode::Look && state.marks)
+    else {
+        return;
+    };
+    let Some(features) = state.features().ready() else { return };
+    let near = |feature: &Feature| {
+        let at = canvas.transform.to_screen(place(feature)?);
+        Some(at.distance(pointer)).filter(|distance| *distance <= HOVER_REACH)
+    };
+    let drawn = features.iter().filter(|feature| is_drawn(state, feature));
+    let nearest = drawn.filter_map(|f| Some((f, near(f)?))).min_by(|a, b| a.1.total_cmp(&b.1));
+    let Some((feature, _)) = nearest else { return };
+    if let Some(pixel) = place(feature) {
+        Overlay::new(&canvas.painter, &canvas.transform).mark(pixel, Mark::Ring, theme::ACCENT);
+    }
+    let from_step = state.feature_evidence().and_then(|e| Some(e.match_features.as_ref()?.from_step));
+    canvas.response.clone().on_hover_text_at_pointer(words(feature, from_step));
+}
+
+/// The numbers of a feature, a line each.
+pub fn words(feature: &Feature, from_step: Option<usize>) -> String {
+    let place = |pixel: Pixel| format!("{:.1}, {:.1}", pixel.x, pixel.y);
+    let mut lines = vec![
+        format!("feature at {}", place(feature.pixel)),
+        format!(
+            "scale {:.2} px, orientation {:+.0}°",
+            feature.sigma_px,
+            feature.orientation_rad.to_degrees()
+        ),
+    ];
+    lines.push(match (feature.range_m, feature.right) {
+        (Some(range_m), Some(right)) => format!("range {range_m:.3} m, partner at {}", place(right)),
+        _ => "no partner in the other eye".to_owned(),
+    });
+    let Some(matched) = &feature.matched else {
+        lines.push("no match with the earlier stop".to_owned());
+        return lines.join("\n");
+    };
+    let step = from_step.map_or_else(|| "earlier".to_owned(), |step| format!("at step {step}"));
+    lines.push(format!("{step} at {}", place(matched.then)));
+    let verdict = if matched.is_inlier { "inlier" } else { "outlier" };
+    let residual = matched.residual_m.map_or_else(String::new, |m| format!("residual {:.1} mm", m * 1000.0));
+    let pixels =
+        matched.residual_px(feature.pixel).map_or_else(String::new, |v| format!(", {:.2} px", v.norm()));
+    lines.push(format!("{residual}{pixels}: {verdict}"));
+    lines.join("\n")
+}

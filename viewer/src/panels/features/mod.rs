@@ -1,0 +1,82 @@
+//! The feature tracker at one step: what it found and matched, which motion most of it agrees with, and how certain
+//! that is (R169, R170, R184).
+//!
+//! The filters at the top act on the images as well.
+
+mod charts;
+mod counts;
+mod filters;
+pub mod marks;
+
+use egui::{ScrollArea, Ui};
+use sightline_core::locate::features::FeatureEvidence;
+use sightline_core::locate::features::rows::Feature;
+
+use crate::cache::Slot;
+use crate::command::Command;
+use crate::panels;
+use crate::state::State;
+use crate::tables::Kind;
+use crate::theme;
+
+/// What the panel is for.
+const PURPOSE: &str = "What the feature tracker saw: features, matches, the motion, and how certain it is.";
+
+/// From this width on tables and plots stand side by side, points.
+const TWO_COLUMNS: f32 = 620.0;
+
+/// Shows the panel.
+pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let evidence = state.feature_evidence().filter(|evidence| evidence.detect.is_some());
+    let Some(evidence) = evidence else {
+        panels::missing(ui, PURPOSE, &state.missing_features());
+        return;
+    };
+    filters::show(ui, state, out);
+    let features = match state.features() {
+        Slot::Ready(features) => Ok(features.as_slice()),
+        Slot::Failed(problem) => Err(format!("The features cannot be shown: {}", problem.detail)),
+        Slot::Absent | Slot::Loading => Err("Loading the features …".to_owned()),
+    };
+    let sentence = features.as_ref().map_or_else(Clone::clone, |features| shown(state, features));
+    ui.add(egui::Label::new(theme::note(sentence)).truncate());
+    ui.separator();
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        let plots = |ui: &mut Ui| draw_charts(ui, state, evidence, features.as_deref().unwrap_or_default());
+        if ui.available_width() < TWO_COLUMNS {
+            tables(ui, state, evidence, out);
+            plots(ui);
+        } else {
+            ui.columns(2, |columns| {
+                tables(&mut columns[0], state, evidence, out);
+                plots(&mut columns[1]);
+            });
+        }
+    });
+}
+
+fn tables(ui: &mut Ui, state: &State, evidence: &FeatureEvidence, out: &mut Vec<Command>) {
+    counts::show(ui, state, evidence, out);
+    ui.add_space(4.0);
+    counts::anchors(ui, evidence);
+    ui.add_space(4.0);
+    counts::motion(ui, evidence);
+    ui.add_space(4.0);
+}
+
+fn draw_charts(ui: &mut Ui, state: &State, evidence: &FeatureEvidence, features: &[Feature]) {
+    let Some(motion) = &evidence.fit_motion else { return };
+    charts::residuals(ui, state, features);
+    charts::consensus(ui, motion);
+}
+
+/// How many of each kind the filters let through.
+fn shown(state: &State, features: &[Feature]) -> String {
+    let words = |kind: Kind| state.feature_view.count(features, kind).words();
+    format!(
+        "shown: {} inliers, {} outliers, {} features without a match",
+        words(Kind::Inlier),
+        words(Kind::Outlier),
+        words(Kind::Unmatched)
+    )
+}

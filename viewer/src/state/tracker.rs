@@ -1,0 +1,80 @@
+//! What the run that is looked at was tracked with, and what only one of the trackers has.
+
+use sightline_core::locate::features::FeatureEvidence;
+use sightline_core::locate::features::rows::{CloudPoint, Feature};
+use sightline_core::session::view::RunView;
+use sightline_core::settings::TrackerKind;
+use sightline_core::trace::{ArrayName, StepRow, StepTrace};
+
+use super::State;
+use crate::cache::{Key, Slot};
+use crate::command::Stage;
+use crate::tables::Table;
+
+impl State {
+    /// The tracker of the run that is looked at; without a run the default.
+    pub fn tracker(&self) -> TrackerKind {
+        self.run().map_or_else(TrackerKind::default, |run| run.settings.tracker)
+    }
+
+    /// The stage that is looked at, in the words of the tracker.
+    pub fn stage(&self) -> Stage {
+        self.stage.of_tracker(self.tracker())
+    }
+
+    /// What the feature tracker saw at the cursor's step.
+    pub fn feature_evidence(&self) -> Option<&FeatureEvidence> {
+        self.trace().and_then(StepTrace::features)
+    }
+
+    /// The features of the cursor's step.
+    pub fn features(&self) -> Slot<'_, Vec<Feature>> {
+        self.table(ArrayName::Features, |table| match table {
+            Table::Features(rows) => Some(rows),
+            Table::Cloud(_) => None,
+        })
+    }
+
+    /// Where the bootstrap puts the target at the cursor's step.
+    pub fn cloud(&self) -> Slot<'_, Vec<CloudPoint>> {
+        self.table(ArrayName::Cloud, |table| match table {
+            Table::Cloud(rows) => Some(rows),
+            Table::Features(_) => None,
+        })
+    }
+
+    fn table<'a, T>(&'a self, name: ArrayName, of: impl FnOnce(&'a Table) -> Option<&'a T>) -> Slot<'a, T> {
+        let key = self.step_key(self.cursor.step).map(|key| Key::Array(key, name));
+        key.map_or(Slot::Absent, |key| self.cache.table(&key).and(of))
+    }
+
+    /// Why a panel about the template has nothing to show, as a sentence that says where to look.
+    pub fn missing_template(&self) -> String {
+        match (self.tracker(), self.row()) {
+            (TrackerKind::Features, Some(_)) => {
+                "This run follows the features of the whole scene and matches no template. The panel “Features” \
+                 shows what it saw."
+                    .to_owned()
+            }
+            _ => self.missing_step(),
+        }
+    }
+
+    /// Why a panel about features has nothing to show, as a sentence that says how to get them.
+    pub fn missing_features(&self) -> String {
+        match (self.tracker(), self.row()) {
+            (TrackerKind::Template, Some(_)) => {
+                "This run follows the target’s own template and looks for no features. Choose the preset \
+                 “features” in Settings and press “Run from here” at the pick."
+                    .to_owned()
+            }
+            _ => self.missing_step(),
+        }
+    }
+}
+
+/// The feature tracker's confidence in a step; the designation, by point stereo, has none of its own.
+pub fn confidence_of(run: &RunView, row: &StepRow) -> Option<f64> {
+    let is_pick = run.rows.first().is_some_and(|first| first.step == row.step);
+    row.confidence.filter(|_| run.settings.tracker == TrackerKind::Features && !is_pick)
+}

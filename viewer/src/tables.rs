@@ -1,0 +1,160 @@
+//! The tables of the feature tracker as they come from the server, and which of their rows are looked at.
+
+use sightline_core::image::npy;
+use sightline_core::locate::features::evidence::{CLOUD_COLUMNS, FeatureColumn};
+use sightline_core::locate::features::rows::{self, CloudPoint, Feature, Matched};
+use sightline_core::trace::ArrayName;
+
+/// A table, row by row.
+pub enum Table {
+    /// The features of the left image.
+    Features(Vec<Feature>),
+    /// Where the bootstrap puts the target.
+    Cloud(Vec<CloudPoint>),
+}
+
+impl Table {
+    /// Whether an array is a table and no picture.
+    pub const fn is_table(name: ArrayName) -> bool {
+        matches!(name, ArrayName::Features | ArrayName::Cloud)
+    }
+
+    /// A table from its NumPy file.
+    ///
+    /// # Errors
+    /// A sentence when the bytes are no 2-D array of numbers with this table's columns.
+    pub fn from_npy(name: ArrayName, bytes: &[u8]) -> Result<Self, String> {
+        let values = npy::decode(bytes, name.word()).map_err(|e| e.to_string())?;
+        let is_cloud = name == ArrayName::Cloud;
+        let columns = if is_cloud { CLOUD_COLUMNS } else { FeatureColumn::COUNT };
+        if values.width() as usize != columns {
+            return Err(format!("{} has {} columns, not {columns}", name.word(), values.width()));
+        }
+        Ok(if is_cloud {
+            Self::Cloud(rows::cloud(values.as_raw()).collect())
+        } else {
+            Self::Features(rows::features(values.as_raw()).collect())
+        })
+    }
+
+    /// Memory that the rows take.
+    pub fn bytes(&self) -> usize {
+        match self {
+            Self::Features(rows) => rows.len() * size_of::<Feature>(),
+            Self::Cloud(rows) => rows.len() * size_of::<CloudPoint>(),
+        }
+    }
+}
+
+/// What became of a feature.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// It has no match with the earlier stop.
+    Unmatched,
+    /// Its match agrees with the motion.
+    Inlier,
+    /// Its match does not.
+    Outlier,
+}
+
+impl Kind {
+    /// What became of `feature`.
+    pub fn of(feature: &Feature) -> Self {
+        match &feature.matched {
+            None => Self::Unmatched,
+            Some(matched) if matched.is_inlier => Self::Inlier,
+            Some(_) => Self::Outlier,
+        }
+    }
+}
+
+/// How features are looked at: which are shown, and how long their residuals are drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FeatureView {
+    /// Least and largest residual of a match that is shown, m; features without a match have none and pass.
+    pub residual_m: [f64; 2],
+    /// Least and largest scale of a feature that is shown, px.
+    pub sigma_px: [f64; 2],
+    /// How much longer than it is a residual is drawn.
+    pub magnification: f64,
+}
+
+impl Default for FeatureView {
+    fn default() -> Self {
+        let all = [0.0, f64::INFINITY];
+        Self { residual_m: all, sigma_px: all, magnification: 10.0 }
+    }
+}
+
+impl FeatureView {
+    /// Whether a feature passes the filters.
+    pub fn shows(&self, feature: &Feature) -> bool {
+        let within = |value: f64, [least, largest]: [f64; 2]| value >= least && value <= largest;
+        let residual_m = feature.matched.as_ref().and_then(|matched: &Matched| matched.residual_m);
+        within(feature.sigma_px, self.sigma_px) && residual_m.is_none_or(|r| within(r, self.residual_m))
+    }
+
+    /// How many features of a kind there are, and how many of them are shown.
+    pub fn count(&self, features: &[Feature], kind: Kind) -> Count {
+        let of_kind = || features.iter().filter(|feature| Kind::of(feature) == kind);
+        Count { all: of_kind().count(), shown: of_kind().filter(|feature| self.shows(feature)).count() }
+    }
+}
+
+/// How many there are, and how many of them are shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Count {
+    /// All of them.
+    pub all: usize,
+    /// Those that pass the filters.
+    pub shown: usize,
+}
+
+impl Count {
+    /// “12”, or “3 of 12” where some are not shown.
+    pub fn words(self) -> String {
+        if self.shown == self.all { self.all.to_string() } else { format!("{} of {}", self.shown, self.all) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sightline_core::frames::Pixel;
+    use sightline_core::image::GrayImage;
+
+    fn feature(sigma_px: f64, residual_m: Option<f64>) -> Feature {
+        let matched = residual_m.map(|residual_m| Matched {
+            then: Pixel::new(1.0, 1.0),
+            moved: None,
+            residual_m: Some(residual_m),
+            is_inlier: residual_m < 0.03,
+        });
+        let pixel = Pixel::new(0.0, 0.0);
+        Feature { pixel, sigma_px, orientation_rad: 0.0, right: None, range_m: None, matched }
+    }
+
+    #[test]
+    fn filters_hold_scale_and_residual_and_features_without_a_match_have_no_residual() {
+        let view = FeatureView { residual_m: [0.0, 0.02], sigma_px: [2.0, 5.0], ..FeatureView::default() };
+        assert!(view.shows(&feature(3.0, Some(0.02))));
+        assert!(!view.shows(&feature(3.0, Some(0.021))));
+        assert!(!view.shows(&feature(1.9, Some(0.01))));
+        assert!(view.shows(&feature(5.0, None)));
+        let features = [feature(3.0, Some(0.01)), feature(3.0, Some(0.025)), feature(3.0, Some(1.0))];
+        assert_eq!(view.count(&features, Kind::Inlier).words(), "1 of 2");
+        assert_eq!(view.count(&features, Kind::Outlier).words(), "0 of 1");
+        assert_eq!(FeatureView::default().count(&features, Kind::Outlier).words(), "1");
+    }
+
+    #[test]
+    fn a_table_with_other_columns_is_refused_and_one_without_rows_is_empty() {
+        let bytes = |width: u32, height: u32| npy::encode(&GrayImage::new(width, height)).unwrap();
+        let refused = Table::from_npy(ArrayName::Features, &bytes(5, 2)).err().unwrap();
+        assert_eq!(refused, "features has 5 columns, not 13");
+        let empty = Table::from_npy(ArrayName::Features, &bytes(13, 0)).unwrap();
+        assert!(matches!(empty, Table::Features(rows) if rows.is_empty()));
+        let cloud = Table::from_npy(ArrayName::Cloud, &bytes(5, 2)).unwrap();
+        assert!(matches!(cloud, Table::Cloud(rows) if rows.len() == 2));
+    }
+}
