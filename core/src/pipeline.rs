@@ -110,22 +110,9 @@ pub fn run_step(stops: &dyn Stops, last: &Updated, settings: &Settings) -> StepT
     let carried = update::carry(target, step, &prediction);
     let pointing = pointing(stops, step, &carried);
     let mut trace = StepTrace {
-        step,
-        time_s: stops.time_s(step),
-        fault: None,
         predict: Some(prediction.clone()),
         point_mast: Some(pointing.clone()),
-        capture: None,
-        locate: None,
-        judge: None,
-        update: Updated {
-            target: carried.clone(),
-            state: last.state,
-            template_renewed: false,
-            correction_m: None,
-            correction_px: None,
-        },
-        truth: None,
+        ..unseen(step, stops.time_s(step), carried.clone(), last.state)
     };
     match stops.capture(step) {
         Err(error) => trace.fault = Some(error.to_string()),
@@ -159,6 +146,28 @@ pub fn run_step(stops: &dyn Stops, last: &Updated, settings: &Settings) -> StepT
         }
     }
     trace
+}
+
+/// A stop before anything was seen of it: the target is where the prediction puts it.
+fn unseen(step: usize, time_s: f64, carried: Target, state: TrackingState) -> StepTrace {
+    StepTrace {
+        step,
+        time_s,
+        fault: None,
+        predict: None,
+        point_mast: None,
+        capture: None,
+        locate: None,
+        judge: None,
+        update: Updated {
+            target: carried,
+            state,
+            template_renewed: false,
+            correction_m: None,
+            correction_px: None,
+        },
+        truth: None,
+    }
 }
 
 /// The target that a designation makes.
