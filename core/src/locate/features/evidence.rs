@@ -107,9 +107,9 @@ pub struct FittedMotion {
     /// Matches that agree with it.
     pub inliers: usize,
     /// Root mean square of their residuals, m.
-    pub rms_m: Option<f64>,
+    pub rms_m: f64,
     /// Median of the residuals of those that agree, m.
-    pub median_m: Option<f64>,
+    pub median_m: f64,
     /// Matches that agreed with each random draw.
     pub consensus_by_draw: Vec<u32>,
     /// How the motion and the set that agrees with it settled.
