@@ -50,6 +50,13 @@ enum Experiment {
     Checkout3(Experimental),
     /// Occlusion, cloud, shadow, boundary, jumps: still tracked, or declared lost within the step?
     Faults(Experimental),
+    /// The K9 rover's three targets at 5, 7.5 and 10 m: what tracking by features adds to the error.
+    #[command(name = "k9")]
+    K9(Experimental),
+    /// Approaches from 10 m to 2 m by features: whether their covariance says how far off they are.
+    FeatureCovariance(Experimental),
+    /// Occlusion, cloud, shadow, few features, wrong poses: does the confidence fall before the drift grows?
+    FeatureFaults(Experimental),
     /// How hard the simulated worlds are: plain correlation, without scale and roll, at steps of 5 % and 23 %.
     Realism(realism::Worlds),
     /// The simulated scenery in numbers: rocks, ground, noise and texture against their laws and real frames.
@@ -121,6 +128,9 @@ impl Study {
             Experiment::Checkout2(arguments) => arguments.run("checkout-2"),
             Experiment::Checkout3(arguments) => arguments.run("checkout-3"),
             Experiment::Faults(arguments) => arguments.run("faults"),
+            Experiment::K9(arguments) => arguments.run("k9"),
+            Experiment::FeatureCovariance(arguments) => arguments.run("feature-covariance"),
+            Experiment::FeatureFaults(arguments) => arguments.run("feature-faults"),
             Experiment::Realism(worlds) => worlds.run(),
             Experiment::Scenery(scenery) => scenery.run(),
         }
