@@ -9,6 +9,7 @@
 //! randomised  approaches that the seed draws
 //! scenery, picture, exposure             the simulated scenery against its laws
 //! realism     how hard a world is for plain correlation
+//! real_motion the motion of recorded frames against their poses
 //! ```
 
 pub mod scenery;
@@ -30,3 +31,4 @@ pub mod row;
 pub mod wire;
 pub mod realism;
 pub mod exposure;
+pub mod real_motion;

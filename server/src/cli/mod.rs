@@ -11,6 +11,7 @@ pub mod info;
 pub mod track;
 pub mod presets;
 pub mod study;
+mod real_motion;
 mod realism;
 mod scenery;
 mod scenery_figure;

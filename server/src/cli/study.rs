@@ -11,6 +11,7 @@ use sightline_core::study::plan::Plan;
 use sightline_core::study::row::Row;
 
 use super::open;
+use super::real_motion;
 use super::realism;
 use super::say::{self, Progress};
 use super::scenery;
@@ -61,6 +62,8 @@ enum Experiment {
     Realism(realism::Worlds),
     /// The simulated scenery in numbers: rocks, ground, noise and texture against their laws and real frames.
     Scenery(scenery::Scenery),
+    /// Recorded frames: the motion that features find against the motion that is known of them.
+    RealMotion(real_motion::RealMotion),
 }
 
 /// What a study over worlds, configurations and a grid takes.
@@ -133,6 +136,7 @@ impl Study {
             Experiment::FeatureFaults(arguments) => arguments.run("feature-faults"),
             Experiment::Realism(worlds) => worlds.run(),
             Experiment::Scenery(scenery) => scenery.run(),
+            Experiment::RealMotion(recordings) => recordings.run(),
         }
     }
 }

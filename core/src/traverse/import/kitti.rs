@@ -136,7 +136,7 @@ fn numbers(line: &str) -> Option<Vec<f64>> {
 }
 
 /// The left and the right camera in the rover frame.
-fn read_cameras(path: &Path, size: [u32; 2]) -> Result<[Camera; 2]> {
+pub(crate) fn read_cameras(path: &Path, size: [u32; 2]) -> Result<[Camera; 2]> {
     let text = read_text(path)?;
     let read = |key: &str| {
         let line = text.lines().find_map(|line| line.trim().strip_prefix(key)?.strip_prefix(':'));
@@ -173,7 +173,7 @@ fn poses_path(sequence: &Path) -> PathBuf {
 }
 
 /// The poses of the rover frame in that of the sequence's first frame.
-fn read_poses(path: &Path) -> Result<Vec<Pose>> {
+pub(crate) fn read_poses(path: &Path) -> Result<Vec<Pose>> {
     let text = read_text(path)?;
     let turn = rover_from_camera();
     let read = |(index, line): (usize, &str)| {
