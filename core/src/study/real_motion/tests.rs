@@ -7,7 +7,6 @@ use nalgebra::{Translation3, UnitQuaternion};
 use super::lens::Lens;
 use super::*;
 use crate::frames::Vector3;
-use crate::locate::features::settings::MotionGate;
 use crate::presets::preset;
 
 /// The folder of the recordings, which are no part of the project: `$SIGHTLINE_DATA`, without it `../shared/data` beside
@@ -23,10 +22,8 @@ fn recorded(set: &str) -> Option<PathBuf> {
     None
 }
 
-/// The preset, but with matches judged by their uncertainty: a gate of 3 cm admits the nearest points alone.
 fn settings() -> FeatureSettings {
-    let features = preset("features").unwrap().settings().unwrap().features;
-    FeatureSettings { motion_gate: MotionGate::Mahalanobis, ..features }
+    preset("features").unwrap().settings().unwrap().features
 }
 
 fn summary(rows: &[Row], set: Set) -> Summary {
