@@ -49,10 +49,10 @@ impl Carried {
         Self { position_in_rover, scattered: covariance_in_rover, shared_m: Matrix3::zeros() }
     }
 
-    /// The position after a motion; `by_shift` says how its parameters change with 1σ of each shared error.
+    /// The position after a motion; `by_shared_error` says how its parameters change with 1σ of each.
     ///
     /// None where a covariance is not positive semidefinite.
-    pub fn after(&self, motion: &Bootstrap, by_shift: Option<[Vector6<f64>; 3]>) -> Option<Self> {
+    pub fn after(&self, motion: &Bootstrap, by_shared_error: Option<[Vector6<f64>; 3]>) -> Option<Self> {
         let (theta, point) = (motion.parameters, &self.position_in_rover);
         let (position_in_rover, scattered) = carry(point, &self.scattered, theta, &motion.covariance)?;
         let moved = |change: Vector6<f64>| {
@@ -63,7 +63,7 @@ impl Carried {
         };
         let turned = theta.to_pose().rotation.to_rotation_matrix() * self.shared_m;
         let added =
-            by_shift.map_or_else(Matrix3::zeros, |changes| Matrix3::from_columns(&changes.map(moved)));
+            by_shared_error.map_or_else(Matrix3::zeros, |changes| Matrix3::from_columns(&changes.map(moved)));
         Some(Self { position_in_rover, scattered, shared_m: turned + added })
     }
 

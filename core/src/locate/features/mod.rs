@@ -136,10 +136,10 @@ impl<'a> Candidate<'a> {
             let (then, left) = (anchor.features.as_ref(), &input.pointing.left);
             motion(&MotionInput { then, now, expected_now_from_then: &expected, left, settings })
         });
-        let by_shift =
-            motion.by_shift.map(|changes| changes.map(|change| change * settings.feature_common_px));
-        let target =
-            motion.bootstrap.as_ref().and_then(|bootstrap| anchor.carried.after(bootstrap, by_shift));
+        let target = motion
+            .bootstrap
+            .as_ref()
+            .and_then(|bootstrap| anchor.carried.after(bootstrap, motion.by_shared_error));
         let confidence = confidence(motion.fit.inliers.len(), settings.confidence());
         Self { anchor, confidence, motion, target }
     }

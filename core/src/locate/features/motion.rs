@@ -34,8 +34,8 @@ pub struct Motion {
     pub fit: MotionFit,
     /// How certain it is; none where there is no motion.
     pub bootstrap: Option<Bootstrap>,
-    /// How it changes with a pixel's error that all features share: to the right, down, and of the disparities of both stops.
-    pub by_shift: Option<[Vector6<f64>; 3]>,
+    /// How it changes with 1σ of the errors that all features share: to the right, down, and of the disparities of both stops.
+    pub by_shared_error: Option<[Vector6<f64>; 3]>,
 }
 
 /// What a motion is measured from.
@@ -74,17 +74,25 @@ pub fn motion(input: &MotionInput<'_>) -> Motion {
     let scatter = |pose| block_bootstrap(&pairs, &blocks, &pose, &settings.bootstrap());
     let bootstrap = fit.motion().and_then(scatter);
     let is_shared = bootstrap.is_some() && settings.feature_common_px > 0.0;
-    let by_shift = if is_shared { by_shift(input, &agreeing, &pairs) } else { None };
-    Motion { matches, fit, bootstrap, by_shift }
+    let by_shared_error = if is_shared { by_shared_error(input, &agreeing, &pairs) } else { None };
+    Motion { matches, fit, bootstrap, by_shared_error }
 }
 
-/// How the motion changes when all pixels of this stop shift, and when all disparities of both stops do, per px.
-fn by_shift(
+/// How the motion changes when all pixels of this stop shift, and when all disparities of both stops do: by
+/// `feature_common_px`, times the way of the camera over the range of the features. What looks different from elsewhere looks
+/// the more different the farther away that is.
+fn by_shared_error(
     input: &MotionInput<'_>,
     agreeing: &[Match],
     pairs: &[Correspondence],
 ) -> Option<[Vector6<f64>; 3]> {
-    let unmoved = MotionParameters::from(&refit(pairs, input.settings)?);
+    let motion = refit(pairs, input.settings)?;
+    let unmoved = MotionParameters::from(&motion);
+    let centre = input.left.model.centre();
+    let mut ranges_m: Vec<f64> = pairs.iter().map(|pair| (pair.after - centre).norm()).collect();
+    ranges_m.sort_by(f64::total_cmp);
+    let way = (motion * centre - centre).norm() / ranges_m[ranges_m.len() / 2];
+    let sigma_px = input.settings.feature_common_px * way;
     let mut changes = [Vector6::zeros(); 3];
     for (shift, change) in changes.iter_mut().enumerate() {
         let mut moved = pairs.to_vec();
@@ -94,7 +102,8 @@ fn by_shift(
                 pair.before += input.then.points[matched.query as usize].by_shift_m[shift] * SHIFT_PX;
             }
         }
-        *change = MotionParameters::from(&refit(&moved, input.settings)?).minus(unmoved) / SHIFT_PX;
+        *change =
+            MotionParameters::from(&refit(&moved, input.settings)?).minus(unmoved) * (sigma_px / SHIFT_PX);
     }
     Some(changes)
 }

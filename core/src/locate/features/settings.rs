@@ -71,8 +71,8 @@ settings_group! {
         feature_sigma_px: f64 = 0.5, "px", Domain::Between(0.01, 10.0), "D§2, R172";
         /// What that grows by for every pixel of a feature's scale: large features lie on no surface point in particular.
         feature_sigma_per_scale: f64 = 0.0, "", Domain::Between(0.0, 10.0), "ours; off";
-        /// Error that the pixels of all features of a stop share, and their disparities: relief and shadows that are seen from
-        /// elsewhere shift many features alike.
+        /// Error that the pixels of all features of a stop share, and their disparities, after a way as long as their range:
+        /// relief and shadows that are seen from elsewhere shift many features alike.
         feature_common_px: f64 = 0.0, "px", Domain::Between(0.0, 5.0), "ours; off";
         /// Random draws of three matches.
         motion_draws: u32 = 100, "", Domain::Between(1.0, 100_000.0), "D§2, R164";
