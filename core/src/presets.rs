@@ -142,7 +142,7 @@ pub const PRESETS: &[Preset] = &[
             "motion_gate=mahalanobis",
             "feature_sigma_px=0.15",
             "feature_sigma_per_scale=0.08",
-            "feature_common_px=0.55",
+            "feature_common_px=0.65",
         ],
     ),
     ours(
