@@ -175,5 +175,6 @@ fn three_points_spread_as_their_altitude_says() {
     assert!((fitted.across_m - 0.02 * 2.0_f64.sqrt() / 3.0).abs() < 1e-12, "{fitted:?}");
     let [thin, broad] = [0.018, 0.024].map(triangle);
     assert!(matches!(rigid_motion(&thin, &thin, None), Err(Degenerate::OnALine { .. })));
-    assert!(rigid_motion(&broad, &broad, None).is_ok());
+    let unmoved = rigid_motion(&broad, &broad, None).unwrap();
+    assert!(unmoved.translation.vector.norm() < 1e-12 && unmoved.rotation.angle() < 1e-9, "{unmoved:?}");
 }
