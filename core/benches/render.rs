@@ -1,24 +1,25 @@
 //! Speed of the simulator's renderer, in samples (rays with their shadow and texture) a second.
 //!
-//! **The bound.** What a sample of the soil costs, counted in scalar instructions from the source and run at
-//! about two a cycle, because noise and ray walks are chains of dependent steps:
+//! **The bound.** What a sample of the soil costs, counted from the source; the noise of a pixel's 16 samples goes in
+//! vectors (`camera/shading.rs`; here of 16 numbers, at about one instruction a cycle), the rest in scalar instructions at
+//! about two a cycle, because ray walks are chains of dependent steps:
 //!
 //! | part | instructions | cycles |
 //! |---|---|---|
-//! | texture: 8 octaves of 4 hashed lattice points, two channels, gradient, turn | 8 × 110 | 440 |
-//! | drifts: 2 octaves; grains: 3 cells, few of them with a grain | 2 × 110 + 3 × 40 | 170 |
+//! | texture: 8 octaves of 4 hashed lattice points, two channels, gradient, turn | 8 × 150 / 16 | 75 |
+//! | drifts: 2 octaves; the hashes of grains: 3 cells | (2 × 150 + 3 × 40) / 16 | 26 |
+//! | few grains' shapes | 60 | 30 |
 //! | ground: 4 levels of blocks, about two blocks each, and one quadratic | 4 × 90 + 60 | 210 |
 //! | branches of the walk that cannot be foreseen | 6 × 15 cycles | 90 |
 //! | ray, light, openness, sun grid | 150 | 75 |
 //! | rocks in view and towards the sun: about one interval of 15 planes | 15 × 8 | 60 |
 //!
-//! together about 1045 cycles, 2.6 million samples a second on a core at 2.7 GHz near the rocks; at 10 m half
-//! of the octaves are too fine for the picture and the bound is 3.6 million. A 1024 × 1024 picture with
-//! 16 samples a pixel is 16.8 million samples: 7 s on one core, and 17 stereo pairs about four minutes.
-//! The goal is 2 million on one thread; measured on a busy two-core machine (AMD EPYC): 2.3 million at the first stop and
-//! at the last one, 4.1 million on both cores. Between 3900 and 15 400 rocks (k from 0.05 to 0.30) the time of a
-//! picture does not grow. Building the world (0.8 million vertices, 5900 rocks) takes one to two seconds and is not
-//! counted.
+//! together about 566 cycles, 4.8 million samples a second on a core at 2.7 GHz; with narrower vectors down to 2.6
+//! million without any. A 1024 × 1024 picture with 16 samples a pixel is 16.8 million samples: 5 s on one core, and 17
+//! stereo pairs under two minutes on two. Measured on a two-core machine (AMD EPYC, vectors of 16): 3.1 million at the
+//! first stop, 3.3 at the last one, 6.2 on both cores; one sample after another it was 2.0, 1.9 and 3.7 in the same hour.
+//! Between 3900 and 15 400 rocks (k from 0.05 to 0.30) the time of a picture does not grow. Building the world (0.8 million
+//! vertices, 5900 rocks) takes one to two seconds and is not counted.
 //!
 //! Run with `cargo bench -p sightline-core --profile dev --bench render` (the profile `dev` is optimised).
 

@@ -252,7 +252,7 @@ mod tests {
             };
             let noise = Octaves::<2>::new(&settings, 3);
             let (image, all) =
-                picture(512, |x, y| 0.5 * (1.0 + noise.at(f64::from(x), f64::from(y), 1e-3).albedo));
+                picture(512, |x, y| 0.5 * (1.0 + noise.at([f64::from(x), f64::from(y)], 1e-3).albedo));
             let report = picture_report(&image, &all).unwrap();
             assert!(
                 (report.spectrum_slope.unwrap() - wanted).abs() < 0.25,

@@ -2,6 +2,7 @@
 
 pub mod rig;
 pub mod sampling;
+mod shading;
 pub mod optics;
 pub mod render;
 pub mod exposure;

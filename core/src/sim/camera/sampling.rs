@@ -1,4 +1,4 @@
-//! Sampling: rays through the pixels of a tile, the surface that each meets, and its light.
+//! Sampling: rays through the pixels of a tile, and the surface that each meets; its light follows in `shading.rs`.
 //!
 //! A pixel is the mean over its area, taken at n × n samples on a fixed grid, turned a little: sample (i, j)
 //! lies at x = (i + (j + ½)/n)/n, y = (j + 1 − (i + ½)/n)/n of the pixel. All n² columns and rows are
@@ -25,8 +25,9 @@
 use crate::camera::Camera;
 use crate::frames::{Pixel, Point3, Ray, Vector3};
 
+use crate::sim::camera::shading::Seen;
 use crate::sim::culling::{Cone, in_cone};
-use crate::sim::light::reflection::Appearance;
+use crate::sim::ground::texture::LANES;
 use crate::sim::world::World;
 
 /// Side of a tile, px.
@@ -68,10 +69,10 @@ impl<'a> Sampler<'a> {
     pub fn tile(&self, x0: i64, y0: i64, width: usize, height: usize) -> Vec<f32> {
         let corners = self.corners(x0, y0, width, height);
         let rocks = self.rocks_in_view(&corners, height);
-        let mut radiances = Vec::with_capacity(width * height);
+        let (mut radiances, mut seen) = (Vec::with_capacity(width * height), Seen::default());
         for y in 0..height {
             for x in 0..width {
-                radiances.push(self.pixel(&corners, x, y, &rocks));
+                radiances.push(self.pixel(&corners, x, y, &rocks, &mut seen));
             }
         }
         radiances
@@ -118,7 +119,7 @@ impl<'a> Sampler<'a> {
     }
 
     /// The mean radiance of a pixel; black where the camera model gives no ray.
-    fn pixel(&self, corners: &Corners, x: usize, y: usize, rocks: &[(f64, usize)]) -> f32 {
+    fn pixel(&self, corners: &Corners, x: usize, y: usize, rocks: &[(f64, usize)], seen: &mut Seen) -> f32 {
         let at = y * (corners.width + 1) + x;
         let below = at + corners.width + 1;
         let [Some(a), Some(b), Some(c), Some(d)] =
@@ -128,15 +129,22 @@ impl<'a> Sampler<'a> {
         };
         let corners = [a, b, c, d].map(|ray| on_image_plane(&ray, &self.axis));
         let mut sum = 0.0;
-        for &[u, v] in &self.offsets {
-            sum += self.radiance(&between(&corners, u, v), rocks);
+        for offsets in self.offsets.chunks(LANES) {
+            seen.clear();
+            for (sample, &[u, v]) in offsets.iter().enumerate() {
+                self.look(sample, &between(&corners, u, v), rocks, seen);
+            }
+            let radiances = seen.radiances(self.world);
+            for radiance in &radiances[..offsets.len()] {
+                sum += radiance;
+            }
         }
         sum / self.offsets.len() as f32
     }
 
-    /// The radiance that comes down a ray.
+    /// Notes what a sample's ray meets.
     #[inline(always)]
-    fn radiance(&self, ray: &Ray, rocks: &[(f64, usize)]) -> f32 {
+    fn look(&self, sample: usize, ray: &Ray, rocks: &[(f64, usize)], seen: &mut Seen) {
         let (world, scenery) = (self.world, &*self.world.scenery);
         let mut nearest_m = f64::INFINITY;
         let mut met = None;
@@ -156,14 +164,15 @@ impl<'a> Sampler<'a> {
         if !world.solids.is_empty()
             && let Some((solid, distance_m, normal)) = world.solid_on(ray, ground_m.unwrap_or(nearest_m))
         {
-            return self.solid(ray, distance_m, solid, &normal);
-        }
-        if let Some(ground_m) = ground_m {
-            return self.ground(ray, ground_m);
-        }
-        match met {
-            Some((rock, plane)) => self.rock(ray, nearest_m, rock, plane),
-            None => world.light.sky([ray.direction.x, ray.direction.y, ray.direction.z].map(|v| v as f32)),
+            seen.solid(world, sample, ray, distance_m, (solid, &normal));
+        } else if let Some(distance_m) = ground_m {
+            let emission = -scenery.terrain.mean_normal().dot(&ray.direction);
+            seen.ground(sample, ray, distance_m, self.cutoff_m(distance_m, emission));
+        } else if let Some((rock, plane)) = met {
+            let emission = -scenery.rocks[rock].normal(plane).dot(&ray.direction);
+            seen.rock(sample, ray, nearest_m, self.cutoff_m(nearest_m, emission), (rock, plane));
+        } else {
+            seen.sky(world, sample, ray);
         }
     }
 
@@ -174,37 +183,6 @@ impl<'a> Sampler<'a> {
         let n = self.samples_per_axis as f64;
         (2.0 * footprint_m / n * f64::max(1.0, 1.0 / (n * emission.max(0.01)))) as f32
     }
-
-    #[inline(always)]
-    fn ground(&self, ray: &Ray, distance_m: f64) -> f32 {
-        let (world, point) = (self.world, ray.at(distance_m));
-        let cutoff_m = self.cutoff_m(distance_m, -world.scenery.terrain.mean_normal().dot(&ray.direction));
-        let mut look = world.scenery.surfaces.soil(&world.scenery.terrain, &point, cutoff_m);
-        if let Some(imprint) = &world.imprint {
-            look = imprint.on_soil(look, point.x, point.y, cutoff_m);
-        }
-        let in_sun = !world.in_shadow(&point);
-        let open = world.scenery.openness.at(point.x, point.y);
-        world.light.reflected(&look, towards_camera(ray), in_sun, open)
-    }
-
-    #[inline(always)]
-    fn rock(&self, ray: &Ray, distance_m: f64, rock: usize, plane: usize) -> f32 {
-        let (world, point) = (self.world, ray.at(distance_m));
-        let normal = world.scenery.rocks[rock].normal(plane);
-        let cutoff_m = self.cutoff_m(distance_m, -normal.dot(&ray.direction));
-        let look = world.scenery.surfaces.rock(&world.scenery.rocks[rock], &point, &normal, cutoff_m);
-        let in_sun = normal.dot(&world.light.to_sun) > 0.0 && !world.in_shadow(&point);
-        world.light.reflected(&look, towards_camera(ray), in_sun, 1.0)
-    }
-
-    fn solid(&self, ray: &Ray, distance_m: f64, solid: usize, normal: &Vector3) -> f32 {
-        let (world, point) = (self.world, ray.at(distance_m));
-        let albedo = world.solids[solid].albedo_at(&point, normal);
-        let look = Appearance { albedo, normal: [normal.x, normal.y, normal.z].map(|v| v as f32) };
-        let in_sun = normal.dot(&world.light.to_sun) > 0.0 && !world.in_shadow(&point);
-        world.light.reflected(&look, towards_camera(ray), in_sun, 1.0)
-    }
 }
 
 /// Positions of n × n samples within a pixel, 0 to 1 (header).
@@ -212,11 +190,6 @@ fn offsets(n: usize) -> Vec<[f64; 2]> {
     let place = |whole: usize, part: f64| (whole as f64 + part) / n as f64;
     let part = |k: usize| (k as f64 + 0.5) / n as f64;
     (0..n * n).map(|k| [place(k % n, part(k / n)), place(k / n, 1.0 - part(k % n))]).collect()
-}
-
-#[inline(always)]
-fn towards_camera(ray: &Ray) -> [f32; 3] {
-    [ray.direction.x, ray.direction.y, ray.direction.z].map(|v| -v as f32)
 }
 
 /// The ray with its direction drawn out to the plane d·A = 1; near and beyond 90°, to some other length.

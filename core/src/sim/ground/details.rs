@@ -19,7 +19,8 @@
 //!
 //! Frames: soil at (x, y) of the site, rock about its centre. Source: ours, after domain.md 10.4.
 
-use crate::sim::ground::texture::{OctaveSettings, Octaves, cell_hash, mix, weight};
+use crate::sim::ground::texture::{LANES, OctaveSettings, Octaves, TextureLanes, mix, weight};
+use crate::sim::ground::value_noise::cell_hash;
 
 /// Sides of the cells of the grains' lattices, m: mean diameters 1.3 cm, 6 mm and 3 mm.
 const GRAIN_CELLS_M: [f64; 3] = [0.026, 0.012, 0.006];
@@ -113,45 +114,61 @@ impl SoilDetails {
         }
     }
 
-    /// How much of a drift lies at a place, 0 to 1.
+    /// How much of a drift lies at each of many places, 0 to 1.
     #[inline(always)]
-    pub(super) fn drift(&self, x_m: f64, y_m: f64) -> f32 {
+    pub(super) fn drifts(&self, p_m: &[[f64; LANES]; 2]) -> [f32; LANES] {
         if self.drift_level == f32::INFINITY {
-            return 0.0;
+            return [0.0; LANES];
         }
-        let t = (0.5 + 1.5 * (self.drifts.at(x_m, y_m, 1e-6).albedo - self.drift_level)).clamp(0.0, 1.0);
-        t * t * (3.0 - 2.0 * t)
+        let mut drifts = self.drifts.at_lanes(p_m, &[1e-6; LANES]).albedo;
+        for drift in &mut drifts {
+            let t = (0.5 + 1.5 * (*drift - self.drift_level)).clamp(0.0, 1.0);
+            *drift = t * t * (3.0 - 2.0 * t);
+        }
+        drifts
     }
 
-    /// The grains at a place.
+    /// The grains at each of many places.
     #[inline(always)]
-    pub(super) fn grains(&self, x_m: f64, y_m: f64, cutoff_m: f32) -> Detail<2> {
-        let mut sum = Detail::NONE;
+    pub(super) fn grains(&self, p_m: &[[f64; LANES]; 2], cutoff_m: &[f32; LANES]) -> TextureLanes<2> {
+        let mut sum = TextureLanes { albedo: [0.0; LANES], slope: [[0.0; LANES]; 2] };
+        if self.grains <= 0.0 {
+            return sum;
+        }
         for (level, cell_m) in GRAIN_CELLS_M.into_iter().enumerate() {
-            let weight = weight(cell_m as f32, cutoff_m);
-            if weight <= 0.0 || self.grains <= 0.0 {
-                break;
+            let (mut weights, mut hashes, mut places) = ([0.0; LANES], [0; LANES], [[0.0; LANES]; 2]);
+            for lane in 0..LANES {
+                weights[lane] = weight(cell_m as f32, cutoff_m[lane]);
+                let lattice = [p_m[0][lane] / cell_m, p_m[1][lane] / cell_m];
+                let (hash, [u, v]) = cell_hash(lattice, self.seed ^ level as u32);
+                (hashes[lane], places[0][lane], places[1][lane]) = (hash, u, v);
             }
-            let (hash, [u, v]) = cell_hash([x_m / cell_m, y_m / cell_m], self.seed ^ level as u32);
-            // Of the four bytes one decides, one makes the size, two the place.
-            if byte(hash, 0) >= self.grains {
-                continue;
-            }
-            let radius = 0.20 + 0.25 * byte(hash, 1);
-            let room = 1.0 - 2.0 * radius;
-            let d =
-                [u - radius - room * byte(hash, 2), v - radius - room * byte(hash, 3)].map(|c| c / radius);
-            if d[0] * d[0] + d[1] * d[1] < 1.0
-                && let Some(slope) = frustum_slope(d, hash.wrapping_mul(0x85eb_ca77))
-            {
-                let tone = byte(hash.wrapping_mul(0x9e37_79b1), 3) - 0.5;
-                sum.albedo += weight * 5.0 * self.contrast * tone;
-                sum.slope[0] += weight * slope[0];
-                sum.slope[1] += weight * slope[1];
+            for lane in 0..LANES {
+                if weights[lane] <= 0.0 || byte(hashes[lane], 0) >= self.grains {
+                    continue;
+                }
+                if let Some((tone, slope)) = grain(hashes[lane], [places[0][lane], places[1][lane]]) {
+                    sum.albedo[lane] += weights[lane] * 5.0 * self.contrast * tone;
+                    sum.slope[0][lane] += weights[lane] * slope[0];
+                    sum.slope[1][lane] += weights[lane] * slope[1];
+                }
             }
         }
         sum
     }
+}
+
+/// The tone (−½ to ½) and slope of the grain of a cell's hash at a place (0 to 1) in the cell, if it lies there.
+fn grain(hash: u32, [u, v]: [f32; 2]) -> Option<(f32, [f32; 2])> {
+    // Of the four bytes one decides whether there is a grain, one makes the size, two the place.
+    let radius = 0.20 + 0.25 * byte(hash, 1);
+    let room = 1.0 - 2.0 * radius;
+    let d = [u - radius - room * byte(hash, 2), v - radius - room * byte(hash, 3)].map(|c| c / radius);
+    if d[0] * d[0] + d[1] * d[1] >= 1.0 {
+        return None;
+    }
+    let slope = frustum_slope(d, hash.wrapping_mul(0x85eb_ca77))?;
+    Some((byte(hash.wrapping_mul(0x9e37_79b1), 3) - 0.5, slope))
 }
 
 impl RockDetails {
@@ -164,13 +181,22 @@ impl RockDetails {
         }
     }
 
-    /// The brightness of veins at a point of a rock, relative.
+    /// The brightness of veins at each of many points of rocks, relative, each with its strength.
     #[inline(always)]
-    pub(super) fn veins(&self, p_m: [f64; 3], strength: f32, cutoff_m: f32) -> f32 {
-        let noise = self.veins.at(p_m, 1e-6).albedo;
-        // Half width 0.05 of the noise's standard deviation: 2 to 5 mm.
-        let t = noise / 0.06;
-        strength * 2.5 * self.contrast * weight(0.012, cutoff_m) * (-t * t).exp()
+    pub(super) fn veins(
+        &self,
+        p_m: &[[f64; LANES]; 3],
+        strength: &[f32; LANES],
+        cutoff_m: &[f32; LANES],
+    ) -> [f32; LANES] {
+        let mut veins = self.veins.at_lanes(p_m, &[1e-6; LANES]).albedo;
+        for lane in 0..LANES {
+            // Half width 0.05 of the noise's standard deviation: 2 to 5 mm.
+            let t = veins[lane] / 0.06;
+            let brightness = strength[lane] * 2.5 * self.contrast * weight(0.012, cutoff_m[lane]);
+            veins[lane] = brightness * (-t * t).exp();
+        }
+        veins
     }
 
     /// The pits at a point of a rock; the slope is that of the surface's height over its face.
@@ -209,12 +235,16 @@ mod tests {
     fn grains_and_drifts_cover_what_they_should_and_grains_fade_out() {
         let details = SoilDetails::new(0.12, 0.3, 0.1, 7);
         let (mut grains, mut drifts, mut count) = (0.0, 0.0, 0.0);
-        for k in 0..200_000 {
-            let (x, y) = (f64::from(k) * 0.003_71, f64::from(k % 997) * 0.0131);
-            grains += f64::from(details.grains(x, y, 1e-4) != Detail::NONE);
-            drifts += f64::from(details.drift(x, y));
-            count += 1.0;
-            assert_eq!(details.grains(x, y, 0.03), Detail::NONE);
+        for k in 0..200_000 / LANES {
+            let p_m = [
+                std::array::from_fn(|lane| (LANES * k + lane) as f64 * 0.003_71),
+                std::array::from_fn(|lane| ((LANES * k + lane) % 997) as f64 * 0.0131),
+            ];
+            let (near, far) = (details.grains(&p_m, &[1e-4; LANES]), details.grains(&p_m, &[0.03; LANES]));
+            grains += near.albedo.iter().filter(|albedo| **albedo != 0.0).count() as f64;
+            drifts += details.drifts(&p_m).iter().copied().map(f64::from).sum::<f64>();
+            count += LANES as f64;
+            assert_eq!((far.albedo, far.slope), ([0.0; LANES], [[0.0; LANES]; 2]));
         }
         // Of the grains of three lattices few overlap: (1 − 0.04)³ is left bare.
         assert!((grains / count / 0.115 - 1.0f64).abs() < 0.05, "{}", grains / count);
@@ -251,7 +281,8 @@ mod tests {
         let (mut veined, mut pitted) = (0, 0);
         for k in 0..50_000 {
             let p = [f64::from(k) * 0.0171, f64::from(k % 991) * 0.013, f64::from(k % 97) * 0.02];
-            veined += u32::from(details.veins(p, 1.0, 1e-4) > 0.1);
+            let veins = details.veins(&p.map(|axis| [axis; LANES]), &[1.0; LANES], &[1e-4; LANES]);
+            veined += u32::from(veins[0] > 0.1);
             let pit = details.pits(p, 1.0, 1e-4);
             pitted += u32::from(pit.albedo < 0.0);
             assert!(pit.albedo <= 0.0);

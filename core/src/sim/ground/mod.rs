@@ -1,5 +1,6 @@
 //! What there is to see: the ground, its rocks, and how their surfaces look.
 
+mod value_noise;
 pub mod texture;
 mod relief;
 pub mod terrain;

@@ -67,7 +67,8 @@ impl Relief {
 
     /// Height over the mean plane at a place, m down.
     pub(super) fn z_m(&self, x_m: f64, y_m: f64) -> f64 {
-        let noise = [&self.fractal, &self.swell].map(|octaves| f64::from(octaves.at(x_m, y_m, 1e-6).albedo));
+        let noise =
+            [&self.fractal, &self.swell].map(|octaves| f64::from(octaves.at([x_m, y_m], 1e-6).albedo));
         let ripples_m = self.ripples.as_ref().map_or(0.0, |ripples| ripples.z_m(x_m, y_m));
         self.amplitude_m * (noise[0] + noise[1]) + ripples_m
     }
@@ -97,8 +98,8 @@ impl Ripples {
     }
 
     fn z_m(&self, x_m: f64, y_m: f64) -> f64 {
-        let phase_rad = f64::from(self.phase.at(x_m, y_m, 1e-6).albedo);
-        let strength = 1.0 + f64::from(self.strength.at(x_m, y_m, 1e-6).albedo).clamp(-0.6, 0.6);
+        let phase_rad = f64::from(self.phase.at([x_m, y_m], 1e-6).albedo);
+        let strength = 1.0 + f64::from(self.strength.at([x_m, y_m], 1e-6).albedo).clamp(-0.6, 0.6);
         let angle_rad = TAU * (self.waves_per_m[0] * x_m + self.waves_per_m[1] * y_m) + phase_rad;
         -self.half_height_m * strength * (angle_rad.cos() + 0.25 * (2.0 * angle_rad).cos())
     }

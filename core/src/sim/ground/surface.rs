@@ -21,9 +21,20 @@ use crate::frames::{Point3, Vector3};
 use crate::sim::ground::details::{RockDetails, SoilDetails};
 use crate::sim::ground::rocks::Rock;
 use crate::sim::ground::terrain::Terrain;
-use crate::sim::ground::texture::{OctaveSettings, Octaves, mix};
+use crate::sim::ground::texture::{LANES, OctaveSettings, Octaves, TextureSample, mix};
 use crate::sim::light::reflection::Appearance;
 use crate::sim::scenario::TextureSettings;
+
+/// A point of a rock's face.
+#[derive(Clone, Copy, Debug)]
+pub struct Face<'a> {
+    /// The rock.
+    pub rock: &'a Rock,
+    /// The point, m, site frame.
+    pub point: Point3,
+    /// The face's outward unit normal, site frame.
+    pub normal: Vector3,
+}
 
 /// The look of soil and rock.
 #[derive(Clone, Debug)]
@@ -70,43 +81,81 @@ impl Surfaces {
         }
     }
 
-    /// The soil at a point of the ground.
+    /// The soil at the first `count` of many places of the ground, (x, y) by lane, m, site frame.
     #[inline(always)]
-    pub fn soil(&self, terrain: &Terrain, point: &Point3, cutoff_m: f32) -> Appearance {
-        let texture = self.soil.at(point.x, point.y, cutoff_m);
-        let drift = self.soil_details.drift(point.x, point.y);
-        let grains = self.soil_details.grains(point.x, point.y, cutoff_m);
-        let slope = terrain.smooth_slope_at(point.x, point.y);
-        let (bare, rough) = (1.0 - 0.7 * drift, 1.0 - 0.4 * drift);
-        let albedo = texture.albedo * rough + bare * grains.albedo + 0.7 * self.albedo_std * drift;
-        let [dx, dy]: [f32; 2] =
-            std::array::from_fn(|k| slope[k] + rough * texture.slope[k] + bare * grains.slope[k]);
-        Appearance { albedo: self.soil_albedo * (1.0 + albedo).max(0.1), normal: unit([dx, dy, -1.0]) }
+    pub fn soil(
+        &self,
+        terrain: &Terrain,
+        p_m: &[[f64; LANES]; 2],
+        cutoff_m: &[f32; LANES],
+        count: usize,
+    ) -> [Appearance; LANES] {
+        let texture = self.soil.at_lanes(p_m, cutoff_m);
+        let drifts = self.soil_details.drifts(p_m);
+        let grains = self.soil_details.grains(p_m, cutoff_m);
+        let mut looks = [Appearance::default(); LANES];
+        for (lane, look) in looks.iter_mut().enumerate().take(count) {
+            let slope = terrain.smooth_slope_at(p_m[0][lane], p_m[1][lane]);
+            let drift = drifts[lane];
+            let (bare, rough) = (1.0 - 0.7 * drift, 1.0 - 0.4 * drift);
+            let albedo = texture.albedo[lane] * rough + bare * grains.albedo[lane];
+            let albedo = albedo + 0.7 * self.albedo_std * drift;
+            let mut normal = [0.0, 0.0, -1.0];
+            for k in 0..2 {
+                normal[k] = slope[k] + rough * texture.slope[k][lane] + bare * grains.slope[k][lane];
+            }
+            *look = Appearance { albedo: self.soil_albedo * (1.0 + albedo).max(0.1), normal: unit(normal) };
+        }
+        looks
     }
 
-    /// A rock at a point of one of its faces.
+    /// Rocks at points of their faces; lanes without one come last.
     #[inline(always)]
-    pub fn rock(&self, rock: &Rock, point: &Point3, face: &Vector3, cutoff_m: f32) -> Appearance {
-        let (p, own) = (point - rock.centre, &rock.look);
-        let shift = own.texture_shift_m;
-        let p_m = [p.x + shift[0], p.y + shift[1], p.z + shift[2]];
-        let mut texture = self.rock.at(p_m, cutoff_m);
-        if own.veins > 0.0 {
-            texture.albedo += self.rock_details.veins(p_m, own.veins, cutoff_m);
+    pub fn rock(&self, faces: &[Option<Face<'_>>; LANES], cutoff_m: &[f32; LANES]) -> [Appearance; LANES] {
+        let (mut p_m, mut veins) = ([[0.0; LANES]; 3], [0.0; LANES]);
+        let mut has_veins = false;
+        for (lane, face) in faces.iter().flatten().enumerate() {
+            let (from_centre, look) = (face.point - face.rock.centre, &face.rock.look);
+            for (k, axis) in p_m.iter_mut().enumerate() {
+                axis[lane] = from_centre[k] + look.texture_shift_m[k];
+            }
+            veins[lane] = look.veins;
+            has_veins |= look.veins > 0.0;
         }
-        if own.pits > 0.0 {
-            let pits = self.rock_details.pits(p_m, own.pits, cutoff_m);
-            texture.albedo += pits.albedo;
-            texture.slope.iter_mut().zip(pits.slope).for_each(|(sum, slope)| *sum += slope);
+        let mut texture = self.rock.at_lanes(&p_m, cutoff_m);
+        if has_veins {
+            veins = self.rock_details.veins(&p_m, &veins, cutoff_m);
         }
-        let n = [face.x as f32, face.y as f32, face.z as f32];
+        let mut looks = [Appearance::default(); LANES];
+        for (lane, face) in faces.iter().flatten().enumerate() {
+            if face.rock.look.veins > 0.0 {
+                texture.albedo[lane] += veins[lane];
+            }
+            let mut sample = TextureSample {
+                albedo: texture.albedo[lane],
+                slope: [texture.slope[0][lane], texture.slope[1][lane], texture.slope[2][lane]],
+            };
+            if face.rock.look.pits > 0.0 {
+                let p_m = [p_m[0][lane], p_m[1][lane], p_m[2][lane]];
+                let pits = self.rock_details.pits(p_m, face.rock.look.pits, cutoff_m[lane]);
+                sample.albedo += pits.albedo;
+                sample.slope.iter_mut().zip(pits.slope).for_each(|(sum, slope)| *sum += slope);
+            }
+            looks[lane] = self.on_face(face, &sample);
+        }
+        looks
+    }
+
+    /// A rock with this texture on one of its faces.
+    fn on_face(&self, face: &Face<'_>, texture: &TextureSample<3>) -> Appearance {
+        let n = [face.normal.x as f32, face.normal.y as f32, face.normal.z as f32];
         // A relief of height b over the face tilts its normal by the part of ∇b that lies in the face.
         let out = n[0] * texture.slope[0] + n[1] * texture.slope[1] + n[2] * texture.slope[2];
         let normal = unit(std::array::from_fn(|k| n[k] - (texture.slope[k] - out * n[k])));
         let up = (-n[2]).max(0.0);
         // Dust lies in the hollows of the noise and leaves its crests bare.
         let dust = (self.dust * up * up * (1.0 + 3.0 * texture.albedo)).clamp(0.0, 1.0);
-        let bare = self.rock_albedo * own.brightness;
+        let bare = self.rock_albedo * face.rock.look.brightness;
         let albedo = bare + dust * (self.soil_albedo - bare);
         Appearance { albedo: albedo * (1.0 + texture.albedo).max(0.1), normal }
     }

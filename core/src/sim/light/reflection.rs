@@ -47,8 +47,8 @@ pub struct Light {
     law: Law,
 }
 
-/// What a point of a surface looks like.
-#[derive(Clone, Copy, Debug)]
+/// What a point of a surface looks like; by default black and level.
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Appearance {
     /// Albedo, without unit.
     pub albedo: f32,
