@@ -12,7 +12,7 @@ const HEADER: &str = "step,state,scale,roll_deg,ncc,stereo_score,err_px,err_m,si
                       position_in_rover_x_m,position_in_rover_y_m,position_in_rover_z_m,\
                       left_pixel_x_px,left_pixel_y_px,range_m,\
                       distance_correction_m,distance_tolerance_m,position_correction_m,position_tolerance_m,\
-                      budget_without_m,budget_with_m,reason";
+                      budget_without_m,budget_with_m,inliers,confidence,reason";
 
 /// One JSON object a line.
 pub fn jsonl(rows: &[StepRow]) -> String {
@@ -54,6 +54,8 @@ pub fn csv_line(row: &StepRow) -> String {
         row.budget_with_m,
     ];
     judged.into_iter().for_each(|number| push(&mut line, number));
+    push(&mut line, row.inliers);
+    push(&mut line, row.confidence);
     push(&mut line, row.reason.as_deref().map(text_cell));
     line + "\n"
 }

@@ -71,8 +71,13 @@ pub(crate) fn trace(step: usize) -> StepTrace {
         located.confidence = 0.354;
         evidence.anchors =
             (0..step).rev().take(2).map(|earlier| anchor(earlier, earlier + 1 == step)).collect();
-        evidence.match_features =
-            Some(MatchedFeatures { from_step: step - 1, then: 50, now: POINTS, matches: MATCHES });
+        evidence.match_features = Some(MatchedFeatures {
+            from_step: step - 1,
+            then: 50,
+            now: POINTS,
+            matches: MATCHES,
+            prior_given_up: false,
+        });
         evidence.fit_motion = Some(fitted());
         evidence.bootstrap = Some(Bootstrapped {
             sets: SETS,

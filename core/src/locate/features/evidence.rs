@@ -95,6 +95,9 @@ pub struct MatchedFeatures {
     pub now: usize,
     /// Matches of the two.
     pub matches: usize,
+    /// Whether too little agreed with the pose estimates, so that the features were looked for everywhere.
+    #[serde(default)]
+    pub prior_given_up: bool,
 }
 
 /// The rigid motion since the earlier stop.

@@ -175,6 +175,7 @@ impl<'a> Candidate<'a> {
             then: anchor.features.points.len(),
             now: now.points.len(),
             matches: motion.matches.len(),
+            prior_given_up: motion.prior_given_up,
         });
         tables::add_motion(&mut evidence.table, motion, &anchor.features, now, left);
         let Some(carried) = self.target else { return Located::default() };

@@ -2,7 +2,8 @@
 //! R173–R175).
 //!
 //! It is a motion of the whole scene and knows no target: all targets share it (R168, R207). With a prior, a feature is
-//! looked for only near where the pose estimates expect it.
+//! looked for only near where the pose estimates expect it. Where fewer than n_conf matches agree then, the estimates
+//! themselves are doubted: the features are looked for everywhere, and of both motions that is kept on which more agree.
 
 use nalgebra::Vector6;
 
@@ -36,6 +37,8 @@ pub struct Motion {
     pub bootstrap: Option<Bootstrap>,
     /// How it changes with 1σ of the errors that all features share: to the right, down, and of the disparities of both stops.
     pub by_shared_error: Option<[Vector6<f64>; 3]>,
+    /// Whether there was a prior and too little agreed with it, so that the features were looked for everywhere.
+    pub prior_given_up: bool,
 }
 
 /// What a motion is measured from.
@@ -55,8 +58,19 @@ pub struct MotionInput<'a> {
 
 /// Measures the motion between two stops.
 pub fn motion(input: &MotionInput<'_>) -> Motion {
+    let settings = input.settings;
+    let expected = motion_of(input, match_points(input));
+    let agree = expected.fit.inliers.len();
+    if settings.prior_radius_px <= 0.0 || agree as f64 >= settings.confidence_matches {
+        return expected;
+    }
+    let free = motion_of(input, match_everywhere(input));
+    if free.fit.inliers.len() > agree { Motion { prior_given_up: true, ..free } } else { expected }
+}
+
+/// The motion that most of some matches agree on.
+fn motion_of(input: &MotionInput<'_>, matches: Vec<Match>) -> Motion {
     let MotionInput { then, now, settings, .. } = *input;
-    let matches = match_points(input);
     let correspondence = |m: &Match| {
         let (before, after) = (&then.points[m.query as usize], &now.points[m.train as usize]);
         Correspondence {
@@ -75,7 +89,7 @@ pub fn motion(input: &MotionInput<'_>) -> Motion {
     let bootstrap = fit.motion().and_then(scatter);
     let is_shared = bootstrap.is_some() && settings.feature_common_px > 0.0;
     let by_shared_error = if is_shared { by_shared_error(input, &agreeing, &pairs) } else { None };
-    Motion { matches, fit, bootstrap, by_shared_error }
+    Motion { matches, fit, bootstrap, by_shared_error, prior_given_up: false }
 }
 
 /// How the motion changes when all pixels of this stop shift, and when all disparities of both stops do: by
@@ -122,12 +136,17 @@ fn refit(pairs: &[Correspondence], settings: &FeatureSettings) -> Option<Pose> {
 }
 
 /// Matches of points by the descriptors of their left features (R160, R161).
+fn match_everywhere(input: &MotionInput<'_>) -> Vec<Match> {
+    matching::matches(&descriptors(input.then), &descriptors(input.now), &input.settings.matching())
+}
+
+/// The same, near where the pose estimates expect them if there is a prior.
 fn match_points(input: &MotionInput<'_>) -> Vec<Match> {
     let MotionInput { then, now, settings, .. } = *input;
-    let (before, after) = (descriptors(then), descriptors(now));
     if settings.prior_radius_px <= 0.0 {
-        return matching::matches(&before, &after, &settings.matching());
+        return match_everywhere(input);
     }
+    let (before, after) = (descriptors(then), descriptors(now));
     let expected: Vec<Option<Pixel>> = then
         .points
         .iter()

@@ -65,7 +65,8 @@ settings_group! {
         feature_range_min_m: f64 = 0.5, "m", Domain::Between(0.05, 1000.0), "ours";
         /// Farthest range of a feature.
         feature_range_max_m: f64 = 100.0, "m", Domain::Between(0.1, 100_000.0), "ours";
-        /// Look for a feature of an earlier stop only so far from where the pose estimate expects it; 0: everywhere.
+        /// Look for a feature of an earlier stop only so far from where the pose estimate expects it; 0: everywhere, as where
+        /// too few agree then.
         prior_radius_px: f64 = 0.0, "px", Domain::Between(0.0, 2000.0), "ours; off";
         /// Noise of each coordinate of a feature, from which the covariances of the points follow.
         feature_sigma_px: f64 = 0.5, "px", Domain::Between(0.01, 10.0), "D§2, R172";

@@ -33,6 +33,10 @@ pub(super) fn lines(evidence: &FeatureEvidence) -> Vec<Line> {
     if let Some(matched) = &evidence.match_features {
         let words = format!("matched with the {} points of step {}", matched.then, matched.from_step);
         add(Stage::MatchFeatures, words, share(matched.matches, matched.now));
+        if matched.prior_given_up {
+            let words = "too few agreed with the pose estimate: looked for everywhere".to_owned();
+            add(Stage::MatchFeatures, words, "prior given up".to_owned());
+        }
         if let Some(motion) = &evidence.fit_motion {
             let words = "agree with the motion".to_owned();
             add(Stage::FitMotion, words, share(motion.inliers, matched.matches));
