@@ -12,7 +12,7 @@
 //!
 //! ```text
 //! scenario       every number, from and to TOML, and its range; library: those that come with it
-//! ground         texture         seeded noise
+//! ground         value_noise     hashes joined smoothly      texture     its octaves
 //!                relief          the fractal and its ripples
 //!                terrain, terrain_cast   the ground, tilted, and rays on it
 //!                far             where a slope ends
@@ -24,7 +24,8 @@
 //! world          cast, shadow, visibility                    moment      sun, clouds, rover at a stop
 //! light          sky             direct and diffuse light    law         laws of reflection
 //!                reflection      what a surface sends        openness    contact shadows
-//! camera         rig             the pairs of cameras        sampling    rays of a tile, their radiance
+//! camera         rig             the pairs of cameras        sampling    rays of a tile, what they meet
+//!                shading         the light of that, many at once
 //!                optics          point spread, flat field    render      clean radiance, development
 //!                exposure        electrons, automatic time   noise       detector, numbers
 //! rover          drive, course   where it truly stands       odometry    where it believes to stand
