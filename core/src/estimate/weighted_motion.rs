@@ -77,7 +77,7 @@ pub enum Loss {
 
 impl Loss {
     /// ρ': what a match of squared distance d² counts.
-    fn weight(self, squared_distance: f64) -> f64 {
+    pub(crate) fn weight(self, squared_distance: f64) -> f64 {
         match self {
             Self::Squares => 1.0,
             Self::Huber => (HUBER / squared_distance.sqrt()).min(1.0),

@@ -10,6 +10,7 @@
 //! is in the evidence.
 
 pub mod features;
+pub mod shape;
 pub mod template;
 
 use nalgebra::{Matrix3, Matrix3x2};

@@ -32,3 +32,4 @@ pub mod wire;
 pub mod realism;
 pub mod exposure;
 pub mod real_motion;
+pub mod registration;

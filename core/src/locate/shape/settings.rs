@@ -1,0 +1,74 @@
+//! The parameters of a registration, with their defaults and sources.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::mesh::MeshSettings;
+use super::nelder_mead::SimplexSettings;
+use super::refine_register::{Method, PlaneSettings};
+
+/// How surfaces are registered.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct ShapeSettings {
+    /// How meshes are made.
+    pub mesh: MeshSettings,
+    /// Pixels of a side of the virtual sensor.
+    pub sensor_px: usize,
+    /// What the sensor spans beyond the rock, as a share of its half width: ground holds the rock's height and tilt.
+    pub margin: f64,
+    /// How far the coarse search goes to each side, m; none: half the rock's width.
+    pub search_half_range_m: Option<f64>,
+    /// Least share of the fixed surface's pixels that both surfaces must cover.
+    pub overlap_min: f64,
+    /// Half the side of the windows whose planes give the normals, px.
+    pub normal_radius_px: usize,
+    /// How the motion is refined.
+    pub method: Method,
+    /// The paper's method.
+    pub simplex: SimplexSettings,
+    /// The modern one.
+    pub plane: PlaneSettings,
+    /// When the result is not to be used.
+    pub checks: CheckSettings,
+}
+
+impl Default for ShapeSettings {
+    /// 40 % overlap (R196), search by half the rock's width (R200), Nelder–Mead (R201); the rest is ours.
+    fn default() -> Self {
+        Self {
+            mesh: MeshSettings::default(),
+            sensor_px: 64,
+            margin: 0.4,
+            search_half_range_m: None,
+            overlap_min: 0.4,
+            normal_radius_px: 2,
+            method: Method::default(),
+            simplex: SimplexSettings::default(),
+            plane: PlaneSettings::default(),
+            checks: CheckSettings::default(),
+        }
+    }
+}
+
+/// When a registration is not to be used; all ours.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct CheckSettings {
+    /// Triangles that a surface needs at least.
+    pub triangles_min: usize,
+    /// Largest 1σ of the target in its weakest direction, m.
+    pub sigma_max_m: f64,
+    /// How many times the surfaces may differ as much as their noise explains.
+    pub misfit_max: f64,
+    /// How far two minima of the coarse surface must be apart to be two, as a share of the half width.
+    pub apart: f64,
+    /// By what factor the other minimum must be higher than the best.
+    pub other_min: f64,
+}
+
+impl Default for CheckSettings {
+    fn default() -> Self {
+        Self { triangles_min: 100, sigma_max_m: 0.02, misfit_max: 2.0, apart: 0.4, other_min: 1.15 }
+    }
+}
