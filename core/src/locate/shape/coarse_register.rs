@@ -25,7 +25,7 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::objective::{Agreement, Objective, Offset, agreement, motion};
+use super::objective::{Agreement, Offset, agreement, motion};
 use super::range_sensor::{Projection, RangeSensor};
 use super::rasterise::{Depths, Facets, Picture, rasterise};
 use crate::frames::Point3;
@@ -180,11 +180,6 @@ fn cell(differences_m: &mut [f32], pixels: usize, overlap_min: f64) -> (Agreemen
     let low: f32 = below.iter().map(|difference| shift_m - difference).sum();
     let high: f32 = above.iter().map(|difference| difference - shift_m).sum();
     (agreement(f64::from(low + high), count, pixels, overlap_min), shift_m)
-}
-
-/// The mesh's best shift as a start of the refinement: J of all pixels there.
-pub(super) fn at_minimum(objective: &mut Objective<'_>, minimum: &Minimum) -> Agreement {
-    objective.at(&minimum.offset())
 }
 
 impl CoarseSurface {

@@ -5,7 +5,7 @@
 //! point to plane  w = 1/σ_i²                                    P = s² κ A⁻¹
 //! L1 of depths    w = √(2/π) / (s σ_i) · slant⁻¹,  B = Σ κ₁ J Jᵀ / slant²           P = A⁻¹ B A⁻¹
 //! κ  = Σ over lags of the autocorrelation of r_i / σ_i          κ₁ the same of its signs
-//! P_target = [I, −[d]×] P [I, −[d]×]ᵀ                           d = target − c
+//! P_target = [I, −[d]×] P [I, −[d]×]ᵀ + σ_common² I             d = target − c
 //! ```
 //! **Shape that only noise has.** Noise tilts normals at random, so that flat ground would seem to hold a shift along it
 //! by its own noise. The two surfaces do not share their noise: products of one's gradient with the other's have no
@@ -15,6 +15,9 @@
 //! differently differs alike over a facet. κ counts how many pixels err together: the autocorrelation of the residuals
 //! themselves is averaged over rings of equal distance and added up to the first ring below 5 %, at most 8 pixels out.
 //! The scale s is measured too (rms of r/σ, cut at 3 of the robust scale): noise that was claimed too small grows.
+//!
+//! **What does not average out.** A window of stereo smooths what it sees, more from farther off: a convex rock looks
+//! smaller, and all pixels say so alike. σ_common stands for it ([`super::ShapeSettings::common_sigma_m`]).
 //!
 //! | symbol | our name | unit, frame |
 //! |---|---|---|
@@ -37,6 +40,8 @@ use crate::frames::{Point3, Vector3};
 const LAG_MAX: i32 = 8;
 /// Autocorrelation below which residuals are independent.
 const ALIKE_MIN: f64 = 0.05;
+/// A surface seen more edge-on than this counts as if it were not: its normal is not known well enough.
+const SLANT_MIN: f64 = 0.2;
 /// Residuals beyond so many robust scales are drawn in.
 const CUT: f64 = 3.0;
 
@@ -99,7 +104,7 @@ fn sums(pairs: &[Pair], slopes: &Slopes, method: Method, scale: f64) -> (Matrix6
         pixels += 1;
         match method {
             Method::SimplexL1 => {
-                let per_depth = 1.0 / pair.slant;
+                let per_depth = 1.0 / pair.slant.max(SLANT_MIN);
                 let density = (2.0 / std::f64::consts::PI).sqrt() / (scale.max(1e-9) * pair.sigma_m);
                 shape += product * (density * per_depth);
                 scatter += product * (per_depth * per_depth);

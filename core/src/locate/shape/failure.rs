@@ -4,13 +4,13 @@
 //! |---|---|
 //! | `EmptySurface`, `TooFewTriangles` | stereo found nothing there |
 //! | `NoOverlap` | the two meshes lie side by side |
-//! | `NotEnoughShape` | flat ground, or a smooth boulder: the mesh slides without getting worse |
 //! | `DoesNotFit` | another rock, or the rock has changed |
+//! | `NotEnoughShape` | flat ground, or a smooth boulder: the mesh slides without getting worse |
 //! | `NotIsolated` | the coarse surface has two valleys |
 //! | `AtSearchEdge` | the valley goes on beyond the search |
 //!
-//! The first that applies is given, in this order: without overlap nothing else means anything, without shape every
-//! place fits alike.
+//! The first that applies is given, in this order: without overlap nothing else means anything; what does not
+//! fit has no place; without shape every place fits alike.
 //!
 //! Source: ours; R196 for the overlap.
 

@@ -44,7 +44,9 @@ mod checks;
 use nalgebra::{Matrix3, Matrix6};
 use serde::{Deserialize, Serialize};
 
-use crate::frames::{Point3, Pose, PoseRecord, Vector3};
+#[cfg(test)]
+use crate::frames::Vector3;
+use crate::frames::{Point3, Pose, PoseRecord};
 
 pub use coarse_register::{CoarseSurface, Minimum};
 pub use covariance::Precision;
@@ -196,7 +198,7 @@ pub fn register(input: &RegistrationInput<'_>, settings: &ShapeSettings) -> Regi
     result.sensor = Some(sensor);
     // A sensor with a place of its own turns the surface about the target as well.
     let pivot = sensor.sensor_from_fixed * input.target_in_fixed;
-    let template = Template::new(sensor, input.fixed, pivot, settings.normal_radius_px);
+    let template = Template::new(sensor, input.fixed, pivot, settings);
     let moving = Moving::new(input.moving, &(sensor.sensor_from_fixed * input.start_fixed_from_moving));
     if template.image.covered() == 0.0 {
         return result.failed(Failure::EmptySurface { side: Side::Fixed });
@@ -216,48 +218,47 @@ pub fn register(input: &RegistrationInput<'_>, settings: &ShapeSettings) -> Regi
     let Some(best) = best else {
         return result.failed(Failure::NoOverlap { share: overlap_best, least: settings.overlap_min });
     };
+    let (near, start) = (refine_register::near(&template, &moving, &best.offset()), best.offset());
     let how = (settings.method, &settings.simplex, &settings.plane);
-    let (end, path) = refine_register(&template, &moving, &best.offset(), settings.overlap_min, how);
+    let (end, path) = refine_register(&template, &near, &start, settings.overlap_min, how);
     result.path = path;
-    finish(result, (&template, &moving), [Offset::zeros(), best.offset(), end], input, settings)
+    let ways = [(Offset::zeros(), &moving), (start, &near), (end, &near)];
+    finish(result, &template, ways, input, settings)
 }
 
-/// What is known at the end of a registration, and whether it is to be used.
+/// What is known at the end of a registration, and whether it is to be used; by the offsets at the start, after the coarse
+/// search and at the end, each with the part of the moving surface that is seen there.
 fn finish(
     mut result: Registration,
-    (template, moving): (&Template, &Moving),
-    offsets: [Offset; 3],
+    template: &Template,
+    ways: [(Offset, &Moving); 3],
     input: &RegistrationInput<'_>,
     settings: &ShapeSettings,
 ) -> Registration {
     let sensor = &template.sensor;
     let fixed_m = &template.image.depth_m;
-    let mut objective = Objective::new(sensor, fixed_m, &moving.facets, template.pivot, settings.overlap_min);
-    result.agreement = offsets.map(|offset| Some(objective.at(&offset)));
-    let errors = |offset: &Offset| {
-        let image = sensor.see_facets(&moving.facets, &motion(offset, &template.pivot));
-        let difference = |(h, z): (&f32, &f32)| if h.is_finite() && z.is_finite() { h - z } else { f32::NAN };
-        image.depth_m.iter().zip(fixed_m).map(difference).collect::<Vec<f32>>()
-    };
-    result.depth_errors = DepthErrors {
-        width: sensor.width,
-        height: sensor.height,
-        fixed_m: fixed_m.clone(),
-        before_m: errors(&offsets[0]),
-        coarse_m: errors(&offsets[1]),
-        fine_m: errors(&offsets[2]),
-    };
-    let end = motion(&offsets[2], &template.pivot);
+    let [(before_m, before), (coarse_m, coarse), (fine_m, fine)] = ways.map(|(offset, moving)| {
+        let overlap_min = settings.overlap_min;
+        let mut objective = Objective::new(sensor, fixed_m, &moving.facets, template.pivot, overlap_min);
+        let agreement = objective.at(&offset);
+        (objective.differences_m(), Some(agreement))
+    });
+    result.agreement = [before, coarse, fine];
+    let (width, height) = (sensor.width, sensor.height);
+    result.depth_errors = DepthErrors { width, height, fixed_m: fixed_m.clone(), before_m, coarse_m, fine_m };
+    let (end, near) = ways[2];
+    let motion = motion(&end, &template.pivot);
     let fixed_from_sensor = sensor.sensor_from_fixed.inverse();
     result.fixed_from_moving =
-        fixed_from_sensor * end * sensor.sensor_from_fixed * input.start_fixed_from_moving;
+        fixed_from_sensor * motion * sensor.sensor_from_fixed * input.start_fixed_from_moving;
     result.target_in_moving = result.fixed_from_moving.inverse() * input.target_in_fixed;
-    let (image, pairs) = template.pairs(moving, &offsets[2]);
+    let (image, pairs) = template.pairs(near, &end);
     let precision = precision(template, &image, &pairs, settings.method);
     let target = arm(&(sensor.sensor_from_fixed * input.target_in_fixed), &template.pivot);
     result.covariance_in_moving = precision.covariance.map(|covariance| {
         let turn = (result.fixed_from_moving.inverse() * fixed_from_sensor).rotation.to_rotation_matrix();
-        turn.matrix() * covariance_of_point(&covariance, &target) * turn.matrix().transpose()
+        let common = Matrix3::identity() * settings.common_sigma_m.powi(2);
+        turn.matrix() * covariance_of_point(&covariance, &target) * turn.matrix().transpose() + common
     });
     result.misfit = checks::misfit(&pairs);
     result.precision = Some(precision);
@@ -280,3 +281,5 @@ pub(crate) fn direction(from: &Point3, to: &Point3) -> Vector3 {
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod lidar_tests;

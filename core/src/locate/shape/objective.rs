@@ -99,6 +99,12 @@ impl<'a> Objective<'a> {
         let (sum_m, count) = Arch::new().dispatch(differences);
         agreement(sum_m, count, self.fixed_pixels, self.overlap_min)
     }
+
+    /// h − z of every pixel where J was asked for last, m; not a number where not both are seen.
+    pub(super) fn differences_m(&self) -> Vec<f32> {
+        let difference = |(h, z): (&f32, &f32)| if h.is_finite() && z.is_finite() { h - z } else { f32::NAN };
+        self.moving_m.iter().zip(self.fixed_m).map(difference).collect()
+    }
 }
 
 /// J of a sum over `count` of the fixed surface's pixels.

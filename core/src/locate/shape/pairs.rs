@@ -2,11 +2,12 @@
 //!
 //! ```text
 //! r_i = n_i · (m_i − f_i) = (n_i · a_i)(h_i − z_i)      both points on the ray of pixel i, m_i = f_i + (h_i − z_i) a_i
-//! σ_i² = Σ over both surfaces  σ_range² max( (n_i · u_i)², 0.2² )
+//! σ_i² = Σ over both surfaces  σ_range² max( (n_i · u_i)², 0.2² ) + σ_model²
 //! ∂r_i/∂(t, ω) = ( n_i, (m_i − c) × n_i )
 //! ```
 //! An error of range moves a point along its own line of sight u, of which only the part along the normal counts; but a
-//! surface seen edge-on is not known without error, which is why that part does not fall below a fifth (ours). Where no
+//! surface seen edge-on is not known without error, which is why that part does not fall below a fifth (ours). σ_model is what a surface misses that its points' noise does not tell:
+//! chords of facets, and the smoothing by the window of stereo. Where no
 //! noise is known σ_i is 1 m, and all that follows is measured from the residuals alone.
 //!
 //! | symbol | our name | unit, frame |
@@ -14,9 +15,12 @@
 //! | n | [`Pair::normal`], of the fixed surface | –, sensor |
 //! | a | (x, y, 1) along the ray of the pixel | –, sensor |
 //! | u | line of sight of the instrument that measured the point | –, sensor |
+//! | σ_model | `Template::model_m` | m |
 //! | c | `Template::pivot` | m, sensor |
 //!
 //! Source: ours; point-to-plane distances are those of Chen & Medioni (1992).
+
+use std::f64::consts::SQRT_2;
 
 use nalgebra::Vector6;
 
@@ -24,6 +28,7 @@ use super::mesh::Mesh;
 use super::objective::{Offset, motion};
 use super::range_sensor::{RangeImage, RangeSensor};
 use super::rasterise::Facets;
+use super::settings::ShapeSettings;
 use super::slopes::Slopes;
 use crate::frames::{Point3, Pose, Vector3};
 
@@ -37,6 +42,7 @@ pub(super) struct Template {
     pub(super) slopes: Slopes,
     pub(super) pivot: Point3,
     pub(super) normal_radius_px: usize,
+    pub(super) model_m: f64,
     /// 1σ of each pixel along its line of sight, m.
     sigma_m: Vec<f32>,
     viewpoint: Point3,
@@ -78,18 +84,19 @@ impl Pair {
 }
 
 impl Template {
-    pub(super) fn new(sensor: RangeSensor, fixed: &Mesh, pivot: Point3, normal_radius_px: usize) -> Self {
+    pub(super) fn new(sensor: RangeSensor, fixed: &Mesh, pivot: Point3, settings: &ShapeSettings) -> Self {
         let image = sensor.see(fixed, &sensor.sensor_from_fixed);
         let sigma_m = (0..image.depth_m.len())
             .map(|pixel| image.interpolate(pixel, &fixed.triangles, &fixed.range_sigma_m))
             .collect();
         Self {
-            slopes: Slopes::of(&sensor, &image, normal_radius_px),
+            slopes: Slopes::of(&sensor, &image, settings.normal_radius_px),
             viewpoint: sensor.sensor_from_fixed * fixed.viewpoint,
             sensor,
             image,
             pivot,
-            normal_radius_px,
+            normal_radius_px: settings.normal_radius_px,
+            model_m: settings.model_sigma_m,
             sigma_m,
         }
     }
@@ -122,7 +129,7 @@ impl Template {
             normal,
             slant,
             residual_m: slant * (f64::from(h) - f64::from(z)),
-            sigma_m: if sigma_m > 0.0 { sigma_m } else { 1.0 },
+            sigma_m: if sigma_m > 0.0 { sigma_m.hypot(self.model_m * SQRT_2) } else { 1.0 },
         })
     }
 }
@@ -134,6 +141,13 @@ impl Moving {
             sigma_m: mesh.range_sigma_m.clone(),
             viewpoint: sensor_from_mesh * mesh.viewpoint,
         }
+    }
+
+    /// The part of it that comes within `reach_px` of the sensor's picture after a motion.
+    pub(super) fn near(&self, sensor: &RangeSensor, motion: &Pose, reach_px: usize) -> Self {
+        let (facets, old_numbers) = self.facets.near(sensor, motion, reach_px);
+        let sigma_m = old_numbers.iter().map(|&vertex| self.sigma_m[vertex as usize]).collect();
+        Self { facets, sigma_m, viewpoint: self.viewpoint }
     }
 }
 

@@ -55,8 +55,9 @@ impl Facets {
         facets
     }
 
-    /// Those triangles, with their vertices alone, that come within `reach_px` of the sensor's picture after a motion.
-    pub(super) fn near(&self, sensor: &RangeSensor, motion: &Pose, reach_px: usize) -> Self {
+    /// Those triangles, with their vertices alone, that come within `reach_px` of the sensor's picture after a motion; and
+    /// what the numbers of these vertices were.
+    pub(super) fn near(&self, sensor: &RangeSensor, motion: &Pose, reach_px: usize) -> (Self, Vec<u32>) {
         let mut picture = Picture::default();
         let wide = sensor.widened(reach_px);
         picture.project(&wide, self, motion);
@@ -70,12 +71,13 @@ impl Facets {
             within(u, right) && within(v, bottom)
         };
         let mut new_number = vec![u32::MAX; self.x.len()];
-        let mut near = Self::default();
+        let (mut near, mut old_numbers) = (Self::default(), Vec::new());
         for triangle in self.triangles.iter().filter(is_near) {
             let numbers = triangle.map(|vertex| {
                 let number = &mut new_number[vertex as usize];
                 if *number == u32::MAX {
                     *number = near.x.len() as u32;
+                    old_numbers.push(vertex);
                     near.x.push(self.x[vertex as usize]);
                     near.y.push(self.y[vertex as usize]);
                     near.z.push(self.z[vertex as usize]);
@@ -84,7 +86,7 @@ impl Facets {
             });
             near.triangles.push(numbers);
         }
-        near
+        (near, old_numbers)
     }
 }
 

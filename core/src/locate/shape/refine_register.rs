@@ -73,6 +73,12 @@ impl Default for PlaneSettings {
     }
 }
 
+/// The part of the moving surface that the refinement from a start can see.
+pub(super) fn near(template: &Template, moving: &Moving, start: &Offset) -> Moving {
+    let reach_px = (REACH_M / template.sensor.pixel_m(template.pivot.z)).ceil() as usize;
+    moving.near(&template.sensor, &motion(start, &template.pivot), reach_px)
+}
+
 /// Refines the motion from a start by one method: where it ends, and the way.
 pub(super) fn refine_register(
     template: &Template,
@@ -82,13 +88,12 @@ pub(super) fn refine_register(
     how: (Method, &SimplexSettings, &PlaneSettings),
 ) -> (Offset, Vec<PathStep>) {
     let (method, simplex, plane) = how;
-    let reach_px = (REACH_M / template.sensor.pixel_m(template.pivot.z)).ceil() as usize;
     match method {
         Method::SimplexL1 => {
-            let start_motion = motion(start, &template.pivot);
-            let near = moving.facets.near(&template.sensor, &start_motion, reach_px);
             let fixed_m = &template.image.depth_m;
-            let mut objective = Objective::new(&template.sensor, fixed_m, &near, template.pivot, overlap_min);
+            let facets = &moving.facets;
+            let mut objective =
+                Objective::new(&template.sensor, fixed_m, facets, template.pivot, overlap_min);
             let (end, _, path) = minimise(|p| objective.at(p).mean_m, start, simplex);
             (end, path)
         }

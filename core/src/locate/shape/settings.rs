@@ -23,6 +23,11 @@ pub struct ShapeSettings {
     pub overlap_min: f64,
     /// Half the side of the windows whose planes give the normals, px.
     pub normal_radius_px: usize,
+    /// What a surface misses that the noise of its points does not tell, 1σ along the normal, m: facets, and the window of
+    /// stereo. Counts where noise is known.
+    pub model_sigma_m: f64,
+    /// Error of the target that all pixels share, 1σ on each axis, m: stereo's window makes what is convex smaller.
+    pub common_sigma_m: f64,
     /// How the motion is refined.
     pub method: Method,
     /// The paper's method.
@@ -34,7 +39,8 @@ pub struct ShapeSettings {
 }
 
 impl Default for ShapeSettings {
-    /// 40 % overlap (R196), search by half the rock's width (R200), Nelder–Mead (R201); the rest is ours.
+    /// 40 % overlap (R196), search by half the rock's width (R200), Nelder–Mead (R201); the rest is ours. The shared error is
+    /// fitted on rocks whose points a window of 2 to 3 cm smooths (docs/shape.md).
     fn default() -> Self {
         Self {
             mesh: MeshSettings::default(),
@@ -43,6 +49,8 @@ impl Default for ShapeSettings {
             search_half_range_m: None,
             overlap_min: 0.4,
             normal_radius_px: 2,
+            model_sigma_m: 0.002,
+            common_sigma_m: 0.0008,
             method: Method::default(),
             simplex: SimplexSettings::default(),
             plane: PlaneSettings::default(),
