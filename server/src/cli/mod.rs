@@ -12,6 +12,7 @@ pub mod track;
 pub mod presets;
 pub mod study;
 mod real_motion;
+mod registration;
 mod realism;
 mod scenery;
 mod scenery_figure;

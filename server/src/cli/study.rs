@@ -13,6 +13,7 @@ use sightline_core::study::row::Row;
 use super::open;
 use super::real_motion;
 use super::realism;
+use super::registration;
 use super::say::{self, Progress};
 use super::scenery;
 use crate::jobs::lock;
@@ -64,6 +65,8 @@ enum Experiment {
     Scenery(scenery::Scenery),
     /// Recorded frames: the motion that features find against the motion that is known of them.
     RealMotion(real_motion::RealMotion),
+    /// Rocks registered by their shape: how far off it may start, how right it ends, what it makes of another rock.
+    Registration(registration::Registrations),
 }
 
 /// What a study over worlds, configurations and a grid takes.
@@ -137,6 +140,7 @@ impl Study {
             Experiment::Realism(worlds) => worlds.run(),
             Experiment::Scenery(scenery) => scenery.run(),
             Experiment::RealMotion(recordings) => recordings.run(),
+            Experiment::Registration(rocks) => rocks.run(),
         }
     }
 }
