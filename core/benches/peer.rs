@@ -10,9 +10,11 @@
 //! out:  <seconds> <keypoints>
 //! in:   match <file of descriptors> <queries> <repetitions>
 //! out:  <seconds> <nearest> <its distance> <that of the second nearest> <nearest> …
+//! in:   stereo <block or semi-global> <index of the left image, before the right one> <disparities> <repetitions>
+//! out:  <seconds> <disparity> <disparity> …
 //! ```
-//! The scores are those of every 97th position, the neighbours those of every 97th query, for the comparison with the
-//! other side's. Descriptors are 128 bytes each: first the queries, then those they are compared with. Everything runs
+//! The scores are those of every 97th position, the neighbours those of every 97th query, the disparities the medians
+//! of some squares, for the comparison with the other side's. Descriptors are 128 bytes each: first the queries, then those they are compared with. Everything runs
 //! on this one thread. Without an argument (as a plain bench) there is nothing to do.
 
 use std::hint::black_box;
@@ -22,6 +24,7 @@ use std::time::Instant;
 use sightline_core::correlate::{PixelRect, zncc_surface};
 use sightline_core::image::{GrayImage, Patch};
 use sightline_core::sift::{Descriptor, SiftSettings, detect, nearest};
+use sightline_core::stereo::{StereoMethod, StereoSettings, disparities};
 
 fn main() {
     let Some(path) = std::env::args().nth(1).filter(|argument| !argument.starts_with('-')) else { return };
@@ -37,6 +40,9 @@ fn main() {
             }
             (["sift", ..], [image, repetitions]) => run_sift(&images[*image as usize], *repetitions),
             (["match", path, ..], [queries, repetitions]) => run_match(path, *queries, *repetitions),
+            (["stereo", method, ..], [image, count, repetitions]) => {
+                run_stereo(&images[*image as usize..][..2], method, *count, *repetitions)
+            }
             _ => panic!("not a line of the protocol: {line}"),
         };
         let mut out = std::io::stdout().lock();
@@ -99,5 +105,22 @@ fn run_match(path: &str, queries: u32, repetitions: u32) -> String {
         let second = found.second_distance2.map_or(-1.0, distance);
         format!(" {} {:.4} {second:.4}", found.nearest, distance(found.distance2))
     });
+    format!("{seconds:.9}{}", shown.collect::<String>())
+}
+
+/// Seconds of the quickest repetition, and the median disparities of squares.
+fn run_stereo(pair: &[GrayImage], method: &str, disparity_count: u32, repetitions: u32) -> String {
+    let method = if method == "block" { StereoMethod::BlockMatching } else { StereoMethod::SemiGlobal };
+    let settings = StereoSettings { method, disparity_count, ..StereoSettings::default() };
+    let (seconds, map) = quickest(repetitions, || disparities([black_box(&pair[0]), &pair[1]], &settings));
+    let map = map.expect("a pair that can be matched");
+    let median = |left: u32, top: u32| {
+        let pixels = (0..31 * 31).map(|k| map.at(left + k % 31, top + k / 31).unwrap_or(-1.0));
+        let mut found: Vec<f32> = pixels.collect();
+        found.sort_by(f32::total_cmp);
+        found[found.len() / 2]
+    };
+    let places = (0..16).map(|k| (200 + 190 * (k % 4), 50 + 250 * (k / 4)));
+    let shown = places.map(|(left, top)| format!(" {:.4}", median(left, top)));
     format!("{seconds:.9}{}", shown.collect::<String>())
 }

@@ -14,8 +14,8 @@
 //! ```
 //!
 //! The order in which to read: [`frames`] (the conventions), [`pipeline`] (the loop on one page), [`trace`]
-//! (what each stage saw and decided), [`stages`] and [`locate`] (the steps), then [`camera`], [`correlate`], [`sift`]
-//! and [`estimate`] (the machinery), [`traverse`] and [`sim`] (where images come from), [`session`] (a person's work)
+//! (what each stage saw and decided), [`stages`] and [`locate`] (the steps), then [`camera`], [`correlate`], [`sift`],
+//! [`estimate`] and [`stereo`] (the machinery), [`traverse`] and [`sim`] (where images come from), [`session`] (a person's work)
 //! and [`study`] (the proof).
 //!
 //! Invariants: stages are pure; geometry is in `f64`, pixels in `f32`; the same input gives the same bits on any
@@ -31,6 +31,7 @@ pub mod image;
 pub mod correlate;
 pub mod sift;
 pub mod estimate;
+pub mod stereo;
 pub mod target;
 pub mod stages;
 pub mod locate;

@@ -1,7 +1,7 @@
 """OpenCV's half of `cargo xtask bench --peers`; `core/benches/peer.rs` says the protocol.
 
-One thread, no OpenCL: `matchTemplate(TM_CCOEFF_NORMED)`, `SIFT.detectAndCompute` and `BFMatcher(NORM_L2).knnMatch` on
-the pixels and descriptors that the other side reads too. The request `describe <image> <count> <file>`, which only this
+One thread, no OpenCL: `matchTemplate(TM_CCOEFF_NORMED)`, `SIFT.detectAndCompute` and `BFMatcher(NORM_L2).knnMatch`,
+`StereoBM` and `StereoSGBM` on the pixels and descriptors that the other side reads too. The request `describe <image> <count> <file>`, which only this
 side gets, writes the descriptors of an image's strongest features.
 """
 
@@ -73,11 +73,28 @@ def match(images, path, queries, repetitions):
     return seconds, [f"{m.trainIdx} {m.distance:.4f} {n.distance:.4f}" for m, n in found[::97]]
 
 
+def stereo(images, method, image, count, repetitions):
+    left, right, count = bits(images[int(image)]), bits(images[int(image) + 1]), int(count)
+    if method == "block":
+        matcher = cv2.StereoBM_create(count, 15)
+        matcher.setUniquenessRatio(10)
+        matcher.setTextureThreshold(10)
+        matcher.setSpeckleWindowSize(100)
+        matcher.setSpeckleRange(2)
+        matcher.setDisp12MaxDiff(1)
+    else:
+        matcher = cv2.StereoSGBM_create(0, count, 5, 8 * 25, 32 * 25, 1, 63, 10, 100, 2, cv2.STEREO_SGBM_MODE_SGBM)
+    seconds, found = quickest(int(repetitions), lambda: matcher.compute(left, right))
+    places = [(200 + 190 * (k % 4), 50 + 250 * (k // 4)) for k in range(16)]
+    medians = [np.median(found[y : y + 31, x : x + 31]) / 16 for x, y in places]
+    return seconds, [f"{median:.4f}" for median in medians]
+
+
 def main():
     cv2.setNumThreads(1)
     cv2.ocl.setUseOpenCL(False)
     images = read_images(sys.argv[1])
-    works = {"zncc": zncc, "sift": sift, "describe": describe, "match": match}
+    works = {"zncc": zncc, "sift": sift, "describe": describe, "match": match, "stereo": stereo}
     for line in sys.stdin:
         name, *words = line.split()
         seconds, found = works[name](images, *words)

@@ -1,10 +1,10 @@
-//! `cargo xtask bench --peers`: our correlation, features and matches and OpenCV's, on the same pixels, in turn, in one run.
+//! `cargo xtask bench --peers`: our correlation, features, matches and dense stereo and OpenCV's, on the same pixels, in turn, in one run.
 //!
 //! Both sides are programs that stay open and answer one line with another (`core/benches/peer.rs`,
 //! `xtask/peers/opencv.py`): a few repetitions of one work, of which the quickest counts. They are asked in turn, ours,
 //! theirs, ours, theirs, so that whatever else the machine does meets both; of the rounds the median is reported. Each
 //! side has one thread. What both find must agree before any time is shown: scores to 1e-4, the number of keypoints to
-//! 5 %, the nearest descriptors exactly.
+//! 5 %, the nearest descriptors exactly, disparities to half a pixel.
 //!
 //! OpenCV comes from PyPI into a virtual environment in the target folder, once.
 
@@ -23,6 +23,7 @@ const PACKAGES: [&str; 2] = ["numpy==2.4.6", "opencv-python-headless==5.0.0.93"]
 const CORRELATION: &str = "opencv matchTemplate(TM_CCOEFF_NORMED)";
 const FEATURES: &str = "opencv SIFT.detectAndCompute";
 const MATCHES: &str = "opencv BFMatcher(NORM_L2).knnMatch(k=2)";
+const STEREO: [(&str, &str); 2] = [("block", "opencv StereoBM(15)"), ("semi-global", "opencv StereoSGBM(5)")];
 
 /// How far two scores of one position may lie apart: OpenCV sums in single precision.
 const SCORES_APART: f64 = 1e-4;
@@ -33,6 +34,9 @@ const KEYPOINTS_APART: f64 = 0.05;
 /// How far distances of descriptors, the roots of whole numbers written with four digits, may lie apart.
 const DISTANCES_APART: f64 = 2e-4;
 
+/// How far disparities may lie apart, px.
+const DISPARITIES_APART: f64 = 0.5;
+
 /// How often each side is asked for one work.
 const ROUNDS: usize = 15;
 
@@ -42,6 +46,9 @@ const SCENE: u32 = 1024;
 
 /// A template of a side over an image of `IMAGES`, so often in a row.
 const TEMPLATES: [(u32, usize, u32); 4] = [(11, 0, 20), (21, 0, 20), (31, 0, 20), (21, 1, 3)];
+
+/// Disparities that are searched in the scene and what a second eye sees of it.
+const DISPARITIES: u32 = 128;
 
 /// Descriptors that are compared with as many others.
 const QUERIES: u32 = 2000;
@@ -75,7 +82,7 @@ pub(crate) fn peers(json: bool) -> Result<()> {
     let mut peer = Side::start(Command::new(python).arg(script).arg(&pixels), "opencv.py")?;
     if !json {
         cmd::say(format!(
-            "{:<24} {:>10} {:>10} {:>7}   one thread each",
+            "{:<40} {:>10} {:>10} {:>7}   one thread each",
             "work", "ours ms", "peer ms", "ratio"
         ));
     }
@@ -111,7 +118,13 @@ fn works(descriptors: &str) -> Vec<Work> {
         peer: MATCHES,
         apart: [DISTANCES_APART, 0.0],
     };
-    TEMPLATES.into_iter().map(correlation).chain([features, matches]).collect()
+    let stereo = STEREO.map(|(method, peer)| Work {
+        name: format!("dense stereo {method} {SCENE}x{SCENE}x{DISPARITIES}"),
+        request: format!("stereo {method} {} {DISPARITIES} 1", IMAGES.len()),
+        peer,
+        apart: [DISPARITIES_APART, 0.0],
+    });
+    TEMPLATES.into_iter().map(correlation).chain([features, matches]).chain(stereo).collect()
 }
 
 impl Compared {
@@ -121,7 +134,7 @@ impl Compared {
 
     fn row(&self) -> String {
         let Self { work, peer, ours_ms, peer_ms } = self;
-        format!("{work:<24} {ours_ms:>10.3} {peer_ms:>10.3} {:>7.2}   {peer}", self.ratio())
+        format!("{work:<40} {ours_ms:>10.3} {peer_ms:>10.3} {:>7.2}   {peer}", self.ratio())
     }
 
     fn json(&self) -> String {
@@ -249,7 +262,8 @@ fn hash(x: u32, y: u32) -> f64 {
     f64::from(h ^ (h >> 13)) / f64::from(u32::MAX)
 }
 
-/// The squares that both sides read, always the same: hashed values smoothed by a 3 × 3 mean, and the scene.
+/// The squares that both sides read, always the same: hashed values smoothed by a 3 × 3 mean, the scene, and what
+/// a second eye sees of it: 16 to 101 px of disparity, more from the top down.
 fn images() -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut add = |side: u32, value: &dyn Fn(u32, u32) -> f64| {
@@ -262,6 +276,7 @@ fn images() -> Vec<u8> {
         add(side, &|x, y| (0..9).map(|i| hash(x + i % 3, y + i / 3)).sum::<f64>() / 9.0);
     }
     add(SCENE, &scene);
+    add(SCENE, &|x, y| scene(x + 16 + y / 12, y));
     bytes
 }
 

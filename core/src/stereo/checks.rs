@@ -1,0 +1,53 @@
+//! What a pixel must pass to have a disparity; the first that it does not pass is the reason why it has none.
+//!
+//! ```text
+//! both pixels are there  →  t ≥ t_min (`texture`)  →  unique (`winner`)  →  | d − d_R(x − d) | ≤ limit  →  no speckle
+//! ```
+//! d_R is what the right image's pixel finds among the same sums. Where a surface is hidden from the right eye, its
+//! pixels meet others that are seen better by their own partners.
+
+use super::census::PLANES;
+use super::lanes::LANES;
+use super::row::RowResult;
+use super::scene::Scene;
+use super::subpixel::fraction;
+use super::{DisparityMap, Outcome, speckle};
+
+/// Writes the disparities and outcomes of row `y`; `texture` is that of the row, empty where it does not count.
+pub(super) fn finish_row(
+    scene: &Scene<'_>,
+    (y, row): (usize, &RowResult),
+    texture: &[f32],
+    disparities: &mut [f32],
+    outcomes: &mut [Outcome],
+) {
+    let settings = scene.settings;
+    let left_is_none = &scene.left.row(y)[PLANES][LANES..];
+    let right_is_none = scene.right.row(y)[PLANES];
+    let (texture_min, uniqueness) = (settings.texture_min as f32, settings.uniqueness_min as f32);
+    let apart_max = settings.left_right_max_px;
+    for (x, pixel) in row.pixels.iter().enumerate() {
+        let apart = pixel.index().abs_diff(usize::from(row.right_index[x])) as f64;
+        outcomes[x] = if left_is_none[x] != 0 || right_is_none[scene.first - x + pixel.index()] != 0 {
+            Outcome::Outside
+        } else if texture.get(x).is_some_and(|texture| *texture < texture_min) {
+            Outcome::NoTexture
+        } else if !pixel.is_unique(uniqueness) {
+            Outcome::NotUnique
+        } else if apart_max >= 0.0 && apart > apart_max {
+            Outcome::LeftRight
+        } else {
+            let whole = (settings.disparity_first_px + pixel.index() as i32) as f32;
+            disparities[x] = whole + pixel.three().map_or(0.0, fraction);
+            Outcome::Found
+        };
+    }
+}
+
+/// Takes the disparities of small patches away.
+pub(super) fn remove_speckles(map: &mut DisparityMap, least: usize, step_px: f32) {
+    for pixels in speckle::small_patches(&map.disparity_px, map.width as usize, least, step_px) {
+        map.disparity_px[pixels.clone()].fill(f32::NAN);
+        map.outcome[pixels].fill(Outcome::Speckle);
+    }
+}

@@ -1,0 +1,54 @@
+//! What both methods read: the bits of an aligned pair, and where disparities lie among them.
+
+use super::census::Bits;
+use super::lanes::{LANES, Row};
+use super::settings::StereoSettings;
+use crate::image::GrayImage;
+
+/// An aligned pair, ready to be matched.
+pub(super) struct Scene<'a> {
+    /// The left image, fractions of full scale.
+    pub(super) image: &'a GrayImage,
+    /// Its columns and rows.
+    pub(super) size: [usize; 2],
+    /// Its bits.
+    pub(super) left: Bits,
+    /// Those of the right image, mirrored.
+    pub(super) right: Bits,
+    /// Where the partners of pixel 0 begin in a mirrored row; those of pixel x begin x before it.
+    pub(super) first: usize,
+    /// Disparities.
+    pub(super) count: usize,
+    /// Their cells: 64, 128, 256 or 512.
+    pub(super) cells: usize,
+    /// 0 for the disparities that are asked for, 65535 for those that fill the last block.
+    pub(super) beyond: Row<u16>,
+    pub(super) settings: &'a StereoSettings,
+}
+
+impl<'a> Scene<'a> {
+    pub(super) fn new(left: &'a GrayImage, right: &GrayImage, settings: &'a StereoSettings) -> Self {
+        let count = settings.disparity_count as usize;
+        let cells = count.next_power_of_two().max(LANES);
+        let first_px = settings.disparity_first_px as isize;
+        let (left_width, right_width) = (left.width() as usize, right.width() as usize);
+        // From the first disparity of the last left pixel to the last one of the first.
+        let margin = (cells + first_px.unsigned_abs() + left_width.saturating_sub(right_width) + 1)
+            .next_multiple_of(LANES);
+        let mut beyond = Row::new(cells, 0);
+        beyond.values_mut()[count..].fill(u16::MAX);
+        let (left_bits, right_bits) =
+            rayon::join(|| Bits::of(left, false, LANES), || Bits::of(right, true, margin));
+        Self {
+            image: left,
+            size: [left_width, left.height() as usize],
+            left: left_bits,
+            right: right_bits,
+            first: (margin + right_width - 1).wrapping_add_signed(first_px),
+            count,
+            cells,
+            beyond,
+            settings,
+        }
+    }
+}
