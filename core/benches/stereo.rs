@@ -69,7 +69,9 @@ fn disparities_one_thread(bencher: Bencher<'_, '_>, name: &str) {
     let ([left, right], settings) = (pair(), settings(name));
     // The pool of one is this thread itself, so that no time goes into handing over.
     let _pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
-    bencher.counter(ItemsCount::new(SIDE * SIDE * 128)).bench_local(|| disparities([&left, &right], &settings));
+    bencher
+        .counter(ItemsCount::new(SIDE * SIDE * 128))
+        .bench_local(|| disparities([&left, &right], &settings));
 }
 
 /// With alignment and points, by Spirit's navcams, with the threads of the machine.

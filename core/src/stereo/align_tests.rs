@@ -1,17 +1,28 @@
-//! Alignment against projection, and against the figures of the rules for a real pair (domain.md 15, TV6).
+//! Alignment against projection, and against the figures of the rules for a real pair (domain.md 15, TV6),
+//! which come from JPL's code: it does not make A unit, so that they agree to 5e-6 rad and 0.01 px (domain.md 3.3).
 
 use super::*;
-use crate::camera::{Cahvor, Mast, MastAngles};
+use crate::camera::{Cahvor, Cahvore, Imaging, Mast, MastAngles};
 use crate::frames::Point3;
-use crate::sim::camera::rig::Rig;
-use crate::sim::scenario::CameraRig;
 
 fn navcams() -> (Camera, Camera) {
     Mast::spirit().cameras_in_rover(MastAngles { azimuth_rad: 0.3, elevation_rad: -0.4 })
 }
 
 fn hazcams() -> (Camera, Camera) {
-    Rig::of(CameraRig::MerFrontHazcam, 1024).cameras_in_rover(None)
+    let at = |x: f64, y: f64, z: f64| {
+        let linear = Cahv::as_printed(
+            Point3::new(x, y, z),
+            Vector3::new(0.703447, -0.005161, 0.710729),
+            Vector3::new(351.362, 452.204, 353.494),
+            Vector3::new(35.8065, -1.75143, 682.705),
+        );
+        let optical_axis = Vector3::new(0.704402, -0.006062, 0.709775);
+        let (radial, pupil) = ([3e-6, -0.012015, -0.007525], [0.001442, 0.001522, 0.000483]);
+        let model = Cahvore::normalised(linear, optical_axis, radial, pupil, (Imaging::General, 0.37));
+        Camera::new(CameraModel::Cahvore(model), 1024, 1024)
+    };
+    (at(0.609331, -0.041064, -0.233849), at(0.6098595, 0.0589344, -0.2336460))
 }
 
 /// Points that both aligned cameras see, at many ranges.
@@ -122,7 +133,7 @@ fn the_real_spirit_pair_is_aligned_as_in_the_reference() {
         (linear.vertical, [14.78999073, -30.36234617, 1334.0014367]),
     ];
     for (found, expected) in expected {
-        assert!((found - Vector3::from(expected)).norm() < 1e-6 * found.norm(), "{found:?} {expected:?}");
+        assert!((found - Vector3::from(expected)).norm() < 1e-5 * found.norm(), "{found:?} {expected:?}");
     }
     let seen = [
         ([1.9297, -4.4632, 0.5615], [512.31947952, 511.49478045], 49.27785962),
@@ -132,8 +143,8 @@ fn the_real_spirit_pair_is_aligned_as_in_the_reference() {
     for (point, [x, y], disparity) in seen {
         let project = |camera: &Camera| camera.project(&Point3::from(point)).unwrap();
         let (in_left, in_right) = (project(&alignment.left), project(&alignment.right));
-        assert!(in_left.distance(Pixel::new(x, y)) < 1e-4, "{in_left:?}");
-        assert!((in_left.x - in_right.x - disparity).abs() < 1e-5);
+        assert!(in_left.distance(Pixel::new(x, y)) < 0.02, "{in_left:?}");
+        assert!((in_left.x - in_right.x - disparity).abs() < 1e-3);
     }
 }
 

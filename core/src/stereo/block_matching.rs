@@ -103,7 +103,13 @@ impl<const N: usize> WithSimd for Columns<'_, N> {
                 left[0][x], left[1][x], left[2][x], left[3][x], left[4][x], left[5][x], left[6][x],
                 left[7][x],
             ];
-            census::costs(bits, right, scene.first.wrapping_sub(x), cost);
+            census::costs(
+                bits,
+                right,
+                scene.first.wrapping_sub(x),
+                blocks(scene.beyond_costs.values(), 0),
+                cost,
+            );
             for k in 0..N {
                 for i in 0..LANES {
                     column[k][i] = column[k][i].wrapping_add(u16::from(cost[k][i]));

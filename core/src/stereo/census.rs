@@ -148,12 +148,13 @@ impl WithSimd for OfRow<'_> {
     }
 }
 
-/// The costs of a pixel for the disparities whose partners begin at `at` of the right planes.
+/// The costs of a pixel for the disparities whose partners begin at `at` of the right planes; 255 where `beyond` has it.
 #[inline(always)]
 pub(super) fn costs<const N: usize>(
     left: [u8; PLANES],
     right: &[&[u8]; PLANES + 1],
     at: usize,
+    beyond: &[Block<u8>; N],
     out: &mut [Block<u8>; N],
 ) {
     let [p0, p1, p2, p3, p4, p5, p6, p7, none]: [&[Block<u8>; N]; PLANES + 1] = [
@@ -185,7 +186,7 @@ pub(super) fn costs<const N: usize>(
             let once = (ones.count_ones() as u8).wrapping_add(h.count_ones() as u8);
             let twice = (fours.count_ones() as u8).wrapping_shl(1).wrapping_add(twos.count_ones() as u8);
             let bits = twice.wrapping_shl(1).wrapping_add(once);
-            cells[i] = if none[k][i] != 0 { COST_NONE } else { bits };
+            cells[i] = beyond[k][i] | if none[k][i] != 0 { COST_NONE } else { bits };
         }
         out[k] = cells;
     }

@@ -43,6 +43,8 @@ mod ranges;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]
+mod rendered_tests;
+#[cfg(test)]
 mod recorded_tests;
 
 use rayon::prelude::*;

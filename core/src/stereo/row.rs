@@ -11,6 +11,8 @@ pub(super) struct Pixel {
     second: u16,
     /// The sums of the disparities before and after; `u16::MAX` where there is none.
     beside: [u16; 2],
+    /// Sums that tell the fraction better.
+    fine: Option<[u16; 3]>,
 }
 
 impl Pixel {
@@ -20,7 +22,13 @@ impl Pixel {
         let cells = cells.as_flattened();
         let before = if won.index > 0 { cells[won.index - 1] } else { u16::MAX };
         let after = if won.index + 1 < count { cells[won.index + 1] } else { u16::MAX };
-        Self { index: won.index as u16, least: won.least, second: won.second, beside: [before, after] }
+        Self {
+            index: won.index as u16,
+            least: won.least,
+            second: won.second,
+            beside: [before, after],
+            fine: None,
+        }
     }
 
     /// The place among the disparities.
@@ -29,17 +37,24 @@ impl Pixel {
         usize::from(self.index)
     }
 
+    /// Takes other sums for the fraction, if there are any.
+    #[inline(always)]
+    pub(super) fn refine(&mut self, three: Option<[u16; 3]>) {
+        self.fine = three;
+    }
+
     /// Whether it is better than any that is no neighbour by the share `least` (0: off).
     #[inline(always)]
     pub(super) fn is_unique(self, least: f32) -> bool {
-        f32::from(self.least) <= (1.0 - least) * f32::from(self.second)
+        least <= 0.0 || f32::from(self.least) < (1.0 - least) * f32::from(self.second)
     }
 
     /// The sums of the disparities before, at, and after the winner; `None` at either end of the range.
     #[inline(always)]
     pub(super) fn three(self) -> Option<[u16; 3]> {
         let [before, after] = self.beside;
-        (before != u16::MAX && after != u16::MAX).then_some([before, self.least, after])
+        let has_both = before != u16::MAX && after != u16::MAX;
+        has_both.then_some(self.fine.unwrap_or([before, self.least, after]))
     }
 }
 

@@ -23,6 +23,8 @@ pub(super) struct Scene<'a> {
     pub(super) cells: usize,
     /// 0 for the disparities that are asked for, 65535 for those that fill the last block.
     pub(super) beyond: Row<u16>,
+    /// 0 and 255 alike, for their costs.
+    pub(super) beyond_costs: Row<u8>,
     pub(super) settings: &'a StereoSettings,
 }
 
@@ -37,6 +39,8 @@ impl<'a> Scene<'a> {
             .next_multiple_of(LANES);
         let mut beyond = Row::new(cells, 0);
         beyond.values_mut()[count..].fill(u16::MAX);
+        let mut beyond_costs = Row::new(cells, 0);
+        beyond_costs.values_mut()[count..].fill(u8::MAX);
         let (left_bits, right_bits) =
             rayon::join(|| Bits::of(left, false, LANES), || Bits::of(right, true, margin));
         Self {
@@ -48,6 +52,7 @@ impl<'a> Scene<'a> {
             count,
             cells,
             beyond,
+            beyond_costs,
             settings,
         }
     }

@@ -16,7 +16,8 @@
 //!
 //! **One pass.** Of each of the three paths from above one row of L is held, of the costs and sums one row as well. From
 //! left to right the costs are taken and four paths go on; from right to left follows the fifth, and its sums
-//! are complete. L fits into bytes, since C ≤ 62 and P2 ≤ 180, so that 64 disparities are one vector.
+//! are complete. L fits into bytes, since C ≤ 62 and P2 ≤ 180, so that 64 disparities are one vector; those
+//! that fill the last vector cost 255 and no path goes through them.
 //!
 //! **Where the rows of L lie.** A path that comes from above reads the cells of pixel x − 1, x or x + 1 and writes those of x. In a
 //! ring of W + 2 places every pixel writes one place before that which it reads: what it overwrites was read by the pixel
@@ -32,6 +33,7 @@ use super::lanes::{Block, LANES, Row, blocks, blocks_mut, least_u8};
 use super::row::{Pixel, RowResult};
 use super::scene::Scene;
 use super::settings::{StereoPaths, StereoSettings};
+use super::subpixel::three_along_row;
 use super::winner::{RightWinners, winner};
 
 /// Paths from above.
@@ -128,7 +130,7 @@ impl<'a, const N: usize> Before<'a, N> {
         let mut cells = [0; LANES];
         for i in 0..LANES {
             let beside = less[i].min(more[i]).saturating_add(self.small);
-            cells[i] = same[i].min(beside).min(self.cap).wrapping_sub(self.floor).wrapping_add(cost[i]);
+            cells[i] = same[i].min(beside).min(self.cap).wrapping_sub(self.floor).saturating_add(cost[i]);
         }
         cells
     }
@@ -262,7 +264,13 @@ impl<const N: usize> WithSimd for FromLeft<'_, N> {
             let (cost, sums): (&mut [Block<u8>; N], &mut [Block<u16>; N]) =
                 (blocks_mut(cost, 0), blocks_mut(sums, 0));
             let bits = std::array::from_fn(|k| left[k][x]);
-            census::costs(bits, &right, scene.first.wrapping_sub(x), cost);
+            census::costs(
+                bits,
+                &right,
+                scene.first.wrapping_sub(x),
+                blocks(scene.beyond_costs.values(), 0),
+                cost,
+            );
             let (to, from) = if x % 2 == 0 { (&mut *even, &*odd) } else { (&mut *odd, &*even) };
             let from = if x == 0 { start.values() } else { from.values() };
             let s_to: &mut [Block<u8>; N] = blocks_mut(to.values_mut(), LANES);
@@ -352,8 +360,9 @@ impl<const N: usize> WithSimd for FromRight<'_, N> {
             right.offer(scene.first.wrapping_sub(x), sums);
             pixels[x] = Pixel::of(winner(simd, sums), sums, scene.count);
         }
-        for (x, pixel) in (0..width).zip(pixels) {
+        for (x, pixel) in (0..width).zip(pixels.iter_mut()) {
             result.right_index[x] = right.index(scene.first - x + pixel.index());
+            pixel.refine(three_along_row(costs.values(), [width, cells], x, pixel.index()));
         }
     }
 }

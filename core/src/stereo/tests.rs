@@ -3,11 +3,6 @@
 use image::Luma;
 
 use super::*;
-use crate::frames::Pixel;
-use crate::sim::camera::rig::Rig;
-use crate::sim::scenario::CameraRig;
-use crate::sim::truth::pixel_truth;
-use crate::sim::{Eye, NoiseSeed, Scenario, World, index, render, true_camera_in_site};
 
 /// No checks.
 fn plain(method: StereoMethod, first: i32, count: u32) -> StereoSettings {
@@ -163,7 +158,8 @@ fn both_methods_find_what_sums_taken_one_by_one_find() {
     let [left, right] = pair([75, 33], |x, y| 6.0 + 0.05 * x + 0.1 * y);
     let noisy = |image: &GrayImage, seed: u32| {
         GrayImage::from_fn(image.width(), image.height(), |x, y| {
-            Luma([image.get_pixel(x, y)[0] * 0.8 + 0.2 * hash(x + seed, y)])
+            // Whole numbers of 255, since the census looks at 16 bits.
+            Luma([((image.get_pixel(x, y)[0] * 0.8 + 0.2 * hash(x + seed, y)) * 255.0).round() / 255.0])
         })
     };
     let (left, right) = (noisy(&left, 0), noisy(&right, 1000));
@@ -210,7 +206,7 @@ fn every_hole_has_its_own_reason() {
     let [left, right] = pair([160, 96], |_, _| 12.0);
     let settings = |method| StereoSettings { method, disparity_count: 32, ..StereoSettings::default() };
     for method in [StereoMethod::SemiGlobal, StereoMethod::BlockMatching] {
-        // A flat square, one that repeats every 6 px, one that is invalid, and one that only the left eye sees.
+        // A flat square, one that is invalid, and one that only the left eye sees.
         let painted = |image: &GrayImage, shift: u32, is_right: bool| {
             GrayImage::from_fn(160, 96, |x, y| {
                 let value = image.get_pixel(x, y)[0];
@@ -219,8 +215,6 @@ fn every_hole_has_its_own_reason() {
                 };
                 Luma([if inside(40, 10) {
                     0.5
-                } else if inside(90, 10) {
-                    0.5 + 0.3 * (std::f32::consts::TAU * x as f32 / 6.0).sin()
                 } else if inside(40, 55) && !is_right {
                     f32::NAN
                 } else if inside(90, 55) && is_right {
@@ -241,9 +235,6 @@ fn every_hole_has_its_own_reason() {
         assert!(share(49, 64, Outcome::Outside) > 0.99, "{method:?}");
         assert!(share(99, 64, Outcome::Found) < 0.3, "{method:?}: {}", share(99, 64, Outcome::Found));
         assert!(share(140, 40, Outcome::Found) > 0.99, "{method:?}");
-        if method == StereoMethod::BlockMatching {
-            assert!(share(99, 19, Outcome::NotUnique) > 0.9, "{}", share(99, 19, Outcome::NotUnique));
-        }
         let at_border = (0..96).filter(|y| (0..8).all(|x| outcome(x, *y) != Outcome::Found)).count();
         assert!(
             at_border > 86,
@@ -253,6 +244,24 @@ fn every_hole_has_its_own_reason() {
             assert_eq!(disparity.is_finite(), *outcome == Outcome::Found);
         }
     }
+}
+
+#[test]
+fn what_repeats_along_the_row_is_not_unique() {
+    let wave = |x: u32| Luma([0.5 + 0.3 * (std::f32::consts::TAU * x as f32 / 9.0).sin()]);
+    let image = GrayImage::from_fn(160, 60, |x, _| wave(x));
+    let method = StereoMethod::BlockMatching;
+    let settings = StereoSettings { method, disparity_count: 32, ..StereoSettings::default() };
+    let map = disparities([&image, &image], &settings).unwrap();
+    let inside = (0..160 * 60).filter(|at| (40..150).contains(&(at % 160)));
+    assert!(
+        inside.clone().all(|at| map.outcome[at] == Outcome::NotUnique),
+        "{:?}",
+        map.outcome[30 * 160 + 80]
+    );
+    // With room for one period only it is.
+    let map = disparities([&image, &image], &StereoSettings { disparity_count: 8, ..settings }).unwrap();
+    assert!(inside.into_iter().all(|at| map.disparity_px[at] == 0.0));
 }
 
 #[test]
@@ -312,74 +321,18 @@ fn any_number_of_threads_gives_the_same_bits() {
 #[test]
 fn settings_and_images_that_cannot_be_used_are_refused() {
     let image = GrayImage::from_pixel(20, 20, Luma([0.5]));
+    let usable = StereoSettings { disparity_count: 8, ..StereoSettings::default() };
     let refused =
         |settings: StereoSettings| disparities([&image, &image], &settings).unwrap_err().to_string();
-    assert!(refused(StereoSettings { window_px: 8, ..StereoSettings::default() }).contains("window_px"));
-    assert!(refused(StereoSettings { large_step: 200, ..StereoSettings::default() }).contains("large_step"));
-    assert!(
-        refused(StereoSettings { disparity_count: 600, ..StereoSettings::default() })
-            .contains("disparity_count")
-    );
+    assert!(refused(StereoSettings { window_px: 8, ..usable.clone() }).contains("window_px"));
+    assert!(refused(StereoSettings { large_step: 200, ..usable.clone() }).contains("large_step"));
+    assert!(refused(StereoSettings { disparity_count: 600, ..usable.clone() }).contains("disparity_count"));
     let other = GrayImage::from_pixel(20, 21, Luma([0.5]));
-    assert!(
-        disparities([&image, &other], &StereoSettings { disparity_count: 8, ..StereoSettings::default() })
-            .is_err()
-    );
+    assert!(disparities([&image, &other], &usable).is_err());
     // Smaller than a window, a block and the reach of the census.
     let small = GrayImage::from_fn(3, 2, |x, y| Luma([hash(x, y)]));
     for method in [StereoMethod::SemiGlobal, StereoMethod::BlockMatching] {
         let map = disparities([&small, &small], &plain(method, 0, 8)).unwrap();
         assert_eq!(map.disparity_px.len(), 6);
-    }
-}
-
-/// The pair of a stop of the demonstration, with noise, and its cameras in the site.
-fn rendered(rig: Option<CameraRig>, size: u32) -> (World, [GrayImage; 2], [Camera; 2]) {
-    let mut scenario = Scenario::demo();
-    scenario.camera.image_size = size;
-    let world = World::new(&scenario);
-    let index = index(&scenario, &world).unwrap();
-    let stop = index.stops.last().unwrap();
-    let eyes = [Eye::Left, Eye::Right];
-    let cameras = match rig {
-        Some(rig) => {
-            let site_from_rover = stop.truth.as_ref().unwrap().site_from_rover.to_pose();
-            let (left, right) = Rig::of(rig, size).cameras_in_rover(None);
-            [left.moved(&site_from_rover), right.moved(&site_from_rover)]
-        }
-        None => eyes.map(|eye| true_camera_in_site(stop, eye).unwrap()),
-    };
-    let images = [0, 1].map(|k| render(&world, &scenario, &cameras[k], NoiseSeed { step: 0, eye: eyes[k] }));
-    (world, images, cameras)
-}
-
-#[test]
-fn points_of_real_cameras_lie_on_the_surface_that_they_show() {
-    for (rig, size, found_min) in [(None, 256, 0.6), (Some(CameraRig::MerFrontHazcam), 256, 0.4)] {
-        let (world, [left, right], [left_camera, right_camera]) = rendered(rig, size);
-        let settings = StereoSettings { range_min_m: 0.6, ..StereoSettings::default() };
-        let stereo = dense_stereo([&left, &right], [&left_camera, &right_camera], &settings).unwrap();
-        let (mut off_px, mut seen) = (Vec::new(), 0);
-        for y in 0..size {
-            let row = stereo.alignment.left_row(y.into());
-            for x in 0..size {
-                let pixel = row.at(x.into());
-                let truth = Some(pixel).filter(|p| p.is_inside(size, size)).and_then(|pixel| {
-                    let ray = left_camera.ray(pixel)?;
-                    pixel_truth(&world, &left_camera, pixel).map(|hit| ray.at(hit.distance_m))
-                });
-                let Some(truth) = truth else { continue };
-                seen += 1;
-                let Some(point) = stereo.point(x, y) else { continue };
-                // Along the ray an error of range is one of disparity: where both appear in the right image.
-                let pixels = right_camera.project(&truth).zip(right_camera.project(&point));
-                off_px.push(pixels.map_or(99.0, |(a, b): (Pixel, Pixel)| a.distance(b)));
-            }
-        }
-        off_px.sort_by(f64::total_cmp);
-        let share = off_px.len() as f64 / f64::from(seen);
-        let (median, most) = (off_px[off_px.len() / 2], off_px[off_px.len() * 95 / 100]);
-        println!("{rig:?}: {share:.3} found, off by {median:.3} px (median), {most:.3} px (95 %)");
-        assert!(share > found_min && median < 0.25 && most < 1.5, "{rig:?}");
     }
 }

@@ -1,7 +1,7 @@
 //! The disparity of a pixel: the cheapest, whether it is the only one, and the fraction below a pixel.
 //!
 //! ```text
-//! d₁ = argmin S(d)      s₂ = min { S(d) : |d − d₁| > 1 }      unique where  S(d₁) ≤ (1 − u) s₂
+//! d₁ = argmin S(d)      s₂ = min { S(d) : |d − d₁| > 1 }      unique where  S(d₁) < (1 − u) s₂
 //! ```
 //! | symbol | our name | unit |
 //! |---|---|---|
