@@ -4,7 +4,8 @@
 //! misfit = √( mean of min( (r_i/σ_i)², 5² ) )        1 where the noise of both surfaces explains all
 //! ```
 //! The cut keeps single wrong points of stereo from deciding; a rock that is not there fills whole regions and is
-//! seen. The mean, not the median, because the ground around a wrong rock fits.
+//! seen. The mean, not the median, because the ground around a wrong rock fits. Six parameters can make a wrong rock fit by
+//! turning it away: the start's attitude comes from the rover's own and bounds that (R198: it is "about right").
 //!
 //! Source: ours; R196 for the overlap.
 
@@ -50,6 +51,10 @@ pub(super) fn result(
     let share = registration.agreement[2].map_or(0.0, |agreement| agreement.overlap);
     if share < overlap_min {
         return Some(Failure::NoOverlap { share, least: overlap_min });
+    }
+    let turn_rad = registration.turn_rad;
+    if turn_rad > limits.turn_max_rad {
+        return Some(Failure::TurnedAway { turn_rad, limit_rad: limits.turn_max_rad });
     }
     if let Some(misfit) = registration.misfit.filter(|&misfit| misfit > limits.misfit_max) {
         return Some(Failure::DoesNotFit { misfit, limit: limits.misfit_max });

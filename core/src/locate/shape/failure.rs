@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `EmptySurface`, `TooFewTriangles` | stereo found nothing there |
 //! | `NoOverlap` | the two meshes lie side by side |
+//! | `TurnedAway` | the refinement turned the mesh until something fitted |
 //! | `DoesNotFit` | another rock, or the rock has changed |
 //! | `NotEnoughShape` | flat ground, or a smooth boulder: the mesh slides without getting worse |
 //! | `NotIsolated` | the coarse surface has two valleys |
@@ -63,6 +64,14 @@ pub enum Failure {
         share: f64,
         /// What is needed.
         least: f64,
+    },
+    /// The refinement turned farther than the start can be off.
+    #[error("the refinement turned by {:.1}°, more than {:.1}°", .turn_rad.to_degrees(), .limit_rad.to_degrees())]
+    TurnedAway {
+        /// By how much, rad.
+        turn_rad: f64,
+        /// How much is allowed, rad.
+        limit_rad: f64,
     },
     /// The shape lets the target slide.
     #[error("the shape holds the target to {} only, not to {limit_m:.3} m", sigma_text(.sigma_m))]

@@ -114,6 +114,8 @@ pub struct Registration {
     pub agreement: [Option<Agreement>; 3],
     /// How many times the surfaces differ as much as their noise explains; none where no noise is known.
     pub misfit: Option<f64>,
+    /// How far the refinement turned from the start, rad.
+    pub turn_rad: f64,
     /// The coarse search.
     pub coarse: CoarseSurface,
     /// The way of the refinement.
@@ -261,6 +263,7 @@ fn finish(
         turn.matrix() * covariance_of_point(&covariance, &target) * turn.matrix().transpose() + common
     });
     result.misfit = checks::misfit(&pairs);
+    result.turn_rad = end.fixed_rows::<3>(3).norm();
     result.precision = Some(precision);
     result.failure = checks::result(&result, &settings.checks, settings.overlap_min);
     result

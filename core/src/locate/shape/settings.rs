@@ -69,6 +69,8 @@ pub struct CheckSettings {
     pub sigma_max_m: f64,
     /// How many times the surfaces may differ as much as their noise explains.
     pub misfit_max: f64,
+    /// How far the refinement may turn from the start, rad.
+    pub turn_max_rad: f64,
     /// How far two minima of the coarse surface must be apart to be two, as a share of the half width.
     pub apart: f64,
     /// By what factor the other minimum must be higher than the best.
@@ -77,6 +79,13 @@ pub struct CheckSettings {
 
 impl Default for CheckSettings {
     fn default() -> Self {
-        Self { triangles_min: 100, sigma_max_m: 0.02, misfit_max: 2.0, apart: 0.4, other_min: 1.15 }
+        Self {
+            triangles_min: 100,
+            sigma_max_m: 0.02,
+            misfit_max: 1.8,
+            turn_max_rad: 0.15,
+            apart: 0.4,
+            other_min: 1.15,
+        }
     }
 }

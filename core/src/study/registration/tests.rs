@@ -29,15 +29,15 @@ fn a_case_seen_without_noise_lies_on_itself_under_the_true_motion() {
 #[test]
 fn a_slice_of_the_study_finds_rocks_in_the_basin_and_refuses_the_others() {
     let staging = Staging::default();
-    let cases = rock_cases(6, &staging, &Stereo::default(), 21);
+    let cases = rock_cases(4, &staging, &Stereo::default(), 21);
     let rows = basin(&cases, &[0.5, 2.0], &staging, &ShapeSettings::default());
     for summary in summarise(&rows) {
         println!("{summary:?}");
         assert_eq!(summary.false_results, 0, "{summary:?}");
         if summary.offset < 1.0 {
-            assert!(summary.success >= 0.8, "{summary:?}");
+            assert!(summary.success >= 0.75, "{summary:?}");
             assert!(summary.error_m.is_some_and(|[median_m, _]| median_m < 6e-3), "{summary:?}");
-            // Six rocks: the band of the mean is wide, and a covariance wrong by a factor of four is outside.
+            // Four rocks: the band of the mean is wide, and a covariance wrong by a factor of four is outside.
             assert!(
                 summary.calibration.as_ref().is_some_and(|c| (0.6..8.0).contains(&c.mean_nees)),
                 "{summary:?}"
