@@ -5,6 +5,8 @@
 //! | `template` (Kim et al. 2009) | `scale_roll` → `match_template` → `point_stereo` → `triangulate` |
 //! | `features` (Deans et al. 2005) | `detect` → `match_features` → `triangulate` → `fit_motion` → `bootstrap` |
 //!
+//! `shape` holds the steps of the third one, `mesh` → `coarse_register` → `refine_register`, as functions over surfaces.
+//!
 //! A locator never fails: where it finds nothing it says so in `Located::missing`, and `judge` rejects it.
 //! Two contracts hold for all of them: the same input gives the same bits, and whatever was seen on the way
 //! is in the evidence.

@@ -10,6 +10,7 @@
 //! scenery, picture, exposure             the simulated scenery against its laws
 //! realism     how hard a world is for plain correlation
 //! real_motion the motion of recorded frames against their poses
+//! registration surfaces registered by their shape where the motion is known
 //! ```
 
 pub mod scenery;
