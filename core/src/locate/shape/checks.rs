@@ -52,16 +52,16 @@ pub(super) fn result(
     if share < overlap_min {
         return Some(Failure::NoOverlap { share, least: overlap_min });
     }
-    let turn_rad = registration.turn_rad;
-    if turn_rad > limits.turn_max_rad {
-        return Some(Failure::TurnedAway { turn_rad, limit_rad: limits.turn_max_rad });
-    }
     if let Some(misfit) = registration.misfit.filter(|&misfit| misfit > limits.misfit_max) {
         return Some(Failure::DoesNotFit { misfit, limit: limits.misfit_max });
     }
     let sigma_m = registration.sigma_m();
     if sigma_m.is_none_or(|sigma_m| sigma_m > limits.sigma_max_m) {
         return Some(Failure::NotEnoughShape { sigma_m, limit_m: limits.sigma_max_m });
+    }
+    let turn_rad = registration.turn_rad;
+    if turn_rad > limits.turn_max_rad {
+        return Some(Failure::TurnedAway { turn_rad, limit_rad: limits.turn_max_rad });
     }
     let coarse = &registration.coarse;
     let best = coarse.best?;

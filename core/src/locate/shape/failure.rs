@@ -4,9 +4,9 @@
 //! |---|---|
 //! | `EmptySurface`, `TooFewTriangles` | stereo found nothing there |
 //! | `NoOverlap` | the two meshes lie side by side |
-//! | `TurnedAway` | the refinement turned the mesh until something fitted |
 //! | `DoesNotFit` | another rock, or the rock has changed |
 //! | `NotEnoughShape` | flat ground, or a smooth boulder: the mesh slides without getting worse |
+//! | `TurnedAway` | the refinement turned the mesh until something fitted: another rock |
 //! | `NotIsolated` | the coarse surface has two valleys |
 //! | `AtSearchEdge` | the valley goes on beyond the search |
 //!
