@@ -146,7 +146,7 @@ impl<const N: usize> WithSimd for Windows<'_, N> {
                 }
             }
         }
-        for x in 0..width {
+        for (x, pixel) in pixels.iter_mut().enumerate() {
             // Beyond the border a column is not there: what is read instead does not count.
             let (comes, goes) = (x + half < width, x > half);
             let more: &[Block<u16>; N] = blocks(columns, if comes { x + half } else { x } * cells);
@@ -161,7 +161,7 @@ impl<const N: usize> WithSimd for Windows<'_, N> {
                 }
             }
             right.offer(scene.first.wrapping_sub(x), &asked);
-            pixels[x] = Pixel::of(winner(simd, &asked), &asked, scene.count);
+            *pixel = Pixel::of(winner(simd, &asked), &asked, scene.count);
         }
         for (x, pixel) in (0..width).zip(pixels) {
             result.right_index[x] = right.index(scene.first - x + pixel.index());

@@ -114,9 +114,5 @@ fn least_of_few<S: Simd>(simd: S, few: [u16; 8]) -> u16 {
     }
     #[cfg(not(target_arch = "x86_64"))]
     let _ = simd;
-    let mut least = few[0];
-    for i in 1..8 {
-        least = least.min(few[i]);
-    }
-    least
+    few.into_iter().fold(u16::MAX, u16::min)
 }

@@ -208,7 +208,7 @@ fn a_street_is_consistent_from_eye_to_eye_and_from_frame_to_frame() {
     let cameras = read_cameras(&folder.join("calib.txt"), frames[0][0].dimensions().into()).unwrap();
     let poses = read_poses(&folder.join("poses.txt")).unwrap();
     for (method, found_min, within_min) in
-        [(StereoMethod::SemiGlobal, 0.8, 0.93), (StereoMethod::BlockMatching, 0.7, 0.93)]
+        [(StereoMethod::SemiGlobal, 0.6, 0.95), (StereoMethod::BlockMatching, 0.6, 0.95)]
     {
         let settings =
             StereoSettings { method, disparity_count: 96, range_max_m: 1000.0, ..StereoSettings::default() };
@@ -228,6 +228,6 @@ fn a_street_is_consistent_from_eye_to_eye_and_from_frame_to_frame() {
             share(Outcome::Speckle),
             share(Outcome::Outside),
         );
-        assert!(share(Outcome::Found) > found_min && within_1 > within_min, "{method:?}");
+        assert!(share(Outcome::Found) > found_min && within_3 > within_min, "{method:?}");
     }
 }

@@ -31,7 +31,7 @@ fn rendered(rig: Option<CameraRig>, size: u32) -> (World, [GrayImage; 2], [Camer
 fn points_of_real_cameras_lie_on_the_surface_that_they_show() {
     for (rig, size, found_min) in [(None, 256, 0.6), (Some(CameraRig::MerFrontHazcam), 512, 0.4)] {
         let (world, [left, right], [left_camera, right_camera]) = rendered(rig, size);
-        let settings = StereoSettings { range_min_m: 0.6, ..StereoSettings::default() };
+        let settings = StereoSettings { range_min_m: 0.25, ..StereoSettings::default() };
         let stereo = dense_stereo([&left, &right], [&left_camera, &right_camera], &settings).unwrap();
         let (mut off_px, mut seen) = (Vec::new(), 0);
         for y in 0..size {

@@ -1,8 +1,8 @@
 //! What a person may change about dense stereo.
 //!
 //! Sources: domain.md 7 (JPL's correlator); Hirschmüller, *Stereo Processing by Semiglobal Matching and Mutual
-//! Information*, PAMI 2008 (P1, P2, paths, the checks after it); Spangenberg et al., *Large Scale Semi-Global Matching on
-//! the CPU*, IV 2014 (values of P1 and P2 for census costs). Those marked *ours* are in docs/stereo.md with what they do.
+//! Information*, PAMI 2008 (P1, P2, paths, the checks after it). Those marked *ours* were chosen on the
+//! pairs of docs/stereo.md.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -53,15 +53,15 @@ pub struct StereoSettings {
     /// Side of the window of block matching, odd, 5 to 31 px (11: ours). Too small: noise; too large: outlines
     /// grow and thin things go.
     pub window_px: u32,
-    /// P1: the price of a step of one disparity from pixel to pixel, 0 to 60 bits of the census (7: Spangenberg et al.). Too
+    /// P1: the price of a step of one disparity from pixel to pixel, 0 to 60 bits of the census (16: ours). Too
     /// high: slopes become stairs.
     pub small_step: u32,
-    /// P2: the price of a larger step where the image is even, up to 180 bits (ours). Too high: things in front
+    /// P2: the price of a larger step where the image is even, up to 180 bits (100: ours). Too high: things in front
     /// are lost in what is behind them; too low: noise.
     pub large_step: u32,
-    /// P2 where the image itself has an edge, which is where depth may jump, bits (ours).
+    /// P2 where the image itself has an edge, which is where depth may jump, bits (30: ours).
     pub large_step_least: u32,
-    /// How quickly P2 falls with the difference of the two pixels: bits per full scale (ours).
+    /// How quickly P2 falls with the difference of the two pixels: bits per full scale (300: ours).
     pub large_step_slope: f64,
     /// Along how many paths.
     pub paths: StereoPaths,
@@ -89,10 +89,10 @@ impl Default for StereoSettings {
             range_max_m: 100.0,
             disparity_count: 0,
             window_px: 11,
-            small_step: 7,
-            large_step: 60,
-            large_step_least: 20,
-            large_step_slope: 200.0,
+            small_step: 16,
+            large_step: 100,
+            large_step_least: 30,
+            large_step_slope: 300.0,
             paths: StereoPaths::Five,
             texture_min: 0.001,
             uniqueness_min: 0.05,

@@ -233,7 +233,7 @@ fn every_hole_has_its_own_reason() {
         };
         assert!(share(49, 19, Outcome::NoTexture) > 0.99, "{method:?}");
         assert!(share(49, 64, Outcome::Outside) > 0.99, "{method:?}");
-        assert!(share(99, 64, Outcome::Found) < 0.3, "{method:?}: {}", share(99, 64, Outcome::Found));
+        assert!(share(99, 64, Outcome::Found) < 0.5, "{method:?}: {}", share(99, 64, Outcome::Found));
         assert!(share(140, 40, Outcome::Found) > 0.99, "{method:?}");
         let at_border = (0..96).filter(|y| (0..8).all(|x| outcome(x, *y) != Outcome::Found)).count();
         assert!(

@@ -31,27 +31,27 @@ pub(super) struct Winner {
 #[inline(always)]
 pub(super) fn winner<S: Simd, const N: usize>(simd: S, cells: &[Block<u16>; N]) -> Winner {
     let mut low = [u16::MAX; LANES];
-    for k in 0..N {
+    for block in cells {
         for i in 0..LANES {
-            low[i] = low[i].min(cells[k][i]);
+            low[i] = low[i].min(block[i]);
         }
     }
     let least = least_u16(simd, &low);
     let mut places = [u16::MAX; LANES];
-    for k in 0..N {
+    for (k, block) in cells.iter().enumerate() {
         let first = (k as u16).wrapping_mul(LANES as u16);
         for i in 0..LANES {
             let place = first.wrapping_add(i as u16);
-            places[i] = places[i].min(if cells[k][i] == least { place } else { u16::MAX });
+            places[i] = places[i].min(if block[i] == least { place } else { u16::MAX });
         }
     }
     let index = least_u16(simd, &places);
     let mut others = [u16::MAX; LANES];
-    for k in 0..N {
+    for (k, block) in cells.iter().enumerate() {
         let first = (k as u16).wrapping_mul(LANES as u16).wrapping_add(1).wrapping_sub(index);
         for i in 0..LANES {
             let off = first.wrapping_add(i as u16);
-            others[i] = others[i].min(if off > 2 { cells[k][i] } else { u16::MAX });
+            others[i] = others[i].min(if off > 2 { block[i] } else { u16::MAX });
         }
     }
     Winner { index: usize::from(index), least, second: least_u16(simd, &others) }
