@@ -291,12 +291,7 @@ impl<const N: usize> WithSimd for FromLeft<'_, N> {
                     b_from.step(k, &cost[k]),
                     c_from.step(k, &cost[k]),
                 );
-                let mut sum = [0; LANES];
-                for i in 0..LANES {
-                    let above = u16::from(a[i]).wrapping_add(u16::from(b[i])).wrapping_add(u16::from(c[i]));
-                    sum[i] = above.wrapping_add(u16::from(s[i] & counted));
-                }
-                sums[k] = sum;
+                sums[k] = sum_of(&s, [&a, &b, &c], counted);
                 lower(&mut low_s, &s);
                 lower(&mut low_a, &a);
                 lower(&mut low_b, &b);
@@ -312,6 +307,17 @@ impl<const N: usize> WithSimd for FromLeft<'_, N> {
             c.close(x, least_u8(simd, &low_c));
         }
     }
+}
+
+/// The sum over the paths from the row above and, where it counts, that from the side.
+#[inline(always)]
+fn sum_of(side: &[u8; LANES], [a, b, c]: [&[u8; LANES]; 3], counted: u8) -> [u16; LANES] {
+    let mut sum = [0; LANES];
+    for i in 0..LANES {
+        let above = u16::from(a[i]).wrapping_add(u16::from(b[i])).wrapping_add(u16::from(c[i]));
+        sum[i] = above.wrapping_add(u16::from(side[i] & counted));
+    }
+    sum
 }
 
 /// From right to left: the last path, and what wins.

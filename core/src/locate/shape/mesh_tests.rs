@@ -1,3 +1,5 @@
+//! Meshes of grids whose surface is a formula: cuts, level of detail, what thinning loses.
+
 use super::*;
 
 /// Points where the rays of a pinhole meet a depth that depends on the pixel.

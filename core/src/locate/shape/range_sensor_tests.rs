@@ -1,3 +1,5 @@
+//! Range images against rays and planes; edges that two triangles share.
+
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 

@@ -1,3 +1,5 @@
+//! Registrations of made surfaces: right ones, and those that must be refused by their names.
+
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 

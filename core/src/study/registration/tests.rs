@@ -1,3 +1,5 @@
+//! A small slice of the study of rocks.
+
 use super::*;
 
 #[test]
