@@ -25,7 +25,7 @@ use sightline_core::error::Result;
 use sightline_core::frames::{Pixel, Pose};
 use sightline_core::locate::features::detect::{StopFeatures, detect};
 use sightline_core::locate::features::motion::{MotionInput, motion};
-use sightline_core::locate::features::store::{FeatureStore, Shared};
+use sightline_core::locate::store::{Shared, SharedStore};
 use sightline_core::pipeline::{self, Stops};
 use sightline_core::presets::preset;
 use sightline_core::settings::Settings;
@@ -48,7 +48,7 @@ struct Scene {
     poses: Vec<Pose>,
     pairs: Vec<StereoPair>,
     cameras: Vec<[Camera; 2]>,
-    store: FeatureStore,
+    store: SharedStore,
 }
 
 impl Scene {
@@ -72,7 +72,7 @@ impl Scene {
             [Eye::Left, Eye::Right].map(|eye| in_site(step, eye).moved(&rover_from_site))
         };
         let (pairs, cameras) = (0..STOPS).map(|step| (pair(step), in_rover(step))).unzip();
-        Self { poses, pairs, cameras, store: FeatureStore::default(), index }
+        Self { poses, pairs, cameras, store: SharedStore::default(), index }
     }
 
     fn cameras(&self, step: usize) -> [&Camera; 2] {
@@ -88,7 +88,7 @@ impl Scene {
 /// The stops with a store that is new for every update, or with the one of the stops before.
 struct Drive<'a> {
     scene: &'a Scene,
-    store: &'a FeatureStore,
+    store: &'a SharedStore,
 }
 
 impl Stops for Drive<'_> {
@@ -151,7 +151,7 @@ fn scene() -> &'static (Scene, Vec<Updated>) {
 /// An update of some targets, for which nothing was found before at its stop.
 fn update(bencher: Bencher<'_, '_>, count: usize) {
     let (scene, targets) = scene();
-    bencher.with_inputs(FeatureStore::default).bench_local_refs(|store| {
+    bencher.with_inputs(SharedStore::default).bench_local_refs(|store| {
         let drive = Drive { scene, store };
         targets[..count].iter().map(|last| pipeline::run_step(&drive, last, settings()).step).sum::<usize>()
     });

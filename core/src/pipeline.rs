@@ -14,8 +14,9 @@ use crate::camera::{Camera, Mast, MastAngles};
 use crate::error::{Error, Result};
 use crate::frames::{Pixel, Pose};
 use crate::locate::features::anchor::Anchors;
-use crate::locate::features::store::Shared;
-use crate::locate::{DesignateInput, LocateInput, Located, locator};
+use crate::locate::shape_tracker::view::Views;
+use crate::locate::store::Shared;
+use crate::locate::{DesignateInput, LocateInput, Located, Place, locator};
 use crate::settings::Settings;
 use crate::stages::capture::{self, Capture, StereoPair};
 use crate::stages::judge::{self, Verdict};
@@ -72,7 +73,17 @@ pub fn designate(stops: &dyn Stops, designation: Designation, settings: &Setting
     let pair = stops.capture(step)?;
     let capture = capture::capture(pair, Some(pixel), settings.template.subframe_px);
     let (stereo, shared) = (stops.stereo(), stops.shared(step));
-    let input = DesignateInput { pixel, capture: &capture, left, right, stereo, shared, settings };
+    let input = DesignateInput {
+        step,
+        site_from_rover: &stops.site_from_rover(step),
+        pixel,
+        capture: &capture,
+        left,
+        right,
+        stereo,
+        shared,
+        settings,
+    };
     let located = locator(settings.tracker).designate(&input);
     let target = first_target(stops, designation, &capture, &located)?;
     let pointing = pointing(stops, step, &target);
@@ -128,6 +139,7 @@ pub fn run_step(stops: &dyn Stops, last: &Updated, settings: &Settings) -> StepT
                 site_from_rover: &site_from_rover,
                 stereo: stops.stereo(),
                 shared: stops.shared(step),
+                place: place(stops, step),
                 lost_count: lost_count(last.state),
                 settings,
             });
@@ -213,7 +225,11 @@ fn first_target(
         appearance,
         memory: Memory::default(),
         anchors: Anchors::default(),
+        views: Views::default(),
     };
+    if let Some(view) = located.evidence.shape().and_then(|evidence| evidence.view.clone()) {
+        target.views = target.views.with(view);
+    }
     if let Some(anchor) = update::anchor(&target, located, &target.appearance.site_from_rover) {
         target.anchors = target.anchors.with(anchor, 1);
     }
@@ -240,6 +256,24 @@ fn pointing(stops: &dyn Stops, step: usize, carried: &Target) -> Pointing {
     let (left, right) = stops.cameras(step);
     let used = UsedPointing { mast: stops.mast(), angles: stops.mast_angles(step), left, right };
     point_mast::point_mast(&carried.position_in_rover, &carried.covariance_in_rover, used)
+}
+
+/// A stop among those of its drive.
+fn place(stops: &dyn Stops, step: usize) -> Place {
+    let changes = |from: usize, to: usize| !is_same_pair(stops.cameras(from).0, stops.cameras(to).0);
+    let is_last = step + 1 >= stops.stop_count();
+    Place {
+        step,
+        is_hand_over: step > 0 && changes(step - 1, step),
+        is_last_of_pair: is_last || changes(step, step + 1),
+    }
+}
+
+/// Whether two left cameras are the same one, however it points: image size, kind of model and focal length.
+fn is_same_pair(a: &Camera, b: &Camera) -> bool {
+    let focal_px = |camera: &Camera| camera.model.focal_length_px(camera.centre_pixel());
+    let is_near = focal_px(a).zip(focal_px(b)).is_none_or(|(a, b)| (a / b - 1.0).abs() < 0.02);
+    a.size == b.size && std::mem::discriminant(&a.model) == std::mem::discriminant(&b.model) && is_near
 }
 
 fn lost_count(state: TrackingState) -> u32 {

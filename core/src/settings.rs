@@ -9,6 +9,7 @@ use utoipa::ToSchema;
 use crate::error::{Error, Result};
 use crate::limits::{Domain, Limits, SettingInfo};
 use crate::locate::features::FeatureSettings;
+use crate::locate::shape_tracker::ShapeTrackerSettings;
 use crate::locate::template::TemplateSettings;
 
 /// Changes to settings by name, as a person writes them.
@@ -23,6 +24,35 @@ pub enum TrackerKind {
     Template,
     /// The motion of the whole scene by its features (Deans et al. 2005).
     Features,
+    /// The shape of the target's surroundings (Deans et al. 2005).
+    Shape,
+    /// Features on the way, the shape at the end (Deans et al. 2005, D§4).
+    Combined,
+}
+
+impl TrackerKind {
+    /// All kinds.
+    pub const ALL: [Self; 4] = [Self::Template, Self::Features, Self::Shape, Self::Combined];
+
+    /// The kind's word.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Template => "template",
+            Self::Features => "features",
+            Self::Shape => "shape",
+            Self::Combined => "combined",
+        }
+    }
+
+    /// Whether features are followed on the way.
+    pub const fn follows_features(self) -> bool {
+        matches!(self, Self::Features | Self::Combined)
+    }
+
+    /// Whether the shape is asked at some stop.
+    pub const fn asks_shape(self) -> bool {
+        matches!(self, Self::Shape | Self::Combined)
+    }
 }
 
 /// One tracker configuration.
@@ -37,6 +67,8 @@ pub struct Settings {
     pub template: TemplateSettings,
     /// The settings of the feature locator.
     pub features: FeatureSettings,
+    /// The settings of the shape tracker.
+    pub shape: ShapeTrackerSettings,
 }
 
 /// The name of the setting that chooses the locator; it is a group of its own.
@@ -50,9 +82,10 @@ impl Settings {
             group: TRACKER.to_owned(),
             unit: String::new(),
             default: serde_json::to_value(TrackerKind::default()).unwrap_or_default(),
-            domain: Domain::choice(&["template", "features"]),
+            domain: Domain::choice(&TrackerKind::ALL.map(TrackerKind::word)),
             source: "Kim et al. 2009, Deans et al. 2005".to_owned(),
-            help: "How the target is found again: by its own window, or by the motion of the whole scene."
+            help: "How the target is found again: by its own window, by the motion of the whole scene, by the shape of \
+                   its surroundings, or by the scene on the way and the shape at the end."
                 .to_owned(),
         }
     }
@@ -63,6 +96,7 @@ impl Settings {
         table.extend(Limits::table());
         table.extend(TemplateSettings::table());
         table.extend(FeatureSettings::table());
+        table.extend(ShapeTrackerSettings::table());
         table
     }
 

@@ -15,6 +15,7 @@ use crate::estimate::drift::Drift;
 use crate::frames::{Pixel, Point3, Pose};
 use crate::image::GrayImage;
 use crate::locate::features::anchor::Anchors;
+use crate::locate::shape_tracker::view::Views;
 use crate::locate::template::height::Relief;
 
 /// How a person names a target: a position in the left image of a stop.
@@ -93,6 +94,10 @@ pub struct Target {
     #[serde(skip)]
     #[schema(ignore)]
     pub anchors: Anchors,
+    /// The surfaces that later stops are registered to.
+    #[serde(skip)]
+    #[schema(ignore)]
+    pub views: Views,
 }
 
 /// An appearance that was replaced, with the error of its centre.

@@ -3,17 +3,19 @@
 //! The debugger is a view of this record. The fields bear the stages' names; arrays are left out of the
 //! serialised form and fetched one by one under the names of [`ArrayName`].
 
+mod arrays;
+
+pub use arrays::{ArrayName, ArrayView};
+
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::correlate::zncc::Surface;
 use crate::estimate::error_budget::{Approach, ErrorBudget, StereoPair};
 use crate::frames::{Pixel, Point3};
-use crate::image::patch::Patch;
 use crate::locate::Located;
 use crate::locate::features::FeatureEvidence;
-use crate::locate::features::evidence::Table;
+use crate::locate::shape_tracker::ShapeEvidence;
 use crate::locate::template::TemplateEvidence;
 use crate::stages::capture::Capture;
 use crate::stages::judge::Verdict;
@@ -170,6 +172,11 @@ impl StepTrace {
         self.locate.as_ref().and_then(|located| located.evidence.features())
     }
 
+    /// The evidence of the shape tracker, where something was located.
+    pub fn shape(&self) -> Option<&ShapeEvidence> {
+        self.locate.as_ref().and_then(|located| located.evidence.shape())
+    }
+
     /// This step as one line.
     pub fn row(&self) -> StepRow {
         let evidence = self.template();
@@ -228,121 +235,6 @@ impl StepTrace {
     pub fn is_false_loss(&self) -> bool {
         let within = |t: &StepTruth| t.err_px.is_some_and(|e| e <= t.tolerance_px);
         self.update.state.is_lost() && self.truth.as_ref().is_some_and(within)
-    }
-
-    /// An array of this step, where the stage that makes it was reached.
-    pub fn array(&self, name: ArrayName) -> Option<ArrayView<'_>> {
-        let table = |table: fn(&FeatureEvidence) -> &Table| {
-            self.features().map(table).filter(|table| table.columns > 0).map(ArrayView::Table)
-        };
-        let evidence = self.template();
-        let scale_roll = evidence.and_then(|e| e.scale_roll.as_ref());
-        let matched = evidence.and_then(|e| e.match_template.as_ref());
-        match name {
-            ArrayName::Features => table(|evidence| &evidence.table),
-            ArrayName::Cloud => table(|evidence| &evidence.cloud),
-            ArrayName::Reference => scale_roll.map(|s| ArrayView::Patch(&s.reference)),
-            ArrayName::Scaled => scale_roll.map(|s| ArrayView::Patch(&s.scaled)),
-            ArrayName::Rolled => scale_roll.map(|s| ArrayView::Patch(&s.rolled)),
-            ArrayName::Matched => matched.map(|m| ArrayView::Patch(&m.matched)),
-            ArrayName::Difference => matched.map(|m| ArrayView::Patch(&m.difference)),
-            ArrayName::Surface => matched.map(|m| &m.surface).filter(|s| s.width > 0).map(ArrayView::Surface),
-            ArrayName::RightWindow => {
-                evidence.and_then(|e| e.point_stereo.as_ref()).map(|s| ArrayView::Patch(&s.right_window))
-            }
-        }
-    }
-}
-
-/// The arrays of a step, in the order of the strip.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum ArrayName {
-    /// The template as it was taken.
-    Reference,
-    /// The template, scaled.
-    Scaled,
-    /// The template, scaled and rolled: what was matched.
-    Rolled,
-    /// The image at the match.
-    Matched,
-    /// Matched minus rolled, both normalised.
-    Difference,
-    /// The scores of all positions of the search window.
-    Surface,
-    /// The right image at the stereo match.
-    RightWindow,
-    /// The features of the left image: a row each, with the columns of `FeatureColumn`.
-    Features,
-    /// Where the bootstrap puts the target: a row each, position and pixel.
-    Cloud,
-}
-
-impl ArrayName {
-    /// All arrays, in the order of the strip.
-    pub const ALL: [Self; 9] = [
-        Self::Reference,
-        Self::Scaled,
-        Self::Rolled,
-        Self::Matched,
-        Self::Difference,
-        Self::Surface,
-        Self::RightWindow,
-        Self::Features,
-        Self::Cloud,
-    ];
-
-    /// The name as paths and files write it.
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::Reference => "reference",
-            Self::Scaled => "scaled",
-            Self::Rolled => "rolled",
-            Self::Matched => "matched",
-            Self::Difference => "difference",
-            Self::Surface => "surface",
-            Self::RightWindow => "right_window",
-            Self::Features => "features",
-            Self::Cloud => "cloud",
-        }
-    }
-
-    /// The array of that name.
-    pub fn from_word(word: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|name| name.word() == word)
-    }
-}
-
-/// A borrowed two-dimensional array of `f32`.
-#[derive(Clone, Copy, Debug)]
-pub enum ArrayView<'a> {
-    /// A patch of grey values; NaN where invalid.
-    Patch(&'a Patch),
-    /// A surface of scores; NaN where excluded.
-    Surface(&'a Surface),
-    /// Rows of numbers; NaN where one does not exist.
-    Table(&'a Table),
-}
-
-impl<'a> ArrayView<'a> {
-    /// Width and height.
-    pub fn size(&self) -> [u32; 2] {
-        match self {
-            Self::Patch(patch) => patch.dimensions().into(),
-            Self::Surface(surface) => [surface.width, surface.height],
-            Self::Table(table) => {
-                [table.columns, (table.values.len() / table.columns.max(1) as usize) as u32]
-            }
-        }
-    }
-
-    /// Row-major values.
-    pub fn values(&self) -> &'a [f32] {
-        match self {
-            Self::Patch(patch) => patch.as_raw(),
-            Self::Surface(surface) => &surface.scores,
-            Self::Table(table) => &table.values,
-        }
     }
 }
 

@@ -2,7 +2,7 @@
 """Reference disparities, by OpenCV's StereoBM and StereoSGBM with their usual settings.
 
     python -m venv venv && venv/bin/pip install numpy opencv-python-headless
-    mkdir pair && SIGHTLINE_STEREO_PAIR=$PWD/pair cargo test -p sightline-core the_rendered_pair -- --ignored
+    mkdir pair && SIGHTLINE_STEREO_PAIR=$PWD/pair cargo test -p sightline-core a_rendered_pair
     SIGHTLINE_DATA=../shared/data venv/bin/python tests/reference/stereo_reference.py pair
 
 writes `stereo_reference.json` beside this file; `core/src/stereo/recorded_tests.rs` holds our disparities against it. The

@@ -53,6 +53,14 @@ pub enum Stage {
     FitMotion,
     /// Its last step.
     Bootstrap,
+    /// First step of `locate` by the shape tracker: dense stereo.
+    Surface,
+    /// Its second step, over all shifts.
+    CoarseRegister,
+    /// Its third step.
+    RefineRegister,
+    /// Its last step: the first line of sight on the near surface.
+    CarriedRay,
     /// Stage 5.
     Judge,
     /// Stage 6.
@@ -89,6 +97,35 @@ impl Stage {
                 Judge,
                 Update,
             ],
+            TrackerKind::Shape => &[
+                Predict,
+                PointMast,
+                Capture,
+                Locate,
+                Surface,
+                CoarseRegister,
+                RefineRegister,
+                CarriedRay,
+                Judge,
+                Update,
+            ],
+            TrackerKind::Combined => &[
+                Predict,
+                PointMast,
+                Capture,
+                Locate,
+                Detect,
+                MatchFeatures,
+                Triangulate,
+                FitMotion,
+                Bootstrap,
+                Surface,
+                CoarseRegister,
+                RefineRegister,
+                CarriedRay,
+                Judge,
+                Update,
+            ],
         }
     }
 
@@ -97,13 +134,19 @@ impl Stage {
         if Self::of(tracker).contains(&self) {
             return self;
         }
-        match self {
-            Self::ScaleRoll => Self::Detect,
-            Self::MatchTemplate | Self::PointStereo => Self::MatchFeatures,
-            Self::Detect => Self::ScaleRoll,
-            Self::MatchFeatures => Self::MatchTemplate,
-            Self::FitMotion | Self::Bootstrap => Self::Triangulate,
-            other => other,
+        // The step of the other tracker that answers the most similar question.
+        match (self, tracker) {
+            (step, _) if !step.is_step_of_locate() => step,
+            (Self::ScaleRoll, TrackerKind::Features | TrackerKind::Combined) => Self::Detect,
+            (_, TrackerKind::Features | TrackerKind::Combined) => Self::MatchFeatures,
+            (Self::Detect | Self::Surface, TrackerKind::Template) => Self::ScaleRoll,
+            (Self::MatchFeatures | Self::CoarseRegister | Self::RefineRegister, TrackerKind::Template) => {
+                Self::MatchTemplate
+            }
+            (_, TrackerKind::Template) => Self::Triangulate,
+            (Self::ScaleRoll | Self::Detect, TrackerKind::Shape) => Self::Surface,
+            (Self::MatchTemplate | Self::MatchFeatures, TrackerKind::Shape) => Self::CoarseRegister,
+            (_, TrackerKind::Shape) => Self::RefineRegister,
         }
     }
 
@@ -122,6 +165,10 @@ impl Stage {
             Self::Triangulate => "triangulate",
             Self::FitMotion => "fit_motion",
             Self::Bootstrap => "bootstrap",
+            Self::Surface => "surface",
+            Self::CoarseRegister => "coarse_register",
+            Self::RefineRegister => "refine_register",
+            Self::CarriedRay => "carried_ray",
             Self::Judge => "judge",
             Self::Update => "update",
         }
@@ -142,9 +189,18 @@ impl Stage {
             Self::Triangulate => "Which point in space do both pixels see?",
             Self::FitMotion => "Which rigid motion do most matches agree with?",
             Self::Bootstrap => "How certain is that motion?",
+            Self::Surface => "Which surface does the pair show?",
+            Self::CoarseRegister => "By which shift does it fit the earlier surface, roughly?",
+            Self::RefineRegister => "By which motion does it fit best, and how certain is that?",
+            Self::CarriedRay => "Where does the first line of sight meet the surface?",
             Self::Judge => "Can the match be trusted?",
             Self::Update => "What does this stop leave to the next?",
         }
+    }
+
+    /// Whether it is a step of `locate` by the shape.
+    pub const fn is_step_of_shape(self) -> bool {
+        matches!(self, Self::Surface | Self::CoarseRegister | Self::RefineRegister | Self::CarriedRay)
     }
 
     /// Whether it is a step of `locate`.

@@ -4,8 +4,10 @@
 //! |---|---|
 //! | `template` (Kim et al. 2009) | `scale_roll` → `match_template` → `point_stereo` → `triangulate` |
 //! | `features` (Deans et al. 2005) | `detect` → `match_features` → `triangulate` → `fit_motion` → `bootstrap` |
+//! | `shape` (Deans et al. 2005) | `surface` → `mesh` → `coarse_register` → `refine_register` → `carried_ray` |
+//! | `combined` (D§4) | those of `features` on the way, those of `shape` at the end |
 //!
-//! `shape` holds the steps of the third one, `mesh` → `coarse_register` → `refine_register`, as functions over surfaces.
+//! `shape` holds the registration of two surfaces, `shape_tracker` the locators that make use of it.
 //!
 //! A locator never fails: where it finds nothing it says so in `Located::missing`, and `judge` rejects it.
 //! Two contracts hold for all of them: the same input gives the same bits, and whatever was seen on the way
@@ -13,13 +15,15 @@
 
 pub mod features;
 pub mod shape;
+pub mod shape_tracker;
+pub mod store;
 pub mod template;
 
 use nalgebra::{Matrix3, Matrix3x2};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use self::features::store::Shared;
+use self::store::Shared;
 use crate::estimate::drift::Drift;
 use crate::frames::{Pixel, Point3, Pose};
 use crate::settings::{Settings, TrackerKind};
@@ -47,7 +51,8 @@ pub struct Located {
     /// How the surface point moves with the left pixel, m per px.
     #[schema(value_type = Option<Vec<f64>>)]
     pub surface_by_pixel: Option<Matrix3x2<f64>>,
-    /// Confidence, from 0 to 1: for `template` the score of the match, cut at 0; for `features` D-Eq 7.
+    /// Confidence, from 0 to 1: for `template` the score of the match, cut at 0; for `features` D-Eq 7; where the shape
+    /// decides, the share of the target's pixels that both surfaces cover.
     pub confidence: f64,
     /// What could not be found and why, as one sentence.
     pub missing: Option<String>,
@@ -63,6 +68,8 @@ pub enum Evidence {
     Template(Box<template::TemplateEvidence>),
     /// Of the feature locator.
     Features(Box<features::FeatureEvidence>),
+    /// Of the shape tracker and the combined one.
+    Shape(Box<shape_tracker::ShapeEvidence>),
 }
 
 impl Default for Evidence {
@@ -78,6 +85,10 @@ impl Evidence {
         match self {
             Self::Template(evidence) => Some(evidence),
             Self::Features(evidence) => evidence.designation.as_deref_mut(),
+            Self::Shape(evidence) => match evidence.features.as_mut() {
+                Some(features) => features.designation.as_deref_mut(),
+                None => evidence.designation.as_deref_mut(),
+            },
         }
     }
 
@@ -86,14 +97,27 @@ impl Evidence {
         match self {
             Self::Template(evidence) => Some(evidence),
             Self::Features(evidence) => evidence.designation.as_deref(),
+            Self::Shape(evidence) => match evidence.features.as_ref() {
+                Some(features) => features.designation.as_deref(),
+                None => evidence.designation.as_deref(),
+            },
         }
     }
 
-    /// The evidence of the feature locator.
+    /// The evidence of the feature locator, where features are followed.
     pub fn features(&self) -> Option<&features::FeatureEvidence> {
         match self {
             Self::Template(_) => None,
             Self::Features(evidence) => Some(evidence),
+            Self::Shape(evidence) => evidence.features.as_deref(),
+        }
+    }
+
+    /// The evidence of the shape tracker.
+    pub fn shape(&self) -> Option<&shape_tracker::ShapeEvidence> {
+        match self {
+            Self::Template(_) | Self::Features(_) => None,
+            Self::Shape(evidence) => Some(evidence),
         }
     }
 }
@@ -101,6 +125,10 @@ impl Evidence {
 /// What a locator is given at the stop of the designation.
 #[derive(Clone, Copy, Debug)]
 pub struct DesignateInput<'a> {
+    /// The stop.
+    pub step: usize,
+    /// The estimated pose there.
+    pub site_from_rover: &'a Pose,
     /// The designated position in the left image, px.
     pub pixel: Pixel,
     /// The stereo pair.
@@ -136,10 +164,23 @@ pub struct LocateInput<'a> {
     pub stereo: StereoGeometry,
     /// What the targets of the traverse share.
     pub shared: Option<Shared<'a>>,
+    /// Which stop of the drive this is.
+    pub place: Place,
     /// Updates in a row that were bad so far.
     pub lost_count: u32,
     /// The configuration.
     pub settings: &'a Settings,
+}
+
+/// A stop among those of its drive.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Place {
+    /// The stop, from 0.
+    pub step: usize,
+    /// Whether its cameras are others than those of the stop before: the target is handed over (R205).
+    pub is_hand_over: bool,
+    /// Whether the drive ends here, or other cameras take over at the next stop.
+    pub is_last_of_pair: bool,
 }
 
 /// One tracker's way of finding the target.
@@ -155,5 +196,7 @@ pub fn locator(kind: TrackerKind) -> &'static dyn Locator {
     match kind {
         TrackerKind::Template => &template::TemplateLocator,
         TrackerKind::Features => &features::FeatureLocator,
+        TrackerKind::Shape => &shape_tracker::ShapeLocator,
+        TrackerKind::Combined => &shape_tracker::CombinedLocator,
     }
 }

@@ -23,6 +23,10 @@
 //! The feature tracker makes no use of scores or of the prediction, whose errors may be large (R156); it is judged by its
 //! confidence alone (D§2, R185): criterion 10 `confidence` ≥ `confidence_min`, and ≥ `confidence_return` once it is lost.
 //!
+//! A registration of surfaces is judged by its own numbers, each against the limit of the shape tracker's settings:
+//! criteria 11 to 16 (`locate/shape/failure.rs`; ours). Where the combined tracker's registration fails and its features are
+//! sure, they decide.
+//!
 //! The tolerances are recomputed at every update (R86, R87, ours):
 //! ```text
 //! tol_dist = g √( ΔR(D_old)² + ΔR(D_new)² + (f L_step)² )
@@ -43,6 +47,7 @@ use utoipa::ToSchema;
 
 use crate::frames::{Point3, Pose};
 use crate::limits::Limits;
+use crate::locate::shape_tracker::ShapeEvidence;
 use crate::locate::template::match_template::TemplateMatch;
 use crate::locate::{Evidence, Located};
 use crate::stages::point_mast::Pointing;
@@ -113,11 +118,16 @@ pub fn judge(
     state_before: TrackingState,
     limits: &Limits,
 ) -> Verdict {
-    let gates = match located.evidence {
+    let gates = match &located.evidence {
         Evidence::Template(_) => {
             template_gates(target, prediction, pointing, located, site_from_rover, limits)
         }
         Evidence::Features(_) => feature_gates(located, state_before, limits),
+        Evidence::Shape(evidence) if evidence.is_judged_by_shape => shape_gates(evidence),
+        Evidence::Shape(evidence) if evidence.features.is_some() => {
+            feature_gates(located, state_before, limits)
+        }
+        Evidence::Shape(_) => vec![Gate::new(11, "shape_overlap", "", None, 0.0, true)],
     };
     let good = gates.iter().all(|gate| gate.passed);
     let state = next_state(state_before, good, limits);
@@ -136,6 +146,17 @@ fn feature_gates(located: &Located, state_before: TrackingState, limits: &Limits
     let limit = if state_before.is_lost() { limits.confidence_return } else { limits.confidence_min };
     let confidence = located.position_in_rover.map(|_| located.confidence);
     vec![Gate::new(10, "confidence", "", confidence, limit, true)]
+}
+
+/// The criteria of a registration.
+fn shape_gates(evidence: &ShapeEvidence) -> Vec<Gate> {
+    let checks = evidence.registration.iter().flat_map(|registration| &registration.checks);
+    (11..)
+        .zip(checks)
+        .map(|(criterion, check)| {
+            Gate::new(criterion, &check.name, &check.unit, check.value, check.limit, check.at_least)
+        })
+        .collect()
 }
 
 fn template_gates(

@@ -5,7 +5,7 @@
 //! matches so far, so that by default it stays as long as it need not be magnified much and still matches well. In
 //! flight it was renewed at every update (R70). What a renewal replaces is remembered, so that it can be looked for again
 //! (`reference_templates`, `template_update = drift_corrected`). Otherwise the position is carried by the prediction alone and the
-//! template stays. The feature tracker has no template: it remembers the stop with its features instead (R186).
+//! template stays. The feature tracker has no template: it remembers the stop with its features instead (R186), the shape tracker its first and its last view (R189, R205).
 
 use std::sync::Arc;
 
@@ -59,7 +59,12 @@ pub fn update(
         .and_then(|target| new_appearance(target, pointing, capture, located, site_from_rover));
     let template_renewed = appearance.is_some();
     let anchor = found.as_ref().and_then(|target| anchor(target, located, site_from_rover));
+    let view =
+        located.evidence.shape().and_then(|evidence| evidence.view.clone()).filter(|_| found.is_some());
     let mut target = found.unwrap_or(carried);
+    if let Some(view) = view {
+        target.views = target.views.with(view);
+    }
     if let Some(anchor) = anchor {
         target.anchors = target.anchors.with(anchor, settings.features.feature_memory as usize);
     }

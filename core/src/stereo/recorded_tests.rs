@@ -161,17 +161,16 @@ fn rendered() -> ([GrayImage; 2], Vec<f32>) {
 #[test]
 fn a_rendered_pair_is_matched_no_worse_than_by_opencv() {
     let ([left, right], truth) = rendered();
+    if let Some(folder) = std::env::var_os("SIGHTLINE_STEREO_PAIR") {
+        write_pair(Path::new(&folder), [&left, &right], &truth);
+    }
     compare("rendered", [&left, &right], &truth);
 }
 
-/// `SIGHTLINE_STEREO_PAIR=FOLDER cargo test -p sightline-core the_rendered_pair -- --ignored`
-#[test]
-#[ignore = "writes the rendered pair for tests/reference/stereo_reference.py"]
-fn the_rendered_pair_is_written() {
-    let Some(folder) = std::env::var_os("SIGHTLINE_STEREO_PAIR").map(PathBuf::from) else { return };
-    let ([left, right], truth) = rendered();
-    write_png_u8(folder.join("left.png"), &left).unwrap();
-    write_png_u8(folder.join("right.png"), &right).unwrap();
+/// Writes the rendered pair for `tests/reference/stereo_reference.py`.
+fn write_pair(folder: &Path, [left, right]: [&GrayImage; 2], truth: &[f32]) {
+    write_png_u8(folder.join("left.png"), left).unwrap();
+    write_png_u8(folder.join("right.png"), right).unwrap();
     let bytes: Vec<u8> = truth.iter().flat_map(|value| value.to_le_bytes()).collect();
     std::fs::write(folder.join("disparity.f32"), bytes).unwrap();
 }

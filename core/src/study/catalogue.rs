@@ -196,7 +196,7 @@ pub const STUDIES: &[Study] = &[
         ..study(
             "k9",
             "How much error does tracking by features add over the K9 rover's three drives (D§4, R209–R215)?",
-            &["features", "features-paper", "sightline"],
+            &["features", "features-paper", "sightline", "combined", "combined-paper"],
         )
     },
     study(

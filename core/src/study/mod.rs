@@ -28,6 +28,8 @@ pub mod picks;
 pub mod step_record;
 pub mod run;
 pub mod evenness;
+pub mod hand_over;
+mod hand_over_row;
 pub mod row;
 pub mod wire;
 pub mod realism;

@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::settings::TrackerKind;
+
 /// Which stops of a drive are visited.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -16,11 +18,20 @@ pub enum Visit {
         /// How many stops are left out.
         count: usize,
     },
-    /// All stops but the last, at which other cameras take over.
+    /// All stops but the last, at which other cameras take over; all of them where the tracker hands the target over.
     AllButLast,
 }
 
 impl Visit {
+    /// The same for a tracker.
+    #[must_use]
+    pub const fn by(self, tracker: TrackerKind) -> Self {
+        match self {
+            Self::AllButLast if tracker.asks_shape() => Self::Every(1),
+            other => other,
+        }
+    }
+
     /// The stops that are visited of `count`.
     pub fn stops(self, count: usize) -> Vec<usize> {
         match self {

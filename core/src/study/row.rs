@@ -107,6 +107,7 @@ pub fn columns(runs: &[&Run], worlds: usize) -> BTreeMap<String, Value> {
         columns.insert("uneven_true_px".to_owned(), truth_px.into());
     }
     columns.extend(faults(&own));
+    columns.extend(super::hand_over_row::columns(&own));
     columns
 }
 
@@ -138,7 +139,7 @@ fn counts(runs: &[&Run]) -> BTreeMap<String, Value> {
 }
 
 /// Number, median, 95th percentile and root mean square.
-fn spread(columns: &mut BTreeMap<String, Value>, name: &str, values: &[f64]) {
+pub(super) fn spread(columns: &mut BTreeMap<String, Value>, name: &str, values: &[f64]) {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     let rms = (!sorted.is_empty())

@@ -17,6 +17,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::confidence::Trust;
+use super::hand_over::HandOver;
 use super::point::{Fault, Point};
 use super::staged::Staged;
 use super::step_record::StepRecord;
@@ -82,6 +83,9 @@ pub struct Run {
     /// What the confidence was worth, and how far the measured motions were off.
     #[serde(default)]
     pub trust: Trust,
+    /// What the shape was worth, where it was asked.
+    #[serde(default)]
+    pub hand_over: HandOver,
     /// What became of it at the last step; null without truth.
     pub end: Option<Fate>,
     /// Whether the last step was lost although its evidence was right.
@@ -117,7 +121,7 @@ pub fn measure<D: Drive>(
     keep_steps: bool,
     watch: &Watch<'_>,
 ) -> Result<Vec<Run>> {
-    let staged = Staged::new(drive, point.visit);
+    let staged = Staged::new(drive, point.visit.by(settings.tracker));
     let staged = match point.fault {
         Some(Fault::HeadingJump { step, yaw_deg }) => staged.with_heading_jump(step, yaw_deg.to_radians()),
         _ => staged,
@@ -154,6 +158,7 @@ impl Follower {
             sigma_m: None,
             nees: None,
             trust: Trust::default(),
+            hand_over: HandOver::default(),
             end: None,
             end_is_false_loss: false,
             fault_step: chosen.fault_step,
@@ -194,7 +199,8 @@ impl Follower {
         first: &StepTrace,
         trace: &StepTrace,
     ) {
-        if before.is_some() {
+        if let Some(before) = before {
+            self.run.hand_over.add(drive, [first, before, trace]);
             self.run.trust.add(drive, trace, drift_m(drive, first, trace));
         }
         add(&mut self.run.summary, &summarise([trace]));

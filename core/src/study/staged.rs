@@ -13,7 +13,7 @@ use nalgebra::UnitQuaternion;
 use crate::camera::{Camera, Mast, MastAngles};
 use crate::error::Result;
 use crate::frames::{Pixel, Point3, Pose, Vector3};
-use crate::locate::features::store::Shared;
+use crate::locate::store::Shared;
 use crate::pipeline::Stops;
 use crate::session::track::Drive;
 use crate::stages::capture::StereoPair;

@@ -65,7 +65,7 @@ use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::frames::Pose;
 use crate::image::{GrayImage, io};
-use crate::locate::features::store::FeatureStore;
+use crate::locate::store::SharedStore;
 use crate::sim::World;
 use crate::stages::capture::StereoPair;
 
@@ -80,7 +80,7 @@ pub struct Traverse {
     cameras: Vec<StopCameras>,
     warnings: Vec<String>,
     cache: Mutex<ImageCache>,
-    pub(super) features: FeatureStore,
+    pub(super) features: SharedStore,
     pub(super) simulated: Option<Simulated>,
 }
 
@@ -108,7 +108,7 @@ impl Traverse {
         let simulated = index.scenario.as_ref().map(read_scenario).transpose().map_err(problem)?;
         let warnings = check::warnings(&index, &folder);
         let cache = Mutex::new(ImageCache::new(CACHE_LIMIT_BYTES));
-        let features = FeatureStore::default();
+        let features = SharedStore::default();
         Ok(Self { folder, index_path, index, cameras, warnings, cache, features, simulated })
     }
 

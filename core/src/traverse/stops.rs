@@ -7,7 +7,7 @@
 use crate::camera::{Camera, Mast, MastAngles};
 use crate::error::Result;
 use crate::frames::{Pixel, Point3, Pose};
-use crate::locate::features::store::Shared;
+use crate::locate::store::Shared;
 use crate::pipeline::Stops;
 use crate::sim::surface_point;
 use crate::stages::capture::StereoPair;

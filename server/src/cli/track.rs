@@ -86,6 +86,10 @@ enum Tracker {
     Template,
     /// The motion of the whole scene by its features.
     Features,
+    /// The shape of the target's surroundings.
+    Shape,
+    /// Features on the way, the shape at the end.
+    Combined,
 }
 
 /// A line of a step.
@@ -165,6 +169,8 @@ impl Track {
             None => own.tracker,
             Some(Tracker::Template) => TrackerKind::Template,
             Some(Tracker::Features) => TrackerKind::Features,
+            Some(Tracker::Shape) => TrackerKind::Shape,
+            Some(Tracker::Combined) => TrackerKind::Combined,
         };
         Settings { tracker, ..own }.with(&changes)
     }

@@ -3,6 +3,7 @@
 use egui::{CollapsingHeader, RichText, ScrollArea, Ui};
 use serde_json::{Value, json};
 use sightline_core::locate::features::FeatureEvidence;
+use sightline_core::locate::shape_tracker::ShapeEvidence;
 use sightline_core::settings::TrackerKind;
 use sightline_core::trace::StepTrace;
 
@@ -42,7 +43,8 @@ fn not_reached(trace: &StepTrace, state: &State) -> String {
         (None, true) => {
             let other = match state.tracker() {
                 TrackerKind::Template => "point_stereo",
-                TrackerKind::Features => "triangulate",
+                TrackerKind::Features | TrackerKind::Combined => "triangulate",
+                TrackerKind::Shape => "surface",
             };
             format!(
                 "{word} is not part of the designation. Go one step on (Right) to see it, or select `{other}`."
@@ -55,6 +57,7 @@ fn not_reached(trace: &StepTrace, state: &State) -> String {
 /// Whether a stage was reached.
 pub fn is_reached(trace: &StepTrace, stage: Stage) -> bool {
     let (evidence, features) = (trace.template(), trace.features());
+    let registration = trace.shape().and_then(|evidence| evidence.registration.as_ref());
     match stage {
         Stage::Predict => trace.predict.is_some(),
         Stage::PointMast => trace.point_mast.is_some(),
@@ -70,6 +73,10 @@ pub fn is_reached(trace: &StepTrace, stage: Stage) -> bool {
         }
         Stage::FitMotion => features.is_some_and(|e| e.fit_motion.is_some()),
         Stage::Bootstrap => features.is_some_and(|e| e.bootstrap.is_some()),
+        Stage::Surface => trace.shape().is_some_and(|e| e.surface.is_some()),
+        Stage::CoarseRegister => registration.is_some(),
+        Stage::RefineRegister => registration.is_some_and(|found| found.mean_m[2].is_some()),
+        Stage::CarriedRay => registration.is_some_and(|found| found.ray.is_some()),
         Stage::Judge => trace.judge.is_some(),
         Stage::Update => true,
     }
@@ -77,6 +84,9 @@ pub fn is_reached(trace: &StepTrace, stage: Stage) -> bool {
 
 /// What a stage returned; none where it was not reached.
 pub fn record(trace: &StepTrace, stage: Stage) -> Option<Value> {
+    if let Some(shape) = trace.shape().filter(|_| stage.is_step_of_shape()) {
+        return shape_record(shape, stage);
+    }
     if let Some(features) = trace.features().filter(|_| stage.is_step_of_locate()) {
         return feature_record(features, stage);
     }
@@ -91,6 +101,7 @@ pub fn record(trace: &StepTrace, stage: Stage) -> Option<Value> {
         Stage::PointStereo => serde_json::to_value(evidence?.point_stereo.as_ref()?),
         Stage::Triangulate => serde_json::to_value(evidence?.triangulate.as_ref()?),
         Stage::Detect | Stage::MatchFeatures | Stage::FitMotion | Stage::Bootstrap => return None,
+        Stage::Surface | Stage::CoarseRegister | Stage::RefineRegister | Stage::CarriedRay => return None,
         Stage::Judge => serde_json::to_value(trace.judge.as_ref()?),
         Stage::Update => serde_json::to_value(&trace.update),
     };
@@ -127,6 +138,26 @@ fn feature_record(features: &FeatureEvidence, stage: Stage) -> Option<Value> {
         // The pick is a measurement by point stereo, whose steps are no stages of this tracker.
         record["pick_by_point_stereo"] = serde_json::to_value(designation).ok()?;
     }
+    Some(record)
+}
+
+/// What a step of the shape tracker returned.
+fn shape_record(shape: &ShapeEvidence, stage: Stage) -> Option<Value> {
+    let found = shape.registration.as_ref();
+    let mut record = match stage {
+        Stage::Surface => serde_json::to_value(shape.surface.as_ref()?).ok()?,
+        Stage::CoarseRegister => found.map(|found| {
+            json!({
+                "to_step": found.to_step, "start_in_rover": found.start_in_rover, "half_width_m": found.half_width_m,
+                "sensor_side_m": found.sensor_side_m, "search_m": found.search_m,
+                "coarse_shift_m": found.coarse_shift_m, "mean_m": found.mean_m[1],
+            })
+        })?,
+        Stage::RefineRegister => serde_json::to_value(found?).ok()?,
+        Stage::CarriedRay => serde_json::to_value(found?.ray.as_ref()?).ok()?,
+        _ => return None,
+    };
+    record["why"] = shape.why.clone().into();
     Some(record)
 }
 

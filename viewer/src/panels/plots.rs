@@ -78,7 +78,10 @@ fn charts(state: &State, run: &RunView) -> Vec<Chart> {
     let (ring, diamond) = (Mark::Ring, Mark::Diamond);
     let mut charts = match run.settings.tracker {
         TrackerKind::Template => vec![scores(state, colour)],
-        TrackerKind::Features => vec![confidence(state, colour), inliers(state, colour)],
+        TrackerKind::Features | TrackerKind::Combined => {
+            vec![confidence(state, colour), inliers(state, colour)]
+        }
+        TrackerKind::Shape => vec![confidence(state, colour)],
     };
     let mut position = vec![series("σ", theme::WEAK, diamond, MarkerShape::Diamond, |_, row| {
         row.sigma_m.map(|v| v * 100.0)

@@ -37,7 +37,8 @@ fn show_group(ui: &mut Ui, state: &State, infos: &[SettingInfo], out: &mut Vec<C
     let tracker = state.pending().map_or_else(|| state.tracker(), |settings| settings.tracker);
     let is_used = match group {
         "template" => tracker == TrackerKind::Template,
-        "features" => tracker == TrackerKind::Features,
+        "features" => tracker.follows_features(),
+        "shape" => tracker.asks_shape(),
         _ => true,
     };
     ui.add_space(4.0);

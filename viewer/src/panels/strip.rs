@@ -169,6 +169,16 @@ fn explain(array: ArrayName) -> String {
         ArrayName::Surface => "The scores of all positions.",
         ArrayName::Features => "The features of the left image.",
         ArrayName::Cloud => "Where the bootstrap puts the target.",
+        ArrayName::Disparities => "The disparities of the aligned left image.",
+        ArrayName::Ranges => "The distances from the left camera.",
+        ArrayName::Sensor => "The earlier surface as the virtual range sensor sees it.",
+        ArrayName::ErrorBefore => "Present less earlier depth before the registration.",
+        ArrayName::ErrorCoarse => "Present less earlier depth after the coarse search.",
+        ArrayName::ErrorFine => "Present less earlier depth at the end.",
+        ArrayName::CoarseSearch => "How far the surfaces are apart for every shift of the search.",
+        ArrayName::RefinePath => "The way of the refinement.",
+        ArrayName::MeshFixed => "The earlier surface.",
+        ArrayName::MeshMoving => "The present surface.",
     };
     if array == ArrayName::Difference {
         format!("{what}\nShown from −{DIFFERENCE_LIMIT} (blue) over 0 (white) to +{DIFFERENCE_LIMIT} (red).")

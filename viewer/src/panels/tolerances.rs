@@ -70,9 +70,13 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             TrackerKind::Template => {
                 "No update was judged yet: tolerances belong to the steps after the pick."
             }
-            TrackerKind::Features => {
+            TrackerKind::Features | TrackerKind::Combined => {
                 "Criteria 3 and 4 belong to the template tracker. This run is judged by its confidence alone: see \
                  “Gates” and “Over the steps”."
+            }
+            TrackerKind::Shape => {
+                "Criteria 3 and 4 belong to the template tracker. This run is judged by the numbers of its registration: \
+                 see “Gates”."
             }
         };
         panels::missing(ui, PURPOSE, sentence);

@@ -51,7 +51,12 @@ impl State {
     /// Why a panel about the template has nothing to show, as a sentence that says where to look.
     pub fn missing_template(&self) -> String {
         match (self.tracker(), self.row()) {
-            (TrackerKind::Features, Some(_)) => {
+            (TrackerKind::Shape, Some(_)) => {
+                "This run registers the shape of the target’s surroundings and matches no template. The panel \
+                 “Shape” shows what it saw."
+                    .to_owned()
+            }
+            (TrackerKind::Features | TrackerKind::Combined, Some(_)) => {
                 "This run follows the features of the whole scene and matches no template. The panel “Features” \
                  shows what it saw."
                     .to_owned()
@@ -63,6 +68,11 @@ impl State {
     /// Why a panel about features has nothing to show, as a sentence that says how to get them.
     pub fn missing_features(&self) -> String {
         match (self.tracker(), self.row()) {
+            (TrackerKind::Shape, Some(_)) => {
+                "This run registers the shape of the target’s surroundings and looks for no features. Choose the \
+                 preset “combined” in Settings and press “Run from here” at the pick."
+                    .to_owned()
+            }
             (TrackerKind::Template, Some(_)) => {
                 "This run follows the target’s own template and looks for no features. Choose the preset \
                  “features” in Settings and press “Run from here” at the pick."
@@ -76,5 +86,5 @@ impl State {
 /// The feature tracker's confidence in a step; the designation, by point stereo, has none of its own.
 pub fn confidence_of(run: &RunView, row: &StepRow) -> Option<f64> {
     let is_pick = run.rows.first().is_some_and(|first| first.step == row.step);
-    row.confidence.filter(|_| run.settings.tracker == TrackerKind::Features && !is_pick)
+    row.confidence.filter(|_| run.settings.tracker != TrackerKind::Template && !is_pick)
 }

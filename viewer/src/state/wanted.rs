@@ -63,6 +63,7 @@ impl State {
 /// Whether the stage that makes an array was reached.
 fn has_array(trace: &StepTrace, name: ArrayName) -> bool {
     let (template, features) = (trace.template(), trace.features());
+    let registration = trace.shape().and_then(|e| e.registration.as_ref());
     let matched = template.and_then(|e| e.match_template.as_ref());
     match name {
         ArrayName::Reference | ArrayName::Scaled | ArrayName::Rolled => {
@@ -74,5 +75,13 @@ fn has_array(trace: &StepTrace, name: ArrayName) -> bool {
         ArrayName::RightWindow => template.is_some_and(|e| e.point_stereo.is_some()),
         ArrayName::Features => features.is_some_and(|e| e.detect.is_some()),
         ArrayName::Cloud => features.is_some_and(|e| e.bootstrap.is_some()),
+        ArrayName::Disparities | ArrayName::Ranges => trace.shape().is_some_and(|e| e.surface.is_some()),
+        ArrayName::CoarseSearch => registration.is_some_and(|found| found.coarse_shift_m.is_some()),
+        ArrayName::MeshFixed | ArrayName::MeshMoving => registration.is_some(),
+        ArrayName::Sensor
+        | ArrayName::ErrorBefore
+        | ArrayName::ErrorCoarse
+        | ArrayName::ErrorFine
+        | ArrayName::RefinePath => registration.is_some_and(|found| found.mean_m[2].is_some()),
     }
 }

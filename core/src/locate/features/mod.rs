@@ -26,7 +26,6 @@ mod match_stereo;
 pub mod motion;
 pub mod rows;
 pub mod settings;
-pub mod store;
 mod tables;
 
 pub use evidence::FeatureEvidence;
@@ -41,6 +40,7 @@ use self::anchor::{Anchor, Carried};
 use self::detect::StopFeatures;
 use self::evidence::{AnchorTried, Bootstrapped, Detected, FittedMotion, MatchedFeatures};
 use self::motion::{Motion, MotionInput, motion};
+use super::store;
 use super::template::TemplateLocator;
 use super::{DesignateInput, Evidence, LocateInput, Located, Locator};
 use crate::estimate::confidence::confidence;
@@ -57,7 +57,7 @@ impl Locator for FeatureLocator {
         let settings = &input.settings.features;
         let designation = match std::mem::take(&mut located.evidence) {
             Evidence::Template(evidence) => Some(evidence),
-            Evidence::Features(_) => None,
+            Evidence::Features(_) | Evidence::Shape(_) => None,
         };
         let stop = input.shared.map(|shared| shared.stop);
         let mut evidence = FeatureEvidence { designation, stop, ..FeatureEvidence::default() };

@@ -3,8 +3,8 @@
 use nalgebra::UnitQuaternion;
 use serde_json::{Value, json};
 
-use super::store::FeatureStore;
 use crate::frames::{Pixel, Pose, Vector3};
+use crate::locate::store::SharedStore;
 use crate::pipeline::Stops;
 use crate::presets::preset;
 use crate::session::track;
@@ -197,9 +197,9 @@ fn the_tables_hold_every_feature_and_tell_those_that_agree() {
 
 #[test]
 fn what_was_found_for_one_target_serves_the_next() {
-    let store = FeatureStore::default();
+    let store = SharedStore::default();
     let settings = settings(&[]).features;
-    let shared = Some(super::store::Shared { store: &store, stop: 3 });
+    let shared = Some(crate::locate::store::Shared { store: &store, stop: 3 });
     let empty = || super::StopFeatures::default();
     let first = super::store::features(shared, &settings, empty);
     let again = super::store::features(shared, &settings, || unreachable!("it is kept"));
