@@ -213,6 +213,7 @@ impl Case {
             start_fixed_from_moving: start,
             target_in_fixed: &self.target_in_fixed,
             half_width_m: self.half_width_m,
+            prior: None,
             sensor: None,
         };
         register(&input, settings)

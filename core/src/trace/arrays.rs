@@ -19,6 +19,7 @@ impl StepTrace {
         let shape = |table: fn(&ShapeArrays) -> &Table| {
             self.shape().map(|e| table(&e.arrays)).filter(|table| table.columns > 0).map(ArrayView::Table)
         };
+        let draped = self.shape().and_then(|e| e.registration.as_ref()?.draped.as_ref());
         let evidence = self.template();
         let scale_roll = evidence.and_then(|e| e.scale_roll.as_ref());
         let matched = evidence.and_then(|e| e.match_template.as_ref());
@@ -35,6 +36,8 @@ impl StepTrace {
             ArrayName::RefinePath => shape(|arrays| &arrays.path),
             ArrayName::MeshFixed => shape(|arrays| &arrays.mesh_fixed),
             ArrayName::MeshMoving => shape(|arrays| &arrays.mesh_moving),
+            ArrayName::Draped => draped.map(|draped| ArrayView::Table(&draped.picture)),
+            ArrayName::DrapedMatch => draped.map(|draped| ArrayView::Table(&draped.matched)),
             ArrayName::Reference => scale_roll.map(|s| ArrayView::Patch(&s.reference)),
             ArrayName::Scaled => scale_roll.map(|s| ArrayView::Patch(&s.scaled)),
             ArrayName::Rolled => scale_roll.map(|s| ArrayView::Patch(&s.rolled)),
@@ -90,11 +93,15 @@ pub enum ArrayName {
     MeshFixed,
     /// The present mesh alike.
     MeshMoving,
+    /// At a hand-off, the earlier image draped over the surface as the present camera would see it.
+    Draped,
+    /// The present image where it was found.
+    DrapedMatch,
 }
 
 impl ArrayName {
     /// All arrays, in the order of the strip.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 21] = [
         Self::Reference,
         Self::Scaled,
         Self::Rolled,
@@ -114,6 +121,8 @@ impl ArrayName {
         Self::RefinePath,
         Self::MeshFixed,
         Self::MeshMoving,
+        Self::Draped,
+        Self::DrapedMatch,
     ];
 
     /// The name as paths and files write it.
@@ -138,6 +147,8 @@ impl ArrayName {
             Self::RefinePath => "refine_path",
             Self::MeshFixed => "mesh_fixed",
             Self::MeshMoving => "mesh_moving",
+            Self::Draped => "draped",
+            Self::DrapedMatch => "draped_match",
         }
     }
 

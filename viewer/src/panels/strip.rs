@@ -179,6 +179,8 @@ fn explain(array: ArrayName) -> String {
         ArrayName::RefinePath => "The way of the refinement.",
         ArrayName::MeshFixed => "The earlier surface.",
         ArrayName::MeshMoving => "The present surface.",
+        ArrayName::Draped => "The earlier image draped over the surface, as this camera would see it.",
+        ArrayName::DrapedMatch => "This camera's image where that was found.",
     };
     if array == ArrayName::Difference {
         format!("{what}\nShown from −{DIFFERENCE_LIMIT} (blue) over 0 (white) to +{DIFFERENCE_LIMIT} (red).")

@@ -77,6 +77,9 @@ fn has_array(trace: &StepTrace, name: ArrayName) -> bool {
         ArrayName::Cloud => features.is_some_and(|e| e.bootstrap.is_some()),
         ArrayName::Disparities | ArrayName::Ranges => trace.shape().is_some_and(|e| e.surface.is_some()),
         ArrayName::CoarseSearch => registration.is_some_and(|found| found.coarse_shift_m.is_some()),
+        ArrayName::Draped | ArrayName::DrapedMatch => {
+            registration.is_some_and(|found| found.draped.is_some())
+        }
         ArrayName::MeshFixed | ArrayName::MeshMoving => registration.is_some(),
         ArrayName::Sensor
         | ArrayName::ErrorBefore

@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Matrix3, Vector6};
+use nalgebra::{Matrix3, UnitQuaternion, Vector6};
 
 use super::detect::StopFeatures;
 use crate::estimate::bootstrap::Bootstrap;
@@ -41,12 +41,19 @@ pub struct Carried {
     pub scattered: Matrix3<f64>,
     /// How the shared errors move it, one column each: 1σ, m.
     pub shared_m: Matrix3<f64>,
+    /// How the rover frame turned since the designation: takes directions of that into the present one.
+    pub now_from_first: UnitQuaternion<f64>,
 }
 
 impl Carried {
     /// A designated position.
     pub fn designated(position_in_rover: Point3, covariance_in_rover: Matrix3<f64>) -> Self {
-        Self { position_in_rover, scattered: covariance_in_rover, shared_m: Matrix3::zeros() }
+        Self {
+            position_in_rover,
+            scattered: covariance_in_rover,
+            shared_m: Matrix3::zeros(),
+            now_from_first: UnitQuaternion::identity(),
+        }
     }
 
     /// The position after a motion; `by_shared_error` says how its parameters change with 1σ of each.
@@ -61,10 +68,12 @@ impl Carried {
             };
             (at(1.0) - at(-1.0)) / 2.0
         };
-        let turned = theta.to_pose().rotation.to_rotation_matrix() * self.shared_m;
+        let turn = theta.to_pose().rotation;
+        let turned = turn.to_rotation_matrix() * self.shared_m;
         let added =
             by_shared_error.map_or_else(Matrix3::zeros, |changes| Matrix3::from_columns(&changes.map(moved)));
-        Some(Self { position_in_rover, scattered, shared_m: turned + added })
+        let now_from_first = turn * self.now_from_first;
+        Some(Self { position_in_rover, scattered, shared_m: turned + added, now_from_first })
     }
 
     /// The covariance of the position, m².

@@ -30,6 +30,7 @@
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, SymmetricEigen};
 use serde::{Deserialize, Serialize};
 
+use super::held::Held;
 use super::pairs::{Pair, Template, robust_scale};
 use super::range_sensor::RangeImage;
 use super::refine_register::Method;
@@ -65,6 +66,7 @@ pub(super) fn precision(
     moving: &RangeImage,
     pairs: &[Pair],
     method: Method,
+    held: &Held,
 ) -> Precision {
     let slopes = Slopes::of(&template.sensor, moving, template.normal_radius_px);
     let cut = CUT * robust_scale(pairs);
@@ -83,6 +85,10 @@ pub(super) fn precision(
         Method::SimplexL1 => alike(|pair, _| pair.residual_m.signum()),
         Method::PointToPlane => alike(|pair, cut| pair.distance().clamp(-cut, cut)),
     };
+    if method == Method::PointToPlane && !held.is_free() {
+        let covariance = with_prior(&(shape / (scale * scale * alike_px).max(1e-12)), held);
+        return Precision { covariance, scale, alike_px, pixels };
+    }
     let covariance = shape.cholesky().map(|factor| {
         let inverse = factor.inverse();
         let spread = match method {
@@ -92,6 +98,17 @@ pub(super) fn precision(
         spread * alike_px
     });
     Precision { covariance, scale, alike_px, pixels }
+}
+
+/// The covariance of what the surfaces and the start say together. Directions of which the surfaces say less than nothing,
+/// by chance, they say nothing of.
+fn with_prior(shape: &Matrix6<f64>, held: &Held) -> Option<Matrix6<f64>> {
+    // Metres and radians differ by the size of the rock; in units of the prior all directions are alike.
+    let whitened = held.information.cholesky()?.l();
+    let inverse = whitened.try_inverse()?;
+    let mut eigen = SymmetricEigen::new(inverse * shape * inverse.transpose());
+    eigen.eigenvalues.apply(|value| *value = 1.0 / (1.0 + value.max(0.0)));
+    Some(inverse.transpose() * eigen.recompose() * inverse)
 }
 
 /// A, B without κ, and the number of pixels where both surfaces have normals.

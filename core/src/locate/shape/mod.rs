@@ -16,6 +16,7 @@
 //! | `objective` | D-Eq 12 with a least overlap |
 //! | `coarse_register` | D-Eq 13, 14 over all shifts |
 //! | `refine_register`, `nelder_mead` | the six parameters; the paper's way and point to plane |
+//! | `held` | what is known of the motion before |
 //! | `pairs`, `slopes` | distances along normals with their noise |
 //! | `covariance` | how well all that is known |
 //! | `failure` | why it is not to be used |
@@ -33,6 +34,7 @@ mod rasterise;
 pub mod objective;
 mod slopes;
 mod pairs;
+mod held;
 pub mod coarse_register;
 pub mod nelder_mead;
 pub mod refine_register;
@@ -61,6 +63,7 @@ pub use settings::{CheckSettings, ShapeSettings};
 
 use coarse_register::{CoarseInput, coarse_register};
 use covariance::{arm, covariance_of_point, precision};
+use held::Held;
 use objective::{Objective, motion};
 use pairs::{Moving, Template};
 use refine_register::refine_register;
@@ -78,8 +81,19 @@ pub struct RegistrationInput<'a> {
     pub target_in_fixed: &'a Point3,
     /// Half the width of what is to be recognised, m.
     pub half_width_m: f64,
+    /// How well the start is known; none: not at all.
+    pub prior: Option<Prior>,
     /// The virtual sensor; none: one that looks at the target ([`sensor_for`]).
     pub sensor: Option<RangeSensor>,
+}
+
+/// How well the start of a registration is known, before the surfaces are compared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Prior {
+    /// Covariance of the target in the present view, m², frame of that.
+    pub target_m2: Matrix3<f64>,
+    /// 1σ of the attitude about each axis, rad.
+    pub attitude_rad: f64,
 }
 
 /// Differences of depth, h − z, as the sensor sees them; m, row by row, not a number where not both are seen (R202).
@@ -221,11 +235,37 @@ pub fn register(input: &RegistrationInput<'_>, settings: &ShapeSettings) -> Regi
         return result.failed(Failure::NoOverlap { share: overlap_best, least: settings.overlap_min });
     };
     let (near, start) = (refine_register::near(&template, &moving, &best.offset()), best.offset());
-    let how = (settings.method, &settings.simplex, &settings.plane);
-    let (end, path) = refine_register(&template, &near, &start, settings.overlap_min, how);
+    let held = Held::new(input, &sensor);
+    let (end, path) = refine(&template, &near, &start, &held, settings);
     result.path = path;
     let ways = [(Offset::zeros(), &moving), (start, &near), (end, &near)];
-    finish(result, &template, ways, input, settings)
+    finish(result, &template, ways, (input, &held), settings)
+}
+
+/// Refines the motion; where its start is known, once more with the number of pixels that were seen to err together.
+fn refine(
+    template: &Template,
+    near: &Moving,
+    start: &Offset,
+    held: &Held,
+    settings: &ShapeSettings,
+) -> (Offset, Vec<PathStep>) {
+    let how = (settings.method, &settings.simplex, &settings.plane);
+    let (end, mut path) = refine_register(template, near, start, settings.overlap_min, how, held);
+    if held.is_free() || settings.method == Method::SimplexL1 {
+        return (end, path);
+    }
+    let (image, pairs) = template.pairs(near, &end);
+    let alike_px = precision(template, &image, &pairs, settings.method, held).alike_px;
+    let held = Held { alike_px, ..*held };
+    let (end, again) = refine_register(template, near, &end, settings.overlap_min, how, &held);
+    let before = path.last().map_or(0, |last| last.evaluations);
+    path.extend(again.into_iter().map(|step| PathStep {
+        evaluations: step.evaluations + before,
+        run: 1,
+        ..step
+    }));
+    (end, path)
 }
 
 /// What is known at the end of a registration, and whether it is to be used; by the offsets at the start, after the coarse
@@ -234,7 +274,7 @@ fn finish(
     mut result: Registration,
     template: &Template,
     ways: [(Offset, &Moving); 3],
-    input: &RegistrationInput<'_>,
+    (input, held): (&RegistrationInput<'_>, &Held),
     settings: &ShapeSettings,
 ) -> Registration {
     let sensor = &template.sensor;
@@ -255,7 +295,7 @@ fn finish(
         fixed_from_sensor * motion * sensor.sensor_from_fixed * input.start_fixed_from_moving;
     result.target_in_moving = result.fixed_from_moving.inverse() * input.target_in_fixed;
     let (image, pairs) = template.pairs(near, &end);
-    let precision = precision(template, &image, &pairs, settings.method);
+    let precision = precision(template, &image, &pairs, settings.method, held);
     let target = arm(&(sensor.sensor_from_fixed * input.target_in_fixed), &template.pivot);
     result.covariance_in_moving = precision.covariance.map(|covariance| {
         let turn = (result.fixed_from_moving.inverse() * fixed_from_sensor).rotation.to_rotation_matrix();

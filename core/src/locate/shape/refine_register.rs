@@ -11,7 +11,7 @@
 //! counts less and less. Steps are bounded, and damped where the shape does not hold them.
 //!
 //! ```text
-//! (H + λ diag H) δ = −Σ w r ∂r/∂p        H = Σ w ∂r/∂p ∂r/∂pᵀ,   w = ρ'(r/(s σ)) / σ²,   λ = 1e-4
+//! (H + Λ' + λ diag) δ = −Σ w r ∂r/∂p − Λ' p     H = Σ w ∂r/∂p ∂r/∂pᵀ,   Λ' of `held`,   w = ρ'(r/(s σ)) / σ²,   λ = 1e-4
 //! T ← T_δ T                              until |δt| < 10 µm and |δω| < 10 µrad, or 40 steps
 //! ```
 //! **What is drawn.** Facets farther from the picture than 15 cm at the start of the refinement are left out.
@@ -28,6 +28,7 @@ use nalgebra::{Matrix6, Vector6};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::held::Held;
 use super::nelder_mead::{PathStep, SimplexSettings, minimise};
 use super::objective::{Objective, Offset, motion, offset};
 use super::pairs::{Moving, Pair, Template, robust_scale};
@@ -86,6 +87,7 @@ pub(super) fn refine_register(
     start: &Offset,
     overlap_min: f64,
     how: (Method, &SimplexSettings, &PlaneSettings),
+    held: &Held,
 ) -> (Offset, Vec<PathStep>) {
     let (method, simplex, plane) = how;
     match method {
@@ -97,7 +99,7 @@ pub(super) fn refine_register(
             let (end, _, path) = minimise(|p| objective.at(p).mean_m, start, simplex);
             (end, path)
         }
-        Method::PointToPlane => point_to_plane(template, moving, start, plane),
+        Method::PointToPlane => point_to_plane(template, moving, start, plane, held),
     }
 }
 
@@ -107,6 +109,7 @@ fn point_to_plane(
     moving: &Moving,
     start: &Offset,
     settings: &PlaneSettings,
+    held: &Held,
 ) -> (Offset, Vec<PathStep>) {
     let mut at = *start;
     let mut path = Vec::new();
@@ -118,7 +121,7 @@ fn point_to_plane(
             value_m: mean_depth_m(&pairs),
             offset: at.into(),
         });
-        let Some(change) = gauss_newton_step(&pairs, settings.loss) else { break };
+        let Some(change) = gauss_newton_step(&pairs, settings.loss, &at, held) else { break };
         let moved = motion(&change, &template.pivot) * motion(&at, &template.pivot);
         at = offset(&moved, &template.pivot);
         if change.amax() < settings.small {
@@ -135,7 +138,7 @@ fn mean_depth_m(pairs: &[Pair]) -> f64 {
 }
 
 /// δ; none where the pairs determine none.
-fn gauss_newton_step(pairs: &[Pair], loss: Loss) -> Option<Offset> {
+fn gauss_newton_step(pairs: &[Pair], loss: Loss, at: &Offset, held: &Held) -> Option<Offset> {
     let scale =
         robust_scale(pairs).max(if pairs.iter().all(|pair| pair.sigma_m == 1.0) { 1e-9 } else { SCALE_MIN });
     let (mut information, mut pull) = (Matrix6::zeros(), Vector6::zeros());
@@ -145,6 +148,9 @@ fn gauss_newton_step(pairs: &[Pair], loss: Loss) -> Option<Offset> {
         information += gradient * gradient.transpose() * weight;
         pull -= gradient * (weight * pair.residual_m);
     }
+    let (known, back) = held.pull(at, scale);
+    information += known;
+    pull += back;
     for k in 0..6 {
         information[(k, k)] *= 1.0 + DAMPING;
     }

@@ -84,7 +84,7 @@ pub(super) fn meet(carried: &Carried<'_>, surface: &Mesh) -> Option<Met> {
     // Of several facets behind one another the eye sees the first.
     let (position, triangle) =
         crossings.min_by(|a, b| (a.0 - origin).norm().total_cmp(&(b.0 - origin).norm()))?;
-    let normal = normal_around(surface, &position)?;
+    let normal = normal_around(surface, &position, AROUND_M)?;
     let facing = normal.dot(&direction);
     if facing.abs() < GRAZING {
         return None;
@@ -121,12 +121,12 @@ fn crossing(origin: &Point3, direction: &Vector3, [a, b, c]: [Point3; 3]) -> Opt
 }
 
 /// The mean normal of the facets around a point, weighed by their areas.
-fn normal_around(surface: &Mesh, point: &Point3) -> Option<Vector3> {
+pub(super) fn normal_around(surface: &Mesh, point: &Point3, around_m: f64) -> Option<Vector3> {
     let mut sum = Vector3::zeros();
     for triangle in &surface.triangles {
         let [a, b, c] = triangle.map(|corner| surface.vertices[corner as usize]);
         let middle = Point3::from((a.coords + b.coords + c.coords) / 3.0);
-        if (middle - point).norm() < AROUND_M {
+        if (middle - point).norm() < around_m {
             sum += (b - a).cross(&(c - a));
         }
     }

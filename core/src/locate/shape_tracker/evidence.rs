@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
+use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::carried_ray::RayMeeting;
+use super::drape::Draped;
 use super::surface::SurfaceSeen;
 use super::view::View;
 use crate::frames::{Point3, Pose};
@@ -72,6 +74,10 @@ pub struct Registered {
     pub sigmas_m: Option<[f64; 3]>,
     /// Where the designation's line of sight met the surface; null where it was not carried along or met nothing.
     pub ray: Option<RayMeeting>,
+    /// The earlier image draped over the surface and found in the present one; at a hand-off.
+    pub draped: Option<Draped>,
+    /// Why it was not found, as one sentence.
+    pub draped_missing: Option<String>,
     /// Its numbers with their limits.
     pub checks: Vec<Check>,
     /// Why it is not used; null where it is.

@@ -24,6 +24,7 @@
 //! Source: D§2, D§4; R146, R154, R187–R206.
 
 pub mod carried_ray;
+pub mod drape;
 pub mod evidence;
 mod half_width;
 pub mod settings;
@@ -38,24 +39,28 @@ mod tests;
 
 use std::sync::Arc;
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, UnitQuaternion};
 
 use self::evidence::Registered;
 use self::surface::StopSurface;
 use self::view::View;
-use super::features::FeatureLocator;
 use super::features::anchor::Carried;
-use super::shape::{Mesh, Region, Registration, RegistrationInput, ShapeSettings, region_radius_m, register};
+use super::features::{FeatureEvidence, FeatureLocator};
+use super::shape::{
+    Mesh, Prior, Region, Registration, RegistrationInput, ShapeSettings, region_radius_m, register,
+};
 use super::template::TemplateLocator;
 use super::{DesignateInput, Evidence, LocateInput, Located, Locator, store};
 use crate::camera::Camera;
-use crate::frames::{Point3, Pose};
+use crate::frames::Point3;
 use crate::stages::capture::Capture;
 
 /// The rock is measured on the surface this far around the target, m.
 const MEASURED_WITHIN_M: f64 = 0.9;
 /// Half the width of what cannot be measured, m (R200).
 const HALF_WIDTH_M: f64 = 0.25;
+/// Attitude since the designation as the features carry it, 1σ about each axis, deg: several times what they err by.
+const FEATURES_ATTITUDE_DEG: f64 = 0.2;
 
 /// The target by the shape of its surroundings at every stop (Deans et al. 2005).
 #[derive(Clone, Copy, Debug)]
@@ -133,7 +138,7 @@ fn first_view(input: &DesignateInput<'_>, located: &Located, evidence: &mut Shap
     let cameras = [input.left, input.right];
     let look = Look { capture: input.capture, cameras, shared: input.shared, settings: input.settings };
     let settings = &input.settings.shape;
-    let surface = match look.surface() {
+    let surface = match look.surface(&position) {
         Ok(surface) => surface,
         Err(why) => {
             evidence.missing = Some(why);
@@ -166,6 +171,8 @@ fn first_view(input: &DesignateInput<'_>, located: &Located, evidence: &mut Shap
         ray: input.left.ray(input.pixel),
         half_width_m,
         mesh,
+        left: input.left.clone(),
+        image: Arc::clone(&input.capture.pair.left),
     }));
 }
 
@@ -179,9 +186,10 @@ struct Look<'a> {
 }
 
 impl Look<'_> {
-    /// The surface of the stop; a sentence where there is none.
-    fn surface(&self) -> Result<Arc<StopSurface>, String> {
-        let stereo = self.settings.shape.stereo();
+    /// The surface of the stop around a target; a sentence where there is none.
+    fn surface(&self, target: &Point3) -> Result<Arc<StopSurface>, String> {
+        let distance_m = (target - self.cameras[0].model.centre()).norm();
+        let stereo = self.settings.shape.stereo(distance_m);
         let find = || StopSurface::measure(&self.capture.pair, self.cameras, &stereo);
         store::surface(self.shared, &stereo, find).map_err(|error| format!("no surface: {error}"))
     }
@@ -210,10 +218,12 @@ fn locate(input: &LocateInput<'_>, base: Option<Located>, asked: Option<String>,
     let mut located = match by_shape {
         Some(found) => {
             if let Some(features) = evidence.features.as_mut() {
-                features.carried = found
-                    .position_in_rover
-                    .zip(found.covariance_in_rover)
-                    .map(|(position, covariance)| Carried::designated(position, covariance));
+                let now_from_first = features.carried.map(|carried| carried.now_from_first);
+                let renewed = found.position_in_rover.zip(found.covariance_in_rover).zip(now_from_first);
+                features.carried = renewed.map(|((position, covariance), now_from_first)| Carried {
+                    now_from_first,
+                    ..Carried::designated(position, covariance)
+                });
             }
             found
         }
@@ -244,12 +254,14 @@ fn by_shape(input: &LocateInput<'_>, base: &Located, evidence: &mut ShapeEvidenc
         return None;
     };
     let settings = &input.settings.shape;
-    let registration = settings.registration();
-    let is_sure = base.confidence >= least_confidence(input);
-    let expected = base.position_in_rover.filter(|_| is_sure).unwrap_or(input.prediction.position_in_rover);
+    let begin = Start::new(input, base, view, evidence.features.as_deref(), is_hand_off);
+    let expected = begin.position;
+    let sigma_m = begin.prior.target_m2.symmetric_eigenvalues().max().max(0.0).sqrt();
+    let search_m = settings.search_m(sigma_m, view.half_width_m);
+    let registration = ShapeSettings { search_half_range_m: Some(search_m), ..settings.registration() };
     let cameras = [&input.pointing.left, &input.pointing.right];
     let look = Look { capture: input.capture, cameras, shared: input.shared, settings: input.settings };
-    let surface = match look.surface() {
+    let surface = match look.surface(&expected) {
         Ok(surface) => surface,
         Err(why) => {
             evidence.missing = Some(why);
@@ -258,7 +270,7 @@ fn by_shape(input: &LocateInput<'_>, base: &Located, evidence: &mut ShapeEvidenc
     };
     let mesh = surface.mesh(&region(expected, view.half_width_m, &registration), settings);
     note(evidence, &surface, &mesh);
-    let start = view.start_from(input.site_from_rover, &expected);
+    let start = view.start_from(begin.fixed_from_moving, &expected);
     let found = register(
         &RegistrationInput {
             fixed: &view.mesh,
@@ -266,13 +278,17 @@ fn by_shape(input: &LocateInput<'_>, base: &Located, evidence: &mut ShapeEvidenc
             start_fixed_from_moving: &start,
             target_in_fixed: &view.position_in_rover,
             half_width_m: view.half_width_m,
+            prior: Some(begin.prior).filter(|_| settings.shape_prior),
             sensor: None,
         },
         &registration,
     );
-    let target =
+    let mut target =
         (found.failure.is_none()).then(|| carried(&found, view, &mesh, settings.carried_ray)).flatten();
     let mut registered = registered(&found, view, (&expected, is_hand_off), &registration);
+    if let Some(target) = target.as_mut().filter(|_| is_hand_off && settings.hand_off_picture) {
+        hand_off_by_picture(input, view, &found, target, &mut registered);
+    }
     if let Some(target) = &target {
         registered.correction_m = Some((target.position - expected).norm());
         registered.ray = target.ray;
@@ -288,6 +304,8 @@ fn by_shape(input: &LocateInput<'_>, base: &Located, evidence: &mut ShapeEvidenc
         ray: None,
         half_width_m: view.half_width_m,
         mesh,
+        left: cameras[0].clone(),
+        image: Arc::clone(&input.capture.pair.left),
     }));
     let target = target?;
     Some(Located {
@@ -300,6 +318,90 @@ fn by_shape(input: &LocateInput<'_>, base: &Located, evidence: &mut ShapeEvidenc
     })
 }
 
+/// Where the target is thought to be before it is registered.
+struct Start {
+    /// Position, m, present rover frame.
+    position: Point3,
+    /// How the present rover frame is turned in that of the earlier view.
+    fixed_from_moving: UnitQuaternion<f64>,
+    /// How well both are known.
+    prior: Prior,
+}
+
+impl Start {
+    /// By the features where they are sure, else by dead reckoning; where cameras change, by the rover that stands still.
+    fn new(
+        input: &LocateInput<'_>,
+        base: &Located,
+        view: &View,
+        features: Option<&FeatureEvidence>,
+        is_hand_off: bool,
+    ) -> Self {
+        let settings = &input.settings.shape;
+        let prediction = input.prediction;
+        let by_poses = view.turn_to(input.site_from_rover);
+        if is_hand_off {
+            let target_m2 = Matrix3::identity() * settings.hand_off_shift_m.powi(2);
+            let prior = Prior { target_m2, attitude_rad: settings.hand_off_turn_deg.to_radians() };
+            return Self { position: prediction.position_in_rover, fixed_from_moving: by_poses, prior };
+        }
+        let by_features = base.position_in_rover.zip(base.covariance_in_rover);
+        let carried = features.and_then(|features| features.carried);
+        match by_features.zip(carried).filter(|_| base.confidence >= least_confidence(input)) {
+            Some(((position, target_m2), carried)) => Self {
+                position,
+                fixed_from_moving: carried.now_from_first.inverse(),
+                prior: Prior { target_m2, attitude_rad: FEATURES_ATTITUDE_DEG.to_radians() },
+            },
+            None => Self {
+                position: prediction.position_in_rover,
+                fixed_from_moving: by_poses,
+                prior: Prior {
+                    target_m2: prediction.covariance_in_rover,
+                    attitude_rad: settings.shape_attitude_deg.to_radians(),
+                },
+            },
+        }
+    }
+}
+
+/// Finds the target in the present image by the earlier one draped over the surface; a target that is not found so stays
+/// where the registration has it.
+fn hand_off_by_picture(
+    input: &LocateInput<'_>,
+    view: &View,
+    found: &Registration,
+    target: &mut CarriedTarget,
+    registered: &mut Registered,
+) {
+    let settings = &input.settings.shape;
+    let Some(covariance) = &found.covariance_in_moving else { return };
+    let drape = drape::DrapeInput {
+        view,
+        fixed_from_moving: &found.fixed_from_moving,
+        registered: &found.target_in_moving,
+        covariance,
+        camera: &input.pointing.left,
+        image: &input.capture.pair.left,
+        window_px: settings.hand_off_window_px,
+        score_min: settings.hand_off_score_min,
+    };
+    match drape::drape(&drape) {
+        Ok((position, covariance, draped)) => {
+            target.position = position;
+            target.covariance = covariance + view_covariance(found, view);
+            registered.draped = Some(draped);
+        }
+        Err(why) => registered.draped_missing = Some(why),
+    }
+}
+
+/// The covariance that the target had in the earlier view, turned into the present rover frame, m².
+fn view_covariance(found: &Registration, view: &View) -> Matrix3<f64> {
+    let turn = found.fixed_from_moving.rotation.inverse().to_rotation_matrix();
+    turn.matrix() * view.covariance_in_rover * turn.matrix().transpose()
+}
+
 /// A target that a registration carried here.
 struct CarriedTarget {
     position: Point3,
@@ -309,10 +411,7 @@ struct CarriedTarget {
 
 /// The target in the present rover frame; none where the registration has no covariance.
 fn carried(found: &Registration, view: &View, mesh: &Mesh, with_ray: bool) -> Option<CarriedTarget> {
-    let turn: Pose = found.fixed_from_moving.inverse();
-    let turn = turn.rotation.to_rotation_matrix();
-    let own = turn.matrix() * view.covariance_in_rover * turn.matrix().transpose();
-    let covariance = found.covariance_in_moving? + own;
+    let covariance = found.covariance_in_moving? + view_covariance(found, view);
     let registered = found.target_in_moving;
     let met = view.ray.as_ref().filter(|_| with_ray).and_then(|ray| {
         let (fixed_from_moving, half_width_m) = (&found.fixed_from_moving, view.half_width_m);
@@ -355,6 +454,8 @@ fn registered(
         turn_deg: found.turn_rad.to_degrees(),
         sigmas_m,
         ray: None,
+        draped: None,
+        draped_missing: None,
         checks: evidence::checks(found, view.half_width_m, settings),
         failure: found.failure,
         reason: found.failure.map(|failure| failure.to_string()),

@@ -21,6 +21,9 @@ pub enum ShapeUse {
     EveryStop,
 }
 
+/// What the cameras of two pairs may disagree by, and the least that the coarse search covers, m.
+const SEARCH_LEAST_M: f64 = 0.04;
+
 settings_group! {
     /// How a target is found by the shape of its surroundings (Deans et al. 2005).
     ShapeTrackerSettings as "shape" {
@@ -33,24 +36,39 @@ settings_group! {
         shape_method: Method = Method::PointToPlane, "", Domain::choice(&["simplex_l1", "point_to_plane"]), "R195, R201; ours";
         /// Half the width of what is to be recognised; 0: measured on the first surface, and 0.25 m where that is not possible.
         shape_half_width_m: f64 = 0.0, "m", Domain::Between(0.0, 2.0), "ours, R200";
-        /// How far the coarse search goes to each side; 0: the half width.
+        /// How far the coarse search goes to each side; 0: three standard deviations of the start and 4 cm, at most the half
+        /// width.
         shape_search_m: f64 = 0.0, "m", Domain::Between(0.0, 2.0), "R200";
+        /// Hold the motion to its start as far as that is known; the paper's simplex never does.
+        shape_prior: bool = true, "", Domain::Switch, "ours, R197";
+        /// Attitude of the pose estimates since the earlier view, 1σ about each axis.
+        shape_attitude_deg: f64 = 1.0, "°", Domain::Between(0.01, 30.0), "ours, R198";
+        /// What two pairs of cameras may disagree by about where a target is, 1σ on each axis.
+        hand_off_shift_m: f64 = 0.02, "m", Domain::Between(0.0001, 1.0), "ours, R205";
+        /// And about its attitude, 1σ about each axis.
+        hand_off_turn_deg: f64 = 0.3, "°", Domain::Between(0.01, 30.0), "ours, R205";
+        /// At a hand-off, find the target in the other camera's image by the last image draped over the surface.
+        hand_off_picture: bool = true, "", Domain::Switch, "ours, R205";
+        /// Side of that picture.
+        hand_off_window_px: u32 = 31, "px", Domain::OddBetween(7, 101), "ours";
+        /// A picture that agrees less is not used.
+        hand_off_score_min: f64 = 0.7, "", Domain::Between(-1.0, 1.0), "ours";
         /// Pixels of a side of the virtual sensor.
         shape_sensor_px: u32 = 64, "px", Domain::Between(16.0, 256.0), "ours, R191";
         /// What the sensor spans beyond the half width, as a share of it: ground holds the height and the tilt.
         shape_margin: f64 = 0.4, "", Domain::Between(0.0, 3.0), "ours";
         /// Least share of the target's pixels that both surfaces must cover.
-        shape_overlap_min: f64 = 0.4, "", Domain::Between(0.05, 1.0), "ours, R196";
-        /// Distance of neighbouring vertices.
+        shape_overlap_min: f64 = 0.25, "", Domain::Between(0.05, 1.0), "ours, R196";
+        /// Distance of neighbouring vertices; never less than twice the error of their range.
         mesh_spacing_m: f64 = 0.01, "m", Domain::Between(0.0, 0.2), "ours, R188";
         /// Neighbours whose ranges have a greater ratio are not joined.
         mesh_ratio_max: f64 = 1.05, "", Domain::Between(1.001, 2.0), "R188";
         /// How pixels are compared in dense stereo.
         surface_method: StereoMethod = StereoMethod::SemiGlobal, "", Domain::choice(&["block_matching", "semi_global"]), "domain.md 7";
-        /// Nearest depth that dense stereo looks at.
-        surface_range_min_m: f64 = 0.8, "m", Domain::Between(0.05, 100.0), "ours";
+        /// Nearest depth that dense stereo looks at; a far target raises it to three tenths of its distance.
+        surface_range_min_m: f64 = 0.4, "m", Domain::Between(0.05, 100.0), "ours";
         /// Noise of a disparity, from which that of the points follows.
-        surface_sigma_px: f64 = 0.2, "px", Domain::Between(0.01, 5.0), "ours";
+        surface_sigma_px: f64 = 0.1, "px", Domain::Between(0.01, 5.0), "ours";
         /// Error that all points of a surface share, 1σ on each axis: stereo's window makes what is convex smaller.
         shape_common_m: f64 = 0.0008, "m", Domain::Between(0.0, 0.1), "ours";
         /// Triangles that a surface needs.
@@ -67,12 +85,22 @@ settings_group! {
 }
 
 impl ShapeTrackerSettings {
-    /// How surfaces are measured.
-    pub fn stereo(&self) -> StereoSettings {
-        StereoSettings {
-            method: self.surface_method,
-            range_min_m: self.surface_range_min_m,
-            ..StereoSettings::default()
+    /// How surfaces are measured around a target at a distance.
+    ///
+    /// Disparities nearer than the target's surroundings only cost time. Limits go in halves, so that targets at similar
+    /// distances share their surfaces.
+    pub fn stereo(&self, distance_m: f64) -> StereoSettings {
+        let nearest_m = (0.3 * distance_m).max(0.01);
+        let range_min_m = 2f64.powf(nearest_m.log2().floor()).max(self.surface_range_min_m);
+        StereoSettings { method: self.surface_method, range_min_m, ..StereoSettings::default() }
+    }
+
+    /// How far the coarse search goes where the start is known to `sigma_m`, m.
+    pub fn search_m(&self, sigma_m: f64, half_width_m: f64) -> f64 {
+        if self.shape_search_m > 0.0 {
+            self.shape_search_m
+        } else {
+            (3.0 * sigma_m + SEARCH_LEAST_M).min(half_width_m)
         }
     }
 
@@ -87,7 +115,6 @@ impl ShapeTrackerSettings {
             },
             sensor_px: self.shape_sensor_px as usize,
             margin: self.shape_margin,
-            search_half_range_m: Some(self.shape_search_m).filter(|range_m| *range_m > 0.0),
             overlap_min: self.shape_overlap_min,
             common_sigma_m: self.shape_common_m,
             method: self.shape_method,
@@ -109,9 +136,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_defaults_are_those_of_the_registration_but_for_its_method_and_a_rounded_angle() {
+    fn the_defaults_are_those_of_the_registration_but_for_its_method_its_overlap_and_a_rounded_angle() {
         let own = ShapeTrackerSettings::default().registration();
-        let mut other = ShapeSettings { method: Method::PointToPlane, ..ShapeSettings::default() };
+        let mut other =
+            ShapeSettings { method: Method::PointToPlane, overlap_min: 0.25, ..ShapeSettings::default() };
         assert!((own.checks.turn_max_rad - other.checks.turn_max_rad).abs() < 1e-3);
         other.checks.turn_max_rad = own.checks.turn_max_rad;
         assert_eq!(own, other);

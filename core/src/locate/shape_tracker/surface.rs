@@ -22,7 +22,7 @@ use crate::camera::Camera;
 use crate::error::Result;
 use crate::frames::Point3;
 use crate::locate::features::evidence::Table;
-use crate::locate::shape::{Mesh, PointGrid, Region};
+use crate::locate::shape::{Mesh, MeshSettings, PointGrid, Region};
 use crate::stages::capture::StereoPair;
 use crate::stereo::{Alignment, DisparityMap, Outcome, StereoSettings, dense_stereo};
 
@@ -80,7 +80,15 @@ impl StopSurface {
     /// The mesh of what lies within a region.
     pub fn mesh(&self, region: &Region, settings: &ShapeTrackerSettings) -> Mesh {
         let grid = self.grid(region, settings.surface_sigma_px);
-        Mesh::from_grid(&grid, &self.viewpoint, Some(region), &settings.registration().mesh)
+        let own = settings.registration().mesh;
+        let spacing_m = own.spacing_m.max(2.0 * self.range_sigma_m(region, settings.surface_sigma_px));
+        Mesh::from_grid(&grid, &self.viewpoint, Some(region), &MeshSettings { spacing_m, ..own })
+    }
+
+    /// 1σ of the range of a point in the middle of a region, m: facets that are smaller than that are all slope.
+    fn range_sigma_m(&self, region: &Region, sigma_px: f64) -> f64 {
+        let distance_m = (region.centre - self.viewpoint).norm();
+        sigma_px * distance_m / self.alignment.disparity_px(distance_m)
     }
 
     /// The points of the smallest part of the picture that holds a region.

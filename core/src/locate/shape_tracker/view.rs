@@ -5,9 +5,11 @@
 
 use std::sync::Arc;
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, UnitQuaternion};
 
+use crate::camera::Camera;
 use crate::frames::{Point3, Pose, Ray};
+use crate::image::GrayImage;
 use crate::locate::shape::Mesh;
 
 /// A target as one stop saw it.
@@ -27,13 +29,20 @@ pub struct View {
     pub half_width_m: f64,
     /// The surface around the target, m, rover frame of that stop.
     pub mesh: Mesh,
+    /// The left camera, rover frame.
+    pub left: Camera,
+    /// Its image.
+    pub image: Arc<GrayImage>,
 }
 
 impl View {
-    /// Where a registration with this view starts: turned as the pose estimates say, with the target where it is thought to
-    /// be now.
-    pub fn start_from(&self, site_from_rover: &Pose, position_in_rover: &Point3) -> Pose {
-        let rotation = self.site_from_rover.rotation.inverse() * site_from_rover.rotation;
+    /// How the rover frame of another stop is turned in that of this view, by the pose estimates.
+    pub fn turn_to(&self, site_from_rover: &Pose) -> UnitQuaternion<f64> {
+        self.site_from_rover.rotation.inverse() * site_from_rover.rotation
+    }
+
+    /// Where a registration with this view starts: turned like that, with the target where it is thought to be now.
+    pub fn start_from(&self, rotation: UnitQuaternion<f64>, position_in_rover: &Point3) -> Pose {
         let shift = self.position_in_rover - rotation * position_in_rover;
         Pose::from_parts(shift.into(), rotation)
     }
@@ -60,7 +69,9 @@ impl Views {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Translation3, UnitQuaternion};
+    use nalgebra::Translation3;
+
+    use crate::pipeline::Stops;
 
     use super::*;
 
@@ -81,13 +92,15 @@ mod tests {
             ray: None,
             half_width_m: 0.2,
             mesh: Mesh::default(),
+            left: crate::testing::PlaneWorld::new(vec![Pose::identity()]).cameras(0).0.clone(),
+            image: Arc::default(),
         };
         let thought = Point3::new(3.1, 0.2, 0.15);
-        let start = view.start_from(&now, &thought);
+        let start = view.start_from(view.turn_to(&now), &thought);
         assert!((start * thought - view.position_in_rover).norm() < 1e-12);
         assert!(start.rotation.angle_to(&(then.inverse() * now).rotation) < 1e-12);
         // With poses and position that agree it is the motion itself.
-        let exact = view.start_from(&now, &((now.inverse() * then) * view.position_in_rover));
+        let exact = view.start_from(view.turn_to(&now), &((now.inverse() * then) * view.position_in_rover));
         assert!((exact.translation.vector - (then.inverse() * now).translation.vector).norm() < 1e-12);
     }
 }
