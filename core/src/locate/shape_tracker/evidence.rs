@@ -10,6 +10,7 @@ use super::carried_ray::RayMeeting;
 use super::drape::Draped;
 use super::surface::SurfaceSeen;
 use super::view::View;
+
 use crate::frames::{Point3, Pose};
 use crate::locate::features::FeatureEvidence;
 use crate::locate::features::evidence::Table;
@@ -84,6 +85,21 @@ pub struct Registered {
     pub failure: Option<Failure>,
     /// The same as one sentence.
     pub reason: Option<String>,
+}
+
+impl Registered {
+    /// Adds a picture that was found: what the surfaces alone let slide it holds, and its own score is judged instead.
+    pub(super) fn add_picture(&mut self, draped: Draped, covariance: &Matrix3<f64>, score_min: f64) {
+        let sigma_m = covariance.symmetric_eigenvalues().max().max(0.0).sqrt();
+        self.checks
+            .retain(|check| !["shape_other_minimum", "shape_edge_distance_m"].contains(&check.name.as_str()));
+        for check in self.checks.iter_mut().filter(|check| check.name == "shape_sigma_m") {
+            check.value = Some(sigma_m);
+        }
+        self.checks.push(Check::new("picture_ncc", "", Some(draped.score), score_min, true));
+        self.draped = Some(draped);
+        (self.failure, self.reason) = (None, None);
+    }
 }
 
 /// A number of a registration that must keep to a limit.

@@ -11,7 +11,8 @@
 //! registration     x = T⁻¹ x_first                                   Σ = Σ_reg + R⁻¹ Σ_first R
 //! carried ray      x = where the designation's line of sight, carried by T, meets the present surface
 //! ```
-//! So what features add up on the way is gone at the end, and with the ray so is the error of the first range. A
+//! At a hand-off the last image is draped over its surface and found in the new camera's image (`drape`), which holds the
+//! target where flat faces let it slide. What features add up on the way is gone at the end, and with the ray so is the error of the first range. A
 //! registration that fails says why and leaves the target to the features, where those are sure; where other cameras
 //! took over there are no features to fall back upon.
 //!
@@ -47,7 +48,7 @@ use self::view::View;
 use super::features::anchor::Carried;
 use super::features::{FeatureEvidence, FeatureLocator};
 use super::shape::{
-    Mesh, Prior, Region, Registration, RegistrationInput, ShapeSettings, region_radius_m, register,
+    Failure, Mesh, Prior, Region, Registration, RegistrationInput, ShapeSettings, region_radius_m, register,
 };
 use super::template::TemplateLocator;
 use super::{DesignateInput, Evidence, LocateInput, Located, Locator, store};
@@ -286,8 +287,8 @@ fn by_shape(input: &LocateInput<'_>, base: &Located, evidence: &mut ShapeEvidenc
     let mut target =
         (found.failure.is_none()).then(|| carried(&found, view, &mesh, settings.carried_ray)).flatten();
     let mut registered = registered(&found, view, (&expected, is_hand_off), &registration);
-    if let Some(target) = target.as_mut().filter(|_| is_hand_off && settings.hand_off_picture) {
-        hand_off_by_picture(input, view, &found, target, &mut registered);
+    if is_hand_off && settings.hand_off_picture && is_left_to_the_picture(found.failure.as_ref()) {
+        target = by_picture(input, view, &found, &mut registered).or(target);
     }
     if let Some(target) = &target {
         registered.correction_m = Some((target.position - expected).norm());
@@ -365,17 +366,25 @@ impl Start {
     }
 }
 
-/// Finds the target in the present image by the earlier one draped over the surface; a target that is not found so stays
-/// where the registration has it.
-fn hand_off_by_picture(
+/// Whether a picture may decide: the surfaces fit, though they may let the target slide.
+const fn is_left_to_the_picture(failure: Option<&Failure>) -> bool {
+    matches!(
+        failure,
+        None | Some(
+            Failure::NotEnoughShape { .. } | Failure::NotIsolated { .. } | Failure::AtSearchEdge { .. }
+        )
+    )
+}
+
+/// The target in the present image by the earlier one draped over the surface; none where it is not found.
+fn by_picture(
     input: &LocateInput<'_>,
     view: &View,
     found: &Registration,
-    target: &mut CarriedTarget,
     registered: &mut Registered,
-) {
+) -> Option<CarriedTarget> {
     let settings = &input.settings.shape;
-    let Some(covariance) = &found.covariance_in_moving else { return };
+    let covariance = &found.covariance_in_moving?;
     let drape = drape::DrapeInput {
         view,
         fixed_from_moving: &found.fixed_from_moving,
@@ -388,11 +397,14 @@ fn hand_off_by_picture(
     };
     match drape::drape(&drape) {
         Ok((position, covariance, draped)) => {
-            target.position = position;
-            target.covariance = covariance + view_covariance(found, view);
-            registered.draped = Some(draped);
+            registered.add_picture(draped, &covariance, settings.hand_off_score_min);
+            let covariance = covariance + view_covariance(found, view);
+            Some(CarriedTarget { position, covariance, ray: None })
         }
-        Err(why) => registered.draped_missing = Some(why),
+        Err(why) => {
+            registered.draped_missing = Some(why);
+            None
+        }
     }
 }
 
