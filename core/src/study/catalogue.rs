@@ -10,6 +10,7 @@
 //! | `terrain` | K§5.5, R124–R126 | slope-…, stuck | `terrain` |
 //! | `checkout-1`, `-2`, `-3` | K§7.1–7.3, R130–R143 | checkout-… | `position`: one row a step |
 //! | `faults` | K§4.6, R88, R126 | several | `fault` |
+//! | `recovery` | D§4, R155, R214 | k9-5 | `start_error_cm` |
 //! | `k9` | D§4, R209–R215 | k9-5, k9-7.5, k9-10 | `scenario` |
 //! | `feature-covariance` | D§2, R172–R177 | approach-10 | none |
 //! | `feature-faults` | D§1, D§4, R156, R185, R208 | several | `fault` |
@@ -77,6 +78,9 @@ const FAULTS: &[&str] = &[
 ];
 
 const K9: &[&str] = &["k9-5", "k9-7.5", "k9-10"];
+
+/// How far off the target is taken to be when the shape is asked, cm (R155, R214).
+const START_ERRORS_CM: &[&str] = &["0", "5", "10", "15", "20", "25", "30", "40"];
 
 /// What happens to features; the last four are no faults of the world but claims of the tracker (R156).
 const FEATURE_FAULTS: &[&str] = &[
@@ -197,6 +201,17 @@ pub const STUDIES: &[Study] = &[
             "k9",
             "How much error does tracking by features add over the K9 rover's three drives (D§4, R209–R215)?",
             &["features", "features-paper", "sightline", "combined", "combined-paper"],
+        )
+    },
+    Study {
+        variable: "start_error_cm",
+        unit: "cm",
+        grid: Grid::Words(START_ERRORS_CM),
+        default_grid: START_ERRORS_CM,
+        ..study(
+            "recovery",
+            "Without features on the way, how far off may the target be for the shape to find it again (R155, R214)?",
+            &["combined", "combined-paper"],
         )
     },
     study(
@@ -330,6 +345,15 @@ impl Study {
             "low-texture" => on("low-texture", Fault::FromTheStart),
             "wrong-prior" => Point { changes: vec!["prior_radius_px=60".to_owned()], ..heading(6.0) },
             "every-third-stop" => Point { visit: Visit::Every(3), ..on("approach-10", Fault::FromTheStart) },
+            start_cm if self.name == "recovery" => Point {
+                visit: Visit::AllButLast,
+                // Too few for any motion: dead reckoning from the first step on, as in the rover's shadow.
+                changes: vec!["features_max=3".to_owned()],
+                fault: Some(Fault::PositionJump {
+                    across_m: start_cm.parse::<f64>().unwrap_or_default() / 100.0,
+                }),
+                ..Point::plain("k9-5", self.variable, word)
+            },
             k9 if self.name == "k9" => {
                 Point { visit: Visit::AllButLast, ..Point::plain(k9, self.variable, word) }
             }

@@ -12,6 +12,9 @@ use super::hand_over::{HandOver, Transfer};
 use super::row::spread;
 use super::run::Run;
 
+/// What is farther off is wrong, m.
+const WRONG_M: f64 = 0.05;
+
 /// What the hand-overs of some runs were worth; empty where none was tried.
 pub(super) fn columns(runs: &[&Run]) -> BTreeMap<String, Value> {
     let mut columns = BTreeMap::new();
@@ -37,6 +40,12 @@ pub(super) fn columns(runs: &[&Run]) -> BTreeMap<String, Value> {
         put("nees", &values(&|transfer| transfer.nees));
         put("half_width_m", &values(&|transfer| Some(transfer.half_width_m)));
         put("weakest_sigma_m", &values(&|transfer| Some(transfer.sigmas_m?[0])));
+        let found = |far: bool| {
+            let off = |t: &Transfer| t.error_m.filter(|error_m| (*error_m > WRONG_M) == far);
+            values(&off).len()
+        };
+        columns.insert(format!("{name}_right"), found(false).into());
+        columns.insert(format!("{name}_wrong"), found(true).into());
         let tried = runs.iter().filter_map(|run| transfer(&run.hand_over));
         let reasons: Vec<&String> = tried.clone().filter_map(|transfer| transfer.failure.as_ref()).collect();
         columns.insert(format!("{name}_tried"), tried.count().into());

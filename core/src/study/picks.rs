@@ -101,7 +101,7 @@ fn find_fault_steps(traverse: &Traverse, point: &Point, fault: Fault, chosen: &m
     let fixed = match fault {
         Fault::Cloud(step) | Fault::AzimuthJump(step) | Fault::HeadingJump { step, .. } => Some(step),
         Fault::Boundary | Fault::FromTheStart => Some(1),
-        Fault::Occlusion | Fault::Shadow | Fault::OutOfFrame => None,
+        Fault::Occlusion | Fault::Shadow | Fault::OutOfFrame | Fault::PositionJump { .. } => None,
     };
     if fixed.is_some() {
         chosen.iter_mut().for_each(|target| target.fault_step = fixed);

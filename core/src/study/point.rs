@@ -79,6 +79,11 @@ pub enum Fault {
         /// By how much, degrees.
         yaw_deg: f64,
     },
+    /// The estimated position jumps sideways at the last stop of the first cameras, one before the last.
+    PositionJump {
+        /// By how much, to the right, m.
+        across_m: f64,
+    },
     /// Nothing but what the point itself changes: the first step.
     FromTheStart,
 }

@@ -124,6 +124,7 @@ pub fn measure<D: Drive>(
     let staged = Staged::new(drive, point.visit.by(settings.tracker));
     let staged = match point.fault {
         Some(Fault::HeadingJump { step, yaw_deg }) => staged.with_heading_jump(step, yaw_deg.to_radians()),
+        Some(Fault::PositionJump { across_m }) => staged.with_position_jump(across_m),
         _ => staged,
     };
     let one = |(target, chosen): (usize, &Chosen)| -> Result<Run> {

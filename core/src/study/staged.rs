@@ -4,11 +4,11 @@
 //! 1 − 0.95^(n+1): 9.75, 14.26, 18.55 and 22.62 %. The last stop is visited only where the stride meets it (E6).
 //!
 //! A jump turns the rover's estimated attitude from one visited stop on, as an estimator does that has lost its
-//! way: `site_from_rover' = site_from_rover · R_z(jump)`. The truth, the cameras and the images stay.
+//! way: `site_from_rover' = site_from_rover · R_z(jump)`; or it moves its position sideways, `site_from_rover · t_y(jump)`. The truth, the cameras and the images stay.
 //!
 //! Steps of the staged drive are numbered from 0 anew; poses, cameras, images and truth are those of the drive.
 
-use nalgebra::UnitQuaternion;
+use nalgebra::{Translation3, UnitQuaternion};
 
 use crate::camera::{Camera, Mast, MastAngles};
 use crate::error::Result;
@@ -25,7 +25,7 @@ use crate::traverse::{OdometryError, StereoGeometry};
 pub struct Staged<'a, D: Drive> {
     drive: &'a D,
     stops: Vec<usize>,
-    jump: Option<(usize, f64)>,
+    jump: Option<(usize, Pose)>,
 }
 
 impl<'a, D: Drive> Staged<'a, D> {
@@ -37,7 +37,15 @@ impl<'a, D: Drive> Staged<'a, D> {
     /// The same with an estimated heading that jumps by `yaw_rad` (clockwise seen from above) at a visited stop.
     #[must_use]
     pub fn with_heading_jump(self, step: usize, yaw_rad: f64) -> Self {
-        Self { jump: Some((step, yaw_rad)), ..self }
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad);
+        Self { jump: Some((step, Pose::from_parts(Translation3::identity(), turn))), ..self }
+    }
+
+    /// The same with an estimated position that jumps by `across_m` to the right at the last stop but one.
+    #[must_use]
+    pub fn with_position_jump(self, across_m: f64) -> Self {
+        let step = self.stops.len().saturating_sub(2);
+        Self { jump: Some((step, Pose::translation(0.0, across_m, 0.0))), ..self }
     }
 }
 
@@ -51,9 +59,7 @@ impl<D: Drive> Stops for Staged<'_, D> {
     fn site_from_rover(&self, step: usize) -> Pose {
         let site_from_rover = self.drive.site_from_rover(self.stops[step]);
         match self.jump {
-            Some((from, yaw_rad)) if step >= from => {
-                site_from_rover * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad)
-            }
+            Some((from, jump)) if step >= from => site_from_rover * jump,
             _ => site_from_rover,
         }
     }
@@ -138,5 +144,16 @@ mod tests {
         assert_eq!((turned(2), staged.true_site_from_rover(4)), (0.0, drive.true_site_from_rover(4)));
         assert!((turned(3) - 0.1).abs() < 1e-12 && (turned(6) - 0.1).abs() < 1e-12);
         assert_eq!(staged.site_from_rover(3).translation, drive.site_from_rover(3).translation);
+    }
+
+    #[test]
+    fn a_jump_to_the_right_moves_the_last_two_estimates_by_it() {
+        let drive = drive();
+        let staged = Staged::new(&drive, Visit::Every(1)).with_position_jump(0.2);
+        let moved = |step: usize| {
+            staged.site_from_rover(step).translation.vector - drive.site_from_rover(step).translation.vector
+        };
+        assert_eq!((moved(4).norm(), staged.true_site_from_rover(5)), (0.0, drive.true_site_from_rover(5)));
+        assert!((moved(5) - Vector3::new(0.0, 0.2, 0.0)).norm() < 1e-12 && (moved(6).y - 0.2).abs() < 1e-12);
     }
 }

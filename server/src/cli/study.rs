@@ -59,6 +59,8 @@ enum Experiment {
     FeatureCovariance(Experimental),
     /// Occlusion, cloud, shadow, few features, wrong poses: does the confidence fall before the drift grows?
     FeatureFaults(Experimental),
+    /// Without features on the way: how far off may the target be for the shape to find it again?
+    Recovery(Experimental),
     /// How hard the simulated worlds are: plain correlation, without scale and roll, at steps of 5 % and 23 %.
     Realism(realism::Worlds),
     /// The simulated scenery in numbers: rocks, ground, noise and texture against their laws and real frames.
@@ -137,6 +139,7 @@ impl Study {
             Experiment::K9(arguments) => arguments.run("k9"),
             Experiment::FeatureCovariance(arguments) => arguments.run("feature-covariance"),
             Experiment::FeatureFaults(arguments) => arguments.run("feature-faults"),
+            Experiment::Recovery(arguments) => arguments.run("recovery"),
             Experiment::Realism(worlds) => worlds.run(),
             Experiment::Scenery(scenery) => scenery.run(),
             Experiment::RealMotion(recordings) => recordings.run(),

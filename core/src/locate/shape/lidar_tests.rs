@@ -88,6 +88,7 @@ fn a_street_is_registered_about_as_well_as_by_another_program() {
             start_fixed_from_moving: &Pose::identity(),
             target_in_fixed: &about,
             half_width_m: 5.0,
+            prior: None,
             sensor: Some(RangeSensor::pinhole(&Point3::origin(), &direction, 0.9, [160, 64])),
         };
         for method in [Method::SimplexL1, Method::PointToPlane] {

@@ -153,6 +153,7 @@ fn a_pinhole_sensor_finds_the_same_motion() {
             start_fixed_from_moving: &start,
             target_in_fixed: &case.target_in_fixed,
             half_width_m: case.half_width_m,
+            prior: None,
             sensor: Some(sensor),
         },
         &settings,

@@ -41,6 +41,8 @@ const SENSOR_PX: usize = 160;
 const PLANE_M: f64 = 0.05;
 /// The farthest shift that is looked for, px.
 const SHIFT_MAX_PX: f64 = 40.0;
+/// The smallest window that says where it belongs, px.
+const WINDOW_MIN_PX: u32 = 7;
 /// The least cosine between the ray and the plane's normal.
 const GRAZING: f64 = 0.2;
 
@@ -92,11 +94,25 @@ pub(super) struct DrapeInput<'a> {
 /// A target that was found so: position (m) and covariance (m²), present rover frame.
 pub(super) type Placed = (Point3, Matrix3<f64>, Draped);
 
-/// Finds the draped picture.
+/// Finds the draped picture; where the earlier image does not show a window that large, a smaller one.
 ///
 /// # Errors
 /// A sentence that says why there is no match.
 pub(super) fn drape(input: &DrapeInput<'_>) -> Result<Placed, String> {
+    let smaller = [1.0, 0.7, 0.5].map(|share| (f64::from(input.window_px) * share) as u32 | 1);
+    let sizes = smaller.into_iter().filter(|&size| size >= WINDOW_MIN_PX);
+    let mut tried = Err("the window is too small".to_owned());
+    for window_px in sizes {
+        tried = drape_window(&DrapeInput { window_px, ..*input });
+        if tried.is_ok() {
+            break;
+        }
+    }
+    tried
+}
+
+/// Finds the draped picture of one size.
+fn drape_window(input: &DrapeInput<'_>) -> Result<Placed, String> {
     let camera = input.camera;
     let start =
         camera.project(input.registered).ok_or("the registered target is not in the present image")?;

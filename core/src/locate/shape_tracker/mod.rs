@@ -36,6 +36,8 @@ pub use evidence::ShapeEvidence;
 pub use settings::{ShapeTrackerSettings, ShapeUse};
 
 #[cfg(test)]
+mod recorded_tests;
+#[cfg(test)]
 mod tests;
 
 use std::sync::Arc;
@@ -340,6 +342,8 @@ impl Start {
     ) -> Self {
         let settings = &input.settings.shape;
         let prediction = input.prediction;
+        // Wheels slip and gyros jump by more than their model says; beyond the basin nothing would be found anyway (R155).
+        let basin_m2 = (view.half_width_m / 2.0).powi(2);
         let by_poses = view.turn_to(input.site_from_rover);
         if is_hand_off {
             let target_m2 = Matrix3::identity() * settings.hand_off_shift_m.powi(2);
@@ -358,7 +362,7 @@ impl Start {
                 position: prediction.position_in_rover,
                 fixed_from_moving: by_poses,
                 prior: Prior {
-                    target_m2: prediction.covariance_in_rover,
+                    target_m2: prediction.covariance_in_rover + Matrix3::identity() * basin_m2,
                     attitude_rad: settings.shape_attitude_deg.to_radians(),
                 },
             },
