@@ -30,6 +30,7 @@ pub mod run;
 pub mod evenness;
 pub mod hand_over;
 mod hand_over_row;
+pub mod hand_over_table;
 pub mod row;
 pub mod wire;
 pub mod realism;

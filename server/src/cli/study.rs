@@ -7,6 +7,7 @@ use std::sync::atomic::AtomicBool;
 use clap::{Args, Subcommand, ValueEnum};
 use serde::Serialize;
 use sightline_core::error::{Error, Result};
+use sightline_core::study::hand_over_table;
 use sightline_core::study::plan::Plan;
 use sightline_core::study::row::Row;
 
@@ -152,7 +153,7 @@ impl Experimental {
     fn run(self, name: &str) -> Result<()> {
         // Everything is checked before anything is rendered.
         let order = self.order(name)?;
-        let folder = order.folder.join(order.plan.study.name);
+        let (folder, variable) = (order.folder.join(order.plan.study.name), order.plan.study.variable);
         let told = Mutex::new(Teller::new());
         let outcome =
             study::carry_out(order, &AtomicBool::new(false), &|progress| lock(&told).tell(progress))?;
@@ -168,7 +169,11 @@ impl Experimental {
                 say::line(&document.map_err(|error| Error::Request(error.to_string()))?)
             }
             Format::Csv => say::line(tables::rows_csv(&outcome.rows).trim_end()),
-            Format::Text => outcome.rows.iter().try_for_each(|row| say::line(&sentence(row))),
+            Format::Text => {
+                let table = hand_over_table::lines(&outcome.rows, variable);
+                let sentences = outcome.rows.iter().map(sentence);
+                sentences.chain(table).try_for_each(|line| say::line(&line))
+            }
         }
     }
 

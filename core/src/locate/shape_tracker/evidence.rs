@@ -8,6 +8,7 @@ use utoipa::ToSchema;
 
 use super::carried_ray::RayMeeting;
 use super::drape::Draped;
+use super::placement::Placement;
 use super::surface::SurfaceSeen;
 use super::view::View;
 
@@ -30,6 +31,8 @@ pub struct ShapeEvidence {
     pub surface: Option<SurfaceSeen>,
     /// The registration with an earlier view.
     pub registration: Option<Registered>,
+    /// What the arm is told, where other cameras took over and the target was found.
+    pub placement: Option<Placement>,
     /// Whether the update is judged by it, rather than by the features.
     pub is_judged_by_shape: bool,
     /// Why there is no registration although it was asked for, as one sentence.

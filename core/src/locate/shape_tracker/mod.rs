@@ -22,12 +22,16 @@
 //! | x_first, Σ_first | `View::position_in_rover`, `View::covariance_in_rover` | m, m², rover frame of the first view |
 //! | Σ_reg | `Registration::covariance_in_moving` | m² |
 //!
+//! One stop's registration is in `register_stop`; what the arm is told at the end in `placement`.
+//!
 //! Source: D§2, D§4; R146, R154, R187–R206.
 
 pub mod carried_ray;
 pub mod drape;
 pub mod evidence;
 mod half_width;
+mod register_stop;
+pub mod placement;
 pub mod settings;
 pub mod surface;
 pub mod view;
@@ -42,16 +46,12 @@ mod tests;
 
 use std::sync::Arc;
 
-use nalgebra::{Matrix3, UnitQuaternion};
-
-use self::evidence::Registered;
+use self::register_stop::by_shape;
 use self::surface::StopSurface;
 use self::view::View;
+use super::features::FeatureLocator;
 use super::features::anchor::Carried;
-use super::features::{FeatureEvidence, FeatureLocator};
-use super::shape::{
-    Failure, Mesh, Prior, Region, Registration, RegistrationInput, ShapeSettings, region_radius_m, register,
-};
+use super::shape::{Mesh, Region, ShapeSettings, region_radius_m};
 use super::template::TemplateLocator;
 use super::{DesignateInput, Evidence, LocateInput, Located, Locator, store};
 use crate::camera::Camera;
@@ -62,8 +62,6 @@ use crate::stages::capture::Capture;
 const MEASURED_WITHIN_M: f64 = 0.9;
 /// Half the width of what cannot be measured, m (R200).
 const HALF_WIDTH_M: f64 = 0.25;
-/// Attitude since the designation as the features carry it, 1σ about each axis, deg: several times what they err by.
-const FEATURES_ATTITUDE_DEG: f64 = 0.2;
 
 /// The target by the shape of its surroundings at every stop (Deans et al. 2005).
 #[derive(Clone, Copy, Debug)]
@@ -246,234 +244,4 @@ fn locate(input: &LocateInput<'_>, base: Option<Located>, asked: Option<String>,
     }
     located.evidence = Evidence::Shape(Box::new(evidence));
     located
-}
-
-/// The target by registration; none where that is not to be used, and why is in the evidence.
-fn by_shape(input: &LocateInput<'_>, base: &Located, evidence: &mut ShapeEvidence) -> Option<Located> {
-    let views = &input.target.views;
-    let is_hand_off = input.place.is_hand_over && views.last.is_some();
-    let Some(view) = (if is_hand_off { &views.last } else { &views.first }) else {
-        evidence.missing = Some("the surface of the first view is not known".to_owned());
-        return None;
-    };
-    let settings = &input.settings.shape;
-    let begin = Start::new(input, base, view, evidence.features.as_deref(), is_hand_off);
-    let expected = begin.position;
-    let sigma_m = begin.prior.target_m2.symmetric_eigenvalues().max().max(0.0).sqrt();
-    let search_m = settings.search_m(sigma_m, view.half_width_m);
-    let registration = ShapeSettings { search_half_range_m: Some(search_m), ..settings.registration() };
-    let cameras = [&input.pointing.left, &input.pointing.right];
-    let look = Look { capture: input.capture, cameras, shared: input.shared, settings: input.settings };
-    let surface = match look.surface(&expected) {
-        Ok(surface) => surface,
-        Err(why) => {
-            evidence.missing = Some(why);
-            return None;
-        }
-    };
-    let mesh = surface.mesh(&region(expected, view.half_width_m, &registration), settings);
-    note(evidence, &surface, &mesh);
-    let start = view.start_from(begin.fixed_from_moving, &expected);
-    let found = register(
-        &RegistrationInput {
-            fixed: &view.mesh,
-            moving: &mesh,
-            start_fixed_from_moving: &start,
-            target_in_fixed: &view.position_in_rover,
-            half_width_m: view.half_width_m,
-            prior: Some(begin.prior).filter(|_| settings.shape_prior),
-            sensor: None,
-        },
-        &registration,
-    );
-    let mut target =
-        (found.failure.is_none()).then(|| carried(&found, view, &mesh, settings.carried_ray)).flatten();
-    let mut registered = registered(&found, view, (&expected, is_hand_off), &registration);
-    if is_hand_off && settings.hand_off_picture && is_left_to_the_picture(found.failure.as_ref()) {
-        target = by_picture(input, view, &found, &mut registered).or(target);
-    }
-    if let Some(target) = &target {
-        registered.correction_m = Some((target.position - expected).norm());
-        registered.ray = target.ray;
-    }
-    evidence.registration = Some(registered);
-    evidence.arrays.add(&found, [&view.mesh, &mesh], &found.fixed_from_moving.inverse());
-    // Kept with the position that this stop ends with.
-    evidence.view = Some(Arc::new(View {
-        step: input.place.step,
-        site_from_rover: *input.site_from_rover,
-        position_in_rover: expected,
-        covariance_in_rover: input.prediction.covariance_in_rover,
-        ray: None,
-        half_width_m: view.half_width_m,
-        mesh,
-        left: cameras[0].clone(),
-        image: Arc::clone(&input.capture.pair.left),
-    }));
-    let target = target?;
-    Some(Located {
-        left_pixel: cameras[0].project(&target.position),
-        right_pixel: cameras[1].project(&target.position),
-        position_in_rover: Some(target.position),
-        covariance_in_rover: Some(target.covariance),
-        confidence: found.agreement[2].map_or(0.0, |agreement| agreement.overlap),
-        ..Located::default()
-    })
-}
-
-/// Where the target is thought to be before it is registered.
-struct Start {
-    /// Position, m, present rover frame.
-    position: Point3,
-    /// How the present rover frame is turned in that of the earlier view.
-    fixed_from_moving: UnitQuaternion<f64>,
-    /// How well both are known.
-    prior: Prior,
-}
-
-impl Start {
-    /// By the features where they are sure, else by dead reckoning; where cameras change, by the rover that stands still.
-    fn new(
-        input: &LocateInput<'_>,
-        base: &Located,
-        view: &View,
-        features: Option<&FeatureEvidence>,
-        is_hand_off: bool,
-    ) -> Self {
-        let settings = &input.settings.shape;
-        let prediction = input.prediction;
-        // Wheels slip and gyros jump by more than their model says; beyond the basin nothing would be found anyway (R155).
-        let basin_m2 = (view.half_width_m / 2.0).powi(2);
-        let by_poses = view.turn_to(input.site_from_rover);
-        if is_hand_off {
-            let target_m2 = Matrix3::identity() * settings.hand_off_shift_m.powi(2);
-            let prior = Prior { target_m2, attitude_rad: settings.hand_off_turn_deg.to_radians() };
-            return Self { position: prediction.position_in_rover, fixed_from_moving: by_poses, prior };
-        }
-        let by_features = base.position_in_rover.zip(base.covariance_in_rover);
-        let carried = features.and_then(|features| features.carried);
-        match by_features.zip(carried).filter(|_| base.confidence >= least_confidence(input)) {
-            Some(((position, target_m2), carried)) => Self {
-                position,
-                fixed_from_moving: carried.now_from_first.inverse(),
-                prior: Prior { target_m2, attitude_rad: FEATURES_ATTITUDE_DEG.to_radians() },
-            },
-            None => Self {
-                position: prediction.position_in_rover,
-                fixed_from_moving: by_poses,
-                prior: Prior {
-                    target_m2: prediction.covariance_in_rover + Matrix3::identity() * basin_m2,
-                    attitude_rad: settings.shape_attitude_deg.to_radians(),
-                },
-            },
-        }
-    }
-}
-
-/// Whether a picture may decide: the surfaces fit, though they may let the target slide.
-const fn is_left_to_the_picture(failure: Option<&Failure>) -> bool {
-    matches!(
-        failure,
-        None | Some(
-            Failure::NotEnoughShape { .. } | Failure::NotIsolated { .. } | Failure::AtSearchEdge { .. }
-        )
-    )
-}
-
-/// The target in the present image by the earlier one draped over the surface; none where it is not found.
-fn by_picture(
-    input: &LocateInput<'_>,
-    view: &View,
-    found: &Registration,
-    registered: &mut Registered,
-) -> Option<CarriedTarget> {
-    let settings = &input.settings.shape;
-    let covariance = &found.covariance_in_moving?;
-    let drape = drape::DrapeInput {
-        view,
-        fixed_from_moving: &found.fixed_from_moving,
-        registered: &found.target_in_moving,
-        covariance,
-        camera: &input.pointing.left,
-        image: &input.capture.pair.left,
-        window_px: settings.hand_off_window_px,
-        score_min: settings.hand_off_score_min,
-    };
-    match drape::drape(&drape) {
-        Ok((position, covariance, draped)) => {
-            registered.add_picture(draped, &covariance, settings.hand_off_score_min);
-            let covariance = covariance + view_covariance(found, view);
-            Some(CarriedTarget { position, covariance, ray: None })
-        }
-        Err(why) => {
-            registered.draped_missing = Some(why);
-            None
-        }
-    }
-}
-
-/// The covariance that the target had in the earlier view, turned into the present rover frame, m².
-fn view_covariance(found: &Registration, view: &View) -> Matrix3<f64> {
-    let turn = found.fixed_from_moving.rotation.inverse().to_rotation_matrix();
-    turn.matrix() * view.covariance_in_rover * turn.matrix().transpose()
-}
-
-/// A target that a registration carried here.
-struct CarriedTarget {
-    position: Point3,
-    covariance: Matrix3<f64>,
-    ray: Option<carried_ray::RayMeeting>,
-}
-
-/// The target in the present rover frame; none where the registration has no covariance.
-fn carried(found: &Registration, view: &View, mesh: &Mesh, with_ray: bool) -> Option<CarriedTarget> {
-    let covariance = found.covariance_in_moving? + view_covariance(found, view);
-    let registered = found.target_in_moving;
-    let met = view.ray.as_ref().filter(|_| with_ray).and_then(|ray| {
-        let (fixed_from_moving, half_width_m) = (&found.fixed_from_moving, view.half_width_m);
-        carried_ray::meet(
-            &carried_ray::Carried { ray, fixed_from_moving, registered, covariance, half_width_m },
-            mesh,
-        )
-    });
-    Some(met.map_or(CarriedTarget { position: registered, covariance, ray: None }, |met| CarriedTarget {
-        position: met.position,
-        covariance: met.covariance,
-        ray: Some(met.meeting),
-    }))
-}
-
-/// A registration in numbers.
-fn registered(
-    found: &Registration,
-    view: &View,
-    (expected, is_hand_off): (&Point3, bool),
-    settings: &ShapeSettings,
-) -> Registered {
-    let sigmas_m = found.covariance_in_moving.map(|covariance| {
-        let mut squares: [f64; 3] = covariance.symmetric_eigenvalues().into();
-        squares.sort_by(|a, b| b.total_cmp(a));
-        squares.map(|square| square.max(0.0).sqrt())
-    });
-    Registered {
-        to_step: view.step,
-        is_hand_off,
-        method: settings.method,
-        half_width_m: view.half_width_m,
-        sensor_side_m: found.sensor.map(|sensor| sensor.pixel_m(1.0) * sensor.width as f64),
-        start_in_rover: expected.coords.into(),
-        correction_m: None,
-        coarse_shift_m: found.coarse.best.map(|best| best.shift_m),
-        search_m: settings.search_half_range_m.unwrap_or(view.half_width_m),
-        mean_m: found.agreement.map(|agreement| agreement.map(|agreement| agreement.mean_m)),
-        evaluations: found.path.last().map_or(0, |step| step.evaluations),
-        turn_deg: found.turn_rad.to_degrees(),
-        sigmas_m,
-        ray: None,
-        draped: None,
-        draped_missing: None,
-        checks: evidence::checks(found, view.half_width_m, settings),
-        failure: found.failure,
-        reason: found.failure.map(|failure| failure.to_string()),
-    }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use super::*;
+use super::evidence::Registered;
 use crate::frames::{Pixel, Pose};
 use crate::locate::features::FeatureSettings;
 use crate::pipeline::Stops;
