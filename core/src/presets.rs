@@ -14,8 +14,8 @@ pub struct Preset {
     pub name: &'static str,
     /// One sentence that says what it does, with its source.
     pub description: &'static str,
-    /// Whether it begins with [`AS_PUBLISHED`].
-    as_published: bool,
+    /// What it begins with, as others do.
+    base: &'static [&'static str],
     /// What it changes, as `key=value`.
     changes: &'static [&'static str],
 }
@@ -29,11 +29,42 @@ const fn published(
     description: &'static str,
     changes: &'static [&'static str],
 ) -> Preset {
-    Preset { name, description, as_published: true, changes }
+    Preset { name, description, base: &AS_PUBLISHED, changes }
 }
 
 const fn ours(name: &'static str, description: &'static str, changes: &'static [&'static str]) -> Preset {
-    Preset { name, description, as_published: false, changes }
+    Preset { name, description, base: &[], changes }
+}
+
+/// Features weighed by range, over the last three good stops.
+const FEATURES: [&str; 6] = [
+    "sift_contrast_min=0.015",
+    "n_retry=100",
+    "motion_gate=mahalanobis",
+    "feature_sigma_px=0.15",
+    "feature_sigma_per_scale=0.08",
+    "feature_common_px=0.65",
+];
+
+/// Features as the K9 rover had them (D§2).
+const FEATURES_PAPER: [&str; 8] = [
+    "sift_contrast_min=0.015",
+    "n_retry=100",
+    "stereo_along_curve=false",
+    "ratio_max=1",
+    "mutual_matches=false",
+    "motion_weighting=none",
+    "feature_memory=1",
+    "noise_model=half_pixel",
+];
+
+const fn following(
+    base: &'static [&'static str],
+    name: &'static str,
+    description: &'static str,
+    changes: &'static [&'static str],
+) -> Preset {
+    Preset { name, description, base, changes }
 }
 
 /// Every preset, in the order in which they are listed.
@@ -132,67 +163,39 @@ pub const PRESETS: &[Preset] = &[
         "The defaults, and of the template and the two before it the one that scores best.",
         &["reference_templates=3"],
     ),
-    ours(
+    following(
+        &FEATURES,
         "features",
         "The motion of the whole scene by its features, weighed by range, over the last three good stops.",
-        &[
-            "tracker=features",
-            "sift_contrast_min=0.015",
-            "n_retry=100",
-            "motion_gate=mahalanobis",
-            "feature_sigma_px=0.15",
-            "feature_sigma_per_scale=0.08",
-            "feature_common_px=0.65",
-        ],
+        &["tracker=features"],
     ),
-    ours(
+    following(
+        &FEATURES_PAPER,
         "features-paper",
         "Features as the K9 rover had them: no constraint on matches, 3 cm, half a pixel, one stop (D§2).",
-        &[
-            "tracker=features",
-            "sift_contrast_min=0.015",
-            "n_retry=100",
-            "stereo_along_curve=false",
-            "ratio_max=1",
-            "mutual_matches=false",
-            "motion_weighting=none",
-            "feature_memory=1",
-            "noise_model=half_pixel",
-        ],
+        &["tracker=features"],
     ),
     ours(
         "shape",
         "The shape of the target's surroundings, registered to the first view at every stop (R189).",
         &["tracker=shape"],
     ),
-    ours(
+    following(
+        &FEATURES,
         "combined",
         "Features on the way, the shape at the end, and the target where the first line of sight meets the near surface.",
-        &[
-            "tracker=combined",
-            "sift_contrast_min=0.015",
-            "n_retry=100",
-            "motion_gate=mahalanobis",
-            "feature_sigma_px=0.15",
-            "feature_sigma_per_scale=0.08",
-            "feature_common_px=0.65",
-        ],
+        &["tracker=combined"],
     ),
-    ours(
+    following(
+        &FEATURES_PAPER,
         "combined-paper",
-        "The same as the K9 rover had it: its features, a simplex over absolute differences, no ray (D§2, D§4).",
+        "The same as the K9 rover had it: its features, a simplex over absolute differences, no ray, no picture (D§2, D§4).",
         &[
             "tracker=combined",
-            "sift_contrast_min=0.015",
-            "n_retry=100",
-            "stereo_along_curve=false",
-            "ratio_max=1",
-            "mutual_matches=false",
-            "motion_weighting=none",
-            "feature_memory=1",
-            "noise_model=half_pixel",
             "shape_method=simplex_l1",
+            "shape_prior=false",
             "carried_ray=false",
+            "hand_off_picture=false",
         ],
     ),
     ours(
@@ -208,8 +211,7 @@ impl Preset {
     /// # Errors
     /// None for a preset of [`PRESETS`]; a test holds that.
     pub fn changes(&self) -> Result<Changes> {
-        let published: &[&str] = if self.as_published { &AS_PUBLISHED } else { &[] };
-        published.iter().chain(self.changes).map(|text| parse_assignment(text)).collect()
+        self.base.iter().chain(self.changes).map(|text| parse_assignment(text)).collect()
     }
 
     /// The settings it stands for.
