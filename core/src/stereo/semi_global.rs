@@ -28,9 +28,9 @@
 
 use pulp::{Arch, Simd, WithSimd};
 
-use super::census;
+use super::census::{Planes, WHOLE, costs};
 use super::lanes::{Block, LANES, Row, blocks, blocks_mut, least_u8};
-use super::row::{Pixel, RowResult};
+use super::row::RowResult;
 use super::scene::Scene;
 use super::settings::{StereoPaths, StereoSettings};
 use super::subpixel::three_along_row;
@@ -78,18 +78,18 @@ impl Ring {
         Self { base: shift * height, shift, cells: row, floors: vec![0; places] }
     }
 
-    /// The cells to write for pixel `x`, and those of the place after it with their margin.
+    /// The cells to write for pixel `x`, and those that its path comes from, for a large step of the price `large`.
     #[inline(always)]
-    fn open(&mut self, x: usize, cells: usize) -> (&mut [u8], &[u8]) {
+    fn open<const N: usize>(
+        &mut self,
+        x: usize,
+        [large, small]: [u8; 2],
+    ) -> (&mut [Block<u8>; N], Before<'_, N>) {
+        let (cells, floor) = (N * LANES, self.floors[self.base.wrapping_add(x).wrapping_add(1)]);
         let (place, block) = (self.base.wrapping_add(x), LANES.wrapping_add(cells));
         let (before, after) = self.cells.values_mut().split_at_mut(place.wrapping_add(1).wrapping_mul(block));
         let start = before.len().wrapping_sub(cells);
-        (&mut before[start..], after)
-    }
-
-    #[inline(always)]
-    fn floor(&self, x: usize) -> u8 {
-        self.floors[self.base.wrapping_add(x).wrapping_add(1)]
+        (blocks_mut(&mut before[start..], 0), Before::new(after, floor, large, small))
     }
 
     #[inline(always)]
@@ -145,6 +145,8 @@ fn lower(low: &mut Block<u8>, cells: &Block<u8>) {
 
 /// The state of a pass.
 struct Pass {
+    /// The bits of the row, on the left and on the right.
+    bits: [Planes<WHOLE>; 2],
     rings: [Ring; ABOVE],
     /// L from the side: two pixels in turn, with margins.
     side: [Row<u8>; 2],
@@ -163,13 +165,14 @@ impl Pass {
         let mut start = Row::new(cells + 2 * LANES, u8::MAX);
         start.values_mut()[LANES..LANES + cells].fill(0);
         Self {
+            bits: [Planes::new(&scene.left, 0), Planes::new(&scene.right, scene.margin)],
             rings: [2, 1, 0].map(|shift| Ring::new([width, height], cells, shift)),
             side: [start.clone(), start.clone()],
             start,
             costs: Row::new(width * cells, 0),
             sums: Row::new(width * cells, 0),
             large: std::array::from_fn(|_| vec![0; width]),
-            right: RightWinners::new(scene.right.stride),
+            right: RightWinners::new(scene.right_stride()),
         }
     }
 
@@ -178,6 +181,8 @@ impl Pass {
         for ring in &mut self.rings {
             ring.base -= ring.shift;
         }
+        self.bits[0].take(&scene.left, y);
+        self.bits[1].take(&scene.right, y);
         Arch::new().dispatch(Begin { scene, pass: self, y, from_y });
     }
 }
@@ -217,14 +222,14 @@ pub(super) fn match_rows<const N: usize>(scene: &Scene<'_>, mut take: impl FnMut
     if eight {
         for (y, keep) in (0..height).rev().zip(below.rchunks_exact_mut(width * scene.cells)) {
             pass.begin(scene, y, Some(y + 1).filter(|y| *y < height));
-            Arch::new().dispatch(FromLeft::<N> { scene, pass: &mut pass, y, side_counts: false });
+            Arch::new().dispatch(FromLeft::<N> { scene, pass: &mut pass, side_counts: false });
             keep.copy_from_slice(pass.sums.values());
         }
         pass = Pass::new(scene);
     }
     for y in 0..height {
         pass.begin(scene, y, y.checked_sub(1));
-        Arch::new().dispatch(FromLeft::<N> { scene, pass: &mut pass, y, side_counts: true });
+        Arch::new().dispatch(FromLeft::<N> { scene, pass: &mut pass, side_counts: true });
         if eight {
             let row = &below[y * width * scene.cells..][..width * scene.cells];
             for (sum, below) in pass.sums.values_mut().iter_mut().zip(row) {
@@ -240,7 +245,6 @@ pub(super) fn match_rows<const N: usize>(scene: &Scene<'_>, mut take: impl FnMut
 struct FromLeft<'a, const N: usize> {
     scene: &'a Scene<'a>,
     pass: &'a mut Pass,
-    y: usize,
     /// Whether the path from the left is part of the sums.
     side_counts: bool,
 }
@@ -250,56 +254,50 @@ impl<const N: usize> WithSimd for FromLeft<'_, N> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { scene, pass, y, side_counts } = self;
+        let Self { scene, pass, side_counts } = self;
         let width = scene.size[0];
-        let right = scene.right.row(y);
-        let left = scene.left.row(y).map(|plane| &plane[scene.left.margin..][..width]);
-        let (small, cells, counted) =
-            (scene.settings.small_step as u8, N * LANES, if side_counts { u8::MAX } else { 0 });
-        let Pass { rings: [a, b, c], side: [even, odd], start, costs, sums, large, .. } = pass;
+        let Pass {
+            bits: [left, right],
+            rings: [a, b, c],
+            side: [even, odd],
+            start,
+            costs: row,
+            sums,
+            large,
+            ..
+        } = pass;
+        let (left, (right, is_none)) = (left.views().0.map(|plane| &plane[..width]), right.views());
+        let beyond = blocks(scene.beyond_costs.values(), 0);
+        let (small, counted) = (scene.settings.small_step as u8, if side_counts { u8::MAX } else { 0 });
         let large = large.each_ref().map(|row| &row[..width]);
-        let rows = costs.values_mut().chunks_exact_mut(cells).zip(sums.values_mut().chunks_exact_mut(cells));
+        let (row, _) = row.values_mut().as_chunks_mut::<LANES>().0.as_chunks_mut::<N>();
+        let (sums, _) = sums.values_mut().as_chunks_mut::<LANES>().0.as_chunks_mut::<N>();
         let mut floor = 0;
-        for (x, (cost, sums)) in (0..width).zip(rows) {
-            let (cost, sums): (&mut [Block<u8>; N], &mut [Block<u16>; N]) =
-                (blocks_mut(cost, 0), blocks_mut(sums, 0));
+        for (x, (cost, sums)) in (0..width).zip(row.iter_mut().zip(sums)) {
             let bits = std::array::from_fn(|k| left[k][x]);
-            census::costs(
-                bits,
-                &right,
-                scene.first.wrapping_sub(x),
-                blocks(scene.beyond_costs.values(), 0),
-                cost,
-            );
+            costs(bits, (&right, is_none), scene.first.wrapping_sub(x), beyond, cost);
             let (to, from) = if x % 2 == 0 { (&mut *even, &*odd) } else { (&mut *odd, &*even) };
             let from = if x == 0 { start.values() } else { from.values() };
             let s_to: &mut [Block<u8>; N] = blocks_mut(to.values_mut(), LANES);
             let s_from = Before::<N>::new(from, floor, large[0][x], small);
-            let floors = [a.floor(x), b.floor(x), c.floor(x)];
-            let ((a_to, a_from), (b_to, b_from), (c_to, c_from)) =
-                (a.open(x, cells), b.open(x, cells), c.open(x, cells));
-            let a_from = Before::<N>::new(a_from, floors[0], large[1][x], small);
-            let b_from = Before::<N>::new(b_from, floors[1], large[2][x], small);
-            let c_from = Before::<N>::new(c_from, floors[2], large[3][x], small);
-            let [a_to, b_to, c_to] = [a_to, b_to, c_to].map(|to| blocks_mut::<N, _>(to, 0));
-            let (mut low_s, mut low_a, mut low_b, mut low_c) =
-                ([u8::MAX; LANES], [u8::MAX; LANES], [u8::MAX; LANES], [u8::MAX; LANES]);
+            let (a_to, a_from) = a.open::<N>(x, [large[1][x], small]);
+            let (b_to, b_from) = b.open::<N>(x, [large[2][x], small]);
+            let (c_to, c_from) = c.open::<N>(x, [large[3][x], small]);
+            let [mut low_s, mut low_a, mut low_b, mut low_c] = [[u8::MAX; LANES]; 4];
             for k in 0..N {
-                let (s, a, b, c) = (
-                    s_from.step(k, &cost[k]),
-                    a_from.step(k, &cost[k]),
-                    b_from.step(k, &cost[k]),
-                    c_from.step(k, &cost[k]),
-                );
-                sums[k] = sum_of(&s, [&a, &b, &c], counted);
+                let (s, a) = (s_from.step(k, &cost[k]), a_from.step(k, &cost[k]));
+                let (b, c) = (b_from.step(k, &cost[k]), c_from.step(k, &cost[k]));
+                let mut sum = [0; LANES];
+                for i in 0..LANES {
+                    let above = u16::from(a[i]).wrapping_add(u16::from(b[i])).wrapping_add(u16::from(c[i]));
+                    sum[i] = above.wrapping_add(u16::from(s[i] & counted));
+                }
+                sums[k] = sum;
                 lower(&mut low_s, &s);
                 lower(&mut low_a, &a);
                 lower(&mut low_b, &b);
                 lower(&mut low_c, &c);
-                s_to[k] = s;
-                a_to[k] = a;
-                b_to[k] = b;
-                c_to[k] = c;
+                (s_to[k], a_to[k], b_to[k], c_to[k]) = (s, a, b, c);
             }
             floor = least_u8(simd, &low_s);
             a.close(x, least_u8(simd, &low_a));
@@ -307,17 +305,6 @@ impl<const N: usize> WithSimd for FromLeft<'_, N> {
             c.close(x, least_u8(simd, &low_c));
         }
     }
-}
-
-/// The sum over the paths from the row above and, where it counts, that from the side.
-#[inline(always)]
-fn sum_of(side: &[u8; LANES], [a, b, c]: [&[u8; LANES]; 3], counted: u8) -> [u16; LANES] {
-    let mut sum = [0; LANES];
-    for i in 0..LANES {
-        let above = u16::from(a[i]).wrapping_add(u16::from(b[i])).wrapping_add(u16::from(c[i]));
-        sum[i] = above.wrapping_add(u16::from(side[i] & counted));
-    }
-    sum
 }
 
 /// From right to left: the last path, and what wins.
@@ -341,34 +328,32 @@ impl<const N: usize> WithSimd for FromRight<'_, N> {
         let pixels = &mut result.pixels[..width];
         right.clear();
         let mut floor = 0;
-        let rows = costs.values().chunks_exact(cells).zip(sums.values_mut().chunks_exact_mut(cells));
+        let rows = costs.values().chunks_exact(cells).zip(sums.values().chunks_exact(cells));
         for (x, (cost, sums)) in (0..width).zip(rows).rev() {
-            let (cost, sums): (&[Block<u8>; N], &mut [Block<u16>; N]) =
-                (blocks(cost, 0), blocks_mut(sums, 0));
+            let (cost, sums): (&[Block<u8>; N], &[Block<u16>; N]) = (blocks(cost, 0), blocks(sums, 0));
             let (to, from) = if x % 2 == 0 { (&mut *even, &*odd) } else { (&mut *odd, &*even) };
             let is_last = x + 1 == width;
             let from = if is_last { start.values() } else { from.values() };
             let step = if is_last { large[x] } else { large[x + 1] };
             let before = Before::<N>::new(from, floor, step, small);
             let to: &mut [Block<u8>; N] = blocks_mut(to.values_mut(), LANES);
-            let mut low = [u8::MAX; LANES];
+            let (mut low, mut whole) = ([u8::MAX; LANES], [[0u16; LANES]; N]);
             for k in 0..N {
                 let l = before.step(k, &cost[k]);
                 lower(&mut low, &l);
                 to[k] = l;
-                let mut whole = [0; LANES];
                 for i in 0..LANES {
-                    whole[i] = sums[k][i].wrapping_add(u16::from(l[i])) | beyond[k][i];
+                    whole[k][i] = sums[k][i].wrapping_add(u16::from(l[i])) | beyond[k][i];
                 }
-                sums[k] = whole;
             }
             floor = least_u8(simd, &low);
-            right.offer(scene.first.wrapping_sub(x), sums);
-            pixels[x] = Pixel::of(winner(simd, sums), sums, scene.count);
+            right.offer(scene.first.wrapping_sub(x), &whole);
+            pixels[x] = winner(simd, &whole, scene.rival_share);
         }
         for (x, pixel) in (0..width).zip(pixels.iter_mut()) {
-            result.right_index[x] = right.index(scene.first - x + pixel.index());
             pixel.refine(three_along_row(costs.values(), [width, cells], x, pixel.index()));
         }
+        right.settle();
+        result.see_right(right.indices(), scene.first);
     }
 }

@@ -48,19 +48,23 @@ fn pair([width, height]: [u32; 2], disparity: impl Fn(f64, f64) -> f64) -> [Gray
     [left, right]
 }
 
-/// The cost of every cell, bit by bit.
-fn cost(left: &GrayImage, right: &GrayImage, [x, y]: [i32; 2], disparity: i32) -> u32 {
+/// The cost of a cell, bit by bit; block matching looks at the black squares of 7 × 7 alone.
+fn cost([left, right]: [&GrayImage; 2], [x, y]: [i32; 2], disparity: i32, method: StereoMethod) -> u32 {
+    let is_block = method == StereoMethod::BlockMatching;
     let at = |image: &GrayImage, x: i32, y: i32| {
         let x = x.clamp(0, image.width() as i32 - 1);
         image.get_pixel(x as u32, y.clamp(0, image.height() as i32 - 1) as u32)[0]
     };
     let partner = x - disparity;
     if partner < 0 || partner >= right.width() as i32 {
-        return 24;
+        return if is_block { 9 } else { 24 };
     }
     let mut bits = 0;
     for dy in -3..=3 {
-        for dx in -4..=4 {
+        for dx in -4..=4_i32 {
+            if is_block && (dx.abs() == 4 || (dx + dy) % 2 != 0) {
+                continue;
+            }
             let is_brighter = |image: &GrayImage, x: i32| at(image, x + dx, y + dy) > at(image, x, y);
             bits += u32::from(is_brighter(left, x) != is_brighter(right, partner));
         }
@@ -121,13 +125,15 @@ fn window_sums(costs: &[Vec<u32>], [width, height]: [i32; 2], half: i32) -> Vec<
 
 /// What wins when everything is summed one by one: whole disparities, and the partners' own.
 fn expected(images: [&GrayImage; 2], settings: &StereoSettings) -> Vec<usize> {
-    let [left, right] = images;
+    let [left, _] = images;
     let (width, height) = (left.width() as i32, left.height() as i32);
     let count = settings.disparity_count as i32;
     let costs: Vec<Vec<u32>> = (0..width * height)
         .map(|at| {
             let pixel = [at % width, at / width];
-            (0..count).map(|d| cost(left, right, pixel, d + settings.disparity_first_px)).collect()
+            (0..count)
+                .map(|d| cost(images, pixel, d + settings.disparity_first_px, settings.method))
+                .collect()
         })
         .collect();
     let sums = match settings.method {
@@ -142,12 +148,12 @@ fn found(images: [&GrayImage; 2], settings: &StereoSettings) -> Vec<usize> {
     let scene = Scene::new(images[0], images[1], settings);
     let mut found = Vec::new();
     let take = |_: usize, row: &RowResult| found.extend(row.pixels.iter().map(|pixel| pixel.index()));
-    let rows = 0..scene.size[1];
+    let (rows, mut band) = (0..scene.size[1], block_matching::Band::new(&scene));
     match (settings.method, scene.cells) {
         (StereoMethod::SemiGlobal, 64) => semi_global::match_rows::<1>(&scene, take),
         (StereoMethod::SemiGlobal, _) => semi_global::match_rows::<2>(&scene, take),
-        (StereoMethod::BlockMatching, 64) => block_matching::match_rows::<1>(&scene, rows, take),
-        (StereoMethod::BlockMatching, _) => block_matching::match_rows::<2>(&scene, rows, take),
+        (StereoMethod::BlockMatching, 64) => block_matching::match_rows::<1>(&scene, &mut band, rows, take),
+        (StereoMethod::BlockMatching, _) => block_matching::match_rows::<2>(&scene, &mut band, rows, take),
     }
     found
 }
@@ -171,6 +177,46 @@ fn both_methods_find_what_sums_taken_one_by_one_find() {
                     (expected([&left, &right], &settings), found([&left, &right], &settings));
                 let wrong = expected.iter().zip(&found).filter(|(a, b)| a != b).count();
                 assert_eq!(wrong, 0, "{method:?} {paths:?} from {first}, {count}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_winner_is_unique_where_all_but_its_neighbours_cost_more_by_the_share_that_is_asked_for() {
+    /// The winner of sums, found by whatever vectors the processor has.
+    struct Found<'a>(&'a [[u16; 64]; 2], u64);
+    impl pulp::WithSimd for Found<'_> {
+        type Output = row::Pixel;
+        #[inline(always)]
+        fn with_simd<S: pulp::Simd>(self, simd: S) -> row::Pixel {
+            winner::winner(simd, self.0, self.1)
+        }
+    }
+    let share = winner::rival_share(0.05);
+    for at in [0, 1, 31, 32, 63, 64, 65, 126, 127_usize] {
+        // 1000 / 0.95 is 1052.6: from 1053 on nothing is a rival; neighbours never are.
+        for (rival, is_unique) in [(1000, false), (1052, false), (1053, true)] {
+            for rival_at in (0..128_usize).filter(|rival_at| rival_at.abs_diff(at) > 1) {
+                let mut cells = [2000_u16; 128];
+                (cells[rival_at], cells[at]) = (rival.max(1001), 1000);
+                let beside = [at.wrapping_sub(1), at + 1];
+                beside.into_iter().filter(|at| *at < 128).for_each(|beside| cells[beside] = 1001);
+                if rival == 1000 && rival_at > at {
+                    cells[rival_at] = 1000;
+                }
+                let cells = bytemuck::cast(cells);
+                let simd = pulp::Arch::new().dispatch(Found(&cells, share));
+                let scalar = pulp::WithSimd::with_simd(Found(&cells, share), pulp::Scalar);
+                for pixel in [simd, scalar] {
+                    assert_eq!(
+                        (pixel.index(), pixel.is_unique()),
+                        (at, is_unique),
+                        "{at} {rival_at} {rival}"
+                    );
+                    let has_both = (1..127).contains(&at);
+                    assert_eq!(pixel.three(), has_both.then_some([1001, 1000, 1001]));
+                }
             }
         }
     }
