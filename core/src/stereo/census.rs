@@ -7,9 +7,9 @@
 //! | for | o_k | planes | C |
 //! |---|---|---|---|
 //! | semi-global matching | the other pixels of 9 × 7 | [`WHOLE`] | 0 … 62 |
-//! | block matching | of those of 7 × 7 the ones with o_x + o_y even, as the black squares of a chessboard | [`BLACK`] | 0 … 24 |
+//! | block matching | of these every second column of the middle row and of the rows 1 and 3 beside it | [`SPARSE`] | 0 … 24 |
 //!
-//! A window sums the bits of its pixels, and what one of them leaves out its neighbours look at: the black squares are
+//! A window sums the bits of its pixels, and what one of them leaves out its neighbours look at: a part of the pixels is
 //! enough there (ours; docs/stereo.md has the figures).
 //!
 //! The bits of a row lie in planes of bytes, so that sixty-four disparities are compared side by side: the right
@@ -27,7 +27,7 @@
 //! | symbol | our name | unit |
 //! |---|---|---|
 //! | I | [`Sixteen`], 16 bits | full scale / 65535 |
-//! | C | [`costs`], [`black_costs`] | bits |
+//! | C | [`costs`], [`sparse_costs`] | bits |
 
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
@@ -38,7 +38,7 @@ use crate::image::GrayImage;
 /// Planes of 62 bits.
 pub(super) const WHOLE: usize = 8;
 /// Planes of 24 bits.
-pub(super) const BLACK: usize = 3;
+pub(super) const SPARSE: usize = 3;
 /// What a cell costs whose partner is none, of 62 bits and of 24.
 const COST_NONE: [u8; 2] = [24, 9];
 /// How far the widest census reaches to the sides and up and down, px.
@@ -125,9 +125,10 @@ impl WithSimd for Convert<'_> {
 /// The other pixels that each of `P` planes looks at; where one has fewer than eight, the pixel itself, which is never brighter.
 fn pattern<const P: usize>() -> [[[isize; 2]; 8]; P] {
     let mut pattern = [[[0; 2]; 8]; P];
-    let [reach_x, reach_y] = if P == BLACK { [3, 3] } else { REACH.map(|reach| reach as isize) };
+    let [reach_x, reach_y] = REACH.map(|reach| reach as isize);
+    let is_sparse = |x: isize, y: isize| x % 2 == 0 && (y == 0 || y % 2 != 0);
     let pixels = (-reach_y..=reach_y).flat_map(|y| (-reach_x..=reach_x).map(move |x| [x, y]));
-    let others = pixels.filter(|[x, y]| [*x, *y] != [0, 0] && (P != BLACK || (x + y) % 2 == 0));
+    let others = pixels.filter(|[x, y]| [*x, *y] != [0, 0] && (P != SPARSE || is_sparse(*x, *y)));
     for (place, other) in pattern.as_flattened_mut().iter_mut().zip(others) {
         *place = other;
     }
@@ -242,15 +243,15 @@ pub(super) fn costs<const N: usize>(
     }
 }
 
-/// The same by the black squares, without `beyond`.
+/// The same by the planes of block matching, without `beyond`.
 #[inline(always)]
-pub(super) fn black_costs<const N: usize>(
-    left: [u8; BLACK],
-    (right, is_none): (&[&[u8]; BLACK], &[u8]),
+pub(super) fn sparse_costs<const N: usize>(
+    left: [u8; SPARSE],
+    (right, is_none): (&[&[u8]; SPARSE], &[u8]),
     at: usize,
     out: &mut [Block<u8>; N],
 ) {
-    let [p0, p1, p2]: [&[Block<u8>; N]; BLACK] =
+    let [p0, p1, p2]: [&[Block<u8>; N]; SPARSE] =
         [blocks(right[0], at), blocks(right[1], at), blocks(right[2], at)];
     let none: &[Block<u8>; N] = blocks(is_none, at);
     for k in 0..N {

@@ -82,6 +82,39 @@ pub(super) fn blocks_mut<const N: usize, T>(values: &mut [T], at: usize) -> &mut
     }
 }
 
+/// Bytes that follow each other in blocks, each with the one before it: the last of `before`, and all of `here` but the last.
+#[inline(always)]
+pub(super) fn moved_up<S: Simd>(simd: S, before: &[u8; LANES], here: &[u8; LANES]) -> [u8; LANES] {
+    #[cfg(target_arch = "x86_64")]
+    if size_of::<S::u8s>() == 64 {
+        let v4 = same::<S, V4>(simd);
+        let [before, here] = [before, here].map(|bytes| bytemuck::cast(Line(*bytes)));
+        // First by whole quarters, then within them.
+        let quarters = v4.avx512f._mm512_alignr_epi32::<12>(here, before);
+        let Line(moved) = bytemuck::cast(v4.avx512bw._mm512_alignr_epi8::<15>(here, quarters));
+        return moved;
+    }
+    let mut moved = [before[LANES - 1]; LANES];
+    moved[1..].copy_from_slice(&here[..LANES - 1]);
+    moved
+}
+
+/// The same with the one after it: all of `here` but the first, and the first of `after`.
+#[inline(always)]
+pub(super) fn moved_down<S: Simd>(simd: S, here: &[u8; LANES], after: &[u8; LANES]) -> [u8; LANES] {
+    #[cfg(target_arch = "x86_64")]
+    if size_of::<S::u8s>() == 64 {
+        let v4 = same::<S, V4>(simd);
+        let [here, after] = [here, after].map(|bytes| bytemuck::cast(Line(*bytes)));
+        let quarters = v4.avx512f._mm512_alignr_epi32::<4>(after, here);
+        let Line(moved) = bytemuck::cast(v4.avx512bw._mm512_alignr_epi8::<1>(quarters, here));
+        return moved;
+    }
+    let mut moved = [after[0]; LANES];
+    moved[..LANES - 1].copy_from_slice(&here[1..]);
+    moved
+}
+
 /// The least of bytes.
 #[inline(always)]
 pub(super) fn least_u8<S: Simd>(simd: S, values: &[u8; LANES]) -> u8 {
@@ -118,12 +151,8 @@ pub(super) fn least_u16<S: Simd>(simd: S, values: &[u16; LANES]) -> u16 {
 /// Which numbers are at most `limit`: the first one's bit is the lowest.
 #[inline(always)]
 pub(super) fn at_most<S: Simd>(simd: S, values: &[u16; LANES], limit: u16) -> u64 {
-    let (mut low, mut high) = ([0; 32], [0; 32]);
-    for i in 0..32 {
-        low[i] = values[i];
-        high[i] = values[i + 32];
-    }
-    u64::from(half_at_most(simd, low, limit)) | (u64::from(half_at_most(simd, high, limit)) << 32)
+    let (halves, _) = values.as_chunks();
+    u64::from(half_at_most(simd, halves[0], limit)) | (u64::from(half_at_most(simd, halves[1], limit)) << 32)
 }
 
 /// The same of half as many.

@@ -48,7 +48,7 @@ fn pair([width, height]: [u32; 2], disparity: impl Fn(f64, f64) -> f64) -> [Gray
     [left, right]
 }
 
-/// The cost of a cell, bit by bit; block matching looks at the black squares of 7 × 7 alone.
+/// The cost of a cell, bit by bit; block matching looks at a part of the pixels.
 fn cost([left, right]: [&GrayImage; 2], [x, y]: [i32; 2], disparity: i32, method: StereoMethod) -> u32 {
     let is_block = method == StereoMethod::BlockMatching;
     let at = |image: &GrayImage, x: i32, y: i32| {
@@ -62,7 +62,7 @@ fn cost([left, right]: [&GrayImage; 2], [x, y]: [i32; 2], disparity: i32, method
     let mut bits = 0;
     for dy in -3..=3 {
         for dx in -4..=4_i32 {
-            if is_block && (dx.abs() == 4 || (dx + dy) % 2 != 0) {
+            if is_block && (dx % 2 != 0 || (dy % 2 == 0 && dy != 0)) {
                 continue;
             }
             let is_brighter = |image: &GrayImage, x: i32| at(image, x + dx, y + dy) > at(image, x, y);
