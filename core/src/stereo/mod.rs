@@ -6,8 +6,8 @@
 //! | file | what it does |
 //! |---|---|
 //! | `align` | two linear cameras whose rows agree, and the images as they see them |
-//! | `scene` | what both methods read |
 //! | `census` | the surroundings of a pixel in bits, and how many of them differ: the cost of a disparity |
+//! | `scene` | what both methods read |
 //! | `block_matching` | sums of costs over a window |
 //! | `semi_global` | sums of costs along paths |
 //! | `winner`, `row` | the cheapest disparity, seen from both eyes |
@@ -42,6 +42,8 @@ mod speckle;
 mod ranges;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod vector_tests;
 #[cfg(test)]
 mod rendered_tests;
 #[cfg(test)]

@@ -183,46 +183,6 @@ fn both_methods_find_what_sums_taken_one_by_one_find() {
 }
 
 #[test]
-fn a_winner_is_unique_where_all_but_its_neighbours_cost_more_by_the_share_that_is_asked_for() {
-    /// The winner of sums, found by whatever vectors the processor has.
-    struct Found<'a>(&'a [[u16; 64]; 2], u64);
-    impl pulp::WithSimd for Found<'_> {
-        type Output = row::Pixel;
-        #[inline(always)]
-        fn with_simd<S: pulp::Simd>(self, simd: S) -> row::Pixel {
-            winner::winner(simd, self.0, self.1)
-        }
-    }
-    let share = winner::rival_share(0.05);
-    for at in [0, 1, 31, 32, 63, 64, 65, 126, 127_usize] {
-        // 1000 / 0.95 is 1052.6: from 1053 on nothing is a rival; neighbours never are.
-        for (rival, is_unique) in [(1000, false), (1052, false), (1053, true)] {
-            for rival_at in (0..128_usize).filter(|rival_at| rival_at.abs_diff(at) > 1) {
-                let mut cells = [2000_u16; 128];
-                (cells[rival_at], cells[at]) = (rival.max(1001), 1000);
-                let beside = [at.wrapping_sub(1), at + 1];
-                beside.into_iter().filter(|at| *at < 128).for_each(|beside| cells[beside] = 1001);
-                if rival == 1000 && rival_at > at {
-                    cells[rival_at] = 1000;
-                }
-                let cells = bytemuck::cast(cells);
-                let simd = pulp::Arch::new().dispatch(Found(&cells, share));
-                let scalar = pulp::WithSimd::with_simd(Found(&cells, share), pulp::Scalar);
-                for pixel in [simd, scalar] {
-                    assert_eq!(
-                        (pixel.index(), pixel.is_unique()),
-                        (at, is_unique),
-                        "{at} {rival_at} {rival}"
-                    );
-                    let has_both = (1..127).contains(&at);
-                    assert_eq!(pixel.three(), has_both.then_some([1001, 1000, 1001]));
-                }
-            }
-        }
-    }
-}
-
-#[test]
 fn a_slanted_surface_has_its_disparity_below_the_pixel() {
     let truth = |x: f64, y: f64| 9.3 + 0.031 * x + 0.017 * y;
     let [left, right] = pair([200, 120], truth);
