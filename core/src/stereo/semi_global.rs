@@ -357,6 +357,7 @@ impl<const N: usize> WithSimd for FromRight<'_, N> {
             let (cost, sums): (&[Block<u8>; N], &[Block<u16>; N]) = (blocks(cost, 0), blocks(sums, 0));
             let step = if x + 1 == width { large[x] } else { large[x + 1] };
             let (mut to, before) = ([[0; LANES]; N], side.before([step, small]));
+            // Sums in an array of their own become vectors; those of the row would be looked at one by one.
             let (mut low, mut whole) = ([u8::MAX; LANES], [[0u16; LANES]; N]);
             for k in 0..N {
                 let l = before.step(k, &cost[k]);
