@@ -94,6 +94,8 @@ pub(super) fn moved_up<S: Simd>(simd: S, before: &[u8; LANES], here: &[u8; LANES
         let Line(moved) = bytemuck::cast(v4.avx512bw._mm512_alignr_epi8::<15>(here, quarters));
         return moved;
     }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = simd;
     let mut moved = [before[LANES - 1]; LANES];
     moved[1..].copy_from_slice(&here[..LANES - 1]);
     moved
@@ -110,6 +112,8 @@ pub(super) fn moved_down<S: Simd>(simd: S, here: &[u8; LANES], after: &[u8; LANE
         let Line(moved) = bytemuck::cast(v4.avx512bw._mm512_alignr_epi8::<1>(quarters, here));
         return moved;
     }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = simd;
     let mut moved = [after[0]; LANES];
     moved[..LANES - 1].copy_from_slice(&here[1..]);
     moved
