@@ -27,9 +27,13 @@ macro_rules! aligned {
 }
 
 aligned! {
+    FewBytes([u8; 16], 16);
+}
+
+#[cfg(target_arch = "x86_64")]
+aligned! {
     Words([u16; 32], 64);
     Marks([u8; 32], 32);
-    FewBytes([u8; 16], 16);
     FewWords([u16; 8], 16);
 }
 
