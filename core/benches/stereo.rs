@@ -1,28 +1,30 @@
 //! Speed of dense stereo against what the processor can do.
 //!
-//! **The bound.** 1024 × 1024 pixels with 128 disparities are 134 M cells; a 512-bit vector holds 64 of bytes, 32 of sums.
-//! Vector operations for 64 cells, as the code has them:
+//! **The bound.** 1024 × 1024 pixels with 128 disparities are 134 M cells in 2.1 M blocks of 64; a 512-bit vector holds 64 of
+//! bytes, 32 of sums. The headers of `core/src/stereo/block_matching.rs` and `semi_global.rs` count the vector operations of a block:
 //!
-//! | work | operations | bytes that come from the second cache |
-//! |---|---|---|
-//! | bits that differ, by a carry-save adder and four counts | 55 | 576, of which a pixel's neighbour reads all but 9 again |
-//! | one path: three loads, two sums, four least, store | 11; five of them 55 | 64 read, 64 written for each of the three from above |
-//! | sums, the least, its place, the second | 40 | 128 read, 128 written |
-//! | the right image's winners | 16 | – |
-//! | block matching beside bits and winners: a row more and less, a column more and less | 26 | 64 + 128 + 256 |
+//! | method | operations a block, and a pixel more | at four a cycle of 4.1 GHz | stores a block, at one a cycle | bytes held |
+//! |---|---|---|---|---|
+//! | block matching | 52, 20 | 8 ms | 9, 5 ms | 1.4 MB of costs, 0.3 MB of V |
+//! | semi-global | 134, 75 | 22 ms | 10, 5 ms | 0.6 MB of L, 0.4 MB of costs and sums |
 //!
-//! Semi-global: 166 operations, block matching 137, for each of 2.1 M blocks. A core that does four vector operations a cycle at
-//! 4.1 GHz takes 21 ms and 18 ms; the least of a vector (11 a block of pixels, not of cells) is
-//! about 40 operations a pixel more, 2.5 ms. Some 600 bytes a block from the second cache, at the 28 bytes a cycle that were seen in `zncc`,
-//! take 11 ms beside it.
+//! Beside it stand, pixel by pixel and not disparity by disparity: the bits (3 and 8 planes of two images), texture, checks,
+//! patches.
 //!
-//! **Reached.** docs/stereo.md; `cargo xtask bench --peers` holds both methods against OpenCV's on the same pair.
+//! **Reached.** One thread, quickest of many runs: block matching 43 ms, of which 25 are the sweep; semi-global 85 ms, of
+//! which 33 are the way to the right and 29 the way back. Both sweeps are three times their bound: besides vectors they
+//! compare lengths and fill addresses (about half of the instructions), and what a row reads lies in the second cache and, for the
+//! costs of block matching, beyond it. On the way back each pixel waits for the least L of the one before, some 45 cycles or
+//! 11 ms. `cargo xtask bench --peers` holds both methods against OpenCV's on the same pair; docs/stereo.md has the figures.
 //!
 //! Run with `cargo bench -p sightline-core --profile dev --bench stereo` (the profile `dev` is optimised).
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use image::Luma;
+use image::imageops::{FilterType, resize};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 use sightline_core::camera::{Mast, MastAngles};
 use sightline_core::image::GrayImage;
 use sightline_core::stereo::{StereoMethod, StereoPaths, StereoSettings, dense_stereo, disparities};
@@ -33,27 +35,18 @@ fn main() {
     divan::main();
 }
 
-fn hash(x: u32, y: u32) -> f64 {
-    let mut h = x.wrapping_mul(0x9E37_79B1) ^ y.wrapping_mul(0x85EB_CA77);
-    h = (h ^ (h >> 15)).wrapping_mul(0x2C1B_3C6D);
-    f64::from(h ^ (h >> 13)) / f64::from(u32::MAX)
-}
-
-/// Hashed values between which is interpolated, every 4, 8 … 64 pixels.
-fn scene(x: u32, y: u32) -> f32 {
-    let noise = |spacing: u32| {
-        let (u, v) = (f64::from(x % spacing), f64::from(y % spacing));
-        let (u, v) = (u / f64::from(spacing), v / f64::from(spacing));
-        let at = |i: u32, j: u32| hash((x / spacing + i) * 97 + spacing, y / spacing + j) - 0.5;
-        let along = |j: u32| at(0, j) * (1.0 - u) + at(1, j) * u;
-        along(0) * (1.0 - v) + along(1) * v
-    };
-    (0.5 + (2..7).map(|octave| 0.45 * noise(1 << octave)).sum::<f64>()) as f32
-}
-
-/// A pair with 16 to 101 px of disparity.
+/// A pair with 16 to 101 px of disparity: random values between which is interpolated, every 4, 8 … 64 pixels.
 fn pair() -> [GrayImage; 2] {
-    let image = |shift: fn(u32) -> u32| GrayImage::from_fn(SIDE, SIDE, |x, y| Luma([scene(x + shift(y), y)]));
+    let (width, mut random) = (SIDE + 128, Pcg64::seed_from_u64(1));
+    let mut wide = GrayImage::from_pixel(width, SIDE, Luma([-0.625]));
+    for octave in 2..7 {
+        let random = |_, _| Luma([random.random::<f32>()]);
+        let grid = GrayImage::from_fn(width >> octave, SIDE >> octave, random);
+        let smooth = resize(&grid, width, SIDE, FilterType::Triangle);
+        wide.iter_mut().zip(smooth.iter()).for_each(|(sum, value)| *sum += 0.45 * value);
+    }
+    let image =
+        |shift: fn(u32) -> u32| GrayImage::from_fn(SIDE, SIDE, |x, y| *wide.get_pixel(x + shift(y), y));
     [image(|_| 0), image(|y| 16 + y / 12)]
 }
 

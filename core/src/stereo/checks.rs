@@ -6,8 +6,6 @@
 //! d_R is what the right image's pixel finds among the same sums. Where a surface is hidden from the right eye, its
 //! pixels meet others that are seen better by their own partners.
 
-use super::census::PLANES;
-use super::lanes::LANES;
 use super::row::RowResult;
 use super::scene::Scene;
 use super::subpixel::fraction;
@@ -22,17 +20,17 @@ pub(super) fn finish_row(
     outcomes: &mut [Outcome],
 ) {
     let settings = scene.settings;
-    let left_is_none = &scene.left.row(y)[PLANES][LANES..];
-    let right_is_none = scene.right.row(y)[PLANES];
-    let (texture_min, uniqueness) = (settings.texture_min as f32, settings.uniqueness_min as f32);
+    let (left_is_none, right_is_none) = (scene.left.is_none(y), scene.right.is_none(y));
+    let (texture_min, has_rivals) = (settings.texture_min as f32, settings.uniqueness_min > 0.0);
     let apart_max = settings.left_right_max_px;
     for (x, pixel) in row.pixels.iter().enumerate() {
         let apart = pixel.index().abs_diff(usize::from(row.right_index[x])) as f64;
-        outcomes[x] = if left_is_none[x] != 0 || right_is_none[scene.first - x + pixel.index()] != 0 {
+        let partner = (scene.first + pixel.index()).wrapping_sub(x + scene.margin);
+        outcomes[x] = if left_is_none[x] != 0 || right_is_none.get(partner).is_none_or(|none| *none != 0) {
             Outcome::Outside
         } else if texture.get(x).is_some_and(|texture| *texture < texture_min) {
             Outcome::NoTexture
-        } else if !pixel.is_unique(uniqueness) {
+        } else if has_rivals && !pixel.is_unique() {
             Outcome::NotUnique
         } else if apart_max >= 0.0 && apart > apart_max {
             Outcome::LeftRight

@@ -6,8 +6,8 @@
 //! | file | what it does |
 //! |---|---|
 //! | `align` | two linear cameras whose rows agree, and the images as they see them |
-//! | `scene` | what both methods read |
 //! | `census` | the surroundings of a pixel in bits, and how many of them differ: the cost of a disparity |
+//! | `scene` | what both methods read |
 //! | `block_matching` | sums of costs over a window |
 //! | `semi_global` | sums of costs along paths |
 //! | `winner`, `row` | the cheapest disparity, seen from both eyes |
@@ -42,6 +42,8 @@ mod speckle;
 mod ranges;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod vector_tests;
 #[cfg(test)]
 mod rendered_tests;
 #[cfg(test)]
@@ -204,10 +206,11 @@ fn match_all<const N: usize>(scene: &Scene<'_>, texture: &[f32], map: &mut Dispa
         StereoMethod::BlockMatching => {
             let band = block_matching::BAND * width;
             let bands = map.disparity_px.par_chunks_mut(band).zip(map.outcome.par_chunks_mut(band));
-            bands.enumerate().for_each(|(number, (disparities, outcomes))| {
+            let room = || block_matching::Band::new(scene);
+            bands.enumerate().for_each_init(room, |room, (number, (disparities, outcomes))| {
                 let first = number * block_matching::BAND;
                 let rows = first..first + disparities.len() / width;
-                block_matching::match_rows::<N>(scene, rows, |y, row: &RowResult| {
+                block_matching::match_rows::<N>(scene, room, rows, |y, row: &RowResult| {
                     let at = (y - first) * width..(y - first + 1) * width;
                     let (disparities, outcomes) = (&mut disparities[at.clone()], &mut outcomes[at]);
                     checks::finish_row(scene, (y, row), of_row(y), disparities, outcomes);

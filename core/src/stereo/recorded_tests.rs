@@ -22,6 +22,20 @@ const BAD_PX: f64 = 2.0;
 #[derive(Deserialize)]
 struct Reference {
     rows: Vec<ReferenceRow>,
+    street: Vec<StreetRow>,
+}
+
+/// What OpenCV finds of a street, and how much of that agrees with the next frame.
+#[derive(Deserialize)]
+struct StreetRow {
+    matcher: String,
+    found: f64,
+    within_1: f64,
+    within_3: f64,
+}
+
+fn reference() -> Reference {
+    serde_json::from_str(include_str!("../../../tests/reference/stereo_reference.json")).unwrap()
 }
 
 #[derive(Deserialize)]
@@ -91,9 +105,7 @@ fn portable_floatmap(path: &Path, width: usize) -> Vec<f32> {
 
 /// Our two methods beside their counterparts; every figure no worse.
 fn compare(pair: &str, [left, right]: [&GrayImage; 2], truth: &[f32]) {
-    let text = include_str!("../../../tests/reference/stereo_reference.json");
-    let reference: Reference = serde_json::from_str(text).unwrap();
-    let rows: Vec<ReferenceRow> = reference.rows.into_iter().filter(|row| row.pair == pair).collect();
+    let rows: Vec<ReferenceRow> = reference().rows.into_iter().filter(|row| row.pair == pair).collect();
     assert!(!rows.is_empty(), "{pair}");
     for row in rows {
         let is_block = row.matcher.starts_with("StereoBM");
@@ -206,9 +218,10 @@ fn a_street_is_consistent_from_eye_to_eye_and_from_frame_to_frame() {
     });
     let cameras = read_cameras(&folder.join("calib.txt"), frames[0][0].dimensions().into()).unwrap();
     let poses = read_poses(&folder.join("poses.txt")).unwrap();
-    for (method, found_min, within_min) in
-        [(StereoMethod::SemiGlobal, 0.6, 0.95), (StereoMethod::BlockMatching, 0.6, 0.95)]
+    for (method, counterpart) in
+        [(StereoMethod::SemiGlobal, "StereoSGBM"), (StereoMethod::BlockMatching, "StereoBM")]
     {
+        let theirs = reference().street.into_iter().find(|row| row.matcher == counterpart).unwrap();
         let settings =
             StereoSettings { method, disparity_count: 96, range_max_m: 1000.0, ..StereoSettings::default() };
         let [before, after] = frames
@@ -219,14 +232,19 @@ fn a_street_is_consistent_from_eye_to_eye_and_from_frame_to_frame() {
         let [within_1, within_3] = reprojected([&before, &after], &(poses[1].inverse() * poses[0]));
         println!(
             "KITTI, {method:?}: found {:.3}, eyes disagree {:.3}, not unique {:.3}, no texture {:.3}, speckle {:.3}, outside \
-             {:.3}; carried to the next frame {within_1:.3} within 1 px, {within_3:.3} within 3 px",
+             {:.3}; carried to the next frame {within_1:.3} within 1 px, {within_3:.3} within 3 px; \
+             {counterpart}: {:.3}, {:.3}, {:.3}",
             share(Outcome::Found),
             share(Outcome::LeftRight),
             share(Outcome::NotUnique),
             share(Outcome::NoTexture),
             share(Outcome::Speckle),
             share(Outcome::Outside),
+            theirs.found,
+            theirs.within_1,
+            theirs.within_3,
         );
-        assert!(share(Outcome::Found) > found_min && within_3 > within_min, "{method:?}");
+        // Half a percent is a few hundred points, as many as change sides with a setting.
+        assert!(share(Outcome::Found) > 0.6 && within_3 > theirs.within_3 - 0.005, "{method:?}");
     }
 }

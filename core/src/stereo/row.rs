@@ -1,34 +1,21 @@
 //! What a row of pixels found, before anything is checked.
 
-use super::lanes::Block;
-use super::winner::Winner;
-
 /// What a pixel of the left image found.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Pixel {
     index: u16,
-    least: u16,
-    second: u16,
-    /// The sums of the disparities before and after; `u16::MAX` where there is none.
-    beside: [u16; 2],
+    /// The sums of the disparity before, its own, and the one after; `u16::MAX` where there is none.
+    three: [u16; 3],
+    is_unique: bool,
     /// Sums that tell the fraction better.
     fine: Option<[u16; 3]>,
 }
 
 impl Pixel {
-    /// The winner among the first `count` of `cells`.
+    /// The winner's place, the sums before, at and after it, and whether no other is nearly as good.
     #[inline(always)]
-    pub(super) fn of<const N: usize>(won: Winner, cells: &[Block<u16>; N], count: usize) -> Self {
-        let cells = cells.as_flattened();
-        let before = if won.index > 0 { cells[won.index - 1] } else { u16::MAX };
-        let after = if won.index + 1 < count { cells[won.index + 1] } else { u16::MAX };
-        Self {
-            index: won.index as u16,
-            least: won.least,
-            second: won.second,
-            beside: [before, after],
-            fine: None,
-        }
+    pub(super) fn new(index: u16, three: [u16; 3], is_unique: bool) -> Self {
+        Self { index, three, is_unique, fine: None }
     }
 
     /// The place among the disparities.
@@ -43,18 +30,17 @@ impl Pixel {
         self.fine = three;
     }
 
-    /// Whether it is better than any that is no neighbour by the share `least` (0: off).
+    /// Whether no other disparity but its neighbours is nearly as good.
     #[inline(always)]
-    pub(super) fn is_unique(self, least: f32) -> bool {
-        least <= 0.0 || f32::from(self.least) < (1.0 - least) * f32::from(self.second)
+    pub(super) fn is_unique(self) -> bool {
+        self.is_unique
     }
 
     /// The sums of the disparities before, at, and after the winner; `None` at either end of the range.
     #[inline(always)]
     pub(super) fn three(self) -> Option<[u16; 3]> {
-        let [before, after] = self.beside;
-        let has_both = before != u16::MAX && after != u16::MAX;
-        has_both.then_some(self.fine.unwrap_or([before, self.least, after]))
+        let has_both = self.three[0] != u16::MAX && self.three[2] != u16::MAX;
+        has_both.then_some(self.fine.unwrap_or(self.three))
     }
 }
 
@@ -69,5 +55,13 @@ pub(super) struct RowResult {
 impl RowResult {
     pub(super) fn new(width: usize) -> Self {
         Self { pixels: vec![Pixel::default(); width], right_index: vec![0; width] }
+    }
+
+    /// Takes what the right image's pixels found, in the mirrored order of its planes; the partners of pixel 0 begin at `first`.
+    #[inline(always)]
+    pub(super) fn see_right(&mut self, indices: &[u16], first: usize) {
+        for (x, (pixel, right)) in self.pixels.iter().zip(&mut self.right_index).enumerate() {
+            *right = indices[(first - x) + pixel.index()];
+        }
     }
 }

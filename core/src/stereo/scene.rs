@@ -1,8 +1,9 @@
-//! What both methods read: the bits of an aligned pair, and where disparities lie among them.
+//! What both methods read: an aligned pair in whole numbers, and where disparities lie among its pixels.
 
-use super::census::Bits;
+use super::census::Sixteen;
 use super::lanes::{LANES, Row};
 use super::settings::StereoSettings;
+use super::winner::rival_share;
 use crate::image::GrayImage;
 
 /// An aligned pair, ready to be matched.
@@ -11,20 +12,22 @@ pub(super) struct Scene<'a> {
     pub(super) image: &'a GrayImage,
     /// Its columns and rows.
     pub(super) size: [usize; 2],
-    /// Its bits.
-    pub(super) left: Bits,
-    /// Those of the right image, mirrored.
-    pub(super) right: Bits,
-    /// Where the partners of pixel 0 begin in a mirrored row; those of pixel x begin x before it.
+    /// The left image in whole numbers.
+    pub(super) left: Sixteen,
+    /// The right one, mirrored.
+    pub(super) right: Sixteen,
+    /// Bytes before the first pixel of a mirrored row, and behind its last one.
+    pub(super) margin: usize,
+    /// Where the partners of pixel 0 begin in a mirrored row with its margin; those of pixel x begin x before it.
     pub(super) first: usize,
-    /// Disparities.
-    pub(super) count: usize,
     /// Their cells: 64, 128, 256 or 512.
     pub(super) cells: usize,
     /// 0 for the disparities that are asked for, 65535 for those that fill the last block.
     pub(super) beyond: Row<u16>,
     /// 0 and 255 alike, for their costs.
     pub(super) beyond_costs: Row<u8>,
+    /// By which share another sum must exceed the least one, in 65536ths.
+    pub(super) rival_share: u64,
     pub(super) settings: &'a StereoSettings,
 }
 
@@ -41,19 +44,25 @@ impl<'a> Scene<'a> {
         beyond.values_mut()[count..].fill(u16::MAX);
         let mut beyond_costs = Row::new(cells, 0);
         beyond_costs.values_mut()[count..].fill(u8::MAX);
-        let (left_bits, right_bits) =
-            rayon::join(|| Bits::of(left, false, LANES), || Bits::of(right, true, margin));
+        let (left_values, right_values) =
+            rayon::join(|| Sixteen::of(left, false), || Sixteen::of(right, true));
         Self {
             image: left,
             size: [left_width, left.height() as usize],
-            left: left_bits,
-            right: right_bits,
+            left: left_values,
+            right: right_values,
+            margin,
             first: (margin + right_width - 1).wrapping_add_signed(first_px),
-            count,
             cells,
             beyond,
             beyond_costs,
+            rival_share: rival_share(settings.uniqueness_min),
             settings,
         }
+    }
+
+    /// Bytes of a mirrored row with its margins.
+    pub(super) fn right_stride(&self) -> usize {
+        self.right.is_none(0).len().next_multiple_of(LANES) + 2 * self.margin
     }
 }

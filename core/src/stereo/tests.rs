@@ -48,19 +48,23 @@ fn pair([width, height]: [u32; 2], disparity: impl Fn(f64, f64) -> f64) -> [Gray
     [left, right]
 }
 
-/// The cost of every cell, bit by bit.
-fn cost(left: &GrayImage, right: &GrayImage, [x, y]: [i32; 2], disparity: i32) -> u32 {
+/// The cost of a cell, bit by bit; block matching looks at a part of the pixels.
+fn cost([left, right]: [&GrayImage; 2], [x, y]: [i32; 2], disparity: i32, method: StereoMethod) -> u32 {
+    let is_block = method == StereoMethod::BlockMatching;
     let at = |image: &GrayImage, x: i32, y: i32| {
         let x = x.clamp(0, image.width() as i32 - 1);
         image.get_pixel(x as u32, y.clamp(0, image.height() as i32 - 1) as u32)[0]
     };
     let partner = x - disparity;
     if partner < 0 || partner >= right.width() as i32 {
-        return 24;
+        return if is_block { 9 } else { 24 };
     }
     let mut bits = 0;
     for dy in -3..=3 {
-        for dx in -4..=4 {
+        for dx in -4..=4_i32 {
+            if is_block && (dx % 2 != 0 || (dy % 2 == 0 && dy != 0)) {
+                continue;
+            }
             let is_brighter = |image: &GrayImage, x: i32| at(image, x + dx, y + dy) > at(image, x, y);
             bits += u32::from(is_brighter(left, x) != is_brighter(right, partner));
         }
@@ -121,13 +125,15 @@ fn window_sums(costs: &[Vec<u32>], [width, height]: [i32; 2], half: i32) -> Vec<
 
 /// What wins when everything is summed one by one: whole disparities, and the partners' own.
 fn expected(images: [&GrayImage; 2], settings: &StereoSettings) -> Vec<usize> {
-    let [left, right] = images;
+    let [left, _] = images;
     let (width, height) = (left.width() as i32, left.height() as i32);
     let count = settings.disparity_count as i32;
     let costs: Vec<Vec<u32>> = (0..width * height)
         .map(|at| {
             let pixel = [at % width, at / width];
-            (0..count).map(|d| cost(left, right, pixel, d + settings.disparity_first_px)).collect()
+            (0..count)
+                .map(|d| cost(images, pixel, d + settings.disparity_first_px, settings.method))
+                .collect()
         })
         .collect();
     let sums = match settings.method {
@@ -142,12 +148,12 @@ fn found(images: [&GrayImage; 2], settings: &StereoSettings) -> Vec<usize> {
     let scene = Scene::new(images[0], images[1], settings);
     let mut found = Vec::new();
     let take = |_: usize, row: &RowResult| found.extend(row.pixels.iter().map(|pixel| pixel.index()));
-    let rows = 0..scene.size[1];
+    let (rows, mut band) = (0..scene.size[1], block_matching::Band::new(&scene));
     match (settings.method, scene.cells) {
         (StereoMethod::SemiGlobal, 64) => semi_global::match_rows::<1>(&scene, take),
         (StereoMethod::SemiGlobal, _) => semi_global::match_rows::<2>(&scene, take),
-        (StereoMethod::BlockMatching, 64) => block_matching::match_rows::<1>(&scene, rows, take),
-        (StereoMethod::BlockMatching, _) => block_matching::match_rows::<2>(&scene, rows, take),
+        (StereoMethod::BlockMatching, 64) => block_matching::match_rows::<1>(&scene, &mut band, rows, take),
+        (StereoMethod::BlockMatching, _) => block_matching::match_rows::<2>(&scene, &mut band, rows, take),
     }
     found
 }

@@ -6,6 +6,7 @@
 //! At the border the window is cut. Sums run over whole numbers (full scale 65535), so that they can be taken from row to
 //! row by one more and one less without an error that adds up. What is invalid has no slope.
 
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use crate::image::GrayImage;
@@ -15,34 +16,76 @@ const HALF: usize = 4;
 /// What 1 becomes.
 const SCALE: f32 = 65535.0;
 
+/// Rows that are made at a time.
+const BAND: usize = 64;
+
 /// t of every pixel, row by row.
 pub(super) fn texture(image: &GrayImage) -> Vec<f32> {
-    let (width, height) = (image.width() as usize, image.height() as usize);
-    let mut along = vec![0u32; width * height];
-    let lines = along.par_chunks_exact_mut(width.max(1)).zip(image.as_raw().par_chunks_exact(width.max(1)));
-    lines.for_each(|(line, row)| {
-        // Casts make 0 of what is not a number.
-        let slope = |x: usize| if x + 1 < width { ((row[x + 1] - row[x]).abs() * SCALE) as u32 } else { 0 };
-        let mut sum: u32 = (0..HALF.min(width)).map(slope).sum();
-        for (x, out) in line.iter_mut().enumerate() {
-            sum += if x + HALF < width { slope(x + HALF) } else { 0 };
-            sum -= if x > HALF { slope(x - HALF - 1) } else { 0 };
-            *out = sum;
-        }
-    });
-    let mut means = vec![0.0; width * height];
-    means.par_chunks_exact_mut(width.max(1)).enumerate().for_each(|(y, out)| {
-        let rows = y.saturating_sub(HALF)..(y + HALF + 1).min(height);
-        let mut sums = vec![0u32; width];
-        for line in rows.clone().map(|y| &along[y * width..][..width]) {
-            for (sum, value) in sums.iter_mut().zip(line) {
-                *sum += value;
-            }
-        }
-        for (x, (out, sum)) in out.iter_mut().zip(sums).enumerate() {
-            let columns = (x + HALF + 1).min(width) - x.saturating_sub(HALF);
-            *out = sum as f32 / (SCALE * (columns * rows.len()) as f32);
-        }
+    let width = image.width() as usize;
+    let mut means = vec![0.0; image.as_raw().len()];
+    means.par_chunks_mut((BAND * width).max(1)).enumerate().for_each(|(band, means)| {
+        Arch::new().dispatch(Band { image, first: band * BAND, means });
     });
     means
+}
+
+/// t of some rows.
+struct Band<'a> {
+    image: &'a GrayImage,
+    /// The first row.
+    first: usize,
+    means: &'a mut [f32],
+}
+
+impl WithSimd for Band<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { image, first, means } = self;
+        let (width, height) = (image.width() as usize, image.height() as usize);
+        let rows = first..first + means.len() / width;
+        // Sums over the rows of the window, with a margin that has no slope, and over its columns as well.
+        let (mut down, mut across) = (vec![0i32; width + 2 * HALF], vec![0i32; width]);
+        let row = |y: usize| &image.as_raw()[y * width..][..width];
+        for y in rows.start.saturating_sub(HALF)..(rows.start + HALF).min(height) {
+            change(row(y), 1, &mut down);
+        }
+        for (y, means) in rows.zip(means.chunks_exact_mut(width)) {
+            if y + HALF < height {
+                change(row(y + HALF), 1, &mut down);
+            }
+            across.fill(0);
+            for shift in 0..=2 * HALF {
+                let down = &down[shift..][..width];
+                for x in 0..width {
+                    across[x] = across[x].wrapping_add(down[x]);
+                }
+            }
+            let count = (y + HALF + 1).min(height) - y.saturating_sub(HALF);
+            let whole = 1.0 / (SCALE * ((2 * HALF + 1) * count) as f32);
+            for x in 0..width {
+                means[x] = across[x] as f32 * whole;
+            }
+            for x in (0..HALF.min(width)).chain(width.saturating_sub(HALF)..width) {
+                let columns = (x + HALF + 1).min(width) - x.saturating_sub(HALF);
+                means[x] = across[x] as f32 / (SCALE * (columns * count) as f32);
+            }
+            if let Some(gone) = y.checked_sub(HALF) {
+                change(row(gone), -1, &mut down);
+            }
+        }
+    }
+}
+
+/// Adds the slopes of a row to the sums, `sign` times.
+#[inline(always)]
+fn change(row: &[f32], sign: i32, sums: &mut [i32]) {
+    let (left, right) = (&row[..row.len() - 1], &row[1..]);
+    let sums = &mut sums[HALF..][..left.len()];
+    for x in 0..left.len() {
+        // The cast makes 0 of what is not a number.
+        let slope = ((right[x] - left[x]).abs() * SCALE) as i32;
+        sums[x] = sums[x].wrapping_add(sign.wrapping_mul(slope));
+    }
 }

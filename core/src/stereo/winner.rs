@@ -1,35 +1,32 @@
-//! The disparity of a pixel: the cheapest, whether it is the only one, and the fraction below a pixel.
+//! The disparity of a pixel: the cheapest, and whether it is the only one.
 //!
 //! ```text
-//! d₁ = argmin S(d)      s₂ = min { S(d) : |d − d₁| > 1 }      unique where  S(d₁) < (1 − u) s₂
+//! d₁ = argmin S(d)      unique where  S(d) > S(d₁) + ⌊S(d₁) u / (1 − u)⌋  for all d with |d − d₁| > 1
 //! ```
 //! | symbol | our name | unit |
 //! |---|---|---|
 //! | S | `cells` | bits, summed over paths or a window |
-//! | d₁ | [`Winner::index`] | px, from the first disparity on |
+//! | d₁ | [`Pixel::index`] | px, from the first disparity on |
 //! | u | `StereoSettings::uniqueness_min` | – |
+//! | u / (1 − u) | [`rival_share`] | 1 / 65536 |
 //!
 //! The same sums serve the right image: those of its pixel q are S(q + d, d), which are met while the left pixels go
 //! by ([`RightWinners`]). Of equal sums the smaller disparity wins on the left; on the right it may be any of them.
 
 use pulp::Simd;
 
-use super::lanes::{Block, LANES, Row, blocks_mut, least_u16};
+use super::lanes::{Block, LANES, Row, at_most, blocks_mut, least_u16};
+use super::row::Pixel;
 
-/// The cheapest disparity of a pixel.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Winner {
-    /// Its place among the disparities.
-    pub(super) index: usize,
-    /// Its sum.
-    pub(super) least: u16,
-    /// The least sum of those that are not next to it.
-    pub(super) second: u16,
+/// By which share of the least sum another one must exceed it, in 65536ths.
+pub(super) fn rival_share(uniqueness_min: f64) -> u64 {
+    // With 1 every sum but zero has rivals.
+    (65536.0 * uniqueness_min / (1.0 - uniqueness_min).max(1e-6)).round() as u64
 }
 
-/// The cheapest of `cells`.
+/// The cheapest of `cells`; those that no disparity belongs to hold `u16::MAX`.
 #[inline(always)]
-pub(super) fn winner<S: Simd, const N: usize>(simd: S, cells: &[Block<u16>; N]) -> Winner {
+pub(super) fn winner<S: Simd, const N: usize>(simd: S, cells: &[Block<u16>; N], rival_share: u64) -> Pixel {
     let mut low = [u16::MAX; LANES];
     for block in cells {
         for i in 0..LANES {
@@ -37,24 +34,21 @@ pub(super) fn winner<S: Simd, const N: usize>(simd: S, cells: &[Block<u16>; N]) 
         }
     }
     let least = least_u16(simd, &low);
-    let mut places = [u16::MAX; LANES];
-    for (k, block) in cells.iter().enumerate() {
-        let first = (k as u16).wrapping_mul(LANES as u16);
-        for i in 0..LANES {
-            let place = first.wrapping_add(i as u16);
-            places[i] = places[i].min(if block[i] == least { place } else { u16::MAX });
-        }
+    let limit = u64::from(least).wrapping_add(u64::from(least).wrapping_mul(rival_share) >> 16);
+    let limit = limit.min(u64::from(u16::MAX - 1)) as u16;
+    let (mut index, mut low_count) = (0, 0);
+    for k in (0..N).rev() {
+        let places = at_most(simd, &cells[k], least);
+        let first = k.wrapping_mul(LANES).wrapping_add(places.trailing_zeros() as usize);
+        index = if places != 0 { first } else { index };
+        low_count += at_most(simd, &cells[k], limit).count_ones();
     }
-    let index = least_u16(simd, &places);
-    let mut others = [u16::MAX; LANES];
-    for (k, block) in cells.iter().enumerate() {
-        let first = (k as u16).wrapping_mul(LANES as u16).wrapping_add(1).wrapping_sub(index);
-        for i in 0..LANES {
-            let off = first.wrapping_add(i as u16);
-            others[i] = others[i].min(if off > 2 { block[i] } else { u16::MAX });
-        }
-    }
-    Winner { index: usize::from(index), least, second: least_u16(simd, &others) }
+    let cells = cells.as_flattened();
+    let before = if index > 0 { cells[index.wrapping_sub(1)] } else { u16::MAX };
+    let after = if index.wrapping_add(1) < cells.len() { cells[index.wrapping_add(1)] } else { u16::MAX };
+    // Of those that are low, itself and its neighbours are no rivals.
+    let own_count = 1 + u32::from(before <= limit) + u32::from(after <= limit);
+    Pixel::new(index as u16, [before, least, after], low_count == own_count)
 }
 
 /// Copies of the right image's winners that take turns: a vector cannot be loaded before what overlaps it is
@@ -97,13 +91,25 @@ impl RightWinners {
         }
     }
 
-    /// The place among the disparities that the pixel at `at` of the mirrored row has.
+    /// Takes the best of all turns, once all left pixels have gone by.
     #[inline(always)]
-    pub(super) fn index(&self, at: usize) -> u16 {
-        let mut best = (u16::MAX, u16::MAX);
-        for turn in 0..TURNS {
-            best = best.min((self.least[turn].values()[at], self.index[turn].values()[at]));
+    pub(super) fn settle(&mut self) {
+        let ([best, least @ ..], [best_index, index @ ..]) = (&mut self.least, &mut self.index);
+        let (best, best_index) = (best.values_mut(), best_index.values_mut());
+        for (least, index) in least.iter().zip(index) {
+            let count = best.len();
+            let (best_index, least, index) =
+                (&mut best_index[..count], &least.values()[..count], &index.values()[..count]);
+            for i in 0..count {
+                best_index[i] = if least[i] < best[i] { index[i] } else { best_index[i] };
+                best[i] = best[i].min(least[i]);
+            }
         }
-        best.1
+    }
+
+    /// After [`Self::settle`], the place among the disparities that each pixel of the mirrored row has.
+    #[inline(always)]
+    pub(super) fn indices(&self) -> &[u16] {
+        self.index[0].values()
     }
 }
