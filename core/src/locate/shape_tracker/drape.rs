@@ -44,7 +44,7 @@ const SHIFT_MAX_PX: f64 = 40.0;
 /// The smallest window that says where it belongs, px.
 const WINDOW_MIN_PX: u32 = 7;
 /// The least cosine between the ray and the plane's normal.
-const GRAZING: f64 = 0.2;
+const GRAZING: f64 = 0.08;
 
 /// The draped picture, found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -264,7 +264,15 @@ impl Surface {
         let scale = 1.0 / area.sqrt().max(1e-6);
         let picture = patch::warp_by(&view.image, scale, size, Kernel::Bicubic, source);
         if !picture.is_complete() {
-            return Err("the earlier image does not show the whole window around the target".to_owned());
+            let half = f64::from(size) / 2.0;
+            let corners = [(-half, -half), (half, -half), (-half, half), (half, half)];
+            let reached = corners.map(|(x, y)| source(Vector2::new(x, y)));
+            let [width, height] = [view.left.width(), view.left.height()];
+            let beyond = reached.iter().flatten().find(|pixel| !pixel.is_inside(width, height));
+            let place = beyond.map_or_else(String::new, |pixel| {
+                format!(": it reaches to ({:.0}, {:.0})", pixel.x, pixel.y)
+            });
+            return Err(format!("the earlier image does not show the whole window around the target{place}"));
         }
         let half = (f64::from(size) - 1.0) / 2.0;
         let places =

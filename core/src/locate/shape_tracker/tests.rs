@@ -25,7 +25,7 @@ struct Scene {
 static SCENE: LazyLock<Scene> = LazyLock::new(|| {
     let mut scenario = library::scenario("k9-5").unwrap();
     (scenario.camera.image_size, scenario.camera.samples_per_axis) = (512, 2);
-    scenario.drive.step_fraction = 0.25;
+    (scenario.drive.step_fraction, scenario.drive.end_distance_m) = (0.2, 3.0);
     (scenario.rocks.area_fraction, scenario.rocks.cluster_count) = (0.02, 0);
     let folder = tempfile::tempdir().unwrap();
     let traverse = create_simulated(&scenario, folder.path()).unwrap();
@@ -68,9 +68,10 @@ fn features_are_followed_on_the_way_and_the_shape_is_asked_at_the_end_and_hands_
     assert_eq!((handed.to_step, handed.is_hand_off), (mast.step, true));
     assert_eq!((&handed.reason, &handed.draped_missing), (&None, &None));
     assert!(handed.draped.as_ref().is_some_and(|draped| draped.score > 0.9));
-    for trace in [mast, hazcam] {
+    // Half a pixel of either camera at this size: a hazcam's pixel is 1.5 cm wide there.
+    for (trace, limit_m) in [(mast, 0.004), (hazcam, 0.008)] {
         assert_eq!(trace.update.state, TrackingState::Tracking, "step {}", trace.step);
-        assert!(error_m(trace) < 0.006, "step {}: {} m", trace.step, error_m(trace));
+        assert!(error_m(trace) < limit_m, "step {}: {} m", trace.step, error_m(trace));
     }
     let target = hazcam.locate.as_ref().unwrap().left_pixel.unwrap();
     assert!(target.distance(hazcam.truth.as_ref().unwrap().left_pixel.unwrap()) < 2.0);
