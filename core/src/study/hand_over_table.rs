@@ -30,11 +30,11 @@ pub fn lines(rows: &[Row], variable: &str) -> Vec<String> {
         return Vec::new();
     }
     let titles = COLUMNS.map(|(title, ..)| format!("{:>22}", format!("{title}, cm")));
-    let head = format!("{:<16} {:<10} {:>6}{}", "configuration", variable, "worlds", titles.concat());
+    let head = format!("{:<24} {:<16} {:>6}{}", "configuration", variable, "worlds", titles.concat());
     let line = |group: &(String, String)| {
         let own: Vec<&Row> = rows.iter().filter(|row| label(row) == *group).collect();
         let cells = COLUMNS.map(|(_, column, tried)| format!("{:>22}", cell(&own, column, tried)));
-        format!("{:<16} {:<10} {:>6}{}", group.0, group.1, own.len(), cells.concat())
+        format!("{:<24} {:<16} {:>6}{}", group.0, group.1, own.len(), cells.concat())
     };
     std::iter::once(head).chain(groups.iter().map(line)).collect()
 }

@@ -31,7 +31,9 @@ pub(super) fn by_shape(
     evidence: &mut ShapeEvidence,
 ) -> Option<Located> {
     let views = &input.target.views;
-    let is_hand_off = input.place.is_hand_over && views.last.is_some();
+    // A target that the stop before did not find may be anywhere: it is looked for by its first view, like any lost one.
+    let is_of_the_stop_before = views.last.as_ref().is_some_and(|last| last.step + 1 == input.place.step);
+    let is_hand_off = input.place.is_hand_over && is_of_the_stop_before;
     let Some(view) = (if is_hand_off { &views.last } else { &views.first }) else {
         evidence.missing = Some("the surface of the first view is not known".to_owned());
         return None;

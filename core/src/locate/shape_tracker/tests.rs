@@ -10,6 +10,8 @@ use crate::presets::preset;
 use crate::session::track;
 use crate::settings::{Settings, TrackerKind};
 use crate::sim::{choose_targets, library};
+use crate::study::point::Visit;
+use crate::study::staged::Staged;
 use crate::target::{Designation, TrackingState};
 use crate::testing::PlaneWorld;
 use crate::trace::StepTrace;
@@ -88,6 +90,19 @@ fn a_drive_without_features_is_dead_reckoned_and_the_shape_finds_the_target_at_i
     assert_eq!((found.to_step, &found.reason), (0, &None));
     assert!(error_m(mast) < 0.01 && error_m(mast) < error_m(before), "{} m", error_m(mast));
     assert_eq!(mast.update.state, TrackingState::Tracking);
+}
+
+#[test]
+fn a_target_lost_beyond_the_basin_is_not_handed_over_as_if_it_stood_where_it_is_thought_to_be() {
+    let mut settings = combined();
+    settings.features = FeatureSettings { features_max: 3, ..settings.features };
+    let staged = Staged::new(&SCENE.traverse, Visit::Every(1)).with_position_jump(0.4);
+    let steps = track::run(&staged, Designation { step: 0, pixel: SCENE.pixel }, &settings).unwrap();
+    let [.., mast, hazcam] = steps.as_slice() else { panic!("too few stops") };
+    assert!(mast.update.state.is_lost() && error_m(mast) > 0.3, "the jump must lead out of the basin");
+    let found = registration(hazcam);
+    assert_eq!((found.to_step, found.is_hand_off), (0, false));
+    assert!(hazcam.update.state.is_lost() || error_m(hazcam) < 0.05, "{} m", error_m(hazcam));
 }
 
 #[test]
