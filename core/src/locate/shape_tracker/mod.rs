@@ -28,6 +28,7 @@ pub mod carried_ray;
 pub mod drape;
 pub mod evidence;
 mod half_width;
+pub mod rows;
 pub mod settings;
 pub mod surface;
 pub mod view;
