@@ -17,14 +17,56 @@ use sightline_tests::rrd;
 
 use super::{FIXTURE, MISSING, promised, sorted};
 
+/// A square of values that grow by one from pixel to pixel; the first does not exist.
+fn picture(columns: u32, first: f32) -> Table {
+    let values = (0..columns * columns).map(|i| if i == 0 { f32::NAN } else { first + i as f32 });
+    Table { columns, values: values.collect() }
+}
+
+/// Whatever the surfaces give a registration.
+fn registered() -> Registered {
+    let check = |name: &str, value: f64, limit: f64| Check {
+        name: name.to_owned(),
+        unit: String::new(),
+        value: Some(value),
+        limit,
+        at_least: false,
+    };
+    Registered {
+        to_step: 0,
+        is_hand_off: true,
+        method: Method::PointToPlane,
+        half_width_m: 0.3,
+        sensor_side_m: Some(0.4),
+        start_in_rover: [4.0, 0.1, 0.2],
+        correction_m: Some(0.02),
+        coarse_shift_m: Some([0.1, -0.1, 0.0]),
+        search_m: 0.1,
+        mean_m: [Some(0.03), Some(0.02), Some(0.01)],
+        evaluations: 5,
+        turn_deg: 0.5,
+        sigmas_m: Some([0.003, 0.002, 0.001]),
+        ray: None,
+        draped: Some(Draped {
+            pixel: Pixel::new(10.0, 10.0),
+            score: 0.875,
+            correction_px: 1.0,
+            covariance_px2: Default::default(),
+            on_mesh: 1.0,
+            picture: picture(3, 0.0),
+            matched: picture(3, 0.0),
+        }),
+        draped_missing: None,
+        checks: vec![check("shape_overlap", 0.5, 0.25), check("shape_misfit", 1.25, 1.8)],
+        failure: None,
+        reason: None,
+    }
+}
+
 /// A surface of two by two pixels, registered with a sensor of four by four and found again at a hand-off.
 fn by_shape(trace: &StepTrace) -> StepTrace {
     let mut trace = trace.clone();
     let (is_pick, Some(located)) = (trace.predict.is_none(), trace.locate.as_mut()) else { return trace };
-    let picture = |columns: u32, first: f32| {
-        let values = (0..columns * columns).map(|i| if i == 0 { f32::NAN } else { first + i as f32 });
-        Table { columns, values: values.collect() }
-    };
     let mut evidence = ShapeEvidence { why: "made up".to_owned(), ..ShapeEvidence::default() };
     evidence.surface = Some(SurfaceSeen {
         size: [2, 2],
@@ -37,42 +79,7 @@ fn by_shape(trace: &StepTrace) -> StepTrace {
     });
     (evidence.arrays.disparities, evidence.arrays.ranges) = (picture(2, 10.0), picture(2, 3.0));
     if !is_pick {
-        let check = |name: &str, value: f64, limit: f64| Check {
-            name: name.to_owned(),
-            unit: String::new(),
-            value: Some(value),
-            limit,
-            at_least: false,
-        };
-        evidence.registration = Some(Registered {
-            to_step: 0,
-            is_hand_off: true,
-            method: Method::PointToPlane,
-            half_width_m: 0.3,
-            sensor_side_m: Some(0.4),
-            start_in_rover: [4.0, 0.1, 0.2],
-            correction_m: Some(0.02),
-            coarse_shift_m: Some([0.1, -0.1, 0.0]),
-            search_m: 0.1,
-            mean_m: [Some(0.03), Some(0.02), Some(0.01)],
-            evaluations: 5,
-            turn_deg: 0.5,
-            sigmas_m: Some([0.003, 0.002, 0.001]),
-            ray: None,
-            draped: Some(Draped {
-                pixel: Pixel::new(10.0, 10.0),
-                score: 0.875,
-                correction_px: 1.0,
-                covariance_px2: Default::default(),
-                on_mesh: 1.0,
-                picture: picture(3, 0.0),
-                matched: picture(3, 0.0),
-            }),
-            draped_missing: None,
-            checks: vec![check("shape_overlap", 0.5, 0.25), check("shape_misfit", 1.25, 1.8)],
-            failure: None,
-            reason: None,
-        });
+        evidence.registration = Some(registered());
         let arrays = &mut evidence.arrays;
         (arrays.sensor, arrays.coarse) = (picture(4, 2.0), picture(3, 0.01));
         arrays.error_before = picture(4, -8.0);

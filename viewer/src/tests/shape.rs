@@ -38,11 +38,8 @@ fn left_image(step: usize) -> Shown<'static> {
 #[test]
 fn the_surface_gives_both_pictures_with_units_and_what_became_of_the_pixels() {
     let shown = part(Part::Surface, 2);
-    shown.says("disparity, px, from 12 px to").says("range from the left camera, m, from");
-    shown
-        .says("80 × 60 px; every 2th pixel is shown")
-        .says("900 vertices, 1700 triangles")
-        .says("2.1 mm rms");
+    shown.says("disparity, px, from 12.0 px to").says("range from the left camera, m, from");
+    shown.says("80 × 60 px; one of 2 × 2 is shown").says("900 vertices, 1700 triangles").says("2.1 mm rms");
     for word in ["found", "outside", "no texture", "not unique", "left–right", "speckle", "out of range"] {
         shown.says(word);
     }
@@ -52,9 +49,9 @@ fn the_surface_gives_both_pictures_with_units_and_what_became_of_the_pixels() {
 #[test]
 fn the_sensor_shows_the_errors_with_one_limit_and_says_what_remained() {
     let shown = part(Part::Sensor, 2);
-    shown.says("earlier surface, depth, from 4 m to 4.150 m");
+    shown.says("earlier surface, depth, from 4.00 m to 4.15 m");
     for title in ["error at the start", "after the coarse search", "at the end"] {
-        shown.says(&format!("{title}, from -10 cm to 10 cm"));
+        shown.says(&format!("{title}, from -10.0 cm to 10.0 cm"));
     }
     shown.says("colours end at ± 10.00 cm").says("at the start, rms").says("98 % of pixels");
     shown.says("registered to step 0; mean distance 31.0 → 8.0 → 4.0 mm; moved the target by 3.2 cm");
@@ -81,7 +78,7 @@ fn a_handle_of_the_histogram_sets_the_limit_of_the_colours_and_a_button_takes_it
     assert!((last - (0.1 - 100.0 * 0.125 / 440.0)).abs() < 0.002, "{last}");
 
     let mut set = with(Part::Sensor, 2, |state| state.shape_view.error_limit_m = Some(0.02));
-    set.says("colours end at ± 2.00 cm").says("at the end, from -2 cm to 2 cm");
+    set.says("colours end at ± 2.00 cm").says("at the end, from -2.00 cm to 2.00 cm");
     let back = Command::SetShapeView(ShapeView { part: Part::Sensor, ..ShapeView::default() });
     assert_eq!(set.click("Automatic limit"), vec![back]);
 }
@@ -89,7 +86,9 @@ fn a_handle_of_the_histogram_sets_the_limit_of_the_colours_and_a_button_takes_it
 #[test]
 fn the_search_gives_its_range_its_best_and_the_way_of_the_refinement() {
     let shown = part(Part::Search, 2);
-    shown.says("9 × 9 shifts of 43.").says("mm, to ± 17.5 cm, as far as the start can be off; half width 25.0 cm");
+    shown
+        .says("9 × 9 shifts of 43.")
+        .says("mm, to ± 17.5 cm, as far as the start can be off; half width 25.0 cm");
     shown.says("best at Δx +4.4, Δy -8.8, Δz +1.0 cm").says("basin: the rock’s half width");
     shown.says("refinement (simplex)").says("restart 1").says("evaluation 50: 1.33 mm; shift +5.00");
 }

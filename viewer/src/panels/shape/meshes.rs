@@ -22,6 +22,8 @@ const PURPOSE: &str = "Both surfaces as meshes, and how they lie on each other."
 const FACETS: usize = 6000;
 /// The least part of them that is left to the earlier mesh.
 const LEAST: usize = 1500;
+/// Of the earlier mesh only what lies this near the target is drawn, as a share of the side that the sensor spans.
+const NEAR: f64 = 0.75;
 /// Standard deviations of the axes that are drawn.
 const SIGMAS: f64 = 3.0;
 
@@ -33,19 +35,25 @@ pub(super) fn show(ui: &mut Ui, look: &Look<'_>, out: &mut Vec<Command>) {
     };
     let Some(fixed) = ready(ui, look.state.facets(ArrayName::MeshFixed), "earlier mesh") else { return };
     let Some(moving) = ready(ui, look.state.facets(ArrayName::MeshMoving), "present mesh") else { return };
-    let Some((middle, reach_m)) = extent(fixed, moving) else {
+    let all = [fixed.len(), moving.len()];
+    let start = Point3::from(found.start_in_rover);
+    let near_m = found.sensor_side_m.map_or(f64::INFINITY, |side_m| NEAR * side_m);
+    let [fixed, moving] = [fixed, moving].map(|mesh| near(mesh, &start, near_m));
+    let Some((middle, reach_m)) = extent(&fixed, &moving) else {
         panels::missing(ui, PURPOSE, &why_not(look, "facets"));
         return;
     };
     let every_moving = every(moving.len(), FACETS - LEAST.min(fixed.len()));
     let every_fixed = every(fixed.len(), (FACETS - moving.len().div_ceil(every_moving)).max(LEAST));
     let run = theme::run(look.state.cursor.run);
-    let thinned = |count: usize, every: usize| match every {
-        1 => format!("{count} facets"),
-        every => format!("1 of {every} of {count} facets"),
+    let thinned = |drawn: usize, all: usize| match drawn {
+        drawn if drawn == all => format!("{all} facets"),
+        drawn => format!("{drawn} of {all} facets"),
     };
-    let fixed_words = format!("step {}, {}", found.to_step, thinned(fixed.len(), every_fixed));
-    let moving_words = format!("this step, {}", thinned(moving.len(), every_moving));
+    let (drawn_fixed, drawn_moving) =
+        (fixed.len().div_ceil(every_fixed), moving.len().div_ceil(every_moving));
+    let fixed_words = format!("step {}, {}", found.to_step, thinned(drawn_fixed, all[0]));
+    let moving_words = format!("this step, {}", thinned(drawn_moving, all[1]));
     names::wrapped(
         ui,
         "drag turns, wheel magnifies, double click takes both back",
@@ -74,6 +82,13 @@ pub(super) fn show(ui: &mut Ui, look: &Look<'_>, out: &mut Vec<Command>) {
     if let Some(orbit) = asked_for(ui, &response, orbit) {
         out.push(Command::SetShapeView(ShapeView { orbit, ..look.state.shape_view }));
     }
+}
+
+/// The facets whose first corner is near a place; all where none is.
+fn near(mesh: &[Facet], place: &Point3, near_m: f64) -> Vec<Facet> {
+    let is_near = |facet: &&Facet| (Point3::from(facet[0].map(f64::from)) - place).norm() <= near_m;
+    let near: Vec<Facet> = mesh.iter().filter(is_near).copied().collect();
+    if near.is_empty() { mesh.to_vec() } else { near }
 }
 
 /// One facet of so many is drawn.
@@ -157,6 +172,14 @@ mod tests {
         assert_eq!(every(400, 4500), 1);
         assert!(20_000_usize.div_ceil(every(20_000, 4500)) <= 4500);
         assert_eq!(every(0, 10), 1);
+    }
+
+    #[test]
+    fn what_is_far_from_the_target_is_left_out_unless_nothing_would_remain() {
+        let facet = |x: f32| [[x, 0.0, 0.0], [x, 0.1, 0.0], [x, 0.0, 0.1]];
+        let mesh = [facet(0.1), facet(0.4), facet(2.0)];
+        assert_eq!(near(&mesh, &Point3::origin(), 0.5).len(), 2);
+        assert_eq!(near(&mesh, &Point3::new(9.0, 0.0, 0.0), 0.5).len(), 3);
     }
 
     #[test]

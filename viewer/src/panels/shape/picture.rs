@@ -4,13 +4,14 @@
 
 use egui::{Align2, Painter, Pos2, Rect, Response, Sense, Stroke, StrokeKind, Ui, Vec2, pos2, vec2};
 
-use super::super::digits;
 use crate::overlay::{Mark, paint_mark};
 use crate::raster::{self, Raster};
 use crate::{theme, view2d};
 
 /// Width of the colour bar with its numbers, points.
-const BAR: f32 = 58.0;
+pub(super) const BAR: f32 = 70.0;
+/// The least that a picture takes, points.
+const LEAST: f32 = 110.0;
 /// Height of the title, points.
 const TITLE: f32 = 16.0;
 
@@ -26,7 +27,19 @@ pub(super) struct Unit {
 impl Unit {
     /// A value with the unit.
     pub(super) fn say(self, value: f32) -> String {
-        format!("{} {}", digits(f64::from(value * self.factor)), self.word)
+        format!("{} {}", self.number(value), self.word)
+    }
+
+    /// A value in the unit, to three digits: a colour tells no more.
+    pub(super) fn number(self, value: f32) -> String {
+        let value = f64::from(value * self.factor);
+        let decimals = match value.abs() {
+            size if size < 1e-9 => 0,
+            size if size < 10.0 => 2,
+            size if size < 100.0 => 1,
+            _ => 0,
+        };
+        format!("{value:.decimals$}")
     }
 }
 
@@ -70,14 +83,14 @@ impl Placed {
 impl Picture<'_> {
     /// Shows the picture in an area of this size.
     pub(super) fn show(&self, ui: &mut Ui, size: Vec2) -> Placed {
-        let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
+        let bar = if self.look.is_some() { BAR } else { 0.0 };
+        let [width, height] = self.raster.size().map(|side| side.max(1) as f32);
+        let scale = ((size.x - bar) / width).min((size.y - TITLE - 2.0) / height).max(0.01);
+        let taken = vec2(size.x, TITLE + height * scale + 2.0);
+        let (rect, response) = ui.allocate_exact_size(taken, Sense::hover());
         let painter = ui.painter_at(rect);
         painter.text(rect.min, Align2::LEFT_TOP, self.title, theme::image_font(), theme::TEXT);
-        let bar = if self.look.is_some() { BAR } else { 0.0 };
-        let room = Rect::from_min_max(rect.min + vec2(0.0, TITLE), rect.max - vec2(bar, 2.0));
-        let [width, height] = self.raster.size().map(|side| side.max(1) as f32);
-        let scale = (room.width() / width).min(room.height() / height).max(0.01);
-        let area = Rect::from_min_size(room.min, vec2(width, height) * scale);
+        let area = Rect::from_min_size(rect.min + vec2(0.0, TITLE), vec2(width, height) * scale);
         view2d::checker(&painter, area);
         if let Some(look) = self.look {
             self.raster.look(look);
@@ -123,24 +136,28 @@ pub(super) fn colour_bar(painter: &Painter, area: Rect, look: raster::Look, unit
         mesh.add_colored_rect(row, look.colour(low + (high - low) * (from + to) / 2.0));
     }
     painter.add(egui::Shape::mesh(mesh));
-    let number = |value: f32| digits(f64::from(value * unit.factor));
     let middle = (low + high) / 2.0;
     let text = |y: f32, anchor: Align2, words: String| {
         painter.text(pos2(strip.right() + 4.0, y), anchor, words, theme::digit_font(), theme::TEXT);
     };
-    text(strip.top(), Align2::LEFT_TOP, format!("≥ {}", number(high)));
-    text(strip.bottom(), Align2::LEFT_BOTTOM, format!("≤ {}", number(low)));
+    text(strip.top(), Align2::LEFT_TOP, format!("≥ {}", unit.number(high)));
+    text(strip.bottom(), Align2::LEFT_BOTTOM, format!("≤ {}", unit.number(low)));
     if strip.height() > 60.0 {
-        text(strip.center().y, Align2::LEFT_CENTER, number(middle));
+        text(strip.center().y, Align2::LEFT_CENTER, unit.number(middle));
     }
     if strip.height() > 34.0 {
         text(strip.top() + 13.0, Align2::LEFT_TOP, unit.word.to_owned());
     }
 }
 
-/// Sizes of `count` pictures side by side in the room there is, at most `height` points high.
+/// The most that each of `count` pictures side by side may take of the room there is, at most `height` points high.
 pub(super) fn side_by_side(ui: &Ui, count: usize, height: f32) -> Vec2 {
     let gaps = ui.spacing().item_spacing.x * (count - 1) as f32;
-    let width = ((ui.available_width() - gaps) / count as f32 - 1.0).max(90.0);
-    vec2(width, height.clamp(90.0, (width - BAR + TITLE).max(90.0)))
+    let width = ((ui.available_width() - gaps) / count as f32 - 1.0).max(LEAST);
+    vec2(width, height.max(LEAST))
+}
+
+/// The longest side that a square picture with its bar has in an area of this size, points.
+pub(super) fn square(size: Vec2) -> f32 {
+    (size.x - BAR).min(size.y - TITLE - 2.0)
 }

@@ -9,8 +9,8 @@ use sightline_core::locate::shape_tracker::rows::{PathStep, sensor_pixel_m};
 use sightline_core::trace::ArrayName;
 
 use super::super::names;
-use super::super::plots::{few_marks, plain};
-use super::picture::{Unit, colour_bar};
+use super::super::plots::plain;
+use super::picture::{BAR, Unit, colour_bar};
 use super::{Look, ready, why_not};
 use crate::overlay::{self, Mark};
 use crate::panels;
@@ -23,6 +23,8 @@ const TWO_COLUMNS: f32 = 520.0;
 const LEAST: f32 = 150.0;
 /// Points of the basin's outline.
 const OUTLINE: u32 = 96;
+/// Height of the names above a plot, points.
+const NAMES: f32 = 56.0;
 /// Height of the words below a plot, points.
 const WORDS: f32 = 32.0;
 /// Mean distances are said in millimetres.
@@ -41,13 +43,13 @@ pub(super) fn show(ui: &mut Ui, look: &Look<'_>) {
     };
     let height = ui.available_height();
     if ui.available_width() < TWO_COLUMNS {
-        let half = (height / 2.0 - 24.0).max(LEAST);
+        let half = (height / 2.0 - NAMES).max(LEAST);
         coarse(ui, look, found, half);
         refinement(ui, look, found, half);
     } else {
         ui.columns(2, |columns| {
-            coarse(&mut columns[0], look, found, (height - 24.0).max(LEAST));
-            refinement(&mut columns[1], look, found, (height - 24.0).max(LEAST));
+            coarse(&mut columns[0], look, found, (height - NAMES).max(LEAST));
+            refinement(&mut columns[1], look, found, (height - NAMES).max(LEAST));
         });
     }
 }
@@ -72,7 +74,7 @@ fn coarse(ui: &mut Ui, look: &Look<'_>, found: &Registered, height: f32) {
         ],
     );
     let area = Rect::from_min_size(ui.cursor().min, vec2(ui.available_width(), height - WORDS));
-    let (left, bar) = area.split_left_right_at_x(area.right() - 58.0);
+    let (left, bar) = area.split_left_right_at_x(area.right() - BAR);
     let mut part = ui.new_child(UiBuilder::new().max_rect(left).id_salt("coarse search"));
     let at = surface(&mut part, raster, found, step_m, run);
     let colours = raster::Look::Values(raster.levels);
@@ -136,11 +138,9 @@ fn surface(ui: &mut Ui, raster: &Raster, found: &Registered, step_m: f64, run: C
         .show_grid(false)
         .x_axis_label(theme::note("Δx, cm"))
         .y_axis_label(theme::note("Δy, cm (down)"))
-        .x_grid_spacer(few_marks)
-        .y_grid_spacer(few_marks)
         .x_axis_formatter(plain)
         // The sensor's y points down, the plot's up.
-        .y_axis_formatter(|mark, _| format!("{}", 0.0 - mark.value))
+        .y_axis_formatter(|mark, range| plain(egui_plot::GridMark { value: 0.0 - mark.value, ..mark }, range))
         .label_formatter(|_| None);
     let texture = raster.texture.id();
     let best = found.coarse_shift_m.map(|[x, y, _]| [x * 100.0, -y * 100.0]);
@@ -203,8 +203,6 @@ fn plot<'a>(ui: &mut Ui, path: &'a [PathStep], height: f32) -> Option<&'a PathSt
         .set_margin_fraction(vec2(0.04, 0.08))
         .x_axis_label(theme::note("evaluations"))
         .y_axis_min_width(26.0)
-        .x_grid_spacer(few_marks)
-        .y_grid_spacer(few_marks)
         .x_axis_formatter(plain)
         .y_axis_formatter(plain)
         .label_formatter(|_| None);

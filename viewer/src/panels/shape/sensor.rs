@@ -5,7 +5,7 @@ use egui::Ui;
 use sightline_core::trace::ArrayName;
 
 use super::histogram::{self, Errors};
-use super::picture::{Picture, Unit, side_by_side};
+use super::picture::{Picture, Unit, side_by_side, square};
 use super::{Look, ready, why_not};
 use crate::command::Command;
 use crate::overlay::Mark;
@@ -15,8 +15,8 @@ use crate::theme;
 
 /// The sensor is asked for where both surfaces were compared.
 const PURPOSE: &str = "The earlier surface in the virtual range sensor, and the errors of depth.";
-/// From this width on the four pictures stand in one row, points.
-const ONE_ROW: f32 = 700.0;
+/// Height of the words between the pictures and the histogram, points.
+const WORDS: f32 = 70.0;
 /// The least limit of the colours, m.
 const LEAST_LIMIT_M: f64 = 0.001;
 
@@ -48,10 +48,10 @@ pub(super) fn show(ui: &mut Ui, look: &Look<'_>, out: &mut Vec<Command>) {
         Picture { title: "after the coarse search", raster: coarse, look: error, unit: cm },
         Picture { title: "at the end", raster: end, look: error, unit: cm },
     ];
-    let columns = if ui.available_width() < ONE_ROW { 2 } else { 4 };
-    let rows = pictures.len() / columns;
-    let height = (ui.available_height() - histogram::HEIGHT - 44.0) / rows as f32;
-    let size = side_by_side(ui, columns, height);
+    // In one row or in two, whichever makes them larger.
+    let height = ui.available_height() - histogram::HEIGHT - WORDS;
+    let [one_row, two_rows] = [(4, height), (2, height / 2.0)].map(|(n, high)| side_by_side(ui, n, high));
+    let (columns, size) = if square(two_rows) > square(one_row) { (2, two_rows) } else { (4, one_row) };
     for row in pictures.chunks(columns) {
         ui.horizontal_top(|ui| {
             for picture in row {

@@ -65,7 +65,7 @@ fn counts(ui: &mut Ui, seen: &SurfaceSeen) {
     let [width, height] = seen.size;
     let thinned = match seen.shown_every {
         0 | 1 => String::new(),
-        every => format!("; every {every}th pixel is shown"),
+        every => format!("; one of {every} × {every} is shown"),
     };
     let words = format!(
         "aligned left image of {width} × {height} px{thinned}. Ring: the target. Mesh around it: {} vertices, {} \
