@@ -39,7 +39,9 @@ impl Unit {
             size if size < 100.0 => 1,
             _ => 0,
         };
-        format!("{value:.decimals$}")
+        let digits = format!("{value:.decimals$}");
+        // What rounds to zero has no sign.
+        if digits.trim_matches(['-', '0', '.']).is_empty() { "0".to_owned() } else { digits }
     }
 }
 

@@ -16,7 +16,7 @@ use crate::theme;
 /// The sensor is asked for where both surfaces were compared.
 const PURPOSE: &str = "The earlier surface in the virtual range sensor, and the errors of depth.";
 /// Height of the words between the pictures and the histogram, points.
-const WORDS: f32 = 70.0;
+const WORDS: f32 = 100.0;
 /// The least limit of the colours, m.
 const LEAST_LIMIT_M: f64 = 0.001;
 
