@@ -3,6 +3,7 @@
 use sightline_core::frames::Pixel;
 use sightline_core::settings::{Changes, TrackerKind};
 
+use crate::shape_view::ShapeView;
 use crate::state::calculator::Calculator;
 use crate::state::studies::Order;
 use crate::stretch::Stretch;
@@ -256,6 +257,8 @@ pub enum Layer {
     Residuals,
     /// Where the bootstrap puts the target.
     Cloud,
+    /// How far from the prediction a registration by shape can start.
+    Basin,
 }
 
 impl Layer {
@@ -334,6 +337,8 @@ pub enum Command {
     SetStretch(Stretch),
     /// Filters the features and magnifies their residuals.
     SetFeatureView(FeatureView),
+    /// Changes what is looked at of a registration by shape.
+    SetShapeView(ShapeView),
     /// Changes what the next study is made of.
     OrderStudy(Order),
     /// Starts that study.

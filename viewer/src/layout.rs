@@ -31,6 +31,8 @@ pub enum Pane {
     Surface,
     /// What the feature tracker saw.
     Features,
+    /// What the shape tracker saw.
+    Shape,
     /// The error budget.
     Budget,
     /// The validation experiments.
@@ -55,12 +57,13 @@ pub enum Pane {
 
 impl Pane {
     /// All of them.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::Targets,
         Self::Settings,
         Self::Left,
         Self::Right,
         Self::Features,
+        Self::Shape,
         Self::Budget,
         Self::Studies,
         Self::Strip,
@@ -89,6 +92,7 @@ impl Pane {
             Self::History => "Template history",
             Self::Surface => "Match scores",
             Self::Features => "Features",
+            Self::Shape => "Shape",
             Self::StereoProfile => "Stereo scores",
             Self::Map => "Map, site frame",
             Self::Plots => "Over the steps",
@@ -115,6 +119,7 @@ pub fn show_pane(ui: &mut Ui, pane: Pane, state: &State, out: &mut Vec<Command>)
         Pane::History => panels::history::show(ui, state, out),
         Pane::Surface => panels::surface::show(ui, state, out),
         Pane::Features => panels::features::show(ui, state, out),
+        Pane::Shape => panels::shape::show(ui, state, out),
         Pane::Budget => panels::budget::show(ui, state, out),
         Pane::Studies => panels::studies::show(ui, state, out),
         Pane::StereoProfile => panels::stereo_profile::show(ui, state, out),
@@ -138,7 +143,7 @@ pub fn overview() -> Tree<Pane> {
     };
     let side = tabs(&mut tiles, &[Pane::Targets, Pane::Settings]);
     let left = tabs(&mut tiles, &[Pane::Left]);
-    let right = tabs(&mut tiles, &[Pane::Right, Pane::Features, Pane::Budget, Pane::Studies]);
+    let right = tabs(&mut tiles, &[Pane::Right, Pane::Features, Pane::Shape, Pane::Budget, Pane::Studies]);
     let strip = tabs(&mut tiles, &[Pane::Strip, Pane::History]);
     let surface = tabs(&mut tiles, &[Pane::Surface, Pane::StereoProfile]);
     let map = tabs(&mut tiles, &[Pane::Map]);

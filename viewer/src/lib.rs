@@ -7,6 +7,7 @@
 //! | `command`, `keys` | what a person can ask for, and by which key |
 //! | `net` | requests and events; nothing blocks |
 //! | `cache`, `raster`, `stretch`, `tables` | what was loaded, with a limit of memory, and how pixels become a texture and tables rows |
+//! | `shape_view` | what is looked at of a registration by shape |
 //! | `panels` | one file a panel: read-only data in, commands out |
 //! | `layout` | where the panels are |
 //! | `view2d`, `overlay`, `ellipse`, `contour` | the zoomable canvas and the marks on it |
@@ -22,6 +23,7 @@ pub mod cache;
 pub mod raster;
 pub mod stretch;
 pub mod tables;
+pub mod shape_view;
 pub mod panels;
 pub mod layout;
 pub mod view2d;

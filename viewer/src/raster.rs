@@ -16,6 +16,33 @@ pub const PATCH_SIGMAS: f32 = 2.5;
 /// The largest side of an image that is taken, px.
 const SIDE_MAX: u32 = 8192;
 
+/// How the values of an array become colours.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Look {
+    /// Viridis from a value to another.
+    Values([f32; 2]),
+    /// Blue–white–red from minus a value to it.
+    Signed(f32),
+}
+
+impl Look {
+    /// The colour of a value; transparent where there is none.
+    pub fn colour(self, value: f32) -> Color32 {
+        match self {
+            Self::Values([low, high]) => theme::score((value - low) / (high - low).max(f32::MIN_POSITIVE)),
+            Self::Signed(limit) => theme::signed(value, limit.max(f32::MIN_POSITIVE)),
+        }
+    }
+
+    /// Between which values the colours run.
+    pub fn limits(self) -> [f32; 2] {
+        match self {
+            Self::Values(limits) => limits,
+            Self::Signed(limit) => [-limit, limit],
+        }
+    }
+}
+
 /// A grid of values and how it looks.
 pub struct Raster {
     /// The values; fractions of full scale for images, scores for surfaces; NaN where there is none.
@@ -26,13 +53,14 @@ pub struct Raster {
     pub mean: f32,
     /// Standard deviation of the values that exist.
     pub sigma: f32,
-    /// Dark and bright end of the values, from which the automatic stretch is made.
+    /// Dark and bright end of an image, from which the automatic stretch is made; of an array the values beyond which
+    /// one in a hundred lies.
     pub levels: [f32; 2],
     options: TextureOptions,
     /// The stretch that the texture has.
     stretched: egui::mutex::Mutex<Stretch>,
-    /// Between which scores the colours of a surface run.
-    limits: egui::mutex::Mutex<[f32; 2]>,
+    /// How the values of an array are coloured, where that is not as it came.
+    look: egui::mutex::Mutex<Option<Look>>,
 }
 
 impl Raster {
@@ -72,7 +100,8 @@ impl Raster {
             _ => theme::grey(0.5 + (v - mean) / (2.0 * PATCH_SIGMAS * sigma.max(1e-6))),
         };
         let colours = values.iter().map(|&v| colour(v)).collect();
-        Ok(Self::new(context, array.word(), values, colours, TextureOptions::NEAREST))
+        let levels = ends(&values);
+        Ok(Self { levels, ..Self::new(context, array.word(), values, colours, TextureOptions::NEAREST) })
     }
 
     fn new(
@@ -86,8 +115,8 @@ impl Raster {
         let texture = context.load_texture(name, ColorImage::new(size, colours), options);
         let (mean, sigma) = statistics(&values);
         let (levels, stretched) = (levels(&values), egui::mutex::Mutex::default());
-        let limits = egui::mutex::Mutex::new([-1.0, 1.0]);
-        Self { values, texture, mean, sigma, levels, options, stretched, limits }
+        let look = egui::mutex::Mutex::default();
+        Self { values, texture, mean, sigma, levels, options, stretched, look }
     }
 
     /// Gives the texture of an image a stretch, where it does not have it yet.
@@ -102,16 +131,15 @@ impl Raster {
         self.texture.clone().set(ColorImage::new(size, colours), self.options);
     }
 
-    /// Gives the texture of a surface of scores these limits of its colours, where it has others.
-    pub fn score_limits(&self, limits: [f32; 2]) {
-        let mut present = self.limits.lock();
-        if *present == limits {
+    /// Gives the texture of an array these colours, where it has others.
+    pub fn look(&self, look: Look) {
+        let mut present = self.look.lock();
+        if *present == Some(look) {
             return;
         }
-        *present = limits;
+        *present = Some(look);
         let size = self.size().map(|side| side as usize);
-        let [low, high] = limits;
-        let colours = self.values.iter().map(|&v| theme::score((v - low) / (high - low))).collect();
+        let colours = self.values.iter().map(|&v| look.colour(v)).collect();
         self.texture.clone().set(ColorImage::new(size, colours), self.options);
     }
 
@@ -130,6 +158,19 @@ impl Raster {
     pub fn bytes(&self) -> usize {
         self.values.as_raw().len() * (size_of::<f32>() + size_of::<Color32>())
     }
+}
+
+/// The values below and above which one in a hundred lies; 0 and 1 where there is none.
+fn ends(values: &GrayImage) -> [f32; 2] {
+    let mut finite: Vec<f32> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    if finite.is_empty() {
+        return [0.0, 1.0];
+    }
+    let skip = finite.len() / 100;
+    let last = finite.len() - 1 - skip;
+    let low = *finite.select_nth_unstable_by(skip, f32::total_cmp).1;
+    let high = *finite.select_nth_unstable_by(last, f32::total_cmp).1;
+    [low, high]
 }
 
 /// Mean and standard deviation of the values that exist.
@@ -151,6 +192,22 @@ mod tests {
         let (mean, sigma) = statistics(&values);
         assert_eq!(mean, 2.0);
         assert!((sigma - (2.0_f32 / 3.0).sqrt()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_ends_leave_out_one_in_a_hundred_on_each_side_and_what_does_not_exist() {
+        let mut values: Vec<f32> = (0..200).map(|value| value as f32).collect();
+        values.push(f32::NAN);
+        assert_eq!(ends(&GrayImage::from_raw(201, 1, values).unwrap()), [2.0, 197.0]);
+        assert_eq!(ends(&GrayImage::from_raw(1, 1, vec![f32::NAN]).unwrap()), [0.0, 1.0]);
+    }
+
+    #[test]
+    fn signed_values_are_coloured_about_zero_and_others_from_their_least() {
+        assert_eq!(Look::Signed(0.02).colour(0.02), theme::signed(1.0, 1.0));
+        assert_eq!(Look::Values([3.0, 5.0]).colour(3.0), theme::score(0.0));
+        assert_eq!(Look::Values([3.0, 5.0]).colour(f32::NAN), Color32::TRANSPARENT);
+        assert_eq!(Look::Signed(0.5).limits(), [-0.5, 0.5]);
     }
 
     #[test]

@@ -1,8 +1,10 @@
-//! The tables of the feature tracker as they come from the server, and which of their rows are looked at.
+//! The tables of the trackers as they come from the server, and which of their rows are looked at.
 
 use sightline_core::image::npy;
 use sightline_core::locate::features::evidence::{CLOUD_COLUMNS, FeatureColumn};
 use sightline_core::locate::features::rows::{self, CloudPoint, Feature, Matched};
+use sightline_core::locate::shape_tracker::evidence::{MESH_COLUMNS, PATH_COLUMNS};
+use sightline_core::locate::shape_tracker::rows::{self as shape_rows, Facet, PathStep};
 use sightline_core::trace::ArrayName;
 
 /// A table, row by row.
@@ -11,12 +13,27 @@ pub enum Table {
     Features(Vec<Feature>),
     /// Where the bootstrap puts the target.
     Cloud(Vec<CloudPoint>),
+    /// The way of a refinement.
+    Path(Vec<PathStep>),
+    /// The facets of a mesh.
+    Facets(Vec<Facet>),
 }
 
 impl Table {
     /// Whether an array is a table and no picture.
     pub const fn is_table(name: ArrayName) -> bool {
-        matches!(name, ArrayName::Features | ArrayName::Cloud)
+        Self::columns(name).is_some()
+    }
+
+    /// How many columns a table has; none for a picture.
+    const fn columns(name: ArrayName) -> Option<usize> {
+        match name {
+            ArrayName::Features => Some(FeatureColumn::COUNT),
+            ArrayName::Cloud => Some(CLOUD_COLUMNS),
+            ArrayName::RefinePath => Some(PATH_COLUMNS),
+            ArrayName::MeshFixed | ArrayName::MeshMoving => Some(MESH_COLUMNS),
+            _ => None,
+        }
     }
 
     /// A table from its NumPy file.
@@ -25,15 +42,18 @@ impl Table {
     /// A sentence when the bytes are no 2-D array of numbers with this table's columns.
     pub fn from_npy(name: ArrayName, bytes: &[u8]) -> Result<Self, String> {
         let values = npy::decode(bytes, name.word()).map_err(|e| e.to_string())?;
-        let is_cloud = name == ArrayName::Cloud;
-        let columns = if is_cloud { CLOUD_COLUMNS } else { FeatureColumn::COUNT };
+        let columns = Self::columns(name).unwrap_or_default();
         if values.width() as usize != columns {
             return Err(format!("{} has {} columns, not {columns}", name.word(), values.width()));
         }
-        Ok(if is_cloud {
-            Self::Cloud(rows::cloud(values.as_raw()).collect())
-        } else {
-            Self::Features(rows::features(values.as_raw()).collect())
+        let values = values.as_raw();
+        Ok(match name {
+            ArrayName::Cloud => Self::Cloud(rows::cloud(values).collect()),
+            ArrayName::RefinePath => Self::Path(shape_rows::path(values).collect()),
+            ArrayName::MeshFixed | ArrayName::MeshMoving => {
+                Self::Facets(shape_rows::facets(values).collect())
+            }
+            _ => Self::Features(rows::features(values).collect()),
         })
     }
 
@@ -42,6 +62,8 @@ impl Table {
         match self {
             Self::Features(rows) => rows.len() * size_of::<Feature>(),
             Self::Cloud(rows) => rows.len() * size_of::<CloudPoint>(),
+            Self::Path(rows) => rows.len() * size_of::<PathStep>(),
+            Self::Facets(rows) => rows.len() * size_of::<Facet>(),
         }
     }
 }
@@ -156,5 +178,10 @@ mod tests {
         assert!(matches!(empty, Table::Features(rows) if rows.is_empty()));
         let cloud = Table::from_npy(ArrayName::Cloud, &bytes(5, 2)).unwrap();
         assert!(matches!(cloud, Table::Cloud(rows) if rows.len() == 2));
+        let mesh = Table::from_npy(ArrayName::MeshFixed, &bytes(9, 4)).unwrap();
+        assert!(matches!(mesh, Table::Facets(rows) if rows.len() == 4));
+        let path = Table::from_npy(ArrayName::RefinePath, &bytes(9, 3)).unwrap();
+        assert!(matches!(path, Table::Path(rows) if rows.len() == 3));
+        assert!(Table::from_npy(ArrayName::MeshMoving, &bytes(3, 3)).is_err());
     }
 }

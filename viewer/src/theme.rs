@@ -53,6 +53,12 @@ pub const KEYPOINT: Color32 = Color32::from_rgb(0xbf, 0xc4, 0xcc);
 pub const INLIER: Color32 = TRACKING;
 /// A match that does not: a cross and dashed lines.
 pub const OUTLIER: Color32 = FAILED;
+/// The surface of an earlier step: lines.
+pub const MESH_EARLIER: Color32 = LOST;
+/// The surface of the step: filled and shaded.
+pub const MESH_PRESENT: Color32 = PREDICTION;
+/// How far from the prediction a registration by shape can start.
+pub const BASIN: Color32 = SEARCH;
 /// What is true.
 pub const TRUTH: Color32 = Color32::WHITE;
 /// A texture in its own colours.

@@ -9,7 +9,8 @@
 //! ```
 //! An entity shows only in the views that name it: what lies over the left image is listed here and not found
 //! by its path, because paths follow the stages and not the pictures. The close-up shows the same as the left
-//! image, from the frame of the subframe, which goes with the target.
+//! image, from the frame of the subframe, which goes with the target. A run that asks for the shape has two tabs, “Match”
+//! and “Shape”; the second has what the shape tracker saw, the meshes and how well they fit.
 
 use rerun::blueprint::components::{
     BackgroundKind, Corner2D, PanelState, PlayState, VisualBounds2D as Bounds,
@@ -58,7 +59,7 @@ const RIGHT: [&str; 4] = [
 ];
 
 /// What of a target is on the map.
-const MAP: [&str; 10] = [
+const MAP: [&str; 14] = [
     "/{target}/predict/position",
     "/{target}/predict/covariance",
     "/{target}/locate/triangulate/position",
@@ -67,6 +68,10 @@ const MAP: [&str; 10] = [
     "/{target}/locate/bootstrap/cloud",
     "/{target}/locate/bootstrap/position",
     "/{target}/locate/bootstrap/covariance",
+    "/{target}/locate/refine_register/mesh_fixed",
+    "/{target}/locate/refine_register/mesh_moving",
+    "/{target}/locate/refine_register/position",
+    "/{target}/locate/refine_register/covariance",
     "/{target}/update/position",
     "/truth/{target}/position",
 ];
@@ -79,6 +84,37 @@ const PATCHES: [(&str, &str); 6] = [
     ("matched", "/{target}/locate/match_template/matched"),
     ("difference", "/{target}/locate/match_template/difference"),
     ("right", "/{target}/locate/point_stereo/right_window"),
+];
+
+/// What the shape tracker saw, in the order of its steps.
+#[rustfmt::skip]
+const SHAPE: [(&str, &str); 9] = [
+    ("disparities, px", "/{target}/locate/surface/disparities"),
+    ("ranges, m", "/{target}/locate/surface/ranges"),
+    ("earlier surface, m", "/{target}/locate/coarse_register/sensor"),
+    ("error at the start", "/{target}/locate/coarse_register/error_before"),
+    ("after the coarse search", "/{target}/locate/coarse_register/error_coarse"),
+    ("at the end", "/{target}/locate/refine_register/error_fine"),
+    ("coarse search, m", "/{target}/locate/coarse_register/coarse_search"),
+    ("draped picture", "/{target}/locate/hand_off/draped"),
+    ("where it was found", "/{target}/locate/hand_off/draped_match"),
+];
+
+/// The meshes with the target.
+const MESHES: [&str; 4] = [
+    "/{target}/locate/refine_register/mesh_fixed",
+    "/{target}/locate/refine_register/mesh_moving",
+    "/{target}/locate/refine_register/position",
+    "/{target}/locate/refine_register/covariance",
+];
+
+/// How well the surfaces fit.
+#[rustfmt::skip]
+const FIT: [Series; 4] = [
+    ("mean distance, m", Corner2D::LeftTop, &["/{target}/locate/coarse_register/mean_m", "/{target}/locate/refine_register/mean_m"]),
+    ("overlap", Corner2D::LeftBottom, &["/{target}/locate/refine_register/overlap/**"]),
+    ("misfit", Corner2D::LeftTop, &["/{target}/locate/refine_register/misfit/**"]),
+    ("sigma, m", Corner2D::LeftTop, &["/{target}/locate/refine_register/sigma_m/**"]),
 ];
 
 /// A time series: its name, the corner that its lines mostly leave free, and its lines.
@@ -111,6 +147,8 @@ pub(super) struct Lane<'a> {
     pub(super) root: &'a str,
     /// Width and height of the close-up, px.
     pub(super) close_up_px: [u32; 2],
+    /// Whether its tracker asks for the shape: such a run has a tab more.
+    pub(super) has_shape: bool,
 }
 
 /// Sends the layout for these runs; a live one follows the newest step.
@@ -168,15 +206,37 @@ fn run(layout: &mut Layout, lane: &Lane<'_>) -> ContainerLike {
     let surface = Spatial2DView::new("surface of scores")
         .with_origin(path("/{target}/locate/match_template/surface", lane.root))
         .with_contents(["$origin/**"]);
-    Horizontal::new([
+    let matched = Horizontal::new([
         close_up(layout, lane),
         Grid::new(PATCHES.map(patch)).with_grid_columns(3).into(),
         surface.into(),
         time_series(layout, &DECISIONS, lane.root),
         time_series(layout, &ERRORS, lane.root),
     ])
-    .with_name(lane.root)
-    .with_column_shares([5.0, 7.0, 5.0, 5.0, 5.0])
+    .with_column_shares([5.0, 7.0, 5.0, 5.0, 5.0]);
+    if !lane.has_shape {
+        return matched.with_name(lane.root).into();
+    }
+    let shape = shape(layout, lane);
+    Tabs::new([matched.with_name("Match").into(), shape]).with_name(lane.root).into()
+}
+
+/// What the shape tracker of a run shows.
+fn shape(layout: &mut Layout, lane: &Lane<'_>) -> ContainerLike {
+    let picture = |(name, entity): (&str, &str)| -> ContainerLike {
+        let view = Spatial2DView::new(name).with_origin(path(entity, lane.root));
+        view.with_contents(["$origin/**"]).into()
+    };
+    let meshes = Spatial3DView::new("meshes").with_origin("/").with_contents(of_all(&MESHES, &[lane.root]));
+    let background = Background::new(BackgroundKind::SolidColor).with_color(color(MAP_BACKGROUND));
+    let meshes = layout.view(meshes, "Background", background);
+    Horizontal::new([
+        Grid::new(SHAPE.map(picture)).with_grid_columns(5).into(),
+        meshes,
+        time_series(layout, &FIT, lane.root),
+    ])
+    .with_name("Shape")
+    .with_column_shares([14.0, 7.0, 6.0])
     .into()
 }
 

@@ -1,9 +1,10 @@
 //! Every entity of a recording, in the order in which a step logs them: the table that the module's header
 //! prints and that a test compares with what is read back from a file.
 
-use sightline_core::trace::StepTrace;
+use sightline_core::trace::{ArrayName, StepTrace};
 
 use super::scores::SCORES;
+use super::shape;
 use super::step::path;
 
 /// How many rows an entity has.
@@ -147,6 +148,20 @@ const EVIDENCE: &[Evidence] = &[
     ("/{target}/locate/bootstrap/left", "Points2D", "the motion has a covariance", bootstrapped),
     ("/{target}/locate/bootstrap/position", "Points3D", "the target was moved", moved),
     ("/{target}/locate/bootstrap/covariance", "Ellipsoids3D", "the target was moved", moved),
+    ("/{target}/locate/surface/disparities", "DepthImage", "a surface was measured", |t| shape::has(t, ArrayName::Disparities)),
+    ("/{target}/locate/surface/ranges", "DepthImage", "a surface was measured", |t| shape::has(t, ArrayName::Ranges)),
+    ("/{target}/locate/coarse_register/sensor", "DepthImage", "surfaces were compared", |t| shape::has(t, ArrayName::Sensor)),
+    ("/{target}/locate/coarse_register/error_before", "Image", "surfaces were compared", |t| shape::has(t, ArrayName::ErrorBefore)),
+    ("/{target}/locate/coarse_register/coarse_search", "DepthImage", "shifts were searched", |t| shape::has(t, ArrayName::CoarseSearch)),
+    ("/{target}/locate/coarse_register/coarse_search/best", "Points2D", "a shift was found", |t| shape::best(t).is_some()),
+    ("/{target}/locate/coarse_register/error_coarse", "Image", "surfaces were compared", |t| shape::has(t, ArrayName::ErrorCoarse)),
+    ("/{target}/locate/refine_register/error_fine", "Image", "surfaces were compared", |t| shape::has(t, ArrayName::ErrorFine)),
+    ("/{target}/locate/refine_register/mesh_fixed", "Mesh3D", "registered to an earlier mesh", |t| shape::has(t, ArrayName::MeshFixed)),
+    ("/{target}/locate/refine_register/mesh_moving", "Mesh3D", "there is a present mesh", |t| shape::has(t, ArrayName::MeshMoving)),
+    ("/{target}/locate/refine_register/position", "Points3D", "the registration is used", |t| shape::registered(t).is_some()),
+    ("/{target}/locate/refine_register/covariance", "Ellipsoids3D", "the registration is used", |t| shape::registered(t).is_some()),
+    ("/{target}/locate/hand_off/draped", "DepthImage", "the last picture was found at a hand-off", |t| shape::has(t, ArrayName::Draped)),
+    ("/{target}/locate/hand_off/draped_match", "DepthImage", "the last picture was found at a hand-off", |t| shape::has(t, ArrayName::DrapedMatch)),
     ("/{target}/locate/left_covariance", "LineStrips2D", "designated or located", |t| t.locate.as_ref().is_some_and(|l| l.left_pixel.is_some())),
     ("/{target}/judge/state", "StateChange", "always", |_| true),
     ("/{target}/judge/verdict", "TextLog", "always", |_| true),
@@ -194,6 +209,7 @@ fn bootstrapped(trace: &StepTrace) -> bool {
 fn moved(trace: &StepTrace) -> bool {
     let located = trace.locate.as_ref();
     bootstrapped(trace)
+        && shape::registered(trace).is_none()
         && located.is_some_and(|l| l.position_in_rover.is_some() && l.covariance_in_rover.is_some())
 }
 

@@ -7,6 +7,7 @@ use rerun::{Boxes2D, LineStrips2D, Radius};
 use sightline_core::frames::Pixel;
 use sightline_core::image::PixelRect;
 use sightline_core::locate::features::rows::moved_covariance_px2;
+use sightline_core::locate::shape_tracker::rows::registered_covariance_px2;
 
 use super::Logged;
 use super::border::{corner_frame, dot, ellipse, haloed, plus, png, point, square};
@@ -96,12 +97,15 @@ pub(super) fn log_second_peak(step: &Step<'_>) -> Logged {
     step.log("/{target}/locate/match_template/second_peak", second)
 }
 
-/// The error of the located left position, bias included; that of a position by features at 1, 2 and 3 σ (R180).
+/// The error of the located left position, bias included; that of a position by features or by shape at 1, 2 and 3 σ (R180).
 pub(super) fn log_left_covariance(step: &Step<'_>) -> Logged {
     let strips = step.trace.locate.as_ref().and_then(|located| {
         let pixel = located.left_pixel?;
         let camera = step.trace.point_mast.as_ref().map(|pointing| &pointing.left);
-        match camera.and_then(|camera| moved_covariance_px2(located, camera)) {
+        let moved = camera.and_then(|camera| {
+            moved_covariance_px2(located, camera).or_else(|| registered_covariance_px2(located, camera))
+        });
+        match moved {
             Some(moved) => {
                 [1.0, 2.0, SIGMAS].map(|sigmas| ellipse(pixel, &moved, sigmas)).into_iter().collect()
             }

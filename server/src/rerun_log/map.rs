@@ -10,10 +10,10 @@ use sightline_core::camera::Camera;
 use sightline_core::frames::{Pixel, Point3, Vector3};
 use sightline_core::pipeline::Stops;
 
-use super::Logged;
 use super::border::{dot_3d, ellipsoids, point_3d, transform};
 use super::palette::{MEASUREMENT, PREDICTION, ROVER, Rgb, TRUTH, color, faint, of_state};
 use super::step::Step;
+use super::{Logged, shape};
 
 /// Length of the drawn camera pyramids, m.
 const FRUSTUM_M: f64 = 0.8;
@@ -120,6 +120,9 @@ pub(super) fn log_moved_covariance(step: &Step<'_>) -> Logged {
 /// Position and covariance of a target that the motion moved, in the rover frame.
 fn moved(step: &Step<'_>) -> Option<(Point3, Matrix3<f64>)> {
     let located = step.features()?.bootstrap.as_ref().and(step.trace.locate.as_ref())?;
+    if shape::registered(step.trace).is_some() {
+        return None;
+    }
     located.position_in_rover.zip(located.covariance_in_rover)
 }
 
@@ -139,7 +142,7 @@ pub(super) fn log_true_position(step: &Step<'_>) -> Logged {
 }
 
 /// The ellipsoids of a covariance in the rover frame, turned into the site frame.
-fn spread(
+pub(super) fn spread(
     step: &Step<'_>,
     point_in_rover: &Point3,
     covariance: &Matrix3<f64>,

@@ -59,6 +59,20 @@
 //! | `/{target}/locate/bootstrap/left` | `Points2D` | the motion has a covariance |
 //! | `/{target}/locate/bootstrap/position` | `Points3D` | the target was moved |
 //! | `/{target}/locate/bootstrap/covariance` | `Ellipsoids3D` | the target was moved |
+//! | `/{target}/locate/surface/disparities` | `DepthImage` | a surface was measured |
+//! | `/{target}/locate/surface/ranges` | `DepthImage` | a surface was measured |
+//! | `/{target}/locate/coarse_register/sensor` | `DepthImage` | surfaces were compared |
+//! | `/{target}/locate/coarse_register/error_before` | `Image` | surfaces were compared |
+//! | `/{target}/locate/coarse_register/coarse_search` | `DepthImage` | shifts were searched |
+//! | `/{target}/locate/coarse_register/coarse_search/best` | `Points2D` | a shift was found |
+//! | `/{target}/locate/coarse_register/error_coarse` | `Image` | surfaces were compared |
+//! | `/{target}/locate/refine_register/error_fine` | `Image` | surfaces were compared |
+//! | `/{target}/locate/refine_register/mesh_fixed` | `Mesh3D` | registered to an earlier mesh |
+//! | `/{target}/locate/refine_register/mesh_moving` | `Mesh3D` | there is a present mesh |
+//! | `/{target}/locate/refine_register/position` | `Points3D` | the registration is used |
+//! | `/{target}/locate/refine_register/covariance` | `Ellipsoids3D` | the registration is used |
+//! | `/{target}/locate/hand_off/draped` | `DepthImage` | the last picture was found at a hand-off |
+//! | `/{target}/locate/hand_off/draped_match` | `DepthImage` | the last picture was found at a hand-off |
 //! | `/{target}/locate/left_covariance` | `LineStrips2D` | designated or located |
 //! | `/{target}/judge/state` | `StateChange`, static `StateConfiguration` | always |
 //! | `/{target}/judge/verdict` | `TextLog` | always |
@@ -78,6 +92,15 @@
 //! | `/{target}/locate/point_stereo/across_px` | `Scalars`, static `SeriesLines` | stereo matched |
 //! | `/{target}/locate/triangulate/gap_px` | `Scalars`, static `SeriesLines` | triangulated |
 //! | `/{target}/locate/fit_motion/inliers` | `Scalars`, static `SeriesLines` | a motion was fitted |
+//! | `/{target}/locate/coarse_register/mean_m` | `Scalars`, static `SeriesLines` | shifts were searched and surfaces overlap |
+//! | `/{target}/locate/refine_register/mean_m` | `Scalars`, static `SeriesLines` | surfaces were compared |
+//! | `/{target}/locate/refine_register/overlap` | `Scalars`, static `SeriesLines` | surfaces were compared |
+//! | `/{target}/locate/refine_register/overlap/limit` | `Scalars`, static `SeriesLines` | registered |
+//! | `/{target}/locate/refine_register/misfit` | `Scalars`, static `SeriesLines` | surfaces were compared |
+//! | `/{target}/locate/refine_register/misfit/limit` | `Scalars`, static `SeriesLines` | registered |
+//! | `/{target}/locate/refine_register/sigma_m` | `Scalars`, static `SeriesLines` | the shape holds the target |
+//! | `/{target}/locate/refine_register/sigma_m/limit` | `Scalars`, static `SeriesLines` | registered |
+//! | `/{target}/locate/hand_off/score` | `Scalars`, static `SeriesLines` | the last picture was found at a hand-off |
 //! | `/{target}/judge/ncc` | `Scalars`, static `SeriesLines` | judged and matched |
 //! | `/{target}/judge/ncc/limit` | `Scalars`, static `SeriesLines` | judged |
 //! | `/{target}/judge/stereo_ncc` | `Scalars`, static `SeriesLines` | judged and stereo matched |
@@ -109,6 +132,7 @@ mod page;
 mod palette;
 mod recorder;
 mod scores;
+mod shape;
 mod states;
 mod step;
 mod surface;
@@ -187,6 +211,7 @@ fn log_step(step: &Step<'_>, is_first_here: bool) -> Logged {
     features::log_cloud_left(step)?;
     map::log_moved_position(step)?;
     map::log_moved_covariance(step)?;
+    log_shape(step)?;
     images::log_left_covariance(step)?;
 
     states::log_state(step)?;
@@ -198,6 +223,24 @@ fn log_step(step: &Step<'_>, is_first_here: bool) -> Logged {
     map::log_true_position(step)?;
 
     SCORES.iter().try_for_each(|score| scores::log_score(step, score))
+}
+
+/// Logs the steps of the shape tracker.
+fn log_shape(step: &Step<'_>) -> Logged {
+    shape::log_disparities(step)?;
+    shape::log_ranges(step)?;
+    shape::log_sensor(step)?;
+    shape::log_error_before(step)?;
+    shape::log_coarse_search(step)?;
+    shape::log_coarse_best(step)?;
+    shape::log_error_coarse(step)?;
+    shape::log_error_fine(step)?;
+    shape::log_mesh_fixed(step)?;
+    shape::log_mesh_moving(step)?;
+    shape::log_position(step)?;
+    shape::log_covariance(step)?;
+    shape::log_draped(step)?;
+    shape::log_draped_match(step)
 }
 
 #[cfg(test)]

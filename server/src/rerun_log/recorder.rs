@@ -55,6 +55,8 @@ struct Known {
     position_in_site: Point3,
     /// Width and height of the subframe, px.
     close_up_px: [u32; 2],
+    /// Whether its tracker asks for the shape.
+    has_shape: bool,
 }
 
 impl Known {
@@ -64,6 +66,7 @@ impl Known {
             steps: BTreeSet::new(),
             position_in_site: first.update.target.initial_position_in_site,
             close_up_px: subframe.map_or([161; 2], |rect| [rect.width, rect.height]),
+            has_shape: first.shape().is_some(),
         }
     }
 }
@@ -110,7 +113,11 @@ impl Recorder {
         if self.runs.len() == known {
             return Ok(());
         }
-        let lanes = self.runs.iter().map(|(root, known)| Lane { root, close_up_px: known.close_up_px });
+        let lanes = self.runs.iter().map(|(root, known)| Lane {
+            root,
+            close_up_px: known.close_up_px,
+            has_shape: known.has_shape,
+        });
         let lanes: Vec<_> = lanes.collect();
         let Some(first) = self.runs.values().next() else { return Ok(()) };
         let outlook = Outlook::over(stops, &first.position_in_site);

@@ -4,6 +4,7 @@
 
 use rerun::{RecordingStream, Scalars};
 use sightline_core::camera::MastAngles;
+use sightline_core::locate::shape_tracker::evidence::{Check, Registered};
 use sightline_core::locate::template::TemplateEvidence;
 use sightline_core::stages::capture::Capture;
 use sightline_core::stages::judge::Gate;
@@ -50,6 +51,15 @@ pub(super) const SCORES: &[Score] = &[
     score("/{target}/locate/point_stereo/across_px", "stereo matched", LOST, |t| Some(evidence(t)?.point_stereo.as_ref()?.across_px)),
     score("/{target}/locate/triangulate/gap_px", "triangulated", SECOND_PEAK, |t| Some(evidence(t)?.triangulate.as_ref()?.gap_px)),
     score("/{target}/locate/fit_motion/inliers", "a motion was fitted", TRACKING, |t| Some(t.features()?.fit_motion.as_ref()?.inliers as f64)),
+    score("/{target}/locate/coarse_register/mean_m", "shifts were searched and surfaces overlap", MEASUREMENT, |t| registration(t)?.mean_m[1]),
+    score("/{target}/locate/refine_register/mean_m", "surfaces were compared", SECOND_PEAK, |t| registration(t)?.mean_m[2]),
+    score("/{target}/locate/refine_register/overlap", "surfaces were compared", MEASUREMENT, |t| check(t, "shape_overlap")?.value),
+    score("/{target}/locate/refine_register/overlap/limit", "registered", LIMIT, |t| Some(check(t, "shape_overlap")?.limit)),
+    score("/{target}/locate/refine_register/misfit", "surfaces were compared", LOST, |t| check(t, "shape_misfit")?.value),
+    score("/{target}/locate/refine_register/misfit/limit", "registered", LIMIT, |t| Some(check(t, "shape_misfit")?.limit)),
+    score("/{target}/locate/refine_register/sigma_m", "the shape holds the target", TRACKING, |t| check(t, "shape_sigma_m")?.value),
+    score("/{target}/locate/refine_register/sigma_m/limit", "registered", LIMIT, |t| Some(check(t, "shape_sigma_m")?.limit)),
+    score("/{target}/locate/hand_off/score", "the last picture was found at a hand-off", MEASUREMENT, |t| Some(registration(t)?.draped.as_ref()?.score)),
     score("/{target}/judge/ncc", "judged and matched", MEASUREMENT, |t| gate(t, "ncc")?.value),
     score("/{target}/judge/ncc/limit", "judged", LIMIT, |t| Some(gate(t, "ncc")?.limit)),
     score("/{target}/judge/stereo_ncc", "judged and stereo matched", SECOND_PEAK, |t| gate(t, "stereo_ncc")?.value),
@@ -114,6 +124,14 @@ fn evidence(trace: &StepTrace) -> Option<&TemplateEvidence> {
 
 fn gate<'a>(trace: &'a StepTrace, name: &str) -> Option<&'a Gate> {
     trace.judge.as_ref()?.gates.iter().find(|gate| gate.name == name)
+}
+
+fn registration(trace: &StepTrace) -> Option<&Registered> {
+    trace.shape()?.registration.as_ref()
+}
+
+fn check<'a>(trace: &'a StepTrace, name: &str) -> Option<&'a Check> {
+    registration(trace)?.checks.iter().find(|check| check.name == name)
 }
 
 fn truth(trace: &StepTrace) -> Option<&StepTruth> {

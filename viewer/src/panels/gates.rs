@@ -110,9 +110,10 @@ fn bar(ui: &mut Ui, gate: &Gate, colour: egui::Color32) {
     response.on_hover_text("At the end: the margin, positive on the good side of the limit.");
 }
 
-/// Value and limit as fractions of the bar: scores from 0 to 1, others from 0 to twice the limit.
+/// Value and limit as fractions of the bar: scores and shares from 0 to 1, others from 0 to twice the limit.
 fn fractions(gate: &Gate) -> (Option<f32>, f32) {
-    let full = if gate.at_least { 1.0 } else { 2.0 * gate.limit.max(1e-9) };
+    let is_share = gate.at_least && gate.unit.is_empty() && gate.limit <= 1.0;
+    let full = if is_share { 1.0 } else { 2.0 * gate.limit.max(1e-9) };
     let fraction = |v: f64| (v / full).clamp(0.0, 1.0) as f32;
     (gate.value.map(fraction), fraction(gate.limit))
 }
@@ -128,6 +129,13 @@ fn readable(name: &str) -> &str {
         "second_peak_ratio" => "second peak",
         "match_sigma_px" => "match σ",
         "edge_distance_px" => "from the edge",
+        "shape_overlap" => "shape overlap",
+        "shape_misfit" => "shape misfit",
+        "shape_sigma_m" => "shape σ",
+        "shape_turn_deg" => "shape turn",
+        "shape_other_minimum" => "next minimum ×",
+        "shape_edge_distance_m" => "from the edge",
+        "picture_ncc" => "draped picture",
         other => other,
     }
 }
@@ -147,5 +155,9 @@ mod tests {
         assert_eq!(fractions(&gate(Some(0.05), 0.1, false)), (Some(0.25), 0.5));
         assert_eq!(fractions(&gate(Some(9.0), 0.1, false)), (Some(1.0), 0.5));
         assert_eq!(fractions(&gate(None, 0.1, false)), (None, 0.5));
+        // A ratio that must exceed one and a distance that must be kept go up to twice their limits as well.
+        assert_eq!(fractions(&gate(Some(1.725), 1.15, true)), (Some(0.75), 0.5));
+        let edge = Gate { unit: "m".to_owned(), ..gate(Some(0.004), 0.004, true) };
+        assert_eq!(fractions(&edge), (Some(0.5), 0.5));
     }
 }

@@ -4,6 +4,7 @@ use egui::{Align, CursorIcon, Layout, Rect, Ui, pos2, vec2};
 use sightline_core::frames::Pixel;
 use sightline_core::image::PixelRect;
 use sightline_core::locate::features::rows::moved_covariance_px2;
+use sightline_core::locate::shape_tracker::rows::{basin, registered_covariance_px2};
 use sightline_core::trace::StepTrace;
 
 use super::exposure;
@@ -106,8 +107,11 @@ fn entries(state: &State) -> Vec<Entry> {
         entries.push(Entry::new(Layer::Truth, Mark::Plus, theme::TRUTH, "truth"));
     }
     if trace.locate.as_ref().is_some_and(|l| l.left_pixel.is_some()) {
+        let by_shape =
+            trace.shape().is_some_and(|shape| shape.registration.is_some() && shape.is_judged_by_shape);
         let word = match (trace.predict.is_some(), trace.features().is_some()) {
             (false, _) => "picked",
+            (true, _) if by_shape => "registered here, 1σ 2σ 3σ",
             (true, false) => "match, 3σ",
             (true, true) => "moved here, 1σ 2σ 3σ",
         };
@@ -121,6 +125,10 @@ fn entries(state: &State) -> Vec<Entry> {
             theme::PREDICTION,
             "predicted, 3σ gate",
         ));
+    }
+    if let Some((_, half_width_m)) = basin_of(trace).filter(|(outline, _)| !outline.is_empty()) {
+        let word = format!("basin, half width {:.0} cm", half_width_m * 100.0);
+        entries.push(Entry::new(Layer::Basin, Mark::Stroke(Line::Dashed), theme::BASIN, word));
     }
     if matched.is_some() {
         entries.push(Entry::new(Layer::Template, Mark::Stroke(Line::Solid), run, "template window"));
@@ -157,6 +165,9 @@ fn paint_marks(overlay: &Overlay<'_>, trace: &StepTrace, state: &State) {
     if state.shows(Layer::Prediction) && trace.predict.is_some() {
         paint_prediction(overlay, trace);
     }
+    if let Some((outline, _)) = basin_of(trace).filter(|_| state.shows(Layer::Basin)) {
+        overlay.outline(&outline, theme::BASIN, Line::Dashed);
+    }
     if let (Some(found), Some(prepared)) = (matched, evidence.and_then(|e| e.scale_roll.as_ref()))
         && state.shows(Layer::Template)
     {
@@ -168,7 +179,9 @@ fn paint_marks(overlay: &Overlay<'_>, trace: &StepTrace, state: &State) {
     if let Some((located, pixel)) = trace.locate.as_ref().and_then(|l| Some((l, l.left_pixel?)))
         && state.shows(Layer::Match)
     {
-        let moved = trace.point_mast.as_ref().and_then(|p| moved_covariance_px2(located, &p.left));
+        let moved = trace.point_mast.as_ref().and_then(|p| {
+            moved_covariance_px2(located, &p.left).or_else(|| registered_covariance_px2(located, &p.left))
+        });
         match moved {
             Some(moved) => {
                 for sigmas in [1.0, 2.0, 3.0] {
@@ -183,6 +196,14 @@ fn paint_marks(overlay: &Overlay<'_>, trace: &StepTrace, state: &State) {
     {
         overlay.mark(pixel, Mark::Plus, theme::TRUTH);
     }
+}
+
+/// The rock's half width about the prediction, in the image and in metres: from farther off a registration may settle on
+/// another place (R155).
+fn basin_of(trace: &StepTrace) -> Option<(Vec<Pixel>, f64)> {
+    let half_width_m = trace.shape()?.registration.as_ref()?.half_width_m;
+    let predicted = &trace.predict.as_ref()?.position_in_rover;
+    Some((basin(predicted, half_width_m, &trace.point_mast.as_ref()?.left), half_width_m))
 }
 
 fn paint_prediction(overlay: &Overlay<'_>, trace: &StepTrace) {

@@ -17,6 +17,7 @@ pub mod messages;
 pub mod names;
 pub mod plots;
 pub mod settings;
+pub mod shape;
 pub mod stereo_profile;
 pub mod strip;
 pub mod studies;

@@ -12,7 +12,7 @@ use crate::cache::Slot;
 use crate::command::{Command, Panel};
 use crate::contour::contour;
 use crate::overlay::{Line, Mark, Overlay};
-use crate::raster::Raster;
+use crate::raster::{Look, Raster};
 use crate::state::State;
 use crate::view2d::Canvas;
 use crate::{panels, theme};
@@ -44,7 +44,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         }
         Slot::Absent | Slot::Loading => return panels::missing(ui, PURPOSE, "Loading the scores …"),
     };
-    raster.score_limits(matched.measure.shown_limits());
+    raster.look(Look::Values(matched.measure.shown_limits()));
     let area = ui.available_rect_before_wrap();
     let (rest, bar) = area.split_left_right_at_x(area.right() - BAR);
     let mut left = ui.new_child(egui::UiBuilder::new().max_rect(rest).id_salt("scores"));

@@ -45,6 +45,7 @@ impl State {
             Command::SetCalculator(calculator) => self.calculator = calculator,
             Command::SetStretch(stretch) => self.stretch = stretch,
             Command::SetFeatureView(view) => self.feature_view = view,
+            Command::SetShapeView(view) => self.shape_view = view,
             Command::OrderStudy(order) => self.studies.order = order,
             Command::StartStudy => self.start_study(),
             Command::CancelStudy(job) => self.outbox.push(Request::CancelStudy(job)),

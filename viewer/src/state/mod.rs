@@ -16,6 +16,7 @@ mod wanted;
 use std::collections::{BTreeMap, HashSet};
 
 use serde_json::Value;
+use sightline_core::camera::Camera;
 use sightline_core::frames::Pixel;
 use sightline_core::limits::SettingInfo;
 use sightline_core::session::Cursor;
@@ -33,6 +34,7 @@ use crate::cache::{Cache, Eye, Key, Slot, StepKey};
 use crate::command::{Layer, Mode, Panel, Stage};
 use crate::net::Request;
 use crate::raster::Raster;
+use crate::shape_view::ShapeView;
 use crate::stretch::Stretch;
 use crate::tables::FeatureView;
 use crate::view2d::View2d;
@@ -140,6 +142,8 @@ pub struct State {
     pub stretch: Stretch,
     /// Which features are shown, and how long their residuals are drawn.
     pub feature_view: FeatureView,
+    /// What is looked at of a registration by shape.
+    pub shape_view: ShapeView,
     /// What the calculator of the error budget is given.
     pub calculator: Calculator,
     /// The validation experiments.
@@ -154,6 +158,8 @@ pub struct State {
     pub open_url: Option<String>,
     outbox: Vec<Request>,
     sync: Sync,
+    /// The aligned left camera of the step that was asked for last: it takes a while to compute.
+    aligned: egui::mutex::Mutex<Option<(StepKey, Option<Camera>)>>,
 }
 
 /// What keeps the page and the server's session together.
@@ -199,6 +205,7 @@ impl State {
             views: Views::default(),
             stretch: Stretch::default(),
             feature_view: FeatureView::default(),
+            shape_view: ShapeView::default(),
             calculator: Calculator::default(),
             studies: Studies::default(),
             wants_history: false,
@@ -207,6 +214,7 @@ impl State {
             open_url: None,
             outbox: Vec::new(),
             sync: Sync { linked, ..Sync::default() },
+            aligned: egui::mutex::Mutex::default(),
         }
     }
 

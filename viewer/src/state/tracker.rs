@@ -1,9 +1,13 @@
 //! What the run that is looked at was tracked with, and what only one of the trackers has.
 
+use sightline_core::camera::Camera;
 use sightline_core::locate::features::FeatureEvidence;
 use sightline_core::locate::features::rows::{CloudPoint, Feature};
+use sightline_core::locate::shape_tracker::ShapeEvidence;
+use sightline_core::locate::shape_tracker::rows::{Facet, PathStep};
 use sightline_core::session::view::RunView;
 use sightline_core::settings::TrackerKind;
+use sightline_core::stereo::{AlignSettings, Alignment};
 use sightline_core::trace::{ArrayName, StepRow, StepTrace};
 
 use super::State;
@@ -31,7 +35,7 @@ impl State {
     pub fn features(&self) -> Slot<'_, Vec<Feature>> {
         self.table(ArrayName::Features, |table| match table {
             Table::Features(rows) => Some(rows),
-            Table::Cloud(_) => None,
+            _ => None,
         })
     }
 
@@ -39,8 +43,43 @@ impl State {
     pub fn cloud(&self) -> Slot<'_, Vec<CloudPoint>> {
         self.table(ArrayName::Cloud, |table| match table {
             Table::Cloud(rows) => Some(rows),
-            Table::Features(_) => None,
+            _ => None,
         })
+    }
+
+    /// The way of the refinement at the cursor's step.
+    pub fn refine_path(&self) -> Slot<'_, Vec<PathStep>> {
+        self.table(ArrayName::RefinePath, |table| match table {
+            Table::Path(rows) => Some(rows),
+            _ => None,
+        })
+    }
+
+    /// The facets of a mesh of the cursor's step.
+    pub fn facets(&self, name: ArrayName) -> Slot<'_, Vec<Facet>> {
+        self.table(name, |table| match table {
+            Table::Facets(rows) => Some(rows),
+            _ => None,
+        })
+    }
+
+    /// What the shape tracker saw at the cursor's step.
+    pub fn shape_evidence(&self) -> Option<&ShapeEvidence> {
+        self.trace().and_then(StepTrace::shape)
+    }
+
+    /// The aligned left camera of the cursor's step, in which surfaces are measured.
+    pub fn aligned_left(&self) -> Option<Camera> {
+        let key = self.step_key(self.cursor.step)?;
+        let mut kept = self.aligned.lock();
+        if let Some((_, camera)) = kept.as_ref().filter(|(of, _)| *of == key) {
+            return camera.clone();
+        }
+        let pointing = self.trace()?.point_mast.as_ref()?;
+        let aligned = Alignment::new(&pointing.left, &pointing.right, &AlignSettings::default());
+        let camera = aligned.ok().map(|aligned| aligned.left);
+        *kept = Some((key, camera.clone()));
+        camera
     }
 
     fn table<'a, T>(&'a self, name: ArrayName, of: impl FnOnce(&'a Table) -> Option<&'a T>) -> Slot<'a, T> {
@@ -76,6 +115,18 @@ impl State {
             (TrackerKind::Template, Some(_)) => {
                 "This run follows the target’s own template and looks for no features. Choose the preset \
                  “features” in Settings and press “Run from here” at the pick."
+                    .to_owned()
+            }
+            _ => self.missing_step(),
+        }
+    }
+
+    /// Why a panel about the shape has nothing to show, as a sentence that says how to get it.
+    pub fn missing_shape(&self) -> String {
+        match (self.tracker(), self.row()) {
+            (TrackerKind::Template | TrackerKind::Features, Some(_)) => {
+                "This run does not ask for the shape of the target’s surroundings. Choose the preset “combined” or \
+                 “shape” in Settings and press “Run from here” at the pick."
                     .to_owned()
             }
             _ => self.missing_step(),

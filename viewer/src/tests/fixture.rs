@@ -175,7 +175,8 @@ pub(crate) fn trace(step: usize) -> StepTrace {
     };
     let is_good = state == TrackingState::Tracking;
     let is_designation = step == 0;
-    let (left, right) = cameras();
+    let mast = Mast::spirit();
+    let (left, right) = (mast.left_in_head, mast.right_in_head);
     let covariance = Matrix3::from_diagonal(&nalgebra::Vector3::new(4e-4, 1e-4, 1e-4));
     let prediction = Prediction {
         position_in_rover: Point3::from(POSITION),
@@ -222,11 +223,6 @@ pub(crate) fn trace(step: usize) -> StepTrace {
             tracked: Some(is_good),
         }),
     }
-}
-
-fn cameras() -> (Camera, Camera) {
-    let mast = Mast::spirit();
-    (mast.left_in_head, mast.right_in_head)
 }
 
 fn located(is_designation: bool, is_good: bool, covariance: Matrix3<f64>) -> Located {
@@ -391,6 +387,7 @@ fn updated(
             },
             memory: Default::default(),
             anchors: Default::default(),
+            views: Default::default(),
         },
         state,
         template_renewed: renewed,

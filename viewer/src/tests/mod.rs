@@ -6,6 +6,8 @@ mod features;
 pub(crate) mod fixture;
 mod history;
 mod session;
+mod shape;
+mod shape_run;
 mod studies;
 mod tracking;
 

@@ -32,6 +32,7 @@ pub mod evidence;
 mod half_width;
 mod register_stop;
 pub mod placement;
+pub mod rows;
 pub mod settings;
 pub mod surface;
 pub mod view;

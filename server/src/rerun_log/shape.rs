@@ -1,0 +1,191 @@
+//! The steps of the shape tracker: the surface that stereo sees, the virtual range sensor with the errors of depth, the
+//! coarse search, both meshes in space, and the picture of a hand-off.
+//!
+//! Values are kept as they are, in metres (disparities in pixels), under colour maps: viridis between the values beyond
+//! which one in a hundred lies. Errors of depth are blue, white at zero and red, all three pictures of a step with the
+//! limit that nearly all errors at the start keep to. A position of the coarse search is one pixel, the first row at the
+//! least Δy. The earlier mesh is where the registration puts it.
+
+use nalgebra::{Matrix3, Vector3};
+use rerun::components::Colormap;
+use rerun::{ColorModel, DepthImage, Image, Mesh3D};
+use sightline_core::frames::{Pixel, Point3};
+use sightline_core::locate::shape_tracker::rows;
+use sightline_core::trace::{ArrayName, ArrayView, StepTrace};
+
+use super::Logged;
+use super::border::{dot, dot_3d, mapped, point_3d};
+use super::map::spread;
+use super::palette::{LOST, MEASUREMENT, PREDICTION, Rgb, color, of_difference};
+use super::step::Step;
+
+/// The least limit of the colours of errors, m.
+const LEAST_LIMIT_M: f32 = 0.001;
+
+/// Disparities of the aligned left image.
+pub(super) fn log_disparities(step: &Step<'_>) -> Logged {
+    let image = viridis(step, ArrayName::Disparities);
+    step.log("/{target}/locate/surface/disparities", image)
+}
+
+/// Distances from the left camera.
+pub(super) fn log_ranges(step: &Step<'_>) -> Logged {
+    step.log("/{target}/locate/surface/ranges", viridis(step, ArrayName::Ranges))
+}
+
+/// The earlier surface in the virtual sensor.
+pub(super) fn log_sensor(step: &Step<'_>) -> Logged {
+    step.log("/{target}/locate/coarse_register/sensor", viridis(step, ArrayName::Sensor))
+}
+
+/// Mean distance of the surfaces for every shift.
+pub(super) fn log_coarse_search(step: &Step<'_>) -> Logged {
+    let image = viridis(step, ArrayName::CoarseSearch);
+    step.log("/{target}/locate/coarse_register/coarse_search", image)
+}
+
+/// Where that is least.
+pub(super) fn log_coarse_best(step: &Step<'_>) -> Logged {
+    let best = best(step.trace).map(|pixel| dot(pixel, MEASUREMENT, "best"));
+    step.log("/{target}/locate/coarse_register/coarse_search/best", best)
+}
+
+/// Present less earlier depth at the start.
+pub(super) fn log_error_before(step: &Step<'_>) -> Logged {
+    let image = signed(step, ArrayName::ErrorBefore);
+    step.log("/{target}/locate/coarse_register/error_before", image)
+}
+
+/// The same after the coarse search.
+pub(super) fn log_error_coarse(step: &Step<'_>) -> Logged {
+    let image = signed(step, ArrayName::ErrorCoarse);
+    step.log("/{target}/locate/coarse_register/error_coarse", image)
+}
+
+/// The same at the end.
+pub(super) fn log_error_fine(step: &Step<'_>) -> Logged {
+    step.log("/{target}/locate/refine_register/error_fine", signed(step, ArrayName::ErrorFine))
+}
+
+/// The earlier surface, where the registration puts it.
+pub(super) fn log_mesh_fixed(step: &Step<'_>) -> Logged {
+    let found = mesh(step, ArrayName::MeshFixed, LOST);
+    step.log("/{target}/locate/refine_register/mesh_fixed", found)
+}
+
+/// The present surface.
+pub(super) fn log_mesh_moving(step: &Step<'_>) -> Logged {
+    let found = mesh(step, ArrayName::MeshMoving, PREDICTION);
+    step.log("/{target}/locate/refine_register/mesh_moving", found)
+}
+
+/// At a hand-off, the earlier image draped over the surface as the present camera would see it.
+pub(super) fn log_draped(step: &Step<'_>) -> Logged {
+    step.log("/{target}/locate/hand_off/draped", grey(step, ArrayName::Draped))
+}
+
+/// The present image where it was found.
+pub(super) fn log_draped_match(step: &Step<'_>) -> Logged {
+    step.log("/{target}/locate/hand_off/draped_match", grey(step, ArrayName::DrapedMatch))
+}
+
+/// The position by registration, accepted or not.
+pub(super) fn log_position(step: &Step<'_>) -> Logged {
+    let point = registered(step.trace).map(|(at, _)| dot_3d(step.in_site(&at), MEASUREMENT, "registered"));
+    step.log("/{target}/locate/refine_register/position", point)
+}
+
+/// The covariance of that position.
+pub(super) fn log_covariance(step: &Step<'_>) -> Logged {
+    let found =
+        registered(step.trace).and_then(|(at, covariance)| spread(step, &at, &covariance, MEASUREMENT));
+    step.log("/{target}/locate/refine_register/covariance", found)
+}
+
+/// Position (m) and covariance (m²) of a target that was registered, in the rover frame.
+pub(super) fn registered(trace: &StepTrace) -> Option<(Point3, Matrix3<f64>)> {
+    trace.shape()?.registration.as_ref().filter(|found| found.failure.is_none())?;
+    let located = trace.locate.as_ref()?;
+    located.position_in_rover.zip(located.covariance_in_rover)
+}
+
+/// The best shift of the coarse search as a pixel of its picture.
+pub(super) fn best(trace: &StepTrace) -> Option<Pixel> {
+    let found = trace.shape()?.registration.as_ref()?;
+    let [columns, rows] = values(trace, ArrayName::CoarseSearch)?.size();
+    let [x_m, y_m, _] = found.coarse_shift_m?;
+    let step_m = rows::sensor_pixel_m(found, values(trace, ArrayName::Sensor)?.size()[0])?;
+    let place = |side: u32, shift_m: f64| (f64::from(side) - 1.0) / 2.0 + shift_m / step_m;
+    Some(Pixel::new(place(columns, x_m), place(rows, y_m)))
+}
+
+/// Whether a step has an array with at least one value.
+pub(super) fn has(trace: &StepTrace, name: ArrayName) -> bool {
+    values(trace, name).is_some()
+}
+
+/// An array that holds at least one value.
+fn values(trace: &StepTrace, name: ArrayName) -> Option<ArrayView<'_>> {
+    trace.array(name).filter(|array| array.size().iter().all(|side| *side > 0))
+}
+
+fn viridis(step: &Step<'_>, name: ArrayName) -> Option<DepthImage> {
+    let array = values(step.trace, name)?;
+    mapped(array.size(), array.values(), ends(array.values()).map(f64::from), Colormap::Viridis)
+}
+
+fn grey(step: &Step<'_>, name: ArrayName) -> Option<DepthImage> {
+    let array = values(step.trace, name)?;
+    mapped(array.size(), array.values(), ends(array.values()).map(f64::from), Colormap::Grayscale)
+}
+
+/// Blue below, white at zero, red above; what does not exist is transparent.
+fn signed(step: &Step<'_>, name: ArrayName) -> Option<Image> {
+    let array = values(step.trace, name)?;
+    let [low, high] = values(step.trace, ArrayName::ErrorBefore).map_or([0.0; 2], |all| ends(all.values()));
+    let limit_m = low.abs().max(high.abs()).max(LEAST_LIMIT_M);
+    let rgba = array.values().iter().flat_map(|value| {
+        let [r, g, b] = of_difference(value / limit_m);
+        if value.is_finite() { [r, g, b, 255] } else { [0; 4] }
+    });
+    Some(Image::from_elements(&rgba.collect::<Vec<u8>>(), array.size(), ColorModel::RGBA))
+}
+
+/// The facets of a mesh in the site frame, each with its own normal.
+fn mesh(step: &Step<'_>, name: ArrayName, rgb: Rgb) -> Option<Mesh3D> {
+    let array = values(step.trace, name)?;
+    let facets = rows::facets(array.values())
+        .map(|facet| facet.map(|corner| step.in_site(&Point3::from(Vector3::from(corner).map(f64::from)))));
+    let (mut corners, mut normals) = (Vec::new(), Vec::new());
+    for [a, b, c] in facets {
+        let normal = (b - a).cross(&(c - a)).try_normalize(1e-15).unwrap_or_else(Vector3::z);
+        corners.extend([a, b, c].map(|corner| point_3d(&corner)));
+        normals.extend([point_3d(&Point3::from(normal)); 3]);
+    }
+    Some(Mesh3D::new(corners).with_vertex_normals(normals).with_albedo_factor(*color(rgb)))
+}
+
+/// The values below and above which one in a hundred lies; never equal, so that what is flat still has a colour.
+fn ends(values: &[f32]) -> [f32; 2] {
+    let mut finite: Vec<f32> = values.iter().copied().filter(|value| value.is_finite()).collect();
+    finite.sort_by(f32::total_cmp);
+    let skip = finite.len() / 100;
+    match (finite.get(skip), finite.len().checked_sub(1 + skip).and_then(|last| finite.get(last))) {
+        (Some(&low), Some(&high)) if low < high => [low, high],
+        _ => [0.0, 1.0],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_value_in_a_hundred_lies_beyond_the_ends_and_a_flat_picture_has_some() {
+        let mut values: Vec<f32> = (0..200).map(|value| value as f32).collect();
+        values.push(f32::NAN);
+        assert_eq!(ends(&values), [2.0, 197.0]);
+        assert_eq!(ends(&[3.0, 3.0]), [0.0, 1.0]);
+        assert_eq!(ends(&[]), [0.0, 1.0]);
+    }
+}

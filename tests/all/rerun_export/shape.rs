@@ -1,0 +1,126 @@
+//! The entities of the shape tracker, from arrays made up for the short drive.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use sightline_core::frames::{Pixel, Point3};
+use sightline_core::locate::Evidence;
+use sightline_core::locate::features::evidence::Table;
+use sightline_core::locate::shape::Method;
+use sightline_core::locate::shape_tracker::ShapeEvidence;
+use sightline_core::locate::shape_tracker::drape::Draped;
+use sightline_core::locate::shape_tracker::evidence::{Check, MESH_COLUMNS, Registered};
+use sightline_core::locate::shape_tracker::surface::SurfaceSeen;
+use sightline_core::trace::StepTrace;
+use sightline_server::rerun_log::{RunLog, entities_of, export, root};
+use sightline_tests::rrd;
+
+use super::{FIXTURE, MISSING, promised, sorted};
+
+/// A square of values that grow by one from pixel to pixel; the first does not exist.
+fn picture(columns: u32, first: f32) -> Table {
+    let values = (0..columns * columns).map(|i| if i == 0 { f32::NAN } else { first + i as f32 });
+    Table { columns, values: values.collect() }
+}
+
+/// Whatever the surfaces give a registration.
+fn registered() -> Registered {
+    let check = |name: &str, value: f64, limit: f64| Check {
+        name: name.to_owned(),
+        unit: String::new(),
+        value: Some(value),
+        limit,
+        at_least: false,
+    };
+    Registered {
+        to_step: 0,
+        is_hand_off: true,
+        method: Method::PointToPlane,
+        half_width_m: 0.3,
+        sensor_side_m: Some(0.4),
+        start_in_rover: [4.0, 0.1, 0.2],
+        correction_m: Some(0.02),
+        coarse_shift_m: Some([0.1, -0.1, 0.0]),
+        search_m: 0.1,
+        mean_m: [Some(0.03), Some(0.02), Some(0.01)],
+        evaluations: 5,
+        turn_deg: 0.5,
+        sigmas_m: Some([0.003, 0.002, 0.001]),
+        ray: None,
+        draped: Some(Draped {
+            pixel: Pixel::new(10.0, 10.0),
+            score: 0.875,
+            correction_px: 1.0,
+            covariance_px2: Default::default(),
+            on_mesh: 1.0,
+            picture: picture(3, 0.0),
+            matched: picture(3, 0.0),
+        }),
+        draped_missing: None,
+        checks: vec![check("shape_overlap", 0.5, 0.25), check("shape_misfit", 1.25, 1.8)],
+        failure: None,
+        reason: None,
+    }
+}
+
+/// A surface of two by two pixels, registered with a sensor of four by four and found again at a hand-off.
+fn by_shape(trace: &StepTrace) -> StepTrace {
+    let mut trace = trace.clone();
+    let (is_pick, Some(located)) = (trace.predict.is_none(), trace.locate.as_mut()) else { return trace };
+    let mut evidence = ShapeEvidence { why: "made up".to_owned(), ..ShapeEvidence::default() };
+    evidence.surface = Some(SurfaceSeen {
+        size: [2, 2],
+        pixels: [3, 1, 0, 0, 0, 0, 0],
+        vertices: 3,
+        triangles: 1,
+        stride: 1,
+        detail_rms_m: 0.0,
+        shown_every: 1,
+    });
+    (evidence.arrays.disparities, evidence.arrays.ranges) = (picture(2, 10.0), picture(2, 3.0));
+    if !is_pick {
+        evidence.registration = Some(registered());
+        let arrays = &mut evidence.arrays;
+        (arrays.sensor, arrays.coarse) = (picture(4, 2.0), picture(3, 0.01));
+        arrays.error_before = picture(4, -8.0);
+        (arrays.error_coarse, arrays.error_fine) = (picture(4, -4.0), picture(4, -2.0));
+        let facet = vec![4.0, 0.0, 0.0, 4.0, 0.1, 0.0, 4.0, 0.0, 0.1];
+        arrays.mesh_fixed = Table { columns: MESH_COLUMNS as u32, values: facet.clone() };
+        arrays.mesh_moving = Table { columns: MESH_COLUMNS as u32, values: facet };
+    }
+    located.evidence = Evidence::Shape(Box::new(evidence));
+    trace
+}
+
+#[test]
+fn a_run_by_shape_has_its_surface_errors_search_meshes_and_hand_off() {
+    let steps: Vec<_> = FIXTURE.runs[0].iter().map(|trace| Arc::new(by_shape(trace))).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("shape.rrd");
+    let runs = [RunLog { target: 0, run: 0, label: "rock", steps: &steps }];
+    export(&path, "short", &FIXTURE.drive, &runs, &mut |_, _| ControlFlow::Continue(())).unwrap();
+    let recording = rrd::read(&path);
+    for doc in entities_of(&root(0, 0)) {
+        let (found, expected) = (&recording.entities[&doc.path], promised(doc.rows, &doc, &steps));
+        assert_eq!(sorted(found.data.clone()), expected.data, "steps with data of {}", doc.path);
+        assert_eq!(sorted(found.cleared.clone()), expected.cleared, "cleared steps of {}", doc.path);
+    }
+    let step = 1;
+    let numbers = |entity: &str, component: &str| {
+        let entity = &recording.entities[&format!("/target_1/locate/{entity}")];
+        entity.numbers[&(component.to_owned(), step)].clone()
+    };
+    // A step of the search is a pixel of the sensor: 10 cm. The middle of its three pixels is no shift.
+    assert_eq!(numbers("coarse_register/coarse_search/best", "Points2D:positions"), [2.5, 0.5]);
+    assert_eq!(numbers("refine_register/mesh_fixed", "Mesh3D:vertex_positions").len(), 3 * 3);
+    assert_eq!(numbers("refine_register/misfit", "Scalars:scalars"), [1.25]);
+    assert_eq!(numbers("refine_register/overlap/limit", "Scalars:scalars"), [0.25]);
+    assert_eq!(numbers("hand_off/score", "Scalars:scalars"), [0.875]);
+    let corner = FIXTURE.drive.traverse.site_from_rover(1) * Point3::new(4.0, 0.1, 0.0);
+    let second = &numbers("refine_register/mesh_moving", "Mesh3D:vertex_positions")[3..6];
+    assert!(second.iter().zip(corner.iter()).all(|(a, b)| (a - b).abs() < 1e-5), "{second:?} {corner}");
+    // The first step has its surface and nothing to be registered to; a step without images has neither.
+    let surface = &recording.entities["/target_1/locate/surface/ranges"];
+    assert!(surface.data.contains(&0) && surface.cleared.contains(&(MISSING as i64)));
+    assert!(recording.entities["/target_1/locate/refine_register/mesh_fixed"].cleared.contains(&0));
+}

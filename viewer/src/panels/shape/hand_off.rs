@@ -1,0 +1,100 @@
+//! The hand-off: the last image of the old cameras, draped over its surface as the new camera would see it, beside where
+//! it was found (R205).
+
+use egui::{Grid, Ui};
+use sightline_core::locate::shape_tracker::drape::Draped;
+use sightline_core::session::wire::StopView;
+use sightline_core::trace::ArrayName;
+
+use super::picture::{Picture, Unit, side_by_side};
+use super::{Look, ready};
+use crate::overlay::Mark;
+use crate::panels;
+use crate::theme;
+
+/// What the part is for.
+const PURPOSE: &str =
+    "The last image of the old cameras in that of the new one, where other cameras take over.";
+
+/// Shows the part.
+pub(super) fn show(ui: &mut Ui, look: &Look<'_>) {
+    let found = look.evidence.registration.as_ref();
+    let Some(draped) = found.and_then(|found| found.draped.as_ref()) else {
+        panels::missing(ui, PURPOSE, &why_none(look));
+        return;
+    };
+    let Some(picture) = ready(ui, look.state.array(ArrayName::Draped), "draped picture") else { return };
+    let Some(matched) = ready(ui, look.state.array(ArrayName::DrapedMatch), "present image") else { return };
+    let size = side_by_side(ui, 2, ui.available_height() - 76.0);
+    let from = found.map_or(0, |found| found.to_step);
+    let titles = [format!("step {from}, draped"), format!("step {}, where it was found", look.trace.step)];
+    ui.horizontal_top(|ui| {
+        for (raster, title) in [picture, matched].into_iter().zip(&titles) {
+            let unit = Unit { word: "", factor: 1.0 };
+            let placed = Picture { title, raster, look: None, unit }.show(ui, size);
+            let [x, y] = raster.size().map(|side| (f64::from(side) - 1.0) / 2.0);
+            placed.mark(x, y, Mark::Plus, theme::run(look.state.cursor.run));
+        }
+    });
+    numbers(ui, look, draped);
+}
+
+fn numbers(ui: &mut Ui, look: &Look<'_>, draped: &Draped) {
+    let least = look.state.setting("shape", "hand_off_score_min").and_then(|value| value.as_f64());
+    let least = least.map_or_else(String::new, |least| format!("at least {least:.2}"));
+    let sigmas = crate::ellipse::axes(&draped.covariance_px2);
+    let sigmas =
+        sigmas.map_or_else(String::new, |[a, b]| format!("1σ {:.2} and {:.2} px", a.norm(), b.norm()));
+    let rows = [
+        ("score", format!("{:.3}", draped.score), least),
+        (
+            "correction",
+            format!("{:.2} px", draped.correction_px),
+            "from where the surfaces put the target".to_owned(),
+        ),
+        ("pixel", format!("{:.1}, {:.1}", draped.pixel.x, draped.pixel.y), sigmas),
+        (
+            "on the mesh",
+            format!("{:.0} %", draped.on_mesh * 100.0),
+            "of the window; the rest continues the plane under the target".to_owned(),
+        ),
+    ];
+    Grid::new("hand-off").num_columns(3).spacing([12.0, 1.0]).show(ui, |ui| {
+        for (name, value, remark) in rows {
+            ui.label(theme::label(name));
+            ui.label(theme::number(value));
+            ui.label(theme::note(remark));
+            ui.end_row();
+        }
+    });
+}
+
+/// Why there is no picture at this step.
+fn why_none(look: &Look<'_>) -> String {
+    let step = look.trace.step;
+    if let Some(found) = look.evidence.registration.as_ref().filter(|found| found.is_hand_off) {
+        let reason = found.draped_missing.as_ref().or(found.reason.as_ref());
+        let why = reason.map_or("the setting hand_off_picture is off", String::as_str);
+        return format!("Here, at step {step}, other cameras take over, but no picture was found: {why}.");
+    }
+    let stops = look.state.traverse.as_ref().map_or(&[][..], |traverse| &traverse.stops);
+    match hand_offs(stops).as_slice() {
+        [] => format!(
+            "No other cameras take over at step {step}. A hand-off is at the first stop whose cameras differ from those \
+             of the stop before; the images of this drive all have one size, as far as they are known."
+        ),
+        [only] => {
+            format!("The hand-off is at step {only}, where other cameras take over. Go there to see it.")
+        }
+        several => {
+            let all: Vec<String> = several.iter().map(usize::to_string).collect();
+            format!("Hand-offs are at steps {}, where other cameras take over.", all.join(", "))
+        }
+    }
+}
+
+/// The stops whose images have another size than those of the stop before: other cameras.
+fn hand_offs(stops: &[StopView]) -> Vec<usize> {
+    let changes = stops.windows(2).enumerate();
+    changes.filter(|(_, pair)| pair[0].left_size != pair[1].left_size).map(|(step, _)| step + 1).collect()
+}

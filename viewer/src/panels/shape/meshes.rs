@@ -1,0 +1,195 @@
+//! Both meshes in space, the earlier one where the registration puts it, with the target and what its covariance spans
+//! (R188, R203).
+
+use egui::{Align2, Sense, Shape, Stroke, Ui, vec2};
+use nalgebra::Matrix3;
+use sightline_core::frames::{Point3, Vector3};
+use sightline_core::locate::shape_tracker::rows::Facet;
+use sightline_core::trace::ArrayName;
+
+use super::super::names;
+use super::solid::{Eye, Scene};
+use super::{Look, ready, why_not};
+use crate::command::Command;
+use crate::overlay::{self, Mark, paint_line, paint_mark};
+use crate::panels;
+use crate::shape_view::{Orbit, ShapeView};
+use crate::theme;
+
+/// What the part is for.
+const PURPOSE: &str = "Both surfaces as meshes, and how they lie on each other.";
+/// Facets that are drawn at most.
+const FACETS: usize = 6000;
+/// The least part of them that is left to the earlier mesh.
+const LEAST: usize = 1500;
+/// Of the earlier mesh only what lies this near the target is drawn, as a share of the side that the sensor spans.
+const NEAR: f64 = 0.75;
+/// Standard deviations of the axes that are drawn.
+const SIGMAS: f64 = 3.0;
+
+/// Shows the part.
+pub(super) fn show(ui: &mut Ui, look: &Look<'_>, out: &mut Vec<Command>) {
+    let Some(found) = &look.evidence.registration else {
+        panels::missing(ui, PURPOSE, &why_not(look, "registration"));
+        return;
+    };
+    let Some(fixed) = ready(ui, look.state.facets(ArrayName::MeshFixed), "earlier mesh") else { return };
+    let Some(moving) = ready(ui, look.state.facets(ArrayName::MeshMoving), "present mesh") else { return };
+    let all = [fixed.len(), moving.len()];
+    let start = Point3::from(found.start_in_rover);
+    let near_m = found.sensor_side_m.map_or(f64::INFINITY, |side_m| NEAR * side_m);
+    let [fixed, moving] = [fixed, moving].map(|mesh| near(mesh, &start, near_m));
+    let Some((middle, reach_m)) = extent(&fixed, &moving) else {
+        panels::missing(ui, PURPOSE, &why_not(look, "facets"));
+        return;
+    };
+    let every_moving = every(moving.len(), FACETS - LEAST.min(fixed.len()));
+    let every_fixed = every(fixed.len(), (FACETS - moving.len().div_ceil(every_moving)).max(LEAST));
+    let run = theme::run(look.state.cursor.run);
+    let thinned = |drawn: usize, all: usize| match drawn {
+        drawn if drawn == all => format!("{all} facets"),
+        drawn => format!("{drawn} of {all} facets"),
+    };
+    let (drawn_fixed, drawn_moving) =
+        (fixed.len().div_ceil(every_fixed), moving.len().div_ceil(every_moving));
+    let fixed_words = format!("step {}, {}", found.to_step, thinned(drawn_fixed, all[0]));
+    let moving_words = format!("this step, {}", thinned(drawn_moving, all[1]));
+    names::wrapped(
+        ui,
+        "drag turns, wheel magnifies, double click takes both back",
+        &[
+            (Mark::Stroke(overlay::Line::Solid), theme::MESH_EARLIER, fixed_words),
+            (Mark::Dot, theme::MESH_PRESENT, moving_words),
+            (Mark::Ring, run, "target, axes of 3σ".to_owned()),
+        ],
+    );
+    let orbit = look.state.shape_view.orbit;
+    let (rect, response) = ui.allocate_exact_size(
+        vec2(ui.available_width(), ui.available_height().max(160.0)),
+        Sense::click_and_drag(),
+    );
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, "meshes in space"));
+    let painter = ui.painter_at(rect);
+    painter.rect_filled(rect, 0.0, theme::WELL);
+    let camera = look.trace.point_mast.as_ref().map(|pointing| pointing.left.model.centre());
+    let eye = Eye::new(&camera.unwrap_or_else(Point3::origin), middle, reach_m, orbit, rect);
+    let mut scene = Scene::new(eye);
+    scene.facets(moving.iter().step_by(every_moving), theme::MESH_PRESENT, true);
+    scene.facets(fixed.iter().step_by(every_fixed), theme::MESH_EARLIER, false);
+    painter.add(scene.shape());
+    target(&painter, look, &eye, run);
+    scale_bar(&painter, &eye, rect);
+    if let Some(orbit) = asked_for(ui, &response, orbit) {
+        out.push(Command::SetShapeView(ShapeView { orbit, ..look.state.shape_view }));
+    }
+}
+
+/// The facets whose first corner is near a place; all where none is.
+fn near(mesh: &[Facet], place: &Point3, near_m: f64) -> Vec<Facet> {
+    let is_near = |facet: &&Facet| (Point3::from(facet[0].map(f64::from)) - place).norm() <= near_m;
+    let near: Vec<Facet> = mesh.iter().filter(is_near).copied().collect();
+    if near.is_empty() { mesh.to_vec() } else { near }
+}
+
+/// One facet of so many is drawn.
+fn every(count: usize, most: usize) -> usize {
+    count.div_ceil(most.max(1)).max(1)
+}
+
+/// The middle of the facets, and how far they reach from it, m.
+fn extent(fixed: &[Facet], moving: &[Facet]) -> Option<(Point3, f64)> {
+    let corners = || fixed.iter().chain(moving).flatten().map(|corner| Vector3::from(corner.map(f64::from)));
+    let first = corners().next()?;
+    let [low, high] =
+        corners().fold([first, first], |[low, high], corner| [low.inf(&corner), high.sup(&corner)]);
+    let middle = (low + high) / 2.0;
+    let reach_m = corners().map(|corner| (corner - middle).norm()).fold(0.0, f64::max);
+    Some((Point3::from(middle), reach_m))
+}
+
+/// The target with the axes of its covariance.
+fn target(painter: &egui::Painter, look: &Look<'_>, eye: &Eye, colour: egui::Color32) {
+    let located = look.trace.locate.as_ref();
+    let position = located.and_then(|located| located.position_in_rover);
+    let Some(position) = position else {
+        let at = painter.clip_rect().left_top() + vec2(8.0, 8.0);
+        let words = "no target: the registration is not used";
+        painter.text(at, Align2::LEFT_TOP, words, theme::image_font(), theme::LOST);
+        return;
+    };
+    if let Some(covariance) = located.and_then(|located| located.covariance_in_rover) {
+        for axis in axes(&covariance) {
+            let ends = [position - axis, position + axis].map(|end| eye.see(&end).0);
+            paint_line(painter, &ends, colour, overlay::Line::Solid, 2.0);
+        }
+    }
+    paint_mark(painter, eye.see(&position).0, Mark::Ring, colour, 6.0);
+}
+
+/// The half axes of the ellipsoid, m.
+fn axes(covariance: &Matrix3<f64>) -> Vec<Vector3> {
+    if covariance.iter().any(|value| !value.is_finite()) {
+        return Vec::new();
+    }
+    let eigen = covariance.symmetric_eigen();
+    let axis = |i: usize| eigen.eigenvectors.column(i) * eigen.eigenvalues[i].max(0.0).sqrt() * SIGMAS;
+    (0..3).map(axis).collect()
+}
+
+/// A length of one, two or five times a power of ten, a fifth of the picture at most.
+fn scale_bar(painter: &egui::Painter, eye: &Eye, rect: egui::Rect) {
+    let room_m = f64::from(rect.width()) / 5.0 / eye.scale;
+    let power = 10f64.powf(room_m.log10().floor());
+    let length_m = [5.0, 2.0, 1.0].into_iter().map(|n| n * power).find(|m| *m <= room_m).unwrap_or(power);
+    let from = rect.left_bottom() + vec2(10.0, -10.0);
+    let to = from + vec2((length_m * eye.scale) as f32, 0.0);
+    painter.add(Shape::line_segment([from, to], Stroke::new(2.0, theme::STRONG)));
+    let words = format!("{} cm", panels::digits((length_m * 1e6).round() / 1e4));
+    painter.text(from - vec2(0.0, 4.0), Align2::LEFT_BOTTOM, words, theme::digit_font(), theme::TEXT);
+}
+
+/// The view that the pointer asked for.
+fn asked_for(ui: &Ui, response: &egui::Response, orbit: Orbit) -> Option<Orbit> {
+    if response.double_clicked() {
+        return Some(Orbit::default());
+    }
+    if response.dragged() && response.drag_delta() != egui::Vec2::ZERO {
+        let by = response.drag_delta();
+        return Some(orbit.turned(by.x, by.y));
+    }
+    response.hover_pos()?;
+    let (scroll, zoom) = ui.input(|input| (input.smooth_scroll_delta().y, input.zoom_delta()));
+    let factor = f64::from(zoom) * (f64::from(scroll) / 200.0).exp();
+    (factor != 1.0).then(|| orbit.zoomed(factor))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_more_facets_are_drawn_than_said_and_few_are_drawn_whole() {
+        assert_eq!(every(400, 4500), 1);
+        assert!(20_000_usize.div_ceil(every(20_000, 4500)) <= 4500);
+        assert_eq!(every(0, 10), 1);
+    }
+
+    #[test]
+    fn what_is_far_from_the_target_is_left_out_unless_nothing_would_remain() {
+        let facet = |x: f32| [[x, 0.0, 0.0], [x, 0.1, 0.0], [x, 0.0, 0.1]];
+        let mesh = [facet(0.1), facet(0.4), facet(2.0)];
+        assert_eq!(near(&mesh, &Point3::origin(), 0.5).len(), 2);
+        assert_eq!(near(&mesh, &Point3::new(9.0, 0.0, 0.0), 0.5).len(), 3);
+    }
+
+    #[test]
+    fn the_axes_are_three_sigma_long_and_none_are_drawn_of_what_is_not_known() {
+        let axes = axes(&Matrix3::from_diagonal(&Vector3::new(4e-4, 1e-4, 1e-6)));
+        let mut lengths: Vec<f64> = axes.iter().map(|axis| axis.norm()).collect();
+        lengths.sort_by(f64::total_cmp);
+        for (length, expected) in lengths.iter().zip([0.003, 0.03, 0.06]) {
+            assert!((length - expected).abs() < 1e-9, "{length}");
+        }
+        assert!(super::axes(&Matrix3::repeat(f64::NAN)).is_empty());
+    }
+}

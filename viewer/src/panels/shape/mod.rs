@@ -1,0 +1,129 @@
+//! The shape tracker at one step: the surface that stereo sees, the virtual range sensor, the search, both meshes, and the
+//! hand-off to other cameras (R155, R187–R203, R205).
+//!
+//! One part at a time, chosen by its name; a part without data says why.
+
+mod hand_off;
+mod histogram;
+mod meshes;
+mod picture;
+mod search;
+mod sensor;
+mod solid;
+mod surface;
+
+use egui::{RichText, ScrollArea, Ui};
+use sightline_core::locate::shape_tracker::ShapeEvidence;
+use sightline_core::locate::shape_tracker::evidence::Registered;
+use sightline_core::trace::StepTrace;
+
+use crate::cache::Slot;
+use crate::command::Command;
+use crate::panels;
+use crate::shape_view::{Part, ShapeView};
+use crate::state::State;
+use crate::theme;
+
+/// What the panel is for.
+const PURPOSE: &str = "What the shape tracker saw: surface, sensor, search, meshes, and the hand-off.";
+
+/// What a part of the panel is given.
+#[derive(Clone, Copy)]
+struct Look<'a> {
+    state: &'a State,
+    trace: &'a StepTrace,
+    evidence: &'a ShapeEvidence,
+}
+
+/// Shows the panel.
+pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let (Some(trace), Some(evidence)) = (state.trace(), state.shape_evidence()) else {
+        panels::missing(ui, PURPOSE, &state.missing_shape());
+        return;
+    };
+    let look = Look { state, trace, evidence };
+    parts(ui, state, out);
+    if let Some(words) = warning(trace, evidence) {
+        ui.add(egui::Label::new(RichText::new(words).small().color(theme::LOST)).wrap());
+    }
+    if let Some(found) = &evidence.registration {
+        summary(ui, found);
+    }
+    ui.separator();
+    // A low panel scrolls instead of squeezing its pictures to nothing.
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| match state.shape_view.part {
+        Part::Surface => surface::show(ui, &look),
+        Part::Sensor => sensor::show(ui, &look, out),
+        Part::Search => search::show(ui, &look),
+        Part::Meshes => meshes::show(ui, &look, out),
+        Part::HandOff => hand_off::show(ui, &look),
+    });
+}
+
+/// The names of the parts.
+fn parts(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 3.0;
+        for part in Part::ALL {
+            let is_present = state.shape_view.part == part;
+            if ui.selectable_label(is_present, part.title()).clicked() && !is_present {
+                out.push(Command::SetShapeView(ShapeView { part, ..state.shape_view }));
+            }
+        }
+    });
+}
+
+/// The prediction against the basin in which a registration settles on the right place (R155).
+fn warning(trace: &StepTrace, evidence: &ShapeEvidence) -> Option<String> {
+    let half_width_m = evidence.registration.as_ref()?.half_width_m;
+    let covariance = &trace.predict.as_ref()?.covariance_in_rover;
+    let sigma_m = covariance.symmetric_eigenvalues().max().max(0.0).sqrt();
+    (sigma_m > half_width_m).then(|| {
+        format!(
+            "The prediction is known to {:.0} cm (1σ), which is more than the half width of the rock, {:.0} cm: \
+             a registration that starts from it may settle on another place.",
+            sigma_m * 100.0,
+            half_width_m * 100.0
+        )
+    })
+}
+
+/// A registration in one line, and the reason where it is not used.
+fn summary(ui: &mut Ui, found: &Registered) {
+    let mm = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |m| format!("{:.1}", m * 1000.0));
+    let [before, coarse, end] = found.mean_m.map(mm);
+    let seen = if found.is_hand_off { "handed over from" } else { "registered to" };
+    let mut words = format!("{seen} step {}; mean distance {before} → {coarse} → {end} mm", found.to_step);
+    if let Some(correction_m) = found.correction_m {
+        words += &format!("; moved the target by {:.1} cm", correction_m * 100.0);
+    }
+    if let Some(sigmas) = found.sigmas_m {
+        let [a, b, c] = sigmas.map(|sigma| sigma * 1000.0);
+        words += &format!("; σ {a:.1}, {b:.1}, {c:.1} mm");
+    }
+    ui.add(egui::Label::new(theme::note(words).color(theme::TEXT)).wrap());
+    if let Some(reason) = &found.reason {
+        let reason = format!("Not used: {reason}.");
+        ui.add(egui::Label::new(RichText::new(reason).small().color(theme::FAILED)).wrap());
+    }
+}
+
+/// Why a part of this step has no data.
+fn why_not(look: &Look<'_>, what: &str) -> String {
+    let evidence = look.evidence;
+    let reason = evidence.registration.as_ref().and_then(|found| found.reason.as_ref());
+    let why = reason.or(evidence.missing.as_ref()).unwrap_or(&evidence.why);
+    format!("No {what} at step {}: {why}.", look.trace.step)
+}
+
+/// What is in a slot; a sentence on the screen where it is not there.
+fn ready<'a, T>(ui: &mut Ui, slot: Slot<'a, T>, what: &str) -> Option<&'a T> {
+    match slot {
+        Slot::Ready(item) => return Some(item),
+        Slot::Failed(problem) => {
+            panels::missing(ui, "", &format!("The {what} cannot be shown: {}", problem.detail));
+        }
+        Slot::Absent | Slot::Loading => panels::missing(ui, "", &format!("Loading the {what} …")),
+    }
+    None
+}

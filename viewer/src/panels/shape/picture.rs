@@ -1,0 +1,165 @@
+//! An array as a picture with its title, its colour bar with unit and limits, and the value under the pointer.
+//!
+//! A value that does not exist is a checker. The colours end where one value in a hundred lies beyond; the bar says so.
+
+use egui::{Align2, Painter, Pos2, Rect, Response, Sense, Stroke, StrokeKind, Ui, Vec2, pos2, vec2};
+
+use crate::overlay::{Mark, paint_mark};
+use crate::raster::{self, Raster};
+use crate::{theme, view2d};
+
+/// Width of the colour bar with its numbers, points.
+pub(super) const BAR: f32 = 70.0;
+/// The least that a picture takes, points.
+const LEAST: f32 = 110.0;
+/// Height of the title, points.
+const TITLE: f32 = 16.0;
+
+/// How values are said: so many of the unit one of theirs is.
+#[derive(Clone, Copy)]
+pub(super) struct Unit {
+    /// The unit.
+    pub(super) word: &'static str,
+    /// How many of it one of the array's is.
+    pub(super) factor: f32,
+}
+
+impl Unit {
+    /// A value with the unit.
+    pub(super) fn say(self, value: f32) -> String {
+        format!("{} {}", self.number(value), self.word)
+    }
+
+    /// A value in the unit, to three digits: a colour tells no more.
+    pub(super) fn number(self, value: f32) -> String {
+        let value = f64::from(value * self.factor);
+        let decimals = match value.abs() {
+            size if size < 1e-9 => 0,
+            size if size < 10.0 => 2,
+            size if size < 100.0 => 1,
+            _ => 0,
+        };
+        let digits = format!("{value:.decimals$}");
+        // What rounds to zero has no sign.
+        if digits.trim_matches(['-', '0', '.']).is_empty() { "0".to_owned() } else { digits }
+    }
+}
+
+/// An array and how it is shown.
+pub(super) struct Picture<'a> {
+    /// What it is.
+    pub(super) title: &'a str,
+    /// The values.
+    pub(super) raster: &'a Raster,
+    /// How they are coloured; none: in grey, without a bar.
+    pub(super) look: Option<raster::Look>,
+    /// Their unit.
+    pub(super) unit: Unit,
+}
+
+/// A picture that was laid out.
+pub(super) struct Placed {
+    /// Where its pixels are on the screen.
+    pub(super) area: Rect,
+    /// Pointer and words.
+    pub(super) response: Response,
+    painter: Painter,
+    scale: f32,
+}
+
+impl Placed {
+    /// Where a place of the array is on the screen; (0, 0) is the middle of its first pixel.
+    pub(super) fn to_screen(&self, x: f64, y: f64) -> Pos2 {
+        self.area.min + vec2(x as f32 + 0.5, y as f32 + 0.5) * self.scale
+    }
+
+    /// A mark at a place of the array; nothing outside of it.
+    pub(super) fn mark(&self, x: f64, y: f64, mark: Mark, colour: egui::Color32) {
+        let at = self.to_screen(x, y);
+        if self.area.contains(at) {
+            paint_mark(&self.painter, at, mark, colour, 6.0);
+        }
+    }
+}
+
+impl Picture<'_> {
+    /// Shows the picture in an area of this size.
+    pub(super) fn show(&self, ui: &mut Ui, size: Vec2) -> Placed {
+        let bar = if self.look.is_some() { BAR } else { 0.0 };
+        let [width, height] = self.raster.size().map(|side| side.max(1) as f32);
+        let scale = ((size.x - bar) / width).min((size.y - TITLE - 2.0) / height).max(0.01);
+        let taken = vec2(size.x, TITLE + height * scale + 2.0);
+        let (rect, response) = ui.allocate_exact_size(taken, Sense::hover());
+        let painter = ui.painter_at(rect);
+        painter.text(rect.min, Align2::LEFT_TOP, self.title, theme::image_font(), theme::TEXT);
+        let area = Rect::from_min_size(rect.min + vec2(0.0, TITLE), vec2(width, height) * scale);
+        view2d::checker(&painter, area);
+        if let Some(look) = self.look {
+            self.raster.look(look);
+            let beside = Rect::from_min_size(area.right_top() + vec2(5.0, 0.0), vec2(BAR, area.height()));
+            colour_bar(&painter, beside, look, self.unit);
+        }
+        let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+        painter.image(self.raster.texture.id(), area, whole, theme::UNTINTED);
+        painter.rect_stroke(area, 0.0, Stroke::new(1.0, theme::LINE), StrokeKind::Outside);
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, self.words()));
+        let placed = Placed { area, response, painter, scale };
+        self.hover(&placed);
+        placed
+    }
+
+    /// Title and limits.
+    fn words(&self) -> String {
+        let Some(look) = self.look else { return self.title.to_owned() };
+        let [low, high] = look.limits();
+        format!("{}, from {} to {}", self.title, self.unit.say(low), self.unit.say(high))
+    }
+
+    /// Says the value under the pointer.
+    fn hover(&self, placed: &Placed) {
+        let Some(at) = placed.response.hover_pos().filter(|at| placed.area.contains(*at)) else { return };
+        let [x, y] = ((at - placed.area.min) / placed.scale).into();
+        let (x, y) = (x.floor() as i64, y.floor() as i64);
+        let value = self.raster.at(x, y).map_or_else(|| "no value here".to_owned(), |v| self.unit.say(v));
+        placed.response.clone().on_hover_text_at_pointer(format!("column {x}, row {y}: {value}"));
+    }
+}
+
+/// The colours with both ends and the middle in words.
+pub(super) fn colour_bar(painter: &Painter, area: Rect, look: raster::Look, unit: Unit) {
+    const STEPS: u16 = 48;
+    let strip = Rect::from_min_max(area.min, pos2(area.left() + 10.0, area.bottom()));
+    let [low, high] = look.limits();
+    let mut mesh = egui::Mesh::default();
+    for step in 0..STEPS {
+        let [from, to] = [step, step + 1].map(|step| f32::from(step) / f32::from(STEPS));
+        let y = |share: f32| strip.bottom() - share * strip.height();
+        let row = Rect::from_min_max(pos2(strip.left(), y(to)), pos2(strip.right(), y(from)));
+        mesh.add_colored_rect(row, look.colour(low + (high - low) * (from + to) / 2.0));
+    }
+    painter.add(egui::Shape::mesh(mesh));
+    let middle = (low + high) / 2.0;
+    let text = |y: f32, anchor: Align2, words: String| {
+        painter.text(pos2(strip.right() + 4.0, y), anchor, words, theme::digit_font(), theme::TEXT);
+    };
+    text(strip.top(), Align2::LEFT_TOP, format!("≥ {}", unit.number(high)));
+    text(strip.bottom(), Align2::LEFT_BOTTOM, format!("≤ {}", unit.number(low)));
+    if strip.height() > 60.0 {
+        text(strip.center().y, Align2::LEFT_CENTER, unit.number(middle));
+    }
+    if strip.height() > 34.0 {
+        text(strip.top() + 13.0, Align2::LEFT_TOP, unit.word.to_owned());
+    }
+}
+
+/// The most that each of `count` pictures side by side may take of the room there is, at most `height` points high.
+pub(super) fn side_by_side(ui: &Ui, count: usize, height: f32) -> Vec2 {
+    let gaps = ui.spacing().item_spacing.x * (count - 1) as f32;
+    let width = ((ui.available_width() - gaps) / count as f32 - 1.0).max(LEAST);
+    vec2(width, height.max(LEAST))
+}
+
+/// The longest side that a square picture with its bar has in an area of this size, points.
+pub(super) fn square(size: Vec2) -> f32 {
+    (size.x - BAR).min(size.y - TITLE - 2.0)
+}

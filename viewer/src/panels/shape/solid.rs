@@ -1,0 +1,163 @@
+//! Facets, lines and dots in space on the screen: orthographic, the farthest painted first.
+//!
+//! ```text
+//! right = a × z,  down = a × right          a: from the eye to the middle, z: the rover's, which points down
+//! ```
+//! The eye stands where the left camera does, turned about the middle by the orbit. Frame: rover, m.
+
+use egui::{Color32, Mesh, Pos2, Rect, Shape, pos2};
+use nalgebra::{Rotation3, Unit};
+use sightline_core::frames::{Point3, Vector3};
+use sightline_core::locate::shape_tracker::rows::Facet;
+
+use crate::shape_view::Orbit;
+
+/// Half the width of a line, points.
+const LINE: f32 = 0.6;
+
+/// Takes points of the rover frame to the screen.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Eye {
+    right: Vector3,
+    down: Vector3,
+    away: Vector3,
+    middle: Point3,
+    /// Points for a metre.
+    pub(super) scale: f64,
+    rect: Rect,
+}
+
+impl Eye {
+    /// From `camera` to `middle`, turned by `orbit`; `reach_m` about the middle fits into `rect`.
+    pub(super) fn new(camera: &Point3, middle: Point3, reach_m: f64, orbit: Orbit, rect: Rect) -> Self {
+        let sight = (middle - camera).try_normalize(1e-9).unwrap_or_else(Vector3::x);
+        let sideways = sight.cross(&Vector3::z()).try_normalize(1e-9).unwrap_or_else(Vector3::y);
+        // Seen from above, z down: a positive turn about z goes to the right.
+        let yaw = Rotation3::from_axis_angle(&Vector3::z_axis(), -orbit.yaw_rad);
+        let pitch = Rotation3::from_axis_angle(&Unit::new_normalize(-sideways), -orbit.pitch_rad);
+        let away = yaw * (pitch * sight);
+        let right = -(yaw * sideways);
+        let down = away.cross(&right).normalize();
+        let fit = f64::from(rect.width().min(rect.height())) / (2.0 * reach_m.max(1e-6));
+        Self { right, down, away, middle, scale: fit * orbit.zoom, rect }
+    }
+
+    /// The place on the screen, and how far from the middle along the line of sight, m.
+    pub(super) fn see(&self, point: &Point3) -> (Pos2, f64) {
+        let from = point - self.middle;
+        let place = |axis: &Vector3| (from.dot(axis) * self.scale) as f32;
+        let centre = self.rect.center();
+        (pos2(centre.x + place(&self.right), centre.y + place(&self.down)), from.dot(&self.away))
+    }
+}
+
+/// What is painted, with its distance.
+pub(super) struct Scene {
+    eye: Eye,
+    parts: Vec<(f64, [Pos2; 3], Color32, bool)>,
+}
+
+impl Scene {
+    /// An empty scene.
+    pub(super) fn new(eye: Eye) -> Self {
+        Self { eye, parts: Vec::new() }
+    }
+
+    /// Facets, filled and shaded by how they face the eye, or as three lines each.
+    pub(super) fn facets<'a>(
+        &mut self,
+        facets: impl Iterator<Item = &'a Facet>,
+        colour: Color32,
+        is_filled: bool,
+    ) {
+        for facet in facets {
+            let corners = facet.map(|corner| Point3::from(corner.map(f64::from)));
+            let seen = corners.map(|corner| self.eye.see(&corner));
+            let depth_m = seen.iter().map(|(_, depth)| depth).sum::<f64>() / 3.0;
+            let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
+            // Light comes from behind the eye, a little from above.
+            let light = (self.eye.away + self.eye.down * 0.5 + self.eye.right * 0.3).normalize();
+            let facing = normal.try_normalize(1e-15).map_or(0.0, |normal| normal.dot(&light).abs());
+            let colour = if is_filled { shade(colour, facing) } else { colour };
+            self.parts.push((depth_m, seen.map(|(at, _)| at), colour, is_filled));
+        }
+    }
+
+    /// The shapes, the farthest first.
+    pub(super) fn shape(mut self) -> Shape {
+        self.parts.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut mesh = Mesh::default();
+        for (_, [a, b, c], colour, is_filled) in self.parts {
+            if is_filled {
+                triangle(&mut mesh, [a, b, c], colour);
+            } else {
+                [[a, b], [b, c], [c, a]].into_iter().for_each(|ends| line(&mut mesh, ends, colour));
+            }
+        }
+        Shape::mesh(mesh)
+    }
+}
+
+/// A colour between a fifth and all of its brightness.
+fn shade(colour: Color32, share: f64) -> Color32 {
+    let bright = 0.2 + 0.8 * share.clamp(0.0, 1.0);
+    let level = |value: u8| (f64::from(value) * bright).round() as u8;
+    Color32::from_rgb(level(colour.r()), level(colour.g()), level(colour.b()))
+}
+
+fn triangle(mesh: &mut Mesh, corners: [Pos2; 3], colour: Color32) {
+    let first = mesh.vertices.len() as u32;
+    corners.into_iter().for_each(|at| mesh.colored_vertex(at, colour));
+    mesh.add_triangle(first, first + 1, first + 2);
+}
+
+fn line(mesh: &mut Mesh, [from, to]: [Pos2; 2], colour: Color32) {
+    let along = to - from;
+    let length = along.length();
+    if length < 1e-3 {
+        return;
+    }
+    let side = along.rot90() / length * LINE;
+    triangle(mesh, [from - side, from + side, to - side], colour);
+    triangle(mesh, [from + side, to + side, to - side], colour);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn eye(orbit: Orbit) -> Eye {
+        let rect = Rect::from_min_max(pos2(0.0, 0.0), pos2(200.0, 100.0));
+        Eye::new(&Point3::new(0.0, 0.0, 0.0), Point3::new(4.0, 0.0, 0.0), 0.5, orbit, rect)
+    }
+
+    #[test]
+    fn the_untouched_view_is_that_of_the_camera() {
+        let eye = eye(Orbit::default());
+        let (at, depth_m) = eye.see(&Point3::new(4.2, 0.25, 0.1));
+        // The rover's y is right, its z down; half a metre is 50 points.
+        assert!((at - pos2(125.0, 60.0)).length() < 1e-3 && (depth_m - 0.2).abs() < 1e-9, "{at} {depth_m}");
+    }
+
+    #[test]
+    fn a_turn_to_the_right_and_up_shows_what_lies_there_nearer() {
+        let nearer = |orbit: Orbit, point: Point3| {
+            eye(orbit).see(&point).1 < eye(Orbit::default()).see(&point).1 - 0.05
+        };
+        let right = Orbit { yaw_rad: 0.5, ..Orbit::default() };
+        assert!(nearer(right, Point3::new(4.0, 0.3, 0.0)));
+        let up = Orbit { pitch_rad: 0.5, ..Orbit::default() };
+        assert!(nearer(up, Point3::new(4.0, 0.0, -0.3)));
+    }
+
+    #[test]
+    fn the_nearest_is_painted_last() {
+        let facet = |x: f32| [[x, 0.0, 0.0], [x, 0.1, 0.0], [x, 0.0, 0.1]];
+        let mut scene = Scene::new(eye(Orbit::default()));
+        let (near, far) = (Color32::from_rgb(200, 0, 0), Color32::from_rgb(0, 0, 200));
+        scene.facets([facet(3.9)].iter(), near, true);
+        scene.facets([facet(4.1)].iter(), far, true);
+        let Shape::Mesh(mesh) = scene.shape() else { panic!("a mesh") };
+        assert!(mesh.vertices[0].color.b() > 0 && mesh.vertices[3].color.r() > 0);
+    }
+}

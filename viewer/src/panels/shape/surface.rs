@@ -1,0 +1,91 @@
+//! The surface of the stop: disparities and ranges, and what became of the pixels (R187).
+
+use egui::{Grid, Ui};
+use sightline_core::locate::shape_tracker::surface::SurfaceSeen;
+use sightline_core::trace::ArrayName;
+
+use super::picture::{Picture, Unit, side_by_side};
+use super::{Look, ready, why_not};
+use crate::overlay::Mark;
+use crate::panels;
+use crate::raster;
+use crate::theme;
+
+/// What becomes of a pixel, in the order of [`SurfaceSeen::pixels`], and what that means.
+const KINDS: [(&str, &str); 7] = [
+    ("found", "a disparity that passed all checks"),
+    ("outside", "not in both images"),
+    ("no texture", "nothing to compare"),
+    ("not unique", "another disparity matches nearly as well"),
+    ("left–right", "the right image does not confirm it"),
+    ("speckle", "in too small a patch"),
+    ("out of range", "nearer or farther than what is looked for"),
+];
+
+/// Shows the part.
+pub(super) fn show(ui: &mut Ui, look: &Look<'_>) {
+    let Some(seen) = &look.evidence.surface else {
+        panels::missing(ui, "Dense stereo of the stop.", &why_not(look, "surface"));
+        return;
+    };
+    let Some(disparities) = ready(ui, look.state.array(ArrayName::Disparities), "disparities") else {
+        return;
+    };
+    let Some(ranges) = ready(ui, look.state.array(ArrayName::Ranges), "ranges") else { return };
+    let size = side_by_side(ui, 2, ui.available_height() - 112.0);
+    let target = target(look, seen);
+    ui.horizontal_top(|ui| {
+        let pictures = [
+            ("disparity, px", disparities, Unit { word: "px", factor: 1.0 }),
+            ("range from the left camera, m", ranges, Unit { word: "m", factor: 1.0 }),
+        ];
+        for (title, raster, unit) in pictures {
+            let colours = Some(raster::Look::Values(raster.levels));
+            let placed = Picture { title, raster, look: colours, unit }.show(ui, size);
+            if let Some([x, y]) = target {
+                placed.mark(x, y, Mark::Ring, theme::run(look.state.cursor.run));
+            }
+        }
+    });
+    counts(ui, seen);
+}
+
+/// The target in the pictures, which are aligned and thinned.
+fn target(look: &Look<'_>, seen: &SurfaceSeen) -> Option<[f64; 2]> {
+    let camera = look.state.aligned_left()?;
+    let located = look.trace.locate.as_ref().and_then(|located| located.position_in_rover);
+    let predicted = look.trace.predict.as_ref().map(|predicted| predicted.position_in_rover);
+    let pixel = camera.project(&located.or(predicted)?)?;
+    let every = seen.shown_every.max(1) as f64;
+    (camera.size == seen.size).then(|| [pixel.x / every, pixel.y / every])
+}
+
+fn counts(ui: &mut Ui, seen: &SurfaceSeen) {
+    let all = seen.pixels.iter().sum::<usize>().max(1) as f64;
+    let [width, height] = seen.size;
+    let thinned = match seen.shown_every {
+        0 | 1 => String::new(),
+        every => format!("; one of {every} × {every} is shown"),
+    };
+    let words = format!(
+        "aligned left image of {width} × {height} px{thinned}. Ring: the target. Mesh around it: {} vertices, {} \
+         triangles, one vertex for {} × {} points, which loses {:.1} mm rms.",
+        seen.vertices,
+        seen.triangles,
+        seen.stride,
+        seen.stride,
+        seen.detail_rms_m * 1000.0
+    );
+    ui.add(egui::Label::new(theme::note(words)).wrap());
+    Grid::new("pixels of the surface").num_columns(7).spacing([14.0, 1.0]).show(ui, |ui| {
+        for (word, meaning) in KINDS {
+            ui.label(theme::note(word)).on_hover_text(meaning);
+        }
+        ui.end_row();
+        for count in seen.pixels {
+            let share = count as f64 / all * 100.0;
+            ui.label(theme::number(format!("{share:.1} %"))).on_hover_text(format!("{count} pixels"));
+        }
+        ui.end_row();
+    });
+}

@@ -1,0 +1,215 @@
+//! The fixed drive with the target found by its shape: registered at step 2, refused at step 3, handed over at step 4.
+
+use std::sync::Arc;
+
+use nalgebra::{Matrix2, Matrix3, Vector3};
+use sightline_core::image::{GrayImage, npy};
+use sightline_core::locate::Evidence;
+use sightline_core::locate::features::FeatureEvidence;
+use sightline_core::locate::features::evidence::Table;
+use sightline_core::locate::shape::{Failure, Method};
+use sightline_core::locate::shape_tracker::ShapeEvidence;
+use sightline_core::locate::shape_tracker::carried_ray::RayMeeting;
+use sightline_core::locate::shape_tracker::drape::Draped;
+use sightline_core::locate::shape_tracker::evidence::{Check, Registered, ShapeArrays};
+use sightline_core::locate::shape_tracker::surface::SurfaceSeen;
+use sightline_core::settings::{Settings, TrackerKind};
+use sightline_core::stages::judge::Gate;
+use sightline_core::trace::{ArrayName, StepTrace, summarise};
+
+use super::{feature_run, fixture};
+use crate::cache::{Item, Key, StepKey};
+use crate::raster::Raster;
+use crate::state::State;
+use crate::tables;
+
+/// Side of the virtual sensor, px.
+const SENSOR: u32 = 16;
+/// Rows and columns of the coarse search.
+const SHIFTS: u32 = 9;
+/// Facets of each mesh.
+pub(crate) const FACETS: usize = 8;
+/// The step at which the registration is refused.
+pub(crate) const REFUSED: usize = 3;
+/// The step at which other cameras take over.
+pub(crate) const HAND_OFF: usize = 4;
+
+/// A session with one target and its run by a tracker that asks the shape, at `step`, with everything loaded.
+pub(crate) fn at_step(context: &egui::Context, tracker: TrackerKind, step: usize) -> State {
+    let mut state = fixture::at_step(context, step);
+    let traces: Vec<StepTrace> = (0..fixture::STOPS - 1).map(|step| trace(tracker, step)).collect();
+    if let Some(session) = &mut state.session {
+        let run = &mut session.targets[0].runs[0];
+        run.settings = Settings { tracker, ..Settings::default() };
+        run.rows = traces.iter().map(StepTrace::row).collect();
+        run.summary = summarise(&traces);
+    }
+    if let Some(traverse) = &mut state.traverse {
+        // Other cameras have other images.
+        traverse.stops.iter_mut().skip(HAND_OFF).for_each(|stop| stop.left_size = [640, 480]);
+    }
+    let Some(trace) = traces.into_iter().nth(step) else { return state };
+    let key = StepKey { session: "s1".to_owned(), target: 0, run: 0, step };
+    for name in ArrayName::ALL {
+        let Some(view) = trace.array(name) else { continue };
+        let [width, height] = view.size();
+        let array = GrayImage::from_raw(width, height, view.values().to_vec()).unwrap();
+        let bytes = npy::encode(&array).unwrap();
+        let item = if tables::Table::is_table(name) {
+            Item::Table(Arc::new(tables::Table::from_npy(name, &bytes).unwrap()))
+        } else {
+            Item::Raster(Arc::new(Raster::from_npy(context, name, &bytes).unwrap()))
+        };
+        state.cache.arrived(Key::Array(key.clone(), name), Ok(item), 0.0);
+    }
+    fixture::load(&mut state, trace);
+    state
+}
+
+/// The record of a step.
+pub(crate) fn trace(tracker: TrackerKind, step: usize) -> StepTrace {
+    let mut trace = match tracker {
+        TrackerKind::Combined => feature_run::trace(step),
+        _ => fixture::trace(step),
+    };
+    let Some(located) = trace.locate.as_mut() else { return trace };
+    let mut evidence = ShapeEvidence { why: why(step), ..ShapeEvidence::default() };
+    match std::mem::take(&mut located.evidence) {
+        Evidence::Features(features) => evidence.features = Some(features),
+        Evidence::Template(designation) if step == 0 => evidence.designation = Some(designation),
+        _ if tracker == TrackerKind::Combined => evidence.features = Some(Box::<FeatureEvidence>::default()),
+        _ => {}
+    }
+    if step != 1 {
+        evidence.surface = Some(surface());
+        evidence.arrays.disparities = picture(40, 30, |x, y| if y < 4.0 { f32::NAN } else { 4.0 + x + y });
+        evidence.arrays.ranges = picture(40, 30, |x, y| if y < 4.0 { f32::NAN } else { 9.0 - 0.1 * (x + y) });
+    }
+    if step >= 2 {
+        located.covariance_in_rover = Some(Matrix3::from_diagonal(&Vector3::new(1.6e-5, 4e-6, 1e-6)));
+        evidence.registration = Some(registered(step));
+        evidence.is_judged_by_shape = true;
+        registration_arrays(&mut evidence.arrays);
+    }
+    if step == REFUSED {
+        (located.position_in_rover, located.left_pixel, located.covariance_in_rover) = (None, None, None);
+    }
+    if let (Some(verdict), Some(found)) = (&mut trace.judge, &evidence.registration) {
+        verdict.gates =
+            found.checks.iter().zip(11..).map(|(check, criterion)| gate(check, criterion)).collect();
+    }
+    located.evidence = Evidence::Shape(Box::new(evidence));
+    trace
+}
+
+fn why(step: usize) -> String {
+    let why = match step {
+        0 => "the surface of the designation is what later stops are registered to",
+        1 => "on the way the features are followed; the shape is asked at the last stop",
+        HAND_OFF => "other cameras take over here",
+        _ => "this is the last stop of these cameras",
+    };
+    why.to_owned()
+}
+
+fn gate(check: &Check, criterion: u8) -> Gate {
+    let value = check.value;
+    let margin = value.map(|v| if check.at_least { v - check.limit } else { check.limit - v });
+    let passed = margin.is_some_and(|margin| margin >= 0.0);
+    let (name, unit) = (check.name.clone(), check.unit.clone());
+    Gate { criterion, name, unit, value, limit: check.limit, at_least: check.at_least, margin, passed }
+}
+
+fn surface() -> SurfaceSeen {
+    SurfaceSeen {
+        size: [80, 60],
+        pixels: [3000, 400, 300, 200, 500, 100, 300],
+        vertices: 900,
+        triangles: 1700,
+        stride: 2,
+        detail_rms_m: 0.0021,
+        shown_every: 2,
+    }
+}
+
+fn registered(step: usize) -> Registered {
+    let is_hand_off = step == HAND_OFF;
+    let failure = (step == REFUSED).then_some(Failure::DoesNotFit { misfit: 2.6, limit: 1.8 });
+    let check = |name: &str, unit: &str, value: f64, limit: f64, at_least: bool| Check {
+        name: name.to_owned(),
+        unit: unit.to_owned(),
+        value: Some(value),
+        limit,
+        at_least,
+    };
+    Registered {
+        to_step: if is_hand_off { step - 1 } else { 0 },
+        is_hand_off,
+        method: Method::SimplexL1,
+        half_width_m: 0.25,
+        sensor_side_m: Some(0.7),
+        start_in_rover: [6.0, 0.4, 0.2],
+        correction_m: failure.is_none().then_some(0.032),
+        coarse_shift_m: Some([0.04375, -0.0875, 0.01]),
+        search_m: 0.175,
+        mean_m: [Some(0.031), Some(0.008), Some(0.004)],
+        evaluations: 60,
+        turn_deg: 1.2,
+        sigmas_m: Some([0.004, 0.002, 0.001]),
+        ray: Some(RayMeeting { moved_m: 0.01, incidence_deg: 30.0 }),
+        draped: is_hand_off.then(draped),
+        draped_missing: None,
+        checks: vec![
+            check("shape_overlap", "", 0.63, 0.25, true),
+            check("shape_misfit", "", if failure.is_some() { 2.6 } else { 1.1 }, 1.8, false),
+            check("shape_sigma_m", "m", 0.004, 0.02, false),
+            check("shape_turn_deg", "°", 1.2, 8.6, false),
+            check("shape_other_minimum", "", 1.9, 1.15, true),
+            check("shape_edge_distance_m", "m", 0.09, 0.005, true),
+        ],
+        failure,
+        reason: failure.map(|failure| failure.to_string()),
+    }
+}
+
+fn draped() -> Draped {
+    Draped {
+        pixel: fixture::PIXEL,
+        score: 0.913,
+        correction_px: 2.4,
+        covariance_px2: Matrix2::new(0.04, 0.0, 0.0, 0.01),
+        on_mesh: 0.82,
+        picture: picture(31, 31, |x, y| 0.5 + 0.01 * (x - y)),
+        matched: picture(31, 31, |x, y| 0.4 + 0.01 * (x - y)),
+    }
+}
+
+fn registration_arrays(arrays: &mut ShapeArrays) {
+    let hole = |x: f32, y: f32| x + y < 3.0;
+    let error = |scale: f32| {
+        picture(SENSOR, SENSOR, move |x, y| if hole(x, y) { f32::NAN } else { scale * (x - 7.5) / 7.5 })
+    };
+    arrays.sensor = picture(SENSOR, SENSOR, |x, y| if hole(x, y) { f32::NAN } else { 4.0 + 0.01 * x });
+    (arrays.error_before, arrays.error_coarse, arrays.error_fine) = (error(0.1), error(0.03), error(0.01));
+    arrays.coarse = picture(SHIFTS, SHIFTS, |x, y| 0.008 + 0.001 * (x - 5.0).abs() + 0.001 * (y - 2.0).abs());
+    let row = |i: u16| {
+        let i = f32::from(i);
+        [10.0 * i, (i / 3.0).floor(), 0.008 / (i + 1.0), 0.01 * i, 0.0, 0.0, 0.001 * i, 0.0, 0.0]
+    };
+    arrays.path = Table { columns: 9, values: (0..6).flat_map(row).collect() };
+    (arrays.mesh_fixed, arrays.mesh_moving) = (mesh(0.01), mesh(0.0));
+}
+
+fn picture(width: u32, height: u32, value: impl Fn(f32, f32) -> f32) -> Table {
+    let places = (0..width * height).map(|i| ((i % width) as f32, (i / width) as f32));
+    Table { columns: width, values: places.map(|(x, y)| value(x, y)).collect() }
+}
+
+/// A strip of facets about the target, `above` m higher.
+fn mesh(above: f32) -> Table {
+    let values = (0..FACETS).flat_map(|i| {
+        let y = 0.2 + 0.05 * i as f32;
+        [6.0, y, 0.2 - above, 6.0, y + 0.05, 0.2 - above, 6.1, y, 0.1 - above]
+    });
+    Table { columns: 9, values: values.collect() }
+}
