@@ -69,11 +69,11 @@ fn a_handle_of_the_histogram_sets_the_limit_of_the_colours_and_a_button_takes_it
     shown.harness.drop_at(to);
     shown.harness.run_steps(2);
     let commands = std::mem::take(shown.harness.state_mut());
-    let limits = commands.iter().filter_map(|command| match command {
+    let mut limits = commands.iter().filter_map(|command| match command {
         Command::SetShapeView(view) => view.error_limit_m,
         _ => None,
     });
-    let last = limits.last().expect("the handle was dragged");
+    let last = limits.next_back().expect("the handle was dragged");
     // The axis of some 880 points ends at 12.5 cm on both sides.
     assert!((last - (0.1 - 100.0 * 0.125 / 440.0)).abs() < 0.002, "{last}");
 

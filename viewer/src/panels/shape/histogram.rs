@@ -119,7 +119,7 @@ fn axis(painter: &Painter, plot: Rect, end_m: f64) {
         };
         painter.vline(at.x, plot.bottom()..=plot.bottom() + 3.0, Stroke::new(1.0, theme::WEAK));
         let words = match f64::from(share) * end_m * 100.0 {
-            cm if cm == 0.0 => "0 cm".to_owned(),
+            0.0 => "0 cm".to_owned(),
             cm if cm.abs() < 10.0 => format!("{cm:+.2}"),
             cm => format!("{cm:+.1}"),
         };

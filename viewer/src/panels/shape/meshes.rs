@@ -185,7 +185,7 @@ mod tests {
     #[test]
     fn the_axes_are_three_sigma_long_and_none_are_drawn_of_what_is_not_known() {
         let axes = axes(&Matrix3::from_diagonal(&Vector3::new(4e-4, 1e-4, 1e-6)));
-        let mut lengths: Vec<f64> = axes.iter().map(|axis| axis.norm()).collect();
+        let mut lengths: Vec<f64> = axes.iter().map(Vector3::norm).collect();
         lengths.sort_by(f64::total_cmp);
         for (length, expected) in lengths.iter().zip([0.003, 0.03, 0.06]) {
             assert!((length - expected).abs() < 1e-9, "{length}");
