@@ -52,7 +52,8 @@ fn scene() -> &'static Scene {
         let traverse = create_simulated(&scenario, folder.path()).expect("a drive");
         let world = traverse.world().expect("a simulated drive has a world");
         let pixel = choose_targets(world, &scenario, traverse.index())[0];
-        let settings = preset("combined").and_then(|preset| preset.settings()).expect("a preset");
+        let settings =
+            preset("combined").and_then(sightline_core::presets::Preset::settings).expect("a preset");
         let steps = track::run(&traverse, Designation { step: 0, pixel }, &settings).expect("a run");
         Scene { _folder: folder, traverse, settings, steps }
     })

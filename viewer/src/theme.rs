@@ -109,6 +109,13 @@ pub fn checker(odd: bool) -> Color32 {
     CHECKER[usize::from(odd)]
 }
 
+/// A colour between a fifth and all of its brightness.
+pub fn shaded(colour: Color32, share: f64) -> Color32 {
+    let bright = 0.2 + 0.8 * share.clamp(0.0, 1.0);
+    let level = |value: u8| (f64::from(value) * bright).round() as u8;
+    Color32::from_rgb(level(colour.r()), level(colour.g()), level(colour.b()))
+}
+
 /// Viridis, from 0 for the least score that is shown to 1 for the greatest; transparent where there is none.
 pub fn score(share: f32) -> Color32 {
     ramp(colorous::VIRIDIS, f64::from(share))

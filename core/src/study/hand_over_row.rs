@@ -15,6 +15,9 @@ use super::run::Run;
 /// What is farther off is wrong, m.
 const WRONG_M: f64 = 0.05;
 
+/// One of the registrations of a hand-over.
+type TransferOf = fn(&HandOver) -> Option<&Transfer>;
+
 /// What the hand-overs of some runs were worth; empty where none was tried.
 pub(super) fn columns(runs: &[&Run]) -> BTreeMap<String, Value> {
     let mut columns = BTreeMap::new();
@@ -26,7 +29,7 @@ pub(super) fn columns(runs: &[&Run]) -> BTreeMap<String, Value> {
     }
     columns.insert("drift_m".to_owned(), median(&of(&|run| run.drift_m)).into());
     columns.insert("tracker_error_m".to_owned(), median(&of(&|run| run.tracker_m)).into());
-    let transfers: [(&str, fn(&HandOver) -> Option<&Transfer>); 2] =
+    let transfers: [(&str, TransferOf); 2] =
         [("first_view", |run| run.first_view.as_ref()), ("hand_off", |run| run.hand_off.as_ref())];
     for (name, transfer) in transfers {
         let values = |value: &dyn Fn(&Transfer) -> Option<f64>| of(&|run| transfer(run).and_then(value));

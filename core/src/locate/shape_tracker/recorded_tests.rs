@@ -104,6 +104,21 @@ fn a_mast_that_turned_moved_along_its_line_of_sight_so_that_rows_cannot_be_align
     assert!(found < 1000, "{found} points");
 }
 
+/// A target as the left navcam saw it, known to 10 cm.
+fn view(target: Point3, mesh: Mesh, left: &Camera, image: &Arc<GrayImage>) -> View {
+    View {
+        step: 0,
+        site_from_rover: Pose::identity(),
+        position_in_rover: target,
+        covariance_in_rover: Matrix3::identity() * 0.01,
+        ray: None,
+        half_width_m: 0.5,
+        mesh,
+        left: left.clone(),
+        image: Arc::clone(image),
+    }
+}
+
 #[test]
 fn the_hazcam_sees_the_ground_of_the_navcams_pair_edge_on_and_no_target_is_handed_over_falsely() {
     let Some(folder) = set() else { return };
@@ -127,23 +142,12 @@ fn the_hazcam_sees_the_ground_of_the_navcams_pair_edge_on_and_no_target_is_hande
             continue;
         }
         seen += 1;
-        let covariance = Matrix3::identity() * 0.01;
-        let view = View {
-            step: 0,
-            site_from_rover: Pose::identity(),
-            position_in_rover: target,
-            covariance_in_rover: covariance,
-            ray: Some(ray),
-            half_width_m: 0.5,
-            mesh: mesh(&ground, &target, &viewpoint),
-            left: left.clone(),
-            image: Arc::clone(&left_image),
-        };
+        let view = view(target, mesh(&ground, &target, &viewpoint), &left, &left_image);
         let input = DrapeInput {
             view: &view,
             fixed_from_moving: &Pose::identity(),
             registered: &target,
-            covariance: &covariance,
+            covariance: &view.covariance_in_rover,
             camera: &hazcam,
             image: &hazcam_image,
             window_px: 31,

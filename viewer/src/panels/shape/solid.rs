@@ -11,6 +11,7 @@ use sightline_core::frames::{Point3, Vector3};
 use sightline_core::locate::shape_tracker::rows::Facet;
 
 use crate::shape_view::Orbit;
+use crate::theme;
 
 /// Half the width of a line, points.
 const LINE: f32 = 0.6;
@@ -78,7 +79,7 @@ impl Scene {
             // Light comes from behind the eye, a little from above.
             let light = (self.eye.away + self.eye.down * 0.5 + self.eye.right * 0.3).normalize();
             let facing = normal.try_normalize(1e-15).map_or(0.0, |normal| normal.dot(&light).abs());
-            let colour = if is_filled { shade(colour, facing) } else { colour };
+            let colour = if is_filled { theme::shaded(colour, facing) } else { colour };
             self.parts.push((depth_m, seen.map(|(at, _)| at), colour, is_filled));
         }
     }
@@ -96,13 +97,6 @@ impl Scene {
         }
         Shape::mesh(mesh)
     }
-}
-
-/// A colour between a fifth and all of its brightness.
-fn shade(colour: Color32, share: f64) -> Color32 {
-    let bright = 0.2 + 0.8 * share.clamp(0.0, 1.0);
-    let level = |value: u8| (f64::from(value) * bright).round() as u8;
-    Color32::from_rgb(level(colour.r()), level(colour.g()), level(colour.b()))
 }
 
 fn triangle(mesh: &mut Mesh, corners: [Pos2; 3], colour: Color32) {
@@ -154,10 +148,12 @@ mod tests {
     fn the_nearest_is_painted_last() {
         let facet = |x: f32| [[x, 0.0, 0.0], [x, 0.1, 0.0], [x, 0.0, 0.1]];
         let mut scene = Scene::new(eye(Orbit::default()));
-        let (near, far) = (Color32::from_rgb(200, 0, 0), Color32::from_rgb(0, 0, 200));
+        let (near, far) = (theme::FAILED, theme::PREDICTION);
         scene.facets([facet(3.9)].iter(), near, true);
         scene.facets([facet(4.1)].iter(), far, true);
         let Shape::Mesh(mesh) = scene.shape() else { panic!("a mesh") };
-        assert!(mesh.vertices[0].color.b() > 0 && mesh.vertices[3].color.r() > 0);
+        // The farther one is the blue one.
+        let is_blue = |at: usize| mesh.vertices[at].color.b() > mesh.vertices[at].color.r();
+        assert!(is_blue(0) && !is_blue(3));
     }
 }
