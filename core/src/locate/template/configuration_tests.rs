@@ -188,7 +188,8 @@ fn a_correction_that_moves_too_far_is_recorded_and_not_used() {
 }
 
 #[test]
-fn every_preset_tracks_a_facing_plane_in_steps_of_a_twentieth() {
+fn every_preset_tracks_a_facing_plane_in_steps_of_a_twentieth_but_for_the_shape_which_a_plane_does_not_have()
+{
     let mut poses = vec![pose(0.0, 0.0)];
     while poses.len() < 4 {
         let x = poses[poses.len() - 1].translation.vector.x;
@@ -200,6 +201,10 @@ fn every_preset_tracks_a_facing_plane_in_steps_of_a_twentieth() {
         settings.template.search_window_px = 63;
         let steps = track::run(&world, designation(118.3, 131.6), &settings).unwrap();
         let last = &steps[3];
+        if preset.name == "shape" {
+            assert!(last.update.state.is_lost() && last.row().reason.unwrap().contains("holds the target"));
+            continue;
+        }
         assert_eq!(last.update.state, TrackingState::Tracking, "{}: {:?}", preset.name, last.row().reason);
         let limit = if preset.name == "integer-peak" { 2.0 } else { 1.0 };
         assert!(err_px(last) < limit, "{}: {} px", preset.name, err_px(last));
