@@ -47,11 +47,14 @@ pub(super) fn columns(runs: &[&Run]) -> BTreeMap<String, Value> {
             let off = |t: &Transfer| t.error_m.filter(|error_m| (*error_m > WRONG_M) == far);
             values(&off).len()
         };
-        columns.insert(format!("{name}_right"), found(false).into());
-        columns.insert(format!("{name}_wrong"), found(true).into());
+        let (right, wrong) = (found(false), found(true));
+        columns.insert(format!("{name}_right"), right.into());
+        columns.insert(format!("{name}_wrong"), wrong.into());
         let tried = runs.iter().filter_map(|run| transfer(&run.hand_over));
         let reasons: Vec<&String> = tried.clone().filter_map(|transfer| transfer.failure.as_ref()).collect();
-        columns.insert(format!("{name}_tried"), tried.count().into());
+        let count = tried.count();
+        columns.insert(format!("{name}_tried"), count.into());
+        columns.insert(format!("{name}_found_share"), (right as f64 / count.max(1) as f64).into());
         columns.insert(format!("{name}_failed"), reasons.len().into());
         if let Some(reason) = reasons.first() {
             columns.insert(format!("{name}_failure"), Value::from(reason.as_str()));

@@ -3,6 +3,7 @@
 //! How far off a registration may start (R204), how right it ends, how well its covariance says so, and what it makes of
 //! another rock; both ways of refining it beside each other, with the time of each.
 
+use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
@@ -15,6 +16,7 @@ use sightline_core::study::registration::views::Stereo;
 use sightline_core::study::registration::{Case, Row, Staging, Summary, rock_cases, summarise};
 
 use super::say::{self, Progress};
+use crate::study::drawn::{Chart, Line};
 
 /// Both ways of refining a registration, as they are reported.
 const METHODS: [(Method, &str); 2] =
@@ -32,6 +34,9 @@ pub(super) struct Registrations {
     /// How far beside the truth registrations start, in half widths of the rock.
     #[arg(long, value_delimiter = ',', default_values_t = [0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0])]
     offsets: Vec<f64>,
+    /// A file for the figure, SVG: how many registrations end right, over how far off they start.
+    #[arg(long, value_name = "FILE")]
+    figure: Option<PathBuf>,
     /// What is written to the standard output.
     #[arg(long, default_value = "text")]
     format: Format,
@@ -102,6 +107,10 @@ impl Registrations {
     fn say(&self, rows: Vec<Timed>, wrong_rocks: Vec<WrongRocks>) -> Result<()> {
         let plain: Vec<Row> = rows.iter().map(|timed| timed.row.clone()).collect();
         let summaries = summarise(&plain);
+        if let Some(file) = &self.figure {
+            let svg = figure(&summaries).svg().map_err(Error::Request)?;
+            std::fs::write(file, svg).map_err(|source| Error::Write { path: file.clone(), source })?;
+        }
         if self.format == Format::Json {
             let document = serde_json::to_string(&Document { rows, summaries, wrong_rocks });
             return say::line(&document.map_err(|error| Error::Request(error.to_string()))?);
@@ -119,6 +128,27 @@ impl Registrations {
             }
         }
         Ok(())
+    }
+}
+
+/// The basin of convergence (R204).
+fn figure(summaries: &[Summary]) -> Chart {
+    let line = |(colour, (method, name)): (usize, (Method, &str))| Line {
+        label: name.to_owned(),
+        colour,
+        points: summaries
+            .iter()
+            .filter(|summary| summary.method == method)
+            .map(|summary| (summary.offset, 100.0 * summary.success))
+            .collect(),
+        ..Line::default()
+    };
+    Chart {
+        title: "registrations that end within 2 cm".to_owned(),
+        axes: ["start, half widths of the rock beside the truth".to_owned(), "share, %".to_owned()],
+        y_range: Some([0.0, 105.0]),
+        lines: METHODS.into_iter().enumerate().map(line).collect(),
+        ..Chart::default()
     }
 }
 

@@ -141,6 +141,14 @@ pub fn figures(plan: &Plan, units: &[Unit]) -> Result<Vec<Figure>, String> {
                 (shares.1, "share of cases, %"),
             )?;
         }
+        "recovery" => {
+            add(
+                "found",
+                "first_view_found_share",
+                "targets found again by the shape of their surroundings",
+                (shares.1, "share of targets, %"),
+            )?;
+        }
         "claim" | "approach" => {
             add("tracked", "tracked_share", "targets tracked to the end", (shares.1, "share of targets, %"))?;
             drawn.push(nees(plan, units)?);
