@@ -16,7 +16,7 @@ use sightline_core::study::registration::views::Stereo;
 use sightline_core::study::registration::{Case, Row, Staging, Summary, rock_cases, summarise};
 
 use super::say::{self, Progress};
-use crate::study::drawn::{Chart, Line};
+use crate::study::drawn::{Chart, Line, merged};
 
 /// Both ways of refining a registration, as they are reported.
 const METHODS: [(Method, &str); 2] =
@@ -147,7 +147,7 @@ fn figure(summaries: &[Summary]) -> Chart {
         title: "registrations that end within 2 cm".to_owned(),
         axes: ["start, half widths of the rock beside the truth".to_owned(), "share, %".to_owned()],
         y_range: Some([0.0, 105.0]),
-        lines: METHODS.into_iter().enumerate().map(line).collect(),
+        lines: merged(METHODS.into_iter().enumerate().map(line).collect()),
         ..Chart::default()
     }
 }
