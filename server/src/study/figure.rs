@@ -121,6 +121,7 @@ pub fn figures(plan: &Plan, units: &[Unit]) -> Result<Vec<Figure>, String> {
     let series = series(plan, units);
     let variable = plan.study.variable;
     let shares: (f64, f64) = (1.0, 100.0);
+    let targets = (shares.1, "share of targets, %");
     let mut drawn = Vec::new();
     let mut add = |name, column: &str, title: &str, unit: (f64, &str)| -> Result<(), String> {
         drawn.push(over_grid(plan, &series, (name, column), title, unit)?);
@@ -128,34 +129,21 @@ pub fn figures(plan: &Plan, units: &[Unit]) -> Result<Vec<Figure>, String> {
     };
     match plan.study.name {
         "faults" => {
-            add(
-                "false",
-                "false_share",
-                "cases that say tracked at the fault and are not",
-                (shares.1, "share of cases, %"),
-            )?;
-            add(
-                "kept",
-                "kept_share",
-                "cases that are still tracked at the fault",
-                (shares.1, "share of cases, %"),
-            )?;
+            let cases = (shares.1, "share of cases, %");
+            add("false", "false_share", "cases that say tracked at the fault and are not", cases)?;
+            add("kept", "kept_share", "cases that are still tracked at the fault", cases)?;
         }
         "recovery" => {
-            add(
-                "found",
-                "first_view_found_share",
-                "targets found again by the shape of their surroundings",
-                (shares.1, "share of targets, %"),
-            )?;
+            let title = "targets found again by the shape of their surroundings";
+            add("found", "first_view_found_share", title, targets)?;
         }
         "claim" | "approach" => {
-            add("tracked", "tracked_share", "targets tracked to the end", (shares.1, "share of targets, %"))?;
+            add("tracked", "tracked_share", "targets tracked to the end", targets)?;
             drawn.push(nees(plan, units)?);
         }
         _ => {
             let title = format!("targets tracked to the end, over {variable}");
-            add("tracked", "tracked_share", &title, (shares.1, "share of targets, %"))?;
+            add("tracked", "tracked_share", &title, targets)?;
             add(
                 "error",
                 "err_px_median",
