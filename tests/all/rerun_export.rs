@@ -169,19 +169,25 @@ fn by_features(trace: &StepTrace) -> StepTrace {
     trace
 }
 
-#[test]
-fn a_run_by_features_has_its_keypoints_matches_residuals_points_and_cloud() {
-    let steps: Vec<_> = FIXTURE.runs[0].iter().map(|trace| Arc::new(by_features(trace))).collect();
+/// The recording of a run, whose every entity has data and is cleared at the steps that its documentation promises.
+fn exported_as_promised(steps: &[Arc<StepTrace>]) -> rrd::Recording {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("features.rrd");
-    let runs = [RunLog { target: 0, run: 0, label: "rock", steps: &steps }];
+    let path = folder.path().join("run.rrd");
+    let runs = [RunLog { target: 0, run: 0, label: "rock", steps }];
     export(&path, "short", &FIXTURE.drive, &runs, &mut |_, _| ControlFlow::Continue(())).unwrap();
     let recording = rrd::read(&path);
     for doc in entities_of(&root(0, 0)) {
-        let (found, expected) = (&recording.entities[&doc.path], promised(doc.rows, &doc, &steps));
+        let (found, expected) = (&recording.entities[&doc.path], promised(doc.rows, &doc, steps));
         assert_eq!(sorted(found.data.clone()), expected.data, "steps with data of {}", doc.path);
         assert_eq!(sorted(found.cleared.clone()), expected.cleared, "cleared steps of {}", doc.path);
     }
+    recording
+}
+
+#[test]
+fn a_run_by_features_has_its_keypoints_matches_residuals_points_and_cloud() {
+    let steps: Vec<_> = FIXTURE.runs[0].iter().map(|trace| Arc::new(by_features(trace))).collect();
+    let recording = exported_as_promised(&steps);
     let step = 1;
     let numbers = |entity: &str, component: &str| {
         let entity = &recording.entities[&format!("/target_1/locate/{entity}")];

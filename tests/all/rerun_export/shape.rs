@@ -1,6 +1,5 @@
 //! The entities of the shape tracker, from arrays made up for the short drive.
 
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use sightline_core::frames::{Pixel, Point3};
@@ -12,10 +11,8 @@ use sightline_core::locate::shape_tracker::drape::Draped;
 use sightline_core::locate::shape_tracker::evidence::{Check, MESH_COLUMNS, Registered};
 use sightline_core::locate::shape_tracker::surface::SurfaceSeen;
 use sightline_core::trace::StepTrace;
-use sightline_server::rerun_log::{RunLog, entities_of, export, root};
-use sightline_tests::rrd;
 
-use super::{FIXTURE, MISSING, promised, sorted};
+use super::{FIXTURE, MISSING, exported_as_promised};
 
 /// A square of values that grow by one from pixel to pixel; the first does not exist.
 fn picture(columns: u32, first: f32) -> Table {
@@ -95,16 +92,7 @@ fn by_shape(trace: &StepTrace) -> StepTrace {
 #[test]
 fn a_run_by_shape_has_its_surface_errors_search_meshes_and_hand_off() {
     let steps: Vec<_> = FIXTURE.runs[0].iter().map(|trace| Arc::new(by_shape(trace))).collect();
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("shape.rrd");
-    let runs = [RunLog { target: 0, run: 0, label: "rock", steps: &steps }];
-    export(&path, "short", &FIXTURE.drive, &runs, &mut |_, _| ControlFlow::Continue(())).unwrap();
-    let recording = rrd::read(&path);
-    for doc in entities_of(&root(0, 0)) {
-        let (found, expected) = (&recording.entities[&doc.path], promised(doc.rows, &doc, &steps));
-        assert_eq!(sorted(found.data.clone()), expected.data, "steps with data of {}", doc.path);
-        assert_eq!(sorted(found.cleared.clone()), expected.cleared, "cleared steps of {}", doc.path);
-    }
+    let recording = exported_as_promised(&steps);
     let step = 1;
     let numbers = |entity: &str, component: &str| {
         let entity = &recording.entities[&format!("/target_1/locate/{entity}")];
