@@ -8,6 +8,8 @@ mod api_security;
 mod cli;
 mod imports;
 mod page;
+mod page_access;
+mod page_speed;
 mod recorded_cameras;
 mod recorded_tracking;
 mod rerun_export;

@@ -22,6 +22,8 @@ use hyper_util::client::legacy::connect::HttpConnector;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
+use crate::processes::{self, Taken};
+
 /// The id of the canvas on which the viewer paints.
 const CANVAS: &str = "sightline";
 
@@ -120,6 +122,58 @@ impl Browser {
             .unwrap_or_else(|error| panic!("the key {key} cannot be pressed: {error}"));
     }
 
+    /// Presses a key while others are held: `["Control"], "k"`.
+    pub async fn chord(&self, held: &[&str], key: &str) {
+        let down = |key: &str| KeyAction::Down { value: key_value(key) };
+        let up = |key: &str| KeyAction::Up { value: key_value(key) };
+        let mut keyboard = KeyActions::new("keyboard".to_owned());
+        for key in held {
+            keyboard = keyboard.then(down(key));
+        }
+        keyboard = keyboard.then(down(key)).then(up(key));
+        for key in held.iter().rev() {
+            keyboard = keyboard.then(up(key));
+        }
+        let done = self.client.perform_actions(keyboard).await;
+        done.unwrap_or_else(|error| panic!("{held:?} and {key} cannot be pressed: {error}"));
+    }
+
+    /// Types a text, letter by letter.
+    pub async fn type_text(&self, text: &str) {
+        for letter in text.chars() {
+            self.press(&letter.to_string()).await;
+        }
+    }
+
+    /// Drags with the left button from one place on the canvas to another, CSS px.
+    pub async fn drag(&self, from: (f64, f64), to: (f64, f64)) {
+        let pause = PointerAction::Pause { duration: Duration::from_millis(60) };
+        let mut rest = vec![PointerAction::Down { button: MOUSE_BUTTON_LEFT }, pause.clone()];
+        for k in 1..=6 {
+            let share = f64::from(k) / 6.0;
+            let (x, y) = (from.0 + (to.0 - from.0) * share, from.1 + (to.1 - from.1) * share);
+            rest.push(PointerAction::MoveTo { duration: None, x: x.round(), y: y.round() });
+            rest.push(pause.clone());
+        }
+        rest.push(PointerAction::Up { button: MOUSE_BUTTON_LEFT });
+        self.act(from.0.round(), from.1.round(), &rest).await;
+    }
+
+    /// Asks the browser itself, which computes it as for a screen reader: role and name of an element.
+    pub async fn computed(&self, selector: &str) -> (String, String) {
+        let element = self.client.find(fantoccini::Locator::Css(selector)).await;
+        let element = element.unwrap_or_else(|error| panic!("nothing is {selector}: {error}"));
+        let ask = |what: &'static str| Computed { element: element.element_id().to_string(), what };
+        let mut answers = Vec::new();
+        for what in ["computedrole", "computedlabel"] {
+            let answer = self.client.issue_cmd(ask(what)).await;
+            let answer = answer.unwrap_or_else(|error| panic!("{what} of {selector}: {error}"));
+            answers.push(answer.as_str().unwrap_or_default().to_owned());
+        }
+        let name = answers.pop().unwrap_or_default();
+        (answers.pop().unwrap_or_default(), name)
+    }
+
     /// The page as it looks now, as a PNG file's bytes.
     pub async fn screenshot(&self) -> Vec<u8> {
         self.client.screenshot().await.unwrap_or_else(|error| panic!("the page cannot be pictured: {error}"))
@@ -134,6 +188,11 @@ impl Browser {
             .unwrap_or_else(|error| panic!("the console is mute: {error}"));
         let errors = entries.as_array().into_iter().flatten().filter(|entry| entry["level"] == "SEVERE");
         errors.map(|entry| entry["message"].as_str().unwrap_or_default().to_owned()).collect()
+    }
+
+    /// What the browser's processes have taken so far; none where the system does not tell.
+    pub fn taken(&self) -> Option<Taken> {
+        processes::taken(self.driver.browser?)
     }
 
     /// Ends the browser; dropping it does the same, less politely.
@@ -241,6 +300,24 @@ impl WebDriverCompatibleCommand for ConsoleLog {
     }
 }
 
+/// WebDriver's question for what the browser tells assistive programs of an element.
+#[derive(Debug)]
+struct Computed {
+    element: String,
+    what: &'static str,
+}
+
+impl WebDriverCompatibleCommand for Computed {
+    fn endpoint(&self, base: &url::Url, session: Option<&str>) -> Result<url::Url, url::ParseError> {
+        let session = session.unwrap_or_default();
+        base.join(&format!("session/{session}/element/{}/{}", self.element, self.what))
+    }
+
+    fn method_and_body(&self, _url: &url::Url) -> (axum::http::Method, Option<String>) {
+        (axum::http::Method::GET, None)
+    }
+}
+
 /// A program of the browser, from its variable or from `PATH`.
 fn program(variable: &str, names: &[&str]) -> PathBuf {
     let named = std::env::var_os(variable).map(PathBuf::from);
@@ -296,6 +373,8 @@ fn key_value(key: &str) -> char {
         "Enter" => Key::Enter,
         "Escape" => Key::Escape,
         "Tab" => Key::Tab,
+        "Control" => Key::Control,
+        "Shift" => Key::Shift,
         "Backspace" => Key::Backspace,
         "Delete" => Key::Delete,
         _ => {

@@ -1,44 +1,54 @@
-//! The application: lays the panels out and carries their commands to state and network.
+//! The application: lays the panels out and carries their commands to state, arrangement and network.
 
 use egui::{CentralPanel, Context, Frame, Margin, Panel, Ui};
-use egui_tiles::Tree;
 
 use crate::command::Command;
-use crate::layout::{LeftImage, Pane, Panels, overview};
+use crate::layout::workspace::Workspace;
+use crate::layout::{LeftImage, Pane, Panels, region};
+use crate::link::Fragment;
 use crate::net::{Net, Request};
-use crate::panels::{bars, help, timeline};
+use crate::panels::{bars, help, palette, timeline};
 use crate::state::{Connection, State};
 use crate::status::Publisher;
-use crate::{keys, theme};
+use crate::{keep, keys, theme};
 
 /// Where a page begins.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Link {
     /// Where the server is, without a slash at the end.
     pub origin: String,
-    /// The session to open; none opens the latest of the first traverse, or begins one.
-    pub session: Option<String>,
+    /// What to open; without a session the latest of the first traverse, or a new one.
+    pub fragment: Fragment,
 }
 
 /// The application.
 pub struct SightlineApp {
     state: State,
     net: Net,
-    tree: Tree<Pane>,
+    workspace: Workspace,
     left_image: LeftImage,
     publisher: Publisher,
-    linked: Option<String>,
+    /// The link as the page's address has it.
+    linked: Fragment,
+    kept: keep::Kept,
 }
 
 impl SightlineApp {
     /// The application as it is when the page opens.
     pub fn new(context: &Context, link: Link) -> Self {
-        theme::apply(context);
-        let mut state = State::new(link.origin.clone(), link.session);
+        let kept = keep::Kept::read();
+        let mut state = State::new(link.origin.clone(), link.fragment.session.clone());
+        state.looks = kept.looks().unwrap_or_default();
+        theme::apply(context, state.looks);
+        let mut workspace = Workspace::restored(kept.layout());
+        if let Some(preset) = link.fragment.preset.filter(|preset| *preset != workspace.preset()) {
+            workspace.apply(crate::layout::workspace::LayoutCommand::Use(preset));
+        }
         state.begin();
+        let linked = link.fragment.clone();
+        state.open_link(link.fragment);
         let net = Net::new(link.origin, context.clone());
-        let (left_image, publisher, linked) = (None, Publisher::default(), None);
-        Self { state, net, tree: overview(), left_image, publisher, linked }
+        Self { state, net, workspace, left_image: None, publisher: Publisher::default(), linked, kept }
     }
 
     /// Takes in what arrived and asks for what is missing.
@@ -85,24 +95,32 @@ impl SightlineApp {
         let mut out = keys::commands(ui.ctx(), &self.state);
         let state = &self.state;
         let bar = Frame::new().fill(theme::BAR).inner_margin(Margin::symmetric(10, 3));
-        Panel::top("top").exact_size(34.0).frame(bar).show(ui, |ui| bars::top(ui, state, &mut out));
+        Panel::top("top").exact_size(34.0).frame(bar).show(ui, |ui| {
+            region(ui, "Status and actions", ui.max_rect());
+            bars::top(ui, state, &mut out);
+        });
         if matches!(state.connection, Connection::Gone { .. }) {
             Panel::top("banner").frame(bar).show(ui, |ui| bars::banner(ui, state, &mut out));
         }
-        Panel::bottom("stages").exact_size(30.0).frame(bar).show(ui, |ui| bars::stages(ui, state, &mut out));
+        Panel::bottom("stages").exact_size(30.0).frame(bar).show(ui, |ui| {
+            region(ui, "Stages", ui.max_rect());
+            bars::stages(ui, state, &mut out);
+        });
         let foot = Frame::new().fill(theme::PANEL).inner_margin(Margin::symmetric(10, 4));
         Panel::bottom("timeline").exact_size(timeline::HEIGHT + 36.0).frame(foot).show(ui, |ui| {
+            region(ui, "Timeline", ui.max_rect());
             bars::transport(ui, state, &mut out);
             timeline::show(ui, state, &mut out);
         });
-        let mut panels = Panels { state, out: &mut out, left_image: None, seen: Vec::new() };
+        let mut panels = Panels::new(state, &mut out);
         CentralPanel::default()
             .frame(Frame::new().fill(theme::PAGE))
-            .show(ui, |ui| self.tree.ui(&mut panels, ui));
+            .show(ui, |ui| self.workspace.show(ui, &mut panels));
         self.left_image = panels.left_image;
         let [is_history_seen, is_studies_seen] =
             [Pane::History, Pane::Studies].map(|pane| panels.seen.contains(&pane));
         help::show(ui, state, &mut out);
+        palette::show(ui, state, &mut out);
         // Every step's window is worth fetching only while the panel that shows them is on the screen.
         self.state.wants_history = is_history_seen;
         if is_studies_seen {
@@ -117,6 +135,12 @@ impl SightlineApp {
             return;
         }
         for command in commands {
+            match &command {
+                Command::Layout(command) => self.workspace.apply(*command),
+                Command::CopyLink => self.copy_link(context),
+                Command::SetLooks(looks) => theme::apply(context, *looks),
+                _ => {}
+            }
             self.state.apply(command);
         }
         self.send();
@@ -124,15 +148,41 @@ impl SightlineApp {
         context.request_repaint();
     }
 
-    /// Tells the page what is open, so that its link opens the same again.
+    /// What the page's address should say.
+    fn fragment(&self) -> Fragment {
+        let preset = Some(self.workspace.preset());
+        Fragment { preset, unknown: self.linked.unknown.clone(), ..self.state.fragment() }
+    }
+
+    fn copy_link(&mut self, context: &Context) {
+        let fragment = self.fragment().text();
+        if fragment.is_empty() {
+            self.state.messages.problem("There is nothing to link to yet: no session is open.", None);
+            return;
+        }
+        context.copy_text(format!("{}/#{fragment}", self.state.origin));
+        self.state.messages.note("The link to what you see is copied.");
+    }
+
+    /// Follows an address that was changed by Back or by hand, and writes what is looked at into it.
     fn keep_link(&mut self) {
-        let session = self.state.session.as_ref().map(|session| session.id.clone());
-        if session != self.linked {
-            #[cfg(target_arch = "wasm32")]
-            if let Some(id) = &session {
-                crate::web::keep_link(id);
+        #[cfg(target_arch = "wasm32")]
+        {
+            let present = Fragment::parse(&crate::web::hash());
+            if present != self.linked && present.session.is_some() {
+                if let Some(preset) = present.preset.filter(|preset| *preset != self.workspace.preset()) {
+                    self.workspace.apply(crate::layout::workspace::LayoutCommand::Use(preset));
+                }
+                self.linked = present.clone();
+                self.state.open_link(present);
+                return;
             }
-            self.linked = session;
+        }
+        let fragment = self.fragment();
+        if fragment.session.is_some() && fragment.text() != self.linked.text() {
+            #[cfg(target_arch = "wasm32")]
+            crate::web::keep_link(&fragment.text(), fragment.is_another_place(&self.linked));
+            self.linked = Fragment::parse(&fragment.text());
         }
     }
 }
@@ -143,6 +193,7 @@ impl eframe::App for SightlineApp {
     }
 
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
+        keys::leave_clicked(ui.ctx());
         let commands = self.lay_out(ui);
         let context = ui.ctx().clone();
         self.carry_out(&context, commands);
@@ -150,6 +201,7 @@ impl eframe::App for SightlineApp {
             context.open_url(egui::OpenUrl::new_tab(url));
         }
         self.keep_link();
+        self.kept.write(&context, self.state.looks, || self.workspace.kept());
         self.wake_for_retries(&context);
         self.publisher.publish(&self.state, &self.left_image, context.zoom_factor());
     }

@@ -3,11 +3,13 @@
 use sightline_core::frames::Pixel;
 use sightline_core::settings::{Changes, TrackerKind};
 
+use crate::layout::workspace::LayoutCommand;
 use crate::shape_view::ShapeView;
 use crate::state::calculator::Calculator;
 use crate::state::studies::Order;
 use crate::stretch::Stretch;
 use crate::tables::FeatureView;
+use crate::theme::Looks;
 use crate::view2d::View2d;
 
 /// Where to go along the drive.
@@ -69,6 +71,28 @@ pub enum Stage {
 }
 
 impl Stage {
+    /// All of them.
+    pub const ALL: [Self; 18] = [
+        Self::Predict,
+        Self::PointMast,
+        Self::Capture,
+        Self::Locate,
+        Self::ScaleRoll,
+        Self::MatchTemplate,
+        Self::PointStereo,
+        Self::Detect,
+        Self::MatchFeatures,
+        Self::Triangulate,
+        Self::FitMotion,
+        Self::Bootstrap,
+        Self::Surface,
+        Self::CoarseRegister,
+        Self::RefineRegister,
+        Self::CarriedRay,
+        Self::Judge,
+        Self::Update,
+    ];
+
     /// Those of a tracker, in running order.
     pub const fn of(tracker: TrackerKind) -> &'static [Self] {
         use Stage::*;
@@ -278,6 +302,17 @@ pub enum Mode {
     GoTo(String),
     /// The help sheet is open.
     Help,
+    /// The palette is open.
+    Palette(Search),
+}
+
+/// What is being looked for in the palette.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Search {
+    /// The words typed so far.
+    pub words: String,
+    /// Which of the findings is chosen, from 0.
+    pub chosen: usize,
 }
 
 /// What a person asks for.
@@ -365,4 +400,10 @@ pub enum Command {
     Dismiss(u64),
     /// Connects again at once.
     Reconnect,
+    /// Moves, closes and shows panels.
+    Layout(LayoutCommand),
+    /// Copies the link to what is looked at.
+    CopyLink,
+    /// Chooses the looks of the page.
+    SetLooks(Looks),
 }

@@ -2,12 +2,15 @@
 
 use egui::{Context, Event, Key, Modifiers};
 
+use crate::actions;
 use crate::command::{Command, Go, Mode, Stage};
+use crate::layout::presets::Preset;
+use crate::layout::workspace::LayoutCommand;
 use crate::state::State;
 use crate::stretch::Stretch;
 
 /// Every key with its meaning, as the help sheet lists them.
-pub const SHEET: [(&str, &str); 16] = [
+pub const SHEET: [(&str, &str); 21] = [
     ("Right  Left", "next, previous step"),
     ("Shift+Right  Shift+Left", "ten steps on, back"),
     ("Home  End", "first, last step"),
@@ -21,33 +24,103 @@ pub const SHEET: [(&str, &str); 16] = [
     ("I", "stretch dark images automatically, or show them as recorded"),
     ("Esc", "cancel what was begun"),
     ("?", "this sheet"),
+    ("Ctrl+K", "the palette: whatever can be asked for, by name"),
+    ("Shift+1 … Shift+7", "arrangements of the panels, from the overview to the report"),
+    ("Q  Shift+Q", "next, previous panel; Tab goes on inside it"),
+    ("`", "let the panel fill the page, and again to restore"),
+    ("Y", "copy a link to what is looked at"),
     ("Wheel", "zoom at the pointer"),
     ("Drag", "pan"),
     ("Double click", "fit the image or plot"),
 ];
+
+/// Takes the keyboard away from a control that was clicked: keys are the page's again. A field of text keeps it, and so
+/// does what Tab went to.
+pub fn leave_clicked(context: &Context) {
+    let is_clicked = context.input(|input| input.pointer.any_released());
+    if is_clicked && !context.text_edit_focused() {
+        context.memory_mut(|memory| {
+            if let Some(held) = memory.focused() {
+                memory.surrender_focus(held);
+            }
+        });
+    }
+}
 
 /// The commands of the keys pressed in this frame.
 pub fn commands(context: &Context, state: &State) -> Vec<Command> {
     if context.text_edit_focused() {
         return Vec::new();
     }
+    let is_held = context.memory(|memory| memory.focused().is_some());
     context.input(|input| {
-        let pressed = input.events.iter().filter_map(|event| match event {
-            Event::Key { key, pressed: true, modifiers, .. } => command(*key, *modifiers, state),
+        let mut out = Vec::new();
+        // What is typed after the key that opens a field, in the same frame, is meant for the field.
+        let mut typed: Option<String> = None;
+        for event in &input.events {
+            match (&mut typed, event) {
+                (Some(typed), Event::Text(text)) => typed.push_str(text),
+                (None, Event::Key { key, pressed: true, modifiers, physical_key, .. }) => {
+                    if is_held && is_of_widgets(*key, *modifiers) {
+                        continue;
+                    }
+                    // Shift turns a digit into a sign that differs from keyboard to keyboard.
+                    let digit = physical_key.filter(|key| modifiers.shift && preset_of(*key).is_some());
+                    let asked = command(digit.unwrap_or(*key), *modifiers, state);
+                    let opens = matches!(asked, Some(Command::SetMode(Mode::Palette(_) | Mode::GoTo(_))));
+                    typed = opens.then(String::new);
+                    out.extend(asked);
+                }
+                _ => {}
+            }
+        }
+        if let (Some(typed), Some(Command::SetMode(Mode::Palette(search)))) = (typed, out.last_mut()) {
+            search.words = typed;
+        }
+        out
+    })
+}
+
+/// What was typed before a field that has just opened has the keyboard; it would otherwise be lost.
+pub fn typed_ahead(context: &Context, is_part: impl Fn(char) -> bool) -> String {
+    if context.text_edit_focused() {
+        return String::new();
+    }
+    context.input(|input| {
+        let texts = input.events.iter().filter_map(|event| match event {
+            Event::Text(text) => Some(text.as_str()),
             _ => None,
         });
-        pressed.collect()
+        texts.flat_map(str::chars).filter(|&c| is_part(c)).collect()
     })
+}
+
+/// Whether a key belongs to the control that has the keyboard: it moves a slider or presses a button.
+fn is_of_widgets(key: Key, modifiers: Modifiers) -> bool {
+    let arrows = [Key::ArrowUp, Key::ArrowDown, Key::ArrowLeft, Key::ArrowRight];
+    modifiers.is_none() && (arrows.contains(&key) || matches!(key, Key::Space | Key::Enter))
+}
+
+/// The arrangement of a digit.
+fn preset_of(key: Key) -> Option<Preset> {
+    let digits = [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6, Key::Num7];
+    digits.into_iter().zip(Preset::ALL).find_map(|(digit, preset)| (digit == key).then_some(preset))
 }
 
 /// What a key asks for.
 pub fn command(key: Key, modifiers: Modifiers, state: &State) -> Option<Command> {
+    if key == Key::K && modifiers.command && !modifiers.alt && !modifiers.shift {
+        return Some(actions::palette());
+    }
     if modifiers.ctrl || modifiers.command || modifiers.alt {
         return None;
     }
     let shift = modifiers.shift;
     if !matches!(state.mode, Mode::Look | Mode::Pick) {
         return (key == Key::Escape).then_some(Command::SetMode(Mode::Look));
+    }
+    if let Some(preset) = preset_of(key).filter(|_| shift) {
+        return Some(Command::Layout(LayoutCommand::Use(preset)));
     }
     Some(match key {
         Key::ArrowRight => Command::Go(Go::By(if shift { 10 } else { 1 })),
@@ -66,6 +139,9 @@ pub fn command(key: Key, modifiers: Modifiers, state: &State) -> Option<Command>
         Key::H => Command::ToggleMarks,
         Key::I if state.stretch == Stretch::None => Command::SetStretch(Stretch::Auto),
         Key::I => Command::SetStretch(Stretch::None),
+        Key::Q => Command::Layout(LayoutCommand::Panel(if shift { -1 } else { 1 })),
+        Key::Backtick => Command::Layout(LayoutCommand::Maximise(None)),
+        Key::Y => Command::CopyLink,
         Key::Escape => Command::SetMode(Mode::Look),
         Key::Questionmark => Command::SetMode(Mode::Help),
         Key::Slash if shift => Command::SetMode(Mode::Help),
@@ -107,7 +183,30 @@ mod tests {
         assert_eq!(press(Key::I, &state), Some(Command::SetStretch(Stretch::Auto)));
         assert_eq!(press(Key::Escape, &state), Some(Command::SetMode(Mode::Look)));
         assert_eq!(press(Key::Questionmark, &state), Some(Command::SetMode(Mode::Help)));
-        assert_eq!(press(Key::Q, &state), None);
+        assert_eq!(press(Key::Q, &state), Some(Command::Layout(LayoutCommand::Panel(1))));
+        assert_eq!(command(Key::K, Modifiers::COMMAND, &state), Some(actions::palette()));
+        let shifted = |key| command(key, Modifiers::SHIFT, &state);
+        assert_eq!(shifted(Key::Num3), Some(Command::Layout(LayoutCommand::Use(Preset::Stereo))));
+        assert_eq!(press(Key::Num3, &state), None);
+    }
+
+    #[test]
+    fn what_is_typed_in_the_frame_in_which_a_field_opens_goes_into_it() {
+        let context = Context::default();
+        let key =
+            |key, modifiers| Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers };
+        let events = vec![
+            key(Key::K, Modifiers::COMMAND),
+            key(Key::T, Modifiers::NONE),
+            Event::Text("t".to_owned()),
+            key(Key::R, Modifiers::NONE),
+            Event::Text("r".to_owned()),
+        ];
+        let input = egui::RawInput { events, ..Default::default() };
+        let mut asked = Vec::new();
+        let _ = context.run_ui(input, |ui| asked = commands(ui.ctx(), &state()));
+        let words = crate::command::Search { words: "tr".to_owned(), chosen: 0 };
+        assert_eq!(asked, [Command::SetMode(Mode::Palette(words))], "no target is picked, nothing is run");
     }
 
     #[test]

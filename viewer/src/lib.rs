@@ -4,7 +4,8 @@
 //! |---|---|
 //! | `app` | lays the panels out and carries their commands to state and network |
 //! | `state` | what is known and looked at: the one value of which every panel is a view |
-//! | `command`, `keys` | what a person can ask for, and by which key |
+//! | `command`, `keys`, `actions` | what a person can ask for, by which key, and by which name |
+//! | `link`, `keep` | what the page's address says, and what the browser keeps across reloads |
 //! | `net` | requests and events; nothing blocks |
 //! | `cache`, `raster`, `stretch`, `tables` | what was loaded, with a limit of memory, and how pixels become a texture and tables rows |
 //! | `shape_view` | what is looked at of a registration by shape |
@@ -12,12 +13,16 @@
 //! | `layout` | where the panels are |
 //! | `view2d`, `overlay`, `ellipse`, `contour` | the zoomable canvas and the marks on it |
 //! | `theme` | colours, text styles and spacing, and nowhere else |
+//! | `access` | the page for a screen reader: egui's tree as elements of the document |
 //! | `status` | the machine-readable status for tests in a browser |
 
 pub mod app;
 pub mod state;
 pub mod command;
 pub mod keys;
+pub mod actions;
+pub mod link;
+pub mod keep;
 pub mod net;
 pub mod cache;
 pub mod raster;
@@ -31,6 +36,7 @@ pub mod overlay;
 pub mod ellipse;
 pub mod contour;
 pub mod theme;
+pub mod access;
 pub mod status;
 #[cfg(target_arch = "wasm32")]
 pub mod web;

@@ -1,5 +1,6 @@
 //! The native viewer: `sightline-viewer [http://127.0.0.1:7700[/#session=ID]]`.
 
+use sightline_viewer::link::Fragment;
 use sightline_viewer::{Link, SightlineApp};
 
 /// Where the server listens unless it is told otherwise.
@@ -18,6 +19,5 @@ fn main() -> eframe::Result {
 /// The server and session that an address names.
 fn link(address: &str) -> Link {
     let (origin, fragment) = address.split_once('#').unwrap_or((address, ""));
-    let session = fragment.split('&').find_map(|part| part.strip_prefix("session="));
-    Link { origin: origin.trim_end_matches('/').to_owned(), session: session.map(str::to_owned) }
+    Link { origin: origin.trim_end_matches('/').to_owned(), fragment: Fragment::parse(fragment) }
 }

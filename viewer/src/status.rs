@@ -38,6 +38,7 @@ use crate::state::{Connection, State};
 #[derive(Default)]
 pub struct Publisher {
     published: String,
+    spoken: String,
 }
 
 impl Publisher {
@@ -49,7 +50,32 @@ impl Publisher {
             crate::web::publish("data-status", &text);
             self.published = text;
         }
+        let spoken = sentence(state);
+        if spoken != self.spoken {
+            #[cfg(target_arch = "wasm32")]
+            crate::access::dom::speak(&spoken);
+            self.spoken = spoken;
+        }
     }
+}
+
+/// Where the cursor is and what is known there, as a screen reader speaks it.
+pub fn sentence(state: &State) -> String {
+    let Some(last) = state.stop_count().checked_sub(1) else { return state.missing_target() };
+    let mut words = format!("step {} of {last}", state.cursor.step);
+    let Some(row) = state.row() else {
+        return words + if state.target().is_some() { ", not computed" } else { ", no target" };
+    };
+    words += &format!(", {}", state.tracking().unwrap_or_default().word());
+    let numbers = [
+        ("score", row.ncc.map(|score| format!("{score:.2}"))),
+        ("error", row.err_px.map(|error| format!("{error:.1} pixels"))),
+        ("sigma", row.sigma_m.map(|sigma| format!("{:.1} centimetres", sigma * 100.0))),
+    ];
+    for (name, number) in numbers {
+        words += &number.map(|number| format!(", {name} {number}")).unwrap_or_default();
+    }
+    words
 }
 
 /// The status as a document.

@@ -81,6 +81,46 @@ const RUNS: [Color32; 4] = [
 ];
 const CHECKER: [Color32; 2] = [Color32::from_rgb(0x24, 0x26, 0x2a), Color32::from_rgb(0x32, 0x35, 0x3b)];
 
+/// Which colours the page has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Looks {
+    /// Light words on dark ground.
+    #[default]
+    Dark,
+    /// Dark words on light ground.
+    Light,
+    /// White words on black ground, with strong lines.
+    Contrast,
+}
+
+impl Looks {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Dark, Self::Light, Self::Contrast];
+
+    /// Its name.
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::Dark => "dark",
+            Self::Light => "light",
+            Self::Contrast => "high contrast",
+        }
+    }
+
+    /// Its word where the browser keeps it.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Dark => "dark",
+            Self::Light => "light",
+            Self::Contrast => "contrast",
+        }
+    }
+
+    /// The looks of that word.
+    pub fn of_word(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|looks| looks.word() == word)
+    }
+}
+
 /// Distance between a panel's border and its contents, points.
 pub const MARGIN: i8 = 8;
 
@@ -144,7 +184,8 @@ fn ramp(gradient: colorous::Gradient, t: f64) -> Color32 {
 }
 
 /// Gives the context its looks.
-pub fn apply(context: &egui::Context) {
+pub fn apply(context: &egui::Context, looks: Looks) {
+    let _ = looks;
     let mut fonts = FontDefinitions::default();
     // Arrows and dots, which the proportional font lacks, come from the one with equal widths.
     let fallback = fonts.families.get(&FontFamily::Monospace).cloned().unwrap_or_default();

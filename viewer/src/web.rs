@@ -5,6 +5,8 @@ use std::sync::{Once, OnceLock};
 use eframe::{WebOptions, WebRunner};
 use wasm_bindgen::prelude::*;
 
+use crate::access::mirror::Mirror;
+use crate::link::Fragment;
 use crate::{Link, SightlineApp};
 
 /// The event that tells the page of a panic; its detail is the panic's message.
@@ -32,30 +34,70 @@ pub async fn start(canvas_id: String) -> Result<(), JsValue> {
         .start(
             canvas,
             WebOptions::default(),
-            Box::new(|context| Ok(Box::new(SightlineApp::new(&context.egui_ctx, link)))),
+            Box::new(|context| {
+                context.egui_ctx.add_plugin(Mirror);
+                watch_address(&context.egui_ctx);
+                Ok(Box::new(SightlineApp::new(&context.egui_ctx, link)))
+            }),
         )
         .await
 }
 
-/// The server that sent the page, and the session that its fragment names: `#session=ID`.
+/// The server that sent the page, and what its fragment says.
 fn link() -> Link {
     let location = web_sys::window().map(|window| window.location());
     let origin = location.as_ref().and_then(|location| location.origin().ok()).unwrap_or_default();
-    let fragment = location.and_then(|location| location.hash().ok()).unwrap_or_default();
-    let parts = fragment.trim_start_matches('#').split('&');
-    let session = parts.filter_map(|part| part.strip_prefix("session=")).find(|id| !id.is_empty());
-    Link { origin, session: session.map(str::to_owned) }
+    Link { origin, fragment: Fragment::parse(&hash()) }
 }
 
-/// Writes the session into the page's address, so that the address opens it again; the history stays as it is.
-pub(crate) fn keep_link(session: &str) {
+/// What the address has after its `#`.
+pub(crate) fn hash() -> String {
+    let location = web_sys::window().map(|window| window.location());
+    location.and_then(|location| location.hash().ok()).unwrap_or_default().trim_start_matches('#').to_owned()
+}
+
+/// Writes what is looked at into the page's address: as a new place of the browser's history, or in place of the
+/// present one.
+pub(crate) fn keep_link(fragment: &str, is_another_place: bool) {
     let history = web_sys::window().and_then(|window| window.history().ok());
     if let Some(history) = history {
-        // Where the browser forbids it the page works all the same, only its address does not.
-        history
-            .replace_state_with_url(&JsValue::NULL, "", Some(&format!("#session={session}")))
-            .unwrap_or_default();
+        let url = format!("#{fragment}");
+        let kept = if is_another_place {
+            history.push_state_with_url(&JsValue::NULL, "", Some(&url))
+        } else {
+            history.replace_state_with_url(&JsValue::NULL, "", Some(&url))
+        };
+        // Where the browser forbids it, or has enough of it, the page works all the same.
+        kept.unwrap_or_default();
     }
+}
+
+/// What the browser keeps for this page under a name.
+pub(crate) fn kept(name: &str) -> Option<String> {
+    web_sys::window()?.local_storage().ok()??.get_item(name).ok()?
+}
+
+/// Lets the browser keep a text for this page.
+pub(crate) fn keep(name: &str, text: &str) {
+    let storage = web_sys::window().and_then(|window| window.local_storage().ok().flatten());
+    if let Some(storage) = storage {
+        // A browser that keeps nothing shows the overview the next time.
+        storage.set_item(name, text).unwrap_or_default();
+    }
+}
+
+/// Wakes the page when its address changes: by Back, or by hand.
+pub(crate) fn watch_address(context: &egui::Context) {
+    let context = context.clone();
+    let changed = Closure::<dyn FnMut()>::new(move || context.request_repaint());
+    if let Some(window) = web_sys::window() {
+        for event in ["popstate", "hashchange"] {
+            window
+                .add_event_listener_with_callback(event, changed.as_ref().unchecked_ref())
+                .unwrap_or_default();
+        }
+    }
+    changed.forget();
 }
 
 /// Sets an attribute of the canvas.

@@ -1,10 +1,13 @@
 //! `cargo xtask web`: the viewer as WASM, its bindings and the page, in `target/web`.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::UNIX_EPOCH;
 
 use anyhow::{Context, Result};
+use flate2::Compression;
+use flate2::write::GzEncoder;
 use wasm_bindgen_cli_support::Bindgen;
 
 use crate::cmd;
@@ -24,8 +27,35 @@ pub(crate) fn web() -> Result<()> {
     std::fs::create_dir_all(&output).with_context(|| format!("{} cannot be made", output.display()))?;
     bind(&wasm, &output)?;
     copy_page(&cmd::root().join("web"), &output)?;
+    compress(&output)?;
     let bytes = std::fs::metadata(output.join("sightline_viewer_bg.wasm"))?.len();
-    cmd::say(format!("The page is in target/web; its WASM has {:.1} MB.", bytes as f64 / 1e6));
+    let sent = std::fs::metadata(output.join("sightline_viewer_bg.wasm.gz"))?.len();
+    let (bytes, sent) = (bytes as f64 / 1e6, sent as f64 / 1e6);
+    cmd::say(format!("The page is in target/web; its WASM has {bytes:.1} MB, {sent:.1} MB compressed."));
+    Ok(())
+}
+
+/// Writes beside every file what is sent to browsers that take it compressed, where that is older or missing.
+fn compress(output: &Path) -> Result<()> {
+    for entry in std::fs::read_dir(output).with_context(|| format!("{} cannot be read", output.display()))? {
+        let file = entry?.path();
+        let Some(name) = file.file_name().and_then(|name| name.to_str()) else { continue };
+        if name.ends_with(".gz") || !file.is_file() {
+            continue;
+        }
+        let packed = file.with_file_name(format!("{name}.gz"));
+        let modified = |path: &Path| std::fs::metadata(path).and_then(|metadata| metadata.modified());
+        let is_current =
+            modified(&packed).is_ok_and(|packed| modified(&file).is_ok_and(|file| file <= packed));
+        if is_current {
+            continue;
+        }
+        let content = std::fs::read(&file).with_context(|| format!("{} cannot be read", file.display()))?;
+        let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
+        encoder.write_all(&content)?;
+        std::fs::write(&packed, encoder.finish()?)
+            .with_context(|| format!("{} cannot be written", packed.display()))?;
+    }
     Ok(())
 }
 
@@ -84,6 +114,26 @@ fn copy_page(page: &Path, output: &Path) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_sent_compressed_follows_what_it_was_made_of() {
+        use std::io::Read;
+        let output = tempfile::tempdir().expect("a temporary folder");
+        let unpack = || {
+            let packed = std::fs::read(output.path().join("a.js.gz")).expect("a compressed file");
+            let mut text = String::new();
+            flate2::read::GzDecoder::new(&packed[..]).read_to_string(&mut text).expect("whole");
+            text
+        };
+        for text in ["one ".repeat(1000), "two".to_owned()] {
+            std::fs::write(output.path().join("a.js"), &text).expect("a file");
+            // File times may be as coarse as a few milliseconds.
+            std::thread::sleep(std::time::Duration::from_millis(20));
+            compress(output.path()).expect("compressed");
+            assert_eq!(unpack(), text);
+        }
+        assert!(!output.path().join("a.js.gz.gz").exists());
+    }
 
     #[test]
     fn the_page_is_copied_again_only_where_it_differs() {

@@ -20,7 +20,12 @@ pub fn top(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         ui.separator();
         status(ui, state);
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            if ui.button("?").on_hover_text("Keys and conventions").clicked() {
+            let sheet = ui.add(Button::new("?").min_size(egui::vec2(26.0, 24.0)));
+            if sheet
+                .accessible_name("Keys and conventions")
+                .on_hover_text("Keys and conventions (?)")
+                .clicked()
+            {
                 out.push(Command::SetMode(Mode::Help));
             }
             let has_targets = state.session.as_ref().is_some_and(|session| !session.targets.is_empty());

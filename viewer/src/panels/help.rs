@@ -1,6 +1,6 @@
 //! The help sheet and the field in which a step is typed.
 
-use egui::{Event, Id, Key, Modal, RichText, Ui};
+use egui::{Id, Key, Modal, RichText, Ui};
 
 use crate::command::{Command, Go, Mode};
 use crate::state::State;
@@ -11,7 +11,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     match &state.mode {
         Mode::Help => sheet(ui, state, out),
         Mode::GoTo(typed) => go_to(ui, state, typed, out),
-        Mode::Look | Mode::Pick => {}
+        Mode::Look | Mode::Pick | Mode::Palette(_) => {}
     }
 }
 
@@ -50,8 +50,8 @@ fn sheet(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 
 fn go_to(ui: &mut Ui, state: &State, typed: &str, out: &mut Vec<Command>) {
     let last = state.stop_count().saturating_sub(1);
-    // What was typed before the field had the focus would otherwise be lost.
-    let ahead = if ui.ctx().text_edit_focused() { String::new() } else { typed_ahead(ui) };
+    // Digits and signs: the letter that opened the field may come as text, too.
+    let ahead = keys::typed_ahead(ui.ctx(), |c| c.is_ascii_digit() || matches!(c, '+' | '-'));
     let mut text = format!("{typed}{ahead}");
     let modal = Modal::new(Id::unique("go to")).backdrop_color(theme::SHADE).show(ui.ctx(), |ui| {
         ui.set_width(240.0);
@@ -75,18 +75,6 @@ fn go_to(ui: &mut Ui, state: &State, typed: &str, out: &mut Vec<Command>) {
     } else if text != typed {
         out.push(Command::SetMode(Mode::GoTo(text)));
     }
-}
-
-/// Digits and signs among the typed text; the letter that opened the field may come as text, too.
-fn typed_ahead(ui: &Ui) -> String {
-    let is_part = |c: &char| c.is_ascii_digit() || matches!(c, '+' | '-');
-    ui.input(|input| {
-        let texts = input.events.iter().filter_map(|event| match event {
-            Event::Text(text) => Some(text.as_str()),
-            _ => None,
-        });
-        texts.flat_map(str::chars).filter(is_part).collect()
-    })
 }
 
 /// The step that was typed: a number, or `+5` and `-3` from the present one.

@@ -15,6 +15,7 @@ pub mod machine;
 pub mod map;
 pub mod messages;
 pub mod names;
+pub mod palette;
 pub mod plots;
 pub mod settings;
 pub mod shape;

@@ -68,6 +68,9 @@ impl State {
             }
             Command::Dismiss(id) => self.messages.dismiss(id),
             Command::Reconnect => self.outbox.push(Request::Reconnect),
+            Command::SetLooks(looks) => self.looks = looks,
+            // The page itself does these: they are no part of what is looked at.
+            Command::Layout(_) | Command::CopyLink => {}
         }
     }
 

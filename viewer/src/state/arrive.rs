@@ -214,11 +214,12 @@ impl State {
         }
         self.sync.linked = Some(view.id.clone());
         self.session = Some(view);
+        self.follow_link();
         self.keep_cursor_valid();
     }
 
     /// Moves the cursor off a target or run that is no more.
-    fn keep_cursor_valid(&mut self) {
+    pub(super) fn keep_cursor_valid(&mut self) {
         let Some(session) = &self.session else { return };
         if self.target().is_none() {
             let newest = session.targets.last();

@@ -7,6 +7,7 @@ mod apply;
 mod arrive;
 pub mod calculator;
 mod configurations;
+mod linked;
 pub mod messages;
 mod missing;
 pub mod studies;
@@ -32,11 +33,13 @@ use self::messages::Messages;
 use self::studies::Studies;
 use crate::cache::{Cache, Eye, Key, Slot, StepKey};
 use crate::command::{Layer, Mode, Panel, Stage};
+use crate::link::Fragment;
 use crate::net::Request;
 use crate::raster::Raster;
 use crate::shape_view::ShapeView;
 use crate::stretch::Stretch;
 use crate::tables::FeatureView;
+use crate::theme::Looks;
 use crate::view2d::View2d;
 
 /// How the server's events come in.
@@ -154,6 +157,8 @@ pub struct State {
     pub hidden: HashSet<Layer>,
     /// Whether marks are shown at all.
     pub marks: bool,
+    /// Which colours the page has.
+    pub looks: Looks,
     /// A page to open in a new tab.
     pub open_url: Option<String>,
     outbox: Vec<Request>,
@@ -177,6 +182,8 @@ struct Sync {
     cursor_messages: u64,
     /// The session named by the page's link, before it was opened.
     linked: Option<String>,
+    /// The rest of the link, until its session is here.
+    link: Option<Fragment>,
     /// The traverse whose latest session is to be opened.
     opening: Option<String>,
 }
@@ -211,6 +218,7 @@ impl State {
             wants_history: false,
             hidden: HashSet::from(Layer::HIDDEN_AT_FIRST),
             marks: true,
+            looks: Looks::default(),
             open_url: None,
             outbox: Vec::new(),
             sync: Sync { linked, ..Sync::default() },

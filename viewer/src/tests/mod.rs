@@ -37,7 +37,7 @@ impl<'a> Shown<'a> {
         let mut harness = Harness::builder().with_size(size).build_ui_state(
             move |ui, out: &mut Vec<Command>| {
                 if let Some(make) = make.take() {
-                    theme::apply(ui.ctx());
+                    theme::apply(ui.ctx(), theme::Looks::Dark);
                     state = Some(make(ui.ctx()));
                 }
                 if let Some(state) = &state {

@@ -1,10 +1,18 @@
-//! Where the panels are: a tree of tiles that a person can drag and resize.
+//! Where the panels are: a tree of tiles that a person can drag, resize, close and bring back.
+//!
+//! | file | what it does |
+//! |---|---|
+//! | `presets` | the seven arrangements that come with the page, and the one for narrow windows |
+//! | `workspace` | the arrangement in use: presets, the panel with the keyboard, the one that fills the page; kept across reloads |
 
-use egui::{Color32, Frame, Margin, Stroke, Ui, Visuals, WidgetText};
-use egui_tiles::{
-    Behavior, Container, Linear, LinearDir, SimplificationOptions, TabState, TileId, Tiles, Tree, UiResponse,
-};
+pub mod presets;
+pub mod workspace;
 
+use egui::{Color32, Frame, Margin, RichText, Stroke, Ui, Visuals, WidgetText};
+use egui_tiles::{Behavior, SimplificationOptions, TabState, TileId, Tiles, UiResponse};
+use serde::{Deserialize, Serialize};
+
+use self::workspace::LayoutCommand;
 use crate::command::Command;
 use crate::panels;
 use crate::state::State;
@@ -13,7 +21,8 @@ use crate::theme;
 use crate::view2d::Transform;
 
 /// A panel that can be dragged around.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Pane {
     /// Targets and runs.
     Targets,
@@ -134,38 +143,6 @@ pub fn show_pane(ui: &mut Ui, pane: Pane, state: &State, out: &mut Vec<Command>)
     None
 }
 
-/// The arrangement with which a page opens: it fits 1600 × 1000 and 1280 × 720.
-pub fn overview() -> Tree<Pane> {
-    let mut tiles = Tiles::default();
-    let tabs = |tiles: &mut Tiles<Pane>, panes: &[Pane]| {
-        let children = panes.iter().map(|&pane| tiles.insert_pane(pane)).collect();
-        tiles.insert_tab_tile(children)
-    };
-    let side = tabs(&mut tiles, &[Pane::Targets, Pane::Settings]);
-    let left = tabs(&mut tiles, &[Pane::Left]);
-    let right = tabs(&mut tiles, &[Pane::Right, Pane::Features, Pane::Shape, Pane::Budget, Pane::Studies]);
-    let strip = tabs(&mut tiles, &[Pane::Strip, Pane::History]);
-    let surface = tabs(&mut tiles, &[Pane::Surface, Pane::StereoProfile]);
-    let map = tabs(&mut tiles, &[Pane::Map]);
-    let plots = tabs(&mut tiles, &[Pane::Plots, Pane::Tolerances]);
-    let gates = tabs(&mut tiles, &[Pane::Gates, Pane::Machine]);
-    let inspector = tabs(&mut tiles, &[Pane::Inspector, Pane::Messages]);
-    let images = linear(&mut tiles, LinearDir::Horizontal, &[(left, 1.0), (right, 1.0)]);
-    let charts = linear(&mut tiles, LinearDir::Horizontal, &[(surface, 1.0), (map, 1.1), (plots, 1.1)]);
-    let middle = linear(&mut tiles, LinearDir::Vertical, &[(images, 0.53), (strip, 0.175), (charts, 0.295)]);
-    let record = linear(&mut tiles, LinearDir::Vertical, &[(gates, 0.38), (inspector, 0.62)]);
-    let root = linear(&mut tiles, LinearDir::Horizontal, &[(side, 0.17), (middle, 0.63), (record, 0.2)]);
-    Tree::new(egui::Id::unique("panels"), root, tiles)
-}
-
-fn linear(tiles: &mut Tiles<Pane>, direction: LinearDir, children: &[(TileId, f32)]) -> TileId {
-    let mut linear = Linear::new(direction, children.iter().map(|(id, _)| *id).collect());
-    for (id, share) in children {
-        linear.shares.set_share(*id, *share);
-    }
-    tiles.insert_container(Container::Linear(linear))
-}
-
 /// Shows the panels and gathers their commands.
 pub struct Panels<'a> {
     /// What they show.
@@ -176,20 +153,99 @@ pub struct Panels<'a> {
     pub left_image: LeftImage,
     /// The panels that are on the screen.
     pub seen: Vec<Pane>,
+    /// The panel with the keyboard.
+    pub current: Option<Pane>,
+    /// Whether the keyboard goes into that panel in this frame.
+    pub takes_keyboard: bool,
+    /// The panels that are closed.
+    pub closed: Vec<Pane>,
+    /// The panel that fills the page.
+    pub maximised: Option<Pane>,
 }
 
-impl Behavior<Pane> for Panels<'_> {
-    fn pane_ui(&mut self, ui: &mut Ui, _tile: TileId, pane: &mut Pane) -> UiResponse {
-        self.seen.push(*pane);
+impl<'a> Panels<'a> {
+    /// Shows `state` and puts what is asked for into `out`.
+    pub fn new(state: &'a State, out: &'a mut Vec<Command>) -> Self {
+        let (seen, closed) = (Vec::new(), Vec::new());
+        let (left_image, current, maximised) = (None, None, None);
+        Self { state, out, left_image, seen, current, takes_keyboard: false, closed, maximised }
+    }
+
+    /// Shows a panel's contents on its ground, as a region that a screen reader and the keyboard find.
+    fn framed(&mut self, ui: &mut Ui, pane: Pane, show: impl FnOnce(&mut Self, &mut Ui)) {
         let margin = match pane {
             Pane::Strip | Pane::History => Margin::symmetric(theme::MARGIN, 3),
             Pane::Left | Pane::Right | Pane::Surface => Margin { left: 4, right: 4, top: 4, bottom: 0 },
             _ => Margin::same(theme::MARGIN),
         };
+        let place = ui.max_rect();
+        region(ui, pane.title(), place);
+        // The panel itself can have the keyboard, so that Tab goes on with what is in it.
+        let whole =
+            ui.interact(place, ui.scope_id().with("whole panel"), egui::Sense::focusable_noninteractive());
+        whole.widget_info(|| {
+            egui::WidgetInfo::labeled(egui::Role::Group, true, format!("{} panel", pane.title()))
+        });
+        if self.takes_keyboard && self.current == Some(pane) {
+            whole.request_focus();
+        }
+        if whole.has_focus() {
+            self.current = Some(pane);
+        }
         Frame::new().fill(theme::PANEL).inner_margin(margin).show(ui, |ui| {
-            let shown = show_pane(ui, *pane, self.state, self.out);
-            self.left_image = shown.or(self.left_image.take());
+            show(self, ui);
             ui.take_available_space();
+        });
+        if whole.has_focus() {
+            let ring = Stroke::new(1.5, theme::ACCENT);
+            ui.painter().rect_stroke(place.shrink(1.0), 2.0, ring, egui::StrokeKind::Inside);
+        }
+    }
+
+    /// The menu of a group of tabs: what can be done with its front panel, and the closed panels.
+    fn menu(&mut self, ui: &mut Ui, front: Option<Pane>) {
+        let name = front.map_or_else(|| "panels".to_owned(), |pane| format!("{} menu", pane.title()));
+        let dots = egui::Button::new(RichText::new("...").color(theme::WEAK)).frame(false);
+        let button = ui.add(dots.min_size(egui::vec2(24.0, 20.0)));
+        let button = button.accessible_name(name).on_hover_text("This panel, and closed ones");
+        egui::Popup::menu(&button).show(|ui| {
+            ui.set_min_width(180.0);
+            if let Some(pane) = front {
+                if ui.button("Fill the page (`)").clicked() {
+                    self.out.push(Command::Layout(LayoutCommand::Maximise(Some(pane))));
+                }
+                if ui.button(format!("Close {}", pane.title())).clicked() {
+                    self.out.push(Command::Layout(LayoutCommand::Close(pane)));
+                }
+            }
+            if !self.closed.is_empty() {
+                ui.separator();
+            }
+            for pane in &self.closed {
+                if ui.button(format!("Show {}", pane.title())).clicked() {
+                    self.out.push(Command::Layout(LayoutCommand::Show(*pane)));
+                }
+            }
+        });
+    }
+}
+
+/// Makes what `ui` holds a region with a name.
+pub fn region(ui: &Ui, name: &str, place: egui::Rect) {
+    ui.ctx().accesskit_node_builder(ui.unique_id(), |node| {
+        node.set_role(egui::Role::Region);
+        node.set_label(name);
+        let [x0, y0, x1, y1] = [place.min.x, place.min.y, place.max.x, place.max.y].map(f64::from);
+        node.set_bounds(egui::accesskit::Rect { x0, y0, x1, y1 });
+    });
+}
+
+impl Behavior<Pane> for Panels<'_> {
+    fn pane_ui(&mut self, ui: &mut Ui, _tile: TileId, pane: &mut Pane) -> UiResponse {
+        self.seen.push(*pane);
+        self.framed(ui, *pane, |panels, ui| {
+            let shown = show_pane(ui, *pane, panels.state, panels.out);
+            panels.left_image = shown.or(panels.left_image.take());
         });
         UiResponse::None
     }
@@ -207,6 +263,36 @@ impl Behavior<Pane> for Panels<'_> {
         }
     }
 
+    fn on_tab_button(
+        &mut self,
+        tiles: &mut Tiles<Pane>,
+        tile: TileId,
+        button: egui::Response,
+    ) -> egui::Response {
+        let name = tiles.get_pane(&tile).map(|pane| pane.title());
+        button.ctx.accesskit_node_builder(button.id, |node| {
+            node.set_role(egui::Role::Tab);
+            // What is painted is in capitals, which some readers would spell.
+            node.set_label(name.unwrap_or("panels"));
+        });
+        if button.clicked() {
+            self.current = tiles.get_pane(&tile).copied().or(self.current);
+        }
+        button
+    }
+
+    fn top_bar_right_ui(
+        &mut self,
+        tiles: &Tiles<Pane>,
+        ui: &mut Ui,
+        _tile: TileId,
+        tabs: &egui_tiles::Tabs,
+        _scroll: &mut f32,
+    ) {
+        let front = tabs.active.and_then(|tile| tiles.get_pane(&tile)).copied();
+        self.menu(ui, front);
+    }
+
     fn simplification_options(&self) -> SimplificationOptions {
         SimplificationOptions { all_panes_must_have_tabs: true, ..SimplificationOptions::default() }
     }
@@ -216,7 +302,7 @@ impl Behavior<Pane> for Panels<'_> {
     }
 
     fn tab_bar_height(&self, _style: &egui::Style) -> f32 {
-        21.0
+        24.0
     }
 
     fn tab_bar_color(&self, _visuals: &Visuals) -> Color32 {
@@ -245,20 +331,5 @@ impl Behavior<Pane> for Panels<'_> {
 
     fn tab_bar_hline_stroke(&self, _visuals: &Visuals) -> Stroke {
         Stroke::NONE
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_panel_is_in_the_overview_once() {
-        let tree = overview();
-        for pane in Pane::ALL {
-            assert!(tree.tiles.find_pane(&pane).is_some(), "{pane:?}");
-        }
-        let panes = tree.tiles.tiles().filter(|tile| tile.is_pane()).count();
-        assert_eq!(panes, Pane::ALL.len());
     }
 }

@@ -1,0 +1,98 @@
+//! A server with one simulated traverse for tests in a browser, and the first steps there.
+
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::time::Duration;
+
+use serde_json::Value;
+use sightline_core::frames::Pixel;
+use sightline_core::sim::{self, Scenario};
+use sightline_core::traverse::{Traverse, create_simulated};
+use sightline_server::guard::Hosts;
+use sightline_server::state::AppState;
+
+use crate::browser::Browser;
+
+/// A server with one traverse, and a rock's pixel in its first left image.
+pub struct Bench {
+    /// The server's port.
+    pub port: u16,
+    /// The rock.
+    pub rock: Pixel,
+    /// How many stops there are.
+    pub stop_count: usize,
+    _folder: tempfile::TempDir,
+}
+
+impl Bench {
+    /// Serves an approach over `scenario`.
+    pub async fn start(scenario: &Scenario) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let traverse = create_simulated(scenario, &folder.path().join("approach")).unwrap();
+        let rock = rock(scenario, &traverse);
+        let stop_count = traverse.stop_count();
+        let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let port = listener.local_addr().unwrap().port();
+        let hosts = Hosts::new(port, &[]);
+        let state = AppState::new(vec![traverse], &folder.path().join("sessions"), hosts).unwrap();
+        tokio::spawn(async move { axum::serve(listener, sightline_server::app(state)).await });
+        Self { port, rock, stop_count, _folder: folder }
+    }
+
+    /// The page's address.
+    pub fn url(&self) -> String {
+        format!("http://127.0.0.1:{}/", self.port)
+    }
+
+    /// The body of a GET, read as an old browser would, so that it comes in one piece.
+    pub fn get(&self, path: &str) -> Vec<u8> {
+        let mut stream = TcpStream::connect(("127.0.0.1", self.port)).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(300))).unwrap();
+        write!(stream, "GET {path} HTTP/1.0\r\nHost: 127.0.0.1:{}\r\n\r\n", self.port).unwrap();
+        let mut answer = Vec::new();
+        stream.read_to_end(&mut answer).unwrap();
+        let end = answer.windows(4).position(|w| w == b"\r\n\r\n").unwrap();
+        let head = String::from_utf8_lossy(&answer[..end]);
+        assert!(head.starts_with("HTTP/1.0 200"), "{path}: {head}");
+        answer.split_off(end + 4)
+    }
+
+    /// The JSON of a GET.
+    pub fn json(&self, path: &str) -> Value {
+        serde_json::from_slice(&self.get(path)).unwrap()
+    }
+
+    /// Opens the page and waits for the first image.
+    pub async fn open(&self, browser: &Browser) {
+        browser.goto(&self.url()).await;
+        browser.wait_for_viewer().await;
+        let shown = "s.phase === 'ready' && s.shown && s.image_to_screen !== null";
+        browser.wait_status("the first image", shown).await;
+    }
+
+    /// Opens the page, picks the rock, and waits until its run has reached the last stop.
+    pub async fn pick(&self, browser: &Browser) {
+        self.open(browser).await;
+        let (x, y) = place(browser, self.rock).await;
+        browser.press("t").await;
+        browser.wait_status("pick mode", "s.pick_mode").await;
+        browser.click(x, y).await;
+        browser.wait_status("the target", "s.target === 0").await;
+        browser.wait_status("the run", &format!("s.steps_done === {} && !s.running", self.stop_count)).await;
+    }
+}
+
+/// The first target that the scenario's rule chooses: on a rock, lit, seen to the end.
+fn rock(scenario: &Scenario, traverse: &Traverse) -> Pixel {
+    sim::choose_targets(traverse.world().unwrap(), scenario, traverse.index())[0]
+}
+
+/// Where an image pixel of the left image lies on the canvas, CSS px.
+pub async fn place(browser: &Browser, pixel: Pixel) -> (f64, f64) {
+    let status = browser.status().await;
+    let map = &status["image_to_screen"];
+    let number =
+        |value: &Value| value.as_f64().unwrap_or_else(|| panic!("no map of the left image: {status}"));
+    let scale = number(&map["scale"]);
+    (number(&map["origin"][0]) + scale * pixel.x, number(&map["origin"][1]) + scale * pixel.y)
+}

@@ -1,0 +1,312 @@
+//! The arrangement in use: which panels are where, which has the keyboard, which fills the page. It is kept by the
+//! browser across reloads; an arrangement of another version, or one that is damaged, is left for the overview.
+
+use egui::Ui;
+use egui_tiles::{Container, Tile, TileId, Tree};
+use serde::{Deserialize, Serialize};
+
+use super::presets::{Preset, narrow};
+use super::{Pane, Panels, show_pane};
+use crate::theme;
+
+/// Windows narrower than this have one column, points.
+const NARROW: f32 = 900.0;
+
+/// The version of the kept form.
+const KEPT_FORMAT: u32 = 1;
+
+/// What can be asked of the arrangement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LayoutCommand {
+    /// Arranges the panels as they came with the page.
+    Use(Preset),
+    /// Brings a panel to the front; one that was closed comes back.
+    Show(Pane),
+    /// Closes a panel.
+    Close(Pane),
+    /// Moves the keyboard by so many panels.
+    Panel(isize),
+    /// Lets the panel with the keyboard fill the page, or gives the others their place back.
+    Maximise(Option<Pane>),
+}
+
+/// The arrangement in use.
+pub struct Workspace {
+    tree: Tree<Pane>,
+    narrow: Tree<Pane>,
+    preset: Preset,
+    maximised: Option<Pane>,
+    current: Option<Pane>,
+    /// The panels on the screen, in reading order.
+    seen: Vec<Pane>,
+    is_narrow: bool,
+    /// Whether the keyboard is to go into the current panel.
+    wants_keyboard: bool,
+}
+
+/// What the browser keeps.
+#[derive(Serialize, Deserialize)]
+struct Kept {
+    format: u32,
+    preset: Preset,
+    tree: Tree<Pane>,
+}
+
+impl Default for Workspace {
+    fn default() -> Self {
+        Self {
+            tree: Preset::Overview.tree(),
+            narrow: narrow(),
+            preset: Preset::Overview,
+            maximised: None,
+            current: None,
+            seen: Vec::new(),
+            is_narrow: false,
+            wants_keyboard: false,
+        }
+    }
+}
+
+impl Workspace {
+    /// The arrangement that was kept; the overview where there is none, or none that can be used.
+    pub fn restored(kept: Option<&str>) -> Self {
+        let kept = kept.and_then(|text| serde_json::from_str::<Kept>(text).ok());
+        let usable = kept.filter(|kept| kept.format == KEPT_FORMAT && is_sound(&kept.tree));
+        usable.map_or_else(Self::default, |kept| Self {
+            tree: kept.tree,
+            preset: kept.preset,
+            ..Self::default()
+        })
+    }
+
+    /// What the browser is to keep.
+    pub fn kept(&self) -> String {
+        let kept = Kept { format: KEPT_FORMAT, preset: self.preset, tree: self.tree.clone() };
+        serde_json::to_string(&kept).unwrap_or_default()
+    }
+
+    /// The arrangement that was chosen last.
+    pub fn preset(&self) -> Preset {
+        self.preset
+    }
+
+    /// The panel that fills the page.
+    pub fn maximised(&self) -> Option<Pane> {
+        self.maximised
+    }
+
+    /// The panels on the screen, in reading order.
+    pub fn seen(&self) -> &[Pane] {
+        &self.seen
+    }
+
+    /// The panels that are closed.
+    pub fn closed(&self) -> Vec<Pane> {
+        Pane::ALL.into_iter().filter(|pane| self.tree.tiles.find_pane(pane).is_none()).collect()
+    }
+
+    /// Carries out one command.
+    pub fn apply(&mut self, command: LayoutCommand) {
+        match command {
+            LayoutCommand::Use(preset) => {
+                (self.tree, self.preset, self.maximised) = (preset.tree(), preset, None);
+            }
+            LayoutCommand::Show(pane) => self.show_panel(pane),
+            LayoutCommand::Close(pane) => self.close(pane),
+            LayoutCommand::Panel(by) => self.step_panel(by),
+            LayoutCommand::Maximise(pane) if self.maximised.is_none() => {
+                self.maximised = pane.or(self.current).or(self.seen.first().copied());
+            }
+            LayoutCommand::Maximise(_) => self.maximised = None,
+        }
+    }
+
+    fn tree_in_use(&mut self) -> &mut Tree<Pane> {
+        if self.is_narrow { &mut self.narrow } else { &mut self.tree }
+    }
+
+    fn show_panel(&mut self, pane: Pane) {
+        if self.maximised.is_some() {
+            self.maximised = Some(pane);
+        }
+        (self.current, self.wants_keyboard) = (Some(pane), true);
+        let tree = self.tree_in_use();
+        if tree.tiles.find_pane(&pane).is_none() {
+            bring_back(tree, pane);
+        }
+        tree.make_active(|_, tile| matches!(tile, Tile::Pane(other) if *other == pane));
+    }
+
+    fn close(&mut self, pane: Pane) {
+        if let Some(tile) = self.tree.tiles.find_pane(&pane) {
+            self.tree.remove_recursively(tile);
+        }
+        self.maximised = self.maximised.filter(|open| *open != pane);
+        self.current = self.current.filter(|open| *open != pane);
+    }
+
+    fn step_panel(&mut self, by: isize) {
+        let count = self.seen.len();
+        if count == 0 {
+            return;
+        }
+        let at = self.current.and_then(|pane| self.seen.iter().position(|seen| *seen == pane));
+        let first = if by < 0 { count - 1 } else { 0 };
+        let next = at.map_or(first, |at| (at as isize + by).rem_euclid(count as isize) as usize);
+        (self.current, self.wants_keyboard) = (Some(self.seen[next]), true);
+    }
+
+    /// Lays the panels out.
+    pub fn show(&mut self, ui: &mut Ui, panels: &mut Panels<'_>) {
+        self.is_narrow = ui.ctx().content_rect().width() < NARROW;
+        panels.current = self.current;
+        panels.takes_keyboard = std::mem::take(&mut self.wants_keyboard);
+        panels.closed = if self.is_narrow { Vec::new() } else { self.closed() };
+        panels.maximised = self.maximised;
+        if let Some(pane) = self.maximised {
+            panels.show_alone(ui, pane);
+        } else if self.closed().len() == Pane::ALL.len() && !self.is_narrow {
+            all_closed(ui, panels);
+        } else if self.is_narrow {
+            self.narrow.ui(panels, ui);
+        } else {
+            self.tree.ui(panels, ui);
+        }
+        self.current = panels.current;
+        self.seen.clone_from(&panels.seen);
+    }
+}
+
+/// What stands where every panel was closed.
+fn all_closed(ui: &mut Ui, panels: &mut Panels<'_>) {
+    ui.centered_and_justified(|ui| {
+        let words = theme::label("Every panel is closed. Press Shift+1, or click here, for the overview.");
+        if ui.add(egui::Button::new(words).frame(false)).clicked() {
+            panels.out.push(crate::command::Command::Layout(LayoutCommand::Use(Preset::Overview)));
+        }
+    });
+}
+
+/// Whether every tile that a tree names exists, and no panel does twice.
+fn is_sound(tree: &Tree<Pane>) -> bool {
+    let Some(root) = tree.root else { return true };
+    let mut panes = Vec::new();
+    let mut seen = std::collections::HashSet::new();
+    let mut waiting = vec![root];
+    while let Some(id) = waiting.pop() {
+        match tree.tiles.get(id) {
+            _ if !seen.insert(id) => return false,
+            None => return false,
+            Some(Tile::Pane(pane)) if panes.contains(pane) => return false,
+            Some(Tile::Pane(pane)) => panes.push(*pane),
+            Some(Tile::Container(container)) => waiting.extend(container.children().copied()),
+        }
+    }
+    true
+}
+
+/// Puts a closed panel behind the tabs of the largest group, or beside what there is.
+fn bring_back(tree: &mut Tree<Pane>, pane: Pane) {
+    let tile = tree.tiles.insert_pane(pane);
+    let group = largest_group(tree);
+    match group.and_then(|id| tree.tiles.get_mut(id)) {
+        Some(Tile::Container(container)) => container.add_child(tile),
+        _ => tree.root = Some(tree.tiles.insert_tab_tile(vec![tile])),
+    }
+}
+
+/// The group of tabs with the most panels; the one that shows the left image stays free.
+fn largest_group(tree: &Tree<Pane>) -> Option<TileId> {
+    let left = tree.tiles.find_pane(&Pane::Left);
+    let groups = tree.tiles.iter().filter_map(|(id, tile)| match tile {
+        Tile::Container(Container::Tabs(tabs)) => Some((*id, tabs)),
+        _ => None,
+    });
+    let best = groups.max_by_key(|(id, tabs)| {
+        let has_left = left.is_some_and(|left| tabs.children.contains(&left));
+        (!has_left, tabs.children.len(), std::cmp::Reverse(id.0))
+    });
+    best.map(|(id, _)| id)
+}
+
+impl Panels<'_> {
+    /// Shows one panel with the whole page.
+    fn show_alone(&mut self, ui: &mut Ui, pane: Pane) {
+        ui.horizontal(|ui| {
+            ui.label(theme::title(pane.title()));
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                if ui.button("Restore (`)").clicked() {
+                    self.out.push(crate::command::Command::Layout(LayoutCommand::Maximise(None)));
+                }
+            });
+        });
+        self.seen.push(pane);
+        self.framed(ui, pane, |panels, ui| {
+            let shown = show_pane(ui, pane, panels.state, panels.out);
+            panels.left_image = shown.or(panels.left_image.take());
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_arrangement_comes_back_as_it_was_kept() {
+        let mut workspace = Workspace::default();
+        workspace.apply(LayoutCommand::Use(Preset::Stereo));
+        workspace.apply(LayoutCommand::Close(Pane::Gates));
+        let again = Workspace::restored(Some(&workspace.kept()));
+        assert_eq!(again.preset(), Preset::Stereo);
+        assert!(again.closed().contains(&Pane::Gates) && !again.closed().contains(&Pane::Right));
+        assert!(again.tree == workspace.tree);
+    }
+
+    #[test]
+    fn what_is_damaged_or_of_another_version_gives_the_overview() {
+        let kept = Workspace::default().kept();
+        for text in [
+            "",
+            "{}",
+            "[1, 2",
+            &kept.replace("\"format\":1", "\"format\":9"),
+            &kept.replace("\"gates\"", "\"no such panel\""),
+            // A panel twice.
+            &kept.replace("\"gates\"", "\"left\""),
+        ] {
+            let restored = Workspace::restored(Some(text));
+            assert!(restored.closed().is_empty(), "{text}");
+            assert_eq!(restored.preset(), Preset::Overview);
+        }
+    }
+
+    #[test]
+    fn a_closed_panel_comes_back_to_the_front() {
+        let mut workspace = Workspace::default();
+        for pane in Pane::ALL {
+            workspace.apply(LayoutCommand::Close(pane));
+        }
+        assert_eq!(workspace.closed().len(), Pane::ALL.len());
+        workspace.apply(LayoutCommand::Show(Pane::Map));
+        workspace.apply(LayoutCommand::Show(Pane::Gates));
+        assert_eq!(workspace.closed().len(), Pane::ALL.len() - 2);
+        let active = workspace.tree.active_tiles();
+        let gates = workspace.tree.tiles.find_pane(&Pane::Gates).unwrap();
+        assert!(active.contains(&gates));
+    }
+
+    #[test]
+    fn the_keyboard_goes_round_the_panels_that_are_seen() {
+        let mut workspace =
+            Workspace { seen: vec![Pane::Left, Pane::Map, Pane::Gates], ..Workspace::default() };
+        let mut step = |by| {
+            workspace.apply(LayoutCommand::Panel(by));
+            workspace.current
+        };
+        assert_eq!(step(1), Some(Pane::Left));
+        assert_eq!(step(1), Some(Pane::Map));
+        assert_eq!(step(-1), Some(Pane::Left));
+        assert_eq!(step(-1), Some(Pane::Gates));
+    }
+}

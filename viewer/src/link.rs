@@ -1,0 +1,180 @@
+//! The page's address: what is looked at, in the fragment, so that a link opens the same again.
+//!
+//! `#v=1&session=s1&tg=0&run=1&step=12&stage=judge&lay=match&L=512.5,300.2,8&off=truth`
+//!
+//! | key | meaning |
+//! |---|---|
+//! | `v` | version of this form |
+//! | `session` | the session |
+//! | `tg`, `run`, `step` | the cursor: target, run, stop |
+//! | `stage` | the stage that is looked at |
+//! | `lay` | the arrangement of the panels |
+//! | `L`, `R` | centre (px) and magnification of the left and right image; left out where the whole image is shown |
+//!
+//! Keys that this version does not know are kept as they are. A key whose value cannot be read is left out, and a
+//! sentence says so; nothing else of the link is lost by it.
+
+use sightline_core::frames::Pixel;
+
+use crate::command::Stage;
+use crate::layout::presets::Preset;
+use crate::view2d::View2d;
+
+/// The version of the form.
+const VERSION: &str = "1";
+
+/// Longer fragments are cut: nobody's link is that long.
+const LONGEST: usize = 4_096;
+
+/// What a link says.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Fragment {
+    /// The session.
+    pub session: Option<String>,
+    /// The target's number.
+    pub target: Option<usize>,
+    /// The run's number.
+    pub run: Option<usize>,
+    /// The stop.
+    pub step: Option<usize>,
+    /// The stage.
+    pub stage: Option<Stage>,
+    /// The arrangement of the panels.
+    pub preset: Option<Preset>,
+    /// The view of the left image.
+    pub left: Option<View2d>,
+    /// The view of the right image.
+    pub right: Option<View2d>,
+    /// What this version does not know, as it came.
+    pub unknown: Vec<String>,
+    /// Parts that cannot be read.
+    pub damaged: Vec<String>,
+}
+
+impl Fragment {
+    /// What an address says after its `#`.
+    pub fn parse(text: &str) -> Self {
+        let mut link = Self::default();
+        let text: String = text.trim_start_matches('#').chars().take(LONGEST).collect();
+        for part in text.split('&').filter(|part| !part.is_empty()) {
+            let (key, value) = part.split_once('=').unwrap_or((part, ""));
+            if !link.take(key, value) {
+                link.damaged.push(part.to_owned());
+            }
+        }
+        link
+    }
+
+    /// Takes one part; whether its value could be read.
+    fn take(&mut self, key: &str, value: &str) -> bool {
+        match key {
+            "v" => return value == VERSION,
+            "session" => self.session = Some(value.to_owned()).filter(|id| is_name(id)),
+            "tg" => self.target = value.parse().ok(),
+            "run" => self.run = value.parse().ok(),
+            "step" => self.step = value.parse().ok(),
+            "stage" => self.stage = Stage::ALL.into_iter().find(|stage| stage.word() == value),
+            "lay" => self.preset = Preset::ALL.into_iter().find(|preset| preset.word() == value),
+            "L" => self.left = view(value),
+            "R" => self.right = view(value),
+            _ => {
+                self.unknown.push(format!("{key}={value}"));
+                return true;
+            }
+        }
+        match key {
+            "session" => self.session.is_some(),
+            "tg" => self.target.is_some(),
+            "run" => self.run.is_some(),
+            "step" => self.step.is_some(),
+            "stage" => self.stage.is_some(),
+            "lay" => self.preset.is_some(),
+            "L" => self.left.is_some(),
+            _ => self.right.is_some(),
+        }
+    }
+
+    /// The fragment without its `#`; empty where nothing is open.
+    pub fn text(&self) -> String {
+        let Some(session) = &self.session else { return String::new() };
+        let mut parts = vec![format!("v={VERSION}"), format!("session={session}")];
+        let number = |key: &str, value: Option<usize>| value.map(|value| format!("{key}={value}"));
+        parts.extend(number("tg", self.target));
+        parts.extend(number("run", self.run));
+        parts.extend(number("step", self.step));
+        parts.extend(self.stage.map(|stage| format!("stage={}", stage.word())));
+        parts.extend(self.preset.map(|preset| format!("lay={}", preset.word())));
+        parts.extend(self.left.and_then(|view| view_text("L", view)));
+        parts.extend(self.right.and_then(|view| view_text("R", view)));
+        parts.extend(self.unknown.iter().cloned());
+        parts.join("&")
+    }
+
+    /// Whether going from `before` to here is a place of its own in the browser's history: another session, target
+    /// or run. Steps, stages and views replace what is there, so that Back does not undo a drive stop by stop.
+    pub fn is_another_place(&self, before: &Self) -> bool {
+        let place = |link: &Self| (link.session.clone(), link.target, link.run);
+        before.session.is_some() && place(self) != place(before)
+    }
+}
+
+fn is_name(id: &str) -> bool {
+    !id.is_empty() && id.len() <= 64 && id.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_')
+}
+
+/// `x,y,scale`, px and points per px.
+fn view(value: &str) -> Option<View2d> {
+    let numbers: Vec<f64> = value.split(',').map(|number| number.parse().ok()).collect::<Option<_>>()?;
+    match numbers[..] {
+        [x, y, scale]
+            if numbers.iter().all(|number| number.is_finite()) && (1e-3..=64.0).contains(&scale) =>
+        {
+            Some(View2d::At { centre: Pixel::new(x, y), scale })
+        }
+        _ => None,
+    }
+}
+
+fn view_text(key: &str, view: View2d) -> Option<String> {
+    match view {
+        View2d::Fit => None,
+        View2d::At { centre, scale } => Some(format!("{key}={:.1},{:.1},{scale:.3}", centre.x, centre.y)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_link_opens_what_it_was_made_of_and_keeps_what_it_does_not_know() {
+        let text = "v=1&session=s7&tg=0&run=2&step=12&stage=judge&lay=match&L=512.5,300.2,8.000&later=x%20y";
+        let link = Fragment::parse(&format!("#{text}"));
+        assert_eq!(link.text(), text);
+        assert_eq!((link.target, link.run, link.step), (Some(0), Some(2), Some(12)));
+        assert_eq!(link.stage, Some(Stage::Judge));
+        assert_eq!(link.left, Some(View2d::At { centre: Pixel::new(512.5, 300.2), scale: 8.0 }));
+        assert_eq!(link.unknown, ["later=x%20y"]);
+        assert!(link.damaged.is_empty());
+    }
+
+    #[test]
+    fn what_cannot_be_read_is_named_and_takes_nothing_else_with_it() {
+        let link = Fragment::parse("#session=s1&step=-4&stage=dance&L=1,2&run=1&lay=&v=2");
+        assert_eq!((link.session.as_deref(), link.run, link.step), (Some("s1"), Some(1), None));
+        assert_eq!(link.damaged, ["step=-4", "stage=dance", "L=1,2", "lay=", "v=2"]);
+        for hostile in ["session=../../etc", "session=<script>", "L=nan,1,2", "L=1,2,1e9", "tg=1e3"] {
+            assert_eq!(Fragment::parse(hostile).damaged, [hostile]);
+        }
+        assert!(Fragment::parse(&"x=".repeat(1 << 20)).unknown.len() <= LONGEST);
+    }
+
+    #[test]
+    fn another_run_is_a_place_of_its_own_and_another_step_is_not() {
+        let link = |text: &str| Fragment::parse(text);
+        let here = link("session=s1&tg=0&run=0&step=3");
+        assert!(!link("session=s1&tg=0&run=0&step=4&stage=judge").is_another_place(&here));
+        assert!(link("session=s1&tg=0&run=1&step=3").is_another_place(&here));
+        assert!(!here.is_another_place(&Fragment::default()), "the first one replaces the bare address");
+    }
+}

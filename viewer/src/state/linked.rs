@@ -1,0 +1,86 @@
+//! What the page's address says, and how an address becomes what is looked at.
+
+use super::State;
+use crate::link::Fragment;
+use crate::net::Request;
+use crate::state::run_letter;
+use crate::view2d::View2d;
+
+impl State {
+    /// What a link to this place says, but for the arrangement of the panels.
+    pub fn fragment(&self) -> Fragment {
+        let at = |view: View2d| Some(view).filter(|view| *view != View2d::Fit);
+        let Some(session) = &self.session else { return Fragment::default() };
+        Fragment {
+            session: Some(session.id.clone()),
+            target: self.cursor.target,
+            run: self.cursor.target.map(|_| self.cursor.run),
+            step: Some(self.cursor.step),
+            stage: Some(self.stage()),
+            left: at(self.views.left),
+            right: at(self.views.right),
+            ..Fragment::default()
+        }
+    }
+
+    /// Goes where a link says: at once where its session is open, else when that is here.
+    pub fn open_link(&mut self, link: Fragment) {
+        for part in &link.damaged {
+            self.messages.problem(
+                format!("A part of the link cannot be read and was left out: `{}`.", shown(part)),
+                Some("Copy the whole link again with Y.".to_owned()),
+            );
+        }
+        let is_open = self.session.as_ref().map(|session| &session.id) == link.session.as_ref();
+        match link.session.clone() {
+            Some(id) if !is_open => {
+                self.sync.linked = Some(id.clone());
+                self.outbox.push(Request::Session(id));
+            }
+            _ => {}
+        }
+        self.sync.link = Some(link);
+        if is_open {
+            self.follow_link();
+            self.keep_cursor_valid();
+        }
+    }
+
+    /// Carries the link out once its session is here.
+    pub(super) fn follow_link(&mut self) {
+        let Some(session) = &self.session else { return };
+        let is_for_this = |link: &mut Fragment| link.session.as_ref() == Some(&session.id);
+        let Some(link) = self.sync.link.take_if(is_for_this) else { return };
+        let target = link.target.and_then(|number| session.targets.iter().find(|t| t.number == number));
+        let is_run_there =
+            link.run.is_none_or(|run| target.is_none_or(|t| t.runs.iter().any(|r| r.number == run)));
+        if link.target.is_some() && target.is_none() {
+            let words = "The link names a target that this session no longer has; another one is shown.";
+            self.messages.problem(words, None);
+        } else if !is_run_there {
+            let letter = run_letter(link.run.unwrap_or_default());
+            let words =
+                format!("The link names run {letter}, which this target does not have; run A is shown.");
+            self.messages.problem(words, Some("Run it again from its step with its settings.".to_owned()));
+        }
+        if let Some(number) = target.map(|target| target.number) {
+            self.cursor.target = Some(number);
+            self.cursor.run = link.run.filter(|_| is_run_there).unwrap_or(0);
+        }
+        let last = session.stop_count.saturating_sub(1);
+        if let Some(step) = link.step {
+            if step > last {
+                self.messages.problem(format!("The link names step {step}; the last one is {last}."), None);
+            }
+            self.cursor.step = step.min(last);
+        }
+        self.stage = link.stage.unwrap_or(self.stage);
+        self.views.left = link.left.unwrap_or(View2d::Fit);
+        self.views.right = link.right.unwrap_or(View2d::Fit);
+    }
+}
+
+/// A part of a link as it can be shown: short, and without signs that move the line.
+fn shown(part: &str) -> String {
+    part.chars().filter(|c| !c.is_control()).take(60).collect()
+}
