@@ -9,6 +9,7 @@ mod cli;
 mod imports;
 mod page;
 mod page_access;
+mod page_panels;
 mod page_speed;
 mod recorded_cameras;
 mod recorded_tracking;

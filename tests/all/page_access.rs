@@ -50,12 +50,7 @@ async fn a_screen_reader_finds_controls_by_role_and_name_and_can_act_on_them() {
     browser.activate("button", "Keys and conventions").await;
     browser.says("the palette: whatever can be asked for").await;
     browser.activate("button", "Close").await;
-    browser
-        .wait_for(
-            "the sheet to close",
-            "return !document.querySelector('#sightline-mirror [aria-label=Close]')",
-        )
-        .await;
+    browser.gone("button", "Close").await;
     assert_eq!(browser.console_errors().await, Vec::<String>::new());
     browser.close().await;
 }
@@ -100,6 +95,7 @@ async fn arrangements_panels_and_palette_work_by_keyboard_and_survive_a_reload()
     browser.type_text("nothing is called that").await;
     browser.says("Nothing is called that.").await;
     browser.press("Escape").await;
+    browser.gone("textbox", "palette").await;
 
     // A panel is closed by its menu and stays closed across a reload; the palette brings it back.
     browser.click_on("button", "Stereo scores menu").await;

@@ -47,6 +47,21 @@ async fn times(browser: &Browser) -> (Vec<f64>, Vec<f64>) {
     (pairs.iter().map(|p| number(p, 0)).collect(), pairs.iter().map(|p| number(p, 1)).collect())
 }
 
+/// Steps from stop to stop along these, each awaited.
+async fn walk(browser: &Browser, along: &[usize]) {
+    for pair in along.windows(2) {
+        let (mut step, to) = (pair[0], pair[1]);
+        while step != to {
+            let (next, key) = if to > step { (step + 1, "ArrowRight") } else { (step - 1, "ArrowLeft") };
+            browser.press(key).await;
+            browser.wait_status("the next step", &format!("s.step === {next} && s.shown")).await;
+            step = next;
+        }
+    }
+    // The frame after the last one is painted, too.
+    tokio::time::sleep(Duration::from_millis(500)).await;
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn steps_are_quick_an_idle_page_rests_and_memory_is_bounded() {
     let bench = Bench::start(&short_approach()).await;
@@ -71,21 +86,9 @@ async fn steps_are_quick_an_idle_page_rests_and_memory_is_bounded() {
     assert!(downloaded > 0 && downloaded <= DOWNLOAD_LIMIT, "{downloaded} bytes are downloaded");
 
     // There and back once, so that everything is cached; then there and back again, watched.
-    for key in ["Home", "End"] {
-        browser.press(key).await;
-        tokio::time::sleep(Duration::from_millis(300)).await;
-    }
-    for _ in 0..last {
-        browser.press("ArrowLeft").await;
-        tokio::time::sleep(Duration::from_millis(250)).await;
-    }
+    walk(&browser, &[0, last, 0]).await;
     browser.evaluate(WATCH).await;
-    for key in ["ArrowRight", "ArrowLeft"] {
-        for _ in 0..last {
-            browser.press(key).await;
-            tokio::time::sleep(Duration::from_millis(250)).await;
-        }
-    }
+    walk(&browser, &[0, last, 0]).await;
     let (own, painted) = times(&browser).await;
     assert!(own.len() >= last, "{} of {} steps were seen", own.len(), 2 * last);
     let ((own_mid, own_95), (painted_mid, painted_95)) = (spread(own), spread(painted));

@@ -174,6 +174,12 @@ impl Browser {
         (answers.pop().unwrap_or_default(), name)
     }
 
+    /// Makes the window so large, px.
+    pub async fn resize(&self, width: u32, height: u32) {
+        let done = self.client.set_window_size(width, height).await;
+        done.unwrap_or_else(|error| panic!("the window cannot have {width} × {height}: {error}"));
+    }
+
     /// The page as it looks now, as a PNG file's bytes.
     pub async fn screenshot(&self) -> Vec<u8> {
         self.client.screenshot().await.unwrap_or_else(|error| panic!("the page cannot be pictured: {error}"))

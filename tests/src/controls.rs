@@ -87,6 +87,18 @@ impl Browser {
         self.controls().await.iter().any(|control| control.role == role && control.name.starts_with(name))
     }
 
+    /// Waits until there is no such control any more: a window above the panels that has closed lets clicks through.
+    ///
+    /// # Panics
+    /// When it stays.
+    pub async fn gone(&self, role: &str, name: &str) {
+        let start = Instant::now();
+        while self.has_control(role, name).await {
+            assert!(start.elapsed() < PATIENCE, "{role} “{name}” stays");
+            tokio::time::sleep(Duration::from_millis(50)).await;
+        }
+    }
+
     /// Clicks a control with the pointer, in its middle.
     pub async fn click_on(&self, role: &str, name: &str) {
         let control = self.control(role, name).await;
