@@ -259,6 +259,8 @@ pub enum Layer {
     Cloud,
     /// How far from the prediction a registration by shape can start.
     Basin,
+    /// The runs that are compared with the one looked at.
+    Compared,
 }
 
 impl Layer {
@@ -365,4 +367,6 @@ pub enum Command {
     Dismiss(u64),
     /// Connects again at once.
     Reconnect,
+    /// Something about comparing runs.
+    Compare(crate::compare::Ask),
 }

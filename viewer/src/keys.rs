@@ -31,12 +31,16 @@ pub fn commands(context: &Context, state: &State) -> Vec<Command> {
     if context.text_edit_focused() {
         return Vec::new();
     }
+    let is_divided = crate::compare::is_divider_focused(context);
+    let is_taken = |key: Key| is_divided && crate::compare::is_of_divider(key);
+    let held = crate::compare::held(context, state);
     context.input(|input| {
         let pressed = input.events.iter().filter_map(|event| match event {
+            Event::Key { key, .. } if is_taken(*key) => None,
             Event::Key { key, pressed: true, modifiers, .. } => command(*key, *modifiers, state),
             _ => None,
         });
-        pressed.collect()
+        pressed.chain(held).collect()
     })
 }
 
@@ -69,7 +73,7 @@ pub fn command(key: Key, modifiers: Modifiers, state: &State) -> Option<Command>
         Key::Escape => Command::SetMode(Mode::Look),
         Key::Questionmark => Command::SetMode(Mode::Help),
         Key::Slash if shift => Command::SetMode(Mode::Help),
-        _ => return None,
+        other => return crate::compare::command(other),
     })
 }
 

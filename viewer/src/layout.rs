@@ -53,11 +53,15 @@ pub enum Pane {
     Inspector,
     /// Messages.
     Messages,
+    /// The table of runs with their metrics.
+    Runs,
+    /// Whether the covariances hold.
+    Uncertainty,
 }
 
 impl Pane {
     /// All of them.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 21] = [
         Self::Targets,
         Self::Settings,
         Self::Left,
@@ -77,6 +81,8 @@ impl Pane {
         Self::Machine,
         Self::Inspector,
         Self::Messages,
+        Self::Runs,
+        Self::Uncertainty,
     ];
 
     /// Its title.
@@ -101,6 +107,8 @@ impl Pane {
             Self::Machine => "State machine",
             Self::Inspector => "Inspector",
             Self::Messages => "Messages",
+            Self::Runs => "Runs",
+            Self::Uncertainty => "Uncertainty",
         }
     }
 }
@@ -130,6 +138,8 @@ pub fn show_pane(ui: &mut Ui, pane: Pane, state: &State, out: &mut Vec<Command>)
         Pane::Gates => panels::gates::show(ui, state, out),
         Pane::Inspector => panels::inspector::show(ui, state, out),
         Pane::Messages => panels::messages::show(ui, state, out),
+        Pane::Runs => panels::runs::show(ui, state, out),
+        Pane::Uncertainty => panels::uncertainty::show(ui, state, out),
     }
     None
 }
@@ -143,11 +153,14 @@ pub fn overview() -> Tree<Pane> {
     };
     let side = tabs(&mut tiles, &[Pane::Targets, Pane::Settings]);
     let left = tabs(&mut tiles, &[Pane::Left]);
-    let right = tabs(&mut tiles, &[Pane::Right, Pane::Features, Pane::Shape, Pane::Budget, Pane::Studies]);
+    let right = tabs(
+        &mut tiles,
+        &[Pane::Right, Pane::Features, Pane::Shape, Pane::Budget, Pane::Studies, Pane::Runs],
+    );
     let strip = tabs(&mut tiles, &[Pane::Strip, Pane::History]);
     let surface = tabs(&mut tiles, &[Pane::Surface, Pane::StereoProfile]);
     let map = tabs(&mut tiles, &[Pane::Map]);
-    let plots = tabs(&mut tiles, &[Pane::Plots, Pane::Tolerances]);
+    let plots = tabs(&mut tiles, &[Pane::Plots, Pane::Tolerances, Pane::Uncertainty]);
     let gates = tabs(&mut tiles, &[Pane::Gates, Pane::Machine]);
     let inspector = tabs(&mut tiles, &[Pane::Inspector, Pane::Messages]);
     let images = linear(&mut tiles, LinearDir::Horizontal, &[(left, 1.0), (right, 1.0)]);

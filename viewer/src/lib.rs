@@ -17,6 +17,7 @@
 pub mod app;
 pub mod state;
 pub mod command;
+pub mod compare;
 pub mod keys;
 pub mod net;
 pub mod cache;

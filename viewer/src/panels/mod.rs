@@ -2,6 +2,7 @@
 
 pub mod bars;
 pub mod budget;
+pub mod compare;
 pub mod exposure;
 pub mod features;
 pub mod gates;
@@ -16,6 +17,7 @@ pub mod map;
 pub mod messages;
 pub mod names;
 pub mod plots;
+pub mod runs;
 pub mod settings;
 pub mod shape;
 pub mod stereo_profile;
@@ -25,6 +27,7 @@ pub mod surface;
 pub mod targets;
 pub mod timeline;
 pub mod tolerances;
+pub mod uncertainty;
 
 use egui::{Align, Layout, RichText, Ui, UiBuilder};
 

@@ -68,6 +68,7 @@ impl State {
             }
             Command::Dismiss(id) => self.messages.dismiss(id),
             Command::Reconnect => self.outbox.push(Request::Reconnect),
+            Command::Compare(ask) => self.ask_compare(ask),
         }
     }
 
@@ -103,7 +104,9 @@ impl State {
 
     fn look(&mut self, target: usize, run: usize) {
         let is_other = self.cursor.target != Some(target) || self.cursor.run != run;
+        let before = self.own_name();
         self.cursor = Cursor { target: Some(target), run, ..self.cursor };
+        self.looked_elsewhere(before, self.cursor);
         if is_other {
             self.draft.clear();
         }
