@@ -31,6 +31,7 @@ pub mod runs;
 pub mod steps;
 pub mod columns;
 pub mod photometry;
+pub mod compare;
 pub mod exports;
 pub mod studies;
 pub mod events;

@@ -11,7 +11,7 @@ use utoipa_axum::routes;
 
 use crate::state::AppState;
 use crate::{
-    about, events, exports, photometry, runs, sessions, settings, steps, studies, targets, traverses,
+    about, compare, events, exports, photometry, runs, sessions, settings, steps, studies, targets, traverses,
 };
 
 #[derive(OpenApi)]
@@ -38,6 +38,7 @@ pub fn router() -> OpenApiRouter<AppState> {
         .merge(targets::router())
         .merge(runs::router())
         .merge(photometry::router())
+        .merge(compare::router())
         .merge(steps::router())
         .merge(exports::router())
         .merge(studies::router())

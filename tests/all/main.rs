@@ -6,6 +6,7 @@
 mod api;
 mod api_security;
 mod cli;
+mod compare;
 mod imports;
 mod page;
 mod page_access;

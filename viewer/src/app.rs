@@ -119,8 +119,10 @@ impl SightlineApp {
         self.left_image = panels.left_image;
         let [is_history_seen, is_studies_seen] =
             [Pane::History, Pane::Studies].map(|pane| panels.seen.contains(&pane));
+        let wants_metrics = [Pane::Runs, Pane::Uncertainty].iter().any(|pane| panels.seen.contains(pane));
         help::show(ui, state, &mut out);
         palette::show(ui, state, &mut out);
+        self.state.compare.wants_metrics = wants_metrics;
         // Every step's window is worth fetching only while the panel that shows them is on the screen.
         self.state.wants_history = is_history_seen;
         if is_studies_seen {

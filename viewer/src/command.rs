@@ -283,6 +283,8 @@ pub enum Layer {
     Cloud,
     /// How far from the prediction a registration by shape can start.
     Basin,
+    /// The runs that are compared with the one looked at.
+    Compared,
 }
 
 impl Layer {
@@ -406,4 +408,6 @@ pub enum Command {
     CopyLink,
     /// Chooses the looks of the page.
     SetLooks(Looks),
+    /// Something about comparing runs.
+    Compare(crate::compare::Ask),
 }

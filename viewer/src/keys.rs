@@ -2,12 +2,12 @@
 
 use egui::{Context, Event, Key, Modifiers};
 
-use crate::actions;
 use crate::command::{Command, Go, Mode, Stage};
 use crate::layout::presets::Preset;
 use crate::layout::workspace::LayoutCommand;
 use crate::state::State;
 use crate::stretch::Stretch;
+use crate::{actions, compare};
 
 /// Every key with its meaning, as the help sheet lists them.
 pub const SHEET: [(&str, &str); 21] = [
@@ -53,6 +53,8 @@ pub fn commands(context: &Context, state: &State) -> Vec<Command> {
         return Vec::new();
     }
     let is_held = context.memory(|memory| memory.focused().is_some());
+    let is_divided = compare::is_divider_focused(context);
+    let held = compare::held(context, state);
     context.input(|input| {
         let mut out = Vec::new();
         // What is typed after the key that opens a field, in the same frame, is meant for the field.
@@ -61,7 +63,8 @@ pub fn commands(context: &Context, state: &State) -> Vec<Command> {
             match (&mut typed, event) {
                 (Some(typed), Event::Text(text)) => typed.push_str(text),
                 (None, Event::Key { key, pressed: true, modifiers, physical_key, .. }) => {
-                    if is_held && is_of_widgets(*key, *modifiers) {
+                    let is_of_divider = is_divided && compare::is_of_divider(*key);
+                    if is_of_divider || is_held && is_of_widgets(*key, *modifiers) {
                         continue;
                     }
                     // Shift turns a digit into a sign that differs from keyboard to keyboard.
@@ -77,6 +80,7 @@ pub fn commands(context: &Context, state: &State) -> Vec<Command> {
         if let (Some(typed), Some(Command::SetMode(Mode::Palette(search)))) = (typed, out.last_mut()) {
             search.words = typed;
         }
+        out.extend(held);
         out
     })
 }
@@ -145,7 +149,7 @@ pub fn command(key: Key, modifiers: Modifiers, state: &State) -> Option<Command>
         Key::Escape => Command::SetMode(Mode::Look),
         Key::Questionmark => Command::SetMode(Mode::Help),
         Key::Slash if shift => Command::SetMode(Mode::Help),
-        _ => return None,
+        other => return crate::compare::command(other),
     })
 }
 

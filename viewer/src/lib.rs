@@ -19,6 +19,7 @@
 pub mod app;
 pub mod state;
 pub mod command;
+pub mod compare;
 pub mod keys;
 pub mod actions;
 pub mod link;

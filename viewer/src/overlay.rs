@@ -43,6 +43,8 @@ pub enum Mark {
     Diamond,
     /// A filled circle.
     Dot,
+    /// A triangle.
+    Triangle,
     /// A short stretch of line.
     Stroke(Line),
 }
@@ -159,6 +161,9 @@ pub fn paint_mark(painter: &Painter, at: Pos2, mark: Mark, colour: Color32, reac
         }
         Mark::Diamond => {
             vec![vec![to(0.0, -0.9), to(0.9, 0.0), to(0.0, 0.9), to(-0.9, 0.0), to(0.05, -0.95)]]
+        }
+        Mark::Triangle => {
+            vec![vec![to(0.0, -0.9), to(0.85, 0.65), to(-0.85, 0.65), to(0.0, -0.9), to(0.08, -0.77)]]
         }
         Mark::Stroke(line) => {
             paint_line(painter, &[to(-1.0, 0.0), to(1.0, 0.0)], colour, line, WIDTH);

@@ -61,6 +61,8 @@ pub const MESH_PRESENT: Color32 = PREDICTION;
 pub const BASIN: Color32 = SEARCH;
 /// What is true.
 pub const TRUTH: Color32 = Color32::WHITE;
+/// A texture that shines through another.
+pub const ONION: Color32 = Color32::from_rgba_premultiplied(0x80, 0x80, 0x80, 0x80);
 /// A texture in its own colours.
 pub const UNTINTED: Color32 = Color32::WHITE;
 /// The dark halo under every line on an image.

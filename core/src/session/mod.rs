@@ -10,6 +10,8 @@ pub mod run;
 pub mod track;
 pub mod view;
 pub mod wire;
+pub mod compare;
+pub mod metrics;
 
 use std::sync::Arc;
 

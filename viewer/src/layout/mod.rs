@@ -62,11 +62,15 @@ pub enum Pane {
     Inspector,
     /// Messages.
     Messages,
+    /// The table of runs with their metrics.
+    Runs,
+    /// Whether the covariances hold.
+    Uncertainty,
 }
 
 impl Pane {
     /// All of them.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 21] = [
         Self::Targets,
         Self::Settings,
         Self::Left,
@@ -86,6 +90,8 @@ impl Pane {
         Self::Machine,
         Self::Inspector,
         Self::Messages,
+        Self::Runs,
+        Self::Uncertainty,
     ];
 
     /// Its title.
@@ -110,6 +116,8 @@ impl Pane {
             Self::Machine => "State machine",
             Self::Inspector => "Inspector",
             Self::Messages => "Messages",
+            Self::Runs => "Runs",
+            Self::Uncertainty => "Uncertainty",
         }
     }
 }
@@ -139,6 +147,8 @@ pub fn show_pane(ui: &mut Ui, pane: Pane, state: &State, out: &mut Vec<Command>)
         Pane::Gates => panels::gates::show(ui, state, out),
         Pane::Inspector => panels::inspector::show(ui, state, out),
         Pane::Messages => panels::messages::show(ui, state, out),
+        Pane::Runs => panels::runs::show(ui, state, out),
+        Pane::Uncertainty => panels::uncertainty::show(ui, state, out),
     }
     None
 }

@@ -116,7 +116,17 @@ const OVERVIEW: Area = Row(&[
             (
                 Row(&[
                     (Tabs(&[Pane::Left]), 1.0),
-                    (Tabs(&[Pane::Right, Pane::Features, Pane::Shape, Pane::Budget, Pane::Studies]), 1.0),
+                    (
+                        Tabs(&[
+                            Pane::Right,
+                            Pane::Features,
+                            Pane::Shape,
+                            Pane::Budget,
+                            Pane::Studies,
+                            Pane::Runs,
+                        ]),
+                        1.0,
+                    ),
                 ]),
                 0.53,
             ),
@@ -125,7 +135,7 @@ const OVERVIEW: Area = Row(&[
                 Row(&[
                     (Tabs(&[Pane::Surface, Pane::StereoProfile]), 1.0),
                     (Tabs(&[Pane::Map]), 1.1),
-                    (Tabs(&[Pane::Plots, Pane::Tolerances]), 1.1),
+                    (Tabs(&[Pane::Plots, Pane::Tolerances, Pane::Uncertainty]), 1.1),
                 ]),
                 0.295,
             ),
@@ -203,8 +213,8 @@ const COMPARE: Area = Row(&[
     ),
     (
         Column(&[
-            (Tabs(&[Pane::Targets, Pane::Settings]), 0.4),
-            (Tabs(&[Pane::Plots, Pane::Map, Pane::Tolerances]), 0.6),
+            (Tabs(&[Pane::Runs, Pane::Targets, Pane::Settings]), 0.45),
+            (Tabs(&[Pane::Plots, Pane::Map, Pane::Uncertainty]), 0.55),
         ]),
         0.3,
     ),
@@ -219,13 +229,13 @@ const COMPARE: Area = Row(&[
 
 const SWEEP: Area = Row(&[
     (Tabs(&[Pane::Targets, Pane::Settings]), 0.22),
-    (Tabs(&[Pane::Studies, Pane::Budget]), 0.48),
+    (Tabs(&[Pane::Studies, Pane::Runs, Pane::Budget]), 0.48),
     (Column(&[(Tabs(&[Pane::Left]), 0.5), (Tabs(&[Pane::Plots, Pane::Map, Pane::Messages]), 0.5)]), 0.3),
 ]);
 
 const REPORT: Area = Row(&[
     (Column(&[(Tabs(&[Pane::Left]), 0.6), (Tabs(&[Pane::Strip, Pane::History]), 0.4)]), 0.45),
-    (Column(&[(Tabs(&[Pane::Map]), 0.5), (Tabs(&[Pane::Plots, Pane::Tolerances]), 0.5)]), 0.35),
+    (Column(&[(Tabs(&[Pane::Map]), 0.5), (Tabs(&[Pane::Plots, Pane::Uncertainty]), 0.5)]), 0.35),
     (Tabs(&[Pane::Targets, Pane::Gates, Pane::Messages]), 0.2),
 ]);
 

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use ehttp::{Headers, Method};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use sightline_core::session::compare::RunName;
 use sightline_core::session::wire::{Designated, Problem};
 use sightline_core::study::wire::StudyRows;
 
@@ -90,6 +91,10 @@ fn describe(request: &Request) -> (Method, String, Option<Vec<u8>>) {
         Request::StudyRows(job) => get(format!("studies/jobs/{job}/rows")),
         Request::Item(key) => get(item_path(key)),
         Request::Reconnect => get(String::new()),
+        Request::Compare { session, new } => (Method::POST, format!("sessions/{session}/compare"), json(new)),
+        Request::Metrics { session, run: RunName { target, run } } => {
+            get(format!("sessions/{session}/targets/{target}/runs/{run}/metrics"))
+        }
     }
 }
 
@@ -140,6 +145,8 @@ fn read(request: &Request, response: &ehttp::Response, context: &egui::Context) 
         | Request::CancelRun { .. }
         | Request::ResumeRun { .. }
         | Request::Reconnect => Reply::Done,
+        Request::Compare { .. } => Reply::Compared(Box::new(parse(bytes)?)),
+        Request::Metrics { .. } => Reply::Metrics(Box::new(parse(bytes)?)),
     })
 }
 

@@ -8,6 +8,8 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 
 use sightline_core::limits::SettingInfo;
 use sightline_core::session::Cursor;
+use sightline_core::session::compare::{Comparison, NewComparison, RunName};
+use sightline_core::session::metrics::RunMetrics;
 use sightline_core::session::view::{RunView, SessionView};
 use sightline_core::session::wire::{
     Event, NewRun, NewSession, NewTarget, Problem, RerunStream, SessionEntry, TraverseEntry, TraverseView,
@@ -107,6 +109,20 @@ pub enum Request {
     Item(Key),
     /// To connect to the events again at once.
     Reconnect,
+    /// Runs side by side.
+    Compare {
+        /// The session.
+        session: String,
+        /// Which runs, and how.
+        new: Box<NewComparison>,
+    },
+    /// What a run is worth.
+    Metrics {
+        /// The session.
+        session: String,
+        /// The run.
+        run: RunName,
+    },
 }
 
 /// What the server answered.
@@ -144,6 +160,10 @@ pub enum Reply {
     Item(Item),
     /// It is done.
     Done,
+    /// Runs side by side.
+    Compared(Box<Comparison>),
+    /// What a run is worth.
+    Metrics(Box<RunMetrics>),
 }
 
 /// An answer with what was asked.

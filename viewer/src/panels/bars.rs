@@ -4,6 +4,7 @@ use egui::{Align, Button, ComboBox, Layout, RichText, Ui};
 use sightline_core::target::TrackingState;
 use sightline_core::trace::StepTrace;
 
+use super::compare::{choosers, readouts};
 use super::inspector;
 use crate::command::{Command, Go, Mode, Stage};
 use crate::state::messages::Weight;
@@ -18,6 +19,7 @@ pub fn top(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         ui.separator();
         traverse_choice(ui, state, out);
         ui.separator();
+        choosers::show(ui, state, out);
         status(ui, state);
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let sheet = ui.add(Button::new("?").min_size(egui::vec2(26.0, 24.0)));
@@ -96,8 +98,10 @@ pub fn status(ui: &mut Ui, state: &State) {
             ui.label(theme::label(name));
             ui.label(theme::number(value).size(13.0));
             ui.label(theme::note(unit));
+            readouts::after(ui, state, name);
         }
     }
+    readouts::states(ui, state);
 }
 
 /// The banner that says the server is gone.

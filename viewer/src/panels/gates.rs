@@ -4,6 +4,7 @@ use egui::{Align2, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
 use sightline_core::stages::judge::{Gate, Verdict};
 use sightline_core::target::TrackingState;
 
+use super::compare::readouts;
 use crate::command::Command;
 use crate::state::State;
 use crate::{panels, theme};
@@ -29,6 +30,7 @@ pub fn show(ui: &mut Ui, state: &State, _out: &mut Vec<Command>) {
         ui.add_space(3.0);
         for gate in &verdict.gates {
             show_gate(ui, gate);
+            readouts::gate(ui, state, gate);
         }
     });
 }

@@ -20,7 +20,7 @@ fn sheet(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         ui.set_width(430.0);
         ui.label(theme::title("Keys and pointer"));
         egui::Grid::new("keys").num_columns(2).spacing([20.0, 3.0]).show(ui, |ui| {
-            for (keys, meaning) in keys::SHEET {
+            for (keys, meaning) in keys::SHEET.into_iter().chain(crate::compare::SHEET) {
                 ui.label(RichText::new(keys).monospace().color(theme::ACCENT));
                 ui.label(meaning);
                 ui.end_row();

@@ -7,6 +7,7 @@ use sightline_core::locate::features::rows::moved_covariance_px2;
 use sightline_core::locate::shape_tracker::rows::{basin, registered_covariance_px2};
 use sightline_core::trace::StepTrace;
 
+use super::compare::{bar, marks as compared, modes};
 use super::exposure;
 use super::features::marks;
 use super::legend::{self, Entry};
@@ -30,6 +31,10 @@ pub fn show(
     let raster = ready_image(ui, state, Eye::Left)?;
     raster.stretch(state.stretch);
     exposure::show(ui, state, raster, out);
+    bar::show(ui, state, out);
+    if let Some(shown) = modes::instead(ui, state, raster, out) {
+        return shown;
+    }
     let [width, height] = raster.size();
     let shape = (width as f32 / height.max(1) as f32, STATUS);
     let transform =
@@ -41,8 +46,9 @@ pub fn show(
 fn picture(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) -> crate::view2d::Transform {
     let [width, height] = raster.size();
     let region = PixelRect::whole(width, height);
-    let canvas = Canvas::new(ui, state.view(Panel::Left), region, STATUS);
+    let canvas = Canvas::new(ui, state.held_view(state.view(Panel::Left), state.trace()), region, STATUS);
     canvas.texture(&raster.texture, region);
+    modes::under(&canvas, state);
     canvas.pixel_grid(region);
     if state.marks {
         paint_others(&canvas, state);
@@ -51,6 +57,7 @@ fn picture(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) 
             paint_marks(&Overlay::new(&canvas.painter, &canvas.transform), trace, state);
         }
     }
+    modes::over(ui, &canvas, state, out);
     paint_designation(&canvas, state);
     pick(ui, &canvas, raster, state, out);
     marks::hover(&canvas, state, |feature| Some(feature.pixel));
@@ -146,6 +153,7 @@ fn entries(state: &State) -> Vec<Entry> {
         entries.push(Entry::new(Layer::Others, Mark::Diamond, theme::WEAK, "other targets"));
     }
     entries.extend(marks::left_entries(state));
+    entries.extend(compared::entries(state));
     entries
 }
 

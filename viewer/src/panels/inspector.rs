@@ -7,6 +7,7 @@ use sightline_core::locate::shape_tracker::ShapeEvidence;
 use sightline_core::settings::TrackerKind;
 use sightline_core::trace::StepTrace;
 
+use super::compare::readouts;
 use super::digits;
 use crate::command::{Command, Stage};
 use crate::state::State;
@@ -27,6 +28,7 @@ pub fn show(ui: &mut Ui, state: &State, _out: &mut Vec<Command>) {
         return;
     };
     ScrollArea::vertical().auto_shrink(false).id_salt(state.stage()).show(ui, |ui| {
+        readouts::record(ui, state);
         entries(ui, &record);
         if let Some(truth) = trace.truth.as_ref().and_then(|truth| serde_json::to_value(truth).ok()) {
             ui.add_space(4.0);

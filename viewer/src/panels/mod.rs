@@ -2,6 +2,7 @@
 
 pub mod bars;
 pub mod budget;
+pub mod compare;
 pub mod exposure;
 pub mod features;
 pub mod gates;
@@ -17,6 +18,7 @@ pub mod messages;
 pub mod names;
 pub mod palette;
 pub mod plots;
+pub mod runs;
 pub mod settings;
 pub mod shape;
 pub mod stereo_profile;
@@ -26,6 +28,7 @@ pub mod surface;
 pub mod targets;
 pub mod timeline;
 pub mod tolerances;
+pub mod uncertainty;
 
 use egui::{Align, Layout, RichText, Ui, UiBuilder};
 

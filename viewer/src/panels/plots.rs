@@ -13,6 +13,7 @@ use super::names::{self, HEIGHT as NAMES};
 use crate::command::{Command, Go};
 use crate::overlay::{self, Mark};
 use crate::state::State;
+use crate::state::compare::Other;
 use crate::state::tracker::confidence_of;
 use crate::{panels, theme};
 
@@ -53,7 +54,8 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let height = ((ui.available_height() - axis - count * (NAMES + 2.0)) / count).max(24.0);
     for (i, chart) in charts.iter().enumerate() {
         let is_last = i + 1 == charts.len();
-        let (title, lines) = names_of(chart);
+        let (title, mut lines) = names_of(chart);
+        lines.extend(state.others().iter().map(|o| (o.look.mark, o.look.colour, state.run_label(o.name))));
         names::show(ui, &title, &lines);
         let height = if is_last { height + axis } else { height };
         if let Some(step) = plot(ui, state, run, chart, height, is_last) {
@@ -198,6 +200,9 @@ fn plot(
         for line in &chart.series {
             paint_series(plot, run, line);
         }
+        for other in state.others() {
+            chart.series.iter().for_each(|line| paint_other(plot, state, run, &other, line));
+        }
         let clicked = plot.response().clicked().then(|| plot.pointer_coordinate()).flatten();
         clicked.map(|at: PlotPoint| at.x.round().clamp(0.0, last) as usize)
     });
@@ -231,6 +236,25 @@ fn paint_series(plot: &mut PlotUi<'_>, run: &RunView, line: &Series) {
     for piece in pieces(&points) {
         plot.line(Line::new(line.name, piece.clone()).color(line.colour).width(1.5).allow_hover(false));
         plot.points(Points::new(line.name, piece).color(line.colour).radius(2.5).shape(line.shape));
+    }
+}
+
+/// A line of a compared run over the steps of this one; what is not the run's own colour is dashed.
+fn paint_other(plot: &mut PlotUi<'_>, state: &State, run: &RunView, other: &Other<'_>, line: &Series) {
+    let point = |row: &StepRow| {
+        let step = state.own_beside(other.name, row.step)?;
+        (line.value)(other.run, row).filter(|v| v.is_finite()).map(|v| [step as f64, v])
+    };
+    let points: Vec<Option<[f64; 2]>> = other.run.rows.iter().map(point).collect();
+    let is_main = line.colour == theme::run(run.number);
+    let (colour, name) = (other.look.colour, format!("{}, {}", line.name, state.run_label(other.name)));
+    for piece in pieces(&points) {
+        let style = if is_main { LineStyle::Solid } else { LineStyle::dashed_loose() };
+        plot.line(Line::new("", piece.clone()).color(colour).style(style).width(1.5).allow_hover(false));
+        if is_main {
+            let points = Points::new(name.clone(), piece).color(colour).radius(3.0);
+            plot.points(points.shape(super::uncertainty::shape(other.look.mark)));
+        }
     }
 }
 

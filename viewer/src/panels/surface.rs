@@ -27,6 +27,9 @@ const TICKS: u32 = 5;
 
 /// Shows the surface.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    if super::compare::surfaces::show(ui, state, out) {
+        return;
+    }
     let matched = state.trace().and_then(StepTrace::template).and_then(|e| e.match_template.as_ref());
     let (Some(trace), Some(matched)) = (state.trace(), matched) else {
         panels::missing(ui, PURPOSE, &state.missing_template());
@@ -92,7 +95,8 @@ fn paint_contour(canvas: &Canvas, raster: &Raster, region: PixelRect, threshold:
     }
 }
 
-fn paint_marks(canvas: &Canvas, trace: &StepTrace, matched: &TemplateMatch, run: egui::Color32) {
+/// Prediction, peaks and truth on the scores.
+pub(super) fn paint_marks(canvas: &Canvas, trace: &StepTrace, matched: &TemplateMatch, run: egui::Color32) {
     let overlay = Overlay::new(&canvas.painter, &canvas.transform);
     if let Some(pixel) = trace.point_mast.as_ref().and_then(|p| p.predicted_left) {
         if let Some(covariance) = trace.point_mast.as_ref().and_then(|p| p.predicted_covariance_px2.as_ref())

@@ -116,7 +116,7 @@ fn show_run(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out:
 
 /// The shape that goes with a run's colour.
 pub fn run_mark(number: usize) -> Mark {
-    [Mark::Ring, Mark::Square, Mark::Plus, Mark::Diamond][number % 4]
+    [Mark::Ring, Mark::Square, Mark::Triangle, Mark::Diamond][number % 4]
 }
 
 /// How far a run is, with a way to stop it.

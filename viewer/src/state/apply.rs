@@ -71,6 +71,7 @@ impl State {
             Command::SetLooks(looks) => self.looks = looks,
             // The page itself does these: they are no part of what is looked at.
             Command::Layout(_) | Command::CopyLink => {}
+            Command::Compare(ask) => self.ask_compare(ask),
         }
     }
 
@@ -106,7 +107,9 @@ impl State {
 
     fn look(&mut self, target: usize, run: usize) {
         let is_other = self.cursor.target != Some(target) || self.cursor.run != run;
+        let before = self.own_name();
         self.cursor = Cursor { target: Some(target), run, ..self.cursor };
+        self.looked_elsewhere(before, self.cursor);
         if is_other {
             self.draft.clear();
         }

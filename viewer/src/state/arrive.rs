@@ -71,6 +71,7 @@ impl State {
     /// Asks again for what may have been missed while the server was gone.
     fn catch_up(&mut self) {
         self.cache.retry(|_| true);
+        self.forget_comparisons(false);
         self.progress.clear();
         self.sync.session_stale = true;
         if self.settings.is_empty() {
@@ -125,6 +126,12 @@ impl State {
                 }
             }
             Reply::Item(_) => {}
+            Reply::Compared(found) => self.took_comparison(&request, Ok(*found)),
+            Reply::Metrics(found) => {
+                if let Request::Metrics { run, .. } = request {
+                    self.took_metrics(run, Ok(*found));
+                }
+            }
         }
     }
 
@@ -148,6 +155,8 @@ impl State {
                 }
             }
             Request::Studies => self.studies.infos = Some(Vec::new()),
+            Request::Compare { .. } => return self.took_comparison(&request, Err(&problem)),
+            Request::Metrics { run, .. } => return self.took_metrics(run, Err(&problem)),
             Request::Session(_) => {
                 self.sync.session_asked = None;
                 if self.session.is_none() && problem.status != 0 {
@@ -199,6 +208,7 @@ impl State {
         if is_other {
             self.progress.clear();
             self.draft.clear();
+            self.forget_comparisons(true);
             self.mode = Mode::Look;
             (self.designating, self.refusal, self.rendering) = (None, None, None);
         }

@@ -5,6 +5,7 @@
 
 mod apply;
 mod arrive;
+pub mod compare;
 pub mod calculator;
 mod configurations;
 mod linked;
@@ -161,6 +162,8 @@ pub struct State {
     pub looks: Looks,
     /// A page to open in a new tab.
     pub open_url: Option<String>,
+    /// Runs that are compared with the one looked at.
+    pub compare: compare::Compare,
     outbox: Vec<Request>,
     sync: Sync,
     /// The aligned left camera of the step that was asked for last: it takes a while to compute.
@@ -220,6 +223,7 @@ impl State {
             marks: true,
             looks: Looks::default(),
             open_url: None,
+            compare: compare::Compare::default(),
             outbox: Vec::new(),
             sync: Sync { linked, ..Sync::default() },
             aligned: egui::mutex::Mutex::default(),
@@ -338,6 +342,7 @@ impl State {
     /// Asks for what keeps page and session together.
     fn sync_session(&mut self) {
         let Some(id) = self.session.as_ref().map(|session| session.id.clone()) else { return };
+        self.sync_compare(&id);
         if self.sync.session_stale && self.sync.session_asked.is_none() {
             self.sync.session_stale = false;
             self.sync.session_asked = Some(self.sync.cursor_messages);

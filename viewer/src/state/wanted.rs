@@ -16,6 +16,7 @@ impl State {
                 self.want_step(step, near, &mut keys);
             }
         }
+        self.want_compared(&mut keys);
         // The record of the pick has the warnings about it.
         let pick = self.run().and_then(|run| run.rows.first()).map(|row| row.step);
         keys.extend(pick.and_then(|step| self.step_key(step)).map(Key::Trace));
@@ -61,7 +62,7 @@ impl State {
 }
 
 /// Whether the stage that makes an array was reached.
-fn has_array(trace: &StepTrace, name: ArrayName) -> bool {
+pub(super) fn has_array(trace: &StepTrace, name: ArrayName) -> bool {
     let (template, features) = (trace.template(), trace.features());
     let registration = trace.shape().and_then(|e| e.registration.as_ref());
     let matched = template.and_then(|e| e.match_template.as_ref());

@@ -1,6 +1,7 @@
 //! Smoke tests of the panels from a fixed drive: what each says when it has data, and when it has none.
 
 mod accuracy;
+mod compare;
 pub(crate) mod feature_run;
 mod features;
 pub(crate) mod fixture;

@@ -12,7 +12,9 @@ use sightline_core::session::view::RunView;
 use sightline_core::session::wire::StopView;
 
 use super::{in_site, on_map, truth_in_site};
+use crate::panels::uncertainty::shape;
 use crate::state::State;
+use crate::state::compare::{Look, Other};
 use crate::{ellipse, theme};
 
 /// The view reaches at least this far to either side, cm: no smaller error is worth magnifying.
@@ -115,9 +117,27 @@ fn paint(plot: &mut PlotUi<'_>, state: &State, run: &RunView, positions: &[Posit
         let words = theme::note(format!("   step {}", here.step)).color(theme::ACCENT);
         plot.text(Text::new("", PlotPoint::new(east, north), words).anchor(Align2::LEFT_BOTTOM));
     }
+    for other in state.others() {
+        paint_other(plot, &positions_of(&other, state), other.look, place);
+    }
     if let Some((truth, _)) = truth_in_site(state) {
         let points = Points::new("", place(&truth)).color(theme::TRUTH).radius(6.0);
         plot.points(points.shape(MarkerShape::Plus));
+    }
+}
+
+/// Where a compared run placed the target.
+fn positions_of(other: &Other<'_>, state: &State) -> Vec<Position> {
+    state.traverse.as_ref().map_or_else(Vec::new, |traverse| positions(other.run, &traverse.stops))
+}
+
+/// The trail of a compared run with its last ellipse.
+fn paint_other(plot: &mut PlotUi<'_>, all: &[Position], look: Look, place: impl Fn(&Point3) -> [f64; 2]) {
+    let trail: Vec<[f64; 2]> = all.iter().map(|at| place(&at.point_in_site)).collect();
+    plot.line(Line::new("", trail.clone()).color(look.colour.gamma_multiply(0.6)).width(1.0));
+    plot.points(Points::new("", trail).color(look.colour).radius(2.5).shape(shape(look.mark)));
+    if let Some(last) = all.last() {
+        outline(plot, last, place(&last.point_in_site), look.colour, 1.5);
     }
 }
 

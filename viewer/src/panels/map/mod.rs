@@ -105,7 +105,10 @@ fn drive(ui: &mut Ui, state: &State, stops: &[StopView], run: Option<&RunView>, 
     let response = plot.show(ui, |plot| {
         paint_paths(plot, stops, state.cursor.step);
         if let Some(run) = run {
-            paint_trail(plot, stops, run);
+            paint_trail(plot, stops, run, theme::run(run.number));
+            for other in state.others() {
+                paint_trail(plot, stops, other.run, other.look.colour);
+            }
         }
         if let Some((truth, _)) = truth_in_site(state) {
             let points = Points::new("", on_map(&truth)).color(theme::TRUTH).radius(6.0);
@@ -127,6 +130,9 @@ fn names_of(state: &State, stops: &[StopView]) -> Vec<(Mark, Color32, String)> {
     if let Some(run) = state.run() {
         let name = format!("target, run {}", run_letter(run.number));
         names.push((Mark::Diamond, theme::run(run.number), name));
+    }
+    for other in state.others() {
+        names.push((other.look.mark, other.look.colour, format!("target, {}", state.run_label(other.name))));
     }
     if let Some((_, off_m)) = truth_in_site(state) {
         names.push((Mark::Plus, theme::TRUTH, format!("truth, {:.0} cm off", off_m * 100.0)));
@@ -178,8 +184,7 @@ fn span_m(stops: &[StopView]) -> f64 {
 }
 
 /// Where the run placed the target from each stop.
-fn paint_trail(plot: &mut PlotUi<'_>, stops: &[StopView], run: &RunView) {
-    let colour = theme::run(run.number);
+fn paint_trail(plot: &mut PlotUi<'_>, stops: &[StopView], run: &RunView, colour: Color32) {
     let trail: Vec<[f64; 2]> =
         convergence::positions(run, stops).iter().map(|at| on_map(&at.point_in_site)).collect();
     plot.line(Line::new("", trail.clone()).color(colour).width(1.0));

@@ -1,0 +1,76 @@
+//! What a compared run saw, in its own colour and shape, on the left image.
+
+use egui::vec2;
+use sightline_core::session::view::RunView;
+use sightline_core::trace::StepTrace;
+
+use crate::command::Layer;
+use crate::overlay::{Line, Mark, Overlay, template_quad};
+use crate::panels::legend::Entry;
+use crate::state::State;
+use crate::state::compare::Look;
+use crate::theme;
+
+/// The entry of the legend for the runs that are compared.
+pub fn entries(state: &State) -> Vec<Entry> {
+    let others = state.others();
+    let Some(first) = others.first() else { return Vec::new() };
+    let names: Vec<String> = others.iter().map(|other| state.run_label(other.name)).collect();
+    vec![Entry::new(
+        Layer::Compared,
+        first.look.mark,
+        first.look.colour,
+        format!("compared: {}", names.join(", ")),
+    )]
+}
+
+/// Paints the marks of all compared runs.
+pub fn paint_all(overlay: &Overlay<'_>, state: &State) {
+    if !state.shows(Layer::Compared) {
+        return;
+    }
+    for other in state.others() {
+        if let Some(trace) = state.other_trace(other.name).ready() {
+            paint(overlay, trace, other.run, other.look, state);
+            name(overlay, trace, other.look, &state.run_label(other.name));
+        }
+    }
+}
+
+/// Paints what one step of a run saw: search window, prediction with its gate, template window and match.
+pub fn paint(overlay: &Overlay<'_>, trace: &StepTrace, run: &RunView, look: Look, state: &State) {
+    let matched = trace.template().and_then(|evidence| evidence.match_template.as_ref());
+    if let Some(matched) = matched.filter(|_| state.shows(Layer::SearchWindow)) {
+        overlay.rectangle(matched.search_window, look.colour, Line::Dashed);
+    }
+    let pointing =
+        trace.point_mast.as_ref().filter(|_| trace.predict.is_some() && state.shows(Layer::Prediction));
+    if let Some((pointing, pixel)) = pointing.and_then(|pointing| Some((pointing, pointing.predicted_left?)))
+    {
+        if let Some(covariance) = &pointing.predicted_covariance_px2 {
+            overlay.ellipse(pixel, covariance, 3.0, look.colour, Line::Dotted);
+        }
+        overlay.mark(pixel, Mark::Cross, look.colour);
+    }
+    if let Some(matched) = matched.filter(|_| state.shows(Layer::Template)) {
+        let side = run.settings.template.template_size_px;
+        let quad = template_quad(matched.pixel, side, &nalgebra::Matrix2::identity());
+        overlay.outline(&quad, look.colour, Line::Solid);
+    }
+    let located = trace.locate.as_ref().filter(|_| state.shows(Layer::Match));
+    if let Some((located, pixel)) = located.and_then(|located| Some((located, located.left_pixel?))) {
+        overlay.ellipse(pixel, &located.left_error.mean_square_px2(), 3.0, look.colour, Line::Solid);
+        overlay.mark(pixel, look.mark, look.colour);
+    }
+    if let Some(pixel) = trace.truth.as_ref().and_then(|t| t.left_pixel).filter(|_| state.shows(Layer::Truth))
+    {
+        overlay.mark(pixel, Mark::Plus, theme::TRUTH);
+    }
+}
+
+/// The run's name beside its mark.
+fn name(overlay: &Overlay<'_>, trace: &StepTrace, look: Look, words: &str) {
+    if let Some(pixel) = crate::state::compare::place_of_target(trace) {
+        overlay.words(pixel, vec2(12.0, 16.0), words, look.colour);
+    }
+}

@@ -1,0 +1,158 @@
+//! The ways in which one left image shows two runs: all marks, wipe and blink, and the step before shining through.
+
+use egui::{CursorIcon, EventFilter, Key, Rect, Sense, Ui, pos2, vec2};
+use sightline_core::image::PixelRect;
+
+use super::{difference, marks, side_by_side};
+use crate::cache::Eye;
+use crate::command::{Command, Mode, Panel};
+use crate::compare::{self, Ask, View};
+use crate::layout::LeftImage;
+use crate::overlay::{Overlay, paint_words};
+use crate::raster::Raster;
+use crate::state::State;
+use crate::state::compare::{Other, place_of_target};
+use crate::theme;
+use crate::view2d::{Canvas, Transform};
+
+/// How far a key moves the divider.
+const KEY_STEP: f32 = 0.05;
+
+/// What is shown instead of the one image, where the way of comparing asks for it.
+pub fn instead(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) -> Option<LeftImage> {
+    // A target is picked on the whole image.
+    if !state.is_comparing() || state.mode == Mode::Pick {
+        return None;
+    }
+    match state.compare.view {
+        View::SideBySide => Some(side_by_side::show(ui, state, raster, out)),
+        View::Difference => {
+            difference::show(ui, state);
+            Some(None)
+        }
+        View::Marks | View::Wipe | View::Blink => None,
+    }
+}
+
+/// Paints what lies under the marks: the step before, where it shines through.
+pub fn under(canvas: &Canvas, state: &State) {
+    if !state.compare.has_onion_skin {
+        return;
+    }
+    let Some(before) = state.cursor.step.checked_sub(1) else { return };
+    let Some(raster) = state.image_key(before, Eye::Left).and_then(|key| state.cache.raster(&key).ready())
+    else {
+        return;
+    };
+    raster.stretch(state.stretch);
+    let [width, height] = raster.size();
+    let mut area = canvas.transform.area(PixelRect::whole(width, height));
+    // With the target held still, its place then lies on its place now.
+    let places =
+        state.trace_at(before).ready().and_then(place_of_target).zip(state.trace().and_then(place_of_target));
+    if let Some((then, now)) = places.filter(|_| state.compare.is_held) {
+        area = area.translate(canvas.transform.to_screen(now) - canvas.transform.to_screen(then));
+    }
+    let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+    canvas.painter.image(raster.texture.id(), area, whole, theme::ONION);
+    let words = format!("step {before} shines through");
+    paint_words(&canvas.painter, canvas.transform.rect.left_bottom() + vec2(8.0, -12.0), &words, theme::TEXT);
+}
+
+/// Paints what lies over the marks of the run that is looked at.
+pub fn over(ui: &Ui, canvas: &Canvas, state: &State, out: &mut Vec<Command>) {
+    let others = state.others();
+    let Some(other) = others.first() else { return };
+    if state.compare.is_blinking {
+        return paint_other(canvas, state, other, canvas.transform.rect);
+    }
+    match state.compare.view {
+        View::Marks if state.marks => {
+            marks::paint_all(&Overlay::new(&canvas.painter, &canvas.transform), state);
+        }
+        View::Wipe => wipe(ui, canvas, state, other, out),
+        View::Blink => {
+            let words = format!("hold X to see {}", state.run_label(other.name));
+            corner(canvas, canvas.transform.rect, &words, other.look.colour);
+        }
+        View::Marks | View::SideBySide | View::Difference => {}
+    }
+}
+
+/// The image of another run with its marks, on a part of the canvas.
+fn paint_other(canvas: &Canvas, state: &State, other: &Other<'_>, part: Rect) {
+    let label = state.run_label(other.name);
+    let Some(raster) = state.other_image(other.name).ready() else {
+        return corner(canvas, part, &format!("{label}: its image is not loaded here"), theme::LOST);
+    };
+    raster.stretch(state.stretch);
+    let trace = state.other_trace(other.name).ready();
+    let [width, height] = raster.size();
+    let region = PixelRect::whole(width, height);
+    let painter = canvas.painter.with_clip_rect(part.intersect(canvas.painter.clip_rect()));
+    let view = state.held_view(state.view(Panel::Left), trace);
+    let transform = Transform::new(view, region, canvas.transform.rect);
+    painter.rect_filled(part, 0.0, theme::WELL);
+    let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+    painter.image(raster.texture.id(), transform.area(region), whole, theme::UNTINTED);
+    if let Some(trace) = trace.filter(|_| state.marks) {
+        marks::paint(&Overlay::new(&painter, &transform), trace, other.run, other.look, state);
+    }
+    let words = match trace {
+        Some(trace) if trace.step != state.cursor.step => format!("{label}, step {}", trace.step),
+        Some(_) => label,
+        None => format!("{label}: this step is not loaded or not computed"),
+    };
+    corner(canvas, part, &words, other.look.colour);
+}
+
+fn corner(canvas: &Canvas, part: Rect, words: &str, colour: egui::Color32) {
+    let width = canvas.painter.layout_no_wrap(words.to_owned(), theme::image_font(), colour).size().x;
+    paint_words(&canvas.painter, part.right_top() + vec2(-width - 8.0, 12.0), words, colour);
+}
+
+/// This run left of the divider, the other right of it.
+fn wipe(ui: &Ui, canvas: &Canvas, state: &State, other: &Other<'_>, out: &mut Vec<Command>) {
+    let area = canvas.transform.rect;
+    let at = state.compare.wipe.unwrap_or(0.5);
+    let x = area.left() + area.width() * at;
+    paint_other(canvas, state, other, area.with_min_x(x));
+    let own = state.own_name().map_or_else(String::new, |own| state.run_label(own));
+    paint_words(&canvas.painter, area.left_top() + vec2(8.0, 12.0), &own, state.own_look().colour);
+    let grip = Rect::from_center_size(pos2(x, area.center().y), vec2(24.0, area.height()));
+    let response = ui.interact(grip.intersect(area), compare::wipe_id(), Sense::click_and_drag());
+    let is_marked = response.hovered() || response.has_focus() || response.dragged();
+    let colour = if is_marked { theme::ACCENT } else { theme::STRONG };
+    canvas.painter.vline(x, area.y_range(), egui::Stroke::new(4.0, theme::HALO));
+    canvas.painter.vline(x, area.y_range(), egui::Stroke::new(2.0, colour));
+    canvas.painter.circle_filled(pos2(x, area.center().y), 7.0, colour);
+    response.widget_info(|| {
+        egui::WidgetInfo::slider(true, f64::from(at) * 100.0, "wipe divider, per cent of the image's width")
+    });
+    if response.clicked() || response.drag_started() {
+        response.request_focus();
+    }
+    let moved = moved(ui, &response, area);
+    if let Some(to) = moved.map(|by| (at + by).clamp(0.0, 1.0)).filter(|&to| to != at) {
+        out.push(Command::Compare(Ask::Wipe(to)));
+    }
+    response.on_hover_cursor(CursorIcon::ResizeHorizontal);
+}
+
+/// By how much pointer or keys move the divider, as a share of the width.
+fn moved(ui: &Ui, response: &egui::Response, area: Rect) -> Option<f32> {
+    if response.dragged() {
+        return Some(response.drag_delta().x / area.width().max(1.0));
+    }
+    if !response.has_focus() {
+        return None;
+    }
+    let filter = EventFilter { horizontal_arrows: true, ..EventFilter::default() };
+    ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, filter));
+    ui.input(|input| {
+        let pressed = |key: Key| input.num_presses(key) as f32 * KEY_STEP;
+        let ends = f32::from(u8::from(input.key_pressed(Key::End)))
+            - f32::from(u8::from(input.key_pressed(Key::Home)));
+        Some(pressed(Key::ArrowRight) - pressed(Key::ArrowLeft) + ends)
+    })
+}

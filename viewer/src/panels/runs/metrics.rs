@@ -1,0 +1,75 @@
+//! Every metric of the run that is looked at and of those compared with it, with protocol and excluded steps.
+
+use egui::{Grid, Ui};
+use sightline_core::session::compare::RunName;
+use sightline_core::session::metrics::{Excluded, NAMES, RunMetrics};
+
+use super::table;
+use crate::command::Command;
+use crate::state::State;
+use crate::theme;
+
+/// Shows the metrics.
+pub(super) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let Some(own) = state.own_name() else { return };
+    ui.label(theme::title("Metrics"));
+    let Some(found) = state.metrics(own) else {
+        let why = state.metrics_problem(own).unwrap_or("The metrics are being computed …");
+        ui.label(theme::label(why));
+        return;
+    };
+    for line in header(found) {
+        ui.label(theme::note(line));
+    }
+    let names: Vec<RunName> =
+        std::iter::once(own).chain(state.others().iter().map(|other| other.name)).collect();
+    Grid::new("metrics").striped(true).spacing([14.0, 2.0]).show(ui, |ui| {
+        ui.label(theme::note("metric"));
+        names.iter().for_each(|&name| table::head(ui, state, name));
+        ui.label(theme::note("steps"));
+        ui.label(theme::note("remark"));
+        ui.end_row();
+        for metric in NAMES {
+            let first = found.metrics.iter().find(|found| found.name == metric);
+            let unit = first
+                .map(|first| first.unit.as_str())
+                .filter(|unit| !unit.is_empty() && !metric.ends_with(unit));
+            ui.label(theme::label(format!("{metric} {}", unit.unwrap_or_default())).size(11.5));
+            for &name in &names {
+                table::cell(ui, state, name, metric, &state.run_label(name), out);
+            }
+            ui.label(theme::note(first.map_or_else(String::new, |first| first.used.to_string())));
+            ui.label(theme::note(first.and_then(|first| first.note.clone()).unwrap_or_default()));
+            ui.end_row();
+        }
+    });
+}
+
+/// Protocol, version, and which steps count.
+fn header(found: &RunMetrics) -> Vec<String> {
+    let truth = match found.truth {
+        None => "no truth is known: only survival_steps and mean_nis can be given",
+        Some(sightline_core::trace::TruthKind::Surface) => {
+            "the truth is the surface point that was designated"
+        }
+        Some(sightline_core::trace::TruthKind::Carried) => {
+            "the truth is the first estimate carried along by true poses: errors are drift"
+        }
+    };
+    let mut lines = vec![
+        format!("protocol: {}; version {}", found.protocol, found.version),
+        format!("{} steps so far; {truth}", found.steps),
+    ];
+    lines.extend(found.excluded.iter().map(excluded));
+    lines
+}
+
+fn excluded(left_out: &Excluded) -> String {
+    const LISTED: usize = 12;
+    let mut steps: Vec<String> = left_out.steps.iter().take(LISTED).map(ToString::to_string).collect();
+    if left_out.steps.len() > LISTED {
+        steps.push(format!("and {} more", left_out.steps.len() - LISTED));
+    }
+    let noun = if left_out.steps.len() == 1 { "step" } else { "steps" };
+    format!("left out of {}: {noun} {} ({})", left_out.of, steps.join(", "), left_out.why)
+}

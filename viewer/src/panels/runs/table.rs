@@ -1,0 +1,278 @@
+//! The table of runs: one row a run, sorted by any metric, with a baseline and a filter.
+
+use egui::{Button, Grid, Link, RichText, Sense, Ui, pos2, vec2};
+use serde_json::Value;
+use sightline_core::session::compare::RunName;
+use sightline_core::session::metrics::Metric;
+use sightline_core::session::view::{RunView, TargetView};
+use sightline_core::settings::Changes;
+
+use crate::command::Command;
+use crate::compare::{Ask, Sort};
+use crate::panels::compare::{chip, mark};
+use crate::panels::digits;
+use crate::panels::targets::run_mark;
+use crate::state::compare::Look;
+use crate::state::{State, run_letter, state_of_word};
+use crate::theme;
+
+/// The metrics of the table with their headings, and whether more is better.
+pub const COLUMNS: [(&str, &str, bool); 9] = [
+    ("tracked_steps", "tracked", true),
+    ("survival_steps", "survived", true),
+    ("ade_px", "mean, px", false),
+    ("max_px", "max, px", false),
+    ("ade_cm", "mean, cm", false),
+    ("pck_4px", "in 4 px", true),
+    ("false_lost", "false lost", false),
+    ("false_tracking", "false tracking", false),
+    ("mean_nees", "NEES", false),
+];
+
+/// A row.
+#[derive(Clone, Copy)]
+pub struct Row<'a> {
+    name: RunName,
+    target: &'a TargetView,
+    run: &'a RunView,
+}
+
+/// How many of the runs are shown.
+pub(super) fn count(state: &State) -> String {
+    let (shown, all) = (rows(state).len(), state.all_runs().count());
+    if shown == all { format!("{all} runs") } else { format!("{shown} of {all} runs") }
+}
+
+/// The rows that the filter lets through, as they are sorted; what has no value comes last.
+fn rows(state: &State) -> Vec<Row<'_>> {
+    let filter = state.compare.filter.to_lowercase();
+    let mut rows: Vec<Row<'_>> =
+        state.all_runs().map(|(name, target, run)| Row { name, target, run }).collect();
+    rows.retain(|row| filter.split_whitespace().all(|word| text(state, row).to_lowercase().contains(word)));
+    if let Some(metric) = &state.compare.sort.metric {
+        let is_descending = state.compare.sort.is_descending;
+        let key = |row: &Row<'_>| state.metric(row.name, metric).and_then(|metric| metric.value);
+        rows.sort_by(|a, b| match (key(a), key(b)) {
+            (Some(a), Some(b)) if is_descending => b.total_cmp(&a),
+            (Some(a), Some(b)) => a.total_cmp(&b),
+            (a, b) => b.is_some().cmp(&a.is_some()),
+        });
+    }
+    rows
+}
+
+/// The names of the runs in the order of the table.
+pub fn order(state: &State) -> Vec<RunName> {
+    rows(state).into_iter().map(|row| row.name).collect()
+}
+
+/// What the filter looks at.
+fn text(state: &State, row: &Row<'_>) -> String {
+    let preset = state.configurations.named(&row.run.settings).map_or("", |preset| preset.name);
+    let settings: Vec<String> = row.run.changes.iter().map(|(key, value)| format!("{key}={value}")).collect();
+    format!("{} run {} {preset} {}", row.target.label, run_letter(row.run.number), settings.join(" "))
+}
+
+/// Shows the table.
+pub(super) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let rows = rows(state);
+    if rows.is_empty() {
+        ui.label(theme::label("No run has these words. Empty the field to see all of them."));
+        return;
+    }
+    Grid::new("runs").striped(true).spacing([10.0, 4.0]).show(ui, |ui| {
+        for heading in ["base", "vs", "run", "states"] {
+            ui.label(theme::note(heading));
+        }
+        COLUMNS.iter().for_each(|column| heading(ui, state, column, out));
+        ui.label(theme::note(match state.compare.baseline {
+            Some(name) => format!("settings unlike {}", state.run_label(name)),
+            None => "settings unlike the defaults".to_owned(),
+        }));
+        ui.end_row();
+        for row in &rows {
+            show_row(ui, state, row, out);
+            ui.end_row();
+        }
+    });
+}
+
+/// A heading: a click sorts, the next one the other way round, a third one not at all.
+fn heading(
+    ui: &mut Ui,
+    state: &State,
+    (metric, words, is_more_better): &(&str, &str, bool),
+    out: &mut Vec<Command>,
+) {
+    let sort = &state.compare.sort;
+    let is_sorted = sort.metric.as_deref() == Some(metric);
+    let arrow = match (is_sorted, sort.is_descending) {
+        (false, _) => "",
+        (true, true) => " ▼",
+        (true, false) => " ▲",
+    };
+    let button = Button::new(RichText::new(format!("{words}{arrow}")).size(11.0))
+        .frame(false)
+        .min_size(vec2(24.0, 22.0));
+    let direction = if *is_more_better { "more is better" } else { "less is better" };
+    let response = ui.add(button).on_hover_text(format!("{metric}; {direction}"));
+    if response.accessible_name(format!("sort by {metric}")).clicked() {
+        // The best comes first.
+        let next = match (is_sorted, sort.is_descending == *is_more_better) {
+            (false, _) => Sort { metric: Some((*metric).to_owned()), is_descending: *is_more_better },
+            (true, true) => Sort { metric: Some((*metric).to_owned()), is_descending: !*is_more_better },
+            (true, false) => Sort::default(),
+        };
+        out.push(Command::Compare(Ask::Sort(next)));
+    }
+}
+
+fn show_row(ui: &mut Ui, state: &State, row: &Row<'_>, out: &mut Vec<Command>) {
+    let label = format!("{} · run {}", row.target.label, run_letter(row.run.number));
+    let is_baseline = state.compare.baseline == Some(row.name);
+    let star =
+        Button::selectable(is_baseline, if is_baseline { "★" } else { "☆" }).min_size(vec2(24.0, 24.0));
+    let response =
+        ui.add(star).on_hover_text("the baseline: the others are given with their difference to it");
+    if response.accessible_name(format!("baseline: {label}")).clicked() {
+        out.push(Command::Compare(Ask::Baseline(row.name)));
+    }
+    let is_own = state.own_name() == Some(row.name);
+    let mut is_compared = is_own || state.compare.others.contains(&row.name);
+    let check = ui.add_enabled(!is_own, egui::Checkbox::without_text(&mut is_compared));
+    if check.accessible_name(format!("compare {label}")).changed() {
+        out.push(Command::Compare(Ask::Toggle(row.name)));
+    }
+    ui.horizontal(|ui| {
+        mark(ui, look(state, row.name));
+        let words = RichText::new(&label).size(12.0).color(if is_own { theme::STRONG } else { theme::TEXT });
+        let button = Button::selectable(is_own, words).min_size(vec2(0.0, 24.0));
+        if ui.add(button).on_hover_text("looks at this run").clicked() {
+            out.push(Command::Look { target: row.name.target, run: row.name.run });
+        }
+    });
+    states(ui, row, state.stop_count());
+    for (metric, ..) in COLUMNS {
+        cell(ui, state, row.name, metric, &label, out);
+    }
+    ui.add(egui::Label::new(theme::note(changes(state, row)).monospace())).on_hover_text(text(state, row));
+}
+
+/// How a run is marked: as it is compared, or by its number.
+fn look(state: &State, name: RunName) -> Look {
+    let compared = state.others().into_iter().find(|other| other.name == name).map(|other| other.look);
+    compared.unwrap_or(Look { colour: theme::run(name.run), mark: run_mark(name.run) })
+}
+
+/// The states of a run, one thin cell a step.
+fn states(ui: &mut Ui, row: &Row<'_>, stop_count: usize) {
+    let (rect, response) = ui.allocate_exact_size(vec2(90.0, 12.0), Sense::hover());
+    let width = rect.width() / stop_count.max(1) as f32;
+    ui.painter().rect_filled(rect, 1.0, theme::BEFORE);
+    for line in &row.run.rows {
+        let state = state_of_word(&line.state);
+        let left = rect.left() + width * line.step as f32;
+        // What is not well is lower, so that the shape tells it too.
+        let top = if state.is_lost() { rect.center().y } else { rect.top() };
+        let cell = egui::Rect::from_min_max(pos2(left, top), pos2(left + width, rect.bottom()));
+        ui.painter().rect_filled(cell, 0.0, theme::state(state));
+    }
+    let words = in_words(row.run);
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, format!("states: {words}")));
+    response.on_hover_text(words);
+}
+
+/// The states of a run in words.
+fn in_words(run: &RunView) -> String {
+    let mut pieces: Vec<(usize, usize, &str)> = Vec::new();
+    for line in &run.rows {
+        match pieces.last_mut() {
+            Some(last) if last.2 == line.state => last.1 = line.step,
+            _ => pieces.push((line.step, line.step, &line.state)),
+        }
+    }
+    let piece = |(first, last, state): &(usize, usize, &str)| {
+        if first == last { format!("{state} {first}") } else { format!("{state} {first} to {last}") }
+    };
+    pieces.iter().map(piece).collect::<Vec<_>>().join(", ")
+}
+
+/// A metric: a link to its worst step, with its difference to the baseline.
+pub(super) fn cell(
+    ui: &mut Ui,
+    state: &State,
+    name: RunName,
+    metric: &str,
+    label: &str,
+    out: &mut Vec<Command>,
+) {
+    let Some(found) = state.metric(name, metric) else {
+        let (word, why) = match state.metrics_problem(name) {
+            Some(problem) => ("–", problem.to_owned()),
+            None => ("…", "being computed".to_owned()),
+        };
+        ui.label(theme::note(word)).on_hover_text(why);
+        return;
+    };
+    let Some(value) = found.value else {
+        ui.label(theme::note("–")).on_hover_text(found.note.clone().unwrap_or_default());
+        return;
+    };
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        let words = words(found, value);
+        match found.worst_step {
+            Some(step) => {
+                let help = format!("{metric}: worst at step {step}; a click goes there");
+                let link = ui.add(Link::new(theme::number(&words).size(11.5)));
+                let link = link.accessible_name(format!("{metric} {words} of {label}, worst at step {step}"));
+                if link.on_hover_text(help).clicked() {
+                    out.push(Command::Compare(Ask::Visit { run: name, step }));
+                }
+            }
+            None => {
+                ui.label(theme::number(&words).size(11.5)).on_hover_text("no step does badly by it");
+            }
+        }
+        let baseline = state.compare.baseline.filter(|&baseline| baseline != name);
+        let there = baseline.and_then(|baseline| state.metric(baseline, metric)?.value);
+        if let Some(there) = there.filter(|there| *there != value) {
+            let sign = if value > there { "+" } else { "−" };
+            ui.label(theme::note(format!("Δ{sign}{}", digits((value - there).abs()))));
+        }
+    });
+}
+
+/// A value as it is written: shares in per cent.
+pub(super) fn words(metric: &Metric, value: f64) -> String {
+    let is_share = metric.name.starts_with("pck_")
+        || matches!(metric.name.as_str(), "average_jaccard" | "occlusion_accuracy" | "inside_3_sigma");
+    if is_share { format!("{:.0} %", value * 100.0) } else { digits(value) }
+}
+
+/// The settings that differ from the baseline's, or from the defaults.
+fn changes(state: &State, row: &Row<'_>) -> String {
+    let baseline = state.compare.baseline.filter(|&name| name != row.name);
+    let against = baseline.and_then(|name| Some(&state.run_named(name)?.1.changes));
+    let nothing = Changes::new();
+    let against = against.unwrap_or(&nothing);
+    let keys: std::collections::BTreeSet<&String> = row.run.changes.keys().chain(against.keys()).collect();
+    let line = |key: &&String| {
+        let (own, there) = (row.run.changes.get(*key), against.get(*key));
+        let default =
+            || state.settings.iter().find(|info| info.key == **key).map(|info| info.default.clone());
+        let shown = own.cloned().or_else(default).map_or_else(|| "default".to_owned(), |value| plain(&value));
+        (own != there).then(|| format!("{key}={shown}"))
+    };
+    let lines: Vec<String> = keys.iter().filter_map(line).collect();
+    if lines.is_empty() { "none".to_owned() } else { lines.join(" ") }
+}
+
+fn plain(value: &Value) -> String {
+    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
+}
+
+/// A run's mark with its name, as the head of a column.
+pub(super) fn head(ui: &mut Ui, state: &State, name: RunName) {
+    ui.horizontal(|ui| chip(ui, look(state, name), &state.run_label(name)));
+}

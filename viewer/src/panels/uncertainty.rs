@@ -1,0 +1,224 @@
+//! Whether the covariances hold: NEES and NIS step by step with their chi-square bands, coverage, and one sentence.
+
+use egui::{Id, RichText, Ui, UiBuilder, vec2};
+use egui_plot::{HLine, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotUi, Points, VLine};
+use sightline_core::session::compare::RunName;
+use sightline_core::session::metrics::uncertainty::{Consistency, Uncertainty};
+
+use super::compare::mark;
+use super::names;
+use super::plots::{few_marks, over_steps, plain};
+use crate::command::{Command, Go};
+use crate::overlay::{self, Mark};
+use crate::panels;
+use crate::state::State;
+use crate::state::compare::Look;
+use crate::theme;
+
+/// What the panel is for.
+const PURPOSE: &str = "Whether errors are as large as the covariances say.";
+
+/// A run whose covariances are shown.
+struct Shown<'a> {
+    name: RunName,
+    look: Look,
+    found: &'a Uncertainty,
+}
+
+/// Shows the verdicts and the plots.
+pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let Some(own) = state.own_name() else {
+        panels::missing(ui, PURPOSE, &state.missing_target());
+        return;
+    };
+    let mut names = vec![(own, state.own_look())];
+    names.extend(state.others().iter().map(|other| (other.name, other.look)));
+    let shown: Vec<Shown<'_>> = names
+        .iter()
+        .filter_map(|&(name, look)| Some(Shown { name, look, found: &state.metrics(name)?.uncertainty }))
+        .collect();
+    if shown.is_empty() {
+        let why = state.metrics_problem(own).unwrap_or("The metrics of the run are being computed …");
+        panels::missing(ui, PURPOSE, why);
+        return;
+    }
+    for run in &shown {
+        verdict(ui, state, run);
+    }
+    let area = ui.available_rect_before_wrap();
+    let (left, right) = area.split_left_right_at_fraction(0.62);
+    let mut steps = ui.new_child(UiBuilder::new().max_rect(left).id_salt("steps"));
+    over_the_steps(&mut steps, state, &shown, out);
+    let mut beside =
+        ui.new_child(UiBuilder::new().max_rect(right.with_min_x(right.left() + 8.0)).id_salt("coverage"));
+    coverage(&mut beside, &shown);
+    ui.advance_cursor_after_rect(area);
+}
+
+fn verdict(ui: &mut Ui, state: &State, run: &Shown<'_>) {
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing = vec2(5.0, 1.0);
+        mark(ui, run.look);
+        let words = format!("{}: {}.", state.run_label(run.name), run.found.sentence.trim_end_matches('.'));
+        let caveat = "The steps of one run are not independent: the true band is wider than that of independent steps, \
+                      hence “probably” until the mean leaves the band of a single value as well.";
+        ui.label(RichText::new(words).size(12.0).color(theme::TEXT)).on_hover_text(caveat);
+        let nis = format!("{}.", run.found.nis_sentence.trim_end_matches('.'));
+        ui.label(theme::note(nis)).on_hover_text("Over accepted updates; NIS needs no truth.");
+    });
+}
+
+fn over_the_steps(ui: &mut Ui, state: &State, shown: &[Shown<'_>], out: &mut Vec<Command>) {
+    type Part = (&'static str, &'static str, fn(&Uncertainty) -> &Consistency);
+    const PARTS: [Part; 2] = [
+        ("NEES", "squared Mahalanobis distance of the error", |found| &found.nees),
+        ("NIS", "squared Mahalanobis distance of match and prediction", |found| &found.nis),
+    ];
+    ui.spacing_mut().item_spacing.y = 1.0;
+    let height = ((ui.available_height() - 16.0) / 2.0 - names::HEIGHT - 2.0).max(24.0);
+    for (i, (title, meaning, of)) in PARTS.into_iter().enumerate() {
+        let band = of(shown[0].found).band_of_one;
+        let line = (
+            Mark::Stroke(overlay::Line::Dashed),
+            theme::WEAK,
+            format!("95 % of single values: {:.2} to {:.1}", band[0], band[1]),
+        );
+        names::show(ui, title, &[line]);
+        let is_last = i == 1;
+        let height = if is_last { height + 16.0 } else { height };
+        let words = summary(state, shown, title, meaning, of);
+        if shown.iter().all(|run| of(run.found).steps.is_empty()) {
+            let why = if title == "NIS" { &shown[0].found.nis_sentence } else { &shown[0].found.sentence };
+            ui.allocate_ui(vec2(ui.available_width(), height), |ui| panels::missing(ui, "", why));
+            continue;
+        }
+        if let Some(step) = plot(ui, state, shown, (title, of), (height, is_last), &words) {
+            out.push(Command::Go(Go::Step(step)));
+        }
+    }
+}
+
+/// What a plot shows, in words.
+fn summary(
+    state: &State,
+    shown: &[Shown<'_>],
+    title: &str,
+    meaning: &str,
+    of: fn(&Uncertainty) -> &Consistency,
+) -> String {
+    let run = |run: &Shown<'_>| {
+        let found = of(run.found);
+        let mean = found.mean.map_or_else(|| "none".to_owned(), |mean| format!("{mean:.2}"));
+        let outside = |value: f64| value < found.band_of_one[0] || value > found.band_of_one[1];
+        let count = found.steps.iter().filter(|step| outside(step.value)).count();
+        format!(
+            "{}: mean {mean}, {count} of {} steps outside the band",
+            state.run_label(run.name),
+            found.steps.len()
+        )
+    };
+    let runs: Vec<String> = shown.iter().map(run).collect();
+    format!("{title}, {meaning}, over the steps; {}", runs.join("; "))
+}
+
+fn plot(
+    ui: &mut Ui,
+    state: &State,
+    shown: &[Shown<'_>],
+    (title, of): (&str, fn(&Uncertainty) -> &Consistency),
+    (height, is_last): (f32, bool),
+    words: &str,
+) -> Option<usize> {
+    let last = state.stop_count().saturating_sub(1) as f64;
+    let band = of(shown[0].found).band_of_one;
+    let plot = over_steps(Plot::new(("uncertainty", title)), last, is_last)
+        .height(height)
+        .include_y(0.0)
+        .include_y(band[1])
+        .set_margin_fraction(vec2(0.0, 0.12))
+        .y_grid_spacer(few_marks)
+        .y_axis_formatter(plain);
+    let response = plot.show(ui, |plot| {
+        plot.vline(
+            VLine::new("", state.cursor.step as f64).color(theme::ACCENT).width(1.5).allow_hover(false),
+        );
+        for edge in band {
+            let line = HLine::new("", edge).color(theme::WEAK).style(LineStyle::dashed_dense());
+            plot.hline(line.width(1.0).allow_hover(false));
+        }
+        for run in shown {
+            let points = |step: usize| state.own_beside(run.name, step).map(|step| step as f64);
+            let points: Vec<[f64; 2]> = of(run.found)
+                .steps
+                .iter()
+                .filter_map(|step| Some([points(step.step)?, step.value]))
+                .collect();
+            series(plot, points, run.look);
+        }
+        let clicked = plot.response().clicked().then(|| plot.pointer_coordinate()).flatten();
+        clicked.map(|at: PlotPoint| at.x.round().clamp(0.0, last) as usize)
+    });
+    response.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, words));
+    response.inner
+}
+
+fn series(plot: &mut PlotUi<'_>, points: Vec<[f64; 2]>, look: Look) {
+    plot.line(Line::new("", points.clone()).color(look.colour).width(1.5).allow_hover(false));
+    plot.points(Points::new("", points).color(look.colour).radius(3.0).shape(shape(look.mark)));
+}
+
+/// The plotted shape of a run's mark.
+pub fn shape(mark: Mark) -> MarkerShape {
+    match mark {
+        Mark::Square => MarkerShape::Square,
+        Mark::Triangle => MarkerShape::Up,
+        Mark::Diamond => MarkerShape::Diamond,
+        _ => MarkerShape::Circle,
+    }
+}
+
+/// The share of errors within k σ against the share that is to be expected.
+fn coverage(ui: &mut Ui, shown: &[Shown<'_>]) {
+    names::show(ui, "coverage", &[(Mark::Stroke(overlay::Line::Dashed), theme::WEAK, "expected".to_owned())]);
+    if shown.iter().all(|run| run.found.coverage.is_empty()) {
+        panels::missing(ui, "", "Coverage needs the truth, which this traverse does not have.");
+        return;
+    }
+    let plot = Plot::new("coverage")
+        .height(ui.available_height())
+        .allow_scroll(false)
+        .allow_drag(false)
+        .allow_zoom(false)
+        .allow_boxed_zoom(false)
+        .include_x(0.0)
+        .include_y(0.0)
+        .include_y(1.0)
+        .x_axis_label(theme::note("within k σ"))
+        .y_axis_label(theme::note("share of steps"))
+        .x_grid_spacer(few_marks)
+        .x_axis_formatter(plain)
+        .y_grid_spacer(few_marks)
+        .y_axis_formatter(plain)
+        .y_axis_min_width(24.0)
+        .link_axis(Id::unique("coverage"), [false, false]);
+    let response = plot.show(ui, |plot| {
+        for (i, run) in shown.iter().enumerate() {
+            if i == 0 {
+                let expected: Vec<[f64; 2]> =
+                    run.found.coverage.iter().map(|c| [c.sigmas, c.expected]).collect();
+                let line = Line::new("", expected).color(theme::WEAK).style(LineStyle::dashed_dense());
+                plot.line(line.width(1.5).allow_hover(false));
+            }
+            series(plot, run.found.coverage.iter().map(|c| [c.sigmas, c.share]).collect(), run.look);
+        }
+    });
+    let words =
+        shown.first().and_then(|run| run.found.coverage.iter().find(|c| c.sigmas == 3.0)).map_or_else(
+            || "coverage".to_owned(),
+            |c| {
+                let [share, expected] = [c.share, c.expected].map(|share| share * 100.0);
+                format!("coverage: {share:.0} % of the steps within 3 σ, {expected:.0} % expected")
+            },
+        );
+    response.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &words));
+}

@@ -1,0 +1,478 @@
+//! Runs that are compared with the one that is looked at: which, where they stand, and what the server says of them.
+
+use std::collections::BTreeMap;
+
+use egui::Color32;
+use sightline_core::frames::Pixel;
+use sightline_core::session::Cursor;
+use sightline_core::session::compare::{Alignment, Comparison, NewComparison, RUNS_MAX, RunName, Tolerance};
+use sightline_core::session::metrics::{Metric, RunMetrics};
+use sightline_core::session::view::{RunView, TargetView};
+use sightline_core::session::wire::Problem;
+use sightline_core::trace::{ArrayName, StepRow, StepTrace};
+
+use super::{State, row_of, run_letter};
+use crate::cache::{Eye, Key, Slot, StepKey};
+use crate::command::{Command, Go, Stage};
+use crate::compare::{Ask, Closeness, Sort, View};
+use crate::net::Request;
+use crate::overlay::Mark;
+use crate::panels::targets::run_mark;
+use crate::raster::Raster;
+use crate::theme;
+use crate::view2d::View2d;
+
+/// Requests for metrics that are under way at a time.
+const METRICS_AT_A_TIME: usize = 2;
+
+/// Magnification at which a held target is shown where the person chose none.
+const HELD_SCALE: f64 = 4.0;
+
+/// What is compared, and how it is shown.
+#[derive(Clone, Debug, Default)]
+pub struct Compare {
+    /// The runs that the one looked at is compared with, three at most.
+    pub others: Vec<RunName>,
+    /// How the left image shows them.
+    pub view: View,
+    /// Which stops stand side by side.
+    pub align: Alignment,
+    /// From which difference on they count as different.
+    pub closeness: Closeness,
+    /// Where the divider of the wipe is, from 0 to 1; none: in the middle.
+    pub wipe: Option<f32>,
+    /// Whether the other run is shown while a key is held.
+    pub is_blinking: bool,
+    /// Whether the target is held still in the left image.
+    pub is_held: bool,
+    /// Whether the step before shines through.
+    pub has_onion_skin: bool,
+    /// The run with which the table compares.
+    pub baseline: Option<RunName>,
+    /// What the table is sorted by.
+    pub sort: Sort,
+    /// The words that the table's runs must have.
+    pub filter: String,
+    /// Whether a panel that shows metrics is on the screen.
+    pub wants_metrics: bool,
+    answer: Option<(Asked, Result<Comparison, String>)>,
+    under_way: Option<Asked>,
+    jumps: bool,
+    metrics: BTreeMap<RunName, (usize, Result<RunMetrics, String>)>,
+    metrics_asked: BTreeMap<RunName, usize>,
+}
+
+/// A comparison as it was asked for, with how far each run was then.
+#[derive(Clone, Debug, PartialEq)]
+struct Asked {
+    session: String,
+    new: NewComparison,
+    rows: Vec<usize>,
+}
+
+/// How a compared run is marked everywhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look {
+    /// Its colour.
+    pub colour: Color32,
+    /// Its shape.
+    pub mark: Mark,
+}
+
+/// A run that the one looked at is compared with.
+#[derive(Clone, Copy)]
+pub struct Other<'a> {
+    /// Which run it is.
+    pub name: RunName,
+    /// Its target.
+    pub target: &'a TargetView,
+    /// The run.
+    pub run: &'a RunView,
+    /// How it is marked.
+    pub look: Look,
+}
+
+impl State {
+    /// The run that is looked at.
+    pub fn own_name(&self) -> Option<RunName> {
+        self.run().and(self.cursor.target).map(|target| RunName { target, run: self.cursor.run })
+    }
+
+    /// The run of that name, with its target.
+    pub fn run_named(&self, name: RunName) -> Option<(&TargetView, &RunView)> {
+        let target = self.session.as_ref()?.targets.iter().find(|target| target.number == name.target)?;
+        Some((target, target.runs.iter().find(|run| run.number == name.run)?))
+    }
+
+    /// All runs of the session.
+    pub fn all_runs(&self) -> impl Iterator<Item = (RunName, &TargetView, &RunView)> {
+        let targets = self.session.iter().flat_map(|session| &session.targets);
+        targets.flat_map(|target| {
+            target
+                .runs
+                .iter()
+                .map(move |run| (RunName { target: target.number, run: run.number }, target, run))
+        })
+    }
+
+    /// What a run is called: its letter, and its target where that is not the one looked at.
+    pub fn run_label(&self, name: RunName) -> String {
+        let letter = run_letter(name.run);
+        match self.run_named(name) {
+            Some((target, _)) if Some(name.target) != self.cursor.target => {
+                format!("{} · run {letter}", target.label)
+            }
+            _ => format!("run {letter}"),
+        }
+    }
+
+    /// The runs that the one looked at is compared with. Each keeps the mark of its number where no run before it has it.
+    pub fn others(&self) -> Vec<Other<'_>> {
+        let Some(own) = self.own_name() else { return Vec::new() };
+        let mut taken = vec![own.run % RUNS_MAX];
+        let mut others = Vec::new();
+        for &name in self.compare.others.iter().filter(|&&name| name != own) {
+            let Some((target, run)) = self.run_named(name) else { continue };
+            let number = (0..RUNS_MAX).map(|i| (name.run + i) % RUNS_MAX).find(|n| !taken.contains(n));
+            let number = number.unwrap_or(name.run);
+            taken.push(number);
+            let look = Look { colour: theme::run(number), mark: run_mark(number) };
+            others.push(Other { name, target, run, look });
+        }
+        others
+    }
+
+    /// How the run that is looked at is marked.
+    pub fn own_look(&self) -> Look {
+        Look { colour: theme::run(self.cursor.run), mark: run_mark(self.cursor.run) }
+    }
+
+    /// Whether there is a run to compare with.
+    pub fn is_comparing(&self) -> bool {
+        self.own_name().is_some_and(|own| {
+            self.compare.others.iter().any(|&name| name != own && self.run_named(name).is_some())
+        })
+    }
+
+    /// What the server says of the comparison, once it has.
+    pub fn comparison(&self) -> Option<&Comparison> {
+        let (asked, answer) = self.compare.answer.as_ref()?;
+        // An answer about other runs would be taken for one about these.
+        (Some(&asked.new.runs) == self.compared_names().as_ref() && asked.new.align == self.compare.align)
+            .then_some(answer.as_ref().ok())
+            .flatten()
+    }
+
+    /// Why there is no comparison, where the server refused one.
+    pub fn comparison_problem(&self) -> Option<&str> {
+        self.compare.answer.as_ref().and_then(|(_, answer)| answer.as_ref().err()).map(String::as_str)
+    }
+
+    /// The run looked at and those compared with it.
+    fn compared_names(&self) -> Option<Vec<RunName>> {
+        let own = self.own_name()?;
+        let names: Vec<RunName> =
+            std::iter::once(own).chain(self.others().iter().map(|other| other.name)).collect();
+        (names.len() > 1).then_some(names)
+    }
+
+    /// The stop of another run that stands beside a stop of this one.
+    pub fn beside(&self, other: RunName, step: usize) -> Option<usize> {
+        if self.compare.align == Alignment::Step {
+            return Some(step);
+        }
+        let (comparison, at) = self.place_of(other)?;
+        comparison.moments.iter().find(|moment| moment.steps[0] == Some(step))?.steps[at]
+    }
+
+    /// The stop of this run beside which a stop of another one stands.
+    pub fn own_beside(&self, other: RunName, step: usize) -> Option<usize> {
+        if self.compare.align == Alignment::Step {
+            return Some(step);
+        }
+        let (comparison, at) = self.place_of(other)?;
+        comparison.moments.iter().find(|moment| moment.steps[at] == Some(step))?.steps[0]
+    }
+
+    fn place_of(&self, other: RunName) -> Option<(&Comparison, usize)> {
+        let comparison = self.comparison()?;
+        Some((comparison, comparison.runs.iter().position(|&name| name == other)?))
+    }
+
+    /// The line of another run beside the cursor's step.
+    pub fn other_row(&self, other: &Other<'_>) -> Option<&StepRow> {
+        let (_, run) = self.run_named(other.name)?;
+        row_of(run, self.beside(other.name, self.cursor.step)?)
+    }
+
+    fn other_key(&self, other: RunName, step: usize) -> Option<StepKey> {
+        let session = self.session.as_ref()?.id.clone();
+        Some(StepKey { session, target: other.target, run: other.run, step })
+    }
+
+    /// The record of another run beside the cursor's step.
+    pub fn other_trace(&self, other: RunName) -> Slot<'_, StepTrace> {
+        let step = self.beside(other, self.cursor.step);
+        let key = step.and_then(|step| self.other_key(other, step));
+        key.map_or(Slot::Absent, |key| self.cache.trace(&key))
+    }
+
+    /// An array of another run beside the cursor's step.
+    pub fn other_array(&self, other: RunName, name: ArrayName) -> Slot<'_, Raster> {
+        let step = self.beside(other, self.cursor.step);
+        let key = step.and_then(|step| self.other_key(other, step)).map(|key| Key::Array(key, name));
+        key.map_or(Slot::Absent, |key| self.cache.raster(&key))
+    }
+
+    /// The left image of another run's stop.
+    pub fn other_image(&self, other: RunName) -> Slot<'_, Raster> {
+        let step = self.beside(other, self.cursor.step);
+        let key = step.and_then(|step| self.image_key(step, Eye::Left));
+        key.map_or(Slot::Absent, |key| self.cache.raster(&key))
+    }
+
+    /// From which difference on values count as different.
+    pub fn tolerance(&self) -> Tolerance {
+        Tolerance::new(&self.tolerances()).unwrap_or_default()
+    }
+
+    fn tolerances(&self) -> BTreeMap<String, f64> {
+        self.compare.closeness.tolerances().iter().map(|(unit, value)| ((*unit).to_owned(), *value)).collect()
+    }
+
+    /// The metrics of a run, once they are here.
+    pub fn metrics(&self, name: RunName) -> Option<&RunMetrics> {
+        self.compare.metrics.get(&name)?.1.as_ref().ok()
+    }
+
+    /// Why a run's metrics cannot be shown.
+    pub fn metrics_problem(&self, name: RunName) -> Option<&str> {
+        self.compare.metrics.get(&name)?.1.as_ref().err().map(String::as_str)
+    }
+
+    /// One metric of a run.
+    pub fn metric(&self, name: RunName, metric: &str) -> Option<&Metric> {
+        self.metrics(name)?.metrics.iter().find(|found| found.name == metric)
+    }
+
+    /// The view of the left image: about the target where that is held still.
+    pub fn held_view(&self, view: View2d, trace: Option<&StepTrace>) -> View2d {
+        match trace.and_then(place_of_target).filter(|_| self.compare.is_held) {
+            Some(centre) => View2d::At { centre, scale: scale_of(view) },
+            None => view,
+        }
+    }
+
+    /// Asks for what comparing needs and is not known.
+    pub(super) fn sync_compare(&mut self, session: &str) {
+        self.ask_for_comparison(session);
+        self.ask_for_metrics(session);
+    }
+
+    fn ask_for_comparison(&mut self, session: &str) {
+        let Some(runs) = self.compared_names() else { return };
+        let rows =
+            runs.iter().map(|&name| self.run_named(name).map_or(0, |(_, run)| run.rows.len())).collect();
+        let (align, tolerance) = (self.compare.align, self.tolerances());
+        // Values come from the records; asked for are only the alignment, the first divergence and the settings.
+        let new = NewComparison { runs, align, tolerance, columns: Some(Vec::new()) };
+        let asked = Asked { session: session.to_owned(), new, rows };
+        let is_known = self.compare.answer.as_ref().is_some_and(|(known, _)| *known == asked);
+        if is_known || self.compare.under_way.is_some() {
+            return;
+        }
+        self.outbox
+            .push(Request::Compare { session: asked.session.clone(), new: Box::new(asked.new.clone()) });
+        self.compare.under_way = Some(asked);
+    }
+
+    fn ask_for_metrics(&mut self, session: &str) {
+        if !self.compare.wants_metrics {
+            return;
+        }
+        let missing: Vec<(RunName, usize)> = self
+            .all_runs()
+            .map(|(name, _, run)| (name, run.rows.len()))
+            .filter(|(name, rows)| {
+                let known = self.compare.metrics.get(name).is_some_and(|(known, _)| known == rows);
+                *rows > 0 && !known && !self.compare.metrics_asked.contains_key(name)
+            })
+            .take(METRICS_AT_A_TIME.saturating_sub(self.compare.metrics_asked.len()))
+            .collect();
+        for (run, rows) in missing {
+            self.compare.metrics_asked.insert(run, rows);
+            self.outbox.push(Request::Metrics { session: session.to_owned(), run });
+        }
+    }
+
+    /// Takes in a comparison, or why there is none.
+    pub(super) fn took_comparison(&mut self, request: &Request, outcome: Result<Comparison, &Problem>) {
+        let is_meant = |asked: &mut Asked| matches!(request, Request::Compare { session, new } if *session == asked.session && **new == asked.new);
+        let Some(asked) = self.compare.under_way.take_if(is_meant) else { return };
+        self.compare.answer = Some((asked, outcome.map_err(|problem| problem.detail.clone())));
+        if std::mem::take(&mut self.compare.jumps) {
+            self.go_to_first_divergence();
+        }
+    }
+
+    /// Takes in the metrics of a run, or why there are none.
+    pub(super) fn took_metrics(&mut self, run: RunName, outcome: Result<RunMetrics, &Problem>) {
+        if let Some(rows) = self.compare.metrics_asked.remove(&run) {
+            self.compare.metrics.insert(run, (rows, outcome.map_err(|problem| problem.detail.clone())));
+        }
+    }
+
+    /// Forgets what belongs to another session, or may have been missed while the server was gone.
+    pub(super) fn forget_comparisons(&mut self, is_other_session: bool) {
+        if is_other_session {
+            let (wants_metrics, view) = (self.compare.wants_metrics, self.compare.view);
+            self.compare = Compare { wants_metrics, view, ..Compare::default() };
+        } else {
+            (self.compare.answer, self.compare.under_way) = (None, None);
+            self.compare.metrics_asked.clear();
+        }
+    }
+
+    /// Keeps the comparison when another run is looked at: the one looked at before takes its place.
+    pub(super) fn looked_elsewhere(&mut self, before: Option<RunName>, now: Cursor) {
+        let now = now.target.map(|target| RunName { target, run: now.run });
+        let place = self.compare.others.iter().position(|&name| Some(name) == now);
+        match (place, before.filter(|&name| Some(name) != now)) {
+            (Some(place), Some(before)) => self.compare.others[place] = before,
+            (Some(place), None) => drop(self.compare.others.remove(place)),
+            (None, _) => {}
+        }
+    }
+
+    /// Carries out what was asked for.
+    pub(super) fn ask_compare(&mut self, ask: Ask) {
+        match ask {
+            Ask::With { place, run } => self.compare_with(place, run),
+            Ask::Toggle(name) => match self.compare.others.iter().position(|&other| other == name) {
+                Some(place) => self.compare_with(place, None),
+                None => self.compare_with(self.compare.others.len(), Some(name)),
+            },
+            Ask::View(view) => self.compare.view = view,
+            Ask::NextView if self.is_comparing() => {
+                self.compare.view = self.compare.view.next();
+                let view = self.compare.view;
+                self.messages.note(format!("Comparing by {}: {}.", view.word(), view.help()));
+            }
+            Ask::NextView => self.say_how_to_compare(),
+            Ask::Align(align) => self.compare.align = align,
+            Ask::Closeness(closeness) => self.compare.closeness = closeness,
+            Ask::FirstDivergence => self.go_to_first_divergence(),
+            Ask::Blink(is_blinking) => self.compare.is_blinking = is_blinking,
+            Ask::Wipe(at) => self.compare.wipe = Some(at.clamp(0.0, 1.0)),
+            Ask::Stabilise => self.compare.is_held = !self.compare.is_held,
+            Ask::OnionSkin => self.compare.has_onion_skin = !self.compare.has_onion_skin,
+            Ask::Baseline(name) => {
+                let is_baseline = self.compare.baseline == Some(name);
+                self.compare.baseline = (!is_baseline).then_some(name);
+            }
+            Ask::Sort(sort) => self.compare.sort = sort,
+            Ask::Filter(words) => self.compare.filter = words,
+            Ask::Visit { run, step } => {
+                self.apply(Command::Look { target: run.target, run: run.run });
+                self.apply(Command::Go(Go::Step(step)));
+            }
+        }
+    }
+
+    fn say_how_to_compare(&mut self) {
+        let hint =
+            "Choose a run beside “vs” in the top bar. A second run comes from “Run from here” in Settings.";
+        self.messages.problem("There is no run to compare with yet.", Some(hint.to_owned()));
+    }
+
+    fn compare_with(&mut self, place: usize, run: Option<RunName>) {
+        let others = &mut self.compare.others;
+        match run {
+            None if place < others.len() => drop(others.remove(place)),
+            None => {}
+            Some(name) => {
+                let was = others.iter().position(|&other| other == name);
+                if let Some(was) = was.filter(|&was| was != place) {
+                    others.remove(was);
+                }
+                let place = place.min(others.len());
+                if place < others.len() {
+                    others[place] = name;
+                } else if others.len() + 1 < RUNS_MAX {
+                    others.push(name);
+                } else {
+                    let hint = Some("Take one of them out first.".to_owned());
+                    self.messages.problem(format!("At most {RUNS_MAX} runs can be compared."), hint);
+                }
+            }
+        }
+    }
+
+    fn go_to_first_divergence(&mut self) {
+        if !self.is_comparing() {
+            self.say_how_to_compare();
+            return;
+        }
+        if let Some(problem) = self.comparison_problem().map(str::to_owned) {
+            self.messages.problem(problem, None);
+            return;
+        }
+        let other = self.others().first().map(|other| other.name);
+        let found = self
+            .comparison()
+            .and_then(|found| found.first.iter().find(|first| Some(first.run) == other))
+            .cloned();
+        let Some(found) = found else {
+            self.compare.jumps = true;
+            self.messages.note("Comparing the runs …");
+            return;
+        };
+        let labels =
+            [self.own_name(), other].map(|name| name.map_or_else(String::new, |name| self.run_label(name)));
+        let [own, other] = labels;
+        self.messages.note(format!("{own} and {other} {}.", found.sentence));
+        let Some(divergence) = found.divergence else { return };
+        self.cursor.step = divergence.step.min(self.stop_count().saturating_sub(1));
+        let word = divergence.part.unwrap_or(divergence.stage);
+        let stage = Stage::of(self.tracker()).iter().find(|stage| stage.word() == word);
+        self.stage = stage.copied().unwrap_or(Stage::Locate);
+    }
+
+    /// What the compared runs need at a step: their records, and the arrays that are shown beside each other.
+    pub(super) fn want_compared(&self, keys: &mut Vec<Key>) {
+        const SHOWN: [ArrayName; 4] =
+            [ArrayName::Surface, ArrayName::Matched, ArrayName::Rolled, ArrayName::Difference];
+        let step = self.cursor.step;
+        for other in self.others() {
+            // The neighbours' records are small; arrays are fetched for the step that is looked at alone.
+            for near in [Some(step), step.checked_add(1), step.checked_sub(1)].into_iter().flatten() {
+                let there = self.beside(other.name, near).filter(|&step| row_of(other.run, step).is_some());
+                let Some(there) = there else { continue };
+                keys.extend(self.other_key(other.name, there).map(Key::Trace));
+                if near == step {
+                    keys.extend(self.image_key(there, Eye::Left));
+                    if let (Some(trace), Some(key)) =
+                        (self.other_trace(other.name).ready(), self.other_key(other.name, there))
+                    {
+                        let made = SHOWN.into_iter().filter(|&name| super::wanted::has_array(trace, name));
+                        keys.extend(made.map(|name| Key::Array(key.clone(), name)));
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Where a run sees the target: the match, or else the prediction.
+pub fn place_of_target(trace: &StepTrace) -> Option<Pixel> {
+    let located = trace.locate.as_ref().filter(|_| !trace.update.state.is_lost()).and_then(|l| l.left_pixel);
+    located.or_else(|| trace.point_mast.as_ref()?.predicted_left)
+}
+
+/// The magnification of a view; of a fitted one that at which a target is looked at.
+pub fn scale_of(view: View2d) -> f64 {
+    match view {
+        View2d::Fit => HELD_SCALE,
+        View2d::At { scale, .. } => scale,
+    }
+}
