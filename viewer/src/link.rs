@@ -9,14 +9,18 @@
 //! | `tg`, `run`, `step` | the cursor: target, run, stop |
 //! | `stage` | the stage that is looked at |
 //! | `lay` | the arrangement of the panels |
+//! | `vs` | the runs it is compared with, `target.run` each, commas between |
+//! | `cmp` | how the left image shows them |
 //! | `L`, `R` | centre (px) and magnification of the left and right image; left out where the whole image is shown |
 //!
 //! Keys that this version does not know are kept as they are. A key whose value cannot be read is left out, and a
 //! sentence says so; nothing else of the link is lost by it.
 
 use sightline_core::frames::Pixel;
+use sightline_core::session::compare::{RUNS_MAX, RunName};
 
 use crate::command::Stage;
+use crate::compare;
 use crate::layout::presets::Preset;
 use crate::view2d::View2d;
 
@@ -41,6 +45,10 @@ pub struct Fragment {
     pub stage: Option<Stage>,
     /// The arrangement of the panels.
     pub preset: Option<Preset>,
+    /// The runs it is compared with.
+    pub others: Vec<RunName>,
+    /// How the left image shows them; none shows their marks.
+    pub compared: Option<compare::View>,
     /// The view of the left image.
     pub left: Option<View2d>,
     /// The view of the right image.
@@ -68,29 +76,23 @@ impl Fragment {
     /// Takes one part; whether its value could be read.
     fn take(&mut self, key: &str, value: &str) -> bool {
         match key {
-            "v" => return value == VERSION,
-            "session" => self.session = Some(value.to_owned()).filter(|id| is_name(id)),
-            "tg" => self.target = value.parse().ok(),
-            "run" => self.run = value.parse().ok(),
-            "step" => self.step = value.parse().ok(),
-            "stage" => self.stage = Stage::ALL.into_iter().find(|stage| stage.word() == value),
-            "lay" => self.preset = Preset::ALL.into_iter().find(|preset| preset.word() == value),
-            "L" => self.left = view(value),
-            "R" => self.right = view(value),
+            "v" => value == VERSION,
+            "session" => put(&mut self.session, Some(value.to_owned()).filter(|id| is_name(id))),
+            "tg" => put(&mut self.target, value.parse().ok()),
+            "run" => put(&mut self.run, value.parse().ok()),
+            "step" => put(&mut self.step, value.parse().ok()),
+            "stage" => put(&mut self.stage, Stage::ALL.into_iter().find(|stage| stage.word() == value)),
+            "lay" => put(&mut self.preset, Preset::ALL.into_iter().find(|preset| preset.word() == value)),
+            "vs" => runs(value).map(|others| self.others = others).is_some(),
+            "cmp" => {
+                put(&mut self.compared, compare::View::ALL.into_iter().find(|view| hyphened(*view) == value))
+            }
+            "L" => put(&mut self.left, view(value)),
+            "R" => put(&mut self.right, view(value)),
             _ => {
                 self.unknown.push(format!("{key}={value}"));
-                return true;
+                true
             }
-        }
-        match key {
-            "session" => self.session.is_some(),
-            "tg" => self.target.is_some(),
-            "run" => self.run.is_some(),
-            "step" => self.step.is_some(),
-            "stage" => self.stage.is_some(),
-            "lay" => self.preset.is_some(),
-            "L" => self.left.is_some(),
-            _ => self.right.is_some(),
         }
     }
 
@@ -104,6 +106,12 @@ impl Fragment {
         parts.extend(number("step", self.step));
         parts.extend(self.stage.map(|stage| format!("stage={}", stage.word())));
         parts.extend(self.preset.map(|preset| format!("lay={}", preset.word())));
+        if !self.others.is_empty() {
+            let names: Vec<String> =
+                self.others.iter().map(|name| format!("{}.{}", name.target, name.run)).collect();
+            parts.push(format!("vs={}", names.join(",")));
+        }
+        parts.extend(self.compared.map(|view| format!("cmp={}", hyphened(view))));
         parts.extend(self.left.and_then(|view| view_text("L", view)));
         parts.extend(self.right.and_then(|view| view_text("R", view)));
         parts.extend(self.unknown.iter().cloned());
@@ -116,6 +124,26 @@ impl Fragment {
         let place = |link: &Self| (link.session.clone(), link.target, link.run);
         before.session.is_some() && place(self) != place(before)
     }
+}
+
+/// Puts a value where it belongs; whether there was one.
+fn put<T>(place: &mut Option<T>, value: Option<T>) -> bool {
+    *place = value;
+    place.is_some()
+}
+
+/// Compared runs: `0.1,0.2`.
+fn runs(value: &str) -> Option<Vec<RunName>> {
+    let name = |text: &str| {
+        let (target, run) = text.split_once('.')?;
+        Some(RunName { target: target.parse().ok()?, run: run.parse().ok()? })
+    };
+    let names: Vec<RunName> = value.split(',').map(name).collect::<Option<_>>()?;
+    (names.len() < RUNS_MAX).then_some(names)
+}
+
+fn hyphened(view: compare::View) -> String {
+    view.word().replace(' ', "-")
 }
 
 fn is_name(id: &str) -> bool {
@@ -148,7 +176,7 @@ mod tests {
 
     #[test]
     fn a_link_opens_what_it_was_made_of_and_keeps_what_it_does_not_know() {
-        let text = "v=1&session=s7&tg=0&run=2&step=12&stage=judge&lay=match&L=512.5,300.2,8.000&later=x%20y";
+        let text = "v=1&session=s7&tg=0&run=2&step=12&stage=judge&lay=match&vs=0.1,1.0&cmp=side-by-side&L=512.5,300.2,8.000&later=x%20y";
         let link = Fragment::parse(&format!("#{text}"));
         assert_eq!(link.text(), text);
         assert_eq!((link.target, link.run, link.step), (Some(0), Some(2), Some(12)));
@@ -163,7 +191,16 @@ mod tests {
         let link = Fragment::parse("#session=s1&step=-4&stage=dance&L=1,2&run=1&lay=&v=2");
         assert_eq!((link.session.as_deref(), link.run, link.step), (Some("s1"), Some(1), None));
         assert_eq!(link.damaged, ["step=-4", "stage=dance", "L=1,2", "lay=", "v=2"]);
-        for hostile in ["session=../../etc", "session=<script>", "L=nan,1,2", "L=1,2,1e9", "tg=1e3"] {
+        for hostile in [
+            "session=../../etc",
+            "session=<script>",
+            "L=nan,1,2",
+            "L=1,2,1e9",
+            "tg=1e3",
+            "vs=1",
+            "vs=0.0,0.1,0.2,0.3",
+            "cmp=dance",
+        ] {
             assert_eq!(Fragment::parse(hostile).damaged, [hostile]);
         }
         assert!(Fragment::parse(&"x=".repeat(1 << 20)).unknown.len() <= LONGEST);

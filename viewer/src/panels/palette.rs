@@ -19,7 +19,10 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         isize::from(down) - isize::from(up)
     });
     let moved = chosen.saturating_add_signed(step).min(found.len().saturating_sub(1));
-    let modal = Modal::new(Id::unique("palette")).backdrop_color(theme::SHADE).show(ui.ctx(), |ui| {
+    // Hung at the top, so that the field stays where it is while the list grows and shrinks.
+    let place = Modal::default_area(Id::unique("palette")).anchor(egui::Align2::CENTER_TOP, [0.0, 90.0]);
+    let modal = Modal::new(Id::unique("palette")).area(place);
+    let modal = modal.backdrop_color(theme::SHADE).show(ui.ctx(), |ui| {
         ui.set_width(520.0);
         let field = egui::TextEdit::singleline(&mut words)
             .hint_text("an action, a step, a panel, a setting, a value")

@@ -1,6 +1,9 @@
 //! What the page's address says, and how an address becomes what is looked at.
 
+use sightline_core::session::compare::RunName;
+
 use super::State;
+use crate::compare;
 use crate::link::Fragment;
 use crate::net::Request;
 use crate::state::run_letter;
@@ -17,6 +20,9 @@ impl State {
             run: self.cursor.target.map(|_| self.cursor.run),
             step: Some(self.cursor.step),
             stage: Some(self.stage()),
+            others: self.compare.others.clone(),
+            compared: Some(self.compare.view)
+                .filter(|view| self.is_comparing() && *view != compare::View::Marks),
             left: at(self.views.left),
             right: at(self.views.right),
             ..Fragment::default()
@@ -74,6 +80,18 @@ impl State {
             }
             self.cursor.step = step.min(last);
         }
+        let is_there = |name: &RunName| {
+            let target = session.targets.iter().find(|target| target.number == name.target);
+            target.is_some_and(|target| target.runs.iter().any(|run| run.number == name.run))
+        };
+        let (others, missing): (Vec<RunName>, Vec<RunName>) =
+            link.others.iter().partition(|name| is_there(name));
+        for name in missing {
+            let letter = run_letter(name.run);
+            self.messages.problem(format!("The link compares with run {letter}, which is not there."), None);
+        }
+        self.compare.others = others;
+        self.compare.view = link.compared.unwrap_or_default();
         self.stage = link.stage.unwrap_or(self.stage);
         self.views.left = link.left.unwrap_or(View2d::Fit);
         self.views.right = link.right.unwrap_or(View2d::Fit);
