@@ -34,6 +34,8 @@ pub mod photometry;
 pub mod exports;
 pub mod studies;
 pub mod events;
+pub mod trackability;
+pub mod first;
 pub mod openapi;
 pub mod page;
 pub mod rerun_log;

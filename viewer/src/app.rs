@@ -6,10 +6,10 @@ use egui_tiles::Tree;
 use crate::command::Command;
 use crate::layout::{LeftImage, Pane, Panels, overview};
 use crate::net::{Net, Request};
-use crate::panels::{bars, help, timeline};
+use crate::panels::{bars, help, timeline, tour as bubbles};
 use crate::state::{Connection, State};
 use crate::status::Publisher;
-use crate::{keys, theme};
+use crate::{keys, theme, tour};
 
 /// Where a page begins.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,6 +28,7 @@ pub struct SightlineApp {
     left_image: LeftImage,
     publisher: Publisher,
     linked: Option<String>,
+    is_tour_kept: bool,
 }
 
 impl SightlineApp {
@@ -36,9 +37,11 @@ impl SightlineApp {
         theme::apply(context);
         let mut state = State::new(link.origin.clone(), link.session);
         state.begin();
+        state.tour.is_seen = tour::was_seen();
+        let is_tour_kept = state.tour.is_seen;
         let net = Net::new(link.origin, context.clone());
         let (left_image, publisher, linked) = (None, Publisher::default(), None);
-        Self { state, net, tree: overview(), left_image, publisher, linked }
+        Self { state, net, tree: overview(), left_image, publisher, linked, is_tour_kept }
     }
 
     /// Takes in what arrived and asks for what is missing.
@@ -85,16 +88,18 @@ impl SightlineApp {
         let mut out = keys::commands(ui.ctx(), &self.state);
         let state = &self.state;
         let bar = Frame::new().fill(theme::BAR).inner_margin(Margin::symmetric(10, 3));
-        Panel::top("top").exact_size(34.0).frame(bar).show(ui, |ui| bars::top(ui, state, &mut out));
+        let top = Panel::top("top").exact_size(34.0).frame(bar).show(ui, |ui| bars::top(ui, state, &mut out));
+        tour::here(ui.ctx(), tour::TOP, top.response.rect);
         if matches!(state.connection, Connection::Gone { .. }) {
             Panel::top("banner").frame(bar).show(ui, |ui| bars::banner(ui, state, &mut out));
         }
         Panel::bottom("stages").exact_size(30.0).frame(bar).show(ui, |ui| bars::stages(ui, state, &mut out));
         let foot = Frame::new().fill(theme::PANEL).inner_margin(Margin::symmetric(10, 4));
-        Panel::bottom("timeline").exact_size(timeline::HEIGHT + 36.0).frame(foot).show(ui, |ui| {
+        let band = Panel::bottom("timeline").exact_size(timeline::HEIGHT + 36.0).frame(foot).show(ui, |ui| {
             bars::transport(ui, state, &mut out);
             timeline::show(ui, state, &mut out);
         });
+        tour::here(ui.ctx(), tour::TIMELINE, band.response.rect);
         let mut panels = Panels { state, out: &mut out, left_image: None, seen: Vec::new() };
         CentralPanel::default()
             .frame(Frame::new().fill(theme::PAGE))
@@ -103,6 +108,7 @@ impl SightlineApp {
         let [is_history_seen, is_studies_seen] =
             [Pane::History, Pane::Studies].map(|pane| panels.seen.contains(&pane));
         help::show(ui, state, &mut out);
+        bubbles::show(ui, state, &mut out);
         // Every step's window is worth fetching only while the panel that shows them is on the screen.
         self.state.wants_history = is_history_seen;
         if is_studies_seen {
@@ -122,6 +128,14 @@ impl SightlineApp {
         self.send();
         // What was asked for shows in the next frame, which otherwise only comes with the next event.
         context.request_repaint();
+    }
+
+    /// Remembers that the tour was seen.
+    fn keep_tour(&mut self) {
+        if self.state.tour.is_seen && !self.is_tour_kept {
+            tour::remember_seen();
+            self.is_tour_kept = true;
+        }
     }
 
     /// Tells the page what is open, so that its link opens the same again.
@@ -150,6 +164,7 @@ impl eframe::App for SightlineApp {
             context.open_url(egui::OpenUrl::new_tab(url));
         }
         self.keep_link();
+        self.keep_tour();
         self.wake_for_retries(&context);
         self.publisher.publish(&self.state, &self.left_image, context.zoom_factor());
     }

@@ -8,6 +8,8 @@ use crate::state::calculator::Calculator;
 use crate::state::studies::Order;
 use crate::stretch::Stretch;
 use crate::tables::FeatureView;
+use crate::aim::Aim;
+use crate::tour::Turn;
 use crate::view2d::View2d;
 
 /// Where to go along the drive.
@@ -259,6 +261,8 @@ pub enum Layer {
     Cloud,
     /// How far from the prediction a registration by shape can start.
     Basin,
+    /// How well a target would do, while one is picked.
+    Trackability,
 }
 
 impl Layer {
@@ -365,4 +369,8 @@ pub enum Command {
     Dismiss(u64),
     /// Connects again at once.
     Reconnect,
+    /// Changes or takes the place that is being chosen.
+    Aim(Aim),
+    /// Leads through the tour.
+    Tour(Turn),
 }

@@ -5,9 +5,11 @@ use egui::{Context, Event, Key, Modifiers};
 use crate::command::{Command, Go, Mode, Stage};
 use crate::state::State;
 use crate::stretch::Stretch;
+use crate::aim::Aim;
+use crate::tour;
 
 /// Every key with its meaning, as the help sheet lists them.
-pub const SHEET: [(&str, &str); 16] = [
+pub const SHEET: [(&str, &str); 18] = [
     ("Right  Left", "next, previous step"),
     ("Shift+Right  Shift+Left", "ten steps on, back"),
     ("Home  End", "first, last step"),
@@ -15,6 +17,8 @@ pub const SHEET: [(&str, &str); 16] = [
     ("G", "go to a step by its number"),
     ("Up  Down", "previous, next stage"),
     ("T", "pick a target: then click in the left image"),
+    ("Arrows, Enter", "while picking: move the aim by 0.1 px (Shift 1 px), take it"),
+    ("Enter  Backspace  Esc", "in the tour: next, back, skip"),
     ("R", "run from this step with the changed settings"),
     ("F", "fit all images to their panels"),
     ("H", "hide or show all marks"),
@@ -31,8 +35,11 @@ pub fn commands(context: &Context, state: &State) -> Vec<Command> {
     if context.text_edit_focused() {
         return Vec::new();
     }
+    // A key that presses the button with the focus means nothing else.
+    let has_focus = context.memory(|memory| memory.focused().is_some());
     context.input(|input| {
         let pressed = input.events.iter().filter_map(|event| match event {
+            Event::Key { key: Key::Enter | Key::Space, .. } if has_focus => None,
             Event::Key { key, pressed: true, modifiers, .. } => command(*key, *modifiers, state),
             _ => None,
         });
@@ -48,6 +55,12 @@ pub fn command(key: Key, modifiers: Modifiers, state: &State) -> Option<Command>
     let shift = modifiers.shift;
     if !matches!(state.mode, Mode::Look | Mode::Pick) {
         return (key == Key::Escape).then_some(Command::SetMode(Mode::Look));
+    }
+    if let Some(aim) = Aim::of_key(key, shift).filter(|_| state.mode == Mode::Pick) {
+        return Some(Command::Aim(aim));
+    }
+    if let Some(turn) = tour::of_key(key, state) {
+        return Some(Command::Tour(turn));
     }
     Some(match key {
         Key::ArrowRight => Command::Go(Go::By(if shift { 10 } else { 1 })),

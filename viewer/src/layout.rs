@@ -181,6 +181,7 @@ pub struct Panels<'a> {
 impl Behavior<Pane> for Panels<'_> {
     fn pane_ui(&mut self, ui: &mut Ui, _tile: TileId, pane: &mut Pane) -> UiResponse {
         self.seen.push(*pane);
+        crate::tour::here(ui.ctx(), pane.title(), ui.max_rect());
         let margin = match pane {
             Pane::Strip | Pane::History => Margin::symmetric(theme::MARGIN, 3),
             Pane::Left | Pane::Right | Pane::Surface => Margin { left: 4, right: 4, top: 4, bottom: 0 },

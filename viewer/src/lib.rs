@@ -12,6 +12,8 @@
 //! | `layout` | where the panels are |
 //! | `view2d`, `overlay`, `ellipse`, `contour` | the zoomable canvas and the marks on it |
 //! | `theme` | colours, text styles and spacing, and nowhere else |
+//! | `aim` | choosing a place in the left image |
+//! | `tour` | the six bubbles for a new user |
 //! | `status` | the machine-readable status for tests in a browser |
 
 pub mod app;
@@ -32,6 +34,8 @@ pub mod ellipse;
 pub mod contour;
 pub mod theme;
 pub mod status;
+pub mod aim;
+pub mod tour;
 #[cfg(target_arch = "wasm32")]
 pub mod web;
 #[cfg(test)]

@@ -58,6 +58,19 @@ pub(crate) fn keep_link(session: &str) {
     }
 }
 
+/// Keeps a word in the browser's own storage; where the browser forbids it, it is forgotten with the page.
+pub(crate) fn remember(name: &str, word: &str) {
+    let storage = web_sys::window().and_then(|window| window.local_storage().ok().flatten());
+    if let Some(storage) = storage {
+        storage.set_item(name, word).unwrap_or_default();
+    }
+}
+
+/// A word that was kept.
+pub(crate) fn recall(name: &str) -> Option<String> {
+    web_sys::window()?.local_storage().ok()??.get_item(name).ok()?
+}
+
 /// Sets an attribute of the canvas.
 pub(crate) fn publish(name: &str, value: &str) {
     let document = web_sys::window().and_then(|window| window.document());

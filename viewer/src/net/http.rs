@@ -90,6 +90,14 @@ fn describe(request: &Request) -> (Method, String, Option<Vec<u8>>) {
         Request::StudyRows(job) => get(format!("studies/jobs/{job}/rows")),
         Request::Item(key) => get(item_path(key)),
         Request::Reconnect => get(String::new()),
+        Request::Trackability { traverse, step } => {
+            get(format!("traverses/{traverse}/steps/{step}/trackability"))
+        }
+        Request::CancelTrackability { traverse, step } => (
+            Method::POST,
+            format!("traverses/{traverse}/steps/{step}/trackability/cancel"),
+            json(&serde_json::json!({})),
+        ),
     }
 }
 
@@ -139,7 +147,9 @@ fn read(request: &Request, response: &ehttp::Response, context: &egui::Context) 
         | Request::RemoveTarget { .. }
         | Request::CancelRun { .. }
         | Request::ResumeRun { .. }
+        | Request::CancelTrackability { .. }
         | Request::Reconnect => Reply::Done,
+        Request::Trackability { .. } => Reply::Trackability(Box::new(parse(bytes)?)),
     })
 }
 
@@ -170,6 +180,7 @@ fn problem(response: &ehttp::Response) -> Problem {
         status: response.status,
         detail: format!("The server answered {} {}.", response.status, response.status_text),
         hint: None,
+        nearest_pixel: None,
     })
 }
 
@@ -180,6 +191,7 @@ fn unreachable(why: &str) -> Problem {
         status: 0,
         detail: format!("The server does not answer ({why})."),
         hint: None,
+        nearest_pixel: None,
     }
 }
 
@@ -190,6 +202,7 @@ fn misread(why: &str) -> Problem {
         status: 500,
         detail: format!("The server's answer cannot be read: {why}."),
         hint: Some("Page and server may be of different versions: load the page again.".to_owned()),
+        nearest_pixel: None,
     }
 }
 

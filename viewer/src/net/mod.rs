@@ -15,6 +15,7 @@ use sightline_core::session::wire::{
 
 use sightline_core::study::row::Row;
 use sightline_core::study::wire::{NewStudy, StudyInfo, StudyJob};
+use sightline_core::trackability::MapProgress;
 
 use self::events::Events;
 use crate::cache::{Item, Key};
@@ -107,6 +108,20 @@ pub enum Request {
     Item(Key),
     /// To connect to the events again at once.
     Reconnect,
+    /// The trackability of a stop.
+    Trackability {
+        /// The traverse.
+        traverse: String,
+        /// The stop.
+        step: usize,
+    },
+    /// To give it up.
+    CancelTrackability {
+        /// The traverse.
+        traverse: String,
+        /// The stop.
+        step: usize,
+    },
 }
 
 /// What the server answered.
@@ -144,6 +159,8 @@ pub enum Reply {
     Item(Item),
     /// It is done.
     Done,
+    /// The trackability of a stop, as far as it was made.
+    Trackability(Box<MapProgress>),
 }
 
 /// An answer with what was asked.

@@ -25,6 +25,8 @@ pub mod surface;
 pub mod targets;
 pub mod timeline;
 pub mod tolerances;
+pub mod picking;
+pub mod tour;
 
 use egui::{Align, Layout, RichText, Ui, UiBuilder};
 

@@ -68,6 +68,8 @@ impl State {
             }
             Command::Dismiss(id) => self.messages.dismiss(id),
             Command::Reconnect => self.outbox.push(Request::Reconnect),
+            Command::Aim(aim) => self.aim(aim),
+            Command::Tour(turn) => self.turn_tour(turn),
         }
     }
 
