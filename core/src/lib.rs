@@ -38,6 +38,7 @@ pub mod locate;
 pub mod trace;
 pub mod pipeline;
 pub mod designate;
+pub mod trackability;
 pub mod traverse;
 pub mod sim;
 pub mod session;

@@ -125,7 +125,11 @@ async fn follow(live: Arc<LiveSession>, stream: Arc<LiveStream>, mut events: Rec
             match events.recv().await {
                 Ok(Event::SessionChanged { session } | Event::RunProgress { session, .. })
                     if session != live.id => {}
-                Ok(Event::RenderProgress { .. } | Event::StudyProgress { .. }) => {}
+                Ok(
+                    Event::RenderProgress { .. }
+                    | Event::StudyProgress { .. }
+                    | Event::TrackabilityProgress { .. },
+                ) => {}
                 Ok(_) | Err(RecvError::Lagged(_)) => break,
                 Err(RecvError::Closed) => return,
             }

@@ -35,6 +35,8 @@ pub mod compare;
 pub mod exports;
 pub mod studies;
 pub mod events;
+pub mod trackability;
+pub mod first;
 pub mod openapi;
 pub mod page;
 pub mod rerun_log;

@@ -11,7 +11,8 @@ use utoipa_axum::routes;
 
 use crate::state::AppState;
 use crate::{
-    about, compare, events, exports, photometry, runs, sessions, settings, steps, studies, targets, traverses,
+    about, compare, events, exports, photometry, runs, sessions, settings, steps, studies, targets,
+    trackability, traverses,
 };
 
 #[derive(OpenApi)]
@@ -43,6 +44,7 @@ pub fn router() -> OpenApiRouter<AppState> {
         .merge(exports::router())
         .merge(studies::router())
         .merge(events::router())
+        .merge(trackability::router())
 }
 
 /// This document

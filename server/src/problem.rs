@@ -6,6 +6,7 @@
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use sightline_core::error::Error;
+use sightline_core::frames::Pixel;
 use sightline_core::session::wire::Problem;
 use utoipa::openapi::{ContentBuilder, RefOr, ResponseBuilder};
 
@@ -32,6 +33,7 @@ impl ApiError {
             status: status.as_u16(),
             detail: detail.into(),
             hint: None,
+            nearest_pixel: None,
         });
         Self { problem, log: None }
     }
@@ -40,6 +42,13 @@ impl ApiError {
     #[must_use]
     pub fn hint(mut self, hint: impl Into<String>) -> Self {
         self.problem.hint = Some(hint.into());
+        self
+    }
+
+    /// Adds the nearest pixel that would do.
+    #[must_use]
+    pub fn nearest_pixel(mut self, pixel: Pixel) -> Self {
+        self.problem.nearest_pixel = Some(Box::new(pixel));
         self
     }
 

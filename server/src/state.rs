@@ -20,6 +20,7 @@ use crate::rerun_log::LiveStream;
 use crate::runner;
 use crate::store::{self, Store};
 use crate::study::shelf::Shelf;
+use crate::trackability::Maps;
 
 /// Events that a slow page may be behind before it is told to read everything again.
 const EVENT_BACKLOG: usize = 256;
@@ -57,6 +58,7 @@ struct Inner {
     exports: Lane,
     studies: Shelf,
     streams: Mutex<BTreeMap<String, Arc<LiveStream>>>,
+    maps: Maps,
 }
 
 #[derive(Default)]
@@ -121,6 +123,7 @@ impl AppState {
             exports: Lane::new(1, 8),
             studies,
             streams: Mutex::default(),
+            maps: Maps::default(),
         })))
     }
 
@@ -241,6 +244,11 @@ impl AppState {
     /// The studies that were started.
     pub fn studies(&self) -> &Shelf {
         &self.0.studies
+    }
+
+    /// The trackability of stops.
+    pub fn maps(&self) -> &Maps {
+        &self.0.maps
     }
 
     /// The live Rerun streams, by session.

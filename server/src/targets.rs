@@ -18,6 +18,7 @@ use crate::live::{LiveSession, TARGET_LIMIT};
 use crate::problem::{ApiError, ApiResult};
 use crate::runner;
 use crate::state::AppState;
+use crate::trackability;
 
 /// How many characters a label may have.
 const LABEL_LIMIT: usize = 100;
@@ -72,7 +73,9 @@ fn add(state: &AppState, live: &Arc<LiveSession>, new: NewTarget, settings: Sett
     has_room(live.with(|session| session.targets.len()))?;
     let named = new.place().name(&live.traverse.traverse, new.step)?;
     let designation = named.designation;
-    let first = Arc::new(runner::designate(&live.traverse, designation, &settings)?);
+    let first = runner::designate(&live.traverse, designation, &settings)
+        .map_err(|error| trackability::refusal(state, &live.traverse, designation, &settings, error))?;
+    let first = Arc::new(first);
     let gap_m = named.gap_m(&first);
     let (target, view) = live.with(|session| {
         has_room(session.targets.len())?;

@@ -16,4 +16,5 @@ mod recorded_cameras;
 mod recorded_tracking;
 mod rerun_export;
 mod studies;
+mod trackability;
 mod zncc_reference;

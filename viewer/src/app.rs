@@ -7,10 +7,10 @@ use crate::layout::workspace::Workspace;
 use crate::layout::{LeftImage, Pane, Panels, region};
 use crate::link::Fragment;
 use crate::net::{Net, Request};
-use crate::panels::{bars, help, palette, timeline};
+use crate::panels::{bars, help, palette, timeline, tour as bubbles};
 use crate::state::{Connection, State};
 use crate::status::Publisher;
-use crate::{keep, keys, theme};
+use crate::{keep, keys, theme, tour};
 
 /// Where a page begins.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,6 +31,7 @@ pub struct SightlineApp {
     /// The link as the page's address has it.
     linked: Fragment,
     kept: keep::Kept,
+    is_tour_kept: bool,
 }
 
 impl SightlineApp {
@@ -47,8 +48,11 @@ impl SightlineApp {
         state.begin();
         let linked = link.fragment.clone();
         state.open_link(link.fragment);
+        state.tour.is_seen = tour::was_seen();
+        let is_tour_kept = state.tour.is_seen;
         let net = Net::new(link.origin, context.clone());
-        Self { state, net, workspace, left_image: None, publisher: Publisher::default(), linked, kept }
+        let (left_image, publisher) = (None, Publisher::default());
+        Self { state, net, workspace, left_image, publisher, linked, kept, is_tour_kept }
     }
 
     /// Takes in what arrived and asks for what is missing.
@@ -95,10 +99,11 @@ impl SightlineApp {
         let mut out = keys::commands(ui.ctx(), &self.state);
         let state = &self.state;
         let bar = Frame::new().fill(theme::BAR).inner_margin(Margin::symmetric(10, 3));
-        Panel::top("top").exact_size(34.0).frame(bar).show(ui, |ui| {
+        let top = Panel::top("top").exact_size(34.0).frame(bar).show(ui, |ui| {
             region(ui, "Status and actions", ui.max_rect());
             bars::top(ui, state, &mut out);
         });
+        tour::here(ui.ctx(), tour::TOP, top.response.rect);
         if matches!(state.connection, Connection::Gone { .. }) {
             Panel::top("banner").frame(bar).show(ui, |ui| bars::banner(ui, state, &mut out));
         }
@@ -107,11 +112,12 @@ impl SightlineApp {
             bars::stages(ui, state, &mut out);
         });
         let foot = Frame::new().fill(theme::PANEL).inner_margin(Margin::symmetric(10, 4));
-        Panel::bottom("timeline").exact_size(timeline::HEIGHT + 36.0).frame(foot).show(ui, |ui| {
+        let band = Panel::bottom("timeline").exact_size(timeline::HEIGHT + 36.0).frame(foot).show(ui, |ui| {
             region(ui, "Timeline", ui.max_rect());
             bars::transport(ui, state, &mut out);
             timeline::show(ui, state, &mut out);
         });
+        tour::here(ui.ctx(), tour::TIMELINE, band.response.rect);
         let mut panels = Panels::new(state, &mut out);
         CentralPanel::default()
             .frame(Frame::new().fill(theme::PAGE))
@@ -122,6 +128,7 @@ impl SightlineApp {
         let wants_metrics = [Pane::Runs, Pane::Uncertainty].iter().any(|pane| panels.seen.contains(pane));
         help::show(ui, state, &mut out);
         palette::show(ui, state, &mut out);
+        bubbles::show(ui, state, &mut out);
         self.state.compare.wants_metrics = wants_metrics;
         // Every step's window is worth fetching only while the panel that shows them is on the screen.
         self.state.wants_history = is_history_seen;
@@ -154,6 +161,14 @@ impl SightlineApp {
     fn fragment(&self) -> Fragment {
         let preset = Some(self.workspace.preset());
         Fragment { preset, unknown: self.linked.unknown.clone(), ..self.state.fragment() }
+    }
+
+    /// Remembers that the tour was seen.
+    fn keep_tour(&mut self) {
+        if self.state.tour.is_seen && !self.is_tour_kept {
+            tour::remember_seen();
+            self.is_tour_kept = true;
+        }
     }
 
     fn copy_link(&mut self, context: &Context) {
@@ -203,6 +218,7 @@ impl eframe::App for SightlineApp {
             context.open_url(egui::OpenUrl::new_tab(url));
         }
         self.keep_link();
+        self.keep_tour();
         self.kept.write(&context, self.state.looks, || self.workspace.kept());
         self.wake_for_retries(&context);
         self.publisher.publish(&self.state, &self.left_image, context.zoom_factor());

@@ -3,6 +3,7 @@
 use sightline_core::frames::Pixel;
 use sightline_core::settings::{Changes, TrackerKind};
 
+use crate::aim::Aim;
 use crate::layout::workspace::LayoutCommand;
 use crate::shape_view::ShapeView;
 use crate::state::calculator::Calculator;
@@ -10,6 +11,7 @@ use crate::state::studies::Order;
 use crate::stretch::Stretch;
 use crate::tables::FeatureView;
 use crate::theme::Looks;
+use crate::tour::Turn;
 use crate::view2d::View2d;
 
 /// Where to go along the drive.
@@ -285,6 +287,8 @@ pub enum Layer {
     Basin,
     /// The runs that are compared with the one looked at.
     Compared,
+    /// How well a target would do, while one is picked.
+    Trackability,
 }
 
 impl Layer {
@@ -410,4 +414,8 @@ pub enum Command {
     SetLooks(Looks),
     /// Something about comparing runs.
     Compare(crate::compare::Ask),
+    /// Changes or takes the place that is being chosen.
+    Aim(Aim),
+    /// Leads through the tour.
+    Tour(Turn),
 }

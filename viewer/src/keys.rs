@@ -2,15 +2,16 @@
 
 use egui::{Context, Event, Key, Modifiers};
 
+use crate::aim::Aim;
 use crate::command::{Command, Go, Mode, Stage};
 use crate::layout::presets::Preset;
 use crate::layout::workspace::LayoutCommand;
 use crate::state::State;
 use crate::stretch::Stretch;
-use crate::{actions, compare};
+use crate::{actions, compare, tour};
 
 /// Every key with its meaning, as the help sheet lists them.
-pub const SHEET: [(&str, &str); 21] = [
+pub const SHEET: [(&str, &str); 23] = [
     ("Right  Left", "next, previous step"),
     ("Shift+Right  Shift+Left", "ten steps on, back"),
     ("Home  End", "first, last step"),
@@ -18,6 +19,8 @@ pub const SHEET: [(&str, &str); 21] = [
     ("G", "go to a step by its number"),
     ("Up  Down", "previous, next stage"),
     ("T", "pick a target: then click in the left image"),
+    ("Arrows, Enter", "while picking: move the aim by 0.1 px (Shift 1 px), take it"),
+    ("Enter  Backspace  Esc", "in the tour: next, back, skip"),
     ("R", "run from this step with the changed settings"),
     ("F", "fit all images to their panels"),
     ("H", "hide or show all marks"),
@@ -122,6 +125,12 @@ pub fn command(key: Key, modifiers: Modifiers, state: &State) -> Option<Command>
     let shift = modifiers.shift;
     if !matches!(state.mode, Mode::Look | Mode::Pick) {
         return (key == Key::Escape).then_some(Command::SetMode(Mode::Look));
+    }
+    if let Some(aim) = Aim::of_key(key, shift).filter(|_| state.mode == Mode::Pick) {
+        return Some(Command::Aim(aim));
+    }
+    if let Some(turn) = tour::of_key(key, state) {
+        return Some(Command::Tour(turn));
     }
     if let Some(preset) = preset_of(key).filter(|_| shift) {
         return Some(Command::Layout(LayoutCommand::Use(preset)));

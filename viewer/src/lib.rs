@@ -14,6 +14,8 @@
 //! | `view2d`, `overlay`, `ellipse`, `contour` | the zoomable canvas and the marks on it |
 //! | `theme` | colours, text styles and spacing, and nowhere else |
 //! | `access` | the page for a screen reader: egui's tree as elements of the document |
+//! | `aim` | choosing a place in the left image |
+//! | `tour` | the six bubbles for a new user |
 //! | `status` | the machine-readable status for tests in a browser |
 
 pub mod app;
@@ -39,6 +41,8 @@ pub mod contour;
 pub mod theme;
 pub mod access;
 pub mod status;
+pub mod aim;
+pub mod tour;
 #[cfg(target_arch = "wasm32")]
 pub mod web;
 #[cfg(test)]

@@ -9,6 +9,7 @@ use egui::{
     Visuals,
 };
 use sightline_core::target::TrackingState;
+use sightline_core::trackability::Verdict;
 
 /// The page behind everything; the boot page has the same colour.
 pub const PAGE: Color32 = Color32::from_rgb(0x10, 0x12, 0x15);
@@ -166,6 +167,20 @@ pub fn score(share: f32) -> Color32 {
 /// Blue–white–red over signed values from −`limit` to `limit`.
 pub fn signed(value: f32, limit: f32) -> Color32 {
     ramp(colorous::RED_BLUE, 0.5 - f64::from(value / limit) / 2.0)
+}
+
+/// How well a target would do.
+pub fn trackability(verdict: Verdict) -> Color32 {
+    match verdict {
+        Verdict::Good => TRACKING,
+        Verdict::Risky => LOST,
+        Verdict::Bad => FAILED,
+    }
+}
+
+/// The same laid over an image, which stays visible.
+pub fn trackability_fill(verdict: Verdict) -> Color32 {
+    trackability(verdict).gamma_multiply(0.16)
 }
 
 /// Grey from black (0) to white (1); transparent where there is no value.

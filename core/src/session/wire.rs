@@ -211,6 +211,19 @@ pub enum Event {
         /// How it stands.
         job: StudyJob,
     },
+    /// Rows of a stop's trackability were made.
+    TrackabilityProgress {
+        /// The traverse.
+        traverse: String,
+        /// The stop.
+        step: usize,
+        /// Rows of cells done.
+        k: usize,
+        /// Rows of cells in all; 0 before that is known.
+        n: usize,
+        /// Whether nothing more will come.
+        ended: bool,
+    },
 }
 
 /// A problem as the server reports it (RFC 9457).
@@ -227,4 +240,7 @@ pub struct Problem {
     /// How to mend it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hint: Option<String>,
+    /// The nearest pixel of the left image that would do, where one was refused.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nearest_pixel: Option<Box<Pixel>>,
 }

@@ -37,7 +37,13 @@ const FILES: &[(&str, &str)] = &[
     ("k9-5", include_str!("library/k9-5.toml")),
     ("k9-7.5", include_str!("library/k9-7.5.toml")),
     ("k9-10", include_str!("library/k9-10.toml")),
+    ("heading-jump", include_str!("library/heading-jump.toml")),
 ];
+
+/// The scenario with which a new user begins, by its name here …
+pub const FIRST: &str = "heading-jump";
+/// … and by the name that its traverse has.
+pub const FIRST_NAME: &str = "a heading that jumps";
 
 /// The names of the library's scenarios, in the order in which they are listed.
 pub fn names() -> impl Iterator<Item = &'static str> {
@@ -77,6 +83,19 @@ mod tests {
             );
             assert!(scenario.description.len() > 40, "{name}: say what it stages");
         }
+    }
+
+    #[test]
+    fn the_first_scenario_has_sixty_stops_and_the_name_by_which_it_is_known() {
+        let first = scenario(FIRST).unwrap();
+        assert_eq!(first.name, FIRST_NAME);
+        let drive = &first.drive;
+        let stops = crate::sim::rover::drive::distances_m(
+            drive.start_distance_m,
+            drive.end_distance_m,
+            drive.step_fraction,
+        );
+        assert_eq!(stops.len(), 60);
     }
 
     #[test]

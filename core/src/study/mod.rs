@@ -11,6 +11,7 @@
 //! realism     how hard a world is for plain correlation
 //! real_motion the motion of recorded frames against their poses
 //! registration surfaces registered by their shape where the motion is known
+//! trackability targets drawn where the map says good, risky or bad, tracked against the truth
 //! ```
 
 pub mod scenery;
@@ -37,3 +38,4 @@ pub mod realism;
 pub mod exposure;
 pub mod real_motion;
 pub mod registration;
+pub mod trackability;

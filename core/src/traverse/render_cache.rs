@@ -28,6 +28,7 @@ use super::files::write_atomically;
 use crate::camera::Camera;
 use crate::image::{GrayImage, npy};
 use crate::sim::Scenario;
+use crate::sim::scenario::RoverSettings;
 
 /// Name of the cache folder within the folder of a traverse.
 pub const CACHE_FOLDER: &str = "cache";
@@ -131,6 +132,7 @@ pub(super) fn key(scenario: &Scenario, moment: &impl Serialize, camera_in_site: 
         odometry_error: default.odometry_error,
         targets: default.targets,
         camera: scenario.camera.of_radiance(),
+        rover: RoverSettings { heading_jumps: Vec::new(), ..scenario.rover.clone() },
         ..scenario.clone()
     };
     let all = (env!("CARGO_PKG_VERSION"), of_radiance, moment, camera_in_site);
@@ -143,7 +145,7 @@ pub(super) fn key(scenario: &Scenario, moment: &impl Serialize, camera_in_site: 
 mod tests {
     use super::*;
     use crate::camera::Mast;
-    use crate::sim::scenario::{CameraRig, ExposureMode, Quantisation};
+    use crate::sim::scenario::{CameraRig, ExposureMode, HeadingJump, Quantisation};
 
     fn camera() -> Camera {
         Mast::spirit().left_in_head.downsampled(64)
@@ -245,6 +247,7 @@ mod tests {
         other.name = "another name".into();
         other.odometry_error.attitude_deg = 1.0;
         other.targets.count += 1;
+        other.rover.heading_jumps = vec![HeadingJump { stop: 1, yaw_deg: 2.0 }];
         other.camera.noise_seed = Some(7);
         other.camera.exposure = ExposureMode::Subframe;
         other.camera.auto_exposure.start_s = 1.0;

@@ -20,6 +20,7 @@ mod scenery_pictures;
 mod open;
 mod say;
 mod sheet;
+mod trackability;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;
@@ -40,7 +41,7 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Open traverses in the browser; without any, a simulated demonstration.
+    /// Open traverses in the browser; without any, a simulated drive whose target is lost.
     Serve(serve::Serve),
     /// List the scenarios that come with the program, or print one.
     Scenarios(scenarios::Scenarios),

@@ -6,17 +6,17 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use sightline_core::error::{Error, Result};
-use sightline_core::sim::Scenario;
 use sightline_core::traverse::Traverse;
 
 use super::{open, say};
+use crate::first;
 use crate::guard::Hosts;
 use crate::state::{AppState, Folders};
 
 /// Open traverses in the browser.
 #[derive(Debug, Args)]
 pub struct Serve {
-    /// Folders or indexes of traverses, or scenarios to simulate; none for the demonstration.
+    /// Folders or indexes of traverses, or scenarios to simulate; none for the first drive, with a target that is lost.
     traverses: Vec<PathBuf>,
     /// The port; 0 for any free one.
     #[arg(long, default_value_t = 7700)]
@@ -54,6 +54,10 @@ impl Serve {
         if !self.listen.is_loopback() {
             say::error("warning: anyone who reaches this address can use the server");
         }
+        if self.traverses.is_empty() {
+            let begun = first::begin(&state, &first::scenario()?);
+            begun.map_err(|problem| Error::Request(problem.problem().detail.clone()))?;
+        }
         let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build();
         let runtime = runtime.map_err(|error| Error::Request(format!("cannot start: {error}")))?;
         runtime.block_on(serve(listener, address, state))
@@ -61,7 +65,7 @@ impl Serve {
 
     fn open_traverses(&self, data: &Path) -> Result<Vec<Traverse>> {
         if self.traverses.is_empty() {
-            return Ok(vec![open::simulated(&Scenario::demo(), data)?]);
+            return Ok(vec![open::simulated(&first::scenario()?, data)?]);
         }
         self.traverses.iter().map(|path| open::open(path, Some(data))).collect()
     }

@@ -17,6 +17,7 @@ use super::realism;
 use super::registration;
 use super::say::{self, Progress};
 use super::scenery;
+use super::trackability;
 use crate::jobs::lock;
 use crate::state::slug;
 use crate::study::{self, Order, Seeds, tables};
@@ -70,6 +71,8 @@ enum Experiment {
     RealMotion(real_motion::RealMotion),
     /// Rocks registered by their shape: how far off it may start, how right it ends, what it makes of another rock.
     Registration(registration::Registrations),
+    /// Targets drawn where the trackability map says good, risky or bad: which of them are tracked to the end?
+    Trackability(trackability::Worlds),
 }
 
 /// What a study over worlds, configurations and a grid takes.
@@ -145,6 +148,7 @@ impl Study {
             Experiment::Scenery(scenery) => scenery.run(),
             Experiment::RealMotion(recordings) => recordings.run(),
             Experiment::Registration(rocks) => rocks.run(),
+            Experiment::Trackability(worlds) => worlds.run(),
         }
     }
 }

@@ -189,6 +189,7 @@ impl<'a> Panels<'a> {
             _ => Margin::same(theme::MARGIN),
         };
         let place = ui.max_rect();
+        crate::tour::here(ui.ctx(), pane.title(), place);
         region(ui, pane.title(), place);
         // The panel itself can have the keyboard, so that Tab goes on with what is in it.
         let whole =

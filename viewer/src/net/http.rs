@@ -95,6 +95,14 @@ fn describe(request: &Request) -> (Method, String, Option<Vec<u8>>) {
         Request::Metrics { session, run: RunName { target, run } } => {
             get(format!("sessions/{session}/targets/{target}/runs/{run}/metrics"))
         }
+        Request::Trackability { traverse, step } => {
+            get(format!("traverses/{traverse}/steps/{step}/trackability"))
+        }
+        Request::CancelTrackability { traverse, step } => (
+            Method::POST,
+            format!("traverses/{traverse}/steps/{step}/trackability/cancel"),
+            json(&serde_json::json!({})),
+        ),
     }
 }
 
@@ -144,9 +152,11 @@ fn read(request: &Request, response: &ehttp::Response, context: &egui::Context) 
         | Request::RemoveTarget { .. }
         | Request::CancelRun { .. }
         | Request::ResumeRun { .. }
+        | Request::CancelTrackability { .. }
         | Request::Reconnect => Reply::Done,
         Request::Compare { .. } => Reply::Compared(Box::new(parse(bytes)?)),
         Request::Metrics { .. } => Reply::Metrics(Box::new(parse(bytes)?)),
+        Request::Trackability { .. } => Reply::Trackability(Box::new(parse(bytes)?)),
     })
 }
 
@@ -177,6 +187,7 @@ fn problem(response: &ehttp::Response) -> Problem {
         status: response.status,
         detail: format!("The server answered {} {}.", response.status, response.status_text),
         hint: None,
+        nearest_pixel: None,
     })
 }
 
@@ -187,6 +198,7 @@ fn unreachable(why: &str) -> Problem {
         status: 0,
         detail: format!("The server does not answer ({why})."),
         hint: None,
+        nearest_pixel: None,
     }
 }
 
@@ -197,6 +209,7 @@ fn misread(why: &str) -> Problem {
         status: 500,
         detail: format!("The server's answer cannot be read: {why}."),
         hint: Some("Page and server may be of different versions: load the page again.".to_owned()),
+        nearest_pixel: None,
     }
 }
 

@@ -17,6 +17,7 @@ use sightline_core::session::wire::{
 
 use sightline_core::study::row::Row;
 use sightline_core::study::wire::{NewStudy, StudyInfo, StudyJob};
+use sightline_core::trackability::MapProgress;
 
 use self::events::Events;
 use crate::cache::{Item, Key};
@@ -123,6 +124,20 @@ pub enum Request {
         /// The run.
         run: RunName,
     },
+    /// The trackability of a stop.
+    Trackability {
+        /// The traverse.
+        traverse: String,
+        /// The stop.
+        step: usize,
+    },
+    /// To give it up.
+    CancelTrackability {
+        /// The traverse.
+        traverse: String,
+        /// The stop.
+        step: usize,
+    },
 }
 
 /// What the server answered.
@@ -164,6 +179,8 @@ pub enum Reply {
     Compared(Box<Comparison>),
     /// What a run is worth.
     Metrics(Box<RunMetrics>),
+    /// The trackability of a stop, as far as it was made.
+    Trackability(Box<MapProgress>),
 }
 
 /// An answer with what was asked.

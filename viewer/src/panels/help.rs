@@ -4,6 +4,7 @@ use egui::{Id, Key, Modal, RichText, Ui};
 
 use crate::command::{Command, Go, Mode};
 use crate::state::State;
+use crate::tour::Turn;
 use crate::{cache, keys, theme};
 
 /// Shows the sheet or the field, whichever is open.
@@ -41,7 +42,13 @@ fn sheet(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         ui.label(theme::note(format!(
             "This page keeps up to {limit} MiB of steps and images; it holds {used} MiB now."
         )));
-        ui.button("Close").clicked()
+        ui.horizontal(|ui| {
+            if ui.button("Take the tour").clicked() {
+                out.extend([Command::SetMode(Mode::Look), Command::Tour(Turn::Begin)]);
+            }
+            ui.button("Close").clicked()
+        })
+        .inner
     });
     if modal.inner || modal.should_close() {
         out.push(Command::SetMode(Mode::Look));

@@ -1,6 +1,6 @@
 //! The left image with all that the tracker knew of the target in it.
 
-use egui::{Align, CursorIcon, Layout, Rect, Ui, pos2, vec2};
+use egui::{Align, Layout, Rect, Ui, pos2, vec2};
 use sightline_core::frames::Pixel;
 use sightline_core::image::PixelRect;
 use sightline_core::locate::features::rows::moved_covariance_px2;
@@ -11,13 +11,14 @@ use super::compare::{bar, marks as compared, modes};
 use super::exposure;
 use super::features::marks;
 use super::legend::{self, Entry};
+use super::picking;
 use crate::cache::{Eye, Slot};
-use crate::command::{Command, Layer, Mode, Panel};
-use crate::overlay::{Line, Mark, Overlay, paint_words, template_quad};
+use crate::command::{Command, Layer, Panel};
+use crate::overlay::{Line, Mark, Overlay, template_quad};
 use crate::raster::Raster;
 use crate::state::{State, row_of, run_letter};
 use crate::view2d::Canvas;
-use crate::{overlay, panels, theme};
+use crate::{panels, theme};
 
 /// Height of the status line below an image, points.
 pub const STATUS: f32 = 24.0;
@@ -50,6 +51,7 @@ fn picture(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) 
     canvas.texture(&raster.texture, region);
     modes::under(&canvas, state);
     canvas.pixel_grid(region);
+    picking::paint_map(&canvas, state);
     if state.marks {
         paint_others(&canvas, state);
         marks::paint_left(&canvas, state);
@@ -59,7 +61,7 @@ fn picture(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) 
     }
     modes::over(ui, &canvas, state, out);
     paint_designation(&canvas, state);
-    pick(ui, &canvas, raster, state, out);
+    picking::show(ui, &canvas, raster, state, out);
     marks::hover(&canvas, state, |feature| Some(feature.pixel));
     status_line(ui, &canvas, raster, region);
     if let Some(view) = canvas.moved {
@@ -104,12 +106,12 @@ fn waiting_words(state: &State, word: &str, step: usize) -> String {
 
 /// What the legend of the left image lists.
 fn entries(state: &State) -> Vec<Entry> {
-    let Some(trace) = state.trace() else { return Vec::new() };
+    let mut entries = picking::entries(state);
+    let Some(trace) = state.trace() else { return entries };
     let pointing = trace.point_mast.as_ref();
     let evidence = trace.template();
     let matched = evidence.and_then(|e| e.match_template.as_ref());
     let run = theme::run(state.cursor.run);
-    let mut entries = Vec::new();
     if trace.truth.as_ref().is_some_and(|t| t.left_pixel.is_some()) {
         entries.push(Entry::new(Layer::Truth, Mark::Plus, theme::TRUTH, "truth"));
     }
@@ -277,51 +279,6 @@ fn paint_wrapped(canvas: &Canvas, at: egui::Pos2, words: &str) {
     );
     canvas.painter.rect_filled(Rect::from_min_size(corner, size).expand(4.0), 3.0, theme::SCRIM);
     canvas.painter.galley(corner, galley, theme::LOST);
-}
-
-/// In pick mode: the loupe, and the designation on a click.
-fn pick(ui: &Ui, canvas: &Canvas, raster: &Raster, state: &State, out: &mut Vec<Command>) {
-    let border = canvas.transform.rect.shrink(1.0);
-    let corner = border.left_bottom() + vec2(10.0, -14.0);
-    if state.mode != Mode::Pick {
-        if state.session.as_ref().is_some_and(|session| session.targets.is_empty()) {
-            paint_words(&canvas.painter, corner, "Press T, then click the rock to track.", theme::ACCENT);
-        }
-        return;
-    }
-    canvas.painter.rect_stroke(border, 0.0, egui::Stroke::new(2.0, theme::ACCENT), egui::StrokeKind::Inside);
-    let hint = "Click the point to track. Esc cancels.";
-    paint_words(&canvas.painter, corner, hint, theme::ACCENT);
-    let [width, height] = raster.size();
-    let Some(pixel) = canvas.hovered(PixelRect::whole(width, height)) else { return };
-    ui.ctx().set_cursor_icon(CursorIcon::Crosshair);
-    loupe(canvas, raster, pixel);
-    if canvas.response.clicked() {
-        out.push(Command::Pick(pixel));
-    }
-}
-
-/// The surroundings of the pointer, magnified, in the corner away from it.
-fn loupe(canvas: &Canvas, raster: &Raster, pixel: Pixel) {
-    const PIXELS: f32 = 21.0;
-    const SIDE: f32 = 147.0;
-    let area = canvas.transform.rect.shrink(8.0);
-    if canvas.transform.scale > 6.0 || area.width() < 2.5 * SIDE || area.height() < 1.5 * SIDE {
-        return;
-    }
-    let on_left = canvas.transform.to_screen(pixel).x > area.center().x;
-    let corner = if on_left {
-        area.left_bottom() - vec2(0.0, SIDE + 20.0)
-    } else {
-        area.right_bottom() - vec2(SIDE, SIDE)
-    };
-    let frame = Rect::from_min_size(corner, vec2(SIDE, SIDE));
-    let [width, height] = raster.size().map(|v| v as f32);
-    let middle = pos2((pixel.x as f32 + 0.5) / width, (pixel.y as f32 + 0.5) / height);
-    let part = Rect::from_center_size(middle, vec2(PIXELS / width, PIXELS / height));
-    canvas.painter.image(raster.texture.id(), frame, part, theme::UNTINTED);
-    canvas.painter.rect_stroke(frame, 0.0, egui::Stroke::new(1.0, theme::ACCENT), egui::StrokeKind::Outside);
-    overlay::paint_mark(&canvas.painter, frame.center(), Mark::Plus, theme::ACCENT, 9.0);
 }
 
 /// Pixel and grey value under the pointer, magnification, and the convention.

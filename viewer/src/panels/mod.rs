@@ -29,6 +29,8 @@ pub mod targets;
 pub mod timeline;
 pub mod tolerances;
 pub mod uncertainty;
+pub mod picking;
+pub mod tour;
 
 use egui::{Align, Layout, RichText, Ui, UiBuilder};
 

@@ -72,6 +72,8 @@ impl State {
             // The page itself does these: they are no part of what is looked at.
             Command::Layout(_) | Command::CopyLink => {}
             Command::Compare(ask) => self.ask_compare(ask),
+            Command::Aim(aim) => self.aim(aim),
+            Command::Tour(turn) => self.turn_tour(turn),
         }
     }
 

@@ -44,6 +44,7 @@ impl State {
             Event::RunProgress { .. } => {}
             Event::RenderProgress { traverse, k, n, ready } => self.rendered(&traverse, k, n, ready),
             Event::StudyProgress { job } => self.study_went_on(job),
+            Event::TrackabilityProgress { traverse, step, .. } => self.trackability_went_on(&traverse, step),
         }
     }
 
@@ -74,6 +75,7 @@ impl State {
         self.forget_comparisons(false);
         self.progress.clear();
         self.sync.session_stale = true;
+        self.trackability_stale();
         if self.settings.is_empty() {
             self.outbox.push(Request::Settings);
         }
@@ -125,6 +127,11 @@ impl State {
                     self.studies.rows.insert(job, rows);
                 }
             }
+            Reply::Trackability(progress) => {
+                if let Request::Trackability { traverse, step } = request {
+                    self.took_trackability((traverse, step), Ok(*progress));
+                }
+            }
             Reply::Item(_) => {}
             Reply::Compared(found) => self.took_comparison(&request, Ok(*found)),
             Reply::Metrics(found) => {
@@ -151,12 +158,19 @@ impl State {
             }
             Request::NewTarget { .. } => {
                 if let Some(place) = self.designating.take() {
-                    self.refusal = Some(Refusal { place, sentence: problem.detail.clone() });
+                    let nearest = problem.nearest_pixel.as_deref().copied();
+                    self.refusal = Some(Refusal { place, sentence: problem.detail.clone(), nearest });
                 }
             }
             Request::Studies => self.studies.infos = Some(Vec::new()),
             Request::Compare { .. } => return self.took_comparison(&request, Err(&problem)),
             Request::Metrics { run, .. } => return self.took_metrics(run, Err(&problem)),
+            Request::Trackability { traverse, step } => {
+                self.took_trackability((traverse, step), Err(problem));
+                return;
+            }
+            // A map that was complete before it was given up is no problem.
+            Request::CancelTrackability { .. } => return,
             Request::Session(_) => {
                 self.sync.session_asked = None;
                 if self.session.is_none() && problem.status != 0 {

@@ -13,6 +13,8 @@ pub mod messages;
 mod missing;
 pub mod studies;
 pub mod tracker;
+pub mod trackability;
+mod tour;
 mod wanted;
 
 use std::collections::{BTreeMap, HashSet};
@@ -32,6 +34,7 @@ use self::calculator::Calculator;
 use self::configurations::Configurations;
 use self::messages::Messages;
 use self::studies::Studies;
+use self::trackability::Trackability;
 use crate::cache::{Cache, Eye, Key, Slot, StepKey};
 use crate::command::{Layer, Mode, Panel, Stage};
 use crate::link::Fragment;
@@ -41,6 +44,7 @@ use crate::shape_view::ShapeView;
 use crate::stretch::Stretch;
 use crate::tables::FeatureView;
 use crate::theme::Looks;
+use crate::tour::Tour;
 use crate::view2d::View2d;
 
 /// How the server's events come in.
@@ -85,6 +89,8 @@ pub struct Refusal {
     pub place: Place,
     /// What the server said.
     pub sentence: String,
+    /// The nearest pixel that would do.
+    pub nearest: Option<Pixel>,
 }
 
 /// What each panel shows.
@@ -164,6 +170,10 @@ pub struct State {
     pub open_url: Option<String>,
     /// Runs that are compared with the one looked at.
     pub compare: compare::Compare,
+    /// How well a target would do at the stop that is looked at.
+    pub trackability: Trackability,
+    /// Where the tour is.
+    pub tour: Tour,
     outbox: Vec<Request>,
     sync: Sync,
     /// The aligned left camera of the step that was asked for last: it takes a while to compute.
@@ -224,6 +234,8 @@ impl State {
             looks: Looks::default(),
             open_url: None,
             compare: compare::Compare::default(),
+            trackability: Trackability::default(),
+            tour: Tour::default(),
             outbox: Vec::new(),
             sync: Sync { linked, ..Sync::default() },
             aligned: egui::mutex::Mutex::default(),
@@ -336,6 +348,8 @@ impl State {
     /// What to ask the server, taken out of the outbox.
     pub fn take_requests(&mut self) -> Vec<Request> {
         self.sync_session();
+        self.sync_trackability();
+        self.sync_tour();
         std::mem::take(&mut self.outbox)
     }
 

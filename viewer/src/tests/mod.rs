@@ -11,6 +11,8 @@ mod shape;
 mod shape_run;
 mod studies;
 mod tracking;
+mod picking;
+mod tour;
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;

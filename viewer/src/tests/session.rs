@@ -22,6 +22,7 @@ fn problem(status: u16) -> Problem {
         status,
         detail: "no 3-D position".to_owned(),
         hint: None,
+        nearest_pixel: None,
     }
 }
 

@@ -121,10 +121,13 @@ pub fn of_shadow(share: f64, limits: &Limits) -> Option<Warning> {
 
 /// A range at an offset from the target.
 #[derive(Clone, Copy, Debug)]
-struct Ranged {
-    u_px: f64,
-    v_px: f64,
-    range_m: f64,
+pub(crate) struct Ranged {
+    /// To the right, px.
+    pub(crate) u_px: f64,
+    /// Downwards, px.
+    pub(crate) v_px: f64,
+    /// Range along the left ray, m.
+    pub(crate) range_m: f64,
 }
 
 fn of_ranges(ranges: &[Ranged], distance_m: f64, half_px: f64, limits: &Limits) -> Vec<Warning> {
@@ -170,7 +173,7 @@ fn row(r: &Ranged) -> Vector3<f64> {
 }
 
 /// The plane through the ranges: a, b and c of the inverse range.
-fn plane(ranges: &[Ranged]) -> Option<Vector3<f64>> {
+pub(crate) fn plane(ranges: &[Ranged]) -> Option<Vector3<f64>> {
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
     for point in ranges {
         normal += row(point) * row(point).transpose();
@@ -180,7 +183,7 @@ fn plane(ranges: &[Ranged]) -> Option<Vector3<f64>> {
 }
 
 /// The largest residual of a plane, as a share of the distance.
-fn departure(plane: &Vector3<f64>, ranges: &[Ranged], distance_m: f64) -> f64 {
+pub(crate) fn departure(plane: &Vector3<f64>, ranges: &[Ranged], distance_m: f64) -> f64 {
     let residual = |r: &Ranged| (1.0 / r.range_m - plane.dot(&row(r))).abs() * distance_m;
     ranges.iter().map(residual).fold(0.0, f64::max)
 }

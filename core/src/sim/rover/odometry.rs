@@ -13,6 +13,9 @@
 //! over a leg of duration T by `bias · T + walk · sqrt(T) · N(0, 1)`, evenly within it. The gyro is read while
 //! the rover drives (domain.md 5.4), not at stops.
 //!
+//! **Heading jumps** (`rover.heading_jumps`) turn the estimate about the rover's own vertical from their stop on; the way
+//! that follows is laid out along the turned heading.
+//!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
 //! | t, R | motion and turn between two stops | m, rover frame of the first |
@@ -30,14 +33,14 @@ use crate::traverse::OdometryError;
 
 use crate::sim::ground::texture::mix;
 use crate::sim::rover::scene::{Leg, TrueDrive};
-use crate::sim::scenario::{OdometryModel, RoverSettings, Scenario};
+use crate::sim::scenario::{HeadingJump, OdometryModel, RoverSettings, Scenario};
 
 /// Seconds of an hour.
 const HOUR_S: f64 = 3600.0;
 
 /// The pose estimates of a scenario's drive, one for each stop.
 pub fn believed(drive: &TrueDrive, scenario: &Scenario) -> Vec<Pose> {
-    match scenario.rover.odometry {
+    let believed = match scenario.rover.odometry {
         OdometryModel::Stated => {
             let true_poses: Vec<Pose> = drive.stops.iter().map(|stop| stop.site_from_rover).collect();
             estimates(&true_poses, &scenario.odometry_error, scenario.seed)
@@ -45,7 +48,23 @@ pub fn believed(drive: &TrueDrive, scenario: &Scenario) -> Vec<Pose> {
         OdometryModel::WheelsAndImu => {
             wheels_and_imu(drive, &scenario.odometry_error, &scenario.rover, scenario.seed)
         }
+    };
+    if scenario.rover.heading_jumps.is_empty() {
+        return believed;
     }
+    with_heading_jumps(&believed, &scenario.rover.heading_jumps)
+}
+
+/// The estimates with their heading turned from some stops on.
+pub fn with_heading_jumps(estimates: &[Pose], jumps: &[HeadingJump]) -> Vec<Pose> {
+    let mut turned: Vec<Pose> = estimates.first().copied().into_iter().collect();
+    for (number, pair) in estimates.windows(2).enumerate() {
+        let yaw_deg: f64 =
+            jumps.iter().filter(|jump| jump.stop as usize == number + 1).map(|jump| jump.yaw_deg).sum();
+        let step = pair[0].inv_mul(&pair[1]) * attitude_from_roll_pitch_yaw(0.0, 0.0, yaw_deg.to_radians());
+        turned.push(turned[turned.len() - 1] * step);
+    }
+    turned
 }
 
 /// The pose estimates of a drive through `true_poses`; the first is true.
@@ -144,4 +163,25 @@ fn believed_way(leg: &Leg, at_start: AttitudeError, drift_rad: f64) -> Vector3 {
         AttitudeError { yaw, ..at_start }.seen(&halfway) * Vector3::new(*x, *y, 0.0)
     });
     ways.sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_heading_jump_turns_the_way_that_follows_and_leaves_the_steps_lengths() {
+        let drive: Vec<Pose> = (0..5).map(|stop| Pose::translation(f64::from(stop), 0.0, 0.0)).collect();
+        let jumps = [HeadingJump { stop: 2, yaw_deg: 30.0 }];
+        let turned = with_heading_jumps(&drive, &jumps);
+        // The jump happens at the stop: the way there is untouched, the next metre leads 30° to the right.
+        for stop in 0..2 {
+            assert!((turned[stop].translation.vector - drive[stop].translation.vector).norm() < 1e-12);
+        }
+        assert!((turned[2].translation.vector - drive[2].translation.vector).norm() < 1e-12);
+        let way = turned[3].translation.vector - turned[2].translation.vector;
+        let (sine, cosine) = 30.0_f64.to_radians().sin_cos();
+        assert!((way - Vector3::new(cosine, sine, 0.0)).norm() < 1e-12, "{way}");
+        assert!((turned[4].rotation.angle() - 30.0_f64.to_radians()).abs() < 1e-12);
+    }
 }

@@ -34,7 +34,7 @@ pub use events::{Cloud, EventSettings, Occluder};
 pub use fiducials::Fiducial;
 pub use ground::{PlacedRock, RockSettings, RockShape, TerrainSettings, TextureSettings};
 pub use light::{Reflectance, SunSettings};
-pub use rover::{ForcedSlip, OdometryModel, RoverSettings, Soil};
+pub use rover::{ForcedSlip, HeadingJump, OdometryModel, RoverSettings, Soil};
 pub use targets::{Arrangement, TargetRule};
 
 /// The largest seed that every reader of the file takes exactly (TOML has 63 bits, a browser 53).

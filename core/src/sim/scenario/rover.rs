@@ -40,6 +40,17 @@ pub struct ForcedSlip {
     pub slip: f64,
 }
 
+/// A jump of the estimated heading that is staged for the way to one stop: the attitude is set anew, for example by a
+/// sighting of the sun, and not to what it was.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct HeadingJump {
+    /// The number of the stop from which on the estimate is turned; the first stop is 0, so 1 or more.
+    pub stop: u32,
+    /// By how much, deg, positive to the right (−45 to 45).
+    pub yaw_deg: f64,
+}
+
 /// The rover's wheels and its sense of place.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -64,6 +75,9 @@ pub struct RoverSettings {
     pub track_depth_m: f64,
     /// Slips staged for single stops, in any order (none; R126).
     pub forced_slip: Vec<ForcedSlip>,
+    /// Jumps of the estimated heading staged for single stops, in any order (none); no covariance knows of them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub heading_jumps: Vec<HeadingJump>,
 }
 
 impl Default for RoverSettings {
@@ -79,6 +93,7 @@ impl Default for RoverSettings {
             track_width_m: 0.16,
             track_depth_m: 0.01,
             forced_slip: Vec::new(),
+            heading_jumps: Vec::new(),
         }
     }
 }
@@ -90,6 +105,10 @@ impl RoverSettings {
         for (index, forced) in self.forced_slip.iter().enumerate() {
             within(&format!("rover.forced_slip[{index}].stop"), f64::from(forced.stop), 1.0, 10_000.0)?;
             within(&format!("rover.forced_slip[{index}].slip"), forced.slip, 0.0, 1.25)?;
+        }
+        for (index, jump) in self.heading_jumps.iter().enumerate() {
+            within(&format!("rover.heading_jumps[{index}].stop"), f64::from(jump.stop), 1.0, 10_000.0)?;
+            within(&format!("rover.heading_jumps[{index}].yaw_deg"), jump.yaw_deg, -45.0, 45.0)?;
         }
         within("rover.gyro_walk_deg_per_root_hour", self.gyro_walk_deg_per_root_hour, 0.0, 10.0)?;
         within("rover.gyro_bias_deg_per_hour", self.gyro_bias_deg_per_hour, 0.0, 100.0)?;

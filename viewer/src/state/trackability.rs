@@ -1,0 +1,135 @@
+//! The trackability of the stop that is looked at, and the place that is being chosen in it.
+//!
+//! The map is asked for while a target is picked, again whenever the server tells of new rows, and given up with the pick.
+
+use sightline_core::frames::Pixel;
+use sightline_core::session::wire::Problem;
+use sightline_core::trackability::map::Cell;
+use sightline_core::trackability::{MapProgress, TrackabilityMap};
+
+use super::State;
+use crate::aim::Aim;
+use crate::command::Mode;
+use crate::net::Request;
+use crate::view2d::View2d;
+
+/// What is known of a stop's trackability.
+#[derive(Clone, Debug, Default)]
+pub struct Trackability {
+    /// The traverse and the stop that it is of.
+    pub place: Option<(String, usize)>,
+    /// How far the map is; none before the first answer.
+    pub progress: Option<MapProgress>,
+    /// The place chosen by keys.
+    pub aim: Option<Pixel>,
+    is_asked: bool,
+    is_stale: bool,
+}
+
+impl State {
+    /// The map of the stop that is looked at, as far as it was made.
+    pub fn trackability_map(&self) -> Option<&TrackabilityMap> {
+        let (traverse, step) = self.trackability.place.as_ref()?;
+        let is_here =
+            self.traverse.as_ref().is_some_and(|open| open.id == *traverse) && *step == self.cursor.step;
+        self.trackability.progress.as_ref().filter(|_| is_here)?.map.as_ref()
+    }
+
+    /// What the map says of a pixel of the left image.
+    pub fn trackability_at(&self, pixel: Pixel) -> Option<Cell> {
+        self.trackability_map()?.at(pixel)
+    }
+
+    /// Carries out what was asked of the place that is being chosen.
+    pub(super) fn aim(&mut self, aim: Aim) {
+        let nearest = self.refusal.as_ref().and_then(|refusal| refusal.nearest);
+        match aim {
+            Aim::Put(pixel) => self.trackability.aim = Some(pixel),
+            Aim::Nudge { dx, dy } => {
+                let from = self.trackability.aim.unwrap_or_else(|| self.first_aim());
+                let [width, height] = self.stop().map_or([1, 1], |stop| stop.left_size);
+                let hold = |v: f64, size: u32| ((v * 10.0).round() / 10.0).clamp(0.0, f64::from(size) - 1.0);
+                self.trackability.aim = Some(Pixel::new(hold(from.x + dx, width), hold(from.y + dy, height)));
+            }
+            Aim::Accept => {
+                if let Some(pixel) = self.trackability.aim.or(nearest) {
+                    self.choose(pixel);
+                }
+            }
+            Aim::TakeNearest => {
+                if let Some(pixel) = nearest {
+                    self.choose(pixel);
+                }
+            }
+        }
+    }
+
+    fn choose(&mut self, pixel: Pixel) {
+        self.trackability.aim = None;
+        self.apply(crate::command::Command::Pick(pixel));
+    }
+
+    /// Where the keys begin: at the refused pixel, else in the middle of what is shown.
+    fn first_aim(&self) -> Pixel {
+        let [width, height] = self.stop().map_or([1, 1], |stop| stop.left_size);
+        let middle = match self.views.left {
+            View2d::Fit => Pixel::new(f64::from(width / 2), f64::from(height / 2)),
+            View2d::At { centre, .. } => centre,
+        };
+        self.refusal.as_ref().map_or(middle, |refusal| refusal.place.pixel)
+    }
+
+    /// Asks for the map while a target is picked, and gives it up with the pick.
+    pub(super) fn sync_trackability(&mut self) {
+        let here = self.traverse.as_ref().map(|open| (open.id.clone(), self.cursor.step));
+        let wanted = here.filter(|_| self.mode == Mode::Pick);
+        if wanted.is_none() {
+            self.trackability.aim = None;
+        }
+        let known = &mut self.trackability;
+        if known.place != wanted {
+            let is_made = known.progress.as_ref().is_none_or(|progress| progress.ended);
+            if let Some((traverse, step)) = known.place.take().filter(|_| !is_made) {
+                self.outbox.push(Request::CancelTrackability { traverse, step });
+            }
+            *known = Trackability { aim: known.aim.filter(|_| wanted.is_some()), ..Trackability::default() };
+            (known.is_stale, known.place) = (wanted.is_some(), wanted);
+        }
+        if let Some((traverse, step)) = known.place.clone().filter(|_| known.is_stale && !known.is_asked) {
+            (known.is_asked, known.is_stale) = (true, false);
+            self.outbox.push(Request::Trackability { traverse, step });
+        }
+    }
+
+    /// The server told of new rows.
+    pub(super) fn trackability_went_on(&mut self, traverse: &str, step: usize) {
+        let known = &mut self.trackability;
+        let is_ours = known.place.as_ref().is_some_and(|(own, at)| own == traverse && *at == step);
+        let is_made = known.progress.as_ref().is_some_and(|progress| progress.ended);
+        known.is_stale |= is_ours && !is_made;
+    }
+
+    /// What may have been missed is asked for again.
+    pub(super) fn trackability_stale(&mut self) {
+        let is_made = self.trackability.progress.as_ref().is_some_and(|progress| progress.ended);
+        self.trackability.is_stale |= self.trackability.place.is_some() && !is_made;
+    }
+
+    /// Takes an answer in; picking works all the same without one.
+    pub(super) fn took_trackability(&mut self, place: (String, usize), answer: Result<MapProgress, Problem>) {
+        let known = &mut self.trackability;
+        if known.place.as_ref() != Some(&place) {
+            return;
+        }
+        known.is_asked = false;
+        match answer {
+            Ok(progress) => known.progress = Some(progress),
+            // The server is gone: asked again when it is back.
+            Err(problem) if problem.status == 0 => {}
+            Err(problem) => {
+                known.progress =
+                    Some(MapProgress { k: 0, n: 0, ended: true, failed: Some(problem.detail), map: None });
+            }
+        }
+    }
+}

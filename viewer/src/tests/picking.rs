@@ -1,0 +1,218 @@
+//! Picking: the map is asked for and given up, its verdicts are said in words, a refusal offers a way out, keys do all of it.
+
+use egui::{Key, Modifiers};
+use egui_kittest::kittest::Queryable;
+use sightline_core::frames::Pixel;
+use sightline_core::session::wire::{Event, Problem};
+use sightline_core::trackability::{Aspect, MapProgress, TrackabilityMap, Verdict};
+
+use super::{Shown, fixture};
+use crate::aim::Aim;
+use crate::command::{Command, Layer, Mode};
+use crate::keys;
+use crate::layout::Pane;
+use crate::net::{Arrived, Reply, Request};
+use crate::panels::picking;
+use crate::state::{Place, Refusal, State};
+
+const PLACE: Pixel = Pixel::new(20.0, 30.0);
+const GOOD: Pixel = Pixel::new(44.0, 36.0);
+
+/// A map of the fixture's image of 64 px: the left half is bad, then a risky column, the rest is good.
+fn map(rows_done: usize) -> TrackabilityMap {
+    let (columns, rows) = (8, 8);
+    let letters: Vec<char> = (0..columns * rows_done)
+        .map(|cell| match cell % columns {
+            0..4 => Verdict::Bad.letter(),
+            4 => Verdict::Risky.letter(),
+            _ => Verdict::Good.letter(),
+        })
+        .collect();
+    let edge = Aspect::DepthEdge.letter();
+    TrackabilityMap {
+        step: 0,
+        cell_px: 8,
+        columns,
+        rows,
+        template_size_px: 21,
+        verdicts: letters.iter().collect(),
+        reasons: letters.iter().map(|letter| if *letter == 'g' { '-' } else { edge }).collect(),
+        values: letters.iter().map(|letter| (*letter != 'g').then_some(2.0)).collect(),
+        ranges_m: vec![Some(6.0); letters.len()],
+        longest_steps_m: vec![Some(0.6); letters.len()],
+        words: Default::default(),
+    }
+}
+
+fn progress(k: usize) -> MapProgress {
+    MapProgress { k, n: 8, ended: k == 8, failed: None, map: Some(map(k)) }
+}
+
+fn requests(state: &mut State) -> Vec<Request> {
+    state.take_requests()
+}
+
+fn asked(state: &mut State) -> bool {
+    requests(state).iter().any(|request| matches!(request, Request::Trackability { .. }))
+}
+
+fn answer(state: &mut State, outcome: Result<MapProgress, Problem>) {
+    let request = Request::Trackability { traverse: "drive".to_owned(), step: state.cursor.step };
+    let outcome = outcome.map(|progress| Reply::Trackability(Box::new(progress)));
+    state.arrived(Arrived { request, outcome }, 0.0);
+}
+
+fn picking(context: &egui::Context) -> State {
+    let mut state = fixture::at_step(context, 0);
+    state.apply(Command::SetMode(Mode::Pick));
+    state.take_requests();
+    answer(&mut state, Ok(progress(8)));
+    state
+}
+
+fn refused(context: &egui::Context) -> State {
+    let mut state = picking(context);
+    let place = Place { step: 0, pixel: PLACE };
+    state.refusal = Some(Refusal { place, sentence: "no 3-D position here".to_owned(), nearest: Some(GOOD) });
+    state
+}
+
+#[test]
+fn the_map_is_asked_for_while_picking_again_with_new_rows_and_given_up_with_the_pick() {
+    let mut state = fixture::at_step(&egui::Context::default(), 0);
+    assert!(!asked(&mut state), "nobody picks");
+    state.apply(Command::SetMode(Mode::Pick));
+    assert!(asked(&mut state));
+    assert!(!asked(&mut state), "once");
+    answer(&mut state, Ok(progress(3)));
+    assert_eq!(state.trackability_map().unwrap().rows_done(), 3);
+    let rows =
+        |step| Event::TrackabilityProgress { traverse: "drive".to_owned(), step, k: 5, n: 8, ended: false };
+    state.told(rows(4));
+    assert!(!asked(&mut state), "another stop");
+    state.told(rows(0));
+    assert!(asked(&mut state));
+    answer(&mut state, Ok(progress(5)));
+    state.apply(Command::SetMode(Mode::Look));
+    let cancel = Request::CancelTrackability { traverse: "drive".to_owned(), step: 0 };
+    assert!(requests(&mut state).contains(&cancel), "nobody wants the rest");
+    assert!(state.trackability_map().is_none());
+    // A map that is complete needs no cancelling.
+    let mut state = picking(&egui::Context::default());
+    state.told(rows(0));
+    assert!(!asked(&mut state));
+    state.apply(Command::SetMode(Mode::Look));
+    assert!(!requests(&mut state).contains(&cancel));
+}
+
+#[test]
+fn without_a_map_picking_works_and_the_panel_says_why_there_is_none() {
+    let state = |context: &egui::Context| {
+        let mut state = fixture::at_step(context, 0);
+        state.apply(Command::SetMode(Mode::Pick));
+        state.take_requests();
+        let problem = Problem {
+            code: "request".to_owned(),
+            title: String::new(),
+            status: 422,
+            detail: "the pair cannot be aligned".to_owned(),
+            hint: None,
+            nearest_pixel: None,
+        };
+        answer(&mut state, Err(problem));
+        assert!(state.messages.newest().is_none(), "it is no problem of the person's");
+        state
+    };
+    Shown::pane(Pane::Left, state);
+    let mut state = state(&egui::Context::default());
+    assert!(state.trackability.progress.as_ref().unwrap().failed.is_some());
+    state.apply(Command::Pick(GOOD));
+    assert!(requests(&mut state).iter().any(|request| matches!(request, Request::NewTarget { .. })));
+}
+
+#[test]
+fn verdict_reason_range_and_longest_step_are_said_in_words_and_the_layer_can_be_switched_off() {
+    let map = map(8);
+    assert_eq!(
+        picking::words(&map.at(PLACE).unwrap()),
+        "bad: depth edge 2 px away · 6.00 m away · longest safe step 0.60 m"
+    );
+    assert!(picking::words(&map.at(Pixel::new(36.0, 30.0)).unwrap()).starts_with("risky: depth edge"));
+    assert_eq!(picking::words(&map.at(GOOD).unwrap()), "good · 6.00 m away · longest safe step 0.60 m");
+    let mut shown = Shown::pane(Pane::Left, |context| {
+        let mut state = picking(context);
+        state.apply(Command::Aim(Aim::Put(PLACE)));
+        state
+    });
+    shown
+        .says("trackability: 38 % good, 12 % risky, 50 % bad")
+        .says("at 20.0, 30.0: bad: depth edge 2 px away");
+    assert_eq!(shown.click("risky place, hatched (legend)"), vec![Command::ToggleLayer(Layer::Trackability)]);
+}
+
+#[test]
+fn a_refused_pick_offers_the_nearest_good_pixel_by_button_and_by_enter() {
+    let mut shown = Shown::pane(Pane::Left, refused);
+    assert_eq!(shown.click("Take the nearest good pixel (44, 36)"), vec![Command::Aim(Aim::TakeNearest)]);
+    for aim in [Aim::TakeNearest, Aim::Accept] {
+        let mut state = refused(&egui::Context::default());
+        state.apply(Command::Aim(aim));
+        let picked = requests(&mut state).into_iter().find_map(|request| match request {
+            Request::NewTarget { target, .. } => target.pixel,
+            _ => None,
+        });
+        assert_eq!(picked, Some(GOOD));
+    }
+    let mut state = fixture::without_target();
+    state.apply(Command::SetMode(Mode::Pick));
+    state.apply(Command::Aim(Aim::Accept));
+    assert!(state.designating.is_none(), "nothing was aimed at");
+}
+
+#[test]
+fn the_servers_refusal_brings_the_nearest_good_pixel_along() {
+    let mut state = fixture::without_target();
+    state.apply(Command::SetMode(Mode::Pick));
+    state.apply(Command::Pick(PLACE));
+    let request = requests(&mut state).into_iter().find(|r| matches!(r, Request::NewTarget { .. })).unwrap();
+    let problem = Problem {
+        code: "target".to_owned(),
+        title: String::new(),
+        status: 422,
+        detail: "no 3-D position".to_owned(),
+        hint: Some("The nearest good pixel is (44, 36).".to_owned()),
+        nearest_pixel: Some(Box::new(GOOD)),
+    };
+    state.arrived(Arrived { request, outcome: Err(problem) }, 0.0);
+    assert_eq!(state.refusal.as_ref().unwrap().nearest, Some(GOOD));
+}
+
+#[test]
+fn arrows_nudge_the_aim_by_a_tenth_of_a_pixel_and_enter_takes_it() {
+    let mut state = refused(&egui::Context::default());
+    let mut press = |key: Key, modifiers: Modifiers| {
+        let command = keys::command(key, modifiers, &state).expect("a command");
+        state.apply(command);
+        state.trackability.aim
+    };
+    assert_eq!(press(Key::ArrowRight, Modifiers::NONE), Some(Pixel::new(20.1, 30.0)));
+    assert_eq!(press(Key::ArrowDown, Modifiers::SHIFT), Some(Pixel::new(20.1, 31.0)));
+    assert_eq!(press(Key::ArrowLeft, Modifiers::NONE), Some(Pixel::new(20.0, 31.0)));
+    assert_eq!(press(Key::Enter, Modifiers::NONE), None);
+    assert_eq!(state.designating.unwrap().pixel, Pixel::new(20.0, 31.0), "the aim comes before the offer");
+    // Outside of picking the arrows step along the drive.
+    let look = fixture::without_target();
+    assert!(matches!(keys::command(Key::ArrowRight, Modifiers::NONE, &look), Some(Command::Go(_))));
+}
+
+#[test]
+fn the_hint_tells_how_far_the_map_is() {
+    let shown = Shown::pane(Pane::Left, |context| {
+        let mut state = picking(context);
+        state.trackability.progress = Some(progress(3));
+        state
+    });
+    // Painted words have no node of their own; the image says what is there so far.
+    shown.says("trackability: 38 % good");
+    assert!(shown.harness.query_by_label_contains("left image of step 0").is_some());
+}
