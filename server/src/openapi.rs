@@ -11,7 +11,8 @@ use utoipa_axum::routes;
 
 use crate::state::AppState;
 use crate::{
-    about, events, exports, photometry, runs, sessions, settings, steps, studies, targets, traverses,
+    about, events, exports, photometry, questions, removal, runs, sessions, settings, steps, studies,
+    targets, traverses, what_if, why,
 };
 
 #[derive(OpenApi)]
@@ -42,6 +43,10 @@ pub fn router() -> OpenApiRouter<AppState> {
         .merge(exports::router())
         .merge(studies::router())
         .merge(events::router())
+        .merge(what_if::router())
+        .merge(why::router())
+        .merge(questions::router())
+        .merge(removal::router())
 }
 
 /// This document

@@ -15,6 +15,7 @@ use crate::guard::Hosts;
 use crate::jobs::{Jobs, Lane, lock};
 use crate::live::LiveSession;
 use crate::problem::{ApiError, ApiResult};
+use crate::questions::Questions;
 use crate::rendering::{Ahead, OpenTraverse};
 use crate::rerun_log::LiveStream;
 use crate::runner;
@@ -57,6 +58,8 @@ struct Inner {
     exports: Lane,
     studies: Shelf,
     streams: Mutex<BTreeMap<String, Arc<LiveStream>>>,
+    tries: Lane,
+    questions: Questions,
 }
 
 #[derive(Default)]
@@ -121,6 +124,8 @@ impl AppState {
             exports: Lane::new(1, 8),
             studies,
             streams: Mutex::default(),
+            tries: Lane::new(2, 16),
+            questions: Questions::default(),
         })))
     }
 
@@ -246,6 +251,16 @@ impl AppState {
     /// The live Rerun streams, by session.
     pub fn streams(&self) -> &Mutex<BTreeMap<String, Arc<LiveStream>>> {
         &self.0.streams
+    }
+
+    /// Where single steps are tried.
+    pub fn tries(&self) -> &Lane {
+        &self.0.tries
+    }
+
+    /// What would have saved steps: the questions that were asked.
+    pub fn questions(&self) -> &Questions {
+        &self.0.questions
     }
 }
 

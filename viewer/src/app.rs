@@ -1,7 +1,7 @@
 //! The application: lays the panels out and carries their commands to state and network.
 
 use egui::{CentralPanel, Context, Frame, Margin, Panel, Ui};
-use egui_tiles::Tree;
+use egui_tiles::{Tile, Tree};
 
 use crate::command::Command;
 use crate::layout::{LeftImage, Pane, Panels, overview};
@@ -100,11 +100,14 @@ impl SightlineApp {
             .frame(Frame::new().fill(theme::PAGE))
             .show(ui, |ui| self.tree.ui(&mut panels, ui));
         self.left_image = panels.left_image;
-        let [is_history_seen, is_studies_seen] =
-            [Pane::History, Pane::Studies].map(|pane| panels.seen.contains(&pane));
+        let [is_history_seen, is_studies_seen, is_why_seen] =
+            [Pane::History, Pane::Studies, Pane::Why].map(|pane| panels.seen.contains(&pane));
         help::show(ui, state, &mut out);
         // Every step's window is worth fetching only while the panel that shows them is on the screen.
         self.state.wants_history = is_history_seen;
+        if is_why_seen {
+            self.state.want_question();
+        }
         if is_studies_seen {
             self.state.want_studies();
         }
@@ -118,6 +121,9 @@ impl SightlineApp {
         }
         for command in commands {
             self.state.apply(command);
+        }
+        if std::mem::take(&mut self.state.why.is_called) {
+            self.tree.make_active(|_, tile| matches!(tile, Tile::Pane(Pane::Why)));
         }
         self.send();
         // What was asked for shows in the next frame, which otherwise only comes with the next event.

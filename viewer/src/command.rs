@@ -6,6 +6,7 @@ use sightline_core::settings::{Changes, TrackerKind};
 use crate::shape_view::ShapeView;
 use crate::state::calculator::Calculator;
 use crate::state::studies::Order;
+use crate::state::why::Ask;
 use crate::stretch::Stretch;
 use crate::tables::FeatureView;
 use crate::view2d::View2d;
@@ -365,4 +366,6 @@ pub enum Command {
     Dismiss(u64),
     /// Connects again at once.
     Reconnect,
+    /// Asks why a step came out as it did, tries a change, or takes a deed back.
+    Why(Ask),
 }

@@ -4,10 +4,11 @@ use egui::{Context, Event, Key, Modifiers};
 
 use crate::command::{Command, Go, Mode, Stage};
 use crate::state::State;
+use crate::state::why::Ask;
 use crate::stretch::Stretch;
 
 /// Every key with its meaning, as the help sheet lists them.
-pub const SHEET: [(&str, &str); 16] = [
+pub const SHEET: [(&str, &str); 19] = [
     ("Right  Left", "next, previous step"),
     ("Shift+Right  Shift+Left", "ten steps on, back"),
     ("Home  End", "first, last step"),
@@ -15,7 +16,10 @@ pub const SHEET: [(&str, &str); 16] = [
     ("G", "go to a step by its number"),
     ("Up  Down", "previous, next stage"),
     ("T", "pick a target: then click in the left image"),
-    ("R", "run from this step with the changed settings"),
+    ("R", "run from this step with the changed settings, or as a branch with what is tried"),
+    ("W", "why: where the selected value came from"),
+    ("C", "what would have saved this step"),
+    ("Ctrl+Z  Ctrl+Y", "take the last deed back, do it again"),
     ("F", "fit all images to their panels"),
     ("H", "hide or show all marks"),
     ("I", "stretch dark images automatically, or show them as recorded"),
@@ -42,7 +46,14 @@ pub fn commands(context: &Context, state: &State) -> Vec<Command> {
 
 /// What a key asks for.
 pub fn command(key: Key, modifiers: Modifiers, state: &State) -> Option<Command> {
-    if modifiers.ctrl || modifiers.command || modifiers.alt {
+    if (modifiers.ctrl || modifiers.command) && !modifiers.alt {
+        return match (key, modifiers.shift) {
+            (Key::Z, false) => Some(Command::Why(Ask::Undo)),
+            (Key::Y, false) | (Key::Z, true) => Some(Command::Why(Ask::Redo)),
+            _ => None,
+        };
+    }
+    if modifiers.alt {
         return None;
     }
     let shift = modifiers.shift;
@@ -61,6 +72,10 @@ pub fn command(key: Key, modifiers: Modifiers, state: &State) -> Option<Command>
         Key::G => Command::SetMode(Mode::GoTo(String::new())),
         Key::T if state.mode == Mode::Pick => Command::SetMode(Mode::Look),
         Key::T => Command::SetMode(Mode::Pick),
+        Key::W => Command::Why(Ask::Selected),
+        Key::C => Command::Why(Ask::Saved),
+        Key::R if state.trial().is_some() => Command::Why(Ask::Branch),
+        Key::Escape if state.mode == Mode::Look && state.trial().is_some() => Command::Why(Ask::Discard),
         Key::R => Command::RunFromHere(state.draft.clone()),
         Key::F => Command::FitAll,
         Key::H => Command::ToggleMarks,

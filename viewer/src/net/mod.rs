@@ -2,6 +2,7 @@
 
 mod events;
 mod http;
+pub mod why;
 
 use std::collections::HashSet;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -17,6 +18,7 @@ use sightline_core::study::row::Row;
 use sightline_core::study::wire::{NewStudy, StudyInfo, StudyJob};
 
 use self::events::Events;
+use self::why::{WhyReply, WhyRequest};
 use crate::cache::{Item, Key};
 use crate::state::Connection;
 
@@ -107,6 +109,8 @@ pub enum Request {
     Item(Key),
     /// To connect to the events again at once.
     Reconnect,
+    /// About single steps.
+    Why(WhyRequest),
 }
 
 /// What the server answered.
@@ -144,6 +148,8 @@ pub enum Reply {
     Item(Item),
     /// It is done.
     Done,
+    /// About single steps.
+    Why(WhyReply),
 }
 
 /// An answer with what was asked.

@@ -10,6 +10,7 @@ use sightline_core::trace::StepTrace;
 use super::exposure;
 use super::features::marks;
 use super::legend::{self, Entry};
+use super::what_if;
 use crate::cache::{Eye, Slot};
 use crate::command::{Command, Layer, Mode, Panel};
 use crate::overlay::{Line, Mark, Overlay, paint_words, template_quad};
@@ -54,6 +55,7 @@ fn picture(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) 
     paint_designation(&canvas, state);
     pick(ui, &canvas, raster, state, out);
     marks::hover(&canvas, state, |feature| Some(feature.pixel));
+    what_if::over_image(ui, &canvas, state, out);
     status_line(ui, &canvas, raster, region);
     if let Some(view) = canvas.moved {
         out.push(Command::View(Panel::Left, view));

@@ -16,6 +16,8 @@ pub mod map;
 pub mod messages;
 pub mod names;
 pub mod plots;
+mod numbers;
+mod run_tree;
 pub mod settings;
 pub mod shape;
 pub mod stereo_profile;
@@ -25,6 +27,8 @@ pub mod surface;
 pub mod targets;
 pub mod timeline;
 pub mod tolerances;
+pub mod what_if;
+pub mod why;
 
 use egui::{Align, Layout, RichText, Ui, UiBuilder};
 

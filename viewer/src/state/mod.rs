@@ -11,7 +11,9 @@ pub mod messages;
 mod missing;
 pub mod studies;
 pub mod tracker;
+pub mod undo;
 mod wanted;
+pub mod why;
 
 use std::collections::{BTreeMap, HashSet};
 
@@ -30,6 +32,8 @@ use self::calculator::Calculator;
 use self::configurations::Configurations;
 use self::messages::Messages;
 use self::studies::Studies;
+use self::undo::Undo;
+use self::why::Why;
 use crate::cache::{Cache, Eye, Key, Slot, StepKey};
 use crate::command::{Layer, Mode, Panel, Stage};
 use crate::net::Request;
@@ -156,6 +160,10 @@ pub struct State {
     pub marks: bool,
     /// A page to open in a new tab.
     pub open_url: Option<String>,
+    /// Why a step came out as it did, what would have saved it, and what is tried.
+    pub why: Why,
+    /// What can be taken back.
+    pub undo: Undo,
     outbox: Vec<Request>,
     sync: Sync,
     /// The aligned left camera of the step that was asked for last: it takes a while to compute.
@@ -212,6 +220,8 @@ impl State {
             hidden: HashSet::from(Layer::HIDDEN_AT_FIRST),
             marks: true,
             open_url: None,
+            why: Why::default(),
+            undo: Undo::default(),
             outbox: Vec::new(),
             sync: Sync { linked, ..Sync::default() },
             aligned: egui::mutex::Mutex::default(),
