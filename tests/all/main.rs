@@ -12,4 +12,5 @@ mod recorded_cameras;
 mod recorded_tracking;
 mod rerun_export;
 mod studies;
+mod why;
 mod zncc_reference;

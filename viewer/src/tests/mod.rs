@@ -10,6 +10,7 @@ mod shape;
 mod shape_run;
 mod studies;
 mod tracking;
+mod why;
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
