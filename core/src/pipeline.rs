@@ -110,14 +110,19 @@ pub fn designate(stops: &dyn Stops, designation: Designation, settings: &Setting
 
 /// One later step of a run: what `last` left behind is found again at the next stop.
 pub fn run_step(stops: &dyn Stops, last: &Updated, settings: &Settings) -> StepTrace {
+    run_step_displaced(stops, last, settings, None)
+}
+
+/// The same from a prediction that a person put at a pixel of the left image, where they did.
+pub fn run_step_displaced(
+    stops: &dyn Stops,
+    last: &Updated,
+    settings: &Settings,
+    prediction_px: Option<Pixel>,
+) -> StepTrace {
     let (target, step) = (&last.target, last.target.step + 1);
     let site_from_rover = stops.site_from_rover(step);
-    let prediction = predict::predict(
-        target,
-        &stops.site_from_rover(target.step),
-        &site_from_rover,
-        &stops.odometry_error(),
-    );
+    let prediction = prediction(stops, target, prediction_px);
     let carried = update::carry(target, step, &prediction);
     let pointing = pointing(stops, step, &carried);
     let mut trace = StepTrace {
@@ -158,6 +163,16 @@ pub fn run_step(stops: &dyn Stops, last: &Updated, settings: &Settings) -> StepT
         }
     }
     trace
+}
+
+/// Where the target should be at the next stop, perhaps displaced.
+fn prediction(stops: &dyn Stops, target: &Target, prediction_px: Option<Pixel>) -> predict::Prediction {
+    let step = target.step + 1;
+    let [then, now] = [target.step, step].map(|step| stops.site_from_rover(step));
+    let predicted = predict::predict(target, &then, &now, &stops.odometry_error());
+    let left = stops.cameras(step).0;
+    let displaced = prediction_px.and_then(|pixel| predict::displaced(&predicted, left, pixel, &now));
+    displaced.unwrap_or(predicted)
 }
 
 /// A stop before anything was seen of it: the target is where the prediction puts it.

@@ -90,7 +90,7 @@ fn write(live: &LiveSession, cancel: &AtomicBool) -> ApiResult<(std::fs::File, T
 fn runs(session: &Session) -> Vec<RunLog<'_>> {
     let live = session.targets.iter().enumerate().filter(|(_, record)| !record.removed);
     let of_target = live.flat_map(|(target, record)| {
-        let runs = record.runs.iter().enumerate().filter(|(_, run)| !run.steps.is_empty());
+        let runs = record.runs.iter().enumerate().filter(|(_, run)| !run.removed && !run.steps.is_empty());
         runs.map(move |(number, run)| RunLog { target, run: number, label: &record.label, steps: &run.steps })
     });
     of_target.collect()

@@ -11,8 +11,8 @@ use utoipa_axum::routes;
 
 use crate::state::AppState;
 use crate::{
-    about, compare, events, exports, photometry, runs, sessions, settings, steps, studies, targets,
-    trackability, traverses,
+    about, compare, events, exports, photometry, questions, removal, runs, sessions, settings, steps,
+    studies, targets, trackability, traverses, what_if, why,
 };
 
 #[derive(OpenApi)]
@@ -45,6 +45,10 @@ pub fn router() -> OpenApiRouter<AppState> {
         .merge(studies::router())
         .merge(events::router())
         .merge(trackability::router())
+        .merge(what_if::router())
+        .merge(why::router())
+        .merge(questions::router())
+        .merge(removal::router())
 }
 
 /// This document

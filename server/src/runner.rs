@@ -40,12 +40,33 @@ pub fn start(state: &AppState, live: &Arc<LiveSession>, target: usize, run: usiz
 /// # Errors
 /// A problem when too much is waiting already.
 pub fn restore(state: &AppState, live: &Arc<LiveSession>) -> ApiResult<()> {
+    go_on(state, live, every_run)
+}
+
+/// Computes what is missing of a target's runs in the background, parents before their forks; what goes on already is left
+/// alone.
+///
+/// # Errors
+/// A problem when too much is waiting already.
+pub fn go_on_with(state: &AppState, live: &Arc<LiveSession>, target: usize) -> ApiResult<()> {
+    go_on(state, live, move |session| {
+        every_run(session).into_iter().filter(|(own, _)| *own == target).collect()
+    })
+}
+
+fn go_on(
+    state: &AppState,
+    live: &Arc<LiveSession>,
+    which: impl FnOnce(&Session) -> Vec<(usize, usize)> + Send + 'static,
+) -> ApiResult<()> {
     let (state_in_job, live) = (state.clone(), Arc::clone(live));
     state.jobs().submit(move || {
-        let runs = live.with(|session| every_run(session));
+        let runs = live.with(|session| which(session));
         for (target, run) in runs {
-            let flag = live.begin(target, run);
-            compute(&state_in_job, &live, target, run, &flag);
+            if !live.is_computing(target, run) {
+                let flag = live.begin(target, run);
+                compute(&state_in_job, &live, target, run, &flag);
+            }
         }
     })
 }
@@ -54,7 +75,11 @@ pub fn restore(state: &AppState, live: &Arc<LiveSession>) -> ApiResult<()> {
 fn every_run(session: &Session) -> Vec<(usize, usize)> {
     let mut targets: Vec<_> = (0..session.targets.len()).filter(|&t| !session.targets[t].removed).collect();
     targets.sort_by_key(|&target| session.cursor.target != Some(target));
-    let runs = |target: usize| (0..session.targets[target].runs.len()).map(move |run| (target, run));
+    let runs = |target: usize| {
+        let needed =
+            (0..session.targets[target].runs.len()).filter(move |run| session.is_needed(target, *run));
+        needed.map(move |run| (target, run))
+    };
     targets.into_iter().flat_map(runs).collect()
 }
 
@@ -139,13 +164,23 @@ fn advance(
             return Err(Error::Cancelled);
         }
     }
-    let mut last = Arc::clone(&pending.last);
-    let appearance = &last.update.target.appearance;
+    let last = with_image(&live.traverse, &pending.last)?;
+    let (first, prediction_px) = (&pending.first, pending.prediction_px);
+    Ok(without_pair(track::advance_displaced(traverse, first, &last, &pending.settings, prediction_px)))
+}
+
+/// A step with the image from which the next template is cut, which a recorded step let go of.
+///
+/// # Errors
+/// When that image cannot be read.
+pub fn with_image(open: &OpenTraverse, step: &Arc<StepTrace>) -> Result<Arc<StepTrace>> {
+    let mut step = Arc::clone(step);
+    let appearance = &step.update.target.appearance;
     if appearance.image.is_empty() {
-        let image = traverse.capture(appearance.step)?.left;
-        Arc::make_mut(&mut last).update.target.appearance.image = image;
+        let image = open.traverse.capture(appearance.step)?.left;
+        Arc::make_mut(&mut step).update.target.appearance.image = image;
     }
-    Ok(without_pair(track::advance(traverse, &pending.first, &last, &pending.settings)))
+    Ok(step)
 }
 
 /// Adds a step to its run; the one before lets go of its image.

@@ -20,6 +20,7 @@ use crate::problem::{ApiError, ApiResult};
 use crate::runner;
 use crate::state::AppState;
 use crate::targets::start_or_say;
+use crate::what_if;
 
 /// The routes of this resource.
 pub fn router() -> OpenApiRouter<AppState> {
@@ -142,6 +143,11 @@ fn add(state: &AppState, live: &Arc<LiveSession>, target: usize, new: &NewRun) -
             format!("from_step: must be from {first} to {last}, not {given}"),
         ));
     }
+    what_if::check_pixel(new.prediction_px)?;
+    if new.prediction_px.is_some() && new.from_step == designation.step {
+        let detail = "prediction_px: the target is designated at this step, so that nothing is predicted";
+        return Err(ApiError::invalid("field", detail).hint("Leave it out, or run from a later step."));
+    }
     let redesignated = if new.from_step == designation.step {
         Some(Arc::new(runner::designate(&live.traverse, designation, &settings)?))
     } else {
@@ -149,7 +155,13 @@ fn add(state: &AppState, live: &Arc<LiveSession>, target: usize, new: &NewRun) -
     };
     let run = live.with(|session| {
         has_room(session, target)?;
-        Ok::<_, ApiError>(session.fork(target, new.run, new.from_step, &new.settings, redesignated)?)
+        // A run again from the very step at which its parent was displaced is displaced alike, unless it says where.
+        let inherited = session.run(target, new.run)?.displaced_at(new.from_step);
+        let run = session.fork(target, new.run, new.from_step, &new.settings, redesignated)?;
+        if let Some(pixel) = new.prediction_px.or(inherited) {
+            session.displace(target, run, pixel)?;
+        }
+        Ok::<_, ApiError>(run)
     })?;
     start_or_say(state, live, target, run);
     state.changed(live)?;

@@ -15,6 +15,7 @@ use crate::guard::Hosts;
 use crate::jobs::{Jobs, Lane, lock};
 use crate::live::LiveSession;
 use crate::problem::{ApiError, ApiResult};
+use crate::questions::Questions;
 use crate::rendering::{Ahead, OpenTraverse};
 use crate::rerun_log::LiveStream;
 use crate::runner;
@@ -59,6 +60,8 @@ struct Inner {
     studies: Shelf,
     streams: Mutex<BTreeMap<String, Arc<LiveStream>>>,
     maps: Maps,
+    tries: Lane,
+    questions: Questions,
 }
 
 #[derive(Default)]
@@ -124,6 +127,8 @@ impl AppState {
             studies,
             streams: Mutex::default(),
             maps: Maps::default(),
+            tries: Lane::new(2, 16),
+            questions: Questions::default(),
         })))
     }
 
@@ -254,6 +259,16 @@ impl AppState {
     /// The live Rerun streams, by session.
     pub fn streams(&self) -> &Mutex<BTreeMap<String, Arc<LiveStream>>> {
         &self.0.streams
+    }
+
+    /// Where single steps are tried.
+    pub fn tries(&self) -> &Lane {
+        &self.0.tries
+    }
+
+    /// What would have saved steps: the questions that were asked.
+    pub fn questions(&self) -> &Questions {
+        &self.0.questions
     }
 }
 

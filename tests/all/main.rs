@@ -17,4 +17,5 @@ mod recorded_tracking;
 mod rerun_export;
 mod studies;
 mod trackability;
+mod why;
 mod zncc_reference;

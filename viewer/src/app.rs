@@ -3,7 +3,7 @@
 use egui::{CentralPanel, Context, Frame, Margin, Panel, Ui};
 
 use crate::command::Command;
-use crate::layout::workspace::Workspace;
+use crate::layout::workspace::{LayoutCommand, Workspace};
 use crate::layout::{LeftImage, Pane, Panels, region};
 use crate::link::Fragment;
 use crate::net::{Net, Request};
@@ -43,7 +43,7 @@ impl SightlineApp {
         theme::apply(context, state.looks);
         let mut workspace = Workspace::restored(kept.layout());
         if let Some(preset) = link.fragment.preset.filter(|preset| *preset != workspace.preset()) {
-            workspace.apply(crate::layout::workspace::LayoutCommand::Use(preset));
+            workspace.apply(LayoutCommand::Use(preset));
         }
         state.begin();
         let linked = link.fragment.clone();
@@ -123,8 +123,8 @@ impl SightlineApp {
             .frame(Frame::new().fill(theme::PAGE))
             .show(ui, |ui| self.workspace.show(ui, &mut panels));
         self.left_image = panels.left_image;
-        let [is_history_seen, is_studies_seen] =
-            [Pane::History, Pane::Studies].map(|pane| panels.seen.contains(&pane));
+        let [is_history_seen, is_studies_seen, is_why_seen] =
+            [Pane::History, Pane::Studies, Pane::Why].map(|pane| panels.seen.contains(&pane));
         let wants_metrics = [Pane::Runs, Pane::Uncertainty].iter().any(|pane| panels.seen.contains(pane));
         help::show(ui, state, &mut out);
         palette::show(ui, state, &mut out);
@@ -132,6 +132,9 @@ impl SightlineApp {
         self.state.compare.wants_metrics = wants_metrics;
         // Every step's window is worth fetching only while the panel that shows them is on the screen.
         self.state.wants_history = is_history_seen;
+        if is_why_seen {
+            self.state.want_question();
+        }
         if is_studies_seen {
             self.state.want_studies();
         }
@@ -151,6 +154,9 @@ impl SightlineApp {
                 _ => {}
             }
             self.state.apply(command);
+        }
+        if std::mem::take(&mut self.state.why.is_called) {
+            self.workspace.apply(LayoutCommand::Show(Pane::Why));
         }
         self.send();
         // What was asked for shows in the next frame, which otherwise only comes with the next event.
@@ -188,7 +194,7 @@ impl SightlineApp {
             let present = Fragment::parse(&crate::web::hash());
             if present != self.linked && present.session.is_some() {
                 if let Some(preset) = present.preset.filter(|preset| *preset != self.workspace.preset()) {
-                    self.workspace.apply(crate::layout::workspace::LayoutCommand::Use(preset));
+                    self.workspace.apply(LayoutCommand::Use(preset));
                 }
                 self.linked = present.clone();
                 self.state.open_link(present);

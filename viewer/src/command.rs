@@ -8,6 +8,7 @@ use crate::layout::workspace::LayoutCommand;
 use crate::shape_view::ShapeView;
 use crate::state::calculator::Calculator;
 use crate::state::studies::Order;
+use crate::state::why::Ask;
 use crate::stretch::Stretch;
 use crate::tables::FeatureView;
 use crate::theme::Looks;
@@ -418,4 +419,6 @@ pub enum Command {
     Aim(Aim),
     /// Leads through the tour.
     Tour(Turn),
+    /// Asks why a step came out as it did, tries a change, or takes a deed back.
+    Why(Ask),
 }

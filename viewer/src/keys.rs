@@ -7,11 +7,12 @@ use crate::command::{Command, Go, Mode, Stage};
 use crate::layout::presets::Preset;
 use crate::layout::workspace::LayoutCommand;
 use crate::state::State;
+use crate::state::why::Ask;
 use crate::stretch::Stretch;
 use crate::{actions, compare, tour};
 
 /// Every key with its meaning, as the help sheet lists them.
-pub const SHEET: [(&str, &str); 23] = [
+pub const SHEET: [(&str, &str); 26] = [
     ("Right  Left", "next, previous step"),
     ("Shift+Right  Shift+Left", "ten steps on, back"),
     ("Home  End", "first, last step"),
@@ -21,7 +22,10 @@ pub const SHEET: [(&str, &str); 23] = [
     ("T", "pick a target: then click in the left image"),
     ("Arrows, Enter", "while picking: move the aim by 0.1 px (Shift 1 px), take it"),
     ("Enter  Backspace  Esc", "in the tour: next, back, skip"),
-    ("R", "run from this step with the changed settings"),
+    ("R", "run from this step with the changed settings, or as a branch with what is tried"),
+    ("W", "why: where the selected value came from"),
+    ("C", "what would have saved this step"),
+    ("Ctrl+Z  Ctrl+Y", "take the last deed back, do it again"),
     ("F", "fit all images to their panels"),
     ("H", "hide or show all marks"),
     ("I", "stretch dark images automatically, or show them as recorded"),
@@ -116,10 +120,15 @@ fn preset_of(key: Key) -> Option<Preset> {
 
 /// What a key asks for.
 pub fn command(key: Key, modifiers: Modifiers, state: &State) -> Option<Command> {
-    if key == Key::K && modifiers.command && !modifiers.alt && !modifiers.shift {
-        return Some(actions::palette());
+    if (modifiers.ctrl || modifiers.command) && !modifiers.alt {
+        return match (key, modifiers.shift) {
+            (Key::K, false) => Some(actions::palette()),
+            (Key::Z, false) => Some(Command::Why(Ask::Undo)),
+            (Key::Y, false) | (Key::Z, true) => Some(Command::Why(Ask::Redo)),
+            _ => None,
+        };
     }
-    if modifiers.ctrl || modifiers.command || modifiers.alt {
+    if modifiers.alt {
         return None;
     }
     let shift = modifiers.shift;
@@ -147,6 +156,10 @@ pub fn command(key: Key, modifiers: Modifiers, state: &State) -> Option<Command>
         Key::G => Command::SetMode(Mode::GoTo(String::new())),
         Key::T if state.mode == Mode::Pick => Command::SetMode(Mode::Look),
         Key::T => Command::SetMode(Mode::Pick),
+        Key::W => Command::Why(Ask::Selected),
+        Key::C => Command::Why(Ask::Saved),
+        Key::R if state.trial().is_some() => Command::Why(Ask::Branch),
+        Key::Escape if state.mode == Mode::Look && state.trial().is_some() => Command::Why(Ask::Discard),
         Key::R => Command::RunFromHere(state.draft.clone()),
         Key::F => Command::FitAll,
         Key::H => Command::ToggleMarks,

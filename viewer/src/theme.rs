@@ -60,6 +60,8 @@ pub const MESH_EARLIER: Color32 = LOST;
 pub const MESH_PRESENT: Color32 = PREDICTION;
 /// How far from the prediction a registration by shape can start.
 pub const BASIN: Color32 = SEARCH;
+/// What is only tried: dashed.
+pub const GHOST: Color32 = ACCENT;
 /// What is true.
 pub const TRUTH: Color32 = Color32::WHITE;
 /// A texture that shines through another.

@@ -5,10 +5,14 @@
 //! fork. What is worth keeping is small: [`Session::saved`] is the list of what the person did, from which
 //! the same session comes again bit for bit, since every step is a function of its input.
 
+pub mod counterfactual;
 pub mod progress;
+mod removal;
 pub mod run;
 pub mod track;
 pub mod view;
+pub mod what_if;
+pub mod why;
 pub mod wire;
 pub mod compare;
 pub mod metrics;
@@ -21,6 +25,7 @@ use utoipa::ToSchema;
 pub use self::progress::Next;
 pub use self::run::{Fork, Run};
 use crate::error::{Error, Result};
+use crate::frames::Pixel;
 use crate::settings::{Changes, Settings};
 use crate::target::Designation;
 use crate::trace::StepTrace;
@@ -74,6 +79,8 @@ pub struct Pending {
     pub last: Arc<StepTrace>,
     /// The run's configuration.
     pub settings: Arc<Settings>,
+    /// Where a person put the prediction of the step in the left image, px.
+    pub prediction_px: Option<Pixel>,
 }
 
 impl Session {
@@ -133,7 +140,7 @@ impl Session {
                 "run {run} of target {target} has no step before step {from_step} yet"
             )));
         }
-        let forked = Run::new(settings, Some(Fork { run, from_step }), kept);
+        let forked = Run::new(settings, Some(Fork::new(run, from_step)), kept);
         let record = self.target_mut(target)?;
         record.runs.push(forked);
         Ok(record.runs.len() - 1)
@@ -144,13 +151,14 @@ impl Session {
     /// # Errors
     /// [`Error::Request`] when there is no such target or run.
     pub fn pending(&self, target: usize, run: usize) -> Result<Option<Pending>> {
-        let run = self.run(target, run)?;
+        let run = self.any_run(target, run)?;
         let end = run.stop_after.map_or(self.stop_count, |stop| self.stop_count.min(stop + 1));
         let last = run.steps.last().filter(|last| last.step + 1 < end && run.stopped.is_none());
         Ok(last.map(|last| Pending {
             first: Arc::clone(&run.steps[0]),
             last: Arc::clone(last),
             settings: Arc::clone(&run.settings),
+            prediction_px: run.displaced_at(last.step + 1),
         }))
     }
 
@@ -196,13 +204,13 @@ impl Session {
         found.ok_or_else(|| Error::Request(format!("session {} has no target {target}", self.id)))
     }
 
-    /// A run of a target.
+    /// A run of a target that was not removed.
     ///
     /// # Errors
     /// [`Error::Request`] when there is none of that number.
     pub fn run(&self, target: usize, run: usize) -> Result<&Run> {
-        let found = self.target(target)?.runs.get(run);
-        found.ok_or_else(|| Error::Request(format!("target {target} has no run {run}")))
+        let found = self.any_run(target, run).ok().filter(|found| !found.removed);
+        found.ok_or_else(|| self.no_run(target, run))
     }
 
     fn target_mut(&mut self, target: usize) -> Result<&mut TargetRecord> {

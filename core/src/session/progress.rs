@@ -57,15 +57,15 @@ impl Session {
     /// [`Error::Request`] when there is no such target or run.
     pub fn next(&mut self, target: usize, run: usize) -> Result<Next> {
         let designation = self.target(target)?.designation;
-        let current = self.run(target, run)?;
-        if current.stopped.is_some() {
+        let current = self.any_run(target, run)?;
+        if current.stopped.is_some() || !self.is_needed(target, run) {
             return Ok(Next::Nothing);
         }
         if current.steps.is_empty() {
             match current.fork.filter(|fork| fork.from_step > designation.step) {
                 None => return Ok(Next::Designate { designation, settings: Arc::clone(&current.settings) }),
                 Some(fork) => {
-                    let kept = self.run(target, fork.run)?.steps_before(fork.from_step);
+                    let kept = self.any_run(target, fork.run)?.steps_before(fork.from_step);
                     let current = self.run_mut(target, run)?;
                     match kept {
                         Some(kept) => current.steps = kept,
@@ -158,7 +158,8 @@ fn restored_target(number: usize, saved: &SavedTarget, stop_count: usize) -> Res
 }
 
 fn restored_run(saved: &SavedRun) -> Run {
-    Run { stop_after: saved.stop_after, ..Run::new(Arc::new(saved.settings.clone()), saved.fork, Vec::new()) }
+    let (stop_after, removed) = (saved.stop_after, saved.removed);
+    Run { stop_after, removed, ..Run::new(Arc::new(saved.settings.clone()), saved.fork, Vec::new()) }
 }
 
 #[cfg(test)]
@@ -169,7 +170,8 @@ mod tests {
 
     fn saved() -> SavedSession {
         let designation = Designation { step: 1, pixel: Pixel::new(3.0, 4.0) };
-        let run = |fork, stop_after| SavedRun { fork, settings: Settings::default(), stop_after };
+        let run =
+            |fork, stop_after| SavedRun { fork, settings: Settings::default(), stop_after, removed: false };
         SavedSession {
             format: SAVED_FORMAT,
             id: "s1".to_owned(),
@@ -179,7 +181,7 @@ mod tests {
                 label: "rock".to_owned(),
                 designation,
                 removed: false,
-                runs: vec![run(None, Some(3)), run(Some(Fork { run: 0, from_step: 3 }), None)],
+                runs: vec![run(None, Some(3)), run(Some(Fork::new(0, 3)), None)],
             }],
         }
     }
@@ -206,7 +208,7 @@ mod tests {
         assert!(refuse(&SavedSession { format: 2, ..saved() }, 9).contains("version 2"));
         assert!(refuse(&saved(), 1).contains("step 1"));
         let mut circular = saved();
-        circular.targets[0].runs[1].fork = Some(Fork { run: 1, from_step: 3 });
+        circular.targets[0].runs[1].fork = Some(Fork::new(1, 3));
         assert!(refuse(&circular, 9).contains("run 1"));
     }
 

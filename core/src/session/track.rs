@@ -3,6 +3,7 @@
 //! Page, REST and command line all come through these two functions, so that they show the same numbers.
 
 use crate::error::Result;
+use crate::frames::Pixel;
 use crate::locate::template::warnings;
 use crate::pipeline::{self, Stops};
 use crate::settings::Settings;
@@ -39,7 +40,18 @@ fn warn_of_shadow<D: Drive>(drive: &D, trace: &mut StepTrace, settings: &Setting
 
 /// The step after `last`; `first` is the run's designation.
 pub fn advance<D: Drive>(drive: &D, first: &StepTrace, last: &StepTrace, settings: &Settings) -> StepTrace {
-    let mut trace = pipeline::run_step(drive, &last.update, settings);
+    advance_displaced(drive, first, last, settings, None)
+}
+
+/// The same from a prediction that a person put at a pixel of the left image, where they did.
+pub fn advance_displaced<D: Drive>(
+    drive: &D,
+    first: &StepTrace,
+    last: &StepTrace,
+    settings: &Settings,
+    prediction_px: Option<Pixel>,
+) -> StepTrace {
+    let mut trace = pipeline::run_step_displaced(drive, &last.update, settings, prediction_px);
     compare(drive, &mut trace, Some(first));
     trace
 }

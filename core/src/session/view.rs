@@ -33,7 +33,7 @@ pub struct TargetView {
     pub label: String,
     /// How it was designated.
     pub designation: Designation,
-    /// Its runs, by number.
+    /// Its runs that were not removed, by number.
     pub runs: Vec<RunView>,
 }
 
@@ -100,6 +100,15 @@ pub struct SavedRun {
     /// The step after which the person stopped it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stop_after: Option<usize>,
+    /// Whether the person removed it.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub removed: bool,
+}
+
+// The signature is that of serde.
+#[allow(clippy::trivially_copy_pass_by_ref)]
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
 impl Session {
@@ -135,6 +144,7 @@ impl Session {
             fork: run.fork,
             settings: run.settings.as_ref().clone(),
             stop_after: run.stop_after,
+            removed: run.removed,
         };
         SavedSession {
             format: SAVED_FORMAT,
@@ -155,7 +165,8 @@ impl Session {
     }
 
     fn target_view(&self, number: usize, record: &TargetRecord) -> TargetView {
-        let runs = record.runs.iter().enumerate().map(|(number, run)| self.run_view(number, run));
+        let live = record.runs.iter().enumerate().filter(|(_, run)| !run.removed);
+        let runs = live.map(|(number, run)| self.run_view(number, run));
         TargetView {
             number,
             label: record.label.clone(),

@@ -158,6 +158,9 @@ pub struct NewRun {
     #[serde(default)]
     #[schema(value_type = Object)]
     pub settings: Changes,
+    /// Where to put the prediction of that one step in the left image, px; left out: where dead reckoning has it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prediction_px: Option<Pixel>,
 }
 
 /// A live Rerun stream that was opened for a session.
@@ -222,6 +225,23 @@ pub enum Event {
         /// Rows of cells in all; 0 before that is known.
         n: usize,
         /// Whether nothing more will come.
+        ended: bool,
+    },
+    /// What would have saved a step is being looked for: read the question again.
+    QuestionProgress {
+        /// The session.
+        session: String,
+        /// The target's number.
+        target: usize,
+        /// The run's number.
+        run: usize,
+        /// The step.
+        step: usize,
+        /// Settings and places looked at.
+        k: usize,
+        /// How many there are.
+        n: usize,
+        /// Whether it has ended.
         ended: bool,
     },
 }

@@ -19,7 +19,8 @@ use nalgebra::{Matrix3, Rotation3};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::frames::{Point3, Pose, Vector3};
+use crate::camera::Camera;
+use crate::frames::{Pixel, Point3, Pose, Vector3};
 use crate::target::Target;
 use crate::traverse::OdometryError;
 
@@ -67,6 +68,35 @@ pub fn predict(
     }
 }
 
+/// `prediction` as a person displaced it: on the line of sight of `pixel`, as far from the left camera's centre as
+/// before.
+///
+/// Of the ways that a pixel leaves open this one keeps the scale by the ratio of distances (K-Eq 6) and every tolerance
+/// of `judge`, so that the displacement is one across the line of sight and nothing else. With the ray `o + t d`, the
+/// camera's centre C and the distance D, `t = b + √(b² − |o − C|² + D²)`, `b = (C − o)·d`: in a CAHVORE lens light does
+/// not enter at C. The covariance is kept.
+///
+/// None where the pixel sees nothing.
+pub fn displaced(
+    prediction: &Prediction,
+    left: &Camera,
+    pixel: Pixel,
+    site_from_rover: &Pose,
+) -> Option<Prediction> {
+    let ray = left.ray(pixel)?;
+    let centre = left.model.centre();
+    let distance_m = (prediction.position_in_rover - centre).norm();
+    let to_centre = centre - ray.origin;
+    let along_m = to_centre.dot(&ray.direction);
+    let root = along_m * along_m - to_centre.norm_squared() + distance_m * distance_m;
+    let position_in_rover = ray.at(along_m + root.max(0.0).sqrt());
+    Some(Prediction {
+        position_in_rover,
+        position_in_site: site_from_rover * position_in_rover,
+        ..prediction.clone()
+    })
+}
+
 /// What the error of one pose change adds to the covariance of a point, m², rover frame.
 fn motion_covariance(point: &Point3, way: &Vector3, odometry: &OdometryError) -> Matrix3<f64> {
     let length_m = way.norm();
@@ -80,4 +110,39 @@ fn motion_covariance(point: &Point3, way: &Vector3, odometry: &OdometryError) ->
     let attitude_rad = odometry.attitude_deg.to_radians();
     let cross = point.coords.cross_matrix();
     translation + cross * cross.transpose() * (attitude_rad * attitude_rad)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{Cahv, CameraModel};
+
+    #[test]
+    fn a_displaced_prediction_lies_under_its_pixel_as_far_away_as_before() {
+        let linear = Cahv::as_printed(
+            Point3::new(0.3, -0.1, -1.2),
+            Vector3::x(),
+            Vector3::new(127.5, 600.0, 0.0),
+            Vector3::new(127.5, 0.0, 600.0),
+        );
+        let left = Camera::new(CameraModel::Cahv(linear), 256, 256);
+        let position_in_rover = Point3::new(6.0, 0.4, -0.3);
+        let site_from_rover = Pose::translation(3.0, -1.0, 0.2);
+        let prediction = Prediction {
+            position_in_rover,
+            position_in_site: site_from_rover * position_in_rover,
+            covariance_in_rover: Matrix3::identity() * 0.01,
+            step_length_m: 1.0,
+            travelled_since_update_m: 2.0,
+            travelled_m: 3.0,
+        };
+        let pixel = Pixel::new(90.5, 201.25);
+        let moved = displaced(&prediction, &left, pixel, &site_from_rover).unwrap();
+        assert!(left.project(&moved.position_in_rover).unwrap().distance(pixel) < 1e-9);
+        let distance_m = |p: &Point3| (p - left.model.centre()).norm();
+        assert!((distance_m(&moved.position_in_rover) - distance_m(&position_in_rover)).abs() < 1e-12);
+        assert!((moved.position_in_site - site_from_rover * moved.position_in_rover).norm() < 1e-12);
+        assert_eq!(moved.covariance_in_rover, prediction.covariance_in_rover);
+        assert_eq!(moved.travelled_since_update_m, prediction.travelled_since_update_m);
+    }
 }

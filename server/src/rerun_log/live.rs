@@ -70,7 +70,8 @@ impl LiveStream {
         let live = session.targets.iter().enumerate().filter(|(_, target)| !target.removed);
         let runs: Vec<_> = live
             .flat_map(|(number, target)| {
-                target.runs.iter().enumerate().map(move |(run, record)| (number, run, record))
+                let runs = target.runs.iter().enumerate().filter(|(_, record)| !record.removed);
+                runs.map(move |(run, record)| (number, run, record))
             })
             .map(|(target, run, record)| RunLog { target, run, label: labels[target], steps: &record.steps })
             .collect();

@@ -66,11 +66,13 @@ pub enum Pane {
     Runs,
     /// Whether the covariances hold.
     Uncertainty,
+    /// Why a step came out as it did.
+    Why,
 }
 
 impl Pane {
     /// All of them.
-    pub const ALL: [Self; 21] = [
+    pub const ALL: [Self; 22] = [
         Self::Targets,
         Self::Settings,
         Self::Left,
@@ -92,6 +94,7 @@ impl Pane {
         Self::Messages,
         Self::Runs,
         Self::Uncertainty,
+        Self::Why,
     ];
 
     /// Its title.
@@ -118,6 +121,7 @@ impl Pane {
             Self::Messages => "Messages",
             Self::Runs => "Runs",
             Self::Uncertainty => "Uncertainty",
+            Self::Why => "Why",
         }
     }
 }
@@ -149,6 +153,7 @@ pub fn show_pane(ui: &mut Ui, pane: Pane, state: &State, out: &mut Vec<Command>)
         Pane::Messages => panels::messages::show(ui, state, out),
         Pane::Runs => panels::runs::show(ui, state, out),
         Pane::Uncertainty => panels::uncertainty::show(ui, state, out),
+        Pane::Why => panels::why::show(ui, state, out),
     }
     None
 }

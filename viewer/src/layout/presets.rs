@@ -145,7 +145,7 @@ const OVERVIEW: Area = Row(&[
     (
         Column(&[
             (Tabs(&[Pane::Gates, Pane::Machine]), 0.38),
-            (Tabs(&[Pane::Inspector, Pane::Messages]), 0.62),
+            (Tabs(&[Pane::Inspector, Pane::Why, Pane::Messages]), 0.62),
         ]),
         0.2,
     ),
@@ -162,7 +162,7 @@ const MATCH: Area = Row(&[
     (
         Column(&[
             (Tabs(&[Pane::Gates, Pane::Machine]), 0.4),
-            (Tabs(&[Pane::Inspector, Pane::Settings, Pane::Targets, Pane::Messages]), 0.6),
+            (Tabs(&[Pane::Why, Pane::Inspector, Pane::Settings, Pane::Targets, Pane::Messages]), 0.6),
         ]),
         0.26,
     ),
@@ -185,7 +185,7 @@ const STEREO: Area = Row(&[
     (
         Column(&[
             (Tabs(&[Pane::Gates, Pane::Targets]), 0.4),
-            (Tabs(&[Pane::Inspector, Pane::Messages]), 0.6),
+            (Tabs(&[Pane::Inspector, Pane::Why, Pane::Messages]), 0.6),
         ]),
         0.24,
     ),
@@ -221,7 +221,7 @@ const COMPARE: Area = Row(&[
     (
         Column(&[
             (Tabs(&[Pane::Gates, Pane::Machine]), 0.4),
-            (Tabs(&[Pane::Inspector, Pane::Messages]), 0.6),
+            (Tabs(&[Pane::Inspector, Pane::Why, Pane::Messages]), 0.6),
         ]),
         0.2,
     ),

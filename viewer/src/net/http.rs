@@ -9,7 +9,7 @@ use sightline_core::session::compare::RunName;
 use sightline_core::session::wire::{Designated, Problem};
 use sightline_core::study::wire::StudyRows;
 
-use super::{Arrived, Reply, Request};
+use super::{Arrived, Reply, Request, why};
 use crate::cache::{Item, Key, StepKey};
 use crate::raster::Raster;
 use crate::tables::Table;
@@ -103,6 +103,7 @@ fn describe(request: &Request) -> (Method, String, Option<Vec<u8>>) {
             format!("traverses/{traverse}/steps/{step}/trackability/cancel"),
             json(&serde_json::json!({})),
         ),
+        Request::Why(request) => why::describe(request),
     }
 }
 
@@ -119,7 +120,7 @@ fn item_path(key: &Key) -> String {
     }
 }
 
-fn json(value: &impl Serialize) -> Option<Vec<u8>> {
+pub(super) fn json(value: &impl Serialize) -> Option<Vec<u8>> {
     serde_json::to_vec(value).ok()
 }
 
@@ -148,6 +149,7 @@ fn read(request: &Request, response: &ehttp::Response, context: &egui::Context) 
             Reply::StudyRows(rows)
         }
         Request::Item(key) => Reply::Item(read_item(key, bytes, context)?),
+        Request::Why(request) => Reply::Why(why::read(request, bytes)?),
         Request::PutCursor { .. }
         | Request::RemoveTarget { .. }
         | Request::CancelRun { .. }
@@ -175,7 +177,7 @@ fn read_item(key: &Key, bytes: &[u8], context: &egui::Context) -> Result<Item, P
     raster.map(|raster| Item::Raster(Arc::new(raster))).map_err(|why| misread(&why))
 }
 
-fn parse<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
+pub(super) fn parse<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
     serde_json::from_slice(bytes).map_err(|why| misread(&why.to_string()))
 }
 

@@ -2,6 +2,7 @@
 
 mod events;
 mod http;
+pub mod why;
 
 use std::collections::HashSet;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -20,6 +21,7 @@ use sightline_core::study::wire::{NewStudy, StudyInfo, StudyJob};
 use sightline_core::trackability::MapProgress;
 
 use self::events::Events;
+use self::why::{WhyReply, WhyRequest};
 use crate::cache::{Item, Key};
 use crate::state::Connection;
 
@@ -138,6 +140,8 @@ pub enum Request {
         /// The stop.
         step: usize,
     },
+    /// About single steps.
+    Why(WhyRequest),
 }
 
 /// What the server answered.
@@ -181,6 +185,8 @@ pub enum Reply {
     Metrics(Box<RunMetrics>),
     /// The trackability of a stop, as far as it was made.
     Trackability(Box<MapProgress>),
+    /// About single steps.
+    Why(WhyReply),
 }
 
 /// An answer with what was asked.

@@ -5,7 +5,7 @@ use sightline_core::target::TrackingState;
 use sightline_core::trace::StepTrace;
 
 use super::compare::{choosers, readouts};
-use super::inspector;
+use super::{inspector, numbers};
 use crate::command::{Command, Go, Mode, Stage};
 use crate::state::messages::Weight;
 use crate::state::tracker::confidence_of;
@@ -20,7 +20,7 @@ pub fn top(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         traverse_choice(ui, state, out);
         ui.separator();
         choosers::show(ui, state, out);
-        status(ui, state);
+        status(ui, state, out);
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let sheet = ui.add(Button::new("?").min_size(egui::vec2(26.0, 24.0)));
             if sheet
@@ -66,7 +66,7 @@ fn traverse_choice(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 }
 
 /// The status line: step, state, score and error.
-pub fn status(ui: &mut Ui, state: &State) {
+pub fn status(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let Some(last) = state.stop_count().checked_sub(1) else {
         ui.label(theme::label(state.missing_target()));
         return;
@@ -87,16 +87,16 @@ pub fn status(ui: &mut Ui, state: &State) {
     };
     ui.label(RichText::new(word).strong().color(theme::state(tracking)));
     let confidence = state.run().and_then(|run| confidence_of(run, row));
-    for (name, value, unit) in [
-        ("ncc", row.ncc.map(|v| format!("{v:.2}")), ""),
-        ("inliers", row.inliers.map(|n| n.to_string()), ""),
-        ("confidence", confidence.map(|v| format!("{v:.2}")), ""),
-        ("err", row.err_px.map(|v| format!("{v:.1}")), "px"),
-        ("σ", row.sigma_m.map(|v| format!("{:.1}", v * 100.0)), "cm"),
+    for (name, value, unit, asked) in [
+        ("ncc", row.ncc.map(|v| format!("{v:.2}")), "", "ncc"),
+        ("inliers", row.inliers.map(|n| n.to_string()), "", "inliers"),
+        ("confidence", confidence.map(|v| format!("{v:.2}")), "", "confidence"),
+        ("err", row.err_px.map(|v| format!("{v:.1}")), "px", "err_px"),
+        ("σ", row.sigma_m.map(|v| format!("{:.1}", v * 100.0)), "cm", "sigma_m"),
     ] {
         if let Some(value) = value {
             ui.label(theme::label(name));
-            ui.label(theme::number(value).size(13.0));
+            numbers::show(ui, theme::number(value).size(13.0), state.cursor.step, asked, out);
             ui.label(theme::note(unit));
             readouts::after(ui, state, name);
         }

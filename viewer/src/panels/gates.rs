@@ -5,6 +5,7 @@ use sightline_core::stages::judge::{Gate, Verdict};
 use sightline_core::target::TrackingState;
 
 use super::compare::readouts;
+use super::numbers;
 use crate::command::Command;
 use crate::state::State;
 use crate::{panels, theme};
@@ -18,7 +19,7 @@ const MARGIN: f32 = 50.0;
 const BAR: f32 = 8.0;
 
 /// Shows the gates.
-pub fn show(ui: &mut Ui, state: &State, _out: &mut Vec<Command>) {
+pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let verdict = state.trace().and_then(|trace| trace.judge.as_ref());
     let Some(verdict) = verdict else {
         panels::missing(ui, PURPOSE, &state.missing_step());
@@ -29,7 +30,7 @@ pub fn show(ui: &mut Ui, state: &State, _out: &mut Vec<Command>) {
         sentence(ui, verdict, state);
         ui.add_space(3.0);
         for gate in &verdict.gates {
-            show_gate(ui, gate);
+            show_gate(ui, state.cursor.step, gate, out);
             readouts::gate(ui, state, gate);
         }
     });
@@ -66,13 +67,16 @@ fn transition(verdict: &Verdict, state: &State) -> String {
     }
 }
 
-fn show_gate(ui: &mut Ui, gate: &Gate) {
+fn show_gate(ui: &mut Ui, step: usize, gate: &Gate, out: &mut Vec<Command>) {
     let colour = theme::verdict(gate.passed);
     let relation = if gate.at_least { "≥" } else { "≤" };
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 5.0;
         ui.label(theme::note(gate.criterion.to_string()));
-        ui.label(RichText::new(readable(&gate.name)).size(12.0).color(theme::TEXT));
+        let name = ui.link(RichText::new(readable(&gate.name)).size(12.0).color(theme::TEXT));
+        let name = name.on_hover_text("Why? Where this margin comes from");
+        let copied = gate.value.map_or_else(|| "none".to_owned(), |value| value.to_string());
+        numbers::ask(&name, step, &format!("gate.{}", gate.name), &copied, out);
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             let word = if gate.passed { "pass" } else { "FAIL" };
             column(ui, 28.0, RichText::new(word).strong().color(colour));

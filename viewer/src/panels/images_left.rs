@@ -11,7 +11,7 @@ use super::compare::{bar, marks as compared, modes};
 use super::exposure;
 use super::features::marks;
 use super::legend::{self, Entry};
-use super::picking;
+use super::{picking, what_if};
 use crate::cache::{Eye, Slot};
 use crate::command::{Command, Layer, Panel};
 use crate::overlay::{Line, Mark, Overlay, template_quad};
@@ -63,6 +63,7 @@ fn picture(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) 
     paint_designation(&canvas, state);
     picking::show(ui, &canvas, raster, state, out);
     marks::hover(&canvas, state, |feature| Some(feature.pixel));
+    what_if::over_image(ui, &canvas, state, out);
     status_line(ui, &canvas, raster, region);
     if let Some(view) = canvas.moved {
         out.push(Command::View(Panel::Left, view));

@@ -8,13 +8,13 @@ use sightline_core::settings::TrackerKind;
 use sightline_core::trace::StepTrace;
 
 use super::compare::readouts;
-use super::digits;
+use super::{digits, numbers};
 use crate::command::{Command, Stage};
 use crate::state::State;
 use crate::{panels, theme};
 
 /// Shows the record.
-pub fn show(ui: &mut Ui, state: &State, _out: &mut Vec<Command>) {
+pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.horizontal_wrapped(|ui| {
         ui.label(RichText::new(state.stage().word()).strong().color(theme::STRONG));
         ui.label(theme::note(state.stage().question()));
@@ -29,11 +29,33 @@ pub fn show(ui: &mut Ui, state: &State, _out: &mut Vec<Command>) {
     };
     ScrollArea::vertical().auto_shrink(false).id_salt(state.stage()).show(ui, |ui| {
         readouts::record(ui, state);
+        asked_fields(ui, trace, state.stage(), &record, out);
         entries(ui, &record);
         if let Some(truth) = trace.truth.as_ref().and_then(|truth| serde_json::to_value(truth).ok()) {
             ui.add_space(4.0);
             ui.label(theme::title("against the truth"));
             entries(ui, &truth);
+        }
+    });
+}
+
+/// The fields whose origin is known, each a link to it.
+fn asked_fields(ui: &mut Ui, trace: &StepTrace, stage: Stage, record: &Value, out: &mut Vec<Command>) {
+    let fields = record.as_object().into_iter().flatten();
+    let asked: Vec<(&String, &str)> =
+        fields.filter_map(|(key, _)| Some((key, numbers::name_of(trace, stage, key)?))).collect();
+    if asked.is_empty() {
+        return;
+    }
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 6.0;
+        ui.label(theme::note("why:"));
+        for (key, name) in asked {
+            let copied = words(key, &record[key]).unwrap_or_else(|| record[key].to_string());
+            let (label, _) = name_and_unit(key);
+            let link =
+                ui.link(RichText::new(label).small()).on_hover_text(format!("Where {name} comes from"));
+            numbers::ask(&link, trace.step, name, &copied, out);
         }
     });
 }

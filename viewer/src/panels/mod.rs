@@ -19,6 +19,8 @@ pub mod names;
 pub mod palette;
 pub mod plots;
 pub mod runs;
+mod numbers;
+mod run_tree;
 pub mod settings;
 pub mod shape;
 pub mod stereo_profile;
@@ -31,6 +33,8 @@ pub mod tolerances;
 pub mod uncertainty;
 pub mod picking;
 pub mod tour;
+pub mod what_if;
+pub mod why;
 
 use egui::{Align, Layout, RichText, Ui, UiBuilder};
 

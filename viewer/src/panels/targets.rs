@@ -3,13 +3,18 @@
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui, vec2};
 use sightline_core::session::view::{RunView, TargetView};
 
+use super::run_tree;
 use crate::command::{Command, Mode};
 use crate::overlay::{Mark, paint_mark};
+use crate::state::why::Ask;
 use crate::state::{State, run_letter, state_of_word};
 use crate::{panels, theme};
 
 /// What the panel is for.
 const PURPOSE: &str = "What is tracked, and each configuration tried on it.";
+
+/// How much a branch stands in from what it left, points.
+const INDENT: f32 = 12.0;
 
 /// Shows the targets.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
@@ -61,8 +66,11 @@ fn show_target(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Co
         ui.add(egui::Label::new(RichText::new(format!("! {sentence}")).small().color(theme::LOST)).wrap())
             .on_hover_text("A warning about the pick; it can be tracked all the same.");
     }
-    for run in &target.runs {
-        show_run(ui, state, target, run, out);
+    for (depth, run) in run_tree::order(&target.runs) {
+        ui.horizontal(|ui| {
+            ui.add_space(INDENT * depth as f32);
+            ui.vertical(|ui| show_run(ui, state, target, run, out));
+        });
     }
 }
 
@@ -96,8 +104,17 @@ fn show_run(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out:
         ui.label(theme::note(summary(run)));
         // A preset's name says them all.
         let unnamed = state.configurations.named(&run.settings).is_none();
-        for (key, value) in run.changes.iter().filter(|_| unnamed) {
-            ui.label(theme::note(format!("{key} = {value}")).monospace());
+        let is_branch = run_tree::parent(&target.runs, run).is_some();
+        for line in run_tree::changed(&target.runs, run).into_iter().filter(|_| unnamed || is_branch) {
+            ui.add(egui::Label::new(theme::note(line).monospace()).wrap());
+        }
+        if target.runs.len() > 1 {
+            let name = format!("remove run {}", run_letter(run.number));
+            let help = "Hides the run; what left it keeps its steps. Ctrl+Z takes it back";
+            let button = ui.small_button("Remove run").accessible_name(name).on_hover_text(help);
+            if button.clicked() {
+                out.push(Command::Why(Ask::RemoveRun { target: target.number, run: run.number }));
+            }
         }
     });
     let response = inside.response.interact(Sense::click());

@@ -12,6 +12,15 @@ use crate::net::Request;
 impl State {
     /// Carries out one command.
     pub fn apply(&mut self, command: Command) {
+        let is_draft = matches!(command, Command::Draft { .. } | Command::UsePreset(_) | Command::ClearDraft);
+        let draft = is_draft.then(|| self.draft.clone());
+        self.carry_out(command);
+        if let Some(before) = draft {
+            self.drafted(before);
+        }
+    }
+
+    fn carry_out(&mut self, command: Command) {
         match command {
             Command::Go(go) => self.go(go),
             Command::OpenTraverse(id) => self.open_traverse(id),
@@ -74,6 +83,7 @@ impl State {
             Command::Compare(ask) => self.ask_compare(ask),
             Command::Aim(aim) => self.aim(aim),
             Command::Tour(turn) => self.turn_tour(turn),
+            Command::Why(ask) => self.ask_why(ask),
         }
     }
 
@@ -152,7 +162,7 @@ impl State {
         let first = self.run().and_then(|run| run.rows.first()).map_or(0, |row| row.step);
         let computed = self.run().and_then(|run| run.rows.last()).map_or(first, |row| row.step);
         let from_step = self.cursor.step.clamp(first, computed + 1);
-        let new = NewRun { run, from_step, settings: changes };
+        let new = NewRun { run, from_step, settings: changes, prediction_px: None };
         if self.ask(|session| Request::NewRun { session, target, new }) {
             self.messages.note(format!("Running {} again from step {from_step} …", run_letter(run)));
         }
@@ -168,7 +178,7 @@ impl State {
     }
 
     /// Puts a request about the open session into the outbox; says so when there is none.
-    fn ask(&mut self, request: impl FnOnce(String) -> Request) -> bool {
+    pub(super) fn ask(&mut self, request: impl FnOnce(String) -> Request) -> bool {
         match self.session.as_ref().map(|session| session.id.clone()) {
             Some(session) => {
                 self.outbox.push(request(session));

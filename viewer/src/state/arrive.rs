@@ -5,9 +5,10 @@ use sightline_core::session::view::{RunView, SessionView};
 use sightline_core::session::wire::{Event, NewSession, Problem, SessionEntry, TraverseEntry};
 
 use super::{Connection, Progress, Refusal, State, run_letter};
-use crate::cache::Key;
+use crate::cache::{Key, StepKey};
 use crate::command::Mode;
 use crate::net::{Arrived, Reply, Request};
+use crate::state::undo::Deed;
 
 impl State {
     /// Asks for what a page needs first.
@@ -45,6 +46,9 @@ impl State {
             Event::RenderProgress { traverse, k, n, ready } => self.rendered(&traverse, k, n, ready),
             Event::StudyProgress { job } => self.study_went_on(job),
             Event::TrackabilityProgress { traverse, step, .. } => self.trackability_went_on(&traverse, step),
+            Event::QuestionProgress { session, target, run, step, .. } => {
+                self.question_went_on(StepKey { session, target, run, step });
+            }
         }
     }
 
@@ -117,7 +121,10 @@ impl State {
             }
             Reply::Done => match request {
                 Request::PutCursor { cursor, .. } => self.put_cursor(cursor),
-                _ => self.sync.session_stale = true,
+                request => {
+                    self.removed_target(&request);
+                    self.sync.session_stale = true;
+                }
             },
             Reply::Studies(infos) => self.studies.infos = Some(infos),
             Reply::StudyJobs(jobs) => self.studies.jobs = jobs,
@@ -130,6 +137,11 @@ impl State {
             Reply::Trackability(progress) => {
                 if let Request::Trackability { traverse, step } = request {
                     self.took_trackability((traverse, step), Ok(*progress));
+                }
+            }
+            Reply::Why(reply) => {
+                if let Request::Why(request) = request {
+                    self.told_why(request, reply);
                 }
             }
             Reply::Item(_) => {}
@@ -150,7 +162,7 @@ impl State {
     }
 
     fn refused(&mut self, request: Request, problem: Problem) {
-        match request {
+        match request.clone() {
             Request::PutCursor { cursor, .. } => {
                 // The page keeps its cursor and tells the server of the next one.
                 self.put_cursor(cursor);
@@ -171,6 +183,8 @@ impl State {
             }
             // A map that was complete before it was given up is no problem.
             Request::CancelTrackability { .. } => return,
+            Request::Why(asked) if !self.refused_why(asked.clone(), &problem) => return,
+            Request::RemoveTarget { .. } => self.forget_refused(&request),
             Request::Session(_) => {
                 self.sync.session_asked = None;
                 if self.session.is_none() && problem.status != 0 {
@@ -217,7 +231,7 @@ impl State {
     }
 
     /// Takes a session over; the cursor stays where the person put it unless somebody else moved it.
-    fn adopt(&mut self, view: SessionView, moved_meanwhile: bool) {
+    pub(super) fn adopt(&mut self, view: SessionView, moved_meanwhile: bool) {
         let is_other = self.session.as_ref().is_none_or(|open| open.id != view.id);
         if is_other {
             self.progress.clear();
@@ -225,6 +239,7 @@ impl State {
             self.forget_comparisons(true);
             self.mode = Mode::Look;
             (self.designating, self.refusal, self.rendering) = (None, None, None);
+            self.forget_deeds();
         }
         if self.traverse.as_ref().is_none_or(|open| open.id != view.traverse) {
             self.traverse = None;
@@ -250,7 +265,8 @@ impl State {
             self.cursor = Cursor { target: newest.map(|target| target.number), run: 0, ..self.cursor };
         }
         if self.run().is_none() {
-            self.cursor.run = 0;
+            self.cursor.run =
+                self.target().and_then(|target| target.runs.first()).map_or(0, |run| run.number);
         }
         self.cursor.step = self.cursor.step.min(session.stop_count.saturating_sub(1));
     }
@@ -261,6 +277,7 @@ impl State {
         self.cursor.target = Some(target);
         self.cursor.run = 0;
         self.draft.clear();
+        self.did(Deed::Picked { target });
         self.keep_cursor_valid();
         if let Some(target) = self.target() {
             let text = format!(
@@ -282,6 +299,7 @@ impl State {
         }
         self.cursor = Cursor { target: Some(target), run: number, ..self.cursor };
         self.draft.clear();
+        self.did(Deed::Branched { target, run: number });
         self.messages.note(format!("Run {} goes on from here.", run_letter(number)));
     }
 }

@@ -15,7 +15,9 @@ pub mod studies;
 pub mod tracker;
 pub mod trackability;
 mod tour;
+pub mod undo;
 mod wanted;
+pub mod why;
 
 use std::collections::{BTreeMap, HashSet};
 
@@ -35,6 +37,8 @@ use self::configurations::Configurations;
 use self::messages::Messages;
 use self::studies::Studies;
 use self::trackability::Trackability;
+use self::undo::Undo;
+use self::why::Why;
 use crate::cache::{Cache, Eye, Key, Slot, StepKey};
 use crate::command::{Layer, Mode, Panel, Stage};
 use crate::link::Fragment;
@@ -174,6 +178,10 @@ pub struct State {
     pub trackability: Trackability,
     /// Where the tour is.
     pub tour: Tour,
+    /// Why a step came out as it did, what would have saved it, and what is tried.
+    pub why: Why,
+    /// What can be taken back.
+    pub undo: Undo,
     outbox: Vec<Request>,
     sync: Sync,
     /// The aligned left camera of the step that was asked for last: it takes a while to compute.
@@ -236,6 +244,8 @@ impl State {
             compare: compare::Compare::default(),
             trackability: Trackability::default(),
             tour: Tour::default(),
+            why: Why::default(),
+            undo: Undo::default(),
             outbox: Vec::new(),
             sync: Sync { linked, ..Sync::default() },
             aligned: egui::mutex::Mutex::default(),

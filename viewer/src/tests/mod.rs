@@ -13,6 +13,7 @@ mod studies;
 mod tracking;
 mod picking;
 mod tour;
+mod why;
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;

@@ -1,0 +1,142 @@
+//! The ghost of what is tried, dashed over the image, and a small card that says what changed.
+
+use egui::{Align, Button, Frame, Label, Layout, Margin, RichText, Ui, UiBuilder, vec2};
+use sightline_core::session::what_if::Ghost;
+use sightline_core::session::why::words::signed;
+
+use crate::command::Command;
+use crate::overlay::{Line, Mark, Overlay, template_quad};
+use crate::state::State;
+use crate::state::state_of_word;
+use crate::state::why::{Ask, Trial};
+use crate::theme;
+use crate::view2d::Canvas;
+
+/// Width of the card, points.
+const WIDTH: f32 = 230.0;
+
+/// Paints what was tried.
+pub(super) fn ghost(canvas: &Canvas, trial: &Trial) {
+    let Some(ghost) = &trial.ghost else { return };
+    let overlay = Overlay::new(&canvas.painter, &canvas.transform);
+    if let Some(window) = ghost.search_window {
+        overlay.rectangle(window, theme::GHOST, Line::Dashed);
+    }
+    if let Some(pixel) = ghost.predicted_left.filter(|_| trial.what_if.prediction_px.is_some()) {
+        overlay.mark(pixel, Mark::Cross, theme::GHOST);
+        if let Some(covariance) = &ghost.predicted_covariance_px2 {
+            overlay.ellipse(pixel, covariance, 3.0, theme::GHOST, Line::Dotted);
+        }
+    }
+    if let Some(pixel) = ghost.left_pixel {
+        if let Some(map) = &ghost.prepared_from_template {
+            let quad = template_quad(pixel, ghost.template_size_px, map);
+            overlay.outline(&quad, theme::GHOST, Line::Dashed);
+        }
+        if let Some(covariance) = &ghost.left_covariance_px2 {
+            overlay.ellipse(pixel, covariance, 3.0, theme::GHOST, Line::Dashed);
+        }
+        overlay.mark(pixel, Mark::Diamond, theme::GHOST);
+    }
+}
+
+/// Shows the card in the corner of the image.
+pub(super) fn show(ui: &mut Ui, canvas: &Canvas, state: &State, trial: &Trial, out: &mut Vec<Command>) {
+    let area = canvas.transform.rect.shrink(8.0);
+    let width = WIDTH.min(area.width());
+    let corner =
+        egui::Rect::from_min_size(egui::pos2(area.right() - width, area.top()), vec2(width, area.height()));
+    let builder =
+        UiBuilder::new().max_rect(corner).layout(Layout::top_down(Align::Min)).id_salt("what if card");
+    let mut inside = ui.new_child(builder);
+    inside.set_clip_rect(canvas.transform.rect);
+    Frame::new()
+        .fill(theme::SCRIM)
+        .stroke(egui::Stroke::new(1.0, theme::GHOST))
+        .corner_radius(4)
+        .inner_margin(Margin::same(6))
+        .show(&mut inside, |ui| contents(ui, state, trial, out));
+}
+
+fn contents(ui: &mut Ui, state: &State, trial: &Trial, out: &mut Vec<Command>) {
+    ui.label(theme::title(&format!("what if, step {}", trial.of.step)));
+    for line in changes(state, trial) {
+        ui.add(Label::new(theme::note(line)).wrap());
+    }
+    match (&trial.ghost, &trial.refused) {
+        (_, Some(why)) => {
+            ui.add(Label::new(RichText::new(why).color(theme::LOST)).wrap());
+        }
+        (Some(ghost), None) => result(ui, ghost, ghost.what_if == trial.what_if),
+        (None, None) => {
+            ui.label(theme::note("computing …"));
+        }
+    }
+    ui.horizontal_wrapped(|ui| {
+        let run = ui.add(Button::new("Run from here as branch").min_size(vec2(0.0, 24.0)));
+        if run.on_hover_text("Nothing recorded is overwritten. Key R").clicked() {
+            out.push(Command::Why(Ask::Branch));
+        }
+        let discard = ui.add(Button::new("Discard").min_size(vec2(0.0, 24.0)));
+        if discard.accessible_name("discard what if").on_hover_text("Key Esc").clicked() {
+            out.push(Command::Why(Ask::Discard));
+        }
+    });
+}
+
+/// What is changed against the run.
+fn changes(state: &State, trial: &Trial) -> Vec<String> {
+    let group = |key: &str| state.settings.iter().find(|info| info.key == key).map(|info| info.group.clone());
+    let settings = trial.what_if.settings.iter().map(|(key, value)| {
+        let before = group(key).and_then(|group| state.setting(&group, key));
+        format!("{key} = {value} instead of {}", before.unwrap_or_default())
+    });
+    let moved = trial.what_if.prediction_px.map(|to| {
+        let from = state.trace().and_then(|trace| trace.point_mast.as_ref()?.predicted_left);
+        let way = from.map_or_else(String::new, |from| {
+            format!(", moved by {}, {} px", signed(to.x - from.x), signed(to.y - from.y))
+        });
+        format!("prediction at {:.1}, {:.1}{way}", to.x, to.y)
+    });
+    settings.chain(moved).collect()
+}
+
+/// State, score and place of the ghost, with what changed.
+fn result(ui: &mut Ui, ghost: &Ghost, is_newest: bool) {
+    let tracking = state_of_word(&ghost.row.state);
+    let deltas = &ghost.deltas;
+    ui.horizontal_wrapped(|ui| {
+        ui.label(RichText::new(ghost.row.state.to_uppercase()).strong().color(theme::state(tracking)));
+        if deltas.state_recorded != ghost.row.state {
+            ui.label(theme::note(format!("was {}", deltas.state_recorded)));
+        }
+        match ghost.is_right() {
+            Some(true) => ui.label(theme::note("right")),
+            Some(false) if ghost.row.state == "tracking" => {
+                ui.label(RichText::new("but FALSE").strong().color(theme::FAILED))
+            }
+            _ => ui.label(""),
+        };
+    });
+    let lines = [
+        ("ncc", ghost.row.ncc, deltas.ncc, ""),
+        ("stereo", ghost.row.stereo_score, deltas.stereo_score, ""),
+        ("confidence", ghost.row.confidence.filter(|_| ghost.row.ncc.is_none()), deltas.confidence, ""),
+        ("err", ghost.row.err_px, deltas.err_px, " px"),
+    ];
+    for (name, value, delta, unit) in lines {
+        if let Some(value) = value {
+            let change = delta.map_or_else(String::new, |delta| format!("  Δ {delta:+.3}{unit}"));
+            ui.label(theme::number(format!("{name} {value:.3}{unit}{change}")).size(11.0));
+        }
+    }
+    if let Some(moved) = deltas.moved_px {
+        ui.label(theme::number(format!("match moved {moved:.2} px")).size(11.0));
+    }
+    if let Some(missing) = &ghost.missing {
+        ui.add(Label::new(RichText::new(missing).small().color(theme::LOST)).wrap());
+    }
+    if !is_newest {
+        ui.label(theme::note("computing the newest change …"));
+    }
+}

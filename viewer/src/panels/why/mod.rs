@@ -1,0 +1,63 @@
+//! Why: the verdict in a sentence, the criteria by margin with limits that can be dragged, what would have saved the step,
+//! and where any number came from.
+
+mod criteria;
+mod saved;
+mod tree;
+
+use egui::{CollapsingHeader, RichText, ScrollArea, Ui};
+use sightline_core::session::why::sentence;
+
+use super::what_if;
+use crate::command::Command;
+use crate::state::State;
+use crate::state::why::Ask;
+use crate::{panels, theme};
+
+/// What the panel is for.
+const PURPOSE: &str =
+    "Why a step was accepted or rejected, what would have saved it, and where a number comes from.";
+
+/// Shows the panel.
+pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let step = state.cursor.step;
+    let (Some(trace), Some(run)) = (state.trace(), state.run()) else {
+        panels::missing(ui, PURPOSE, &state.missing_step());
+        return;
+    };
+    let before = step.checked_sub(1).and_then(|before| state.trace_at(before).ready());
+    let words = sentence::verdict(trace, before, &run.settings);
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        let said = ui.add(
+            egui::Label::new(RichText::new(&words).color(theme::STRONG)).wrap().sense(egui::Sense::click()),
+        );
+        said.context_menu(|ui| {
+            if ui.button("Copy sentence").clicked() {
+                ui.ctx().copy_text(words.clone());
+                ui.close();
+            }
+        });
+        ui.horizontal_wrapped(|ui| {
+            let explain =
+                ui.button("Why this state?").on_hover_text("Where the tracking state of this step came from");
+            if explain.clicked() {
+                out.push(Command::Why(Ask::Value { step, value: "state".to_owned() }));
+            }
+            saved::button(ui, state, out);
+        });
+        saved::show(ui, state, out);
+        tree::show(ui, state, out);
+        if let Some(verdict) = &trace.judge {
+            CollapsingHeader::new(theme::title("criteria, worst margin first"))
+                .id_salt("criteria")
+                .default_open(true)
+                .show(ui, |ui| criteria::show(ui, state, verdict, out));
+        }
+        if what_if::can_be_tried(trace) {
+            CollapsingHeader::new(theme::title("what if, for this step"))
+                .id_salt("what if")
+                .default_open(true)
+                .show(ui, |ui| what_if::form(ui, state, trace, out));
+        }
+    });
+}

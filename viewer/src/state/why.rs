@@ -1,0 +1,382 @@
+//! Why a step came out as it did, what would have saved it, and what if: asked of the server and kept by step.
+//!
+//! A what-if belongs to one step. While it changes, at most one of its requests is under way; when the answer comes, the
+//! newest change is asked for next, so that dragging never queues.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde_json::Value;
+use sightline_core::frames::Pixel;
+use sightline_core::session::counterfactual::wire::{Question, QuestionState};
+use sightline_core::session::view::RunView;
+use sightline_core::session::what_if::{Ghost, WhatIf};
+use sightline_core::session::why::{Explanation, gates};
+use sightline_core::session::wire::{NewRun, Problem};
+
+use super::undo::Deed;
+use super::{State, run_letter};
+use crate::cache::StepKey;
+use crate::net::Request;
+use crate::net::why::{WhyReply, WhyRequest};
+
+/// What a person asks about a step.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Ask {
+    /// Where a value came from.
+    Value {
+        /// The step.
+        step: usize,
+        /// The value's name.
+        value: String,
+    },
+    /// Where the value came from that was asked for before.
+    Back,
+    /// Where the selected value came from: the last one asked for, else the worst criterion.
+    Selected,
+    /// What would have saved the step.
+    Saved,
+    /// To stop looking for that.
+    CancelSaved,
+    /// To try a change in place of what is tried.
+    Try(WhatIf),
+    /// To try another value of a setting; none takes the change back.
+    Change {
+        /// The setting's name.
+        key: String,
+        /// The value.
+        value: Option<Value>,
+    },
+    /// To try another place of the prediction.
+    Displace(Option<Pixel>),
+    /// To stop trying.
+    Discard,
+    /// To run from here as a branch with what is tried.
+    Branch,
+    /// To run from here as a branch with a change.
+    BranchWith(WhatIf),
+    /// To remove a run.
+    RemoveRun {
+        /// The target's number.
+        target: usize,
+        /// The run's number.
+        run: usize,
+    },
+    /// To take the last deed back.
+    Undo,
+    /// To do it again.
+    Redo,
+}
+
+/// Something that was asked of the server.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Told<T> {
+    /// It was asked.
+    Waiting,
+    /// It is here.
+    Here(T),
+    /// It was refused, with the server's sentence.
+    Refused(String),
+}
+
+/// What is tried at a step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trial {
+    /// The step.
+    pub of: StepKey,
+    /// The change.
+    pub what_if: WhatIf,
+    /// What came of the newest change that was answered.
+    pub ghost: Option<Ghost>,
+    /// Why the newest change could not be tried.
+    pub refused: Option<String>,
+}
+
+/// What is asked and known.
+#[derive(Default)]
+pub struct Why {
+    /// The values that were asked for, the last one shown.
+    pub asked: Vec<(StepKey, String)>,
+    /// Where they came from.
+    pub trees: BTreeMap<(StepKey, String), Told<Explanation>>,
+    /// What is tried.
+    pub trial: Option<Trial>,
+    /// What would have saved steps.
+    pub questions: BTreeMap<StepKey, Told<Question>>,
+    /// Whether the panel is to be brought to the front.
+    pub is_called: bool,
+    /// The change that the server tries now.
+    trying: Option<(StepKey, WhatIf)>,
+    /// The steps whose question was looked for.
+    looked_for: BTreeSet<StepKey>,
+}
+
+/// How many values are remembered for the way back.
+const REMEMBERED: usize = 50;
+/// How many trees are kept.
+const KEPT: usize = 400;
+
+impl State {
+    /// What is tried at the cursor's step.
+    pub fn trial(&self) -> Option<&Trial> {
+        let key = self.step_key(self.cursor.step)?;
+        self.why.trial.as_ref().filter(|trial| trial.of == key)
+    }
+
+    /// The question about the cursor's step.
+    pub fn question(&self) -> Option<&Told<Question>> {
+        self.why.questions.get(&self.step_key(self.cursor.step)?)
+    }
+
+    /// The value that is shown, with its tree.
+    pub fn explained(&self) -> Option<(&StepKey, &str, &Told<Explanation>)> {
+        let (key, value) = self.why.asked.last()?;
+        let tree = self.why.trees.get(&(key.clone(), value.clone()))?;
+        Some((key, value, tree))
+    }
+
+    /// The branch that left the run at the cursor with this very change, where there is one.
+    pub fn branch_of(&self, what_if: &WhatIf) -> Option<&RunView> {
+        let (step, parent) = (self.cursor.step, self.run()?);
+        let is_it = |run: &&RunView| {
+            let left_here = run.fork.is_some_and(|fork| {
+                (fork.run, fork.from_step, fork.prediction_px) == (parent.number, step, what_if.prediction_px)
+            });
+            left_here
+                && parent.settings.with(&what_if.settings).is_ok_and(|settings| settings == run.settings)
+        };
+        self.target()?.runs.iter().find(is_it)
+    }
+
+    /// A setting as it is tried, else as it is in the run.
+    pub fn tried_setting(&self, group: &str, key: &str) -> Option<Value> {
+        let tried = self.trial().and_then(|trial| trial.what_if.settings.get(key)).cloned();
+        tried.or_else(|| self.setting(group, key))
+    }
+
+    /// Carries out what was asked.
+    pub(super) fn ask_why(&mut self, ask: Ask) {
+        match ask {
+            Ask::Value { step, value } => self.ask_value(step, value),
+            Ask::Back => {
+                self.why.asked.pop();
+            }
+            Ask::Selected => self.ask_selected(),
+            Ask::Saved => self.ask_what_saves(),
+            Ask::CancelSaved => {
+                let key = self.step_key(self.cursor.step);
+                self.outbox.extend(key.map(|key| Request::Why(WhyRequest::CancelQuestion(key))));
+            }
+            Ask::Try(what_if) => self.try_out(what_if),
+            Ask::Change { key, value } => {
+                let mut what_if = self.trial().map(|trial| trial.what_if.clone()).unwrap_or_default();
+                match value {
+                    Some(value) => what_if.settings.insert(key, value),
+                    None => what_if.settings.remove(&key),
+                };
+                self.try_out(what_if);
+            }
+            Ask::Displace(pixel) => {
+                let what_if = self.trial().map(|trial| trial.what_if.clone()).unwrap_or_default();
+                self.try_out(WhatIf { prediction_px: pixel, ..what_if });
+            }
+            Ask::Discard => self.try_out(WhatIf::default()),
+            Ask::Branch => {
+                if let Some(what_if) = self.trial().map(|trial| trial.what_if.clone()) {
+                    self.branch(&what_if);
+                }
+            }
+            Ask::BranchWith(what_if) => self.branch(&what_if),
+            Ask::RemoveRun { target, run } => {
+                self.ask(|session| Request::Why(WhyRequest::RemoveRun { session, target, run }));
+            }
+            Ask::Undo => self.undo_last(),
+            Ask::Redo => self.redo_last(),
+        }
+    }
+
+    fn ask_value(&mut self, step: usize, value: String) {
+        self.why.is_called = true;
+        let Some(key) = self.step_key(step) else { return };
+        self.want_tree(&key, &value);
+        let place = (key, value);
+        if self.why.asked.last() != Some(&place) {
+            self.why.asked.push(place);
+        }
+        if self.why.asked.len() > REMEMBERED {
+            self.why.asked.remove(0);
+        }
+    }
+
+    fn want_tree(&mut self, key: &StepKey, value: &str) {
+        let place = (key.clone(), value.to_owned());
+        if matches!(self.why.trees.get(&place), Some(Told::Waiting | Told::Here(_))) {
+            return;
+        }
+        if self.why.trees.len() >= KEPT {
+            self.why.trees.pop_first();
+        }
+        let (of, value) = place.clone();
+        self.why.trees.insert(place, Told::Waiting);
+        self.outbox.push(Request::Why(WhyRequest::Explain { of, value }));
+    }
+
+    /// The last value asked for, at this step; before the first the worst criterion, else the state.
+    fn ask_selected(&mut self) {
+        let last = self.why.asked.last().map(|(_, value)| value.clone());
+        let worst = || {
+            let verdict = self.trace()?.judge.as_ref()?;
+            gates::by_margin(&verdict.gates).first().map(|margin| format!("gate.{}", margin.gate.name))
+        };
+        let value = last.or_else(worst).unwrap_or_else(|| "state".to_owned());
+        self.ask_value(self.cursor.step, value);
+    }
+
+    fn ask_what_saves(&mut self) {
+        self.why.is_called = true;
+        let Some(key) = self.step_key(self.cursor.step).filter(|_| self.row().is_some()) else {
+            let missing = self.missing_step();
+            self.messages.problem(missing, None);
+            return;
+        };
+        let goes_on = match self.why.questions.get(&key) {
+            Some(Told::Waiting) => true,
+            Some(Told::Here(question)) => {
+                matches!(
+                    question.state,
+                    QuestionState::Waiting | QuestionState::Running | QuestionState::Done
+                )
+            }
+            _ => false,
+        };
+        if !goes_on {
+            self.why.questions.insert(key.clone(), Told::Waiting);
+            self.outbox.push(Request::Why(WhyRequest::AskQuestion(key)));
+        }
+    }
+
+    /// Changes what is tried at the cursor's step.
+    fn try_out(&mut self, what_if: WhatIf) {
+        let Some(key) = self.step_key(self.cursor.step).filter(|_| self.row().is_some()) else { return };
+        let before = self.trial().map(|trial| trial.what_if.clone()).unwrap_or_default();
+        if before == what_if {
+            return;
+        }
+        self.did(Deed::Tried { of: key.clone(), before, after: what_if.clone() });
+        self.set_trial(key, what_if);
+    }
+
+    pub(super) fn set_trial(&mut self, of: StepKey, what_if: WhatIf) {
+        if what_if.is_empty() {
+            self.why.trial = None;
+            return;
+        }
+        // The last ghost stands until the new one is here, so that a drag does not flicker.
+        let ghost = self.why.trial.take().filter(|trial| trial.of == of).and_then(|trial| trial.ghost);
+        self.why.trial = Some(Trial { of, what_if, ghost, refused: None });
+        self.send_trial();
+    }
+
+    /// Asks for the newest change, unless an older one is under way.
+    fn send_trial(&mut self) {
+        let Some(trial) = &self.why.trial else { return };
+        let is_answered = trial.ghost.as_ref().is_some_and(|ghost| ghost.what_if == trial.what_if);
+        if self.why.trying.is_some() || is_answered || trial.refused.is_some() {
+            return;
+        }
+        let (of, what_if) = (trial.of.clone(), trial.what_if.clone());
+        self.why.trying = Some((of.clone(), what_if.clone()));
+        self.outbox.push(Request::Why(WhyRequest::WhatIf { of, what_if }));
+    }
+
+    /// Forks the run at the cursor's step with a change.
+    fn branch(&mut self, what_if: &WhatIf) {
+        let Some((target, run)) = self.target().map(|t| t.number).zip(self.run().map(|r| r.number)) else {
+            return;
+        };
+        let from_step = self.cursor.step;
+        let (settings, prediction_px) = (what_if.settings.clone(), what_if.prediction_px);
+        let new = NewRun { run, from_step, settings, prediction_px };
+        if self.ask(|session| Request::NewRun { session, target, new }) {
+            self.messages.note(format!("Running {} from step {from_step} as a branch …", run_letter(run)));
+        }
+    }
+
+    /// Takes in an answer.
+    pub(super) fn told_why(&mut self, request: WhyRequest, reply: WhyReply) {
+        match (request, reply) {
+            (WhyRequest::Explain { of, value }, WhyReply::Explanation(explanation)) => {
+                self.why.trees.insert((of, value), Told::Here(*explanation));
+            }
+            (WhyRequest::WhatIf { of, what_if }, WhyReply::Ghost(ghost)) => {
+                self.why.trying = None;
+                let ours = self.why.trial.as_mut().filter(|trial| trial.of == of);
+                if let Some(trial) = ours {
+                    trial.ghost = Some(*ghost);
+                    if trial.what_if == what_if {
+                        trial.refused = None;
+                    }
+                }
+                self.send_trial();
+            }
+            (
+                WhyRequest::Question(key) | WhyRequest::AskQuestion(key) | WhyRequest::CancelQuestion(key),
+                WhyReply::Question(question),
+            ) => {
+                self.why.questions.insert(key, Told::Here(*question));
+            }
+            (request, WhyReply::Session(view)) => {
+                self.removed(&request);
+                self.adopt(*view, true);
+                self.sync.session_stale = true;
+            }
+            _ => {}
+        }
+    }
+
+    /// Takes in a refusal; true where it is to be said among the messages as well.
+    pub(super) fn refused_why(&mut self, request: WhyRequest, problem: &Problem) -> bool {
+        match request {
+            WhyRequest::Explain { of, value } => {
+                self.why.trees.insert((of, value), Told::Refused(problem.detail.clone()));
+                false
+            }
+            WhyRequest::WhatIf { of, what_if } => {
+                self.why.trying = None;
+                let ours = self.why.trial.as_mut().filter(|trial| trial.of == of && trial.what_if == what_if);
+                if let Some(trial) = ours {
+                    trial.refused = Some(problem.detail.clone());
+                }
+                self.send_trial();
+                false
+            }
+            WhyRequest::AskQuestion(key) => {
+                self.why.questions.insert(key, Told::Refused(problem.detail.clone()));
+                false
+            }
+            // Nobody has asked, or it ended meanwhile.
+            WhyRequest::Question(_) | WhyRequest::CancelQuestion(_) => false,
+            WhyRequest::RemoveRun { .. }
+            | WhyRequest::RestoreRun { .. }
+            | WhyRequest::RestoreTarget { .. } => {
+                self.forget_silent(&request);
+                true
+            }
+        }
+    }
+
+    /// Takes in that a question went on.
+    pub(super) fn question_went_on(&mut self, key: StepKey) {
+        if self.session.as_ref().is_some_and(|session| session.id == key.session) {
+            self.outbox.push(Request::Why(WhyRequest::Question(key)));
+        }
+    }
+
+    /// Asks once whether somebody has asked what saves the cursor's step: a page that was loaded again finds its answer.
+    pub fn want_question(&mut self) {
+        let is_lost = self.row().is_some_and(|row| row.state != "tracking" || row.tracked == Some(false));
+        let Some(key) = self.step_key(self.cursor.step).filter(|_| is_lost) else { return };
+        if self.why.looked_for.insert(key.clone()) {
+            self.outbox.push(Request::Why(WhyRequest::Question(key)));
+        }
+    }
+}
