@@ -3,12 +3,15 @@
 use sightline_core::trace::StepRow;
 
 use crate::command::{Command, Go, Mode, Search, Stage};
+use crate::compare;
 use crate::layout::Pane;
 use crate::layout::presets::Preset;
 use crate::layout::workspace::LayoutCommand;
 use crate::panels::digits;
+use crate::state::why::Ask;
 use crate::state::{State, events, run_letter};
 use crate::theme::Looks;
+use crate::tour::Turn;
 
 /// How many findings the palette lists.
 const LISTED: usize = 12;
@@ -98,6 +101,14 @@ fn works(state: &State) -> Vec<Action> {
         action("Export the session as a Rerun recording (.rrd)", "", Command::ExportRrd),
         action("Open the session in Rerun", "", Command::OpenRerun),
         action("Copy a link to this place", "Y", Command::CopyLink),
+        action("Tour: six bubbles from a lost target to a saved one", "", Command::Tour(Turn::Begin)),
+        action("Why: where the selected value came from", "W", Command::Why(Ask::Selected)),
+        action("What would have saved this step?", "C", Command::Why(Ask::Saved)),
+        action("Take the last deed back (undo)", "Ctrl+Z", Command::Why(Ask::Undo)),
+        action("Do it again (redo)", "Ctrl+Y", Command::Why(Ask::Redo)),
+        action("Compare: first divergence", "D", Command::Compare(compare::Ask::FirstDivergence)),
+        action("Compare: next way of the left image", "V", Command::Compare(compare::Ask::NextView)),
+        action("Hold the target still in the left image", "S", Command::Compare(compare::Ask::Stabilise)),
         action("Keys and conventions", "?", Command::SetMode(Mode::Help)),
         action("Fit all images", "F", Command::FitAll),
         action("Hide or show all marks", "H", Command::ToggleMarks),

@@ -98,7 +98,7 @@ impl SightlineApp {
     fn lay_out(&mut self, ui: &mut Ui) -> Vec<Command> {
         let mut out = keys::commands(ui.ctx(), &self.state);
         let state = &self.state;
-        let bar = Frame::new().fill(theme::BAR).inner_margin(Margin::symmetric(10, 3));
+        let bar = Frame::new().fill(theme::bar()).inner_margin(Margin::symmetric(10, 3));
         let top = Panel::top("top").exact_size(34.0).frame(bar).show(ui, |ui| {
             region(ui, "Status and actions", ui.max_rect());
             bars::top(ui, state, &mut out);
@@ -111,7 +111,7 @@ impl SightlineApp {
             region(ui, "Stages", ui.max_rect());
             bars::stages(ui, state, &mut out);
         });
-        let foot = Frame::new().fill(theme::PANEL).inner_margin(Margin::symmetric(10, 4));
+        let foot = Frame::new().fill(theme::panel()).inner_margin(Margin::symmetric(10, 4));
         let band = Panel::bottom("timeline").exact_size(timeline::HEIGHT + 36.0).frame(foot).show(ui, |ui| {
             region(ui, "Timeline", ui.max_rect());
             bars::transport(ui, state, &mut out);
@@ -120,7 +120,7 @@ impl SightlineApp {
         tour::here(ui.ctx(), tour::TIMELINE, band.response.rect);
         let mut panels = Panels::new(state, &mut out);
         CentralPanel::default()
-            .frame(Frame::new().fill(theme::PAGE))
+            .frame(Frame::new().fill(theme::page()))
             .show(ui, |ui| self.workspace.show(ui, &mut panels));
         self.left_image = panels.left_image;
         let [is_history_seen, is_studies_seen, is_why_seen] =
@@ -231,6 +231,6 @@ impl eframe::App for SightlineApp {
     }
 
     fn clear_color(&self, _visuals: &egui::Visuals) -> [f32; 4] {
-        theme::PAGE.to_normalized_gamma_f32()
+        theme::page().to_normalized_gamma_f32()
     }
 }

@@ -136,7 +136,7 @@ pub fn paint_line(painter: &Painter, points: &[Pos2], colour: Color32, line: Lin
             Line::Dotted => Shape::dotted_line(points, colour, 5.0, width / 2.0),
         }
     };
-    painter.extend(shapes(theme::HALO, width + 2.0 * HALO));
+    painter.extend(shapes(theme::halo(), width + 2.0 * HALO));
     painter.extend(shapes(colour, width));
 }
 
@@ -145,12 +145,12 @@ pub fn paint_mark(painter: &Painter, at: Pos2, mark: Mark, colour: Color32, reac
     let to = |x: f32, y: f32| at + vec2(x, y) * reach;
     let lines: Vec<Vec<Pos2>> = match mark {
         Mark::Ring => {
-            painter.circle_stroke(at, reach * 0.75, Stroke::new(WIDTH + 2.0 * HALO, theme::HALO));
+            painter.circle_stroke(at, reach * 0.75, Stroke::new(WIDTH + 2.0 * HALO, theme::halo()));
             painter.circle_stroke(at, reach * 0.75, Stroke::new(WIDTH, colour));
             return;
         }
         Mark::Dot => {
-            painter.circle_filled(at, reach * 0.6 + HALO, theme::HALO);
+            painter.circle_filled(at, reach * 0.6 + HALO, theme::halo());
             painter.circle_filled(at, reach * 0.6, colour);
             return;
         }
@@ -170,7 +170,7 @@ pub fn paint_mark(painter: &Painter, at: Pos2, mark: Mark, colour: Color32, reac
             return;
         }
     };
-    for (colour, width) in [(theme::HALO, WIDTH + 2.0 * HALO), (colour, WIDTH)] {
+    for (colour, width) in [(theme::halo(), WIDTH + 2.0 * HALO), (colour, WIDTH)] {
         for line in &lines {
             painter.add(Shape::line(line.clone(), Stroke::new(width, colour)));
         }
@@ -181,7 +181,7 @@ pub fn paint_mark(painter: &Painter, at: Pos2, mark: Mark, colour: Color32, reac
 pub fn paint_words(painter: &Painter, at: Pos2, words: &str, colour: Color32) -> Rect {
     let galley = painter.layout_no_wrap(words.to_owned(), theme::image_font(), colour);
     let area = Align2::LEFT_CENTER.anchor_rect(Rect::from_min_size(at, galley.size()));
-    painter.rect_filled(area.expand2(vec2(3.0, 1.0)), 2.0, theme::SCRIM);
+    painter.rect_filled(area.expand2(vec2(3.0, 1.0)), 2.0, theme::scrim());
     painter.galley(area.min, galley, colour);
     area
 }
@@ -206,9 +206,9 @@ pub fn paint_legend_row(
 ) -> Rect {
     let faded = |c: Color32| if shown { c } else { c.gamma_multiply(0.35) };
     paint_mark(painter, at + vec2(9.0, 7.0), mark, faded(colour), 6.0);
-    let galley = painter.layout_no_wrap(word.to_owned(), theme::image_font(), faded(theme::TEXT));
+    let galley = painter.layout_no_wrap(word.to_owned(), theme::image_font(), faded(theme::text()));
     let size = galley.size();
-    painter.galley(pos2(at.x + 22.0, at.y + 7.0 - size.y / 2.0), galley, faded(theme::TEXT));
+    painter.galley(pos2(at.x + 22.0, at.y + 7.0 - size.y / 2.0), galley, faded(theme::text()));
     Rect::from_min_size(at, vec2(26.0 + size.x, 15.0))
 }
 

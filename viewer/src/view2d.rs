@@ -120,7 +120,7 @@ impl Canvas {
         let size = vec2(ui.available_width().max(24.0), (ui.available_height() - below).max(24.0));
         let (rect, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
         let painter = ui.painter_at(rect);
-        painter.rect_filled(rect, 0.0, theme::WELL);
+        painter.rect_filled(rect, 0.0, theme::well());
         let transform = Transform::new(view, region, rect);
         let moved = asked_for(ui, &response, &transform, region);
         Self { response, painter, transform, moved }
@@ -143,7 +143,7 @@ impl Canvas {
         if self.transform.scale < GRID_SCALE {
             return;
         }
-        let stroke = egui::Stroke::new(1.0, theme::GRID);
+        let stroke = egui::Stroke::new(1.0, theme::grid());
         let area = self.transform.area(region).intersect(self.transform.rect);
         let (first, last) = (self.transform.to_pixel(area.min), self.transform.to_pixel(area.max));
         for x in first.x.round() as i32..=last.x.round() as i32 {

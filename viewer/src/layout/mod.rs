@@ -208,12 +208,12 @@ impl<'a> Panels<'a> {
         if whole.has_focus() {
             self.current = Some(pane);
         }
-        Frame::new().fill(theme::PANEL).inner_margin(margin).show(ui, |ui| {
+        Frame::new().fill(theme::panel()).inner_margin(margin).show(ui, |ui| {
             show(self, ui);
             ui.take_available_space();
         });
         if whole.has_focus() {
-            let ring = Stroke::new(1.5, theme::ACCENT);
+            let ring = Stroke::new(1.5, theme::accent());
             ui.painter().rect_stroke(place.shrink(1.0), 2.0, ring, egui::StrokeKind::Inside);
         }
     }
@@ -221,7 +221,7 @@ impl<'a> Panels<'a> {
     /// The menu of a group of tabs: what can be done with its front panel, and the closed panels.
     fn menu(&mut self, ui: &mut Ui, front: Option<Pane>) {
         let name = front.map_or_else(|| "panels".to_owned(), |pane| format!("{} menu", pane.title()));
-        let dots = egui::Button::new(RichText::new("...").color(theme::WEAK)).frame(false);
+        let dots = egui::Button::new(RichText::new("...").color(theme::weak())).frame(false);
         let button = ui.add(dots.min_size(egui::vec2(24.0, 20.0)));
         let button = button.accessible_name(name).on_hover_text("This panel, and closed ones");
         egui::Popup::menu(&button).show(|ui| {
@@ -270,10 +270,10 @@ impl Behavior<Pane> for Panels<'_> {
         let problems = self.state.messages.all().iter().filter(|m| m.weight == Weight::Problem).count();
         match pane {
             Pane::Messages if problems > 0 => {
-                theme::title(&format!("Messages ({problems})")).color(theme::LOST).into()
+                theme::title(&format!("Messages ({problems})")).color(theme::lost()).into()
             }
             Pane::Settings if !self.state.draft.is_empty() => {
-                theme::title(&format!("Settings ({})", self.state.draft.len())).color(theme::ACCENT).into()
+                theme::title(&format!("Settings ({})", self.state.draft.len())).color(theme::accent()).into()
             }
             pane => theme::title(pane.title()).into(),
         }
@@ -322,7 +322,7 @@ impl Behavior<Pane> for Panels<'_> {
     }
 
     fn tab_bar_color(&self, _visuals: &Visuals) -> Color32 {
-        theme::BAR
+        theme::bar()
     }
 
     fn tab_bg_color(
@@ -332,7 +332,7 @@ impl Behavior<Pane> for Panels<'_> {
         _tile: TileId,
         state: &TabState,
     ) -> Color32 {
-        if state.active { theme::PANEL } else { Color32::TRANSPARENT }
+        if state.active { theme::panel() } else { Color32::TRANSPARENT }
     }
 
     fn tab_outline_stroke(

@@ -5,7 +5,7 @@ use sightline_core::target::TrackingState;
 use sightline_core::trace::StepTrace;
 
 use super::compare::{choosers, readouts};
-use super::{inspector, numbers};
+use super::{inspector, numbers, view_menu};
 use crate::command::{Command, Go, Mode, Stage};
 use crate::state::messages::Weight;
 use crate::state::tracker::confidence_of;
@@ -15,7 +15,7 @@ use crate::theme;
 /// The top bar: what is open, where the cursor is, and what can be done with the whole.
 pub fn top(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.horizontal_centered(|ui| {
-        ui.label(RichText::new("Sightline").size(16.0).strong().color(theme::ACCENT));
+        ui.label(RichText::new("Sightline").size(16.0).strong().color(theme::accent()));
         ui.separator();
         traverse_choice(ui, state, out);
         ui.separator();
@@ -30,6 +30,7 @@ pub fn top(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             {
                 out.push(Command::SetMode(Mode::Help));
             }
+            view_menu::show(ui, state, out);
             let has_targets = state.session.as_ref().is_some_and(|session| !session.targets.is_empty());
             let rerun = ui.add_enabled(has_targets, Button::new("Open in Rerun"));
             if rerun.on_hover_text("Streams this session to a Rerun viewer in a new tab").clicked() {
@@ -110,7 +111,7 @@ pub fn banner(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         ui.horizontal(|ui| {
             let words =
                 format!("The server is gone. Steps that are loaded stay browsable; retrying ({attempts}) …");
-            ui.label(RichText::new(words).color(theme::LOST));
+            ui.label(RichText::new(words).color(theme::lost()));
             if ui.small_button("Retry now").clicked() {
                 out.push(Command::Reconnect);
             }
@@ -164,15 +165,15 @@ fn run_progress(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 fn progress_bar(ui: &mut Ui, words: &str, k: usize, n: usize) {
     let fraction = k as f32 / n.max(1) as f32;
     let (rect, _) = ui.allocate_exact_size(egui::vec2(90.0, 6.0), egui::Sense::hover());
-    ui.painter().rect_filled(rect, 3.0, theme::UNKNOWN);
+    ui.painter().rect_filled(rect, 3.0, theme::unknown());
     let done = egui::Rect::from_min_size(rect.min, egui::vec2(rect.width() * fraction, rect.height()));
-    ui.painter().rect_filled(done, 3.0, theme::ACCENT);
+    ui.painter().rect_filled(done, 3.0, theme::accent());
     ui.label(theme::note(words));
 }
 
 fn newest_message(ui: &mut Ui, state: &State) {
     if let Some(message) = state.messages.newest() {
-        let colour = if message.weight == Weight::Problem { theme::LOST } else { theme::WEAK };
+        let colour = if message.weight == Weight::Problem { theme::lost() } else { theme::weak() };
         let words = RichText::new(&message.text).small().color(colour);
         ui.add(egui::Label::new(words).truncate()).on_hover_text(&message.text);
     }
@@ -199,9 +200,9 @@ pub fn stages(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 fn stage_button(ui: &mut Ui, state: &State, stage: Stage, out: &mut Vec<Command>) {
     let reached = state.trace().map(|trace| inspector::is_reached(trace, stage));
     let colour = match (reached, has_failed(state.trace(), stage)) {
-        (_, true) => theme::FAILED,
-        (Some(true), _) => theme::TEXT,
-        _ => theme::WEAK.gamma_multiply(0.7),
+        (_, true) => theme::failed(),
+        (Some(true), _) => theme::text(),
+        _ => theme::weak().gamma_multiply(0.7),
     };
     let size = if stage.is_step_of_locate() { 11.5 } else { 12.5 };
     let words = RichText::new(stage.word()).size(size).color(colour);

@@ -27,7 +27,7 @@ pub fn show(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>)
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let words = state.trace().and_then(|trace| trace.capture.as_ref()).map(exposure);
             if let Some((words, is_bad)) = words {
-                let colour = if is_bad { theme::LOST } else { theme::WEAK };
+                let colour = if is_bad { theme::lost() } else { theme::weak() };
                 let label = egui::Label::new(RichText::new(&words).small().color(colour)).truncate();
                 ui.add(label).on_hover_text(format!(
                     "{words}\nThe exposure is chosen for this subframe around the prediction, not for the whole frame."

@@ -39,16 +39,16 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 /// The verdict in words, with the counter of the state machine.
 fn sentence(ui: &mut Ui, verdict: &Verdict, state: &State) {
     let (word, colour) = match (verdict.accepted, verdict.good) {
-        (true, _) => ("ACCEPTED", theme::TRACKING),
-        (false, true) => ("GOOD, BUT NOT USED", theme::LOST),
-        (false, false) => ("REJECTED", theme::FAILED),
+        (true, _) => ("ACCEPTED", theme::tracking()),
+        (false, true) => ("GOOD, BUT NOT USED", theme::lost()),
+        (false, false) => ("REJECTED", theme::failed()),
     };
     ui.horizontal_wrapped(|ui| {
         ui.label(RichText::new(word).strong().color(colour));
         ui.label(theme::note(transition(verdict, state)));
     });
     if let Some(reason) = &verdict.reason {
-        ui.add(egui::Label::new(RichText::new(reason).small().color(theme::TEXT)).wrap());
+        ui.add(egui::Label::new(RichText::new(reason).small().color(theme::text())).wrap());
     }
 }
 
@@ -73,7 +73,7 @@ fn show_gate(ui: &mut Ui, step: usize, gate: &Gate, out: &mut Vec<Command>) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 5.0;
         ui.label(theme::note(gate.criterion.to_string()));
-        let name = ui.link(RichText::new(readable(&gate.name)).size(12.0).color(theme::TEXT));
+        let name = ui.link(RichText::new(readable(&gate.name)).size(12.0).color(theme::text()));
         let name = name.on_hover_text("Why? Where this margin comes from");
         let copied = gate.value.map_or_else(|| "none".to_owned(), |value| value.to_string());
         numbers::ask(&name, step, &format!("gate.{}", gate.name), &copied, out);
@@ -102,7 +102,7 @@ fn bar(ui: &mut Ui, gate: &Gate, colour: egui::Color32) {
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), BAR + 5.0), Sense::hover());
     let rail = Rect::from_min_size(rect.min + vec2(0.0, 2.0), vec2(rect.width() - MARGIN, BAR));
     let painter = ui.painter();
-    painter.rect_filled(rail, 2.0, theme::WELL);
+    painter.rect_filled(rail, 2.0, theme::well());
     let (value, limit) = fractions(gate);
     let at = |fraction: f32| rail.left() + rail.width() * fraction;
     if let Some(value) = value {
@@ -110,7 +110,7 @@ fn bar(ui: &mut Ui, gate: &Gate, colour: egui::Color32) {
         let fill = Rect::from_min_max(rail.min, pos2(right, rail.bottom()));
         painter.rect_filled(fill, 2.0, colour.gamma_multiply(0.85));
     }
-    painter.vline(at(limit), rail.expand(2.0).y_range(), egui::Stroke::new(2.0, theme::STRONG));
+    painter.vline(at(limit), rail.expand(2.0).y_range(), egui::Stroke::new(2.0, theme::strong()));
     let margin = gate.margin.map_or_else(|| "–".to_owned(), |m| format!("{m:+.3}"));
     painter.text(rect.right_center(), Align2::RIGHT_CENTER, margin, theme::digit_font(), colour);
     response.on_hover_text("At the end: the margin, positive on the good side of the limit.");

@@ -17,12 +17,12 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 }
 
 fn sheet(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    let modal = Modal::new(Id::unique("help")).backdrop_color(theme::SHADE).show(ui.ctx(), |ui| {
+    let modal = Modal::new(Id::unique("help")).backdrop_color(theme::shade()).show(ui.ctx(), |ui| {
         ui.set_width(430.0);
         ui.label(theme::title("Keys and pointer"));
         egui::Grid::new("keys").num_columns(2).spacing([20.0, 3.0]).show(ui, |ui| {
             for (keys, meaning) in keys::SHEET.into_iter().chain(crate::compare::SHEET) {
-                ui.label(RichText::new(keys).monospace().color(theme::ACCENT));
+                ui.label(RichText::new(keys).monospace().color(theme::accent()));
                 ui.label(meaning);
                 ui.end_row();
             }
@@ -60,14 +60,14 @@ fn go_to(ui: &mut Ui, state: &State, typed: &str, out: &mut Vec<Command>) {
     // Digits and signs: the letter that opened the field may come as text, too.
     let ahead = keys::typed_ahead(ui.ctx(), |c| c.is_ascii_digit() || matches!(c, '+' | '-'));
     let mut text = format!("{typed}{ahead}");
-    let modal = Modal::new(Id::unique("go to")).backdrop_color(theme::SHADE).show(ui.ctx(), |ui| {
+    let modal = Modal::new(Id::unique("go to")).backdrop_color(theme::shade()).show(ui.ctx(), |ui| {
         ui.set_width(240.0);
         ui.label(theme::title("Go to step"));
         let field =
             ui.add(egui::TextEdit::singleline(&mut text).hint_text(format!("0 to {last}, or +5, -3")));
         field.request_focus();
         if !text.is_empty() && target(&text, state.cursor.step).is_none() {
-            ui.label(RichText::new("a step is a whole number").small().color(theme::LOST));
+            ui.label(RichText::new("a step is a whole number").small().color(theme::lost()));
         }
         ui.label(theme::note("Enter goes, Esc cancels"));
         ui.input(|input| input.key_pressed(Key::Enter))

@@ -68,11 +68,11 @@ fn entries(state: &State) -> Vec<Entry> {
         entries.push(Entry::new(Layer::Match, Mark::Ring, theme::run(state.cursor.run), word));
     }
     if trace.predict.is_some() && trace.point_mast.as_ref().is_some_and(|p| p.predicted_right.is_some()) {
-        entries.push(Entry::new(Layer::Prediction, Mark::Cross, theme::PREDICTION, "predicted"));
+        entries.push(Entry::new(Layer::Prediction, Mark::Cross, theme::prediction(), "predicted"));
     }
     if trace.locate.as_ref().is_some_and(|l| l.left_pixel.is_some()) {
         let word = "epipolar curve, range in m";
-        entries.push(Entry::new(Layer::Curve, Mark::Stroke(Line::Solid), theme::SEARCH, word));
+        entries.push(Entry::new(Layer::Curve, Mark::Stroke(Line::Solid), theme::search(), word));
     }
     entries.extend(marks::right_entries(state));
     entries
@@ -84,10 +84,10 @@ fn paint_marks(canvas: &Canvas, trace: &StepTrace, state: &State) {
     if let Some(left_pixel) = located.left_pixel.filter(|_| state.shows(Layer::Curve)) {
         let curve = |range_m: f64| on_curve(&pointing.left, &pointing.right, left_pixel, range_m);
         let whole: Vec<Pixel> = ranges().filter_map(curve).collect();
-        overlay.line(&whole, theme::SEARCH, Line::Dotted);
+        overlay.line(&whole, theme::search(), Line::Dotted);
         if let Some(stereo) = trace.template().and_then(|e| e.point_stereo.as_ref()) {
             let searched: Vec<Pixel> = stereo.curve.iter().map(|point| point.pixel).collect();
-            overlay.line(&searched, theme::SEARCH, Line::Solid);
+            overlay.line(&searched, theme::search(), Line::Solid);
         }
         paint_ticks(canvas, &overlay, curve);
     }
@@ -95,7 +95,7 @@ fn paint_marks(canvas: &Canvas, trace: &StepTrace, state: &State) {
         && state.shows(Layer::Prediction)
         && let Some(pixel) = pointing.predicted_right
     {
-        overlay.mark(pixel, Mark::Cross, theme::PREDICTION);
+        overlay.mark(pixel, Mark::Cross, theme::prediction());
     }
     if let Some(pixel) = located.right_pixel.filter(|_| state.shows(Layer::Match)) {
         let run = theme::run(state.cursor.run);
@@ -104,7 +104,7 @@ fn paint_marks(canvas: &Canvas, trace: &StepTrace, state: &State) {
             let words = format!("{:.2} m, ncc {:.2}", stereo.range_m, stereo.score);
             overlay.words(pixel, vec2(12.0, -14.0), &words, run);
             if stereo.at_end {
-                overlay.words(pixel, vec2(12.0, 4.0), "at the end of the searched ranges", theme::LOST);
+                overlay.words(pixel, vec2(12.0, 4.0), "at the end of the searched ranges", theme::lost());
             }
         }
         overlay.mark(pixel, Mark::Ring, run);
@@ -137,8 +137,8 @@ fn paint_ticks(canvas: &Canvas, overlay: &Overlay<'_>, curve: impl Fn(f64) -> Op
         let across = (-(beyond.y - at.y) / length, (beyond.x - at.x) / length);
         let reach = 5.0 / canvas.transform.scale;
         let ends = [-reach, reach].map(|t| at.offset(across.0 * t, across.1 * t));
-        overlay.line(&ends, theme::SEARCH, Line::Solid);
-        overlay.words(at, vec2(-8.0, 15.0), &format!("{range_m}"), theme::SEARCH);
+        overlay.line(&ends, theme::search(), Line::Solid);
+        overlay.words(at, vec2(-8.0, 15.0), &format!("{range_m}"), theme::search());
         last = Some(screen);
     }
 }

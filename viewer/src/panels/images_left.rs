@@ -114,7 +114,7 @@ fn entries(state: &State) -> Vec<Entry> {
     let matched = evidence.and_then(|e| e.match_template.as_ref());
     let run = theme::run(state.cursor.run);
     if trace.truth.as_ref().is_some_and(|t| t.left_pixel.is_some()) {
-        entries.push(Entry::new(Layer::Truth, Mark::Plus, theme::TRUTH, "truth"));
+        entries.push(Entry::new(Layer::Truth, Mark::Plus, theme::truth(), "truth"));
     }
     if trace.locate.as_ref().is_some_and(|l| l.left_pixel.is_some()) {
         let by_shape =
@@ -132,28 +132,28 @@ fn entries(state: &State) -> Vec<Entry> {
         entries.push(Entry::new(
             Layer::Prediction,
             Mark::Stroke(Line::Dotted),
-            theme::PREDICTION,
+            theme::prediction(),
             "predicted, 3σ gate",
         ));
     }
     if let Some((_, half_width_m)) = basin_of(trace).filter(|(outline, _)| !outline.is_empty()) {
         let word = format!("basin, half width {:.0} cm", half_width_m * 100.0);
-        entries.push(Entry::new(Layer::Basin, Mark::Stroke(Line::Dashed), theme::BASIN, word));
+        entries.push(Entry::new(Layer::Basin, Mark::Stroke(Line::Dashed), theme::basin(), word));
     }
     if matched.is_some() {
         entries.push(Entry::new(Layer::Template, Mark::Stroke(Line::Solid), run, "template window"));
         entries.push(Entry::new(
             Layer::SearchWindow,
             Mark::Stroke(Line::Dashed),
-            theme::SEARCH,
+            theme::search(),
             "search window",
         ));
     }
     if trace.capture.as_ref().is_some_and(|c| c.subframe.is_some()) {
-        entries.push(Entry::new(Layer::Subframe, Mark::Stroke(Line::Dotted), theme::SUBFRAME, "subframe"));
+        entries.push(Entry::new(Layer::Subframe, Mark::Stroke(Line::Dotted), theme::subframe(), "subframe"));
     }
     if state.session.as_ref().is_some_and(|s| s.targets.len() > 1) {
-        entries.push(Entry::new(Layer::Others, Mark::Diamond, theme::WEAK, "other targets"));
+        entries.push(Entry::new(Layer::Others, Mark::Diamond, theme::weak(), "other targets"));
     }
     entries.extend(marks::left_entries(state));
     entries.extend(compared::entries(state));
@@ -168,16 +168,16 @@ fn paint_marks(overlay: &Overlay<'_>, trace: &StepTrace, state: &State) {
     if let Some(subframe) =
         trace.capture.as_ref().and_then(|c| c.subframe).filter(|_| state.shows(Layer::Subframe))
     {
-        overlay.rectangle(subframe, theme::SUBFRAME, Line::Dotted);
+        overlay.rectangle(subframe, theme::subframe(), Line::Dotted);
     }
     if let Some(found) = matched.filter(|_| state.shows(Layer::SearchWindow)) {
-        overlay.rectangle(found.search_window, theme::SEARCH, Line::Dashed);
+        overlay.rectangle(found.search_window, theme::search(), Line::Dashed);
     }
     if state.shows(Layer::Prediction) && trace.predict.is_some() {
         paint_prediction(overlay, trace);
     }
     if let Some((outline, _)) = basin_of(trace).filter(|_| state.shows(Layer::Basin)) {
-        overlay.outline(&outline, theme::BASIN, Line::Dashed);
+        overlay.outline(&outline, theme::basin(), Line::Dashed);
     }
     if let (Some(found), Some(prepared)) = (matched, evidence.and_then(|e| e.scale_roll.as_ref()))
         && state.shows(Layer::Template)
@@ -205,7 +205,7 @@ fn paint_marks(overlay: &Overlay<'_>, trace: &StepTrace, state: &State) {
     }
     if let Some(pixel) = trace.truth.as_ref().and_then(|t| t.left_pixel).filter(|_| state.shows(Layer::Truth))
     {
-        overlay.mark(pixel, Mark::Plus, theme::TRUTH);
+        overlay.mark(pixel, Mark::Plus, theme::truth());
     }
 }
 
@@ -221,15 +221,15 @@ fn paint_prediction(overlay: &Overlay<'_>, trace: &StepTrace) {
     let Some(pointing) = &trace.point_mast else { return };
     let Some(pixel) = pointing.predicted_left else { return };
     if let Some(covariance) = &pointing.predicted_covariance_px2 {
-        overlay.ellipse(pixel, covariance, 3.0, theme::PREDICTION, Line::Dotted);
+        overlay.ellipse(pixel, covariance, 3.0, theme::prediction(), Line::Dotted);
         if let Some([long, _]) = crate::ellipse::axes(covariance) {
             let end = pixel.offset(3.0 * long.x.abs(), 3.0 * long.x.signum() * long.y);
             if overlay.length(pixel, end) > 24.0 {
-                overlay.words(end, vec2(6.0, 0.0), "3σ", theme::PREDICTION);
+                overlay.words(end, vec2(6.0, 0.0), "3σ", theme::prediction());
             }
         }
     }
-    overlay.mark(pixel, Mark::Cross, theme::PREDICTION);
+    overlay.mark(pixel, Mark::Cross, theme::prediction());
 }
 
 /// Side of the template, px.
@@ -245,8 +245,8 @@ fn paint_others(canvas: &Canvas, state: &State) {
     for target in session.targets.iter().filter(|target| Some(target.number) != state.cursor.target) {
         let row = target.runs.last().and_then(|run| row_of(run, state.cursor.step));
         if let Some(pixel) = row.and_then(|row| row.left_pixel) {
-            overlay.mark(pixel, Mark::Diamond, theme::WEAK);
-            overlay.words(pixel, vec2(10.0, 0.0), &target.label, theme::WEAK);
+            overlay.mark(pixel, Mark::Diamond, theme::weak());
+            overlay.words(pixel, vec2(10.0, 0.0), &target.label, theme::weak());
         }
     }
 }
@@ -256,11 +256,11 @@ fn paint_designation(canvas: &Canvas, state: &State) {
     let here = |step: usize| step == state.cursor.step;
     let overlay = Overlay::new(&canvas.painter, &canvas.transform);
     if let Some(place) = state.designating.filter(|place| here(place.step)) {
-        overlay.mark(place.pixel, Mark::Ring, theme::ACCENT);
-        overlay.words(place.pixel, vec2(12.0, 0.0), "computing the position …", theme::ACCENT);
+        overlay.mark(place.pixel, Mark::Ring, theme::accent());
+        overlay.words(place.pixel, vec2(12.0, 0.0), "computing the position …", theme::accent());
     }
     if let Some(refusal) = state.refusal.as_ref().filter(|refusal| here(refusal.place.step)) {
-        overlay.mark(refusal.place.pixel, Mark::Cross, theme::FAILED);
+        overlay.mark(refusal.place.pixel, Mark::Cross, theme::failed());
         let at = canvas.transform.to_screen(refusal.place.pixel) + vec2(12.0, 0.0);
         paint_wrapped(canvas, at, &format!("refused: {}", refusal.sentence));
     }
@@ -272,14 +272,14 @@ fn paint_wrapped(canvas: &Canvas, at: egui::Pos2, words: &str) {
     // Below stands the hint of the pick mode.
     area.max.y -= 22.0;
     let width = 280.0_f32.min(area.width());
-    let galley = canvas.painter.layout(words.to_owned(), theme::image_font(), theme::LOST, width);
+    let galley = canvas.painter.layout(words.to_owned(), theme::image_font(), theme::lost(), width);
     let size = galley.size();
     let corner = pos2(
         at.x.clamp(area.left(), (area.right() - size.x).max(area.left())),
         (at.y - size.y / 2.0).clamp(area.top(), (area.bottom() - size.y).max(area.top())),
     );
-    canvas.painter.rect_filled(Rect::from_min_size(corner, size).expand(4.0), 3.0, theme::SCRIM);
-    canvas.painter.galley(corner, galley, theme::LOST);
+    canvas.painter.rect_filled(Rect::from_min_size(corner, size).expand(4.0), 3.0, theme::scrim());
+    canvas.painter.galley(corner, galley, theme::lost());
 }
 
 /// Pixel and grey value under the pointer, magnification, and the convention.

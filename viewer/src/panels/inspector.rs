@@ -16,7 +16,7 @@ use crate::{panels, theme};
 /// Shows the record.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.horizontal_wrapped(|ui| {
-        ui.label(RichText::new(state.stage().word()).strong().color(theme::STRONG));
+        ui.label(RichText::new(state.stage().word()).strong().color(theme::strong()));
         ui.label(theme::note(state.stage().question()));
     });
     let Some(trace) = state.trace() else {
@@ -211,7 +211,7 @@ fn entries(ui: &mut Ui, record: &Value) {
         let count = list.map(|list| format!(" ({})", list.len())).unwrap_or_default();
         let header = RichText::new(format!("{name}{count} {unit}").trim_end().to_owned())
             .size(12.0)
-            .color(theme::TEXT);
+            .color(theme::text());
         CollapsingHeader::new(header)
             .id_salt(key)
             .default_open(is_small(key, value))

@@ -73,7 +73,7 @@ fn has_column(area: Rect, widest: f32, height: f32, width_by_height: f32, below:
 }
 
 fn width_of(ui: &Ui, entry: &Entry) -> f32 {
-    let galley = ui.painter().layout_no_wrap(entry.word.clone(), theme::image_font(), theme::TEXT);
+    let galley = ui.painter().layout_no_wrap(entry.word.clone(), theme::image_font(), theme::text());
     galley.size().x + MARK
 }
 

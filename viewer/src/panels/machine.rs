@@ -41,7 +41,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let now = state.tracking().unwrap_or_default();
     let count = bad_in_a_row(run, state.cursor.step);
     diagram(ui, state, now, count);
-    ui.label(RichText::new(sentence(state, now, count)).color(theme::TEXT));
+    ui.label(RichText::new(sentence(state, now, count)).color(theme::text()));
     ui.separator();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let past = run.rows.iter().filter(|row| row.step <= state.cursor.step).rev();
@@ -114,7 +114,7 @@ fn paint_state(ui: &Ui, frame: Rect, word: &str, below: &str, colour: Color32, i
     let fill = if is_present { colour.gamma_multiply(0.35) } else { Color32::TRANSPARENT };
     let stroke = Stroke::new(if is_present { 3.0 } else { 1.0 }, colour);
     painter.rect(frame, 6.0, fill, stroke, StrokeKind::Inside);
-    let text = if is_present { theme::STRONG } else { theme::TEXT };
+    let text = if is_present { theme::strong() } else { theme::text() };
     let font = |of: egui::FontId| egui::FontId::new(of.size.min(frame.width() / 5.8), of.family);
     if below.is_empty() {
         painter.text(frame.center(), Align2::CENTER_CENTER, word, font(theme::image_font()), text);
@@ -127,7 +127,7 @@ fn paint_state(ui: &Ui, frame: Rect, word: &str, below: &str, colour: Color32, i
         Align2::CENTER_CENTER,
         below,
         font(theme::digit_font()),
-        theme::TEXT,
+        theme::text(),
     );
 }
 
@@ -150,7 +150,7 @@ fn paint_transitions(ui: &Ui, [cleared, tracking, lost, failed]: [Rect; 4]) {
 /// An arrow that leaves and enters a box from above (`rise` < 0) or from below, with a word.
 fn bent(ui: &Ui, from: Pos2, to: Pos2, rise: f32, word: &str) {
     let painter = ui.painter();
-    let stroke = Stroke::new(1.5, theme::WEAK);
+    let stroke = Stroke::new(1.5, theme::weak());
     let (up, over) = (from + vec2(0.0, rise), to + vec2(0.0, rise));
     painter.line(vec![from, up, over, to], stroke);
     let back = rise.signum() * 4.0;
@@ -161,7 +161,7 @@ fn bent(ui: &Ui, from: Pos2, to: Pos2, rise: f32, word: &str) {
     } else {
         (middle + vec2(0.0, 2.0), Align2::CENTER_TOP)
     };
-    painter.text(at, align, word, theme::digit_font(), theme::TEXT);
+    painter.text(at, align, word, theme::digit_font(), theme::text());
 }
 
 /// One past update: its step, its state, and what fired.
@@ -186,7 +186,7 @@ fn history(ui: &mut Ui, state: &State, run: &RunView, row: &StepRow, out: &mut V
         }
         for fired in fired {
             let words = format!("criterion {}: {}", fired.criterion, fired.words);
-            ui.add(egui::Label::new(RichText::new(words).size(11.5).color(theme::LOST)).wrap());
+            ui.add(egui::Label::new(RichText::new(words).size(11.5).color(theme::lost())).wrap());
         }
     });
 }

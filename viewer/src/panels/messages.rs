@@ -26,8 +26,8 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 
 fn show_message(ui: &mut Ui, message: &Message, out: &mut Vec<Command>) {
     let is_problem = message.weight == Weight::Problem;
-    let colour = if is_problem { theme::LOST } else { theme::TEXT };
-    egui::Frame::new().fill(theme::BAR).corner_radius(4).inner_margin(6).show(ui, |ui| {
+    let colour = if is_problem { theme::lost() } else { theme::text() };
+    egui::Frame::new().fill(theme::bar()).corner_radius(4).inner_margin(6).show(ui, |ui| {
         ui.horizontal(|ui| {
             ui.label(theme::title(if is_problem { "problem" } else { "note" }));
             if message.count > 1 {

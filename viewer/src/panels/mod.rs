@@ -33,6 +33,7 @@ pub mod tolerances;
 pub mod uncertainty;
 pub mod picking;
 pub mod tour;
+pub mod view_menu;
 pub mod what_if;
 pub mod why;
 
@@ -46,7 +47,7 @@ pub fn missing(ui: &mut Ui, purpose: &str, sentence: &str) {
     let builder = UiBuilder::new().max_rect(space.shrink(6.0)).layout(Layout::top_down(Align::Center));
     let mut middle = ui.new_child(builder);
     middle.add_space((space.height() / 2.0 - 24.0).clamp(0.0, 80.0));
-    middle.add(egui::Label::new(RichText::new(sentence).color(theme::TEXT)).wrap());
+    middle.add(egui::Label::new(RichText::new(sentence).color(theme::text())).wrap());
     if !purpose.is_empty() {
         middle.add(egui::Label::new(theme::note(purpose)).wrap());
     }

@@ -28,7 +28,7 @@ pub fn wrapped(ui: &mut Ui, title: &str, names: &[(Mark, Color32, String)]) {
 fn contents(ui: &mut Ui, title: &str, names: &[(Mark, Color32, String)]) {
     ui.spacing_mut().item_spacing.x = 10.0;
     if !title.is_empty() {
-        ui.label(theme::note(title).color(theme::TEXT));
+        ui.label(theme::note(title).color(theme::text()));
     }
     for (mark, colour, name) in names {
         entry(ui, *mark, *colour, name);
@@ -38,12 +38,12 @@ fn contents(ui: &mut Ui, title: &str, names: &[(Mark, Color32, String)]) {
 /// A mark with its word, which stay together where the row is broken.
 fn entry(ui: &mut Ui, mark: Mark, colour: Color32, name: &str) {
     let reach = if matches!(mark, Mark::Stroke(_)) { 8.0 } else { 4.0 };
-    let word = ui.painter().layout_no_wrap(name.to_owned(), theme::image_font(), theme::WEAK);
+    let word = ui.painter().layout_no_wrap(name.to_owned(), theme::image_font(), theme::weak());
     let beside = 2.0 * reach + 6.0;
     let size = vec2(beside + word.size().x, word.size().y.max(HEIGHT - 2.0));
     let (frame, response) = ui.allocate_exact_size(size, Sense::hover());
     paint_mark(ui.painter(), frame.left_center() + vec2(reach + 1.0, 0.0), mark, colour, reach);
     let at = frame.left_center() + vec2(beside, -word.size().y / 2.0);
-    ui.painter().galley(at, word, theme::WEAK);
+    ui.painter().galley(at, word, theme::weak());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, name));
 }

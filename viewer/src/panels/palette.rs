@@ -22,7 +22,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     // Hung at the top, so that the field stays where it is while the list grows and shrinks.
     let place = Modal::default_area(Id::unique("palette")).anchor(egui::Align2::CENTER_TOP, [0.0, 90.0]);
     let modal = Modal::new(Id::unique("palette")).area(place);
-    let modal = modal.backdrop_color(theme::SHADE).show(ui.ctx(), |ui| {
+    let modal = modal.backdrop_color(theme::shade()).show(ui.ctx(), |ui| {
         ui.set_width(520.0);
         let field = egui::TextEdit::singleline(&mut words)
             .hint_text("an action, a step, a panel, a setting, a value")
@@ -59,16 +59,16 @@ fn list(ui: &mut Ui, found: &[Action], chosen: usize) -> Option<usize> {
             WidgetInfo::selected(egui::Role::ListBoxOption, true, at == chosen, &action.title)
         });
         if at == chosen || row.hovered() {
-            ui.painter().rect_filled(row.rect, 3.0, theme::SELECTED);
+            ui.painter().rect_filled(row.rect, 3.0, theme::selected());
         }
         let mut line = ui.new_child(
             egui::UiBuilder::new()
                 .max_rect(row.rect.shrink2(egui::vec2(6.0, 0.0)))
                 .layout(egui::Layout::right_to_left(egui::Align::Center)),
         );
-        line.label(RichText::new(action.keys).monospace().small().color(theme::ACCENT));
+        line.label(RichText::new(action.keys).monospace().small().color(theme::accent()));
         line.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
-            ui.add(egui::Label::new(RichText::new(&action.title).color(theme::TEXT)).truncate());
+            ui.add(egui::Label::new(RichText::new(&action.title).color(theme::text())).truncate());
         });
         if row.clicked() {
             clicked = Some(at);

@@ -119,12 +119,12 @@ pub fn show(ui: &mut Ui, canvas: &Canvas, raster: &Raster, state: &State, out: &
     let corner = border.left_bottom() + vec2(10.0, -14.0);
     if state.mode != Mode::Pick {
         if state.session.as_ref().is_some_and(|session| session.targets.is_empty()) {
-            paint_words(&canvas.painter, corner, "Press T, then click the rock to track.", theme::ACCENT);
+            paint_words(&canvas.painter, corner, "Press T, then click the rock to track.", theme::accent());
         }
         return;
     }
-    canvas.painter.rect_stroke(border, 0.0, Stroke::new(2.0, theme::ACCENT), egui::StrokeKind::Inside);
-    paint_words(&canvas.painter, corner, &hint(state), theme::ACCENT);
+    canvas.painter.rect_stroke(border, 0.0, Stroke::new(2.0, theme::accent()), egui::StrokeKind::Inside);
+    paint_words(&canvas.painter, corner, &hint(state), theme::accent());
     offer(ui, canvas, state, out);
     let [width, height] = raster.size();
     let hovered = canvas.hovered(PixelRect::whole(width, height));
@@ -135,10 +135,10 @@ pub fn show(ui: &mut Ui, canvas: &Canvas, raster: &Raster, state: &State, out: &
         let overlay = Overlay::new(&canvas.painter, &canvas.transform);
         overlay.outline(
             &template_quad(pixel, super::images_left::template_side(state), &nalgebra::Matrix2::identity()),
-            theme::ACCENT,
+            theme::accent(),
             Line::Dotted,
         );
-        overlay.mark(pixel, Mark::Plus, theme::ACCENT);
+        overlay.mark(pixel, Mark::Plus, theme::accent());
     }
     let Some(pixel) = described else { return };
     loupe(canvas, raster, pixel);
@@ -227,8 +227,8 @@ fn loupe(canvas: &Canvas, raster: &Raster, pixel: Pixel) {
     let middle = pos2((pixel.x as f32 + 0.5) / width, (pixel.y as f32 + 0.5) / height);
     let part = Rect::from_center_size(middle, vec2(pixels / width, pixels / height));
     canvas.painter.image(raster.texture.id(), frame, part, theme::UNTINTED);
-    canvas.painter.rect_stroke(frame, 0.0, Stroke::new(1.0, theme::ACCENT), egui::StrokeKind::Outside);
-    overlay::paint_mark(&canvas.painter, frame.center(), Mark::Plus, theme::ACCENT, 9.0);
+    canvas.painter.rect_stroke(frame, 0.0, Stroke::new(1.0, theme::accent()), egui::StrokeKind::Outside);
+    overlay::paint_mark(&canvas.painter, frame.center(), Mark::Plus, theme::accent(), 9.0);
 }
 
 fn loupe_corner(area: Rect, at: Pos2, side: f32) -> Pos2 {

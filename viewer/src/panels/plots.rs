@@ -85,7 +85,7 @@ fn charts(state: &State, run: &RunView) -> Vec<Chart> {
         }
         TrackerKind::Shape => vec![confidence(state, colour)],
     };
-    let mut position = vec![series("σ", theme::WEAK, diamond, MarkerShape::Diamond, |_, row| {
+    let mut position = vec![series("σ", theme::weak(), diamond, MarkerShape::Diamond, |_, row| {
         row.sigma_m.map(|v| v * 100.0)
     })];
     if run.rows.iter().any(|row| row.err_m.is_some()) {
@@ -120,7 +120,9 @@ fn scores(state: &State, colour: Color32) -> Chart {
         unit: "",
         series: vec![
             series("ncc", colour, Mark::Ring, MarkerShape::Circle, |_, row| row.ncc),
-            series("stereo", theme::PREDICTION, Mark::Square, MarkerShape::Square, |_, row| row.stereo_score),
+            series("stereo", theme::prediction(), Mark::Square, MarkerShape::Square, |_, row| {
+                row.stereo_score
+            }),
         ],
         thresholds: limit("ncc_min").into_iter().chain(limit("stereo_ncc_min")).collect(),
         threshold: "least allowed".to_owned(),
@@ -162,7 +164,7 @@ fn names_of(chart: &Chart) -> (String, Vec<(Mark, Color32, String)>) {
     let unit = if chart.unit.is_empty() { String::new() } else { format!(", {}", chart.unit) };
     let mut names: Vec<_> = chart.series.iter().map(|s| (s.mark, s.colour, s.name.to_owned())).collect();
     if !chart.thresholds.is_empty() {
-        names.push((Mark::Stroke(overlay::Line::Dashed), theme::FAILED, chart.threshold.clone()));
+        names.push((Mark::Stroke(overlay::Line::Dashed), theme::failed(), chart.threshold.clone()));
     }
     (format!("{}{unit}", chart.title), names)
 }
@@ -191,10 +193,10 @@ fn plot(
             });
     let response = plot.show(ui, |plot| {
         plot.vline(
-            VLine::new("", state.cursor.step as f64).color(theme::ACCENT).width(1.5).allow_hover(false),
+            VLine::new("", state.cursor.step as f64).color(theme::accent()).width(1.5).allow_hover(false),
         );
         for &value in &chart.thresholds {
-            let line = HLine::new("", value).color(theme::FAILED).style(LineStyle::dashed_dense());
+            let line = HLine::new("", value).color(theme::failed()).style(LineStyle::dashed_dense());
             plot.hline(line.width(1.0).allow_hover(false));
         }
         for line in &chart.series {

@@ -61,7 +61,7 @@ fn presets(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.horizontal(|ui| {
         ui.label(theme::label("preset"));
         let choice = ComboBox::from_id_salt("preset").width(ui.available_width()).height(420.0);
-        let shown = choice.selected_text(RichText::new(name).color(theme::STRONG)).show_ui(ui, |ui| {
+        let shown = choice.selected_text(RichText::new(name).color(theme::strong())).show_ui(ui, |ui| {
             ui.set_min_width(300.0);
             for preset in state.configurations.all() {
                 let is_chosen = now.is_some_and(|now| now.name == preset.name);
@@ -115,9 +115,9 @@ fn show_setting(ui: &mut Ui, state: &State, info: &SettingInfo, out: &mut Vec<Co
     let drafted = state.draft.get(&info.key);
     let value = drafted.unwrap_or(&in_run).clone();
     let colour = match (drafted, in_run == info.default) {
-        (Some(_), _) => theme::ACCENT,
-        (None, false) => theme::STRONG,
-        (None, true) => theme::TEXT,
+        (Some(_), _) => theme::accent(),
+        (None, false) => theme::strong(),
+        (None, true) => theme::text(),
     };
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
@@ -147,7 +147,7 @@ fn show_setting(ui: &mut Ui, state: &State, info: &SettingInfo, out: &mut Vec<Co
         });
     });
     if let Some(problem) = problem(state, info) {
-        ui.label(RichText::new(format!("{} {problem}", info.key)).small().color(theme::LOST));
+        ui.label(RichText::new(format!("{} {problem}", info.key)).small().color(theme::lost()));
     }
 }
 

@@ -71,12 +71,12 @@ pub fn show(ui: &mut Ui, state: &State, _out: &mut Vec<Command>) {
 
 fn names_of(run: Color32, is_predicted: bool) -> Vec<(Mark, Color32, String)> {
     let mut names = vec![
-        (Mark::Stroke(overlay::Line::Solid), theme::SEARCH, "searched".to_owned()),
+        (Mark::Stroke(overlay::Line::Solid), theme::search(), "searched".to_owned()),
         (Mark::Ring, run, "best".to_owned()),
-        (Mark::Stroke(overlay::Line::Dashed), theme::FAILED, "least allowed".to_owned()),
+        (Mark::Stroke(overlay::Line::Dashed), theme::failed(), "least allowed".to_owned()),
     ];
     if is_predicted {
-        names.push((Mark::Stroke(overlay::Line::Dotted), theme::PREDICTION, "predicted ± 3σ".to_owned()));
+        names.push((Mark::Stroke(overlay::Line::Dotted), theme::prediction(), "predicted ± 3σ".to_owned()));
     }
     names
 }
@@ -93,7 +93,7 @@ fn sentences(stereo: &PointStereo, predicted: Option<(f64, f64)>) -> [RichText; 
         Some(px) => format!("left to right and back: {px:.2} px off"),
         None => "left to right and back: nothing was found there".to_owned(),
     };
-    let colour = if stereo.at_end { theme::LOST } else { theme::TEXT };
+    let colour = if stereo.at_end { theme::lost() } else { theme::text() };
     let ranges = stereo.curve.iter().map(|point| point.range_m);
     let (near, far) = ranges.fold((f64::INFINITY, 0.0_f64), |(near, far), r| (near.min(r), far.max(r)));
     let prior = predicted.map_or_else(
@@ -139,25 +139,25 @@ fn paint(
     if let Some((range_m, sigma_m)) = predicted {
         let far = 1.0 / (range_m + 3.0 * sigma_m);
         let near = 1.0 / (range_m - 3.0 * sigma_m).max(0.1);
-        let fill = theme::PREDICTION.gamma_multiply(0.15);
+        let fill = theme::prediction().gamma_multiply(0.15);
         plot.span(Span::new("", far..=near).axis(Axis::X).fill(fill).border_width(0.0));
-        let line = VLine::new("", 1.0 / range_m).color(theme::PREDICTION).style(LineStyle::dotted_dense());
+        let line = VLine::new("", 1.0 / range_m).color(theme::prediction()).style(LineStyle::dotted_dense());
         plot.vline(line.width(1.5).allow_hover(false));
     }
     if let Some(threshold) = threshold {
-        let line = HLine::new("", threshold).color(theme::FAILED).style(LineStyle::dashed_dense());
+        let line = HLine::new("", threshold).color(theme::failed()).style(LineStyle::dashed_dense());
         plot.hline(line.width(1.0).allow_hover(false));
     }
     let point = |p: &sightline_core::locate::template::point_stereo::CurvePoint| {
         Some([1.0 / p.range_m, f64::from(p.score.filter(|score| score.is_finite())?)])
     };
     for piece in pieces(&stereo.curve.iter().map(point).collect::<Vec<_>>()) {
-        plot.line(Line::new("", piece).color(theme::SEARCH).width(1.5));
+        plot.line(Line::new("", piece).color(theme::search()).width(1.5));
     }
     let best = [1.0 / stereo.range_m, stereo.score];
     plot.vline(VLine::new("", best[0]).color(run).width(1.0).allow_hover(false));
     plot.points(Points::new("", best).color(run).radius(5.0).shape(MarkerShape::Circle).filled(false));
-    let words = theme::note(format!("  {:.2}", stereo.score)).color(theme::STRONG);
+    let words = theme::note(format!("  {:.2}", stereo.score)).color(theme::strong());
     let text = Text::new("", PlotPoint::new(best[0], best[1]), words);
     plot.text(text.anchor(Align2::LEFT_TOP));
 }

@@ -97,20 +97,20 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 /// The arrow between two patches with what happened.
 fn arrow(ui: &Ui, middle: Pos2, words: &str) {
     let painter = ui.painter();
-    let stroke = egui::Stroke::new(1.5, theme::WEAK);
+    let stroke = egui::Stroke::new(1.5, theme::weak());
     let tip = middle + vec2(12.0, 6.0);
     painter.line_segment([middle + vec2(-12.0, 6.0), tip], stroke);
     painter.line_segment([tip, tip + vec2(-4.0, -4.0)], stroke);
     painter.line_segment([tip, tip + vec2(-4.0, 4.0)], stroke);
-    painter.text(middle - vec2(0.0, 2.0), Align2::CENTER_BOTTOM, words, theme::digit_font(), theme::STRONG);
+    painter.text(middle - vec2(0.0, 2.0), Align2::CENTER_BOTTOM, words, theme::digit_font(), theme::strong());
 }
 
 fn show_patch(ui: &mut Ui, state: &State, patch: &Patch, frame: Rect, out: &mut Vec<Command>) {
     let response = ui.interact(frame, ui.scope_id().with(("patch", patch.array)), Sense::click());
     let painter = ui.painter();
     let above = frame.center_top() - vec2(0.0, 3.0);
-    painter.text(above, Align2::CENTER_BOTTOM, &patch.title, theme::image_font(), theme::TEXT);
-    let border = if response.hovered() { theme::ACCENT } else { theme::LINE };
+    painter.text(above, Align2::CENTER_BOTTOM, &patch.title, theme::image_font(), theme::text());
+    let border = if response.hovered() { theme::accent() } else { theme::line() };
     match state.array(patch.array) {
         Slot::Ready(raster) => {
             view2d::checker(painter, frame);
@@ -119,17 +119,23 @@ fn show_patch(ui: &mut Ui, state: &State, patch: &Patch, frame: Rect, out: &mut 
             statistics(ui, raster, frame);
         }
         Slot::Failed(_) => {
-            painter.rect_filled(frame, 0.0, theme::WELL);
-            painter.text(frame.center(), Align2::CENTER_CENTER, "not kept", theme::image_font(), theme::LOST);
+            painter.rect_filled(frame, 0.0, theme::well());
+            painter.text(
+                frame.center(),
+                Align2::CENTER_CENTER,
+                "not kept",
+                theme::image_font(),
+                theme::lost(),
+            );
         }
         Slot::Absent | Slot::Loading => {
-            painter.rect_filled(frame, 0.0, theme::WELL);
+            painter.rect_filled(frame, 0.0, theme::well());
             painter.text(
                 frame.center(),
                 Align2::CENTER_CENTER,
                 "loading …",
                 theme::image_font(),
-                theme::WEAK,
+                theme::weak(),
             );
         }
     }
@@ -149,7 +155,7 @@ fn statistics(ui: &Ui, raster: &Raster, frame: Rect) {
         room if room > 170.0 => format!("mean {:.3}  σ {:.3}", raster.mean, raster.sigma),
         _ => format!("{:.3} ±{:.3}", raster.mean, raster.sigma),
     };
-    ui.painter().text(below, Align2::CENTER_TOP, words, theme::digit_font(), theme::TEXT);
+    ui.painter().text(below, Align2::CENTER_TOP, words, theme::digit_font(), theme::text());
 }
 
 fn explain(array: ArrayName) -> String {

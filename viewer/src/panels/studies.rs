@@ -86,7 +86,7 @@ fn form(ui: &mut Ui, state: &State, chosen: &StudyInfo, out: &mut Vec<Command>) 
             out.push(Command::StartStudy);
         }
         match &problem {
-            Some(problem) => ui.label(RichText::new(problem).small().color(theme::LOST)),
+            Some(problem) => ui.label(RichText::new(problem).small().color(theme::lost())),
             None => ui.label(theme::note("Left empty, a field means what stands in it in grey.")),
         };
     });
@@ -98,7 +98,7 @@ fn form(ui: &mut Ui, state: &State, chosen: &StudyInfo, out: &mut Vec<Command>) 
 fn show_job(ui: &mut Ui, state: &State, job: &StudyJob, out: &mut Vec<Command>) {
     let (word, colour) = word_of(job.state);
     ui.horizontal_wrapped(|ui| {
-        ui.label(RichText::new(&job.study).strong().color(theme::STRONG)).on_hover_text(&job.command);
+        ui.label(RichText::new(&job.study).strong().color(theme::strong())).on_hover_text(&job.command);
         ui.label(RichText::new(word).color(colour));
         if job.n > 0 {
             ui.label(theme::number(format!("{} of {}", job.k, job.n)).size(11.0));
@@ -127,24 +127,24 @@ fn show_job(ui: &mut Ui, state: &State, job: &StudyJob, out: &mut Vec<Command>) 
     });
     if matches!(job.state, StudyState::Waiting | StudyState::Running) {
         let share = job.k as f32 / job.n.max(1) as f32;
-        ui.add(egui::ProgressBar::new(share).desired_height(6.0).fill(theme::ACCENT));
+        ui.add(egui::ProgressBar::new(share).desired_height(6.0).fill(theme::accent()));
     }
     if !job.doing.is_empty() {
         ui.add(egui::Label::new(theme::note(&job.doing)).wrap());
     }
     for notice in &job.notices {
-        ui.add(egui::Label::new(RichText::new(format!("! {notice}")).small().color(theme::LOST)).wrap());
+        ui.add(egui::Label::new(RichText::new(format!("! {notice}")).small().color(theme::lost())).wrap());
     }
     ui.add_space(4.0);
 }
 
 fn word_of(state: StudyState) -> (&'static str, egui::Color32) {
     match state {
-        StudyState::Waiting => ("waiting", theme::WEAK),
-        StudyState::Running => ("running", theme::ACCENT),
-        StudyState::Done => ("done", theme::TRACKING),
-        StudyState::Cancelled => ("cancelled", theme::LOST),
-        StudyState::Failed => ("failed", theme::FAILED),
+        StudyState::Waiting => ("waiting", theme::weak()),
+        StudyState::Running => ("running", theme::accent()),
+        StudyState::Done => ("done", theme::tracking()),
+        StudyState::Cancelled => ("cancelled", theme::lost()),
+        StudyState::Failed => ("failed", theme::failed()),
     }
 }
 

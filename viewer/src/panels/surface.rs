@@ -88,7 +88,7 @@ pub fn region_of(search_window: PixelRect, size: [u32; 2]) -> PixelRect {
 /// The line along which the scores have the threshold's height.
 fn paint_contour(canvas: &Canvas, raster: &Raster, region: PixelRect, threshold: f32) {
     let (x, y) = (f64::from(region.x), f64::from(region.y));
-    let stroke = egui::Stroke::new(1.5, theme::STRONG);
+    let stroke = egui::Stroke::new(1.5, theme::strong());
     for segment in contour(raster.values.as_raw(), raster.values.width() as usize, threshold) {
         let ends = segment.map(|[dx, dy]| canvas.transform.to_screen(Pixel::new(x + dx, y + dy)));
         canvas.painter.line_segment(ends, stroke);
@@ -101,34 +101,39 @@ pub(super) fn paint_marks(canvas: &Canvas, trace: &StepTrace, matched: &Template
     if let Some(pixel) = trace.point_mast.as_ref().and_then(|p| p.predicted_left) {
         if let Some(covariance) = trace.point_mast.as_ref().and_then(|p| p.predicted_covariance_px2.as_ref())
         {
-            overlay.ellipse(pixel, covariance, 3.0, theme::PREDICTION, Line::Dotted);
+            overlay.ellipse(pixel, covariance, 3.0, theme::prediction(), Line::Dotted);
         }
-        overlay.mark(pixel, Mark::Cross, theme::PREDICTION);
+        overlay.mark(pixel, Mark::Cross, theme::prediction());
     }
     if let Some(second) = &matched.second_peak {
-        overlay.mark(second.pixel, Mark::Square, theme::STRONG);
+        overlay.mark(second.pixel, Mark::Square, theme::strong());
         let words = format!("2nd: {:.0} % at {:.0} px", second.ratio * 100.0, second.distance_px);
-        overlay.words(second.pixel, vec2(12.0, 12.0), &words, theme::STRONG);
+        overlay.words(second.pixel, vec2(12.0, 12.0), &words, theme::strong());
     }
     let peak = &matched.peak;
     overlay.ellipse(peak.pixel, &matched.covariance_px2, 3.0, run, Line::Solid);
     overlay.mark(peak.pixel, Mark::Ring, run);
-    overlay.words(peak.pixel, vec2(12.0, -12.0), &format!("peak {:.3}", peak.score), theme::STRONG);
+    overlay.words(peak.pixel, vec2(12.0, -12.0), &format!("peak {:.3}", peak.score), theme::strong());
     if let Some(pixel) = trace.truth.as_ref().and_then(|t| t.left_pixel) {
-        overlay.mark(pixel, Mark::Plus, theme::TRUTH);
+        overlay.mark(pixel, Mark::Plus, theme::truth());
     }
 }
 
 fn warn_of_edge(canvas: &Canvas, matched: &TemplateMatch) {
     if matched.peak.at_edge {
         let area = canvas.transform.rect.shrink(1.0);
-        canvas.painter.rect_stroke(area, 0.0, egui::Stroke::new(2.0, theme::LOST), egui::StrokeKind::Inside);
+        canvas.painter.rect_stroke(
+            area,
+            0.0,
+            egui::Stroke::new(2.0, theme::lost()),
+            egui::StrokeKind::Inside,
+        );
         let words = "The peak is at the edge: the true one may lie outside the search window.";
         let galley =
-            canvas.painter.layout(words.to_owned(), theme::image_font(), theme::LOST, area.width() - 16.0);
+            canvas.painter.layout(words.to_owned(), theme::image_font(), theme::lost(), area.width() - 16.0);
         let frame = Rect::from_min_size(area.left_top() + vec2(8.0, 6.0), galley.size());
-        canvas.painter.rect_filled(frame.expand(3.0), 2.0, theme::SCRIM);
-        canvas.painter.galley(frame.min, galley, theme::LOST);
+        canvas.painter.rect_filled(frame.expand(3.0), 2.0, theme::scrim());
+        canvas.painter.galley(frame.min, galley, theme::lost());
     }
 }
 
@@ -174,13 +179,13 @@ fn colour_bar(ui: &Ui, area: Rect, matched: &TemplateMatch, threshold: Option<f3
     painter.add(egui::Shape::mesh(mesh));
     for tick in (0..TICKS).map(|i| of(i as f32 / (TICKS - 1) as f32)) {
         let end = pos2(strip.right() + 4.0, at(tick));
-        painter.line_segment([pos2(strip.right(), at(tick)), end], egui::Stroke::new(1.0, theme::WEAK));
+        painter.line_segment([pos2(strip.right(), at(tick)), end], egui::Stroke::new(1.0, theme::weak()));
         let words =
             if tick == 0.0 { "0".to_owned() } else { format!("{:+}", (tick * 1000.0).round() / 1000.0) };
-        painter.text(end + vec2(2.0, 0.0), Align2::LEFT_CENTER, words, theme::digit_font(), theme::WEAK);
+        painter.text(end + vec2(2.0, 0.0), Align2::LEFT_CENTER, words, theme::digit_font(), theme::weak());
     }
     if let Some(threshold) = threshold {
-        painter.hline(strip.x_range(), at(threshold), egui::Stroke::new(2.0, theme::STRONG));
+        painter.hline(strip.x_range(), at(threshold), egui::Stroke::new(2.0, theme::strong()));
     }
     let tip = pos2(strip.left() - 1.0, at(matched.peak.score as f32));
     let arrow = vec![tip, tip + vec2(-5.0, -4.0), tip + vec2(-5.0, 4.0)];

@@ -42,9 +42,9 @@ fn show_target(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Co
     let is_selected = state.cursor.target == Some(target.number);
     ui.horizontal(|ui| {
         let text = RichText::new(&target.label).strong().color(if is_selected {
-            theme::STRONG
+            theme::strong()
         } else {
-            theme::TEXT
+            theme::text()
         });
         if ui.add(egui::Label::new(text).sense(Sense::click())).clicked() {
             let run = target.runs.last().map_or(0, |run| run.number);
@@ -63,7 +63,7 @@ fn show_target(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Co
     let at = target.designation;
     ui.label(theme::note(format!("picked at step {}, pixel {:.1}, {:.1}", at.step, at.pixel.x, at.pixel.y)));
     for sentence in warnings(state, target) {
-        ui.add(egui::Label::new(RichText::new(format!("! {sentence}")).small().color(theme::LOST)).wrap())
+        ui.add(egui::Label::new(RichText::new(format!("! {sentence}")).small().color(theme::lost())).wrap())
             .on_hover_text("A warning about the pick; it can be tracked all the same.");
     }
     for (depth, run) in run_tree::order(&target.runs) {
@@ -84,16 +84,16 @@ fn warnings<'a>(state: &'a State, target: &TargetView) -> Vec<&'a str> {
 
 fn show_run(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: &mut Vec<Command>) {
     let is_selected = state.cursor.target == Some(target.number) && state.cursor.run == run.number;
-    let fill = if is_selected { theme::SELECTED } else { egui::Color32::TRANSPARENT };
+    let fill = if is_selected { theme::selected() } else { egui::Color32::TRANSPARENT };
     let frame = egui::Frame::new().fill(fill).corner_radius(4).inner_margin(egui::Margin::symmetric(6, 3));
     let inside = frame.show(ui, |ui| {
         ui.set_width(ui.available_width());
         ui.horizontal(|ui| {
             let (mark, _) = ui.allocate_exact_size(vec2(14.0, 14.0), Sense::hover());
             paint_mark(ui.painter(), mark.center(), run_mark(run.number), theme::run(run.number), 6.0);
-            ui.label(RichText::new(format!("run {}", run_letter(run.number))).color(theme::STRONG));
+            ui.label(RichText::new(format!("run {}", run_letter(run.number))).color(theme::strong()));
             if let Some(preset) = state.configurations.named(&run.settings) {
-                ui.label(RichText::new(preset.name).color(theme::ACCENT)).on_hover_text(preset.description);
+                ui.label(RichText::new(preset.name).color(theme::accent())).on_hover_text(preset.description);
             }
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| how_far(ui, state, target, run, out));
         });
@@ -147,7 +147,8 @@ fn how_far(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: 
         if ui.small_button("Resume").clicked() {
             out.push(Command::ResumeRun { target: target.number, run: run.number });
         }
-        ui.add(egui::Label::new(RichText::new(why).small().color(theme::LOST)).truncate()).on_hover_text(why);
+        ui.add(egui::Label::new(RichText::new(why).small().color(theme::lost())).truncate())
+            .on_hover_text(why);
     } else if run.complete {
         ui.label(theme::note("complete"));
     } else {
@@ -159,7 +160,7 @@ fn how_far(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: 
 fn sparkline(ui: &mut Ui, run: &RunView, stop_count: usize) {
     let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), 5.0), Sense::hover());
     let width = rect.width() / stop_count.max(1) as f32;
-    ui.painter().rect_filled(rect, 1.0, theme::BEFORE);
+    ui.painter().rect_filled(rect, 1.0, theme::before());
     for row in &run.rows {
         let state = state_of_word(&row.state);
         let left = rect.left() + width * row.step as f32;

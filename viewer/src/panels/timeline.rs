@@ -72,7 +72,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             Align2::CENTER_CENTER,
             state.missing_target(),
             theme::image_font(),
-            theme::WEAK,
+            theme::weak(),
         );
         return;
     }
@@ -90,14 +90,14 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         let is_rendered = state.traverse.as_ref().is_some_and(|t| t.stops[step].ready);
         if is_rendered {
             let bottom = frame(step).bottom() + 2.0;
-            painter.hline(frame(step).x_range(), bottom, Stroke::new(2.0, theme::UNKNOWN));
+            painter.hline(frame(step).x_range(), bottom, Stroke::new(2.0, theme::unknown()));
         }
     }
     paint_numbers(&painter, count, width, frame);
     paint_words(&painter, state, count, width, frame);
     for event in state.run().map(events).unwrap_or_default() {
         let top = frame(event).left_top() - vec2(0.0, 6.0);
-        painter.vline(top.x, top.y..=top.y + 6.0, Stroke::new(2.0, theme::STRONG));
+        painter.vline(top.x, top.y..=top.y + 6.0, Stroke::new(2.0, theme::strong()));
     }
     paint_cursor(&painter, frame(state.cursor.step.min(count - 1)));
     let at = |x: f32| (((x - rect.left()) / width).max(0.0) as usize).min(count - 1);
@@ -142,21 +142,21 @@ fn paint_cell(painter: &Painter, frame: Rect, cell: Cell) {
         painter.rect_filled(frame, 1.0, colour.gamma_multiply(strength));
     };
     match cell {
-        Cell::Before => fill(theme::BEFORE, 1.0),
-        Cell::Unknown => fill(theme::UNKNOWN, 1.0),
-        Cell::Tracking => fill(theme::TRACKING, 1.0),
+        Cell::Before => fill(theme::before(), 1.0),
+        Cell::Unknown => fill(theme::unknown(), 1.0),
+        Cell::Tracking => fill(theme::tracking(), 1.0),
         Cell::Lost => {
-            fill(theme::LOST, 0.25);
-            dashes(painter, frame, theme::LOST);
+            fill(theme::lost(), 0.25);
+            dashes(painter, frame, theme::lost());
         }
         Cell::Failed => {
-            fill(theme::FAILED, 0.3);
-            hatch(painter, frame, theme::FAILED);
+            fill(theme::failed(), 0.3);
+            hatch(painter, frame, theme::failed());
         }
         Cell::Fault => {
-            fill(theme::UNKNOWN, 1.0);
-            hatch(painter, frame, theme::WEAK);
-            cross(painter, frame, theme::FAILED);
+            fill(theme::unknown(), 1.0);
+            hatch(painter, frame, theme::weak());
+            cross(painter, frame, theme::failed());
         }
     }
 }
@@ -195,7 +195,7 @@ fn paint_numbers(painter: &Painter, count: usize, width: f32, frame: impl Fn(usi
     let every = every.unwrap_or(5000);
     for step in (0..count).step_by(every) {
         let at = frame(step).center_bottom() + vec2(0.0, 5.0);
-        painter.text(at, Align2::CENTER_TOP, step.to_string(), theme::digit_font(), theme::WEAK);
+        painter.text(at, Align2::CENTER_TOP, step.to_string(), theme::digit_font(), theme::weak());
     }
 }
 
@@ -207,7 +207,7 @@ fn paint_words(painter: &Painter, state: &State, count: usize, width: f32, frame
         let (cell, first) = (stretch[0], frame(step));
         step += stretch.len();
         let room = width * stretch.len() as f32;
-        let galley = painter.layout_no_wrap(cell.word().to_owned(), theme::image_font(), theme::STRONG);
+        let galley = painter.layout_no_wrap(cell.word().to_owned(), theme::image_font(), theme::strong());
         if galley.size().x + 16.0 > room || state.target().is_none() {
             continue;
         }
@@ -215,16 +215,16 @@ fn paint_words(painter: &Painter, state: &State, count: usize, width: f32, frame
         painter.rect_filled(
             Rect::from_min_size(at, galley.size()).expand2(vec2(4.0, 0.0)),
             2.0,
-            theme::SCRIM,
+            theme::scrim(),
         );
-        painter.galley(at, galley, theme::STRONG);
+        painter.galley(at, galley, theme::strong());
     }
 }
 
 fn paint_cursor(painter: &Painter, frame: Rect) {
     let outline = frame.expand2(vec2(1.0, 2.0));
-    painter.rect_stroke(outline, 2.0, Stroke::new(2.0, theme::ACCENT), egui::StrokeKind::Outside);
+    painter.rect_stroke(outline, 2.0, Stroke::new(2.0, theme::accent()), egui::StrokeKind::Outside);
     let tip = frame.center_top() - vec2(0.0, 1.0);
     let triangle = vec![tip, tip + vec2(-5.0, -7.0), tip + vec2(5.0, -7.0)];
-    painter.add(egui::Shape::convex_polygon(triangle, theme::ACCENT, Stroke::NONE));
+    painter.add(egui::Shape::convex_polygon(triangle, theme::accent(), Stroke::NONE));
 }

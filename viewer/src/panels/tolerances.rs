@@ -101,8 +101,8 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 fn names_of(run: usize) -> Vec<(Mark, Color32, String)> {
     vec![
         (Mark::Ring, theme::run(run), "value".to_owned()),
-        (Mark::Stroke(overlay::Line::Dashed), theme::LOST, "tolerance".to_owned()),
-        (Mark::Cross, theme::FAILED, "fired".to_owned()),
+        (Mark::Stroke(overlay::Line::Dashed), theme::lost(), "tolerance".to_owned()),
+        (Mark::Cross, theme::failed(), "fired".to_owned()),
     ]
 }
 
@@ -119,9 +119,9 @@ fn sentence(criterion: &Criterion, run: &RunView, step: usize) -> RichText {
     };
     let fired: Vec<String> = criterion.fired(run).iter().map(|[step, _]| format!("{step}")).collect();
     if fired.is_empty() {
-        return theme::note(format!("{now}; never fired")).color(theme::TEXT);
+        return theme::note(format!("{now}; never fired")).color(theme::text());
     }
-    theme::note(format!("{now}; fired at {}", fired.join(", "))).color(theme::LOST)
+    theme::note(format!("{now}; fired at {}", fired.join(", "))).color(theme::lost())
 }
 
 /// One plot. Returns the step that was clicked.
@@ -142,7 +142,7 @@ fn plot(
         .y_axis_formatter(plain)
         .label_formatter(|_| None);
     let response = plot.show(ui, |plot| {
-        let cursor = VLine::new("", state.cursor.step as f64).color(theme::ACCENT).width(1.5);
+        let cursor = VLine::new("", state.cursor.step as f64).color(theme::accent()).width(1.5);
         plot.vline(cursor.allow_hover(false));
         paint(plot, run, criterion);
         let clicked = plot.response().clicked().then(|| plot.pointer_coordinate()).flatten();
@@ -157,7 +157,7 @@ fn paint(plot: &mut PlotUi<'_>, run: &RunView, criterion: &Criterion) {
         pieces(&run.rows.iter().map(point).collect::<Vec<_>>())
     };
     for piece in line(criterion.tolerance_m) {
-        plot.line(Line::new("", piece).color(theme::LOST).style(LineStyle::dashed_dense()).width(1.5));
+        plot.line(Line::new("", piece).color(theme::lost()).style(LineStyle::dashed_dense()).width(1.5));
     }
     for piece in line(criterion.value_m) {
         let colour = theme::run(run.number);
@@ -165,9 +165,9 @@ fn paint(plot: &mut PlotUi<'_>, run: &RunView, criterion: &Criterion) {
         plot.points(Points::new("", piece).color(colour).radius(2.5).shape(MarkerShape::Circle));
     }
     for [step, value_cm] in criterion.fired(run) {
-        let mark = Points::new("", [step, value_cm]).color(theme::FAILED).radius(6.0);
+        let mark = Points::new("", [step, value_cm]).color(theme::failed()).radius(6.0);
         plot.points(mark.shape(MarkerShape::Cross));
-        let word = Text::new("", PlotPoint::new(step, value_cm), theme::note("fired").color(theme::FAILED));
+        let word = Text::new("", PlotPoint::new(step, value_cm), theme::note("fired").color(theme::failed()));
         plot.text(word.anchor(Align2::CENTER_BOTTOM));
     }
 }

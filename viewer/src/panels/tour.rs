@@ -23,14 +23,14 @@ pub fn show(ui: &Ui, state: &State, out: &mut Vec<Command>) {
     if let Some(anchor) = anchor {
         let layer = egui::LayerId::new(Order::Foreground, Id::unique("tour outline"));
         let painter = context.layer_painter(layer);
-        painter.rect_stroke(anchor.shrink(1.0), 4.0, Stroke::new(2.0, theme::ACCENT), StrokeKind::Inside);
+        painter.rect_stroke(anchor.shrink(1.0), 4.0, Stroke::new(2.0, theme::accent()), StrokeKind::Inside);
     }
     Area::new(Id::unique("tour")).order(Order::Foreground).fixed_pos(corner(anchor, screen)).show(
         context,
         |ui| {
             let frame = Frame::new()
-                .fill(theme::BAR)
-                .stroke(Stroke::new(1.0, theme::ACCENT))
+                .fill(theme::bar())
+                .stroke(Stroke::new(1.0, theme::accent()))
                 .corner_radius(6.0)
                 .inner_margin(Margin::same(12));
             frame.show(ui, |ui| contents(ui, at, bubble, state, out));
@@ -42,7 +42,7 @@ fn contents(ui: &mut Ui, at: usize, bubble: Bubble, state: &State, out: &mut Vec
     let count = Bubble::ALL.len();
     ui.set_width(WIDTH.min(ui.ctx().content_rect().width() - 40.0));
     ui.horizontal(|ui| {
-        ui.label(egui::RichText::new(bubble.title()).heading().color(theme::ACCENT));
+        ui.label(egui::RichText::new(bubble.title()).heading().color(theme::accent()));
         ui.label(theme::note(format!("{} of {count}", at + 1)));
     });
     ui.add(egui::Label::new(bubble.words(state)).wrap());

@@ -62,7 +62,7 @@ fn verdict(ui: &mut Ui, state: &State, run: &Shown<'_>) {
         let words = format!("{}: {}.", state.run_label(run.name), run.found.sentence.trim_end_matches('.'));
         let caveat = "The steps of one run are not independent: the true band is wider than that of independent steps, \
                       hence “probably” until the mean leaves the band of a single value as well.";
-        ui.label(RichText::new(words).size(12.0).color(theme::TEXT)).on_hover_text(caveat);
+        ui.label(RichText::new(words).size(12.0).color(theme::text())).on_hover_text(caveat);
         let nis = format!("{}.", run.found.nis_sentence.trim_end_matches('.'));
         ui.label(theme::note(nis)).on_hover_text("Over accepted updates; NIS needs no truth.");
     });
@@ -80,7 +80,7 @@ fn over_the_steps(ui: &mut Ui, state: &State, shown: &[Shown<'_>], out: &mut Vec
         let band = of(shown[0].found).band_of_one;
         let line = (
             Mark::Stroke(overlay::Line::Dashed),
-            theme::WEAK,
+            theme::weak(),
             format!("95 % of single values: {:.2} to {:.1}", band[0], band[1]),
         );
         names::show(ui, title, &[line]);
@@ -140,10 +140,10 @@ fn plot(
         .y_axis_formatter(plain);
     let response = plot.show(ui, |plot| {
         plot.vline(
-            VLine::new("", state.cursor.step as f64).color(theme::ACCENT).width(1.5).allow_hover(false),
+            VLine::new("", state.cursor.step as f64).color(theme::accent()).width(1.5).allow_hover(false),
         );
         for edge in band {
-            let line = HLine::new("", edge).color(theme::WEAK).style(LineStyle::dashed_dense());
+            let line = HLine::new("", edge).color(theme::weak()).style(LineStyle::dashed_dense());
             plot.hline(line.width(1.0).allow_hover(false));
         }
         for run in shown {
@@ -179,7 +179,11 @@ pub fn shape(mark: Mark) -> MarkerShape {
 
 /// The share of errors within k σ against the share that is to be expected.
 fn coverage(ui: &mut Ui, shown: &[Shown<'_>]) {
-    names::show(ui, "coverage", &[(Mark::Stroke(overlay::Line::Dashed), theme::WEAK, "expected".to_owned())]);
+    names::show(
+        ui,
+        "coverage",
+        &[(Mark::Stroke(overlay::Line::Dashed), theme::weak(), "expected".to_owned())],
+    );
     if shown.iter().all(|run| run.found.coverage.is_empty()) {
         panels::missing(ui, "", "Coverage needs the truth, which this traverse does not have.");
         return;
@@ -206,7 +210,7 @@ fn coverage(ui: &mut Ui, shown: &[Shown<'_>]) {
             if i == 0 {
                 let expected: Vec<[f64; 2]> =
                     run.found.coverage.iter().map(|c| [c.sigmas, c.expected]).collect();
-                let line = Line::new("", expected).color(theme::WEAK).style(LineStyle::dashed_dense());
+                let line = Line::new("", expected).color(theme::weak()).style(LineStyle::dashed_dense());
                 plot.line(line.width(1.5).allow_hover(false));
             }
             series(plot, run.found.coverage.iter().map(|c| [c.sigmas, c.share]).collect(), run.look);

@@ -48,10 +48,10 @@ fn painted(shown: &Shown<'_>, is_meant: impl Fn(&Shape) -> bool) -> usize {
 
 /// Dots of inliers, and strokes of outliers' crosses, the legend's own among them.
 fn dots_and_crosses(shown: &Shown<'_>) -> (usize, usize) {
-    let dots = painted(shown, |shape| matches!(shape, Shape::Circle(c) if c.fill == theme::INLIER));
+    let dots = painted(shown, |shape| matches!(shape, Shape::Circle(c) if c.fill == theme::inlier()));
     let strokes = painted(shown, |shape| match shape {
-        Shape::LineSegment { stroke, .. } => stroke.color == theme::OUTLIER,
-        Shape::Path(path) => path.stroke.color == egui::epaint::ColorMode::Solid(theme::OUTLIER),
+        Shape::LineSegment { stroke, .. } => stroke.color == theme::outlier(),
+        Shape::Path(path) => path.stroke.color == egui::epaint::ColorMode::Solid(theme::outlier()),
         _ => false,
     });
     (dots, strokes / 2)
@@ -107,7 +107,7 @@ fn inliers_and_outliers_are_layers_of_their_own_and_what_would_drown_the_picture
     shown.says("moved here, 1σ 2σ 3σ");
     assert_eq!(shown.click("outliers 6 (legend)"), vec![Command::ToggleLayer(Layer::Outliers)]);
     let circles = |shown: &Shown<'_>| {
-        painted(shown, |shape| matches!(shape, Shape::Circle(c) if c.stroke.color == theme::KEYPOINT))
+        painted(shown, |shape| matches!(shape, Shape::Circle(c) if c.stroke.color == theme::keypoint()))
     };
     let with_all = left_image(|context| {
         let mut state = in_view(context);

@@ -29,7 +29,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             None => {
                 let sentence =
                     "The present cameras are known once a step with a target is loaded: pick one, or choose another pair.";
-                ui.add(egui::Label::new(RichText::new(sentence).color(theme::LOST)).wrap());
+                ui.add(egui::Label::new(RichText::new(sentence).color(theme::lost())).wrap());
             }
         }
         ui.separator();

@@ -82,9 +82,9 @@ pub(super) fn show(ui: &mut Ui, state: &State, pair: Option<&StereoPair>) {
 
 fn names_of(curves: &Curves, run: Color32) -> Vec<(Mark, Color32, String)> {
     let mut names = vec![
-        (Mark::Stroke(overlay::Line::Dashed), theme::LOST, "without tracking".to_owned()),
-        (Mark::Stroke(overlay::Line::Solid), theme::PREDICTION, "with tracking".to_owned()),
-        (Mark::Stroke(overlay::Line::Dotted), theme::FAILED, "3 cm needed".to_owned()),
+        (Mark::Stroke(overlay::Line::Dashed), theme::lost(), "without tracking".to_owned()),
+        (Mark::Stroke(overlay::Line::Solid), theme::prediction(), "with tracking".to_owned()),
+        (Mark::Stroke(overlay::Line::Dotted), theme::failed(), "3 cm needed".to_owned()),
     ];
     if !curves.achieved.is_empty() {
         names.push((Mark::Ring, run, "achieved".to_owned()));
@@ -140,11 +140,11 @@ fn paint(plot: &mut PlotUi<'_>, curves: &Curves, run: Color32) {
     let place = |points: &[[f64; 2]]| -> Vec<[f64; 2]> {
         points.iter().map(|[range_m, error_m]| [*range_m, (error_m.max(LEAST_M) * 100.0).log10()]).collect()
     };
-    let need = HLine::new("", (PLACEMENT_NEED_M * 100.0).log10()).color(theme::FAILED);
+    let need = HLine::new("", (PLACEMENT_NEED_M * 100.0).log10()).color(theme::failed());
     plot.hline(need.style(LineStyle::dotted_dense()).width(1.5).allow_hover(false));
-    let without = Line::new("", place(&curves.without)).color(theme::LOST).style(LineStyle::dashed_dense());
+    let without = Line::new("", place(&curves.without)).color(theme::lost()).style(LineStyle::dashed_dense());
     plot.line(without.width(1.5));
-    plot.line(Line::new("", place(&curves.with)).color(theme::PREDICTION).width(1.5));
+    plot.line(Line::new("", place(&curves.with)).color(theme::prediction()).width(1.5));
     let achieved = Points::new("", place(&curves.achieved)).color(run).radius(3.0);
     plot.points(achieved.shape(MarkerShape::Circle));
 }

@@ -61,7 +61,7 @@ const QUANTITIES: [Quantity; 5] = [
 pub(super) fn show(ui: &mut Ui) {
     ui.horizontal(|ui| {
         ui.label(theme::title("Table I of the paper, cm"));
-        ui.label(RichText::new("errata").small().underline().color(theme::ACCENT)).on_hover_text(ERRATA);
+        ui.label(RichText::new("errata").small().underline().color(theme::accent())).on_hover_text(ERRATA);
     });
     ScrollArea::horizontal().id_salt("table one").auto_shrink([false, true]).show(ui, grid);
     ui.label(theme::note("Printed under the camera's name; computed under the pixel size that was taken."));
@@ -96,7 +96,7 @@ fn cells(ui: &mut Ui, row: &TableOneRow, quantity: &Quantity) {
         let agrees = (computed_cm - printed_cm).abs() <= AGREE_CM;
         let mark = if agrees { "" } else { " ≠" };
         let text = theme::number(format!("{computed_cm:.*}{mark}", quantity.digits + 1));
-        ui.label(if agrees { text } else { text.color(theme::LOST) });
+        ui.label(if agrees { text } else { text.color(theme::lost()) });
     }
 }
 

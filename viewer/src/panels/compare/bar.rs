@@ -97,7 +97,7 @@ fn divergence(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     {
         out.push(Command::Compare(Ask::FirstDivergence));
     }
-    let label = egui::Label::new(RichText::new(sentence(state)).size(11.5).color(theme::TEXT)).truncate();
+    let label = egui::Label::new(RichText::new(sentence(state)).size(11.5).color(theme::text())).truncate();
     ui.add(label);
 }
 

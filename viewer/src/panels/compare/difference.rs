@@ -154,7 +154,7 @@ fn show_row(ui: &mut Ui, row: Rect, title: &str, names: [&str; 2], rasters: [&Ra
         let corner = row.min + vec2((side + 12.0) * i as f32, WORDS);
         let frame = Rect::from_min_size(corner, vec2(side, side));
         let above = frame.left_top() - vec2(0.0, 2.0);
-        ui.painter().text(above, Align2::LEFT_BOTTOM, words, theme::image_font(), theme::TEXT);
+        ui.painter().text(above, Align2::LEFT_BOTTOM, words, theme::image_font(), theme::text());
         crate::view2d::checker(ui.painter(), frame);
         paint(ui, frame, patches.size, values, colour);
     }
@@ -187,7 +187,7 @@ fn paint(ui: &Ui, frame: Rect, [width, height]: [u32; 2], values: &[f32], colour
         mesh.add_colored_rect(Rect::from_min_size(corner, cell), colour(value));
     }
     ui.painter().add(egui::Shape::mesh(mesh));
-    ui.painter().rect_stroke(frame, 0.0, egui::Stroke::new(1.0, theme::LINE), egui::StrokeKind::Outside);
+    ui.painter().rect_stroke(frame, 0.0, egui::Stroke::new(1.0, theme::line()), egui::StrokeKind::Outside);
 }
 
 #[cfg(test)]

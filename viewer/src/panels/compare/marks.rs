@@ -64,7 +64,7 @@ pub fn paint(overlay: &Overlay<'_>, trace: &StepTrace, run: &RunView, look: Look
     }
     if let Some(pixel) = trace.truth.as_ref().and_then(|t| t.left_pixel).filter(|_| state.shows(Layer::Truth))
     {
-        overlay.mark(pixel, Mark::Plus, theme::TRUTH);
+        overlay.mark(pixel, Mark::Plus, theme::truth());
     }
 }
 

@@ -20,7 +20,7 @@ use crate::theme;
 /// A run's mark with its name.
 pub fn chip(ui: &mut Ui, look: Look, words: &str) -> egui::Response {
     mark(ui, look);
-    ui.label(RichText::new(words).size(12.0).color(theme::TEXT))
+    ui.label(RichText::new(words).size(12.0).color(theme::text()))
 }
 
 /// A run's mark alone.

@@ -56,7 +56,12 @@ pub fn under(canvas: &Canvas, state: &State) {
     let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
     canvas.painter.image(raster.texture.id(), area, whole, theme::ONION);
     let words = format!("step {before} shines through");
-    paint_words(&canvas.painter, canvas.transform.rect.left_bottom() + vec2(8.0, -12.0), &words, theme::TEXT);
+    paint_words(
+        &canvas.painter,
+        canvas.transform.rect.left_bottom() + vec2(8.0, -12.0),
+        &words,
+        theme::text(),
+    );
 }
 
 /// Paints what lies over the marks of the run that is looked at.
@@ -83,7 +88,7 @@ pub fn over(ui: &Ui, canvas: &Canvas, state: &State, out: &mut Vec<Command>) {
 fn paint_other(canvas: &Canvas, state: &State, other: &Other<'_>, part: Rect) {
     let label = state.run_label(other.name);
     let Some(raster) = state.other_image(other.name).ready() else {
-        return corner(canvas, part, &format!("{label}: its image is not loaded here"), theme::LOST);
+        return corner(canvas, part, &format!("{label}: its image is not loaded here"), theme::lost());
     };
     raster.stretch(state.stretch);
     let trace = state.other_trace(other.name).ready();
@@ -92,7 +97,7 @@ fn paint_other(canvas: &Canvas, state: &State, other: &Other<'_>, part: Rect) {
     let painter = canvas.painter.with_clip_rect(part.intersect(canvas.painter.clip_rect()));
     let view = state.held_view(state.view(Panel::Left), trace);
     let transform = Transform::new(view, region, canvas.transform.rect);
-    painter.rect_filled(part, 0.0, theme::WELL);
+    painter.rect_filled(part, 0.0, theme::well());
     let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
     painter.image(raster.texture.id(), transform.area(region), whole, theme::UNTINTED);
     if let Some(trace) = trace.filter(|_| state.marks) {
@@ -122,8 +127,8 @@ fn wipe(ui: &Ui, canvas: &Canvas, state: &State, other: &Other<'_>, out: &mut Ve
     let grip = Rect::from_center_size(pos2(x, area.center().y), vec2(24.0, area.height()));
     let response = ui.interact(grip.intersect(area), compare::wipe_id(), Sense::click_and_drag());
     let is_marked = response.hovered() || response.has_focus() || response.dragged();
-    let colour = if is_marked { theme::ACCENT } else { theme::STRONG };
-    canvas.painter.vline(x, area.y_range(), egui::Stroke::new(4.0, theme::HALO));
+    let colour = if is_marked { theme::accent() } else { theme::strong() };
+    canvas.painter.vline(x, area.y_range(), egui::Stroke::new(4.0, theme::halo()));
     canvas.painter.vline(x, area.y_range(), egui::Stroke::new(2.0, colour));
     canvas.painter.circle_filled(pos2(x, area.center().y), 7.0, colour);
     response.widget_info(|| {

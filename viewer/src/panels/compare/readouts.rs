@@ -62,7 +62,7 @@ pub fn states(ui: &mut Ui, state: &State) {
     for other in state.others() {
         let row = state.other_row(&other);
         let word = row.map_or_else(|| "not computed".to_owned(), |row| row.state.to_uppercase());
-        let colour = row.map_or(theme::WEAK, |row| theme::state(state_of_word(&row.state)));
+        let colour = row.map_or(theme::weak(), |row| theme::state(state_of_word(&row.state)));
         mark(ui, other.look);
         ui.label(RichText::new(word).strong().size(11.0).color(colour))
             .on_hover_text(format!("the state of {} here", state.run_label(other.name)));
@@ -121,10 +121,10 @@ pub fn record(ui: &mut Ui, state: &State) {
     header.show(ui, |ui| {
         Grid::new("differences").num_columns(4).spacing([8.0, 2.0]).show(ui, |ui| {
             for (name, colour) in [
-                ("value", theme::WEAK),
+                ("value", theme::weak()),
                 ("this", state.own_look().colour),
                 (label.as_str(), other.look.colour),
-                ("Δ", theme::WEAK),
+                ("Δ", theme::weak()),
             ] {
                 ui.label(RichText::new(name).small().color(colour));
             }

@@ -57,9 +57,9 @@ pub(super) fn residuals(ui: &mut Ui, state: &State, features: &[Feature]) {
         ui,
         "residuals of matches, cm",
         &[
-            (Mark::Dot, theme::INLIER, "inliers, filled".to_owned()),
-            (Mark::Square, theme::OUTLIER, "outliers, outlined; the last bar: beyond".to_owned()),
-            (Mark::Stroke(Line::Dashed), theme::STRONG, gate),
+            (Mark::Dot, theme::inlier(), "inliers, filled".to_owned()),
+            (Mark::Square, theme::outlier(), "outliers, outlined; the last bar: beyond".to_owned()),
+            (Mark::Stroke(Line::Dashed), theme::strong(), gate),
         ],
     );
     let histogram = Histogram::new(features, gate_m);
@@ -69,8 +69,8 @@ pub(super) fn residuals(ui: &mut Ui, state: &State, features: &[Feature]) {
         bar.base_offset(below as f64)
     };
     let counts = || histogram.inliers.iter().zip(&histogram.outliers).enumerate();
-    let (filled, edge) = (Stroke::new(0.5, theme::INLIER), Stroke::new(1.0, theme::OUTLIER));
-    let inliers = counts().map(|(i, (n, _))| bar(i, *n, 0).fill(theme::INLIER).stroke(filled)).collect();
+    let (filled, edge) = (Stroke::new(0.5, theme::inlier()), Stroke::new(1.0, theme::outlier()));
+    let inliers = counts().map(|(i, (n, _))| bar(i, *n, 0).fill(theme::inlier()).stroke(filled)).collect();
     let outliers = counts().filter(|(_, (_, n))| **n > 0);
     let outliers =
         outliers.map(|(i, (below, n))| bar(i, *n, *below).fill(Color32::TRANSPARENT).stroke(edge)).collect();
@@ -78,11 +78,11 @@ pub(super) fn residuals(ui: &mut Ui, state: &State, features: &[Feature]) {
         plot.bar_chart(BarChart::new("inliers", inliers).allow_hover(false));
         plot.bar_chart(BarChart::new("outliers", outliers).allow_hover(false));
         if is_distance {
-            let line = VLine::new("", gate_m * 100.0).color(theme::STRONG).style(LineStyle::dashed_dense());
+            let line = VLine::new("", gate_m * 100.0).color(theme::strong()).style(LineStyle::dashed_dense());
             plot.vline(line.width(1.5).allow_hover(false));
         }
         for limit in state.feature_view.residual_m.into_iter().filter(|v| *v > 0.0 && v.is_finite()) {
-            plot.vline(VLine::new("", limit * 100.0).color(theme::ACCENT).width(1.0).allow_hover(false));
+            plot.vline(VLine::new("", limit * 100.0).color(theme::accent()).width(1.0).allow_hover(false));
         }
     });
 }
@@ -95,17 +95,17 @@ pub(super) fn consensus(ui: &mut Ui, motion: &FittedMotion) {
         ui,
         &title,
         &[
-            (Mark::Dot, theme::PREDICTION, format!("a draw, best {best}")),
-            (Mark::Stroke(Line::Dashed), theme::INLIER, format!("in the end {}", motion.inliers)),
+            (Mark::Dot, theme::prediction(), format!("a draw, best {best}")),
+            (Mark::Stroke(Line::Dashed), theme::inlier(), format!("in the end {}", motion.inliers)),
         ],
     );
     let points: Vec<[f64; 2]> =
         motion.consensus_by_draw.iter().enumerate().map(|(i, n)| [i as f64, f64::from(*n)]).collect();
     still("consensus").show(ui, |plot| {
         let line =
-            HLine::new("", motion.inliers as f64).color(theme::INLIER).style(LineStyle::dashed_dense());
+            HLine::new("", motion.inliers as f64).color(theme::inlier()).style(LineStyle::dashed_dense());
         plot.hline(line.width(1.5).allow_hover(false));
-        let points = Points::new("", points).color(theme::PREDICTION).radius(1.8);
+        let points = Points::new("", points).color(theme::prediction()).radius(1.8);
         plot.points(points.shape(MarkerShape::Circle).allow_hover(false));
     });
 }

@@ -93,7 +93,7 @@ pub(super) fn anchors(ui: &mut Ui, evidence: &FeatureEvidence) {
 }
 
 fn anchor(ui: &mut Ui, tried: &AnchorTried) {
-    let colour = if tried.chosen { theme::ACCENT } else { theme::STRONG };
+    let colour = if tried.chosen { theme::accent() } else { theme::strong() };
     let sigma = tried.sigma_m.map_or_else(|| "–".to_owned(), |m| format!("{:.2}", m * 100.0));
     let numbers = [
         tried.step.to_string(),

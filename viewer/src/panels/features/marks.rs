@@ -36,9 +36,9 @@ pub fn left_entries(state: &State) -> Vec<Entry> {
         let magnified = format!("residuals × {}", state.feature_view.magnification);
         let (solid, dashed) = (Mark::Stroke(Line::Solid), Mark::Stroke(Line::Dashed));
         entries.extend([
-            Entry::new(Layer::Flow, solid, theme::INLIER, format!("inliers {from}")),
-            Entry::new(Layer::OutlierFlow, dashed, theme::OUTLIER, format!("outliers {from}")),
-            Entry::new(Layer::Residuals, solid, theme::SEARCH, magnified),
+            Entry::new(Layer::Flow, solid, theme::inlier(), format!("inliers {from}")),
+            Entry::new(Layer::OutlierFlow, dashed, theme::outlier(), format!("outliers {from}")),
+            Entry::new(Layer::Residuals, solid, theme::search(), magnified),
         ]);
     }
     if let Some(cloud) = state.cloud().ready() {
@@ -61,20 +61,20 @@ fn kinds(state: &State, all: &str) -> Vec<Entry> {
     if features.iter().any(|feature| feature.matched.is_some()) {
         let words = |kind: Kind, name: &str| format!("{name} {}", count(kind).words());
         let word = words(Kind::Inlier, "inliers");
-        entries.push(Entry::new(Layer::Inliers, Mark::Dot, theme::INLIER, word));
+        entries.push(Entry::new(Layer::Inliers, Mark::Dot, theme::inlier(), word));
         let word = words(Kind::Outlier, "outliers");
-        entries.push(Entry::new(Layer::Outliers, Mark::Cross, theme::OUTLIER, word));
+        entries.push(Entry::new(Layer::Outliers, Mark::Cross, theme::outlier(), word));
     }
-    entries.push(Entry::new(Layer::Keypoints, Mark::Ring, theme::KEYPOINT, all));
+    entries.push(Entry::new(Layer::Keypoints, Mark::Ring, theme::keypoint(), all));
     entries
 }
 
 /// The layer and the looks of a kind.
 fn looks(kind: Kind) -> (Layer, Mark, Color32) {
     match kind {
-        Kind::Unmatched => (Layer::Keypoints, Mark::Ring, theme::KEYPOINT),
-        Kind::Inlier => (Layer::Inliers, Mark::Dot, theme::INLIER),
-        Kind::Outlier => (Layer::Outliers, Mark::Cross, theme::OUTLIER),
+        Kind::Unmatched => (Layer::Keypoints, Mark::Ring, theme::keypoint()),
+        Kind::Inlier => (Layer::Inliers, Mark::Dot, theme::inlier()),
+        Kind::Outlier => (Layer::Outliers, Mark::Cross, theme::outlier()),
     }
 }
 
@@ -142,7 +142,7 @@ fn keypoint(canvas: &Canvas, feature: &Feature) {
     }
     let strength = if feature.range_m.is_some() { 1.0 } else { 0.5 };
     let (sin, cos) = (feature.orientation_rad.sin() as f32, feature.orientation_rad.cos() as f32);
-    for (colour, width) in [(theme::HALO, 3.0), (theme::KEYPOINT.gamma_multiply(strength), 1.0)] {
+    for (colour, width) in [(theme::halo(), 3.0), (theme::keypoint().gamma_multiply(strength), 1.0)] {
         let stroke = Stroke::new(width, colour);
         canvas.painter.circle_stroke(at, radius, stroke);
         canvas.painter.line_segment([at, at + vec2(cos, sin) * radius], stroke);
@@ -154,7 +154,7 @@ fn residual(canvas: &Canvas, feature: &Feature, matched: &Matched, magnification
     let Some((moved, vector)) = matched.moved.zip(matched.residual_px(feature.pixel)) else { return };
     let end = moved.offset(vector.x * magnification, vector.y * magnification);
     let (line, colour) =
-        if matched.is_inlier { (Line::Solid, theme::SEARCH) } else { (Line::Dashed, theme::OUTLIER) };
+        if matched.is_inlier { (Line::Solid, theme::search()) } else { (Line::Dashed, theme::outlier()) };
     let overlay = Overlay::new(&canvas.painter, &canvas.transform);
     overlay.thin_line(&[moved, end], colour, line);
     let [from, tip] = [moved, end].map(|pixel| canvas.transform.to_screen(pixel));
@@ -181,7 +181,7 @@ pub fn hover(canvas: &Canvas, state: &State, place: fn(&Feature) -> Option<Pixel
     let nearest = drawn.filter_map(|f| Some((f, near(f)?))).min_by(|a, b| a.1.total_cmp(&b.1));
     let Some((feature, _)) = nearest else { return };
     if let Some(pixel) = place(feature) {
-        Overlay::new(&canvas.painter, &canvas.transform).mark(pixel, Mark::Ring, theme::ACCENT);
+        Overlay::new(&canvas.painter, &canvas.transform).mark(pixel, Mark::Ring, theme::accent());
     }
     let from_step = state.feature_evidence().and_then(|e| Some(e.match_features.as_ref()?.from_step));
     canvas.response.clone().on_hover_text_at_pointer(words(feature, from_step));

@@ -90,7 +90,7 @@ fn is_pick(run: &RunView, row: &StepRow) -> bool {
 fn frame(ui: &Ui, state: &State, run: &RunView, row: &StepRow, (place, window): (Rect, Rect)) {
     let is_here = row.step == state.cursor.step;
     let painter = ui.painter();
-    let colour = if is_here { theme::ACCENT } else { theme::TEXT };
+    let colour = if is_here { theme::accent() } else { theme::text() };
     let title = if is_pick(run, row) { format!("pick, {}", row.step) } else { format!("step {}", row.step) };
     painter.text(place.center_top(), Align2::CENTER_TOP, title, theme::image_font(), colour);
     let message = match state.window_key(run, row).map(|key| state.cache.raster(&key)) {
@@ -105,17 +105,19 @@ fn frame(ui: &Ui, state: &State, run: &RunView, row: &StepRow, (place, window): 
         None => Some("none"),
     };
     if let Some(message) = message {
-        painter.rect_filled(window, 0.0, theme::WELL);
-        painter.text(window.center(), Align2::CENTER_CENTER, message, theme::digit_font(), theme::WEAK);
+        painter.rect_filled(window, 0.0, theme::well());
+        painter.text(window.center(), Align2::CENTER_CENTER, message, theme::digit_font(), theme::weak());
     }
-    let stroke =
-        egui::Stroke::new(if is_here { 2.0 } else { 1.0 }, if is_here { theme::ACCENT } else { theme::LINE });
+    let stroke = egui::Stroke::new(
+        if is_here { 2.0 } else { 1.0 },
+        if is_here { theme::accent() } else { theme::line() },
+    );
     painter.rect_stroke(window, 0.0, stroke, egui::StrokeKind::Outside);
     let [geometry, score] = words_of(run, row);
     let below = window.center_bottom() + vec2(0.0, 2.0);
-    painter.text(below, Align2::CENTER_TOP, geometry, theme::digit_font(), theme::TEXT);
+    painter.text(below, Align2::CENTER_TOP, geometry, theme::digit_font(), theme::text());
     let is_low = state_is_lost(row);
-    let colour = if is_low { theme::LOST } else { theme::STRONG };
+    let colour = if is_low { theme::lost() } else { theme::strong() };
     painter.text(below + vec2(0.0, 12.0), Align2::CENTER_TOP, score, theme::digit_font(), colour);
 }
 
@@ -134,7 +136,7 @@ fn comparisons(ui: &mut Ui, state: &State, run: &RunView) {
         let score = |c: &Comparison| [c.step as f64, c.score];
         chart(ui, "score, by earlier step", size, [0.0, 1.0], &points(&all, score), colour);
         let shift = |c: &Comparison| [c.step as f64, c.shift_px];
-        chart(ui, "shift, px, by earlier step", size, [0.0, 1.0], &points(&all, shift), theme::LOST);
+        chart(ui, "shift, px, by earlier step", size, [0.0, 1.0], &points(&all, shift), theme::lost());
     });
 }
 

@@ -106,22 +106,22 @@ fn paint(plot: &mut PlotUi<'_>, state: &State, run: &RunView, positions: &[Posit
         // Later ellipses are stronger; the cursor's is the thick one.
         let strength = 0.4 + 0.6 * i as f32 / count;
         let (tint, width) =
-            if is_here { (theme::ACCENT, 2.5) } else { (colour.gamma_multiply(strength), 1.0) };
+            if is_here { (theme::accent(), 2.5) } else { (colour.gamma_multiply(strength), 1.0) };
         outline(plot, at, place(&at.point_in_site), tint, width);
     }
     if let Some(here) = positions.iter().find(|at| at.step == state.cursor.step) {
         let [east, north] = place(&here.point_in_site);
         plot.points(
-            Points::new("", [east, north]).color(theme::ACCENT).radius(5.0).shape(MarkerShape::Diamond),
+            Points::new("", [east, north]).color(theme::accent()).radius(5.0).shape(MarkerShape::Diamond),
         );
-        let words = theme::note(format!("   step {}", here.step)).color(theme::ACCENT);
+        let words = theme::note(format!("   step {}", here.step)).color(theme::accent());
         plot.text(Text::new("", PlotPoint::new(east, north), words).anchor(Align2::LEFT_BOTTOM));
     }
     for other in state.others() {
         paint_other(plot, &positions_of(&other, state), other.look, place);
     }
     if let Some((truth, _)) = truth_in_site(state) {
-        let points = Points::new("", place(&truth)).color(theme::TRUTH).radius(6.0);
+        let points = Points::new("", place(&truth)).color(theme::truth()).radius(6.0);
         plot.points(points.shape(MarkerShape::Plus));
     }
 }

@@ -111,7 +111,7 @@ fn drive(ui: &mut Ui, state: &State, stops: &[StopView], run: Option<&RunView>, 
             }
         }
         if let Some((truth, _)) = truth_in_site(state) {
-            let points = Points::new("", on_map(&truth)).color(theme::TRUTH).radius(6.0);
+            let points = Points::new("", on_map(&truth)).color(theme::truth()).radius(6.0);
             plot.points(points.shape(MarkerShape::Plus));
         }
         plot.response().clicked().then(|| nearest_stop(plot, stops)).flatten()
@@ -123,9 +123,9 @@ fn drive(ui: &mut Ui, state: &State, stops: &[StopView], run: Option<&RunView>, 
 
 /// What the row above the map names.
 fn names_of(state: &State, stops: &[StopView]) -> Vec<(Mark, Color32, String)> {
-    let mut names = vec![(Mark::Stroke(overlay::Line::Solid), theme::WEAK, "path".to_owned())];
+    let mut names = vec![(Mark::Stroke(overlay::Line::Solid), theme::weak(), "path".to_owned())];
     if stops.iter().any(|stop| stop.true_site_from_rover.is_some()) {
-        names.push((Mark::Stroke(overlay::Line::Dotted), theme::TRUTH, "true".to_owned()));
+        names.push((Mark::Stroke(overlay::Line::Dotted), theme::truth(), "true".to_owned()));
     }
     if let Some(run) = state.run() {
         let name = format!("target, run {}", run_letter(run.number));
@@ -135,7 +135,7 @@ fn names_of(state: &State, stops: &[StopView]) -> Vec<(Mark, Color32, String)> {
         names.push((other.look.mark, other.look.colour, format!("target, {}", state.run_label(other.name))));
     }
     if let Some((_, off_m)) = truth_in_site(state) {
-        names.push((Mark::Plus, theme::TRUTH, format!("truth, {:.0} cm off", off_m * 100.0)));
+        names.push((Mark::Plus, theme::truth(), format!("truth, {:.0} cm off", off_m * 100.0)));
     }
     if state.cloud().ready().is_some() {
         names.push((Mark::Dot, theme::run(state.cursor.run), "bootstrap of this step".to_owned()));
@@ -151,13 +151,13 @@ fn paint_paths(plot: &mut PlotUi<'_>, stops: &[StopView], step: usize) {
     let truth = poses(stops, |stop| stop.true_site_from_rover);
     if !truth.is_empty() {
         plot.line(
-            Line::new("true path", truth).color(theme::TRUTH).style(LineStyle::dotted_loose()).width(1.5),
+            Line::new("true path", truth).color(theme::truth()).style(LineStyle::dotted_loose()).width(1.5),
         );
     }
     let estimated = poses(stops, |stop| Some(stop.site_from_rover));
-    plot.line(Line::new("estimated path", estimated.clone()).color(theme::WEAK).width(1.5));
+    plot.line(Line::new("estimated path", estimated.clone()).color(theme::weak()).width(1.5));
     plot.points(
-        Points::new("estimated path", estimated).color(theme::WEAK).radius(2.0).shape(MarkerShape::Circle),
+        Points::new("estimated path", estimated).color(theme::weak()).radius(2.0).shape(MarkerShape::Circle),
     );
     if let Some(stop) = stops.get(step) {
         paint_rover(plot, &stop.site_from_rover.to_pose(), stops);
@@ -170,8 +170,8 @@ fn paint_rover(plot: &mut PlotUi<'_>, site_from_rover: &Pose, stops: &[StopView]
     let nose = site_from_rover * Point3::new(length_m, 0.0, 0.0);
     let origin = on_map(&Point3::from(site_from_rover.translation.vector));
     let arrow = Arrows::new("", PlotPoints::from(vec![origin]), PlotPoints::from(vec![on_map(&nose)]));
-    plot.arrows(arrow.color(theme::ACCENT).tip_length(9.0));
-    plot.points(Points::new("", origin).color(theme::ACCENT).radius(5.0).shape(MarkerShape::Circle));
+    plot.arrows(arrow.color(theme::accent()).tip_length(9.0));
+    plot.points(Points::new("", origin).color(theme::accent()).radius(5.0).shape(MarkerShape::Circle));
 }
 
 /// The longer side of the box around the path, m.

@@ -145,7 +145,8 @@ fn show_row(ui: &mut Ui, state: &State, row: &Row<'_>, out: &mut Vec<Command>) {
     }
     ui.horizontal(|ui| {
         mark(ui, look(state, row.name));
-        let words = RichText::new(&label).size(12.0).color(if is_own { theme::STRONG } else { theme::TEXT });
+        let words =
+            RichText::new(&label).size(12.0).color(if is_own { theme::strong() } else { theme::text() });
         let button = Button::selectable(is_own, words).min_size(vec2(0.0, 24.0));
         if ui.add(button).on_hover_text("looks at this run").clicked() {
             out.push(Command::Look { target: row.name.target, run: row.name.run });
@@ -168,7 +169,7 @@ fn look(state: &State, name: RunName) -> Look {
 fn states(ui: &mut Ui, row: &Row<'_>, stop_count: usize) {
     let (rect, response) = ui.allocate_exact_size(vec2(90.0, 12.0), Sense::hover());
     let width = rect.width() / stop_count.max(1) as f32;
-    ui.painter().rect_filled(rect, 1.0, theme::BEFORE);
+    ui.painter().rect_filled(rect, 1.0, theme::before());
     for line in &row.run.rows {
         let state = state_of_word(&line.state);
         let left = rect.left() + width * line.step as f32;

@@ -43,7 +43,7 @@ pub(super) fn show(
     ui.horizontal_wrapped(|ui| {
         let title = format!("errors of depth; colours end at ± {:.2} cm", limit_m * 100.0);
         let said = [
-            (Mark::Square, theme::KEYPOINT, format!("at the start, {}", words(errors.before))),
+            (Mark::Square, theme::keypoint(), format!("at the start, {}", words(errors.before))),
             (Mark::Dot, colour, format!("at the end, {}", words(errors.end))),
         ];
         names::wrapped(ui, &title, &said);
@@ -57,7 +57,7 @@ pub(super) fn show(
     let words = "histogram of the errors of depth: drag a handle to set the limit of the colours";
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, words));
     let plot = Rect::from_min_max(rect.min, rect.max - vec2(0.0, AXIS));
-    ui.painter().rect_filled(plot, 0.0, theme::WELL);
+    ui.painter().rect_filled(plot, 0.0, theme::well());
     let (before, end) = (bars(errors.before, end_m), bars(errors.end, end_m));
     let most = before.iter().chain(&end).copied().max().unwrap_or_default().max(1);
     paint(ui.painter(), plot, &end, most, Some(colour));
@@ -104,7 +104,7 @@ fn paint(painter: &Painter, plot: Rect, bars: &[usize; BARS], most: usize, fill:
         let bar = Rect::from_min_size(corner, vec2(width - 1.0, height));
         match fill {
             Some(colour) => painter.rect_filled(bar, 0.0, colour),
-            None => painter.rect_stroke(bar, 0.0, Stroke::new(1.0, theme::KEYPOINT), StrokeKind::Inside),
+            None => painter.rect_stroke(bar, 0.0, Stroke::new(1.0, theme::keypoint()), StrokeKind::Inside),
         };
     }
 }
@@ -117,13 +117,13 @@ fn axis(painter: &Painter, plot: Rect, end_m: f64) {
             s if s > 0.9 => Align2::RIGHT_TOP,
             _ => Align2::CENTER_TOP,
         };
-        painter.vline(at.x, plot.bottom()..=plot.bottom() + 3.0, Stroke::new(1.0, theme::WEAK));
+        painter.vline(at.x, plot.bottom()..=plot.bottom() + 3.0, Stroke::new(1.0, theme::weak()));
         let words = match f64::from(share) * end_m * 100.0 {
             0.0 => "0 cm".to_owned(),
             cm if cm.abs() < 10.0 => format!("{cm:+.2}"),
             cm => format!("{cm:+.1}"),
         };
-        painter.text(at + vec2(0.0, 3.0), anchor, words, theme::digit_font(), theme::WEAK);
+        painter.text(at + vec2(0.0, 3.0), anchor, words, theme::digit_font(), theme::weak());
     }
 }
 
@@ -136,7 +136,7 @@ fn handles(ui: &mut Ui, state: &State, plot: Rect, [limit_m, end_m]: [f64; 2], o
         let response = ui.interact(grip, Id::unique(("errors of depth", name)), Sense::drag());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, name));
         let is_held = response.hovered() || response.dragged();
-        let colour = if is_held { theme::STRONG } else { theme::ACCENT };
+        let colour = if is_held { theme::strong() } else { theme::accent() };
         ui.painter().vline(x, plot.y_range(), Stroke::new(2.0, colour));
         let knob = Rect::from_center_size(pos2(x, plot.center().y), vec2(6.0, 18.0));
         ui.painter().rect_filled(knob, 2.0, colour);

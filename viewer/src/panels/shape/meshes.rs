@@ -58,8 +58,8 @@ pub(super) fn show(ui: &mut Ui, look: &Look<'_>, out: &mut Vec<Command>) {
         ui,
         "drag turns, wheel magnifies, double click takes both back",
         &[
-            (Mark::Stroke(overlay::Line::Solid), theme::MESH_EARLIER, fixed_words),
-            (Mark::Dot, theme::MESH_PRESENT, moving_words),
+            (Mark::Stroke(overlay::Line::Solid), theme::mesh_earlier(), fixed_words),
+            (Mark::Dot, theme::mesh_present(), moving_words),
             (Mark::Ring, run, "target, axes of 3σ".to_owned()),
         ],
     );
@@ -70,12 +70,12 @@ pub(super) fn show(ui: &mut Ui, look: &Look<'_>, out: &mut Vec<Command>) {
     );
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, "meshes in space"));
     let painter = ui.painter_at(rect);
-    painter.rect_filled(rect, 0.0, theme::WELL);
+    painter.rect_filled(rect, 0.0, theme::well());
     let camera = look.trace.point_mast.as_ref().map(|pointing| pointing.left.model.centre());
     let eye = Eye::new(&camera.unwrap_or_else(Point3::origin), middle, reach_m, orbit, rect);
     let mut scene = Scene::new(eye);
-    scene.facets(moving.iter().step_by(every_moving), theme::MESH_PRESENT, true);
-    scene.facets(fixed.iter().step_by(every_fixed), theme::MESH_EARLIER, false);
+    scene.facets(moving.iter().step_by(every_moving), theme::mesh_present(), true);
+    scene.facets(fixed.iter().step_by(every_fixed), theme::mesh_earlier(), false);
     painter.add(scene.shape());
     target(&painter, look, &eye, run);
     scale_bar(&painter, &eye, rect);
@@ -114,7 +114,7 @@ fn target(painter: &egui::Painter, look: &Look<'_>, eye: &Eye, colour: egui::Col
     let Some(position) = position else {
         let at = painter.clip_rect().left_top() + vec2(8.0, 8.0);
         let words = "no target: the registration is not used";
-        painter.text(at, Align2::LEFT_TOP, words, theme::image_font(), theme::LOST);
+        painter.text(at, Align2::LEFT_TOP, words, theme::image_font(), theme::lost());
         return;
     };
     if let Some(covariance) = located.and_then(|located| located.covariance_in_rover) {
@@ -143,9 +143,9 @@ fn scale_bar(painter: &egui::Painter, eye: &Eye, rect: egui::Rect) {
     let length_m = [5.0, 2.0, 1.0].into_iter().map(|n| n * power).find(|m| *m <= room_m).unwrap_or(power);
     let from = rect.left_bottom() + vec2(10.0, -10.0);
     let to = from + vec2((length_m * eye.scale) as f32, 0.0);
-    painter.add(Shape::line_segment([from, to], Stroke::new(2.0, theme::STRONG)));
+    painter.add(Shape::line_segment([from, to], Stroke::new(2.0, theme::strong())));
     let words = format!("{} cm", panels::digits((length_m * 1e6).round() / 1e4));
-    painter.text(from - vec2(0.0, 4.0), Align2::LEFT_BOTTOM, words, theme::digit_font(), theme::TEXT);
+    painter.text(from - vec2(0.0, 4.0), Align2::LEFT_BOTTOM, words, theme::digit_font(), theme::text());
 }
 
 /// The view that the pointer asked for.

@@ -44,7 +44,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let look = Look { state, trace, evidence };
     parts(ui, state, out);
     if let Some(words) = warning(trace, evidence) {
-        ui.add(egui::Label::new(RichText::new(words).small().color(theme::LOST)).wrap());
+        ui.add(egui::Label::new(RichText::new(words).small().color(theme::lost())).wrap());
     }
     if let Some(found) = &evidence.registration {
         summary(ui, found);
@@ -101,10 +101,10 @@ fn summary(ui: &mut Ui, found: &Registered) {
         let [a, b, c] = sigmas.map(|sigma| sigma * 1000.0);
         words += &format!("; σ {a:.1}, {b:.1}, {c:.1} mm");
     }
-    ui.add(egui::Label::new(theme::note(words).color(theme::TEXT)).wrap());
+    ui.add(egui::Label::new(theme::note(words).color(theme::text())).wrap());
     if let Some(reason) = &found.reason {
         let reason = format!("Not used: {reason}.");
-        ui.add(egui::Label::new(RichText::new(reason).small().color(theme::FAILED)).wrap());
+        ui.add(egui::Label::new(RichText::new(reason).small().color(theme::failed())).wrap());
     }
 }
 

@@ -91,7 +91,7 @@ impl Picture<'_> {
         let taken = vec2(size.x, TITLE + height * scale + 2.0);
         let (rect, response) = ui.allocate_exact_size(taken, Sense::hover());
         let painter = ui.painter_at(rect);
-        painter.text(rect.min, Align2::LEFT_TOP, self.title, theme::image_font(), theme::TEXT);
+        painter.text(rect.min, Align2::LEFT_TOP, self.title, theme::image_font(), theme::text());
         let area = Rect::from_min_size(rect.min + vec2(0.0, TITLE), vec2(width, height) * scale);
         view2d::checker(&painter, area);
         if let Some(look) = self.look {
@@ -101,7 +101,7 @@ impl Picture<'_> {
         }
         let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
         painter.image(self.raster.texture.id(), area, whole, theme::UNTINTED);
-        painter.rect_stroke(area, 0.0, Stroke::new(1.0, theme::LINE), StrokeKind::Outside);
+        painter.rect_stroke(area, 0.0, Stroke::new(1.0, theme::line()), StrokeKind::Outside);
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, self.words()));
         let placed = Placed { area, response, painter, scale };
         self.hover(&placed);
@@ -140,7 +140,7 @@ pub(super) fn colour_bar(painter: &Painter, area: Rect, look: raster::Look, unit
     painter.add(egui::Shape::mesh(mesh));
     let middle = (low + high) / 2.0;
     let text = |y: f32, anchor: Align2, words: String| {
-        painter.text(pos2(strip.right() + 4.0, y), anchor, words, theme::digit_font(), theme::TEXT);
+        painter.text(pos2(strip.right() + 4.0, y), anchor, words, theme::digit_font(), theme::text());
     };
     text(strip.top(), Align2::LEFT_TOP, format!("≥ {}", unit.number(high)));
     text(strip.bottom(), Align2::LEFT_BOTTOM, format!("≤ {}", unit.number(low)));

@@ -68,9 +68,9 @@ fn coarse(ui: &mut Ui, look: &Look<'_>, found: &Registered, height: f32) {
         ui,
         "mean distance of the surfaces, by shift across the line of sight",
         &[
-            (Mark::Plus, theme::STRONG, "start".to_owned()),
+            (Mark::Plus, theme::strong(), "start".to_owned()),
             (Mark::Ring, run, "best".to_owned()),
-            (Mark::Stroke(overlay::Line::Dashed), theme::SEARCH, "basin: the rock’s half width".to_owned()),
+            (Mark::Stroke(overlay::Line::Dashed), theme::search(), "basin: the rock’s half width".to_owned()),
         ],
     );
     let area = Rect::from_min_size(ui.cursor().min, vec2(ui.available_width(), height - WORDS));
@@ -151,9 +151,9 @@ fn surface(ui: &mut Ui, raster: &Raster, found: &Registered, step_m: f64, run: C
             .map(|i| (std::f64::consts::TAU * f64::from(i) / f64::from(OUTLINE)).sin_cos())
             .map(|(sin, cos)| [basin_cm * cos, basin_cm * sin])
             .collect();
-        let line = Line::new("basin", outline).color(theme::SEARCH).style(LineStyle::dashed_dense());
+        let line = Line::new("basin", outline).color(theme::search()).style(LineStyle::dashed_dense());
         plot.line(line.width(1.5).allow_hover(false));
-        let start = Points::new("start", [0.0, 0.0]).color(theme::STRONG).radius(6.0);
+        let start = Points::new("start", [0.0, 0.0]).color(theme::strong()).radius(6.0);
         plot.points(start.shape(MarkerShape::Plus).allow_hover(false));
         if let Some(best) = best {
             let ring = Points::new("best", best).color(run).radius(6.0).filled(false);
@@ -209,7 +209,7 @@ fn plot<'a>(ui: &mut Ui, path: &'a [PathStep], height: f32) -> Option<&'a PathSt
     let place = |step: &PathStep| [f64::from(step.evaluations), step.mean_m * 1000.0];
     let response = plot.show(ui, |plot| {
         let way: Vec<[f64; 2]> = path.iter().map(place).collect();
-        plot.line(Line::new("way", way).color(theme::WEAK).width(1.0).allow_hover(false));
+        plot.line(Line::new("way", way).color(theme::weak()).width(1.0).allow_hover(false));
         for run in 0..=path.last().map_or(0, |step| step.run) {
             let points: Vec<[f64; 2]> = path.iter().filter(|step| step.run == run).map(place).collect();
             let points = Points::new("steps", points).color(theme::run(run as usize)).radius(2.5);
@@ -218,7 +218,7 @@ fn plot<'a>(ui: &mut Ui, path: &'a [PathStep], height: f32) -> Option<&'a PathSt
         let at = plot.response().hovered().then(|| plot.pointer_coordinate()).flatten()?;
         let away = |step: &&PathStep| (f64::from(step.evaluations) - at.x).abs();
         let nearest = path.iter().min_by(|a, b| away(a).total_cmp(&away(b)))?;
-        let ring = Points::new("here", place(nearest)).color(theme::ACCENT).radius(5.0).filled(false);
+        let ring = Points::new("here", place(nearest)).color(theme::accent()).radius(5.0).filled(false);
         plot.points(ring.shape(MarkerShape::Circle).allow_hover(false));
         Some(nearest)
     });

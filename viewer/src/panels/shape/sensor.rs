@@ -58,7 +58,7 @@ pub(super) fn show(ui: &mut Ui, look: &Look<'_>, out: &mut Vec<Command>) {
                 let placed = picture.show(ui, size);
                 let [width, height] = picture.raster.size().map(|side| (f64::from(side) - 1.0) / 2.0);
                 // The sensor looks at the target.
-                placed.mark(width, height, Mark::Plus, theme::STRONG);
+                placed.mark(width, height, Mark::Plus, theme::strong());
             }
         });
     }

@@ -148,7 +148,7 @@ mod tests {
     fn the_nearest_is_painted_last() {
         let facet = |x: f32| [[x, 0.0, 0.0], [x, 0.1, 0.0], [x, 0.0, 0.1]];
         let mut scene = Scene::new(eye(Orbit::default()));
-        let (near, far) = (theme::FAILED, theme::PREDICTION);
+        let (near, far) = (theme::failed(), theme::prediction());
         scene.facets([facet(3.9)].iter(), near, true);
         scene.facets([facet(4.1)].iter(), far, true);
         let Shape::Mesh(mesh) = scene.shape() else { panic!("a mesh") };

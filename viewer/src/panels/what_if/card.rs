@@ -20,23 +20,23 @@ pub(super) fn ghost(canvas: &Canvas, trial: &Trial) {
     let Some(ghost) = &trial.ghost else { return };
     let overlay = Overlay::new(&canvas.painter, &canvas.transform);
     if let Some(window) = ghost.search_window {
-        overlay.rectangle(window, theme::GHOST, Line::Dashed);
+        overlay.rectangle(window, theme::ghost(), Line::Dashed);
     }
     if let Some(pixel) = ghost.predicted_left.filter(|_| trial.what_if.prediction_px.is_some()) {
-        overlay.mark(pixel, Mark::Cross, theme::GHOST);
+        overlay.mark(pixel, Mark::Cross, theme::ghost());
         if let Some(covariance) = &ghost.predicted_covariance_px2 {
-            overlay.ellipse(pixel, covariance, 3.0, theme::GHOST, Line::Dotted);
+            overlay.ellipse(pixel, covariance, 3.0, theme::ghost(), Line::Dotted);
         }
     }
     if let Some(pixel) = ghost.left_pixel {
         if let Some(map) = &ghost.prepared_from_template {
             let quad = template_quad(pixel, ghost.template_size_px, map);
-            overlay.outline(&quad, theme::GHOST, Line::Dashed);
+            overlay.outline(&quad, theme::ghost(), Line::Dashed);
         }
         if let Some(covariance) = &ghost.left_covariance_px2 {
-            overlay.ellipse(pixel, covariance, 3.0, theme::GHOST, Line::Dashed);
+            overlay.ellipse(pixel, covariance, 3.0, theme::ghost(), Line::Dashed);
         }
-        overlay.mark(pixel, Mark::Diamond, theme::GHOST);
+        overlay.mark(pixel, Mark::Diamond, theme::ghost());
     }
 }
 
@@ -51,8 +51,8 @@ pub(super) fn show(ui: &mut Ui, canvas: &Canvas, state: &State, trial: &Trial, o
     let mut inside = ui.new_child(builder);
     inside.set_clip_rect(canvas.transform.rect);
     Frame::new()
-        .fill(theme::SCRIM)
-        .stroke(egui::Stroke::new(1.0, theme::GHOST))
+        .fill(theme::scrim())
+        .stroke(egui::Stroke::new(1.0, theme::ghost()))
         .corner_radius(4)
         .inner_margin(Margin::same(6))
         .show(&mut inside, |ui| contents(ui, state, trial, out));
@@ -65,7 +65,7 @@ fn contents(ui: &mut Ui, state: &State, trial: &Trial, out: &mut Vec<Command>) {
     }
     match (&trial.ghost, &trial.refused) {
         (_, Some(why)) => {
-            ui.add(Label::new(RichText::new(why).color(theme::LOST)).wrap());
+            ui.add(Label::new(RichText::new(why).color(theme::lost())).wrap());
         }
         (Some(ghost), None) => result(ui, ghost, ghost.what_if == trial.what_if),
         (None, None) => {
@@ -113,7 +113,7 @@ fn result(ui: &mut Ui, ghost: &Ghost, is_newest: bool) {
         match ghost.is_right() {
             Some(true) => ui.label(theme::note("right")),
             Some(false) if ghost.row.state == "tracking" => {
-                ui.label(RichText::new("but FALSE").strong().color(theme::FAILED))
+                ui.label(RichText::new("but FALSE").strong().color(theme::failed()))
             }
             _ => ui.label(""),
         };
@@ -134,7 +134,7 @@ fn result(ui: &mut Ui, ghost: &Ghost, is_newest: bool) {
         ui.label(theme::number(format!("match moved {moved:.2} px")).size(11.0));
     }
     if let Some(missing) = &ghost.missing {
-        ui.add(Label::new(RichText::new(missing).small().color(theme::LOST)).wrap());
+        ui.add(Label::new(RichText::new(missing).small().color(theme::lost())).wrap());
     }
     if !is_newest {
         ui.label(theme::note("computing the newest change …"));

@@ -31,7 +31,7 @@ pub(super) fn show(ui: &mut Ui, canvas: &Canvas, state: &State, trace: &StepTrac
         let template = side(state, "template_size_px").unwrap_or(LEAST[1]);
         let limits = [LEAST[0].max(template), MOST[0]];
         let corner = Corner { name: "search window size", key: "search_window_px", centre, limits };
-        corner.show(ui, canvas, window, theme::SEARCH, state, out);
+        corner.show(ui, canvas, window, theme::search(), state, out);
         let matched = trace.locate.as_ref().and_then(|located| located.left_pixel).unwrap_or(centre);
         let limits = [LEAST[1], MOST[1].min(window)];
         let corner = Corner { name: "template size", key: "template_size_px", centre: matched, limits };
@@ -82,7 +82,7 @@ impl Corner {
 
 /// The handle of the predicted point.
 fn point(ui: &mut Ui, canvas: &Canvas, at: Pixel, out: &mut Vec<Command>) {
-    let Some(response) = handle(ui, canvas, "prediction", at, theme::PREDICTION) else { return };
+    let Some(response) = handle(ui, canvas, "prediction", at, theme::prediction()) else { return };
     let words = format!("prediction handle, at {:.1}, {:.1} px", at.x, at.y);
     response.widget_info(|| WidgetInfo::labeled(egui::Role::Button, true, &words));
     let dragged = response.dragged().then(|| response.interact_pointer_pos()).flatten();
@@ -107,11 +107,11 @@ fn handle(ui: &mut Ui, canvas: &Canvas, id: &str, at: Pixel, colour: Color32) ->
     let response = ui.interact(area, ui.scope_id().with(("what if", id)), Sense::drag());
     let reach = if response.hovered() || response.dragged() { MARK + 2.0 } else { MARK };
     let mark = Rect::from_center_size(place, vec2(2.0 * reach, 2.0 * reach));
-    canvas.painter.rect_filled(mark.expand(1.0), 1.0, theme::HALO);
+    canvas.painter.rect_filled(mark.expand(1.0), 1.0, theme::halo());
     canvas.painter.rect_filled(mark, 1.0, colour);
     if response.dragged() {
         let overlay = Overlay::new(&canvas.painter, &canvas.transform);
-        overlay.line(&[at, canvas.transform.to_pixel(place)], theme::GHOST, Line::Dashed);
+        overlay.line(&[at, canvas.transform.to_pixel(place)], theme::ghost(), Line::Dashed);
     }
     Some(response)
 }

@@ -71,13 +71,13 @@ fn headline(ui: &mut Ui, step: usize, gate: &Gate, out: &mut Vec<Command>) {
 fn bar(ui: &mut Ui, gate: &Gate, relative: f64) {
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), BAR + 4.0), Sense::hover());
     let rail = egui::Rect::from_min_size(rect.min + vec2(0.0, 2.0), vec2(rect.width(), BAR));
-    ui.painter().rect_filled(rail, 2.0, theme::WELL);
+    ui.painter().rect_filled(rail, 2.0, theme::well());
     let middle = rail.center().x;
     let end = middle + rail.width() / 2.0 * relative.clamp(-1.0, 1.0) as f32;
     let (left, right) = if end < middle { (end, middle) } else { (middle, end.max(middle + 1.0)) };
     let fill = egui::Rect::from_min_max(pos2(left, rail.top()), pos2(right, rail.bottom()));
     ui.painter().rect_filled(fill, 2.0, theme::verdict(gate.passed).gamma_multiply(0.85));
-    ui.painter().vline(middle, rail.expand(2.0).y_range(), egui::Stroke::new(2.0, theme::STRONG));
+    ui.painter().vline(middle, rail.expand(2.0).y_range(), egui::Stroke::new(2.0, theme::strong()));
     let words = match gate.margin {
         Some(margin) => format!("margin of {}: {} {}", gate.name, signed(margin), gate.unit),
         None => format!("margin of {}: nothing to judge", gate.name),

@@ -29,7 +29,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let words = sentence::verdict(trace, before, &run.settings);
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let said = ui.add(
-            egui::Label::new(RichText::new(&words).color(theme::STRONG)).wrap().sense(egui::Sense::click()),
+            egui::Label::new(RichText::new(&words).color(theme::strong())).wrap().sense(egui::Sense::click()),
         );
         said.context_menu(|ui| {
             if ui.button("Copy sentence").clicked() {

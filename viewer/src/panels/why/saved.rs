@@ -32,7 +32,7 @@ pub(super) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             ui.label(theme::note("Asking …"));
         }
         Some(Told::Refused(why)) => {
-            ui.add(Label::new(RichText::new(why).color(theme::LOST)).wrap());
+            ui.add(Label::new(RichText::new(why).color(theme::lost())).wrap());
         }
         Some(Told::Here(question)) => show_question(ui, state, question, out),
     }
@@ -83,24 +83,24 @@ fn progress(ui: &mut Ui, question: &Question, out: &mut Vec<Command>) {
         }
         QuestionState::Failed => {
             let why = question.problem.as_deref().unwrap_or("it failed");
-            ui.add(Label::new(RichText::new(why).color(theme::FAILED)).wrap());
+            ui.add(Label::new(RichText::new(why).color(theme::failed())).wrap());
         }
     }
 }
 
 fn show_finding(ui: &mut Ui, state: &State, number: usize, finding: &Finding, out: &mut Vec<Command>) {
     let (word, colour) = match finding.outcome {
-        Outcome::Right => ("RIGHT", theme::TRACKING),
-        Outcome::Rejected => ("REJECTED", theme::LOST),
-        Outcome::Unknown => ("ACCEPTED", theme::PREDICTION),
-        Outcome::False => ("FALSE", theme::FAILED),
+        Outcome::Right => ("RIGHT", theme::tracking()),
+        Outcome::Rejected => ("REJECTED", theme::lost()),
+        Outcome::Unknown => ("ACCEPTED", theme::prediction()),
+        Outcome::False => ("FALSE", theme::failed()),
     };
     ui.horizontal_wrapped(|ui| {
         ui.label(RichText::new(word).strong().color(colour));
         ui.label(theme::note(format!("{:.0} %", 100.0 * finding.relative)))
             .on_hover_text("The size of the change, over the present value");
     });
-    ui.add(Label::new(RichText::new(&finding.sentence).color(theme::TEXT)).wrap());
+    ui.add(Label::new(RichText::new(&finding.sentence).color(theme::text())).wrap());
     let what_if = finding.what_if();
     ui.horizontal_wrapped(|ui| {
         // Their names tell one finding from the others.

@@ -34,7 +34,7 @@ pub(super) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             ui.label(theme::note("Asking …"));
         }
         Told::Refused(why) => {
-            ui.add(Label::new(RichText::new(why).color(theme::LOST)).wrap());
+            ui.add(Label::new(RichText::new(why).color(theme::lost())).wrap());
         }
         Told::Here(explanation) => {
             if let Some(tree) = &explanation.tree {
@@ -57,7 +57,7 @@ fn branch(ui: &mut Ui, node: &Node, id: Id, depth: usize, out: &mut Vec<Command>
             if let Some(formula) = &node.formula {
                 let sign = if node.is_closed_form { "= " } else { "" };
                 ui.add(
-                    Label::new(RichText::new(format!("{sign}{formula}")).small().color(theme::TEXT)).wrap(),
+                    Label::new(RichText::new(format!("{sign}{formula}")).small().color(theme::text())).wrap(),
                 );
             }
             if let Some(origin) = &node.origin {

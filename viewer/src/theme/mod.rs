@@ -1,0 +1,244 @@
+//! How everything looks: colours (`palette`), text styles and spacing. The only place with colour literals.
+//!
+//! Data colours are those of Okabe and Ito, which people with any common colour vision tell apart; each meaning
+//! has a shape and a word besides. Scores are viridis with fixed limits, signed errors blue–white–red about zero,
+//! and a value that does not exist is a checker, never a colour.
+
+use egui::{
+    Color32, CornerRadius, FontDefinitions, FontFamily, FontId, Margin, RichText, Stroke, TextStyle, Theme,
+    Visuals,
+};
+use sightline_core::target::TrackingState;
+use sightline_core::trackability::Verdict;
+
+mod palette;
+
+pub use self::palette::*;
+
+/// A match that agrees with the motion: a dot and solid lines.
+pub fn inlier() -> Color32 {
+    tracking()
+}
+
+/// A match that does not: a cross and dashed lines.
+pub fn outlier() -> Color32 {
+    failed()
+}
+
+/// The surface of an earlier step: lines.
+pub fn mesh_earlier() -> Color32 {
+    lost()
+}
+
+/// The surface of the step: filled and shaded.
+pub fn mesh_present() -> Color32 {
+    prediction()
+}
+
+/// How far from the prediction a registration by shape can start.
+pub fn basin() -> Color32 {
+    search()
+}
+
+/// What is only tried: dashed.
+pub fn ghost() -> Color32 {
+    accent()
+}
+
+/// The tint of the step before, where it shines through.
+pub const ONION: Color32 = Color32::from_rgba_premultiplied(0x80, 0x80, 0x80, 0x80);
+/// A texture in its own colours.
+pub const UNTINTED: Color32 = Color32::WHITE;
+
+/// Distance between a panel's border and its contents, points.
+pub const MARGIN: i8 = 8;
+
+/// The colour of a tracking state.
+pub fn state(state: TrackingState) -> Color32 {
+    match state {
+        TrackingState::Cleared => weak(),
+        TrackingState::Tracking => tracking(),
+        TrackingState::Lost { .. } => lost(),
+        TrackingState::Failed => failed(),
+    }
+}
+
+/// The colour of met and unmet.
+pub fn verdict(good: bool) -> Color32 {
+    if good { tracking() } else { failed() }
+}
+
+/// A colour between a fifth and all of its brightness.
+pub fn shaded(colour: Color32, share: f64) -> Color32 {
+    let bright = 0.2 + 0.8 * share.clamp(0.0, 1.0);
+    let level = |value: u8| (f64::from(value) * bright).round() as u8;
+    Color32::from_rgb(level(colour.r()), level(colour.g()), level(colour.b()))
+}
+
+/// Viridis, from 0 for the least score that is shown to 1 for the greatest; transparent where there is none.
+pub fn score(share: f32) -> Color32 {
+    ramp(colorous::VIRIDIS, f64::from(share))
+}
+
+/// Blue–white–red over signed values from −`limit` to `limit`.
+pub fn signed(value: f32, limit: f32) -> Color32 {
+    ramp(colorous::RED_BLUE, 0.5 - f64::from(value / limit) / 2.0)
+}
+
+/// How well a target would do.
+pub fn trackability(verdict: Verdict) -> Color32 {
+    match verdict {
+        Verdict::Good => tracking(),
+        Verdict::Risky => lost(),
+        Verdict::Bad => failed(),
+    }
+}
+
+/// The same laid over an image, which stays visible.
+pub fn trackability_fill(verdict: Verdict) -> Color32 {
+    trackability(verdict).gamma_multiply(0.16)
+}
+
+/// Grey from black (0) to white (1); transparent where there is no value.
+pub fn grey(value: f32) -> Color32 {
+    if value.is_nan() {
+        Color32::TRANSPARENT
+    } else {
+        Color32::from_gray((value.clamp(0.0, 1.0) * 255.0).round() as u8)
+    }
+}
+
+fn ramp(gradient: colorous::Gradient, t: f64) -> Color32 {
+    if t.is_nan() {
+        return Color32::TRANSPARENT;
+    }
+    let c = gradient.eval_continuous(t.clamp(0.0, 1.0));
+    Color32::from_rgb(c.r, c.g, c.b)
+}
+
+/// Gives the context its looks.
+pub fn apply(context: &egui::Context, looks: Looks) {
+    palette::choose(looks);
+    let mut fonts = FontDefinitions::default();
+    // Arrows and dots, which the proportional font lacks, come from the one with equal widths.
+    let fallback = fonts.families.get(&FontFamily::Monospace).cloned().unwrap_or_default();
+    let proportional = fonts.families.entry(FontFamily::Proportional).or_default();
+    for font in fallback {
+        if !proportional.contains(&font) {
+            proportional.push(font);
+        }
+    }
+    context.set_fonts(fonts);
+    context.set_theme(if looks == Looks::Light { Theme::Light } else { Theme::Dark });
+    context.all_styles_mut(|style| {
+        style.text_styles = [
+            (TextStyle::Heading, FontId::new(17.0, FontFamily::Proportional)),
+            (TextStyle::Body, FontId::new(13.0, FontFamily::Proportional)),
+            (TextStyle::Button, FontId::new(13.0, FontFamily::Proportional)),
+            (TextStyle::Monospace, FontId::new(12.0, FontFamily::Monospace)),
+            (TextStyle::Small, FontId::new(11.0, FontFamily::Proportional)),
+        ]
+        .into();
+        style.visuals = visuals();
+        style.animation_time = 0.0;
+        style.spacing.item_spacing = egui::vec2(6.0, 4.0);
+        style.spacing.button_padding = egui::vec2(8.0, 2.0);
+        style.spacing.interact_size.y = 22.0;
+        style.spacing.menu_margin = Margin::same(6);
+        style.spacing.scroll = egui::style::ScrollStyle::thin();
+        style.interaction.selectable_labels = false;
+        style.interaction.tooltip_delay = 0.3;
+    });
+}
+
+fn visuals() -> Visuals {
+    let mut visuals = if looks() == Looks::Light { Visuals::light() } else { Visuals::dark() };
+    visuals.panel_fill = panel();
+    visuals.window_fill = bar();
+    visuals.window_stroke = Stroke::new(1.0, line());
+    visuals.extreme_bg_color = well();
+    visuals.faint_bg_color = bar();
+    visuals.hyperlink_color = prediction();
+    visuals.warn_fg_color = lost();
+    visuals.error_fg_color = failed();
+    visuals.weak_text_color = Some(weak());
+    visuals.selection.bg_fill = selected();
+    visuals.selection.stroke = Stroke::new(1.0, accent());
+    let widgets = &mut visuals.widgets;
+    widgets.noninteractive.fg_stroke = Stroke::new(1.0, text());
+    widgets.noninteractive.bg_stroke = Stroke::new(1.0, line());
+    widgets.noninteractive.bg_fill = panel();
+    widgets.noninteractive.weak_bg_fill = panel();
+    for (widget, fill, line) in [
+        (&mut widgets.inactive, button(), line()),
+        (&mut widgets.hovered, button_hovered(), weak()),
+        (&mut widgets.active, selected(), accent()),
+        (&mut widgets.open, button(), weak()),
+    ] {
+        widget.weak_bg_fill = fill;
+        widget.bg_fill = fill;
+        widget.bg_stroke = Stroke::new(1.0, line);
+        widget.fg_stroke = Stroke::new(1.0, text());
+        widget.corner_radius = CornerRadius::same(4);
+    }
+    widgets.hovered.fg_stroke.color = strong();
+    widgets.active.fg_stroke.color = strong();
+    visuals
+}
+
+/// A panel's title: small capitals, widely set.
+pub fn title(text: &str) -> RichText {
+    RichText::new(text.to_uppercase()).size(10.5).extra_letter_spacing(1.1).color(weak())
+}
+
+/// A label beside a value.
+pub fn label(text: impl Into<String>) -> RichText {
+    RichText::new(text).color(weak())
+}
+
+/// A value with digits of equal width.
+pub fn number(text: impl Into<String>) -> RichText {
+    RichText::new(text).monospace().color(strong())
+}
+
+/// A unit or remark, small.
+pub fn note(text: impl Into<String>) -> RichText {
+    RichText::new(text).small().color(weak())
+}
+
+/// The font of words painted on images.
+pub fn image_font() -> FontId {
+    FontId::new(11.0, FontFamily::Proportional)
+}
+
+/// The font of digits painted on images.
+pub fn digit_font() -> FontId {
+    FontId::new(10.5, FontFamily::Monospace)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_signed_scale_is_blue_below_white_at_and_red_above_zero() {
+        let [negative, zero, positive] = [-1.0, 0.0, 1.0].map(|value| signed(value, 1.0));
+        assert!(negative.b() > negative.r() + 40, "{negative:?}");
+        assert!(zero.r() > 0xe8 && zero.g() > 0xe8 && zero.b() > 0xe8, "{zero:?}");
+        assert!(positive.r() > positive.b() + 40, "{positive:?}");
+    }
+
+    #[test]
+    fn what_does_not_exist_has_no_colour() {
+        assert_eq!(score(f32::NAN), Color32::TRANSPARENT);
+        assert_eq!(signed(f32::NAN, 1.0), Color32::TRANSPARENT);
+        assert_eq!(grey(f32::NAN), Color32::TRANSPARENT);
+    }
+
+    #[test]
+    fn the_score_scale_is_fixed_from_minus_one_to_one() {
+        assert_eq!(score(-1.0), score(-7.0));
+        assert_eq!(score(1.0), score(7.0));
+        assert_ne!(score(0.0), score(0.5));
+    }
+}
