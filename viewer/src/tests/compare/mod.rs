@@ -3,7 +3,6 @@
 mod panels;
 mod state;
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use egui::{Context, Key as Keyboard, Modifiers};
@@ -11,7 +10,7 @@ use egui_kittest::kittest::Queryable;
 use sightline_core::frames::Pixel;
 use sightline_core::image::{GrayImage, npy};
 use sightline_core::locate::Evidence;
-use sightline_core::session::compare::{Alignment, Compared, NewComparison, RunName, compare};
+use sightline_core::session::compare::{Alignment, Compared, RunName, compare};
 use sightline_core::session::metrics::metrics;
 use sightline_core::session::view::RunView;
 use sightline_core::session::wire::Problem;
@@ -165,4 +164,18 @@ fn paints(shown: &Shown<'_>, words: &str) -> bool {
         }
     }
     shown.harness.output().shapes.iter().any(|clipped| has(&clipped.shape, words))
+}
+
+/// Answers a comparison as if run B had driven twice as far between its stops.
+fn twice_as_far(state: &mut State) {
+    let request = state.take_requests().into_iter().find(|r| matches!(r, Request::Compare { .. })).unwrap();
+    let Request::Compare { new, .. } = &request else { panic!("a comparison was asked for") };
+    let mut faster = traces_b();
+    faster.iter_mut().for_each(|trace| trace.update.target.travelled_m *= 2.0);
+    let runs = [
+        Compared { name: A, settings: Arc::default(), steps: steps(A) },
+        Compared { name: B, settings: Arc::default(), steps: faster.into_iter().map(Arc::new).collect() },
+    ];
+    let found = compare(&runs, new).unwrap();
+    state.arrived(Arrived { request, outcome: Ok(Reply::Compared(Box::new(found))) }, 0.0);
 }

@@ -52,6 +52,25 @@ fn all_runs_are_marked_on_one_image_with_their_names() {
 }
 
 #[test]
+fn the_right_image_marks_the_compared_runs_as_well() {
+    let mut shown = panel(Pane::Right, View::Marks);
+    assert_eq!(shown.click("compared: run B (legend)"), vec![Command::ToggleLayer(Layer::Compared)]);
+    assert!(paints(&shown, "run B"));
+}
+
+#[test]
+fn marks_of_another_stop_are_not_painted_on_this_one() {
+    let shown = Shown::pane(Pane::Left, |context| {
+        let mut state = compared(context, 2);
+        state.apply(Command::Compare(Ask::Align(Alignment::Distance)));
+        twice_as_far(&mut state);
+        state
+    });
+    assert!(paints(&shown, "run B stands at step 1: press V to see its own image"));
+    assert!(!paints(&shown, "run B"));
+}
+
+#[test]
 fn side_by_side_shows_each_run_about_its_own_target() {
     let shown = panel(Pane::Left, View::SideBySide);
     shown.says("left image, run A: lost, ncc 0.41").says("left image, run B: tracking, ncc 0.41");

@@ -144,22 +144,7 @@ fn aligned_by_distance_the_other_run_is_read_at_the_stop_that_stands_beside() {
     let mut state = two_runs(&Context::default(), 2);
     state.apply(Command::Compare(Ask::With { place: 0, run: Some(B) }));
     state.apply(Command::Compare(Ask::Align(Alignment::Distance)));
-    // Run B drove twice as far between its stops.
-    let request = state.take_requests().into_iter().find(|r| matches!(r, Request::Compare { .. })).unwrap();
-    let mut faster = traces_b();
-    faster.iter_mut().for_each(|trace| trace.update.target.travelled_m *= 2.0);
-    let runs = [
-        Compared { name: A, settings: Arc::default(), steps: steps(A) },
-        Compared { name: B, settings: Arc::default(), steps: faster.into_iter().map(Arc::new).collect() },
-    ];
-    let new = NewComparison {
-        runs: vec![A, B],
-        align: Alignment::Distance,
-        tolerance: BTreeMap::new(),
-        columns: Some(Vec::new()),
-    };
-    let found = compare(&runs, &new).unwrap();
-    state.arrived(Arrived { request, outcome: Ok(Reply::Compared(Box::new(found))) }, 0.0);
+    twice_as_far(&mut state);
     assert_eq!([0, 1, 2, 4].map(|step| state.beside(B, step)), [Some(0), None, Some(1), Some(2)]);
     assert_eq!(state.own_beside(B, 2), Some(4));
     assert_eq!(state.other_trace(B).ready().unwrap().step, 1);
