@@ -6,6 +6,7 @@ use sightline_core::frames::Pixel;
 use sightline_core::image::PixelRect;
 use sightline_core::trace::StepTrace;
 
+use super::compare::marks as compared;
 use super::features::marks;
 use super::images_left::{STATUS, ready_image, status_line};
 use super::legend::{self, Entry};
@@ -52,6 +53,7 @@ fn picture(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) 
     if let Some(trace) = state.trace().filter(|_| state.marks) {
         paint_marks(&canvas, trace, state);
     }
+    compared::paint_right(&Overlay::new(&canvas.painter, &canvas.transform), state);
     status_line(ui, &canvas, raster, region);
     if let Some(view) = canvas.moved {
         out.push(Command::View(Panel::Right, view));
@@ -75,6 +77,7 @@ fn entries(state: &State) -> Vec<Entry> {
         entries.push(Entry::new(Layer::Curve, Mark::Stroke(Line::Solid), theme::search(), word));
     }
     entries.extend(marks::right_entries(state));
+    entries.extend(compared::entries(state));
     entries
 }
 

@@ -6,6 +6,7 @@
 mod apply;
 mod arrive;
 pub mod compare;
+mod comparing;
 pub mod calculator;
 mod configurations;
 mod linked;

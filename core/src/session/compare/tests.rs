@@ -141,11 +141,11 @@ fn a_tolerance_moves_the_first_divergence_on_to_where_it_is_exceeded() {
 fn columns_have_the_difference_of_each_run_from_the_first_with_its_unit() {
     let world = world();
     let mut session = session(&world);
-    let other = fork(&mut session, &world, 3, &[("ncc_min", json!(0.9999))]);
+    let other = fork(&mut session, &world, 3, &[("ncc_min", json!(1.0))]);
     let found = compared(&session, &asked(&[A, other]));
     let column = |name: &str| found.columns.iter().find(|column| column.name == name).unwrap();
     let limits = column("gates.ncc.limit");
-    let expected = [None, Some(0.0), Some(0.0), Some(0.9999 - 0.7), Some(0.9999 - 0.7), Some(0.9999 - 0.7)];
+    let expected = [None, Some(0.0), Some(0.0), Some(1.0 - 0.7), Some(1.0 - 0.7), Some(1.0 - 0.7)];
     assert_eq!(limits.deltas[1], expected, "the designation has no gate");
     let range = column("range_m");
     assert_eq!(range.unit, "m");
@@ -153,7 +153,9 @@ fn columns_have_the_difference_of_each_run_from_the_first_with_its_unit() {
         assert_eq!(range.deltas[1][moment], b.zip(*a).map(|(b, a)| b - a));
     }
     let states = found.words.iter().find(|column| column.name == "state").unwrap();
-    assert_eq!(states.differs, [false, false, false, true, true, true]);
+    let is_unlike = |moment: usize| states.values[0][moment] != states.values[1][moment];
+    assert_eq!(states.differs, [0, 1, 2, 3, 4, 5].map(is_unlike));
+    assert_eq!(states.differs[..4], [false, false, false, true], "the fork is lost at its first step");
     let few = NewComparison { columns: Some(vec!["ncc".to_owned()]), ..asked(&[A, other]) };
     assert_eq!(compared(&session, &few).columns.len(), 1);
     let none = NewComparison { columns: Some(vec!["nonsense".to_owned()]), ..few };

@@ -8,7 +8,7 @@ use crate::command::Layer;
 use crate::overlay::{Line, Mark, Overlay, template_quad};
 use crate::panels::legend::Entry;
 use crate::state::State;
-use crate::state::compare::Look;
+use crate::state::compare::{Look, Other};
 use crate::theme;
 
 /// The entry of the legend for the runs that are compared.
@@ -30,11 +30,66 @@ pub fn paint_all(overlay: &Overlay<'_>, state: &State) {
         return;
     }
     for other in state.others() {
-        if let Some(trace) = state.other_trace(other.name).ready() {
+        if let Some(trace) = here(state, &other) {
             paint(overlay, trace, other.run, other.look, state);
             name(overlay, trace, other.look, &state.run_label(other.name));
         }
     }
+}
+
+/// Paints where the compared runs see the target in the right image, and where they searched for it.
+pub fn paint_right(overlay: &Overlay<'_>, state: &State) {
+    if !state.shows(Layer::Compared) || !state.marks {
+        return;
+    }
+    for other in state.others() {
+        let Some(trace) = here(state, &other) else { continue };
+        if let Some(stereo) = trace.template().and_then(|evidence| evidence.point_stereo.as_ref()) {
+            if state.shows(Layer::Curve) {
+                let searched: Vec<_> = stereo.curve.iter().map(|point| point.pixel).collect();
+                overlay.thin_line(&searched, other.look.colour, Line::Dashed);
+            }
+            if state.shows(Layer::Match) {
+                overlay.ellipse(
+                    stereo.right_pixel,
+                    &stereo.covariance_px2,
+                    3.0,
+                    other.look.colour,
+                    Line::Solid,
+                );
+            }
+        }
+        let predicted =
+            trace.point_mast.as_ref().filter(|_| trace.predict.is_some()).and_then(|p| p.predicted_right);
+        if let Some(pixel) = predicted.filter(|_| state.shows(Layer::Prediction)) {
+            overlay.mark(pixel, Mark::Cross, other.look.colour);
+        }
+        if let Some(pixel) =
+            trace.locate.as_ref().and_then(|l| l.right_pixel).filter(|_| state.shows(Layer::Match))
+        {
+            overlay.mark(pixel, other.look.mark, other.look.colour);
+            overlay.words(pixel, vec2(12.0, 16.0), &state.run_label(other.name), other.look.colour);
+        }
+    }
+}
+
+/// The record of another run at this very stop: pixels of another stop mean nothing on its image.
+fn here<'a>(state: &'a State, other: &Other<'_>) -> Option<&'a StepTrace> {
+    state.other_trace(other.name).ready().filter(|trace| trace.step == state.cursor.step)
+}
+
+/// What keeps the marks of compared runs off this image, as a sentence; none where all of them are on it.
+pub fn elsewhere(state: &State) -> Option<String> {
+    let others = state.others();
+    others.iter().find_map(|other| {
+        let step = state.beside(other.name, state.cursor.step);
+        let label = state.run_label(other.name);
+        match step {
+            Some(step) if step == state.cursor.step => None,
+            Some(step) => Some(format!("{label} stands at step {step}: press V to see its own image")),
+            None => Some(format!("{label} has no stop beside this one")),
+        }
+    })
 }
 
 /// Paints what one step of a run saw: search window, prediction with its gate, template window and match.

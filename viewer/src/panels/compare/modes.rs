@@ -1,5 +1,6 @@
 //! The ways in which one left image shows two runs: all marks, wipe and blink, and the step before shining through.
 
+use egui::accesskit::{Action, ActionData};
 use egui::{CursorIcon, EventFilter, Key, Rect, Sense, Ui, pos2, vec2};
 use sightline_core::image::PixelRect;
 
@@ -74,6 +75,9 @@ pub fn over(ui: &Ui, canvas: &Canvas, state: &State, out: &mut Vec<Command>) {
     match state.compare.view {
         View::Marks if state.marks => {
             marks::paint_all(&Overlay::new(&canvas.painter, &canvas.transform), state);
+            if let Some(words) = marks::elsewhere(state) {
+                corner(canvas, canvas.transform.rect, &words, theme::TEXT);
+            }
         }
         View::Wipe => wipe(ui, canvas, state, other, out),
         View::Blink => {
@@ -134,23 +138,46 @@ fn wipe(ui: &Ui, canvas: &Canvas, state: &State, other: &Other<'_>, out: &mut Ve
     response.widget_info(|| {
         egui::WidgetInfo::slider(true, f64::from(at) * 100.0, "wipe divider, per cent of the image's width")
     });
+    ui.ctx().accesskit_node_builder(response.id, |node| {
+        for action in [Action::Increment, Action::Decrement, Action::SetValue] {
+            node.add_action(action);
+        }
+        node.set_min_numeric_value(0.0);
+        node.set_max_numeric_value(100.0);
+        node.set_numeric_value_step(f64::from(KEY_STEP) * 100.0);
+    });
     if response.clicked() || response.drag_started() {
         response.request_focus();
     }
-    let moved = moved(ui, &response, area);
-    if let Some(to) = moved.map(|by| (at + by).clamp(0.0, 1.0)).filter(|&to| to != at) {
+    let to = told(ui, response.id).or_else(|| moved(ui, &response, area).map(|by| at + by));
+    if let Some(to) = to.map(|to| to.clamp(0.0, 1.0)).filter(|&to| to != at) {
         out.push(Command::Compare(Ask::Wipe(to)));
     }
     response.on_hover_cursor(CursorIcon::ResizeHorizontal);
 }
 
-/// By how much pointer or keys move the divider, as a share of the width.
+/// Where a screen reader puts the divider.
+fn told(ui: &Ui, id: egui::Id) -> Option<f32> {
+    ui.input(|input| {
+        let mut requests = input.accesskit_action_requests(id, Action::SetValue);
+        requests.find_map(|request| match request.data {
+            Some(ActionData::NumericValue(value)) => Some(value as f32 / 100.0),
+            _ => None,
+        })
+    })
+}
+
+/// By how much pointer, keys or a screen reader move the divider, as a share of the width.
 fn moved(ui: &Ui, response: &egui::Response, area: Rect) -> Option<f32> {
     if response.dragged() {
         return Some(response.drag_delta().x / area.width().max(1.0));
     }
-    if !response.has_focus() {
-        return None;
+    let steps = ui.input(|input| {
+        let count = |action: Action| input.num_accesskit_action_requests(response.id, action) as f32;
+        count(Action::Increment) - count(Action::Decrement)
+    });
+    if steps != 0.0 || !response.has_focus() {
+        return Some(steps * KEY_STEP).filter(|by| *by != 0.0);
     }
     let filter = EventFilter { horizontal_arrows: true, ..EventFilter::default() };
     ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, filter));

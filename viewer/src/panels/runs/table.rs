@@ -130,11 +130,7 @@ fn heading(
 fn show_row(ui: &mut Ui, state: &State, row: &Row<'_>, out: &mut Vec<Command>) {
     let label = format!("{} · run {}", row.target.label, run_letter(row.run.number));
     let is_baseline = state.compare.baseline == Some(row.name);
-    let star =
-        Button::selectable(is_baseline, if is_baseline { "★" } else { "☆" }).min_size(vec2(24.0, 24.0));
-    let response =
-        ui.add(star).on_hover_text("the baseline: the others are given with their difference to it");
-    if response.accessible_name(format!("baseline: {label}")).clicked() {
+    if star(ui, is_baseline, &label).clicked() {
         out.push(Command::Compare(Ask::Baseline(row.name)));
     }
     let is_own = state.own_name() == Some(row.name);
@@ -157,6 +153,31 @@ fn show_row(ui: &mut Ui, state: &State, row: &Row<'_>, out: &mut Vec<Command>) {
         cell(ui, state, row.name, metric, &label, out);
     }
     ui.add(egui::Label::new(theme::note(changes(state, row)).monospace())).on_hover_text(text(state, row));
+}
+
+/// The star of the baseline; the fonts have none.
+fn star(ui: &mut Ui, is_baseline: bool, label: &str) -> egui::Response {
+    let (frame, response) = ui.allocate_exact_size(vec2(24.0, 24.0), Sense::click());
+    let centre = frame.center();
+    let corner = |i: usize| {
+        let angle = std::f32::consts::PI * (i as f32 / 5.0 - 0.5);
+        centre + egui::Vec2::angled(angle) * if i.is_multiple_of(2) { 8.0 } else { 3.6 }
+    };
+    let corners: Vec<egui::Pos2> = (0..10).map(corner).collect();
+    if is_baseline {
+        // A star is not convex: it is filled in triangles about its middle.
+        for i in 0..10 {
+            let triangle = vec![centre, corners[i], corners[(i + 1) % 10]];
+            ui.painter().add(egui::Shape::convex_polygon(triangle, theme::ACCENT, egui::Stroke::NONE));
+        }
+    }
+    let is_marked = response.hovered() || response.has_focus() || is_baseline;
+    let colour = if is_marked { theme::ACCENT } else { theme::WEAK };
+    ui.painter().add(egui::Shape::closed_line(corners, egui::Stroke::new(1.5, colour)));
+    response.widget_info(|| {
+        egui::WidgetInfo::selected(egui::Role::CheckBox, true, is_baseline, format!("baseline: {label}"))
+    });
+    response.on_hover_text("the baseline: the others are given with their difference to it")
 }
 
 /// How a run is marked: as it is compared, or by its number.
