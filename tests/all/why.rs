@@ -106,7 +106,6 @@ async fn a_step_can_be_tried_with_other_settings_and_nothing_is_stored() {
 async fn what_cannot_be_tried_is_refused_in_one_sentence() {
     let fixture = Fixture::new().await;
     let path = format!("{}/what_if", fixture.step(0, 2));
-    let refuse = |body: Value| fixture.server.post(&path, &body);
     for (body, code, names) in [
         (json!({ "settings": { "ncc_min": 3 } }), "setting", "ncc_min"),
         (json!({ "settings": { "ncc_mim": 0.3 } }), "setting", "did you mean ncc_min"),
@@ -114,7 +113,7 @@ async fn what_cannot_be_tried_is_refused_in_one_sentence() {
         (json!({ "prediction_px": { "x": 1e9, "y": 0.0 } }), "field", "prediction_px"),
         (json!({ "arrays": ["nonsense"] }), "field", "arrays"),
     ] {
-        let sentence = refuse(body.clone()).await.problem(422, code);
+        let sentence = fixture.server.post(&path, &body).await.problem(422, code);
         assert!(sentence.contains(names), "{body}: {sentence}");
     }
     let designated = format!("{}/what_if", fixture.step(0, 0));
