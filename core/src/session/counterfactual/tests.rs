@@ -1,16 +1,22 @@
 //! Steps of a world whose truth is a formula, lost for a known reason: the counterfactual must name it.
 
+use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
 use serde_json::{Value, json};
 
 use super::*;
-use crate::frames::{Pose, Vector3};
+use crate::camera::{Camera, Mast, MastAngles};
+use crate::frames::{Point3, Pose, Vector3};
+use crate::pipeline::Stops;
 use crate::session::track;
 use crate::session::what_if::try_step;
 use crate::settings::Settings;
+use crate::stages::capture::StereoPair;
+use crate::study::truth::TruthSource;
 use crate::target::Designation;
 use crate::testing::{PlaneWorld, Trouble};
+use crate::traverse::{OdometryError, StereoGeometry};
 
 /// The step that goes wrong.
 const STEP: usize = 2;
@@ -27,15 +33,77 @@ fn world(jump_m: f64) -> PlaneWorld {
     world
 }
 
+/// The world with its pictures kept: a question looks at the same two again and again.
+struct Rendered {
+    world: PlaneWorld,
+    pairs: Vec<OnceLock<StereoPair>>,
+}
+
+impl Rendered {
+    fn new(world: PlaneWorld) -> Self {
+        let pairs = world.true_poses.iter().map(|_| OnceLock::new()).collect();
+        Self { world, pairs }
+    }
+}
+
+impl Stops for Rendered {
+    fn stop_count(&self) -> usize {
+        self.world.stop_count()
+    }
+    fn time_s(&self, step: usize) -> f64 {
+        self.world.time_s(step)
+    }
+    fn site_from_rover(&self, step: usize) -> Pose {
+        self.world.estimates[step]
+    }
+    fn cameras(&self, step: usize) -> (&Camera, &Camera) {
+        self.world.cameras(step)
+    }
+    fn mast(&self) -> Option<&Mast> {
+        None
+    }
+    fn mast_angles(&self, _step: usize) -> Option<MastAngles> {
+        None
+    }
+    fn odometry_error(&self) -> OdometryError {
+        self.world.odometry_error()
+    }
+    fn stereo(&self) -> StereoGeometry {
+        self.world.stereo()
+    }
+    fn capture(&self, step: usize) -> Result<StereoPair> {
+        if self.world.troubles[step] == Trouble::Missing {
+            return self.world.capture(step);
+        }
+        Ok(self.pairs[step].get_or_init(|| self.world.capture(step).unwrap()).clone())
+    }
+}
+
+impl TruthSource for Rendered {
+    fn true_site_from_rover(&self, step: usize) -> Option<Pose> {
+        self.world.true_site_from_rover(step)
+    }
+    fn true_left_camera(&self, step: usize) -> &Camera {
+        self.world.true_left_camera(step)
+    }
+    fn surface_point_in_site(&self, step: usize, pixel: Pixel) -> Option<Point3> {
+        self.world.surface_point_in_site(step, pixel)
+    }
+    fn is_visible(&self, step: usize, point_in_site: &Point3) -> bool {
+        self.world.is_visible(step, point_in_site)
+    }
+}
+
 /// A run of which only the last step has the settings under test.
 struct Staged {
-    world: PlaneWorld,
+    world: Rendered,
     steps: Vec<StepTrace>,
     settings: Settings,
 }
 
 impl Staged {
     fn new(world: PlaneWorld, changes: &[(&str, Value)]) -> Self {
+        let world = Rendered::new(world);
         let designation = Designation { step: 0, pixel: Pixel::new(118.3, 131.6) };
         let mut steps = track::run(&world, designation, &Settings::default()).unwrap();
         steps.truncate(STEP);

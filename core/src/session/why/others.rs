@@ -180,16 +180,20 @@ impl Book<'_> {
             "confidence" => {
                 let located = trace.locate.as_ref()?;
                 let draft = Draft::number("locate", "confidence", "", located.confidence);
+                let is_matched = trace.template().is_some_and(|e| e.match_template.is_some());
+                let has_motion = trace.features().is_some_and(|e| e.fit_motion.is_some());
                 match &located.evidence {
-                    Evidence::Template(_) => draft.exactly("ncc, cut to 0 … 1; 1 at a designation", &["ncc"]),
+                    _ if trace.predict.is_none() => draft.exactly("1, since a person designated it", &[]),
+                    Evidence::Template(_) if is_matched => draft.exactly("ncc, cut to 0 … 1", &["ncc"]),
                     Evidence::Shape(evidence) if evidence.is_judged_by_shape => draft.roughly(
                         "the share of the target's pixels that both surfaces cover",
                         &["shape_overlap"],
                     ),
-                    _ => draft.exactly(
+                    _ if has_motion => draft.exactly(
                         "1 / (1 + exp(confidence_slope · (confidence_matches − inliers)))  (D-Eq 7)",
                         &["inliers", "setting.confidence_matches", "setting.confidence_slope"],
                     ),
+                    _ => draft.roughly("0, since nothing was found", &["predicted_position"]),
                 }
             }
             _ => return None,

@@ -89,7 +89,8 @@ fn recomputed(node: &Node) -> Option<Vec<f64>> {
     let stereo = |of: &str| {
         i.one(of).powi(2) * i.one("setting.disparity_error_px") / (i.one("focal_px") * i.one("baseline_m"))
     };
-    Some(match node.value.as_str() {
+    // What a criterion judges is the same number under its own name.
+    Some(match node.value.strip_prefix("value.").unwrap_or(&node.value) {
         name if name.starts_with("gate.") => {
             let sign = if node.formula.as_deref() == Some("value − limit") { 1.0 } else { -1.0 };
             let name = name.trim_start_matches("gate.");
@@ -161,7 +162,7 @@ fn recomputed(node: &Node) -> Option<Vec<f64>> {
                 + Matrix2::from_row_slice(&i.all("match_covariance_px2"));
             vec![away.dot(&(sum.try_inverse().unwrap() * away)).sqrt()]
         }
-        "match_sigma_px" | "value.match_sigma_px" => vec![largest_sigma(&i.all("match_covariance_px2"))],
+        "match_sigma_px" => vec![largest_sigma(&i.all("match_covariance_px2"))],
         "predicted_sigma_px" => vec![largest_sigma(&i.all("predicted_covariance_px2"))],
         "sigma_m" => vec![largest_sigma(&i.all("position_covariance_m2"))],
         "feature_sigma_m" => {
@@ -170,13 +171,13 @@ fn recomputed(node: &Node) -> Option<Vec<f64>> {
         }
         "confidence" if node.inputs.is_empty() => vec![1.0],
         "confidence" if node.inputs[0].value == "ncc" => vec![i.one("ncc").clamp(0.0, 1.0)],
-        "confidence" | "value.confidence" => {
+        "confidence" => {
             let below = i.one("setting.confidence_matches") - i.one("inliers");
             vec![1.0 / (1.0 + (i.one("setting.confidence_slope") * below).exp())]
         }
         // The same number under another name.
         name if name.starts_with("limit.")
-            || ["ncc", "value.ncc", "position", "position_covariance_m2", "template_size_px"]
+            || ["ncc", "far_ncc", "position", "position_covariance_m2", "template_size_px"]
                 .contains(&name) =>
         {
             numbers(&node.inputs[0])

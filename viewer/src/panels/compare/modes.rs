@@ -76,7 +76,7 @@ pub fn over(ui: &Ui, canvas: &Canvas, state: &State, out: &mut Vec<Command>) {
         View::Marks if state.marks => {
             marks::paint_all(&Overlay::new(&canvas.painter, &canvas.transform), state);
             if let Some(words) = marks::elsewhere(state) {
-                corner(canvas, canvas.transform.rect, &words, theme::TEXT);
+                corner(canvas, canvas.transform.rect, &words, theme::text());
             }
         }
         View::Wipe => wipe(ui, canvas, state, other, out),

@@ -168,11 +168,11 @@ fn star(ui: &mut Ui, is_baseline: bool, label: &str) -> egui::Response {
         // A star is not convex: it is filled in triangles about its middle.
         for i in 0..10 {
             let triangle = vec![centre, corners[i], corners[(i + 1) % 10]];
-            ui.painter().add(egui::Shape::convex_polygon(triangle, theme::ACCENT, egui::Stroke::NONE));
+            ui.painter().add(egui::Shape::convex_polygon(triangle, theme::accent(), egui::Stroke::NONE));
         }
     }
     let is_marked = response.hovered() || response.has_focus() || is_baseline;
-    let colour = if is_marked { theme::ACCENT } else { theme::WEAK };
+    let colour = if is_marked { theme::accent() } else { theme::weak() };
     ui.painter().add(egui::Shape::closed_line(corners, egui::Stroke::new(1.5, colour)));
     response.widget_info(|| {
         egui::WidgetInfo::selected(egui::Role::CheckBox, true, is_baseline, format!("baseline: {label}"))

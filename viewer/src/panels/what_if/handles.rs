@@ -8,7 +8,6 @@ use sightline_core::trace::StepTrace;
 
 use super::{predicted, side};
 use crate::command::Command;
-use crate::overlay::{Line, Overlay};
 use crate::state::State;
 use crate::state::why::Ask;
 use crate::theme;
@@ -109,10 +108,6 @@ fn handle(ui: &mut Ui, canvas: &Canvas, id: &str, at: Pixel, colour: Color32) ->
     let mark = Rect::from_center_size(place, vec2(2.0 * reach, 2.0 * reach));
     canvas.painter.rect_filled(mark.expand(1.0), 1.0, theme::halo());
     canvas.painter.rect_filled(mark, 1.0, colour);
-    if response.dragged() {
-        let overlay = Overlay::new(&canvas.painter, &canvas.transform);
-        overlay.line(&[at, canvas.transform.to_pixel(place)], theme::ghost(), Line::Dashed);
-    }
     Some(response)
 }
 

@@ -46,6 +46,7 @@ fn a_refused_comparison_says_why() {
         status: 422,
         detail: "target 0 has no run 1".to_owned(),
         hint: None,
+        nearest_pixel: None,
     };
     state.arrived(Arrived { request, outcome: Err(problem) }, 0.0);
     assert_eq!(state.comparison_problem(), Some("target 0 has no run 1"));
