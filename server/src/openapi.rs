@@ -11,7 +11,8 @@ use utoipa_axum::routes;
 
 use crate::state::AppState;
 use crate::{
-    about, events, exports, photometry, runs, sessions, settings, steps, studies, targets, traverses,
+    about, documents, events, exports, notes, photometry, plain, runs, sessions, settings, steps, studies,
+    targets, traverses,
 };
 
 #[derive(OpenApi)]
@@ -41,6 +42,9 @@ pub fn router() -> OpenApiRouter<AppState> {
         .merge(steps::router())
         .merge(exports::router())
         .merge(studies::router())
+        .merge(notes::router())
+        .merge(documents::router())
+        .merge(plain::router())
         .merge(events::router())
 }
 

@@ -40,14 +40,26 @@ pub fn start(state: &AppState, live: &Arc<LiveSession>, target: usize, run: usiz
 /// # Errors
 /// A problem when too much is waiting already.
 pub fn restore(state: &AppState, live: &Arc<LiveSession>) -> ApiResult<()> {
-    let (state_in_job, live) = (state.clone(), Arc::clone(live));
+    live.set_restoring(true);
+    let restoring = Restoring(Arc::clone(live));
+    let state_in_job = state.clone();
     state.jobs().submit(move || {
+        let live = &restoring.0;
         let runs = live.with(|session| every_run(session));
         for (target, run) in runs {
             let flag = live.begin(target, run);
-            compute(&state_in_job, &live, target, run, &flag);
+            compute(&state_in_job, live, target, run, &flag);
         }
     })
+}
+
+/// A session whose runs are being computed again, until this goes away, also by a panic or a queue that is full.
+struct Restoring(Arc<LiveSession>);
+
+impl Drop for Restoring {
+    fn drop(&mut self) {
+        self.0.set_restoring(false);
+    }
 }
 
 /// All runs of a session, those of the target that is looked at first.

@@ -6,7 +6,9 @@
 mod api;
 mod api_security;
 mod cli;
+mod exports;
 mod imports;
+mod keeping;
 mod page;
 mod recorded_cameras;
 mod recorded_tracking;

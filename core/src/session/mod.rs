@@ -5,8 +5,12 @@
 //! fork. What is worth keeping is small: [`Session::saved`] is the list of what the person did, from which
 //! the same session comes again bit for bit, since every step is a function of its input.
 
+pub mod documents;
+pub mod exports;
+pub mod notes;
 pub mod progress;
 pub mod run;
+pub mod shell;
 pub mod track;
 pub mod view;
 pub mod wire;

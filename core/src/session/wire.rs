@@ -211,6 +211,11 @@ pub enum Event {
         /// How it stands.
         job: StudyJob,
     },
+    /// Notes of a session changed: read them again.
+    NotesChanged {
+        /// The session.
+        session: String,
+    },
 }
 
 /// A problem as the server reports it (RFC 9457).

@@ -44,6 +44,7 @@ impl State {
             Event::RunProgress { .. } => {}
             Event::RenderProgress { traverse, k, n, ready } => self.rendered(&traverse, k, n, ready),
             Event::StudyProgress { job } => self.study_went_on(job),
+            Event::NotesChanged { .. } => {}
         }
     }
 
