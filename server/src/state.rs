@@ -19,6 +19,7 @@ use crate::rendering::{Ahead, OpenTraverse};
 use crate::rerun_log::LiveStream;
 use crate::runner;
 use crate::store::{self, Store};
+use crate::study::kept::Keeper;
 use crate::study::shelf::Shelf;
 
 /// Events that a slow page may be behind before it is told to read everything again.
@@ -50,7 +51,7 @@ struct Inner {
     events: broadcast::Sender<Event>,
     jobs: Jobs,
     ahead: Arc<Ahead>,
-    store: Store,
+    store: Arc<Store>,
     notices: Vec<String>,
     designations: Lane,
     pictures: Lane,
@@ -106,7 +107,10 @@ impl AppState {
         if let Some(first) = open.first() {
             ahead.look_at(first, 0);
         }
-        let studies = Shelf::start(folders.studies.clone(), events.clone()).map_err(no_threads)?;
+        let store = Arc::new(store);
+        let keeper = Keeper::new(&store);
+        let studies = Shelf::start(folders.studies.clone(), events.clone(), keeper).map_err(no_threads)?;
+        studies.read_back(|new| crate::studies::order(&folders.studies, new))?;
         Ok(Self(Arc::new(Inner {
             hosts,
             traverses: open,

@@ -6,10 +6,10 @@ use egui_tiles::Tree;
 use crate::command::Command;
 use crate::layout::{LeftImage, Pane, Panels, overview};
 use crate::net::{Net, Request};
-use crate::panels::{bars, help, timeline};
+use crate::panels::{bars, export, help, notes, timeline};
 use crate::state::{Connection, State};
 use crate::status::Publisher;
-use crate::{keys, theme};
+use crate::{keys, picture, theme};
 
 /// Where a page begins.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,6 +28,7 @@ pub struct SightlineApp {
     left_image: LeftImage,
     publisher: Publisher,
     linked: Option<String>,
+    places: Vec<(Pane, egui::Rect)>,
 }
 
 impl SightlineApp {
@@ -38,7 +39,7 @@ impl SightlineApp {
         state.begin();
         let net = Net::new(link.origin, context.clone());
         let (left_image, publisher, linked) = (None, Publisher::default(), None);
-        Self { state, net, tree: overview(), left_image, publisher, linked }
+        Self { state, net, tree: overview(), left_image, publisher, linked, places: Vec::new() }
     }
 
     /// Takes in what arrived and asks for what is missing.
@@ -95,14 +96,19 @@ impl SightlineApp {
             bars::transport(ui, state, &mut out);
             timeline::show(ui, state, &mut out);
         });
-        let mut panels = Panels { state, out: &mut out, left_image: None, seen: Vec::new() };
+        let (seen, places) = (Vec::new(), Vec::new());
+        let mut panels = Panels { state, out: &mut out, left_image: None, seen, places };
         CentralPanel::default()
             .frame(Frame::new().fill(theme::PAGE))
             .show(ui, |ui| self.tree.ui(&mut panels, ui));
         self.left_image = panels.left_image;
         let [is_history_seen, is_studies_seen] =
             [Pane::History, Pane::Studies].map(|pane| panels.seen.contains(&pane));
+        self.places = panels.places;
         help::show(ui, state, &mut out);
+        notes::editor(ui, state, &mut out);
+        export::show(ui, state, &mut out);
+        self.state.exports.panes = self.places.iter().map(|(pane, _)| *pane).collect();
         // Every step's window is worth fetching only while the panel that shows them is on the screen.
         self.state.wants_history = is_history_seen;
         if is_studies_seen {
@@ -122,6 +128,15 @@ impl SightlineApp {
         self.send();
         // What was asked for shows in the next frame, which otherwise only comes with the next event.
         context.request_repaint();
+    }
+
+    /// Takes a picture of the panel that was asked for.
+    fn take_picture(&mut self, context: &Context) {
+        let Some(pane) = self.state.exports.picture_of.take() else { return };
+        if let Some((_, rect)) = self.places.iter().find(|(known, _)| *known == pane) {
+            let words = pane.title().to_lowercase().replace([' ', ','], "-");
+            picture::take(context, *rect, format!("sightline-{words}-step-{}", self.state.cursor.step));
+        }
     }
 
     /// Tells the page what is open, so that its link opens the same again.
@@ -149,6 +164,7 @@ impl eframe::App for SightlineApp {
         if let Some(url) = self.state.open_url.take() {
             context.open_url(egui::OpenUrl::new_tab(url));
         }
+        self.take_picture(&context);
         self.keep_link();
         self.wake_for_retries(&context);
         self.publisher.publish(&self.state, &self.left_image, context.zoom_factor());

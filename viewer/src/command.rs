@@ -6,6 +6,7 @@ use sightline_core::settings::{Changes, TrackerKind};
 use crate::shape_view::ShapeView;
 use crate::state::calculator::Calculator;
 use crate::state::studies::Order;
+use crate::state::{exports, notes};
 use crate::stretch::Stretch;
 use crate::tables::FeatureView;
 use crate::view2d::View2d;
@@ -357,12 +358,14 @@ pub enum Command {
     ToggleLayer(Layer),
     /// Shows or hides all marks.
     ToggleMarks,
-    /// Downloads the session as a Rerun recording.
-    ExportRrd,
     /// Opens the session in Rerun.
     OpenRerun,
     /// Takes a message away.
     Dismiss(u64),
     /// Connects again at once.
     Reconnect,
+    /// Something about notes.
+    Notes(notes::Ask),
+    /// Something about exports.
+    Exports(exports::Ask),
 }

@@ -3,11 +3,11 @@
 use egui::{Context, Event, Key, Modifiers};
 
 use crate::command::{Command, Go, Mode, Stage};
-use crate::state::State;
+use crate::state::{State, exports, notes};
 use crate::stretch::Stretch;
 
 /// Every key with its meaning, as the help sheet lists them.
-pub const SHEET: [(&str, &str); 16] = [
+pub const SHEET: [(&str, &str); 18] = [
     ("Right  Left", "next, previous step"),
     ("Shift+Right  Shift+Left", "ten steps on, back"),
     ("Home  End", "first, last step"),
@@ -17,6 +17,8 @@ pub const SHEET: [(&str, &str); 16] = [
     ("T", "pick a target: then click in the left image"),
     ("R", "run from this step with the changed settings"),
     ("F", "fit all images to their panels"),
+    ("M", "pin a note here"),
+    ("Ctrl+S", "export: files, pictures, commands"),
     ("H", "hide or show all marks"),
     ("I", "stretch dark images automatically, or show them as recorded"),
     ("Esc", "cancel what was begun"),
@@ -42,7 +44,12 @@ pub fn commands(context: &Context, state: &State) -> Vec<Command> {
 
 /// What a key asks for.
 pub fn command(key: Key, modifiers: Modifiers, state: &State) -> Option<Command> {
-    if modifiers.ctrl || modifiers.command || modifiers.alt {
+    let is_window_open = state.exports.is_open || state.notes.draft.is_some();
+    if modifiers.command && !modifiers.alt && key == Key::S && state.mode == Mode::Look && !is_window_open {
+        return Some(Command::Exports(exports::Ask::Open));
+    }
+    // A window that is open hears of its own keys.
+    if modifiers.ctrl || modifiers.command || modifiers.alt || is_window_open {
         return None;
     }
     let shift = modifiers.shift;
@@ -64,6 +71,7 @@ pub fn command(key: Key, modifiers: Modifiers, state: &State) -> Option<Command>
         Key::R => Command::RunFromHere(state.draft.clone()),
         Key::F => Command::FitAll,
         Key::H => Command::ToggleMarks,
+        Key::M => Command::Notes(notes::Ask::Pin),
         Key::I if state.stretch == Stretch::None => Command::SetStretch(Stretch::Auto),
         Key::I => Command::SetStretch(Stretch::None),
         Key::Escape => Command::SetMode(Mode::Look),
@@ -105,6 +113,9 @@ mod tests {
         assert_eq!(press(Key::T, &state), Some(Command::SetMode(Mode::Pick)));
         assert_eq!(press(Key::F, &state), Some(Command::FitAll));
         assert_eq!(press(Key::I, &state), Some(Command::SetStretch(Stretch::Auto)));
+        assert_eq!(press(Key::M, &state), Some(Command::Notes(notes::Ask::Pin)));
+        let save = command(Key::S, Modifiers::COMMAND, &state);
+        assert_eq!(save, Some(Command::Exports(exports::Ask::Open)));
         assert_eq!(press(Key::Escape, &state), Some(Command::SetMode(Mode::Look)));
         assert_eq!(press(Key::Questionmark, &state), Some(Command::SetMode(Mode::Help)));
         assert_eq!(press(Key::Q, &state), None);

@@ -53,11 +53,13 @@ pub enum Pane {
     Inspector,
     /// Messages.
     Messages,
+    /// Notes.
+    Notes,
 }
 
 impl Pane {
     /// All of them.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 20] = [
         Self::Targets,
         Self::Settings,
         Self::Left,
@@ -77,6 +79,7 @@ impl Pane {
         Self::Machine,
         Self::Inspector,
         Self::Messages,
+        Self::Notes,
     ];
 
     /// Its title.
@@ -101,6 +104,7 @@ impl Pane {
             Self::Machine => "State machine",
             Self::Inspector => "Inspector",
             Self::Messages => "Messages",
+            Self::Notes => "Notes",
         }
     }
 }
@@ -130,6 +134,7 @@ pub fn show_pane(ui: &mut Ui, pane: Pane, state: &State, out: &mut Vec<Command>)
         Pane::Gates => panels::gates::show(ui, state, out),
         Pane::Inspector => panels::inspector::show(ui, state, out),
         Pane::Messages => panels::messages::show(ui, state, out),
+        Pane::Notes => panels::notes::show(ui, state, out),
     }
     None
 }
@@ -149,7 +154,7 @@ pub fn overview() -> Tree<Pane> {
     let map = tabs(&mut tiles, &[Pane::Map]);
     let plots = tabs(&mut tiles, &[Pane::Plots, Pane::Tolerances]);
     let gates = tabs(&mut tiles, &[Pane::Gates, Pane::Machine]);
-    let inspector = tabs(&mut tiles, &[Pane::Inspector, Pane::Messages]);
+    let inspector = tabs(&mut tiles, &[Pane::Inspector, Pane::Messages, Pane::Notes]);
     let images = linear(&mut tiles, LinearDir::Horizontal, &[(left, 1.0), (right, 1.0)]);
     let charts = linear(&mut tiles, LinearDir::Horizontal, &[(surface, 1.0), (map, 1.1), (plots, 1.1)]);
     let middle = linear(&mut tiles, LinearDir::Vertical, &[(images, 0.53), (strip, 0.175), (charts, 0.295)]);
@@ -176,11 +181,14 @@ pub struct Panels<'a> {
     pub left_image: LeftImage,
     /// The panels that are on the screen.
     pub seen: Vec<Pane>,
+    /// Where they are on the screen, points.
+    pub places: Vec<(Pane, egui::Rect)>,
 }
 
 impl Behavior<Pane> for Panels<'_> {
     fn pane_ui(&mut self, ui: &mut Ui, _tile: TileId, pane: &mut Pane) -> UiResponse {
         self.seen.push(*pane);
+        self.places.push((*pane, ui.max_rect()));
         let margin = match pane {
             Pane::Strip | Pane::History => Margin::symmetric(theme::MARGIN, 3),
             Pane::Left | Pane::Right | Pane::Surface => Margin { left: 4, right: 4, top: 4, bottom: 0 },

@@ -11,6 +11,8 @@
 //! | `panels` | one file a panel: read-only data in, commands out |
 //! | `layout` | where the panels are |
 //! | `view2d`, `overlay`, `ellipse`, `contour` | the zoomable canvas and the marks on it |
+//! | `as_text` | any action as `curl` and as a command |
+//! | `markdown`, `picture` | notes as text with emphasis; a panel as a PNG file |
 //! | `theme` | colours, text styles and spacing, and nowhere else |
 //! | `status` | the machine-readable status for tests in a browser |
 
@@ -32,6 +34,9 @@ pub mod ellipse;
 pub mod contour;
 pub mod theme;
 pub mod status;
+pub mod as_text;
+pub mod markdown;
+pub mod picture;
 #[cfg(target_arch = "wasm32")]
 pub mod web;
 #[cfg(test)]

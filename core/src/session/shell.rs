@@ -23,6 +23,43 @@ pub fn settings_arguments(changes: &Changes) -> String {
     changes.iter().map(argument).collect()
 }
 
+/// A request over HTTP, to be written as `curl`.
+#[derive(Clone, Copy, Debug)]
+pub struct Curl<'a> {
+    /// Its method.
+    pub method: &'a str,
+    /// Its whole address.
+    pub url: &'a str,
+    /// Its JSON body.
+    pub body: Option<&'a str>,
+    /// The revision that was read, for `If-Match`.
+    pub revision: Option<u64>,
+    /// The file into which the answer goes; none for the standard output.
+    pub file: Option<&'a str>,
+}
+
+impl Curl<'_> {
+    /// The command: silent but for problems, which make it fail.
+    pub fn text(&self) -> String {
+        let mut text = "curl -fsS".to_owned();
+        if self.method != "GET" {
+            text.push_str(&format!(" -X {}", self.method));
+        }
+        if let Some(file) = self.file {
+            text.push_str(&format!(" -o {}", quoted(file)));
+        }
+        text.push_str(&format!(" {}", quoted(self.url)));
+        if let Some(revision) = self.revision {
+            text.push_str(&format!(" -H {}", quoted(&format!("If-Match: \"{revision}\""))));
+        }
+        if let Some(body) = self.body {
+            // Raw, because a body that begins with @ would be the name of a file.
+            text.push_str(&format!(" -H 'Content-Type: application/json' --data-raw {}", quoted(body)));
+        }
+        text
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

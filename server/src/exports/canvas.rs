@@ -3,7 +3,8 @@
 use std::sync::OnceLock;
 
 use ab_glyph::{Font, FontRef, PxScale, ScaleFont, point};
-use image::{ImageFormat, RgbImage};
+use image::RgbImage;
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use sightline_core::image::GrayImage;
 use tiny_skia::{
     Color, FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, Rect, Stroke, StrokeDash, Transform,
@@ -86,7 +87,7 @@ impl Canvas {
         let Some(path) = path(points, is_closed) else { return };
         let gaps = match line {
             Line::Solid => None,
-            Line::Dotted => StrokeDash::new(vec![0.5, 4.0], 0.0),
+            Line::Dotted => StrokeDash::new(vec![1.0, 5.5], 0.0),
         };
         for (width, colour) in [(WIDTH + 2.0 * HALO, [0; 3]), (WIDTH, colour)] {
             let stroke = Stroke {
@@ -173,7 +174,10 @@ impl Canvas {
         let [width, height] = self.size();
         let image = RgbImage::from_raw(width, height, self.rgb()).ok_or("size and pixels disagree")?;
         let mut bytes = std::io::Cursor::new(Vec::new());
-        image.write_to(&mut bytes, ImageFormat::Png).map_err(|error| error.to_string())?;
+        // Pictures are kept and sent: smaller is worth the time.
+        let encoder =
+            PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive);
+        image.write_with_encoder(encoder).map_err(|error| error.to_string())?;
         Ok(bytes.into_inner())
     }
 

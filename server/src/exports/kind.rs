@@ -143,7 +143,7 @@ impl Kind {
             Self::Parquet => about(9_000 + 190 * steps as u64),
             Self::Animation => about(sheet::bytes_of_animation(source, part)),
             Self::Sheet => about(sheet::bytes_of_sheet(source, part)),
-            Self::Report => about(30_000 + source.runs(part).len() as u64 * 480_000 + 160 * steps as u64),
+            Self::Report => about(25_000 + source.runs(part).len() as u64 * 530_000 + 330 * steps as u64),
             Self::Recording => about(recording_bytes(source, part)),
         }
     }

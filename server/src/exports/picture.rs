@@ -3,7 +3,7 @@
 //! | mark | meaning |
 //! |---|---|
 //! | blue square with cross, and ellipse | the window that was found, and its 3σ |
-//! | sky ring, dotted, and ellipse | the prediction and its 3σ gate |
+//! | sky ring, and dotted ellipse | the prediction and its 3σ gate |
 //! | white plus | the truth |
 //! Colours are those of Okabe and Ito, the same as in the viewer and in recordings.
 
@@ -38,7 +38,7 @@ const MEASUREMENT: Rgb = [0x2f, 0x8f, 0xd0];
 const TRUTH: Rgb = [0xff, 0xff, 0xff];
 
 /// What the marks mean, in words, for whoever cannot see or has no legend.
-pub const LEGEND: &str = "Blue square: where it was found, with its 3σ ellipse. Sky blue, dotted: the prediction and its 3σ gate. \
+pub const LEGEND: &str = "Blue square: where it was found, with its 3σ ellipse. Sky blue ring: the prediction, with its 3σ gate dotted. \
                           White plus: the truth, where it is known.";
 
 /// Width and height of a picture with its words, px.
@@ -100,7 +100,7 @@ fn marks(canvas: &mut Canvas, trace: &StepTrace, window: &Window, settings: &Set
         .as_ref()
         .and_then(|pointing| pointing.predicted_left.map(|pixel| (pixel, pointing.predicted_covariance_px2)));
     if let Some((pixel, covariance)) = predicted.filter(|_| trace.predict.is_some()) {
-        canvas.line(&ring(window, pixel, 5.0), true, PREDICTION, Line::Dotted);
+        canvas.line(&ring(window, pixel, 2.5), true, PREDICTION, Line::Solid);
         if let Some(points) = covariance.and_then(|covariance| ellipse(window, pixel, &covariance)) {
             canvas.line(&points, true, PREDICTION, Line::Dotted);
         }
@@ -111,7 +111,7 @@ fn marks(canvas: &mut Canvas, trace: &StepTrace, window: &Window, settings: &Set
         let corners = [(-half, -half), (half, -half), (half, half), (-half, half)];
         let square = corners.map(|(x, y)| window.place(pixel.x + x, pixel.y + y));
         canvas.line(&square, true, MEASUREMENT, Line::Solid);
-        for stroke in cross(window, pixel, 4.0) {
+        for stroke in cross(window, pixel, 2.0) {
             canvas.line(&stroke, false, MEASUREMENT, Line::Solid);
         }
         if let Some(points) = ellipse(window, pixel, &located.left_error.covariance_px2) {
@@ -132,7 +132,7 @@ fn foot(canvas: &mut Canvas, trace: &StepTrace, top: f32) {
     let row = trace.row();
     let first = format!("step {}  {}", row.step, state_words(trace));
     canvas.text([16.0, top + 4.0], 14.0, width as f32 - 22.0, INK, &first);
-    canvas.text([16.0, top + 22.0], 13.0, width as f32 - 22.0, INK, &numbers(&row));
+    canvas.text([16.0, top + 23.0], 11.0, width as f32 - 20.0, INK, &numbers(&row));
 }
 
 /// The state in capitals, with the count of bad updates.

@@ -185,12 +185,12 @@ fn figure_of(trace: &StepTrace, png: &[u8]) -> String {
         picture::state_words(trace).to_lowercase(),
         picture::numbers(&row)
     );
-    let reason = row.reason.map_or_else(String::new, |reason| format!(" {reason}."));
+    let reason = row.reason.map_or_else(|| "The update was accepted".to_owned(), |reason| reason);
     format!(
         "<figure><img src=\"{}\" width=\"320\" alt=\"{}\"><figcaption>{}</figcaption></figure>",
         png_address(png),
         escape(&format!("The target in the left image. {words}")),
-        escape(format!("{words}{reason}").trim())
+        escape(&format!("Step {}. {}.", row.step, reason.trim_end_matches('.')))
     )
 }
 
@@ -240,24 +240,21 @@ fn figures(steps: &[std::sync::Arc<StepTrace>], run: &NamedRun<'_>) -> ApiResult
             ],
         ),
     ];
-    let drawn = |(title, unit, lines): (&str, &str, Vec<Line>)| {
-        let lines: Vec<Line> = lines.into_iter().filter(|line| !line.points.is_empty()).collect();
-        // A limit without what it limits says nothing.
-        if lines.first().is_none_or(|line| line.is_thin) {
-            return Ok(None);
-        }
-        let chart = Chart {
-            title: title.to_owned(),
-            axes: ["step".to_owned(), unit.to_owned()],
-            lines,
-            ..Chart::default()
-        };
-        let svg = chart.svg().map_err(|why| ApiError::internal(format!("a figure: {why}")))?;
-        Ok(Some(format!(
-            "<figure role=\"img\" aria-label=\"{title} over the steps; the table of steps has the numbers\">{svg}</figure>\n"
-        )))
-    };
-    charts.into_iter().filter_map(|chart| drawn(chart).transpose()).collect()
+    charts.into_iter().filter_map(|(title, unit, lines)| drawn(title, unit, lines).transpose()).collect()
+}
+
+/// One chart; none where it has nothing to show.
+fn drawn(title: &str, unit: &str, lines: Vec<Line>) -> ApiResult<Option<String>> {
+    let lines: Vec<Line> = lines.into_iter().filter(|line| !line.points.is_empty()).collect();
+    // A limit without what it limits says nothing.
+    if lines.first().is_none_or(|line| line.is_thin) {
+        return Ok(None);
+    }
+    let axes = ["step".to_owned(), unit.to_owned()];
+    let chart = Chart { title: title.to_owned(), axes, lines, ..Chart::default() };
+    let svg = chart.svg().map_err(|why| ApiError::internal(format!("a figure: {why}")))?;
+    let label = format!("{title} over the steps; the table of steps has the numbers");
+    Ok(Some(format!("<figure role=\"img\" aria-label=\"{label}\">{svg}</figure>\n")))
 }
 
 fn step_table(steps: &[std::sync::Arc<StepTrace>]) -> String {

@@ -145,7 +145,7 @@ pub fn bytes_of_sheet(source: &Source, part: Part) -> u64 {
 }
 
 fn bytes_of_picture() -> u64 {
-    95_000
+    80_000
 }
 
 #[cfg(test)]

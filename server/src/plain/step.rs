@@ -142,6 +142,7 @@ fn pictures(source: &Source, run: &Run, trace: &StepTrace, cancel: &AtomicBool) 
         ("left", &pointing.left, located.and_then(|l| l.left_pixel)),
         ("right", &pointing.right, located.and_then(|l| l.right_pixel)),
     ];
+    html.push_str("<div class=\"pair\">\n");
     for (eye, camera, found) in eyes {
         let [width, height] = camera.size;
         let path = format!("/api/v1/traverses/{}/steps/{}/images/{eye}.png", source.open.id, trace.step);
@@ -155,6 +156,7 @@ fn pictures(source: &Source, run: &Run, trace: &StepTrace, cancel: &AtomicBool) 
             "<figure><img src=\"{path}\" width=\"{width}\" height=\"{height}\" loading=\"lazy\" alt=\"{words}\"><figcaption>{words}</figcaption></figure>"
         );
     }
+    html.push_str("</div>\n");
     Ok(html)
 }
 

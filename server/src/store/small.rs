@@ -111,6 +111,14 @@ impl Store {
         read().map_err(|error| failed(&self.disk.path, &error.to_string()))
     }
 
+    /// Takes a study out of the list.
+    ///
+    /// # Errors
+    /// [`sightline_core::error::Error::Write`]; the database is then as it was.
+    pub fn remove_study(&self, number: u64) -> Result<()> {
+        self.disk.write(|transaction| Ok(transaction.open_table(STUDIES)?.remove(number)?.is_some()))
+    }
+
     /// Writes how a study stands.
     ///
     /// # Errors

@@ -8,6 +8,8 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 
 use sightline_core::limits::SettingInfo;
 use sightline_core::session::Cursor;
+use sightline_core::session::exports::ExportEntry;
+use sightline_core::session::notes::{EditNote, NewNote, Note};
 use sightline_core::session::view::{RunView, SessionView};
 use sightline_core::session::wire::{
     Event, NewRun, NewSession, NewTarget, Problem, RerunStream, SessionEntry, TraverseEntry, TraverseView,
@@ -17,6 +19,7 @@ use sightline_core::study::row::Row;
 use sightline_core::study::wire::{NewStudy, StudyInfo, StudyJob};
 
 use self::events::Events;
+pub(crate) use self::http::{describe, revision};
 use crate::cache::{Item, Key};
 use crate::state::Connection;
 
@@ -107,6 +110,51 @@ pub enum Request {
     Item(Key),
     /// To connect to the events again at once.
     Reconnect,
+    /// The notes of a session.
+    Notes(String),
+    /// To pin a note.
+    NewNote {
+        /// The session.
+        session: String,
+        /// The note.
+        new: NewNote,
+    },
+    /// To change a note.
+    EditNote {
+        /// The session.
+        session: String,
+        /// The note's number.
+        id: u64,
+        /// The revision that was read.
+        revision: u64,
+        /// The change.
+        edit: EditNote,
+    },
+    /// To remove a note.
+    RemoveNote {
+        /// The session.
+        session: String,
+        /// The note's number.
+        id: u64,
+        /// The revision that was read.
+        revision: u64,
+    },
+    /// To bring a removed note back.
+    RestoreNote {
+        /// The session.
+        session: String,
+        /// The note's number.
+        id: u64,
+    },
+    /// What a part of a session can be exported as.
+    Exports {
+        /// The session.
+        session: String,
+        /// One target by its number.
+        target: Option<usize>,
+        /// One run of it by its number.
+        run: Option<usize>,
+    },
 }
 
 /// What the server answered.
@@ -142,6 +190,10 @@ pub enum Reply {
     StudyRows(Vec<Row>),
     /// An image, an array or a record.
     Item(Item),
+    /// The notes of a session.
+    Notes(Vec<Note>),
+    /// What can be exported.
+    Exports(Vec<ExportEntry>),
     /// It is done.
     Done,
 }

@@ -2,6 +2,7 @@
 
 pub mod bars;
 pub mod budget;
+pub mod export;
 pub mod exposure;
 pub mod features;
 pub mod gates;
@@ -15,6 +16,7 @@ pub mod machine;
 pub mod map;
 pub mod messages;
 pub mod names;
+pub mod notes;
 pub mod plots;
 pub mod settings;
 pub mod shape;

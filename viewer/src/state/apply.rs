@@ -61,13 +61,14 @@ impl State {
                 }
             }
             Command::ToggleMarks => self.marks = !self.marks,
-            Command::ExportRrd => self.export(),
             Command::OpenRerun => {
                 self.ask(Request::OpenRerun);
                 self.messages.note("Opening the session in Rerun …");
             }
             Command::Dismiss(id) => self.messages.dismiss(id),
             Command::Reconnect => self.outbox.push(Request::Reconnect),
+            Command::Notes(ask) => self.ask_of_notes(ask),
+            Command::Exports(ask) => self.ask_of_exports(ask),
         }
     }
 
@@ -150,17 +151,8 @@ impl State {
         }
     }
 
-    fn export(&mut self) {
-        match &self.session {
-            Some(session) => {
-                self.open_url = Some(format!("{}/api/v1/sessions/{}/export.rrd", self.origin, session.id));
-            }
-            None => self.messages.problem("There is no session to export yet.", None),
-        }
-    }
-
     /// Puts a request about the open session into the outbox; says so when there is none.
-    fn ask(&mut self, request: impl FnOnce(String) -> Request) -> bool {
+    pub(super) fn ask(&mut self, request: impl FnOnce(String) -> Request) -> bool {
         match self.session.as_ref().map(|session| session.id.clone()) {
             Some(session) => {
                 self.outbox.push(request(session));

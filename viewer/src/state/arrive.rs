@@ -44,7 +44,7 @@ impl State {
             Event::RunProgress { .. } => {}
             Event::RenderProgress { traverse, k, n, ready } => self.rendered(&traverse, k, n, ready),
             Event::StudyProgress { job } => self.study_went_on(job),
-            Event::NotesChanged { .. } => {}
+            Event::NotesChanged { session } => self.notes_changed(session),
         }
     }
 
@@ -56,6 +56,7 @@ impl State {
         }
         match (was, connection) {
             (Connection::Gone { .. }, Connection::Live) => {
+                self.outbox.extend(self.session.as_ref().map(|session| Request::Notes(session.id.clone())));
                 self.messages.note("The server answers again.");
                 self.catch_up();
             }
@@ -114,6 +115,11 @@ impl State {
                 self.open_url = Some(stream.viewer_url);
             }
             Reply::Done => match request {
+                // The server tells every page that notes changed.
+                Request::NewNote { .. }
+                | Request::EditNote { .. }
+                | Request::RemoveNote { .. }
+                | Request::RestoreNote { .. } => {}
                 Request::PutCursor { cursor, .. } => self.put_cursor(cursor),
                 _ => self.sync.session_stale = true,
             },
@@ -125,6 +131,12 @@ impl State {
                     self.studies.rows.insert(job, rows);
                 }
             }
+            Reply::Notes(list) => {
+                if let Request::Notes(session) = request {
+                    self.took_notes(&session, list);
+                }
+            }
+            Reply::Exports(entries) => self.exports.entries = Some(entries),
             Reply::Item(_) => {}
         }
     }
@@ -149,6 +161,13 @@ impl State {
                 }
             }
             Request::Studies => self.studies.infos = Some(Vec::new()),
+            Request::Exports { .. } => {
+                self.exports.refused = Some(problem.detail);
+                return;
+            }
+            request @ (Request::NewNote { .. } | Request::EditNote { .. } | Request::RemoveNote { .. }) => {
+                self.note_refused(&request);
+            }
             Request::Session(_) => {
                 self.sync.session_asked = None;
                 if self.session.is_none() && problem.status != 0 {
@@ -198,6 +217,7 @@ impl State {
     fn adopt(&mut self, view: SessionView, moved_meanwhile: bool) {
         let is_other = self.session.as_ref().is_none_or(|open| open.id != view.id);
         if is_other {
+            self.open_notes(&view.id);
             self.progress.clear();
             self.draft.clear();
             self.mode = Mode::Look;

@@ -7,8 +7,10 @@ mod apply;
 mod arrive;
 pub mod calculator;
 mod configurations;
+pub mod exports;
 pub mod messages;
 mod missing;
+pub mod notes;
 pub mod studies;
 pub mod tracker;
 mod wanted;
@@ -28,7 +30,9 @@ use sightline_core::trace::{ArrayName, StepRow, StepTrace};
 
 use self::calculator::Calculator;
 use self::configurations::Configurations;
+use self::exports::Exports;
 use self::messages::Messages;
+use self::notes::Notes;
 use self::studies::Studies;
 use crate::cache::{Cache, Eye, Key, Slot, StepKey};
 use crate::command::{Layer, Mode, Panel, Stage};
@@ -156,6 +160,10 @@ pub struct State {
     pub marks: bool,
     /// A page to open in a new tab.
     pub open_url: Option<String>,
+    /// What a person wrote about places of the drive.
+    pub notes: Notes,
+    /// What the session can be had as.
+    pub exports: Exports,
     outbox: Vec<Request>,
     sync: Sync,
     /// The aligned left camera of the step that was asked for last: it takes a while to compute.
@@ -212,6 +220,8 @@ impl State {
             hidden: HashSet::from(Layer::HIDDEN_AT_FIRST),
             marks: true,
             open_url: None,
+            notes: Notes::default(),
+            exports: Exports::default(),
             outbox: Vec::new(),
             sync: Sync { linked, ..Sync::default() },
             aligned: egui::mutex::Mutex::default(),

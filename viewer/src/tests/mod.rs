@@ -5,6 +5,7 @@ pub(crate) mod feature_run;
 mod features;
 pub(crate) mod fixture;
 mod history;
+mod keeping;
 mod session;
 mod shape;
 mod shape_run;
