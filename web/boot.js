@@ -10,6 +10,7 @@ const message = document.getElementById("message");
 const text = document.getElementById("message-text");
 const progress = document.getElementById("message-progress");
 const detail = document.getElementById("message-detail");
+const plain = document.getElementById("message-plain");
 
 /** A failure with a sentence for the person before the screen; `cause` is shown small below it. */
 class Failure extends Error {}
@@ -33,6 +34,14 @@ function fail(sentence, cause) {
   tell(sentence);
   detail.hidden = !cause;
   detail.textContent = cause ? String(cause) : "";
+  offerPlainPages();
+}
+
+/** Offers the pages that the server makes of every step, which need neither WebGL nor WebAssembly. */
+function offerPlainPages() {
+  const session = /(?:^#|&)session=(s[0-9]+)(?:&|$)/.exec(location.hash);
+  plain.querySelector("a").href = session ? `api/v1/sessions/${session[1]}/page` : "api/v1/page";
+  plain.hidden = false;
 }
 
 /** Refuses a browser in which the viewer cannot run, before anything large is loaded. */

@@ -69,7 +69,7 @@ fn push(line: &mut String, value: Option<impl std::fmt::Display>) {
 }
 
 /// A cell of text: in quotes where it must be, and never a formula of a spreadsheet.
-fn text_cell(text: &str) -> String {
+pub fn text_cell(text: &str) -> String {
     let text =
         if text.starts_with(['=', '+', '-', '@', '\t', '\r']) { format!("'{text}") } else { text.to_owned() };
     if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text }

@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex};
 
 use sightline_core::error::Result;
 use sightline_core::session::Session;
+use sightline_core::session::notes::Notes;
 
 use crate::jobs::lock;
 use crate::rendering::OpenTraverse;
@@ -26,10 +27,12 @@ pub struct LiveSession {
     /// What it works on.
     pub traverse: Arc<OpenTraverse>,
     session: Mutex<Session>,
+    notes: Mutex<Notes>,
     /// The runs, by target and number, that are computed now or wait for it.
     computing: Mutex<HashMap<(usize, usize), CancelFlag>>,
     saving: Mutex<()>,
     is_awake: AtomicBool,
+    is_restoring: AtomicBool,
 }
 
 impl LiveSession {
@@ -39,9 +42,11 @@ impl LiveSession {
             id: session.id.clone(),
             traverse,
             session: Mutex::new(session),
+            notes: Mutex::default(),
             computing: Mutex::default(),
             saving: Mutex::default(),
             is_awake: AtomicBool::new(is_awake),
+            is_restoring: AtomicBool::new(false),
         }
     }
 
@@ -53,16 +58,41 @@ impl LiveSession {
     /// Writes what the person did. The last write holds the last state, whoever comes first.
     ///
     /// # Errors
-    /// When the file cannot be written.
+    /// When the database cannot be written.
     pub fn save(&self, store: &Store) -> Result<()> {
         let _saving = lock(&self.saving);
         let saved = self.with(|session| session.saved());
         store.save(&saved)
     }
 
+    /// Looks at or changes the notes; keep it short. Where both are needed, the session comes first.
+    pub fn with_notes<T>(&self, work: impl FnOnce(&mut Notes) -> T) -> T {
+        work(&mut lock(&self.notes))
+    }
+
+    /// Writes the notes. The last write holds the last state, whoever comes first.
+    ///
+    /// # Errors
+    /// When the database cannot be written.
+    pub fn save_notes(&self, store: &Store) -> Result<()> {
+        let _saving = lock(&self.saving);
+        let notes = self.with_notes(|notes| notes.clone());
+        store.save_notes(&self.id, &notes)
+    }
+
     /// Whether this is the first time that somebody asks for it.
     pub fn wake(&self) -> bool {
         !self.is_awake.swap(true, Ordering::Relaxed)
+    }
+
+    /// Says whether the runs of a session that was read back are being computed again.
+    pub fn set_restoring(&self, is_restoring: bool) {
+        self.is_restoring.store(is_restoring, Ordering::Release);
+    }
+
+    /// Whether they are.
+    pub fn is_restoring(&self) -> bool {
+        self.is_restoring.load(Ordering::Acquire)
     }
 
     /// Lets the next one who asks for it be the first again.

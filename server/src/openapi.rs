@@ -11,8 +11,8 @@ use utoipa_axum::routes;
 
 use crate::state::AppState;
 use crate::{
-    about, compare, events, exports, photometry, questions, removal, runs, sessions, settings, steps,
-    studies, targets, trackability, traverses, what_if, why,
+    about, compare, documents, events, exports, notes, photometry, plain, questions, removal, runs, sessions,
+    settings, steps, studies, targets, trackability, traverses, what_if, why,
 };
 
 #[derive(OpenApi)]
@@ -43,6 +43,9 @@ pub fn router() -> OpenApiRouter<AppState> {
         .merge(steps::router())
         .merge(exports::router())
         .merge(studies::router())
+        .merge(notes::router())
+        .merge(documents::router())
+        .merge(plain::router())
         .merge(events::router())
         .merge(trackability::router())
         .merge(what_if::router())

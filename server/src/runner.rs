@@ -40,7 +40,9 @@ pub fn start(state: &AppState, live: &Arc<LiveSession>, target: usize, run: usiz
 /// # Errors
 /// A problem when too much is waiting already.
 pub fn restore(state: &AppState, live: &Arc<LiveSession>) -> ApiResult<()> {
-    go_on(state, live, every_run)
+    live.set_restoring(true);
+    let restoring = Restoring(Arc::clone(live));
+    go_on(state, live, Some(restoring), every_run)
 }
 
 /// Computes what is missing of a target's runs in the background, parents before their forks; what goes on already is left
@@ -49,7 +51,7 @@ pub fn restore(state: &AppState, live: &Arc<LiveSession>) -> ApiResult<()> {
 /// # Errors
 /// A problem when too much is waiting already.
 pub fn go_on_with(state: &AppState, live: &Arc<LiveSession>, target: usize) -> ApiResult<()> {
-    go_on(state, live, move |session| {
+    go_on(state, live, None, move |session| {
         every_run(session).into_iter().filter(|(own, _)| *own == target).collect()
     })
 }
@@ -57,10 +59,12 @@ pub fn go_on_with(state: &AppState, live: &Arc<LiveSession>, target: usize) -> A
 fn go_on(
     state: &AppState,
     live: &Arc<LiveSession>,
+    restoring: Option<Restoring>,
     which: impl FnOnce(&Session) -> Vec<(usize, usize)> + Send + 'static,
 ) -> ApiResult<()> {
     let (state_in_job, live) = (state.clone(), Arc::clone(live));
     state.jobs().submit(move || {
+        let _until_the_end = restoring;
         let runs = live.with(|session| which(session));
         for (target, run) in runs {
             if !live.is_computing(target, run) {
@@ -69,6 +73,15 @@ fn go_on(
             }
         }
     })
+}
+
+/// A session whose runs are being computed again, until this goes away, also by a panic or a queue that is full.
+struct Restoring(Arc<LiveSession>);
+
+impl Drop for Restoring {
+    fn drop(&mut self) {
+        self.0.set_restoring(false);
+    }
 }
 
 /// All runs of a session, those of the target that is looked at first.

@@ -73,7 +73,7 @@ async fn move_cursor(
         })?;
         if before != cursor {
             state.look_at(&live.traverse, cursor.step);
-            state.changed(&live)?;
+            state.cursor_moved(&live, cursor);
         }
         Ok(Json(cursor))
     })

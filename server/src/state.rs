@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex};
 
 use sha2::{Digest, Sha256};
 use sightline_core::error::{Error, Result};
-use sightline_core::session::Session;
 use sightline_core::session::wire::Event;
+use sightline_core::session::{Cursor, Session};
 use sightline_core::traverse::Traverse;
 use tokio::sync::broadcast;
 
@@ -20,6 +20,7 @@ use crate::rendering::{Ahead, OpenTraverse};
 use crate::rerun_log::LiveStream;
 use crate::runner;
 use crate::store::{self, Store};
+use crate::study::kept::Keeper;
 use crate::study::shelf::Shelf;
 use crate::trackability::Maps;
 
@@ -52,7 +53,7 @@ struct Inner {
     events: broadcast::Sender<Event>,
     jobs: Jobs,
     ahead: Arc<Ahead>,
-    store: Store,
+    store: Arc<Store>,
     notices: Vec<String>,
     designations: Lane,
     pictures: Lane,
@@ -111,7 +112,10 @@ impl AppState {
         if let Some(first) = open.first() {
             ahead.look_at(first, 0);
         }
-        let studies = Shelf::start(folders.studies.clone(), events.clone()).map_err(no_threads)?;
+        let store = Arc::new(store);
+        let keeper = Keeper::new(&store);
+        let studies = Shelf::start(folders.studies.clone(), events.clone(), keeper).map_err(no_threads)?;
+        studies.read_back(|new| crate::studies::order(&folders.studies, new))?;
         Ok(Self(Arc::new(Inner {
             hosts,
             traverses: open,
@@ -183,7 +187,7 @@ impl AppState {
         let mut sessions = lock(&self.0.sessions);
         if sessions.by_number.len() >= SESSION_LIMIT {
             let detail = format!("There are {SESSION_LIMIT} sessions already.");
-            return Err(ApiError::conflict(detail).hint("Remove files of old ones from the data folder."));
+            return Err(ApiError::conflict(detail).hint("Begin with another data folder: --data-dir."));
         }
         sessions.last_number += 1;
         let number = sessions.last_number;
@@ -200,6 +204,17 @@ impl AppState {
     pub fn changed(&self, live: &LiveSession) -> ApiResult<()> {
         self.tell(Event::SessionChanged { session: live.id.clone() });
         Ok(live.save(&self.0.store)?)
+    }
+
+    /// Remembers a cursor that moved, which is on disk a moment later, and tells every page.
+    pub fn cursor_moved(&self, live: &LiveSession, cursor: Cursor) {
+        self.0.store.move_cursor(&live.id, cursor);
+        self.tell(Event::SessionChanged { session: live.id.clone() });
+    }
+
+    /// What survives the server.
+    pub fn store(&self) -> &Store {
+        &self.0.store
     }
 
     /// Renders the stops of `traverse` from `from` on before all others.
@@ -273,7 +288,10 @@ impl AppState {
 }
 
 /// The name of a traverse in paths: readable, and another one when its index is another.
-fn name_of(traverse: &Traverse) -> Result<String> {
+///
+/// # Errors
+/// An index that cannot be written as JSON.
+pub fn name_of(traverse: &Traverse) -> Result<String> {
     let index = serde_json::to_vec(traverse.index()).map_err(|error| Error::Request(error.to_string()))?;
     Ok(format!("{}-{}", slug(&traverse.index().name), &hash(&index)[..6]))
 }
@@ -293,15 +311,16 @@ pub fn hash(bytes: &[u8]) -> String {
 
 /// The sessions on disk whose traverses are open; the others stay where they are.
 fn read_back(store: &Store, traverses: &[Arc<OpenTraverse>]) -> Result<(Sessions, Vec<String>)> {
-    let found = store.load()?;
+    let mut found = store.load()?;
     let mut sessions = Sessions { last_number: found.last_number, ..Sessions::default() };
-    let mut notices = found.messages;
-    for saved in found.sessions {
+    let mut notices = std::mem::take(&mut found.messages);
+    for saved in std::mem::take(&mut found.sessions) {
         let traverse = traverses.iter().find(|open| open.id == saved.traverse);
         let (Some(traverse), Some(number)) = (traverse, store::number_of(&saved.id)) else { continue };
         match Session::restored(&saved, traverse.traverse.stop_count()) {
             Ok(session) => {
                 let live = LiveSession::new(session, Arc::clone(traverse), false);
+                live.with_notes(|notes| *notes = found.notes.remove(&number).unwrap_or_default());
                 sessions.by_number.insert(number, Arc::new(live));
             }
             Err(error) => notices.push(store.set_aside(&saved.id, &error.to_string())),

@@ -1,5 +1,7 @@
 //! `studies`: the validation experiments as jobs, with their progress, their rows and their report.
 
+use std::path::Path;
+
 use axum::Json;
 use axum::extract::State;
 use axum::http::{StatusCode, header};
@@ -11,7 +13,7 @@ use sightline_core::study::wire::{NewStudy, StudyInfo, StudyJob, StudyRows};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
-use crate::extract::{Body, Path};
+use crate::extract::{self, Body};
 use crate::jobs::blocking;
 use crate::problem::{ApiError, ApiResult};
 use crate::state::{AppState, hash};
@@ -60,8 +62,8 @@ async fn list(State(state): State<AppState>) -> Json<Vec<StudyJob>> {
     responses((status = 202, body = StudyJob), ApiError))]
 async fn start(State(state): State<AppState>, Body(new): Body<NewStudy>) -> ApiResult<Response> {
     let job = blocking(move || {
-        let order = order(&state, &new)?;
-        state.studies().add(order)
+        let order = order(state.studies().folder(), &new)?;
+        state.studies().add(new, order)
     })
     .await?;
     let location = [(header::LOCATION, format!("/api/v1/studies/jobs/{}", job.id))];
@@ -71,14 +73,20 @@ async fn start(State(state): State<AppState>, Body(new): Body<NewStudy>) -> ApiR
 /// How a study stands
 #[utoipa::path(get, operation_id = "show_study_job", path = "/studies/jobs/{job}", tag = "studies",
     params(("job" = String, Path)), responses((status = 200, body = StudyJob), ApiError))]
-async fn show(State(state): State<AppState>, Path(job): Path<String>) -> ApiResult<Json<StudyJob>> {
+async fn show(
+    State(state): State<AppState>,
+    extract::Path(job): extract::Path<String>,
+) -> ApiResult<Json<StudyJob>> {
     Ok(Json(state.studies().work(&job)?.view()))
 }
 
 /// Stops a study; what it found is kept
 #[utoipa::path(post, operation_id = "cancel_study", path = "/studies/jobs/{job}/cancel", tag = "studies",
     params(("job" = String, Path)), responses((status = 200, body = StudyJob), ApiError))]
-async fn cancel(State(state): State<AppState>, Path(job): Path<String>) -> ApiResult<Json<StudyJob>> {
+async fn cancel(
+    State(state): State<AppState>,
+    extract::Path(job): extract::Path<String>,
+) -> ApiResult<Json<StudyJob>> {
     Ok(Json(state.studies().cancel(&job)?))
 }
 
@@ -87,7 +95,7 @@ async fn cancel(State(state): State<AppState>, Path(job): Path<String>) -> ApiRe
     params(("job" = String, Path)), responses((status = 202, body = StudyJob), ApiError))]
 async fn resume(
     State(state): State<AppState>,
-    Path(job): Path<String>,
+    extract::Path(job): extract::Path<String>,
 ) -> ApiResult<(StatusCode, Json<StudyJob>)> {
     Ok((StatusCode::ACCEPTED, Json(state.studies().resume(&job)?)))
 }
@@ -95,14 +103,20 @@ async fn resume(
 /// The table of a study, as far as it is
 #[utoipa::path(get, operation_id = "study_rows", path = "/studies/jobs/{job}/rows", tag = "studies",
     params(("job" = String, Path)), responses((status = 200, body = StudyRows), ApiError))]
-async fn rows(State(state): State<AppState>, Path(job): Path<String>) -> ApiResult<Json<StudyRows>> {
+async fn rows(
+    State(state): State<AppState>,
+    extract::Path(job): extract::Path<String>,
+) -> ApiResult<Json<StudyRows>> {
     Ok(Json(StudyRows { rows: state.studies().work(&job)?.rows() }))
 }
 
 /// The report of a study that is done, a page that needs no other
 #[utoipa::path(get, operation_id = "study_report", path = "/studies/jobs/{job}/report.html", tag = "studies",
     params(("job" = String, Path)), responses((status = 200, content_type = "text/html", body = String), ApiError))]
-async fn report(State(state): State<AppState>, Path(job): Path<String>) -> ApiResult<Response> {
+async fn report(
+    State(state): State<AppState>,
+    extract::Path(job): extract::Path<String>,
+) -> ApiResult<Response> {
     let report = state.studies().work(&job)?.report();
     let report =
         report.ok_or_else(|| ApiError::conflict("The study is not done, so that it has no report."))?;
@@ -127,8 +141,11 @@ fn info(study: &Study) -> Result<StudyInfo, Error> {
     })
 }
 
-/// Checks what was asked for.
-fn order(state: &AppState, new: &NewStudy) -> ApiResult<Order> {
+/// What is to be done for a study that is asked for, with its worlds below `folder`.
+///
+/// # Errors
+/// A problem that names what is wrong with it.
+pub fn order(folder: &Path, new: &NewStudy) -> ApiResult<Order> {
     let plan = Plan::new(&new.study, &new.configurations, &new.grid)?;
     let seeds = seeds(new)?;
     let scenario = match &new.scenario {
@@ -140,7 +157,7 @@ fn order(state: &AppState, new: &NewStudy) -> ApiResult<Order> {
         None => None,
     };
     let command = command(new, &plan, &seeds);
-    Ok(Order { plan, seeds, scenario, folder: state.studies().folder().clone(), command })
+    Ok(Order { plan, seeds, scenario, folder: folder.to_owned(), command })
 }
 
 fn seeds(new: &NewStudy) -> ApiResult<Seeds> {

@@ -237,9 +237,10 @@ async fn a_cancelled_run_gains_no_step_until_it_is_resumed() {
     assert_eq!(server.get(&path).await.expect(200), cancelled);
     server.post(&format!("{path}/cancel"), &json!({})).await.problem(409, "conflict");
 
-    let restarted = TestServer::open(drive.path(), folder.path());
+    drop(server);
+    let server = TestServer::open(drive.path(), folder.path());
     let rows = cancelled["rows"].as_array().unwrap().len();
-    assert_eq!(restarted.ended(&session, 0, 0).await["rows"].as_array().unwrap().len(), rows);
+    assert_eq!(server.ended(&session, 0, 0).await["rows"].as_array().unwrap().len(), rows);
 
     server.post(&format!("{path}/resume"), &json!({})).await.expect(202);
     let run = server.ended(&session, 0, 0).await;

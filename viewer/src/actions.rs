@@ -8,6 +8,7 @@ use crate::layout::Pane;
 use crate::layout::presets::Preset;
 use crate::layout::workspace::LayoutCommand;
 use crate::panels::digits;
+use crate::state::exports;
 use crate::state::why::Ask;
 use crate::state::{State, events, run_letter};
 use crate::theme::Looks;
@@ -98,7 +99,8 @@ fn works(state: &State) -> Vec<Action> {
             Command::RunFromHere(state.draft.clone()),
         ),
         action("Take the changed settings back", "", Command::ClearDraft),
-        action("Export the session as a Rerun recording (.rrd)", "", Command::ExportRrd),
+        action("Export: recording, tables, report, pictures", "Ctrl+S", Command::Exports(exports::Ask::Open)),
+        action("Open the plain page of this step", "", Command::Exports(exports::Ask::PlainPage)),
         action("Open the session in Rerun", "", Command::OpenRerun),
         action("Copy a link to this place", "Y", Command::CopyLink),
         action("Tour: six bubbles from a lost target to a saved one", "", Command::Tour(Turn::Begin)),

@@ -7,10 +7,10 @@ use crate::layout::workspace::{LayoutCommand, Workspace};
 use crate::layout::{LeftImage, Pane, Panels, region};
 use crate::link::Fragment;
 use crate::net::{Net, Request};
-use crate::panels::{bars, help, palette, timeline, tour as bubbles};
+use crate::panels::{bars, export, help, notes, palette, timeline, tour as bubbles};
 use crate::state::{Connection, State};
 use crate::status::Publisher;
-use crate::{keep, keys, theme, tour};
+use crate::{keep, keys, picture, theme, tour};
 
 /// Where a page begins.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,6 +32,8 @@ pub struct SightlineApp {
     linked: Fragment,
     kept: keep::Kept,
     is_tour_kept: bool,
+    /// Where the panels are on the screen, points.
+    places: Vec<(Pane, egui::Rect)>,
 }
 
 impl SightlineApp {
@@ -51,8 +53,8 @@ impl SightlineApp {
         state.tour.is_seen = tour::was_seen();
         let is_tour_kept = state.tour.is_seen;
         let net = Net::new(link.origin, context.clone());
-        let (left_image, publisher) = (None, Publisher::default());
-        Self { state, net, workspace, left_image, publisher, linked, kept, is_tour_kept }
+        let (left_image, publisher, places) = (None, Publisher::default(), Vec::new());
+        Self { state, net, workspace, left_image, publisher, linked, kept, is_tour_kept, places }
     }
 
     /// Takes in what arrived and asks for what is missing.
@@ -126,9 +128,14 @@ impl SightlineApp {
         let [is_history_seen, is_studies_seen, is_why_seen] =
             [Pane::History, Pane::Studies, Pane::Why].map(|pane| panels.seen.contains(&pane));
         let wants_metrics = [Pane::Runs, Pane::Uncertainty].iter().any(|pane| panels.seen.contains(pane));
+        let places = panels.places;
         help::show(ui, state, &mut out);
+        notes::editor(ui, state, &mut out);
+        export::show(ui, state, &mut out);
         palette::show(ui, state, &mut out);
         bubbles::show(ui, state, &mut out);
+        self.places = places;
+        self.state.exports.panes = self.places.iter().map(|(pane, _)| *pane).collect();
         self.state.compare.wants_metrics = wants_metrics;
         // Every step's window is worth fetching only while the panel that shows them is on the screen.
         self.state.wants_history = is_history_seen;
@@ -161,6 +168,15 @@ impl SightlineApp {
         self.send();
         // What was asked for shows in the next frame, which otherwise only comes with the next event.
         context.request_repaint();
+    }
+
+    /// Takes a picture of the panel that was asked for.
+    fn take_picture(&mut self, context: &Context) {
+        let Some(pane) = self.state.exports.picture_of.take() else { return };
+        if let Some((_, rect)) = self.places.iter().find(|(known, _)| *known == pane) {
+            let words = pane.title().to_lowercase().replace([' ', ','], "-");
+            picture::take(context, *rect, format!("sightline-{words}-step-{}", self.state.cursor.step));
+        }
     }
 
     /// What the page's address should say.
@@ -223,6 +239,7 @@ impl eframe::App for SightlineApp {
         if let Some(url) = self.state.open_url.take() {
             context.open_url(egui::OpenUrl::new_tab(url));
         }
+        self.take_picture(&context);
         self.keep_link();
         self.keep_tour();
         self.kept.write(&context, self.state.looks, || self.workspace.kept());

@@ -9,6 +9,7 @@ use crate::shape_view::ShapeView;
 use crate::state::calculator::Calculator;
 use crate::state::studies::Order;
 use crate::state::why::Ask;
+use crate::state::{exports, notes};
 use crate::stretch::Stretch;
 use crate::tables::FeatureView;
 use crate::theme::Looks;
@@ -399,8 +400,6 @@ pub enum Command {
     ToggleLayer(Layer),
     /// Shows or hides all marks.
     ToggleMarks,
-    /// Downloads the session as a Rerun recording.
-    ExportRrd,
     /// Opens the session in Rerun.
     OpenRerun,
     /// Takes a message away.
@@ -421,4 +420,8 @@ pub enum Command {
     Tour(Turn),
     /// Asks why a step came out as it did, tries a change, or takes a deed back.
     Why(Ask),
+    /// Something about notes.
+    Notes(notes::Ask),
+    /// Something about exports.
+    Exports(exports::Ask),
 }

@@ -6,13 +6,13 @@ use crate::aim::Aim;
 use crate::command::{Command, Go, Mode, Stage};
 use crate::layout::presets::Preset;
 use crate::layout::workspace::LayoutCommand;
-use crate::state::State;
 use crate::state::why::Ask;
+use crate::state::{State, exports, notes};
 use crate::stretch::Stretch;
 use crate::{actions, compare, tour};
 
 /// Every key with its meaning, as the help sheet lists them.
-pub const SHEET: [(&str, &str); 26] = [
+pub const SHEET: [(&str, &str); 28] = [
     ("Right  Left", "next, previous step"),
     ("Shift+Right  Shift+Left", "ten steps on, back"),
     ("Home  End", "first, last step"),
@@ -27,6 +27,8 @@ pub const SHEET: [(&str, &str); 26] = [
     ("C", "what would have saved this step"),
     ("Ctrl+Z  Ctrl+Y", "take the last deed back, do it again"),
     ("F", "fit all images to their panels"),
+    ("M", "pin a note here"),
+    ("Ctrl+S", "export: files, pictures, commands"),
     ("H", "hide or show all marks"),
     ("I", "stretch dark images automatically, or show them as recorded"),
     ("Esc", "cancel what was begun"),
@@ -120,15 +122,20 @@ fn preset_of(key: Key) -> Option<Preset> {
 
 /// What a key asks for.
 pub fn command(key: Key, modifiers: Modifiers, state: &State) -> Option<Command> {
+    let is_window_open = state.exports.is_open || state.notes.draft.is_some();
     if (modifiers.ctrl || modifiers.command) && !modifiers.alt {
         return match (key, modifiers.shift) {
+            (Key::S, false) if state.mode == Mode::Look && !is_window_open => {
+                Some(Command::Exports(exports::Ask::Open))
+            }
             (Key::K, false) => Some(actions::palette()),
             (Key::Z, false) => Some(Command::Why(Ask::Undo)),
             (Key::Y, false) | (Key::Z, true) => Some(Command::Why(Ask::Redo)),
             _ => None,
         };
     }
-    if modifiers.alt {
+    // A window that is open hears of its own keys.
+    if modifiers.alt || is_window_open {
         return None;
     }
     let shift = modifiers.shift;
@@ -163,6 +170,7 @@ pub fn command(key: Key, modifiers: Modifiers, state: &State) -> Option<Command>
         Key::R => Command::RunFromHere(state.draft.clone()),
         Key::F => Command::FitAll,
         Key::H => Command::ToggleMarks,
+        Key::M => Command::Notes(notes::Ask::Pin),
         Key::I if state.stretch == Stretch::None => Command::SetStretch(Stretch::Auto),
         Key::I => Command::SetStretch(Stretch::None),
         Key::Q => Command::Layout(LayoutCommand::Panel(if shift { -1 } else { 1 })),
@@ -207,6 +215,9 @@ mod tests {
         assert_eq!(press(Key::T, &state), Some(Command::SetMode(Mode::Pick)));
         assert_eq!(press(Key::F, &state), Some(Command::FitAll));
         assert_eq!(press(Key::I, &state), Some(Command::SetStretch(Stretch::Auto)));
+        assert_eq!(press(Key::M, &state), Some(Command::Notes(notes::Ask::Pin)));
+        let save = command(Key::S, Modifiers::COMMAND, &state);
+        assert_eq!(save, Some(Command::Exports(exports::Ask::Open)));
         assert_eq!(press(Key::Escape, &state), Some(Command::SetMode(Mode::Look)));
         assert_eq!(press(Key::Questionmark, &state), Some(Command::SetMode(Mode::Help)));
         assert_eq!(press(Key::Q, &state), Some(Command::Layout(LayoutCommand::Panel(1))));

@@ -12,6 +12,8 @@
 //! | `panels` | one file a panel: read-only data in, commands out |
 //! | `layout` | where the panels are |
 //! | `view2d`, `overlay`, `ellipse`, `contour` | the zoomable canvas and the marks on it |
+//! | `as_text` | any action as `curl` and as a command |
+//! | `markdown`, `picture` | notes as text with emphasis; a panel as a PNG file |
 //! | `theme` | colours, text styles and spacing, and nowhere else |
 //! | `access` | the page for a screen reader: egui's tree as elements of the document |
 //! | `aim` | choosing a place in the left image |
@@ -43,6 +45,9 @@ pub mod access;
 pub mod status;
 pub mod aim;
 pub mod tour;
+pub mod as_text;
+pub mod markdown;
+pub mod picture;
 #[cfg(target_arch = "wasm32")]
 pub mod web;
 #[cfg(test)]

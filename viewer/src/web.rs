@@ -100,6 +100,26 @@ pub(crate) fn watch_address(context: &egui::Context) {
     changed.forget();
 }
 
+/// Offers bytes to the person as a file of that name.
+pub(crate) fn download(name: &str, media_type: &str, bytes: &[u8]) {
+    // Where the browser refuses, nothing is saved, which it says itself.
+    let _ = try_download(name, media_type, bytes);
+}
+
+fn try_download(name: &str, media_type: &str, bytes: &[u8]) -> Result<(), JsValue> {
+    let document = web_sys::window().and_then(|window| window.document()).ok_or(JsValue::NULL)?;
+    let parts = js_sys::Array::of1(&js_sys::Uint8Array::from(bytes));
+    let about = web_sys::BlobPropertyBag::new();
+    about.set_type(media_type);
+    let blob = web_sys::Blob::new_with_u8_array_sequence_and_options(&parts, &about)?;
+    let url = web_sys::Url::create_object_url_with_blob(&blob)?;
+    let anchor: web_sys::HtmlAnchorElement = document.create_element("a")?.dyn_into()?;
+    anchor.set_href(&url);
+    anchor.set_download(name);
+    anchor.click();
+    web_sys::Url::revoke_object_url(&url)
+}
+
 /// Sets an attribute of the canvas.
 pub(crate) fn publish(name: &str, value: &str) {
     let document = web_sys::window().and_then(|window| window.document());

@@ -6,9 +6,13 @@
 //! the same session comes again bit for bit, since every step is a function of its input.
 
 pub mod counterfactual;
+pub mod documents;
+pub mod exports;
+pub mod notes;
 pub mod progress;
 mod removal;
 pub mod run;
+pub mod shell;
 pub mod track;
 pub mod view;
 pub mod what_if;

@@ -244,6 +244,11 @@ pub enum Event {
         /// Whether it has ended.
         ended: bool,
     },
+    /// Notes of a session changed: read them again.
+    NotesChanged {
+        /// The session.
+        session: String,
+    },
 }
 
 /// A problem as the server reports it (RFC 9457).

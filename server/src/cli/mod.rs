@@ -11,6 +11,7 @@ pub mod info;
 pub mod track;
 pub mod presets;
 pub mod study;
+pub mod export;
 mod real_motion;
 mod registration;
 mod realism;
@@ -57,6 +58,8 @@ enum Command {
     Track(track::Track),
     /// Run a validation experiment: many targets in many worlds against the truth.
     Study(study::Study),
+    /// Write a session as a file: a recording, tables, pictures, a report.
+    Export(export::Export),
 }
 
 /// Runs the command that the arguments name.
@@ -72,6 +75,7 @@ pub fn run() -> ExitCode {
         Command::Presets(command) => command.run(),
         Command::Track(command) => command.run(),
         Command::Study(command) => command.run(),
+        Command::Export(command) => command.run(),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

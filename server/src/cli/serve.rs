@@ -74,13 +74,32 @@ impl Serve {
 async fn serve(listener: TcpListener, address: SocketAddr, state: AppState) -> Result<()> {
     let failed = |error: std::io::Error| Error::Request(format!("the server stopped: {error}"));
     let listener = tokio::net::TcpListener::from_std(listener).map_err(failed)?;
-    let app = crate::app(state);
+    let app = crate::app(state.clone());
     say::line(&format!("Sightline is ready: {}", url(address)))?;
-    tokio::select! {
+    let ended = tokio::select! {
         ended = async { axum::serve(listener, app).await } => ended.map_err(failed),
-        // Sessions are on disk already, so there is nothing to wait for.
-        _ = tokio::signal::ctrl_c() => Ok(()),
+        () = told_to_end() => Ok(()),
+    };
+    // Everything but a cursor that has just moved is on disk already.
+    state.store().flush()?;
+    ended
+}
+
+/// Waits until a person or the system asks the program to end.
+async fn told_to_end() {
+    #[cfg(unix)]
+    {
+        use tokio::signal::unix::{SignalKind, signal};
+        if let Ok(mut terminate) = signal(SignalKind::terminate()) {
+            tokio::select! {
+                _ = tokio::signal::ctrl_c() => {}
+                _ = terminate.recv() => {}
+            }
+            return;
+        }
     }
+    // Without a way to hear of it the program ends at once, as any other does.
+    let _ = tokio::signal::ctrl_c().await;
 }
 
 /// Takes the port before anything long begins.

@@ -288,7 +288,7 @@ fn numbers(text: &str) -> Option<Vec<f64>> {
 }
 
 /// Reads `x,y`.
-fn pixel(text: &str) -> Result<Pixel, String> {
+pub(super) fn pixel(text: &str) -> Result<Pixel, String> {
     match numbers(text).as_deref() {
         Some([x, y]) => Ok(Pixel::new(*x, *y)),
         _ => Err("write it as x,y in pixels, for example 512.5,300".to_owned()),

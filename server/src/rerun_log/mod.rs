@@ -130,6 +130,7 @@ mod live;
 mod map;
 mod page;
 mod palette;
+mod properties;
 mod recorder;
 mod scores;
 mod shape;

@@ -13,7 +13,7 @@ use sightline_core::trace::StepTrace;
 use super::blueprint::Lane;
 use super::map::Outlook;
 use super::step::Step;
-use super::{Logged, blueprint, log_step, log_stop, map, root, scores, states};
+use super::{Logged, blueprint, log_step, log_stop, map, properties, root, scores, states};
 
 /// One run: which it is, and its steps.
 #[derive(Clone, Copy, Debug)]
@@ -89,6 +89,7 @@ impl Recorder {
             return Ok(());
         }
         self.stream.send_recording_name(name)?;
+        properties::send(&self.stream, name)?;
         let about = format!("# {name}\n{} stops. Frames: site x north, y east, z down.", stops.stop_count());
         self.stream.log_static("/traverse", &TextDocument::from_markdown(about))?;
         map::log_site_axes(&self.stream)?;

@@ -17,6 +17,7 @@ pub mod figure;
 pub mod step_figure;
 pub mod drawn;
 pub mod report;
+pub mod kept;
 pub mod shelf;
 
 pub use conduct::{Order, Outcome, Progress, Seeds, carry_out};

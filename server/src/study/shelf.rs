@@ -1,7 +1,7 @@
 //! The studies that were started over REST: one is carried out at a time, the others wait.
 //!
-//! The list lives as long as the server; what a study found lives in its folder, from which the same study, started
-//! again, goes on.
+//! The list is kept with the sessions; what a study found lives in its folder, too, from which the same study, started
+//! again, goes on. One that the end of the server stopped is found as cancelled.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,9 +10,10 @@ use std::sync::{Arc, Mutex};
 use sightline_core::error::Error;
 use sightline_core::session::wire::Event;
 use sightline_core::study::row::Row;
-use sightline_core::study::wire::{StudyJob, StudyState};
+use sightline_core::study::wire::{NewStudy, StudyJob, StudyState};
 use tokio::sync::broadcast;
 
+use super::kept::{Keeper, KeptStudy};
 use super::{Order, Progress, carry_out};
 use crate::jobs::{Jobs, lock};
 use crate::problem::{ApiError, ApiResult};
@@ -27,12 +28,16 @@ pub struct Shelf {
     folder: PathBuf,
     events: broadcast::Sender<Event>,
     jobs: Jobs,
+    keeper: Keeper,
     works: Mutex<Vec<Arc<Work>>>,
 }
 
 /// A study that was started.
 pub struct Work {
+    number: u64,
+    new: NewStudy,
     order: Order,
+    keeper: Keeper,
     events: broadcast::Sender<Event>,
     inside: Mutex<Inside>,
 }
@@ -45,12 +50,32 @@ struct Inside {
 }
 
 impl Shelf {
-    /// An empty shelf whose studies are kept in `folder`.
+    /// A shelf whose studies work in `folder`; its list is read back by [`Shelf::read_back`].
     ///
     /// # Errors
     /// When the system starts no thread.
-    pub fn start(folder: PathBuf, events: broadcast::Sender<Event>) -> std::io::Result<Self> {
-        Ok(Self { folder, events, jobs: Jobs::start(1, WAITING_LIMIT)?, works: Mutex::default() })
+    pub fn start(folder: PathBuf, events: broadcast::Sender<Event>, keeper: Keeper) -> std::io::Result<Self> {
+        Ok(Self { folder, events, jobs: Jobs::start(1, WAITING_LIMIT)?, keeper, works: Mutex::default() })
+    }
+
+    /// Puts the studies on the shelf that were kept; `order` says what is to be done for one, and where it cannot, because
+    /// the catalogue is another by now, the study is left out.
+    ///
+    /// # Errors
+    /// When the list cannot be read.
+    pub fn read_back(
+        &self,
+        order: impl Fn(&NewStudy) -> ApiResult<Order>,
+    ) -> sightline_core::error::Result<()> {
+        let mut works = lock(&self.works);
+        for (number, kept) in self.keeper.all()? {
+            let KeptStudy { new, job: view, rows, report } = kept.after_a_restart();
+            let Ok(order) = order(&new) else { continue };
+            let inside = Mutex::new(Inside { view, rows, report, cancel: Arc::default() });
+            let (events, keeper) = (self.events.clone(), self.keeper.clone());
+            works.push(Arc::new(Work { number, new, order, keeper, events, inside }));
+        }
+        Ok(())
     }
 
     /// The folder of all studies.
@@ -76,15 +101,19 @@ impl Shelf {
     ///
     /// # Errors
     /// A problem when there are too many already.
-    pub fn add(&self, order: Order) -> ApiResult<StudyJob> {
+    pub fn add(&self, new: NewStudy, order: Order) -> ApiResult<StudyJob> {
         let work = {
             let mut works = lock(&self.works);
             if works.len() >= STUDY_LIMIT {
-                return Err(ApiError::conflict(format!("There are {STUDY_LIMIT} studies already."))
-                    .hint("Start the server again; what they found is kept."));
+                let ended = works.iter().position(|work| work.has_ended()).ok_or_else(|| {
+                    ApiError::conflict(format!("{STUDY_LIMIT} studies are under way already."))
+                        .hint("Wait until some of them are done, or cancel one.")
+                })?;
+                self.keeper.forget(works.remove(ended).number);
             }
+            let number = works.iter().map(|work| work.number).max().unwrap_or(0) + 1;
             let view = StudyJob {
-                id: format!("study-{}", works.len() + 1),
+                id: format!("study-{number}"),
                 study: order.plan.study.name.to_owned(),
                 state: StudyState::Waiting,
                 k: 0,
@@ -94,10 +123,12 @@ impl Shelf {
                 command: order.command.clone(),
             };
             let inside = Inside { view, rows: Vec::new(), report: None, cancel: Arc::default() };
-            let work = Arc::new(Work { order, events: self.events.clone(), inside: Mutex::new(inside) });
+            let (events, keeper) = (self.events.clone(), self.keeper.clone());
+            let work = Arc::new(Work { number, new, order, keeper, events, inside: Mutex::new(inside) });
             works.push(Arc::clone(&work));
             work
         };
+        work.keep();
         if let Err(problem) = self.submit(&work) {
             work.change(|inside| end(inside, StudyState::Failed, "too many studies were waiting"));
             return Err(problem);
@@ -169,6 +200,22 @@ impl Work {
         lock(&self.inside).report.clone()
     }
 
+    fn has_ended(&self) -> bool {
+        !matches!(self.view().state, StudyState::Waiting | StudyState::Running)
+    }
+
+    /// Writes how it stands.
+    fn keep(&self) {
+        let kept = {
+            let inside = lock(&self.inside);
+            let (job, rows, report) = (inside.view.clone(), inside.rows.clone(), inside.report.clone());
+            // Rows before the end are found again in the study's folder.
+            let rows = if report.is_some() { rows } else { Vec::new() };
+            KeptStudy { new: self.new.clone(), job, rows, report }
+        };
+        self.keeper.keep(self.number, &kept);
+    }
+
     /// Changes it and tells every page.
     fn change<T>(&self, change: impl FnOnce(&mut Inside) -> T) -> T {
         let (result, job) = {
@@ -188,6 +235,7 @@ impl Work {
             return;
         }
         self.change(|inside| inside.view.state = StudyState::Running);
+        self.keep();
         let work = std::panic::AssertUnwindSafe(|| {
             carry_out(self.order.clone(), &cancel, &|progress| self.hear(progress))
         });
@@ -205,6 +253,7 @@ impl Work {
                 self.change(|inside| end(inside, StudyState::Failed, why));
             }
         }
+        self.keep();
     }
 
     fn hear(&self, progress: Progress) {

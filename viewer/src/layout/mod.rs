@@ -68,11 +68,13 @@ pub enum Pane {
     Uncertainty,
     /// Why a step came out as it did.
     Why,
+    /// Notes.
+    Notes,
 }
 
 impl Pane {
     /// All of them.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 23] = [
         Self::Targets,
         Self::Settings,
         Self::Left,
@@ -95,6 +97,7 @@ impl Pane {
         Self::Runs,
         Self::Uncertainty,
         Self::Why,
+        Self::Notes,
     ];
 
     /// Its title.
@@ -122,6 +125,7 @@ impl Pane {
             Self::Runs => "Runs",
             Self::Uncertainty => "Uncertainty",
             Self::Why => "Why",
+            Self::Notes => "Notes",
         }
     }
 }
@@ -154,6 +158,7 @@ pub fn show_pane(ui: &mut Ui, pane: Pane, state: &State, out: &mut Vec<Command>)
         Pane::Runs => panels::runs::show(ui, state, out),
         Pane::Uncertainty => panels::uncertainty::show(ui, state, out),
         Pane::Why => panels::why::show(ui, state, out),
+        Pane::Notes => panels::notes::show(ui, state, out),
     }
     None
 }
@@ -168,6 +173,8 @@ pub struct Panels<'a> {
     pub left_image: LeftImage,
     /// The panels that are on the screen.
     pub seen: Vec<Pane>,
+    /// Where they are on the screen, points.
+    pub places: Vec<(Pane, egui::Rect)>,
     /// The panel with the keyboard.
     pub current: Option<Pane>,
     /// Whether the keyboard goes into that panel in this frame.
@@ -181,9 +188,9 @@ pub struct Panels<'a> {
 impl<'a> Panels<'a> {
     /// Shows `state` and puts what is asked for into `out`.
     pub fn new(state: &'a State, out: &'a mut Vec<Command>) -> Self {
-        let (seen, closed) = (Vec::new(), Vec::new());
+        let (seen, places, closed) = (Vec::new(), Vec::new(), Vec::new());
         let (left_image, current, maximised) = (None, None, None);
-        Self { state, out, left_image, seen, current, takes_keyboard: false, closed, maximised }
+        Self { state, out, left_image, seen, places, current, takes_keyboard: false, closed, maximised }
     }
 
     /// Shows a panel's contents on its ground, as a region that a screen reader and the keyboard find.
@@ -194,6 +201,7 @@ impl<'a> Panels<'a> {
             _ => Margin::same(theme::MARGIN),
         };
         let place = ui.max_rect();
+        self.places.push((pane, place));
         crate::tour::here(ui.ctx(), pane.title(), place);
         region(ui, pane.title(), place);
         // The panel itself can have the keyboard, so that Tab goes on with what is in it.

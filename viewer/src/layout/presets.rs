@@ -145,7 +145,7 @@ const OVERVIEW: Area = Row(&[
     (
         Column(&[
             (Tabs(&[Pane::Gates, Pane::Machine]), 0.38),
-            (Tabs(&[Pane::Inspector, Pane::Why, Pane::Messages]), 0.62),
+            (Tabs(&[Pane::Inspector, Pane::Why, Pane::Notes, Pane::Messages]), 0.62),
         ]),
         0.2,
     ),
@@ -236,7 +236,7 @@ const SWEEP: Area = Row(&[
 const REPORT: Area = Row(&[
     (Column(&[(Tabs(&[Pane::Left]), 0.6), (Tabs(&[Pane::Strip, Pane::History]), 0.4)]), 0.45),
     (Column(&[(Tabs(&[Pane::Map]), 0.5), (Tabs(&[Pane::Plots, Pane::Uncertainty]), 0.5)]), 0.35),
-    (Tabs(&[Pane::Targets, Pane::Gates, Pane::Messages]), 0.2),
+    (Tabs(&[Pane::Notes, Pane::Targets, Pane::Gates, Pane::Messages]), 0.2),
 ]);
 
 fn build(tiles: &mut Tiles<Pane>, area: &Area) -> TileId {

@@ -30,6 +30,9 @@ pub(super) fn send(
         http.headers = Headers::new(&[("Accept", "application/json"), ("Content-Type", "application/json")]);
         http.body = body;
     }
+    if let Some(revision) = revision(&request) {
+        http.headers.insert("If-Match", format!("\"{revision}\""));
+    }
     let context = context.clone();
     ehttp::fetch(http, move |answer| {
         let outcome = match answer {
@@ -45,7 +48,7 @@ pub(super) fn send(
 }
 
 /// Method, path and body of a request.
-fn describe(request: &Request) -> (Method, String, Option<Vec<u8>>) {
+pub(crate) fn describe(request: &Request) -> (Method, String, Option<Vec<u8>>) {
     let get = |path: String| (Method::GET, path, None);
     match request {
         Request::Traverses => get("traverses".to_owned()),
@@ -104,6 +107,30 @@ fn describe(request: &Request) -> (Method, String, Option<Vec<u8>>) {
             json(&serde_json::json!({})),
         ),
         Request::Why(request) => why::describe(request),
+        Request::Notes(session) => get(format!("sessions/{session}/notes")),
+        Request::NewNote { session, new } => (Method::POST, format!("sessions/{session}/notes"), json(new)),
+        Request::EditNote { session, id, edit, .. } => {
+            (Method::PATCH, format!("sessions/{session}/notes/{id}"), json(edit))
+        }
+        Request::RemoveNote { session, id, .. } => {
+            (Method::DELETE, format!("sessions/{session}/notes/{id}"), None)
+        }
+        Request::RestoreNote { session, id } => {
+            (Method::POST, format!("sessions/{session}/notes/{id}/restore"), json(&serde_json::json!({})))
+        }
+        Request::Exports { session, target, run } => {
+            let target = target.map_or_else(String::new, |target| format!("?target={target}"));
+            let run = run.map_or_else(String::new, |run| format!("&run={run}"));
+            get(format!("sessions/{session}/exports{target}{run}"))
+        }
+    }
+}
+
+/// The revision that a request says it has read.
+pub(crate) fn revision(request: &Request) -> Option<u64> {
+    match request {
+        Request::EditNote { revision, .. } | Request::RemoveNote { revision, .. } => Some(*revision),
+        _ => None,
     }
 }
 
@@ -150,7 +177,13 @@ fn read(request: &Request, response: &ehttp::Response, context: &egui::Context) 
         }
         Request::Item(key) => Reply::Item(read_item(key, bytes, context)?),
         Request::Why(request) => Reply::Why(why::read(request, bytes)?),
-        Request::PutCursor { .. }
+        Request::Notes(_) => Reply::Notes(parse(bytes)?),
+        Request::Exports { .. } => Reply::Exports(parse(bytes)?),
+        Request::NewNote { .. }
+        | Request::EditNote { .. }
+        | Request::RemoveNote { .. }
+        | Request::RestoreNote { .. }
+        | Request::PutCursor { .. }
         | Request::RemoveTarget { .. }
         | Request::CancelRun { .. }
         | Request::ResumeRun { .. }

@@ -10,7 +10,9 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use sightline_core::limits::SettingInfo;
 use sightline_core::session::Cursor;
 use sightline_core::session::compare::{Comparison, NewComparison, RunName};
+use sightline_core::session::exports::ExportEntry;
 use sightline_core::session::metrics::RunMetrics;
+use sightline_core::session::notes::{EditNote, NewNote, Note};
 use sightline_core::session::view::{RunView, SessionView};
 use sightline_core::session::wire::{
     Event, NewRun, NewSession, NewTarget, Problem, RerunStream, SessionEntry, TraverseEntry, TraverseView,
@@ -21,6 +23,7 @@ use sightline_core::study::wire::{NewStudy, StudyInfo, StudyJob};
 use sightline_core::trackability::MapProgress;
 
 use self::events::Events;
+pub(crate) use self::http::{describe, revision};
 use self::why::{WhyReply, WhyRequest};
 use crate::cache::{Item, Key};
 use crate::state::Connection;
@@ -142,6 +145,51 @@ pub enum Request {
     },
     /// About single steps.
     Why(WhyRequest),
+    /// The notes of a session.
+    Notes(String),
+    /// To pin a note.
+    NewNote {
+        /// The session.
+        session: String,
+        /// The note.
+        new: NewNote,
+    },
+    /// To change a note.
+    EditNote {
+        /// The session.
+        session: String,
+        /// The note's number.
+        id: u64,
+        /// The revision that was read.
+        revision: u64,
+        /// The change.
+        edit: EditNote,
+    },
+    /// To remove a note.
+    RemoveNote {
+        /// The session.
+        session: String,
+        /// The note's number.
+        id: u64,
+        /// The revision that was read.
+        revision: u64,
+    },
+    /// To bring a removed note back.
+    RestoreNote {
+        /// The session.
+        session: String,
+        /// The note's number.
+        id: u64,
+    },
+    /// What a part of a session can be exported as.
+    Exports {
+        /// The session.
+        session: String,
+        /// One target by its number.
+        target: Option<usize>,
+        /// One run of it by its number.
+        run: Option<usize>,
+    },
 }
 
 /// What the server answered.
@@ -177,6 +225,10 @@ pub enum Reply {
     StudyRows(Vec<Row>),
     /// An image, an array or a record.
     Item(Item),
+    /// The notes of a session.
+    Notes(Vec<Note>),
+    /// What can be exported.
+    Exports(Vec<ExportEntry>),
     /// It is done.
     Done,
     /// Runs side by side.

@@ -7,6 +7,7 @@ use sightline_core::trace::StepTrace;
 use super::compare::{choosers, readouts};
 use super::{inspector, numbers, view_menu};
 use crate::command::{Command, Go, Mode, Stage};
+use crate::state::exports;
 use crate::state::messages::Weight;
 use crate::state::tracker::confidence_of;
 use crate::state::{Connection, State, run_letter};
@@ -36,9 +37,9 @@ pub fn top(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             if rerun.on_hover_text("Streams this session to a Rerun viewer in a new tab").clicked() {
                 out.push(Command::OpenRerun);
             }
-            let export = ui.add_enabled(has_targets, Button::new("Export .rrd"));
-            if export.on_hover_text("Downloads this session as a Rerun recording").clicked() {
-                out.push(Command::ExportRrd);
+            let export = ui.add_enabled(state.session.is_some(), Button::new("Export"));
+            if export.on_hover_text("Files, pictures, and any action as a command (Ctrl+S)").clicked() {
+                out.push(Command::Exports(exports::Ask::Open));
             }
         });
     });

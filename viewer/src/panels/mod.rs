@@ -3,6 +3,7 @@
 pub mod bars;
 pub mod budget;
 pub mod compare;
+pub mod export;
 pub mod exposure;
 pub mod features;
 pub mod gates;
@@ -17,6 +18,7 @@ pub mod map;
 pub mod messages;
 pub mod names;
 pub mod palette;
+pub mod notes;
 pub mod plots;
 pub mod runs;
 mod numbers;

@@ -70,7 +70,6 @@ impl State {
                 }
             }
             Command::ToggleMarks => self.marks = !self.marks,
-            Command::ExportRrd => self.export(),
             Command::OpenRerun => {
                 self.ask(Request::OpenRerun);
                 self.messages.note("Opening the session in Rerun …");
@@ -84,6 +83,8 @@ impl State {
             Command::Aim(aim) => self.aim(aim),
             Command::Tour(turn) => self.turn_tour(turn),
             Command::Why(ask) => self.ask_why(ask),
+            Command::Notes(ask) => self.ask_of_notes(ask),
+            Command::Exports(ask) => self.ask_of_exports(ask),
         }
     }
 
@@ -165,15 +166,6 @@ impl State {
         let new = NewRun { run, from_step, settings: changes, prediction_px: None };
         if self.ask(|session| Request::NewRun { session, target, new }) {
             self.messages.note(format!("Running {} again from step {from_step} …", run_letter(run)));
-        }
-    }
-
-    fn export(&mut self) {
-        match &self.session {
-            Some(session) => {
-                self.open_url = Some(format!("{}/api/v1/sessions/{}/export.rrd", self.origin, session.id));
-            }
-            None => self.messages.problem("There is no session to export yet.", None),
         }
     }
 

@@ -49,6 +49,7 @@ impl State {
             Event::QuestionProgress { session, target, run, step, .. } => {
                 self.question_went_on(StepKey { session, target, run, step });
             }
+            Event::NotesChanged { session } => self.notes_changed(session),
         }
     }
 
@@ -60,6 +61,7 @@ impl State {
         }
         match (was, connection) {
             (Connection::Gone { .. }, Connection::Live) => {
+                self.outbox.extend(self.session.as_ref().map(|session| Request::Notes(session.id.clone())));
                 self.messages.note("The server answers again.");
                 self.catch_up();
             }
@@ -120,6 +122,11 @@ impl State {
                 self.open_url = Some(stream.viewer_url);
             }
             Reply::Done => match request {
+                // The server tells every page that notes changed.
+                Request::NewNote { .. }
+                | Request::EditNote { .. }
+                | Request::RemoveNote { .. }
+                | Request::RestoreNote { .. } => {}
                 Request::PutCursor { cursor, .. } => self.put_cursor(cursor),
                 request => {
                     self.removed_target(&request);
@@ -144,6 +151,12 @@ impl State {
                     self.told_why(request, reply);
                 }
             }
+            Reply::Notes(list) => {
+                if let Request::Notes(session) = request {
+                    self.took_notes(&session, list);
+                }
+            }
+            Reply::Exports(entries) => self.exports.entries = Some(entries),
             Reply::Item(_) => {}
             Reply::Compared(found) => self.took_comparison(&request, Ok(*found)),
             Reply::Metrics(found) => {
@@ -185,6 +198,13 @@ impl State {
             Request::CancelTrackability { .. } => return,
             Request::Why(asked) if !self.refused_why(asked.clone(), &problem) => return,
             Request::RemoveTarget { .. } => self.forget_refused(&request),
+            Request::Exports { .. } => {
+                self.exports.refused = Some(problem.detail);
+                return;
+            }
+            request @ (Request::NewNote { .. } | Request::EditNote { .. } | Request::RemoveNote { .. }) => {
+                self.note_refused(&request);
+            }
             Request::Session(_) => {
                 self.sync.session_asked = None;
                 if self.session.is_none() && problem.status != 0 {
@@ -234,6 +254,7 @@ impl State {
     pub(super) fn adopt(&mut self, view: SessionView, moved_meanwhile: bool) {
         let is_other = self.session.as_ref().is_none_or(|open| open.id != view.id);
         if is_other {
+            self.open_notes(&view.id);
             self.progress.clear();
             self.draft.clear();
             self.forget_comparisons(true);

@@ -10,8 +10,10 @@ mod comparing;
 pub mod calculator;
 mod configurations;
 mod linked;
+pub mod exports;
 pub mod messages;
 mod missing;
+pub mod notes;
 pub mod studies;
 pub mod tracker;
 pub mod trackability;
@@ -35,7 +37,9 @@ use sightline_core::trace::{ArrayName, StepRow, StepTrace};
 
 use self::calculator::Calculator;
 use self::configurations::Configurations;
+use self::exports::Exports;
 use self::messages::Messages;
+use self::notes::Notes;
 use self::studies::Studies;
 use self::trackability::Trackability;
 use self::undo::Undo;
@@ -183,6 +187,10 @@ pub struct State {
     pub why: Why,
     /// What can be taken back.
     pub undo: Undo,
+    /// What a person wrote about places of the drive.
+    pub notes: Notes,
+    /// What the session can be had as.
+    pub exports: Exports,
     outbox: Vec<Request>,
     sync: Sync,
     /// The aligned left camera of the step that was asked for last: it takes a while to compute.
@@ -247,6 +255,8 @@ impl State {
             tour: Tour::default(),
             why: Why::default(),
             undo: Undo::default(),
+            notes: Notes::default(),
+            exports: Exports::default(),
             outbox: Vec::new(),
             sync: Sync { linked, ..Sync::default() },
             aligned: egui::mutex::Mutex::default(),

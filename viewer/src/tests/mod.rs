@@ -6,6 +6,7 @@ pub(crate) mod feature_run;
 mod features;
 pub(crate) mod fixture;
 mod history;
+mod keeping;
 mod session;
 mod shape;
 mod shape_run;

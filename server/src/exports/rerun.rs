@@ -2,27 +2,22 @@
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use axum::Json;
-use axum::body::Body;
 use axum::extract::State;
-use axum::http::header;
-use axum::response::{IntoResponse, Response};
-use sightline_core::session::Session;
+use axum::response::Response;
 use sightline_core::session::wire::{Event, RerunStream};
-use tempfile::TempDir;
 use tokio::sync::broadcast::Receiver;
 use tokio::sync::broadcast::error::RecvError;
-use tokio_util::io::ReaderStream;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
+use super::{Kind, Part, Source, answer, make};
 use crate::extract::Path;
 use crate::jobs::{blocking, lock};
 use crate::live::LiveSession;
 use crate::problem::{ApiError, ApiResult};
-use crate::rerun_log::{self, LiveStream, RunLog};
+use crate::rerun_log::LiveStream;
 use crate::state::AppState;
 use crate::traverses::{CancelOnDrop, FileBytes};
 
@@ -42,14 +37,11 @@ async fn export(State(state): State<AppState>, Path(session): Path<String>) -> A
     let name = format!("sightline-{}.rrd", live.id);
     let cancel = CancelOnDrop::default();
     let flag = cancel.flag();
-    let (file, folder) = state.exports().run(move || write(&live, &flag)).await?;
-    let headers = [
-        (header::CONTENT_TYPE, "application/octet-stream".to_owned()),
-        (header::CONTENT_DISPOSITION, format!("attachment; filename=\"{name}\"")),
-    ];
-    // The folder is removed when the last byte was sent or the request went away.
-    let file = KeptFile { file: tokio::fs::File::from_std(file), _folder: folder };
-    Ok((headers, Body::from_stream(ReaderStream::with_capacity(file, 1 << 16))).into_response())
+    let work = move || {
+        let mut go_on = |_, _| ControlFlow::Continue(());
+        make(&Source::of(&live), Kind::Recording, Part::default(), &flag, &mut go_on)
+    };
+    answer(Kind::Recording, &name, state.exports().run(work).await?).await
 }
 
 /// Streams a session to Rerun while it goes on
@@ -70,30 +62,6 @@ async fn stream(State(state): State<AppState>, Path(session): Path<String>) -> A
         tokio::spawn(follow(live, stream, events));
     }
     Ok(Json(answer))
-}
-
-/// Writes the recording into a temporary folder.
-fn write(live: &LiveSession, cancel: &AtomicBool) -> ApiResult<(std::fs::File, TempDir)> {
-    let internal = |error: std::io::Error| ApiError::internal(format!("cannot write a recording: {error}"));
-    let folder = tempfile::tempdir().map_err(internal)?;
-    let path = folder.path().join("session.rrd");
-    let session = live.with(|session| session.clone());
-    let mut progress = |_, _| {
-        if cancel.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    };
-    let traverse = &live.traverse.traverse;
-    rerun_log::export(&path, &traverse.index().name, traverse, &runs(&session), &mut progress)?;
-    Ok((std::fs::File::open(&path).map_err(internal)?, folder))
-}
-
-/// The runs of a session as the recording takes them.
-fn runs(session: &Session) -> Vec<RunLog<'_>> {
-    let live = session.targets.iter().enumerate().filter(|(_, record)| !record.removed);
-    let of_target = live.flat_map(|(target, record)| {
-        let runs = record.runs.iter().enumerate().filter(|(_, run)| !run.removed && !run.steps.is_empty());
-        runs.map(move |(number, run)| RunLog { target, run: number, label: &record.label, steps: &run.steps })
-    });
-    of_target.collect()
 }
 
 /// The stream of a session, opened where it is not yet.
@@ -128,27 +96,12 @@ async fn follow(live: Arc<LiveSession>, stream: Arc<LiveStream>, mut events: Rec
                 Ok(
                     Event::RenderProgress { .. }
                     | Event::StudyProgress { .. }
-                    | Event::TrackabilityProgress { .. },
+                    | Event::TrackabilityProgress { .. }
+                    | Event::NotesChanged { .. },
                 ) => {}
                 Ok(_) | Err(RecvError::Lagged(_)) => break,
                 Err(RecvError::Closed) => return,
             }
         }
-    }
-}
-
-/// An open file with the temporary folder in which it lies.
-struct KeptFile {
-    file: tokio::fs::File,
-    _folder: TempDir,
-}
-
-impl tokio::io::AsyncRead for KeptFile {
-    fn poll_read(
-        mut self: std::pin::Pin<&mut Self>,
-        context: &mut std::task::Context<'_>,
-        buffer: &mut tokio::io::ReadBuf<'_>,
-    ) -> std::task::Poll<std::io::Result<()>> {
-        std::pin::Pin::new(&mut self.file).poll_read(context, buffer)
     }
 }

@@ -1,0 +1,228 @@
+//! `sightline export`: the files that the server makes, by the very same code, without a browser.
+//!
+//! Either of a session in the data folder, also while a server works in it, or of targets on a traverse. Runs are computed
+//! again from what the session says of them: the same input gives the same bits.
+
+use std::fs::File;
+use std::io::Write;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+use clap::Args;
+use sightline_core::error::{Error, Result};
+use sightline_core::frames::Pixel;
+use sightline_core::presets::preset;
+use sightline_core::session::Session;
+use sightline_core::session::view::SavedSession;
+use sightline_core::settings::{Changes, Settings, parse_assignment};
+use sightline_core::target::Designation;
+use sightline_core::traverse::Traverse;
+
+use super::say::Progress;
+use super::track::pixel;
+use super::{open, say};
+use crate::exports::{Kind, Made, Part, Source, make};
+use crate::guard::Hosts;
+use crate::live::LiveSession;
+use crate::problem::ApiError;
+use crate::state::{AppState, name_of};
+use crate::store::{self, Store};
+
+/// How often a run that is being computed is looked at.
+const GLANCE: Duration = Duration::from_millis(50);
+
+/// Write a session as a file: a recording, tables, pictures, a report, or what is needed to do the same again.
+#[derive(Debug, Args)]
+pub struct Export {
+    /// The file: recording.rrd, rows.csv, rows.jsonl, rows.parquet, steps.apng, steps.png, report.html or reproduce.json.
+    #[arg(value_parser = kind)]
+    kind: Kind,
+    /// The traverse: a folder, an index or a scenario; not needed for a session on a simulated traverse of the data folder.
+    traverse: Option<PathBuf>,
+    /// A session of the data folder.
+    #[arg(long, value_name = "NAME", required_unless_present = "target", conflicts_with = "target")]
+    session: Option<String>,
+    /// Where sessions and simulated traverses are kept.
+    #[arg(long, value_name = "FOLDER")]
+    data_dir: Option<PathBuf>,
+    /// One target of the session, or one of its runs, by numbers from 0: 0 or 0/1.
+    #[arg(long, value_name = "TARGET[/RUN]", value_parser = part)]
+    run: Option<Part>,
+    /// A target by its position in the left image, px, instead of a session; can be given more than once.
+    #[arg(long, value_name = "X,Y", value_parser = pixel, allow_hyphen_values = true, requires = "traverse")]
+    target: Vec<Pixel>,
+    /// The stop in whose left image such targets are designated.
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "target")]
+    from_step: usize,
+    /// A named configuration for such targets; --set changes it further.
+    #[arg(long, value_name = "NAME", requires = "target")]
+    preset: Option<String>,
+    /// A setting of the tracker for such targets, for example ncc_min=0.6; can be given more than once.
+    #[arg(long, value_name = "KEY=VALUE", requires = "target")]
+    set: Vec<String>,
+    /// The file to write, a new one; by default a name that says what it is, in the present folder.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+impl Export {
+    /// Makes the file.
+    ///
+    /// # Errors
+    /// A session, traverse, target or setting that does not exist, or a file that cannot be written.
+    pub fn run(self) -> Result<()> {
+        if let Some(out) = self.out.as_ref().filter(|out| out.exists()) {
+            return Err(Error::format(out, "exists already; choose another name"));
+        }
+        // What the server keeps is not touched: the session is worked on in a folder of its own.
+        let folder =
+            tempfile::tempdir().map_err(|error| Error::Request(format!("cannot make a folder: {error}")))?;
+        let live = match &self.session {
+            Some(id) => self.session(id, folder.path())?,
+            None => self.targets(folder.path())?,
+        };
+        let source = Source::of(&live);
+        let part = self.run.unwrap_or_default();
+        source.check(self.kind, part).map_err(refused)?;
+        let part = source.narrowed(self.kind, part);
+        let out = self.out.unwrap_or_else(|| PathBuf::from(source.file_name(self.kind, part)));
+        let mut progress = Progress::new("wrote stop");
+        let mut tell = |k, n| {
+            progress.tell(k, n);
+            ControlFlow::Continue(())
+        };
+        let made = make(&source, self.kind, part, &AtomicBool::new(false), &mut tell).map_err(refused)?;
+        write(&out, made)?;
+        say::line(&out.display().to_string())
+    }
+
+    /// A session of the data folder, computed again.
+    fn session(&self, id: &str, folder: &Path) -> Result<Arc<LiveSession>> {
+        let data = open::data_folder(self.data_dir.as_deref())?;
+        let sessions = data.join("sessions");
+        let found = store::read_only(&sessions)?;
+        let missing = || {
+            let known: Vec<&str> = found.sessions.iter().map(|saved| saved.id.as_str()).collect();
+            let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+            Error::Request(format!("{} has no session {id}; there are: {known}", sessions.display()))
+        };
+        let saved = found.sessions.iter().find(|saved| saved.id == id).ok_or_else(missing)?;
+        let traverse = match &self.traverse {
+            Some(path) => open::open(path, Some(&data))?,
+            None => find_traverse(&data, &saved.traverse)?,
+        };
+        let own = name_of(&traverse)?;
+        if own != saved.traverse {
+            let theirs = &saved.traverse;
+            return Err(Error::Request(format!("session {id} is on the traverse {theirs}, not on {own}")));
+        }
+        let notes =
+            store::number_of(id).and_then(|number| found.notes.get(&number)).cloned().unwrap_or_default();
+        let copy = Store::open(folder)?;
+        copy.save(saved)?;
+        copy.save_notes(id, &notes)?;
+        drop(copy);
+        computed(traverse, folder, id)
+    }
+
+    /// Targets on a traverse, as a session that nobody keeps.
+    fn targets(&self, folder: &Path) -> Result<Arc<LiveSession>> {
+        let path = self.traverse.as_ref().ok_or_else(|| Error::Request("name a traverse".to_owned()))?;
+        let changes = self.set.iter().map(|text| parse_assignment(text)).collect::<Result<Changes>>()?;
+        let own = match &self.preset {
+            Some(name) => preset(name)?.settings()?,
+            None => Settings::default(),
+        };
+        let settings = own.with(&changes)?;
+        let traverse = open::open(path, self.data_dir.as_deref())?;
+        let mut session = Session::new("s1", name_of(&traverse)?, traverse.stop_count());
+        for pixel in &self.target {
+            let designation = Designation { step: self.from_step, pixel: *pixel };
+            if self.from_step < traverse.stop_count() {
+                traverse.render_step(self.from_step, &AtomicBool::new(false))?;
+            }
+            let first = sightline_core::session::track::designate(&traverse, designation, &settings)?;
+            session.add_target(None, settings.clone(), Arc::new(first));
+        }
+        session.cursor.target = Some(0);
+        let saved: SavedSession = session.saved();
+        let copy = Store::open(folder)?;
+        copy.save(&saved)?;
+        drop(copy);
+        computed(traverse, folder, "s1")
+    }
+}
+
+/// The session of that name in `folder` with all its runs, which are computed by what computes them in the server.
+fn computed(traverse: Traverse, folder: &Path, id: &str) -> Result<Arc<LiveSession>> {
+    let state = AppState::new(vec![traverse], folder, Hosts::new(0, &[]))?;
+    let live = state.session(id).map_err(refused)?;
+    let count = |session: &Session| {
+        let live = session.targets.iter().filter(|target| !target.removed);
+        let runs = live.flat_map(|target| target.runs.iter().map(move |run| (target, run)));
+        runs.fold((0, 0), |(k, n), (target, run)| {
+            let end = run.stop_after.map_or(session.stop_count, |stop| session.stop_count.min(stop + 1));
+            (k + run.steps.len(), n + end.saturating_sub(target.designation.step))
+        })
+    };
+    let mut progress = Progress::new("tracked step");
+    while live.is_restoring() {
+        let (k, n) = live.with(|session| count(session));
+        if k < n {
+            progress.tell(k, n);
+        }
+        std::thread::sleep(GLANCE);
+    }
+    let (k, n) = live.with(|session| count(session));
+    if k == n && n > 0 {
+        progress.tell(k, n);
+    }
+    Ok(live)
+}
+
+/// The traverse of that name among the simulated ones of the data folder.
+fn find_traverse(data: &Path, id: &str) -> Result<Traverse> {
+    let entries = std::fs::read_dir(data.join("traverses")).into_iter().flatten().flatten();
+    let opened = entries.filter_map(|entry| Traverse::open(&entry.path()).ok());
+    let found = opened.into_iter().find(|traverse| name_of(traverse).is_ok_and(|name| name == id));
+    found.ok_or_else(|| {
+        Error::Request(format!(
+            "the session is on the traverse {id}; name its folder: sightline export KIND FOLDER …"
+        ))
+    })
+}
+
+fn write(path: &Path, made: Made) -> Result<()> {
+    let unwritable = |source| Error::Write { path: path.to_owned(), source };
+    let mut file = File::create_new(path).map_err(unwritable)?;
+    match made {
+        Made::Bytes(bytes) => file.write_all(&bytes),
+        Made::File(mut source, _folder) => std::io::copy(&mut source, &mut file).map(|_| ()),
+    }
+    .and_then(|()| file.sync_all())
+    .map_err(unwritable)
+}
+
+/// A problem as the command line says it.
+#[allow(clippy::needless_pass_by_value)]
+fn refused(problem: ApiError) -> Error {
+    let said = problem.problem();
+    let hint = said.hint.as_ref().map_or_else(String::new, |hint| format!(" {hint}"));
+    Error::Request(format!("{}{hint}", said.detail))
+}
+
+fn kind(text: &str) -> Result<Kind, String> {
+    let names = || Kind::ALL.map(Kind::name).join(", ");
+    Kind::from_name(text).ok_or_else(|| format!("is none of {}", names()))
+}
+
+fn part(text: &str) -> Result<Part, String> {
+    let number = |text: &str| text.parse::<usize>().map_err(|_| "write it as 0 or 0/1".to_owned());
+    match text.split_once('/') {
+        Some((target, run)) => Ok(Part { target: Some(number(target)?), run: Some(number(run)?) }),
+        None => Ok(Part { target: Some(number(text)?), run: None }),
+    }
+}

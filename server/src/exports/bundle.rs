@@ -1,0 +1,105 @@
+//! What anybody needs to get the same rows again, bit for bit: settings, seed, versions, hashes and commands, as JSON.
+
+use serde_json::{Value, json};
+use sightline_core::session::shell::{quoted, settings_arguments};
+use sightline_core::sim::Scenario;
+use sightline_core::study::plan::tracker_version;
+
+use super::kind::Part;
+use super::rows;
+use super::source::{NamedRun, Source};
+use crate::state::hash;
+
+/// The version of this form.
+const FORMAT: u32 = 1;
+
+/// The bundle as JSON text.
+pub fn json(source: &Source, part: Part) -> String {
+    let traverse = &source.open.traverse;
+    let index = traverse.index();
+    let scenario = scenario(source);
+    let runs: Vec<Value> = source.runs(part).into_iter().map(|run| of_run(source, run)).collect();
+    let bundle = json!({
+        "format": "sightline-reproduce",
+        "format_version": FORMAT,
+        "program": {
+            "name": "sightline",
+            "version": env!("CARGO_PKG_VERSION"),
+            "tracker": tracker_version(),
+            "same_bits": "on the same build and kind of processor, whatever the number of threads; across processors within 1e-5",
+        },
+        "traverse": {
+            "id": source.open.id,
+            "name": index.name,
+            "description": index.description,
+            "stops": index.stops.len(),
+            "index_sha256": hash(&serde_json::to_vec(index).unwrap_or_default()),
+            "seed": scenario.as_ref().map(|scenario| scenario.seed),
+            "scenario_sha256": scenario.as_ref().map(|scenario| hash(scenario.to_toml().as_bytes())),
+            "scenario_toml": scenario.as_ref().map(Scenario::to_toml),
+        },
+        "session": source.session.saved(),
+        "notes": source.notes.list,
+        "runs": runs,
+    });
+    format!("{bundle:#}\n")
+}
+
+fn of_run(source: &Source, run: NamedRun<'_>) -> Value {
+    let only = Part { target: Some(run.target), run: Some(run.number) };
+    let settings = serde_json::to_vec(run.run.settings.as_ref()).unwrap_or_default();
+    json!({
+        "target": run.target,
+        "label": run.record.label,
+        "run": run.number,
+        "designation": run.record.designation,
+        "fork": run.run.fork,
+        "settings_changed": run.run.settings.changes(),
+        "settings_sha256": hash(&settings),
+        "steps": run.run.steps.len(),
+        "rows_sha256": hash(rows::jsonl(source, only).as_bytes()),
+        "command": command(source, run),
+    })
+}
+
+/// The command line that computes a run again; none for one that left another run on the way.
+pub fn command(source: &Source, run: NamedRun<'_>) -> Option<String> {
+    let designation = run.record.designation;
+    if run.run.fork.is_some_and(|fork| fork.from_step > designation.step) {
+        return None;
+    }
+    let from =
+        if designation.step == 0 { String::new() } else { format!(" --from-step {}", designation.step) };
+    Some(format!(
+        "sightline track {} --target {},{}{from}{}",
+        quoted(&place_of_traverse(source)),
+        designation.pixel.x,
+        designation.pixel.y,
+        settings_arguments(&run.run.settings.changes())
+    ))
+}
+
+/// What a person would write for the traverse: the library's name of its scenario, or a word to be replaced. Where the
+/// folder lies on this machine is nobody else's business.
+fn place_of_traverse(source: &Source) -> String {
+    let own = scenario(source);
+    let in_library = own.as_ref().and_then(|own| {
+        let is_it = |name: &&str| {
+            sightline_core::sim::library::scenario(name).is_ok_and(|known| known.to_toml() == own.to_toml())
+        };
+        sightline_core::sim::library::names().find(is_it)
+    });
+    match (in_library, own) {
+        (Some(name), _) => name.to_owned(),
+        (None, Some(_)) => "scenario.toml".to_owned(),
+        (None, None) => "FOLDER".to_owned(),
+    }
+}
+
+/// The scenario of a simulated traverse.
+pub fn scenario(source: &Source) -> Option<Scenario> {
+    let traverse = &source.open.traverse;
+    let path = traverse.folder().join(traverse.index().scenario.as_ref()?);
+    let text = std::fs::read_to_string(&path).ok()?;
+    Scenario::from_toml(&text, &path).ok()
+}

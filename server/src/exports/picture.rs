@@ -1,0 +1,195 @@
+//! The target in the left image of a step, with what was predicted, found and true, and the state in words.
+//!
+//! | mark | meaning |
+//! |---|---|
+//! | blue square with cross, and ellipse | the window that was found, and its 3σ |
+//! | sky ring, and dotted ellipse | the prediction and its 3σ gate |
+//! | white plus | the truth |
+//! Colours are those of Okabe and Ito, the same as in the viewer and in recordings.
+
+use nalgebra::{Matrix2, SymmetricEigen, Vector2};
+use sightline_core::frames::Pixel;
+use sightline_core::image::GrayImage;
+use sightline_core::settings::Settings;
+use sightline_core::target::TrackingState;
+use sightline_core::trace::{StepRow, StepTrace};
+
+use super::canvas::{Canvas, Line, Rgb, Window};
+use super::source::place_of;
+
+/// Side of the part of the image that is shown, px of the image.
+const SIDE_PX: f64 = 160.0;
+/// Side of the picture, px.
+pub(super) const PICTURE_PX: u32 = 320;
+/// Height of the words above and below, px.
+const HEAD_PX: u32 = 22;
+const FOOT_PX: u32 = 42;
+/// Standard deviations of the ellipses.
+const SIGMAS: f64 = 3.0;
+
+pub(super) const PAPER: Rgb = [0xff, 0xff, 0xff];
+pub(super) const INK: Rgb = [0x22, 0x22, 0x22];
+const TRACKING: Rgb = [0x00, 0x9e, 0x73];
+const LOST: Rgb = [0xe6, 0x9f, 0x00];
+const FAILED: Rgb = [0xd5, 0x5e, 0x00];
+const CLEARED: Rgb = [0x99, 0x99, 0x99];
+const PREDICTION: Rgb = [0x56, 0xb4, 0xe9];
+const MEASUREMENT: Rgb = [0x2f, 0x8f, 0xd0];
+const TRUTH: Rgb = [0xff, 0xff, 0xff];
+
+/// What the marks mean, in words, for whoever cannot see or has no legend.
+pub const LEGEND: &str = "Blue square: where it was found, with its 3σ ellipse. Sky blue ring: the prediction, with its 3σ gate dotted. \
+                          White plus: the truth, where it is known.";
+
+/// Width and height of a picture with its words, px.
+pub(super) fn size(has_head: bool) -> [u32; 2] {
+    [PICTURE_PX, PICTURE_PX + FOOT_PX + if has_head { HEAD_PX } else { 0 }]
+}
+
+/// Width and height of a picture without a line above it, px.
+pub fn plain_size() -> [u32; 2] {
+    size(false)
+}
+
+/// The picture of a step as a PNG file.
+///
+/// # Errors
+/// What the encoder says.
+pub fn png(trace: &StepTrace, left: Option<&GrayImage>, settings: &Settings) -> Result<Vec<u8>, String> {
+    draw(trace, left, settings, None).ok_or("a picture without pixels")?.png()
+}
+
+/// The picture of a step; `head` is a line above it. None of the images: their place is a checker.
+pub(super) fn draw(
+    trace: &StepTrace,
+    left: Option<&GrayImage>,
+    settings: &Settings,
+    head: Option<&str>,
+) -> Option<Canvas> {
+    let [width, height] = size(head.is_some());
+    let mut canvas = Canvas::new(width, height, PAPER)?;
+    let top = if head.is_some() { HEAD_PX } else { 0 };
+    if let Some(words) = head {
+        canvas.text([6.0, 4.0], 13.0, width as f32 - 12.0, INK, words);
+    }
+    let empty = GrayImage::default();
+    let image = left.unwrap_or(&empty);
+    let centre = place_of(trace).unwrap_or_else(|| {
+        Pixel::new(f64::from(image.width()) / 2.0 - 0.5, f64::from(image.height()) / 2.0 - 0.5)
+    });
+    let window = Window {
+        origin: [centre.x + 0.5 - SIDE_PX / 2.0, centre.y + 0.5 - SIDE_PX / 2.0],
+        scale: f64::from(PICTURE_PX) / SIDE_PX,
+        at: [0.0, f64::from(top)],
+        size: [PICTURE_PX; 2],
+    };
+    canvas.image(image, &window);
+    marks(&mut canvas, trace, &window, settings);
+    // Marks that reach over the picture's border are cut there.
+    if let Some(words) = head {
+        canvas.fill([0.0, 0.0], [width as f32, top as f32], PAPER);
+        canvas.text([6.0, 4.0], 13.0, width as f32 - 12.0, INK, words);
+    }
+    foot(&mut canvas, trace, (top + PICTURE_PX) as f32);
+    Some(canvas)
+}
+
+fn marks(canvas: &mut Canvas, trace: &StepTrace, window: &Window, settings: &Settings) {
+    let predicted = trace
+        .point_mast
+        .as_ref()
+        .and_then(|pointing| pointing.predicted_left.map(|pixel| (pixel, pointing.predicted_covariance_px2)));
+    if let Some((pixel, covariance)) = predicted.filter(|_| trace.predict.is_some()) {
+        canvas.line(&ring(window, pixel, 2.5), true, PREDICTION, Line::Solid);
+        if let Some(points) = covariance.and_then(|covariance| ellipse(window, pixel, &covariance)) {
+            canvas.line(&points, true, PREDICTION, Line::Dotted);
+        }
+    }
+    let located = trace.locate.as_ref().and_then(|located| Some((located.left_pixel?, located)));
+    if let Some((pixel, located)) = located {
+        let half = f64::from(settings.template.template_size_px) / 2.0;
+        let corners = [(-half, -half), (half, -half), (half, half), (-half, half)];
+        let square = corners.map(|(x, y)| window.place(pixel.x + x, pixel.y + y));
+        canvas.line(&square, true, MEASUREMENT, Line::Solid);
+        for stroke in cross(window, pixel, 2.0) {
+            canvas.line(&stroke, false, MEASUREMENT, Line::Solid);
+        }
+        if let Some(points) = ellipse(window, pixel, &located.left_error.covariance_px2) {
+            canvas.line(&points, true, MEASUREMENT, Line::Solid);
+        }
+    }
+    if let Some(pixel) = trace.truth.as_ref().and_then(|truth| truth.left_pixel) {
+        let [x, y] = window.place(pixel.x, pixel.y);
+        canvas.line(&[[x - 8.0, y], [x + 8.0, y]], false, TRUTH, Line::Solid);
+        canvas.line(&[[x, y - 8.0], [x, y + 8.0]], false, TRUTH, Line::Solid);
+    }
+}
+
+fn foot(canvas: &mut Canvas, trace: &StepTrace, top: f32) {
+    let [width, height] = canvas.size();
+    canvas.fill([0.0, top], [width as f32, height as f32 - top], PAPER);
+    canvas.fill([0.0, top], [8.0, height as f32 - top], state_colour(trace.update.state));
+    let row = trace.row();
+    let first = format!("step {}  {}", row.step, state_words(trace));
+    canvas.text([16.0, top + 4.0], 14.0, width as f32 - 22.0, INK, &first);
+    canvas.text([16.0, top + 23.0], 11.0, width as f32 - 20.0, INK, &numbers(&row));
+}
+
+/// The state in capitals, with the count of bad updates.
+pub fn state_words(trace: &StepTrace) -> String {
+    match trace.update.state {
+        TrackingState::Lost { count } => format!("LOST {count}"),
+        other => other.word().to_uppercase(),
+    }
+}
+
+/// The numbers of a step that matter most, with their units.
+pub fn numbers(row: &StepRow) -> String {
+    let all = [
+        row.ncc.map(|score| format!("NCC {score:.2}")),
+        row.inliers.map(|count| format!("{count} inliers")),
+        row.err_px.map(|error| format!("error {error:.2} px")),
+        row.sigma_m.map(|sigma| format!("σ {:.1} cm", 100.0 * sigma)),
+        row.range_m.map(|range| format!("{range:.2} m")),
+    ];
+    let known: Vec<String> = all.into_iter().flatten().collect();
+    if known.is_empty() { "nothing was measured".to_owned() } else { known.join(" · ") }
+}
+
+/// The colour of a tracking state.
+pub(super) fn state_colour(state: TrackingState) -> Rgb {
+    match state {
+        TrackingState::Cleared => CLEARED,
+        TrackingState::Tracking => TRACKING,
+        TrackingState::Lost { .. } => LOST,
+        TrackingState::Failed => FAILED,
+    }
+}
+
+fn ring(window: &Window, at: Pixel, radius_px: f64) -> Vec<[f32; 2]> {
+    around(|x, y| window.place(at.x + radius_px * x, at.y + radius_px * y))
+}
+
+fn ellipse(window: &Window, at: Pixel, covariance_px2: &Matrix2<f64>) -> Option<Vec<[f32; 2]>> {
+    if !covariance_px2.iter().all(|v| v.is_finite()) || covariance_px2.trace() <= 0.0 {
+        return None;
+    }
+    let eigen = SymmetricEigen::new(*covariance_px2);
+    let lengths = eigen.eigenvalues.map(|v| v.max(0.0).sqrt() * SIGMAS);
+    let axes = eigen.eigenvectors * Matrix2::from_diagonal(&lengths);
+    Some(around(|x, y| {
+        let offset = axes * Vector2::new(x, y);
+        window.place(at.x + offset.x, at.y + offset.y)
+    }))
+}
+
+fn around(place: impl Fn(f64, f64) -> [f32; 2]) -> Vec<[f32; 2]> {
+    const POINTS: u32 = 64;
+    let angle = |k: u32| f64::from(k) / f64::from(POINTS) * std::f64::consts::TAU;
+    (0..POINTS).map(|k| place(angle(k).cos(), angle(k).sin())).collect()
+}
+
+fn cross(window: &Window, at: Pixel, arm_px: f64) -> [[[f32; 2]; 2]; 2] {
+    let stroke = |x: f64, y: f64| [window.place(at.x - x, at.y - y), window.place(at.x + x, at.y + y)];
+    [stroke(arm_px, arm_px), stroke(arm_px, -arm_px)]
+}

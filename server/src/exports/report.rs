@@ -1,0 +1,330 @@
+//! A report of a session: one HTML page that needs nothing else, on light paper, made to be printed.
+
+use std::fmt::Write;
+use std::sync::atomic::AtomicBool;
+
+use sightline_core::session::notes::Note;
+use sightline_core::study::plan::tracker_version;
+use sightline_core::trace::StepTrace;
+
+use super::kind::Part;
+use super::metrics::{metrics, worst};
+use super::source::{NamedRun, Source};
+use super::{bundle, picture, sheet};
+use crate::html::{escape, markdown, number, png_address, table};
+use crate::problem::{ApiError, ApiResult};
+use crate::state::hash;
+use crate::study::drawn::{Chart, Line};
+
+/// How many runs have a chapter; of more, the first ones.
+const MOST_RUNS: usize = 20;
+
+const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:1080px;margin:2rem auto;padding:0 1rem;color:#222;\
+background:#fff}h1{font-size:1.6rem;margin-bottom:.2rem}h2{font-size:1.25rem;margin-top:2.2rem;border-bottom:2px solid #222}\
+h3{font-size:1.02rem;margin:1.6rem 0 .4rem}.sub{color:#444;margin-top:0}figure{margin:.6rem 0;break-inside:avoid}\
+figure svg,figure img{max-width:100%;height:auto;display:block}figcaption{font-size:.86rem;color:#333}\
+.row{display:flex;flex-wrap:wrap;gap:.8rem}.row figure{width:320px;margin:0}table{border-collapse:collapse;font-size:.82rem;\
+font-variant-numeric:tabular-nums}caption{text-align:left;font-size:.86rem;color:#333;padding:.3rem 0}th,td{padding:.16rem .55rem;\
+border-bottom:1px solid #ddd;text-align:right;vertical-align:top}thead th{border-bottom:2px solid #888}th{font-weight:600}\
+th[scope=row]{font-weight:400}th:first-child,td:first-child{text-align:left}code,pre{font-size:.82rem;background:#f4f4f4;\
+padding:.1rem .3rem;overflow-wrap:anywhere;white-space:pre-wrap}.wide{overflow-x:auto}.note{border-left:3px solid #0072b2;\
+padding:.1rem .8rem;margin:.6rem 0;break-inside:avoid}.note p{margin:.3rem 0}.at{color:#444;font-size:.85rem}\
+@media print{body{margin:0;max-width:none;font-size:11pt}h2{break-before:page}h2:first-of-type{break-before:auto}\
+a{color:inherit;text-decoration:none}tr{break-inside:avoid}}";
+
+/// The report.
+///
+/// # Errors
+/// A problem when it is cancelled or a figure cannot be drawn.
+pub fn html(source: &Source, part: Part, cancel: &AtomicBool) -> ApiResult<String> {
+    let index = source.open.traverse.index();
+    let name = escape(&index.name);
+    let mut text = format!(
+        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width, \
+         initial-scale=1\"><title>Sightline report: {name}</title><style>{STYLE}</style></head><body>\n\
+         <h1>{name}</h1>\n<p class=\"sub\">Sightline report of session {}, {} stops. {}</p>\n",
+        escape(&source.session.id),
+        index.stops.len(),
+        escape(&index.description)
+    );
+    let runs = source.runs(part);
+    text.push_str(&overview(source, &runs));
+    text.push_str(&notes(source, part));
+    for run in runs.iter().take(MOST_RUNS) {
+        chapter(&mut text, source, *run, cancel)?;
+    }
+    if runs.len() > MOST_RUNS {
+        let _ = writeln!(
+            text,
+            "<p>{} more runs have no chapter here; export them one by one.</p>",
+            runs.len() - MOST_RUNS
+        );
+    }
+    text.push_str(&origin(source));
+    text.push_str("</body></html>\n");
+    Ok(text)
+}
+
+/// All runs in one table.
+fn overview(source: &Source, runs: &[NamedRun<'_>]) -> String {
+    let row = |run: &NamedRun<'_>| {
+        let summary = sightline_core::trace::summarise(run.run.steps.iter().map(AsRef::as_ref));
+        let changes = serde_json::to_string(&run.run.settings.changes()).unwrap_or_default();
+        let left = run.run.fork.map_or_else(String::new, |fork| {
+            format!("run {} at step {}", sheet::run_letter(fork.run), fork.from_step)
+        });
+        vec![
+            format!("{}, run {}", run.record.label, sheet::run_letter(run.number)),
+            run.run.settings.tracker.word().to_owned(),
+            left,
+            summary.steps.to_string(),
+            summary.steps_tracked.map_or_else(|| "–".to_owned(), |count| count.to_string()),
+            summary.steps_lost.to_string(),
+            summary.false_tracked.map_or_else(|| "–".to_owned(), |count| count.to_string()),
+            number(summary.final_err_px, 2),
+            number(summary.final_err_m.map(|m| 100.0 * m), 2),
+            if changes == "{}" { "defaults".to_owned() } else { changes },
+        ]
+    };
+    let head = [
+        "target and run",
+        "tracker",
+        "left",
+        "steps",
+        "tracked",
+        "lost",
+        "tracked falsely",
+        "last error, px",
+        "last error, cm",
+        "settings changed",
+    ];
+    let rows: Vec<Vec<String>> = runs.iter().map(row).collect();
+    let seed = bundle::scenario(source)
+        .map_or_else(String::new, |scenario| format!(" The traverse is simulated, seed {}.", scenario.seed));
+    format!(
+        "<h2>Runs</h2>\n<p>{}</p>{}",
+        escape(seed.trim()),
+        table("Every run of this report; – where the truth is not known.", &head, &rows)
+    )
+}
+
+/// The notes that belong to the part.
+fn notes(source: &Source, part: Part) -> String {
+    let is_meant = |note: &&Note| {
+        note.pin.target.is_none_or(|target| {
+            part.target.is_none_or(|wanted| wanted == target)
+                && part.run.is_none_or(|wanted| wanted == note.pin.run)
+        })
+    };
+    let meant: Vec<&Note> = source.notes.list.iter().filter(is_meant).collect();
+    if meant.is_empty() {
+        return "<h2>Notes</h2>\n<p>There are no notes.</p>\n".to_owned();
+    }
+    let mut text = "<h2>Notes</h2>\n".to_owned();
+    for (k, note) in meant.iter().enumerate() {
+        text.push_str(&note_html(k + 1, note, &source.session));
+    }
+    text
+}
+
+/// A note with where it is pinned.
+pub fn note_html(number: usize, note: &Note, session: &sightline_core::session::Session) -> String {
+    let of = note.pin.target.map_or_else(String::new, |target| {
+        let label = session.targets.get(target).map_or("a target", |record| record.label.as_str());
+        format!("{label}, run {}, ", sheet::run_letter(note.pin.run))
+    });
+    let stage = note.pin.stage.as_ref().map_or_else(String::new, |stage| format!(", {stage}"));
+    let pixel =
+        note.pin.pixel.map_or_else(String::new, |pixel| format!(", pixel {:.1}, {:.1}", pixel.x, pixel.y));
+    let at = format!("{of}step {}{stage}{pixel}", note.pin.step);
+    format!(
+        "<div class=\"note\"><p class=\"at\">{number}. {} · {}</p>\n{}</div>\n",
+        escape(&at),
+        escape(&note.made),
+        markdown(&note.text)
+    )
+}
+
+/// What there is to say of one run.
+fn chapter(text: &mut String, source: &Source, run: NamedRun<'_>, cancel: &AtomicBool) -> ApiResult<()> {
+    let steps = &run.run.steps;
+    let _ = writeln!(text, "<h2>{}</h2>", escape(&sheet::title(source, run)));
+    if let Some(why) = run.run.why_stopped() {
+        let _ = writeln!(text, "<p>The run stopped before the last stop: {}.</p>", escape(&why));
+    }
+    let rows: Vec<Vec<String>> = metrics(steps)
+        .into_iter()
+        .map(|metric| {
+            let worst = metric.worst_step.map_or_else(String::new, |step| format!("step {step}"));
+            vec![metric.name, metric.value, worst]
+        })
+        .collect();
+    let caption =
+        "Metrics. Errors are those of steps in state tracking after the designation whose truth is known.";
+    text.push_str(&table(caption, &["metric", "value", "worst at"], &rows));
+    for figure in figures(steps, &run)? {
+        text.push_str(&figure);
+    }
+    text.push_str("<h3>Worst steps</h3>\n<div class=\"row\">");
+    for place in worst(steps) {
+        let drawn = sheet::picture_of(source, run, place, None, cancel)?;
+        let png = drawn.png().map_err(ApiError::internal)?;
+        text.push_str(&figure_of(&steps[place], &png));
+    }
+    let _ = writeln!(text, "</div>\n<p class=\"at\">{}</p>", escape(picture::LEGEND));
+    text.push_str(&step_table(steps));
+    text.push_str(&configuration(source, run));
+    Ok(())
+}
+
+fn figure_of(trace: &StepTrace, png: &[u8]) -> String {
+    let row = trace.row();
+    let words = format!(
+        "Step {}, {}: {}.",
+        row.step,
+        picture::state_words(trace).to_lowercase(),
+        picture::numbers(&row)
+    );
+    let reason = row.reason.unwrap_or_else(|| "The update was accepted".to_owned());
+    format!(
+        "<figure><img src=\"{}\" width=\"320\" alt=\"{}\"><figcaption>{}</figcaption></figure>",
+        png_address(png),
+        escape(&format!("The target in the left image. {words}")),
+        escape(&format!("Step {}. {}.", row.step, reason.trim_end_matches('.')))
+    )
+}
+
+/// Scores and errors over the steps.
+fn figures(steps: &[std::sync::Arc<StepTrace>], run: &NamedRun<'_>) -> ApiResult<Vec<String>> {
+    let rows: Vec<_> = steps.iter().map(|trace| trace.row()).collect();
+    let points = |get: &dyn Fn(usize) -> Option<f64>| {
+        (0..rows.len()).filter_map(|k| Some((rows[k].step as f64, get(k)?))).collect::<Vec<_>>()
+    };
+    let line = |label: &str, colour: usize, points: Vec<(f64, f64)>, is_thin: bool| Line {
+        label: label.to_owned(),
+        colour,
+        points,
+        is_thin,
+        ..Line::default()
+    };
+    let limit = run.run.settings.limits.ncc_min;
+    let gate = |k: usize| rows[k].ncc.map(|_| limit);
+    let charts = [
+        (
+            "Match score (NCC)",
+            "score",
+            vec![
+                line("score of the match", 0, points(&|k| rows[k].ncc), false),
+                line("least that is accepted", 1, points(&gate), true),
+            ],
+        ),
+        (
+            "Error in the left image",
+            "error, px",
+            vec![
+                line("error", 0, points(&|k| rows[k].err_px), false),
+                line(
+                    "tolerance",
+                    1,
+                    points(&|k| steps[k].truth.as_ref().map(|truth| truth.tolerance_px)),
+                    true,
+                ),
+            ],
+        ),
+        (
+            "Error and uncertainty in space",
+            "cm",
+            vec![
+                line("error", 0, points(&|k| rows[k].err_m.map(|m| 100.0 * m)), false),
+                line("3σ, largest axis", 2, points(&|k| rows[k].sigma_m.map(|m| 300.0 * m)), true),
+            ],
+        ),
+    ];
+    charts.into_iter().filter_map(|(title, unit, lines)| drawn(title, unit, lines).transpose()).collect()
+}
+
+/// One chart; none where it has nothing to show.
+fn drawn(title: &str, unit: &str, lines: Vec<Line>) -> ApiResult<Option<String>> {
+    let lines: Vec<Line> = lines.into_iter().filter(|line| !line.points.is_empty()).collect();
+    // A limit without what it limits says nothing.
+    if lines.first().is_none_or(|line| line.is_thin) {
+        return Ok(None);
+    }
+    let axes = ["step".to_owned(), unit.to_owned()];
+    let chart = Chart { title: title.to_owned(), axes, lines, ..Chart::default() };
+    let svg = chart.svg().map_err(|why| ApiError::internal(format!("a figure: {why}")))?;
+    let label = format!("{title} over the steps; the table of steps has the numbers");
+    Ok(Some(format!("<figure role=\"img\" aria-label=\"{label}\">{svg}</figure>\n")))
+}
+
+fn step_table(steps: &[std::sync::Arc<StepTrace>]) -> String {
+    let row = |trace: &std::sync::Arc<StepTrace>| {
+        let row = trace.row();
+        vec![
+            row.step.to_string(),
+            row.state.clone(),
+            number(row.ncc, 3),
+            number(row.stereo_score, 3),
+            row.inliers.map_or_else(|| "–".to_owned(), |count| count.to_string()),
+            number(row.err_px, 2),
+            number(row.err_m.map(|m| 100.0 * m), 2),
+            number(row.sigma_m.map(|m| 100.0 * m), 2),
+            number(row.nees, 1),
+            number(row.range_m, 2),
+            row.reason.unwrap_or_default(),
+        ]
+    };
+    let head = [
+        "step",
+        "state",
+        "NCC",
+        "stereo",
+        "inliers",
+        "error, px",
+        "error, cm",
+        "σ, cm",
+        "NEES",
+        "range, m",
+        "why rejected",
+    ];
+    let rows: Vec<Vec<String>> = steps.iter().map(row).collect();
+    format!("<h3>Steps</h3>\n{}", table("Every step of the run.", &head, &rows))
+}
+
+fn configuration(source: &Source, run: NamedRun<'_>) -> String {
+    let changes = run.run.settings.changes();
+    let rows: Vec<Vec<String>> =
+        changes.iter().map(|(key, value)| vec![key.clone(), value.to_string()]).collect();
+    let changed = if rows.is_empty() {
+        "<p>All settings are at their defaults.</p>".to_owned()
+    } else {
+        table("Settings that differ from the defaults.", &["setting", "value"], &rows)
+    };
+    let settings = serde_json::to_vec(run.run.settings.as_ref()).unwrap_or_default();
+    let again = bundle::command(source, run).map_or_else(
+        || "<p>The run left another one on its way; the reproduce bundle holds both.</p>".to_owned(),
+        |command| format!("<p>Again:</p>\n<pre>{}</pre>", escape(&command)),
+    );
+    format!(
+        "<h3>Configuration</h3>\n{changed}\n<p>SHA-256 of all settings: <code>{}</code></p>\n{again}\n",
+        hash(&settings)
+    )
+}
+
+/// Where the numbers come from.
+fn origin(source: &Source) -> String {
+    let index = serde_json::to_vec(source.open.traverse.index()).unwrap_or_default();
+    let rows = [
+        ("program", format!("sightline {}", env!("CARGO_PKG_VERSION"))),
+        ("tracker", tracker_version()),
+        ("traverse", source.open.id.clone()),
+        ("SHA-256 of the traverse's index", hash(&index)),
+        ("pixels", "(0, 0) is the centre of the first pixel; x to the right, y down".to_owned()),
+        (
+            "err_px, err_m",
+            "distance from the truth in the left image, and in the present rover frame".to_owned(),
+        ),
+    ];
+    let rows: Vec<Vec<String>> = rows.into_iter().map(|(name, value)| vec![name.to_owned(), value]).collect();
+    format!("<h2>Origin</h2>\n{}", table("What made this report.", &["", ""], &rows))
+}

@@ -1,0 +1,28 @@
+//! What a viewer shows as the properties of a recording: what made it, and from what.
+
+use rerun::components::Text;
+use rerun::{AnyValues, RecordingStream};
+use sightline_core::study::plan::tracker_version;
+
+use super::Logged;
+
+/// The version of Rerun for which recordings are written.
+const RERUN_VERSION: &str = "0.36";
+
+/// Sends the properties.
+pub(super) fn send(stream: &RecordingStream, traverse: &str) -> Logged {
+    let values = [
+        ("program", format!("sightline {}", env!("CARGO_PKG_VERSION"))),
+        ("tracker", tracker_version()),
+        ("traverse", traverse.to_owned()),
+        ("rerun", format!("written for Rerun {RERUN_VERSION}")),
+        (
+            "pixels",
+            "Rerun counts from the corner of the first pixel, half a pixel more than Sightline".to_owned(),
+        ),
+    ];
+    let all = values
+        .into_iter()
+        .fold(AnyValues::default(), |all, (name, value)| all.with_component::<Text>(name, [value.as_str()]));
+    stream.send_property("sightline", &all)
+}

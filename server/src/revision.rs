@@ -1,0 +1,73 @@
+//! `If-Match`: which revision of a thing a person has read before changing it, so that nobody's words are lost.
+
+use axum::extract::FromRequestParts;
+use axum::http::request::Parts;
+use axum::http::{HeaderMap, StatusCode, header};
+
+use crate::problem::{ApiError, ApiResult};
+
+/// The revision that was read: `If-Match: "3"`; `If-Match: *` is none, whichever it is; `If-None-Match: *` is 0, a thing
+/// that is not there yet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Read(pub Option<u64>);
+
+impl<S: Send + Sync> FromRequestParts<S> for Read {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, _state: &S) -> ApiResult<Self> {
+        read(&parts.headers)
+    }
+}
+
+fn read(headers: &HeaderMap) -> ApiResult<Read> {
+    let said = |name| headers.get(name).map(|value| value.to_str().unwrap_or_default().trim().to_owned());
+    match (said(header::IF_MATCH), said(header::IF_NONE_MATCH)) {
+        (Some(any), _) if any == "*" => Ok(Read(None)),
+        (Some(tag), _) => {
+            let number =
+                tag.strip_prefix('"').and_then(|tag| tag.strip_suffix('"')).and_then(|n| n.parse().ok());
+            let wrong = || {
+                ApiError::invalid("if_match", "If-Match: must be a revision in quotes, such as \"3\", or *")
+            };
+            number.map(|number| Read(Some(number))).ok_or_else(wrong)
+        }
+        (None, Some(any)) if any == "*" => Ok(Read(Some(0))),
+        _ => Err(ApiError::new(
+            StatusCode::PRECONDITION_REQUIRED,
+            "if_match",
+            "The header If-Match must name the revision that you have read.",
+        )
+        .hint("It is in the field `revision` and in the header ETag; `If-Match: *` takes whichever it is.")),
+    }
+}
+
+/// The header that tells a revision.
+pub fn tag(revision: u64) -> [(header::HeaderName, String); 1] {
+    [(header::ETAG, format!("\"{revision}\""))]
+}
+
+/// Somebody changed it meanwhile.
+pub fn changed(what: &str, revision: u64) -> ApiError {
+    let detail = format!("{what} was changed meanwhile; its revision is {revision} now.");
+    ApiError::new(StatusCode::PRECONDITION_FAILED, "changed", detail)
+        .hint("Read it again, then change it with that revision.")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use axum::http::HeaderValue;
+
+    #[test]
+    fn a_revision_is_read_from_its_quotes() {
+        let with = |name, value: &'static str| {
+            read(&HeaderMap::from_iter([(name, HeaderValue::from_static(value))]))
+                .map_err(|e| e.problem().status)
+        };
+        assert_eq!(with(header::IF_MATCH, "\"12\""), Ok(Read(Some(12))));
+        assert_eq!(with(header::IF_MATCH, "*"), Ok(Read(None)));
+        assert_eq!(with(header::IF_NONE_MATCH, "*"), Ok(Read(Some(0))));
+        assert_eq!(with(header::IF_MATCH, "12"), Err(422));
+        assert_eq!(read(&HeaderMap::new()).map_err(|e| e.problem().status), Err(428));
+    }
+}

@@ -1,0 +1,181 @@
+//! The database: what comes back, what is moved aside, and that nothing is lost on the way.
+
+use super::*;
+use sightline_core::session::documents::Document;
+use sightline_core::session::notes::NewNote;
+use sightline_core::session::view::{SavedRun, SavedTarget};
+use sightline_core::session::{Fork, Session};
+
+/// A session with a target, a run and a fork of it.
+fn saved(id: &str) -> SavedSession {
+    let mut saved = Session::new(id, "t", 9).saved();
+    let run = |fork: Option<Fork>| {
+        let settings = serde_json::to_value(sightline_core::settings::Settings::default()).unwrap();
+        let run = serde_json::json!({ "fork": fork, "settings": settings });
+        serde_json::from_value::<SavedRun>(run).unwrap()
+    };
+    let target = serde_json::json!({
+        "label": "rock", "designation": { "step": 1, "pixel": { "x": 0.1 + 0.2, "y": 1.0 / 3.0 } },
+        "removed": false, "runs": []
+    });
+    let mut target: SavedTarget = serde_json::from_value(target).unwrap();
+    target.runs = vec![run(None), run(Some(Fork::new(0, 3)))];
+    saved.targets.push(target);
+    saved.cursor = Cursor { target: Some(0), run: 1, step: 4 };
+    saved
+}
+
+fn sessions(folder: &Path) -> Found {
+    Store::open(folder).unwrap().load().unwrap()
+}
+
+#[test]
+fn a_session_comes_back_with_its_runs_cursor_and_notes_bit_for_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut notes = Notes::default();
+    {
+        let store = Store::open(folder.path()).unwrap();
+        store.save(&saved("s2")).unwrap();
+        let new = NewNote { step: 3, text: "moved".to_owned(), ..NewNote::default() };
+        notes.add(new, &Session::new("s2", "t", 9), "2026-11-22T12:00:00Z").unwrap();
+        store.save_notes("s2", &notes).unwrap();
+        let mut moved = saved("s2").cursor;
+        moved.step = 7;
+        store.move_cursor("s2", moved);
+    }
+    let found = sessions(folder.path());
+    let mut expected = saved("s2");
+    expected.cursor.step = 7;
+    assert_eq!((found.sessions, found.last_number), (vec![expected], 2));
+    assert_eq!(found.notes[&2], notes);
+    assert!(found.messages.is_empty(), "{:?}", found.messages);
+}
+
+#[test]
+fn a_run_that_is_taken_out_of_a_session_is_taken_out_of_the_database() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).unwrap();
+    store.save(&saved("s1")).unwrap();
+    let mut shorter = saved("s1");
+    shorter.targets[0].runs.pop();
+    store.save(&shorter).unwrap();
+    assert_eq!(store.load().unwrap().sessions, vec![shorter]);
+}
+
+#[test]
+fn a_cursor_is_on_disk_soon_although_nobody_asks_for_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).unwrap();
+    store.save(&saved("s1")).unwrap();
+    for step in 0..6 {
+        store.move_cursor("s1", Cursor { target: Some(0), run: 0, step });
+    }
+    assert_eq!(read_only(folder.path()).unwrap().sessions[0].cursor.step, 4, "not at once");
+    std::thread::sleep(2 * CURSOR_PERIOD);
+    assert_eq!(read_only(folder.path()).unwrap().sessions[0].cursor.step, 5);
+}
+
+#[test]
+fn json_files_of_an_earlier_version_are_read_in_once_and_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = serde_json::to_vec_pretty(&saved("s2")).unwrap();
+    std::fs::write(folder.path().join("s2.json"), &text).unwrap();
+    std::fs::write(folder.path().join("s7.json"), b"{\"format\": 1, \"id\"").unwrap();
+    std::fs::write(folder.path().join("notes.txt"), b"mine").unwrap();
+    let found = sessions(folder.path());
+    assert_eq!((found.sessions, found.last_number), (vec![saved("s2")], 7));
+    let said = found.messages.join("\n");
+    assert!(said.contains("s2.json") && said.contains("s7.json"), "{said}");
+    assert_eq!(std::fs::read(folder.path().join("s2.imported")).unwrap(), text);
+    assert_eq!(std::fs::read(folder.path().join("s7.damaged")).unwrap(), b"{\"format\": 1, \"id\"");
+    assert!(folder.path().join("notes.txt").is_file());
+    // A file of the same name that turns up later does not replace what was done since.
+    let mut older = saved("s2");
+    older.targets.clear();
+    std::fs::write(folder.path().join("s2.json"), serde_json::to_vec(&older).unwrap()).unwrap();
+    assert_eq!(sessions(folder.path()).sessions, vec![saved("s2")]);
+    assert!(folder.path().join("s2.imported-2").is_file());
+}
+
+#[test]
+fn a_damaged_database_is_moved_aside_whole_and_another_one_begun() {
+    let whole = tempfile::tempdir().unwrap();
+    Store::open(whole.path()).unwrap().save(&saved("s1")).unwrap();
+    let good = std::fs::read(whole.path().join(FILE_NAME)).unwrap();
+    let mut flipped = good.clone();
+    // Every page that holds something loses a few bytes.
+    flipped
+        .chunks_mut(4096)
+        .filter(|page| page.iter().any(|byte| *byte != 0))
+        .for_each(|page| page[16..48].fill(0xa5));
+    for (name, bytes) in
+        [("garbage", b"not a database at all".to_vec()), ("flipped", flipped), ("cut", good[..5000].to_vec())]
+    {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join(FILE_NAME), &bytes).unwrap();
+        let store = Store::open(folder.path()).unwrap();
+        let found = store.load().unwrap();
+        assert!(found.sessions.is_empty(), "{name}");
+        assert!(found.messages[0].contains("sessions.redb.damaged"), "{name}: {:?}", found.messages);
+        let aside = std::fs::read(folder.path().join("sessions.redb.damaged")).unwrap();
+        assert_eq!(aside.len(), bytes.len(), "{name}");
+        store.save(&saved("s1")).unwrap();
+        assert_eq!(store.load().unwrap().sessions.len(), 1, "{name}");
+    }
+}
+
+#[test]
+fn a_session_that_cannot_be_understood_is_moved_into_a_file_and_the_others_stay() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).unwrap();
+    store.save(&saved("s1")).unwrap();
+    store.save(&saved("s2")).unwrap();
+    store.disk.write(|transaction| put(transaction, RUNS, (2, 0, 1), &"nonsense")).unwrap();
+    let found = store.load().unwrap();
+    assert_eq!(found.sessions, vec![saved("s1")]);
+    assert!(found.messages[0].contains("session s2") && found.messages[0].contains("run 1 of target 0"));
+    let aside = std::fs::read_to_string(folder.path().join("s2.damaged")).unwrap();
+    assert!(aside.contains("nonsense") && aside.contains("rock"), "{aside}");
+    let again = store.load().unwrap();
+    assert_eq!((again.messages.len(), again.last_number), (0, 2));
+}
+
+#[test]
+fn a_database_of_a_newer_version_is_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    {
+        let store = Store::open(folder.path()).unwrap();
+        let newer = |transaction: &WriteTransaction| {
+            transaction.open_table(META)?.insert("version", STORE_VERSION + 1)?;
+            Ok(true)
+        };
+        store.disk.write(newer).unwrap();
+    }
+    let refused = Store::open(folder.path()).err().unwrap().to_string();
+    assert!(refused.contains("newer version"), "{refused}");
+    assert!(!folder.path().join("sessions.redb.damaged").exists());
+}
+
+#[test]
+fn a_document_is_replaced_only_by_whom_has_read_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).unwrap();
+    let put = |value: i32, revision| store.put_document("layout", value.into(), revision).unwrap();
+    assert_eq!(put(1, Some(0)).unwrap().revision, 1);
+    assert_eq!(put(2, Some(0)), Err(Clash::Changed(Some(1))));
+    assert_eq!(
+        put(3, Some(1)).unwrap(),
+        Document { name: "layout".to_owned(), revision: 2, value: 3.into() }
+    );
+    assert_eq!(store.remove_document("layout", Some(1)).unwrap(), Err(Clash::Changed(Some(2))));
+    assert_eq!(store.remove_document("layout", None).unwrap(), Ok(true));
+    assert_eq!((store.documents().unwrap().len(), put(4, Some(2))), (0, Err(Clash::Changed(None))));
+}
+
+#[test]
+fn only_the_very_form_of_a_name_is_one() {
+    assert_eq!(number_of("s12"), Some(12));
+    for id in ["", "s", "s01", "s+1", "s-1", "S1", "s1/", "../s1"] {
+        assert_eq!(number_of(id), None, "{id}");
+    }
+}

@@ -1,0 +1,70 @@
+//! The list of studies on disk: what was ordered, how it stands, and what it found, so that it outlives the server.
+
+use std::sync::{Arc, Weak};
+
+use serde::{Deserialize, Serialize};
+use sightline_core::error::Result;
+use sightline_core::study::row::Row;
+use sightline_core::study::wire::{NewStudy, StudyJob, StudyState};
+
+use crate::store::Store;
+
+/// A study as it is kept.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct KeptStudy {
+    /// What was ordered.
+    pub new: NewStudy,
+    /// How it stands.
+    pub job: StudyJob,
+    /// What it found, once it is done.
+    pub rows: Vec<Row>,
+    /// Its report, once it is done.
+    pub report: Option<String>,
+}
+
+impl KeptStudy {
+    /// The study after a restart: what was under way was stopped by it, and goes on when it is resumed.
+    #[must_use]
+    pub fn after_a_restart(mut self) -> Self {
+        if matches!(self.job.state, StudyState::Waiting | StudyState::Running) {
+            self.job.state = StudyState::Cancelled;
+            "stopped by the end of the server; resume it to go on".clone_into(&mut self.job.doing);
+        }
+        self
+    }
+}
+
+/// Where studies are kept; it does not keep the database open.
+#[derive(Clone)]
+pub struct Keeper(Weak<Store>);
+
+impl Keeper {
+    /// Keeps studies in `store`.
+    pub fn new(store: &Arc<Store>) -> Self {
+        Self(Arc::downgrade(store))
+    }
+
+    /// The studies that were kept, by number.
+    ///
+    /// # Errors
+    /// When the database cannot be read.
+    pub fn all(&self) -> Result<Vec<(u64, KeptStudy)>> {
+        self.0.upgrade().map_or_else(|| Ok(Vec::new()), |store| store.studies())
+    }
+
+    /// Keeps a study; a failure goes to the log, because the study itself goes on.
+    pub fn keep(&self, number: u64, study: &KeptStudy) {
+        let Some(store) = self.0.upgrade() else { return };
+        if let Err(error) = store.save_study(number, study) {
+            tracing::error!("study {number} is not saved: {}", crate::plain(&error.to_string()));
+        }
+    }
+
+    /// Forgets a study, for which the list has no room any more; what it found stays in its folder.
+    pub fn forget(&self, number: u64) {
+        let Some(store) = self.0.upgrade() else { return };
+        if let Err(error) = store.remove_study(number) {
+            tracing::error!("study {number} stays in the list: {}", crate::plain(&error.to_string()));
+        }
+    }
+}

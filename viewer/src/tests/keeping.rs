@@ -1,0 +1,246 @@
+//! Notes and exports: what they show, what they ask of the server, and that no words are lost.
+
+use sightline_core::session::exports::{ExportEntry, Size};
+use sightline_core::session::notes::{Note, Pin, STAGES};
+use sightline_core::session::wire::{Event, Problem};
+
+use egui_kittest::kittest::Queryable;
+
+use super::{Shown, fixture};
+use crate::command::{Command, Stage};
+use crate::layout::Pane;
+use crate::net::{Arrived, Reply, Request};
+use crate::panels::{export, notes as panel};
+use crate::state::State;
+use crate::state::exports;
+use crate::state::notes::Ask;
+
+fn note(id: u64, step: usize, target: Option<usize>, text: &str) -> Note {
+    let stage = target.map(|_| "judge".to_owned());
+    let pin = Pin { target, run: 0, step, stage, pixel: None };
+    let time = || "2026-11-22T12:00:00Z".to_owned();
+    Note { id, revision: 3, pin, text: text.to_owned(), made: time(), changed: time() }
+}
+
+/// A session at step 2 with three notes.
+fn noted(context: &egui::Context) -> State {
+    let mut state = fixture::at_step(context, 2);
+    state.notes.list = Some(vec![
+        note(4, 3, Some(0), "the **shade** moved"),
+        note(7, 1, None, "a dusty stop"),
+        note(5, 2, Some(0), "still fine"),
+    ]);
+    state
+}
+
+fn do_(state: &mut State, ask: Ask) {
+    state.apply(Command::Notes(ask));
+}
+
+fn refuse(state: &mut State, request: Request) {
+    let detail = "Note 5 was changed meanwhile.".to_owned();
+    let (code, title) = ("changed".to_owned(), String::new());
+    let problem = Problem { code, title, status: 412, detail, hint: None, nearest_pixel: None };
+    state.arrived(Arrived { request, outcome: Err(problem) }, 0.0);
+}
+
+#[test]
+fn notes_are_listed_in_their_order_and_a_click_goes_there() {
+    let mut shown = Shown::pane(Pane::Notes, noted);
+    shown
+        .says("1. step 3, ridge, run A, judge")
+        .says("the shade moved")
+        .says("2. step 1")
+        .says("a dusty stop");
+    let commands = shown.click("go to note 1: step 3, ridge, run A, judge");
+    assert_eq!(commands, vec![Command::Notes(Ask::GoTo(4))]);
+    assert_eq!(shown.click("remove note 2"), vec![Command::Notes(Ask::Remove(7))]);
+    assert_eq!(shown.click("later in the tour: note 1"), vec![Command::Notes(Ask::Move { id: 4, place: 1 })]);
+    assert_eq!(shown.click("Pin a note here  (M)"), vec![Command::Notes(Ask::Pin)]);
+    Shown::pane(Pane::Notes, |context| fixture::at_step(context, 2)).says("Asking the server for its notes");
+    let none = |context: &egui::Context| {
+        let mut state = fixture::at_step(context, 2);
+        state.notes.list = Some(Vec::new());
+        state
+    };
+    Shown::pane(Pane::Notes, none).says("No notes yet").says("press M");
+}
+
+#[test]
+fn a_note_of_a_step_is_found_by_the_step_and_its_run() {
+    let mut state = noted(&egui::Context::default());
+    let ids =
+        |state: &State, step: usize| state.notes_at(step).iter().map(|note| note.id).collect::<Vec<_>>();
+    assert_eq!((ids(&state, 3), ids(&state, 1), ids(&state, 0)), (vec![4], vec![7], vec![]));
+    state.cursor.run = 1;
+    assert_eq!(
+        (ids(&state, 3), ids(&state, 1)),
+        (vec![], vec![7]),
+        "a note of another run is not of this one"
+    );
+}
+
+#[test]
+fn the_tour_goes_through_the_notes_in_their_order_and_ends_at_its_ends() {
+    let mut state = noted(&egui::Context::default());
+    let mut tour = |by: isize| {
+        do_(&mut state, Ask::Tour(by));
+        (state.cursor.step, state.stage)
+    };
+    assert_eq!(tour(1), (3, Stage::Judge));
+    assert_eq!(tour(1).0, 1);
+    assert_eq!((tour(1).0, tour(1).0), (2, 2));
+    assert_eq!((tour(-1).0, tour(-1).0, tour(-1).0), (1, 3, 3));
+}
+
+#[test]
+fn a_note_is_pinned_to_what_is_looked_at_and_its_words_are_never_lost() {
+    let mut state = noted(&egui::Context::default());
+    state.take_requests();
+    state.stage = Stage::MatchTemplate;
+    do_(&mut state, Ask::Pin);
+    do_(&mut state, Ask::Write("half a thought".to_owned()));
+    do_(&mut state, Ask::Close);
+    assert!(state.notes.draft.is_none());
+    do_(&mut state, Ask::Pin);
+    assert_eq!(state.notes.draft.as_ref().unwrap().text, "half a thought", "closing keeps the words");
+    do_(&mut state, Ask::Save);
+    let [request @ Request::NewNote { .. }] = &state.take_requests()[..] else { panic!("the note is sent") };
+    let Request::NewNote { new, .. } = request else { unreachable!() };
+    let stage = Some("match_template".to_owned());
+    assert_eq!((new.target, new.run, new.step, &new.stage), (Some(0), 0, 2, &stage));
+    assert_eq!((new.text.as_str(), new.pixel), ("half a thought", Some(fixture::PIXEL)));
+    refuse(&mut state, request.clone());
+    assert_eq!(state.notes.draft.as_ref().unwrap().text, "half a thought", "a refusal keeps them, too");
+    do_(&mut state, Ask::Write("  ".to_owned()));
+    do_(&mut state, Ask::Save);
+    assert!(state.take_requests().is_empty() && state.notes.draft.is_some(), "nothing is no note");
+}
+
+#[test]
+fn an_edit_that_came_too_late_shows_its_words_again_and_reads_the_notes() {
+    let mut state = noted(&egui::Context::default());
+    state.take_requests();
+    do_(&mut state, Ask::Edit(5));
+    do_(&mut state, Ask::Write("not so fine".to_owned()));
+    do_(&mut state, Ask::Save);
+    let [request] = &state.take_requests()[..] else { panic!("one request") };
+    assert!(matches!(request, Request::EditNote { id: 5, revision: 3, .. }), "{request:?}");
+    refuse(&mut state, request.clone());
+    assert!(state.take_requests().contains(&Request::Notes("s1".to_owned())));
+    assert_eq!(state.notes.draft.as_ref().unwrap().text, "not so fine");
+    assert!(state.messages.newest().unwrap().text.contains("changed meanwhile"));
+}
+
+#[test]
+fn a_removed_note_can_be_brought_back() {
+    let mut state = noted(&egui::Context::default());
+    state.take_requests();
+    do_(&mut state, Ask::Remove(5));
+    let expected = Request::RemoveNote { session: "s1".to_owned(), id: 5, revision: 3 };
+    assert_eq!(state.take_requests(), vec![expected]);
+    let removed = |context: &egui::Context| {
+        let mut state = noted(context);
+        do_(&mut state, Ask::Remove(5));
+        state
+    };
+    let mut shown = Shown::pane(Pane::Notes, removed);
+    shown.says("A note at step 2 was removed");
+    assert_eq!(shown.click("bring the removed note back"), vec![Command::Notes(Ask::Restore(5))]);
+    do_(&mut state, Ask::Restore(5));
+    assert_eq!(state.take_requests(), vec![Request::RestoreNote { session: "s1".to_owned(), id: 5 }]);
+}
+
+#[test]
+fn notes_that_changed_elsewhere_are_read_again() {
+    let mut state = fixture::nothing();
+    let view = noted(&egui::Context::default()).session.unwrap();
+    let request = Request::Session("s1".to_owned());
+    state.arrived(Arrived { request, outcome: Ok(Reply::Session(Box::new(view))) }, 0.0);
+    let asked = Request::Notes("s1".to_owned());
+    assert!(state.take_requests().contains(&asked), "an opened session has its notes read");
+    let list = vec![note(1, 0, None, "x")];
+    state.arrived(Arrived { request: asked.clone(), outcome: Ok(Reply::Notes(list)) }, 0.0);
+    assert_eq!(state.notes_at(0).len(), 1);
+    state.told(Event::NotesChanged { session: "other".to_owned() });
+    assert!(!state.take_requests().contains(&asked));
+    state.told(Event::NotesChanged { session: "s1".to_owned() });
+    assert!(state.take_requests().contains(&asked));
+}
+
+#[test]
+fn every_stage_of_the_viewer_is_one_to_which_a_note_can_be_pinned() {
+    for tracker in sightline_core::settings::TrackerKind::ALL {
+        for stage in Stage::of(tracker) {
+            assert!(STAGES.contains(&stage.word()), "{}", stage.word());
+        }
+    }
+}
+
+#[test]
+fn the_editor_names_the_place_and_saves() {
+    let mut shown = Shown::new(
+        [700.0, 500.0],
+        |context| {
+            let mut state = noted(context);
+            do_(&mut state, Ask::Pin);
+            do_(&mut state, Ask::Write("done".to_owned()));
+            state
+        },
+        panel::editor,
+    );
+    shown.says("NEW NOTE AT STEP 2");
+    assert_eq!(shown.click("Save note"), vec![Command::Notes(Ask::Save)]);
+}
+
+#[test]
+fn the_export_window_lists_files_with_sizes_and_ways_to_copy_them() {
+    let mut shown = Shown::new(
+        [900.0, 800.0],
+        |context| {
+            let mut state = noted(context);
+            state.apply(Command::Exports(exports::Ask::Open));
+            assert!(state.take_requests().iter().any(|request| matches!(request, Request::Exports { .. })));
+            state.exports.panes = vec![Pane::Map];
+            state.exports.entries = Some(vec![ExportEntry {
+                name: "rows.csv".to_owned(),
+                title: "Rows, CSV".to_owned(),
+                sentence: "One line a step.".to_owned(),
+                file: "sightline-s1-rows.csv".to_owned(),
+                size: Size { bytes: 1234, is_exact: true },
+                path: "sessions/s1/exports/rows.csv".to_owned(),
+                command: "sightline export rows.csv --session s1".to_owned(),
+            }]);
+            state
+        },
+        export::show,
+    );
+    shown.says("Rows, CSV").says("1 kB").says("One line a step.").says("pick ridge");
+    let download = exports::Ask::Download("sessions/s1/exports/rows.csv".to_owned());
+    assert_eq!(shown.click("download: Rows, CSV"), vec![Command::Exports(download)]);
+    let copied = |shown: &mut Shown<'_>, label: &str| {
+        shown.harness.get_by_label(label).click();
+        shown.harness.step();
+        let text = shown.harness.output().platform_output.commands.iter().find_map(|command| match command {
+            egui::OutputCommand::CopyText(text) => Some(text.clone()),
+            _ => None,
+        });
+        text.unwrap_or_else(|| panic!("{label} copies nothing"))
+    };
+    assert_eq!(copied(&mut shown, "copy as command: Rows, CSV"), "sightline export rows.csv --session s1");
+    let curl = copied(&mut shown, "copy as HTTP: Rows, CSV");
+    assert_eq!(
+        curl,
+        "curl -fsS -o sightline-s1-rows.csv http://localhost/api/v1/sessions/s1/exports/rows.csv"
+    );
+    let picture = shown.click("picture of Map, site frame");
+    assert_eq!(picture, vec![Command::Exports(exports::Ask::Picture(Pane::Map))]);
+}
+
+#[test]
+fn the_plain_page_of_what_is_looked_at_is_opened() {
+    let mut state = noted(&egui::Context::default());
+    state.apply(Command::Exports(exports::Ask::PlainPage));
+    let expected = "http://localhost/api/v1/sessions/s1/targets/0/runs/0/steps/2/page";
+    assert_eq!(state.open_url.as_deref(), Some(expected));
+}
