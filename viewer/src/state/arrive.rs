@@ -33,7 +33,10 @@ impl State {
     pub fn told(&mut self, event: Event) {
         let is_ours = |session: &str| self.session.as_ref().is_some_and(|open| open.id == session);
         match event {
-            Event::SessionChanged { session } => self.sync.session_stale |= is_ours(&session),
+            Event::SessionChanged { session } => {
+                self.sync.session_stale |= is_ours(&session);
+                self.follow_questions();
+            }
             Event::RunProgress { session, target, run, k, n, ended, doing } if is_ours(&session) => {
                 if ended {
                     self.progress.remove(&(target, run));

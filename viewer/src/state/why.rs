@@ -371,6 +371,14 @@ impl State {
         }
     }
 
+    /// Asks again for what is still being answered: a page that missed events is told that the session changed.
+    pub(super) fn follow_questions(&mut self) {
+        let is_open =
+            |told: &Told<Question>| matches!(told, Told::Here(question) if !question.state.is_over());
+        let open = self.why.questions.iter().filter(|(_, told)| is_open(told));
+        self.outbox.extend(open.map(|(key, _)| Request::Why(WhyRequest::Question(key.clone()))));
+    }
+
     /// Asks once whether somebody has asked what saves the cursor's step: a page that was loaded again finds its answer.
     pub fn want_question(&mut self) {
         let is_lost = self.row().is_some_and(|row| row.state != "tracking" || row.tracked == Some(false));

@@ -273,6 +273,15 @@ fn a_question_is_asked_once_followed_by_events_and_found_again_by_a_new_page() {
     state.told(Event::QuestionProgress { session, target, run, step, k: 1, n: 9, ended: false });
     assert_eq!(asked(&mut state), vec![WhyRequest::Question(key())]);
     assert_eq!(state.question(), Some(&Told::Waiting));
+    // A page that missed events reads the session again, and what is still being answered with it.
+    let running = question(QuestionState::Running, Vec::new());
+    answer(&mut state, WhyRequest::Question(key()), WhyReply::Question(Box::new(running)));
+    state.told(Event::SessionChanged { session: "s1".to_owned() });
+    assert_eq!(asked(&mut state), vec![WhyRequest::Question(key())]);
+    let done = question(QuestionState::Done, Vec::new());
+    answer(&mut state, WhyRequest::Question(key()), WhyReply::Question(Box::new(done)));
+    state.told(Event::SessionChanged { session: "s1".to_owned() });
+    assert!(asked(&mut state).is_empty());
 }
 
 #[test]

@@ -12,7 +12,8 @@
 //! | `gates` | criteria, margins, the setting behind a limit |
 //! | `limits` | the limits, the tolerances of K§4.6 term by term |
 //! | `template` | the match and point stereo |
-//! | `position` | prediction, position, covariance, errors against the truth |
+//! | `prediction`, `position` | prediction, position, covariance |
+//! | `truth` | errors against the truth |
 //! | `others` | features, shape, state, settings |
 //! | `sentence` | the verdict as one sentence, from the evidence |
 
@@ -21,8 +22,10 @@ mod limits;
 mod node;
 mod others;
 mod position;
+mod prediction;
 pub mod sentence;
 mod template;
+mod truth;
 #[cfg(test)]
 mod tests;
 pub mod words;

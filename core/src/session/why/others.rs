@@ -9,6 +9,7 @@ impl Book<'_> {
     /// A value of another tracker, of the state machine or of the error budget.
     pub(super) fn of_others(&self, name: &str) -> Option<Draft> {
         self.of_features(name)
+            .or_else(|| self.of_detection(name))
             .or_else(|| self.of_shape(name))
             .or_else(|| self.of_state(name))
             .or_else(|| self.of_budget(name))
@@ -16,7 +17,6 @@ impl Book<'_> {
 
     fn of_features(&self, name: &str) -> Option<Draft> {
         let evidence = self.trace.features()?;
-        let step = self.trace.step;
         Some(match name {
             "inliers" => Draft::number(
                 "fit_motion",
@@ -46,6 +46,30 @@ impl Book<'_> {
                     Some(matched.from_step),
                 )
             }
+            "feature_covariance" => Draft::numbers(
+                "bootstrap",
+                "covariance of the motion: translation (m), roll, pitch, yaw (rad)",
+                "",
+                evidence.bootstrap.as_ref()?.covariance.transpose().iter().copied(),
+            )
+            .roughly(
+                "the scatter of motions fitted to sets drawn with replacement (R173)",
+                &["inliers", "setting.bootstrap_sets"],
+            ),
+            "feature_sigma_m" => {
+                let covariance = &evidence.bootstrap.as_ref()?.covariance;
+                let largest = (0..3).map(|k| covariance[(k, k)].max(0.0).sqrt()).fold(0.0, f64::max);
+                Draft::number("bootstrap", "largest 1σ of the translation's coordinates", "m", largest)
+                    .exactly("√ of the largest of the first three diagonal elements", &["feature_covariance"])
+            }
+            _ => return None,
+        })
+    }
+
+    fn of_detection(&self, name: &str) -> Option<Draft> {
+        let evidence = self.trace.features()?;
+        let step = self.trace.step;
+        Some(match name {
             "points_then" => {
                 let matched = evidence.match_features.as_ref()?;
                 Draft::number("detect", "points of the remembered stop", "", matched.then as f64)
@@ -71,22 +95,6 @@ impl Book<'_> {
                         file.unwrap_or_else(|| format!("left image of stop {step}")),
                         Some(step),
                     )
-            }
-            "feature_covariance" => Draft::numbers(
-                "bootstrap",
-                "covariance of the motion: translation (m), roll, pitch, yaw (rad)",
-                "",
-                evidence.bootstrap.as_ref()?.covariance.transpose().iter().copied(),
-            )
-            .roughly(
-                "the scatter of motions fitted to sets drawn with replacement (R173)",
-                &["inliers", "setting.bootstrap_sets"],
-            ),
-            "feature_sigma_m" => {
-                let covariance = &evidence.bootstrap.as_ref()?.covariance;
-                let largest = (0..3).map(|k| covariance[(k, k)].max(0.0).sqrt()).fold(0.0, f64::max);
-                Draft::number("bootstrap", "largest 1σ of the translation's coordinates", "m", largest)
-                    .exactly("√ of the largest of the first three diagonal elements", &["feature_covariance"])
             }
             _ => return None,
         })

@@ -1,4 +1,4 @@
-//! Prediction, position, covariance, and what the truth says of them.
+//! Position and covariance, and the geometry that they come from.
 
 use nalgebra::Matrix3;
 
@@ -7,11 +7,11 @@ use super::node::{Draft, OriginKind};
 use crate::frames::{Pixel, Point3, Pose};
 use crate::locate::Evidence;
 
-fn of_point(point: &Point3) -> [f64; 3] {
+pub(super) fn of_point(point: &Point3) -> [f64; 3] {
     [point.x, point.y, point.z]
 }
 
-fn of_pixel(pixel: Pixel) -> [f64; 2] {
+pub(super) fn of_pixel(pixel: Pixel) -> [f64; 2] {
     [pixel.x, pixel.y]
 }
 
@@ -52,92 +52,12 @@ impl Book<'_> {
     /// A value of prediction, location or update.
     pub(super) fn of_position(&self, name: &str) -> Option<Draft> {
         self.of_prediction(name)
+            .or_else(|| self.of_projection(name))
             .or_else(|| self.of_geometry(name))
             .or_else(|| self.of_location(name))
+            .or_else(|| self.of_correction(name))
             .or_else(|| self.of_update(name))
-    }
-
-    fn of_prediction(&self, name: &str) -> Option<Draft> {
-        let predict = self.trace.predict.as_ref()?;
-        let stage = "predict";
-        Some(match name {
-            "predicted_position" => {
-                let draft = Draft::numbers(
-                    stage,
-                    "predicted position, rover frame",
-                    "m",
-                    of_point(&predict.position_in_rover),
-                );
-                match self.prediction_px {
-                    Some(_) => draft.roughly(
-                        "on the line of sight of the pixel at which a person put it, as far away as dead reckoning says",
-                        &["displaced_to", "last_position", "pose_before", "pose"],
-                    ),
-                    None => draft.exactly(
-                        "site_from_rover(now)⁻¹ · site_from_rover(before) · last_position",
-                        &["last_position", "pose_before", "pose"],
-                    ),
-                }
-            }
-            "displaced_to" => Draft::numbers(
-                stage,
-                "where a person put the prediction",
-                "px",
-                of_pixel(self.prediction_px?),
-            )
-            .from(OriginKind::Person, "displaced prediction", Some(self.trace.step)),
-            "predicted_covariance_m2" => Draft::numbers(
-                stage,
-                "covariance of the prediction, rover frame",
-                "m²",
-                predict.covariance_in_rover.transpose().iter().copied(),
-            )
-            .roughly(
-                "R Σ Rᵀ of the last position, plus the error of the way driven (odometry)",
-                &["last_position"],
-            ),
-            "travelled_m" => Draft::number(stage, "driven since the designation", "m", predict.travelled_m)
-                .roughly("the sum of the steps' lengths", &["pose_before", "pose"]),
-            "travelled_since_update_m" => Draft::number(
-                stage,
-                "driven since the last accepted update",
-                "m",
-                predict.travelled_since_update_m,
-            )
-            .roughly("the sum of the steps' lengths since then", &["pose_before", "pose"]),
-            "predicted_left" => Draft::numbers(
-                "point_mast",
-                "prediction in the left image",
-                "px",
-                of_pixel(self.predicted_left()?),
-            )
-            .roughly("the predicted position through the left camera", &["predicted_position"])
-            .from(OriginKind::Camera, self.camera_name(0), Some(self.trace.step)),
-            "predicted_covariance_px2" => Draft::numbers(
-                "point_mast",
-                "covariance of the prediction in the left image",
-                "px²",
-                self.trace.point_mast.as_ref()?.predicted_covariance_px2?.transpose().iter().copied(),
-            )
-            .roughly("J Σ Jᵀ, J = ∂pixel/∂point", &["predicted_covariance_m2", "predicted_left"]),
-            "predicted_sigma_px" => {
-                let covariance = self.trace.point_mast.as_ref()?.predicted_covariance_px2?;
-                let sigma_px = covariance.symmetric_eigenvalues().max().max(0.0).sqrt();
-                Draft::number("point_mast", "1σ of the prediction along its worst direction", "px", sigma_px)
-                    .exactly(
-                        "√ of the largest eigenvalue of predicted_covariance_px2",
-                        &["predicted_covariance_px2"],
-                    )
-            }
-            "predicted_range_m" => Draft::number(
-                "judge",
-                "predicted distance from the left camera",
-                "m",
-                self.predicted_range_m()?,
-            )
-            .exactly("│predicted_position − camera_centre│", &["predicted_position", "camera_centre"]),
-            _ => return None,
-        })
+            .or_else(|| self.of_covariance(name))
     }
 
     fn of_geometry(&self, name: &str) -> Option<Draft> {
@@ -245,6 +165,13 @@ impl Book<'_> {
                 Draft::numbers("judge", "located position, site frame", "m", of_point(&in_site))
                     .exactly("site_from_rover(now) · located_position", &["located_position", "pose"])
             }
+            _ => return None,
+        })
+    }
+
+    /// How far what was located lies from what was expected.
+    fn of_correction(&self, name: &str) -> Option<Draft> {
+        Some(match name {
             "distance_correction_m" => {
                 let correction = (self.range_located_m()? - self.predicted_range_m()?).abs();
                 Draft::number("judge", "correction of the distance", "m", correction).exactly(
@@ -253,7 +180,7 @@ impl Book<'_> {
                 )
             }
             "position_correction_m" => {
-                let in_site = self.sources.site_from_rover(step) * self.located()?;
+                let in_site = self.sources.site_from_rover(self.trace.step) * self.located()?;
                 let moved = (in_site - self.trace.update.target.initial_position_in_site).norm();
                 Draft::number("judge", "correction of the position since the designation", "m", moved)
                     .exactly(
@@ -279,21 +206,40 @@ impl Book<'_> {
         })
     }
 
+    /// Whether what was located was taken.
+    fn is_found(&self) -> bool {
+        self.trace.judge.as_ref().is_none_or(|verdict| verdict.accepted)
+            && self.trace.locate.as_ref().is_some_and(|l| l.position_in_rover.is_some())
+    }
+
     fn of_update(&self, name: &str) -> Option<Draft> {
-        let target = &self.trace.update.target;
-        let is_found = self.trace.judge.as_ref().is_none_or(|verdict| verdict.accepted)
-            && self.trace.locate.as_ref().is_some_and(|l| l.position_in_rover.is_some());
-        let stage = "update";
+        let (target, stage) = (&self.trace.update.target, "update");
         Some(match name {
             "position" => {
                 let draft =
                     Draft::numbers(stage, "position, rover frame", "m", of_point(&target.position_in_rover));
-                if is_found {
+                if self.is_found() {
                     draft.exactly("the located position, since it was accepted", &["located_position"])
                 } else {
                     draft.exactly("the prediction, since nothing was accepted", &["predicted_position"])
                 }
             }
+            "sigma_m" => Draft::number(
+                stage,
+                "largest 1σ axis of the position",
+                "m",
+                sigma(&target.covariance_in_rover),
+            )
+            .exactly("√ of the largest eigenvalue of position_covariance_m2", &["position_covariance_m2"]),
+            "range_m" => Draft::number(stage, "distance from the left camera", "m", self.trace.range_m()?)
+                .exactly("│position − camera_centre│", &["position", "camera_centre"]),
+            _ => return None,
+        })
+    }
+
+    fn of_covariance(&self, name: &str) -> Option<Draft> {
+        let (target, stage) = (&self.trace.update.target, "update");
+        Some(match name {
             "position_covariance_m2" => {
                 let draft = Draft::numbers(
                     stage,
@@ -301,7 +247,7 @@ impl Book<'_> {
                     "m²",
                     target.covariance_in_rover.transpose().iter().copied(),
                 );
-                match (is_found, self.trace.features().is_some()) {
+                match (self.is_found(), self.trace.features().is_some()) {
                     (false, _) => draft.exactly(
                         "that of the prediction, since nothing was accepted",
                         &["predicted_covariance_m2"],
@@ -333,64 +279,6 @@ impl Book<'_> {
                 .roughly(
                     "the template's drift carried here, plus this match, plus what biases it (estimate/drift)",
                     &["match_covariance_px2", "setting.match_correlation"],
-                )
-            }
-            "sigma_m" => Draft::number(
-                stage,
-                "largest 1σ axis of the position",
-                "m",
-                sigma(&target.covariance_in_rover),
-            )
-            .exactly("√ of the largest eigenvalue of position_covariance_m2", &["position_covariance_m2"]),
-            "range_m" => Draft::number(stage, "distance from the left camera", "m", self.trace.range_m()?)
-                .exactly("│position − camera_centre│", &["position", "camera_centre"]),
-            _ => return None,
-        })
-    }
-
-    /// A value of the comparison with the truth.
-    pub(super) fn of_truth(&self, name: &str) -> Option<Draft> {
-        let truth = self.trace.truth.as_ref()?;
-        let stage = "truth";
-        let known =
-            |draft: Draft| draft.from(OriginKind::Truth, "truth of the traverse", Some(self.trace.step));
-        Some(match name {
-            "true_px" => {
-                known(Draft::numbers(stage, "the truth in the left image", "px", of_pixel(truth.left_pixel?)))
-            }
-            "true_position" => known(Draft::numbers(
-                stage,
-                "the true position, true rover frame",
-                "m",
-                of_point(&truth.position_in_rover),
-            )),
-            "magnification" => {
-                known(Draft::number(stage, "magnification since the designation", "", truth.magnification))
-            }
-            "err_px" => Draft::number(stage, "error in the left image", "px", truth.err_px?)
-                .exactly("│left_px − true_px│", &["left_px", "true_px"]),
-            "err_m" => {
-                Draft::number(stage, "error of the position in the present rover frame", "m", truth.err_m)
-                    .exactly("│position − true_position│", &["position", "true_position"])
-            }
-            "nees" => Draft::number(stage, "squared Mahalanobis distance of the error", "", truth.nees?)
-                .exactly(
-                    "eᵀ Σ⁻¹ e, e = position − true_position",
-                    &["position", "true_position", "position_covariance_m2"],
-                ),
-            "tolerance_px" => {
-                Draft::number(stage, "error up to which it counts as tracked", "px", truth.tolerance_px)
-                    .exactly("max(5 px, 0.5 px · magnification)  (R116)", &["magnification"])
-            }
-            "tracked" => {
-                let word = match truth.tracked {
-                    Some(true) => "tracked",
-                    Some(false) => "not tracked",
-                    None => "the truth is hidden",
-                };
-                Draft::text(stage, "whether the target is tracked", word).roughly(
-                    "state tracking, and err_px ≤ tolerance_px",
-                    &["state", "err_px", "tolerance_px"],
                 )
             }
             _ => return None,

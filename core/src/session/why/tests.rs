@@ -84,39 +84,46 @@ fn largest_sigma(covariance: &[f64]) -> f64 {
 
 /// The value of a closed form by what its formula says, from the inputs alone; none for a name without a recomputation.
 fn recomputed(node: &Node) -> Option<Vec<f64>> {
+    // What a criterion judges is the same number under its own name.
+    let name = node.value.strip_prefix("value.").unwrap_or(&node.value);
+    limits(node, name).or_else(|| places(node, name)).or_else(|| errors(node, name)).or_else(|| {
+        let same = ["ncc", "far_ncc", "position", "position_covariance_m2", "template_size_px"];
+        (name.starts_with("limit.") || same.contains(&name)).then(|| numbers(&node.inputs[0]))
+    })
+}
+
+fn limits(node: &Node, name: &str) -> Option<Vec<f64>> {
     let i = Inputs(node);
     let root = |names: &[&str]| names.iter().map(|name| i.one(name).powi(2)).sum::<f64>().sqrt();
     let stereo = |of: &str| {
         i.one(of).powi(2) * i.one("setting.disparity_error_px") / (i.one("focal_px") * i.one("baseline_m"))
     };
-    // What a criterion judges is the same number under its own name.
-    Some(match node.value.strip_prefix("value.").unwrap_or(&node.value) {
+    let fraction = || i.one("setting.navigation_error_fraction");
+    let factor = || i.one("setting.tolerance_factor");
+    let both = ["stereo_error_old_m", "stereo_error_new_m", "navigation_step_m"];
+    let four = ["stereo_error_first_m", "stereo_error_new_m", "navigation_total_m", "designation_error_m"];
+    Some(vec![match name {
         name if name.starts_with("gate.") => {
             let sign = if node.formula.as_deref() == Some("value − limit") { 1.0 } else { -1.0 };
             let name = name.trim_start_matches("gate.");
-            vec![sign * (i.one(&format!("value.{name}")) - i.one(&format!("limit.{name}")))]
+            sign * (i.one(&format!("value.{name}")) - i.one(&format!("limit.{name}")))
         }
-        "limit.distance_correction_m" => vec![
-            i.one("setting.tolerance_factor")
-                * root(&["stereo_error_old_m", "stereo_error_new_m", "navigation_step_m"]),
-        ],
-        "limit.position_correction_m" => vec![
-            i.one("setting.tolerance_factor")
-                * root(&[
-                    "stereo_error_first_m",
-                    "stereo_error_new_m",
-                    "navigation_total_m",
-                    "designation_error_m",
-                ]),
-        ],
-        "stereo_error_old_m" => vec![stereo("last_distance_m")],
-        "stereo_error_first_m" => vec![stereo("initial_distance_m")],
-        "stereo_error_new_m" => vec![stereo(&node.inputs[0].value)],
-        "navigation_step_m" => {
-            vec![i.one("setting.navigation_error_fraction") * i.one("travelled_since_update_m")]
-        }
-        "navigation_total_m" => vec![i.one("setting.navigation_error_fraction") * i.one("travelled_m")],
-        "designation_error_m" => vec![0.5 * i.one("initial_distance_m") / i.one("focal_px")],
+        "limit.distance_correction_m" => factor() * root(&both),
+        "limit.position_correction_m" => factor() * root(&four),
+        "stereo_error_old_m" => stereo("last_distance_m"),
+        "stereo_error_first_m" => stereo("initial_distance_m"),
+        "stereo_error_new_m" => stereo(&node.inputs[0].value),
+        "navigation_step_m" => fraction() * i.one("travelled_since_update_m"),
+        "navigation_total_m" => fraction() * i.one("travelled_m"),
+        "designation_error_m" => 0.5 * i.one("initial_distance_m") / i.one("focal_px"),
+        _ => return None,
+    }])
+}
+
+fn places(node: &Node, name: &str) -> Option<Vec<f64>> {
+    let i = Inputs(node);
+    let apart = |a: &str, b: &str| vec![(i.point(a) - i.point(b)).norm()];
+    Some(match name {
         "scale" => vec![i.one("old_distance_m") / i.one("new_distance_m")],
         "search_window_px" => {
             let growth = i.one("setting.lost_search_growth").powf(i.one("lost_count"));
@@ -135,55 +142,51 @@ fn recomputed(node: &Node) -> Option<Vec<f64>> {
             let now_from_before = i.pose("pose").inverse() * i.pose("pose_before");
             (now_from_before * i.point("last_position")).coords.iter().copied().collect()
         }
-        "predicted_range_m" => vec![(i.point("predicted_position") - i.point("camera_centre")).norm()],
-        "range_located_m" => vec![(i.point("located_position") - i.point("camera_centre")).norm()],
-        "range_m" => vec![(i.point("position") - i.point("camera_centre")).norm()],
         "position_in_site" => (i.pose("pose") * i.point("located_position")).coords.iter().copied().collect(),
-        name if name.ends_with("distance_correction_m") => {
-            vec![(i.one("range_located_m") - i.one("predicted_range_m")).abs()]
-        }
-        name if name.ends_with("position_correction_m") => {
-            vec![(i.point("position_in_site") - i.point("initial_position_in_site")).norm()]
-        }
-        "correction_m" => vec![(i.point("located_position") - i.point("predicted_position")).norm()],
+        "predicted_range_m" => apart("predicted_position", "camera_centre"),
+        "range_located_m" => apart("located_position", "camera_centre"),
+        "range_m" => apart("position", "camera_centre"),
+        "distance_correction_m" => vec![(i.one("range_located_m") - i.one("predicted_range_m")).abs()],
+        "position_correction_m" => apart("position_in_site", "initial_position_in_site"),
+        "correction_m" => apart("located_position", "predicted_position"),
         "correction_px" => vec![i.pixel_distance("left_px", "predicted_left")],
-        "err_px" => vec![i.pixel_distance("left_px", "true_px")],
-        "err_m" => vec![(i.point("position") - i.point("true_position")).norm()],
+        _ => return None,
+    })
+}
+
+fn errors(node: &Node, name: &str) -> Option<Vec<f64>> {
+    let i = Inputs(node);
+    let error = || i.point("position") - i.point("true_position");
+    Some(vec![match name {
+        "err_px" => i.pixel_distance("left_px", "true_px"),
+        "err_m" => error().norm(),
         "nees" => {
-            let error = i.point("position") - i.point("true_position");
             let covariance = Matrix3::from_row_slice(&i.all("position_covariance_m2"));
-            vec![error.dot(&(covariance.try_inverse().unwrap() * error))]
+            error().dot(&(covariance.try_inverse().unwrap() * error()))
         }
-        "tolerance_px" => vec![(0.5 * i.one("magnification")).max(5.0)],
+        "tolerance_px" => (0.5 * i.one("magnification")).max(5.0),
         "innovation_sigma" => {
             let (to, from) = (i.all("match_px"), i.all("predicted_left"));
             let away = Vector2::new(to[0] - from[0], to[1] - from[1]);
             let sum = Matrix2::from_row_slice(&i.all("predicted_covariance_px2"))
                 + Matrix2::from_row_slice(&i.all("match_covariance_px2"));
-            vec![away.dot(&(sum.try_inverse().unwrap() * away)).sqrt()]
+            away.dot(&(sum.try_inverse().unwrap() * away)).sqrt()
         }
-        "match_sigma_px" => vec![largest_sigma(&i.all("match_covariance_px2"))],
-        "predicted_sigma_px" => vec![largest_sigma(&i.all("predicted_covariance_px2"))],
-        "sigma_m" => vec![largest_sigma(&i.all("position_covariance_m2"))],
+        "match_sigma_px" => largest_sigma(&i.all("match_covariance_px2")),
+        "predicted_sigma_px" => largest_sigma(&i.all("predicted_covariance_px2")),
+        "sigma_m" => largest_sigma(&i.all("position_covariance_m2")),
         "feature_sigma_m" => {
             let covariance = i.all("feature_covariance");
-            vec![(0..3).map(|k| covariance[7 * k].sqrt()).fold(0.0, f64::max)]
+            (0..3).map(|k| covariance[7 * k].sqrt()).fold(0.0, f64::max)
         }
-        "confidence" if node.inputs.is_empty() => vec![1.0],
-        "confidence" if node.inputs[0].value == "ncc" => vec![i.one("ncc").clamp(0.0, 1.0)],
+        "confidence" if node.inputs.is_empty() => 1.0,
+        "confidence" if node.inputs[0].value == "ncc" => i.one("ncc").clamp(0.0, 1.0),
         "confidence" => {
             let below = i.one("setting.confidence_matches") - i.one("inliers");
-            vec![1.0 / (1.0 + (i.one("setting.confidence_slope") * below).exp())]
-        }
-        // The same number under another name.
-        name if name.starts_with("limit.")
-            || ["ncc", "far_ncc", "position", "position_covariance_m2", "template_size_px"]
-                .contains(&name) =>
-        {
-            numbers(&node.inputs[0])
+            1.0 / (1.0 + (i.one("setting.confidence_slope") * below).exp())
         }
         _ => return None,
-    })
+    }])
 }
 
 /// Checks a tree; counts the closed forms that were recomputed.
