@@ -177,8 +177,7 @@ impl Maps {
     /// A map that is under way, taken out, so that the next who asks begins anew.
     fn take_unfinished(&self, traverse: &str, step: usize) -> Option<Arc<Making>> {
         let mut making = lock(&self.making);
-        let place =
-            making.iter().position(|one| one.is_of(traverse, step) && !lock(&one.progress).ended)?;
+        let place = making.iter().position(|one| one.is_of(traverse, step) && !lock(&one.progress).ended)?;
         making.remove(place)
     }
 }

@@ -44,7 +44,8 @@ async fn a_map_is_made_in_the_background_and_its_nearest_good_pixel_can_be_desig
     let map: TrackabilityMap = serde_json::from_value(progress["map"].clone()).unwrap();
     assert_eq!((map.columns, map.rows, map.verdicts.len(), map.ranges_m.len()), (32, 32, 1024, 1024));
     assert!(map.words.values().any(|word| word.contains("depth edge")));
-    let told = std::iter::from_fn(|| events.try_recv().ok()).map(|event| serde_json::to_value(event).unwrap());
+    let told =
+        std::iter::from_fn(|| events.try_recv().ok()).map(|event| serde_json::to_value(event).unwrap());
     let last = told.filter(|event| event["event"] == "trackability_progress").last().expect("an event");
     assert_eq!((&last["step"], &last["ended"]), (&json!(0), &json!(true)));
     // The sky has no range, and says so.
@@ -58,7 +59,8 @@ async fn a_map_is_made_in_the_background_and_its_nearest_good_pixel_can_be_desig
 async fn a_pixel_is_judged_by_its_designation_with_criteria_that_have_units_and_sources() {
     let (drive, sessions) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), sessions.path());
-    let path = |x: f64, y: f64| format!("traverses/{}/steps/0/trackability/pixel?x={x}&y={y}", server.traverse);
+    let path =
+        |x: f64, y: f64| format!("traverses/{}/steps/0/trackability/pixel?x={x}&y={y}", server.traverse);
     let [x, y] = SKY;
     let bad = server.get(&path(x, y)).await.expect(200);
     assert_eq!(bad["verdict"], "bad", "{bad}");
@@ -66,7 +68,10 @@ async fn a_pixel_is_judged_by_its_designation_with_criteria_that_have_units_and_
     let good = &bad["nearest_good"];
     let (x, y) = (good["x"].as_f64().unwrap(), good["y"].as_f64().unwrap());
     let found = server.get(&path(x, y)).await.expect(200);
-    assert_eq!((&found["verdict"], &found["reason"], &found["nearest_good"]), (&json!("good"), &json!(null), &json!(null)));
+    assert_eq!(
+        (&found["verdict"], &found["reason"], &found["nearest_good"]),
+        (&json!("good"), &json!(null), &json!(null))
+    );
     let range_m = found["range_m"].as_f64().unwrap();
     assert!(found["longest_step_m"].as_f64().unwrap() <= 0.1001 * range_m, "{found}");
     for criterion in found["criteria"].as_array().unwrap() {
@@ -90,7 +95,8 @@ async fn a_refused_pick_offers_the_nearest_good_pixel_and_that_one_is_taken() {
     let refused = server.post(&path, &pick(4.0, 128.0)).await;
     assert!(!refused.problem(422, "target").is_empty());
     let problem = refused.json();
-    let (x, y) = (problem["nearest_pixel"]["x"].as_f64().unwrap(), problem["nearest_pixel"]["y"].as_f64().unwrap());
+    let (x, y) =
+        (problem["nearest_pixel"]["x"].as_f64().unwrap(), problem["nearest_pixel"]["y"].as_f64().unwrap());
     assert!(problem["hint"].as_str().unwrap().contains("nearest good pixel"), "{problem}");
     server.post(&path, &pick(x, y)).await.expect(201);
     // A pixel that is none has no neighbour to offer.
@@ -159,7 +165,12 @@ fn the_first_drive_loses_its_target_where_the_heading_jumps_and_a_wider_search_w
     let saved = run(&["search_window_px=201"]);
     for step in &saved {
         let truth = step.truth.as_ref().unwrap();
-        assert_eq!((step.update.state, truth.tracked), (TrackingState::Tracking, Some(true)), "step {}", step.step);
+        assert_eq!(
+            (step.update.state, truth.tracked),
+            (TrackingState::Tracking, Some(true)),
+            "step {}",
+            step.step
+        );
     }
     // More patience alone does not bring it back: where it is looked for, it is not.
     assert!(run(&["n_retry=50"]).last().unwrap().update.state.is_lost());

@@ -273,7 +273,14 @@ mod tests {
     }
 
     fn problem(status: u16) -> Problem {
-        Problem { code: "x".to_owned(), title: String::new(), status, detail: "no".to_owned(), hint: None, nearest_pixel: None }
+        Problem {
+            code: "x".to_owned(),
+            title: String::new(),
+            status,
+            detail: "no".to_owned(),
+            hint: None,
+            nearest_pixel: None,
+        }
     }
 
     #[test]

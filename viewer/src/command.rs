@@ -3,12 +3,12 @@
 use sightline_core::frames::Pixel;
 use sightline_core::settings::{Changes, TrackerKind};
 
+use crate::aim::Aim;
 use crate::shape_view::ShapeView;
 use crate::state::calculator::Calculator;
 use crate::state::studies::Order;
 use crate::stretch::Stretch;
 use crate::tables::FeatureView;
-use crate::aim::Aim;
 use crate::tour::Turn;
 use crate::view2d::View2d;
 

@@ -2,10 +2,10 @@
 
 use egui::{Context, Event, Key, Modifiers};
 
+use crate::aim::Aim;
 use crate::command::{Command, Go, Mode, Stage};
 use crate::state::State;
 use crate::stretch::Stretch;
-use crate::aim::Aim;
 use crate::tour;
 
 /// Every key with its meaning, as the help sheet lists them.

@@ -144,7 +144,9 @@ fn lost_words(state: &State) -> String {
     });
     match (lost, state.run_progress(), state.target()) {
         (Some(step), ..) => {
-            format!("The target is lost at step {step}. PgDn goes to the next event, PgUp back to the one before.")
+            format!(
+                "The target is lost at step {step}. PgDn goes to the next event, PgUp back to the one before."
+            )
         }
         (None, Some(progress), _) => format!(
             "The run is still being computed ({} of {} stops). A loss appears in the band in another colour and \
@@ -155,7 +157,8 @@ fn lost_words(state: &State) -> String {
             "No loss in this run. PgDn goes from event to event, wherever a state changes.".to_owned()
         }
         (None, None, None) => {
-            "Without a target there is nothing to lose: press T and click a rock in the left image.".to_owned()
+            "Without a target there is nothing to lose: press T and click a rock in the left image."
+                .to_owned()
         }
     }
 }

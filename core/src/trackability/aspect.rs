@@ -134,7 +134,7 @@ impl Aspect {
             Self::Range => "R19, R187",
             Self::RangeError => "K-Eq 1, R35",
             Self::DepthEdge | Self::Relief => "R119",
-            Self::Slant => "R20, as the rule of simulated targets",
+            Self::Slant => "ours, R20",
             Self::DepthRange | Self::Dark | Self::Contrast => "R21",
             Self::Likeness => "R68",
         }
@@ -146,7 +146,9 @@ impl Aspect {
         let percent = 100.0 * v;
         match self {
             Self::Refused => "the designation is refused".to_owned(),
-            Self::Rim if verdict == Verdict::Bad => format!("the window reaches over the image’s rim, {v:.0} px away"),
+            Self::Rim if verdict == Verdict::Bad => {
+                format!("the window reaches over the image’s rim, {v:.0} px away")
+            }
             Self::Rim => format!("{v:.0} px from the image’s rim: a step may carry it out"),
             Self::Data => "pixels without data in the window".to_owned(),
             Self::Range => format!("no range here: stereo hole ({})", hole(v)),
@@ -154,7 +156,9 @@ impl Aspect {
             Self::DepthEdge => format!("depth edge {v:.0} px away"),
             Self::Relief => format!("deep relief in the window: {percent:.0} % of the distance"),
             Self::DepthRange => format!("the ranges in the window differ by {percent:.0} %"),
-            Self::Slant => format!("the surface is turned away by {v:.0}°: it will look different from nearby"),
+            Self::Slant => {
+                format!("the surface is turned away by {v:.0}°: it will look different from nearby")
+            }
             Self::Saturation => format!("{percent:.0} % of the window is overexposed"),
             Self::Dark => format!("{percent:.0} % of the window is dark, perhaps shadow"),
             Self::Contrast => format!("hardly any contrast: {percent:.1} % of full scale"),

@@ -80,21 +80,29 @@ fn chamfer(distance: &mut [f32], width: usize, height: usize) {
     };
     for at in 0..width * height {
         let up = at.checked_sub(width);
-        relax(at, at % width, [
-            (at.checked_sub(1), true, false, STRAIGHT),
-            (up, false, false, STRAIGHT),
-            (up.and_then(|up| up.checked_sub(1)), true, false, SLANTED),
-            (up.map(|up| up + 1), false, true, SLANTED),
-        ]);
+        relax(
+            at,
+            at % width,
+            [
+                (at.checked_sub(1), true, false, STRAIGHT),
+                (up, false, false, STRAIGHT),
+                (up.and_then(|up| up.checked_sub(1)), true, false, SLANTED),
+                (up.map(|up| up + 1), false, true, SLANTED),
+            ],
+        );
     }
     for at in (0..width * height).rev() {
         let down = at + width;
-        relax(at, at % width, [
-            (Some(at + 1), false, true, STRAIGHT),
-            (Some(down), false, false, STRAIGHT),
-            (Some(down + 1), false, true, SLANTED),
-            (down.checked_sub(1), true, false, SLANTED),
-        ]);
+        relax(
+            at,
+            at % width,
+            [
+                (Some(at + 1), false, true, STRAIGHT),
+                (Some(down), false, false, STRAIGHT),
+                (Some(down + 1), false, true, SLANTED),
+                (down.checked_sub(1), true, false, SLANTED),
+            ],
+        );
     }
 }
 

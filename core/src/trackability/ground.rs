@@ -137,7 +137,12 @@ impl Ground {
     ///
     /// # Errors
     /// [`Error::Target`] when there is no such stop, [`Error::Request`] for a pair that cannot be aligned; file errors.
-    pub fn new(stops: &dyn Stops, step: usize, settings: &Settings, limits: &TrackabilityLimits) -> Result<Self> {
+    pub fn new(
+        stops: &dyn Stops,
+        step: usize,
+        settings: &Settings,
+        limits: &TrackabilityLimits,
+    ) -> Result<Self> {
         let count = stops.stop_count();
         if step >= count {
             return Err(Error::Target(format!("step {step} does not exist: the traverse has {count} stops")));
@@ -173,7 +178,7 @@ impl Ground {
         self.image.dimensions().into()
     }
 
-    /// Judges a place by all criteria of the images, or until one is bad.
+    /// Judges a place by all criteria of the images, or until its verdict is as good as certain.
     pub fn assess(&self, pixel: Pixel, all: bool) -> Assessment {
         let mut criteria = vec![self.rim(pixel)];
         let is_over = |criteria: &[Measured]| {
@@ -193,7 +198,8 @@ impl Ground {
             return Assessment::new(pixel, criteria, seen);
         }
         self.grey_values(&window, &mut criteria);
-        if all || criteria.iter().all(|one| one.verdict != Verdict::Bad) {
+        // The dearest one: what is risky already is seldom made worse by it.
+        if all || criteria.iter().all(|one| one.verdict == Verdict::Good) {
             let (template, limits) = (&self.settings.template, &self.settings.limits);
             let likeness = texture::likeness(&self.image, pixel, &window, template.search_window_px);
             let limits = [limits.far_ncc_min, template.renew_ncc];
@@ -228,17 +234,28 @@ impl Ground {
             criteria.push(hole(ranges.outcome(at)));
             return None;
         };
-        let (range_m, half) = (ranges.range_m(&point), f64::from(self.settings.template.template_size_px / 2));
+        let (range_m, half) =
+            (ranges.range_m(&point), f64::from(self.settings.template.template_size_px / 2));
         let (limits, own) = (&self.settings.limits, &self.limits);
         let edge = f64::from(self.edges_px[(at[1] * self.surface.disparities.width + at[0]) as usize]);
+        // Beyond the focus of the refinement an edge has little say.
+        let focus_px = self.settings.template.focus_px;
+        let near = if focus_px > 0.0 { (own.edge_risky_focus * focus_px).min(half) } else { half };
         let window = ranges.window(at, range_m, half);
         let error = self.range_error(pixel, range_m);
+        // What stereo errs by looks like relief; far away it is most of it.
+        let noise = error.unwrap_or(0.0);
         criteria.extend([
             Measured::new(Aspect::RangeError, error, Some(own.range_error_risky), Some(own.range_error_bad)),
-            Measured::new(Aspect::Relief, window.departure, Some(limits.warn_boundary), None),
-            Measured::new(Aspect::DepthRange, window.spread, Some(limits.warn_depth_range), None),
-            Measured::new(Aspect::Slant, window.incidence_rad.map(f64::to_degrees), Some(own.slant_risky_deg), None),
-            Measured::new(Aspect::DepthEdge, Some(edge), Some(half), Some(own.edge_bad_px)),
+            Measured::new(Aspect::Relief, window.departure, Some(limits.warn_boundary + noise), None),
+            Measured::new(Aspect::DepthRange, window.spread, Some(limits.warn_depth_range + noise), None),
+            Measured::new(
+                Aspect::Slant,
+                window.incidence_rad.map(f64::to_degrees),
+                Some(own.slant_risky_deg),
+                None,
+            ),
+            Measured::new(Aspect::DepthEdge, Some(edge), Some(near), Some(own.edge_bad_px)),
         ]);
         Some((range_m, self.longest_step_m(pixel, range_m, &window)))
     }
@@ -266,7 +283,12 @@ impl Ground {
         let sigma = sigma.unwrap_or(f64::from(self.settings.template.search_window_px));
         let flat = patch::FLAT_STD;
         criteria.extend([
-            Measured::new(Aspect::Saturation, Some(saturated), Some(own.saturated_risky), Some(own.saturated_bad)),
+            Measured::new(
+                Aspect::Saturation,
+                Some(saturated),
+                Some(own.saturated_risky),
+                Some(own.saturated_bad),
+            ),
             Measured::new(Aspect::Dark, Some(dark), Some(limits.warn_shadow_share), None),
             Measured::new(Aspect::Contrast, window.std(), Some(limits.warn_contrast), Some(flat)),
             Measured::new(

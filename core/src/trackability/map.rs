@@ -169,13 +169,15 @@ impl TrackabilityMap {
 
     /// The cell of a pixel.
     pub fn at(&self, pixel: Pixel) -> Option<Cell> {
-        let index = |v: f64| (v >= -0.5 && self.cell_px > 0).then(|| ((v + 0.5) / f64::from(self.cell_px)) as usize);
+        let index =
+            |v: f64| (v >= -0.5 && self.cell_px > 0).then(|| ((v + 0.5) / f64::from(self.cell_px)) as usize);
         self.cell(index(pixel.x)?, index(pixel.y)?)
     }
 
     /// All cells that were made.
     pub fn cells(&self) -> impl Iterator<Item = Cell> {
-        (0..self.rows_done()).flat_map(move |row| (0..self.columns).filter_map(move |column| self.cell(column, row)))
+        (0..self.rows_done())
+            .flat_map(move |row| (0..self.columns).filter_map(move |column| self.cell(column, row)))
     }
 
     /// The good cell nearest to a pixel, among the rows that were made.

@@ -33,7 +33,8 @@ fn window(value: impl Fn(u32, u32) -> f32) -> Patch {
 fn noise_is_measured_through_slopes_and_bends() {
     // A pseudo-random ±1 has deviation 1; the bent ground under it has none for this mask.
     let sign = |x: u32, y: u32| {
-        let mixed = (x.wrapping_mul(2_654_435_761) ^ y.wrapping_mul(40_503).wrapping_mul(97)).wrapping_mul(0x9e37_79b1);
+        let mixed = (x.wrapping_mul(2_654_435_761) ^ y.wrapping_mul(40_503).wrapping_mul(97))
+            .wrapping_mul(0x9e37_79b1);
         if mixed >> 31 == 0 { 1.0 } else { -1.0 }
     };
     let image = GrayImage::from_fn(200, 200, |x, y| {
@@ -98,7 +99,8 @@ fn a_depth_edge_is_a_step_beyond_any_slope_also_across_a_hole() {
 
 #[test]
 fn limits_divide_good_risky_and_bad_on_the_side_that_is_meant() {
-    let verdict = |aspect, value, risky, bad| Measured::new(aspect, Some(value), Some(risky), Some(bad)).verdict;
+    let verdict =
+        |aspect, value, risky, bad| Measured::new(aspect, Some(value), Some(risky), Some(bad)).verdict;
     assert_eq!(verdict(Aspect::DepthEdge, 12.0, 10.0, 3.0), Verdict::Good);
     assert_eq!(verdict(Aspect::DepthEdge, 7.0, 10.0, 3.0), Verdict::Risky);
     assert_eq!(verdict(Aspect::DepthEdge, 2.0, 10.0, 3.0), Verdict::Bad);

@@ -10,8 +10,8 @@ use sightline_core::settings::{Changes, Settings, parse_assignment};
 use sightline_core::study::trackability::{self, Counts, Outcome, Table};
 use sightline_core::trackability::{TrackabilityMap, Verdict};
 
-use super::say::{self, Progress};
 use super::open;
+use super::say::{self, Progress};
 
 /// The worlds whose targets are drawn by the map.
 #[derive(Debug, Args)]
@@ -67,7 +67,9 @@ impl Worlds {
             let traverse = open::open(path, None)?;
             if traverse.world().is_none() {
                 let name = path.display();
-                return Err(Error::Request(format!("{name} is recorded: only a simulated drive has a truth")));
+                return Err(Error::Request(format!(
+                    "{name} is recorded: only a simulated drive has a truth"
+                )));
             }
             open::render(&traverse)?;
             let begun = Instant::now();

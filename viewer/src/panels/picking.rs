@@ -185,8 +185,7 @@ fn described_words(state: &State, pixel: Option<Pixel>) -> String {
 fn verdict_line(canvas: &Canvas, state: &State, pixel: Pixel) {
     let Some(cell) = state.trackability_at(pixel) else { return };
     let (text, colour) = (words(&cell), theme::trackability(cell.verdict));
-    let width =
-        canvas.painter.layout_no_wrap(text.clone(), theme::image_font(), colour).size().x;
+    let width = canvas.painter.layout_no_wrap(text.clone(), theme::image_font(), colour).size().x;
     let (at, area) = (canvas.transform.to_screen(pixel), canvas.transform.rect.shrink(8.0));
     let x = (at.x + 16.0).min(area.right() - width).max(area.left());
     let y = if at.y + 30.0 < area.bottom() - 24.0 { at.y + 22.0 } else { at.y - 22.0 };
@@ -201,7 +200,10 @@ fn offer(ui: &mut Ui, canvas: &Canvas, state: &State, out: &mut Vec<Command>) {
     overlay.mark(pixel, Mark::Diamond, theme::trackability(Verdict::Good));
     let text = format!("Take the nearest good pixel ({:.0}, {:.0})", pixel.x, pixel.y);
     let area = canvas.transform.rect;
-    let place = Rect::from_min_size(area.left_bottom() + vec2(10.0, -56.0), vec2(250.0_f32.min(area.width() - 20.0), 26.0));
+    let place = Rect::from_min_size(
+        area.left_bottom() + vec2(10.0, -56.0),
+        vec2(250.0_f32.min(area.width() - 20.0), 26.0),
+    );
     let button = ui.put(place, Button::new(text));
     if button.on_hover_text("Enter does the same").clicked() {
         out.push(Command::Aim(Aim::TakeNearest));
@@ -213,10 +215,14 @@ fn loupe(canvas: &Canvas, raster: &Raster, pixel: Pixel) {
     let (magnification, pixels) = LOUPE;
     let side = magnification * pixels;
     let area = canvas.transform.rect.shrink(8.0);
-    if canvas.transform.scale > f64::from(magnification) || area.width() < 2.5 * side || area.height() < 1.5 * side {
+    if canvas.transform.scale > f64::from(magnification)
+        || area.width() < 2.5 * side
+        || area.height() < 1.5 * side
+    {
         return;
     }
-    let frame = Rect::from_min_size(loupe_corner(area, canvas.transform.to_screen(pixel), side), vec2(side, side));
+    let frame =
+        Rect::from_min_size(loupe_corner(area, canvas.transform.to_screen(pixel), side), vec2(side, side));
     let [width, height] = raster.size().map(|v| v as f32);
     let middle = pos2((pixel.x as f32 + 0.5) / width, (pixel.y as f32 + 0.5) / height);
     let part = Rect::from_center_size(middle, vec2(pixels / width, pixels / height));

@@ -25,14 +25,17 @@ pub fn show(ui: &Ui, state: &State, out: &mut Vec<Command>) {
         let painter = context.layer_painter(layer);
         painter.rect_stroke(anchor.shrink(1.0), 4.0, Stroke::new(2.0, theme::ACCENT), StrokeKind::Inside);
     }
-    Area::new(Id::unique("tour")).order(Order::Foreground).fixed_pos(corner(anchor, screen)).show(context, |ui| {
-        let frame = Frame::new()
-            .fill(theme::BAR)
-            .stroke(Stroke::new(1.0, theme::ACCENT))
-            .corner_radius(6.0)
-            .inner_margin(Margin::same(12));
-        frame.show(ui, |ui| contents(ui, at, bubble, state, out));
-    });
+    Area::new(Id::unique("tour")).order(Order::Foreground).fixed_pos(corner(anchor, screen)).show(
+        context,
+        |ui| {
+            let frame = Frame::new()
+                .fill(theme::BAR)
+                .stroke(Stroke::new(1.0, theme::ACCENT))
+                .corner_radius(6.0)
+                .inner_margin(Margin::same(12));
+            frame.show(ui, |ui| contents(ui, at, bubble, state, out));
+        },
+    );
 }
 
 fn contents(ui: &mut Ui, at: usize, bubble: Bubble, state: &State, out: &mut Vec<Command>) {
@@ -65,8 +68,10 @@ fn contents(ui: &mut Ui, at: usize, bubble: Bubble, state: &State, out: &mut Vec
 fn corner(anchor: Option<Rect>, screen: Rect) -> Pos2 {
     let middle = screen.center() - SIZE / 2.0;
     let Some(anchor) = anchor else { return middle };
-    let along_x = (anchor.center().x - SIZE.x / 2.0).clamp(screen.left() + GAP, (screen.right() - SIZE.x - GAP).max(screen.left()));
-    let along_y = (anchor.center().y - SIZE.y / 2.0).clamp(screen.top() + GAP, (screen.bottom() - SIZE.y - GAP).max(screen.top()));
+    let along_x = (anchor.center().x - SIZE.x / 2.0)
+        .clamp(screen.left() + GAP, (screen.right() - SIZE.x - GAP).max(screen.left()));
+    let along_y = (anchor.center().y - SIZE.y / 2.0)
+        .clamp(screen.top() + GAP, (screen.bottom() - SIZE.y - GAP).max(screen.top()));
     if anchor.top() - SIZE.y - GAP > screen.top() {
         pos2(along_x, anchor.top() - SIZE.y - GAP)
     } else if anchor.bottom() + SIZE.y + GAP < screen.bottom() {

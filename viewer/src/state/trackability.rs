@@ -30,7 +30,8 @@ impl State {
     /// The map of the stop that is looked at, as far as it was made.
     pub fn trackability_map(&self) -> Option<&TrackabilityMap> {
         let (traverse, step) = self.trackability.place.as_ref()?;
-        let is_here = self.traverse.as_ref().is_some_and(|open| open.id == *traverse) && *step == self.cursor.step;
+        let is_here =
+            self.traverse.as_ref().is_some_and(|open| open.id == *traverse) && *step == self.cursor.step;
         self.trackability.progress.as_ref().filter(|_| is_here)?.map.as_ref()
     }
 

@@ -73,8 +73,7 @@ fn picking(context: &egui::Context) -> State {
 fn refused(context: &egui::Context) -> State {
     let mut state = picking(context);
     let place = Place { step: 0, pixel: PLACE };
-    state.refusal =
-        Some(Refusal { place, sentence: "no 3-D position here".to_owned(), nearest: Some(GOOD) });
+    state.refusal = Some(Refusal { place, sentence: "no 3-D position here".to_owned(), nearest: Some(GOOD) });
     state
 }
 
@@ -87,7 +86,8 @@ fn the_map_is_asked_for_while_picking_again_with_new_rows_and_given_up_with_the_
     assert!(!asked(&mut state), "once");
     answer(&mut state, Ok(progress(3)));
     assert_eq!(state.trackability_map().unwrap().rows_done(), 3);
-    let rows = |step| Event::TrackabilityProgress { traverse: "drive".to_owned(), step, k: 5, n: 8, ended: false };
+    let rows =
+        |step| Event::TrackabilityProgress { traverse: "drive".to_owned(), step, k: 5, n: 8, ended: false };
     state.told(rows(4));
     assert!(!asked(&mut state), "another stop");
     state.told(rows(0));
@@ -144,20 +144,16 @@ fn verdict_reason_range_and_longest_step_are_said_in_words_and_the_layer_can_be_
         state.apply(Command::Aim(Aim::Put(PLACE)));
         state
     });
-    shown.says("trackability: 38 % good, 12 % risky, 50 % bad").says("at 20.0, 30.0: bad: depth edge 2 px away");
-    assert_eq!(
-        shown.click("risky place, hatched (legend)"),
-        vec![Command::ToggleLayer(Layer::Trackability)]
-    );
+    shown
+        .says("trackability: 38 % good, 12 % risky, 50 % bad")
+        .says("at 20.0, 30.0: bad: depth edge 2 px away");
+    assert_eq!(shown.click("risky place, hatched (legend)"), vec![Command::ToggleLayer(Layer::Trackability)]);
 }
 
 #[test]
 fn a_refused_pick_offers_the_nearest_good_pixel_by_button_and_by_enter() {
     let mut shown = Shown::pane(Pane::Left, refused);
-    assert_eq!(
-        shown.click("Take the nearest good pixel (44, 36)"),
-        vec![Command::Aim(Aim::TakeNearest)]
-    );
+    assert_eq!(shown.click("Take the nearest good pixel (44, 36)"), vec![Command::Aim(Aim::TakeNearest)]);
     for aim in [Aim::TakeNearest, Aim::Accept] {
         let mut state = refused(&egui::Context::default());
         state.apply(Command::Aim(aim));
