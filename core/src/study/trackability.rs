@@ -1,7 +1,8 @@
 //! What the trackability map is worth: targets drawn where it says good, risky or bad, tracked and held against the truth.
 //!
 //! From each verdict of the first stop's map as many cells are drawn as asked for, by the seed alone. A target is followed to
-//! its *end*: the last stop up to which its surface point is seen by the left camera, hidden by nothing, at every stop. One that
+//! its *end*: the last stop up to which, at every stop, its surface point is hidden by nothing and its window lies in both images
+//! with as much again around it (what leaves a picture is no fault of the place). One that
 //! is not seen for [`STEPS_MIN`] stops says little and is left out, before anything is tracked. It is *kept* when it is tracked
 //! there (R116), *false* when the state says so and it is not.
 //!
@@ -18,6 +19,7 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use crate::camera::Camera;
 use crate::error::Result;
 use crate::frames::{Pixel, Point3};
 use crate::session::track::{self, Drive};
@@ -126,22 +128,31 @@ pub fn measure<D: Drive>(
     seed: u64,
 ) -> Vec<Outcome> {
     let mut chosen: Vec<(Cell, usize)> = Vec::new();
+    let margin_px = f64::from(ground.settings.template.template_size_px);
     for verdict in Verdict::ALL {
         let mut cells: Vec<Cell> = map.cells().filter(|cell| cell.verdict == verdict).collect();
         cells.shuffle(&mut Pcg64::seed_from_u64(seed ^ (verdict as u64 + 1)));
-        let seen = cells.into_iter().filter_map(|cell| Some((cell, end_of(drive, cell.pixel)?)));
+        let seen = cells.into_iter().filter_map(|cell| Some((cell, end_of(drive, cell.pixel, margin_px)?)));
         chosen.extend(seen.filter(|(_, end)| *end >= STEPS_MIN).take(count));
     }
     chosen.par_iter().map(|(cell, end)| follow(drive, ground, cell, *end)).collect()
 }
 
 /// The last stop up to which the surface point under a pixel of the first image is seen at every stop.
-fn end_of<D: Drive>(drive: &D, pixel: Pixel) -> Option<usize> {
+fn end_of<D: Drive>(drive: &D, pixel: Pixel, margin_px: f64) -> Option<usize> {
     let point = drive.surface_point_in_site(0, pixel)?;
     let is_seen = |step: usize| {
         let Some(site_from_rover) = drive.true_site_from_rover(step) else { return false };
         let in_rover: Point3 = site_from_rover.inverse() * point;
-        drive.true_left_camera(step).sees(&in_rover) && drive.is_visible(step, &point)
+        let is_inside = |camera: &Camera| {
+            let [right, bottom] = camera.size.map(|side| f64::from(side) - 1.0 - margin_px);
+            camera.project(&in_rover).is_some_and(|pixel| {
+                (margin_px..=right).contains(&pixel.x) && (margin_px..=bottom).contains(&pixel.y)
+            })
+        };
+        is_inside(drive.true_left_camera(step))
+            && is_inside(drive.cameras(step).1)
+            && drive.is_visible(step, &point)
     };
     (1..drive.stop_count()).take_while(|step| is_seen(*step)).last()
 }

@@ -134,7 +134,7 @@ impl Aspect {
             Self::Range => "R19, R187",
             Self::RangeError => "K-Eq 1, R35",
             Self::DepthEdge | Self::Relief => "R119",
-            Self::Slant => "R20, as the rule of simulated targets",
+            Self::Slant => "ours, R20",
             Self::DepthRange | Self::Dark | Self::Contrast => "R21",
             Self::Likeness => "R68",
         }

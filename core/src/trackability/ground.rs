@@ -178,7 +178,7 @@ impl Ground {
         self.image.dimensions().into()
     }
 
-    /// Judges a place by all criteria of the images, or until one is bad.
+    /// Judges a place by all criteria of the images, or until its verdict is as good as certain.
     pub fn assess(&self, pixel: Pixel, all: bool) -> Assessment {
         let mut criteria = vec![self.rim(pixel)];
         let is_over = |criteria: &[Measured]| {
@@ -198,7 +198,8 @@ impl Ground {
             return Assessment::new(pixel, criteria, seen);
         }
         self.grey_values(&window, &mut criteria);
-        if all || criteria.iter().all(|one| one.verdict != Verdict::Bad) {
+        // The dearest one: what is risky already is seldom made worse by it.
+        if all || criteria.iter().all(|one| one.verdict == Verdict::Good) {
             let (template, limits) = (&self.settings.template, &self.settings.limits);
             let likeness = texture::likeness(&self.image, pixel, &window, template.search_window_px);
             let limits = [limits.far_ncc_min, template.renew_ncc];
@@ -237,19 +238,24 @@ impl Ground {
             (ranges.range_m(&point), f64::from(self.settings.template.template_size_px / 2));
         let (limits, own) = (&self.settings.limits, &self.limits);
         let edge = f64::from(self.edges_px[(at[1] * self.surface.disparities.width + at[0]) as usize]);
+        // Beyond the focus of the refinement an edge has little say.
+        let focus_px = self.settings.template.focus_px;
+        let near = if focus_px > 0.0 { (own.edge_risky_focus * focus_px).min(half) } else { half };
         let window = ranges.window(at, range_m, half);
         let error = self.range_error(pixel, range_m);
+        // What stereo errs by looks like relief; far away it is most of it.
+        let noise = error.unwrap_or(0.0);
         criteria.extend([
             Measured::new(Aspect::RangeError, error, Some(own.range_error_risky), Some(own.range_error_bad)),
-            Measured::new(Aspect::Relief, window.departure, Some(limits.warn_boundary), None),
-            Measured::new(Aspect::DepthRange, window.spread, Some(limits.warn_depth_range), None),
+            Measured::new(Aspect::Relief, window.departure, Some(limits.warn_boundary + noise), None),
+            Measured::new(Aspect::DepthRange, window.spread, Some(limits.warn_depth_range + noise), None),
             Measured::new(
                 Aspect::Slant,
                 window.incidence_rad.map(f64::to_degrees),
                 Some(own.slant_risky_deg),
                 None,
             ),
-            Measured::new(Aspect::DepthEdge, Some(edge), Some(half), Some(own.edge_bad_px)),
+            Measured::new(Aspect::DepthEdge, Some(edge), Some(near), Some(own.edge_bad_px)),
         ]);
         Some((range_m, self.longest_step_m(pixel, range_m, &window)))
     }

@@ -10,12 +10,14 @@ settings_group! {
         cell_px: u32 = 8, "px", Domain::Between(2.0, 64.0), "ours";
         /// A place is bad whose nearest depth edge is not farther: it lies where the match counts most (`focus_px` less).
         edge_bad_px: f64 = 3.0, "px", Domain::Between(0.0, 50.0), "ours, R119";
+        /// A place is risky whose nearest depth edge is not farther than so many widths of the focus (`focus_px`).
+        edge_risky_focus: f64 = 1.5, "", Domain::Between(0.0, 10.0), "ours; docs/trackability.md";
         /// A step between neighbours is a depth edge beyond this share of the disparity …
         edge_share: f64 = 0.03, "", Domain::Between(0.0, 1.0), "ours; warn_boundary";
         /// … and beyond what the steepest surface makes whose slope is believed, px of disparity per px.
         edge_slope: f64 = 0.5, "px/px", Domain::Between(0.0, 10.0), "ours; STRETCH_LIMIT";
         /// A place is risky whose surface is turned farther away from the line of sight: what it shows changes on the way.
-        slant_risky_deg: f64 = 70.0, "deg", Domain::Between(0.0, 90.0), "ours, R20; sim/targets/window.rs";
+        slant_risky_deg: f64 = 80.0, "deg", Domain::Between(0.0, 90.0), "ours; docs/trackability.md";
         /// The 3σ error of the range, over the range, from which on a place is risky.
         range_error_risky: f64 = 0.10, "", Domain::Between(0.0, 10.0), "ours; the step of R104";
         /// The same for a bad one.

@@ -11,9 +11,9 @@
 //! | `data` | pixels of the window without data | share | – | any | R66 |
 //! | `range` | dense stereo's outcome | – | – | a hole | R19, R187 |
 //! | `range_error` | 3σ of the range over the range: `R Δd/(f B)` | share | `range_error_risky` | `range_error_bad` | K-Eq 1, R35 |
-//! | `depth_edge` | to the nearest jump of the disparity | px | half a window | `edge_bad_px` | R119, ours |
-//! | `relief` | largest departure of the ranges from a plane, over the range | share | `warn_boundary` | – | R119 |
-//! | `depth_range` | (farthest − nearest)/range in the window | share | `warn_depth_range` | – | R21 |
+//! | `depth_edge` | to the nearest jump of the disparity | px | `edge_risky_focus` · `focus_px` | `edge_bad_px` | R119, ours |
+//! | `relief` | largest departure of the ranges from a plane, over the range | share | `warn_boundary` + `range_error` | – | R119 |
+//! | `depth_range` | (farthest − nearest)/range in the window | share | `warn_depth_range` + `range_error` | – | R21 |
 //! | `slant` | between the surface's normal and the line of sight | deg | `slant_risky_deg` | – | R20, ours |
 //! | `saturation` | pixels at full scale | share | `saturated_risky` | `saturated_bad` | ours |
 //! | `dark` | pixels much darker than the ground | share | `warn_shadow_share` | – | R21 |
