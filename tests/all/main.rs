@@ -6,6 +6,7 @@
 mod api;
 mod api_security;
 mod cli;
+mod copied;
 mod exports;
 mod imports;
 mod keeping;

@@ -185,7 +185,7 @@ fn figure_of(trace: &StepTrace, png: &[u8]) -> String {
         picture::state_words(trace).to_lowercase(),
         picture::numbers(&row)
     );
-    let reason = row.reason.map_or_else(|| "The update was accepted".to_owned(), |reason| reason);
+    let reason = row.reason.unwrap_or_else(|| "The update was accepted".to_owned());
     format!(
         "<figure><img src=\"{}\" width=\"320\" alt=\"{}\"><figcaption>{}</figcaption></figure>",
         png_address(png),
