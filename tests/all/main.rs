@@ -7,6 +7,7 @@ mod api;
 mod api_security;
 mod cli;
 mod compare;
+mod copied;
 mod exports;
 mod imports;
 mod keeping;

@@ -139,6 +139,18 @@ async fn a_study_over_rest_is_carried_out_cancelled_and_resumed() {
     let policy = report.headers["content-security-policy"].to_str().unwrap();
     assert!(policy.contains("default-src 'none'") && policy.contains("sandbox"), "{policy}");
     server.post("studies/jobs/study-1/cancel", &json!({})).await.problem(409, "conflict");
+
+    let second = server.post("studies/jobs", &new).await.expect(202);
+    assert_eq!(second["id"], json!("study-2"));
+    let (report, rows) = (report.text(), server.get("studies/jobs/study-1/rows").await);
+    drop(server);
+    let server = TestServer::open(drive.path(), folder.path());
+    let listed = server.get("studies/jobs").await.expect(200);
+    assert_eq!((&listed[0], listed.as_array().unwrap().len()), (&done, 2), "the list outlives the server");
+    assert_eq!(server.get("studies/jobs/study-1/report.html").await.text(), report);
+    assert_eq!(server.get("studies/jobs/study-1/rows").await.bytes, rows.bytes);
+    let state = listed[1]["state"].as_str().unwrap();
+    assert!(["cancelled", "done"].contains(&state), "nothing is under way that nobody works on: {state}");
 }
 
 /// Waits until the first study has ended, and returns how it stands.

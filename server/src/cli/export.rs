@@ -180,7 +180,20 @@ fn computed(traverse: Traverse, folder: &Path, id: &str) -> Result<Arc<LiveSessi
     if k == n && n > 0 {
         progress.tell(k, n);
     }
+    // What stopped a run by itself is no reason to export nothing, but it has to be said.
+    for (target, run, why) in live.with(|session| stopped(session)) {
+        say::error(&format!("run {run} of target {target} stopped before the last stop: {why}"));
+    }
     Ok(live)
+}
+
+/// The runs that did not come to the last stop, and why.
+fn stopped(session: &Session) -> Vec<(usize, usize, String)> {
+    let targets = session.targets.iter().enumerate().filter(|(_, target)| !target.removed);
+    let of_target = targets.flat_map(|(number, target)| {
+        target.runs.iter().enumerate().map(move |(run, found)| (number, run, found.why_stopped()))
+    });
+    of_target.filter_map(|(target, run, why)| why.map(|why| (target, run, why))).collect()
 }
 
 /// The traverse of that name among the simulated ones of the data folder.

@@ -128,7 +128,7 @@ impl Shelf {
             works.push(Arc::clone(&work));
             work
         };
-        work.keep();
+        work.keep(&lock(&work.inside));
         if let Err(problem) = self.submit(&work) {
             work.change(|inside| end(inside, StudyState::Failed, "too many studies were waiting"));
             return Err(problem);
@@ -205,15 +205,11 @@ impl Work {
     }
 
     /// Writes how it stands.
-    fn keep(&self) {
-        let kept = {
-            let inside = lock(&self.inside);
-            let (job, rows, report) = (inside.view.clone(), inside.rows.clone(), inside.report.clone());
-            // Rows before the end are found again in the study's folder.
-            let rows = if report.is_some() { rows } else { Vec::new() };
-            KeptStudy { new: self.new.clone(), job, rows, report }
-        };
-        self.keeper.keep(self.number, &kept);
+    fn keep(&self, inside: &Inside) {
+        let (job, report) = (inside.view.clone(), inside.report.clone());
+        // Rows before the end are found again in the study's folder.
+        let rows = if report.is_some() { inside.rows.clone() } else { Vec::new() };
+        self.keeper.keep(self.number, &KeptStudy { new: self.new.clone(), job, rows, report });
     }
 
     /// Changes it and tells every page.
@@ -231,29 +227,38 @@ impl Work {
     fn carry_out(&self) {
         let cancel = Arc::clone(&lock(&self.inside).cancel);
         if cancel.load(Ordering::Relaxed) {
-            self.change(|inside| end(inside, StudyState::Cancelled, "cancelled"));
+            self.finish(|inside| end(inside, StudyState::Cancelled, "cancelled"));
             return;
         }
         self.change(|inside| inside.view.state = StudyState::Running);
-        self.keep();
+        self.keep(&lock(&self.inside));
         let work = std::panic::AssertUnwindSafe(|| {
             carry_out(self.order.clone(), &cancel, &|progress| self.hear(progress))
         });
         match std::panic::catch_unwind(work) {
-            Ok(Ok(outcome)) => self.change(|inside| {
+            Ok(Ok(outcome)) => self.finish(|inside| {
                 (inside.rows, inside.report) = (outcome.rows, Some(outcome.report));
                 end(inside, StudyState::Done, "done");
             }),
             Ok(Err(Error::Cancelled)) => {
-                self.change(|inside| end(inside, StudyState::Cancelled, "cancelled"));
+                self.finish(|inside| end(inside, StudyState::Cancelled, "cancelled"));
             }
-            Ok(Err(error)) => self.change(|inside| end(inside, StudyState::Failed, &error.to_string())),
+            Ok(Err(error)) => self.finish(|inside| end(inside, StudyState::Failed, &error.to_string())),
             Err(_) => {
                 let why = "the server met a fault of its own; its log says more";
-                self.change(|inside| end(inside, StudyState::Failed, why));
+                self.finish(|inside| end(inside, StudyState::Failed, why));
             }
         }
-        self.keep();
+    }
+
+    /// Ends it: on disk before anybody sees it, so that what a person saw outlives the server.
+    fn finish(&self, end: impl FnOnce(&mut Inside)) {
+        {
+            let mut inside = lock(&self.inside);
+            end(&mut inside);
+            self.keep(&inside);
+        }
+        self.change(|_| ());
     }
 
     fn hear(&self, progress: Progress) {
