@@ -43,6 +43,30 @@ pub(super) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             ui.end_row();
         }
     });
+    settings(ui, state);
+}
+
+/// The settings that are not alike in the compared runs.
+fn settings(ui: &mut Ui, state: &State) {
+    let Some(found) = state.comparison() else { return };
+    ui.add_space(8.0);
+    ui.label(theme::title("Settings that differ"));
+    if found.settings.is_empty() {
+        ui.label(theme::note("The compared runs have the same settings."));
+        return;
+    }
+    Grid::new("settings that differ").striped(true).spacing([14.0, 2.0]).show(ui, |ui| {
+        ui.label(theme::note("setting"));
+        found.runs.iter().for_each(|&name| table::head(ui, state, name));
+        ui.end_row();
+        for setting in &found.settings {
+            ui.label(theme::label(format!("{} {}", setting.key, setting.unit)).size(11.5));
+            for value in &setting.values {
+                ui.label(theme::number(table::plain(value)).size(11.5));
+            }
+            ui.end_row();
+        }
+    });
 }
 
 /// Protocol, version, and which steps count.

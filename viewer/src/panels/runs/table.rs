@@ -290,7 +290,8 @@ fn changes(state: &State, row: &Row<'_>) -> String {
     if lines.is_empty() { "none".to_owned() } else { lines.join(" ") }
 }
 
-fn plain(value: &Value) -> String {
+/// A setting's value as it is written.
+pub(super) fn plain(value: &Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 

@@ -245,6 +245,7 @@ fn the_table_links_every_metric_to_its_worst_step() {
     );
     shown.says("ridge · run A").says("ridge · run B").says("states: tracking 0 to 2, lost 3, failed 4");
     shown.says("ncc_min=0.3").says("protocol: sightline").says("left out of all metrics: step 0");
+    shown.says("SETTINGS THAT DIFFER").says("0.3").says("0.7");
     let label = "max_px 5.500 of ridge · run B, worst at step 4";
     assert_eq!(shown.click(label), vec![Command::Compare(Ask::Visit { run: B, step: 4 })]);
     let star = shown.click("baseline: ridge · run A");
