@@ -33,6 +33,8 @@ pub mod columns;
 pub mod photometry;
 pub mod exports;
 pub mod studies;
+pub mod breakpoints;
+pub mod expressions;
 pub mod events;
 pub mod openapi;
 pub mod page;

@@ -11,7 +11,8 @@ use utoipa_axum::routes;
 
 use crate::state::AppState;
 use crate::{
-    about, events, exports, photometry, runs, sessions, settings, steps, studies, targets, traverses,
+    about, breakpoints, events, exports, expressions, photometry, runs, sessions, settings, steps, studies,
+    targets, traverses,
 };
 
 #[derive(OpenApi)]
@@ -42,6 +43,8 @@ pub fn router() -> OpenApiRouter<AppState> {
         .merge(exports::router())
         .merge(studies::router())
         .merge(events::router())
+        .merge(breakpoints::router())
+        .merge(expressions::router())
 }
 
 /// This document

@@ -6,6 +6,7 @@
 mod api;
 mod api_security;
 mod cli;
+mod expressions;
 mod imports;
 mod page;
 mod recorded_cameras;

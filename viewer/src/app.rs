@@ -1,7 +1,7 @@
 //! The application: lays the panels out and carries their commands to state and network.
 
 use egui::{CentralPanel, Context, Frame, Margin, Panel, Ui};
-use egui_tiles::Tree;
+use egui_tiles::{Tile, Tree};
 
 use crate::command::Command;
 use crate::layout::{LeftImage, Pane, Panels, overview};
@@ -52,6 +52,9 @@ impl SightlineApp {
         for arrived in self.net.poll() {
             self.state.arrived(arrived, now);
         }
+        if let Some(due) = self.state.tick(now) {
+            context.request_repaint_after(std::time::Duration::from_secs_f64((due - now).max(0.0)));
+        }
         self.send();
         if matches!(self.state.connection, Connection::Gone { .. }) {
             return;
@@ -91,7 +94,7 @@ impl SightlineApp {
         }
         Panel::bottom("stages").exact_size(30.0).frame(bar).show(ui, |ui| bars::stages(ui, state, &mut out));
         let foot = Frame::new().fill(theme::PANEL).inner_margin(Margin::symmetric(10, 4));
-        Panel::bottom("timeline").exact_size(timeline::HEIGHT + 36.0).frame(foot).show(ui, |ui| {
+        Panel::bottom("timeline").exact_size(timeline::height(state) + 36.0).frame(foot).show(ui, |ui| {
             bars::transport(ui, state, &mut out);
             timeline::show(ui, state, &mut out);
         });
@@ -118,6 +121,10 @@ impl SightlineApp {
         }
         for command in commands {
             self.state.apply(command);
+        }
+        if self.state.ask.take_reveal() {
+            let is_box = |tile: &Tile<Pane>| matches!(tile, Tile::Pane(Pane::Breakpoints));
+            self.tree.make_active(|_, tile| is_box(tile));
         }
         self.send();
         // What was asked for shows in the next frame, which otherwise only comes with the next event.

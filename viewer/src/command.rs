@@ -4,6 +4,7 @@ use sightline_core::frames::Pixel;
 use sightline_core::settings::{Changes, TrackerKind};
 
 use crate::shape_view::ShapeView;
+use crate::state::ask::Ask;
 use crate::state::calculator::Calculator;
 use crate::state::studies::Order;
 use crate::stretch::Stretch;
@@ -365,4 +366,6 @@ pub enum Command {
     Dismiss(u64),
     /// Connects again at once.
     Reconnect,
+    /// Breakpoints, derived columns and time travel.
+    Ask(Ask),
 }

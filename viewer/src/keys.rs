@@ -4,15 +4,26 @@ use egui::{Context, Event, Key, Modifiers};
 
 use crate::command::{Command, Go, Mode, Stage};
 use crate::state::State;
+use crate::state::ask::Ask;
+use crate::state::ask::play::Shuttle;
 use crate::stretch::Stretch;
 
 /// Every key with its meaning, as the help sheet lists them.
-pub const SHEET: [(&str, &str); 16] = [
+pub const SHEET: [(&str, &str); 25] = [
     ("Right  Left", "next, previous step"),
     ("Shift+Right  Shift+Left", "ten steps on, back"),
     ("Home  End", "first, last step"),
     ("PgDn  PgUp", "next, previous event (change of state)"),
-    ("G", "go to a step by its number"),
+    ("G", "go to a step: 12, +5, last, t=3.5, or an event such as lost"),
+    ("Space", "play, pause"),
+    ("J  K  L", "play backwards, stop, play forwards; again: twice as fast"),
+    ("[  ]", "a loop begins, ends at this step"),
+    ("Backspace", "no loop any more"),
+    ("N  Shift+N", "next, previous hit of a breakpoint"),
+    ("B", "break at this step, or no longer"),
+    ("Shift+B", "break when: write a condition"),
+    ("Tab  Enter", "in the expression box: take the suggestion, set the breakpoint"),
+    ("Click above the timeline", "break at that step, or no longer"),
     ("Up  Down", "previous, next stage"),
     ("T", "pick a target: then click in the left image"),
     ("R", "run from this step with the changed settings"),
@@ -31,9 +42,13 @@ pub fn commands(context: &Context, state: &State) -> Vec<Command> {
     if context.text_edit_focused() {
         return Vec::new();
     }
+    // Space presses the button that has the keyboard.
+    let is_taken = |key: Key| key == Key::Space && context.memory(|memory| memory.focused().is_some());
     context.input(|input| {
         let pressed = input.events.iter().filter_map(|event| match event {
-            Event::Key { key, pressed: true, modifiers, .. } => command(*key, *modifiers, state),
+            Event::Key { key, pressed: true, modifiers, .. } if !is_taken(*key) => {
+                command(*key, *modifiers, state)
+            }
             _ => None,
         });
         pressed.collect()
@@ -69,6 +84,24 @@ pub fn command(key: Key, modifiers: Modifiers, state: &State) -> Option<Command>
         Key::Escape => Command::SetMode(Mode::Look),
         Key::Questionmark => Command::SetMode(Mode::Help),
         Key::Slash if shift => Command::SetMode(Mode::Help),
+        key => Command::Ask(of_time_and_breakpoints(key, shift, state)?),
+    })
+}
+
+/// What a key asks for of breakpoints and of time.
+fn of_time_and_breakpoints(key: Key, shift: bool, state: &State) -> Option<Ask> {
+    Some(match key {
+        Key::Space => Ask::Shuttle(Shuttle::Toggle),
+        Key::J => Ask::Shuttle(Shuttle::Reverse),
+        Key::K => Ask::Shuttle(Shuttle::Stop),
+        Key::L => Ask::Shuttle(Shuttle::Forward),
+        Key::OpenBracket => Ask::Shuttle(Shuttle::LoopIn),
+        Key::CloseBracket => Ask::Shuttle(Shuttle::LoopOut),
+        Key::Backspace => Ask::Shuttle(Shuttle::ClearLoop),
+        Key::N if shift => Ask::PreviousHit,
+        Key::N => Ask::NextHit,
+        Key::B if shift => Ask::Focus,
+        Key::B => Ask::BreakAt(state.cursor.step),
         _ => return None,
     })
 }

@@ -53,11 +53,13 @@ pub enum Pane {
     Inspector,
     /// Messages.
     Messages,
+    /// Breakpoints and expressions.
+    Breakpoints,
 }
 
 impl Pane {
     /// All of them.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 20] = [
         Self::Targets,
         Self::Settings,
         Self::Left,
@@ -77,6 +79,7 @@ impl Pane {
         Self::Machine,
         Self::Inspector,
         Self::Messages,
+        Self::Breakpoints,
     ];
 
     /// Its title.
@@ -101,6 +104,7 @@ impl Pane {
             Self::Machine => "State machine",
             Self::Inspector => "Inspector",
             Self::Messages => "Messages",
+            Self::Breakpoints => "Breakpoints",
         }
     }
 }
@@ -130,6 +134,7 @@ pub fn show_pane(ui: &mut Ui, pane: Pane, state: &State, out: &mut Vec<Command>)
         Pane::Gates => panels::gates::show(ui, state, out),
         Pane::Inspector => panels::inspector::show(ui, state, out),
         Pane::Messages => panels::messages::show(ui, state, out),
+        Pane::Breakpoints => panels::breakpoints::show(ui, state, out),
     }
     None
 }
@@ -148,7 +153,7 @@ pub fn overview() -> Tree<Pane> {
     let surface = tabs(&mut tiles, &[Pane::Surface, Pane::StereoProfile]);
     let map = tabs(&mut tiles, &[Pane::Map]);
     let plots = tabs(&mut tiles, &[Pane::Plots, Pane::Tolerances]);
-    let gates = tabs(&mut tiles, &[Pane::Gates, Pane::Machine]);
+    let gates = tabs(&mut tiles, &[Pane::Gates, Pane::Machine, Pane::Breakpoints]);
     let inspector = tabs(&mut tiles, &[Pane::Inspector, Pane::Messages]);
     let images = linear(&mut tiles, LinearDir::Horizontal, &[(left, 1.0), (right, 1.0)]);
     let charts = linear(&mut tiles, LinearDir::Horizontal, &[(surface, 1.0), (map, 1.1), (plots, 1.1)]);

@@ -104,6 +104,11 @@ pub fn verdict(good: bool) -> Color32 {
     if good { TRACKING } else { FAILED }
 }
 
+/// The colour of a breakpoint's hits; its shape is another one where the colours repeat.
+pub fn breakpoint(number: usize) -> Color32 {
+    [FAILED, RUNS[1], SEARCH, PREDICTION][number % 4]
+}
+
 /// The two greys of the pattern that stands for no data.
 pub fn checker(odd: bool) -> Color32 {
     CHECKER[usize::from(odd)]

@@ -90,6 +90,7 @@ fn describe(request: &Request) -> (Method, String, Option<Vec<u8>>) {
         Request::StudyRows(job) => get(format!("studies/jobs/{job}/rows")),
         Request::Item(key) => get(item_path(key)),
         Request::Reconnect => get(String::new()),
+        Request::Ask(asked) => super::ask::describe(asked),
     }
 }
 
@@ -106,7 +107,7 @@ fn item_path(key: &Key) -> String {
     }
 }
 
-fn json(value: &impl Serialize) -> Option<Vec<u8>> {
+pub(super) fn json(value: &impl Serialize) -> Option<Vec<u8>> {
     serde_json::to_vec(value).ok()
 }
 
@@ -140,6 +141,7 @@ fn read(request: &Request, response: &ehttp::Response, context: &egui::Context) 
         | Request::CancelRun { .. }
         | Request::ResumeRun { .. }
         | Request::Reconnect => Reply::Done,
+        Request::Ask(asked) => Reply::Ask(super::ask::read(asked, bytes)?),
     })
 }
 
@@ -158,7 +160,7 @@ fn read_item(key: &Key, bytes: &[u8], context: &egui::Context) -> Result<Item, P
     raster.map(|raster| Item::Raster(Arc::new(raster))).map_err(|why| misread(&why))
 }
 
-fn parse<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
+pub(super) fn parse<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
     serde_json::from_slice(bytes).map_err(|why| misread(&why.to_string()))
 }
 

@@ -1,5 +1,6 @@
 //! Everything that crosses the network. Nothing here blocks: answers come in through a channel.
 
+mod ask;
 mod events;
 mod http;
 
@@ -19,6 +20,7 @@ use sightline_core::study::wire::{NewStudy, StudyInfo, StudyJob};
 use self::events::Events;
 use crate::cache::{Item, Key};
 use crate::state::Connection;
+use crate::state::ask::{AskReply, AskRequest};
 
 /// How many images, arrays and records are asked for at a time.
 const AT_A_TIME: usize = 6;
@@ -107,6 +109,8 @@ pub enum Request {
     Item(Key),
     /// To connect to the events again at once.
     Reconnect,
+    /// About breakpoints and expressions.
+    Ask(AskRequest),
 }
 
 /// What the server answered.
@@ -144,6 +148,8 @@ pub enum Reply {
     Item(Item),
     /// It is done.
     Done,
+    /// About breakpoints and expressions.
+    Ask(AskReply),
 }
 
 /// An answer with what was asked.

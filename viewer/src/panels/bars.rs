@@ -4,7 +4,7 @@ use egui::{Align, Button, ComboBox, Layout, RichText, Ui};
 use sightline_core::target::TrackingState;
 use sightline_core::trace::StepTrace;
 
-use super::inspector;
+use super::{inspector, playing};
 use crate::command::{Command, Go, Mode, Stage};
 use crate::state::messages::Weight;
 use crate::state::tracker::confidence_of;
@@ -126,6 +126,7 @@ pub fn transport(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
                 out.push(Command::Go(go));
             }
         }
+        playing::controls(ui, state, out);
         ui.add_space(8.0);
         run_progress(ui, state, out);
         if let Some((k, n)) = state.rendering {

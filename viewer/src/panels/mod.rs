@@ -1,7 +1,9 @@
 //! The panels: read-only data in, commands out. Each file shows one thing.
 
 pub mod bars;
+pub mod breakpoints;
 pub mod budget;
+pub mod derived;
 pub mod exposure;
 pub mod features;
 pub mod gates;
@@ -15,6 +17,7 @@ pub mod machine;
 pub mod map;
 pub mod messages;
 pub mod names;
+pub mod playing;
 pub mod plots;
 pub mod settings;
 pub mod shape;

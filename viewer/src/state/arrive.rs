@@ -125,6 +125,11 @@ impl State {
                 }
             }
             Reply::Item(_) => {}
+            Reply::Ask(reply) => {
+                if let Request::Ask(asked) = &request {
+                    self.answered_ask(asked, reply);
+                }
+            }
         }
     }
 
@@ -148,6 +153,7 @@ impl State {
                 }
             }
             Request::Studies => self.studies.infos = Some(Vec::new()),
+            Request::Ask(asked) => self.refused_ask(&asked, &problem),
             Request::Session(_) => {
                 self.sync.session_asked = None;
                 if self.session.is_none() && problem.status != 0 {
@@ -196,7 +202,9 @@ impl State {
     /// Takes a session over; the cursor stays where the person put it unless somebody else moved it.
     fn adopt(&mut self, view: SessionView, moved_meanwhile: bool) {
         let is_other = self.session.as_ref().is_none_or(|open| open.id != view.id);
+        self.ask.make_stale();
         if is_other {
+            self.ask.forget();
             self.progress.clear();
             self.draft.clear();
             self.mode = Mode::Look;

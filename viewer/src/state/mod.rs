@@ -5,6 +5,7 @@
 
 mod apply;
 mod arrive;
+pub mod ask;
 pub mod calculator;
 mod configurations;
 pub mod messages;
@@ -26,6 +27,7 @@ use sightline_core::settings::Changes;
 use sightline_core::target::TrackingState;
 use sightline_core::trace::{ArrayName, StepRow, StepTrace};
 
+use self::ask::Asking;
 use self::calculator::Calculator;
 use self::configurations::Configurations;
 use self::messages::Messages;
@@ -156,6 +158,8 @@ pub struct State {
     pub marks: bool,
     /// A page to open in a new tab.
     pub open_url: Option<String>,
+    /// Breakpoints, derived columns, and time travel.
+    pub ask: Asking,
     outbox: Vec<Request>,
     sync: Sync,
     /// The aligned left camera of the step that was asked for last: it takes a while to compute.
@@ -212,6 +216,7 @@ impl State {
             hidden: HashSet::from(Layer::HIDDEN_AT_FIRST),
             marks: true,
             open_url: None,
+            ask: Asking::default(),
             outbox: Vec::new(),
             sync: Sync { linked, ..Sync::default() },
             aligned: egui::mutex::Mutex::default(),
@@ -324,6 +329,7 @@ impl State {
     /// What to ask the server, taken out of the outbox.
     pub fn take_requests(&mut self) -> Vec<Request> {
         self.sync_session();
+        self.sync_ask();
         std::mem::take(&mut self.outbox)
     }
 

@@ -1,14 +1,17 @@
 //! Smoke tests of the panels from a fixed drive: what each says when it has data, and when it has none.
 
 mod accuracy;
+mod ask;
 pub(crate) mod feature_run;
 mod features;
 pub(crate) mod fixture;
 mod history;
+mod playing;
 mod session;
 mod shape;
 mod shape_run;
 mod studies;
+mod timelines;
 mod tracking;
 
 use egui_kittest::Harness;
