@@ -114,7 +114,7 @@ pub struct StepRow {
     pub tracked: Option<bool>,
     /// Estimated position in the rover frame, m.
     pub position_in_rover: [f64; 3],
-    /// Covariance of that position, m².
+    /// Covariance of the estimated position, m².
     #[schema(value_type = Vec<f64>)]
     pub covariance_in_rover: Matrix3<f64>,
     /// Located position in the left image, px.
@@ -123,15 +123,15 @@ pub struct StepRow {
     pub range_m: Option<f64>,
     /// Correction of the distance, m: criterion 3.
     pub distance_correction_m: Option<f64>,
-    /// Its tolerance at this step, m.
+    /// Tolerance of the distance's correction at this step, m.
     pub distance_tolerance_m: Option<f64>,
     /// Correction of the position since the designation, m: criterion 4.
     pub position_correction_m: Option<f64>,
-    /// Its tolerance at this step, m.
+    /// Tolerance of the position's correction at this step, m.
     pub position_tolerance_m: Option<f64>,
     /// What the paper's budget grants a drive without tracking at this range, m, 3σ (K-Eq 3).
     pub budget_without_m: Option<f64>,
-    /// What it grants tracking that drifts by half a pixel of the first image, m, 3σ (K-Eq 5, R40).
+    /// What the paper's budget grants tracking that drifts by half a pixel of the first image, m, 3σ (K-Eq 5, R40).
     pub budget_with_m: Option<f64>,
     /// Why an update was rejected, or what is wrong with the stop's files.
     pub reason: Option<String>,

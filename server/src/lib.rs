@@ -39,6 +39,8 @@ pub mod documents;
 pub mod revision;
 pub mod html;
 pub mod plain;
+pub mod breakpoints;
+pub mod expressions;
 pub mod events;
 pub mod trackability;
 pub mod first;

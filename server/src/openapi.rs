@@ -11,8 +11,9 @@ use utoipa_axum::routes;
 
 use crate::state::AppState;
 use crate::{
-    about, compare, documents, events, exports, notes, photometry, plain, questions, removal, runs, sessions,
-    settings, steps, studies, targets, trackability, traverses, what_if, why,
+    about, breakpoints, compare, documents, events, exports, expressions, notes, photometry, plain,
+    questions, removal, runs, sessions, settings, steps, studies, targets, trackability, traverses, what_if,
+    why,
 };
 
 #[derive(OpenApi)]
@@ -52,6 +53,8 @@ pub fn router() -> OpenApiRouter<AppState> {
         .merge(why::router())
         .merge(questions::router())
         .merge(removal::router())
+        .merge(breakpoints::router())
+        .merge(expressions::router())
 }
 
 /// This document

@@ -7,7 +7,7 @@ use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use sightline_core::error::Error;
 use sightline_core::frames::Pixel;
-use sightline_core::session::wire::Problem;
+use sightline_core::session::wire::{ExpressionProblem, Problem, ProblemPlace, TextRange};
 use utoipa::openapi::{ContentBuilder, RefOr, ResponseBuilder};
 
 /// The media type of problems.
@@ -18,6 +18,7 @@ pub const PROBLEM_JSON: &str = "application/problem+json";
 pub struct ApiError {
     // In a box, because every result of a handler has room for it.
     problem: Box<Problem>,
+    place: Option<Box<ProblemPlace>>,
     log: Option<String>,
 }
 
@@ -35,7 +36,7 @@ impl ApiError {
             hint: None,
             nearest_pixel: None,
         });
-        Self { problem, log: None }
+        Self { problem, place: None, log: None }
     }
 
     /// Adds how to mend it.
@@ -49,6 +50,14 @@ impl ApiError {
     #[must_use]
     pub fn nearest_pixel(mut self, pixel: Pixel) -> Self {
         self.problem.nearest_pixel = Some(Box::new(pixel));
+        self
+    }
+
+    /// Says which characters of which field are at fault.
+    #[must_use]
+    pub fn place(mut self, field: &str, from: usize, to: usize) -> Self {
+        let position = TextRange { from, to };
+        self.place = Some(Box::new(ProblemPlace { field: field.to_owned(), position }));
         self
     }
 
@@ -124,7 +133,14 @@ impl IntoResponse for ApiError {
             tracing::error!(code = self.problem.code, "{}", crate::plain(cause));
         }
         let status = StatusCode::from_u16(self.problem.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
-        let mut response = (status, axum::Json(self.problem.as_ref())).into_response();
+        let mut response = match self.place {
+            // The place is an extension member of the problem, as RFC 9457 has it.
+            Some(place) => {
+                let whole = ExpressionProblem { problem: *self.problem, place: *place };
+                (status, axum::Json(whole)).into_response()
+            }
+            None => (status, axum::Json(self.problem.as_ref())).into_response(),
+        };
         response.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static(PROBLEM_JSON));
         if status == StatusCode::SERVICE_UNAVAILABLE {
             response.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from_static("2"));

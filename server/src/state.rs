@@ -57,6 +57,7 @@ struct Inner {
     notices: Vec<String>,
     designations: Lane,
     pictures: Lane,
+    queries: Lane,
     exports: Lane,
     studies: Shelf,
     streams: Mutex<BTreeMap<String, Arc<LiveStream>>>,
@@ -127,6 +128,7 @@ impl AppState {
             notices,
             designations: Lane::new(2, 16),
             pictures: Lane::new(8, 256),
+            queries: Lane::new(2, 64),
             exports: Lane::new(1, 8),
             studies,
             streams: Mutex::default(),
@@ -254,6 +256,11 @@ impl AppState {
     /// Where images are read.
     pub fn pictures(&self) -> &Lane {
         &self.0.pictures
+    }
+
+    /// Where expressions are asked over all steps.
+    pub fn queries(&self) -> &Lane {
+        &self.0.queries
     }
 
     /// Where recordings are written.

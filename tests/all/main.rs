@@ -9,6 +9,7 @@ mod cli;
 mod compare;
 mod copied;
 mod exports;
+mod expressions;
 mod imports;
 mod keeping;
 mod page;

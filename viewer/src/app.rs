@@ -68,6 +68,9 @@ impl SightlineApp {
         for arrived in self.net.poll() {
             self.state.arrived(arrived, now);
         }
+        if let Some(due) = self.state.tick(now) {
+            context.request_repaint_after(std::time::Duration::from_secs_f64((due - now).max(0.0)));
+        }
         self.send();
         if matches!(self.state.connection, Connection::Gone { .. }) {
             return;
@@ -114,11 +117,12 @@ impl SightlineApp {
             bars::stages(ui, state, &mut out);
         });
         let foot = Frame::new().fill(theme::panel()).inner_margin(Margin::symmetric(10, 4));
-        let band = Panel::bottom("timeline").exact_size(timeline::HEIGHT + 36.0).frame(foot).show(ui, |ui| {
-            region(ui, "Timeline", ui.max_rect());
-            bars::transport(ui, state, &mut out);
-            timeline::show(ui, state, &mut out);
-        });
+        let band =
+            Panel::bottom("timeline").exact_size(timeline::height(state) + 36.0).frame(foot).show(ui, |ui| {
+                region(ui, "Timeline", ui.max_rect());
+                bars::transport(ui, state, &mut out);
+                timeline::show(ui, state, &mut out);
+            });
         tour::here(ui.ctx(), tour::TIMELINE, band.response.rect);
         let mut panels = Panels::new(state, &mut out);
         CentralPanel::default()
@@ -164,6 +168,9 @@ impl SightlineApp {
         }
         if std::mem::take(&mut self.state.why.is_called) {
             self.workspace.apply(LayoutCommand::Show(Pane::Why));
+        }
+        if self.state.ask.take_reveal() {
+            self.workspace.apply(LayoutCommand::Show(Pane::Breakpoints));
         }
         self.send();
         // What was asked for shows in the next frame, which otherwise only comes with the next event.

@@ -424,4 +424,6 @@ pub enum Command {
     Notes(notes::Ask),
     /// Something about exports.
     Exports(exports::Ask),
+    /// Breakpoints, derived columns and time travel.
+    Ask(crate::state::ask::Ask),
 }

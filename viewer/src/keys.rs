@@ -6,18 +6,29 @@ use crate::aim::Aim;
 use crate::command::{Command, Go, Mode, Stage};
 use crate::layout::presets::Preset;
 use crate::layout::workspace::LayoutCommand;
+use crate::state::ask;
+use crate::state::ask::play::Shuttle;
 use crate::state::why::Ask;
 use crate::state::{State, exports, notes};
 use crate::stretch::Stretch;
 use crate::{actions, compare, tour};
 
 /// Every key with its meaning, as the help sheet lists them.
-pub const SHEET: [(&str, &str); 28] = [
+pub const SHEET: [(&str, &str); 37] = [
     ("Right  Left", "next, previous step"),
     ("Shift+Right  Shift+Left", "ten steps on, back"),
     ("Home  End", "first, last step"),
     ("PgDn  PgUp", "next, previous event (change of state)"),
-    ("G", "go to a step by its number"),
+    ("G", "go to a step: 12, +5, last, t=3.5, or an event such as lost"),
+    ("Space", "play, pause"),
+    ("J  K  L", "play backwards, stop, play forwards; again: twice as fast"),
+    ("[  ]", "a loop begins, ends at this step"),
+    ("Backspace", "no loop any more"),
+    ("N  Shift+N", "next, previous hit of a breakpoint"),
+    ("B", "break at this step, or no longer"),
+    ("Shift+B", "break when: write a condition"),
+    ("Tab  Enter", "in the expression box: take the suggestion, set the breakpoint"),
+    ("Click above the timeline", "break at that step, or no longer"),
     ("Up  Down", "previous, next stage"),
     ("T", "pick a target: then click in the left image"),
     ("Arrows, Enter", "while picking: move the aim by 0.1 px (Shift 1 px), take it"),
@@ -179,7 +190,28 @@ pub fn command(key: Key, modifiers: Modifiers, state: &State) -> Option<Command>
         Key::Escape => Command::SetMode(Mode::Look),
         Key::Questionmark => Command::SetMode(Mode::Help),
         Key::Slash if shift => Command::SetMode(Mode::Help),
-        other => return crate::compare::command(other),
+        key => match of_time_and_breakpoints(key, shift, state) {
+            Some(ask) => Command::Ask(ask),
+            None => return crate::compare::command(key),
+        },
+    })
+}
+
+/// What a key asks for of breakpoints and of time.
+fn of_time_and_breakpoints(key: Key, shift: bool, state: &State) -> Option<ask::Ask> {
+    Some(match key {
+        Key::Space => ask::Ask::Shuttle(Shuttle::Toggle),
+        Key::J => ask::Ask::Shuttle(Shuttle::Reverse),
+        Key::K => ask::Ask::Shuttle(Shuttle::Stop),
+        Key::L => ask::Ask::Shuttle(Shuttle::Forward),
+        Key::OpenBracket => ask::Ask::Shuttle(Shuttle::LoopIn),
+        Key::CloseBracket => ask::Ask::Shuttle(Shuttle::LoopOut),
+        Key::Backspace => ask::Ask::Shuttle(Shuttle::ClearLoop),
+        Key::N if shift => ask::Ask::PreviousHit,
+        Key::N => ask::Ask::NextHit,
+        Key::B if shift => ask::Ask::Focus,
+        Key::B => ask::Ask::BreakAt(state.cursor.step),
+        _ => return None,
     })
 }
 

@@ -20,6 +20,8 @@
 //!   "image_to_screen": {"scale": s, "origin": [x, y]},
 //!   "pick_mode": false,
 //!   "designating": false,          // whether a designation waits for its answer
+//!   "playing": 0,                  // how many times the rate; negative backwards, 0 paused
+//!   "breakpoints": 1, "hits": 4,   // how many there are, and their hits in all runs
 //!   "problem": "sentence or null"  // the newest message, where that is a problem
 //! }
 //! ```
@@ -108,6 +110,9 @@ pub fn describe(state: &State, left_image: &LeftImage, zoom: f32) -> Value {
         "stage": state.stage().word(),
         "pick_mode": state.mode == Mode::Pick,
         "designating": state.designating.is_some(),
+        "playing": state.ask.play.speed,
+        "breakpoints": state.ask.breakpoints.len(),
+        "hits": state.ask.breakpoints.iter().map(|breakpoint| breakpoint.count).sum::<usize>(),
         "problem": problem.map(|message| &message.text),
         "left_image_rect": null,
         "left_image_size": null,

@@ -20,12 +20,18 @@ pub mod why;
 pub mod wire;
 pub mod compare;
 pub mod metrics;
+pub mod expression;
+pub mod breakpoints;
+pub mod query;
+#[cfg(test)]
+mod breakpoint_tests;
 
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+pub use self::breakpoints::Breakpoints;
 pub use self::progress::Next;
 pub use self::run::{Fork, Run};
 use crate::error::{Error, Result};
@@ -72,6 +78,8 @@ pub struct Session {
     pub targets: Vec<TargetRecord>,
     /// What is looked at.
     pub cursor: Cursor,
+    /// The conditions that are looked for.
+    pub breakpoints: Breakpoints,
 }
 
 /// What a run needs for its next step.
@@ -90,8 +98,8 @@ pub struct Pending {
 impl Session {
     /// A session without targets.
     pub fn new(id: impl Into<String>, traverse: impl Into<String>, stop_count: usize) -> Self {
-        let (targets, cursor) = (Vec::new(), Cursor::default());
-        Self { id: id.into(), traverse: traverse.into(), stop_count, targets, cursor }
+        let (targets, cursor, breakpoints) = (Vec::new(), Cursor::default(), Breakpoints::default());
+        Self { id: id.into(), traverse: traverse.into(), stop_count, targets, cursor, breakpoints }
     }
 
     /// Adds a target whose designation was computed, and looks at it. Returns its number.

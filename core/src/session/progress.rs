@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use super::breakpoints::Breakpoints;
 use super::view::{SavedRun, SavedSession, SavedTarget};
 use super::{Pending, Run, Session, TargetRecord};
 use crate::error::{Error, Result};
@@ -45,7 +46,9 @@ impl Session {
         }
         let restore = |(number, target)| restored_target(number, target, stop_count);
         let targets = saved.targets.iter().enumerate().map(restore).collect::<Result<_>>()?;
-        let mut session = Self { targets, ..Self::new(&saved.id, &saved.traverse, stop_count) };
+        let breakpoints = Breakpoints::restored(&saved.breakpoints);
+        let new = Self::new(&saved.id, &saved.traverse, stop_count);
+        let mut session = Self { targets, breakpoints, ..new };
         // A cursor that points nowhere is no reason to lose the targets.
         let _ = session.move_cursor(saved.cursor);
         Ok(session)
@@ -166,6 +169,7 @@ fn restored_run(saved: &SavedRun) -> Run {
 mod tests {
     use super::*;
     use crate::frames::Pixel;
+    use crate::session::breakpoints::Breakpoint;
     use crate::session::{Cursor, Fork};
 
     fn saved() -> SavedSession {
@@ -183,6 +187,7 @@ mod tests {
                 removed: false,
                 runs: vec![run(None, Some(3)), run(Some(Fork::new(0, 3)), None)],
             }],
+            breakpoints: vec![Breakpoint { number: 4, expression: "ncc < 0.6".to_owned(), on: false }],
         }
     }
 

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::breakpoints::Breakpoint;
 use super::progress::SAVED_FORMAT;
 use super::{Cursor, Fork, Run, Session, TargetRecord};
 use crate::settings::{Changes, Settings};
@@ -22,6 +23,9 @@ pub struct SessionView {
     pub cursor: Cursor,
     /// The targets that were not removed.
     pub targets: Vec<TargetView>,
+    /// The conditions that are looked for; `…/breakpoints` says what they hit.
+    #[serde(default)]
+    pub breakpoints: Vec<Breakpoint>,
 }
 
 /// A target as pages and scripts see it.
@@ -73,6 +77,9 @@ pub struct SavedSession {
     pub cursor: Cursor,
     /// The targets, by number.
     pub targets: Vec<SavedTarget>,
+    /// The conditions that were looked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub breakpoints: Vec<Breakpoint>,
 }
 
 /// A target as it was designated, and the configurations tried on it.
@@ -121,6 +128,7 @@ impl Session {
             stop_count: self.stop_count,
             cursor: self.cursor,
             targets: live.map(|(number, record)| self.target_view(number, record)).collect(),
+            breakpoints: self.breakpoints.list(),
         }
     }
 
@@ -161,6 +169,7 @@ impl Session {
                     runs: record.runs.iter().map(saved_run).collect(),
                 })
                 .collect(),
+            breakpoints: self.breakpoints.list(),
         }
     }
 

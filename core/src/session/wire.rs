@@ -269,3 +269,32 @@ pub struct Problem {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nearest_pixel: Option<Box<Pixel>>,
 }
+
+/// Characters of a text.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct TextRange {
+    /// The first one, from 0.
+    pub from: usize,
+    /// The first one after it.
+    pub to: usize,
+}
+
+/// Where in a request something is wrong.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct ProblemPlace {
+    /// The field of the request.
+    pub field: String,
+    /// The characters of its text.
+    pub position: TextRange,
+}
+
+/// A problem with an expression: a [`Problem`] with the field and the characters at fault.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ExpressionProblem {
+    /// The problem.
+    #[serde(flatten)]
+    pub problem: Problem,
+    /// Where it is.
+    #[serde(flatten)]
+    pub place: ProblemPlace,
+}

@@ -70,11 +70,13 @@ pub enum Pane {
     Why,
     /// Notes.
     Notes,
+    /// Breakpoints and expressions.
+    Breakpoints,
 }
 
 impl Pane {
     /// All of them.
-    pub const ALL: [Self; 23] = [
+    pub const ALL: [Self; 24] = [
         Self::Targets,
         Self::Settings,
         Self::Left,
@@ -98,6 +100,7 @@ impl Pane {
         Self::Uncertainty,
         Self::Why,
         Self::Notes,
+        Self::Breakpoints,
     ];
 
     /// Its title.
@@ -126,6 +129,7 @@ impl Pane {
             Self::Uncertainty => "Uncertainty",
             Self::Why => "Why",
             Self::Notes => "Notes",
+            Self::Breakpoints => "Breakpoints",
         }
     }
 }
@@ -159,6 +163,7 @@ pub fn show_pane(ui: &mut Ui, pane: Pane, state: &State, out: &mut Vec<Command>)
         Pane::Uncertainty => panels::uncertainty::show(ui, state, out),
         Pane::Why => panels::why::show(ui, state, out),
         Pane::Notes => panels::notes::show(ui, state, out),
+        Pane::Breakpoints => panels::breakpoints::show(ui, state, out),
     }
     None
 }

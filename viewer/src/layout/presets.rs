@@ -144,7 +144,7 @@ const OVERVIEW: Area = Row(&[
     ),
     (
         Column(&[
-            (Tabs(&[Pane::Gates, Pane::Machine]), 0.38),
+            (Tabs(&[Pane::Gates, Pane::Machine, Pane::Breakpoints]), 0.38),
             (Tabs(&[Pane::Inspector, Pane::Why, Pane::Notes, Pane::Messages]), 0.62),
         ]),
         0.2,

@@ -123,6 +123,7 @@ pub(crate) fn describe(request: &Request) -> (Method, String, Option<Vec<u8>>) {
             let run = run.map_or_else(String::new, |run| format!("&run={run}"));
             get(format!("sessions/{session}/exports{target}{run}"))
         }
+        Request::Ask(asked) => super::ask::describe(asked),
     }
 }
 
@@ -192,6 +193,7 @@ fn read(request: &Request, response: &ehttp::Response, context: &egui::Context) 
         Request::Compare { .. } => Reply::Compared(Box::new(parse(bytes)?)),
         Request::Metrics { .. } => Reply::Metrics(Box::new(parse(bytes)?)),
         Request::Trackability { .. } => Reply::Trackability(Box::new(parse(bytes)?)),
+        Request::Ask(asked) => Reply::Ask(super::ask::read(asked, bytes)?),
     })
 }
 

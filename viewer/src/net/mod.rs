@@ -1,5 +1,6 @@
 //! Everything that crosses the network. Nothing here blocks: answers come in through a channel.
 
+mod ask;
 mod events;
 mod http;
 pub mod why;
@@ -27,6 +28,7 @@ pub(crate) use self::http::{describe, revision};
 use self::why::{WhyReply, WhyRequest};
 use crate::cache::{Item, Key};
 use crate::state::Connection;
+use crate::state::ask::{AskReply, AskRequest};
 
 /// How many images, arrays and records are asked for at a time.
 const AT_A_TIME: usize = 6;
@@ -190,6 +192,8 @@ pub enum Request {
         /// One run of it by its number.
         run: Option<usize>,
     },
+    /// About breakpoints and expressions.
+    Ask(AskRequest),
 }
 
 /// What the server answered.
@@ -239,6 +243,8 @@ pub enum Reply {
     Trackability(Box<MapProgress>),
     /// About single steps.
     Why(WhyReply),
+    /// About breakpoints and expressions.
+    Ask(AskReply),
 }
 
 /// An answer with what was asked.

@@ -5,7 +5,7 @@ use sightline_core::target::TrackingState;
 use sightline_core::trace::StepTrace;
 
 use super::compare::{choosers, readouts};
-use super::{inspector, numbers, view_menu};
+use super::{inspector, numbers, playing, view_menu};
 use crate::command::{Command, Go, Mode, Stage};
 use crate::state::exports;
 use crate::state::messages::Weight;
@@ -137,6 +137,7 @@ pub fn transport(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
                 out.push(Command::Go(go));
             }
         }
+        playing::controls(ui, state, out);
         ui.add_space(8.0);
         run_progress(ui, state, out);
         if let Some((k, n)) = state.rendering {

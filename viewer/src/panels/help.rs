@@ -4,6 +4,7 @@ use egui::{Id, Key, Modal, RichText, Ui};
 
 use crate::command::{Command, Go, Mode};
 use crate::state::State;
+use crate::state::ask::goto;
 use crate::tour::Turn;
 use crate::{cache, keys, theme};
 
@@ -56,56 +57,40 @@ fn sheet(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 }
 
 fn go_to(ui: &mut Ui, state: &State, typed: &str, out: &mut Vec<Command>) {
-    let last = state.stop_count().saturating_sub(1);
-    // Digits and signs: the letter that opened the field may come as text, too.
-    let ahead = keys::typed_ahead(ui.ctx(), |c| c.is_ascii_digit() || matches!(c, '+' | '-'));
+    // What was typed before the field had the focus would otherwise be lost.
+    let ahead = keys::typed_ahead(ui.ctx(), |c| !c.is_control());
+    // The letter that opened the field may come as text, too.
+    let ahead = if typed.is_empty() { ahead.trim_start_matches(['g', 'G']) } else { &ahead };
     let mut text = format!("{typed}{ahead}");
     let modal = Modal::new(Id::unique("go to")).backdrop_color(theme::shade()).show(ui.ctx(), |ui| {
-        ui.set_width(240.0);
+        ui.set_width(330.0);
         ui.label(theme::title("Go to step"));
-        let field =
-            ui.add(egui::TextEdit::singleline(&mut text).hint_text(format!("0 to {last}, or +5, -3")));
-        field.request_focus();
-        if !text.is_empty() && target(&text, state.cursor.step).is_none() {
-            ui.label(RichText::new("a step is a whole number").small().color(theme::lost()));
-        }
+        let field = ui.add(egui::TextEdit::singleline(&mut text).hint_text("12, +5, t=3.5, lost"));
+        field.accessible_name("go to step").request_focus();
+        let meant = state.step_meant(&text);
+        match &meant {
+            Ok(step) => ui.label(theme::note(format!("step {step}"))),
+            Err(_) if text.is_empty() => ui.add(egui::Label::new(theme::note(goto::FORMS)).wrap()),
+            Err(why) => ui.add(egui::Label::new(RichText::new(why).small().color(theme::lost())).wrap()),
+        };
         ui.label(theme::note("Enter goes, Esc cancels"));
-        ui.input(|input| input.key_pressed(Key::Enter))
+        (ui.input(|input| input.key_pressed(Key::Enter)), meant)
     });
-    if modal.inner {
-        if let Some(step) = target(&text, state.cursor.step) {
-            out.push(Command::Go(Go::Step(step)));
+    match modal.inner {
+        // What is wrong stays on the screen, so that it can be mended.
+        (true, Err(_)) if !text.trim().is_empty() => {}
+        (true, meant) => {
+            out.extend(meant.ok().map(|step| Command::Go(Go::Step(step))));
+            out.push(Command::SetMode(Mode::Look));
+            return;
         }
-        out.push(Command::SetMode(Mode::Look));
-    } else if modal.should_close() {
-        out.push(Command::SetMode(Mode::Look));
-    } else if text != typed {
+        (false, _) if modal.should_close() => {
+            out.push(Command::SetMode(Mode::Look));
+            return;
+        }
+        (false, _) => {}
+    }
+    if text != typed {
         out.push(Command::SetMode(Mode::GoTo(text)));
-    }
-}
-
-/// The step that was typed: a number, or `+5` and `-3` from the present one.
-fn target(text: &str, step: usize) -> Option<usize> {
-    let text = text.trim();
-    if let Some(on) = text.strip_prefix('+') {
-        return Some(step.saturating_add(on.trim().parse().ok()?));
-    }
-    match text.strip_prefix(['-', '−']) {
-        Some(back) => Some(step.saturating_sub(back.trim().parse().ok()?)),
-        None => text.parse().ok(),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::target;
-
-    #[test]
-    fn a_typed_step_is_absolute_or_relative() {
-        assert_eq!(target("12", 3), Some(12));
-        assert_eq!(target(" +5", 3), Some(8));
-        assert_eq!(target("-5", 3), Some(0));
-        assert_eq!(target("−2", 3), Some(1));
-        assert_eq!(target("twelve", 3), None);
     }
 }

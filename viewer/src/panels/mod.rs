@@ -1,9 +1,11 @@
 //! The panels: read-only data in, commands out. Each file shows one thing.
 
 pub mod bars;
+pub mod breakpoints;
 pub mod budget;
 pub mod compare;
 pub mod export;
+pub mod derived;
 pub mod exposure;
 pub mod features;
 pub mod gates;
@@ -19,6 +21,7 @@ pub mod messages;
 pub mod names;
 pub mod palette;
 pub mod notes;
+pub mod playing;
 pub mod plots;
 pub mod runs;
 mod numbers;

@@ -48,19 +48,24 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         return;
     };
     let charts = charts(state, run);
-    let count = charts.len() as f32;
+    let derived = &state.ask.derived;
+    let count = (charts.len() + derived.len()) as f32;
     ui.spacing_mut().item_spacing.y = 1.0;
     let axis = 16.0;
     let height = ((ui.available_height() - axis - count * (NAMES + 2.0)) / count).max(24.0);
     for (i, chart) in charts.iter().enumerate() {
-        let is_last = i + 1 == charts.len();
+        let is_last = i + 1 == charts.len() && derived.is_empty();
         let (title, mut lines) = names_of(chart);
         lines.extend(state.others().iter().map(|o| (o.look.mark, o.look.colour, state.run_label(o.name))));
         names::show(ui, &title, &lines);
         let height = if is_last { height + axis } else { height };
-        if let Some(step) = plot(ui, state, run, chart, height, is_last) {
+        if let Some(step) = plot(ui, state, run, (chart, height, is_last), out) {
             out.push(Command::Go(Go::Step(step)));
         }
+    }
+    for at in 0..derived.len() {
+        let is_last = at + 1 == derived.len();
+        super::derived::show(ui, state, at, if is_last { height + axis } else { height }, is_last, out);
     }
 }
 
@@ -174,9 +179,8 @@ fn plot(
     ui: &mut Ui,
     state: &State,
     run: &RunView,
-    chart: &Chart,
-    height: f32,
-    is_last: bool,
+    (chart, height, is_last): (&Chart, f32, bool),
+    out: &mut Vec<Command>,
 ) -> Option<usize> {
     let last = state.stop_count().saturating_sub(1) as f64;
     let plot =
@@ -208,7 +212,24 @@ fn plot(
         let clicked = plot.response().clicked().then(|| plot.pointer_coordinate()).flatten();
         clicked.map(|at: PlotPoint| at.x.round().clamp(0.0, last) as usize)
     });
+    let plotted: Vec<(&str, f64)> = state.row().map(|row| asked_of(chart, row)).unwrap_or_default();
+    super::breakpoints::menu(&response.response, &plotted, out);
     response.inner
+}
+
+/// What a chart shows of a row, as expressions with their values.
+fn asked_of(chart: &Chart, row: &StepRow) -> Vec<(&'static str, f64)> {
+    let column = |line: &Series| match (chart.title, line.name) {
+        (_, "ncc") => Some(("ncc", row.ncc?)),
+        (_, "stereo") => Some(("stereo_score", row.stereo_score?)),
+        (_, "confidence") => Some(("confidence", row.confidence?)),
+        (_, "inliers") => Some(("inliers", row.inliers? as f64)),
+        (_, "σ") => Some(("sigma_m", row.sigma_m?)),
+        ("pixel error", _) => Some(("err_px", row.err_px?)),
+        ("position error", _) => Some(("err_m", row.err_m?)),
+        _ => None,
+    };
+    chart.series.iter().filter_map(column).collect()
 }
 
 /// A plot over the steps, which moves with its neighbours; only the lowest one has numbers of steps.

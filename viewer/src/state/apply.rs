@@ -5,6 +5,7 @@ use sightline_core::session::Cursor;
 use sightline_core::session::wire::{NewRun, NewTarget};
 use sightline_core::settings::Changes;
 
+use super::ask::play::Shuttle;
 use super::{Place, State, Views, events, run_letter};
 use crate::command::{Command, Go, Mode, Panel};
 use crate::net::Request;
@@ -85,11 +86,14 @@ impl State {
             Command::Why(ask) => self.ask_why(ask),
             Command::Notes(ask) => self.ask_of_notes(ask),
             Command::Exports(ask) => self.ask_of_exports(ask),
+            Command::Ask(ask) => self.apply_ask(ask),
         }
     }
 
     fn go(&mut self, go: Go) {
         let Some(last) = self.stop_count().checked_sub(1) else { return };
+        // Who steps by hand wants to stay there.
+        self.shuttle(Shuttle::Stop);
         let events = self.run().map(events).unwrap_or_default();
         let step = self.cursor.step;
         let to = match go {

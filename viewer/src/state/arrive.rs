@@ -127,7 +127,7 @@ impl State {
             Reply::Done => match request {
                 // The server tells every page that notes changed.
                 Request::NewNote { .. } => {
-                    self.messages.note("The note is pinned; the panel Notes lists them.")
+                    self.messages.note("The note is pinned; the panel Notes lists them.");
                 }
                 Request::EditNote { .. } | Request::RemoveNote { .. } | Request::RestoreNote { .. } => {}
                 Request::PutCursor { cursor, .. } => self.put_cursor(cursor),
@@ -165,6 +165,11 @@ impl State {
             Reply::Metrics(found) => {
                 if let Request::Metrics { run, .. } = request {
                     self.took_metrics(run, Ok(*found));
+                }
+            }
+            Reply::Ask(reply) => {
+                if let Request::Ask(asked) = &request {
+                    self.answered_ask(asked, reply);
                 }
             }
         }
@@ -208,6 +213,7 @@ impl State {
             request @ (Request::NewNote { .. } | Request::EditNote { .. } | Request::RemoveNote { .. }) => {
                 self.note_refused(&request);
             }
+            Request::Ask(asked) => self.refused_ask(&asked, &problem),
             Request::Session(_) => {
                 self.sync.session_asked = None;
                 if self.session.is_none() && problem.status != 0 {
@@ -256,8 +262,10 @@ impl State {
     /// Takes a session over; the cursor stays where the person put it unless somebody else moved it.
     pub(super) fn adopt(&mut self, view: SessionView, moved_meanwhile: bool) {
         let is_other = self.session.as_ref().is_none_or(|open| open.id != view.id);
+        self.ask.make_stale();
         if is_other {
             self.open_notes(&view.id);
+            self.ask.forget();
             self.progress.clear();
             self.draft.clear();
             self.forget_comparisons(true);

@@ -7,6 +7,7 @@ mod apply;
 mod arrive;
 pub mod compare;
 mod comparing;
+pub mod ask;
 pub mod calculator;
 mod configurations;
 mod linked;
@@ -35,6 +36,7 @@ use sightline_core::settings::Changes;
 use sightline_core::target::TrackingState;
 use sightline_core::trace::{ArrayName, StepRow, StepTrace};
 
+use self::ask::Asking;
 use self::calculator::Calculator;
 use self::configurations::Configurations;
 use self::exports::Exports;
@@ -191,6 +193,8 @@ pub struct State {
     pub notes: Notes,
     /// What the session can be had as.
     pub exports: Exports,
+    /// Breakpoints, derived columns, and time travel.
+    pub ask: Asking,
     outbox: Vec<Request>,
     sync: Sync,
     /// The aligned left camera of the step that was asked for last: it takes a while to compute.
@@ -257,6 +261,7 @@ impl State {
             undo: Undo::default(),
             notes: Notes::default(),
             exports: Exports::default(),
+            ask: Asking::default(),
             outbox: Vec::new(),
             sync: Sync { linked, ..Sync::default() },
             aligned: egui::mutex::Mutex::default(),
@@ -371,6 +376,7 @@ impl State {
         self.sync_session();
         self.sync_trackability();
         self.sync_tour();
+        self.sync_ask();
         std::mem::take(&mut self.outbox)
     }
 

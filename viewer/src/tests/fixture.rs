@@ -68,6 +68,7 @@ pub(crate) fn without_target() -> State {
         stop_count: STOPS,
         cursor: Cursor::default(),
         targets: Vec::new(),
+        breakpoints: Vec::new(),
     });
     state
 }

@@ -2,15 +2,18 @@
 
 mod accuracy;
 mod compare;
+mod ask;
 pub(crate) mod feature_run;
 mod features;
 pub(crate) mod fixture;
 mod history;
 mod keeping;
+mod playing;
 mod session;
 mod shape;
 mod shape_run;
 mod studies;
+mod timelines;
 mod tracking;
 mod picking;
 mod tour;

@@ -68,6 +68,11 @@ pub fn verdict(good: bool) -> Color32 {
     if good { tracking() } else { failed() }
 }
 
+/// The colour of a breakpoint's hits; its shape is another one where the colours repeat.
+pub fn breakpoint(number: usize) -> Color32 {
+    [failed(), run(1), search(), prediction()][number % 4]
+}
+
 /// A colour between a fifth and all of its brightness.
 pub fn shaded(colour: Color32, share: f64) -> Color32 {
     let bright = 0.2 + 0.8 * share.clamp(0.0, 1.0);

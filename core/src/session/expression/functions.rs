@@ -1,0 +1,112 @@
+//! The functions of the language: what they are given, how they are written, what they mean.
+
+use super::evaluate::Function;
+
+/// How a function is checked.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Signature {
+    /// Numbers of one unit.
+    Numbers(Function),
+    /// The value at the step before.
+    Before,
+    /// Whether it is another than at the step before.
+    Changes,
+    /// Whether there is a value (true), or none (false).
+    Has(bool),
+    /// Entries of a list.
+    Count,
+    /// A text in a text.
+    Contains,
+    /// Two runs.
+    Differs,
+}
+
+/// A function of the language.
+#[derive(Clone, Copy, Debug)]
+pub struct FunctionInfo {
+    /// Its name.
+    pub name: &'static str,
+    /// How it is written.
+    pub form: &'static str,
+    /// What it means.
+    pub meaning: &'static str,
+    pub(super) signature: Signature,
+    pub(super) takes: (usize, usize),
+}
+
+const fn function(
+    name: &'static str,
+    form: &'static str,
+    meaning: &'static str,
+    takes: (usize, usize),
+    signature: Signature,
+) -> FunctionInfo {
+    FunctionInfo { name, form, meaning, signature, takes }
+}
+
+/// The most values that `min`, `max` and `hypot` take.
+const MOST: usize = 16;
+
+/// All functions.
+pub static FUNCTIONS: [FunctionInfo; 12] = [
+    function("abs", "abs(x)", "The size of a number.", (1, 1), Signature::Numbers(Function::Abs)),
+    function(
+        "min",
+        "min(x, y, …)",
+        "The smallest; missing where one is missing.",
+        (2, MOST),
+        Signature::Numbers(Function::Min),
+    ),
+    function(
+        "max",
+        "max(x, y, …)",
+        "The greatest; missing where one is missing.",
+        (2, MOST),
+        Signature::Numbers(Function::Max),
+    ),
+    function(
+        "sqrt",
+        "sqrt(x)",
+        "The square root; missing for a negative number.",
+        (1, 1),
+        Signature::Numbers(Function::Sqrt),
+    ),
+    function(
+        "hypot",
+        "hypot(x, y, …)",
+        "The root of the sum of squares: a length.",
+        (2, MOST),
+        Signature::Numbers(Function::Hypot),
+    ),
+    function(
+        "prev",
+        "prev(x)",
+        "The value at the step before; missing at the first one.",
+        (1, 1),
+        Signature::Before,
+    ),
+    function(
+        "changes",
+        "changes(x)",
+        "Whether it is another than at the step before; also `x changes`.",
+        (1, 1),
+        Signature::Changes,
+    ),
+    function("has", "has(x)", "Whether there is a value.", (1, 1), Signature::Has(true)),
+    function("missing", "missing(x)", "Whether there is none.", (1, 1), Signature::Has(false)),
+    function("count", "count(list)", "How many entries a list has.", (1, 1), Signature::Count),
+    function(
+        "contains",
+        "contains(text, \"part\")",
+        "Whether a text holds another, in any case of letters.",
+        (2, 2),
+        Signature::Contains,
+    ),
+    function(
+        "differs",
+        "differs(A, B, x, by)",
+        "Whether a value differs between two runs of the target by more than that; without the last, at all.",
+        (3, 4),
+        Signature::Differs,
+    ),
+];

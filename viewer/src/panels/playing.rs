@@ -1,0 +1,67 @@
+//! The controls of time travel: play, pause, direction, rate, loop, and the next hit of a breakpoint.
+
+use egui::{Button, DragValue, RichText, Ui, vec2};
+
+use crate::command::Command;
+use crate::state::State;
+use crate::state::ask::Ask;
+use crate::state::ask::play::{RATES, Shuttle};
+use crate::theme;
+
+/// Shows the controls in a row.
+pub fn controls(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let play = &state.ask.play;
+    ui.add_space(6.0);
+    let (words, name) = if play.is_playing() { ("||", "pause") } else { ("▶", "play") };
+    for (words, name, help, ask) in [
+        ("◀", "play backwards", "play backwards, again: twice as fast (J)", Shuttle::Reverse),
+        (words, name, "play, pause (Space)", Shuttle::Toggle),
+        ("▶▶", "play faster", "play forwards, again: twice as fast (L)", Shuttle::Forward),
+    ] {
+        if button(ui, words, name, help) {
+            out.push(Command::Ask(Ask::Shuttle(ask)));
+        }
+    }
+    let mut rate = play.rate;
+    let field = DragValue::new(&mut rate).range(RATES).speed(0.1).max_decimals(1).suffix(" /s");
+    let field = ui.add(field).accessible_name("steps a second");
+    if field.on_hover_text("steps a second at single speed").changed() {
+        out.push(Command::Ask(Ask::Shuttle(Shuttle::Rate(rate))));
+    }
+    ui.label(theme::note(play.in_words()));
+    ui.add_space(4.0);
+    for (words, name, help, ask) in [
+        ("[", "loop in", "the loop begins at this step ([)", Shuttle::LoopIn),
+        ("]", "loop out", "the loop ends at this step (])", Shuttle::LoopOut),
+    ] {
+        if button(ui, words, name, help) {
+            out.push(Command::Ask(Ask::Shuttle(ask)));
+        }
+    }
+    if play.loop_in.is_some() || play.loop_out.is_some() {
+        let end = |end: Option<usize>| end.map_or_else(|| "…".to_owned(), |step| step.to_string());
+        ui.label(theme::note(format!("loop {} to {}", end(play.loop_in), end(play.loop_out))));
+        if button(ui, "x", "no loop", "no loop any more (Backspace)") {
+            out.push(Command::Ask(Ask::Shuttle(Shuttle::ClearLoop)));
+        }
+    }
+    others(ui, state, out);
+}
+
+/// The switch for the bands of the other targets, where there are others.
+fn others(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let count = state.session.as_ref().map_or(0, |session| session.targets.len().saturating_sub(1));
+    if count == 0 || state.target().is_none() {
+        return;
+    }
+    let mut shown = state.ask.shows_others;
+    let words = RichText::new(format!("{count} other targets")).small();
+    if ui.checkbox(&mut shown, words).on_hover_text("their state bands on the timeline").changed() {
+        out.push(Command::Ask(Ask::ShowOthers(shown)));
+    }
+}
+
+fn button(ui: &mut Ui, words: &str, name: &str, help: &str) -> bool {
+    let button = Button::new(RichText::new(words).monospace()).min_size(vec2(26.0, 24.0));
+    ui.add(button).accessible_name(name).on_hover_text(help).clicked()
+}

@@ -1,0 +1,135 @@
+//! What a stop shows on a state band, by colour, pattern and word.
+
+use egui::{Color32, Painter, Rect, Shape, Stroke, pos2, vec2};
+use sightline_core::session::view::{RunView, TargetView};
+
+use crate::state::{State, row_of};
+use crate::theme;
+
+/// What a cell shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cell {
+    /// Before the target was picked, or without a target.
+    Before,
+    /// Not computed yet.
+    Unknown,
+    /// State `tracking`.
+    Tracking,
+    /// State `lost`.
+    Lost,
+    /// State `failed`.
+    Failed,
+    /// The stop's files are damaged.
+    Fault,
+}
+
+impl Cell {
+    /// The word for tooltips.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Before => "before the pick",
+            Self::Unknown => "not computed yet",
+            Self::Tracking => "tracking",
+            Self::Lost => "lost",
+            Self::Failed => "failed",
+            Self::Fault => "fault of the files",
+        }
+    }
+
+    /// How serious it is: of steps that share a column the most serious is shown.
+    pub(super) const fn weight(self) -> u8 {
+        match self {
+            Self::Before => 0,
+            Self::Unknown => 1,
+            Self::Tracking => 2,
+            Self::Fault => 3,
+            Self::Lost => 4,
+            Self::Failed => 5,
+        }
+    }
+}
+
+/// The cell of a stop in the run that is looked at.
+pub fn cell(state: &State, step: usize) -> Cell {
+    state.target().map_or(Cell::Before, |target| cell_of(target, state.run(), step))
+}
+
+/// The cell of a stop in a run.
+pub(super) fn cell_of(target: &TargetView, run: Option<&RunView>, step: usize) -> Cell {
+    if step < target.designation.step {
+        return Cell::Before;
+    }
+    match run.and_then(|run| row_of(run, step)) {
+        None => Cell::Unknown,
+        Some(row) if row.fault => Cell::Fault,
+        Some(row) => match row.state.as_str() {
+            "tracking" => Cell::Tracking,
+            "lost" => Cell::Lost,
+            "failed" => Cell::Failed,
+            _ => Cell::Unknown,
+        },
+    }
+}
+
+/// Paints a stretch of equal cells.
+pub(super) fn paint(painter: &Painter, frame: Rect, cell: Cell) {
+    let fill = |colour: Color32, strength: f32| {
+        painter.rect_filled(frame, 1.0, colour.gamma_multiply(strength));
+    };
+    match cell {
+        Cell::Before => fill(theme::before(), 1.0),
+        Cell::Unknown => fill(theme::unknown(), 1.0),
+        Cell::Tracking => fill(theme::tracking(), 1.0),
+        Cell::Lost => {
+            fill(theme::lost(), 0.25);
+            dashes(painter, frame, theme::lost());
+        }
+        Cell::Failed => {
+            fill(theme::failed(), 0.3);
+            hatch(painter, frame, theme::failed());
+        }
+        Cell::Fault => {
+            fill(theme::unknown(), 1.0);
+            hatch(painter, frame, theme::weak());
+            cross(painter, frame, theme::failed());
+        }
+    }
+}
+
+/// Dashed rows: three on a high band, one on a low one.
+fn dashes(painter: &Painter, frame: Rect, colour: Color32) {
+    let rows = if frame.height() > 14.0 { 3 } else { 1 };
+    for i in 0..rows {
+        let y = frame.top() + frame.height() * (i as f32 + 0.5) / rows as f32;
+        if frame.width() < 8.0 {
+            // Too short for a dash and its gap.
+            painter.hline(frame.x_range(), y, Stroke::new(3.0, colour));
+            continue;
+        }
+        let ends = [pos2(frame.left() + 1.0, y), pos2(frame.right() - 1.0, y)];
+        painter.extend(Shape::dashed_line(&ends, Stroke::new(3.0, colour), 6.0, 4.0));
+    }
+}
+
+/// Slanted lines.
+fn hatch(painter: &Painter, frame: Rect, colour: Color32) {
+    let inside = painter.with_clip_rect(frame.intersect(painter.clip_rect()));
+    let slant = frame.height();
+    // Lines lie on one raster, so that many short stretches have no more of them than one long one.
+    let first = ((frame.left() - slant) / 6.0).ceil() as i32;
+    let last = (frame.right() / 6.0).floor() as i32;
+    let crossing = (first..=last).filter(|line| frame.width() >= 6.0 || *line == last);
+    for line in crossing {
+        let x = line as f32 * 6.0;
+        let ends = [pos2(x, frame.bottom()), pos2(x + slant, frame.top())];
+        inside.line_segment(ends, Stroke::new(1.5, colour));
+    }
+}
+
+fn cross(painter: &Painter, frame: Rect, colour: Color32) {
+    let (middle, reach) = (frame.center(), (frame.height() / 2.0 - 3.0).min(frame.width() / 2.0));
+    for sign in [-1.0, 1.0] {
+        let way = vec2(reach, reach * sign);
+        painter.line_segment([middle - way, middle + way], Stroke::new(2.0, colour));
+    }
+}
