@@ -107,7 +107,7 @@ fn a_limit_is_tried_by_its_slider_and_a_displacement_by_its_own() {
             crate::layout::show_pane(ui, Pane::Why, state, out);
         },
     );
-    for name in ["try limit ncc_min", "try search window size", "try prediction moved in x"] {
+    for name in ["try ncc_min", "try search window", "try template", "move prediction x"] {
         shown.harness.get_by_role_and_label(egui::accesskit::Role::Slider, name);
     }
 }

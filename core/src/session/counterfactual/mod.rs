@@ -251,6 +251,7 @@ impl Answer {
 
 /// The smallest change of one setting.
 fn one_setting<D: Drive>(trials: &mut Trials<'_, D>, info: &SettingInfo) -> Result<Option<Finding>> {
+    trials.check()?;
     let before = trials.runs;
     let Some(from) = trials.base.settings.value(&info.group, &info.key) else { return Ok(None) };
     let found = match directed::exact_limit(trials, info, &from) {

@@ -41,15 +41,18 @@ impl<'a, D: Drive> Trials<'a, D> {
         Self { drive, base, goal, runs: 0, cancel }
     }
 
+    /// Ends the search once it was cancelled.
+    pub(super) fn check(&self) -> Result<()> {
+        if self.cancel.load(Ordering::Relaxed) { Err(Error::Cancelled) } else { Ok(()) }
+    }
+
     /// The step with changes; none where they are no settings.
     pub(super) fn run(
         &mut self,
         changes: &Changes,
         prediction_px: Option<Pixel>,
     ) -> Result<Option<StepTrace>> {
-        if self.cancel.load(Ordering::Relaxed) {
-            return Err(Error::Cancelled);
-        }
+        self.check()?;
         self.runs += 1;
         let what_if = WhatIf { settings: changes.clone(), prediction_px, arrays: Vec::new() };
         match try_step(self.drive, self.base, &what_if) {

@@ -1,6 +1,6 @@
 //! The same by sliders, for hands and readers that do not drag in images.
 
-use egui::{Slider, Ui, WidgetInfo};
+use egui::{Slider, Ui};
 use serde_json::json;
 use sightline_core::frames::Pixel;
 use sightline_core::settings::TrackerKind;
@@ -52,18 +52,14 @@ fn size(
 ) {
     let low = if key == "search_window_px" { 21 } else { 5 };
     let mut number = value;
-    ui.horizontal(|ui| {
-        let response = ui.add(Slider::new(&mut number, low..=high.max(value)).step_by(2.0).suffix(" px"));
-        let label = format!("try {name} size");
-        response.widget_info(|| WidgetInfo::slider(true, number as f64, &label));
-        if response.changed() {
-            let odd = number | 1;
-            let in_run = state.setting("template", key).and_then(|value| value.as_u64());
-            let value = (in_run != Some(odd)).then(|| json!(odd));
-            out.push(Command::Why(Ask::Change { key: key.to_owned(), value }));
-        }
-        ui.label(theme::note(name));
-    });
+    let label = theme::note(format!("try {name}"));
+    let slider = Slider::new(&mut number, low..=high.max(value)).step_by(2.0).suffix(" px").text(label);
+    if ui.add(slider).changed() {
+        let odd = number | 1;
+        let in_run = state.setting("template", key).and_then(|value| value.as_u64());
+        let value = (in_run != Some(odd)).then(|| json!(odd));
+        out.push(Command::Why(Ask::Change { key: key.to_owned(), value }));
+    }
 }
 
 /// Where the prediction is put, against where the run has it.
@@ -73,14 +69,9 @@ fn displacement(ui: &mut Ui, state: &State, trace: &StepTrace, out: &mut Vec<Com
     let mut by = [now.x - recorded.x, now.y - recorded.y];
     let mut changed = false;
     for (axis, value) in ["x", "y"].iter().zip(by.iter_mut()) {
-        ui.horizontal(|ui| {
-            let range = -REACH_PX.max(value.abs())..=REACH_PX.max(value.abs());
-            let response = ui.add(Slider::new(value, range).max_decimals(1).suffix(" px"));
-            let label = format!("try prediction moved in {axis}");
-            response.widget_info(|| WidgetInfo::slider(true, *value, &label));
-            changed |= response.changed();
-            ui.label(theme::note(format!("prediction {axis}")));
-        });
+        let range = -REACH_PX.max(value.abs())..=REACH_PX.max(value.abs());
+        let label = theme::note(format!("move prediction {axis}"));
+        changed |= ui.add(Slider::new(value, range).max_decimals(1).suffix(" px").text(label)).changed();
     }
     if changed {
         let tenth = |v: f64| (v * 10.0).round() / 10.0;

@@ -1,6 +1,6 @@
 //! The criteria by margin: value, limit, margin, and a slider by which the limit is tried.
 
-use egui::{Label, RichText, Sense, Slider, Ui, WidgetInfo, pos2, vec2};
+use egui::{RichText, Sense, Slider, Ui, WidgetInfo, pos2, vec2};
 use serde_json::json;
 use sightline_core::limits::Domain;
 use sightline_core::session::why::gates::{by_margin, limit_setting};
@@ -99,15 +99,10 @@ fn limit_slider(ui: &mut Ui, state: &State, setting: &str, out: &mut Vec<Command
     // A factor that may be a hundred is seldom dragged beyond five times what it is.
     let high = if high > 1.0 { high.min((5.0 * in_run).max(1.0)) } else { high };
     let mut value = tried;
-    ui.horizontal(|ui| {
-        let slider = Slider::new(&mut value, low..=high).max_decimals(3).show_value(true);
-        let response = ui.add(slider);
-        let name = format!("try limit {setting}");
-        response.widget_info(|| WidgetInfo::slider(true, value, &name));
-        if response.on_hover_text("Drag to try another limit at this step").changed() {
-            let new = (value != in_run).then(|| json!(value));
-            out.push(Command::Why(Ask::Change { key: setting.to_owned(), value: new }));
-        }
-        ui.add(Label::new(theme::note(setting)).truncate());
-    });
+    let name = theme::note(format!("try {setting}"));
+    let response = ui.add(Slider::new(&mut value, low..=high).max_decimals(3).text(name));
+    if response.on_hover_text("Drag to try another limit at this step").changed() {
+        let new = (value != in_run).then(|| json!(value));
+        out.push(Command::Why(Ask::Change { key: setting.to_owned(), value: new }));
+    }
 }
