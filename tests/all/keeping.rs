@@ -133,49 +133,48 @@ fn a_killed_server_has_lost_nothing_and_computes_the_same_rows_bit_for_bit() {
 }
 
 #[test]
-fn a_server_that_is_killed_while_it_writes_leaves_whole_sessions() {
+fn a_server_that_is_killed_while_it_writes_has_everything_that_it_confirmed() {
     let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
-    let mut written = 0;
+    let mut confirmed = 0;
     for round in 0..4 {
         let server = Killable::start(drive.path(), data.path());
         assert_eq!(server.get("health")["notices"], json!([]), "round {round}");
         if round == 0 {
             let traverse = server.get("traverses")[0]["id"].clone();
             server.json("POST", "sessions", &json!({ "traverse": traverse }));
+            server.json("POST", "sessions/s1/notes", &json!({ "step": 0, "text": "0" }));
         }
-        let notes = server.get("sessions/s1/notes");
-        let kept = notes.as_array().unwrap().len();
-        assert!(kept >= written, "round {round}: {kept} of {written} notes that were confirmed");
+        let note = server.get("sessions/s1/notes/1");
+        let kept: u64 = note["text"].as_str().unwrap().parse().unwrap();
+        assert!(kept >= confirmed, "round {round}: {kept} was kept, and {confirmed} confirmed");
+        assert!(kept <= confirmed + 1, "round {round}: {kept} was never asked for");
         // Another thread writes without a pause, until the server is killed in the middle of it.
         let address = server.address.clone();
-        let writer = std::thread::spawn(move || {
-            let mut confirmed = kept;
-            for k in 0.. {
-                let body = json!({ "step": k % 5, "text": format!("note {k}") }).to_string();
-                let Ok(mut stream) = TcpStream::connect(&address) else { break };
-                let head = format!(
-                    "POST /api/v1/sessions/s1/notes HTTP/1.0\r\nHost: {address}\r\nContent-Type: application/json\r\nContent-Length: {}\r\n\r\n{body}",
-                    body.len()
-                );
-                let mut answer = Vec::new();
-                if stream
-                    .write_all(head.as_bytes())
-                    .and_then(|()| stream.read_to_end(&mut answer).map(|_| ()))
-                    .is_err()
-                {
-                    break;
-                }
-                if !answer.starts_with(b"HTTP/1.0 201") {
-                    break;
-                }
-                confirmed += 1;
-            }
-            confirmed
-        });
-        std::thread::sleep(Duration::from_millis(230 + 70 * round));
+        let writer = std::thread::spawn(move || write_until_it_fails(&address, kept));
+        std::thread::sleep(Duration::from_millis(400 + 90 * round));
         server.kill();
-        written = writer.join().unwrap();
-        assert!(written > kept, "round {round}: nothing was written, so that nothing is tested");
+        confirmed = writer.join().unwrap();
+        assert!(confirmed > kept, "round {round}: nothing was written, so that nothing is tested");
+    }
+}
+
+/// Writes one number after the other into the first note; the last one that was confirmed.
+fn write_until_it_fails(address: &str, kept: u64) -> u64 {
+    let mut confirmed = kept;
+    loop {
+        let body = json!({ "text": (confirmed + 1).to_string() }).to_string();
+        let Ok(mut stream) = TcpStream::connect(address) else { return confirmed };
+        let head = format!(
+            "PATCH /api/v1/sessions/s1/notes/1 HTTP/1.0\r\nHost: {address}\r\nIf-Match: *\r\n\
+             Content-Type: application/json\r\nContent-Length: {}\r\n\r\n{body}",
+            body.len()
+        );
+        let mut answer = Vec::new();
+        let sent = stream.write_all(head.as_bytes()).and_then(|()| stream.read_to_end(&mut answer));
+        if sent.is_err() || !answer.starts_with(b"HTTP/1.0 200") {
+            return confirmed;
+        }
+        confirmed += 1;
     }
 }
 

@@ -53,7 +53,7 @@ impl Writer {
 
     fn open(&mut self, tag: &Tag<'_>) {
         match tag {
-            Tag::Paragraph | Tag::BlockQuote(_) if self.lists.is_empty() => self.new_line(),
+            Tag::Paragraph | Tag::BlockQuote(_) | Tag::HtmlBlock if self.lists.is_empty() => self.new_line(),
             Tag::Heading { .. } => {
                 self.new_line();
                 self.strong += 1;

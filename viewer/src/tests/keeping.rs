@@ -47,11 +47,8 @@ fn refuse(state: &mut State, request: Request) {
 #[test]
 fn notes_are_listed_in_their_order_and_a_click_goes_there() {
     let mut shown = Shown::pane(Pane::Notes, noted);
-    shown
-        .says("1. step 3, ridge, run A, judge")
-        .says("the shade moved")
-        .says("2. step 1")
-        .says("a dusty stop");
+    shown.says("go to note 1: step 3, ridge, run A, judge").says("the shade moved");
+    shown.says("go to note 2: step 1").says("a dusty stop");
     let commands = shown.click("go to note 1: step 3, ridge, run A, judge");
     assert_eq!(commands, vec![Command::Notes(Ask::GoTo(4))]);
     assert_eq!(shown.click("remove note 2"), vec![Command::Notes(Ask::Remove(7))]);
