@@ -74,7 +74,14 @@ async fn ask(State(state): State<AppState>, Path(path): Path<StepPath>) -> ApiRe
     ("session" = String, Path), ("target" = usize, Path), ("run" = usize, Path), ("step" = usize, Path)),
     responses((status = 200, body = Question), ApiError))]
 async fn show(State(state): State<AppState>, Path(path): Path<StepPath>) -> ApiResult<Json<Question>> {
-    Ok(Json(state.questions().find(&path)?.view()))
+    if let Ok(work) = state.questions().find(&path) {
+        return Ok(Json(work.view()));
+    }
+    // That nobody has asked is an answer, too; that there is no such step is none.
+    Asked::find(&state, &path)?;
+    let (session, target, run, step) = path;
+    let (state, answer, problem) = (QuestionState::Unasked, None, None);
+    Ok(Json(Question { session, target, run, step, state, answer, problem }))
 }
 
 /// Stops looking; what was found is kept

@@ -173,7 +173,9 @@ async fn what_would_have_saved_a_step_is_a_job_that_answers_with_verified_change
     let fixture = Fixture::new().await;
     let lost = fixture.lost().await;
     let path = format!("{}/counterfactual", fixture.step(1, 2));
-    fixture.server.get(&path).await.problem(404, "not_found");
+    assert_eq!(fixture.server.get(&path).await.expect(200)["state"], json!("unasked"));
+    let nowhere = format!("{}/counterfactual", fixture.step(1, 99));
+    fixture.server.get(&nowhere).await.problem(404, "not_found");
     let asked = fixture.server.post(&path, &json!({})).await;
     assert_eq!(asked.headers[header::LOCATION], format!("/api/v1/{path}"));
     assert_eq!(asked.expect(202)["step"], json!(2));

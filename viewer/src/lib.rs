@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `app` | lays the panels out and carries their commands to state and network |
 //! | `state` | what is known and looked at: the one value of which every panel is a view |
+//! | `stage` | the stages, their order and their words |
 //! | `command`, `keys`, `actions` | what a person can ask for, by which key, and by which name |
 //! | `link`, `keep` | what the page's address says, and what the browser keeps across reloads |
 //! | `net` | requests and events; nothing blocks |
@@ -22,6 +23,7 @@
 
 pub mod app;
 pub mod state;
+pub mod stage;
 pub mod command;
 pub mod compare;
 pub mod keys;

@@ -6,7 +6,6 @@
 use egui::{Context, Id, Key, Rect};
 
 use crate::command::Mode;
-use crate::layout::Pane;
 use crate::state::{State, events};
 
 /// Under which name the browser remembers that the tour was seen.
@@ -96,15 +95,14 @@ impl Bubble {
         match self {
             Self::Step | Self::Lost => &[TIMELINE],
             Self::Why => &["Why", "Gates", "Inspector"],
-            Self::WhatIf => &["Why", "Settings", "Targets and runs"],
-            Self::Compare => &["Compare", "Compare runs", "Targets and runs"],
+            Self::WhatIf => &["Why", "Gates", "Inspector"],
+            Self::Compare => &[TOP, "Targets and runs"],
             Self::Share => &[TOP],
         }
     }
 
     /// What it says of what is there.
     pub fn words(self, state: &State) -> String {
-        let has = |title: &str| Pane::ALL.iter().any(|pane| pane.title() == title);
         match self {
             Self::Step => format!(
                 "A rover drives towards a rock and finds one point of it again at each of {} stops. Right and Left go \
@@ -112,25 +110,19 @@ impl Bubble {
                 state.stop_count()
             ),
             Self::Lost => lost_words(state),
-            Self::Why if has("Why") => "At the stop where it was lost, the panel Why goes back from the verdict to \
-                what made it, and names what would have had to be otherwise. The panel Gates has every criterion with \
-                its value, limit and margin."
+            Self::Why => "Go there and press W: the panel Why says in one sentence why the match was rejected, \
+                lists every criterion with its margin, and follows any number back to where it came from."
                 .to_owned(),
-            Self::Why => "At the stop where it was lost, the panel Gates has every criterion with its value, limit \
-                and margin. In the left image, compare the predicted point and its search window with the truth."
+            Self::WhatIf => "Press C there: the page looks for the smallest change of one setting that would have \
+                kept the target, and tries each by computing the step. Run from here makes a branch with it; nothing \
+                that was recorded is overwritten."
                 .to_owned(),
-            Self::WhatIf => "Would another setting have saved it? Go to the stop where it was lost, open the panel \
-                Settings, give search_window_px a larger value, and press R: a new run leaves from there. Nothing that \
-                was recorded is overwritten."
+            Self::Compare => "Choose the other run after vs in the top bar: its marks and differences appear \
+                everywhere. D goes to where the two first differ, V to the next way of laying the images beside each \
+                other; the panel Runs has what each is worth."
                 .to_owned(),
-            Self::Compare if has("Compare") || has("Compare runs") => "Each run has its letter. The panel Targets and \
-                runs switches between them, and the panel Compare lays two beside each other."
-                .to_owned(),
-            Self::Compare => "Each run has its letter. In the panel Targets and runs, a click on one shows it \
-                everywhere; step through both and see where they part."
-                .to_owned(),
-            Self::Share => "The address of this page opens what you see now, and Export .rrd downloads the session \
-                as a Rerun recording. The sheet behind the question mark has all keys, and this tour."
+            Self::Share => "Y copies a link to what you see, M pins a note to it, and Export (Ctrl+S) has recordings, \
+                tables and a report. The sheet behind the question mark has all keys, and this tour."
                 .to_owned(),
         }
     }

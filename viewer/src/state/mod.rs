@@ -11,6 +11,8 @@ pub mod ask;
 pub mod calculator;
 mod configurations;
 mod linked;
+mod rows;
+mod views;
 pub mod exports;
 pub mod messages;
 mod missing;
@@ -22,6 +24,9 @@ mod tour;
 pub mod undo;
 mod wanted;
 pub mod why;
+
+pub use self::rows::{events, row_of, run_letter, state_of_word};
+pub use self::views::Views;
 
 use std::collections::{BTreeMap, HashSet};
 
@@ -102,23 +107,6 @@ pub struct Refusal {
     pub sentence: String,
     /// The nearest pixel that would do.
     pub nearest: Option<Pixel>,
-}
-
-/// What each panel shows.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Views {
-    /// The left image.
-    pub left: View2d,
-    /// The right image.
-    pub right: View2d,
-    /// The surface of scores.
-    pub surface: View2d,
-}
-
-impl Default for Views {
-    fn default() -> Self {
-        Self { left: View2d::Fit, right: View2d::Fit, surface: View2d::Fit }
-    }
 }
 
 /// Everything that is known and looked at.
@@ -398,37 +386,4 @@ impl State {
             self.outbox.push(Request::PutCursor { session: id, cursor: self.cursor });
         }
     }
-}
-
-/// A step of a run as one line.
-pub fn row_of(run: &RunView, step: usize) -> Option<&StepRow> {
-    let first = run.rows.first()?.step;
-    run.rows.get(step.checked_sub(first)?)
-}
-
-/// The steps at which a run's state changes, its designation and its faults included.
-pub fn events(run: &RunView) -> Vec<usize> {
-    let mut events: Vec<usize> = run.rows.first().map(|row| row.step).into_iter().collect();
-    for pair in run.rows.windows(2) {
-        if pair[0].state != pair[1].state || pair[1].fault {
-            events.push(pair[1].step);
-        }
-    }
-    events
-}
-
-/// The state that a row's word names.
-pub fn state_of_word(word: &str) -> TrackingState {
-    match word {
-        "tracking" => TrackingState::Tracking,
-        "lost" => TrackingState::Lost { count: 1 },
-        "failed" => TrackingState::Failed,
-        _ => TrackingState::Cleared,
-    }
-}
-
-/// The letter of a run.
-pub fn run_letter(number: usize) -> String {
-    let letter = char::from(b'A' + (number % 26) as u8);
-    if number < 26 { letter.to_string() } else { format!("{letter}{}", number / 26) }
 }

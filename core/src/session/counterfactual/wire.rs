@@ -9,6 +9,8 @@ use super::Answer;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum QuestionState {
+    /// Nobody has asked.
+    Unasked,
     /// Others come first.
     Waiting,
     /// It is being answered.

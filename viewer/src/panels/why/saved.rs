@@ -61,6 +61,7 @@ fn progress(ui: &mut Ui, question: &Question, out: &mut Vec<Command>) {
         None => (0, 0, "", 0),
     };
     match question.state {
+        QuestionState::Unasked => {}
         QuestionState::Waiting | QuestionState::Running => {
             ui.horizontal(|ui| {
                 if ui.button("Cancel search").clicked() {
