@@ -321,10 +321,8 @@ impl State {
             (
                 WhyRequest::Question(key) | WhyRequest::AskQuestion(key) | WhyRequest::CancelQuestion(key),
                 WhyReply::Question(question),
-            ) => {
-                if question.state != QuestionState::Unasked {
-                    self.why.questions.insert(key, Told::Here(*question));
-                }
+            ) if question.state != QuestionState::Unasked => {
+                self.why.questions.insert(key, Told::Here(*question));
             }
             (request, WhyReply::Session(view)) => {
                 self.removed(&request);
