@@ -120,7 +120,7 @@ impl Bubble {
                 and margin. In the left image, compare the predicted point and its search window with the truth."
                 .to_owned(),
             Self::WhatIf => "Would another setting have saved it? Go to the stop where it was lost, open the panel \
-                Settings, give search_window_px a larger value, and press R: a new run leaves from there. Nothing that \
+                Settings, give search_window_px a larger value, such as 201, and press R: a new run leaves from there. Nothing that \
                 was recorded is overwritten."
                 .to_owned(),
             Self::Compare if has("Compare") || has("Compare runs") => "Each run has its letter. The panel Targets and \
