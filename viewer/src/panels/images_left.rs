@@ -107,12 +107,12 @@ fn waiting_words(state: &State, word: &str, step: usize) -> String {
 
 /// What the legend of the left image lists.
 fn entries(state: &State) -> Vec<Entry> {
-    let mut entries = picking::entries(state);
-    let Some(trace) = state.trace() else { return entries };
+    let Some(trace) = state.trace() else { return Vec::new() };
     let pointing = trace.point_mast.as_ref();
     let evidence = trace.template();
     let matched = evidence.and_then(|e| e.match_template.as_ref());
     let run = theme::run(state.cursor.run);
+    let mut entries = Vec::new();
     if trace.truth.as_ref().is_some_and(|t| t.left_pixel.is_some()) {
         entries.push(Entry::new(Layer::Truth, Mark::Plus, theme::truth(), "truth"));
     }

@@ -72,7 +72,8 @@ fn has_column(area: Rect, widest: f32, height: f32, width_by_height: f32, below:
     room >= height && area.width() - widest >= room * width_by_height
 }
 
-fn width_of(ui: &Ui, entry: &Entry) -> f32 {
+/// What an entry takes beside others, points.
+pub fn width_of(ui: &Ui, entry: &Entry) -> f32 {
     let galley = ui.painter().layout_no_wrap(entry.word.clone(), theme::image_font(), theme::text());
     galley.size().x + MARK
 }
@@ -91,7 +92,8 @@ fn rows(ui: &mut Ui, entries: &[Entry], widths: &[f32], state: &State, out: &mut
     ui.add_space(at.y + ROW - area.top());
 }
 
-fn row(ui: &Ui, row: Rect, entry: &Entry, state: &State, out: &mut Vec<Command>) {
+/// One entry in an area of its own; a click hides or shows its layer.
+pub fn row(ui: &Ui, row: Rect, entry: &Entry, state: &State, out: &mut Vec<Command>) {
     let shown = !state.hidden.contains(&entry.layer);
     paint_legend_row(ui.painter(), row.min, entry.mark, entry.colour, &entry.word, shown);
     let response = ui.interact(row, ui.scope_id().with(("legend", entry.layer)), Sense::click());

@@ -2,13 +2,13 @@
 //!
 //! Verdicts are told apart by pattern and word, not by colour alone: good is plain, risky is hatched, bad is crossed.
 
-use egui::{Button, CursorIcon, Mesh, Pos2, Rect, Shape, Stroke, Ui, pos2, vec2};
+use egui::{Button, CursorIcon, Mesh, Pos2, Rect, Shape, Stroke, Ui, UiBuilder, pos2, vec2};
 use sightline_core::frames::Pixel;
 use sightline_core::image::PixelRect;
 use sightline_core::trackability::map::Cell;
 use sightline_core::trackability::{TrackabilityMap, Verdict};
 
-use super::legend::Entry;
+use super::legend::{self, Entry};
 use crate::aim::Aim;
 use crate::command::{Command, Layer, Mode};
 use crate::overlay::{self, Line, Mark, Overlay, paint_words, template_quad};
@@ -19,22 +19,40 @@ use crate::view2d::{Canvas, Transform};
 
 /// Distance between the strokes of the pattern, points.
 const PITCH: f64 = 9.0;
+/// Height of a row of the legend, points.
+const ROW: f32 = 24.0;
 /// The loupe's magnification, and its side in pixels of the image.
 const LOUPE: (f32, f32) = (4.0, 37.0);
 
-/// What the legend lists while a target is picked.
-pub fn entries(state: &State) -> Vec<Entry> {
-    if state.mode != Mode::Pick || state.trackability_map().is_none() {
-        return Vec::new();
-    }
+/// What the legend of the map lists.
+fn entries() -> [Entry; 3] {
     let entry = |verdict: Verdict, mark: Mark, word: &str| {
         Entry::new(Layer::Trackability, mark, theme::trackability(verdict), word)
     };
-    vec![
+    [
         entry(Verdict::Good, Mark::Dot, "good place, plain"),
         entry(Verdict::Risky, Mark::Stroke(Line::Dashed), "risky place, hatched"),
         entry(Verdict::Bad, Mark::Cross, "bad place, crossed"),
     ]
+}
+
+/// The legend of the map. It lies on the image, in a corner: what is about to be clicked must not move when the map comes.
+fn legend(ui: &mut Ui, canvas: &Canvas, state: &State, out: &mut Vec<Command>) {
+    if state.trackability_map().is_none() || !state.marks {
+        return;
+    }
+    let entries = entries();
+    let width = entries.iter().map(|entry| legend::width_of(ui, entry)).fold(0.0, f32::max);
+    let corner = canvas.transform.rect.left_top() + vec2(6.0, 6.0);
+    let area = Rect::from_min_size(corner, vec2(width, ROW * entries.len() as f32));
+    canvas.painter.rect_filled(area.expand(3.0), 3.0, theme::scrim());
+    for (number, entry) in (0_u8..).zip(&entries) {
+        let top = corner + vec2(0.0, ROW * f32::from(number));
+        let place = Rect::from_min_size(top, vec2(width, ROW));
+        // A child leaves the cursor of the panel where it is, below the image.
+        let child = ui.new_child(UiBuilder::new().max_rect(place).id_salt(("trackability", number)));
+        legend::row(&child, place, entry, state, out);
+    }
 }
 
 /// The map over the image, under all marks.
@@ -125,6 +143,7 @@ pub fn show(ui: &mut Ui, canvas: &Canvas, raster: &Raster, state: &State, out: &
     }
     canvas.painter.rect_stroke(border, 0.0, Stroke::new(2.0, theme::accent()), egui::StrokeKind::Inside);
     paint_words(&canvas.painter, corner, &hint(state), theme::accent());
+    legend(ui, canvas, state, out);
     offer(ui, canvas, state, out);
     let [width, height] = raster.size();
     let hovered = canvas.hovered(PixelRect::whole(width, height));
@@ -204,13 +223,14 @@ fn offer(ui: &mut Ui, canvas: &Canvas, state: &State, out: &mut Vec<Command>) {
         area.left_bottom() + vec2(10.0, -56.0),
         vec2(250.0_f32.min(area.width() - 20.0), 26.0),
     );
-    let button = ui.put(place, Button::new(text));
+    let mut child = ui.new_child(UiBuilder::new().max_rect(place).id_salt("nearest good"));
+    let button = child.add_sized(place.size(), Button::new(text));
     if button.on_hover_text("Enter does the same").clicked() {
         out.push(Command::Aim(Aim::TakeNearest));
     }
 }
 
-/// The surroundings of a place at 400 %, in the corner away from it.
+/// The surroundings of a place at 400 %, on the side away from it.
 fn loupe(canvas: &Canvas, raster: &Raster, pixel: Pixel) {
     let (magnification, pixels) = LOUPE;
     let side = magnification * pixels;
@@ -233,7 +253,7 @@ fn loupe(canvas: &Canvas, raster: &Raster, pixel: Pixel) {
 
 fn loupe_corner(area: Rect, at: Pos2, side: f32) -> Pos2 {
     let x = if at.x > area.center().x { area.left() } else { area.right() - side };
-    pos2(x, area.top())
+    pos2(x, area.center().y - side / 2.0)
 }
 
 #[cfg(test)]
@@ -241,9 +261,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_loupe_stands_in_the_corner_away_from_the_place() {
+    fn the_loupe_stands_on_the_side_away_from_the_place() {
         let area = Rect::from_min_size(pos2(0.0, 0.0), vec2(400.0, 300.0));
-        assert_eq!(loupe_corner(area, pos2(300.0, 20.0), 148.0), pos2(0.0, 0.0));
-        assert_eq!(loupe_corner(area, pos2(30.0, 20.0), 148.0), pos2(252.0, 0.0));
+        assert_eq!(loupe_corner(area, pos2(300.0, 20.0), 148.0), pos2(0.0, 76.0));
+        assert_eq!(loupe_corner(area, pos2(30.0, 20.0), 148.0), pos2(252.0, 76.0));
     }
 }
