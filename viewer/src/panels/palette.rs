@@ -38,7 +38,11 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         ui.label(theme::note("Up and Down choose, Enter does it, Esc closes"));
         clicked.or_else(|| ui.input(|input| input.key_pressed(Key::Enter)).then_some(moved))
     });
-    if let Some(action) = modal.inner.and_then(|at| found.get(at)) {
+    // What was typed in the same frame as Enter counts: the list on the screen is of the frame before.
+    let is_newer = words != search.words;
+    let meant = if is_newer { actions::find(state, &words) } else { found };
+    let at = modal.inner.map(|at| if is_newer { 0 } else { at });
+    if let Some(action) = at.and_then(|at| meant.get(at)) {
         out.push(Command::SetMode(Mode::Look));
         out.push(action.command.clone());
     } else if modal.should_close() {

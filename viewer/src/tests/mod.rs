@@ -15,6 +15,7 @@ mod shape_run;
 mod studies;
 mod timelines;
 mod tracking;
+mod palette;
 mod picking;
 mod tour;
 mod why;
