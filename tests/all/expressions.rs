@@ -3,7 +3,8 @@
 use axum::body::Body;
 use axum::http::Method;
 use serde_json::json;
-use sightline_tests::server::{Answer, TestServer, request, small_drive};
+use sightline_core::traverse::create_simulated;
+use sightline_tests::server::{Answer, TestServer, request, small_drive, small_scenario};
 
 /// A server with a session whose target was tracked to the end, and what keeps its folders.
 async fn tracked() -> (TestServer, String, [tempfile::TempDir; 2]) {
@@ -12,6 +13,15 @@ async fn tracked() -> (TestServer, String, [tempfile::TempDir; 2]) {
     let session = server.begin().await;
     server.pick(&session).await;
     server.ended(&session, 0, 0).await;
+    (server, session, folders)
+}
+
+/// A server with a session on a drive that was never rendered: what needs no step needs no image.
+async fn begun() -> (TestServer, String, [tempfile::TempDir; 2]) {
+    let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
+    create_simulated(&small_scenario(), folders[0].path()).unwrap();
+    let server = TestServer::open(folders[0].path(), folders[1].path());
+    let session = server.begin().await;
     (server, session, folders)
 }
 
@@ -94,7 +104,7 @@ async fn a_run_that_goes_on_adds_hits() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_bad_expression_is_a_problem_with_field_position_and_hint() {
-    let (server, session, _folders) = tracked().await;
+    let (server, session, _folders) = begun().await;
     let query = format!("sessions/{session}/query");
     let breakpoints = format!("sessions/{session}/breakpoints");
     let unknown = server.post(&query, &json!({ "expression": "step > 1 && nccc < 0.6" })).await;
@@ -131,7 +141,7 @@ async fn a_bad_expression_is_a_problem_with_field_position_and_hint() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn unknown_fields_targets_and_breakpoints_are_refused() {
-    let (server, session, _folders) = tracked().await;
+    let (server, session, _folders) = begun().await;
     let query = format!("sessions/{session}/query");
     let path = format!("sessions/{session}/breakpoints");
     let extra = json!({ "expression": "fault", "colour": "red" });
@@ -156,8 +166,7 @@ async fn unknown_fields_targets_and_breakpoints_are_refused() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn the_language_and_completion_are_served() {
-    let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
-    let server = TestServer::open(drive.path(), folder.path());
+    let (server, _session, _folders) = begun().await;
     let language = server.get("expressions").await.expect(200);
     let names = language["names"].as_array().unwrap();
     let sigma = names.iter().find(|name| name["name"] == json!("sigma_m")).unwrap();

@@ -68,9 +68,7 @@ impl SightlineApp {
         for arrived in self.net.poll() {
             self.state.arrived(arrived, now);
         }
-        if let Some(due) = self.state.tick(now) {
-            context.request_repaint_after(std::time::Duration::from_secs_f64((due - now).max(0.0)));
-        }
+        self.state.tick(now);
         self.send();
         if matches!(self.state.connection, Connection::Gone { .. }) {
             return;
@@ -90,6 +88,14 @@ impl SightlineApp {
         if let Some(at) = item.into_iter().chain(self.net.retry_at()).min_by(f64::total_cmp) {
             let now = context.input(|input| input.time);
             context.request_repaint_after(std::time::Duration::from_secs_f64((at - now).max(0.05)));
+        }
+    }
+
+    /// Wakes the page when the next step is due that plays.
+    fn wake_for_play(&self, context: &Context) {
+        if let Some(due) = self.state.ask.play.due_s() {
+            let now = context.input(|input| input.time);
+            context.request_repaint_after(std::time::Duration::from_secs_f64((due - now).max(0.0)));
         }
     }
 
@@ -251,6 +257,7 @@ impl eframe::App for SightlineApp {
         self.keep_tour();
         self.kept.write(&context, self.state.looks, || self.workspace.kept());
         self.wake_for_retries(&context);
+        self.wake_for_play(&context);
         self.publisher.publish(&self.state, &self.left_image, context.zoom_factor());
     }
 

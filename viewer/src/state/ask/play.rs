@@ -65,6 +65,11 @@ impl Play {
         self.speed != 0
     }
 
+    /// When the next step is due, s; none while it is paused.
+    pub fn due_s(&self) -> Option<f64> {
+        self.due_s.filter(|_| self.is_playing())
+    }
+
     /// How it plays, in words.
     pub fn in_words(&self) -> String {
         match self.speed {
