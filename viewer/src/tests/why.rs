@@ -14,7 +14,7 @@ use sightline_core::settings::Changes;
 
 use super::{Shown, fixture};
 use crate::cache::StepKey;
-use crate::command::{Command, Go};
+use crate::command::{Command, Go, Panel};
 use crate::keys;
 use crate::layout::Pane;
 use crate::net::why::{WhyReply, WhyRequest};
@@ -22,6 +22,7 @@ use crate::net::{Arrived, Reply, Request};
 use crate::state::State;
 use crate::state::undo::Deed;
 use crate::state::why::{Ask, Told};
+use crate::view2d::View2d;
 
 /// The step that is lost.
 const LOST: usize = 3;
@@ -170,7 +171,12 @@ fn the_ghost_has_a_card_with_what_changed_and_what_can_be_done() {
 
 #[test]
 fn the_left_image_has_handles_with_names() {
-    let shown = Shown::pane(Pane::Left, |context| fixture::at_step(context, LOST));
+    let shown = Shown::pane(Pane::Left, |context| {
+        let mut state = fixture::at_step(context, LOST);
+        let view = View2d::At { centre: fixture::PIXEL, scale: 1.0 };
+        state.apply(Command::View(Panel::Left, view));
+        state
+    });
     let roles = [
         (egui::accesskit::Role::Slider, "search window size handle, px"),
         (egui::accesskit::Role::Slider, "template size handle, px"),
