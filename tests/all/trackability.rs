@@ -11,7 +11,7 @@ use sightline_core::study::staged::Staged;
 use sightline_core::study::trackability::{Table, ground, measure};
 use sightline_core::target::{Designation, TrackingState};
 use sightline_core::trackability::{TrackabilityMap, Verdict};
-use sightline_core::traverse::{Traverse, create_simulated};
+use sightline_core::traverse::create_simulated;
 use sightline_server::first;
 use sightline_tests::scenario::short_approach;
 use sightline_tests::server::{TestServer, small_drive};
@@ -134,46 +134,38 @@ async fn a_map_under_way_can_be_given_up_and_asked_for_again() {
     assert_eq!(map_of(&server, 0).await["failed"], json!(null));
 }
 
-/// The first drive, of which only the stops of `visit` are rendered, and those of `visit` alone.
-fn first_drive(visit: &Visit) -> (tempfile::TempDir, Traverse) {
+#[test]
+fn the_first_drive_loses_its_target_where_the_heading_jumps_and_a_wider_search_window_saves_it() {
     let folder = tempfile::tempdir().unwrap();
     let scenario = library::scenario(library::FIRST).unwrap();
     let traverse = create_simulated(&scenario, folder.path()).unwrap();
-    for stop in visit.stops(traverse.stop_count()) {
+    // Every ninth stop, up to the one after the jump, which comes with the third.
+    let visit = Visit::Every(9);
+    for stop in visit.stops(traverse.stop_count()).into_iter().take(4) {
         traverse.render_step(stop, &AtomicBool::new(false)).unwrap();
     }
-    (folder, traverse)
-}
-
-#[test]
-fn the_first_drive_loses_its_target_where_the_heading_jumps_and_a_wider_search_window_saves_it() {
-    // Every ninth stop: steps of 22 % of the distance; the jump lies between the second and the third.
-    let visit = Visit::Every(9);
-    let (_folder, traverse) = first_drive(&visit);
-    let scenario = library::scenario(library::FIRST).unwrap();
     let pixel = choose_targets(traverse.world().unwrap(), &scenario, traverse.index())[0];
     let staged = Staged::new(&traverse, visit);
     let run = |changes: &[&str]| {
         let changes = changes.iter().map(|text| parse_assignment(text)).collect::<Result<_, _>>().unwrap();
         let settings = Settings::default().with(&changes).unwrap();
-        track::run(&staged, Designation { step: 0, pixel }, &settings).unwrap()
+        let mut steps = vec![track::designate(&staged, Designation { step: 0, pixel }, &settings).unwrap()];
+        for step in 0..3 {
+            steps.push(track::advance(&staged, &steps[0], &steps[step], &settings));
+        }
+        steps
     };
     let lost = run(&[]);
     let states: Vec<TrackingState> = lost.iter().map(|step| step.update.state).collect();
     assert_eq!(states[..2], [TrackingState::Tracking; 2]);
     assert_eq!(states[2], TrackingState::Lost { count: 1 }, "{states:?}");
-    let saved = run(&["search_window_px=201"]);
-    for step in &saved {
+    for step in &run(&["search_window_px=201"]) {
         let truth = step.truth.as_ref().unwrap();
-        assert_eq!(
-            (step.update.state, truth.tracked),
-            (TrackingState::Tracking, Some(true)),
-            "step {}",
-            step.step
-        );
+        let found = (step.update.state, truth.tracked);
+        assert_eq!(found, (TrackingState::Tracking, Some(true)), "step {}", step.step);
     }
     // More patience alone does not bring it back: where it is looked for, it is not.
-    assert!(run(&["n_retry=50"]).last().unwrap().update.state.is_lost());
+    assert!(run(&["n_retry=50"])[3].update.state.is_lost());
 }
 
 #[tokio::test]

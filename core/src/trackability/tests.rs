@@ -123,14 +123,17 @@ fn every_aspect_has_a_letter_and_a_sentence_of_its_own() {
 }
 
 #[test]
-fn a_textured_plane_is_good_where_both_eyes_see_it_with_its_true_range() {
+fn a_textured_plane_is_good_where_both_eyes_see_it_at_its_range_within_the_stated_error() {
     let world = plane();
     let ground = ground(&world);
     let pixel = Pixel::new(140.0, 120.0);
     let seen = ground.assess(pixel, true);
     assert_eq!((seen.verdict, seen.reason), (Verdict::Good, None), "{:?}", seen.criteria);
     let truth_m = (world.plane_point(0, &world.left, pixel).unwrap() - world.left.model.centre()).norm();
-    assert!((seen.range_m.unwrap() / truth_m - 1.0).abs() < 0.02, "{:?} for {truth_m}", seen.range_m);
+    let stated = seen.criteria.iter().find(|one| one.aspect == Aspect::RangeError).unwrap().value.unwrap();
+    let error = (seen.range_m.unwrap() / truth_m - 1.0).abs();
+    // One pixel of disparity in 15.6 at 7.7 m.
+    assert!(error < stated && (0.06..0.07).contains(&stated), "{error} of {stated}");
     // A plane across the line of sight is not foreshortened: the papers' rule is what limits the step.
     assert!((seen.longest_step_m.unwrap() - 0.1 * seen.range_m.unwrap()).abs() < 1e-9);
     let rim = ground.assess(Pixel::new(6.0, 120.0), false);
