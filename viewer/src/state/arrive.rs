@@ -117,7 +117,7 @@ impl State {
             Reply::Done => match request {
                 // The server tells every page that notes changed.
                 Request::NewNote { .. } => {
-                    self.messages.note("The note is pinned; the panel Notes lists them.")
+                    self.messages.note("The note is pinned; the panel Notes lists them.");
                 }
                 Request::EditNote { .. } | Request::RemoveNote { .. } | Request::RestoreNote { .. } => {}
                 Request::PutCursor { cursor, .. } => self.put_cursor(cursor),
