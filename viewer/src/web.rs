@@ -117,7 +117,8 @@ fn try_download(name: &str, media_type: &str, bytes: &[u8]) -> Result<(), JsValu
     anchor.set_href(&url);
     anchor.set_download(name);
     anchor.click();
-    web_sys::Url::revoke_object_url(&url)
+    // The address lives as long as the page: some browsers save nothing when it is taken back at once.
+    Ok(())
 }
 
 /// Sets an attribute of the canvas.

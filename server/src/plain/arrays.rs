@@ -18,9 +18,9 @@ const fn words(name: ArrayName) -> Option<&'static str> {
         ArrayName::Disparities => "Disparities of the aligned left image; bright is near",
         ArrayName::Ranges => "Distances in the aligned left image; bright is far",
         ArrayName::Sensor => "The earlier surface in the virtual range sensor; bright is far",
-        ArrayName::ErrorBefore => "Distance of the two surfaces before the registration",
-        ArrayName::ErrorCoarse => "Distance of the two surfaces after the coarse search",
-        ArrayName::ErrorFine => "Distance of the two surfaces at the end",
+        ArrayName::ErrorBefore => "Present less earlier depth before the registration; grey is no difference",
+        ArrayName::ErrorCoarse => "Present less earlier depth after the coarse search; grey is no difference",
+        ArrayName::ErrorFine => "Present less earlier depth at the end; grey is no difference",
         ArrayName::CoarseSearch => "Mean distance of the surfaces for every shift; dark is a better fit",
         ArrayName::Draped => "The earlier image as the present camera would see it",
         ArrayName::DrapedMatch => "The present image where that was found",
@@ -54,6 +54,13 @@ fn figure(trace: &StepTrace, name: ArrayName) -> Option<String> {
     if low > high {
         return None;
     }
+    // Signed values have their zero in the middle grey.
+    let is_signed = matches!(
+        name,
+        ArrayName::Difference | ArrayName::ErrorBefore | ArrayName::ErrorCoarse | ArrayName::ErrorFine
+    );
+    let reach = high.max(-low);
+    let (low, high) = if is_signed { (-reach, reach) } else { (low, high) };
     let span = (high - low).max(1e-9);
     let grey = |x: u32, y: u32| {
         let value = values.get((y * width + x) as usize).copied().unwrap_or(f32::NAN);
@@ -63,7 +70,7 @@ fn figure(trace: &StepTrace, name: ArrayName) -> Option<String> {
     image::GrayImage::from_fn(width, height, grey).write_to(&mut png, ImageFormat::Png).ok()?;
     let missing = values.len() - known().count();
     let holes = if missing > 0 { format!("; {missing} have no value and are black") } else { String::new() };
-    let limits = format!("{width} × {height} values from {low:.3} to {high:.3}{holes}.");
+    let limits = format!("{width} × {height} values, black to white from {low:.3} to {high:.3}{holes}.");
     // What is larger than a template stands wider.
     let class = if width <= 64 { "patch" } else { "map" };
     Some(format!(

@@ -3,6 +3,7 @@
 use std::sync::{Arc, Weak};
 
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use sightline_core::error::Result;
 use sightline_core::study::row::Row;
 use sightline_core::study::wire::{NewStudy, StudyJob, StudyState};
@@ -16,13 +17,24 @@ pub struct KeptStudy {
     pub new: NewStudy,
     /// How it stands.
     pub job: StudyJob,
-    /// What it found, once it is done.
-    pub rows: Vec<Row>,
+    /// What it found, once it is done: rows as JSON values, in which a name stands once. A row as it is written may name
+    /// its scenario twice, as its own field and as a column.
+    pub rows: Vec<Value>,
     /// Its report, once it is done.
     pub report: Option<String>,
 }
 
 impl KeptStudy {
+    /// Rows as they are kept.
+    pub fn kept_rows(rows: &[Row]) -> Vec<Value> {
+        rows.iter().filter_map(|row| serde_json::to_value(row).ok()).collect()
+    }
+
+    /// The rows that were kept.
+    pub fn read_rows(&self) -> Vec<Row> {
+        self.rows.iter().filter_map(|row| serde_json::from_value(row.clone()).ok()).collect()
+    }
+
     /// The study after a restart: what was under way was stopped by it, and goes on when it is resumed.
     #[must_use]
     pub fn after_a_restart(mut self) -> Self {
@@ -66,5 +78,29 @@ impl Keeper {
         if let Err(error) = store.remove_study(number) {
             tracing::error!("study {number} stays in the list: {}", crate::plain(&error.to_string()));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_that_names_its_scenario_twice_comes_back() {
+        let row = serde_json::json!({
+            "study": "approach", "configuration": "ncc", "scenario": "small", "seed": 3, "tracked": 3, "err_px": 0.1
+        });
+        let mut row: Row = serde_json::from_value(row).unwrap();
+        row.columns.insert("scenario".to_owned(), "small".into());
+        let job = serde_json::json!({ "id": "study-1", "study": "approach", "state": "running", "k": 0, "n": 1,
+            "doing": "tracking", "notices": [], "command": "" });
+        let new = serde_json::from_value(serde_json::json!({ "study": "approach" })).unwrap();
+        let rows = KeptStudy::kept_rows(&[row.clone()]);
+        let kept = KeptStudy { new, job: serde_json::from_value(job).unwrap(), rows, report: None };
+        let text = serde_json::to_vec(&kept).unwrap();
+        let back: KeptStudy = serde_json::from_slice(&text).unwrap();
+        let json = |row: &Row| serde_json::to_value(row).unwrap();
+        assert_eq!(back.read_rows().iter().map(json).collect::<Vec<_>>(), [json(&row)]);
+        assert_eq!(back.after_a_restart().job.state, StudyState::Cancelled);
     }
 }

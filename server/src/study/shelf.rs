@@ -69,7 +69,8 @@ impl Shelf {
     ) -> sightline_core::error::Result<()> {
         let mut works = lock(&self.works);
         for (number, kept) in self.keeper.all()? {
-            let KeptStudy { new, job: view, rows, report } = kept.after_a_restart();
+            let rows = kept.read_rows();
+            let KeptStudy { new, job: view, report, .. } = kept.after_a_restart();
             let Ok(order) = order(&new) else { continue };
             let inside = Mutex::new(Inside { view, rows, report, cancel: Arc::default() });
             let (events, keeper) = (self.events.clone(), self.keeper.clone());
@@ -208,7 +209,7 @@ impl Work {
     fn keep(&self, inside: &Inside) {
         let (job, report) = (inside.view.clone(), inside.report.clone());
         // Rows before the end are found again in the study's folder.
-        let rows = if report.is_some() { inside.rows.clone() } else { Vec::new() };
+        let rows = if report.is_some() { KeptStudy::kept_rows(&inside.rows) } else { Vec::new() };
         self.keeper.keep(self.number, &KeptStudy { new: self.new.clone(), job, rows, report });
     }
 
