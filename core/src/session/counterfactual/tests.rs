@@ -234,7 +234,12 @@ fn two_limits_too_strict_are_answered_together_and_neither_alone() {
 fn an_acceptance_that_is_false_tracking_is_said_plainly_and_comes_last() {
     let staged = Staged::new(
         world(0.4),
-        &[("search_window_px", json!(61)), ("stereo_ncc_min", json!(-1.0)), ("far_ncc_min", json!(-1.0))],
+        &[
+            ("search_window_px", json!(61)),
+            ("ncc_min", json!(0.95)),
+            ("stereo_ncc_min", json!(-1.0)),
+            ("far_ncc_min", json!(-1.0)),
+        ],
     );
     let answer = staged.answer();
     let finding = of(&answer, "ncc_min");
