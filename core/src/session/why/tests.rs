@@ -231,7 +231,10 @@ fn every_closed_form_gives_the_recorded_value_from_the_inputs_that_are_shown() {
 fn the_values_are_those_of_the_record() {
     let (world, steps, settings) = run(&[]);
     let value = |step: usize, name: &str| {
-        book(&world, &steps, &settings, step).ask(name).ok().and_then(|node| node.numbers[0])
+        book(&world, &steps, &settings, step)
+            .ask(name)
+            .ok()
+            .and_then(|node| node.numbers.first().copied().flatten())
     };
     for (step, trace) in steps.iter().enumerate() {
         let row = trace.row();
