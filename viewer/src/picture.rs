@@ -60,15 +60,16 @@ fn keep(name: &str, png: &[u8]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use egui::{Color32, pos2};
+    use crate::theme;
+    use egui::pos2;
 
     #[test]
     fn a_panel_is_cut_out_at_the_scale_of_the_screen() {
-        let mut whole = ColorImage::filled([40, 20], Color32::BLACK);
-        whole.pixels[9 * 40 + 21] = Color32::WHITE;
+        let mut whole = ColorImage::filled([40, 20], theme::grey(0.0));
+        whole.pixels[9 * 40 + 21] = theme::UNTINTED;
         let rect = Rect::from_min_max(pos2(10.0, 4.0), pos2(15.0, 6.0));
         let part = cut(&whole, rect, 2.0).unwrap();
-        assert_eq!((part.size, part.pixels[10 + 1]), ([10, 4], Color32::WHITE));
+        assert_eq!((part.size, part.pixels[10 + 1]), ([10, 4], theme::UNTINTED));
         assert!(cut(&whole, rect.translate(egui::vec2(100.0, 0.0)), 2.0).is_none());
         let png = image::load_from_memory(&encode(&part).unwrap()).unwrap();
         assert_eq!((png.width(), png.height()), (10, 4));

@@ -1,6 +1,6 @@
 //! What dense stereo says of a place: its range, the nearest depth edge, and the plane of its window.
 //!
-//! A depth edge lies between two neighbours with a disparity, or across a hole of at most [`HOLE_PX`], when
+//! A depth edge lies between two neighbours with a disparity, or across a hole of at most `HOLE_PX`, when
 //! ```text
 //! │d₁ − d₂│ > edge_share · max(d₁, d₂) + edge_slope · gap
 //! ```

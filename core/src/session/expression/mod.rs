@@ -5,8 +5,8 @@
 //! sigma_m > 5 cm or state == lost judge.gates.ncc.margin < 5 %  differs(A, B, ncc, 0.02)
 //! ```
 //! Breakpoints are expressions that are yes or no; derived columns are expressions that are numbers. The whole language
-//! is described in docs/expressions.md, which a test keeps true. Reading it goes text → [`token`] → [`parse`] →
-//! [`tree`] → [`check`] → [`evaluate`]; names come from [`catalogue`], which is made from the schema of the record.
+//! is described in docs/expressions.md, which a test keeps true. Reading it goes text → `token` → `parse` →
+//! [`tree`] → `check` → `evaluate`; names come from [`catalogue`], which is made from the schema of the record.
 //!
 //! There are no loops and no definitions; length, depth and parts are limited; every expression has a value at every
 //! step. What is wrong with a text is one sentence with its place.
