@@ -14,6 +14,7 @@ mod imports;
 mod keeping;
 mod page;
 mod page_access;
+mod page_debugger;
 mod page_first;
 mod page_panels;
 mod page_speed;

@@ -54,7 +54,7 @@ const STAGES: [(&str, &str); 7] = [
 ];
 
 /// The criteria by name: the entries of `judge.gates`.
-pub(super) const GATES: [&str; 17] = [
+pub(crate) const GATES: [&str; 17] = [
     "ncc",
     "stereo_ncc",
     "distance_correction_m",

@@ -104,6 +104,7 @@ impl Book<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::session::expression::catalogue::GATES;
 
     #[test]
     fn the_worst_margin_comes_first_whatever_its_unit_and_what_was_not_found_before_all() {
@@ -134,24 +135,8 @@ mod tests {
     #[test]
     fn every_limit_setting_is_a_setting() {
         let table = crate::settings::Settings::table();
-        let gates = [
-            "ncc",
-            "stereo_ncc",
-            "distance_correction_m",
-            "position_correction_m",
-            "left_right_px",
-            "second_peak_ratio",
-            "match_sigma_px",
-            "edge_distance_px",
-            "far_ncc",
-            "confidence",
-            "shape_overlap",
-            "shape_misfit",
-            "shape_sigma_m",
-            "shape_turn_deg",
-            "shape_other_minimum",
-            "picture_ncc",
-        ];
+        // How near the edge of a surface lies is no setting.
+        let gates = GATES.into_iter().filter(|gate| *gate != "shape_edge_distance_m");
         for gate in gates {
             for state in [TrackingState::Tracking, TrackingState::Lost { count: 1 }] {
                 let setting = limit_setting(gate, state).unwrap();

@@ -16,6 +16,9 @@ use crate::theme;
 /// What the box is called by who cannot see it.
 const NAME: &str = "expression";
 
+/// How many letters a suggestion and its meaning have together: more would break the name in the narrowest panel.
+const SUGGESTION_LETTERS: usize = 42;
+
 /// What may be part of a name: everything else ends the word that is completed.
 fn ends_word(c: char) -> bool {
     !(c.is_ascii_alphanumeric() || matches!(c, '_' | '.' | '[' | ']'))
@@ -65,9 +68,20 @@ fn suggestions(text: &str, cursor: usize) -> Vec<Suggestion> {
     }
     let suggest = |candidate: sightline_core::session::expression::complete::Candidate| {
         let unit = if candidate.unit.is_empty() { String::new() } else { format!("{}  ", candidate.unit) };
-        Suggestion::new(candidate.text).description(theme::note(format!("{unit}{}", candidate.meaning)))
+        let room = SUGGESTION_LETTERS.saturating_sub(candidate.text.chars().count());
+        let meaning = shortened(&format!("{unit}{}", candidate.meaning), room);
+        Suggestion::new(candidate.text).description(theme::note(meaning))
     };
     complete(text, cursor).candidates.into_iter().map(suggest).collect()
+}
+
+/// A text cut to so many letters, with a sign that it was.
+fn shortened(text: &str, letters: usize) -> String {
+    if text.chars().count() <= letters {
+        return text.to_owned();
+    }
+    let kept: String = text.chars().take(letters.saturating_sub(2)).collect();
+    kept.trim_end().to_owned() + " …"
 }
 
 fn buttons(ui: &mut Ui, state: &State, read: &Result<Expression, Refused>, out: &mut Vec<Command>) {

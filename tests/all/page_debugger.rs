@@ -1,0 +1,174 @@
+//! The debugger's parts in a real browser, by role and name or by key: breakpoints and play, what-if and undo, compare,
+//! notes, export, looks. Every test ends by asking the console for errors.
+
+use std::time::Duration;
+
+use sightline_tests::bench::Bench;
+use sightline_tests::browser::Browser;
+use sightline_tests::controls::Control;
+use sightline_tests::scenario::short_approach;
+
+/// A page with a run over a short approach.
+async fn page() -> (Bench, Browser) {
+    let bench = Bench::start(&short_approach()).await;
+    let browser = Browser::start().await;
+    bench.pick(&browser).await;
+    (bench, browser)
+}
+
+async fn end(browser: Browser) {
+    assert_eq!(browser.console_errors().await, Vec::<String>::new());
+    browser.close().await;
+}
+
+/// Chooses what an open list calls so; the list of targets calls its runs the same.
+async fn choose(browser: &Browser, name: &str) {
+    for _ in 0..100 {
+        let all = browser.controls().await;
+        let listed = |c: &&Control| c.role == "button" && c.name == name && c.region != "Targets and runs";
+        if let Some(control) = all.iter().filter(listed).last() {
+            let (x, y) = control.middle();
+            return browser.click(x, y).await;
+        }
+        tokio::time::sleep(Duration::from_millis(100)).await;
+    }
+    panic!("nothing in the list is called {name}");
+}
+
+/// Goes to a step and waits until it is shown.
+async fn go_to(browser: &Browser, step: usize) {
+    browser.press("g").await;
+    browser.control("textbox", "go to step").await;
+    browser.type_text(&step.to_string()).await;
+    browser.press("Enter").await;
+    browser.wait_status("the step", &format!("s.step === {step} && s.shown")).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn conditions_are_written_hit_and_played_to() {
+    let (_bench, browser) = page().await;
+    browser.chord(&["Shift"], "b").await;
+    browser.control("textbox", "expression").await;
+    // What is wrong is said while it is typed, and nothing is lost.
+    browser.type_text("ncc < 3 px").await;
+    browser.says("px").await;
+    assert_eq!(browser.control("textbox", "expression").await.value, "ncc < 3 px");
+    for _ in 0.."ncc < 3 px".len() {
+        browser.press("Backspace").await;
+    }
+    browser.type_text("step == 2 or step == 4").await;
+    browser.press("Enter").await;
+    browser.wait_status("the hits", "s.breakpoints === 1 && s.hits === 2").await;
+    browser.says("2 hits in all runs").await;
+    browser.shot("breakpoints").await;
+    browser.press("Escape").await;
+    browser.press("n").await;
+    browser.wait_status("the first hit", "s.step === 2 && s.shown").await;
+    browser.press("n").await;
+    browser.wait_status("the second hit", "s.step === 4 && s.shown").await;
+    browser.chord(&["Shift"], "n").await;
+    browser.wait_status("the hit before", "s.step === 2 && s.shown").await;
+    // Playing stops at a hit, not before and not behind.
+    browser.press("Home").await;
+    browser.wait_status("the first step", "s.step === 0 && s.playing === 0").await;
+    browser.press("l").await;
+    browser.wait_status("the hit at which it stops", "s.step === 2 && s.playing === 0").await;
+    // The box takes what a person types for a place on the drive, and says what is wrong with the rest.
+    browser.press("g").await;
+    browser.control("textbox", "go to step").await;
+    browser.type_text("nowhere").await;
+    browser.press("Enter").await;
+    browser.control("textbox", "go to step").await;
+    browser.shot("go-to").await;
+    browser.press("Escape").await;
+    browser.gone("textbox", "go to step").await;
+    go_to(&browser, 5).await;
+    end(browser).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_change_is_tried_branched_compared_and_taken_back() {
+    let (bench, browser) = page().await;
+    let last = bench.stop_count - 1;
+    go_to(&browser, 3).await;
+    browser.press("w").await;
+    browser.says("Accepted").await;
+    // A limit that the match does not meet: the ghost says what the step would have been.
+    let slider = browser.control("slider", "try limit ncc_min").await;
+    let (_, y) = slider.middle();
+    browser
+        .drag((slider.rect[0] + slider.rect[2] * 0.6, y), (slider.rect[0] + slider.rect[2] - 3.0, y))
+        .await;
+    browser.control("button", "Run from here as branch").await;
+    browser.shot("what-if").await;
+    browser.press("Escape").await;
+    browser.gone("button", "Run from here as branch").await;
+    assert_eq!(browser.status().await["run"], 0, "what was tried left nothing behind");
+
+    // A branch without a change is the same run: the two do not differ, and the page says so.
+    browser.press("r").await;
+    browser
+        .wait_status("the branch", &format!("s.run === 1 && s.steps_done === {} && !s.running", last + 1))
+        .await;
+    browser.click_on("combobox", "compared with").await;
+    choose(&browser, "run A").await;
+    browser.wait_for("the comparison in the address", "return location.hash.includes('vs=0.0')").await;
+    browser.press("d").await;
+    browser.says("do not differ").await;
+    for name in ["side-by-side", "wipe", "blink", "difference"] {
+        browser.press("v").await;
+        browser.wait_for(name, &format!("return location.hash.includes('cmp={name}')")).await;
+        tokio::time::sleep(Duration::from_millis(800)).await;
+        browser.shot(&format!("compare-{name}")).await;
+    }
+    browser.chord(&["Control"], "z").await;
+    browser.wait_status("the run before", "s.run === 0").await;
+    browser.chord(&["Control"], "y").await;
+    browser
+        .wait_for(
+            "the branch again",
+            "return JSON.parse(document.getElementById('sightline').dataset.status).run >= 0",
+        )
+        .await;
+    end(browser).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn notes_are_pinned_exports_are_listed_and_looks_are_kept() {
+    let (bench, browser) = page().await;
+    go_to(&browser, 2).await;
+    browser.press("m").await;
+    browser.control("textbox", "text of the note").await;
+    browser.type_text("the *shadow* comes here").await;
+    browser.click_on("button", "Save note").await;
+    browser.gone("textbox", "text of the note").await;
+    browser.activate("tab", "Notes").await;
+    browser.says("comes here").await;
+    browser.shot("notes").await;
+    let session = browser.status().await["session"].as_str().unwrap().to_owned();
+    let notes = bench.json(&format!("/api/v1/sessions/{session}/notes"));
+    assert!(notes.to_string().contains("the *shadow* comes here"), "{notes}");
+
+    browser.chord(&["Control"], "s").await;
+    browser.control("button", "download: ").await;
+    browser.control("button", "copy as command: ").await;
+    browser.control("button", "copy as HTTP: ").await;
+    browser.shot("export").await;
+    browser.press("Escape").await;
+    browser.gone("button", "download: ").await;
+
+    browser.click_on("button", "View").await;
+    browser.click_on("radio", "light").await;
+    browser.press("Escape").await;
+    tokio::time::sleep(Duration::from_millis(800)).await;
+    browser.shot("looks-light").await;
+    browser.evaluate("location.reload()").await;
+    browser.wait_for_viewer().await;
+    browser.wait_status("the page again", "s.target === 0 && s.shown").await;
+    assert_eq!(browser.evaluate("return localStorage.getItem('sightline.looks')").await, "light");
+    let page = browser.screenshot().await;
+    let picture = image::load_from_memory(&page).unwrap().to_luma8();
+    let bright = picture.pixels().filter(|pixel| pixel.0[0] > 200).count();
+    assert!(bright * 2 > picture.len(), "the page is light: {bright} of {} pixels", picture.len());
+    end(browser).await;
+}
