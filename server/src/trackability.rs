@@ -11,6 +11,8 @@ use std::time::{Duration, Instant};
 
 use axum::Json;
 use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 use sightline_core::error::{Error, Result};
 use sightline_core::frames::Pixel;
@@ -132,18 +134,19 @@ async fn at_pixel(
 /// Stops making a map; asking for it again begins it anew
 #[utoipa::path(post, operation_id = "cancel_trackability", path = "/traverses/{id}/steps/{step}/trackability/cancel",
     tag = "trackability", params(("id" = String, Path), ("step" = usize, Path)),
-    responses((status = 200, body = MapProgress), ApiError))]
+    responses((status = 200, body = MapProgress), (status = 204, description = "Nothing was being made"), ApiError))]
 async fn cancel(
     State(state): State<AppState>,
     Path((id, step)): Path<(String, usize)>,
-) -> ApiResult<Json<MapProgress>> {
+) -> ApiResult<Response> {
     let open = stop(&state, &id, step)?;
     let Some(making) = state.maps().take_unfinished(&open.id, step) else {
-        return Err(ApiError::conflict("No map of this stop is being made."));
+        // A map that was complete a moment ago is what was wanted, too.
+        return Ok(StatusCode::NO_CONTENT.into_response());
     };
     making.cancel.store(true, Ordering::Relaxed);
     making.end(Some("cancelled".to_owned()));
-    Ok(Json(lock(&making.progress).clone()))
+    Ok(Json(lock(&making.progress).clone()).into_response())
 }
 
 /// The stop of a traverse that the path names.

@@ -101,8 +101,13 @@ impl Browser {
 
     /// Clicks a control with the pointer, in its middle.
     pub async fn click_on(&self, role: &str, name: &str) {
-        let control = self.control(role, name).await;
-        assert!(!control.disabled, "{role} “{name}” is disabled");
+        let start = Instant::now();
+        let mut control = self.control(role, name).await;
+        while control.disabled {
+            assert!(start.elapsed() < PATIENCE, "{role} “{name}” is disabled");
+            tokio::time::sleep(Duration::from_millis(50)).await;
+            control = self.control(role, name).await;
+        }
         let (x, y) = control.middle();
         self.click(x, y).await;
     }

@@ -273,7 +273,8 @@ mod tests {
         ];
         let input = egui::RawInput { events, ..Default::default() };
         let mut asked = Vec::new();
-        let _ = context.run_ui(input, |ui| asked = commands(ui.ctx(), &state()));
+        let mut output = context.run_ui(input, |ui| asked = commands(ui.ctx(), &state()));
+        output.textures_delta.clear();
         let words = crate::command::Search { words: "tr".to_owned(), chosen: 0 };
         assert_eq!(asked, [Command::SetMode(Mode::Palette(words))], "no target is picked, nothing is run");
     }

@@ -19,15 +19,11 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 
 fn sheet(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let modal = Modal::new(Id::unique("help")).backdrop_color(theme::shade()).show(ui.ctx(), |ui| {
-        ui.set_width(430.0);
+        ui.set_width(470.0);
+        // What follows the list stays on the screen, however small that is.
+        let height = (ui.ctx().content_rect().height() - 260.0).max(120.0);
         ui.label(theme::title("Keys and pointer"));
-        egui::Grid::new("keys").num_columns(2).spacing([20.0, 3.0]).show(ui, |ui| {
-            for (keys, meaning) in keys::SHEET.into_iter().chain(crate::compare::SHEET) {
-                ui.label(RichText::new(keys).monospace().color(theme::accent()));
-                ui.label(meaning);
-                ui.end_row();
-            }
-        });
+        egui::ScrollArea::vertical().max_height(height).auto_shrink([false, true]).show(ui, key_list);
         ui.add_space(6.0);
         ui.label(theme::title("Conventions"));
         for line in [
@@ -54,6 +50,17 @@ fn sheet(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     if modal.inner || modal.should_close() {
         out.push(Command::SetMode(Mode::Look));
     }
+}
+
+/// Every key with its meaning.
+fn key_list(ui: &mut Ui) {
+    egui::Grid::new("keys").num_columns(2).spacing([20.0, 3.0]).show(ui, |ui| {
+        for (keys, meaning) in keys::SHEET.into_iter().chain(crate::compare::SHEET) {
+            ui.label(RichText::new(keys).monospace().color(theme::accent()));
+            ui.label(meaning);
+            ui.end_row();
+        }
+    });
 }
 
 fn go_to(ui: &mut Ui, state: &State, typed: &str, out: &mut Vec<Command>) {

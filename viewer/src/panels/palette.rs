@@ -36,7 +36,12 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         let clicked = list(ui, &found, moved);
         ui.add_space(4.0);
         ui.label(theme::note("Up and Down choose, Enter does it, Esc closes"));
-        clicked.or_else(|| ui.input(|input| input.key_pressed(Key::Enter)).then_some(moved))
+        let asked = clicked.or_else(|| ui.input(|input| input.key_pressed(Key::Enter)).then_some(moved));
+        if asked.is_some() {
+            // The next key is the page's again, also when it comes at once.
+            field.surrender_focus();
+        }
+        asked
     });
     // What was typed in the same frame as Enter counts: the list on the screen is of the frame before.
     let is_newer = words != search.words;

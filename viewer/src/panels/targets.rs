@@ -86,38 +86,12 @@ fn show_run(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out:
     let is_selected = state.cursor.target == Some(target.number) && state.cursor.run == run.number;
     let fill = if is_selected { theme::selected() } else { egui::Color32::TRANSPARENT };
     let frame = egui::Frame::new().fill(fill).corner_radius(4).inner_margin(egui::Margin::symmetric(6, 3));
-    let inside = frame.show(ui, |ui| {
-        ui.set_width(ui.available_width());
-        ui.horizontal(|ui| {
-            let (mark, _) = ui.allocate_exact_size(vec2(14.0, 14.0), Sense::hover());
-            paint_mark(ui.painter(), mark.center(), run_mark(run.number), theme::run(run.number), 6.0);
-            ui.label(RichText::new(format!("run {}", run_letter(run.number))).color(theme::strong()));
-            if let Some(preset) = state.configurations.named(&run.settings) {
-                ui.label(RichText::new(preset.name).color(theme::accent())).on_hover_text(preset.description);
-            }
-            ui.with_layout(Layout::right_to_left(Align::Center), |ui| how_far(ui, state, target, run, out));
-        });
-        sparkline(ui, run, state.stop_count());
-        if let Some(fork) = run.fork {
-            ui.label(theme::note(format!("from run {} at step {}", run_letter(fork.run), fork.from_step)));
-        }
-        ui.label(theme::note(summary(run)));
-        // A preset's name says them all.
-        let unnamed = state.configurations.named(&run.settings).is_none();
-        let is_branch = run_tree::parent(&target.runs, run).is_some();
-        for line in run_tree::changed(&target.runs, run).into_iter().filter(|_| unnamed || is_branch) {
-            ui.add(egui::Label::new(theme::note(line).monospace()).wrap());
-        }
-        if target.runs.len() > 1 {
-            let name = format!("remove run {}", run_letter(run.number));
-            let help = "Hides the run; what left it keeps its steps. Ctrl+Z takes it back";
-            let button = ui.small_button("Remove run").accessible_name(name).on_hover_text(help);
-            if button.clicked() {
-                out.push(Command::Why(Ask::RemoveRun { target: target.number, run: run.number }));
-            }
-        }
+    // The card hears of a click only where no button in it does: it comes before what is in it.
+    let card = egui::UiBuilder::new().id_salt(("run", target.number, run.number)).sense(Sense::click());
+    let inside = ui.scope_builder(card, |ui| {
+        frame.show(ui, |ui| card_of(ui, state, target, run, out));
     });
-    let response = inside.response.interact(Sense::click());
+    let response = inside.response;
     response.widget_info(|| {
         egui::WidgetInfo::selected(
             egui::Role::Button,
@@ -128,6 +102,39 @@ fn show_run(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out:
     });
     if response.clicked() {
         out.push(Command::Look { target: target.number, run: run.number });
+    }
+}
+
+/// What a run's card says, and what can be done with the run.
+fn card_of(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: &mut Vec<Command>) {
+    ui.set_width(ui.available_width());
+    ui.horizontal(|ui| {
+        let (mark, _) = ui.allocate_exact_size(vec2(14.0, 14.0), Sense::hover());
+        paint_mark(ui.painter(), mark.center(), run_mark(run.number), theme::run(run.number), 6.0);
+        ui.label(RichText::new(format!("run {}", run_letter(run.number))).color(theme::strong()));
+        if let Some(preset) = state.configurations.named(&run.settings) {
+            ui.label(RichText::new(preset.name).color(theme::accent())).on_hover_text(preset.description);
+        }
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| how_far(ui, state, target, run, out));
+    });
+    sparkline(ui, run, state.stop_count());
+    if let Some(fork) = run.fork {
+        ui.label(theme::note(format!("from run {} at step {}", run_letter(fork.run), fork.from_step)));
+    }
+    ui.label(theme::note(summary(run)));
+    // A preset's name says them all.
+    let unnamed = state.configurations.named(&run.settings).is_none();
+    let is_branch = run_tree::parent(&target.runs, run).is_some();
+    for line in run_tree::changed(&target.runs, run).into_iter().filter(|_| unnamed || is_branch) {
+        ui.add(egui::Label::new(theme::note(line).monospace()).wrap());
+    }
+    if target.runs.len() > 1 {
+        let name = format!("remove run {}", run_letter(run.number));
+        let help = "Hides the run; what left it keeps its steps. Ctrl+Z takes it back";
+        let button = ui.small_button("Remove run").accessible_name(name).on_hover_text(help);
+        if button.clicked() {
+            out.push(Command::Why(Ask::RemoveRun { target: target.number, run: run.number }));
+        }
     }
 }
 
