@@ -81,7 +81,8 @@ async fn a_pixel_is_judged_by_its_designation_with_criteria_that_have_units_and_
         (&json!("good"), &json!(null), &json!(null))
     );
     let range_m = found["range_m"].as_f64().unwrap();
-    assert!(found["longest_step_m"].as_f64().unwrap() <= 0.1001 * range_m, "{found}");
+    // The step is of dense stereo, the range of point stereo: they agree within a part in a hundred.
+    assert!(found["longest_step_m"].as_f64().unwrap() <= 0.101 * range_m, "{found}");
     for criterion in found["criteria"].as_array().unwrap() {
         assert!(criterion["source"].as_str().is_some_and(|source| !source.is_empty()), "{criterion}");
     }
@@ -100,7 +101,7 @@ async fn a_refused_pick_offers_the_nearest_good_pixel_and_that_one_is_taken() {
     let session = server.begin().await;
     let path = format!("sessions/{session}/targets");
     let pick = |x: f64, y: f64| json!({ "step": 0, "pixel": { "x": x, "y": y } });
-    let refused = server.post(&path, &pick(SKY[0], SKY[1])).await;
+    let refused = server.post(&path, &pick(4.0, 256.0)).await;
     assert!(!refused.problem(422, "target").is_empty());
     let problem = refused.json();
     let (x, y) =

@@ -118,6 +118,16 @@ impl Browser {
         self.evaluate(&format!("document.getElementById('{}').click()", control.id)).await;
     }
 
+    /// Gives a field or slider a value as a screen reader does, without the pointer.
+    pub async fn set_value(&self, role: &str, name: &str, value: &str) {
+        let id = self.control(role, name).await.id;
+        let script = format!(
+            "const e = document.getElementById('{id}'); e.value = '{value}'; \
+             e.dispatchEvent(new Event('input', {{bubbles: true}}))"
+        );
+        self.evaluate(&script).await;
+    }
+
     /// Waits until a text with these words is on the page.
     ///
     /// # Panics
