@@ -1,4 +1,4 @@
-//! The debugger's parts in a real browser, by role and name or by key: what-if and undo, compare,
+//! The debugger's parts in a real browser, by role and name or by key: breakpoints and play, what-if and undo, compare,
 //! notes, export, looks. Every test ends by asking the console for errors.
 
 use std::time::Duration;
@@ -42,6 +42,50 @@ async fn go_to(browser: &Browser, step: usize) {
     browser.type_text(&step.to_string()).await;
     browser.press("Enter").await;
     browser.wait_status("the step", &format!("s.step === {step} && s.shown")).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn conditions_are_written_hit_and_played_to() {
+    let (_bench, browser) = page().await;
+    browser.chord(&["Shift"], "b").await;
+    browser.control("textbox", "expression").await;
+    // What is wrong is said while it is typed, and nothing is lost.
+    browser.type_text("ncc < 3 px").await;
+    let typed =
+        "[...document.querySelectorAll('#sightline-mirror input')].some(e => e.value === 'ncc < 3 px')";
+    browser.wait_for("what was typed", &format!("return {typed}")).await;
+    browser.says("`ncc` is without a unit").await;
+    for _ in 0.."ncc < 3 px".len() {
+        browser.press("Backspace").await;
+    }
+    browser.type_text("step == 2 or step == 4").await;
+    browser.press("Enter").await;
+    browser.wait_status("the hits", "s.breakpoints === 1 && s.hits === 2").await;
+    browser.says("2 hits in all runs").await;
+    browser.shot("breakpoints").await;
+    browser.press("Escape").await;
+    browser.press("n").await;
+    browser.wait_status("the first hit", "s.step === 2 && s.shown").await;
+    browser.press("n").await;
+    browser.wait_status("the second hit", "s.step === 4 && s.shown").await;
+    browser.chord(&["Shift"], "n").await;
+    browser.wait_status("the hit before", "s.step === 2 && s.shown").await;
+    // Playing stops at a hit, not before and not behind.
+    browser.press("Home").await;
+    browser.wait_status("the first step", "s.step === 0 && s.playing === 0").await;
+    browser.press("l").await;
+    browser.wait_status("the hit at which it stops", "s.step === 2 && s.playing === 0").await;
+    // The box takes what a person types for a place on the drive, and says what is wrong with the rest.
+    browser.press("g").await;
+    browser.control("textbox", "go to step").await;
+    browser.type_text("nowhere").await;
+    browser.press("Enter").await;
+    browser.control("textbox", "go to step").await;
+    browser.shot("go-to").await;
+    browser.press("Escape").await;
+    browser.gone("textbox", "go to step").await;
+    go_to(&browser, 5).await;
+    end(browser).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]

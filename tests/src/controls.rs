@@ -13,6 +13,9 @@ use crate::browser::Browser;
 /// How long a control may take to come.
 const PATIENCE: Duration = Duration::from_secs(60);
 
+/// How long what is rendered or tracked on a busy machine may take to come.
+const LONG_PATIENCE: Duration = Duration::from_secs(300);
+
 /// Lists the elements of the mirror.
 const LIST: &str = "return [...document.querySelectorAll('#sightline-mirror [data-node]')].map(e => { \
     const [x, y, w, h] = ['left', 'top', 'width', 'height'].map(k => parseFloat(e.style[k])); \
@@ -174,13 +177,15 @@ impl Browser {
         let script = format!(
             "const s = JSON.parse(document.getElementById('sightline').dataset.status || '{{}}'); return {condition}"
         );
-        for _ in 0..2400 {
+        let start = Instant::now();
+        while start.elapsed() < LONG_PATIENCE {
             if self.evaluate(&script).await == Value::Bool(true) {
                 return;
             }
-            tokio::time::sleep(Duration::from_millis(250)).await;
+            tokio::time::sleep(Duration::from_millis(100)).await;
         }
-        panic!("waited ten minutes for {what}; the page says {}", self.status().await);
+        self.shot("waited").await;
+        panic!("waited {} s for {what}; the page says {}", LONG_PATIENCE.as_secs(), self.status().await);
     }
 
     /// Keeps a picture of the page in the folder that `SIGHTLINE_SHOTS` names, to be looked at.

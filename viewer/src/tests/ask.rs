@@ -139,6 +139,30 @@ fn completion_is_taken_by_arrow_keys_tab_and_enter_and_a_whole_condition_is_set_
 }
 
 #[test]
+fn letters_and_the_enter_behind_them_may_come_in_one_frame() {
+    // While suggestions are open for the unfinished text before, and for letters that finish it with none open.
+    for (before, last) in
+        [("step == 2 or step", " == 4"), ("step == 2 or step == ", "4"), ("err_px >", " 2 px")]
+    {
+        let mut harness = live_box();
+        harness.state_mut().apply(Command::Ask(Ask::Focus));
+        harness.run_steps(3);
+        let box_ = || egui_kittest::kittest::by().role(egui::accesskit::Role::TextInput);
+        harness.get(box_()).type_text(before);
+        harness.run_steps(3);
+        harness.state_mut().take_requests();
+        let (key, modifiers) = (egui::Key::Enter, egui::Modifiers::NONE);
+        let enter = egui::Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers };
+        harness.input_mut().events.extend([egui::Event::Text(last.to_owned()), enter]);
+        harness.run_steps(3);
+        let new = NewBreakpoint { expression: Some(format!("{before}{last}")), step: None };
+        let expected = Request::Ask(AskRequest::Add { session: "s1".to_owned(), new });
+        assert!(harness.state_mut().take_requests().contains(&expected), "{before}{last}");
+        assert!(!harness.ctx.text_edit_focused(), "keys mean steps again");
+    }
+}
+
+#[test]
 fn breaking_at_a_step_twice_takes_the_breakpoint_back() {
     let mut state = loaded(4);
     let new = NewBreakpoint { expression: None, step: Some(4) };

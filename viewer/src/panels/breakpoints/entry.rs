@@ -2,8 +2,8 @@
 
 use egui::text::LayoutJob;
 use egui::{
-    Button, CompletionPopup, FontFamily, FontId, Id, Key, RectAlign, RichText, Stroke, Suggestion, TextEdit,
-    TextFormat, Ui,
+    Button, CompletionPopup, Event, FontFamily, FontId, Id, Key, RectAlign, RichText, Stroke, Suggestion,
+    TextEdit, TextFormat, Ui,
 };
 use sightline_core::session::expression::complete::complete;
 use sightline_core::session::expression::{Answers, Expression, LENGTH_LIMIT, Refused};
@@ -30,8 +30,10 @@ pub(super) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let mut text = before.to_owned();
     let read = Expression::read(before);
     let id = Id::unique("expression box");
+    let is_entered = ui.input(|input| input.key_pressed(Key::Enter));
     // A whole expression is set by Enter; only an unfinished one takes the suggestion by it.
-    let keys = if read.is_ok() { vec![Key::Tab] } else { vec![Key::Tab, Key::Enter] };
+    let is_whole = Expression::read(&with_typed(ui, before)).is_ok();
+    let keys = if is_whole { vec![Key::Tab] } else { vec![Key::Tab, Key::Enter] };
     let field = TextEdit::singleline(&mut text)
         .hint_text("ncc < 0.6 && step > 10")
         .font(FontId::new(12.5, FontFamily::Monospace))
@@ -44,21 +46,35 @@ pub(super) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     if state.ask.wants_focus && !response.has_focus() {
         response.request_focus();
     }
-    let enters = response.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
+    let had_focus = response.has_focus() || response.lost_focus();
     if state.ask.wants_focus || text != before {
-        out.push(Command::Ask(Ask::Type(text)));
+        out.push(Command::Ask(Ask::Type(text.clone())));
     }
-    if enters && shown.accepted.is_none() {
-        out.push(Command::Ask(Ask::Set));
-        if Expression::condition(&state.ask.text).is_err() {
-            // What cannot be set is to be mended, not left.
-            response.request_focus();
+    if is_entered && had_focus && shown.accepted.is_none() {
+        // What cannot be set is to be mended, not left.
+        if Expression::condition(&text).is_err() {
+            response.request_focus()
+        } else {
+            response.surrender_focus()
         }
+        out.push(Command::Ask(Ask::Set));
     }
     buttons(ui, state, &read, out);
     if !before.trim().is_empty() {
         verdict(ui, before, &read);
     }
+}
+
+/// The text with the letters of this frame at its end: who types fast sends the last ones together with Enter.
+fn with_typed(ui: &Ui, before: &str) -> String {
+    let typed = ui.input(|input| {
+        let texts = input.events.iter().filter_map(|event| match event {
+            Event::Text(text) => Some(text.as_str()),
+            _ => None,
+        });
+        texts.collect::<String>()
+    });
+    before.to_owned() + &typed
 }
 
 /// What could be written at the cursor.
