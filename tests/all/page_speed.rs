@@ -1,51 +1,28 @@
 //! How quick the page is in a real browser: printed, not judged, since a busy machine is no fault of the page's. What is
 //! judged does not depend on the clock: what is downloaded, that an idle page paints nothing, that memory is bounded.
 //!
-//! Chromium paints WebGL in software here, which costs more than everything the page computes; so the time from the
-//! key to the end of the page's own work is told apart from the time to the painted frame.
+//! [`sightline_tests::stopwatch`] says which times are told apart, and why.
 
 use std::time::Duration;
 
-use serde_json::Value;
+use sightline_core::frames::Pixel;
 use sightline_tests::bench::Bench;
 use sightline_tests::browser::Browser;
 use sightline_tests::scenario::short_approach;
+use sightline_tests::server::{PIXEL, long_recording};
+use sightline_tests::stopwatch::{self, Lap, spread};
 
 /// The largest download of the page, compressed.
 const DOWNLOAD_LIMIT: u64 = 5 << 20;
+
+/// The steps of the long recording.
+const LONG: usize = 10_000;
 
 /// How many steps are walked for the memory.
 const WALKED: usize = 500;
 
 /// The largest growth of the page's process over that walk: what the cache may hold, and as much again.
 const GROWTH_LIMIT: u64 = 2 * (256 << 20);
-
-/// Watches keys and the page's status: times from a key to the end of the work for it, and to the frame after, ms.
-const WATCH: &str = "window.times = []; \
-    const canvas = document.getElementById('sightline'); let began = null; \
-    window.addEventListener('keydown', () => { began = performance.now(); }, true); \
-    new MutationObserver(() => { \
-        const s = JSON.parse(canvas.dataset.status); \
-        if (began === null || !s.shown) return; \
-        const key = began, worked = performance.now(); began = null; \
-        requestAnimationFrame(() => requestAnimationFrame(() => \
-            window.times.push([worked - key, performance.now() - key]))); \
-    }).observe(canvas, {attributes: true, attributeFilter: ['data-status']});";
-
-/// Median and 95th percentile.
-fn spread(mut values: Vec<f64>) -> (f64, f64) {
-    values.sort_by(f64::total_cmp);
-    let at = |share: f64| values[((values.len() - 1) as f64 * share).round() as usize];
-    (at(0.5), at(0.95))
-}
-
-/// The times that were watched: own work, and to the painted frame, ms.
-async fn times(browser: &Browser) -> (Vec<f64>, Vec<f64>) {
-    let pairs = browser.evaluate("const t = window.times; window.times = []; return t").await;
-    let number = |pair: &Value, index: usize| pair[index].as_f64().unwrap_or(f64::NAN);
-    let pairs = pairs.as_array().cloned().unwrap_or_default();
-    (pairs.iter().map(|p| number(p, 0)).collect(), pairs.iter().map(|p| number(p, 1)).collect())
-}
 
 /// Steps from stop to stop along these, each awaited.
 async fn walk(browser: &Browser, along: &[usize]) {
@@ -55,11 +32,25 @@ async fn walk(browser: &Browser, along: &[usize]) {
             let (next, key) = if to > step { (step + 1, "ArrowRight") } else { (step - 1, "ArrowLeft") };
             browser.press(key).await;
             browser.wait_status("the next step", &format!("s.step === {next} && s.shown")).await;
+            // The frame is painted, too.
+            tokio::time::sleep(Duration::from_millis(500)).await;
             step = next;
         }
     }
-    // The frame after the last one is painted, too.
-    tokio::time::sleep(Duration::from_millis(500)).await;
+}
+
+/// Prints the laps of one kind.
+fn tell(what: &str, laps: &[Lap]) {
+    let ms = |of: fn(&Lap) -> f64| {
+        let (middle, high) = spread(laps.iter().map(of)).unwrap_or((f64::NAN, f64::NAN));
+        format!("{middle:.0} ms (95 %: {high:.0})")
+    };
+    let (own, loading, both) = (ms(|l| l.own_ms), ms(|l| l.loading_ms), ms(|l| l.own_ms + l.loading_ms));
+    let painted = ms(|l| l.painted_ms);
+    println!(
+        "{what}, {} of them: own work {own}, loading {loading}, both {both}; painted {painted}",
+        laps.len()
+    );
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -87,14 +78,11 @@ async fn steps_are_quick_an_idle_page_rests_and_memory_is_bounded() {
 
     // There and back once, so that everything is cached; then there and back again, watched.
     walk(&browser, &[0, last, 0]).await;
-    browser.evaluate(WATCH).await;
+    stopwatch::begin(&browser).await;
     walk(&browser, &[0, last, 0]).await;
-    let (own, painted) = times(&browser).await;
-    assert!(own.len() >= last, "{} of {} steps were seen", own.len(), 2 * last);
-    let ((own_mid, own_95), (painted_mid, painted_95)) = (spread(own), spread(painted));
-    println!(
-        "cached step: own work {own_mid:.0} ms, 95 % {own_95:.0}; painted {painted_mid:.0} ms, 95 % {painted_95:.0}"
-    );
+    let laps = stopwatch::laps(&browser).await;
+    assert!(laps.len() >= last, "{} of {} steps were seen", laps.len(), 2 * last);
+    tell("cached steps", &laps);
 
     // An idle page computes nothing: no status changes, and next to no processor time.
     tokio::time::sleep(Duration::from_secs(2)).await;
@@ -130,6 +118,45 @@ async fn steps_are_quick_an_idle_page_rests_and_memory_is_bounded() {
         );
         assert!(end.page_bytes < start.page_bytes + GROWTH_LIMIT, "the page grows without end");
     }
+    assert_eq!(browser.console_errors().await, Vec::<String>::new());
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_long_recording_is_scrubbed_and_its_steps_come_when_they_are_asked_for() {
+    let bench = Bench::recording(long_recording(LONG), Pixel::new(PIXEL[0], PIXEL[1])).await;
+    let browser = Browser::start().await;
+    let start = std::time::Instant::now();
+    bench.pick(&browser).await;
+    println!("{LONG} steps are tracked and on the page after {:.0} s", start.elapsed().as_secs_f64());
+    // The first steps are cached by the pick; those ten apart are not.
+    stopwatch::begin(&browser).await;
+    for step in (10..=300).step_by(10) {
+        browser.chord(&["Shift"], "ArrowRight").await;
+        browser.wait_status("ten steps on", &format!("s.step === {step} && s.shown")).await;
+        tokio::time::sleep(Duration::from_millis(400)).await;
+    }
+    let laps = stopwatch::laps(&browser).await;
+    assert!(laps.len() >= 20, "{} of 30 steps were seen", laps.len());
+    tell("uncached steps", &laps);
+
+    // The pointer is drawn along the whole timeline and back.
+    let band = browser.control("slider", "timeline").await.rect;
+    let (left, right, y) = (band[0] + 2.0, band[0] + band[2] - 2.0, band[1] + band[3] / 2.0);
+    stopwatch::begin(&browser).await;
+    let start = std::time::Instant::now();
+    browser.drag((left, y), (right, y)).await;
+    browser.wait_status("the last steps", &format!("s.step > {}", LONG * 9 / 10)).await;
+    browser.drag((right, y), (left, y)).await;
+    browser.wait_status("the first steps", &format!("s.step < {}", LONG / 10)).await;
+    let took_s = start.elapsed().as_secs_f64();
+    let frames = stopwatch::frames(&browser).await;
+    let (middle, high) = spread(frames.iter().copied()).unwrap();
+    println!(
+        "scrubbing {LONG} steps: own work a frame {middle:.1} ms, 95 % {high:.1}; {} frames in {took_s:.1} s",
+        frames.len()
+    );
+    browser.shot("scrubbed").await;
     assert_eq!(browser.console_errors().await, Vec::<String>::new());
     browser.close().await;
 }

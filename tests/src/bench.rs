@@ -30,6 +30,15 @@ impl Bench {
         let folder = tempfile::tempdir().unwrap();
         let traverse = create_simulated(scenario, &folder.path().join("approach")).unwrap();
         let rock = rock(scenario, &traverse);
+        Self::serve(traverse, rock, folder).await
+    }
+
+    /// Serves the recording in a folder, with a pixel of its first left image at which a rock is.
+    pub async fn recording(folder: tempfile::TempDir, rock: Pixel) -> Self {
+        Self::serve(Traverse::open(folder.path()).unwrap(), rock, folder).await
+    }
+
+    async fn serve(traverse: Traverse, rock: Pixel, folder: tempfile::TempDir) -> Self {
         let stop_count = traverse.stop_count();
         let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
         let port = listener.local_addr().unwrap().port();

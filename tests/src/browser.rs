@@ -138,6 +138,20 @@ impl Browser {
         done.unwrap_or_else(|error| panic!("{held:?} and {key} cannot be pressed: {error}"));
     }
 
+    /// Holds a key down until [`Self::let_go`].
+    pub async fn hold(&self, key: &str) {
+        let down = KeyActions::new("keyboard".to_owned()).then(KeyAction::Down { value: key_value(key) });
+        let done = self.client.perform_actions(down).await;
+        done.unwrap_or_else(|error| panic!("the key {key} cannot be held: {error}"));
+    }
+
+    /// Lets a held key go.
+    pub async fn let_go(&self, key: &str) {
+        let up = KeyActions::new("keyboard".to_owned()).then(KeyAction::Up { value: key_value(key) });
+        let done = self.client.perform_actions(up).await;
+        done.unwrap_or_else(|error| panic!("the key {key} cannot be let go: {error}"));
+    }
+
     /// Types a text, letter by letter.
     pub async fn type_text(&self, text: &str) {
         for letter in text.chars() {

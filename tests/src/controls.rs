@@ -14,7 +14,7 @@ use crate::browser::Browser;
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// How long what is rendered or tracked on a busy machine may take to come.
-const LONG_PATIENCE: Duration = Duration::from_secs(300);
+const LONG_PATIENCE: Duration = Duration::from_secs(100);
 
 /// Lists the elements of the mirror.
 const LIST: &str = "return [...document.querySelectorAll('#sightline-mirror [data-node]')].map(e => { \

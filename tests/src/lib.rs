@@ -12,3 +12,4 @@ pub mod rrd;
 pub mod scenario;
 pub mod troubled;
 pub mod server;
+pub mod stopwatch;

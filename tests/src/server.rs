@@ -11,7 +11,7 @@ use axum::http::{HeaderMap, Method, Request, StatusCode, header};
 use serde_json::{Value, json};
 use sightline_core::sim::Scenario;
 use sightline_core::sim::scenario::{PlacedRock, RockShape};
-use sightline_core::traverse::{Traverse, create_simulated};
+use sightline_core::traverse::{Stop, Traverse, create_simulated};
 use sightline_server::app;
 use sightline_server::guard::Hosts;
 use sightline_server::state::AppState;
@@ -177,6 +177,25 @@ pub fn small_recording() -> TempDir {
     let recorded: String =
         text.lines().filter(|line| !line.starts_with("scenario")).map(|l| format!("{l}\n")).collect();
     std::fs::write(&index, recorded).expect("an index");
+    folder
+}
+
+/// A recording of so many stops: the rover drives to and fro over the small drive's stops, which lends its images.
+pub fn long_recording(stop_count: usize) -> TempDir {
+    let folder = small_recording();
+    let traverse = Traverse::open(folder.path()).expect("the small recording");
+    let mut index = traverse.index().clone();
+    let there = std::mem::take(&mut index.stops);
+    let there_and_back: Vec<&Stop> = there.iter().chain(there[1..there.len() - 1].iter().rev()).collect();
+    let stop_at = |step: usize| Stop {
+        time_s: 60.0 * step as f64,
+        ..there_and_back[step % there_and_back.len()].clone()
+    };
+    index.stops = (0..stop_count).map(stop_at).collect();
+    index.name = format!("to and fro, {stop_count} stops");
+    let text = serde_json::to_vec(&index).expect("an index");
+    std::fs::write(folder.path().join("traverse.json"), text).expect("an index");
+    std::fs::remove_file(folder.path().join("traverse.toml")).expect("the index before");
     folder
 }
 

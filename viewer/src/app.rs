@@ -70,6 +70,11 @@ impl SightlineApp {
         }
         self.state.tick(now);
         self.send();
+        self.ask_for_missing(now);
+    }
+
+    /// Asks for what the cursor's step needs and is not there.
+    fn ask_for_missing(&mut self, now: f64) {
         if matches!(self.state.connection, Connection::Gone { .. }) {
             return;
         }
@@ -107,7 +112,7 @@ impl SightlineApp {
 
     /// Lays everything out and gathers what was asked for.
     fn lay_out(&mut self, ui: &mut Ui) -> Vec<Command> {
-        let mut out = keys::commands(ui.ctx(), &self.state);
+        let mut out = Vec::new();
         let state = &self.state;
         let bar = Frame::new().fill(theme::bar()).inner_margin(Margin::symmetric(10, 3));
         let top = Panel::top("top").exact_size(34.0).frame(bar).show(ui, |ui| {
@@ -158,18 +163,40 @@ impl SightlineApp {
         out
     }
 
-    /// Carries out what was asked for.
-    fn carry_out(&mut self, context: &Context, commands: Vec<Command>) {
+    /// Takes the keys in. Steps are taken at once, so that the frame of the key shows where they lead; the rest, which
+    /// follows what the page shows, is returned.
+    fn take_keys(&mut self, context: &Context) -> Vec<Command> {
+        let mut at_once = keys::commands(context, &self.state);
+        let first_other = at_once.iter().position(|command| !command.is_step()).unwrap_or(at_once.len());
+        let later = at_once.split_off(first_other);
+        if !at_once.is_empty() {
+            self.carry_out(at_once);
+            self.ask_for_missing(context.input(|input| input.time));
+        }
+        later
+    }
+
+    /// Carries out what was asked for of the page, and then of the state.
+    fn follow(&mut self, context: &Context, commands: Vec<Command>) {
         if commands.is_empty() {
             return;
         }
-        for command in commands {
-            match &command {
+        for command in &commands {
+            match command {
                 Command::Layout(command) => self.workspace.apply(*command),
                 Command::CopyLink => self.copy_link(context),
                 Command::SetLooks(looks) => theme::apply(context, *looks),
                 _ => {}
             }
+        }
+        self.carry_out(commands);
+        // What was asked for shows in the next frame, which otherwise only comes with the next event.
+        context.request_repaint();
+    }
+
+    /// Carries out what was asked for of the state.
+    fn carry_out(&mut self, commands: Vec<Command>) {
+        for command in commands {
             self.state.apply(command);
         }
         if std::mem::take(&mut self.state.why.is_called) {
@@ -179,8 +206,6 @@ impl SightlineApp {
             self.workspace.apply(LayoutCommand::Show(Pane::Breakpoints));
         }
         self.send();
-        // What was asked for shows in the next frame, which otherwise only comes with the next event.
-        context.request_repaint();
     }
 
     /// Takes a picture of the panel that was asked for.
@@ -246,9 +271,10 @@ impl eframe::App for SightlineApp {
 
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
         keys::leave_clicked(ui.ctx());
-        let commands = self.lay_out(ui);
         let context = ui.ctx().clone();
-        self.carry_out(&context, commands);
+        let mut commands = self.take_keys(&context);
+        commands.extend(self.lay_out(ui));
+        self.follow(&context, commands);
         if let Some(url) = self.state.open_url.take() {
             context.open_url(egui::OpenUrl::new_tab(url));
         }

@@ -11,7 +11,7 @@ use crate::shape_view::ShapeView;
 use crate::state::calculator::Calculator;
 use crate::state::studies::Order;
 use crate::state::why::Ask;
-use crate::state::{exports, notes};
+use crate::state::{self, exports, notes};
 use crate::stretch::Stretch;
 use crate::tables::FeatureView;
 use crate::theme::Looks;
@@ -220,4 +220,16 @@ pub enum Command {
     Exports(exports::Ask),
     /// Breakpoints, derived columns and time travel.
     Ask(crate::state::ask::Ask),
+}
+
+impl Command {
+    /// Whether it does nothing but lead to another step or stage.
+    pub fn is_step(&self) -> bool {
+        matches!(
+            self,
+            Command::Go(_)
+                | Command::SelectStage(_)
+                | Command::Ask(state::ask::Ask::NextHit | state::ask::Ask::PreviousHit)
+        )
+    }
 }

@@ -13,6 +13,7 @@
 //! | `panels` | one file a panel: read-only data in, commands out |
 //! | `layout` | where the panels are |
 //! | `view2d`, `overlay`, `ellipse`, `contour` | the zoomable canvas and the marks on it |
+//! | `thin` | what of a long drive is drawn |
 //! | `as_text` | any action as `curl` and as a command |
 //! | `markdown`, `picture` | notes as text with emphasis; a panel as a PNG file |
 //! | `theme` | colours, text styles and spacing, and nowhere else |
@@ -48,6 +49,7 @@ pub mod status;
 pub mod aim;
 pub mod tour;
 pub mod as_text;
+pub mod thin;
 pub mod markdown;
 pub mod picture;
 #[cfg(target_arch = "wasm32")]

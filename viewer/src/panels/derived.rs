@@ -10,7 +10,7 @@ use crate::panels::digits;
 use crate::state::State;
 use crate::state::ask::Ask;
 use crate::state::ask::derived::Derived;
-use crate::theme;
+use crate::{theme, thin};
 
 /// The most points that are drawn of a line: what a wide screen can tell apart, twice.
 const POINTS: usize = 4000;
@@ -39,7 +39,7 @@ pub fn show(ui: &mut Ui, state: &State, at: usize, height: f32, is_last: bool, o
         );
         for piece in of_run.map(points).unwrap_or_default() {
             plot.line(Line::new("", piece.clone()).color(colour).width(1.5).allow_hover(false));
-            plot.points(Points::new("", piece).color(colour).radius(2.5));
+            plot.points(Points::new("", thin::marks(piece)).color(colour).radius(2.5));
         }
         plot.pointer_coordinate()
     });

@@ -15,7 +15,7 @@ use crate::overlay::{self, Mark};
 use crate::state::State;
 use crate::state::compare::Other;
 use crate::state::tracker::confidence_of;
-use crate::{panels, theme};
+use crate::{panels, theme, thin};
 
 /// What the panel is for.
 const PURPOSE: &str = "Scores or confidence, and errors of the run, step by step.";
@@ -258,7 +258,9 @@ fn paint_series(plot: &mut PlotUi<'_>, run: &RunView, line: &Series) {
     let points: Vec<Option<[f64; 2]>> = run.rows.iter().map(point).collect();
     for piece in pieces(&points) {
         plot.line(Line::new(line.name, piece.clone()).color(line.colour).width(1.5).allow_hover(false));
-        plot.points(Points::new(line.name, piece).color(line.colour).radius(2.5).shape(line.shape));
+        plot.points(
+            Points::new(line.name, thin::marks(piece)).color(line.colour).radius(2.5).shape(line.shape),
+        );
     }
 }
 
@@ -275,7 +277,7 @@ fn paint_other(plot: &mut PlotUi<'_>, state: &State, run: &RunView, other: &Othe
         let style = if is_main { LineStyle::Solid } else { LineStyle::dashed_loose() };
         plot.line(Line::new("", piece.clone()).color(colour).style(style).width(1.5).allow_hover(false));
         if is_main {
-            let points = Points::new(name.clone(), piece).color(colour).radius(3.0);
+            let points = Points::new(name.clone(), thin::marks(piece)).color(colour).radius(3.0);
             plot.points(points.shape(super::uncertainty::shape(other.look.mark)));
         }
     }
@@ -297,10 +299,11 @@ pub(super) fn plain(mark: GridMark, _: &std::ops::RangeInclusive<f64>) -> String
     format!("{}", (mark.value * 1e6).round() / 1e6)
 }
 
-/// The runs of consecutive points.
+/// The runs of consecutive points, each no longer than its curve needs.
 pub(super) fn pieces(points: &[Option<[f64; 2]>]) -> Vec<Vec<[f64; 2]>> {
     let runs = points.split(Option::is_none);
-    runs.filter(|run| !run.is_empty()).map(|run| run.iter().copied().flatten().collect()).collect()
+    let pieces = runs.filter(|run| !run.is_empty()).map(|run| run.iter().copied().flatten().collect());
+    pieces.map(thin::curve).collect()
 }
 
 #[cfg(test)]

@@ -3,11 +3,11 @@
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui, vec2};
 use sightline_core::session::view::{RunView, TargetView};
 
-use super::run_tree;
+use super::{run_tree, timeline};
 use crate::command::{Command, Mode};
 use crate::overlay::{Mark, paint_mark};
 use crate::state::why::Ask;
-use crate::state::{State, run_letter, state_of_word};
+use crate::state::{State, run_letter};
 use crate::{panels, theme};
 
 /// What the panel is for.
@@ -117,7 +117,7 @@ fn card_of(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: 
         }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| how_far(ui, state, target, run, out));
     });
-    sparkline(ui, run, state.stop_count());
+    sparkline(ui, target, run, state.stop_count());
     if let Some(fork) = run.fork {
         ui.label(theme::note(format!("from run {} at step {}", run_letter(fork.run), fork.from_step)));
     }
@@ -163,19 +163,10 @@ fn how_far(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: 
     }
 }
 
-/// The states of a run, one thin cell a step.
-fn sparkline(ui: &mut Ui, run: &RunView, stop_count: usize) {
+/// The states of a run as a thin band.
+fn sparkline(ui: &mut Ui, target: &TargetView, run: &RunView, stop_count: usize) {
     let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), 5.0), Sense::hover());
-    let width = rect.width() / stop_count.max(1) as f32;
-    ui.painter().rect_filled(rect, 1.0, theme::before());
-    for row in &run.rows {
-        let state = state_of_word(&row.state);
-        let left = rect.left() + width * row.step as f32;
-        // What is not well is lower, so that the shape tells it too.
-        let top = if state.is_lost() { rect.top() + 2.5 } else { rect.top() };
-        let cell = egui::Rect::from_min_max(egui::pos2(left, top), egui::pos2(left + width, rect.bottom()));
-        ui.painter().rect_filled(cell, 0.0, theme::state(state));
-    }
+    timeline::thin_band(ui.painter(), rect, target, run, stop_count);
 }
 
 fn summary(run: &RunView) -> String {

@@ -14,7 +14,7 @@ use super::plots::{few_marks, over_steps, pieces, plain};
 use crate::command::{Command, Go};
 use crate::overlay::{self, Mark};
 use crate::state::State;
-use crate::{panels, theme};
+use crate::{panels, theme, thin};
 
 /// What the panel is for.
 const PURPOSE: &str = "Criteria 3 and 4: each correction against its tolerance, step by step.";
@@ -58,6 +58,9 @@ impl Criterion {
         run.rows.iter().filter_map(fires).collect()
     }
 }
+
+/// The most firings that are marked: more would cover the plot.
+const FIRED: usize = 100;
 
 /// Shows both criteria, one below the other over the same steps.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
@@ -162,9 +165,9 @@ fn paint(plot: &mut PlotUi<'_>, run: &RunView, criterion: &Criterion) {
     for piece in line(criterion.value_m) {
         let colour = theme::run(run.number);
         plot.line(Line::new("", piece.clone()).color(colour).width(1.5));
-        plot.points(Points::new("", piece).color(colour).radius(2.5).shape(MarkerShape::Circle));
+        plot.points(Points::new("", thin::marks(piece)).color(colour).radius(2.5).shape(MarkerShape::Circle));
     }
-    for [step, value_cm] in criterion.fired(run) {
+    for &[step, value_cm] in thin::evenly(&criterion.fired(run), FIRED) {
         let mark = Points::new("", [step, value_cm]).color(theme::failed()).radius(6.0);
         plot.points(mark.shape(MarkerShape::Cross));
         let word = Text::new("", PlotPoint::new(step, value_cm), theme::note("fired").color(theme::failed()));

@@ -13,7 +13,7 @@ use crate::overlay::{self, Mark};
 use crate::panels;
 use crate::state::State;
 use crate::state::compare::Look;
-use crate::theme;
+use crate::{theme, thin};
 
 /// What the panel is for.
 const PURPOSE: &str = "Whether errors are as large as the covariances say.";
@@ -163,8 +163,9 @@ fn plot(
 }
 
 fn series(plot: &mut PlotUi<'_>, points: Vec<[f64; 2]>, look: Look) {
+    let points = thin::curve(points);
     plot.line(Line::new("", points.clone()).color(look.colour).width(1.5).allow_hover(false));
-    plot.points(Points::new("", points).color(look.colour).radius(3.0).shape(shape(look.mark)));
+    plot.points(Points::new("", thin::marks(points)).color(look.colour).radius(3.0).shape(shape(look.mark)));
 }
 
 /// The plotted shape of a run's mark.

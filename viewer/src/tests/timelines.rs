@@ -6,6 +6,7 @@ use egui_kittest::kittest::Queryable;
 use super::ask::breakpoint;
 use super::{Shown, fixture};
 use crate::command::{Command, Go};
+use crate::layout::Pane;
 use crate::panels::timeline;
 use crate::state::State;
 use crate::state::ask::Ask;
@@ -130,4 +131,24 @@ fn every_run_of_the_target_has_a_band_and_other_targets_have_one_when_they_are_a
         .extend((5..200).map(|number| sightline_core::session::view::RunView { number, ..run.clone() }));
     many.cursor.run = 150;
     assert!(timeline::height(&many) < 180.0, "no more bands than fit");
+}
+
+#[test]
+fn ten_thousand_steps_cost_every_panel_hardly_more_than_a_thousand() {
+    let vertices = |pane: Pane, steps: usize| {
+        let shown = Shown::pane(pane, move |_| long(steps, steps.div_ceil(60)));
+        let shapes = shown.harness.output().shapes.clone();
+        let count = |clipped: &egui::ClippedPrimitive| match &clipped.primitive {
+            egui::epaint::Primitive::Mesh(mesh) => mesh.vertices.len(),
+            egui::epaint::Primitive::Callback(_) => 0,
+        };
+        shown.harness.ctx.tessellate(shapes, 1.0).iter().map(count).sum::<usize>()
+    };
+    for pane in Pane::ALL {
+        let [short, longer] = [1_000, 10_000].map(|steps| vertices(pane, steps));
+        println!("{pane:?}: {short} vertices for 1,000 steps, {longer} for 10,000");
+        // A curve of a thousand steps is drawn whole, a longer one by four points in each of 600 columns.
+        assert!(longer < 3 * short + 20_000, "{pane:?}: {longer} for 10,000 steps, {short} for 1,000");
+        assert!(longer < 250_000, "{pane:?}: {longer}");
+    }
 }

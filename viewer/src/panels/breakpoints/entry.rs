@@ -53,9 +53,9 @@ pub(super) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     if is_entered && had_focus && shown.accepted.is_none() {
         // What cannot be set is to be mended, not left.
         if Expression::condition(&text).is_err() {
-            response.request_focus()
+            response.request_focus();
         } else {
-            response.surrender_focus()
+            response.surrender_focus();
         }
         out.push(Command::Ask(Ask::Set));
     }

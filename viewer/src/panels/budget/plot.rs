@@ -13,7 +13,7 @@ use crate::overlay::{self, Mark};
 use crate::panels::names;
 use crate::panels::plots::{few_marks, plain};
 use crate::state::{State, run_letter};
-use crate::theme;
+use crate::{theme, thin};
 
 /// Height of the plot, points.
 const HEIGHT: f32 = 190.0;
@@ -108,7 +108,8 @@ fn sentence(curves: &Curves) -> String {
 
 fn of_run(run: &RunView) -> Curves {
     let column = |of: fn(&StepRow) -> Option<f64>| -> Vec<[f64; 2]> {
-        run.rows.iter().filter_map(|row| Some([row.range_m?, of(row)?])).collect()
+        let rows = thin::evenly(&run.rows, thin::PLACES);
+        rows.filter_map(|row| Some([row.range_m?, of(row)?])).collect()
     };
     Curves {
         without: column(|row| row.budget_without_m),

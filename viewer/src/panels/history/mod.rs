@@ -17,7 +17,7 @@ use crate::cache::Slot;
 use crate::command::{Command, Go};
 use crate::raster::Raster;
 use crate::state::State;
-use crate::{panels, theme, view2d};
+use crate::{panels, theme, thin, view2d};
 
 /// What the panel is for.
 const PURPOSE: &str = "Every step’s matched window, and how today’s view compares with them.";
@@ -54,7 +54,7 @@ fn strip(ui: &mut Ui, state: &State, run: &RunView, out: &mut Vec<Command>) {
         let width = side.max(FRAME);
         ui.horizontal_top(|ui| {
             ui.spacing_mut().item_spacing.x = 5.0;
-            for row in &run.rows {
+            for row in state.near_rows(run) {
                 let size = vec2(width, side + WORDS.0 + WORDS.1);
                 let (place, response) = ui.allocate_exact_size(size, Sense::click());
                 let window = Rect::from_min_size(
@@ -129,7 +129,12 @@ fn state_is_lost(row: &StepRow) -> bool {
 fn comparisons(ui: &mut Ui, state: &State, run: &RunView) {
     let all = compare_all(state, run);
     let known: Vec<&Comparison> = all.iter().flatten().collect();
-    ui.add(egui::Label::new(theme::note(sentence(state, &all, &known))).truncate());
+    let mut words = sentence(state, &all, &known);
+    let shown = state.near_rows(run).count();
+    if shown < run.rows.len() {
+        words += &format!("; of {} windows the pick and {} near it", run.rows.len(), shown - 1);
+    }
+    ui.add(egui::Label::new(theme::note(words)).truncate());
     let size = vec2((ui.available_width() - 6.0) / 2.0, ui.available_height());
     let colour = theme::run(run.number);
     ui.horizontal_top(|ui| {
@@ -162,12 +167,13 @@ fn sentence(state: &State, all: &[Option<Comparison>], known: &[&Comparison]) ->
 
 /// One entry for every earlier window; none where it, or what leads from it to now, is not loaded.
 fn compare_all(state: &State, run: &RunView) -> Vec<Option<Comparison>> {
-    let here = run.rows.iter().find(|row| row.step == state.cursor.step && row.ncc.is_some());
+    let here = state.row().filter(|row| row.ncc.is_some());
     let Some(here) = here else { return Vec::new() };
     let window =
         |row: &StepRow| -> Option<&Raster> { state.cache.raster(&state.window_key(run, row)?).ready() };
     let now = window(here);
-    let earlier = run.rows.iter().filter(|row| row.step < here.step && state.window_key(run, row).is_some());
+    let earlier =
+        state.near_rows(run).filter(|row| row.step < here.step && state.window_key(run, row).is_some());
     let compare = |row: &StepRow| {
         let now_from_then = drift::now_from_then(state, run, row.step, here.step)?;
         drift::compare(row.step, &window(row)?.values, &now?.values, &now_from_then)
@@ -207,7 +213,9 @@ fn chart(
         plot.show(ui, |plot| {
             for piece in pieces(points) {
                 plot.line(Line::new("", piece.clone()).color(colour).width(1.5));
-                plot.points(Points::new("", piece).color(colour).radius(2.5).shape(MarkerShape::Circle));
+                plot.points(
+                    Points::new("", thin::marks(piece)).color(colour).radius(2.5).shape(MarkerShape::Circle),
+                );
             }
         });
     });

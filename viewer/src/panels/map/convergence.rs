@@ -10,12 +10,13 @@ use nalgebra::Matrix2;
 use sightline_core::frames::Point3;
 use sightline_core::session::view::RunView;
 use sightline_core::session::wire::StopView;
+use sightline_core::trace::StepRow;
 
 use super::{in_site, on_map, truth_in_site};
 use crate::panels::uncertainty::shape;
 use crate::state::State;
 use crate::state::compare::{Look, Other};
-use crate::{ellipse, theme};
+use crate::{ellipse, theme, thin};
 
 /// The view reaches at least this far to either side, cm: no smaller error is worth magnifying.
 const LEAST_HALF_CM: f64 = 0.5;
@@ -30,20 +31,22 @@ pub(super) struct Position {
     pub from_above: Option<Matrix2<f64>>,
 }
 
-/// The positions of a run, step by step.
+/// The positions of a run, step by step; of a long one as many as a map shows.
 pub(super) fn positions(run: &RunView, stops: &[StopView]) -> Vec<Position> {
-    let of_row = |row: &sightline_core::trace::StepRow| {
-        let site_from_rover = stops.get(row.step)?.site_from_rover.to_pose();
-        let rotation = *site_from_rover.rotation.to_rotation_matrix().matrix();
-        let in_site = rotation * row.covariance_in_rover * rotation.transpose();
-        let from_above = Matrix2::new(in_site[(1, 1)], in_site[(1, 0)], in_site[(0, 1)], in_site[(0, 0)]);
-        Some(Position {
-            step: row.step,
-            point_in_site: site_from_rover * Point3::from(row.position_in_rover),
-            from_above: from_above.iter().all(|v| v.is_finite()).then_some(from_above),
-        })
-    };
-    run.rows.iter().filter_map(of_row).collect()
+    thin::evenly(&run.rows, thin::PLACES).filter_map(|row| position(row, stops)).collect()
+}
+
+/// Where a step placed the target.
+fn position(row: &StepRow, stops: &[StopView]) -> Option<Position> {
+    let site_from_rover = stops.get(row.step)?.site_from_rover.to_pose();
+    let rotation = *site_from_rover.rotation.to_rotation_matrix().matrix();
+    let in_site = rotation * row.covariance_in_rover * rotation.transpose();
+    let from_above = Matrix2::new(in_site[(1, 1)], in_site[(1, 0)], in_site[(0, 1)], in_site[(0, 0)]);
+    Some(Position {
+        step: row.step,
+        point_in_site: site_from_rover * Point3::from(row.position_in_rover),
+        from_above: from_above.iter().all(|v| v.is_finite()).then_some(from_above),
+    })
 }
 
 /// Shows the target's neighbourhood.
@@ -51,8 +54,12 @@ pub(super) fn show(ui: &mut Ui, state: &State, stops: &[StopView], run: &RunView
     let positions = positions(run, stops);
     let Some(last) = positions.last() else { return };
     let origin = on_map(&last.point_in_site);
-    let here = positions.iter().find(|at| at.step == state.cursor.step);
-    ui.add(egui::Label::new(theme::note(sentence(&positions, here))).truncate());
+    let here = state.row().and_then(|row| position(row, stops));
+    let mut words = sentence(&positions, here.as_ref());
+    if let Some(thinned) = thin::words(run.rows.len(), thin::PLACES) {
+        words += &format!("; {thinned}");
+    }
+    ui.add(egui::Label::new(theme::note(words)).truncate());
     let plot = Plot::new(("convergence", run.number, positions.len()))
         .data_aspect(1.0)
         .include_x(-LEAST_HALF_CM)
@@ -63,7 +70,7 @@ pub(super) fn show(ui: &mut Ui, state: &State, stops: &[StopView], run: &RunView
         .x_axis_label(theme::note("east of the last position, cm"))
         .y_axis_label(theme::note("north, cm"));
     let plot = in_site(plot, |at| format!("E {:+.1}  N {:+.1} cm", at.x, at.y));
-    plot.show(ui, |plot| paint(plot, state, run, &positions, origin));
+    plot.show(ui, |plot| paint(plot, state, (run, &positions, here.as_ref()), origin));
 }
 
 /// Where the bootstrap of the cursor's step puts the target, in the site frame.
@@ -89,7 +96,10 @@ fn long_axis_cm(at: &Position) -> Option<f64> {
     Some(300.0 * long.norm())
 }
 
-fn paint(plot: &mut PlotUi<'_>, state: &State, run: &RunView, positions: &[Position], origin: [f64; 2]) {
+/// A run's positions and the cursor's.
+type Shown<'a> = (&'a RunView, &'a [Position], Option<&'a Position>);
+
+fn paint(plot: &mut PlotUi<'_>, state: &State, (run, positions, here): Shown<'_>, origin: [f64; 2]) {
     let colour = theme::run(run.number);
     let place = |point: &Point3| {
         let [east, north] = on_map(point);
@@ -98,18 +108,20 @@ fn paint(plot: &mut PlotUi<'_>, state: &State, run: &RunView, positions: &[Posit
     let cloud = cloud_in_site(state).map(|point| place(&point)).collect::<Vec<_>>();
     plot.points(Points::new("", cloud).color(colour).radius(1.0).allow_hover(false));
     let trail: Vec<[f64; 2]> = positions.iter().map(|at| place(&at.point_in_site)).collect();
-    plot.line(Line::new("", trail.clone()).color(colour.gamma_multiply(0.6)).width(1.0));
-    plot.points(Points::new("", trail).color(colour).radius(2.0).shape(MarkerShape::Diamond));
-    let count = positions.len().max(2) as f32 - 1.0;
-    for (i, at) in positions.iter().enumerate() {
-        let is_here = at.step == state.cursor.step;
+    for piece in thin::path(&trail) {
+        plot.line(Line::new("", piece).color(colour.gamma_multiply(0.6)).width(1.0));
+    }
+    plot.points(Points::new("", thin::marks(trail)).color(colour).radius(2.0).shape(MarkerShape::Diamond));
+    let count = positions.len().clamp(2, thin::ELLIPSES) as f32 - 1.0;
+    for (i, at) in thin::evenly(positions, thin::ELLIPSES).enumerate() {
         // Later ellipses are stronger; the cursor's is the thick one.
         let strength = 0.4 + 0.6 * i as f32 / count;
-        let (tint, width) =
-            if is_here { (theme::accent(), 2.5) } else { (colour.gamma_multiply(strength), 1.0) };
-        outline(plot, at, place(&at.point_in_site), tint, width);
+        if here.is_none_or(|here| here.step != at.step) {
+            outline(plot, at, place(&at.point_in_site), colour.gamma_multiply(strength), 1.0);
+        }
     }
-    if let Some(here) = positions.iter().find(|at| at.step == state.cursor.step) {
+    if let Some(here) = here {
+        outline(plot, here, place(&here.point_in_site), theme::accent(), 2.5);
         let [east, north] = place(&here.point_in_site);
         plot.points(
             Points::new("", [east, north]).color(theme::accent()).radius(5.0).shape(MarkerShape::Diamond),
@@ -134,8 +146,10 @@ fn positions_of(other: &Other<'_>, state: &State) -> Vec<Position> {
 /// The trail of a compared run with its last ellipse.
 fn paint_other(plot: &mut PlotUi<'_>, all: &[Position], look: Look, place: impl Fn(&Point3) -> [f64; 2]) {
     let trail: Vec<[f64; 2]> = all.iter().map(|at| place(&at.point_in_site)).collect();
-    plot.line(Line::new("", trail.clone()).color(look.colour.gamma_multiply(0.6)).width(1.0));
-    plot.points(Points::new("", trail).color(look.colour).radius(2.5).shape(shape(look.mark)));
+    for piece in thin::path(&trail) {
+        plot.line(Line::new("", piece).color(look.colour.gamma_multiply(0.6)).width(1.0));
+    }
+    plot.points(Points::new("", thin::marks(trail)).color(look.colour).radius(2.5).shape(shape(look.mark)));
     if let Some(last) = all.last() {
         outline(plot, last, place(&last.point_in_site), look.colour, 1.5);
     }

@@ -16,7 +16,7 @@ use super::plots::{few_marks, plain};
 use crate::command::{Command, Go};
 use crate::overlay::{self, Mark};
 use crate::state::{State, run_letter};
-use crate::{panels, theme};
+use crate::{panels, theme, thin};
 
 /// What the panel is for.
 const PURPOSE: &str = "The rover’s path and the target, seen from above.";
@@ -144,20 +144,25 @@ fn names_of(state: &State, stops: &[StopView]) -> Vec<(Mark, Color32, String)> {
 }
 
 fn poses<'a>(stops: &'a [StopView], of: impl Fn(&StopView) -> Option<PoseRecord> + 'a) -> Vec<[f64; 2]> {
-    stops.iter().filter_map(of).map(|pose| on_map(&Point3::from(pose.position_m))).collect()
+    let shown = thin::evenly(stops, thin::PLACES);
+    shown.filter_map(of).map(|pose| on_map(&Point3::from(pose.position_m))).collect()
 }
 
 fn paint_paths(plot: &mut PlotUi<'_>, stops: &[StopView], step: usize) {
     let truth = poses(stops, |stop| stop.true_site_from_rover);
-    if !truth.is_empty() {
-        plot.line(
-            Line::new("true path", truth).color(theme::truth()).style(LineStyle::dotted_loose()).width(1.5),
-        );
+    for piece in thin::path(&truth) {
+        let line = Line::new("true path", piece).color(theme::truth());
+        plot.line(line.style(LineStyle::dotted_loose()).width(1.5));
     }
     let estimated = poses(stops, |stop| Some(stop.site_from_rover));
-    plot.line(Line::new("estimated path", estimated.clone()).color(theme::weak()).width(1.5));
+    for piece in thin::path(&estimated) {
+        plot.line(Line::new("estimated path", piece).color(theme::weak()).width(1.5));
+    }
     plot.points(
-        Points::new("estimated path", estimated).color(theme::weak()).radius(2.0).shape(MarkerShape::Circle),
+        Points::new("estimated path", thin::marks(estimated))
+            .color(theme::weak())
+            .radius(2.0)
+            .shape(MarkerShape::Circle),
     );
     if let Some(stop) = stops.get(step) {
         paint_rover(plot, &stop.site_from_rover.to_pose(), stops);
@@ -187,8 +192,10 @@ fn span_m(stops: &[StopView]) -> f64 {
 fn paint_trail(plot: &mut PlotUi<'_>, stops: &[StopView], run: &RunView, colour: Color32) {
     let trail: Vec<[f64; 2]> =
         convergence::positions(run, stops).iter().map(|at| on_map(&at.point_in_site)).collect();
-    plot.line(Line::new("", trail.clone()).color(colour).width(1.0));
-    plot.points(Points::new("", trail).color(colour).radius(2.5).shape(MarkerShape::Diamond));
+    for piece in thin::path(&trail) {
+        plot.line(Line::new("", piece).color(colour).width(1.0));
+    }
+    plot.points(Points::new("", thin::marks(trail)).color(colour).radius(2.5).shape(MarkerShape::Diamond));
 }
 
 /// The true position, carried by the true pose, and the estimate's distance from it in the site frame, m.

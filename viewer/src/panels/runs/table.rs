@@ -1,6 +1,6 @@
 //! The table of runs: one row a run, sorted by any metric, with a baseline and a filter.
 
-use egui::{Button, Grid, Link, RichText, Sense, Ui, pos2, vec2};
+use egui::{Button, Grid, Link, RichText, Sense, Ui, vec2};
 use serde_json::Value;
 use sightline_core::session::compare::RunName;
 use sightline_core::session::metrics::Metric;
@@ -12,8 +12,9 @@ use crate::compare::{Ask, Sort};
 use crate::panels::compare::{chip, mark};
 use crate::panels::digits;
 use crate::panels::targets::run_mark;
+use crate::panels::timeline;
 use crate::state::compare::Look;
-use crate::state::{State, run_letter, state_of_word};
+use crate::state::{State, run_letter};
 use crate::theme;
 
 /// The metrics of the table with their headings, and whether more is better.
@@ -186,23 +187,17 @@ fn look(state: &State, name: RunName) -> Look {
     compared.unwrap_or(Look { colour: theme::run(name.run), mark: run_mark(name.run) })
 }
 
-/// The states of a run, one thin cell a step.
+/// The states of a run as a thin band.
 fn states(ui: &mut Ui, row: &Row<'_>, stop_count: usize) {
     let (rect, response) = ui.allocate_exact_size(vec2(90.0, 12.0), Sense::hover());
-    let width = rect.width() / stop_count.max(1) as f32;
-    ui.painter().rect_filled(rect, 1.0, theme::before());
-    for line in &row.run.rows {
-        let state = state_of_word(&line.state);
-        let left = rect.left() + width * line.step as f32;
-        // What is not well is lower, so that the shape tells it too.
-        let top = if state.is_lost() { rect.center().y } else { rect.top() };
-        let cell = egui::Rect::from_min_max(pos2(left, top), pos2(left + width, rect.bottom()));
-        ui.painter().rect_filled(cell, 0.0, theme::state(state));
-    }
+    timeline::thin_band(ui.painter(), rect, row.target, row.run, stop_count);
     let words = in_words(row.run);
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, format!("states: {words}")));
     response.on_hover_text(words);
 }
+
+/// The most changes of state that are said one by one.
+const CHANGES_SAID: usize = 12;
 
 /// The states of a run in words.
 fn in_words(run: &RunView) -> String {
@@ -216,7 +211,11 @@ fn in_words(run: &RunView) -> String {
     let piece = |(first, last, state): &(usize, usize, &str)| {
         if first == last { format!("{state} {first}") } else { format!("{state} {first} to {last}") }
     };
-    pieces.iter().map(piece).collect::<Vec<_>>().join(", ")
+    let mut words = pieces.iter().take(CHANGES_SAID).map(piece).collect::<Vec<_>>().join(", ");
+    if let Some(more) = pieces.len().checked_sub(CHANGES_SAID).filter(|more| *more > 0) {
+        words += &format!(" and {more} more changes");
+    }
+    words
 }
 
 /// A metric: a link to its worst step, with its difference to the baseline.

@@ -168,6 +168,23 @@ fn paint_spans(painter: &Painter, spans: &[Span], band: Rect, scale: &Scale) {
     }
 }
 
+/// The states of a run as a band too thin for patterns; what is not well is lower, so that the shape tells it too.
+pub fn thin_band(painter: &Painter, band: Rect, target: &TargetView, run: &RunView, stop_count: usize) {
+    painter.rect_filled(band, 1.0, theme::before());
+    let scale = Scale::new(band.x_range(), stop_count);
+    for span in scale.spans(|step| cells::cell_of(target, Some(run), step)) {
+        let (colour, top) = match span.cell {
+            Cell::Before | Cell::Unknown => continue,
+            Cell::Tracking => (theme::tracking(), band.top()),
+            Cell::Lost => (theme::lost(), band.center().y),
+            Cell::Failed => (theme::failed(), band.center().y),
+            Cell::Fault => (theme::weak(), band.center().y),
+        };
+        let x = scale.left_of(span.from)..=scale.left_of(span.to);
+        painter.rect_filled(Rect::from_x_y_ranges(x, top..=band.bottom()), 0.0, colour);
+    }
+}
+
 /// The word of each stretch of equal cells at its beginning, where it fits.
 fn paint_words(painter: &Painter, spans: &[Span], band: Rect, scale: &Scale) {
     for span in spans {

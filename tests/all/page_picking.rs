@@ -1,0 +1,109 @@
+//! Picking a target in a real browser: the map of good and bad places, a refusal with its way out, the aim by keys; and
+//! the plain page of a step for whom the viewer cannot run.
+
+use sightline_core::frames::Pixel;
+use sightline_tests::bench::{Bench, place};
+use sightline_tests::browser::Browser;
+use sightline_tests::scenario::short_approach;
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_bad_place_is_refused_with_the_reason_and_the_nearest_good_one_is_taken() {
+    let bench = Bench::start(&short_approach()).await;
+    let browser = Browser::start().await;
+    bench.open(&browser).await;
+    browser.press("t").await;
+    browser.wait_status("pick mode", "s.pick_mode").await;
+    // The map comes by itself, with its legend in words.
+    browser.says("bad place, crossed").await;
+    browser.says("% good").await;
+    browser.shot("trackability").await;
+    // Over the sky it says why not, before anything is clicked; a click there is refused with the same reason.
+    let (x, y) = place(&browser, Pixel::new(250.0, 20.0)).await;
+    browser.point_at(x, y).await;
+    browser.says(": bad: ").await;
+    browser.shot("trackability-hover").await;
+    browser.click(x, y).await;
+    browser.control("button", "Take the nearest good pixel").await;
+    browser.wait_status("the refusal", "s.problem !== null && s.targets === 0").await;
+    browser.shot("refused").await;
+    browser.click_on("button", "Take the nearest good pixel").await;
+    browser
+        .wait_status(
+            "the target",
+            &format!("s.target === 0 && s.steps_done === {} && !s.running", bench.stop_count),
+        )
+        .await;
+    assert!(!browser.status().await["pick_mode"].as_bool().unwrap());
+
+    // A second one by keys alone: arrows move the aim from the middle, Enter takes it; a refusal offers, and Enter takes that.
+    browser.press("t").await;
+    browser.wait_status("pick mode", "s.pick_mode").await;
+    browser.says("% good").await;
+    for key in ["ArrowDown", "ArrowRight", "ArrowLeft"] {
+        browser.chord(&["Shift"], key).await;
+    }
+    browser.says("; at 256.0, 257.0").await;
+    browser.press("ArrowUp").await;
+    browser.says("; at 256.0, 256.9").await;
+    browser.press("Enter").await;
+    browser.wait_status("an answer", "!s.designating && (s.targets === 2 || s.problem !== null)").await;
+    if browser.status().await["targets"] != 2 {
+        browser.press("Enter").await;
+    }
+    browser.wait_status("the second target", "s.targets === 2 && s.target === 1").await;
+    // Esc leaves without a target.
+    browser.press("t").await;
+    browser.wait_status("pick mode", "s.pick_mode").await;
+    browser.press("Escape").await;
+    browser.wait_status("no pick mode", "!s.pick_mode && s.targets === 2").await;
+    // What was refused is no error of the page's.
+    let errors = browser.console_errors().await;
+    assert!(errors.iter().all(|error| error.contains("422")), "{errors:?}");
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn without_the_viewer_a_plain_page_of_the_same_step_is_offered() {
+    let bench = Bench::start(&short_approach()).await;
+    let browser = Browser::start().await;
+    bench.pick(&browser).await;
+    browser.press("End").await;
+    browser.wait_status("the last step", &format!("s.step === {} && s.shown", bench.stop_count - 1)).await;
+    // The viewer stops as it does at a fault in it: the page says so and leads on.
+    browser
+        .evaluate("window.dispatchEvent(new CustomEvent('sightline-panic', {detail: 'a test of the page'}))")
+        .await;
+    browser
+        .wait_for(
+            "the sentence",
+            "return document.getElementById('message-text').innerText.includes('stopped')",
+        )
+        .await;
+    browser.shot("stopped").await;
+    let link = browser.evaluate("return document.querySelector('#message-plain a').href").await;
+    assert!(link.as_str().unwrap().ends_with("/api/v1/sessions/s1/page"), "{link}");
+    browser.goto(link.as_str().unwrap()).await;
+    let told = browser.evaluate("return document.body.innerText").await;
+    let told = told.as_str().unwrap();
+    for words in ["tracking", "target 1"] {
+        assert!(told.contains(words), "the plain page does not say {words}: {told}");
+    }
+    let count = |what: &'static str| {
+        let browser = &browser;
+        async move {
+            browser
+                .evaluate(&format!("return document.querySelectorAll('{what}').length"))
+                .await
+                .as_u64()
+                .unwrap()
+        }
+    };
+    assert!(count("table").await >= 1 && count("h1").await == 1 && count("script").await == 0);
+    let described = browser
+        .evaluate("return [...document.images].every(i => i.alt.length > 10 && i.naturalWidth > 0)")
+        .await;
+    assert_eq!(described, true, "every image is there and described");
+    browser.shot("plain").await;
+    assert_eq!(browser.console_errors().await, Vec::<String>::new());
+    browser.close().await;
+}
