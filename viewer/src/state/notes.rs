@@ -4,7 +4,7 @@
 //! refusal of the server.
 
 use sightline_core::session::Cursor;
-use sightline_core::session::notes::{EditNote, NewNote, Note};
+use sightline_core::session::notes::{EditNote, NewNote, Note, Pin};
 
 use super::State;
 use crate::command::Stage;
@@ -46,7 +46,7 @@ pub struct Draft {
     /// The note that is changed, with the revision that was read; none for a new one.
     pub of: Option<(u64, u64)>,
     /// Where a new one is pinned.
-    pub pin: NewNote,
+    pub pin: Pin,
     /// Its words so far.
     pub text: String,
 }
@@ -77,7 +77,7 @@ impl State {
                 let note = self.note(id).cloned();
                 self.notes.draft = note.map(|note| Draft {
                     of: Some((note.id, note.revision)),
-                    pin: NewNote::default(),
+                    pin: note.pin,
                     text: note.text,
                 });
             }
@@ -153,12 +153,12 @@ impl State {
     /// A note could not be kept: its words come back.
     pub(super) fn note_refused(&mut self, request: &Request) {
         let draft = match request {
-            Request::NewNote { new, .. } => Draft { of: None, pin: new.clone(), text: new.text.clone() },
+            Request::NewNote { new, .. } => Draft { of: None, pin: new.pin.clone(), text: new.text.clone() },
             Request::EditNote { session, id, revision, edit: EditNote { text: Some(text), .. } } => {
                 self.outbox.push(Request::Notes(session.clone()));
                 // The next attempt is one against what the server has by then.
                 let revision = self.note(*id).map_or(*revision, |note| note.revision);
-                Draft { of: Some((*id, revision)), pin: NewNote::default(), text: text.clone() }
+                Draft { of: Some((*id, revision)), pin: Pin::default(), text: text.clone() }
             }
             Request::EditNote { session, .. } | Request::RemoveNote { session, .. } => {
                 self.notes.removed = None;
@@ -181,13 +181,12 @@ impl State {
         let target = target.filter(|_| self.run().is_some());
         let located =
             self.trace().and_then(|trace| trace.locate.as_ref()).and_then(|located| located.left_pixel);
-        let pin = NewNote {
+        let pin = Pin {
             target,
             run: if target.is_some() { run } else { 0 },
             step,
             stage: target.map(|_| self.stage().word().to_owned()),
             pixel: located.filter(|_| target.is_some()),
-            text: String::new(),
         };
         self.notes.draft = Some(Draft { of: None, pin, text: std::mem::take(&mut self.notes.kept) });
     }
@@ -206,7 +205,7 @@ impl State {
                 self.ask(|session| Request::EditNote { session, id, revision, edit });
             }
             None => {
-                let new = NewNote { text, ..pin };
+                let new = NewNote { pin, text };
                 self.ask(|session| Request::NewNote { session, new });
             }
         }

@@ -148,7 +148,8 @@ fn a_change_that_is_refused_says_so_in_the_card_and_loses_nothing() {
     let request = Request::Why(asked(&mut state).remove(0));
     let (code, title, detail) =
         ("setting".to_owned(), String::new(), "search_window_px must be odd".to_owned());
-    let problem = Problem { code, title, status: 422, detail, hint: None, nearest_pixel: None };
+    let problem =
+        Problem { code, title, status: 422, detail, hint: None, nearest_pixel: None, received: None };
     state.arrived(Arrived { request, outcome: Err(problem) }, 0.0);
     assert_eq!(state.trial().unwrap().refused.as_deref(), Some("search_window_px must be odd"));
     assert!(asked(&mut state).is_empty(), "it is not asked for again and again");

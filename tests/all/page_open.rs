@@ -1,0 +1,1 @@
+//! Opening in a real browser.
