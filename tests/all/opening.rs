@@ -12,6 +12,9 @@ fn other() -> Scenario {
     Scenario { name: "other drive".to_owned(), seed: 77, ..small_scenario() }
 }
 
+/// The code of a refusal, and what brings it about.
+type Change = (&'static str, fn(&mut Value));
+
 /// What the page sends of an exported file.
 fn brought(file: &Value) -> Value {
     serde_json::to_value(Opened::read(file).expect("a file of our own").reproduction).unwrap()
@@ -104,7 +107,7 @@ async fn a_session_that_names_what_cannot_be_is_refused_and_none_is_begun() {
     server.ended(&session, 0, 0).await;
     let path = format!("sessions/{session}/exports/reproduce.json");
     let good = brought(&server.get(&path).await.expect(200));
-    let changes: [(&str, fn(&mut Value)); 7] = [
+    let changes: [Change; 7] = [
         ("traverse", |v| {
             v["traverse"] = json!({ "id": "mars-1", "name": "Mars", "scenario_toml": null });
         }),

@@ -124,6 +124,7 @@ pub(crate) fn describe(request: &Request) -> (Method, String, Option<Vec<u8>>) {
             get(format!("sessions/{session}/exports{target}{run}"))
         }
         Request::Ask(asked) => super::ask::describe(asked),
+        Request::Files(asked) => super::files::describe(asked),
     }
 }
 
@@ -194,6 +195,7 @@ fn read(request: &Request, response: &ehttp::Response, context: &egui::Context) 
         Request::Metrics { .. } => Reply::Metrics(Box::new(parse(bytes)?)),
         Request::Trackability { .. } => Reply::Trackability(Box::new(parse(bytes)?)),
         Request::Ask(asked) => Reply::Ask(super::ask::read(asked, bytes)?),
+        Request::Files(asked) => Reply::Files(super::files::read(asked, bytes)?),
     })
 }
 
@@ -228,7 +230,7 @@ fn unreachable(why: &str) -> Problem {
     Problem::new(0, "unreachable", "no answer", format!("The server does not answer ({why})."))
 }
 
-pub(super) fn misread(why: &str) -> Problem {
+fn misread(why: &str) -> Problem {
     let hint = "Page and server may be of different versions: load the page again.".to_owned();
     let detail = format!("The server's answer cannot be read: {why}.");
     Problem { hint: Some(hint), ..Problem::new(500, "misread", "unreadable answer", detail) }

@@ -2,6 +2,7 @@
 
 pub mod bars;
 pub mod breakpoints;
+pub mod card;
 pub mod budget;
 pub mod compare;
 pub mod export;
@@ -21,6 +22,7 @@ pub mod messages;
 pub mod names;
 pub mod palette;
 pub mod notes;
+pub mod open;
 pub mod playing;
 pub mod plots;
 pub mod runs;

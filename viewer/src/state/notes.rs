@@ -7,6 +7,7 @@ use sightline_core::session::Cursor;
 use sightline_core::session::notes::{EditNote, NewNote, Note, Pin};
 
 use super::State;
+use super::undo::Deed;
 use crate::command::Stage;
 use crate::net::Request;
 
@@ -92,15 +93,10 @@ impl State {
                 self.notes.kept = draft.map(|draft| draft.text).unwrap_or_default();
             }
             Ask::Remove(id) => {
-                let Some(note) = self.note(id).cloned() else { return };
-                let revision = note.revision;
-                self.notes.removed = Some(note);
-                self.ask(|session| Request::RemoveNote { session, id, revision });
+                let request = self.removal_of_note(id);
+                self.outbox.extend(request);
             }
-            Ask::Restore(id) => {
-                self.notes.removed = None;
-                self.ask(|session| Request::RestoreNote { session, id });
-            }
+            Ask::Restore(id) => self.restore_note(id),
             Ask::Move { id, place } => {
                 let Some(revision) = self.note(id).map(|note| note.revision) else { return };
                 let edit = EditNote { text: None, place: Some(place) };
@@ -113,6 +109,36 @@ impl State {
                 }
             }
         }
+    }
+
+    /// What removes a note; none where there is no such one. It can be brought back in the panel, too.
+    pub(super) fn removal_of_note(&mut self, id: u64) -> Option<Request> {
+        let session = self.session.as_ref()?.id.clone();
+        let note = self.note(id)?.clone();
+        let revision = note.revision;
+        self.notes.removed = Some(note);
+        Some(Request::RemoveNote { session, id, revision })
+    }
+
+    /// Brings a removed note back; where its removal was the last deed, that is taking it back.
+    fn restore_note(&mut self, id: u64) {
+        if matches!(self.undo.ends().0, Some(Deed::RemovedNote { id: last, .. }) if *last == id) {
+            self.undo_last();
+            return;
+        }
+        self.notes.removed = None;
+        self.ask(|session| Request::RestoreNote { session, id });
+    }
+
+    /// Takes in that a note was removed: a deed, unless it does one again.
+    pub(super) fn removed_note(&mut self, request: &Request) {
+        let Request::RemoveNote { id, .. } = *request else { return };
+        if self.take_silent(request) {
+            return;
+        }
+        let removed = self.notes.removed.as_ref().filter(|note| note.id == id);
+        let step = removed.map_or(self.cursor.step, |note| note.pin.step);
+        self.did_remove(&format!("the note at step {step}"), Deed::RemovedNote { id, step });
     }
 
     /// The note of that number.
@@ -162,6 +188,7 @@ impl State {
             }
             Request::EditNote { session, .. } | Request::RemoveNote { session, .. } => {
                 self.notes.removed = None;
+                self.forget_refused(request);
                 self.outbox.push(Request::Notes(session.clone()));
                 return;
             }

@@ -1,4 +1,4 @@
-//! Why, what if, what would have saved it, and undo: what the panels show and what the state asks for.
+//! Why, what if, and what would have saved it: what the panels show and what the state asks for.
 
 use egui_kittest::kittest::Queryable;
 use serde_json::json;
@@ -20,7 +20,6 @@ use crate::layout::Pane;
 use crate::net::why::{WhyReply, WhyRequest};
 use crate::net::{Arrived, Reply, Request};
 use crate::state::State;
-use crate::state::undo::Deed;
 use crate::state::why::{Ask, Told};
 use crate::view2d::View2d;
 
@@ -357,58 +356,54 @@ fn w_asks_for_the_worst_criterion_first_and_numbers_elsewhere_lead_to_why() {
 }
 
 #[test]
-fn deeds_are_taken_back_and_done_again() {
-    let mut state = lost();
-    let ctrl = egui::Modifiers::CTRL;
-    assert_eq!(keys::command(egui::Key::Z, ctrl, &state), Some(Command::Why(Ask::Undo)));
-    assert_eq!(keys::command(egui::Key::Y, ctrl, &state), Some(Command::Why(Ask::Redo)));
-    // A removed target comes back, and its undoing is no deed of its own.
-    state.apply(Command::RemoveTarget(0));
-    let request =
-        state.take_requests().into_iter().find(|r| matches!(r, Request::RemoveTarget { .. })).unwrap();
-    state.arrived(Arrived { request, outcome: Ok(Reply::Done) }, 0.0);
-    assert_eq!(state.undo.ends().0, Some(&Deed::RemovedTarget { target: 0 }));
-    state.apply(Command::Why(Ask::Undo));
-    let restore = WhyRequest::RestoreTarget { session: "s1".to_owned(), target: 0 };
-    assert_eq!(asked(&mut state), vec![restore.clone()]);
-    let view = Box::new(state.session.clone().unwrap());
-    answer(&mut state, restore, WhyReply::Session(view));
-    assert_eq!(state.undo.ends(), (None, Some(&Deed::RemovedTarget { target: 0 })));
-    // The draft goes back value by value, a drag as one.
-    for value in [0.6, 0.5, 0.4] {
-        state.apply(Command::Draft { key: "ncc_min".to_owned(), value: Some(json!(value)) });
-    }
-    state.apply(Command::Draft { key: "roll".to_owned(), value: Some(json!(false)) });
-    state.apply(Command::Why(Ask::Undo));
-    assert_eq!(state.draft, Changes::from([("ncc_min".to_owned(), json!(0.4))]));
-    state.apply(Command::Why(Ask::Undo));
-    assert!(state.draft.is_empty());
-    state.apply(Command::Why(Ask::Redo));
-    assert_eq!(state.draft, Changes::from([("ncc_min".to_owned(), json!(0.4))]));
+fn the_tree_follows_the_cursor_and_nothing_of_another_step_stands_there_unlabelled() {
+    let mut state = fixture::with_history(&egui::Context::default(), LOST);
+    let at = |step: usize| StepKey { step, ..key() };
+    let explain = |step: usize| WhyRequest::Explain { of: at(step), value: "ncc".to_owned() };
+    state.apply(Command::Why(Ask::Value { step: LOST, value: "ncc".to_owned() }));
+    state.follow_why();
+    assert_eq!(asked(&mut state), vec![explain(LOST)]);
+    // While the answer is under way the cursor runs ahead, and only where it rests is asked.
+    state.apply(Command::Go(Go::By(-1)));
+    state.follow_why();
+    state.apply(Command::Go(Go::By(-1)));
+    state.follow_why();
+    assert!(asked(&mut state).is_empty());
+    let empty = Explanation {
+        step: LOST,
+        sentence: String::new(),
+        gates: Vec::new(),
+        values: Vec::new(),
+        tree: None,
+    };
+    answer(&mut state, explain(LOST), WhyReply::Explanation(Box::new(empty.clone())));
+    state.follow_why();
+    assert_eq!(asked(&mut state), vec![explain(1)]);
+    let (shown, value, told) = state.explained().unwrap();
+    assert_eq!((shown, value, told), (&at(1), "ncc", &Told::Waiting), "the old tree is gone at once");
+    answer(&mut state, explain(1), WhyReply::Explanation(Box::new(empty)));
+    // A value of an earlier step can be looked into from here.
+    state.apply(Command::Why(Ask::Value { step: 0, value: "position".to_owned() }));
+    state.follow_why();
+    assert_eq!(state.explained().unwrap().0, &at(0));
+    assert_eq!(state.whose(&at(0)), "run A, step 0");
+    let other = StepKey { target: 7, run: 1, ..at(2) };
+    assert_eq!(state.whose(&other), "run B, step 2");
 }
 
 #[test]
-fn a_removed_run_leaves_the_list_and_can_be_taken_back() {
-    let two_runs = |context: &egui::Context| {
-        let mut state = fixture::at_step(context, LOST);
-        let run = RunView { number: 1, fork: Some(Fork::new(0, 2)), ..state.run().unwrap().clone() };
-        state.session.as_mut().unwrap().targets[0].runs.push(run);
-        state
-    };
-    let mut shown = Shown::pane(Pane::Targets, two_runs);
-    shown.says("from run A at step 2");
-    let remove = Ask::RemoveRun { target: 0, run: 1 };
-    assert_eq!(shown.click("remove run B"), vec![Command::Why(remove.clone())]);
-    let mut state = two_runs(&egui::Context::default());
-    state.apply(Command::Why(remove));
+fn a_branch_that_is_looked_at_gets_its_own_tree() {
+    let mut state = lost();
+    let run = RunView { number: 1, fork: Some(Fork::new(0, 2)), ..state.run().unwrap().clone() };
+    state.session.as_mut().unwrap().targets[0].runs.push(run);
+    state.apply(Command::Why(Ask::Value { step: LOST, value: "ncc".to_owned() }));
+    state.follow_why();
     let request = asked(&mut state).remove(0);
-    let mut view = state.session.clone().unwrap();
-    view.targets[0].runs.truncate(1);
-    answer(&mut state, request, WhyReply::Session(Box::new(view)));
-    assert_eq!(state.target().unwrap().runs.len(), 1);
-    state.apply(Command::Why(Ask::Undo));
-    assert_eq!(
-        asked(&mut state),
-        vec![WhyRequest::RestoreRun { session: "s1".to_owned(), target: 0, run: 1 }]
-    );
+    let refused = Problem::new(422, "request", "", "no such value");
+    state.arrived(Arrived { request: Request::Why(request), outcome: Err(refused) }, 0.0);
+    state.apply(Command::Look { target: 0, run: 1 });
+    state.follow_why();
+    let branch = StepKey { run: 1, ..key() };
+    assert_eq!(asked(&mut state), vec![WhyRequest::Explain { of: branch.clone(), value: "ncc".to_owned() }]);
+    assert_eq!((state.explained().unwrap().0, state.why.asked.len()), (&branch, 1));
 }
