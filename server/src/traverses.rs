@@ -8,6 +8,7 @@ use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
+use sightline_core::error::Error;
 use sightline_core::image::io;
 use sightline_core::session::wire::{NewTraverse, StopView, TraverseEntry, TraverseView};
 use utoipa::{IntoParams, ToSchema};
@@ -29,6 +30,10 @@ pub fn router() -> OpenApiRouter<AppState> {
         .routes(routes!(image))
         .routes(routes!(prefetch))
 }
+
+/// What to do about an image that cannot be read.
+const MEND: &str =
+    "Put the file back or mend it, then try again; the other steps can be looked at as they are.";
 
 /// How an image is wanted.
 #[derive(Clone, Copy, Debug, Default, Deserialize, IntoParams)]
@@ -127,7 +132,16 @@ async fn image(
     }
     let cancel = CancelOnDrop::default();
     let flag = cancel.flag();
-    let png = state.pictures().run(move || Ok(encode(&open, step, is_left, is_deep, &flag)?)).await?;
+    let png = state
+        .pictures()
+        .run(move || {
+            encode(&open, step, is_left, is_deep, &flag).map_err(|error| {
+                let is_of_file = matches!(error, Error::Read { .. } | Error::Format { .. });
+                let problem = ApiError::from(error);
+                if is_of_file { problem.hint(MEND) } else { problem }
+            })
+        })
+        .await?;
     Ok(picture(png, &headers))
 }
 

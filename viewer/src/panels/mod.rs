@@ -3,6 +3,7 @@
 pub mod bars;
 pub mod breakpoints;
 pub mod card;
+pub mod broken;
 pub mod budget;
 pub mod compare;
 pub mod export;

@@ -9,6 +9,7 @@ use sightline_core::settings::{Changes, Settings};
 
 use super::State;
 use super::ask::AskRequest;
+use crate::cache::Key;
 use crate::inbox::Arrival;
 use crate::layout::Pane;
 use crate::net::Request;
@@ -32,6 +33,8 @@ pub enum Ask {
     Resume(String),
     /// Begins a new session on a traverse.
     Begin(String),
+    /// Asks again for what of the cursor's stop could not be shown.
+    TryAgain,
 }
 
 /// What is known of files and sessions.
@@ -78,6 +81,10 @@ impl State {
                     self.sync.linked = Some(id.clone());
                     self.outbox.push(Request::Session(id));
                 }
+            }
+            Ask::TryAgain => {
+                let here = self.cursor.step;
+                self.cache.retry(|key| matches!(key, Key::Image { step, .. } if *step == here));
             }
             Ask::Begin(traverse) => {
                 self.files.is_open = false;

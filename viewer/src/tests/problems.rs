@@ -3,10 +3,12 @@
 use sightline_core::session::wire::{Problem, Received};
 
 use super::{Shown, fixture};
+use crate::cache::Eye;
 use crate::command::{Command, Go, Mode};
 use crate::layout::Pane;
 use crate::net::{Arrived, Reply, Request};
 use crate::panels::card;
+use crate::state::files::Ask;
 use crate::state::{Connection, State};
 
 fn problem() -> Problem {
@@ -113,4 +115,27 @@ fn the_cursor_is_kept_when_a_server_comes_back_that_forgot_its_last_move() {
     view.cursor.step = 3;
     state.arrived(Arrived { request, outcome: Ok(Reply::Session(Box::new(view))) }, 0.0);
     assert_eq!(state.cursor.step, 3);
+}
+
+#[test]
+fn an_image_that_cannot_be_read_names_file_and_remedy_and_can_be_tried_again() {
+    let broken = |context: &egui::Context| {
+        let mut state = fixture::at_step(context, 2);
+        let key = state.image_key(2, Eye::Left).unwrap();
+        let problem = Problem::new(422, "file", "", "cannot read left_0002.png: no such file");
+        let problem = Problem { hint: Some("Put the file back.".to_owned()), ..problem };
+        state.cache.arrived(key, Err(problem), 0.0);
+        state
+    };
+    let mut shown = Shown::pane(Pane::Left, broken);
+    shown
+        .says("The left image of step 2 cannot be shown: cannot read left_0002.png")
+        .says("Put the file back.");
+    let again = vec![Command::Files(Ask::TryAgain)];
+    assert_eq!(shown.click("try the left image of step 2 again"), again);
+    let mut state = broken(&egui::Context::default());
+    let key = state.image_key(2, Eye::Left).unwrap();
+    assert!(state.cache.want(std::slice::from_ref(&key), |_| true, 1.0).is_empty(), "a refusal stays");
+    state.apply(Command::Files(Ask::TryAgain));
+    assert_eq!(state.cache.want(std::slice::from_ref(&key), |_| true, 1.0), vec![key]);
 }
