@@ -57,6 +57,9 @@ pub fn body(ui: &mut Ui, message: &Message) {
     }
     let Some(about) = &message.about else { return };
     ui.label(theme::note(format!("code {}", about.code)));
+    if about.details.is_empty() {
+        return;
+    }
     CollapsingHeader::new("Details").id_salt(("details", message.id)).show(ui, |ui| {
         for (name, value) in &about.details {
             ui.horizontal_wrapped(|ui| {

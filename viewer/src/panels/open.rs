@@ -185,6 +185,9 @@ pub fn veil(ui: &mut Ui, state: &State) {
         let mut lines = vec!["Drop one file to open it".to_owned()];
         lines.extend(OPENABLE.map(|(what, comes_of_it)| format!("{what} {comes_of_it}")));
         let middle = whole.center() - vec2(0.0, 14.0 * lines.len() as f32);
+        let room = vec2(680.0, 28.0 * lines.len() as f32 + 28.0);
+        let behind = egui::Rect::from_center_size(whole.center() - vec2(0.0, 14.0), room);
+        ui.painter().rect_filled(behind, 8.0, theme::panel());
         for (place, line) in lines.iter().enumerate() {
             let (size, colour) = if place == 0 { (24.0, theme::strong()) } else { (15.0, theme::text()) };
             let at = middle + vec2(0.0, 28.0 * place as f32);
