@@ -101,7 +101,8 @@ fn recent(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(Ask)) {
     }
     for entry in list.iter().take(LISTED) {
         let is_open = state.session.as_ref().is_some_and(|open| open.id == entry.id);
-        if row(ui, &entry.traverse_name, &about(entry, is_open), is_open, &session_name(entry)) {
+        let words = format!("{}: {}", entry.id, about(entry, is_open));
+        if row(ui, &entry.traverse_name, &words, is_open, &session_name(entry)) {
             ask(Ask::Resume(entry.id.clone()));
         }
     }

@@ -20,6 +20,7 @@ mod picking;
 mod tour;
 mod why;
 mod undo;
+mod following;
 mod opening;
 mod problems;
 
