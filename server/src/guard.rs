@@ -61,9 +61,7 @@ pub async fn guard(State(hosts): State<Hosts>, request: Request, next: Next) -> 
         }
     };
     let mut response = answer.instrument(tracing::info_span!("request", id)).await;
-    if is_api || !response.status().is_success() {
-        response = request_id::told(response, &id).await;
-    }
+    response = request_id::told(response, &id).await;
     put_headers(response.headers_mut(), host.as_deref(), is_api);
     response
 }

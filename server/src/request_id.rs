@@ -1,5 +1,5 @@
-//! A name for every request, by which a person's report finds the log's lines: on every answer of the interface as the
-//! header `x-request-id`, and in every problem beside the time.
+//! A name for every request, by which a person's report finds the log's lines: in every problem beside the time, and there
+//! as the header `x-request-id`, too.
 
 use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -21,11 +21,8 @@ pub(crate) fn next() -> String {
     format!("{:x}-{}", *STARTED, COUNT.fetch_add(1, Ordering::Relaxed))
 }
 
-/// The answer with the name of its request.
-pub(crate) async fn told(mut response: Response<Body>, id: &str) -> Response<Body> {
-    if let Ok(value) = HeaderValue::from_str(id) {
-        response.headers_mut().insert(HeaderName::from_static("x-request-id"), value);
-    }
+/// A problem with the name of its request; every other answer as it is, so that the same question has the same answer.
+pub(crate) async fn told(response: Response<Body>, id: &str) -> Response<Body> {
     let is_problem = response.headers().get(header::CONTENT_TYPE).is_some_and(|kind| kind == PROBLEM_JSON);
     if !is_problem {
         return response;
@@ -42,5 +39,8 @@ pub(crate) async fn told(mut response: Response<Body>, id: &str) -> Response<Bod
         Err(_) => bytes.to_vec(),
     };
     parts.headers.insert(header::CONTENT_LENGTH, bytes.len().into());
+    if let Ok(value) = HeaderValue::from_str(id) {
+        parts.headers.insert(HeaderName::from_static("x-request-id"), value);
+    }
     Response::from_parts(parts, Body::from(bytes))
 }
