@@ -241,6 +241,10 @@ impl State {
             self.messages.problem(missing, None);
             return;
         };
+        if self.target().is_some_and(|target| target.designation.step == key.step) {
+            self.messages.note("The target was picked at this step: nothing was judged that could be saved.");
+            return;
+        }
         let goes_on = match self.why.questions.get(&key) {
             Some(Told::Waiting) => true,
             Some(Told::Here(question)) => {

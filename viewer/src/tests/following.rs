@@ -88,3 +88,12 @@ fn a_branch_that_is_looked_at_gets_its_own_tree() {
     assert_eq!(asked(&mut state), vec![WhyRequest::Explain { of: branch.clone(), value: "ncc".to_owned() }]);
     assert_eq!((state.explained().unwrap().0, state.why.asked.len()), (&branch, 1));
 }
+
+#[test]
+fn what_would_have_saved_the_pick_is_answered_without_asking_the_server() {
+    let mut state = fixture::at_step(&egui::Context::default(), 0);
+    state.take_requests();
+    state.apply(Command::Why(Ask::Saved));
+    assert!(asked(&mut state).is_empty());
+    assert!(state.messages.newest().unwrap().text.contains("picked at this step"));
+}
