@@ -32,11 +32,11 @@ pub fn scenario() -> Result<Scenario> {
 /// # Errors
 /// A session that cannot be written, or too much waiting already.
 pub fn begin(state: &AppState, scenario: &Scenario) -> ApiResult<()> {
-    let Some(open) = state.traverses().first() else { return Ok(()) };
+    let Some(open) = state.traverses().first().cloned() else { return Ok(()) };
     if state.sessions().iter().any(|live| live.traverse.id == open.id) {
         return Ok(());
     }
-    let live = state.begin_session(Arc::clone(open))?;
+    let live = state.begin_session(open)?;
     state.changed(&live)?;
     let (own, scenario) = (state.clone(), scenario.clone());
     state.jobs().submit(move || {

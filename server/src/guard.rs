@@ -16,6 +16,8 @@ use axum::response::{IntoResponse, Response};
 
 use crate::extract::check_content_type;
 use crate::problem::{ApiError, ApiResult};
+use crate::request_id;
+use tracing::Instrument;
 
 /// The hosts under which the server may be addressed.
 #[derive(Clone, Debug)]
@@ -48,13 +50,18 @@ pub async fn guard(State(hosts): State<Hosts>, request: Request, next: Next) -> 
         Ok(host) => (Some(host.clone()), request.uri().path().starts_with("/api/")),
         Err(_) => (None, false),
     };
-    let mut response = match checked {
-        Ok(_) => next.run(request).await,
-        Err(refusal) => {
-            tracing::warn!("refused: {}", crate::plain(&refusal.problem().detail));
-            refusal.into_response()
+    let id = request_id::next();
+    let answer = async {
+        match checked {
+            Ok(_) => next.run(request).await,
+            Err(refusal) => {
+                tracing::warn!("refused: {}", crate::plain(&refusal.problem().detail));
+                refusal.into_response()
+            }
         }
     };
+    let mut response = answer.instrument(tracing::info_span!("request", id)).await;
+    response = request_id::told(response, &id).await;
     put_headers(response.headers_mut(), host.as_deref(), is_api);
     response
 }

@@ -33,6 +33,7 @@ pub struct LiveSession {
     saving: Mutex<()>,
     is_awake: AtomicBool,
     is_restoring: AtomicBool,
+    used: Mutex<Option<jiff::Timestamp>>,
 }
 
 impl LiveSession {
@@ -47,12 +48,23 @@ impl LiveSession {
             saving: Mutex::default(),
             is_awake: AtomicBool::new(is_awake),
             is_restoring: AtomicBool::new(false),
+            used: Mutex::default(),
         }
     }
 
     /// Looks at or changes the session; keep it short.
     pub fn with<T>(&self, work: impl FnOnce(&mut Session) -> T) -> T {
         work(&mut lock(&self.session))
+    }
+
+    /// When something of it was changed or stepped through last.
+    pub fn used(&self) -> Option<jiff::Timestamp> {
+        *lock(&self.used)
+    }
+
+    /// Remembers when it was used last.
+    pub fn set_used(&self, used: Option<jiff::Timestamp>) {
+        *lock(&self.used) = used;
     }
 
     /// Writes what the person did. The last write holds the last state, whoever comes first.

@@ -28,14 +28,8 @@ pub type ApiResult<T> = Result<T, ApiError>;
 impl ApiError {
     /// A problem of that status; `code` is its stable name for programs.
     pub fn new(status: StatusCode, code: &str, detail: impl Into<String>) -> Self {
-        let problem = Box::new(Problem {
-            code: code.to_owned(),
-            title: status.canonical_reason().unwrap_or("Problem").to_owned(),
-            status: status.as_u16(),
-            detail: detail.into(),
-            hint: None,
-            nearest_pixel: None,
-        });
+        let title = status.canonical_reason().unwrap_or("Problem");
+        let problem = Box::new(Problem::new(status.as_u16(), code, title, detail));
         Self { problem, place: None, log: None }
     }
 

@@ -11,6 +11,7 @@ use sightline_core::session::{Cursor, Session};
 use sightline_core::traverse::Traverse;
 use tokio::sync::broadcast;
 
+use crate::drives;
 use crate::guard::Hosts;
 use crate::jobs::{Jobs, Lane, lock};
 use crate::live::LiveSession;
@@ -40,6 +41,8 @@ pub struct Folders {
     pub sessions: PathBuf,
     /// Studies, with their worlds.
     pub studies: PathBuf,
+    /// Simulated traverses.
+    pub traverses: PathBuf,
 }
 
 /// What the handlers share.
@@ -48,7 +51,8 @@ pub struct AppState(Arc<Inner>);
 
 struct Inner {
     hosts: Hosts,
-    traverses: Vec<Arc<OpenTraverse>>,
+    traverses: Mutex<Vec<Arc<OpenTraverse>>>,
+    folders: Folders,
     sessions: Mutex<Sessions>,
     events: broadcast::Sender<Event>,
     jobs: Jobs,
@@ -85,7 +89,11 @@ impl AppState {
     /// # Errors
     /// As [`Self::with_folders`].
     pub fn new(traverses: Vec<Traverse>, folder: &Path, hosts: Hosts) -> Result<Self> {
-        let folders = Folders { sessions: folder.to_owned(), studies: folder.join("studies") };
+        let folders = Folders {
+            sessions: folder.to_owned(),
+            studies: folder.join("studies"),
+            traverses: folder.join("traverses"),
+        };
         Self::with_folders(traverses, &folders, hosts)
     }
 
@@ -105,7 +113,9 @@ impl AppState {
             }
         }
         let store = Store::open(&folders.sessions)?;
-        let (sessions, notices) = read_back(&store, &open)?;
+        let drives_lost = drives::open_again(&store, folders, &mut open, &events)?;
+        let (sessions, mut notices) = read_back(&store, &open)?;
+        notices.extend(drives_lost);
         for notice in &notices {
             tracing::warn!("{}", crate::plain(notice));
         }
@@ -119,7 +129,8 @@ impl AppState {
         studies.read_back(|new| crate::studies::order(&folders.studies, new))?;
         Ok(Self(Arc::new(Inner {
             hosts,
-            traverses: open,
+            traverses: Mutex::new(open),
+            folders: folders.clone(),
             sessions: Mutex::new(sessions),
             events,
             jobs: Jobs::start(RUNS_AT_A_TIME, RUNS_WAITING).map_err(no_threads)?,
@@ -148,9 +159,35 @@ impl AppState {
         &self.0.notices
     }
 
-    /// The open traverses.
-    pub fn traverses(&self) -> &[Arc<OpenTraverse>] {
-        &self.0.traverses
+    /// The open traverses, those that were opened from a page last.
+    pub fn traverses(&self) -> Vec<Arc<OpenTraverse>> {
+        lock(&self.0.traverses).clone()
+    }
+
+    /// Where the server keeps what it makes.
+    pub fn folders(&self) -> &Folders {
+        &self.0.folders
+    }
+
+    /// Adds a traverse with the sessions that it had when it was open before; the one of that name where it is open already.
+    ///
+    /// # Errors
+    /// A database that cannot be read.
+    pub fn add_traverse(&self, open: Arc<OpenTraverse>) -> Result<Arc<OpenTraverse>> {
+        let mut traverses = lock(&self.0.traverses);
+        if let Some(known) = traverses.iter().find(|known| known.id == open.id) {
+            return Ok(Arc::clone(known));
+        }
+        let (found, notices) = read_back(&self.0.store, std::slice::from_ref(&open))?;
+        for notice in &notices {
+            tracing::warn!("{}", crate::plain(notice));
+        }
+        let mut sessions = lock(&self.0.sessions);
+        for (number, live) in found.by_number {
+            sessions.by_number.entry(number).or_insert(live);
+        }
+        traverses.push(Arc::clone(&open));
+        Ok(open)
     }
 
     /// The traverse of that name.
@@ -158,7 +195,7 @@ impl AppState {
     /// # Errors
     /// A problem when there is none.
     pub fn traverse(&self, id: &str) -> ApiResult<Arc<OpenTraverse>> {
-        let found = self.0.traverses.iter().find(|open| open.id == id).cloned();
+        let found = lock(&self.0.traverses).iter().find(|open| open.id == id).cloned();
         found.ok_or_else(|| ApiError::not_found("There is no such traverse."))
     }
 
@@ -186,15 +223,30 @@ impl AppState {
     /// # Errors
     /// A problem when there are too many already.
     pub fn begin_session(&self, traverse: Arc<OpenTraverse>) -> ApiResult<Arc<LiveSession>> {
+        let count = traverse.traverse.stop_count();
+        let name = traverse.id.clone();
+        self.enter_session(traverse, true, |id| Ok(Session::new(id, &name, count)))
+    }
+
+    /// Enters the session that `make` makes of its name; one that is not awake has its runs computed when it is asked for.
+    ///
+    /// # Errors
+    /// A problem when there are too many already, or that of `make`.
+    pub fn enter_session(
+        &self,
+        traverse: Arc<OpenTraverse>,
+        is_awake: bool,
+        make: impl FnOnce(String) -> ApiResult<Session>,
+    ) -> ApiResult<Arc<LiveSession>> {
         let mut sessions = lock(&self.0.sessions);
         if sessions.by_number.len() >= SESSION_LIMIT {
             let detail = format!("There are {SESSION_LIMIT} sessions already.");
             return Err(ApiError::conflict(detail).hint("Begin with another data folder: --data-dir."));
         }
-        sessions.last_number += 1;
-        let number = sessions.last_number;
-        let session = Session::new(store::id_of(number), &traverse.id, traverse.traverse.stop_count());
-        let live = Arc::new(LiveSession::new(session, traverse, true));
+        let number = sessions.last_number + 1;
+        let live = Arc::new(LiveSession::new(make(store::id_of(number))?, traverse, is_awake));
+        live.set_used(Some(jiff::Timestamp::now()));
+        sessions.last_number = number;
         sessions.by_number.insert(number, Arc::clone(&live));
         Ok(live)
     }
@@ -205,12 +257,20 @@ impl AppState {
     /// A problem when it cannot be written.
     pub fn changed(&self, live: &LiveSession) -> ApiResult<()> {
         self.tell(Event::SessionChanged { session: live.id.clone() });
+        self.touched(live);
         Ok(live.save(&self.0.store)?)
+    }
+
+    /// Remembers that a session is used now.
+    fn touched(&self, live: &LiveSession) {
+        live.set_used(Some(jiff::Timestamp::now()));
+        self.0.store.touch(&live.id, crate::notes::now());
     }
 
     /// Remembers a cursor that moved, which is on disk a moment later, and tells every page.
     pub fn cursor_moved(&self, live: &LiveSession, cursor: Cursor) {
         self.0.store.move_cursor(&live.id, cursor);
+        self.touched(live);
         self.tell(Event::SessionChanged { session: live.id.clone() });
     }
 
@@ -239,7 +299,7 @@ impl AppState {
     pub fn everything_may_have_changed(&self) -> Vec<Event> {
         let sessions =
             self.sessions().into_iter().map(|live| Event::SessionChanged { session: live.id.clone() });
-        let traverses = self.traverses().iter().filter(|open| open.traverse.index().scenario.is_some());
+        let traverses = self.traverses().into_iter().filter(|open| open.traverse.index().scenario.is_some());
         sessions.chain(traverses.map(|open| open.progress(None))).collect()
     }
 
@@ -328,6 +388,7 @@ fn read_back(store: &Store, traverses: &[Arc<OpenTraverse>]) -> Result<(Sessions
             Ok(session) => {
                 let live = LiveSession::new(session, Arc::clone(traverse), false);
                 live.with_notes(|notes| *notes = found.notes.remove(&number).unwrap_or_default());
+                live.set_used(found.used.remove(&number).and_then(|time| time.parse().ok()));
                 sessions.by_number.insert(number, Arc::new(live));
             }
             Err(error) => notices.push(store.set_aside(&saved.id, &error.to_string())),

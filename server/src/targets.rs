@@ -21,7 +21,7 @@ use crate::state::AppState;
 use crate::trackability;
 
 /// How many characters a label may have.
-const LABEL_LIMIT: usize = 100;
+pub const LABEL_LIMIT: usize = 100;
 
 /// The routes of this resource.
 pub fn router() -> OpenApiRouter<AppState> {

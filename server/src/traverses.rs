@@ -8,13 +8,15 @@ use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
+use sightline_core::error::Error;
 use sightline_core::image::io;
-use sightline_core::session::wire::{StopView, TraverseEntry, TraverseView};
+use sightline_core::session::wire::{NewTraverse, StopView, TraverseEntry, TraverseView};
 use utoipa::{IntoParams, ToSchema};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
-use crate::extract::{Params, Path};
+use crate::drives;
+use crate::extract::{Body, Params, Path};
 use crate::jobs::blocking;
 use crate::problem::{ApiError, ApiResult};
 use crate::rendering::OpenTraverse;
@@ -23,11 +25,15 @@ use crate::state::{AppState, hash};
 /// The routes of this resource.
 pub fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
-        .routes(routes!(list))
+        .routes(routes!(list, add))
         .routes(routes!(show))
         .routes(routes!(image))
         .routes(routes!(prefetch))
 }
+
+/// What to do about an image that cannot be read.
+const MEND: &str =
+    "Put the file back or mend it, then try again; the other steps can be looked at as they are.";
 
 /// How an image is wanted.
 #[derive(Clone, Copy, Debug, Default, Deserialize, IntoParams)]
@@ -57,17 +63,35 @@ pub struct FileBytes(#[allow(dead_code)] Vec<u8>);
 #[utoipa::path(get, operation_id = "list_traverses", path = "/traverses", tag = "traverses", responses(
     (status = 200, body = Vec<TraverseEntry>), ApiError))]
 async fn list(State(state): State<AppState>) -> Json<Vec<TraverseEntry>> {
-    let entry = |open: &Arc<OpenTraverse>| {
-        let index = open.traverse.index();
-        TraverseEntry {
-            id: open.id.clone(),
-            name: index.name.clone(),
-            description: index.description.clone(),
-            simulated: index.scenario.is_some(),
-            stop_count: index.stops.len(),
-        }
+    Json(state.traverses().iter().map(|open| entry(open)).collect())
+}
+
+fn entry(open: &OpenTraverse) -> TraverseEntry {
+    let index = open.traverse.index();
+    TraverseEntry {
+        id: open.id.clone(),
+        name: index.name.clone(),
+        description: index.description.clone(),
+        simulated: index.scenario.is_some(),
+        stop_count: index.stops.len(),
+    }
+}
+
+/// Opens a simulated drive by its scenario
+///
+/// The same scenario is the same drive. It stays open across restarts; its images are rendered when they are looked at.
+#[utoipa::path(post, operation_id = "open_traverse", path = "/traverses", tag = "traverses", request_body = NewTraverse, responses(
+    (status = 200, description = "It was open already", body = TraverseEntry),
+    (status = 201, body = TraverseEntry), ApiError))]
+async fn add(State(state): State<AppState>, Body(new): Body<NewTraverse>) -> ApiResult<Response> {
+    let work_state = state.clone();
+    let work = move || {
+        let (open, is_new) = drives::open(&work_state, &new.scenario)?;
+        let status = if is_new { StatusCode::CREATED } else { StatusCode::OK };
+        let location = [(header::LOCATION, format!("/api/v1/traverses/{}", open.id))];
+        Ok((status, location, Json(entry(&open))).into_response())
     };
-    Json(state.traverses().iter().map(entry).collect())
+    state.designations().run(work).await
 }
 
 /// A traverse with its stops
@@ -108,7 +132,16 @@ async fn image(
     }
     let cancel = CancelOnDrop::default();
     let flag = cancel.flag();
-    let png = state.pictures().run(move || Ok(encode(&open, step, is_left, is_deep, &flag)?)).await?;
+    let png = state
+        .pictures()
+        .run(move || {
+            encode(&open, step, is_left, is_deep, &flag).map_err(|error| {
+                let is_of_file = matches!(error, Error::Read { .. } | Error::Format { .. });
+                let problem = ApiError::from(error);
+                if is_of_file { problem.hint(MEND) } else { problem }
+            })
+        })
+        .await?;
     Ok(picture(png, &headers))
 }
 

@@ -71,7 +71,8 @@ async fn the_light_of_a_target_is_a_table_with_a_line_for_every_accepted_update(
     let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
     let accepted = run["rows"].as_array().unwrap().iter().filter(|row| row["state"] == "tracking").count();
     assert_eq!((lines.len(), lines[0][7]), (accepted + 1, "phase_deg"));
-    let index = &server.state.traverses()[0].traverse;
+    let open = server.state.traverses().remove(0);
+    let index = &open.traverse;
     for line in &lines[1..] {
         let number = |column: usize| line[column].parse::<f64>().unwrap();
         let light = index.light(line[0].parse().unwrap(), &std::sync::atomic::AtomicBool::new(false));

@@ -12,6 +12,8 @@ mod exports;
 mod expressions;
 mod imports;
 mod keeping;
+mod opening;
+mod page_open;
 mod page;
 mod page_access;
 mod page_compare;

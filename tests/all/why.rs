@@ -233,7 +233,8 @@ async fn a_value_leads_to_its_inputs_its_file_and_its_pose() {
     let tree = fixture.server.get(&format!("{path}?value=ncc")).await.expect(200)["tree"].clone();
     assert_eq!((&tree["numbers"][0], &tree["stage"]), (score, &json!("match_template")));
     let text = tree.to_string();
-    let files = &fixture.server.state.traverses()[0].traverse.index().stops[2];
+    let open = fixture.server.state.traverses().remove(0);
+    let files = &open.traverse.index().stops[2];
     assert!(text.contains(&files.left.image), "{text}");
     assert!(text.contains("pose estimate of stop 2") && text.contains("\"kind\":\"setting\""), "{text}");
     for name in verdict["values"].as_array().unwrap() {

@@ -8,9 +8,9 @@ use crate::layout::Pane;
 use crate::layout::presets::Preset;
 use crate::layout::workspace::LayoutCommand;
 use crate::panels::digits;
-use crate::state::exports;
 use crate::state::why::Ask;
 use crate::state::{State, events, run_letter};
+use crate::state::{exports, files};
 use crate::theme::Looks;
 use crate::tour::Turn;
 
@@ -100,6 +100,7 @@ fn works(state: &State) -> Vec<Action> {
         ),
         action("Take the changed settings back", "", Command::ClearDraft),
         action("Export: recording, tables, report, pictures", "Ctrl+S", Command::Exports(exports::Ask::Open)),
+        action("Open: a file, a recent session, a drive", "Ctrl+O", Command::Files(files::Ask::Open)),
         action("Open the plain page of this step", "", Command::Exports(exports::Ask::PlainPage)),
         action("Open the session in Rerun", "", Command::OpenRerun),
         action("Copy a link to this place", "Y", Command::CopyLink),

@@ -3,11 +3,12 @@
 use egui::{CentralPanel, Context, Frame, Margin, Panel, Ui};
 
 use crate::command::Command;
+use crate::inbox::Inbox;
 use crate::layout::workspace::{LayoutCommand, Workspace};
 use crate::layout::{LeftImage, Pane, Panels, region};
 use crate::link::Fragment;
 use crate::net::{Net, Request};
-use crate::panels::{bars, export, help, notes, palette, timeline, tour as bubbles};
+use crate::panels::{bars, card, export, help, notes, open, palette, timeline, tour as bubbles};
 use crate::state::{Connection, State};
 use crate::status::Publisher;
 use crate::{keep, keys, picture, theme, tour};
@@ -34,6 +35,7 @@ pub struct SightlineApp {
     is_tour_kept: bool,
     /// Where the panels are on the screen, points.
     places: Vec<(Pane, egui::Rect)>,
+    inbox: Inbox,
 }
 
 impl SightlineApp {
@@ -54,7 +56,8 @@ impl SightlineApp {
         let is_tour_kept = state.tour.is_seen;
         let net = Net::new(link.origin, context.clone());
         let (left_image, publisher, places) = (None, Publisher::default(), Vec::new());
-        Self { state, net, workspace, left_image, publisher, linked, kept, is_tour_kept, places }
+        let inbox = Inbox::new(context.clone());
+        Self { state, net, workspace, left_image, publisher, linked, kept, is_tour_kept, places, inbox }
     }
 
     /// Takes in what arrived and asks for what is missing.
@@ -68,6 +71,10 @@ impl SightlineApp {
         for arrived in self.net.poll() {
             self.state.arrived(arrived, now);
         }
+        for arrival in self.inbox.poll() {
+            self.state.file_arrived(arrival);
+        }
+        self.state.files.is_hovered = self.inbox.is_hovered();
         self.state.tick(now);
         self.send();
         self.ask_for_missing(now);
@@ -147,7 +154,10 @@ impl SightlineApp {
         help::show(ui, state, &mut out);
         notes::editor(ui, state, &mut out);
         export::show(ui, state, &mut out);
+        open::show(ui, state, &mut out);
+        card::show(ui, state, &mut out);
         palette::show(ui, state, &mut out);
+        open::veil(ui, state);
         bubbles::show(ui, state, &mut out);
         self.places = places;
         self.state.exports.panes = self.places.iter().map(|(pane, _)| *pane).collect();
@@ -156,6 +166,7 @@ impl SightlineApp {
         self.state.wants_history = is_history_seen;
         if is_why_seen {
             self.state.want_question();
+            self.state.follow_why();
         }
         if is_studies_seen {
             self.state.want_studies();
@@ -202,10 +213,32 @@ impl SightlineApp {
         if std::mem::take(&mut self.state.why.is_called) {
             self.workspace.apply(LayoutCommand::Show(Pane::Why));
         }
+        self.take_files();
         if self.state.ask.take_reveal() {
             self.workspace.apply(LayoutCommand::Show(Pane::Breakpoints));
         }
         self.send();
+    }
+
+    /// Lets a file be chosen, or reads the one that was named.
+    fn take_files(&mut self) {
+        let wants_choice = std::mem::take(&mut self.state.files.wants_choice);
+        let path = self.state.files.wants_path.take();
+        #[cfg(target_arch = "wasm32")]
+        if wants_choice || path.is_some() {
+            self.inbox.choose();
+        }
+        #[cfg(not(target_arch = "wasm32"))]
+        if let Some(path) = path.filter(|_| !wants_choice) {
+            self.inbox.open_path(std::path::Path::new(&path));
+        }
+    }
+
+    /// Brings the panel to the front into which a file went.
+    fn reveal(&mut self) {
+        if let Some(pane) = self.state.files.reveal.take() {
+            self.workspace.apply(LayoutCommand::Show(pane));
+        }
     }
 
     /// Takes a picture of the panel that was asked for.
@@ -279,6 +312,7 @@ impl eframe::App for SightlineApp {
             context.open_url(egui::OpenUrl::new_tab(url));
         }
         self.take_picture(&context);
+        self.reveal();
         self.keep_link();
         self.keep_tour();
         self.kept.write(&context, self.state.looks, || self.workspace.kept());

@@ -280,6 +280,7 @@ mod tests {
             detail: "no".to_owned(),
             hint: None,
             nearest_pixel: None,
+            received: None,
         }
     }
 

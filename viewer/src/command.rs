@@ -220,6 +220,10 @@ pub enum Command {
     Exports(exports::Ask),
     /// Breakpoints, derived columns and time travel.
     Ask(crate::state::ask::Ask),
+    /// Something about files and sessions.
+    Files(crate::state::files::Ask),
+    /// Closes the card of a problem.
+    CloseCard,
 }
 
 impl Command {

@@ -9,12 +9,12 @@ use crate::layout::workspace::LayoutCommand;
 use crate::state::ask;
 use crate::state::ask::play::Shuttle;
 use crate::state::why::Ask;
-use crate::state::{State, exports, notes};
+use crate::state::{State, exports, files, notes};
 use crate::stretch::Stretch;
 use crate::{actions, compare, tour};
 
 /// Every key with its meaning, as the help sheet lists them.
-pub const SHEET: [(&str, &str); 37] = [
+pub const SHEET: [(&str, &str); 38] = [
     ("Right  Left", "next, previous step"),
     ("Shift+Right  Shift+Left", "ten steps on, back"),
     ("Home  End", "first, last step"),
@@ -40,6 +40,7 @@ pub const SHEET: [(&str, &str); 37] = [
     ("F", "fit all images to their panels"),
     ("M", "pin a note here"),
     ("Ctrl+S", "export: files, pictures, commands"),
+    ("Ctrl+O", "open: a file, a recent session, a drive; or drop a file on the page"),
     ("H", "hide or show all marks"),
     ("I", "stretch dark images automatically, or show them as recorded"),
     ("Esc", "cancel what was begun"),
@@ -133,11 +134,14 @@ fn preset_of(key: Key) -> Option<Preset> {
 
 /// What a key asks for.
 pub fn command(key: Key, modifiers: Modifiers, state: &State) -> Option<Command> {
-    let is_window_open = state.exports.is_open || state.notes.draft.is_some();
+    let is_window_open = state.exports.is_open || state.notes.draft.is_some() || state.files.is_open;
     if (modifiers.ctrl || modifiers.command) && !modifiers.alt {
         return match (key, modifiers.shift) {
             (Key::S, false) if state.mode == Mode::Look && !is_window_open => {
                 Some(Command::Exports(exports::Ask::Open))
+            }
+            (Key::O, false) if state.mode == Mode::Look && !is_window_open => {
+                Some(Command::Files(files::Ask::Open))
             }
             (Key::K, false) => Some(actions::palette()),
             (Key::Z, false) => Some(Command::Why(Ask::Undo)),
@@ -250,6 +254,7 @@ mod tests {
         assert_eq!(press(Key::M, &state), Some(Command::Notes(notes::Ask::Pin)));
         let save = command(Key::S, Modifiers::COMMAND, &state);
         assert_eq!(save, Some(Command::Exports(exports::Ask::Open)));
+        assert_eq!(command(Key::O, Modifiers::COMMAND, &state), Some(Command::Files(files::Ask::Open)));
         assert_eq!(press(Key::Escape, &state), Some(Command::SetMode(Mode::Look)));
         assert_eq!(press(Key::Questionmark, &state), Some(Command::SetMode(Mode::Help)));
         assert_eq!(press(Key::Q, &state), Some(Command::Layout(LayoutCommand::Panel(1))));

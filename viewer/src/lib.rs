@@ -15,6 +15,7 @@
 //! | `view2d`, `overlay`, `ellipse`, `contour` | the zoomable canvas and the marks on it |
 //! | `thin` | what of a long drive is drawn |
 //! | `as_text` | any action as `curl` and as a command |
+//! | `opening`, `inbox` | what a dropped or chosen file is, and how its bytes come in |
 //! | `markdown`, `picture` | notes as text with emphasis; a panel as a PNG file |
 //! | `theme` | colours, text styles and spacing, and nowhere else |
 //! | `access` | the page for a screen reader: egui's tree as elements of the document |
@@ -52,6 +53,8 @@ pub mod as_text;
 pub mod thin;
 pub mod markdown;
 pub mod picture;
+pub mod opening;
+pub mod inbox;
 #[cfg(target_arch = "wasm32")]
 pub mod web;
 #[cfg(test)]

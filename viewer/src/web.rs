@@ -143,3 +143,25 @@ fn report_panics_to_the_page() {
         }
     }));
 }
+
+/// Lets the person choose a file; `chosen` gets it, and is never called where none is chosen.
+pub(crate) fn choose_file(chosen: impl FnOnce(web_sys::File) + 'static) {
+    // Where the browser refuses, no dialog opens, and dropping a file works all the same.
+    let _ = try_choose_file(chosen);
+}
+
+fn try_choose_file(chosen: impl FnOnce(web_sys::File) + 'static) -> Result<(), JsValue> {
+    let document = web_sys::window().and_then(|window| window.document()).ok_or(JsValue::NULL)?;
+    let input: web_sys::HtmlInputElement = document.create_element("input")?.dyn_into()?;
+    input.set_type("file");
+    input.set_accept(".toml,.json");
+    let from = input.clone();
+    let changed = Closure::once_into_js(move || {
+        if let Some(file) = from.files().and_then(|files| files.get(0)) {
+            chosen(file);
+        }
+    });
+    input.add_event_listener_with_callback("change", changed.unchecked_ref())?;
+    input.click();
+    Ok(())
+}

@@ -23,6 +23,7 @@ pub mod metrics;
 pub mod expression;
 pub mod breakpoints;
 pub mod query;
+pub mod reproduce;
 #[cfg(test)]
 mod breakpoint_tests;
 

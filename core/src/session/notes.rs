@@ -16,6 +16,8 @@ use crate::frames::Pixel;
 pub const NOTE_LIMIT: usize = 500;
 /// How many characters a note may have.
 pub const TEXT_LIMIT: usize = 4000;
+/// How many bytes a time may have.
+const TIME_LIMIT: usize = 40;
 /// How many removed notes are kept.
 const REMOVED_KEPT: usize = 50;
 
@@ -82,20 +84,9 @@ pub struct Pin {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewNote {
-    /// The target's number; left out: the note is about the stop alone.
-    #[serde(default)]
-    pub target: Option<usize>,
-    /// The run's number within the target.
-    #[serde(default)]
-    pub run: usize,
-    /// The stop, from 0.
-    pub step: usize,
-    /// The stage or the step of `locate`, by its word.
-    #[serde(default)]
-    pub stage: Option<String>,
-    /// A position in the left image, px.
-    #[serde(default)]
-    pub pixel: Option<Pixel>,
+    /// Where it is to be pinned.
+    #[serde(flatten)]
+    pub pin: Pin,
     /// What it says, in Markdown.
     pub text: String,
 }
@@ -136,15 +127,35 @@ pub struct Notes {
     pub removed: Vec<(usize, Note)>,
 }
 
-impl NewNote {
-    /// Where it is to be pinned.
-    pub fn pin(&self) -> Pin {
-        let Self { target, run, step, stage, pixel, .. } = self.clone();
-        Pin { target, run, step, stage, pixel }
-    }
-}
-
 impl Notes {
+    /// The notes of a session that was brought from elsewhere, numbered anew in their order; what they are pinned to may have
+    /// been removed there.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when there are too many, or one names a step or stage that does not exist, or says nothing or too
+    /// much.
+    pub fn brought(list: Vec<Note>, session: &Session) -> Result<Self> {
+        let mut notes = Self::default();
+        for (place, note) in list.into_iter().enumerate() {
+            let wrong = |why: String| Error::Request(format!("notes[{place}]: {why}"));
+            let anywhere = Pin { target: None, ..note.pin.clone() };
+            check_pin(&anywhere, session).map_err(|error| wrong(error.to_string()))?;
+            if note.pin.target.is_some_and(|target| target >= session.targets.len()) {
+                return Err(wrong("target: there is none of that number".to_owned()));
+            }
+            if [&note.made, &note.changed].iter().any(|time| time.len() > TIME_LIMIT) {
+                return Err(wrong("made, changed: must be times as RFC 3339 has them".to_owned()));
+            }
+            if place >= NOTE_LIMIT {
+                return Err(Error::Request(format!("a session may have at most {NOTE_LIMIT} notes")));
+            }
+            let text = checked(&note.text).map_err(wrong)?;
+            notes.last_id += 1;
+            notes.list.push(Note { id: notes.last_id, revision: 1, text, ..note });
+        }
+        Ok(notes)
+    }
+
     /// Adds a note at the end; `now` is RFC 3339, UTC.
     ///
     /// # Errors
@@ -153,11 +164,11 @@ impl Notes {
         if self.list.len() >= NOTE_LIMIT {
             return Err(Error::Request(format!("a session may have at most {NOTE_LIMIT} notes")));
         }
-        check_pin(&new.pin(), session)?;
+        check_pin(&new.pin, session)?;
         let text = checked(&new.text).map_err(Error::Request)?;
         self.last_id += 1;
         let (made, changed) = (now.to_owned(), now.to_owned());
-        let note = Note { id: self.last_id, revision: 1, pin: new.pin(), text, made, changed };
+        let note = Note { id: self.last_id, revision: 1, pin: new.pin, text, made, changed };
         self.list.push(note.clone());
         Ok(note)
     }
@@ -267,7 +278,11 @@ mod tests {
     const NOW: &str = "2026-11-22T12:00:00Z";
 
     fn note(text: &str) -> NewNote {
-        NewNote { step: 1, text: text.to_owned(), ..NewNote::default() }
+        pinned(Pin::default(), text)
+    }
+
+    fn pinned(pin: Pin, text: &str) -> NewNote {
+        NewNote { pin: Pin { step: pin.step.max(1), ..pin }, text: text.to_owned() }
     }
 
     fn three() -> Notes {
@@ -324,11 +339,41 @@ mod tests {
     fn a_note_is_pinned_only_to_what_exists() {
         let (mut notes, session) = (Notes::default(), Session::new("s1", "t", 3));
         let mut refuse = |new: NewNote| notes.add(new, &session, NOW).unwrap_err().to_string();
-        assert!(refuse(NewNote { step: 3, ..note("x") }).contains("step"));
-        assert!(refuse(NewNote { target: Some(0), ..note("x") }).contains("target 0"));
-        assert!(refuse(NewNote { stage: Some("guess".to_owned()), ..note("x") }).contains("stage"));
+        assert!(refuse(pinned(Pin { step: 3, ..Pin::default() }, "x")).contains("step"));
+        assert!(refuse(pinned(Pin { target: Some(0), ..Pin::default() }, "x")).contains("target 0"));
+        let guess = Pin { stage: Some("guess".to_owned()), ..Pin::default() };
+        assert!(refuse(pinned(guess, "x")).contains("stage"));
         assert!(refuse(note(&"x".repeat(TEXT_LIMIT + 1))).contains("4000"));
         let nowhere = Pixel::new(f64::NAN, 0.0);
-        assert!(refuse(NewNote { pixel: Some(nowhere), ..note("x") }).contains("pixel"));
+        assert!(refuse(pinned(Pin { pixel: Some(nowhere), ..Pin::default() }, "x")).contains("pixel"));
+    }
+
+    #[test]
+    fn a_new_note_is_one_flat_record_and_refuses_what_it_does_not_know() {
+        let read = |text: &str| serde_json::from_str::<NewNote>(text);
+        let new = read(r#"{"target": 2, "step": 1, "stage": "judge", "text": "a"}"#).unwrap();
+        assert_eq!((new.pin.target, new.pin.step, new.text.as_str()), (Some(2), 1, "a"));
+        assert_eq!(serde_json::to_value(&new).unwrap()["step"], 1, "flat again when it is written");
+        let refused = read(r#"{"step": 1, "text": "a", "colour": "red"}"#).unwrap_err().to_string();
+        assert!(refused.contains("colour"), "{refused}");
+        assert!(read(r#"{"text": "a"}"#).unwrap_err().to_string().contains("step"));
+    }
+
+    #[test]
+    fn notes_from_elsewhere_are_numbered_anew_and_checked_like_new_ones() {
+        let (list, session) = (three().list, Session::new("s1", "t", 3));
+        let mut brought = list.clone();
+        brought[0].id = 77;
+        let notes = Notes::brought(brought, &session).unwrap();
+        assert_eq!((texts(&notes).as_str(), notes.last_id, notes.list[0].id), ("abc", 3, 1));
+        let refused = |change: fn(&mut Note)| {
+            let mut list = list.clone();
+            change(&mut list[1]);
+            Notes::brought(list, &session).unwrap_err().to_string()
+        };
+        assert!(refused(|note| note.pin.step = 3).starts_with("notes[1]: step"));
+        assert!(refused(|note| note.pin.target = Some(0)).contains("target"));
+        assert!(refused(|note| note.text.clear()).contains("text"));
+        assert!(refused(|note| note.made = "x".repeat(41)).contains("made"));
     }
 }

@@ -37,6 +37,26 @@ pub struct SessionEntry {
     pub traverse: String,
     /// How many targets it has.
     pub target_count: usize,
+    /// The traverse's short name.
+    pub traverse_name: String,
+    /// How many runs its targets have.
+    pub run_count: usize,
+    /// The step that was looked at last.
+    pub step: usize,
+    /// How many stops the traverse has.
+    pub stop_count: usize,
+    /// When something of it was changed or stepped through last: RFC 3339, UTC; null where that is not known.
+    pub used: Option<String>,
+    /// How long ago that was, s.
+    pub idle_s: Option<f64>,
+}
+
+/// Opens a simulated drive.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewTraverse {
+    /// Its scenario, as TOML.
+    pub scenario: String,
 }
 
 /// A traverse as pages and scripts see it.
@@ -268,6 +288,42 @@ pub struct Problem {
     /// The nearest pixel of the left image that would do, where one was refused.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nearest_pixel: Option<Box<Pixel>>,
+    /// Which request it answers, and when; what the server adds on the way out.
+    #[serde(flatten, default, skip_serializing_if = "Option::is_none")]
+    pub received: Option<Box<Received>>,
+}
+
+/// By which a person's report finds the lines of the server's log.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct Received {
+    /// The request's name in the log.
+    pub request_id: String,
+    /// When it was answered: RFC 3339, UTC.
+    pub time: String,
+}
+
+impl Problem {
+    /// A problem of that status; `code` is its stable name for programs.
+    pub fn new(status: u16, code: &str, title: &str, detail: impl Into<String>) -> Self {
+        Self {
+            code: code.to_owned(),
+            title: title.to_owned(),
+            status,
+            detail: detail.into(),
+            hint: None,
+            nearest_pixel: None,
+            received: None,
+        }
+    }
+
+    /// The field of the request that is at fault, where the sentence begins with its name.
+    pub fn field(&self) -> Option<&str> {
+        let is_named = matches!(self.code.as_str(), "field" | "setting" | "query" | "expression");
+        let name = self.detail.split_once(": ").map(|(name, _)| name).filter(|_| is_named)?;
+        let name = name.strip_prefix("setting ").unwrap_or(name);
+        let is_part = |c: char| c.is_ascii_alphanumeric() || "_.[]".contains(c);
+        (!name.is_empty() && name.chars().all(is_part)).then_some(name)
+    }
 }
 
 /// Characters of a text.

@@ -9,7 +9,10 @@ use sightline_core::sim::{Scenario, library};
 use sightline_core::traverse::{Traverse, create_simulated};
 
 use super::say::{self, Progress};
-use crate::state::{hash, slug};
+use crate::drives;
+
+/// The folder of simulated traverses in the data folder.
+pub(super) const TRAVERSES: &str = "traverses";
 
 /// The largest scenario that is read, bytes.
 const SCENARIO_LIMIT: u64 = 1 << 20;
@@ -47,8 +50,7 @@ pub(super) fn open(path: &Path, data: Option<&Path>) -> Result<Traverse> {
 /// # Errors
 /// As [`create_simulated`].
 pub(super) fn simulated(scenario: &Scenario, data: &Path) -> Result<Traverse> {
-    let name = format!("{}-{}", slug(&scenario.name), &hash(scenario.to_toml().as_bytes())[..12]);
-    let folder = data.join("traverses").join(name);
+    let folder = data.join(TRAVERSES).join(drives::folder_name(scenario));
     if !folder.exists() {
         say::error(&format!("making the simulated traverse {}", folder.display()));
     }

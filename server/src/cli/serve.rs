@@ -48,7 +48,8 @@ impl Serve {
         let address = listener.local_addr().map_err(|error| Error::Request(error.to_string()))?;
         let _lock = lock(&data)?;
         let traverses = self.open_traverses(&data)?;
-        let folders = Folders { sessions: data.join("sessions"), studies: data.join("studies") };
+        let [sessions, studies, made] = ["sessions", "studies", open::TRAVERSES].map(|name| data.join(name));
+        let folders = Folders { sessions, studies, traverses: made };
         let state =
             AppState::with_folders(traverses, &folders, Hosts::new(address.port(), &self.allow_host))?;
         if !self.listen.is_loopback() {

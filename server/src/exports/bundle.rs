@@ -1,6 +1,7 @@
 //! What anybody needs to get the same rows again, bit for bit: settings, seed, versions, hashes and commands, as JSON.
 
 use serde_json::{Value, json};
+use sightline_core::session::reproduce::{FORMAT, FORMAT_VERSION};
 use sightline_core::session::shell::{quoted, settings_arguments};
 use sightline_core::sim::Scenario;
 use sightline_core::study::plan::tracker_version;
@@ -8,10 +9,8 @@ use sightline_core::study::plan::tracker_version;
 use super::kind::Part;
 use super::rows;
 use super::source::{NamedRun, Source};
+use crate::drives;
 use crate::state::hash;
-
-/// The version of this form.
-const FORMAT: u32 = 1;
 
 /// The bundle as JSON text.
 pub fn json(source: &Source, part: Part) -> String {
@@ -20,8 +19,8 @@ pub fn json(source: &Source, part: Part) -> String {
     let scenario = scenario(source);
     let runs: Vec<Value> = source.runs(part).into_iter().map(|run| of_run(source, run)).collect();
     let bundle = json!({
-        "format": "sightline-reproduce",
-        "format_version": FORMAT,
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
         "program": {
             "name": "sightline",
             "version": env!("CARGO_PKG_VERSION"),
@@ -98,8 +97,5 @@ fn place_of_traverse(source: &Source) -> String {
 
 /// The scenario of a simulated traverse.
 pub fn scenario(source: &Source) -> Option<Scenario> {
-    let traverse = &source.open.traverse;
-    let path = traverse.folder().join(traverse.index().scenario.as_ref()?);
-    let text = std::fs::read_to_string(&path).ok()?;
-    Scenario::from_toml(&text, &path).ok()
+    drives::scenario_of(&source.open.traverse)
 }

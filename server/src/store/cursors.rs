@@ -1,4 +1,5 @@
-//! Cursors on their way to disk: gathered for a moment, because one moves with every key, then written together.
+//! Cursors, and when sessions were used, on their way to disk: gathered for a moment, because a cursor moves with every key,
+//! then written together.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
@@ -8,7 +9,7 @@ use std::time::Duration;
 use sightline_core::error::{Error, Result};
 use sightline_core::session::Cursor;
 
-use super::{CURSORS, Disk, put};
+use super::{CURSORS, Disk, USED, put};
 use crate::jobs::lock;
 
 /// How long a cursor that moved may not be on disk.
@@ -29,6 +30,7 @@ struct Waiting {
 #[derive(Default)]
 struct Inside {
     moved: BTreeMap<u64, Cursor>,
+    used: BTreeMap<u64, String>,
     closed: bool,
 }
 
@@ -45,6 +47,12 @@ impl Cursors {
     /// Remembers a cursor.
     pub(super) fn set(&self, number: u64, cursor: Cursor) {
         lock(&self.waiting.inside).moved.insert(number, cursor);
+        self.waiting.changed.notify_all();
+    }
+
+    /// Remembers when a session was used.
+    pub(super) fn touch(&self, number: u64, now: String) {
+        lock(&self.waiting.inside).used.insert(number, now);
         self.waiting.changed.notify_all();
     }
 
@@ -74,7 +82,7 @@ impl Waiting {
     fn work(&self, disk: &Disk) {
         loop {
             let mut inside = lock(&self.inside);
-            while inside.moved.is_empty() && !inside.closed {
+            while inside.moved.is_empty() && inside.used.is_empty() && !inside.closed {
                 inside = self.changed.wait(inside).unwrap_or_else(PoisonError::into_inner);
             }
             if !inside.closed {
@@ -95,8 +103,11 @@ impl Waiting {
 
     /// Writes what is remembered; what moves meanwhile stays for the next time.
     fn write(&self, disk: &Disk) -> Result<()> {
-        let moved = std::mem::take(&mut lock(&self.inside).moved);
-        if moved.is_empty() {
+        let (moved, used) = {
+            let mut inside = lock(&self.inside);
+            (std::mem::take(&mut inside.moved), std::mem::take(&mut inside.used))
+        };
+        if moved.is_empty() && used.is_empty() {
             return Ok(());
         }
         let written = disk.write(|transaction| {
@@ -104,12 +115,18 @@ impl Waiting {
             for (number, cursor) in &moved {
                 is_changed |= put(transaction, CURSORS, *number, cursor)?;
             }
+            for (number, now) in &used {
+                is_changed |= put(transaction, USED, *number, now)?;
+            }
             Ok(is_changed)
         });
         if written.is_err() {
             let mut inside = lock(&self.inside);
             for (number, cursor) in moved {
                 inside.moved.entry(number).or_insert(cursor);
+            }
+            for (number, now) in used {
+                inside.used.entry(number).or_insert(now);
             }
         }
         written

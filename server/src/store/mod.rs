@@ -9,8 +9,10 @@
 //! notes      number → Notes
 //! studies    number → what was ordered and how it stands
 //! documents  name → Document
+//! used       number → when it was changed or stepped through last, RFC 3339    as late as cursors
+//! drives     folder → scenario of a simulated drive that was opened from a page, as TOML
 //! ```
-//! Values are JSON, in which numbers come back bit for bit. Everything but the cursor is on disk before the request is
+//! Values are JSON, in which numbers come back bit for bit. Everything but cursors and times of use is on disk before the request is
 //! answered, in one transaction: a server that is killed leaves the last transaction whole. Cursors are gathered, because
 //! one moves with every key, and written [`CURSOR_PERIOD`] after the first move at the latest; an orderly end writes them.
 //! A file that is damaged, or a session that cannot be read, is moved aside under a name that says so, never removed.
@@ -50,6 +52,8 @@ const CURSORS: TableDefinition<'_, u64, &[u8]> = TableDefinition::new("cursors")
 const NOTES: TableDefinition<'_, u64, &[u8]> = TableDefinition::new("notes");
 const STUDIES: TableDefinition<'_, u64, &[u8]> = TableDefinition::new("studies");
 const DOCUMENTS: TableDefinition<'_, &str, &[u8]> = TableDefinition::new("documents");
+const USED: TableDefinition<'_, u64, &[u8]> = TableDefinition::new("used");
+const DRIVES: TableDefinition<'_, &str, &[u8]> = TableDefinition::new("drives");
 
 /// The entry of [`META`] with the largest number that a session ever had.
 const LAST_SESSION: &str = "last_session";
@@ -113,6 +117,13 @@ impl Store {
     pub fn move_cursor(&self, session: &str, cursor: Cursor) {
         if let Some(number) = number_of(session) {
             self.cursors.set(number, cursor);
+        }
+    }
+
+    /// Remembers when a session was used last; it is written soon.
+    pub fn touch(&self, session: &str, now: String) {
+        if let Some(number) = number_of(session) {
+            self.cursors.touch(number, now);
         }
     }
 
@@ -234,6 +245,7 @@ fn forget(transaction: &WriteTransaction, number: u64) -> std::result::Result<bo
     transaction.open_table(SESSIONS)?.remove(number)?;
     transaction.open_table(CURSORS)?.remove(number)?;
     transaction.open_table(NOTES)?.remove(number)?;
+    transaction.open_table(USED)?.remove(number)?;
     let range = (number, 0, 0)..=(number, u64::MAX, u64::MAX);
     transaction.open_table(RUNS)?.retain_in(range, |_, _| false)?;
     Ok(true)

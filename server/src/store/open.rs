@@ -11,8 +11,8 @@ use sightline_core::error::{Error, Result};
 use sightline_core::session::view::SavedSession;
 
 use super::{
-    CURSORS, DOCUMENTS, Disk, FILE_NAME, LAST_SESSION, META, NOTES, RUNS, SESSIONS, STORE_VERSION, STUDIES,
-    Store, id_of, number_of,
+    CURSORS, DOCUMENTS, DRIVES, Disk, FILE_NAME, LAST_SESSION, META, NOTES, RUNS, SESSIONS, STORE_VERSION,
+    STUDIES, Store, USED, id_of, number_of,
 };
 
 /// How long a database is waited for that a server in this very process is about to let go of.
@@ -101,6 +101,8 @@ fn prepare(database: &Database) -> std::result::Result<u64, redb::Error> {
     transaction.open_table(NOTES)?;
     transaction.open_table(STUDIES)?;
     transaction.open_table(DOCUMENTS)?;
+    transaction.open_table(USED)?;
+    transaction.open_table(DRIVES)?;
     transaction.commit()?;
     Ok(version)
 }

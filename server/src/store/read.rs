@@ -12,7 +12,7 @@ use sightline_core::session::notes::Notes;
 use sightline_core::session::view::SavedSession;
 
 use super::open::{builder, failed, refused};
-use super::{CURSORS, FILE_NAME, LAST_SESSION, META, NOTES, RUNS, SESSIONS, id_of};
+use super::{CURSORS, FILE_NAME, LAST_SESSION, META, NOTES, RUNS, SESSIONS, USED, id_of};
 
 /// What was found.
 #[derive(Debug, Default)]
@@ -21,6 +21,8 @@ pub struct Found {
     pub sessions: Vec<SavedSession>,
     /// Their notes, by the sessions' numbers.
     pub notes: BTreeMap<u64, Notes>,
+    /// When they were used last, RFC 3339, by the sessions' numbers.
+    pub used: BTreeMap<u64, String>,
     /// One sentence for everything that a person should know.
     pub messages: Vec<String>,
     /// The largest number that a session ever had here.
@@ -65,6 +67,14 @@ pub(super) fn read(database: &impl ReadableDatabase, path: &Path) -> Result<Foun
                     found.notes.insert(key.value(), notes);
                 }
                 Err(why) => found.damaged.push((id_of(key.value()), format!("its notes: {why}"))),
+            }
+        }
+        // Another program may have the database open for writing in an earlier form, which has no such table.
+        if let Ok(table) = transaction.open_table(USED) {
+            for entry in table.iter()? {
+                let (key, value) = entry?;
+                // A time that cannot be read is no reason to lose anything.
+                found.used.extend(parsed(value.value()).map(|time: String| (key.value(), time)));
             }
         }
         // A session of which one thing cannot be read is moved aside once, with everything.

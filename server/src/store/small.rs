@@ -1,4 +1,4 @@
-//! Documents and studies: small values by name or number, each replaced as a whole.
+//! Documents, studies and opened drives: small values by name or number, each replaced as a whole.
 
 use redb::{ReadableDatabase, ReadableTable, ReadableTableMetadata};
 use serde::Serialize;
@@ -8,7 +8,7 @@ use sightline_core::error::Result;
 use sightline_core::session::documents::{DOCUMENT_LIMIT, Document};
 
 use super::open::failed;
-use super::{DOCUMENTS, STUDIES, Store, put};
+use super::{DOCUMENTS, DRIVES, STUDIES, Store, put};
 
 /// Why a document could not be replaced.
 #[derive(Clone, Debug, PartialEq)]
@@ -92,6 +92,32 @@ impl Store {
             Ok(was_there)
         })?;
         Ok(outcome)
+    }
+
+    /// The scenarios of the drives that were opened from a page, as TOML, by the names of their folders.
+    ///
+    /// # Errors
+    /// [`sightline_core::error::Error::Read`] when the database cannot be read.
+    pub fn drives(&self) -> Result<Vec<(String, String)>> {
+        let read = || {
+            let table = self.disk.database.begin_read()?.open_table(DRIVES)?;
+            let mut all = Vec::new();
+            for entry in table.iter()? {
+                let (key, value) = entry?;
+                let scenario = serde_json::from_slice::<String>(value.value());
+                all.extend(scenario.map(|scenario| (key.value().to_owned(), scenario)));
+            }
+            Ok::<_, redb::Error>(all)
+        };
+        read().map_err(|error| failed(&self.disk.path, &error.to_string()))
+    }
+
+    /// Remembers a drive that was opened from a page.
+    ///
+    /// # Errors
+    /// [`sightline_core::error::Error::Write`]; the database is then as it was.
+    pub fn save_drive(&self, folder: &str, scenario: &str) -> Result<()> {
+        self.disk.write(|transaction| put(transaction, DRIVES, folder, &scenario))
     }
 
     /// The studies that were started, by number; what cannot be read is left out.

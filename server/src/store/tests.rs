@@ -2,7 +2,7 @@
 
 use super::*;
 use sightline_core::session::documents::Document;
-use sightline_core::session::notes::NewNote;
+use sightline_core::session::notes::{NewNote, Pin};
 use sightline_core::session::view::{SavedRun, SavedTarget};
 use sightline_core::session::{Fork, Session};
 
@@ -36,7 +36,7 @@ fn a_session_comes_back_with_its_runs_cursor_and_notes_bit_for_bit() {
     {
         let store = Store::open(folder.path()).unwrap();
         store.save(&saved("s2")).unwrap();
-        let new = NewNote { step: 3, text: "moved".to_owned(), ..NewNote::default() };
+        let new = NewNote { pin: Pin { step: 3, ..Pin::default() }, text: "moved".to_owned() };
         notes.add(new, &Session::new("s2", "t", 9), "2026-11-22T12:00:00Z").unwrap();
         store.save_notes("s2", &notes).unwrap();
         let mut moved = saved("s2").cursor;

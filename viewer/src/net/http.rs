@@ -124,6 +124,7 @@ pub(crate) fn describe(request: &Request) -> (Method, String, Option<Vec<u8>>) {
             get(format!("sessions/{session}/exports{target}{run}"))
         }
         Request::Ask(asked) => super::ask::describe(asked),
+        Request::Files(asked) => super::files::describe(asked),
     }
 }
 
@@ -194,6 +195,7 @@ fn read(request: &Request, response: &ehttp::Response, context: &egui::Context) 
         Request::Metrics { .. } => Reply::Metrics(Box::new(parse(bytes)?)),
         Request::Trackability { .. } => Reply::Trackability(Box::new(parse(bytes)?)),
         Request::Ask(asked) => Reply::Ask(super::ask::read(asked, bytes)?),
+        Request::Files(asked) => Reply::Files(super::files::read(asked, bytes)?),
     })
 }
 
@@ -218,36 +220,20 @@ pub(super) fn parse<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
 
 /// What the server said instead of an answer.
 fn problem(response: &ehttp::Response) -> Problem {
-    serde_json::from_slice(&response.bytes).unwrap_or_else(|_| Problem {
-        code: "unexpected".to_owned(),
-        title: response.status_text.clone(),
-        status: response.status,
-        detail: format!("The server answered {} {}.", response.status, response.status_text),
-        hint: None,
-        nearest_pixel: None,
+    serde_json::from_slice(&response.bytes).unwrap_or_else(|_| {
+        let detail = format!("The server answered {} {}.", response.status, response.status_text);
+        Problem::new(response.status, "unexpected", &response.status_text, detail)
     })
 }
 
 fn unreachable(why: &str) -> Problem {
-    Problem {
-        code: "unreachable".to_owned(),
-        title: "no answer".to_owned(),
-        status: 0,
-        detail: format!("The server does not answer ({why})."),
-        hint: None,
-        nearest_pixel: None,
-    }
+    Problem::new(0, "unreachable", "no answer", format!("The server does not answer ({why})."))
 }
 
 fn misread(why: &str) -> Problem {
-    Problem {
-        code: "misread".to_owned(),
-        title: "unreadable answer".to_owned(),
-        status: 500,
-        detail: format!("The server's answer cannot be read: {why}."),
-        hint: Some("Page and server may be of different versions: load the page again.".to_owned()),
-        nearest_pixel: None,
-    }
+    let hint = "Page and server may be of different versions: load the page again.".to_owned();
+    let detail = format!("The server's answer cannot be read: {why}.");
+    Problem { hint: Some(hint), ..Problem::new(500, "misread", "unreadable answer", detail) }
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 mod ask;
 mod events;
+pub mod files;
 mod http;
 pub mod why;
 
@@ -24,6 +25,7 @@ use sightline_core::study::wire::{NewStudy, StudyInfo, StudyJob};
 use sightline_core::trackability::MapProgress;
 
 use self::events::Events;
+use self::files::{FileReply, FileRequest};
 pub(crate) use self::http::{describe, revision};
 use self::why::{WhyReply, WhyRequest};
 use crate::cache::{Item, Key};
@@ -194,6 +196,8 @@ pub enum Request {
     },
     /// About breakpoints and expressions.
     Ask(AskRequest),
+    /// About what is opened.
+    Files(FileRequest),
 }
 
 /// What the server answered.
@@ -245,6 +249,8 @@ pub enum Reply {
     Why(WhyReply),
     /// About breakpoints and expressions.
     Ask(AskReply),
+    /// About what is opened.
+    Files(FileReply),
 }
 
 /// An answer with what was asked.

@@ -5,12 +5,12 @@ use sightline_core::target::TrackingState;
 use sightline_core::trace::StepTrace;
 
 use super::compare::{choosers, readouts};
-use super::{inspector, numbers, playing, view_menu};
+use super::{inspector, messages, numbers, playing, view_menu};
 use crate::command::{Command, Go, Mode, Stage};
-use crate::state::exports;
 use crate::state::messages::Weight;
 use crate::state::tracker::confidence_of;
 use crate::state::{Connection, State, run_letter};
+use crate::state::{exports, files};
 use crate::theme;
 
 /// The top bar: what is open, where the cursor is, and what can be done with the whole.
@@ -40,6 +40,10 @@ pub fn top(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             let export = ui.add_enabled(state.session.is_some(), Button::new("Export"));
             if export.on_hover_text("Files, pictures, and any action as a command (Ctrl+S)").clicked() {
                 out.push(Command::Exports(exports::Ask::Open));
+            }
+            let open = ui.add(Button::new("Open"));
+            if open.on_hover_text("Files, recent sessions, drives (Ctrl+O)").clicked() {
+                out.push(Command::Files(files::Ask::Open));
             }
         });
     });
@@ -143,7 +147,7 @@ pub fn transport(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         if let Some((k, n)) = state.rendering {
             progress_bar(ui, &format!("rendering {k} of {n} stops"), k, n);
         }
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| newest_message(ui, state));
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| newest_message(ui, state, out));
     });
 }
 
@@ -173,8 +177,9 @@ fn progress_bar(ui: &mut Ui, words: &str, k: usize, n: usize) {
     ui.label(theme::note(words));
 }
 
-fn newest_message(ui: &mut Ui, state: &State) {
+fn newest_message(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     if let Some(message) = state.messages.newest() {
+        messages::undo(ui, state, message, out);
         let colour = if message.weight == Weight::Problem { theme::lost() } else { theme::weak() };
         let words = RichText::new(&message.text).small().color(colour);
         ui.add(egui::Label::new(words).truncate()).on_hover_text(&message.text);

@@ -32,7 +32,7 @@ const TICK_GAP: f32 = 34.0;
 
 /// Shows the right image.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    let Some(raster) = ready_image(ui, state, Eye::Right) else { return };
+    let Some(raster) = ready_image(ui, state, Eye::Right, out) else { return };
     raster.stretch(state.stretch);
     let [width, height] = raster.size();
     let shape = (width as f32 / height.max(1) as f32, STATUS);

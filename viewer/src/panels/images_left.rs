@@ -7,6 +7,7 @@ use sightline_core::locate::features::rows::moved_covariance_px2;
 use sightline_core::locate::shape_tracker::rows::{basin, registered_covariance_px2};
 use sightline_core::trace::StepTrace;
 
+use super::broken;
 use super::compare::{bar, marks as compared, modes};
 use super::exposure;
 use super::features::marks;
@@ -29,7 +30,7 @@ pub fn show(
     state: &State,
     out: &mut Vec<Command>,
 ) -> Option<(crate::view2d::Transform, [u32; 2])> {
-    let raster = ready_image(ui, state, Eye::Left)?;
+    let raster = ready_image(ui, state, Eye::Left, out)?;
     raster.stretch(state.stretch);
     exposure::show(ui, state, raster, out);
     bar::show(ui, state, out);
@@ -72,18 +73,17 @@ fn picture(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) 
 }
 
 /// An image of the cursor's stop, or the sentence that says why it is not there yet.
-pub fn ready_image<'a>(ui: &mut Ui, state: &'a State, eye: Eye) -> Option<&'a Raster> {
+pub fn ready_image<'a>(
+    ui: &mut Ui,
+    state: &'a State,
+    eye: Eye,
+    out: &mut Vec<Command>,
+) -> Option<&'a Raster> {
     let word = eye.word();
     let step = state.cursor.step;
     match state.image(eye) {
         Slot::Ready(raster) => return Some(raster),
-        Slot::Failed(problem) => {
-            panels::missing(
-                ui,
-                "",
-                &format!("The {word} image of step {step} cannot be shown: {}", problem.detail),
-            );
-        }
+        Slot::Failed(problem) => broken::show(ui, word, step, problem, out),
         Slot::Absent if state.traverse.is_none() => panels::missing(ui, "", &state.missing_target()),
         Slot::Absent | Slot::Loading => panels::missing(ui, "", &waiting_words(state, word, step)),
     }

@@ -1,10 +1,12 @@
 //! The list of messages: what was said to the person, the newest first.
 
-use egui::{Align, Layout, RichText, ScrollArea, Ui};
+use egui::{Align, Layout, ScrollArea, Ui};
 
+use super::card;
 use crate::command::Command;
 use crate::state::State;
 use crate::state::messages::{Message, Weight};
+use crate::state::why::Ask;
 use crate::{panels, theme};
 
 /// Shows the list.
@@ -19,14 +21,13 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     }
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         for message in state.messages.all().iter().rev() {
-            show_message(ui, message, out);
+            show_message(ui, state, message, out);
         }
     });
 }
 
-fn show_message(ui: &mut Ui, message: &Message, out: &mut Vec<Command>) {
+fn show_message(ui: &mut Ui, state: &State, message: &Message, out: &mut Vec<Command>) {
     let is_problem = message.weight == Weight::Problem;
-    let colour = if is_problem { theme::lost() } else { theme::text() };
     egui::Frame::new().fill(theme::bar()).corner_radius(4).inner_margin(6).show(ui, |ui| {
         ui.horizontal(|ui| {
             ui.label(theme::title(if is_problem { "problem" } else { "note" }));
@@ -37,17 +38,23 @@ fn show_message(ui: &mut Ui, message: &Message, out: &mut Vec<Command>) {
                 if ui.small_button("Dismiss").clicked() {
                     out.push(Command::Dismiss(message.id));
                 }
-                if ui.small_button("Copy").clicked() {
-                    ui.ctx().copy_text(message.text.clone());
-                }
+                card::copy(ui, message);
+                undo(ui, state, message, out);
             });
         });
-        ui.add(egui::Label::new(RichText::new(&message.text).color(colour)).wrap().selectable(true));
-        if let Some(hint) = &message.hint {
-            ui.add(egui::Label::new(theme::note(hint)).wrap());
-        }
+        card::body(ui, message);
         if let Some(link) = &message.link {
             ui.hyperlink_to(link, link);
         }
     });
+}
+
+/// A button that takes back what a message tells of, as long as that was the last deed.
+pub fn undo(ui: &mut Ui, state: &State, message: &Message, out: &mut Vec<Command>) {
+    if message.deed.is_some_and(|deed| state.undo.is_last(deed)) {
+        let button = egui::Button::new("Undo").min_size(egui::vec2(24.0, 22.0));
+        if ui.add(button).on_hover_text("Takes it back (Ctrl+Z)").clicked() {
+            out.push(Command::Why(Ask::Undo));
+        }
+    }
 }

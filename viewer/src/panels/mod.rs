@@ -2,6 +2,8 @@
 
 pub mod bars;
 pub mod breakpoints;
+pub mod card;
+pub mod broken;
 pub mod budget;
 pub mod compare;
 pub mod export;
@@ -21,6 +23,7 @@ pub mod messages;
 pub mod names;
 pub mod palette;
 pub mod notes;
+pub mod open;
 pub mod playing;
 pub mod plots;
 pub mod runs;

@@ -87,6 +87,8 @@ impl State {
             Command::Notes(ask) => self.ask_of_notes(ask),
             Command::Exports(ask) => self.ask_of_exports(ask),
             Command::Ask(ask) => self.apply_ask(ask),
+            Command::Files(ask) => self.ask_of_files(ask),
+            Command::CloseCard => self.messages.close_card(),
         }
     }
 
@@ -135,6 +137,7 @@ impl State {
     fn set_mode(&mut self, mode: Mode) {
         if mode == Mode::Look && self.mode == Mode::Look {
             self.refusal = None;
+            self.messages.close_card();
         }
         if mode == Mode::Pick {
             self.refusal = None;

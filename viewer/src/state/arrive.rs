@@ -8,6 +8,7 @@ use super::{Connection, Progress, Refusal, State, run_letter};
 use crate::cache::{Key, StepKey};
 use crate::command::Mode;
 use crate::net::{Arrived, Reply, Request};
+use crate::state::ask::AskRequest;
 use crate::state::undo::Deed;
 
 impl State {
@@ -81,6 +82,8 @@ impl State {
     /// Asks again for what may have been missed while the server was gone.
     fn catch_up(&mut self) {
         self.cache.retry(|_| true);
+        self.ask_why_again();
+        self.sync.keeps_cursor = true;
         self.forget_comparisons(false);
         self.progress.clear();
         self.sync.session_stale = true;
@@ -129,7 +132,8 @@ impl State {
                 Request::NewNote { .. } => {
                     self.messages.note("The note is pinned; the panel Notes lists them.");
                 }
-                Request::EditNote { .. } | Request::RemoveNote { .. } | Request::RestoreNote { .. } => {}
+                Request::EditNote { .. } | Request::RestoreNote { .. } => {}
+                request @ Request::RemoveNote { .. } => self.removed_note(&request),
                 Request::PutCursor { cursor, .. } => self.put_cursor(cursor),
                 request => {
                     self.removed_target(&request);
@@ -172,6 +176,11 @@ impl State {
                     self.answered_ask(asked, reply);
                 }
             }
+            Reply::Files(reply) => {
+                if let Request::Files(asked) = request {
+                    self.answered_file(asked, reply);
+                }
+            }
         }
     }
 
@@ -182,7 +191,7 @@ impl State {
         self.sync.server_cursor = cursor;
     }
 
-    fn refused(&mut self, request: Request, problem: Problem) {
+    fn refused(&mut self, request: Request, mut problem: Problem) {
         match request.clone() {
             Request::PutCursor { cursor, .. } => {
                 // The page keeps its cursor and tells the server of the next one.
@@ -214,6 +223,7 @@ impl State {
                 self.note_refused(&request);
             }
             Request::Ask(asked) => self.refused_ask(&asked, &problem),
+            Request::Files(asked) if !self.refused_file(&asked, &mut problem) => return,
             Request::Session(_) => {
                 self.sync.session_asked = None;
                 if self.session.is_none() && problem.status != 0 {
@@ -224,9 +234,18 @@ impl State {
             }
             _ => {}
         }
-        // That the server is gone is said once, by the banner.
+        let (method, path, _) = crate::net::describe(&request);
         if problem.status != 0 {
-            self.messages.problem(problem.detail, problem.hint);
+            let is_shown_in_place = matches!(
+                request,
+                Request::NewTarget { .. }
+                    | Request::Ask(AskRequest::Query { .. } | AskRequest::Breakpoints(_))
+            );
+            self.messages.refused(&problem, format!("{method:?} {path}"), !is_shown_in_place);
+        } else if method != ehttp::Method::GET {
+            // That the server is gone is said by the banner, but not that something came to nothing.
+            let hint = "Do it again when the banner has gone.".to_owned();
+            self.messages.problem("The server does not answer, so that nothing was changed.", Some(hint));
         }
     }
 
@@ -276,6 +295,11 @@ impl State {
         if self.traverse.as_ref().is_none_or(|open| open.id != view.traverse) {
             self.traverse = None;
             self.outbox.push(Request::Traverse(view.traverse.clone()));
+        }
+        let is_kept = std::mem::take(&mut self.sync.keeps_cursor) && !is_other;
+        if is_kept {
+            // A server that was ended may have lost the last move: it is told again where the page is.
+            self.sync.server_cursor = view.cursor;
         }
         let is_moved_elsewhere =
             !self.sync.cursor_asked && !moved_meanwhile && view.cursor != self.sync.server_cursor;

@@ -39,7 +39,12 @@ impl State {
 
     /// The changes that take the run looked at to a named configuration.
     pub(super) fn changes_to(&self, name: &str) -> Option<Changes> {
-        let (now, wanted) = (&self.run()?.settings, self.configurations.settings(name)?);
+        self.changes_to_settings(self.configurations.settings(name)?)
+    }
+
+    /// The changes that take the run looked at to these settings.
+    pub(super) fn changes_to_settings(&self, wanted: &Settings) -> Option<Changes> {
+        let now = &self.run()?.settings;
         let differing = Settings::table().into_iter().filter_map(|info| {
             let [old, new] = [now, wanted].map(|settings| settings.value(&info.group, &info.key));
             (old != new).then_some((info.key, new?))

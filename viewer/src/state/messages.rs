@@ -1,4 +1,6 @@
-//! What was said to the person, newest last.
+//! What was said to the person, newest last. The problem that was met last also has a card, until it is closed.
+
+use sightline_core::session::wire::Problem;
 
 /// How much a message matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,6 +26,35 @@ pub struct Message {
     pub link: Option<String>,
     /// How often it was said in a row.
     pub count: u32,
+    /// What else is known of a problem.
+    pub about: Option<Box<About>>,
+    /// The deed that it tells of, which can be taken back while it is the last one.
+    pub deed: Option<u64>,
+}
+
+/// What else is known of a problem.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct About {
+    /// Its stable name.
+    pub code: String,
+    /// Names and values: what was asked, field, request and time.
+    pub details: Vec<(&'static str, String)>,
+}
+
+impl Message {
+    /// All that is known of it, as text to copy.
+    pub fn words(&self) -> String {
+        let mut words = self.text.clone();
+        let hint = self.hint.iter().map(|hint| ("what to do", hint.clone()));
+        let about = self.about.iter().flat_map(|about| {
+            let code = ("code", about.code.clone());
+            std::iter::once(code).chain(about.details.iter().cloned())
+        });
+        for (name, value) in hint.chain(about) {
+            words += &format!("\n{name}: {value}");
+        }
+        words
+    }
 }
 
 /// The list of messages.
@@ -31,6 +62,8 @@ pub struct Message {
 pub struct Messages {
     list: Vec<Message>,
     next: u64,
+    /// The message whose card is open.
+    card: Option<u64>,
 }
 
 /// How many messages are kept.
@@ -50,6 +83,59 @@ impl Messages {
     /// Something was refused or failed.
     pub fn problem(&mut self, text: impl Into<String>, hint: Option<String>) {
         self.add(Weight::Problem, text.into(), hint, None);
+    }
+
+    /// Something was done that can be taken back as long as no other deed follows.
+    pub fn deed(&mut self, text: impl Into<String>, deed: u64) {
+        self.add(Weight::Note, text.into(), None, None);
+        if let Some(last) = self.list.last_mut() {
+            last.deed = Some(deed);
+        }
+    }
+
+    /// The server refused `asked`; `has_card` says whether that is shown above the panels.
+    pub fn refused(&mut self, problem: &Problem, asked: String, has_card: bool) {
+        let mut details = vec![("asked", asked)];
+        details.extend(problem.field().map(|field| ("field", field.to_owned())));
+        if let Some(received) = &problem.received {
+            details.push(("request", received.request_id.clone()));
+            details.push(("time", received.time.clone()));
+        }
+        details.push(("status", problem.status.to_string()));
+        self.about(problem.detail.clone(), problem.hint.clone(), problem.code.clone(), details, has_card);
+    }
+
+    /// A file cannot be opened; the sentence names it and says what to do.
+    pub fn refused_file(&mut self, sentence: impl Into<String>) {
+        self.about(sentence.into(), None, "file".to_owned(), Vec::new(), true);
+    }
+
+    fn about(
+        &mut self,
+        text: String,
+        hint: Option<String>,
+        code: String,
+        details: Vec<(&'static str, String)>,
+        has_card: bool,
+    ) {
+        self.add(Weight::Problem, text, hint, None);
+        if let Some(last) = self.list.last_mut() {
+            // Of the same problem twice the newest request is the one to look for.
+            last.about = Some(Box::new(About { code, details }));
+            if has_card {
+                self.card = Some(last.id);
+            }
+        }
+    }
+
+    /// The message whose card is open.
+    pub fn card(&self) -> Option<&Message> {
+        self.list.iter().find(|message| Some(message.id) == self.card)
+    }
+
+    /// Closes the card; the message stays.
+    pub fn close_card(&mut self) {
+        self.card = None;
     }
 
     /// Takes a message away.
@@ -73,7 +159,8 @@ impl Messages {
             last.link = link.or(last.link.take());
             return;
         }
-        self.list.push(Message { id: self.next, weight, text, hint, link, count: 1 });
+        let (id, about, deed) = (self.next, None, None);
+        self.list.push(Message { id, weight, text, hint, link, count: 1, about, deed });
         self.next += 1;
         if self.list.len() > KEPT {
             self.list.remove(0);

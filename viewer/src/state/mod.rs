@@ -14,6 +14,8 @@ mod linked;
 mod rows;
 mod views;
 pub mod exports;
+pub mod files;
+mod following;
 pub mod messages;
 mod missing;
 pub mod notes;
@@ -45,6 +47,7 @@ use self::ask::Asking;
 use self::calculator::Calculator;
 use self::configurations::Configurations;
 use self::exports::Exports;
+use self::files::Files;
 use self::messages::Messages;
 use self::notes::Notes;
 use self::studies::Studies;
@@ -181,6 +184,8 @@ pub struct State {
     pub notes: Notes,
     /// What the session can be had as.
     pub exports: Exports,
+    /// What can be opened.
+    pub files: Files,
     /// Breakpoints, derived columns, and time travel.
     pub ask: Asking,
     outbox: Vec<Request>,
@@ -208,6 +213,8 @@ struct Sync {
     link: Option<Fragment>,
     /// The traverse whose latest session is to be opened.
     opening: Option<String>,
+    /// The page's cursor counts more than the server's when the session is read next: the server was gone.
+    keeps_cursor: bool,
 }
 
 impl State {
@@ -249,6 +256,7 @@ impl State {
             undo: Undo::default(),
             notes: Notes::default(),
             exports: Exports::default(),
+            files: Files::default(),
             ask: Asking::default(),
             outbox: Vec::new(),
             sync: Sync { linked, ..Sync::default() },

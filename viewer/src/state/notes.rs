@@ -4,9 +4,10 @@
 //! refusal of the server.
 
 use sightline_core::session::Cursor;
-use sightline_core::session::notes::{EditNote, NewNote, Note};
+use sightline_core::session::notes::{EditNote, NewNote, Note, Pin};
 
 use super::State;
+use super::undo::Deed;
 use crate::command::Stage;
 use crate::net::Request;
 
@@ -46,7 +47,7 @@ pub struct Draft {
     /// The note that is changed, with the revision that was read; none for a new one.
     pub of: Option<(u64, u64)>,
     /// Where a new one is pinned.
-    pub pin: NewNote,
+    pub pin: Pin,
     /// Its words so far.
     pub text: String,
 }
@@ -77,7 +78,7 @@ impl State {
                 let note = self.note(id).cloned();
                 self.notes.draft = note.map(|note| Draft {
                     of: Some((note.id, note.revision)),
-                    pin: NewNote::default(),
+                    pin: note.pin,
                     text: note.text,
                 });
             }
@@ -92,15 +93,10 @@ impl State {
                 self.notes.kept = draft.map(|draft| draft.text).unwrap_or_default();
             }
             Ask::Remove(id) => {
-                let Some(note) = self.note(id).cloned() else { return };
-                let revision = note.revision;
-                self.notes.removed = Some(note);
-                self.ask(|session| Request::RemoveNote { session, id, revision });
+                let request = self.removal_of_note(id);
+                self.outbox.extend(request);
             }
-            Ask::Restore(id) => {
-                self.notes.removed = None;
-                self.ask(|session| Request::RestoreNote { session, id });
-            }
+            Ask::Restore(id) => self.restore_note(id),
             Ask::Move { id, place } => {
                 let Some(revision) = self.note(id).map(|note| note.revision) else { return };
                 let edit = EditNote { text: None, place: Some(place) };
@@ -113,6 +109,36 @@ impl State {
                 }
             }
         }
+    }
+
+    /// What removes a note; none where there is no such one. It can be brought back in the panel, too.
+    pub(super) fn removal_of_note(&mut self, id: u64) -> Option<Request> {
+        let session = self.session.as_ref()?.id.clone();
+        let note = self.note(id)?.clone();
+        let revision = note.revision;
+        self.notes.removed = Some(note);
+        Some(Request::RemoveNote { session, id, revision })
+    }
+
+    /// Brings a removed note back; where its removal was the last deed, that is taking it back.
+    fn restore_note(&mut self, id: u64) {
+        if matches!(self.undo.ends().0, Some(Deed::RemovedNote { id: last, .. }) if *last == id) {
+            self.undo_last();
+            return;
+        }
+        self.notes.removed = None;
+        self.ask(|session| Request::RestoreNote { session, id });
+    }
+
+    /// Takes in that a note was removed: a deed, unless it does one again.
+    pub(super) fn removed_note(&mut self, request: &Request) {
+        let Request::RemoveNote { id, .. } = *request else { return };
+        if self.take_silent(request) {
+            return;
+        }
+        let removed = self.notes.removed.as_ref().filter(|note| note.id == id);
+        let step = removed.map_or(self.cursor.step, |note| note.pin.step);
+        self.did_remove(&format!("the note at step {step}"), Deed::RemovedNote { id, step });
     }
 
     /// The note of that number.
@@ -153,15 +179,16 @@ impl State {
     /// A note could not be kept: its words come back.
     pub(super) fn note_refused(&mut self, request: &Request) {
         let draft = match request {
-            Request::NewNote { new, .. } => Draft { of: None, pin: new.clone(), text: new.text.clone() },
+            Request::NewNote { new, .. } => Draft { of: None, pin: new.pin.clone(), text: new.text.clone() },
             Request::EditNote { session, id, revision, edit: EditNote { text: Some(text), .. } } => {
                 self.outbox.push(Request::Notes(session.clone()));
                 // The next attempt is one against what the server has by then.
                 let revision = self.note(*id).map_or(*revision, |note| note.revision);
-                Draft { of: Some((*id, revision)), pin: NewNote::default(), text: text.clone() }
+                Draft { of: Some((*id, revision)), pin: Pin::default(), text: text.clone() }
             }
             Request::EditNote { session, .. } | Request::RemoveNote { session, .. } => {
                 self.notes.removed = None;
+                self.forget_refused(request);
                 self.outbox.push(Request::Notes(session.clone()));
                 return;
             }
@@ -181,13 +208,12 @@ impl State {
         let target = target.filter(|_| self.run().is_some());
         let located =
             self.trace().and_then(|trace| trace.locate.as_ref()).and_then(|located| located.left_pixel);
-        let pin = NewNote {
+        let pin = Pin {
             target,
             run: if target.is_some() { run } else { 0 },
             step,
             stage: target.map(|_| self.stage().word().to_owned()),
             pixel: located.filter(|_| target.is_some()),
-            text: String::new(),
         };
         self.notes.draft = Some(Draft { of: None, pin, text: std::mem::take(&mut self.notes.kept) });
     }
@@ -206,7 +232,7 @@ impl State {
                 self.ask(|session| Request::EditNote { session, id, revision, edit });
             }
             None => {
-                let new = NewNote { text, ..pin };
+                let new = NewNote { pin, text };
                 self.ask(|session| Request::NewNote { session, new });
             }
         }

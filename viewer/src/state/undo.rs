@@ -1,7 +1,7 @@
 //! Undo and redo: a short memory of deeds, each with what takes it back.
 //!
-//! It covers picks, removed targets and runs, branches, the draft of settings and what is tried. Nothing that was computed
-//! is lost by taking a deed back: targets and runs are hidden, and shown again.
+//! It covers picks, removed targets, runs, breakpoints, derived plots and notes, branches, the draft of settings and what is
+//! tried. Nothing that was computed is lost by taking a deed back: targets and runs are hidden, and shown again.
 
 use sightline_core::session::what_if::WhatIf;
 use sightline_core::settings::Changes;
@@ -41,6 +41,27 @@ pub enum Deed {
         /// The run's number.
         run: usize,
     },
+    /// Removed a breakpoint.
+    RemovedBreakpoint {
+        /// Its condition.
+        expression: String,
+        /// Whether it was on.
+        is_on: bool,
+    },
+    /// Removed a derived plot.
+    RemovedPlot {
+        /// Its expression.
+        expression: String,
+        /// Its place among the plots.
+        place: usize,
+    },
+    /// Removed a note.
+    RemovedNote {
+        /// Its number.
+        id: u64,
+        /// The step to which it is pinned.
+        step: usize,
+    },
     /// Changed the draft of settings.
     Drafted {
         /// The draft before.
@@ -66,12 +87,40 @@ pub struct Undo {
     undone: Vec<Deed>,
     /// Requests that take a deed back or do it again, and are no deeds themselves.
     silent: Vec<Request>,
+    /// Conditions of breakpoints that are to be switched off when they are set.
+    to_switch_off: Vec<String>,
+    /// Raised by every deed, and by taking one back.
+    changes: u64,
 }
 
 impl Undo {
     /// The last deed, and the last that was taken back.
     pub fn ends(&self) -> (Option<&Deed>, Option<&Deed>) {
         (self.done.last(), self.undone.last())
+    }
+
+    /// Whether the deed with this number is the one that would be taken back next.
+    pub fn is_last(&self, deed: u64) -> bool {
+        self.changes == deed && !self.done.is_empty()
+    }
+
+    /// A breakpoint with this condition is to be switched off when it is set.
+    pub(super) fn switch_off(&mut self, expression: &str) {
+        self.to_switch_off.push(expression.to_owned());
+    }
+
+    /// Whether a breakpoint that was set is to be switched off, which is asked once.
+    pub(super) fn take_switch_off(&mut self, expression: &str) -> bool {
+        let place = self.to_switch_off.iter().position(|waiting| waiting == expression);
+        place.map(|place| self.to_switch_off.remove(place)).is_some()
+    }
+
+    /// Forgets the last deed, where it is this one: it was refused.
+    pub(super) fn forget_last(&mut self, is_it: impl Fn(&Deed) -> bool) {
+        if self.done.last().is_some_and(is_it) {
+            self.done.pop();
+            self.changes += 1;
+        }
     }
 }
 
@@ -83,6 +132,11 @@ impl Deed {
             Self::RemovedTarget { target } => format!("the removal of target {}", target + 1),
             Self::Branched { run, .. } => format!("the branch {}", run_letter(*run)),
             Self::RemovedRun { run, .. } => format!("the removal of run {}", run_letter(*run)),
+            Self::RemovedBreakpoint { expression, .. } => {
+                format!("the removal of the breakpoint `{expression}`")
+            }
+            Self::RemovedPlot { expression, .. } => format!("the removal of the plot `{expression}`"),
+            Self::RemovedNote { step, .. } => format!("the removal of the note at step {step}"),
             Self::Drafted { .. } => "the change of the draft".to_owned(),
             Self::Tried { .. } => "the what-if".to_owned(),
         }
@@ -127,6 +181,7 @@ impl State {
     /// Remembers a deed; what was taken back before cannot be done again after it.
     pub(super) fn did(&mut self, deed: Deed) {
         self.undo.undone.clear();
+        self.undo.changes += 1;
         match self.undo.done.pop() {
             Some(last) if last.goes_on_with(&deed) => self.undo.done.push(last.merged(deed)),
             last => {
@@ -137,6 +192,12 @@ impl State {
         if self.undo.done.len() > REMEMBERED {
             self.undo.done.remove(0);
         }
+    }
+
+    /// Remembers a removal, and says so with a way to take it back.
+    pub(super) fn did_remove(&mut self, what: &str, deed: Deed) {
+        self.did(deed);
+        self.messages.deed(format!("Removed {what}."), self.undo.changes);
     }
 
     /// Remembers a change of the draft.
@@ -158,7 +219,7 @@ impl State {
             return;
         }
         if let WhyRequest::RemoveRun { target, run, .. } = *request {
-            self.did(Deed::RemovedRun { target, run });
+            self.did_remove(&format!("run {}", run_letter(run)), Deed::RemovedRun { target, run });
         }
     }
 
@@ -167,7 +228,7 @@ impl State {
         if let Request::RemoveTarget { target, .. } = *request
             && !self.take_silent(request)
         {
-            self.did(Deed::RemovedTarget { target });
+            self.did_remove(&format!("target {}", target + 1), Deed::RemovedTarget { target });
         }
     }
 
@@ -180,7 +241,7 @@ impl State {
         self.take_silent(request);
     }
 
-    fn take_silent(&mut self, request: &Request) -> bool {
+    pub(super) fn take_silent(&mut self, request: &Request) -> bool {
         let place = self.undo.silent.iter().position(|silent| silent == request);
         place.map(|place| self.undo.silent.remove(place)).is_some()
     }
@@ -188,6 +249,7 @@ impl State {
     pub(super) fn undo_last(&mut self) {
         match self.undo.done.pop() {
             Some(deed) => {
+                self.undo.changes += 1;
                 self.carry_over(&deed, false);
                 self.messages.note(format!("Took {} back.  Ctrl+Y does it again.", deed.words()));
                 self.undo.undone.push(deed);
@@ -199,6 +261,7 @@ impl State {
     pub(super) fn redo_last(&mut self) {
         match self.undo.undone.pop() {
             Some(deed) => {
+                self.undo.changes += 1;
                 self.carry_over(&deed, true);
                 self.messages.note(format!("Did {} again.", deed.words()));
                 self.undo.done.push(deed);
@@ -229,6 +292,32 @@ impl State {
             Deed::RemovedTarget { target } => target_request(*target, !again, session),
             Deed::Branched { target, run } => run_request(*target, *run, again, session),
             Deed::RemovedRun { target, run } => run_request(*target, *run, !again, session),
+            Deed::RemovedBreakpoint { expression, is_on } => {
+                if again {
+                    self.unset(expression);
+                } else {
+                    self.set_again(expression, *is_on);
+                }
+                return;
+            }
+            Deed::RemovedPlot { expression, place } => {
+                if again {
+                    self.take_plot_out(expression);
+                } else {
+                    self.plot_again(expression, *place);
+                }
+                return;
+            }
+            Deed::RemovedNote { id, .. } if again => match self.removal_of_note(*id) {
+                Some(request) => request,
+                None => return,
+            },
+            Deed::RemovedNote { id, .. } => {
+                // What brings a note back is no removal, so that nothing has to be kept silent.
+                self.notes.removed = None;
+                self.outbox.push(Request::RestoreNote { session, id: *id });
+                return;
+            }
             Deed::Drafted { before, after } => {
                 self.draft = if again { after } else { before }.clone();
                 return;

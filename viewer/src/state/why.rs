@@ -106,6 +106,8 @@ pub struct Why {
     pub is_called: bool,
     /// The change that the server tries now.
     trying: Option<(StepKey, WhatIf)>,
+    /// Where the cursor was when it was followed last, or when a value was asked for.
+    pub(super) followed: Option<StepKey>,
     /// The steps whose question was looked for.
     looked_for: BTreeSet<StepKey>,
 }
@@ -197,6 +199,7 @@ impl State {
     fn ask_value(&mut self, step: usize, value: String) {
         self.why.is_called = true;
         let Some(key) = self.step_key(step) else { return };
+        self.why.followed = self.step_key(self.cursor.step);
         self.want_tree(&key, &value);
         let place = (key, value);
         if self.why.asked.last() != Some(&place) {
@@ -207,7 +210,7 @@ impl State {
         }
     }
 
-    fn want_tree(&mut self, key: &StepKey, value: &str) {
+    pub(super) fn want_tree(&mut self, key: &StepKey, value: &str) {
         let place = (key.clone(), value.to_owned());
         if matches!(self.why.trees.get(&place), Some(Told::Waiting | Told::Here(_))) {
             return;
@@ -238,6 +241,10 @@ impl State {
             self.messages.problem(missing, None);
             return;
         };
+        if self.target().is_some_and(|target| target.designation.step == key.step) {
+            self.messages.note("The target was picked at this step: nothing was judged that could be saved.");
+            return;
+        }
         let goes_on = match self.why.questions.get(&key) {
             Some(Told::Waiting) => true,
             Some(Told::Here(question)) => {

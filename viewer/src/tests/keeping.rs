@@ -40,7 +40,8 @@ fn do_(state: &mut State, ask: Ask) {
 fn refuse(state: &mut State, request: Request) {
     let detail = "Note 5 was changed meanwhile.".to_owned();
     let (code, title) = ("changed".to_owned(), String::new());
-    let problem = Problem { code, title, status: 412, detail, hint: None, nearest_pixel: None };
+    let problem =
+        Problem { code, title, status: 412, detail, hint: None, nearest_pixel: None, received: None };
     state.arrived(Arrived { request, outcome: Err(problem) }, 0.0);
 }
 
@@ -105,8 +106,8 @@ fn a_note_is_pinned_to_what_is_looked_at_and_its_words_are_never_lost() {
     let [request @ Request::NewNote { .. }] = &state.take_requests()[..] else { panic!("the note is sent") };
     let Request::NewNote { new, .. } = request else { unreachable!() };
     let stage = Some("match_template".to_owned());
-    assert_eq!((new.target, new.run, new.step, &new.stage), (Some(0), 0, 2, &stage));
-    assert_eq!((new.text.as_str(), new.pixel), ("half a thought", Some(fixture::PIXEL)));
+    assert_eq!((new.pin.target, new.pin.run, new.pin.step, &new.pin.stage), (Some(0), 0, 2, &stage));
+    assert_eq!((new.text.as_str(), new.pin.pixel), ("half a thought", Some(fixture::PIXEL)));
     refuse(&mut state, request.clone());
     assert_eq!(state.notes.draft.as_ref().unwrap().text, "half a thought", "a refusal keeps them, too");
     do_(&mut state, Ask::Write("  ".to_owned()));

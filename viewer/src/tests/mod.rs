@@ -19,6 +19,10 @@ mod palette;
 mod picking;
 mod tour;
 mod why;
+mod undo;
+mod following;
+mod opening;
+mod problems;
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;

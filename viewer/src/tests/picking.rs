@@ -118,6 +118,7 @@ fn without_a_map_picking_works_and_the_panel_says_why_there_is_none() {
             detail: "the pair cannot be aligned".to_owned(),
             hint: None,
             nearest_pixel: None,
+            received: None,
         };
         answer(&mut state, Err(problem));
         assert!(state.messages.newest().is_none(), "it is no problem of the person's");
@@ -182,6 +183,7 @@ fn the_servers_refusal_brings_the_nearest_good_pixel_along() {
         detail: "no 3-D position".to_owned(),
         hint: Some("The nearest good pixel is (44, 36).".to_owned()),
         nearest_pixel: Some(Box::new(GOOD)),
+        received: None,
     };
     state.arrived(Arrived { request, outcome: Err(problem) }, 0.0);
     assert_eq!(state.refusal.as_ref().unwrap().nearest, Some(GOOD));

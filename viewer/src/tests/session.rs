@@ -23,6 +23,7 @@ fn problem(status: u16) -> Problem {
         detail: "no 3-D position".to_owned(),
         hint: None,
         nearest_pixel: None,
+        received: None,
     }
 }
 
@@ -58,6 +59,12 @@ fn a_page_without_a_link_opens_the_latest_session_of_the_first_traverse() {
         id: id.to_owned(),
         traverse: traverse.to_owned(),
         target_count: 1,
+        traverse_name: traverse.to_owned(),
+        run_count: 1,
+        step: 0,
+        stop_count: 5,
+        used: None,
+        idle_s: None,
     };
     let list = vec![entry("a", "drive"), entry("b", "drive"), entry("c", "other")];
     state.arrived(Arrived { request: Request::Sessions, outcome: Ok(Reply::Sessions(list)) }, 0.0);

@@ -1,4 +1,4 @@
-//! Why, what if, what would have saved it, and undo: what the panels show and what the state asks for.
+//! Why, what if, and what would have saved it: what the panels show and what the state asks for.
 
 use egui_kittest::kittest::Queryable;
 use serde_json::json;
@@ -20,7 +20,6 @@ use crate::layout::Pane;
 use crate::net::why::{WhyReply, WhyRequest};
 use crate::net::{Arrived, Reply, Request};
 use crate::state::State;
-use crate::state::undo::Deed;
 use crate::state::why::{Ask, Told};
 use crate::view2d::View2d;
 
@@ -148,7 +147,8 @@ fn a_change_that_is_refused_says_so_in_the_card_and_loses_nothing() {
     let request = Request::Why(asked(&mut state).remove(0));
     let (code, title, detail) =
         ("setting".to_owned(), String::new(), "search_window_px must be odd".to_owned());
-    let problem = Problem { code, title, status: 422, detail, hint: None, nearest_pixel: None };
+    let problem =
+        Problem { code, title, status: 422, detail, hint: None, nearest_pixel: None, received: None };
     state.arrived(Arrived { request, outcome: Err(problem) }, 0.0);
     assert_eq!(state.trial().unwrap().refused.as_deref(), Some("search_window_px must be odd"));
     assert!(asked(&mut state).is_empty(), "it is not asked for again and again");
@@ -353,61 +353,4 @@ fn w_asks_for_the_worst_criterion_first_and_numbers_elsewhere_lead_to_why() {
     let mut status =
         Shown::new([1200.0, 60.0], |context| fixture::at_step(context, LOST), crate::panels::bars::top);
     assert_eq!(status.click("0.41"), value("ncc"));
-}
-
-#[test]
-fn deeds_are_taken_back_and_done_again() {
-    let mut state = lost();
-    let ctrl = egui::Modifiers::CTRL;
-    assert_eq!(keys::command(egui::Key::Z, ctrl, &state), Some(Command::Why(Ask::Undo)));
-    assert_eq!(keys::command(egui::Key::Y, ctrl, &state), Some(Command::Why(Ask::Redo)));
-    // A removed target comes back, and its undoing is no deed of its own.
-    state.apply(Command::RemoveTarget(0));
-    let request =
-        state.take_requests().into_iter().find(|r| matches!(r, Request::RemoveTarget { .. })).unwrap();
-    state.arrived(Arrived { request, outcome: Ok(Reply::Done) }, 0.0);
-    assert_eq!(state.undo.ends().0, Some(&Deed::RemovedTarget { target: 0 }));
-    state.apply(Command::Why(Ask::Undo));
-    let restore = WhyRequest::RestoreTarget { session: "s1".to_owned(), target: 0 };
-    assert_eq!(asked(&mut state), vec![restore.clone()]);
-    let view = Box::new(state.session.clone().unwrap());
-    answer(&mut state, restore, WhyReply::Session(view));
-    assert_eq!(state.undo.ends(), (None, Some(&Deed::RemovedTarget { target: 0 })));
-    // The draft goes back value by value, a drag as one.
-    for value in [0.6, 0.5, 0.4] {
-        state.apply(Command::Draft { key: "ncc_min".to_owned(), value: Some(json!(value)) });
-    }
-    state.apply(Command::Draft { key: "roll".to_owned(), value: Some(json!(false)) });
-    state.apply(Command::Why(Ask::Undo));
-    assert_eq!(state.draft, Changes::from([("ncc_min".to_owned(), json!(0.4))]));
-    state.apply(Command::Why(Ask::Undo));
-    assert!(state.draft.is_empty());
-    state.apply(Command::Why(Ask::Redo));
-    assert_eq!(state.draft, Changes::from([("ncc_min".to_owned(), json!(0.4))]));
-}
-
-#[test]
-fn a_removed_run_leaves_the_list_and_can_be_taken_back() {
-    let two_runs = |context: &egui::Context| {
-        let mut state = fixture::at_step(context, LOST);
-        let run = RunView { number: 1, fork: Some(Fork::new(0, 2)), ..state.run().unwrap().clone() };
-        state.session.as_mut().unwrap().targets[0].runs.push(run);
-        state
-    };
-    let mut shown = Shown::pane(Pane::Targets, two_runs);
-    shown.says("from run A at step 2");
-    let remove = Ask::RemoveRun { target: 0, run: 1 };
-    assert_eq!(shown.click("remove run B"), vec![Command::Why(remove.clone())]);
-    let mut state = two_runs(&egui::Context::default());
-    state.apply(Command::Why(remove));
-    let request = asked(&mut state).remove(0);
-    let mut view = state.session.clone().unwrap();
-    view.targets[0].runs.truncate(1);
-    answer(&mut state, request, WhyReply::Session(Box::new(view)));
-    assert_eq!(state.target().unwrap().runs.len(), 1);
-    state.apply(Command::Why(Ask::Undo));
-    assert_eq!(
-        asked(&mut state),
-        vec![WhyRequest::RestoreRun { session: "s1".to_owned(), target: 0, run: 1 }]
-    );
 }

@@ -230,7 +230,8 @@ mod tests {
         let (a, b) = (json!({ "at": { "range_m": 1.5 } }), json!({ "at": { "range_m": near } }));
         let found = differences(&a, &b, &Tolerance::default());
         assert_eq!((found.len(), found[0].path.as_str(), found[0].unit.as_str()), (1, "at.range_m", "m"));
-        assert!(found[0].delta.unwrap() > 0.0);
+        // One unit in the last place of 1.5.
+        assert_eq!(found[0].delta, Some(f64::EPSILON));
         assert!(differences(&a, &b, &tolerance("m", 1e-9).unwrap()).is_empty());
         assert_eq!(differences(&a, &b, &tolerance("px", 1e-9).unwrap()).len(), 1, "of another unit");
     }

@@ -114,7 +114,7 @@ impl Scenario {
     /// Reads and checks a scenario; `path` only names the culprit in the message, beside key and allowed range.
     pub fn from_toml(text: &str, path: &Path) -> Result<Self> {
         let scenario: Self =
-            toml::from_str(text).map_err(|problem| Error::format(path, problem.to_string()))?;
+            toml::from_str(text).map_err(|problem| Error::format(path, in_one_sentence(text, &problem)))?;
         scenario.validate().map_err(|problem| Error::format(path, problem.to_string()))?;
         Ok(scenario)
     }
@@ -147,6 +147,15 @@ impl Scenario {
     }
 }
 
+/// What a reader of TOML says, with the line, as one sentence; its own words are a drawing of several lines.
+pub fn in_one_sentence(text: &str, problem: &toml::de::Error) -> String {
+    let said = problem.message().split_whitespace().collect::<Vec<_>>().join(" ");
+    match problem.span().and_then(|span| text.get(..span.start)) {
+        Some(before) => format!("line {}: {said}", before.matches('\n').count() + 1),
+        None => said,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -171,7 +180,9 @@ mod tests {
     fn unknown_and_impossible_settings_are_refused_by_name() {
         let refused =
             |text: &str| Scenario::from_toml(text, Path::new("s.toml")).expect_err("refused").to_string();
-        assert!(refused("[sun]\nheight_deg = 3.0\n").contains("height_deg"));
+        let unknown = refused("seed = 2\n[sun]\nheight_deg = 3.0\n");
+        assert!(unknown.starts_with("s.toml: line 3: unknown field `height_deg`"), "{unknown}");
+        assert!(!unknown.contains('\n'), "one sentence: {unknown}");
         assert!(refused("[sun]\nelevation_deg = -3.0\n").contains("sun.elevation_deg"));
         assert!(refused("[camera]\nimage_size = 1000\n").contains("camera.image_size"));
         assert!(refused("[drive]\nend_distance_m = nan\n").contains("drive.end_distance_m"));

@@ -18,13 +18,13 @@ pub(super) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let Some((key, value, told)) = state.explained() else { return };
     ui.add_space(2.0);
     ui.horizontal_wrapped(|ui| {
-        ui.label(theme::title(&format!("why {value}, step {}", key.step)));
+        ui.label(theme::title(&format!("why {value}, {}", state.whose(key))));
         if state.why.asked.len() > 1
             && ui.button("Back").on_hover_text("The value asked for before").clicked()
         {
             out.push(Command::Why(Ask::Back));
         }
-        let is_here = key.step == state.cursor.step && key.run == state.cursor.run;
+        let is_here = state.step_key(state.cursor.step).as_ref() == Some(key);
         if !is_here && ui.button("At this step").clicked() {
             out.push(Command::Why(Ask::Value { step: state.cursor.step, value: value.to_owned() }));
         }

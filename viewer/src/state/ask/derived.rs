@@ -29,7 +29,7 @@ pub struct Derived {
 }
 
 impl Derived {
-    fn new(expression: String) -> Self {
+    pub(super) fn new(expression: String) -> Self {
         Self { expression, answer: None, problem: None, asked_for: None, is_asked: false, is_stale: true }
     }
 

@@ -3,6 +3,7 @@
 pub mod derived;
 pub mod goto;
 pub mod play;
+mod removal;
 
 use sightline_core::session::breakpoints::{BreakpointChange, BreakpointView, NewBreakpoint};
 use sightline_core::session::expression::Expression;
@@ -11,6 +12,7 @@ use sightline_core::session::wire::Problem;
 
 use self::derived::Derived;
 use self::play::{Play, Shuttle};
+use super::undo::Deed;
 use super::{Connection, State};
 use crate::command::Go;
 use crate::net::Request;
@@ -185,11 +187,7 @@ impl State {
             }
             Ask::Remove(number) => self.remove_breakpoint(number),
             Ask::Plot(text) => self.plot_expression(text),
-            Ask::Unplot(at) => {
-                if at < self.ask.derived.len() {
-                    self.ask.derived.remove(at);
-                }
-            }
+            Ask::Unplot(place) => self.unplot(place),
             Ask::NextHit => self.go_to_hit(true),
             Ask::PreviousHit => self.go_to_hit(false),
             Ask::Shuttle(shuttle) => self.shuttle(shuttle),
@@ -241,15 +239,10 @@ impl State {
     }
 
     fn remove_breakpoint(&mut self, number: usize) {
-        let known = self.ask.breakpoints.iter().position(|breakpoint| breakpoint.number == number);
-        if let Some(at) = known
-            && self.ask_server(|session| AskRequest::Remove { session, number })
-        {
-            let removed = self.ask.breakpoints.remove(at);
-            if self.ask.edited == Some(number) {
-                self.ask.edited = None;
-            }
-            self.messages.note(format!("The breakpoint `{}` is removed.", removed.expression));
+        if let Some(removed) = self.take_breakpoint_out(number) {
+            let (expression, is_on) = (removed.expression, removed.on);
+            let what = format!("the breakpoint `{expression}`");
+            self.did_remove(&what, Deed::RemovedBreakpoint { expression, is_on });
         }
     }
 
@@ -331,6 +324,7 @@ impl State {
                 self.ask.breakpoints = list;
             }
             (_, AskReply::Breakpoint(view)) => {
+                self.switch_off_again(&view);
                 match self.ask.breakpoints.iter_mut().find(|known| known.number == view.number) {
                     Some(known) => *known = view,
                     None => self.ask.breakpoints.push(view),
@@ -349,6 +343,10 @@ impl State {
             AskRequest::Breakpoints(_) => self.ask.asked = false,
             AskRequest::Query { query, .. } => self.took_column(query, Err(problem.detail.clone())),
             // What the page believed of the list may be wrong now.
+            AskRequest::Remove { .. } => {
+                self.undo.forget_last(|deed| matches!(deed, Deed::RemovedBreakpoint { .. }));
+                self.ask.stale = true;
+            }
             _ => self.ask.stale = true,
         }
     }

@@ -47,6 +47,7 @@ fn a_refused_comparison_says_why() {
         detail: "target 0 has no run 1".to_owned(),
         hint: None,
         nearest_pixel: None,
+        received: None,
     };
     state.arrived(Arrived { request, outcome: Err(problem) }, 0.0);
     assert_eq!(state.comparison_problem(), Some("target 0 has no run 1"));

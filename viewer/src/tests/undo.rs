@@ -1,0 +1,236 @@
+//! Undo: what is taken back and done again, and that every removal offers it.
+
+use egui_kittest::kittest::Queryable;
+use serde_json::json;
+use sightline_core::session::Fork;
+use sightline_core::session::breakpoints::BreakpointView;
+use sightline_core::session::notes::{Note, Pin};
+use sightline_core::session::view::RunView;
+use sightline_core::session::wire::Problem;
+use sightline_core::settings::Changes;
+
+use super::{Shown, fixture};
+use crate::command::Command;
+use crate::keys;
+use crate::layout::Pane;
+use crate::net::why::{WhyReply, WhyRequest};
+use crate::net::{Arrived, Reply, Request};
+use crate::state::ask::{AskReply, AskRequest};
+use crate::state::undo::Deed;
+use crate::state::why::Ask;
+use crate::state::{State, ask, notes};
+
+/// The step that is lost.
+const LOST: usize = 3;
+
+fn lost() -> State {
+    fixture::at_step(&egui::Context::default(), LOST)
+}
+
+fn answer(state: &mut State, request: WhyRequest, reply: WhyReply) {
+    state.arrived(Arrived { request: Request::Why(request), outcome: Ok(Reply::Why(reply)) }, 0.0);
+}
+
+fn asked(state: &mut State) -> Vec<WhyRequest> {
+    let why = |request| match request {
+        Request::Why(request) => Some(request),
+        _ => None,
+    };
+    state.take_requests().into_iter().filter_map(why).collect()
+}
+
+/// What is asked about breakpoints.
+fn asked_of_breakpoints(state: &mut State) -> Vec<AskRequest> {
+    let of = |request| match request {
+        Request::Ask(request) if !matches!(request, AskRequest::Breakpoints(_)) => Some(request),
+        _ => None,
+    };
+    state.take_requests().into_iter().filter_map(of).collect()
+}
+
+fn undo(state: &mut State) {
+    state.apply(Command::Why(Ask::Undo));
+}
+
+fn redo(state: &mut State) {
+    state.apply(Command::Why(Ask::Redo));
+}
+
+fn breakpoint(number: usize, expression: &str, on: bool) -> BreakpointView {
+    let expression = expression.to_owned();
+    BreakpointView { number, expression, on, count: 0, hits: Vec::new(), problem: None }
+}
+
+#[test]
+fn deeds_are_taken_back_and_done_again() {
+    let mut state = lost();
+    let ctrl = egui::Modifiers::CTRL;
+    assert_eq!(keys::command(egui::Key::Z, ctrl, &state), Some(Command::Why(Ask::Undo)));
+    assert_eq!(keys::command(egui::Key::Y, ctrl, &state), Some(Command::Why(Ask::Redo)));
+    // A removed target comes back, and its undoing is no deed of its own.
+    state.apply(Command::RemoveTarget(0));
+    let request =
+        state.take_requests().into_iter().find(|r| matches!(r, Request::RemoveTarget { .. })).unwrap();
+    state.arrived(Arrived { request, outcome: Ok(Reply::Done) }, 0.0);
+    assert_eq!(state.undo.ends().0, Some(&Deed::RemovedTarget { target: 0 }));
+    state.apply(Command::Why(Ask::Undo));
+    let restore = WhyRequest::RestoreTarget { session: "s1".to_owned(), target: 0 };
+    assert_eq!(asked(&mut state), vec![restore.clone()]);
+    let view = Box::new(state.session.clone().unwrap());
+    answer(&mut state, restore, WhyReply::Session(view));
+    assert_eq!(state.undo.ends(), (None, Some(&Deed::RemovedTarget { target: 0 })));
+    // The draft goes back value by value, a drag as one.
+    for value in [0.6, 0.5, 0.4] {
+        state.apply(Command::Draft { key: "ncc_min".to_owned(), value: Some(json!(value)) });
+    }
+    state.apply(Command::Draft { key: "roll".to_owned(), value: Some(json!(false)) });
+    state.apply(Command::Why(Ask::Undo));
+    assert_eq!(state.draft, Changes::from([("ncc_min".to_owned(), json!(0.4))]));
+    state.apply(Command::Why(Ask::Undo));
+    assert!(state.draft.is_empty());
+    state.apply(Command::Why(Ask::Redo));
+    assert_eq!(state.draft, Changes::from([("ncc_min".to_owned(), json!(0.4))]));
+}
+
+#[test]
+fn a_removed_run_leaves_the_list_and_can_be_taken_back() {
+    let two_runs = |context: &egui::Context| {
+        let mut state = fixture::at_step(context, LOST);
+        let run = RunView { number: 1, fork: Some(Fork::new(0, 2)), ..state.run().unwrap().clone() };
+        state.session.as_mut().unwrap().targets[0].runs.push(run);
+        state
+    };
+    let mut shown = Shown::pane(Pane::Targets, two_runs);
+    shown.says("from run A at step 2");
+    let remove = Ask::RemoveRun { target: 0, run: 1 };
+    assert_eq!(shown.click("remove run B"), vec![Command::Why(remove.clone())]);
+    let mut state = two_runs(&egui::Context::default());
+    state.apply(Command::Why(remove));
+    let request = asked(&mut state).remove(0);
+    let mut view = state.session.clone().unwrap();
+    view.targets[0].runs.truncate(1);
+    answer(&mut state, request, WhyReply::Session(Box::new(view)));
+    assert_eq!(state.target().unwrap().runs.len(), 1);
+    state.apply(Command::Why(Ask::Undo));
+    assert_eq!(
+        asked(&mut state),
+        vec![WhyRequest::RestoreRun { session: "s1".to_owned(), target: 0, run: 1 }]
+    );
+}
+
+#[test]
+fn a_removed_breakpoint_comes_back_as_it_was_also_where_it_was_off() {
+    let mut state = lost();
+    state.ask.breakpoints = vec![breakpoint(4, "ncc < 0.5", false)];
+    state.take_requests();
+    state.apply(Command::Ask(ask::Ask::Remove(4)));
+    let removal = asked_of_breakpoints(&mut state);
+    assert_eq!(removal, vec![AskRequest::Remove { session: "s1".to_owned(), number: 4 }]);
+    let message = state.messages.newest().unwrap();
+    assert_eq!(message.text, "Removed the breakpoint `ncc < 0.5`.");
+    assert!(state.undo.is_last(message.deed.unwrap()), "the message offers to take it back");
+    undo(&mut state);
+    let add = asked_of_breakpoints(&mut state).remove(0);
+    assert!(matches!(&add, AskRequest::Add { new, .. } if new.expression.as_deref() == Some("ncc < 0.5")));
+    let reply = Reply::Ask(AskReply::Breakpoint(breakpoint(5, "ncc < 0.5", true)));
+    state.arrived(Arrived { request: Request::Ask(add), outcome: Ok(reply) }, 0.0);
+    let change = asked_of_breakpoints(&mut state);
+    assert!(
+        matches!(&change[..], [AskRequest::Change { number: 5, change, .. }] if change.on == Some(false)),
+        "{change:?}"
+    );
+    redo(&mut state);
+    let again = asked_of_breakpoints(&mut state);
+    assert_eq!(
+        again,
+        vec![AskRequest::Remove { session: "s1".to_owned(), number: 5 }],
+        "under its new number"
+    );
+}
+
+#[test]
+fn a_removal_of_a_breakpoint_that_is_refused_is_no_deed() {
+    let mut state = lost();
+    state.ask.breakpoints = vec![breakpoint(4, "ncc < 0.5", true)];
+    state.apply(Command::Ask(ask::Ask::Remove(4)));
+    let request = Request::Ask(asked_of_breakpoints(&mut state).remove(0));
+    state.arrived(Arrived { request, outcome: Err(Problem::new(500, "internal", "", "a fault")) }, 0.0);
+    assert_eq!(state.undo.ends().0, None);
+}
+
+#[test]
+fn a_removed_plot_comes_back_at_its_place() {
+    let mut state = lost();
+    for text in ["ncc", "err_px", "sigma_m"] {
+        state.apply(Command::Ask(ask::Ask::Plot(text.to_owned())));
+    }
+    let texts = |state: &State| -> Vec<String> {
+        state.ask.derived.iter().map(|derived| derived.expression.clone()).collect()
+    };
+    let before = texts(&state);
+    state.apply(Command::Ask(ask::Ask::Unplot(1)));
+    assert_eq!(texts(&state), ["ncc", "sigma_m"]);
+    undo(&mut state);
+    assert_eq!(texts(&state), before);
+    redo(&mut state);
+    assert_eq!(texts(&state), ["ncc", "sigma_m"]);
+}
+
+#[test]
+fn a_removed_note_comes_back_by_undo_or_by_its_button_but_not_twice() {
+    let mut state = lost();
+    let note = Note {
+        id: 5,
+        revision: 3,
+        pin: Pin { step: 2, ..Pin::default() },
+        text: "here".to_owned(),
+        made: String::new(),
+        changed: String::new(),
+    };
+    state.notes.list = Some(vec![note]);
+    state.take_requests();
+    let remove = |state: &mut State| {
+        state.apply(Command::Notes(notes::Ask::Remove(5)));
+        let request = state.take_requests().into_iter().find(|r| matches!(r, Request::RemoveNote { .. }));
+        state.arrived(Arrived { request: request.unwrap(), outcome: Ok(Reply::Done) }, 0.0);
+    };
+    let restored = |state: &mut State| {
+        let requests = state.take_requests();
+        requests.iter().filter(|request| matches!(request, Request::RestoreNote { id: 5, .. })).count()
+    };
+    remove(&mut state);
+    assert_eq!(state.undo.ends().0, Some(&Deed::RemovedNote { id: 5, step: 2 }));
+    assert_eq!(state.messages.newest().unwrap().text, "Removed the note at step 2.");
+    state.apply(Command::Notes(notes::Ask::Restore(5)));
+    assert_eq!(restored(&mut state), 1);
+    undo(&mut state);
+    assert_eq!(restored(&mut state), 0, "the button took the deed back already");
+    // Done again it is the same deed, not another one.
+    redo(&mut state);
+    let request =
+        state.take_requests().into_iter().find(|r| matches!(r, Request::RemoveNote { .. })).unwrap();
+    assert!(matches!(request, Request::RemoveNote { revision: 3, .. }));
+    state.arrived(Arrived { request, outcome: Ok(Reply::Done) }, 0.0);
+    assert_eq!(state.undo.ends(), (Some(&Deed::RemovedNote { id: 5, step: 2 }), None));
+}
+
+#[test]
+fn only_the_message_of_the_last_deed_offers_to_take_it_back() {
+    let removed = |with_another: bool| {
+        move |context: &egui::Context| {
+            let mut state = fixture::at_step(context, LOST);
+            state.apply(Command::Ask(ask::Ask::Plot("ncc".to_owned())));
+            state.apply(Command::Ask(ask::Ask::Unplot(0)));
+            if with_another {
+                state.apply(Command::Draft { key: "ncc_min".to_owned(), value: Some(json!(0.6)) });
+            }
+            state
+        }
+    };
+    let mut shown = Shown::pane(Pane::Messages, removed(false));
+    shown.says("Removed the plot `ncc`.");
+    assert_eq!(shown.click("Undo"), vec![Command::Why(Ask::Undo)]);
+    let later = Shown::pane(Pane::Messages, removed(true));
+    later.says("Removed the plot `ncc`.");
+    assert!(later.harness.query_by_label("Undo").is_none(), "it would take something else back");
+}
