@@ -220,4 +220,6 @@ pub enum Command {
     Exports(exports::Ask),
     /// Breakpoints, derived columns and time travel.
     Ask(crate::state::ask::Ask),
+    /// Shows a panel as a table, or as it is painted again.
+    Table(crate::layout::Pane),
 }

@@ -14,7 +14,8 @@
 //! | `layout` | where the panels are |
 //! | `view2d`, `overlay`, `ellipse`, `contour` | the zoomable canvas and the marks on it |
 //! | `as_text` | any action as `curl` and as a command |
-//! | `markdown`, `picture` | notes as text with emphasis; a panel as a PNG file |
+//! | `markdown`, `picture` | notes as text with emphasis; a file that is given to the person |
+//! | `figure` | a panel as a figure: SVG, and PNG at 1x to 4x |
 //! | `theme` | colours, text styles and spacing, and nowhere else |
 //! | `access` | the page for a screen reader: egui's tree as elements of the document |
 //! | `aim` | choosing a place in the left image |
@@ -48,6 +49,7 @@ pub mod status;
 pub mod aim;
 pub mod tour;
 pub mod as_text;
+pub mod figure;
 pub mod markdown;
 pub mod picture;
 #[cfg(target_arch = "wasm32")]

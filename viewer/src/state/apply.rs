@@ -87,6 +87,7 @@ impl State {
             Command::Notes(ask) => self.ask_of_notes(ask),
             Command::Exports(ask) => self.ask_of_exports(ask),
             Command::Ask(ask) => self.apply_ask(ask),
+            Command::Table(pane) => self.turn_table(pane),
         }
     }
 

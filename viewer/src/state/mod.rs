@@ -14,6 +14,7 @@ mod linked;
 mod rows;
 mod views;
 pub mod exports;
+pub mod ghost;
 pub mod messages;
 mod missing;
 pub mod notes;
@@ -183,6 +184,8 @@ pub struct State {
     pub exports: Exports,
     /// Breakpoints, derived columns, and time travel.
     pub ask: Asking,
+    /// Panels that are looked at as tables.
+    pub tables: HashSet<crate::layout::Pane>,
     outbox: Vec<Request>,
     sync: Sync,
     /// The aligned left camera of the step that was asked for last: it takes a while to compute.
@@ -250,6 +253,7 @@ impl State {
             notes: Notes::default(),
             exports: Exports::default(),
             ask: Asking::default(),
+            tables: HashSet::new(),
             outbox: Vec::new(),
             sync: Sync { linked, ..Sync::default() },
             aligned: egui::mutex::Mutex::default(),

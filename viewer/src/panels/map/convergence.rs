@@ -21,7 +21,7 @@ use crate::{ellipse, theme};
 const LEAST_HALF_CM: f64 = 0.5;
 
 /// Where a step placed the target.
-pub(super) struct Position {
+pub(in crate::panels) struct Position {
     /// The step.
     pub step: usize,
     /// The position in the site frame, m.
@@ -31,7 +31,7 @@ pub(super) struct Position {
 }
 
 /// The positions of a run, step by step.
-pub(super) fn positions(run: &RunView, stops: &[StopView]) -> Vec<Position> {
+pub(in crate::panels) fn positions(run: &RunView, stops: &[StopView]) -> Vec<Position> {
     let of_row = |row: &sightline_core::trace::StepRow| {
         let site_from_rover = stops.get(row.step)?.site_from_rover.to_pose();
         let rotation = *site_from_rover.rotation.to_rotation_matrix().matrix();

@@ -3,7 +3,7 @@
 //! Site frame: +x north, +y east, +z down. On the map east is to the right, so a site point is drawn at (y, x).
 //! Beside the whole drive stands the target's neighbourhood, where the positions converge (`convergence`).
 
-mod convergence;
+pub(in crate::panels) mod convergence;
 
 use egui::{Color32, Rect, Ui, UiBuilder, vec2};
 use egui_plot::{Arrows, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotPoints, PlotUi, Points};
