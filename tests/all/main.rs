@@ -15,6 +15,7 @@ mod keeping;
 mod page;
 mod page_access;
 mod page_debugger;
+mod page_figures;
 mod page_first;
 mod page_panels;
 mod page_speed;

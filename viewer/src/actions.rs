@@ -9,7 +9,7 @@ use crate::layout::Pane;
 use crate::layout::presets::Preset;
 use crate::layout::workspace::LayoutCommand;
 use crate::panels::{digits, sheets};
-use crate::state::exports;
+use crate::state::{exports, limits};
 use crate::state::why::Ask;
 use crate::state::{State, events, run_letter};
 use crate::theme::Looks;
@@ -99,6 +99,7 @@ fn works(state: &State) -> Vec<Action> {
             "R",
             Command::RunFromHere(state.draft.clone()),
         ),
+        action("Trackability: limits of the map", "", Command::Limits(limits::Ask::Open)),
         action("Take the changed settings back", "", Command::ClearDraft),
         action("Export: recording, tables, report, pictures", "Ctrl+S", Command::Exports(exports::Ask::Open)),
         action("Open the plain page of this step", "", Command::Exports(exports::Ask::PlainPage)),

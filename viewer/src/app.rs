@@ -7,7 +7,7 @@ use crate::layout::workspace::{LayoutCommand, Workspace};
 use crate::layout::{LeftImage, Pane, Panels, region};
 use crate::link::Fragment;
 use crate::net::{Net, Request};
-use crate::panels::{bars, export, help, notes, palette, timeline, tour as bubbles};
+use crate::panels::{bars, export, help, limits, notes, palette, timeline, tour as bubbles};
 use crate::state::{Connection, State};
 use crate::status::Publisher;
 use crate::{figure, keep, keys, picture, theme, tour};
@@ -142,6 +142,7 @@ impl SightlineApp {
         help::show(ui, state, &mut out);
         notes::editor(ui, state, &mut out);
         export::show(ui, state, &mut out);
+        limits::show(ui, state, &mut out);
         palette::show(ui, state, &mut out);
         bubbles::show(ui, state, &mut out);
         self.places = places;

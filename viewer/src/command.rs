@@ -222,4 +222,6 @@ pub enum Command {
     Ask(crate::state::ask::Ask),
     /// Shows a panel as a table, or as it is painted again.
     Table(crate::layout::Pane),
+    /// The limits of trackability.
+    Limits(crate::state::limits::Ask),
 }

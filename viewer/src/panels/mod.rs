@@ -16,6 +16,7 @@ pub mod image_right;
 pub mod images_left;
 pub mod inspector;
 pub mod legend;
+pub mod limits;
 pub mod machine;
 pub mod map;
 pub mod messages;

@@ -87,6 +87,7 @@ impl State {
             Command::Notes(ask) => self.ask_of_notes(ask),
             Command::Exports(ask) => self.ask_of_exports(ask),
             Command::Ask(ask) => self.apply_ask(ask),
+            Command::Limits(ask) => self.ask_limits(ask),
             Command::Table(pane) => self.turn_table(pane),
         }
     }
@@ -133,7 +134,7 @@ impl State {
         }
     }
 
-    fn set_mode(&mut self, mode: Mode) {
+    pub(super) fn set_mode(&mut self, mode: Mode) {
         if mode == Mode::Look && self.mode == Mode::Look {
             self.refusal = None;
         }

@@ -15,6 +15,7 @@ mod rows;
 mod views;
 pub mod exports;
 pub mod ghost;
+pub mod limits;
 pub mod messages;
 mod missing;
 pub mod notes;

@@ -7,6 +7,7 @@ pub(crate) mod feature_run;
 mod features;
 mod figures;
 pub(crate) mod fixture;
+mod ghost;
 mod history;
 mod keeping;
 mod playing;
