@@ -147,7 +147,8 @@ async fn at_pixel(
     state
         .designations()
         .run(move || {
-            let ground = ground(&work_state, &open, step, (&Settings::default(), &limits), &CancelFlag::default())?;
+            let ground =
+                ground(&work_state, &open, step, (&Settings::default(), &limits), &CancelFlag::default())?;
             Ok(Json(PixelVerdict::of(&open.traverse, &ground, place)))
         })
         .await
@@ -202,9 +203,15 @@ impl Maps {
     }
 
     /// A map that is under way, taken out, so that the next who asks begins anew.
-    fn take_unfinished(&self, traverse: &str, step: usize, limits: &TrackabilityLimits) -> Option<Arc<Making>> {
+    fn take_unfinished(
+        &self,
+        traverse: &str,
+        step: usize,
+        limits: &TrackabilityLimits,
+    ) -> Option<Arc<Making>> {
         let mut making = lock(&self.making);
-        let place = making.iter().position(|one| one.is_of(traverse, step, limits) && !lock(&one.progress).ended)?;
+        let place =
+            making.iter().position(|one| one.is_of(traverse, step, limits) && !lock(&one.progress).ended)?;
         making.remove(place)
     }
 }

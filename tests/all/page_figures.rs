@@ -97,14 +97,16 @@ async fn a_panel_is_saved_as_svg_and_png_which_look_alike_and_a_plot_is_read_as_
     let (name, svg) = save(&browser, "Match scores", "SVG").await;
     assert!(name.contains("-target-0-run-a-step-") && name.ends_with("-match-scores.svg"), "{name}");
     let text = String::from_utf8(svg).unwrap();
-    assert!(text.contains("<title id=\"title\">Match scores: ") && text.contains("<image "), "{}", &text[..400]);
+    assert!(
+        text.contains("<title id=\"title\">Match scores: ") && text.contains("<image "),
+        "{}",
+        &text[..400]
+    );
     // The browser draws the file by itself: another hand than the one that drew the PNG.
     let drawn = value(&browser, "the drawn file", &draw(width, height)).await;
     let drawn = drawn.as_array().unwrap_or_else(|| panic!("the browser says: {drawn}"));
-    let drawn: Vec<u8> = drawn
-        .chunks(4)
-        .flat_map(|pixel| pixel[..3].iter().map(|v| v.as_u64().unwrap() as u8))
-        .collect();
+    let drawn: Vec<u8> =
+        drawn.chunks(4).flat_map(|pixel| pixel[..3].iter().map(|v| v.as_u64().unwrap() as u8)).collect();
     if let Some(folder) = std::env::var_os("SIGHTLINE_SHOTS") {
         let folder = std::path::PathBuf::from(folder);
         std::fs::create_dir_all(&folder).unwrap();

@@ -9,9 +9,9 @@ use crate::layout::Pane;
 use crate::layout::presets::Preset;
 use crate::layout::workspace::LayoutCommand;
 use crate::panels::{digits, sheets};
-use crate::state::{exports, limits};
 use crate::state::why::Ask;
 use crate::state::{State, events, run_letter};
+use crate::state::{exports, limits};
 use crate::theme::Looks;
 use crate::tour::Turn;
 

@@ -124,7 +124,8 @@ impl Fragment {
             parts.push(format!("vs={}", names.join(",")));
         }
         parts.extend(self.compared.map(|view| format!("cmp={}", hyphened(view))));
-        if let Some((sort, metric)) = self.sort.as_ref().and_then(|sort| Some((sort, sort.metric.as_ref()?))) {
+        if let Some((sort, metric)) = self.sort.as_ref().and_then(|sort| Some((sort, sort.metric.as_ref()?)))
+        {
             parts.push(format!("sort={}{metric}", if sort.is_descending { "-" } else { "" }));
         }
         parts.extend(self.filter.as_ref().map(|words| format!("show={}", escaped(words))));
@@ -168,7 +169,8 @@ fn sort(value: &str) -> Option<compare::Sort> {
 /// Words as a part of an address: all but letters, digits, `.`, `_` and `-` of ASCII as percent signs and digits.
 fn escaped(words: &str) -> String {
     let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'.' | b'_' | b'-');
-    let escape = |byte: u8| if is_plain(byte) { char::from(byte).to_string() } else { format!("%{byte:02X}") };
+    let escape =
+        |byte: u8| if is_plain(byte) { char::from(byte).to_string() } else { format!("%{byte:02X}") };
     words.chars().take(WORDS_MAX).collect::<String>().bytes().map(escape).collect()
 }
 

@@ -255,7 +255,8 @@ mod tests {
         assert_eq!(ghost.search_window, Some(PixelRect::centred(put, 143)));
         assert!(ghost.deltas.moved_px.unwrap() < 0.01, "{:?}", ghost.deltas);
         assert_eq!(tried.update.state, TrackingState::Tracking);
-        let (recorded, matched) = (steps[1].template().unwrap().match_template.as_ref().unwrap(), ghost.matched.unwrap());
+        let (recorded, matched) =
+            (steps[1].template().unwrap().match_template.as_ref().unwrap(), ghost.matched.unwrap());
         assert!(matched.peak.pixel.distance(recorded.peak.pixel) < 0.01, "{:?}", matched.peak);
         assert_eq!((ghost.arrays[0].size, ghost.arrays[0].values.len()), ([123, 123], 123 * 123));
         // Far enough away the target is not in the window, and the step is lost.

@@ -123,7 +123,9 @@ mod tests {
 
     #[test]
     fn limits_come_back_from_their_text_and_only_what_differs_is_said() {
-        let limits = TrackabilityLimits::parse("edge_bad_px=4, slant_risky_deg=70,cell_px=16,edge_share=0.03").unwrap();
+        let limits =
+            TrackabilityLimits::parse("edge_bad_px=4, slant_risky_deg=70,cell_px=16,edge_share=0.03")
+                .unwrap();
         assert_eq!((limits.edge_bad_px, limits.slant_risky_deg, limits.cell_px), (4.0, 70.0, 16));
         let text = TrackabilityLimits::text(&limits.changes());
         assert_eq!(text, "cell_px=16,edge_bad_px=4.0,slant_risky_deg=70.0");

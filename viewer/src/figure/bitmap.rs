@@ -104,7 +104,8 @@ impl Sheet<'_> {
     fn draw(&mut self, clip: Rect, ink: &Ink) {
         let is_cut = !clip.contains_rect(ink.bounds());
         if is_cut && self.mask.as_ref().is_none_or(|(known, _)| *known != clip) {
-            self.mask = mask(clip, self.scale, [self.pixmap.width(), self.pixmap.height()]).map(|mask| (clip, mask));
+            self.mask =
+                mask(clip, self.scale, [self.pixmap.width(), self.pixmap.height()]).map(|mask| (clip, mask));
         }
         let mask = self.mask.as_ref().filter(|_| is_cut).map(|(_, mask)| mask);
         let whole = Transform::from_scale(self.scale, self.scale);
@@ -200,7 +201,12 @@ fn texture(pixels: &ColorImage) -> Option<Pixmap> {
 fn mask(clip: Rect, scale: f32, [width, height]: [u32; 2]) -> Option<Mask> {
     let mut mask = Mask::new(width, height)?;
     let whole = |v: f32| (v * scale).round();
-    let area = tiny_skia::Rect::from_ltrb(whole(clip.left()), whole(clip.top()), whole(clip.right()), whole(clip.bottom()))?;
+    let area = tiny_skia::Rect::from_ltrb(
+        whole(clip.left()),
+        whole(clip.top()),
+        whole(clip.right()),
+        whole(clip.bottom()),
+    )?;
     mask.fill_path(&PathBuilder::from_rect(area), FillRule::Winding, false, Transform::identity());
     Some(mask)
 }
@@ -213,7 +219,12 @@ fn path(form: &Form) -> Option<(Path, Transform)> {
         Form::Rect(rect, radii) => corners(&mut path, *rect, *radii),
         Form::Ellipse(middle, half, angle) => {
             let box_of = Rect::from_center_size(*middle, 2.0 * *half);
-            path.push_oval(tiny_skia::Rect::from_ltrb(box_of.left(), box_of.top(), box_of.right(), box_of.bottom())?);
+            path.push_oval(tiny_skia::Rect::from_ltrb(
+                box_of.left(),
+                box_of.top(),
+                box_of.right(),
+                box_of.bottom(),
+            )?);
             turn = Transform::from_rotate_at(angle.to_degrees(), middle.x, middle.y);
         }
         Form::Lines(points, closed) => {

@@ -28,8 +28,9 @@ impl<'a> Faces<'a> {
             Some(Face { font, scale: data.tweak.scale, down: data.tweak.y_offset_factor })
         };
         let families = definitions.families.iter();
-        let families =
-            families.map(|(family, names)| (family.clone(), names.iter().filter_map(face).collect())).collect();
+        let families = families
+            .map(|(family, names)| (family.clone(), names.iter().filter_map(face).collect()))
+            .collect();
         Self { families, outlines: HashMap::new() }
     }
 
@@ -46,9 +47,8 @@ fn outline(faces: &[Face<'_>], letter: char) -> Option<Path> {
     let face = faces.iter().find(has).or(faces.first())?;
     let per_em = face.font.units_per_em()?;
     let curves = face.font.outline(face.font.glyph_id(letter))?.curves;
-    let at = |point: ab_glyph::Point| {
-        (point.x / per_em * face.scale, -point.y / per_em * face.scale + face.down)
-    };
+    let at =
+        |point: ab_glyph::Point| (point.x / per_em * face.scale, -point.y / per_em * face.scale + face.down);
     let mut path = PathBuilder::new();
     let mut last = None;
     for curve in curves {

@@ -130,7 +130,9 @@ impl Form {
     fn bounds(&self) -> Rect {
         match self {
             Self::Rect(rect, _) => *rect,
-            Self::Ellipse(middle, half, _) => Rect::from_center_size(*middle, Vec2::splat(2.0 * half.max_elem())),
+            Self::Ellipse(middle, half, _) => {
+                Rect::from_center_size(*middle, Vec2::splat(2.0 * half.max_elem()))
+            }
             Self::Lines(points, _) => Rect::from_points(points),
             Self::Curve(points, _) => Rect::from_points(points),
         }

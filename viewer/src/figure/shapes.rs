@@ -6,10 +6,10 @@
 
 use std::sync::Arc;
 
+use egui::emath::TSTransform;
 use egui::epaint::{
     ClippedShape, ColorMode, CubicBezierShape, Mesh, PathShape, PathStroke, RectShape, StrokeKind, Vertex,
 };
-use egui::emath::TSTransform;
 use egui::{Color32, ColorImage, Pos2, Rect, Shape, Stroke, TextureId, Vec2, pos2, vec2};
 
 use super::{Figure, Form, Ink, Piece, words};
@@ -37,8 +37,7 @@ pub fn figure<'s>(
     scale: f32,
     textures: Textures<'_>,
 ) -> Figure {
-    let mut gatherer =
-        Gatherer { textures, scale, pieces: Vec::new(), left_out: 0, clip: frame };
+    let mut gatherer = Gatherer { textures, scale, pieces: Vec::new(), left_out: 0, clip: frame };
     for clipped in shapes {
         gatherer.clip = clipped.clip_rect.intersect(frame);
         if !gatherer.clip.is_positive() {
@@ -150,10 +149,15 @@ impl Gatherer<'_> {
     fn rect(&mut self, shape: &RectShape) {
         let whole = |v: f32| (v * self.scale).round() / self.scale;
         let on_pixels = |rect: Rect| {
-            Rect::from_min_max(pos2(whole(rect.min.x), whole(rect.min.y)), pos2(whole(rect.max.x), whole(rect.max.y)))
+            Rect::from_min_max(
+                pos2(whole(rect.min.x), whole(rect.min.y)),
+                pos2(whole(rect.max.x), whole(rect.max.y)),
+            )
         };
         let rect = if shape.round_to_pixels.unwrap_or(true) { on_pixels(shape.rect) } else { shape.rect };
-        if let Some(brush) = shape.brush.as_ref().filter(|brush| brush.fill_texture_id != TextureId::default()) {
+        if let Some(brush) =
+            shape.brush.as_ref().filter(|brush| brush.fill_texture_id != TextureId::default())
+        {
             self.picture(brush.fill_texture_id, shape.rect, brush.uv, shape.fill);
         } else if shape.fill != Color32::TRANSPARENT {
             self.area(turned(rect, radii(shape, 0.0), shape.angle), shape.fill, Stroke::NONE);
@@ -181,7 +185,8 @@ impl Gatherer<'_> {
                     Some((place, uv)) => self.picture(mesh.texture_id, place, uv, pair[0].color),
                     None => self.left_out += 1,
                 }
-            } else if let Some((place, _)) = upright.filter(|_| pair.iter().all(|v| v.color == pair[0].color)) {
+            } else if let Some((place, _)) = upright.filter(|_| pair.iter().all(|v| v.color == pair[0].color))
+            {
                 self.area(Form::Rect(place, [0.0; 4]), pair[0].color, Stroke::NONE);
             } else {
                 self.triangle(&pair[..3.min(pair.len())]);
@@ -216,17 +221,24 @@ impl Gatherer<'_> {
         let column = |x: f32| (uv.left() + share(x, place.left(), place.right()) * uv.width()) * width;
         let row = |y: f32| (uv.top() + share(y, place.top(), place.bottom()) * uv.height()) * height;
         let whole = |low: f32, high: f32, side: f32| {
-            [low.min(high).floor().clamp(0.0, side), low.max(high).ceil().clamp(0.0, side)].map(|v| v as usize)
+            [low.min(high).floor().clamp(0.0, side), low.max(high).ceil().clamp(0.0, side)]
+                .map(|v| v as usize)
         };
         let [left, right] = whole(column(seen.left()), column(seen.right()), width);
         let [top, bottom] = whole(row(seen.top()), row(seen.bottom()), height);
         if left >= right || top >= bottom {
             return;
         }
-        let rows = (top..bottom).flat_map(|y| &pixels.pixels[y * pixels.size[0] + left..y * pixels.size[0] + right]);
-        let part: Vec<Color32> = rows.map(|colour| if tint == crate::theme::UNTINTED { *colour } else { *colour * tint }).collect();
-        let at_x = |column: usize| place.left() + share(column as f32 / width, uv.left(), uv.right()) * place.width();
-        let at_y = |row: usize| place.top() + share(row as f32 / height, uv.top(), uv.bottom()) * place.height();
+        let rows =
+            (top..bottom).flat_map(|y| &pixels.pixels[y * pixels.size[0] + left..y * pixels.size[0] + right]);
+        let part: Vec<Color32> = rows
+            .map(|colour| if tint == crate::theme::UNTINTED { *colour } else { *colour * tint })
+            .collect();
+        let at_x = |column: usize| {
+            place.left() + share(column as f32 / width, uv.left(), uv.right()) * place.width()
+        };
+        let at_y =
+            |row: usize| place.top() + share(row as f32 / height, uv.top(), uv.bottom()) * place.height();
         let place = Rect::from_min_max(pos2(at_x(left), at_y(top)), pos2(at_x(right), at_y(bottom)));
         let pixels = Arc::new(ColorImage::new([right - left, bottom - top], part));
         self.push(Ink::Picture { pixels, place });
@@ -243,7 +255,9 @@ fn mean_of(corners: &[Vertex], of: fn(&Color32) -> u8) -> u8 {
 fn plain(stroke: &PathStroke, points: &[Pos2]) -> Stroke {
     let colour = match &stroke.color {
         ColorMode::Solid(colour) => *colour,
-        ColorMode::UV(of) => points.first().map_or(Color32::TRANSPARENT, |at| of(Rect::from_points(points), *at)),
+        ColorMode::UV(of) => {
+            points.first().map_or(Color32::TRANSPARENT, |at| of(Rect::from_points(points), *at))
+        }
     };
     Stroke::new(stroke.width, colour)
 }
@@ -271,7 +285,8 @@ fn upright(pair: &[Vertex]) -> Option<(Rect, Rect)> {
         let at = corner.pos;
         (at.x == place.left() || at.x == place.right()) && (at.y == place.top() || at.y == place.bottom())
     };
-    let mut corners: Vec<[u32; 2]> = pair.iter().map(|corner| [corner.pos.x.to_bits(), corner.pos.y.to_bits()]).collect();
+    let mut corners: Vec<[u32; 2]> =
+        pair.iter().map(|corner| [corner.pos.x.to_bits(), corner.pos.y.to_bits()]).collect();
     corners.sort_unstable();
     corners.dedup();
     if corners.len() != 4 || !pair.iter().all(is_corner) {

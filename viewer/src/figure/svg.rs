@@ -44,20 +44,32 @@ pub fn text(figure: &Figure) -> Result<String, String> {
     let mut clips: Vec<([u32; 4], usize)> = clips.into_iter().collect();
     clips.sort_unstable_by_key(|(_, number)| *number);
     let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
-    line(&mut text, format_args!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" xmlns:xlink=\"http://www.w3.org/1999/xlink\" version=\"1.1\" \
+    line(
+        &mut text,
+        format_args!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" xmlns:xlink=\"http://www.w3.org/1999/xlink\" version=\"1.1\" \
          width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" role=\"img\" \
          aria-labelledby=\"title desc\">"
-    ));
+        ),
+    );
     line(&mut text, format_args!("<title id=\"title\">{}</title>", escaped(&figure.title)));
     line(&mut text, format_args!("<desc id=\"desc\">{}</desc>", escaped(&figure.description)));
     text.push_str("<defs>\n");
     for (corners, clip) in clips {
         let [x0, y0, x1, y1] = corners.map(f32::from_bits);
-        line(&mut text, format_args!("<clipPath id=\"clip{clip}\"><rect {}/></clipPath>", box_of(x0, y0, x1 - x0, y1 - y0)));
+        line(
+            &mut text,
+            format_args!(
+                "<clipPath id=\"clip{clip}\"><rect {}/></clipPath>",
+                box_of(x0, y0, x1 - x0, y1 - y0)
+            ),
+        );
     }
     text.push_str("</defs>\n");
-    line(&mut text, format_args!("<rect width=\"{width}\" height=\"{height}\"{}/>", paint("fill", figure.ground)));
+    line(
+        &mut text,
+        format_args!("<rect width=\"{width}\" height=\"{height}\"{}/>", paint("fill", figure.ground)),
+    );
     text.push_str(&body);
     text.push_str("</svg>\n");
     Ok(text)
@@ -70,16 +82,21 @@ fn line(text: &mut String, words: std::fmt::Arguments<'_>) {
 
 fn ink(body: &mut String, ink: &Ink) -> Result<(), String> {
     match ink {
-        Ink::Area { form, fill, stroke } => line(body, format_args!("{}{}{}/>", open(form), paint("fill", *fill), drawn(stroke))),
+        Ink::Area { form, fill, stroke } => {
+            line(body, format_args!("{}{}{}/>", open(form), paint("fill", *fill), drawn(stroke)))
+        }
         Ink::Words(words) => self::words(body, words),
         Ink::Picture { pixels, place } => {
             let png = STANDARD.encode(super::bitmap::png_of(pixels)?);
             let is_magnified = place.width() > pixels.size[0] as f32;
             let kept = if is_magnified { " style=\"image-rendering:pixelated\"" } else { "" };
-            line(body, format_args!(
-                "<image {} preserveAspectRatio=\"none\"{kept} xlink:href=\"data:image/png;base64,{png}\"/>",
-                box_of(place.left(), place.top(), place.width(), place.height())
-            ));
+            line(
+                body,
+                format_args!(
+                    "<image {} preserveAspectRatio=\"none\"{kept} xlink:href=\"data:image/png;base64,{png}\"/>",
+                    box_of(place.left(), place.top(), place.width(), place.height())
+                ),
+            );
         }
     }
     Ok(())
@@ -94,12 +111,19 @@ fn open(form: &Form) -> String {
         }
         Form::Rect(rect, radii) => format!("<path d=\"{}\"", rounded(*rect, *radii)),
         Form::Ellipse(middle, half, _) if half.x == half.y => {
-            format!("<circle cx=\"{}\" cy=\"{}\" r=\"{}\"", number(middle.x), number(middle.y), number(half.x))
+            format!(
+                "<circle cx=\"{}\" cy=\"{}\" r=\"{}\"",
+                number(middle.x),
+                number(middle.y),
+                number(half.x)
+            )
         }
         Form::Ellipse(middle, half, angle) => {
             let [x, y, rx, ry] = [middle.x, middle.y, half.x, half.y].map(number);
             let turn = number(angle.to_degrees());
-            format!("<ellipse cx=\"{x}\" cy=\"{y}\" rx=\"{rx}\" ry=\"{ry}\" transform=\"rotate({turn} {x} {y})\"")
+            format!(
+                "<ellipse cx=\"{x}\" cy=\"{y}\" rx=\"{rx}\" ry=\"{ry}\" transform=\"rotate({turn} {x} {y})\""
+            )
         }
         Form::Lines(points, closed) => {
             let mut data = String::new();
@@ -145,12 +169,15 @@ fn words(body: &mut String, words: &Words) {
     };
     let lean = if words.is_italic { " font-style=\"italic\"" } else { "" };
     let fit = if words.is_spaced { "spacing" } else { "spacingAndGlyphs" };
-    line(body, format_args!(
-        "<text x=\"{x}\" y=\"{y}\" font-family=\"{family}\" font-size=\"{size}\"{lean}{} textLength=\"{width}\" \
+    line(
+        body,
+        format_args!(
+            "<text x=\"{x}\" y=\"{y}\" font-family=\"{family}\" font-size=\"{size}\"{lean}{} textLength=\"{width}\" \
          lengthAdjust=\"{fit}\" xml:space=\"preserve\"{turn}>{}</text>",
-        paint("fill", words.colour),
-        escaped(&words.text)
-    ));
+            paint("fill", words.colour),
+            escaped(&words.text)
+        ),
+    );
 }
 
 fn drawn(stroke: &Stroke) -> String {

@@ -92,7 +92,8 @@ pub fn take(context: &Context, state: &State, places: &[(Pane, Rect)], wish: Wis
     let name = file_name(state, wish);
     let mut sentence = format!("Saved {name}: {size}, {} kB.", bytes.len().div_ceil(1000));
     if place.is_none() {
-        sentence += &format!(" {} is not on the screen: it was drawn apart, with what is loaded.", wish.pane.title());
+        sentence +=
+            &format!(" {} is not on the screen: it was drawn apart, with what is loaded.", wish.pane.title());
     }
     if figure.left_out > 0 {
         sentence += &format!(" {} shapes could not be taken over.", figure.left_out);
@@ -108,7 +109,10 @@ pub fn fonts(context: &Context) -> FontDefinitions {
 /// What is painted inside a rectangle of the layer of the panels.
 pub fn of_layer(context: &Context, state: &State, place: Rect, scale: f32) -> Figure {
     let painted: Vec<ClippedShape> = context.graphics(|layers| {
-        layers.get(LayerId::background()).map(|list| list.all_entries().cloned().collect()).unwrap_or_default()
+        layers
+            .get(LayerId::background())
+            .map(|list| list.all_entries().cloned().collect())
+            .unwrap_or_default()
     });
     shapes::figure(&painted, place, scale, &|id| state.pixels_of(id))
 }
@@ -139,7 +143,8 @@ fn apart(state: &State, pane: Pane, scale: f32) -> Figure {
 fn named(context: &Context, state: &State, pane: Pane, mut figure: Figure) -> Figure {
     let of = place_words(state);
     figure.title = if of.is_empty() { pane.title().to_owned() } else { format!("{}: {of}", pane.title()) };
-    let session = state.session.as_ref().map(|session| format!(" Session {}.", session.id)).unwrap_or_default();
+    let session =
+        state.session.as_ref().map(|session| format!(" Session {}.", session.id)).unwrap_or_default();
     let row = state.row().map(|row| format!(" The target is {}.", row.state)).unwrap_or_default();
     figure.description = format!("The panel “{}” of Sightline.{session}{row}", pane.title());
     if state.exports.burns_in {

@@ -23,9 +23,9 @@ pub fn inks(shape: &TextShape) -> Vec<Ink> {
             let at = characters.next_if(|(_, c)| *c == glyph.chr || !shape.galley.elided);
             let at = at.map_or(shape.galley.job.text.len().saturating_sub(1), |(at, _)| at);
             let sections = &shape.galley.job.sections;
-            let section = sections.iter().find(|section| {
-                (section.byte_range.start.0..section.byte_range.end.0).contains(&at)
-            });
+            let section = sections
+                .iter()
+                .find(|section| (section.byte_range.start.0..section.byte_range.end.0).contains(&at));
             let Some(format) = section.or(sections.last()).map(|section| &section.format) else { continue };
             match runs.last_mut().filter(|run| run.continues(format, glyph)) {
                 Some(run) => run.letters.push((glyph.chr, *glyph)),
@@ -60,7 +60,12 @@ impl Run<'_> {
         };
         if self.format.background != Color32::TRANSPARENT {
             let top = first.pos.to_vec2() - vec2(0.0, first.font_ascent);
-            let corners = [vec2(0.0, 0.0), vec2(width, 0.0), vec2(width, first.line_height), vec2(0.0, first.line_height)];
+            let corners = [
+                vec2(0.0, 0.0),
+                vec2(width, 0.0),
+                vec2(width, first.line_height),
+                vec2(0.0, first.line_height),
+            ];
             let outline = corners.map(|corner| place(top + corner)).to_vec();
             let fill = solid(self.format.background);
             inks.push(Ink::Area { form: Form::Lines(outline, true), fill, stroke: Stroke::NONE });
@@ -79,7 +84,11 @@ impl Run<'_> {
                 colour: solid(shape.override_text_color.unwrap_or(self.format.color)),
             }));
         }
-        for (line, height) in [(self.format.underline, 1.5), (shape.underline, 1.5), (self.format.strikethrough, -0.3 * first.font_ascent)] {
+        for (line, height) in [
+            (self.format.underline, 1.5),
+            (shape.underline, 1.5),
+            (self.format.strikethrough, -0.3 * first.font_ascent),
+        ] {
             if !line.is_empty() {
                 let ends = [0.0, width].map(|x| place(first.pos.to_vec2() + vec2(x, height))).to_vec();
                 let stroke = Stroke::new(line.width, solid(line.color));

@@ -244,7 +244,8 @@ impl<'a> Panels<'a> {
         egui::Popup::menu(&button).show(|ui| {
             ui.set_min_width(180.0);
             if let Some(pane) = front {
-                let words = if self.maximised.is_some() { "Restore all panels (`)" } else { "Fill the page (`)" };
+                let words =
+                    if self.maximised.is_some() { "Restore all panels (`)" } else { "Fill the page (`)" };
                 if ui.button(words).clicked() {
                     self.out.push(Command::Layout(LayoutCommand::Maximise(Some(pane))));
                 }

@@ -3,13 +3,13 @@
 use egui::{Id, Modal, RichText, ScrollArea, Ui};
 use sightline_core::session::exports::ExportEntry;
 
+use super::figure_menu;
 use crate::as_text;
 use crate::command::Command;
 use crate::figure::take::{Kind, Wish};
 use crate::layout::Pane;
 use crate::state::State;
 use crate::state::exports::{Ask, Part};
-use super::figure_menu;
 use crate::theme;
 
 /// Shows the window, while it is open.
@@ -116,7 +116,9 @@ fn pictures(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         figure_menu::burn_in(ui, state, out);
     });
     let seen = |pane: &Pane| state.exports.panes.contains(pane);
-    for (words, is_seen) in [("on the screen, as it is there", true), ("not on the screen, drawn apart", false)] {
+    for (words, is_seen) in
+        [("on the screen, as it is there", true), ("not on the screen, drawn apart", false)]
+    {
         ui.label(theme::note(words));
         ui.horizontal_wrapped(|ui| {
             for pane in Pane::ALL.into_iter().filter(|pane| seen(pane) == is_seen) {

@@ -15,7 +15,10 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let modal = Modal::new(Id::unique("limits")).backdrop_color(theme::shade()).show(ui.ctx(), |ui| {
         ui.set_width(560.0);
         ui.label(RichText::new("Limits of trackability").size(16.0).strong().color(theme::strong()));
-        ui.add(Label::new(theme::note("By these a place is good, risky or bad. The map is made anew by them.")).wrap());
+        ui.add(
+            Label::new(theme::note("By these a place is good, risky or bad. The map is made anew by them."))
+                .wrap(),
+        );
         let height = (ui.ctx().content_rect().height() - 220.0).max(120.0);
         ScrollArea::vertical().max_height(height).auto_shrink([false, true]).show(ui, |ui| {
             Grid::new("limits").num_columns(4).spacing([10.0, 4.0]).striped(true).show(ui, |ui| {

@@ -199,7 +199,9 @@ fn made_with(state: &State) -> String {
     let limits = state.trackability_map().map(|map| &map.limits).filter(|limits| !limits.is_empty());
     let table = TrackabilityLimits::table();
     let unit = |key: &str| table.iter().find(|info| info.key == key).map_or("", |info| info.unit.as_str());
-    let one = |(key, value): (&String, &serde_json::Value)| format!("{key} {value} {}", unit(key)).trim_end().to_owned();
+    let one = |(key, value): (&String, &serde_json::Value)| {
+        format!("{key} {value} {}", unit(key)).trim_end().to_owned()
+    };
     match limits {
         Some(limits) => format!("Map made with {}", limits.iter().map(one).collect::<Vec<_>>().join(", ")),
         None => "Map made with the default limits".to_owned(),

@@ -79,9 +79,15 @@ pub(super) fn sheets(state: &State) -> Result<Vec<Sheet>, String> {
     let (charts, others) = (charts(state, run), state.others());
     let mut columns = vec![Column::new("state", "")];
     for (chart, line) in charts.iter().flat_map(|chart| chart.series.iter().map(move |line| (chart, line))) {
-        let name = if chart.series.len() > 1 { format!("{} {}", chart.title, line.name) } else { chart.title.to_owned() };
+        let name = if chart.series.len() > 1 {
+            format!("{} {}", chart.title, line.name)
+        } else {
+            chart.title.to_owned()
+        };
         columns.push(Column::new(&name, chart.unit));
-        let beside = others.iter().map(|other| Column::new(format!("{name}, {}", state.run_label(other.name)), chart.unit));
+        let beside = others
+            .iter()
+            .map(|other| Column::new(format!("{name}, {}", state.run_label(other.name)), chart.unit));
         columns.extend(beside);
     }
     columns.extend(state.ask.derived.iter().map(|derived| {
@@ -89,9 +95,17 @@ pub(super) fn sheets(state: &State) -> Result<Vec<Sheet>, String> {
         let unit = if unit.is_empty() { String::new() } else { format!(", {unit}") };
         Column::new(format!("{}{unit}", derived.expression), "")
     }));
-    let beside: Vec<HashMap<usize, &StepRow>> = others.iter().map(|other| {
-        other.run.rows.iter().filter_map(|row| Some((state.own_beside(other.name, row.step)?, row))).collect()
-    }).collect();
+    let beside: Vec<HashMap<usize, &StepRow>> = others
+        .iter()
+        .map(|other| {
+            other
+                .run
+                .rows
+                .iter()
+                .filter_map(|row| Some((state.own_beside(other.name, row.step)?, row)))
+                .collect()
+        })
+        .collect();
     let mut sheet = Sheet::over_steps("Over the steps", columns);
     for row in &run.rows {
         let mut cells = vec![state_of(row)];
@@ -101,7 +115,8 @@ pub(super) fn sheets(state: &State) -> Result<Vec<Sheet>, String> {
                 cells.push(rows.get(&row.step).and_then(|row| (line.value)(other.run, row)).into());
             }
         }
-        cells.extend((0..state.ask.derived.len()).map(|at| super::derived::value(state, at, row.step).into()));
+        cells
+            .extend((0..state.ask.derived.len()).map(|at| super::derived::value(state, at, row.step).into()));
         sheet.step(row.step, state.cursor.step, cells);
     }
     Ok(vec![sheet])

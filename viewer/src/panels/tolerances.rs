@@ -10,8 +10,8 @@ use sightline_core::settings::TrackerKind;
 use sightline_core::trace::StepRow;
 
 use super::names;
-use super::sheets::{Cell, Column, Sheet};
 use super::plots::{few_marks, over_steps, pieces, plain};
+use super::sheets::{Cell, Column, Sheet};
 use crate::command::{Command, Go};
 use crate::overlay::{self, Mark};
 use crate::state::State;
@@ -104,7 +104,11 @@ pub(super) fn sheets(state: &State) -> Result<Vec<Sheet>, String> {
     let run = state.run().ok_or_else(|| state.missing_target())?;
     let columns = CRITERIA.iter().flat_map(|criterion| {
         let name = criterion.title.trim_end_matches(", cm");
-        [(name.to_owned(), "cm"), (format!("tolerance {}", criterion.number), "cm"), (format!("fired {}", criterion.number), "")]
+        [
+            (name.to_owned(), "cm"),
+            (format!("tolerance {}", criterion.number), "cm"),
+            (format!("fired {}", criterion.number), ""),
+        ]
     });
     let columns = columns.map(|(name, unit)| Column::new(name, unit)).collect();
     let mut sheet = Sheet::over_steps("Tolerances", columns);
@@ -112,7 +116,9 @@ pub(super) fn sheets(state: &State) -> Result<Vec<Sheet>, String> {
         let cells = CRITERIA.iter().flat_map(|criterion| {
             let (value, tolerance) = ((criterion.value_m)(row), (criterion.tolerance_m)(row));
             let fired = match value.zip(tolerance) {
-                Some((value_m, tolerance_m)) => Cell::Word(if value_m > tolerance_m { "fired" } else { "no" }.to_owned()),
+                Some((value_m, tolerance_m)) => {
+                    Cell::Word(if value_m > tolerance_m { "fired" } else { "no" }.to_owned())
+                }
                 None => Cell::Nothing,
             };
             let cm = |value: Option<f64>| Cell::from(value.map(|m| m * 100.0));

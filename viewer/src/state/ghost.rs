@@ -88,7 +88,8 @@ impl State {
     pub(super) fn send_trial(&mut self) {
         let Some(trial) = &self.why.trial else { return };
         let is_whole = trial.has_scores || !self.why.wants_scores;
-        let is_answered = trial.ghost.as_ref().is_some_and(|ghost| ghost.what_if == trial.what_if) && is_whole;
+        let is_answered =
+            trial.ghost.as_ref().is_some_and(|ghost| ghost.what_if == trial.what_if) && is_whole;
         if self.why.trying.is_some() || is_answered || trial.refused.is_some() {
             return;
         }

@@ -104,7 +104,9 @@ impl State {
             *known = Trackability { aim, limits, form, ..Trackability::default() };
             (known.is_stale, known.place) = (wanted.is_some(), wanted);
         }
-        if let Some((traverse, step, limits)) = known.place.clone().filter(|_| known.is_stale && !known.is_asked) {
+        if let Some((traverse, step, limits)) =
+            known.place.clone().filter(|_| known.is_stale && !known.is_asked)
+        {
             (known.is_asked, known.is_stale) = (true, false);
             self.outbox.push(Request::Trackability { traverse, step, limits });
         }

@@ -13,8 +13,8 @@ use sightline_core::session::what_if::WhatIf;
 use sightline_core::session::why::{Explanation, gates};
 use sightline_core::session::wire::{NewRun, Problem};
 
-use super::ghost::{self, Scores};
 pub use super::ghost::Trial;
+use super::ghost::{self, Scores};
 use super::{State, run_letter};
 use crate::cache::StepKey;
 use crate::net::Request;

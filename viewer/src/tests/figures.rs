@@ -61,7 +61,11 @@ fn every_panel_becomes_well_formed_xml_with_all_its_words() {
         let document = roxmltree::Document::parse(&text).unwrap_or_else(|e| panic!("{pane:?}: {e}"));
         assert_eq!(taken.figure.left_out, 0, "{pane:?}");
         let root = document.root_element();
-        assert_eq!((root.attribute("width"), root.attribute("height")), (Some("504"), Some("404")), "{pane:?}");
+        assert_eq!(
+            (root.attribute("width"), root.attribute("height")),
+            (Some("504"), Some("404")),
+            "{pane:?}"
+        );
         let all: String = document
             .descendants()
             .filter(|node| node.has_tag_name("text"))
@@ -81,7 +85,10 @@ fn every_panel_becomes_well_formed_xml_with_all_its_words() {
             }
         }
         assert!(checked > 0 || all.is_empty() || !all.trim().is_empty(), "{pane:?}");
-        assert!(!text.contains("href=\"http") && !text.contains("NaN"), "{pane:?}: the file needs nothing else");
+        assert!(
+            !text.contains("href=\"http") && !text.contains("NaN"),
+            "{pane:?}: the file needs nothing else"
+        );
         let clips: Vec<&str> =
             document.descendants().filter_map(|node| node.attribute("clip-path")).collect();
         for clip in clips {
@@ -178,7 +185,8 @@ fn a_picture_has_the_pixels_of_its_scale_and_says_the_same_at_every_scale() {
 #[test]
 fn a_line_is_sharp_at_four_times_its_size() {
     let colour = theme::UNTINTED;
-    let line = Shape::line_segment([egui::pos2(2.3, 5.2), egui::pos2(18.0, 5.2)], egui::Stroke::new(1.0, colour));
+    let line =
+        Shape::line_segment([egui::pos2(2.3, 5.2), egui::pos2(18.0, 5.2)], egui::Stroke::new(1.0, colour));
     let all = Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(20.0, 10.0));
     let painted = [clipped(all, line)];
     let figure = shapes::figure(&painted, all, 4.0, &|_| None);
@@ -196,7 +204,12 @@ fn forms_keep_their_place_and_form() {
     let all = Rect::from_min_size(egui::pos2(100.0, 50.0), egui::vec2(200.0, 100.0));
     let shapes = [
         Shape::circle_stroke(egui::pos2(150.0, 90.0), 12.0, stroke),
-        Shape::rect_stroke(Rect::from_min_size(egui::pos2(110.0, 60.0), egui::vec2(30.0, 20.0)), 4.0, stroke, egui::StrokeKind::Inside),
+        Shape::rect_stroke(
+            Rect::from_min_size(egui::pos2(110.0, 60.0), egui::vec2(30.0, 20.0)),
+            4.0,
+            stroke,
+            egui::StrokeKind::Inside,
+        ),
         Shape::circle_filled(egui::pos2(900.0, 90.0), 12.0, theme::UNTINTED),
     ];
     let painted: Vec<ClippedShape> =
@@ -228,7 +241,8 @@ fn a_file_says_in_its_name_and_above_it_of_what_it_is() {
     assert!(svg.sentence.contains("not on the screen: it was drawn apart"), "{}", svg.sentence);
     let text = String::from_utf8(svg.bytes).unwrap();
     let document = roxmltree::Document::parse(&text).unwrap();
-    let word = |name: &str| document.descendants().find(|node| node.has_tag_name(name)).unwrap().text().unwrap();
+    let word =
+        |name: &str| document.descendants().find(|node| node.has_tag_name(name)).unwrap().text().unwrap();
     assert_eq!(word("title"), "Map, site frame: Six stops, ridge run A, step 2 of 5");
     assert!(word("desc").contains("Session s1. The target is tracking."), "{}", word("desc"));
     assert_eq!(document.root_element().attribute("height"), Some("480"));

@@ -87,12 +87,17 @@ fn the_scores_of_what_is_tried_stand_beside_those_of_the_run_with_the_difference
     let mut shown = Shown::pane(Pane::Surface, trying);
     shown.says("what if: peak 0.830 at").says("+0.420 against the recorded 0.410").says("second peak");
     let name = "match scores of what if: what if: peak 0.830";
-    let images: Vec<String> =
-        shown.harness.query_all_by_role(Role::Image).filter_map(|node| node.accesskit_node().label()).collect();
+    let images: Vec<String> = shown
+        .harness
+        .query_all_by_role(Role::Image)
+        .filter_map(|node| node.accesskit_node().label())
+        .collect();
     assert!(images.iter().any(|label| label.starts_with(name)), "{images:?}");
-    for (label, choice) in
-        [("scores: recorded", Scores::Recorded), ("scores: what if", Scores::Tried), ("scores: both", Scores::Both)]
-    {
+    for (label, choice) in [
+        ("scores: recorded", Scores::Recorded),
+        ("scores: what if", Scores::Tried),
+        ("scores: both", Scores::Both),
+    ] {
         assert_eq!(shown.click(label), vec![Command::Why(Ask::Scores(choice))]);
     }
     let alone = Shown::pane(Pane::Surface, |context| {
@@ -101,7 +106,10 @@ fn the_scores_of_what_is_tried_stand_beside_those_of_the_run_with_the_difference
         state
     });
     alone.says("what if, ").says("colours -1 to +1");
-    assert!(alone.harness.query_by_label_contains("white line: threshold").is_none(), "the run's are not shown");
+    assert!(
+        alone.harness.query_by_label_contains("white line: threshold").is_none(),
+        "the run's are not shown"
+    );
 }
 
 #[test]
@@ -147,7 +155,9 @@ fn card(size: [f32; 2], view: View2d) -> (egui::Rect, egui::Rect, egui::Rect) {
 
 #[test]
 fn the_card_covers_neither_the_target_nor_the_search_window() {
-    for (size, scale) in [([900.0, 700.0], 0.5), ([900.0, 700.0], 4.0), ([420.0, 380.0], 0.4), ([420.0, 380.0], 3.0)] {
+    for (size, scale) in
+        [([900.0, 700.0], 0.5), ([900.0, 700.0], 4.0), ([420.0, 380.0], 0.4), ([420.0, 380.0], 3.0)]
+    {
         let view = View2d::At { centre: fixture::PIXEL, scale };
         let (button, window, image) = card(size, view);
         assert!(!button.intersects(window), "{size:?} at {scale}: {button:?} covers {window:?}");

@@ -245,7 +245,10 @@ fn limits_are_typed_refused_in_a_sentence_and_used_for_a_map_of_their_own() {
     assert_eq!(text, "cell_px=16,edge_bad_px=4.5");
     let request = Request::Trackability { traverse: "drive".to_owned(), step: 0, limits };
     let curl = crate::as_text::http("http://localhost", &request).unwrap();
-    assert!(curl.contains("/traverses/drive/steps/0/trackability?limits=cell_px%3D16%2Cedge_bad_px%3D4.5"), "{curl}");
+    assert!(
+        curl.contains("/traverses/drive/steps/0/trackability?limits=cell_px%3D16%2Cedge_bad_px%3D4.5"),
+        "{curl}"
+    );
     // An answer for the limits before is no answer.
     let before = Request::Trackability { traverse: "drive".to_owned(), step: 0, limits: Default::default() };
     state.arrived(Arrived { request: before, outcome: Ok(Reply::Trackability(Box::new(progress(8)))) }, 0.0);

@@ -125,10 +125,14 @@ fn a_table_is_copied_as_csv() {
 
 #[test]
 fn the_switch_has_a_name_and_the_palette_knows_it() {
-    let mut shown = Shown::new([300.0, 60.0], |context| fixture::at_step(context, 2), |ui, state, out| {
-        sheets::switch(ui, state, Pane::Plots, out);
-        sheets::switch(ui, state, Pane::Gates, out);
-    });
+    let mut shown = Shown::new(
+        [300.0, 60.0],
+        |context| fixture::at_step(context, 2),
+        |ui, state, out| {
+            sheets::switch(ui, state, Pane::Plots, out);
+            sheets::switch(ui, state, Pane::Gates, out);
+        },
+    );
     assert_eq!(shown.click("Over the steps as table"), vec![Command::Table(Pane::Plots)]);
     assert_eq!(shown.harness.query_all_by_role(Role::Button).count(), 1, "gates are a table already");
     let found = actions::find(&fixture::without_target(), "match scores table");

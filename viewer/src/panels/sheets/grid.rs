@@ -16,7 +16,8 @@ const TALL: f32 = 14.0;
 
 /// Shows tables, one below the other.
 pub(super) fn show(ui: &mut Ui, sheets: &[Sheet], out: &mut Vec<Command>) {
-    let tall = if sheets.len() == 1 { (ui.available_height() - 3.0 * ROW).max(4.0 * ROW) } else { TALL * ROW };
+    let tall =
+        if sheets.len() == 1 { (ui.available_height() - 3.0 * ROW).max(4.0 * ROW) } else { TALL * ROW };
     ScrollArea::both().id_salt("tables").auto_shrink(false).show(ui, |ui| {
         for sheet in sheets {
             ui.push_id(&sheet.title, |ui| one(ui, sheet, tall, out));

@@ -12,8 +12,16 @@ use crate::state::{State, row_of};
 pub(super) fn map(state: &State) -> Result<Vec<Sheet>, String> {
     let Some(traverse) = &state.traverse else { return Err(state.missing_target()) };
     let columns = [
-        "rover east", "rover north", "rover down", "true rover east", "true rover north", "target east", "target north",
-        "target down", "σ east", "σ north",
+        "rover east",
+        "rover north",
+        "rover down",
+        "true rover east",
+        "true rover north",
+        "target east",
+        "target north",
+        "target down",
+        "σ east",
+        "σ north",
     ];
     let columns = columns.map(|name| Column::new(name, "m")).to_vec();
     let mut sheet = Sheet::over_steps("Map, site frame", columns);
@@ -23,7 +31,8 @@ pub(super) fn map(state: &State) -> Result<Vec<Sheet>, String> {
         let truth = stop.true_site_from_rover.map(|pose| pose.position_m);
         let target = targets.iter().find(|target| target.step == step);
         let axis = |k: usize| target.map(|target| Point3::from(target.point_in_site)[k]).into();
-        let sigma = |k: usize| target.and_then(|target| Some(target.from_above?[(k, k)].max(0.0).sqrt())).into();
+        let sigma =
+            |k: usize| target.and_then(|target| Some(target.from_above?[(k, k)].max(0.0).sqrt())).into();
         let rover = [east, north, down].map(Cell::Number);
         let true_rover = [truth.map(|at| at[1]).into(), truth.map(|at| at[0]).into()];
         let cells = rover.into_iter().chain(true_rover);
@@ -36,7 +45,8 @@ pub(super) fn map(state: &State) -> Result<Vec<Sheet>, String> {
 /// Predicted with and without tracking, and achieved.
 pub(super) fn budget(state: &State) -> Result<Vec<Sheet>, String> {
     let run = state.run().ok_or_else(|| state.missing_target())?;
-    let columns = [("range", "m"), ("3σ without tracking", "cm"), ("3σ with tracking", "cm"), ("achieved", "cm")];
+    let columns =
+        [("range", "m"), ("3σ without tracking", "cm"), ("3σ with tracking", "cm"), ("achieved", "cm")];
     let columns = columns.map(|(name, unit)| Column::new(name, unit)).to_vec();
     let mut sheet = Sheet::over_steps("Error budget over range", columns);
     for row in &run.rows {
@@ -59,7 +69,10 @@ pub(super) fn history(state: &State) -> Result<Vec<Sheet>, String> {
         sheet.step(found.step, state.cursor.step, cells);
     }
     if sheet.rows.is_empty() {
-        return Err(format!("No earlier window is loaded to compare with that of step {}: look at the panel first.", state.cursor.step));
+        return Err(format!(
+            "No earlier window is loaded to compare with that of step {}: look at the panel first.",
+            state.cursor.step
+        ));
     }
     Ok(vec![sheet])
 }

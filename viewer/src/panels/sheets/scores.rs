@@ -20,7 +20,8 @@ pub(super) fn surface(state: &State) -> Result<Vec<Sheet>, String> {
     let step = state.cursor.step;
     let mut marks = Sheet::of(format!("Match scores, step {step}"), names.collect());
     let mut mark = |what: &str, pixel: Pixel, score: Option<f64>| {
-        let cells = vec![Cell::Word(what.to_owned()), Cell::Number(pixel.x), Cell::Number(pixel.y), score.into()];
+        let cells =
+            vec![Cell::Word(what.to_owned()), Cell::Number(pixel.x), Cell::Number(pixel.y), score.into()];
         marks.row(what == "peak", cells);
     };
     let raster = state.array(ArrayName::Surface).ready();
@@ -60,9 +61,8 @@ fn about_the_peak(
     [x, y]: [i64; 2],
     measure: &'static str,
 ) -> Sheet {
-    let at = |x: i64, y: i64| {
-        raster.at(x - i64::from(region.x), y - i64::from(region.y)).map(f64::from).into()
-    };
+    let at =
+        |x: i64, y: i64| raster.at(x - i64::from(region.x), y - i64::from(region.y)).map(f64::from).into();
     let columns = (x - NEAR_PX..=x + NEAR_PX).map(|x| Column::new(format!("x {x}"), ""));
     let columns = std::iter::once(Column::new("y", "px")).chain(columns).collect();
     let mut sheet = Sheet::of(format!("Scores about the peak, {measure}"), columns);
@@ -86,17 +86,22 @@ fn about_the_peak(
 pub(super) fn stereo_profile(state: &State) -> Result<Vec<Sheet>, String> {
     let stereo = state.trace().and_then(StepTrace::template).and_then(|e| e.point_stereo.as_ref());
     let Some(stereo) = stereo else { return Err(state.missing_template()) };
-    let columns = [("range", "m"), ("score", ""), ("x in the right image", "px"), ("y in the right image", "px")];
+    let columns =
+        [("range", "m"), ("score", ""), ("x in the right image", "px"), ("y in the right image", "px")];
     let columns = columns.map(|(name, unit)| Column::new(name, unit)).to_vec();
     let mut sheet = Sheet::of(format!("Stereo scores, step {}", state.cursor.step), columns);
-    let nearest = stereo.curve.iter().map(|point| (point.range_m - stereo.range_m).abs()).fold(f64::INFINITY, f64::min);
+    let nearest =
+        stereo.curve.iter().map(|point| (point.range_m - stereo.range_m).abs()).fold(f64::INFINITY, f64::min);
     for point in &stereo.curve {
         let is_best = (point.range_m - stereo.range_m).abs() == nearest;
         let cells = [point.range_m, point.pixel.x, point.pixel.y].map(|value| Cell::from(Some(value)));
         let [range, x, y] = cells;
         sheet.row(is_best, vec![range, point.score.map(f64::from).into(), x, y]);
     }
-    let mut best = Sheet::of("Best stereo match", vec![Column::new("what", ""), Column::new("value", ""), Column::new("unit", "")]);
+    let mut best = Sheet::of(
+        "Best stereo match",
+        vec![Column::new("what", ""), Column::new("value", ""), Column::new("unit", "")],
+    );
     for (what, value, unit) in [
         ("range", Some(stereo.range_m), "m"),
         ("score", Some(stereo.score), ""),

@@ -132,7 +132,8 @@ pub fn state_of(row: &StepRow) -> Cell {
 
 /// A field of CSV. What a spreadsheet would take for a formula begins with an apostrophe.
 fn quoted(text: &str) -> String {
-    let is_formula = text.starts_with(['=', '+', '@']) || text.starts_with('-') && text.parse::<f64>().is_err();
+    let is_formula =
+        text.starts_with(['=', '+', '@']) || text.starts_with('-') && text.parse::<f64>().is_err();
     let text = if is_formula { format!("'{text}") } else { text.to_owned() };
     if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text }
 }

@@ -11,7 +11,8 @@ use crate::state::State;
 /// NEES and NIS of the run and of those that it is compared with, and how often errors lie within k σ.
 pub(super) fn uncertainty(state: &State) -> Result<Vec<Sheet>, String> {
     let own = state.own_name().ok_or_else(|| state.missing_target())?;
-    let names: Vec<RunName> = std::iter::once(own).chain(state.others().iter().map(|other| other.name)).collect();
+    let names: Vec<RunName> =
+        std::iter::once(own).chain(state.others().iter().map(|other| other.name)).collect();
     let shown: Vec<(RunName, &Uncertainty)> =
         names.iter().filter_map(|&name| Some((name, &state.metrics(name)?.uncertainty))).collect();
     if shown.is_empty() {

@@ -58,7 +58,8 @@ pub(super) fn over(ui: &mut Ui, canvas: &Canvas, at: Pos2, state: &State, out: &
 pub(super) fn under(ui: &mut Ui, height: f32, state: &State, out: &mut Vec<Command>) {
     let Some(trial) = state.trial() else { return };
     let area = Rect::from_min_size(ui.next_widget_position(), vec2(ui.available_width(), height));
-    let builder = UiBuilder::new().max_rect(area).layout(Layout::top_down(Align::Min)).id_salt("what if card");
+    let builder =
+        UiBuilder::new().max_rect(area).layout(Layout::top_down(Align::Min)).id_salt("what if card");
     let mut inside = ui.new_child(builder);
     inside.set_clip_rect(area.intersect(ui.clip_rect()));
     egui::ScrollArea::vertical().id_salt("what if").auto_shrink([false, true]).show(&mut inside, |ui| {

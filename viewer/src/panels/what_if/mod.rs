@@ -20,13 +20,7 @@ use crate::state::State;
 use crate::view2d::{Canvas, View2d};
 
 /// Shows handles and ghost over the left image.
-pub fn over_image(
-    ui: &mut Ui,
-    canvas: &Canvas,
-    place: Option<Place>,
-    state: &State,
-    out: &mut Vec<Command>,
-) {
+pub fn over_image(ui: &mut Ui, canvas: &Canvas, place: Option<Place>, state: &State, out: &mut Vec<Command>) {
     let Some(trace) = state.trace().filter(|_| state.marks && state.mode == Mode::Look) else { return };
     if can_be_tried(trace) {
         handles::show(ui, canvas, state, trace, out);

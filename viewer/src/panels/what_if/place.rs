@@ -55,7 +55,11 @@ fn kept_free(trial: &Trial, trace: &StepTrace, transform: &Transform) -> Vec<Rec
         [located, pointing, trial.what_if.prediction_px, ghost.and_then(|ghost| ghost.left_pixel)];
     let windows = windows.into_iter().flatten().map(|window| transform.area(window).expand(2.0));
     let places = places.into_iter().flatten();
-    windows.chain(places.map(|place| Rect::from_center_size(transform.to_screen(place), Vec2::splat(2.0 * ROOM)))).collect()
+    windows
+        .chain(
+            places.map(|place| Rect::from_center_size(transform.to_screen(place), Vec2::splat(2.0 * ROOM))),
+        )
+        .collect()
 }
 
 /// The corner of `area` in which something of that size covers nothing of what is kept free: of several the one that is
@@ -66,8 +70,7 @@ pub(super) fn corner(area: Rect, size: Vec2, kept: &[Rect]) -> Option<Pos2> {
     }
     let (right, bottom) = (area.right() - size.x, area.bottom() - size.y);
     // The first of equals is where the card has always been.
-    let corners =
-        [pos2(right, area.top()), area.min, pos2(right, bottom), pos2(area.left(), bottom)];
+    let corners = [pos2(right, area.top()), area.min, pos2(right, bottom), pos2(area.left(), bottom)];
     let room = |at: Pos2| {
         let card = Rect::from_min_size(at, size);
         kept.iter().map(|kept| card.signed_distance(*kept)).fold(f32::INFINITY, f32::min)
@@ -89,7 +92,8 @@ trait Apart {
 
 impl Apart for Rect {
     fn signed_distance(&self, other: Rect) -> f32 {
-        let gap = |low: f32, high: f32, other_low: f32, other_high: f32| (other_low - high).max(low - other_high);
+        let gap =
+            |low: f32, high: f32, other_low: f32, other_high: f32| (other_low - high).max(low - other_high);
         let x = gap(self.left(), self.right(), other.left(), other.right());
         let y = gap(self.top(), self.bottom(), other.top(), other.bottom());
         if x > 0.0 && y > 0.0 { x.hypot(y) } else { x.max(y) }

@@ -24,7 +24,9 @@ const GAP: f32 = 4.0;
 
 /// Shows the scores while a change is tried; false where none is, or the tracker matches no template.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) -> bool {
-    let Some(trial) = state.trial().filter(|_| state.tracker() == TrackerKind::Template) else { return false };
+    let Some(trial) = state.trial().filter(|_| state.tracker() == TrackerKind::Template) else {
+        return false;
+    };
     let shown = state.why.scores_shown;
     let tried = state.tried_scores(ui.ctx());
     let recorded = state.trace().and_then(StepTrace::template).and_then(|e| e.match_template.as_ref());
@@ -69,7 +71,8 @@ fn why_none(trial: &Trial) -> String {
     match (&trial.refused, &trial.ghost) {
         (Some(refused), _) => format!("What if cannot be tried: {refused}"),
         (None, Some(ghost)) if trial.has_scores && ghost.what_if == trial.what_if => {
-            let why = ghost.missing.as_deref().unwrap_or("the step did not come to compare a window of positions");
+            let why =
+                ghost.missing.as_deref().unwrap_or("the step did not come to compare a window of positions");
             format!("What if has no scores: {why}.")
         }
         (None, _) => "What if: computing the scores …".to_owned(),
@@ -117,7 +120,8 @@ fn show_tried(ui: &mut Ui, state: &State, ghost: &Ghost, raster: &Raster, out: &
         surface::paint_peaks(&canvas, &Marked { predicted, matched, truth, colour: theme::ghost() });
     }
     let frame = canvas.transform.rect.shrink(1.5);
-    let corners = [frame.left_top(), frame.right_top(), frame.right_bottom(), frame.left_bottom(), frame.left_top()];
+    let corners =
+        [frame.left_top(), frame.right_top(), frame.right_bottom(), frame.left_bottom(), frame.left_top()];
     canvas.painter.extend(Shape::dashed_line(&corners, Stroke::new(2.0, theme::ghost()), 7.0, 4.0));
     paint_words(&canvas.painter, frame.left_top() + vec2(8.0, 12.0), "what if", theme::ghost());
     let said = format!("match scores of what if: {}", words(matched, None));
