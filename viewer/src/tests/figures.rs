@@ -78,13 +78,15 @@ fn every_panel_becomes_well_formed_xml_with_all_its_words() {
         for node in taken.shown.harness.query_all_by_role(egui::accesskit::Role::Label) {
             let (Some(value), place) = (node.value(), node.rect()) else { continue };
             let first = value.split_whitespace().next().unwrap_or_default();
-            if value.lines().count() == 1 && screen.contains_rect(place) && !first.is_empty() {
+            // The boxes of the state machine are described by more words than are painted in them.
+            let is_painted = value.lines().count() == 1 && pane != Pane::Machine;
+            if is_painted && screen.contains_rect(place) && !first.is_empty() {
                 let is_there = all.contains(first) || all.to_lowercase().contains(&first.to_lowercase());
                 assert!(is_there, "{pane:?}: “{first}” is not in the file: {all}");
                 checked += 1;
             }
         }
-        assert!(checked > 0 || all.is_empty() || !all.trim().is_empty(), "{pane:?}");
+        assert!(checked > 0 || pane == Pane::Machine && all.contains("TRACKING"), "{pane:?} has words");
         assert!(
             !text.contains("href=\"http") && !text.contains("NaN"),
             "{pane:?}: the file needs nothing else"

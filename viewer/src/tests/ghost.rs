@@ -77,6 +77,7 @@ fn scores_are_asked_for_only_while_they_are_seen() {
     assert!(asked(&mut state).is_empty(), "they are here");
     assert_eq!(state.trial().unwrap().ghost.as_ref().unwrap().what_if, what_if(Vec::new()));
     state.apply(Command::Why(Ask::Scores(Scores::Recorded)));
+    state.want_tried_scores(true);
     state.apply(Command::Why(Ask::Change { key: "ncc_min".to_owned(), value: Some(json!(0.3)) }));
     state.want_tried_scores(true);
     assert!(asked(&mut state).iter().all(|what_if| what_if.arrays.is_empty()), "those of the run are shown");
@@ -155,14 +156,19 @@ fn card(size: [f32; 2], view: View2d) -> (egui::Rect, egui::Rect, egui::Rect) {
 
 #[test]
 fn the_card_covers_neither_the_target_nor_the_search_window() {
-    for (size, scale) in
-        [([900.0, 700.0], 0.5), ([900.0, 700.0], 4.0), ([420.0, 380.0], 0.4), ([420.0, 380.0], 3.0)]
-    {
+    for (size, scale, is_under) in [
+        ([900.0, 700.0], 0.5, false),
+        ([900.0, 700.0], 8.0, true),
+        ([420.0, 380.0], 0.2, false),
+        ([420.0, 380.0], 3.0, true),
+    ] {
         let view = View2d::At { centre: fixture::PIXEL, scale };
         let (button, window, image) = card(size, view);
         assert!(!button.intersects(window), "{size:?} at {scale}: {button:?} covers {window:?}");
-        if scale >= 3.0 {
-            assert!(button.top() >= image.bottom(), "{size:?} at {scale}: it is under the image");
-        }
+        assert_eq!(
+            button.top() >= image.bottom(),
+            is_under,
+            "{size:?} at {scale}: {button:?}, image {image:?}"
+        );
     }
 }
