@@ -159,7 +159,8 @@ fn the_card_covers_neither_the_target_nor_the_search_window() {
     for (size, scale, is_under) in [
         ([900.0, 700.0], 0.5, false),
         ([900.0, 700.0], 8.0, true),
-        ([420.0, 380.0], 0.2, false),
+        // So small an image has no corner that is large enough.
+        ([420.0, 380.0], 0.2, true),
         ([420.0, 380.0], 3.0, true),
     ] {
         let view = View2d::At { centre: fixture::PIXEL, scale };
