@@ -158,7 +158,7 @@ fn join_keys(changes: &Changes) -> String {
     changes.keys().cloned().collect::<Vec<_>>().join(", ")
 }
 
-fn unknown(key: &str, table: &[SettingInfo]) -> Error {
+pub(crate) fn unknown(key: &str, table: &[SettingInfo]) -> Error {
     let nearest = table.iter().min_by_key(|info| edit_distance(key, &info.key)).map(|info| info.key.as_str());
     let hint = nearest.map(|n| format!("; did you mean {n}?")).unwrap_or_default();
     Error::setting(key, format!("there is no such setting{hint}"))

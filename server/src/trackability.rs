@@ -47,8 +47,23 @@ pub fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new().routes(routes!(show)).routes(routes!(at_pixel)).routes(routes!(cancel))
 }
 
+/// The limits by which a map is made.
+#[derive(Clone, Debug, Default, Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+struct LimitParams {
+    /// Limits that are not the defaults: `name=value`, commas between, for example `edge_bad_px=4,slant_risky_deg=70`.
+    limits: Option<String>,
+}
+
+impl LimitParams {
+    fn limits(&self) -> ApiResult<TrackabilityLimits> {
+        Ok(TrackabilityLimits::parse(self.limits.as_deref().unwrap_or_default())?)
+    }
+}
+
 /// A pixel of the left image.
-#[derive(Clone, Copy, Debug, Deserialize, IntoParams)]
+#[derive(Clone, Debug, Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 struct PixelParams {
@@ -56,6 +71,8 @@ struct PixelParams {
     x: f64,
     /// Its row, px.
     y: f64,
+    /// Limits that are not the defaults: `name=value`, commas between.
+    limits: Option<String>,
 }
 
 /// The maps that were made or are being made, and the surfaces behind the newest.
@@ -69,6 +86,7 @@ pub struct Maps {
 struct Making {
     traverse: String,
     step: usize,
+    limits: TrackabilityLimits,
     progress: Mutex<MapProgress>,
     cancel: CancelFlag,
 }
@@ -83,13 +101,16 @@ impl Default for Maps {
 ///
 /// Asking for it begins it; rows follow in the background, told by the event `trackability_progress`.
 #[utoipa::path(get, operation_id = "show_trackability", path = "/traverses/{id}/steps/{step}/trackability", tag = "trackability",
-    params(("id" = String, Path), ("step" = usize, Path)), responses((status = 200, body = MapProgress), ApiError))]
+    params(("id" = String, Path), ("step" = usize, Path), LimitParams),
+    responses((status = 200, body = MapProgress), ApiError))]
 async fn show(
     State(state): State<AppState>,
     Path((id, step)): Path<(String, usize)>,
+    Params(params): Params<LimitParams>,
 ) -> ApiResult<Json<MapProgress>> {
+    let limits = params.limits()?;
     let open = stop(&state, &id, step)?;
-    let (making, is_new) = state.maps().find_or_begin(&open.id, step);
+    let (making, is_new) = state.maps().find_or_begin(&open.id, step, limits);
     if is_new {
         let (state, making) = (state.clone(), Arc::clone(&making));
         tokio::spawn(async move {
@@ -112,6 +133,7 @@ async fn at_pixel(
     Params(params): Params<PixelParams>,
 ) -> ApiResult<Json<PixelVerdict>> {
     let open = stop(&state, &id, step)?;
+    let limits = LimitParams { limits: params.limits.clone() }.limits()?;
     let [width, height] = open.traverse.left_camera(step).size;
     let place = Pixel::new(params.x, params.y);
     if !(place.x.is_finite() && place.y.is_finite() && place.is_inside(width, height)) {
@@ -125,7 +147,8 @@ async fn at_pixel(
     state
         .designations()
         .run(move || {
-            let ground = ground(&work_state, &open, step, &Settings::default(), &CancelFlag::default())?;
+            let ground =
+                ground(&work_state, &open, step, (&Settings::default(), &limits), &CancelFlag::default())?;
             Ok(Json(PixelVerdict::of(&open.traverse, &ground, place)))
         })
         .await
@@ -133,14 +156,16 @@ async fn at_pixel(
 
 /// Stops making a map; asking for it again begins it anew
 #[utoipa::path(post, operation_id = "cancel_trackability", path = "/traverses/{id}/steps/{step}/trackability/cancel",
-    tag = "trackability", params(("id" = String, Path), ("step" = usize, Path)),
+    tag = "trackability", params(("id" = String, Path), ("step" = usize, Path), LimitParams),
     responses((status = 200, body = MapProgress), (status = 204, description = "Nothing was being made"), ApiError))]
 async fn cancel(
     State(state): State<AppState>,
     Path((id, step)): Path<(String, usize)>,
+    Params(params): Params<LimitParams>,
 ) -> ApiResult<Response> {
+    let limits = params.limits()?;
     let open = stop(&state, &id, step)?;
-    let Some(making) = state.maps().take_unfinished(&open.id, step) else {
+    let Some(making) = state.maps().take_unfinished(&open.id, step, &limits) else {
         // A map that was complete a moment ago is what was wanted, too.
         return Ok(StatusCode::NO_CONTENT.into_response());
     };
@@ -159,14 +184,14 @@ fn stop(state: &AppState, id: &str, step: usize) -> ApiResult<Arc<OpenTraverse>>
 }
 
 impl Maps {
-    fn find_or_begin(&self, traverse: &str, step: usize) -> (Arc<Making>, bool) {
+    fn find_or_begin(&self, traverse: &str, step: usize, limits: TrackabilityLimits) -> (Arc<Making>, bool) {
         let mut making = lock(&self.making);
-        if let Some(known) = making.iter().find(|one| one.is_of(traverse, step)) {
+        if let Some(known) = making.iter().find(|one| one.is_of(traverse, step, &limits)) {
             return (Arc::clone(known), false);
         }
         let progress = MapProgress { k: 0, n: 0, ended: false, failed: None, map: None };
         let (traverse, cancel) = (traverse.to_owned(), CancelFlag::default());
-        let new = Arc::new(Making { traverse, step, progress: Mutex::new(progress), cancel });
+        let new = Arc::new(Making { traverse, step, limits, progress: Mutex::new(progress), cancel });
         making.push_back(Arc::clone(&new));
         // The oldest that is complete goes; those under way are few.
         if making.len() > MAPS
@@ -178,16 +203,22 @@ impl Maps {
     }
 
     /// A map that is under way, taken out, so that the next who asks begins anew.
-    fn take_unfinished(&self, traverse: &str, step: usize) -> Option<Arc<Making>> {
+    fn take_unfinished(
+        &self,
+        traverse: &str,
+        step: usize,
+        limits: &TrackabilityLimits,
+    ) -> Option<Arc<Making>> {
         let mut making = lock(&self.making);
-        let place = making.iter().position(|one| one.is_of(traverse, step) && !lock(&one.progress).ended)?;
+        let place =
+            making.iter().position(|one| one.is_of(traverse, step, limits) && !lock(&one.progress).ended)?;
         making.remove(place)
     }
 }
 
 impl Making {
-    fn is_of(&self, traverse: &str, step: usize) -> bool {
-        self.traverse == traverse && self.step == step
+    fn is_of(&self, traverse: &str, step: usize, limits: &TrackabilityLimits) -> bool {
+        self.traverse == traverse && self.step == step && self.limits == *limits
     }
 
     /// Nothing more will come; the first reason stands.
@@ -207,7 +238,7 @@ impl Making {
 
 /// Makes a map row by row.
 fn make(state: &AppState, open: &OpenTraverse, making: &Making) -> Result<()> {
-    let ground = ground(state, open, making.step, &Settings::default(), &making.cancel)?;
+    let ground = ground(state, open, making.step, (&Settings::default(), &making.limits), &making.cancel)?;
     let empty = TrackabilityMap::empty(&ground);
     let rows = empty.rows;
     {
@@ -239,18 +270,18 @@ fn ground(
     state: &AppState,
     open: &OpenTraverse,
     step: usize,
-    settings: &Settings,
+    (settings, limits): (&Settings, &TrackabilityLimits),
     cancel: &CancelFlag,
 ) -> Result<Arc<Ground>> {
     let grounds = &state.maps().grounds;
     let is_same = |(id, ground): &&(String, Arc<Ground>)| {
-        *id == open.id && ground.step == step && ground.settings == *settings
+        *id == open.id && ground.step == step && ground.settings == *settings && ground.limits == *limits
     };
     if let Some((_, known)) = lock(grounds).iter().find(is_same) {
         return Ok(Arc::clone(known));
     }
     open.make_ready(step, cancel)?;
-    let made = Arc::new(Ground::new(&open.traverse, step, settings, &TrackabilityLimits::default())?);
+    let made = Arc::new(Ground::new(&open.traverse, step, settings, limits)?);
     let mut grounds = lock(grounds);
     grounds.push_back((open.id.clone(), Arc::clone(&made)));
     let surplus = grounds.len().saturating_sub(GROUNDS);
@@ -273,7 +304,8 @@ pub fn refusal(
     if !place.is_inside(width, height) {
         return problem;
     }
-    let found = ground(state, open, step, settings, &CancelFlag::default())
+    let limits = TrackabilityLimits::default();
+    let found = ground(state, open, step, (settings, &limits), &CancelFlag::default())
         .ok()
         .and_then(|ground| pixel::nearest_good(&open.traverse, &ground, place));
     match found {

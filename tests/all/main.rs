@@ -18,6 +18,7 @@ mod page;
 mod page_access;
 mod page_compare;
 mod page_debugger;
+mod page_figures;
 mod page_first;
 mod page_panels;
 mod page_picking;

@@ -4,13 +4,14 @@ use sightline_core::trace::StepRow;
 
 use crate::command::{Command, Go, Mode, Search, Stage};
 use crate::compare;
+use crate::figure::take::{Kind, Wish};
 use crate::layout::Pane;
 use crate::layout::presets::Preset;
 use crate::layout::workspace::LayoutCommand;
-use crate::panels::digits;
+use crate::panels::{digits, sheets};
 use crate::state::why::Ask;
 use crate::state::{State, events, run_letter};
-use crate::state::{exports, files};
+use crate::state::{exports, files, limits};
 use crate::theme::Looks;
 use crate::tour::Turn;
 
@@ -98,6 +99,7 @@ fn works(state: &State) -> Vec<Action> {
             "R",
             Command::RunFromHere(state.draft.clone()),
         ),
+        action("Trackability: limits of the map", "", Command::Limits(limits::Ask::Open)),
         action("Take the changed settings back", "", Command::ClearDraft),
         action("Export: recording, tables, report, pictures", "Ctrl+S", Command::Exports(exports::Ask::Open)),
         action("Open: a file, a recent session, a drive", "Ctrl+O", Command::Files(files::Ask::Open)),
@@ -147,6 +149,15 @@ fn places(state: &State) -> Vec<Action> {
         Pane::ALL
             .map(|pane| action(format!("Show {}", pane.title()), "", arrange(LayoutCommand::Show(pane)))),
     );
+    for pane in sheets::PANES {
+        all.push(action(format!("{} as table, or as it was", pane.title()), "", Command::Table(pane)));
+    }
+    for pane in Pane::ALL {
+        all.extend(Kind::ALL.map(|kind| {
+            let title = format!("Save {} as {}", pane.title(), kind.word());
+            action(title, "", Command::Exports(exports::Ask::Figure(Wish { pane, kind })))
+        }));
+    }
     all.push(action("Fill the page with the current panel", "`", arrange(LayoutCommand::Maximise(None))));
     all.push(action("Next panel", "Q", arrange(LayoutCommand::Panel(1))));
     all.push(action("Previous panel", "Shift+Q", arrange(LayoutCommand::Panel(-1))));

@@ -8,10 +8,10 @@ use crate::layout::workspace::{LayoutCommand, Workspace};
 use crate::layout::{LeftImage, Pane, Panels, region};
 use crate::link::Fragment;
 use crate::net::{Net, Request};
-use crate::panels::{bars, card, export, help, notes, open, palette, timeline, tour as bubbles};
+use crate::panels::{bars, card, export, help, limits, notes, open, palette, timeline, tour as bubbles};
 use crate::state::{Connection, State};
 use crate::status::Publisher;
-use crate::{keep, keys, picture, theme, tour};
+use crate::{figure, keep, keys, picture, theme, tour};
 
 /// Where a page begins.
 #[derive(Clone, Debug, PartialEq)]
@@ -147,13 +147,14 @@ impl SightlineApp {
             .frame(Frame::new().fill(theme::page()))
             .show(ui, |ui| self.workspace.show(ui, &mut panels));
         self.left_image = panels.left_image;
-        let [is_history_seen, is_studies_seen, is_why_seen] =
-            [Pane::History, Pane::Studies, Pane::Why].map(|pane| panels.seen.contains(&pane));
+        let [is_history_seen, is_studies_seen, is_why_seen, is_surface_seen] =
+            [Pane::History, Pane::Studies, Pane::Why, Pane::Surface].map(|pane| panels.seen.contains(&pane));
         let wants_metrics = [Pane::Runs, Pane::Uncertainty].iter().any(|pane| panels.seen.contains(pane));
         let places = panels.places;
         help::show(ui, state, &mut out);
         notes::editor(ui, state, &mut out);
         export::show(ui, state, &mut out);
+        limits::show(ui, state, &mut out);
         open::show(ui, state, &mut out);
         card::show(ui, state, &mut out);
         palette::show(ui, state, &mut out);
@@ -162,6 +163,7 @@ impl SightlineApp {
         self.places = places;
         self.state.exports.panes = self.places.iter().map(|(pane, _)| *pane).collect();
         self.state.compare.wants_metrics = wants_metrics;
+        self.state.want_tried_scores(is_surface_seen);
         // Every step's window is worth fetching only while the panel that shows them is on the screen.
         self.state.wants_history = is_history_seen;
         if is_why_seen {
@@ -241,12 +243,17 @@ impl SightlineApp {
         }
     }
 
-    /// Takes a picture of the panel that was asked for.
-    fn take_picture(&mut self, context: &Context) {
-        let Some(pane) = self.state.exports.picture_of.take() else { return };
-        if let Some((_, rect)) = self.places.iter().find(|(known, _)| *known == pane) {
-            let words = pane.title().to_lowercase().replace([' ', ','], "-");
-            picture::take(context, *rect, format!("sightline-{words}-step-{}", self.state.cursor.step));
+    /// Saves the figure that was asked for.
+    fn save_figure(&mut self, context: &Context) {
+        let Some(wish) = self.state.exports.figure_of.take() else { return };
+        let file = figure::take::take(context, &self.state, &self.places, wish);
+        let kept = file.and_then(|file| {
+            picture::keep(&file.name, file.media_type, &file.bytes)?;
+            Ok(file.sentence)
+        });
+        match kept {
+            Ok(sentence) => self.state.messages.note(sentence),
+            Err(sentence) => self.state.messages.problem(sentence, None),
         }
     }
 
@@ -311,7 +318,7 @@ impl eframe::App for SightlineApp {
         if let Some(url) = self.state.open_url.take() {
             context.open_url(egui::OpenUrl::new_tab(url));
         }
-        self.take_picture(&context);
+        self.save_figure(&context);
         self.reveal();
         self.keep_link();
         self.keep_tour();

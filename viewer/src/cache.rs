@@ -218,6 +218,14 @@ impl Cache {
         })
     }
 
+    /// All that have a texture.
+    pub fn rasters(&self) -> impl Iterator<Item = &Raster> {
+        self.entries.values().filter_map(|entry| match entry {
+            Entry::Ready { item: Item::Raster(raster), .. } => Some(raster.as_ref()),
+            _ => None,
+        })
+    }
+
     fn slot(&self, key: &Key) -> Slot<'_, Item> {
         match self.entries.get(key) {
             None => Slot::Absent,

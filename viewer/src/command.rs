@@ -224,6 +224,10 @@ pub enum Command {
     Files(crate::state::files::Ask),
     /// Closes the card of a problem.
     CloseCard,
+    /// Shows a panel as a table, or as it is painted again.
+    Table(crate::layout::Pane),
+    /// The limits of trackability.
+    Limits(crate::state::limits::Ask),
 }
 
 impl Command {

@@ -134,7 +134,10 @@ fn preset_of(key: Key) -> Option<Preset> {
 
 /// What a key asks for.
 pub fn command(key: Key, modifiers: Modifiers, state: &State) -> Option<Command> {
-    let is_window_open = state.exports.is_open || state.notes.draft.is_some() || state.files.is_open;
+    let is_window_open = state.exports.is_open
+        || state.notes.draft.is_some()
+        || state.files.is_open
+        || state.trackability.form.is_some();
     if (modifiers.ctrl || modifiers.command) && !modifiers.alt {
         return match (key, modifiers.shift) {
             (Key::S, false) if state.mode == Mode::Look && !is_window_open => {

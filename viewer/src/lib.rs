@@ -16,7 +16,8 @@
 //! | `thin` | what of a long drive is drawn |
 //! | `as_text` | any action as `curl` and as a command |
 //! | `opening`, `inbox` | what a dropped or chosen file is, and how its bytes come in |
-//! | `markdown`, `picture` | notes as text with emphasis; a panel as a PNG file |
+//! | `markdown`, `picture` | notes as text with emphasis; a file that is given to the person |
+//! | `figure` | a panel as a figure: SVG, and PNG at 1x to 4x |
 //! | `theme` | colours, text styles and spacing, and nowhere else |
 //! | `access` | the page for a screen reader: egui's tree as elements of the document |
 //! | `aim` | choosing a place in the left image |
@@ -50,6 +51,7 @@ pub mod status;
 pub mod aim;
 pub mod tour;
 pub mod as_text;
+pub mod figure;
 pub mod thin;
 pub mod markdown;
 pub mod picture;

@@ -11,6 +11,8 @@
 //! | `lay` | the arrangement of the panels |
 //! | `vs` | the runs it is compared with, `target.run` each, commas between |
 //! | `cmp` | how the left image shows them |
+//! | `sort`, `show` | the metric by which the table of runs is sorted (`-` first: the largest comes first), and the words
+//! that the runs in it must have |
 //! | `L`, `R` | centre (px) and magnification of the left and right image; left out where the whole image is shown |
 //!
 //! Keys that this version does not know are kept as they are. A key whose value cannot be read is left out, and a
@@ -22,6 +24,7 @@ use sightline_core::session::compare::{RUNS_MAX, RunName};
 use crate::command::Stage;
 use crate::compare;
 use crate::layout::presets::Preset;
+use crate::panels::runs::table::COLUMNS;
 use crate::view2d::View2d;
 
 /// The version of the form.
@@ -29,6 +32,9 @@ const VERSION: &str = "1";
 
 /// Longer fragments are cut: nobody's link is that long.
 const LONGEST: usize = 4_096;
+
+/// The longest words by which the runs of the table are chosen, letters.
+const WORDS_MAX: usize = 120;
 
 /// What a link says.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -49,6 +55,10 @@ pub struct Fragment {
     pub others: Vec<RunName>,
     /// How the left image shows them; none shows their marks.
     pub compared: Option<compare::View>,
+    /// How the table of runs is sorted; none leaves the runs in their own order.
+    pub sort: Option<compare::Sort>,
+    /// The words that the runs of the table must have; none shows all.
+    pub filter: Option<String>,
     /// The view of the left image.
     pub left: Option<View2d>,
     /// The view of the right image.
@@ -87,6 +97,8 @@ impl Fragment {
             "cmp" => {
                 put(&mut self.compared, compare::View::ALL.into_iter().find(|view| hyphened(*view) == value))
             }
+            "sort" => put(&mut self.sort, sort(value)),
+            "show" => put(&mut self.filter, unescaped(value)),
             "L" => put(&mut self.left, view(value)),
             "R" => put(&mut self.right, view(value)),
             _ => {
@@ -112,6 +124,11 @@ impl Fragment {
             parts.push(format!("vs={}", names.join(",")));
         }
         parts.extend(self.compared.map(|view| format!("cmp={}", hyphened(view))));
+        if let Some((sort, metric)) = self.sort.as_ref().and_then(|sort| Some((sort, sort.metric.as_ref()?)))
+        {
+            parts.push(format!("sort={}{metric}", if sort.is_descending { "-" } else { "" }));
+        }
+        parts.extend(self.filter.as_ref().map(|words| format!("show={}", escaped(words))));
         parts.extend(self.left.and_then(|view| view_text("L", view)));
         parts.extend(self.right.and_then(|view| view_text("R", view)));
         parts.extend(self.unknown.iter().cloned());
@@ -140,6 +157,39 @@ fn runs(value: &str) -> Option<Vec<RunName>> {
     };
     let names: Vec<RunName> = value.split(',').map(name).collect::<Option<_>>()?;
     (names.len() < RUNS_MAX).then_some(names)
+}
+
+/// How the table of runs is sorted: `-ade_px`.
+fn sort(value: &str) -> Option<compare::Sort> {
+    let (metric, is_descending) = value.strip_prefix('-').map_or((value, false), |metric| (metric, true));
+    let is_known = COLUMNS.iter().any(|(name, ..)| *name == metric);
+    is_known.then(|| compare::Sort { metric: Some(metric.to_owned()), is_descending })
+}
+
+/// Words as a part of an address: all but letters, digits, `.`, `_` and `-` of ASCII as percent signs and digits.
+fn escaped(words: &str) -> String {
+    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'.' | b'_' | b'-');
+    let escape =
+        |byte: u8| if is_plain(byte) { char::from(byte).to_string() } else { format!("%{byte:02X}") };
+    words.chars().take(WORDS_MAX).collect::<String>().bytes().map(escape).collect()
+}
+
+/// Such a part as words; none where it is no text, or a long one.
+fn unescaped(value: &str) -> Option<String> {
+    let mut bytes = Vec::new();
+    let mut rest = value.bytes();
+    while let Some(byte) = rest.next() {
+        if byte != b'%' {
+            bytes.push(byte);
+            continue;
+        }
+        let mut digit = || char::from(rest.next()?).to_digit(16);
+        let (high, low) = (digit()?, digit()?);
+        bytes.push((high * 16 + low) as u8);
+    }
+    let words = String::from_utf8(bytes).ok()?;
+    let is_line = !words.is_empty() && !words.chars().any(char::is_control);
+    (is_line && words.chars().count() <= WORDS_MAX).then_some(words)
 }
 
 fn hyphened(view: compare::View) -> String {
@@ -176,12 +226,14 @@ mod tests {
 
     #[test]
     fn a_link_opens_what_it_was_made_of_and_keeps_what_it_does_not_know() {
-        let text = "v=1&session=s7&tg=0&run=2&step=12&stage=judge&lay=match&vs=0.1,1.0&cmp=side-by-side&L=512.5,300.2,8.000&later=x%20y";
+        let text = "v=1&session=s7&tg=0&run=2&step=12&stage=judge&lay=match&vs=0.1,1.0&cmp=side-by-side&sort=-ade_px&show=ridge%20ncc_min%3D0.6&L=512.5,300.2,8.000&later=x%20y";
         let link = Fragment::parse(&format!("#{text}"));
         assert_eq!(link.text(), text);
         assert_eq!((link.target, link.run, link.step), (Some(0), Some(2), Some(12)));
         assert_eq!(link.stage, Some(Stage::Judge));
         assert_eq!(link.left, Some(View2d::At { centre: Pixel::new(512.5, 300.2), scale: 8.0 }));
+        let sort = compare::Sort { metric: Some("ade_px".to_owned()), is_descending: true };
+        assert_eq!((link.sort.clone(), link.filter.as_deref()), (Some(sort), Some("ridge ncc_min=0.6")));
         assert_eq!(link.unknown, ["later=x%20y"]);
         assert!(link.damaged.is_empty());
     }
@@ -200,6 +252,10 @@ mod tests {
             "vs=1",
             "vs=0.0,0.1,0.2,0.3",
             "cmp=dance",
+            "sort=-no_such_metric",
+            "show=%zz",
+            "show=%ff",
+            "show=a%0Ab",
         ] {
             assert_eq!(Fragment::parse(hostile).damaged, [hostile]);
         }

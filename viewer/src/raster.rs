@@ -57,6 +57,8 @@ pub struct Raster {
     /// one in a hundred lies.
     pub levels: [f32; 2],
     options: TextureOptions,
+    /// Which array it is; none for an image of a stop.
+    array: Option<ArrayName>,
     /// The stretch that the texture has.
     stretched: egui::mutex::Mutex<Stretch>,
     /// How the values of an array are coloured, where that is not as it came.
@@ -93,15 +95,16 @@ impl Raster {
     /// A sentence when the bytes are no 2-D array of numbers.
     pub fn from_npy(context: &egui::Context, array: ArrayName, bytes: &[u8]) -> Result<Self, String> {
         let values = npy::decode(bytes, array.word()).map_err(|e| e.to_string())?;
+        Ok(Self::from_values(context, array, values))
+    }
+
+    /// An array of a step from its values.
+    pub fn from_values(context: &egui::Context, array: ArrayName, values: GrayImage) -> Self {
         let (mean, sigma) = statistics(&values);
-        let colour = |v: f32| match array {
-            ArrayName::Surface => theme::score((v + 1.0) / 2.0),
-            ArrayName::Difference => theme::signed(v, DIFFERENCE_LIMIT),
-            _ => theme::grey(0.5 + (v - mean) / (2.0 * PATCH_SIGMAS * sigma.max(1e-6))),
-        };
-        let colours = values.iter().map(|&v| colour(v)).collect();
+        let colours = values.iter().map(|&v| as_it_came(array, v, [mean, sigma])).collect();
         let levels = ends(&values);
-        Ok(Self { levels, ..Self::new(context, array.word(), values, colours, TextureOptions::NEAREST) })
+        let new = Self::new(context, array.word(), values, colours, TextureOptions::NEAREST);
+        Self { levels, array: Some(array), ..new }
     }
 
     fn new(
@@ -116,7 +119,7 @@ impl Raster {
         let (mean, sigma) = statistics(&values);
         let (levels, stretched) = (levels(&values), egui::mutex::Mutex::default());
         let look = egui::mutex::Mutex::default();
-        Self { values, texture, mean, sigma, levels, options, stretched, look }
+        Self { values, texture, mean, sigma, levels, options, array: None, stretched, look }
     }
 
     /// Gives the texture of an image a stretch, where it does not have it yet.
@@ -143,6 +146,18 @@ impl Raster {
         self.texture.clone().set(ColorImage::new(size, colours), self.options);
     }
 
+    /// The pixels that the texture shows.
+    pub fn pixels(&self) -> ColorImage {
+        let (stretch, look) = (*self.stretched.lock(), *self.look.lock());
+        let colour = |v: f32| match (look, self.array) {
+            (Some(look), _) => look.colour(v),
+            (None, Some(array)) => as_it_came(array, v, [self.mean, self.sigma]),
+            (None, None) => theme::grey(stretch.apply(v, self.levels)),
+        };
+        let colours = self.values.iter().map(|&v| colour(v)).collect();
+        ColorImage::new(self.size().map(|side| side as usize), colours)
+    }
+
     /// Width and height.
     pub fn size(&self) -> [u32; 2] {
         self.values.dimensions().into()
@@ -157,6 +172,15 @@ impl Raster {
     /// Memory that values and texture take.
     pub fn bytes(&self) -> usize {
         self.values.as_raw().len() * (size_of::<f32>() + size_of::<Color32>())
+    }
+}
+
+/// The colour of a value of an array before a panel gives it another one.
+fn as_it_came(array: ArrayName, value: f32, [mean, sigma]: [f32; 2]) -> Color32 {
+    match array {
+        ArrayName::Surface => theme::score((value + 1.0) / 2.0),
+        ArrayName::Difference => theme::signed(value, DIFFERENCE_LIMIT),
+        _ => theme::grey(0.5 + (value - mean) / (2.0 * PATCH_SIGMAS * sigma.max(1e-6))),
     }
 }
 

@@ -11,6 +11,7 @@ use utoipa::ToSchema;
 use crate::error::{Error, Result};
 use crate::frames::Pixel;
 use crate::image::PixelRect;
+use crate::locate::template::match_template::TemplateMatch;
 use crate::session::removal::NO_PREDICTION;
 use crate::session::track::{self, Drive};
 use crate::settings::{Changes, Settings};
@@ -92,6 +93,9 @@ pub struct Ghost {
     /// Its covariance, px².
     #[schema(value_type = Option<Vec<f64>>)]
     pub predicted_covariance_px2: Option<Matrix2<f64>>,
+    /// How the template matched: peak, second peak and region; null where nothing was matched.
+    #[serde(default)]
+    pub matched: Option<TemplateMatch>,
     /// The region searched, cut to the image.
     pub search_window: Option<PixelRect>,
     /// Side of the template, px.
@@ -159,6 +163,7 @@ impl Ghost {
             missing: tried.fault.clone().or_else(|| located.and_then(|l| l.missing.clone())),
             predicted_left: pointing.and_then(|p| p.predicted_left),
             predicted_covariance_px2: pointing.and_then(|p| p.predicted_covariance_px2),
+            matched: matched.cloned(),
             search_window: matched.map(|m| m.search_window),
             template_size_px: settings.template.template_size_px,
             prepared_from_template: evidence
@@ -250,6 +255,9 @@ mod tests {
         assert_eq!(ghost.search_window, Some(PixelRect::centred(put, 143)));
         assert!(ghost.deltas.moved_px.unwrap() < 0.01, "{:?}", ghost.deltas);
         assert_eq!(tried.update.state, TrackingState::Tracking);
+        let (recorded, matched) =
+            (steps[1].template().unwrap().match_template.as_ref().unwrap(), ghost.matched.unwrap());
+        assert!(matched.peak.pixel.distance(recorded.peak.pixel) < 0.01, "{:?}", matched.peak);
         assert_eq!((ghost.arrays[0].size, ghost.arrays[0].values.len()), ([123, 123], 123 * 123));
         // Far enough away the target is not in the window, and the step is lost.
         let away = WhatIf { prediction_px: Some(predicted.offset(-75.0, 60.0)), ..WhatIf::default() };

@@ -12,6 +12,7 @@ use utoipa::ToSchema;
 use super::ground::{Assessment, Ground};
 use super::{Aspect, Verdict};
 use crate::frames::Pixel;
+use crate::settings::Changes;
 
 /// The letter of a cell that has no reason.
 const NONE: char = '-';
@@ -27,6 +28,10 @@ pub struct TrackabilityMap {
     pub columns: usize,
     /// Rows of cells.
     pub rows: usize,
+    /// The limits that it was made with, as far as they are not the defaults, by name.
+    #[serde(default)]
+    #[schema(value_type = Object)]
+    pub limits: Changes,
     /// Side of the window that was judged, px.
     pub template_size_px: u32,
     /// The verdicts of the rows that were made: `g` good, `r` risky, `b` bad.
@@ -100,6 +105,7 @@ impl TrackabilityMap {
             cell_px,
             columns: width.div_ceil(cell_px) as usize,
             rows: height.div_ceil(cell_px) as usize,
+            limits: ground.limits.changes(),
             template_size_px: ground.settings.template.template_size_px,
             words: words.collect(),
             ..Self::default()

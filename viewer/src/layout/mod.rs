@@ -139,6 +139,10 @@ pub type LeftImage = Option<(Transform, [u32; 2])>;
 
 /// Shows one panel.
 pub fn show_pane(ui: &mut Ui, pane: Pane, state: &State, out: &mut Vec<Command>) -> LeftImage {
+    if state.is_table(pane) {
+        panels::sheets::show(ui, state, pane, out);
+        return None;
+    }
     match pane {
         Pane::Left => return panels::images_left::show(ui, state, out),
         Pane::Targets => panels::targets::show(ui, state, out),
@@ -240,12 +244,16 @@ impl<'a> Panels<'a> {
         egui::Popup::menu(&button).show(|ui| {
             ui.set_min_width(180.0);
             if let Some(pane) = front {
-                if ui.button("Fill the page (`)").clicked() {
+                let words =
+                    if self.maximised.is_some() { "Restore all panels (`)" } else { "Fill the page (`)" };
+                if ui.button(words).clicked() {
                     self.out.push(Command::Layout(LayoutCommand::Maximise(Some(pane))));
                 }
                 if ui.button(format!("Close {}", pane.title())).clicked() {
                     self.out.push(Command::Layout(LayoutCommand::Close(pane)));
                 }
+                ui.separator();
+                panels::figure_menu::entries(ui, self.state, pane, self.out);
             }
             if !self.closed.is_empty() {
                 ui.separator();
@@ -320,6 +328,9 @@ impl Behavior<Pane> for Panels<'_> {
     ) {
         let front = tabs.active.and_then(|tile| tiles.get_pane(&tile)).copied();
         self.menu(ui, front);
+        if let Some(pane) = front {
+            panels::sheets::switch(ui, self.state, pane, self.out);
+        }
     }
 
     fn simplification_options(&self) -> SimplificationOptions {

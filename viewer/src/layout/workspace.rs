@@ -235,6 +235,8 @@ impl Panels<'_> {
         ui.horizontal(|ui| {
             ui.label(theme::title(pane.title()));
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                self.menu(ui, Some(pane));
+                crate::panels::sheets::switch(ui, self.state, pane, self.out);
                 if ui.button("Restore (`)").clicked() {
                     self.out.push(crate::command::Command::Layout(LayoutCommand::Maximise(None)));
                 }

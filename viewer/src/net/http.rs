@@ -7,7 +7,9 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use sightline_core::session::compare::RunName;
 use sightline_core::session::wire::{Designated, Problem};
+use sightline_core::settings::Changes;
 use sightline_core::study::wire::StudyRows;
+use sightline_core::trackability::TrackabilityLimits;
 
 use super::{Arrived, Reply, Request, why};
 use crate::cache::{Item, Key, StepKey};
@@ -98,12 +100,12 @@ pub(crate) fn describe(request: &Request) -> (Method, String, Option<Vec<u8>>) {
         Request::Metrics { session, run: RunName { target, run } } => {
             get(format!("sessions/{session}/targets/{target}/runs/{run}/metrics"))
         }
-        Request::Trackability { traverse, step } => {
-            get(format!("traverses/{traverse}/steps/{step}/trackability"))
+        Request::Trackability { traverse, step, limits } => {
+            get(format!("traverses/{traverse}/steps/{step}/trackability{}", query_of(limits)))
         }
-        Request::CancelTrackability { traverse, step } => (
+        Request::CancelTrackability { traverse, step, limits } => (
             Method::POST,
-            format!("traverses/{traverse}/steps/{step}/trackability/cancel"),
+            format!("traverses/{traverse}/steps/{step}/trackability/cancel{}", query_of(limits)),
             json(&serde_json::json!({})),
         ),
         Request::Why(request) => why::describe(request),
@@ -197,6 +199,14 @@ fn read(request: &Request, response: &ehttp::Response, context: &egui::Context) 
         Request::Ask(asked) => Reply::Ask(super::ask::read(asked, bytes)?),
         Request::Files(asked) => Reply::Files(super::files::read(asked, bytes)?),
     })
+}
+
+/// Changed limits as a query; nothing where none is changed.
+fn query_of(limits: &Changes) -> String {
+    if limits.is_empty() {
+        return String::new();
+    }
+    format!("?limits={}", why::escaped(&TrackabilityLimits::text(limits)))
 }
 
 fn read_item(key: &Key, bytes: &[u8], context: &egui::Context) -> Result<Item, Problem> {

@@ -20,6 +20,7 @@ use sightline_core::session::wire::{
     Event, NewRun, NewSession, NewTarget, Problem, RerunStream, SessionEntry, TraverseEntry, TraverseView,
 };
 
+use sightline_core::settings::Changes;
 use sightline_core::study::row::Row;
 use sightline_core::study::wire::{NewStudy, StudyInfo, StudyJob};
 use sightline_core::trackability::MapProgress;
@@ -139,6 +140,8 @@ pub enum Request {
         traverse: String,
         /// The stop.
         step: usize,
+        /// The limits that are not the defaults.
+        limits: Changes,
     },
     /// To give it up.
     CancelTrackability {
@@ -146,6 +149,8 @@ pub enum Request {
         traverse: String,
         /// The stop.
         step: usize,
+        /// The limits that are not the defaults.
+        limits: Changes,
     },
     /// About single steps.
     Why(WhyRequest),

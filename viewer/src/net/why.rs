@@ -101,7 +101,7 @@ pub(super) fn describe(request: &WhyRequest) -> (Method, String, Option<Vec<u8>>
 }
 
 /// A name in a query: all but letters, digits, points and underscores as percent signs and digits.
-fn escaped(text: &str) -> String {
+pub(super) fn escaped(text: &str) -> String {
     let plain = |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'.' | b'_' | b'-');
     let escape = |byte: u8| if plain(byte) { char::from(byte).to_string() } else { format!("%{byte:02X}") };
     text.bytes().map(escape).collect()

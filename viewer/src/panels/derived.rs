@@ -92,6 +92,12 @@ fn run_answer<'a>(state: &State, derived: &'a Derived) -> Option<&'a RunAnswer> 
     runs.iter().find(|answer| answer.target == target && answer.run == state.cursor.run)
 }
 
+/// What a derived column is at a step of the run that is looked at.
+pub(super) fn value(state: &State, at: usize, step: usize) -> Option<f64> {
+    let derived = state.ask.derived.get(at)?;
+    value_at(run_answer(state, derived), step)
+}
+
 fn value_at(of_run: Option<&RunAnswer>, step: usize) -> Option<f64> {
     let of_run = of_run?;
     *of_run.values.get(step.checked_sub(of_run.first_step)?)?

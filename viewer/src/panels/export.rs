@@ -1,10 +1,13 @@
-//! The window of exports: every file with its size, every action as a command to copy, and pictures of panels.
+//! The window of exports: every file with its size, every action as a command to copy, and panels as figures.
 
 use egui::{Id, Modal, RichText, ScrollArea, Ui};
 use sightline_core::session::exports::ExportEntry;
 
+use super::figure_menu;
 use crate::as_text;
 use crate::command::Command;
+use crate::figure::take::{Kind, Wish};
+use crate::layout::Pane;
 use crate::state::State;
 use crate::state::exports::{Ask, Part};
 use crate::theme;
@@ -101,15 +104,32 @@ fn copy(ui: &mut Ui, words: &str, name: &str, text: Option<String>) {
 }
 
 fn pictures(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    ui.label(theme::title("Picture of a panel (PNG, as it is on the screen)"));
+    ui.label(theme::title("A panel as a figure"));
     ui.horizontal_wrapped(|ui| {
-        for pane in &state.exports.panes {
-            let button = ui.button(pane.title()).accessible_name(format!("picture of {}", pane.title()));
-            if button.clicked() {
-                out.push(Command::Exports(Ask::Picture(*pane)));
+        ui.label(theme::label("as"));
+        for kind in Kind::ALL {
+            let button = egui::Button::selectable(state.exports.kind == kind, kind.word());
+            if ui.add(button.min_size(egui::vec2(24.0, 24.0))).clicked() {
+                out.push(Command::Exports(Ask::Kind(kind)));
             }
         }
+        figure_menu::burn_in(ui, state, out);
     });
+    let seen = |pane: &Pane| state.exports.panes.contains(pane);
+    for (words, is_seen) in
+        [("on the screen, as it is there", true), ("not on the screen, drawn apart", false)]
+    {
+        ui.label(theme::note(words));
+        ui.horizontal_wrapped(|ui| {
+            for pane in Pane::ALL.into_iter().filter(|pane| seen(pane) == is_seen) {
+                let button = ui.button(pane.title()).accessible_name(format!("figure of {}", pane.title()));
+                if button.clicked() {
+                    let kind = state.exports.kind;
+                    out.push(Command::Exports(Ask::Figure(Wish { pane, kind })));
+                }
+            }
+        });
+    }
     ui.add_space(4.0);
     if ui.button("Open this step as a plain page").clicked() {
         out.push(Command::Exports(Ask::PlainPage));

@@ -6,14 +6,14 @@ use egui::{Button, CursorIcon, Mesh, Pos2, Rect, Shape, Stroke, Ui, UiBuilder, p
 use sightline_core::frames::Pixel;
 use sightline_core::image::PixelRect;
 use sightline_core::trackability::map::Cell;
-use sightline_core::trackability::{TrackabilityMap, Verdict};
+use sightline_core::trackability::{TrackabilityLimits, TrackabilityMap, Verdict};
 
 use super::legend::{self, Entry};
 use crate::aim::Aim;
 use crate::command::{Command, Layer, Mode};
 use crate::overlay::{self, Line, Mark, Overlay, paint_words, template_quad};
 use crate::raster::Raster;
-use crate::state::State;
+use crate::state::{State, limits};
 use crate::theme;
 use crate::view2d::{Canvas, Transform};
 
@@ -52,6 +52,13 @@ fn legend(ui: &mut Ui, canvas: &Canvas, state: &State, out: &mut Vec<Command>) {
         // A child leaves the cursor of the panel where it is, below the image.
         let child = ui.new_child(UiBuilder::new().max_rect(place).id_salt(("trackability", number)));
         legend::row(&child, place, entry, state, out);
+    }
+    let below = Rect::from_min_size(corner + vec2(0.0, area.height() + 4.0), vec2(width, ROW));
+    let mut child = ui.new_child(UiBuilder::new().max_rect(below).id_salt("limits"));
+    let button = child.add_sized(below.size(), Button::new("Limits …"));
+    let button = button.accessible_name("limits of trackability");
+    if button.on_hover_text(made_with(state)).clicked() {
+        out.push(Command::Limits(limits::Ask::Open));
     }
 }
 
@@ -178,9 +185,26 @@ fn hint(state: &State) -> String {
     };
     match (&progress.failed, progress.ended) {
         (Some(why), _) => format!("{hint} No trackability: {why}."),
-        (None, true) => hint.to_owned(),
+        (None, true) => match state.trackability_map() {
+            Some(map) if !map.limits.is_empty() => format!("{hint} {}.", made_with(state)),
+            _ => hint.to_owned(),
+        },
         (None, false) if progress.n == 0 => format!("{hint} Trackability: measuring the surface …"),
         (None, false) => format!("{hint} Trackability: {} of {} rows.", progress.k, progress.n),
+    }
+}
+
+/// By which limits the map was made.
+fn made_with(state: &State) -> String {
+    let limits = state.trackability_map().map(|map| &map.limits).filter(|limits| !limits.is_empty());
+    let table = TrackabilityLimits::table();
+    let unit = |key: &str| table.iter().find(|info| info.key == key).map_or("", |info| info.unit.as_str());
+    let one = |(key, value): (&String, &serde_json::Value)| {
+        format!("{key} {value} {}", unit(key)).trim_end().to_owned()
+    };
+    match limits {
+        Some(limits) => format!("Map made with {}", limits.iter().map(one).collect::<Vec<_>>().join(", ")),
+        None => "Map made with the default limits".to_owned(),
     }
 }
 
@@ -190,6 +214,7 @@ fn described_words(state: &State, pixel: Option<Pixel>) -> String {
     if let Some(map) = state.trackability_map() {
         let [good, risky, bad] = map.shares().map(|share| 100.0 * share);
         words += &format!(", trackability: {good:.0} % good, {risky:.0} % risky, {bad:.0} % bad");
+        words += &format!("; {}", made_with(state));
     }
     if let Some(pixel) = pixel {
         words += &format!("; at {:.1}, {:.1}", pixel.x, pixel.y);

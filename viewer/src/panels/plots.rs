@@ -1,5 +1,7 @@
 //! Plots over the steps of a run: scores, or confidence and inliers; pixel error; position error with its 1 σ.
 
+use std::collections::HashMap;
+
 use egui::{Color32, Id, Ui, vec2};
 use egui_plot::{
     GridInput, GridMark, HLine, HoverPosition, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotUi, Points,
@@ -10,6 +12,8 @@ use sightline_core::settings::TrackerKind;
 use sightline_core::trace::StepRow;
 
 use super::names::{self, HEIGHT as NAMES};
+use super::sheets::sheet::state_of;
+use super::sheets::{Column, Sheet};
 use crate::command::{Command, Go};
 use crate::overlay::{self, Mark};
 use crate::state::State;
@@ -67,6 +71,55 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         let is_last = at + 1 == derived.len();
         super::derived::show(ui, state, at, if is_last { height + axis } else { height }, is_last, out);
     }
+}
+
+/// The plots as one table: every line a column, the compared runs beside it, and what is derived.
+pub(super) fn sheets(state: &State) -> Result<Vec<Sheet>, String> {
+    let run = state.run().ok_or_else(|| state.missing_target())?;
+    let (charts, others) = (charts(state, run), state.others());
+    let mut columns = vec![Column::new("state", "")];
+    for (chart, line) in charts.iter().flat_map(|chart| chart.series.iter().map(move |line| (chart, line))) {
+        let name = if chart.series.len() > 1 {
+            format!("{} {}", chart.title, line.name)
+        } else {
+            chart.title.to_owned()
+        };
+        columns.push(Column::new(&name, chart.unit));
+        let beside = others
+            .iter()
+            .map(|other| Column::new(format!("{name}, {}", state.run_label(other.name)), chart.unit));
+        columns.extend(beside);
+    }
+    columns.extend(state.ask.derived.iter().map(|derived| {
+        let unit = derived.answer.as_ref().map_or("", |answer| answer.unit.as_str());
+        let unit = if unit.is_empty() { String::new() } else { format!(", {unit}") };
+        Column::new(format!("{}{unit}", derived.expression), "")
+    }));
+    let beside: Vec<HashMap<usize, &StepRow>> = others
+        .iter()
+        .map(|other| {
+            other
+                .run
+                .rows
+                .iter()
+                .filter_map(|row| Some((state.own_beside(other.name, row.step)?, row)))
+                .collect()
+        })
+        .collect();
+    let mut sheet = Sheet::over_steps("Over the steps", columns);
+    for row in &run.rows {
+        let mut cells = vec![state_of(row)];
+        for line in charts.iter().flat_map(|chart| &chart.series) {
+            cells.push((line.value)(run, row).into());
+            for (other, rows) in others.iter().zip(&beside) {
+                cells.push(rows.get(&row.step).and_then(|row| (line.value)(other.run, row)).into());
+            }
+        }
+        cells
+            .extend((0..state.ask.derived.len()).map(|at| super::derived::value(state, at, row.step).into()));
+        sheet.step(row.step, state.cursor.step, cells);
+    }
+    Ok(vec![sheet])
 }
 
 fn series(

@@ -1,6 +1,7 @@
 //! The surface of match scores over the search window, with its peaks, the threshold and the prediction.
 
 use egui::{Align2, Rect, Ui, pos2, vec2};
+use nalgebra::Matrix2;
 use sightline_core::frames::Pixel;
 use sightline_core::image::PixelRect;
 use sightline_core::locate::template::match_template::TemplateMatch;
@@ -30,6 +31,14 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     if super::compare::surfaces::show(ui, state, out) {
         return;
     }
+    if super::what_if::scores::show(ui, state, out) {
+        return;
+    }
+    recorded(ui, state, out);
+}
+
+/// Shows the scores of the run.
+pub(super) fn recorded(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let matched = state.trace().and_then(StepTrace::template).and_then(|e| e.match_template.as_ref());
     let (Some(trace), Some(matched)) = (state.trace(), matched) else {
         panels::missing(ui, PURPOSE, &state.missing_template());
@@ -86,7 +95,7 @@ pub fn region_of(search_window: PixelRect, size: [u32; 2]) -> PixelRect {
 }
 
 /// The line along which the scores have the threshold's height.
-fn paint_contour(canvas: &Canvas, raster: &Raster, region: PixelRect, threshold: f32) {
+pub(super) fn paint_contour(canvas: &Canvas, raster: &Raster, region: PixelRect, threshold: f32) {
     let (x, y) = (f64::from(region.x), f64::from(region.y));
     let stroke = egui::Stroke::new(1.5, theme::strong());
     for segment in contour(raster.values.as_raw(), raster.values.width() as usize, threshold) {
@@ -97,10 +106,30 @@ fn paint_contour(canvas: &Canvas, raster: &Raster, region: PixelRect, threshold:
 
 /// Prediction, peaks and truth on the scores.
 pub(super) fn paint_marks(canvas: &Canvas, trace: &StepTrace, matched: &TemplateMatch, run: egui::Color32) {
+    let pointing = trace.point_mast.as_ref();
+    let predicted = pointing.and_then(|p| Some((p.predicted_left?, p.predicted_covariance_px2)));
+    let truth = trace.truth.as_ref().and_then(|t| t.left_pixel);
+    paint_peaks(canvas, &Marked { predicted, matched, truth, colour: run });
+}
+
+/// What is marked on scores.
+pub(super) struct Marked<'a> {
+    /// The prediction with its covariance, px and px².
+    pub predicted: Option<(Pixel, Option<Matrix2<f64>>)>,
+    /// The match.
+    pub matched: &'a TemplateMatch,
+    /// The truth, px.
+    pub truth: Option<Pixel>,
+    /// The colour of the match.
+    pub colour: egui::Color32,
+}
+
+/// Prediction, peaks and truth.
+pub(super) fn paint_peaks(canvas: &Canvas, marked: &Marked<'_>) {
+    let (matched, run) = (marked.matched, marked.colour);
     let overlay = Overlay::new(&canvas.painter, &canvas.transform);
-    if let Some(pixel) = trace.point_mast.as_ref().and_then(|p| p.predicted_left) {
-        if let Some(covariance) = trace.point_mast.as_ref().and_then(|p| p.predicted_covariance_px2.as_ref())
-        {
+    if let Some((pixel, covariance)) = marked.predicted {
+        if let Some(covariance) = &covariance {
             overlay.ellipse(pixel, covariance, 3.0, theme::prediction(), Line::Dotted);
         }
         overlay.mark(pixel, Mark::Cross, theme::prediction());
@@ -114,7 +143,7 @@ pub(super) fn paint_marks(canvas: &Canvas, trace: &StepTrace, matched: &Template
     overlay.ellipse(peak.pixel, &matched.covariance_px2, 3.0, run, Line::Solid);
     overlay.mark(peak.pixel, Mark::Ring, run);
     overlay.words(peak.pixel, vec2(12.0, -12.0), &format!("peak {:.3}", peak.score), theme::strong());
-    if let Some(pixel) = trace.truth.as_ref().and_then(|t| t.left_pixel) {
+    if let Some(pixel) = marked.truth {
         overlay.mark(pixel, Mark::Plus, theme::truth());
     }
 }

@@ -11,6 +11,7 @@ use sightline_core::trace::StepRow;
 
 use super::names;
 use super::plots::{few_marks, over_steps, pieces, plain};
+use super::sheets::{Cell, Column, Sheet};
 use crate::command::{Command, Go};
 use crate::overlay::{self, Mark};
 use crate::state::State;
@@ -99,6 +100,36 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             out.push(Command::Go(Go::Step(step)));
         }
     }
+}
+
+/// Both criteria as one table.
+pub(super) fn sheets(state: &State) -> Result<Vec<Sheet>, String> {
+    let run = state.run().ok_or_else(|| state.missing_target())?;
+    let columns = CRITERIA.iter().flat_map(|criterion| {
+        let name = criterion.title.trim_end_matches(", cm");
+        [
+            (name.to_owned(), "cm"),
+            (format!("tolerance {}", criterion.number), "cm"),
+            (format!("fired {}", criterion.number), ""),
+        ]
+    });
+    let columns = columns.map(|(name, unit)| Column::new(name, unit)).collect();
+    let mut sheet = Sheet::over_steps("Tolerances", columns);
+    for row in &run.rows {
+        let cells = CRITERIA.iter().flat_map(|criterion| {
+            let (value, tolerance) = ((criterion.value_m)(row), (criterion.tolerance_m)(row));
+            let fired = match value.zip(tolerance) {
+                Some((value_m, tolerance_m)) => {
+                    Cell::Word(if value_m > tolerance_m { "fired" } else { "no" }.to_owned())
+                }
+                None => Cell::Nothing,
+            };
+            let cm = |value: Option<f64>| Cell::from(value.map(|m| m * 100.0));
+            [cm(value), cm(tolerance), fired]
+        });
+        sheet.step(row.step, state.cursor.step, cells.collect::<Vec<_>>());
+    }
+    Ok(vec![sheet])
 }
 
 fn names_of(run: usize) -> Vec<(Mark, Color32, String)> {

@@ -89,6 +89,8 @@ impl State {
             Command::Ask(ask) => self.apply_ask(ask),
             Command::Files(ask) => self.ask_of_files(ask),
             Command::CloseCard => self.messages.close_card(),
+            Command::Limits(ask) => self.ask_limits(ask),
+            Command::Table(pane) => self.turn_table(pane),
         }
     }
 
@@ -134,7 +136,7 @@ impl State {
         }
     }
 
-    fn set_mode(&mut self, mode: Mode) {
+    pub(super) fn set_mode(&mut self, mode: Mode) {
         if mode == Mode::Look && self.mode == Mode::Look {
             self.refusal = None;
             self.messages.close_card();

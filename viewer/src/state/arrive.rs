@@ -149,8 +149,8 @@ impl State {
                 }
             }
             Reply::Trackability(progress) => {
-                if let Request::Trackability { traverse, step } = request {
-                    self.took_trackability((traverse, step), Ok(*progress));
+                if let Request::Trackability { traverse, step, limits } = request {
+                    self.took_trackability((traverse, step, limits), Ok(*progress));
                 }
             }
             Reply::Why(reply) => {
@@ -207,8 +207,8 @@ impl State {
             Request::Studies => self.studies.infos = Some(Vec::new()),
             Request::Compare { .. } => return self.took_comparison(&request, Err(&problem)),
             Request::Metrics { run, .. } => return self.took_metrics(run, Err(&problem)),
-            Request::Trackability { traverse, step } => {
-                self.took_trackability((traverse, step), Err(problem));
+            Request::Trackability { traverse, step, limits } => {
+                self.took_trackability((traverse, step, limits), Err(problem));
                 return;
             }
             // A map that was complete before it was given up is no problem.

@@ -3,6 +3,7 @@
 use sightline_core::session::exports::ExportEntry;
 
 use super::State;
+use crate::figure::take::{Kind, Wish};
 use crate::layout::Pane;
 use crate::net::Request;
 
@@ -17,8 +18,12 @@ pub enum Ask {
     Of(Part),
     /// Downloads a file by its path below `/api/v1/`.
     Download(String),
-    /// Takes a picture of a panel.
-    Picture(Pane),
+    /// Saves a panel as a figure.
+    Figure(Wish),
+    /// Chooses what the figures of the window are saved as.
+    Kind(Kind),
+    /// Puts a line above figures that says of what they are, or does not.
+    BurnIn(bool),
     /// Opens the plain page of the step.
     PlainPage,
 }
@@ -48,8 +53,12 @@ pub struct Exports {
     pub refused: Option<String>,
     /// The panels on the screen.
     pub panes: Vec<Pane>,
-    /// A panel of which a picture is to be taken.
-    pub picture_of: Option<Pane>,
+    /// A figure that is to be saved.
+    pub figure_of: Option<Wish>,
+    /// What the figures of the window are saved as.
+    pub kind: Kind,
+    /// Whether a line above a figure says of what it is.
+    pub burns_in: bool,
 }
 
 impl State {
@@ -66,11 +75,9 @@ impl State {
                 self.want_exports();
             }
             Ask::Download(path) => self.open_url = Some(format!("{}/api/v1/{path}", self.origin)),
-            Ask::Picture(pane) => {
-                // The window would lie over the panel.
-                self.exports.is_open = false;
-                self.exports.picture_of = Some(pane);
-            }
+            Ask::Figure(wish) => self.exports.figure_of = Some(wish),
+            Ask::Kind(kind) => self.exports.kind = kind,
+            Ask::BurnIn(is_on) => self.exports.burns_in = is_on,
             Ask::PlainPage => self.open_url = Some(format!("{}/api/v1/{}", self.origin, self.plain_page())),
         }
     }

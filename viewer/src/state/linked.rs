@@ -23,6 +23,8 @@ impl State {
             others: self.compare.others.clone(),
             compared: Some(self.compare.view)
                 .filter(|view| self.is_comparing() && *view != compare::View::Marks),
+            sort: Some(self.compare.sort.clone()).filter(|sort| sort.metric.is_some()),
+            filter: Some(self.compare.filter.trim().to_owned()).filter(|words| !words.is_empty()),
             left: at(self.views.left),
             right: at(self.views.right),
             ..Fragment::default()
@@ -92,6 +94,12 @@ impl State {
         }
         self.compare.others = others;
         self.compare.view = link.compared.unwrap_or_default();
+        self.compare.sort = link.sort.unwrap_or_default();
+        // A blank at the end is being typed: the address does not have it.
+        let filter = link.filter.unwrap_or_default();
+        if self.compare.filter.trim() != filter {
+            self.compare.filter = filter;
+        }
         self.stage = link.stage.unwrap_or(self.stage);
         self.views.left = link.left.unwrap_or(View2d::Fit);
         self.views.right = link.right.unwrap_or(View2d::Fit);

@@ -16,6 +16,9 @@ mod views;
 pub mod exports;
 pub mod files;
 mod following;
+mod known;
+pub mod ghost;
+pub mod limits;
 pub mod messages;
 mod missing;
 pub mod notes;
@@ -27,6 +30,7 @@ pub mod undo;
 mod wanted;
 pub mod why;
 
+pub use self::known::{Connection, Place, Progress, Refusal};
 pub use self::rows::{events, row_of, run_letter, state_of_word};
 pub use self::views::Views;
 
@@ -34,7 +38,6 @@ use std::collections::{BTreeMap, HashSet};
 
 use serde_json::Value;
 use sightline_core::camera::Camera;
-use sightline_core::frames::Pixel;
 use sightline_core::limits::SettingInfo;
 use sightline_core::session::Cursor;
 use sightline_core::session::view::{RunView, SessionView, TargetView};
@@ -65,52 +68,6 @@ use crate::tables::FeatureView;
 use crate::theme::Looks;
 use crate::tour::Tour;
 use crate::view2d::View2d;
-
-/// How the server's events come in.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Connection {
-    /// The first attempt is under way.
-    #[default]
-    Connecting,
-    /// Events come in.
-    Live,
-    /// The server does not answer.
-    Gone {
-        /// Attempts so far.
-        attempts: u32,
-    },
-}
-
-/// How far a run is.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Progress {
-    /// Steps done.
-    pub k: usize,
-    /// Steps in all.
-    pub n: usize,
-    /// What is being done.
-    pub doing: String,
-}
-
-/// A place in the left image of a stop.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place {
-    /// The stop.
-    pub step: usize,
-    /// The position, px.
-    pub pixel: Pixel,
-}
-
-/// Why a target could not be designated.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Refusal {
-    /// Where.
-    pub place: Place,
-    /// What the server said.
-    pub sentence: String,
-    /// The nearest pixel that would do.
-    pub nearest: Option<Pixel>,
-}
 
 /// Everything that is known and looked at.
 pub struct State {
@@ -188,6 +145,8 @@ pub struct State {
     pub files: Files,
     /// Breakpoints, derived columns, and time travel.
     pub ask: Asking,
+    /// Panels that are looked at as tables.
+    pub tables: HashSet<crate::layout::Pane>,
     outbox: Vec<Request>,
     sync: Sync,
     /// The aligned left camera of the step that was asked for last: it takes a while to compute.
@@ -258,6 +217,7 @@ impl State {
             exports: Exports::default(),
             files: Files::default(),
             ask: Asking::default(),
+            tables: HashSet::new(),
             outbox: Vec::new(),
             sync: Sync { linked, ..Sync::default() },
             aligned: egui::mutex::Mutex::default(),

@@ -4,10 +4,12 @@
 
 use sightline_core::frames::Pixel;
 use sightline_core::session::wire::Problem;
+use sightline_core::settings::Changes;
 use sightline_core::trackability::map::Cell;
 use sightline_core::trackability::{MapProgress, TrackabilityMap};
 
 use super::State;
+use super::limits::Form;
 use crate::aim::Aim;
 use crate::command::Mode;
 use crate::net::Request;
@@ -16,8 +18,12 @@ use crate::view2d::View2d;
 /// What is known of a stop's trackability.
 #[derive(Clone, Debug, Default)]
 pub struct Trackability {
-    /// The traverse and the stop that it is of.
-    pub place: Option<(String, usize)>,
+    /// The traverse and the stop that it is of, and the limits by which it is made, where they are not the defaults.
+    pub place: Option<(String, usize, Changes)>,
+    /// The limits that are not the defaults.
+    pub limits: Changes,
+    /// The limits as they are typed, while their window is open.
+    pub form: Option<Form>,
     /// How far the map is; none before the first answer.
     pub progress: Option<MapProgress>,
     /// The place chosen by keys.
@@ -29,7 +35,7 @@ pub struct Trackability {
 impl State {
     /// The map of the stop that is looked at, as far as it was made.
     pub fn trackability_map(&self) -> Option<&TrackabilityMap> {
-        let (traverse, step) = self.trackability.place.as_ref()?;
+        let (traverse, step, _) = self.trackability.place.as_ref()?;
         let is_here =
             self.traverse.as_ref().is_some_and(|open| open.id == *traverse) && *step == self.cursor.step;
         self.trackability.progress.as_ref().filter(|_| is_here)?.map.as_ref()
@@ -81,7 +87,8 @@ impl State {
 
     /// Asks for the map while a target is picked, and gives it up with the pick.
     pub(super) fn sync_trackability(&mut self) {
-        let here = self.traverse.as_ref().map(|open| (open.id.clone(), self.cursor.step));
+        let limits = &self.trackability.limits;
+        let here = self.traverse.as_ref().map(|open| (open.id.clone(), self.cursor.step, limits.clone()));
         let wanted = here.filter(|_| self.mode == Mode::Pick);
         if wanted.is_none() {
             self.trackability.aim = None;
@@ -89,22 +96,26 @@ impl State {
         let known = &mut self.trackability;
         if known.place != wanted {
             let is_made = known.progress.as_ref().is_none_or(|progress| progress.ended);
-            if let Some((traverse, step)) = known.place.take().filter(|_| !is_made) {
-                self.outbox.push(Request::CancelTrackability { traverse, step });
+            if let Some((traverse, step, limits)) = known.place.take().filter(|_| !is_made) {
+                self.outbox.push(Request::CancelTrackability { traverse, step, limits });
             }
-            *known = Trackability { aim: known.aim.filter(|_| wanted.is_some()), ..Trackability::default() };
+            let (limits, form) = (std::mem::take(&mut known.limits), known.form.take());
+            let aim = known.aim.filter(|_| wanted.is_some());
+            *known = Trackability { aim, limits, form, ..Trackability::default() };
             (known.is_stale, known.place) = (wanted.is_some(), wanted);
         }
-        if let Some((traverse, step)) = known.place.clone().filter(|_| known.is_stale && !known.is_asked) {
+        if let Some((traverse, step, limits)) =
+            known.place.clone().filter(|_| known.is_stale && !known.is_asked)
+        {
             (known.is_asked, known.is_stale) = (true, false);
-            self.outbox.push(Request::Trackability { traverse, step });
+            self.outbox.push(Request::Trackability { traverse, step, limits });
         }
     }
 
     /// The server told of new rows.
     pub(super) fn trackability_went_on(&mut self, traverse: &str, step: usize) {
         let known = &mut self.trackability;
-        let is_ours = known.place.as_ref().is_some_and(|(own, at)| own == traverse && *at == step);
+        let is_ours = known.place.as_ref().is_some_and(|(own, at, _)| own == traverse && *at == step);
         let is_made = known.progress.as_ref().is_some_and(|progress| progress.ended);
         known.is_stale |= is_ours && !is_made;
     }
@@ -116,7 +127,11 @@ impl State {
     }
 
     /// Takes an answer in; picking works all the same without one.
-    pub(super) fn took_trackability(&mut self, place: (String, usize), answer: Result<MapProgress, Problem>) {
+    pub(super) fn took_trackability(
+        &mut self,
+        place: (String, usize, Changes),
+        answer: Result<MapProgress, Problem>,
+    ) {
         let known = &mut self.trackability;
         if known.place.as_ref() != Some(&place) {
             return;

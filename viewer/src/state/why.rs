@@ -9,11 +9,12 @@ use serde_json::Value;
 use sightline_core::frames::Pixel;
 use sightline_core::session::counterfactual::wire::{Question, QuestionState};
 use sightline_core::session::view::RunView;
-use sightline_core::session::what_if::{Ghost, WhatIf};
+use sightline_core::session::what_if::WhatIf;
 use sightline_core::session::why::{Explanation, gates};
 use sightline_core::session::wire::{NewRun, Problem};
 
-use super::undo::Deed;
+pub use super::ghost::Trial;
+use super::ghost::{self, Scores};
 use super::{State, run_letter};
 use crate::cache::StepKey;
 use crate::net::Request;
@@ -48,6 +49,8 @@ pub enum Ask {
     },
     /// To try another place of the prediction.
     Displace(Option<Pixel>),
+    /// Which scores are shown while a change is tried.
+    Scores(Scores),
     /// To stop trying.
     Discard,
     /// To run from here as a branch with what is tried.
@@ -78,19 +81,6 @@ pub enum Told<T> {
     Refused(String),
 }
 
-/// What is tried at a step.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Trial {
-    /// The step.
-    pub of: StepKey,
-    /// The change.
-    pub what_if: WhatIf,
-    /// What came of the newest change that was answered.
-    pub ghost: Option<Ghost>,
-    /// Why the newest change could not be tried.
-    pub refused: Option<String>,
-}
-
 /// What is asked and known.
 #[derive(Default)]
 pub struct Why {
@@ -102,10 +92,16 @@ pub struct Why {
     pub trial: Option<Trial>,
     /// What would have saved steps.
     pub questions: BTreeMap<StepKey, Told<Question>>,
+    /// Which scores are shown while a change is tried.
+    pub scores_shown: Scores,
+    /// The texture of those of the change.
+    pub scores: ghost::Shown,
+    /// Whether they are looked at.
+    pub(super) wants_scores: bool,
     /// Whether the panel is to be brought to the front.
     pub is_called: bool,
     /// The change that the server tries now.
-    trying: Option<(StepKey, WhatIf)>,
+    pub(super) trying: Option<(StepKey, WhatIf)>,
     /// Where the cursor was when it was followed last, or when a value was asked for.
     pub(super) followed: Option<StepKey>,
     /// The steps whose question was looked for.
@@ -181,6 +177,7 @@ impl State {
                 let what_if = self.trial().map(|trial| trial.what_if.clone()).unwrap_or_default();
                 self.try_out(WhatIf { prediction_px: pixel, ..what_if });
             }
+            Ask::Scores(shown) => self.why.scores_shown = shown,
             Ask::Discard => self.try_out(WhatIf::default()),
             Ask::Branch => {
                 if let Some(what_if) = self.trial().map(|trial| trial.what_if.clone()) {
@@ -261,40 +258,6 @@ impl State {
         }
     }
 
-    /// Changes what is tried at the cursor's step.
-    fn try_out(&mut self, what_if: WhatIf) {
-        let Some(key) = self.step_key(self.cursor.step).filter(|_| self.row().is_some()) else { return };
-        let before = self.trial().map(|trial| trial.what_if.clone()).unwrap_or_default();
-        if before == what_if {
-            return;
-        }
-        self.did(Deed::Tried { of: key.clone(), before, after: what_if.clone() });
-        self.set_trial(key, what_if);
-    }
-
-    pub(super) fn set_trial(&mut self, of: StepKey, what_if: WhatIf) {
-        if what_if.is_empty() {
-            self.why.trial = None;
-            return;
-        }
-        // The last ghost stands until the new one is here, so that a drag does not flicker.
-        let ghost = self.why.trial.take().filter(|trial| trial.of == of).and_then(|trial| trial.ghost);
-        self.why.trial = Some(Trial { of, what_if, ghost, refused: None });
-        self.send_trial();
-    }
-
-    /// Asks for the newest change, unless an older one is under way.
-    fn send_trial(&mut self) {
-        let Some(trial) = &self.why.trial else { return };
-        let is_answered = trial.ghost.as_ref().is_some_and(|ghost| ghost.what_if == trial.what_if);
-        if self.why.trying.is_some() || is_answered || trial.refused.is_some() {
-            return;
-        }
-        let (of, what_if) = (trial.of.clone(), trial.what_if.clone());
-        self.why.trying = Some((of.clone(), what_if.clone()));
-        self.outbox.push(Request::Why(WhyRequest::WhatIf { of, what_if }));
-    }
-
     /// Forks the run at the cursor's step with a change.
     fn branch(&mut self, what_if: &WhatIf) {
         let Some((target, run)) = self.target().map(|t| t.number).zip(self.run().map(|r| r.number)) else {
@@ -314,11 +277,15 @@ impl State {
             (WhyRequest::Explain { of, value }, WhyReply::Explanation(explanation)) => {
                 self.why.trees.insert((of, value), Told::Here(*explanation));
             }
-            (WhyRequest::WhatIf { of, what_if }, WhyReply::Ghost(ghost)) => {
+            (WhyRequest::WhatIf { of, mut what_if }, WhyReply::Ghost(mut ghost)) => {
                 self.why.trying = None;
+                let has_scores = !what_if.arrays.is_empty();
+                // What is sent along is no part of the change.
+                what_if.arrays.clear();
+                ghost.what_if.arrays.clear();
                 let ours = self.why.trial.as_mut().filter(|trial| trial.of == of);
                 if let Some(trial) = ours {
-                    trial.ghost = Some(*ghost);
+                    (trial.ghost, trial.has_scores) = (Some(*ghost), has_scores);
                     if trial.what_if == what_if {
                         trial.refused = None;
                     }
@@ -347,8 +314,9 @@ impl State {
                 self.why.trees.insert((of, value), Told::Refused(problem.detail.clone()));
                 false
             }
-            WhyRequest::WhatIf { of, what_if } => {
+            WhyRequest::WhatIf { of, mut what_if } => {
                 self.why.trying = None;
+                what_if.arrays.clear();
                 let ours = self.why.trial.as_mut().filter(|trial| trial.of == of && trial.what_if == what_if);
                 if let Some(trial) = ours {
                     trial.refused = Some(problem.detail.clone());

@@ -8,6 +8,7 @@ use egui_kittest::kittest::Queryable;
 
 use super::{Shown, fixture};
 use crate::command::{Command, Stage};
+use crate::figure::take::{Kind, Wish};
 use crate::layout::Pane;
 use crate::net::{Arrived, Reply, Request};
 use crate::panels::{export, notes as panel};
@@ -231,8 +232,10 @@ fn the_export_window_lists_files_with_sizes_and_ways_to_copy_them() {
         curl,
         "curl -fsS -o sightline-s1-rows.csv http://localhost/api/v1/sessions/s1/exports/rows.csv"
     );
-    let picture = shown.click("picture of Map, site frame");
-    assert_eq!(picture, vec![Command::Exports(exports::Ask::Picture(Pane::Map))]);
+    let figure = shown.click("figure of Map, site frame");
+    let wish = Wish { pane: Pane::Map, kind: Kind::Png(2) };
+    assert_eq!(figure, vec![Command::Exports(exports::Ask::Figure(wish))]);
+    assert_eq!(shown.click("SVG"), vec![Command::Exports(exports::Ask::Kind(Kind::Svg))]);
 }
 
 #[test]

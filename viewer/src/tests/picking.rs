@@ -13,7 +13,7 @@ use crate::keys;
 use crate::layout::Pane;
 use crate::net::{Arrived, Reply, Request};
 use crate::panels::picking;
-use crate::state::{Place, Refusal, State};
+use crate::state::{Place, Refusal, State, limits};
 
 const PLACE: Pixel = Pixel::new(20.0, 30.0);
 const GOOD: Pixel = Pixel::new(44.0, 36.0);
@@ -34,6 +34,7 @@ fn map(rows_done: usize) -> TrackabilityMap {
         cell_px: 8,
         columns,
         rows,
+        limits: Default::default(),
         template_size_px: 21,
         verdicts: letters.iter().collect(),
         reasons: letters.iter().map(|letter| if *letter == 'g' { '-' } else { edge }).collect(),
@@ -57,7 +58,8 @@ fn asked(state: &mut State) -> bool {
 }
 
 fn answer(state: &mut State, outcome: Result<MapProgress, Problem>) {
-    let request = Request::Trackability { traverse: "drive".to_owned(), step: state.cursor.step };
+    let limits = state.trackability.limits.clone();
+    let request = Request::Trackability { traverse: "drive".to_owned(), step: state.cursor.step, limits };
     let outcome = outcome.map(|progress| Reply::Trackability(Box::new(progress)));
     state.arrived(Arrived { request, outcome }, 0.0);
 }
@@ -94,7 +96,8 @@ fn the_map_is_asked_for_while_picking_again_with_new_rows_and_given_up_with_the_
     assert!(asked(&mut state));
     answer(&mut state, Ok(progress(5)));
     state.apply(Command::SetMode(Mode::Look));
-    let cancel = Request::CancelTrackability { traverse: "drive".to_owned(), step: 0 };
+    let cancel =
+        Request::CancelTrackability { traverse: "drive".to_owned(), step: 0, limits: Default::default() };
     assert!(requests(&mut state).contains(&cancel), "nobody wants the rest");
     assert!(state.trackability_map().is_none());
     // A map that is complete needs no cancelling.
@@ -217,4 +220,69 @@ fn the_hint_tells_how_far_the_map_is() {
     // Painted words have no node of their own; the image says what is there so far.
     shown.says("trackability: 38 % good");
     assert!(shown.harness.query_by_label_contains("left image of step 0").is_some());
+}
+
+fn typed(state: &mut State, key: &str, text: &str) {
+    let (key, text) = (key.to_owned(), text.to_owned());
+    state.apply(Command::Limits(limits::Ask::Type { key, text }));
+}
+
+#[test]
+fn limits_are_typed_refused_in_a_sentence_and_used_for_a_map_of_their_own() {
+    let mut state = picking(&egui::Context::default());
+    state.apply(Command::Limits(limits::Ask::Open));
+    assert_eq!(keys::command(Key::T, Modifiers::NONE, &state), None, "the window has the keyboard");
+    typed(&mut state, "edge_bad_px", "99");
+    typed(&mut state, "cell_px", "16");
+    state.apply(Command::Limits(limits::Ask::Use));
+    let form = state.trackability.form.clone().unwrap();
+    assert!(form.refused.unwrap().contains("edge_bad_px: must be a number from 0 to 50, not 99"));
+    assert_eq!(form.texts["cell_px"], "16", "nothing typed is lost");
+    typed(&mut state, "edge_bad_px", "4,5");
+    state.apply(Command::Limits(limits::Ask::Use));
+    assert!(state.trackability.form.is_none());
+    assert!(state.trackability_map().is_none() || asked(&mut state));
+    let limits = state.trackability.limits.clone();
+    let text = sightline_core::trackability::TrackabilityLimits::text(&limits);
+    assert_eq!(text, "cell_px=16,edge_bad_px=4.5");
+    let request = Request::Trackability { traverse: "drive".to_owned(), step: 0, limits };
+    let curl = crate::as_text::http("http://localhost", &request).unwrap();
+    assert!(
+        curl.contains("/traverses/drive/steps/0/trackability?limits=cell_px%3D16%2Cedge_bad_px%3D4.5"),
+        "{curl}"
+    );
+    // An answer for the limits before is no answer.
+    let before = Request::Trackability { traverse: "drive".to_owned(), step: 0, limits: Default::default() };
+    state.arrived(Arrived { request: before, outcome: Ok(Reply::Trackability(Box::new(progress(8)))) }, 0.0);
+    assert!(state.trackability_map().is_none());
+    answer(&mut state, Ok(progress(8)));
+    assert!(state.trackability_map().is_some());
+}
+
+#[test]
+fn the_map_says_by_which_limits_it_was_made() {
+    let default = Shown::pane(Pane::Left, picking);
+    default.says("Map made with the default limits");
+    let mut changed = Shown::pane(Pane::Left, |context| {
+        let mut state = picking(context);
+        let mut progress = progress(8);
+        progress.map.as_mut().unwrap().limits.insert("edge_bad_px".to_owned(), serde_json::json!(4.5));
+        answer(&mut state, Ok(progress));
+        state
+    });
+    changed.says("Map made with edge_bad_px 4.5 px");
+    assert_eq!(changed.click("limits of trackability"), vec![Command::Limits(limits::Ask::Open)]);
+    let mut window = Shown::new(
+        [800.0, 900.0],
+        |context| {
+            let mut state = picking(context);
+            state.apply(Command::Limits(limits::Ask::Open));
+            state
+        },
+        crate::panels::limits::show,
+    );
+    window.harness.get_by_role_and_label(egui::accesskit::Role::TextInput, "slant_risky_deg");
+    window.says("default 80.0").says("deg");
+    assert_eq!(window.click("Make the map with these"), vec![Command::Limits(limits::Ask::Use)]);
+    assert_eq!(window.click("Put the defaults"), vec![Command::Limits(limits::Ask::Defaults)]);
 }

@@ -163,6 +163,11 @@ pub fn shade() -> Color32 {
     Color32::from_black_alpha(0x90)
 }
 
+/// A colour whose red, green and blue are multiplied by its opacity already.
+pub fn premultiplied([r, g, b, a]: [u8; 4]) -> Color32 {
+    Color32::from_rgba_premultiplied(r, g, b, a)
+}
+
 /// The pixel grid of a magnified image.
 pub fn grid() -> Color32 {
     Color32::from_rgba_unmultiplied(0x66, 0x66, 0x66, 0x50)

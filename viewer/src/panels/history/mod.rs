@@ -166,7 +166,7 @@ fn sentence(state: &State, all: &[Option<Comparison>], known: &[&Comparison]) ->
 }
 
 /// One entry for every earlier window; none where it, or what leads from it to now, is not loaded.
-fn compare_all(state: &State, run: &RunView) -> Vec<Option<Comparison>> {
+pub(in crate::panels) fn compare_all(state: &State, run: &RunView) -> Vec<Option<Comparison>> {
     let here = state.row().filter(|row| row.ncc.is_some());
     let Some(here) = here else { return Vec::new() };
     let window =

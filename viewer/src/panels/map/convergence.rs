@@ -22,7 +22,7 @@ use crate::{ellipse, theme, thin};
 const LEAST_HALF_CM: f64 = 0.5;
 
 /// Where a step placed the target.
-pub(super) struct Position {
+pub(in crate::panels) struct Position {
     /// The step.
     pub step: usize,
     /// The position in the site frame, m.
@@ -31,8 +31,13 @@ pub(super) struct Position {
     pub from_above: Option<Matrix2<f64>>,
 }
 
-/// The positions of a run, step by step; of a long one as many as a map shows.
-pub(super) fn positions(run: &RunView, stops: &[StopView]) -> Vec<Position> {
+/// The positions of a run, step by step.
+pub(in crate::panels) fn positions(run: &RunView, stops: &[StopView]) -> Vec<Position> {
+    run.rows.iter().filter_map(|row| position(row, stops)).collect()
+}
+
+/// As many of them as a map shows.
+pub(super) fn shown(run: &RunView, stops: &[StopView]) -> Vec<Position> {
     thin::evenly(&run.rows, thin::PLACES).filter_map(|row| position(row, stops)).collect()
 }
 
@@ -51,7 +56,7 @@ fn position(row: &StepRow, stops: &[StopView]) -> Option<Position> {
 
 /// Shows the target's neighbourhood.
 pub(super) fn show(ui: &mut Ui, state: &State, stops: &[StopView], run: &RunView) {
-    let positions = positions(run, stops);
+    let positions = shown(run, stops);
     let Some(last) = positions.last() else { return };
     let origin = on_map(&last.point_in_site);
     let here = state.row().and_then(|row| position(row, stops));
@@ -140,7 +145,7 @@ fn paint(plot: &mut PlotUi<'_>, state: &State, (run, positions, here): Shown<'_>
 
 /// Where a compared run placed the target.
 fn positions_of(other: &Other<'_>, state: &State) -> Vec<Position> {
-    state.traverse.as_ref().map_or_else(Vec::new, |traverse| positions(other.run, &traverse.stops))
+    state.traverse.as_ref().map_or_else(Vec::new, |traverse| shown(other.run, &traverse.stops))
 }
 
 /// The trail of a compared run with its last ellipse.

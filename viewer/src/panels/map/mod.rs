@@ -3,7 +3,7 @@
 //! Site frame: +x north, +y east, +z down. On the map east is to the right, so a site point is drawn at (y, x).
 //! Beside the whole drive stands the target's neighbourhood, where the positions converge (`convergence`).
 
-mod convergence;
+pub(in crate::panels) mod convergence;
 
 use egui::{Color32, Rect, Ui, UiBuilder, vec2};
 use egui_plot::{Arrows, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotPoints, PlotUi, Points};
@@ -58,7 +58,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 /// Width over height of what the map of the drive must hold.
 fn aspect(stops: &[StopView], run: &RunView) -> f32 {
     let path = poses(stops, |stop| Some(stop.site_from_rover));
-    let trail = convergence::positions(run, stops).into_iter().map(|at| on_map(&at.point_in_site));
+    let trail = convergence::shown(run, stops).into_iter().map(|at| on_map(&at.point_in_site));
     let all: Vec<[f64; 2]> = path.into_iter().chain(trail).collect();
     let side = |k: usize| {
         let values = || all.iter().map(|point| point[k]);
@@ -191,7 +191,7 @@ fn span_m(stops: &[StopView]) -> f64 {
 /// Where the run placed the target from each stop.
 fn paint_trail(plot: &mut PlotUi<'_>, stops: &[StopView], run: &RunView, colour: Color32) {
     let trail: Vec<[f64; 2]> =
-        convergence::positions(run, stops).iter().map(|at| on_map(&at.point_in_site)).collect();
+        convergence::shown(run, stops).iter().map(|at| on_map(&at.point_in_site)).collect();
     for piece in thin::path(&trail) {
         plot.line(Line::new("", piece).color(colour).width(1.0));
     }

@@ -1,9 +1,10 @@
 //! The ghost of what is tried, dashed over the image, and a small card that says what changed.
 
-use egui::{Align, Button, Frame, Label, Layout, Margin, RichText, Ui, UiBuilder, vec2};
+use egui::{Align, Button, Frame, Label, Layout, Margin, Pos2, Rect, RichText, Ui, UiBuilder, vec2};
 use sightline_core::session::what_if::Ghost;
 use sightline_core::session::why::words::signed;
 
+use super::place;
 use crate::command::Command;
 use crate::overlay::{Line, Mark, Overlay, template_quad};
 use crate::state::State;
@@ -40,22 +41,36 @@ pub(super) fn ghost(canvas: &Canvas, trial: &Trial) {
     }
 }
 
-/// Shows the card in the corner of the image.
-pub(super) fn show(ui: &mut Ui, canvas: &Canvas, state: &State, trial: &Trial, out: &mut Vec<Command>) {
-    let area = canvas.transform.rect.shrink(8.0);
-    let width = WIDTH.min(area.width());
-    let corner =
-        egui::Rect::from_min_size(egui::pos2(area.right() - width, area.top()), vec2(width, area.height()));
+/// Shows the card in a corner of the image.
+pub(super) fn over(ui: &mut Ui, canvas: &Canvas, at: Pos2, state: &State, out: &mut Vec<Command>) {
+    let Some(trial) = state.trial() else { return };
+    let area = canvas.transform.rect;
+    let corner = Rect::from_min_max(at, area.max).with_max_x((at.x + WIDTH).min(area.right()));
     let builder =
         UiBuilder::new().max_rect(corner).layout(Layout::top_down(Align::Min)).id_salt("what if card");
     let mut inside = ui.new_child(builder);
-    inside.set_clip_rect(canvas.transform.rect);
-    Frame::new()
-        .fill(theme::scrim())
-        .stroke(egui::Stroke::new(1.0, theme::ghost()))
-        .corner_radius(4)
-        .inner_margin(Margin::same(6))
-        .show(&mut inside, |ui| contents(ui, state, trial, out));
+    inside.set_clip_rect(area.intersect(ui.clip_rect()));
+    let shown = frame().show(&mut inside, |ui| contents(ui, state, trial, out));
+    place::remember(ui, shown.response.rect.size());
+}
+
+/// Shows the card under the image, where it scrolls when there is little room.
+pub(super) fn under(ui: &mut Ui, height: f32, state: &State, out: &mut Vec<Command>) {
+    let Some(trial) = state.trial() else { return };
+    let area = Rect::from_min_size(ui.next_widget_position(), vec2(ui.available_width(), height));
+    let builder =
+        UiBuilder::new().max_rect(area).layout(Layout::top_down(Align::Min)).id_salt("what if card");
+    let mut inside = ui.new_child(builder);
+    inside.set_clip_rect(area.intersect(ui.clip_rect()));
+    egui::ScrollArea::vertical().id_salt("what if").auto_shrink([false, true]).show(&mut inside, |ui| {
+        frame().show(ui, |ui| contents(ui, state, trial, out));
+    });
+    ui.advance_cursor_after_rect(area);
+}
+
+fn frame() -> Frame {
+    let stroke = egui::Stroke::new(1.0, theme::ghost());
+    Frame::new().fill(theme::scrim()).stroke(stroke).corner_radius(4).inner_margin(Margin::same(6))
 }
 
 fn contents(ui: &mut Ui, state: &State, trial: &Trial, out: &mut Vec<Command>) {

@@ -1,0 +1,271 @@
+//! A figure as an opaque PNG, drawn anew at the scale that is asked for: lines and letters are sharp at every scale.
+//!
+//! It is drawn by the processor, so that the limits of the graphics card's textures do not count; the limit is memory.
+
+use egui::{Color32, ColorImage, FontDefinitions, Rect};
+use tiny_skia::{
+    Color, FillRule, FilterQuality, Mask, Paint, Path, PathBuilder, Pattern, Pixmap, PremultipliedColorU8,
+    Shader, SpreadMode, Transform,
+};
+
+use super::faces::Faces;
+use super::{Figure, Form, Ink, Words};
+
+/// The most pixels of a picture: four bytes each while it is drawn.
+pub const PIXELS_MAX: f64 = 48e6;
+
+/// How far a circle's handles reach: of a quarter that is drawn as one Bézier curve.
+const QUARTER: f32 = 0.552_284_8;
+
+/// How far italics lean: the tangent.
+const LEAN: f32 = 0.2;
+
+/// Width and height at a scale, px.
+///
+/// # Errors
+/// A sentence when there would be too many pixels.
+pub fn size_px(figure: &Figure, scale: u8) -> Result<[u32; 2], String> {
+    let side = |points: f32| (f64::from(points) * f64::from(scale)).round().max(1.0);
+    let [width, height] = [side(figure.size.x), side(figure.size.y)];
+    if width * height > PIXELS_MAX {
+        let fits = (1..scale).rev().find(|&less| size_px(figure, less).is_ok());
+        let way = fits.map_or_else(
+            || "make the panel smaller, or save it as SVG".to_owned(),
+            |less| format!("save it at {less}×, or as SVG"),
+        );
+        return Err(format!(
+            "The picture would have {width:.0} × {height:.0} px, more than {:.0} million in all: {way}.",
+            PIXELS_MAX / 1e6
+        ));
+    }
+    Ok([width as u32, height as u32])
+}
+
+/// The picture at a scale, as a PNG file.
+///
+/// # Errors
+/// A sentence when it would be too large.
+pub fn png(figure: &Figure, scale: u8, fonts: &FontDefinitions) -> Result<Vec<u8>, String> {
+    let pixmap = drawn(figure, scale, fonts)?;
+    let pixels: Vec<u8> =
+        pixmap.pixels().iter().flat_map(|pixel| [pixel.red(), pixel.green(), pixel.blue()]).collect();
+    let picture = image::RgbImage::from_raw(pixmap.width(), pixmap.height(), pixels);
+    encoded(picture.map(image::DynamicImage::ImageRgb8))
+}
+
+/// Pixels with their opacity as a PNG file.
+///
+/// # Errors
+/// A sentence when they cannot be encoded.
+pub fn png_of(pixels: &ColorImage) -> Result<Vec<u8>, String> {
+    let [width, height] = pixels.size.map(|side| side as u32);
+    let is_opaque = pixels.pixels.iter().all(|colour| colour.a() == u8::MAX);
+    let colours = pixels.pixels.iter().map(Color32::to_srgba_unmultiplied);
+    let picture = if is_opaque {
+        let bytes: Vec<u8> = colours.flat_map(|[r, g, b, _]| [r, g, b]).collect();
+        image::RgbImage::from_raw(width, height, bytes).map(image::DynamicImage::ImageRgb8)
+    } else {
+        let bytes: Vec<u8> = colours.flatten().collect();
+        image::RgbaImage::from_raw(width, height, bytes).map(image::DynamicImage::ImageRgba8)
+    };
+    encoded(picture)
+}
+
+fn encoded(picture: Option<image::DynamicImage>) -> Result<Vec<u8>, String> {
+    let mut png = std::io::Cursor::new(Vec::new());
+    picture
+        .and_then(|picture| picture.write_to(&mut png, image::ImageFormat::Png).ok())
+        .ok_or_else(|| "The picture cannot be encoded as PNG.".to_owned())?;
+    Ok(png.into_inner())
+}
+
+fn drawn(figure: &Figure, scale: u8, fonts: &FontDefinitions) -> Result<Pixmap, String> {
+    let [width, height] = size_px(figure, scale)?;
+    let mut pixmap =
+        Pixmap::new(width, height).ok_or_else(|| "The panel has no size on the screen.".to_owned())?;
+    // What is behind the page is nobody's business: the picture is opaque.
+    pixmap.fill(colour(figure.ground.to_opaque()));
+    let mut sheet = Sheet { pixmap, scale: f32::from(scale), mask: None, faces: Faces::new(fonts) };
+    for piece in &figure.pieces {
+        sheet.draw(piece.clip, &piece.ink);
+    }
+    Ok(sheet.pixmap)
+}
+
+struct Sheet<'a> {
+    pixmap: Pixmap,
+    scale: f32,
+    /// The mask of the last clip that cut something.
+    mask: Option<(Rect, Mask)>,
+    faces: Faces<'a>,
+}
+
+impl Sheet<'_> {
+    fn draw(&mut self, clip: Rect, ink: &Ink) {
+        let is_cut = !clip.contains_rect(ink.bounds());
+        if is_cut && self.mask.as_ref().is_none_or(|(known, _)| *known != clip) {
+            self.mask =
+                mask(clip, self.scale, [self.pixmap.width(), self.pixmap.height()]).map(|mask| (clip, mask));
+        }
+        let mask = self.mask.as_ref().filter(|_| is_cut).map(|(_, mask)| mask);
+        let whole = Transform::from_scale(self.scale, self.scale);
+        match ink {
+            Ink::Area { form, fill, stroke } => {
+                let Some((path, turn)) = path(form) else { return };
+                let transform = whole.pre_concat(turn);
+                if fill.a() > 0 {
+                    self.pixmap.fill_path(&path, &paint(*fill), FillRule::Winding, transform, mask);
+                }
+                if !stroke.is_empty() {
+                    let line = tiny_skia::Stroke { width: stroke.width, ..tiny_skia::Stroke::default() };
+                    self.pixmap.stroke_path(&path, &paint(stroke.color), &line, transform, mask);
+                }
+            }
+            Ink::Words(words) => {
+                letters(&mut self.pixmap, &mut self.faces, words, whole, mask);
+            }
+            Ink::Picture { pixels, place } => picture(&mut self.pixmap, pixels, *place, self.scale, mask),
+        }
+    }
+}
+
+fn letters(pixmap: &mut Pixmap, faces: &mut Faces<'_>, words: &Words, whole: Transform, mask: Option<&Mask>) {
+    let ink = paint(words.colour);
+    let line = whole.pre_translate(words.at.x, words.at.y).pre_rotate(words.angle.to_degrees());
+    for (letter, place) in words.text.chars().zip(&words.places) {
+        let Some(outline) = faces.outline(&words.family, letter) else { continue };
+        let mut transform = line.pre_translate(*place, 0.0).pre_scale(words.size, words.size);
+        if words.is_italic {
+            transform = transform.pre_concat(Transform::from_skew(-LEAN, 0.0));
+        }
+        pixmap.fill_path(outline, &ink, FillRule::Winding, transform, mask);
+    }
+}
+
+/// Draws a picture into a rectangle: magnified with whole pixels, made small by averaging.
+fn picture(pixmap: &mut Pixmap, pixels: &ColorImage, place: Rect, scale: f32, mask: Option<&Mask>) {
+    let wanted = [place.width(), place.height()].map(|side| (side * scale).round().max(1.0) as usize);
+    let averaged;
+    let is_smaller = wanted[0] < pixels.size[0] && wanted[1] < pixels.size[1];
+    let pixels = if is_smaller {
+        averaged = average(pixels, wanted);
+        &averaged
+    } else {
+        pixels
+    };
+    let Some(texture) = texture(pixels) else { return };
+    let [width, height] = pixels.size.map(|side| side as f32);
+    let (sx, sy) = (place.width() * scale / width, place.height() * scale / height);
+    let (x, y) = (place.left() * scale, place.top() * scale);
+    let placed = Transform::from_row(sx, 0.0, 0.0, sy, x, y);
+    let shader = Pattern::new(texture.as_ref(), SpreadMode::Pad, FilterQuality::Nearest, 1.0, placed);
+    let paint = Paint { shader, anti_alias: false, ..Paint::default() };
+    if let Some(area) = tiny_skia::Rect::from_xywh(x, y, sx * width, sy * height) {
+        pixmap.fill_rect(area, &paint, Transform::identity(), mask);
+    }
+}
+
+/// A smaller picture, each of whose pixels is the mean of those that it covers.
+fn average(pixels: &ColorImage, [width, height]: [usize; 2]) -> ColorImage {
+    let range = |k: usize, count: usize, side: usize| {
+        let first = k * side / count;
+        first..((k + 1) * side / count).max(first + 1)
+    };
+    let mut small = Vec::with_capacity(width * height);
+    for y in 0..height {
+        for x in 0..width {
+            let (mut sum, mut count) = ([0_u32; 4], 0);
+            for row in range(y, height, pixels.size[1]) {
+                for column in range(x, width, pixels.size[0]) {
+                    let pixel = pixels.pixels[row * pixels.size[0] + column].to_array();
+                    sum.iter_mut().zip(pixel).for_each(|(sum, value)| *sum += u32::from(value));
+                    count += 1;
+                }
+            }
+            small.push(crate::theme::premultiplied(sum.map(|sum| (sum / count) as u8)));
+        }
+    }
+    ColorImage::new([width, height], small)
+}
+
+fn texture(pixels: &ColorImage) -> Option<Pixmap> {
+    let mut texture = Pixmap::new(pixels.size[0] as u32, pixels.size[1] as u32)?;
+    for (place, colour) in texture.pixels_mut().iter_mut().zip(&pixels.pixels) {
+        let [r, g, b, a] = colour.to_array();
+        // Colours that add light have no place in a picture.
+        *place = PremultipliedColorU8::from_rgba(r.min(a), g.min(a), b.min(a), a)?;
+    }
+    Some(texture)
+}
+
+fn mask(clip: Rect, scale: f32, [width, height]: [u32; 2]) -> Option<Mask> {
+    let mut mask = Mask::new(width, height)?;
+    let whole = |v: f32| (v * scale).round();
+    let area = tiny_skia::Rect::from_ltrb(
+        whole(clip.left()),
+        whole(clip.top()),
+        whole(clip.right()),
+        whole(clip.bottom()),
+    )?;
+    mask.fill_path(&PathBuilder::from_rect(area), FillRule::Winding, false, Transform::identity());
+    Some(mask)
+}
+
+/// The path of a form, and how it is turned.
+fn path(form: &Form) -> Option<(Path, Transform)> {
+    let mut path = PathBuilder::new();
+    let mut turn = Transform::identity();
+    match form {
+        Form::Rect(rect, radii) => corners(&mut path, *rect, *radii),
+        Form::Ellipse(middle, half, angle) => {
+            let box_of = Rect::from_center_size(*middle, 2.0 * *half);
+            path.push_oval(tiny_skia::Rect::from_ltrb(
+                box_of.left(),
+                box_of.top(),
+                box_of.right(),
+                box_of.bottom(),
+            )?);
+            turn = Transform::from_rotate_at(angle.to_degrees(), middle.x, middle.y);
+        }
+        Form::Lines(points, closed) => {
+            let (first, rest) = points.split_first()?;
+            path.move_to(first.x, first.y);
+            rest.iter().for_each(|point| path.line_to(point.x, point.y));
+            if *closed {
+                path.close();
+            }
+        }
+        Form::Curve([first, one, two, last], closed) => {
+            path.move_to(first.x, first.y);
+            path.cubic_to(one.x, one.y, two.x, two.y, last.x, last.y);
+            if *closed {
+                path.close();
+            }
+        }
+    }
+    Some((path.finish()?, turn))
+}
+
+/// A rectangle with round corners, clockwise.
+fn corners(path: &mut PathBuilder, Rect { min, max }: Rect, [nw, ne, se, sw]: [f32; 4]) {
+    let away = 1.0 - QUARTER;
+    path.move_to(min.x + nw, min.y);
+    path.line_to(max.x - ne, min.y);
+    path.cubic_to(max.x - ne * away, min.y, max.x, min.y + ne * away, max.x, min.y + ne);
+    path.line_to(max.x, max.y - se);
+    path.cubic_to(max.x, max.y - se * away, max.x - se * away, max.y, max.x - se, max.y);
+    path.line_to(min.x + sw, max.y);
+    path.cubic_to(min.x + sw * away, max.y, min.x, max.y - sw * away, min.x, max.y - sw);
+    path.line_to(min.x, min.y + nw);
+    path.cubic_to(min.x, min.y + nw * away, min.x + nw * away, min.y, min.x + nw, min.y);
+    path.close();
+}
+
+fn colour(colour: Color32) -> Color {
+    let [r, g, b, a] = colour.to_srgba_unmultiplied();
+    Color::from_rgba8(r, g, b, a)
+}
+
+fn paint(ink: Color32) -> Paint<'static> {
+    Paint { shader: Shader::SolidColor(colour(ink)), ..Paint::default() }
+}

@@ -1,0 +1,81 @@
+//! The outlines of letters, from the fonts with which the page paints.
+
+use std::collections::HashMap;
+
+use ab_glyph::{Font, FontRef, OutlineCurve};
+use egui::{FontDefinitions, FontFamily};
+use tiny_skia::{Path, PathBuilder};
+
+/// The fonts of every family, in the order in which a letter is looked for.
+pub(super) struct Faces<'a> {
+    families: HashMap<FontFamily, Vec<Face<'a>>>,
+    outlines: HashMap<(FontFamily, char), Option<Path>>,
+}
+
+struct Face<'a> {
+    font: FontRef<'a>,
+    scale: f32,
+    down: f32,
+}
+
+impl<'a> Faces<'a> {
+    /// The fonts of these definitions; one that cannot be read is left out.
+    pub(super) fn new(definitions: &'a FontDefinitions) -> Self {
+        let face = |name: &String| {
+            let data = definitions.font_data.get(name)?;
+            let bytes: &[u8] = data.font.as_ref().as_ref();
+            let font = FontRef::try_from_slice_and_index(bytes, data.index).ok()?;
+            Some(Face { font, scale: data.tweak.scale, down: data.tweak.y_offset_factor })
+        };
+        let families = definitions.families.iter();
+        let families = families
+            .map(|(family, names)| (family.clone(), names.iter().filter_map(face).collect()))
+            .collect();
+        Self { families, outlines: HashMap::new() }
+    }
+
+    /// The outline of a letter one point large, y down from the baseline; none for a blank.
+    pub(super) fn outline(&mut self, family: &FontFamily, letter: char) -> Option<&Path> {
+        let key = (family.clone(), letter);
+        let families = &self.families;
+        self.outlines.entry(key).or_insert_with(|| outline(families.get(family)?, letter)).as_ref()
+    }
+}
+
+fn outline(faces: &[Face<'_>], letter: char) -> Option<Path> {
+    let has = |face: &&Face<'_>| face.font.glyph_id(letter).0 != 0;
+    let face = faces.iter().find(has).or(faces.first())?;
+    let per_em = face.font.units_per_em()?;
+    let curves = face.font.outline(face.font.glyph_id(letter))?.curves;
+    let at =
+        |point: ab_glyph::Point| (point.x / per_em * face.scale, -point.y / per_em * face.scale + face.down);
+    let mut path = PathBuilder::new();
+    let mut last = None;
+    for curve in curves {
+        let (first, end) = match &curve {
+            OutlineCurve::Line(first, end) => (*first, *end),
+            OutlineCurve::Quad(first, _, end) => (*first, *end),
+            OutlineCurve::Cubic(first, _, _, end) => (*first, *end),
+        };
+        if last != Some(first) {
+            path.close();
+            let (x, y) = at(first);
+            path.move_to(x, y);
+        }
+        let (x, y) = at(end);
+        match curve {
+            OutlineCurve::Line(..) => path.line_to(x, y),
+            OutlineCurve::Quad(_, handle, _) => {
+                let (hx, hy) = at(handle);
+                path.quad_to(hx, hy, x, y);
+            }
+            OutlineCurve::Cubic(_, one, two, _) => {
+                let ((ax, ay), (bx, by)) = (at(one), at(two));
+                path.cubic_to(ax, ay, bx, by, x, y);
+            }
+        }
+        last = Some(end);
+    }
+    path.close();
+    path.finish()
+}

@@ -1,0 +1,154 @@
+//! A table of values, and the same as CSV (RFC 4180): full digits, units in the head, nothing where there is no value.
+
+use sightline_core::trace::StepRow;
+
+use crate::panels::digits;
+
+/// A value of a table.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Cell {
+    /// A number.
+    Number(f64),
+    /// A word.
+    Word(String),
+    /// No value.
+    Nothing,
+}
+
+impl Cell {
+    /// As it is read.
+    pub fn shown(&self) -> String {
+        match self {
+            Self::Number(value) => digits(*value),
+            Self::Word(word) => word.clone(),
+            Self::Nothing => "–".to_owned(),
+        }
+    }
+
+    fn csv(&self) -> String {
+        match self {
+            Self::Number(value) => value.to_string(),
+            Self::Word(word) => quoted(word),
+            Self::Nothing => String::new(),
+        }
+    }
+}
+
+impl From<Option<f64>> for Cell {
+    fn from(value: Option<f64>) -> Self {
+        value.filter(|value| value.is_finite()).map_or(Self::Nothing, Self::Number)
+    }
+}
+
+/// A column: its name, and its unit where it has one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Column {
+    /// What it is called.
+    pub name: String,
+    /// The unit; empty for a pure number.
+    pub unit: &'static str,
+}
+
+impl Column {
+    /// A column.
+    pub fn new(name: impl Into<String>, unit: &'static str) -> Self {
+        Self { name: name.into(), unit }
+    }
+
+    /// Its name with its unit.
+    pub fn head(&self) -> String {
+        if self.unit.is_empty() { self.name.clone() } else { format!("{}, {}", self.name, self.unit) }
+    }
+}
+
+/// A row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// The step to which it leads.
+    pub step: Option<usize>,
+    /// Whether it is of what is looked at.
+    pub is_present: bool,
+    /// Its values, one a column.
+    pub cells: Vec<Cell>,
+}
+
+/// A table.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sheet {
+    /// What it is of.
+    pub title: String,
+    /// Its columns.
+    pub columns: Vec<Column>,
+    /// Its rows.
+    pub rows: Vec<Row>,
+    /// Rows that only the copy has: too many to be read. Columns of their own.
+    pub more: Option<Box<Sheet>>,
+}
+
+impl Sheet {
+    /// A table whose first column is the step.
+    pub fn over_steps(title: impl Into<String>, columns: Vec<Column>) -> Self {
+        let columns = std::iter::once(Column::new("step", "")).chain(columns).collect();
+        Self { title: title.into(), columns, rows: Vec::new(), more: None }
+    }
+
+    /// A table of other things.
+    pub fn of(title: impl Into<String>, columns: Vec<Column>) -> Self {
+        Self { title: title.into(), columns, rows: Vec::new(), more: None }
+    }
+
+    /// Adds the row of a step.
+    pub fn step(&mut self, step: usize, present: usize, cells: impl IntoIterator<Item = Cell>) {
+        let cells = std::iter::once(Cell::Number(step as f64)).chain(cells).collect();
+        self.rows.push(Row { step: Some(step), is_present: step == present, cells });
+    }
+
+    /// Adds a row that leads nowhere.
+    pub fn row(&mut self, is_present: bool, cells: Vec<Cell>) {
+        self.rows.push(Row { step: None, is_present, cells });
+    }
+
+    /// The table as CSV; rows that only the copy has replace those that are read.
+    pub fn csv(&self) -> String {
+        if let Some(more) = &self.more {
+            return more.csv();
+        }
+        let mut text = String::new();
+        let head: Vec<String> = self.columns.iter().map(|column| quoted(&column.head())).collect();
+        text += &(head.join(",") + "\r\n");
+        for row in &self.rows {
+            let cells: Vec<String> = row.cells.iter().map(Cell::csv).collect();
+            text += &(cells.join(",") + "\r\n");
+        }
+        text
+    }
+}
+
+/// The state of a step, and why, as it is read.
+pub fn state_of(row: &StepRow) -> Cell {
+    let word = if row.fault { "fault" } else { &row.state };
+    Cell::Word(word.to_owned())
+}
+
+/// A field of CSV. What a spreadsheet would take for a formula begins with an apostrophe.
+fn quoted(text: &str) -> String {
+    let is_formula =
+        text.starts_with(['=', '+', '@']) || text.starts_with('-') && text.parse::<f64>().is_err();
+    let text = if is_formula { format!("'{text}") } else { text.to_owned() };
+    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn csv_has_units_all_digits_and_no_value_where_there_is_none() {
+        let mut sheet = Sheet::over_steps("errors", vec![Column::new("err", "px"), Column::new("note", "")]);
+        sheet.step(3, 3, [Cell::Number(0.123_456_789), Cell::Word("a, \"b\"".to_owned())]);
+        sheet.step(4, 3, [Cell::from(Some(f64::NAN)), Cell::Word("=1+1".to_owned())]);
+        let expected = "step,\"err, px\",note\r\n3,0.123456789,\"a, \"\"b\"\"\"\r\n4,,'=1+1\r\n";
+        assert_eq!(sheet.csv(), expected);
+        assert_eq!(sheet.rows.iter().map(|row| row.is_present).collect::<Vec<_>>(), [true, false]);
+    }
+}
