@@ -23,6 +23,7 @@
 
 pub mod frames;
 pub mod error;
+pub mod toml_text;
 pub mod limits;
 pub mod settings;
 pub mod presets;

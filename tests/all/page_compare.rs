@@ -48,7 +48,7 @@ async fn branched() -> (Bench, Browser) {
     browser.wait_status("the branch", "s.run === 1 && !s.running && s.steps_done > s.step").await;
     browser.wait_status("the loss", &format!("s.step === {FORK} && s.state !== 'tracking' && s.shown")).await;
     browser.click_on("combobox", "compared with").await;
-    browser.click_on("button", "run A").await;
+    browser.choose("run A").await;
     (bench, browser)
 }
 

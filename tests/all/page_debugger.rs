@@ -5,7 +5,6 @@ use std::time::Duration;
 
 use sightline_tests::bench::Bench;
 use sightline_tests::browser::Browser;
-use sightline_tests::controls::Control;
 use sightline_tests::scenario::short_approach;
 
 /// A page with a run over a short approach.
@@ -19,20 +18,6 @@ async fn page() -> (Bench, Browser) {
 async fn end(browser: Browser) {
     assert_eq!(browser.console_errors().await, Vec::<String>::new());
     browser.close().await;
-}
-
-/// Chooses what an open list calls so; the list of targets calls its runs the same.
-async fn choose(browser: &Browser, name: &str) {
-    for _ in 0..100 {
-        let all = browser.controls().await;
-        let listed = |c: &&Control| c.role == "button" && c.name == name && c.region != "Targets and runs";
-        if let Some(control) = all.iter().rfind(listed) {
-            let (x, y) = control.middle();
-            return browser.click(x, y).await;
-        }
-        tokio::time::sleep(Duration::from_millis(100)).await;
-    }
-    panic!("nothing in the list is called {name}");
 }
 
 /// Goes to a step and waits until it is shown.
@@ -109,7 +94,7 @@ async fn a_change_is_tried_branched_compared_and_taken_back() {
         .wait_status("the branch", &format!("s.run === 1 && s.steps_done === {} && !s.running", last + 1))
         .await;
     browser.click_on("combobox", "compared with").await;
-    choose(&browser, "run A").await;
+    browser.choose("run A").await;
     browser.wait_for("the comparison in the address", "return location.hash.includes('vs=0.0')").await;
     browser.press("d").await;
     browser.says("do not differ").await;

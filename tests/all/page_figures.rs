@@ -3,6 +3,8 @@
 
 use std::time::Duration;
 
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
 use sightline_tests::bench::Bench;
 use sightline_tests::browser::Browser;
@@ -37,20 +39,7 @@ async fn save(browser: &Browser, panel: &str, kind: &str) -> (String, Vec<u8>) {
     let script = format!("return window.saved[{before}] ?? null");
     let file = value(browser, "a file", &script).await;
     let (name, url) = (file[0].as_str().unwrap().to_owned(), file[1].as_str().unwrap());
-    (name, decoded(url.split_once("base64,").unwrap().1))
-}
-
-/// Base64.
-fn decoded(text: &str) -> Vec<u8> {
-    const LETTERS: &[u8] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let value = |letter: u8| LETTERS.iter().position(|l| *l == letter);
-    let digits: Vec<usize> = text.bytes().filter_map(value).collect();
-    let group = |group: &[usize]| {
-        let bits = group.iter().fold(0, |bits, digit| bits << 6 | digit) << (6 * (4 - group.len()));
-        let bytes = [bits >> 16, bits >> 8, bits].map(|byte| (byte & 0xff) as u8);
-        bytes[..group.len() - 1].to_vec()
-    };
-    digits.chunks(4).flat_map(group).collect()
+    (name, STANDARD.decode(url.split_once("base64,").unwrap().1).unwrap())
 }
 
 /// The mean difference of two pictures, of 255, and the share of pixels that differ by more than 48.

@@ -53,7 +53,7 @@ async fn files_are_opened_by_dropping_bad_ones_are_told_why_and_a_recent_session
     browser.says("“huge.toml” has 67 MB, more than the 0.5 MB").await;
     drop_one(&browser, "hill.toml", b"seed = 4\n[sun]\nheight_deg = 3.0\n").await;
     browser
-        .says("“hill.toml” is no scenario that can be simulated: line 3: unknown field `height_deg`")
+        .says("“hill.toml” is no scenario that can be simulated: line 3: sun.height_deg: unknown field `height_deg`")
         .await;
     browser.shot("problem-card").await;
     let status = browser.status().await;

@@ -115,6 +115,25 @@ impl Browser {
         self.click(x, y).await;
     }
 
+    /// Chooses what an open list calls so; the list of targets calls its runs the same.
+    ///
+    /// # Panics
+    /// When nothing in the list is called so.
+    pub async fn choose(&self, name: &str) {
+        let start = Instant::now();
+        while start.elapsed() < PATIENCE {
+            let all = self.controls().await;
+            let listed =
+                |c: &&Control| c.role == "button" && c.name == name && c.region != "Targets and runs";
+            if let Some(control) = all.iter().rfind(listed) {
+                let (x, y) = control.middle();
+                return self.click(x, y).await;
+            }
+            tokio::time::sleep(Duration::from_millis(100)).await;
+        }
+        panic!("nothing in the list is called {name}");
+    }
+
     /// Activates a control as a screen reader does, without the pointer.
     pub async fn activate(&self, role: &str, name: &str) {
         let control = self.control(role, name).await;

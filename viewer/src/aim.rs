@@ -20,6 +20,8 @@ pub enum Aim {
     Accept,
     /// Designates the nearest good pixel that a refusal offers.
     TakeNearest,
+    /// Designates the place that was refused as a bad one all the same.
+    Insist,
     /// Puts the aim on a pixel.
     Put(Pixel),
 }

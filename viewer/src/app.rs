@@ -179,14 +179,16 @@ impl SightlineApp {
     /// Takes the keys in. Steps are taken at once, so that the frame of the key shows where they lead; the rest, which
     /// follows what the page shows, is returned.
     fn take_keys(&mut self, context: &Context) -> Vec<Command> {
-        let mut at_once = keys::commands(context, &self.state);
-        let first_other = at_once.iter().position(|command| !command.is_step()).unwrap_or(at_once.len());
-        let later = at_once.split_off(first_other);
-        if !at_once.is_empty() {
-            self.carry_out(at_once);
-            self.ask_for_missing(context.input(|input| input.time));
+        let mut all = keys::commands(context, &self.state);
+        let steps = all.iter().take_while(|command| command.is_step()).count();
+        if steps == 0 {
+            return all;
         }
-        later
+        all.truncate(steps);
+        self.carry_out(all);
+        self.ask_for_missing(context.input(|input| input.time));
+        // What follows is meant for the step to which they led.
+        keys::commands(context, &self.state).split_off(steps)
     }
 
     /// Carries out what was asked for of the page, and then of the state.

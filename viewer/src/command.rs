@@ -133,6 +133,8 @@ pub enum Command {
     },
     /// Looks at a stage.
     SelectStage(Stage),
+    /// Looks at the stage so many places on.
+    StageBy(isize),
     /// Changes what pointer and keys mean.
     SetMode(Mode),
     /// Designates the target under a pixel of the left image.
@@ -237,6 +239,7 @@ impl Command {
             self,
             Command::Go(_)
                 | Command::SelectStage(_)
+                | Command::StageBy(_)
                 | Command::Ask(state::ask::Ask::NextHit | state::ask::Ask::PreviousHit)
         )
     }

@@ -3,7 +3,7 @@
 use egui::{Context, Event, Key, Modifiers};
 
 use crate::aim::Aim;
-use crate::command::{Command, Go, Mode, Stage};
+use crate::command::{Command, Go, Mode};
 use crate::layout::presets::Preset;
 use crate::layout::workspace::LayoutCommand;
 use crate::state::ask;
@@ -176,8 +176,8 @@ pub fn command(key: Key, modifiers: Modifiers, state: &State) -> Option<Command>
         Key::End => Command::Go(Go::Last),
         Key::PageDown => Command::Go(Go::NextEvent),
         Key::PageUp => Command::Go(Go::PreviousEvent),
-        Key::ArrowUp => Command::SelectStage(neighbour(state, -1)),
-        Key::ArrowDown => Command::SelectStage(neighbour(state, 1)),
+        Key::ArrowUp => Command::StageBy(-1),
+        Key::ArrowDown => Command::StageBy(1),
         Key::G => Command::SetMode(Mode::GoTo(String::new())),
         Key::T if state.mode == Mode::Pick => Command::SetMode(Mode::Look),
         Key::T => Command::SetMode(Mode::Pick),
@@ -222,15 +222,10 @@ fn of_time_and_breakpoints(key: Key, shift: bool, state: &State) -> Option<ask::
     })
 }
 
-fn neighbour(state: &State, by: isize) -> Stage {
-    let (stages, stage) = (Stage::of(state.tracker()), state.stage());
-    let at = stages.iter().position(|&s| s == stage).unwrap_or(0);
-    stages[at.saturating_add_signed(by).min(stages.len() - 1)]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::command::Stage;
 
     fn state() -> State {
         State::new("http://localhost".to_owned(), None)
@@ -288,6 +283,26 @@ mod tests {
     }
 
     #[test]
+    fn every_press_of_one_frame_counts() {
+        let context = Context::default();
+        let down = Event::Key {
+            key: Key::ArrowDown,
+            physical_key: None,
+            pressed: true,
+            repeat: false,
+            modifiers: Modifiers::NONE,
+        };
+        let input = egui::RawInput { events: vec![down; 3], ..Default::default() };
+        let mut state = state();
+        state.stage = Stage::Predict;
+        let mut output = context.run_ui(input, |ui| {
+            commands(ui.ctx(), &state).into_iter().for_each(|command| state.apply(command));
+        });
+        output.textures_delta.clear();
+        assert_eq!(state.stage(), Stage::Locate, "three stages below the first");
+    }
+
+    #[test]
     fn keys_of_the_browser_are_left_alone() {
         assert_eq!(command(Key::R, Modifiers::CTRL, &state()), None);
         assert_eq!(command(Key::ArrowLeft, Modifiers::ALT, &state()), None);
@@ -299,19 +314,5 @@ mod tests {
         state.mode = Mode::Help;
         assert_eq!(press(Key::T, &state), None);
         assert_eq!(press(Key::Escape, &state), Some(Command::SetMode(Mode::Look)));
-    }
-
-    #[test]
-    fn stages_end_at_the_first_and_the_last() {
-        let from = |stage: Stage, by: isize| {
-            let mut state = state();
-            state.stage = stage;
-            neighbour(&state, by)
-        };
-        assert_eq!(from(Stage::Predict, -1), Stage::Predict);
-        assert_eq!(from(Stage::Predict, 1), Stage::PointMast);
-        assert_eq!(from(Stage::Update, 1), Stage::Update);
-        // A stage of the other tracker counts as the one in its place.
-        assert_eq!(from(Stage::FitMotion, 1), Stage::Judge);
     }
 }

@@ -12,7 +12,7 @@ use sightline_core::session::expression::Expression;
 use sightline_core::session::reproduce::Opened;
 use sightline_core::settings::{Changes, Settings};
 use sightline_core::sim::Scenario;
-use sightline_core::sim::scenario::in_one_sentence;
+use sightline_core::toml_text;
 
 /// The largest JSON file that is read, bytes: a `reproduce.json` holds every run with its whole configuration.
 pub const JSON_LIMIT: u64 = 8 << 20;
@@ -191,10 +191,8 @@ fn of_json(text: &str) -> Result<Document, String> {
 }
 
 fn of_toml(text: &str) -> Result<Document, String> {
-    let table = toml::from_str::<toml::Table>(text).map_err(|wrong| {
-        let said = in_one_sentence(text, &wrong);
-        format!("is no TOML: {said}; mend that line.")
-    })?;
+    let table: toml::Table =
+        toml_text::read(text).map_err(|said| format!("is no TOML: {said}; mend that line."))?;
     if table.contains_key("stops") || table.contains_key("format") {
         return Err(index());
     }

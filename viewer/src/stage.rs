@@ -127,6 +127,13 @@ impl Stage {
         }
     }
 
+    /// The stage so many places on in the tracker's order; the first and the last are where it ends.
+    pub fn neighbour(self, tracker: TrackerKind, by: isize) -> Self {
+        let stages = Self::of(tracker);
+        let at = stages.iter().position(|&stage| stage == self.of_tracker(tracker)).unwrap_or(0);
+        stages[at.saturating_add_signed(by).min(stages.len() - 1)]
+    }
+
     /// The stage itself, or the one that stands in its place where `tracker` does not have it.
     pub fn of_tracker(self, tracker: TrackerKind) -> Self {
         if Self::of(tracker).contains(&self) {
@@ -207,5 +214,21 @@ impl Stage {
             self,
             Self::Predict | Self::PointMast | Self::Capture | Self::Locate | Self::Judge | Self::Update
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stages_end_at_the_first_and_the_last() {
+        let from = |stage: Stage, by: isize| stage.neighbour(TrackerKind::Template, by);
+        assert_eq!(from(Stage::Predict, -1), Stage::Predict);
+        assert_eq!(from(Stage::Predict, 1), Stage::PointMast);
+        assert_eq!(from(Stage::Update, 1), Stage::Update);
+        assert_eq!(from(Stage::Predict, 99), Stage::Update);
+        // A stage of the other tracker counts as the one in its place.
+        assert_eq!(from(Stage::FitMotion, 1), Stage::Judge);
     }
 }

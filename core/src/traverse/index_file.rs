@@ -12,6 +12,7 @@ use super::files::write_atomically;
 use super::{CameraSource, TraverseIndex};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
+use crate::toml_text;
 
 /// The largest index that is read, bytes.
 const SIZE_LIMIT: u64 = 64 << 20;
@@ -94,15 +95,11 @@ pub(super) fn read(path: &Path, format: IndexFormat) -> Result<TraverseIndex> {
 
 fn parse(text: &str, format: IndexFormat) -> Result<TraverseIndex, String> {
     match format {
-        IndexFormat::Toml => {
-            let toml = toml::Deserializer::parse(text).map_err(|error| at_line(text, &error, ""))?;
-            serde_path_to_error::deserialize(toml)
-                .map_err(|error| at_line(text, error.inner(), &error.path().to_string()))
-        }
+        IndexFormat::Toml => toml_text::read(text),
         IndexFormat::Json => {
             let mut json = serde_json::Deserializer::from_str(text);
             let index: TraverseIndex = serde_path_to_error::deserialize(&mut json).map_err(|error| {
-                let (line, field) = (error.inner().line(), field(&error.path().to_string()));
+                let (line, field) = (error.inner().line(), toml_text::field(&error.path().to_string()));
                 let message = error.inner().to_string();
                 // serde_json puts the place behind the message; here it comes first, as for TOML.
                 let message = message.split(" at line ").next().unwrap_or_default();
@@ -112,18 +109,6 @@ fn parse(text: &str, format: IndexFormat) -> Result<TraverseIndex, String> {
             Ok(index)
         }
     }
-}
-
-fn at_line(text: &str, error: &toml::de::Error, path: &str) -> String {
-    let place = error.span().and_then(|span| text.get(..span.start));
-    let line = place.map(|before| format!("line {}: ", before.matches('\n').count() + 1));
-    let message = error.message().replace('\n', ", ");
-    format!("{}{}{message}", line.unwrap_or_default(), field(path))
-}
-
-/// The field's path with a colon, where there is one.
-fn field(path: &str) -> String {
-    if matches!(path, "" | "." | "?") { String::new() } else { format!("{path}: ") }
 }
 
 /// Writes an index into `folder`, which is made where it is missing.

@@ -49,9 +49,7 @@ fn picture(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) 
     let [width, height] = raster.size();
     let region = PixelRect::whole(width, height);
     let view = state.held_view(state.view(Panel::Left), state.trace());
-    let card = what_if::card_place(ui, state, view, region, STATUS);
-    let below = if let Some(what_if::Place::Under(height)) = card { height + STATUS + 4.0 } else { STATUS };
-    let canvas = Canvas::new(ui, view, region, below);
+    let canvas = Canvas::new(ui, view, region, STATUS);
     canvas.texture(&raster.texture, region);
     modes::under(&canvas, state);
     canvas.pixel_grid(region);
@@ -67,8 +65,7 @@ fn picture(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) 
     paint_designation(&canvas, state);
     picking::show(ui, &canvas, raster, state, out);
     marks::hover(&canvas, state, |feature| Some(feature.pixel));
-    what_if::over_image(ui, &canvas, card, state, out);
-    what_if::under_image(ui, card, state, out);
+    what_if::over_image(ui, &canvas, state, out);
     status_line(ui, &canvas, raster, region);
     if let Some(view) = canvas.moved {
         out.push(Command::View(Panel::Left, view));

@@ -236,22 +236,30 @@ fn verdict_line(canvas: &Canvas, state: &State, pixel: Pixel) {
     paint_words(&canvas.painter, pos2(x, y), &text, colour);
 }
 
-/// The nearest good pixel, where a pick was refused.
+/// The ways on, where a pick was refused: the nearest good pixel, and to insist on what only the map speaks against.
 fn offer(ui: &mut Ui, canvas: &Canvas, state: &State, out: &mut Vec<Command>) {
     let here = |refusal: &&crate::state::Refusal| refusal.place.step == state.cursor.step;
-    let Some(pixel) = state.refusal.as_ref().filter(here).and_then(|refusal| refusal.nearest) else { return };
-    let overlay = Overlay::new(&canvas.painter, &canvas.transform);
-    overlay.mark(pixel, Mark::Diamond, theme::trackability(Verdict::Good));
-    let text = format!("Take the nearest good pixel ({:.0}, {:.0})", pixel.x, pixel.y);
+    let Some(refusal) = state.refusal.as_ref().filter(here) else { return };
+    let mut choices = Vec::new();
+    if let Some(pixel) = refusal.nearest {
+        let overlay = Overlay::new(&canvas.painter, &canvas.transform);
+        overlay.mark(pixel, Mark::Diamond, theme::trackability(Verdict::Good));
+        let words = format!("Take the nearest good pixel ({:.0}, {:.0})", pixel.x, pixel.y);
+        choices.push((words, "Enter does the same", Aim::TakeNearest));
+    }
+    if refusal.is_advice {
+        let help = "A bad place often loses its target; some are kept all the same";
+        choices.push(("Pick it all the same".to_owned(), help, Aim::Insist));
+    }
     let area = canvas.transform.rect;
-    let place = Rect::from_min_size(
-        area.left_bottom() + vec2(10.0, -56.0),
-        vec2(250.0_f32.min(area.width() - 20.0), 26.0),
-    );
-    let mut child = ui.new_child(UiBuilder::new().max_rect(place).id_salt("nearest good"));
-    let button = child.add_sized(place.size(), Button::new(text));
-    if button.on_hover_text("Enter does the same").clicked() {
-        out.push(Command::Aim(Aim::TakeNearest));
+    let size = vec2(250.0_f32.min(area.width() - 20.0), 26.0);
+    for (row, (words, help, aim)) in choices.into_iter().rev().enumerate() {
+        let corner = area.left_bottom() + vec2(10.0, -56.0 - 30.0 * row as f32);
+        let place = Rect::from_min_size(corner, size);
+        let mut child = ui.new_child(UiBuilder::new().max_rect(place).id_salt(("refused", row)));
+        if child.add_sized(size, Button::new(words)).on_hover_text(help).clicked() {
+            out.push(Command::Aim(aim));
+        }
     }
 }
 

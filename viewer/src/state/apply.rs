@@ -27,6 +27,7 @@ impl State {
             Command::OpenTraverse(id) => self.open_traverse(id),
             Command::Look { target, run } => self.look(target, run),
             Command::SelectStage(stage) => self.stage = stage,
+            Command::StageBy(by) => self.stage = self.stage().neighbour(self.tracker(), by),
             Command::SetMode(mode) => self.set_mode(mode),
             Command::Pick(pixel) => self.pick(pixel),
             Command::RemoveTarget(target) => {
@@ -152,12 +153,20 @@ impl State {
     }
 
     fn pick(&mut self, pixel: Pixel) {
+        let place = Place { step: self.cursor.step, pixel };
+        self.refusal = self.advised_against(place);
+        if self.refusal.is_none() {
+            self.designate(place);
+        }
+    }
+
+    /// Has the server designate a place.
+    pub(super) fn designate(&mut self, place: Place) {
         if self.designating.is_some() {
             self.messages.note("The last designation is still being computed.");
             return;
         }
-        let place = Place { step: self.cursor.step, pixel };
-        let target = NewTarget::at_pixel(place.step, pixel);
+        let target = NewTarget::at_pixel(place.step, place.pixel);
         if self.ask(|session| Request::NewTarget { session, target }) {
             (self.designating, self.refusal) = (Some(place), None);
         }

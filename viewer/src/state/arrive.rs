@@ -201,7 +201,8 @@ impl State {
             Request::NewTarget { .. } => {
                 if let Some(place) = self.designating.take() {
                     let nearest = problem.nearest_pixel.as_deref().copied();
-                    self.refusal = Some(Refusal { place, sentence: problem.detail.clone(), nearest });
+                    self.refusal =
+                        Some(Refusal { place, sentence: problem.detail.clone(), nearest, is_advice: false });
                 }
             }
             Request::Studies => self.studies.infos = Some(Vec::new()),

@@ -37,13 +37,15 @@ pub struct Place {
     pub pixel: Pixel,
 }
 
-/// Why a target could not be designated.
+/// Why a target was not designated.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Refusal {
     /// Where.
     pub place: Place,
-    /// What the server said.
+    /// What the server said, or what the map of trackability says of the place.
     pub sentence: String,
     /// The nearest pixel that would do.
     pub nearest: Option<Pixel>,
+    /// Whether the place was not tried: a person may insist on it.
+    pub is_advice: bool,
 }

@@ -6,10 +6,10 @@ use sightline_core::frames::Pixel;
 use sightline_core::session::wire::Problem;
 use sightline_core::settings::Changes;
 use sightline_core::trackability::map::Cell;
-use sightline_core::trackability::{MapProgress, TrackabilityMap};
+use sightline_core::trackability::{MapProgress, TrackabilityMap, Verdict};
 
-use super::State;
 use super::limits::Form;
+use super::{Place, Refusal, State};
 use crate::aim::Aim;
 use crate::command::Mode;
 use crate::net::Request;
@@ -57,22 +57,31 @@ impl State {
                 let hold = |v: f64, size: u32| ((v * 10.0).round() / 10.0).clamp(0.0, f64::from(size) - 1.0);
                 self.trackability.aim = Some(Pixel::new(hold(from.x + dx, width), hold(from.y + dy, height)));
             }
-            Aim::Accept => {
-                if let Some(pixel) = self.trackability.aim.or(nearest) {
-                    self.choose(pixel);
+            Aim::Accept => match self.trackability.aim.take() {
+                Some(pixel) => self.apply(crate::command::Command::Pick(pixel)),
+                None => self.aim(Aim::TakeNearest),
+            },
+            Aim::Insist => {
+                if let Some(refusal) = self.refusal.clone().filter(|refusal| refusal.is_advice) {
+                    self.trackability.aim = None;
+                    self.designate(refusal.place);
                 }
             }
             Aim::TakeNearest => {
                 if let Some(pixel) = nearest {
-                    self.choose(pixel);
+                    self.trackability.aim = None;
+                    self.designate(Place { step: self.cursor.step, pixel });
                 }
             }
         }
     }
 
-    fn choose(&mut self, pixel: Pixel) {
-        self.trackability.aim = None;
-        self.apply(crate::command::Command::Pick(pixel));
+    /// What speaks against a place that the map calls bad. Where there is no map yet, nothing does.
+    pub(super) fn advised_against(&self, place: Place) -> Option<Refusal> {
+        let cell = self.trackability_at(place.pixel).filter(|cell| cell.verdict == Verdict::Bad)?;
+        let sentence = cell.sentence().unwrap_or_else(|| "a bad place".to_owned());
+        let nearest = self.trackability_map().and_then(|map| map.nearest_good(place.pixel));
+        Some(Refusal { place, sentence, nearest, is_advice: true })
     }
 
     /// Where the keys begin: at the refused pixel, else in the middle of what is shown.

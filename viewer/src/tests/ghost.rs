@@ -131,14 +131,18 @@ fn scores_that_are_missing_say_why() {
     none.says("What if has no scores: the step did not come to compare a window of positions.");
 }
 
-/// Where the card is, and where the target and the search window are.
-fn card(size: [f32; 2], view: View2d) -> (egui::Rect, egui::Rect, egui::Rect) {
+/// Where the left image is, and on it the target and the search window; and the panel.
+fn left_image(
+    size: [f32; 2],
+    view: View2d,
+    make: fn(&egui::Context) -> State,
+) -> (Shown<'static>, egui::Rect, egui::Rect, egui::Pos2) {
     let canvas = std::rc::Rc::new(std::cell::RefCell::new(None));
     let kept = std::rc::Rc::clone(&canvas);
     let mut shown = Shown::new(
         size,
         move |context| {
-            let mut state = trying(context);
+            let mut state = make(context);
             state.apply(Command::View(Panel::Left, view));
             state
         },
@@ -150,13 +154,12 @@ fn card(size: [f32; 2], view: View2d) -> (egui::Rect, egui::Rect, egui::Rect) {
     let (transform, _) = (*canvas.borrow()).unwrap();
     let matched = fixture::trace(STEP).template().unwrap().match_template.clone().unwrap();
     let window = transform.area(matched.search_window).intersect(transform.rect);
-    let button = shown.harness.get_by_label("Run from here as branch").rect();
-    (button, window, transform.rect)
+    (shown, transform.rect, window, transform.to_screen(fixture::PIXEL))
 }
 
 #[test]
-fn the_card_covers_neither_the_target_nor_the_search_window() {
-    for (size, scale, is_under) in [
+fn the_card_covers_no_target_and_the_image_keeps_its_size() {
+    for (size, scale, is_strip) in [
         ([900.0, 700.0], 0.5, false),
         ([900.0, 700.0], 8.0, true),
         // So small an image has no corner that is large enough.
@@ -164,12 +167,20 @@ fn the_card_covers_neither_the_target_nor_the_search_window() {
         ([420.0, 380.0], 3.0, true),
     ] {
         let view = View2d::At { centre: fixture::PIXEL, scale };
-        let (button, window, image) = card(size, view);
-        assert!(!button.intersects(window), "{size:?} at {scale}: {button:?} covers {window:?}");
-        assert_eq!(
-            button.top() >= image.bottom(),
-            is_under,
-            "{size:?} at {scale}: {button:?}, image {image:?}"
-        );
+        let (_, without, ..) = left_image(size, view, |context| fixture::at_step(context, STEP));
+        let (shown, image, window, target) = left_image(size, view, trying);
+        assert_eq!(image, without, "{size:?} at {scale}: the image moves when something is tried");
+        let buttons = ["Run from here as branch", "discard what if"];
+        for button in buttons.map(|name| shown.harness.get_by_label(name).rect()) {
+            assert!(image.contains_rect(button), "{size:?} at {scale}: {button:?} is cut off by {image:?}");
+            assert!(
+                !button.expand(10.0).contains(target),
+                "{size:?} at {scale}: {button:?} covers the target"
+            );
+            assert!(
+                is_strip || !button.intersects(window),
+                "{size:?} at {scale}: {button:?} covers {window:?}"
+            );
+        }
     }
 }

@@ -77,7 +77,11 @@ fn whatever_else_is_dropped_gets_one_sentence_that_names_the_file_and_the_fix() 
         ("folder", Vec::new(), "sightline serve FOLDER"),
         ("core", vec![0x7f, b'E', b'L', b'F', 0, 0xff, 0xfe], "no text"),
         ("nul.toml", b"seed = 4\0".to_vec(), "no text"),
-        ("drive.toml", b"[sun]\nheight_deg = 3.0\n".to_vec(), "line 2: unknown field `height_deg`"),
+        (
+            "drive.toml",
+            b"[sun]\nheight_deg = 3.0\n".to_vec(),
+            "line 2: sun.height_deg: unknown field `height_deg`",
+        ),
         ("drive.toml", b"[sun]\nelevation_deg = -3.0\n".to_vec(), "sun.elevation_deg"),
         ("drive.toml", b"seed = = 4\n".to_vec(), "no TOML: line 1"),
         ("other.toml", b"colour = 3\n".to_vec(), "`colour`"),

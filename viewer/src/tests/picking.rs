@@ -75,7 +75,12 @@ fn picking(context: &egui::Context) -> State {
 fn refused(context: &egui::Context) -> State {
     let mut state = picking(context);
     let place = Place { step: 0, pixel: PLACE };
-    state.refusal = Some(Refusal { place, sentence: "no 3-D position here".to_owned(), nearest: Some(GOOD) });
+    state.refusal = Some(Refusal {
+        place,
+        sentence: "no 3-D position here".to_owned(),
+        nearest: Some(GOOD),
+        is_advice: false,
+    });
     state
 }
 
@@ -204,7 +209,13 @@ fn arrows_nudge_the_aim_by_a_tenth_of_a_pixel_and_enter_takes_it() {
     assert_eq!(press(Key::ArrowDown, Modifiers::SHIFT), Some(Pixel::new(20.1, 31.0)));
     assert_eq!(press(Key::ArrowLeft, Modifiers::NONE), Some(Pixel::new(20.0, 31.0)));
     assert_eq!(press(Key::Enter, Modifiers::NONE), None);
-    assert_eq!(state.designating.unwrap().pixel, Pixel::new(20.0, 31.0), "the aim comes before the offer");
+    let refusal = state.refusal.clone().unwrap();
+    assert_eq!(refusal.place.pixel, Pixel::new(20.0, 31.0), "the aim comes before the offer");
+    assert!(refusal.is_advice, "the left half of the map is bad");
+    state.apply(Command::Aim(Aim::Put(Pixel::new(50.0, 31.0))));
+    let command = keys::command(Key::Enter, Modifiers::NONE, &state).unwrap();
+    state.apply(command);
+    assert_eq!(state.designating.unwrap().pixel, Pixel::new(50.0, 31.0));
     // Outside of picking the arrows step along the drive.
     let look = fixture::without_target();
     assert!(matches!(keys::command(Key::ArrowRight, Modifiers::NONE, &look), Some(Command::Go(_))));
@@ -285,4 +296,34 @@ fn the_map_says_by_which_limits_it_was_made() {
     window.says("default 80.0").says("deg");
     assert_eq!(window.click("Make the map with these"), vec![Command::Limits(limits::Ask::Use)]);
     assert_eq!(window.click("Put the defaults"), vec![Command::Limits(limits::Ask::Defaults)]);
+}
+
+#[test]
+fn a_place_that_the_map_calls_bad_is_refused_before_it_is_asked_for_unless_one_insists() {
+    let mut state = picking(&egui::Context::default());
+    let map = state.trackability_map().unwrap();
+    let bad = map.cells().find(|cell| cell.verdict == Verdict::Bad).unwrap();
+    let nearest = map.nearest_good(bad.pixel);
+    assert!(nearest.is_some());
+    let is_asked = |state: &mut State| {
+        let asked = requests(state);
+        asked.iter().any(|request| matches!(request, Request::NewTarget { .. }))
+    };
+    state.apply(Command::Pick(bad.pixel));
+    assert!(!is_asked(&mut state), "nothing is designated");
+    let refusal = state.refusal.clone().unwrap();
+    assert_eq!((refusal.place.pixel, refusal.nearest, refusal.is_advice), (bad.pixel, nearest, true));
+    assert_eq!(Some(refusal.sentence), bad.sentence());
+    assert_eq!(state.mode, Mode::Pick, "the person chooses on");
+    state.apply(Command::Aim(Aim::Insist));
+    assert!(is_asked(&mut state) && state.refusal.is_none());
+
+    let mut state = picking(&egui::Context::default());
+    state.apply(Command::Pick(bad.pixel));
+    state.apply(Command::Aim(Aim::TakeNearest));
+    assert!(is_asked(&mut state), "the nearest good one is no place to be refused");
+    // What the server refused was tried: there is nothing to insist on.
+    let mut state = refused(&egui::Context::default());
+    state.apply(Command::Aim(Aim::Insist));
+    assert!(!is_asked(&mut state) && state.refusal.is_some());
 }

@@ -26,6 +26,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::error::{Error, Result};
+use crate::toml_text;
 use crate::traverse::OdometryError;
 
 pub use camera::{AutoExposureSettings, CameraRig, CameraSettings, ExposureMode, Quantisation};
@@ -113,8 +114,7 @@ impl Scenario {
 
     /// Reads and checks a scenario; `path` only names the culprit in the message, beside key and allowed range.
     pub fn from_toml(text: &str, path: &Path) -> Result<Self> {
-        let scenario: Self =
-            toml::from_str(text).map_err(|problem| Error::format(path, in_one_sentence(text, &problem)))?;
+        let scenario: Self = toml_text::read(text).map_err(|problem| Error::format(path, problem))?;
         scenario.validate().map_err(|problem| Error::format(path, problem.to_string()))?;
         Ok(scenario)
     }
@@ -147,15 +147,6 @@ impl Scenario {
     }
 }
 
-/// What a reader of TOML says, with the line, as one sentence; its own words are a drawing of several lines.
-pub fn in_one_sentence(text: &str, problem: &toml::de::Error) -> String {
-    let said = problem.message().split_whitespace().collect::<Vec<_>>().join(" ");
-    match problem.span().and_then(|span| text.get(..span.start)) {
-        Some(before) => format!("line {}: {said}", before.matches('\n').count() + 1),
-        None => said,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -181,7 +172,10 @@ mod tests {
         let refused =
             |text: &str| Scenario::from_toml(text, Path::new("s.toml")).expect_err("refused").to_string();
         let unknown = refused("seed = 2\n[sun]\nheight_deg = 3.0\n");
-        assert!(unknown.starts_with("s.toml: line 3: unknown field `height_deg`"), "{unknown}");
+        assert!(
+            unknown.starts_with("s.toml: line 3: sun.height_deg: unknown field `height_deg`"),
+            "{unknown}"
+        );
         assert!(!unknown.contains('\n'), "one sentence: {unknown}");
         assert!(refused("[sun]\nelevation_deg = -3.0\n").contains("sun.elevation_deg"));
         assert!(refused("[camera]\nimage_size = 1000\n").contains("camera.image_size"));

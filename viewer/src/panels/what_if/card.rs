@@ -4,7 +4,7 @@ use egui::{Align, Button, Frame, Label, Layout, Margin, Pos2, Rect, RichText, Ui
 use sightline_core::session::what_if::Ghost;
 use sightline_core::session::why::words::signed;
 
-use super::place;
+use super::place::{self, Edge};
 use crate::command::Command;
 use crate::overlay::{Line, Mark, Overlay, template_quad};
 use crate::state::State;
@@ -54,18 +54,28 @@ pub(super) fn over(ui: &mut Ui, canvas: &Canvas, at: Pos2, state: &State, out: &
     place::remember(ui, shown.response.rect.size());
 }
 
-/// Shows the card under the image, where it scrolls when there is little room.
-pub(super) fn under(ui: &mut Ui, height: f32, state: &State, out: &mut Vec<Command>) {
+/// Shows it as a strip along an edge of the image.
+pub(super) fn strip(ui: &mut Ui, canvas: &Canvas, edge: Edge, state: &State, out: &mut Vec<Command>) {
     let Some(trial) = state.trial() else { return };
-    let area = Rect::from_min_size(ui.next_widget_position(), vec2(ui.available_width(), height));
-    let builder =
-        UiBuilder::new().max_rect(area).layout(Layout::top_down(Align::Min)).id_salt("what if card");
+    let area = canvas.transform.rect;
+    let memory = ui.scope_id().with("height of the what-if strip");
+    let height = ui.data(|data| data.get_temp(memory)).unwrap_or(0.0_f32);
+    let top = if edge == Edge::Top { area.top() } else { (area.bottom() - height).max(area.top()) };
+    let builder = UiBuilder::new()
+        .max_rect(area.with_min_y(top))
+        .layout(Layout::top_down(Align::Min))
+        .id_salt("what if strip");
     let mut inside = ui.new_child(builder);
     inside.set_clip_rect(area.intersect(ui.clip_rect()));
-    egui::ScrollArea::vertical().id_salt("what if").auto_shrink([false, true]).show(&mut inside, |ui| {
-        frame().show(ui, |ui| contents(ui, state, trial, out));
+    let shown = frame().show(&mut inside, |ui| {
+        ui.set_width(ui.available_width());
+        ui.horizontal_wrapped(|ui| contents(ui, state, trial, out));
     });
-    ui.advance_cursor_after_rect(area);
+    let new = shown.response.rect.height();
+    if (new - height).abs() > 1.0 {
+        ui.data_mut(|data| data.insert_temp(memory, new));
+        ui.ctx().request_repaint();
+    }
 }
 
 fn frame() -> Frame {
@@ -87,7 +97,7 @@ fn contents(ui: &mut Ui, state: &State, trial: &Trial, out: &mut Vec<Command>) {
             ui.label(theme::note("computing …"));
         }
     }
-    ui.horizontal_wrapped(|ui| {
+    flow(ui, |ui| {
         let run = ui.add(Button::new("Run from here as branch").min_size(vec2(0.0, 24.0)));
         if run.on_hover_text("Nothing recorded is overwritten. Key R").clicked() {
             out.push(Command::Why(Ask::Branch));
@@ -97,6 +107,15 @@ fn contents(ui: &mut Ui, state: &State, trial: &Trial, out: &mut Vec<Command>) {
             out.push(Command::Why(Ask::Discard));
         }
     });
+}
+
+/// Pieces that stand beside each other: in a strip, where everything does, they are part of its row.
+fn flow(ui: &mut Ui, contents: impl FnOnce(&mut Ui)) {
+    if ui.layout().is_horizontal() {
+        contents(ui);
+    } else {
+        ui.horizontal_wrapped(contents);
+    }
 }
 
 /// What is changed against the run.
@@ -120,7 +139,7 @@ fn changes(state: &State, trial: &Trial) -> Vec<String> {
 fn result(ui: &mut Ui, ghost: &Ghost, is_newest: bool) {
     let tracking = state_of_word(&ghost.row.state);
     let deltas = &ghost.deltas;
-    ui.horizontal_wrapped(|ui| {
+    flow(ui, |ui| {
         ui.label(RichText::new(ghost.row.state.to_uppercase()).strong().color(theme::state(tracking)));
         if deltas.state_recorded != ghost.row.state {
             ui.label(theme::note(format!("was {}", deltas.state_recorded)));

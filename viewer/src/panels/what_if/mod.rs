@@ -7,42 +7,30 @@ mod place;
 pub mod scores;
 
 use sightline_core::frames::Pixel;
-use sightline_core::image::PixelRect;
 use sightline_core::trace::StepTrace;
 
 pub use self::form::form;
-pub use self::place::Place;
+use self::place::Place;
 
 use egui::Ui;
 
 use crate::command::{Command, Mode};
 use crate::state::State;
-use crate::view2d::{Canvas, View2d};
+use crate::view2d::Canvas;
 
 /// Shows handles and ghost over the left image.
-pub fn over_image(ui: &mut Ui, canvas: &Canvas, place: Option<Place>, state: &State, out: &mut Vec<Command>) {
+pub fn over_image(ui: &mut Ui, canvas: &Canvas, state: &State, out: &mut Vec<Command>) {
     let Some(trace) = state.trace().filter(|_| state.marks && state.mode == Mode::Look) else { return };
     if can_be_tried(trace) {
         handles::show(ui, canvas, state, trace, out);
     }
     if let Some(trial) = state.trial() {
         card::ghost(canvas, trial);
-        if let Some(Place::Over(at)) = place {
-            card::over(ui, canvas, at, state, out);
+        match place::of(ui, state, &canvas.transform) {
+            Some(Place::Over(at)) => card::over(ui, canvas, at, state, out),
+            Some(Place::Strip(edge)) => card::strip(ui, canvas, edge, state, out),
+            None => {}
         }
-    }
-}
-
-/// Where the card lies over an image that would fill the rest of `ui` less `below` points; none where there is none.
-pub fn card_place(ui: &Ui, state: &State, view: View2d, region: PixelRect, below: f32) -> Option<Place> {
-    let is_shown = state.marks && state.mode == Mode::Look;
-    if is_shown { place::of(ui, state, view, region, below) } else { None }
-}
-
-/// Shows the card under the image, where it has its place there.
-pub fn under_image(ui: &mut Ui, place: Option<Place>, state: &State, out: &mut Vec<Command>) {
-    if let Some(Place::Under(height)) = place {
-        card::under(ui, height, state, out);
     }
 }
 

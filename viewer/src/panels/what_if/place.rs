@@ -1,47 +1,69 @@
 //! Where the card of a what-if lies: in the corner of the image with most room, never over the target or the search
-//! window; where no corner is free, under the image.
+//! window; where no corner is free, as a flat strip along the edge that covers less. The image keeps its place and size,
+//! and while a handle is dragged the card keeps its own, so that nothing moves under the pointer.
 
 use egui::{Pos2, Rect, Ui, Vec2, pos2, vec2};
 use sightline_core::frames::Pixel;
-use sightline_core::image::PixelRect;
 use sightline_core::trace::StepTrace;
 
 use crate::state::State;
 use crate::state::why::Trial;
-use crate::view2d::{Transform, View2d};
+use crate::view2d::Transform;
 
 /// Room that is left about what must not be covered, points.
 const ROOM: f32 = 14.0;
 /// Room between the card and the image's rim, points.
 const RIM: f32 = 8.0;
-/// The share of the panel that a card under the image takes at most.
-const SHARE: f32 = 0.45;
 /// How large the card is before it was painted, points.
 const FIRST: Vec2 = vec2(230.0, 170.0);
+/// About how high a strip is, points.
+const STRIP: f32 = 84.0;
 
 /// Where the card lies.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Place {
+pub(super) enum Place {
     /// Over the image, with this corner of its upper left.
     Over(Pos2),
-    /// Under the image, so many points high.
-    Under(f32),
+    /// A strip along the upper edge of the image, or along the lower one.
+    Strip(Edge),
 }
 
-/// Where the card of the present trial lies over an image that would fill the rest of `ui` less `below` points; none
-/// where nothing is tried.
-pub(super) fn of(ui: &Ui, state: &State, view: View2d, region: PixelRect, below: f32) -> Option<Place> {
+/// An edge of the image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Edge {
+    /// The upper one.
+    Top,
+    /// The lower one.
+    Bottom,
+}
+
+/// Where the card of the present trial lies over the image; none where nothing is tried.
+pub(super) fn of(ui: &Ui, state: &State, transform: &Transform) -> Option<Place> {
     let trial = state.trial()?;
     let trace = state.trace()?;
-    let rest = ui.available_rect_before_wrap();
-    let image = rest.with_max_y((rest.bottom() - below).max(rest.top() + 24.0));
-    let transform = Transform::new(view, region, image);
-    let kept: Vec<Rect> = kept_free(trial, trace, &transform);
-    let size = last_size(ui);
-    Some(match corner(image.shrink(RIM), size, &kept) {
+    let known = ui.data(|data| data.get_temp::<Place>(id().with("place")));
+    if let Some(known) = known.filter(|_| ui.input(|input| input.pointer.any_down())) {
+        return Some(known);
+    }
+    let kept = kept_free(trial, trace, transform);
+    let image = transform.rect;
+    let place = match corner(image.shrink(RIM), last_size(ui, FIRST), &kept) {
         Some(at) => Place::Over(at),
-        None => Place::Under(size.y.min(image.height() * SHARE)),
-    })
+        None => Place::Strip(edge(image, &kept)),
+    };
+    ui.data_mut(|data| data.insert_temp(id().with("place"), place));
+    Some(place)
+}
+
+/// The edge along which a strip covers less of what is kept free.
+fn edge(image: Rect, kept: &[Rect]) -> Edge {
+    let covered = |strip: Rect| {
+        let shared = kept.iter().map(|kept| kept.intersect(strip)).filter(Rect::is_positive);
+        shared.map(|shared| shared.area()).sum::<f32>()
+    };
+    let above = covered(image.with_max_y(image.top() + STRIP));
+    let below = covered(image.with_min_y(image.bottom() - STRIP));
+    if above < below { Edge::Top } else { Edge::Bottom }
 }
 
 /// What the card must not cover, on the screen.
@@ -105,13 +127,13 @@ fn id() -> egui::Id {
 }
 
 /// How large the card was when it was painted last.
-fn last_size(ui: &Ui) -> Vec2 {
-    ui.data(|data| data.get_temp(id())).unwrap_or(FIRST)
+pub(super) fn last_size(ui: &Ui, first: Vec2) -> Vec2 {
+    ui.data(|data| data.get_temp(id())).unwrap_or(first)
 }
 
 /// Remembers it.
 pub(super) fn remember(ui: &Ui, size: Vec2) {
-    let before = last_size(ui);
+    let before = last_size(ui, FIRST);
     ui.data_mut(|data| data.insert_temp(id(), size));
     if (before - size).length() > 1.0 {
         ui.ctx().request_repaint();
@@ -148,5 +170,13 @@ mod tests {
         let window = Rect::from_center_size(pos2(200.0, 150.0), vec2(380.0, 280.0));
         assert_eq!(corner(area(), vec2(150.0, 100.0), &[window]), None);
         assert_eq!(corner(area(), vec2(500.0, 20.0), &[]), None, "it does not fit at all");
+    }
+
+    #[test]
+    fn a_strip_lies_along_the_edge_that_is_free() {
+        assert_eq!(edge(area(), &[target(200.0, 60.0)]), Edge::Bottom);
+        assert_eq!(edge(area(), &[target(200.0, 250.0)]), Edge::Top);
+        let window = Rect::from_min_max(pos2(20.0, 40.0), pos2(380.0, 295.0));
+        assert_eq!(edge(area(), &[window]), Edge::Top, "less of the window lies there");
     }
 }
