@@ -57,7 +57,8 @@ async fn a_panel_is_saved_as_svg_and_png_which_look_alike_and_a_plot_is_read_as_
     let browser = Browser::start().await;
     bench.pick(&browser).await;
     browser.evaluate(CATCH).await;
-    browser.press("PageDown").await;
+    browser.press("ArrowRight").await;
+    browser.wait_status("a step with scores", "s.step === 1 && s.shown").await;
     browser.activate("tab", "Match scores").await;
     tokio::time::sleep(Duration::from_millis(1500)).await;
 

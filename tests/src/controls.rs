@@ -14,7 +14,7 @@ use crate::browser::Browser;
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// How long what is rendered or tracked on a busy machine may take to come.
-const LONG_PATIENCE: Duration = Duration::from_secs(100);
+const LONG_PATIENCE: Duration = Duration::from_secs(300);
 
 /// Lists the elements of the mirror.
 const LIST: &str = "return [...document.querySelectorAll('#sightline-mirror [data-node]')].map(e => { \
@@ -78,6 +78,7 @@ impl Browser {
                 return control.clone();
             }
             if start.elapsed() > PATIENCE {
+                self.shot("missing").await;
                 let names: Vec<&str> = of_role().map(|control| control.name.as_str()).collect();
                 panic!("there is no {role} “{name}”, but {names:?}");
             }
@@ -97,7 +98,10 @@ impl Browser {
     pub async fn gone(&self, role: &str, name: &str) {
         let start = Instant::now();
         while self.has_control(role, name).await {
-            assert!(start.elapsed() < PATIENCE, "{role} “{name}” stays");
+            if start.elapsed() > PATIENCE {
+                self.shot("stays").await;
+                panic!("{role} “{name}” stays");
+            }
             tokio::time::sleep(Duration::from_millis(50)).await;
         }
     }

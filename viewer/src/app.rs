@@ -314,8 +314,10 @@ impl eframe::App for SightlineApp {
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
         keys::leave_clicked(ui.ctx());
         let context = ui.ctx().clone();
-        let mut commands = self.take_keys(&context);
-        commands.extend(self.lay_out(ui));
+        let keys = self.take_keys(&context);
+        // What the pointer did comes first: Esc at the end of a drag takes back what the drag tried.
+        let mut commands = self.lay_out(ui);
+        commands.extend(keys);
         self.follow(&context, commands);
         if let Some(url) = self.state.open_url.take() {
             context.open_url(egui::OpenUrl::new_tab(url));

@@ -79,10 +79,11 @@ pub fn commands(context: &Context, state: &State) -> Vec<Command> {
     context.input(|input| {
         let mut out = Vec::new();
         // What is typed after the key that opens a field, in the same frame, is meant for the field.
-        let mut typed: Option<String> = None;
+        let mut typed: Option<Typed> = None;
         for event in &input.events {
             match (&mut typed, event) {
-                (Some(typed), Event::Text(text)) => typed.push_str(text),
+                (Some(typed), Event::Text(text)) if !typed.is_entered => typed.words.push_str(text),
+                (Some(typed), Event::Key { key: Key::Enter, pressed: true, .. }) => typed.is_entered = true,
                 (None, Event::Key { key, pressed: true, modifiers, physical_key, .. }) => {
                     let is_of_divider = is_divided && compare::is_of_divider(*key);
                     if is_of_divider || is_held && is_of_widgets(*key, *modifiers) {
@@ -92,18 +93,50 @@ pub fn commands(context: &Context, state: &State) -> Vec<Command> {
                     let digit = physical_key.filter(|key| modifiers.shift && preset_of(*key).is_some());
                     let asked = command(digit.unwrap_or(*key), *modifiers, state);
                     let opens = matches!(asked, Some(Command::SetMode(Mode::Palette(_) | Mode::GoTo(_))));
-                    typed = opens.then(String::new);
+                    typed = opens.then(Typed::default);
                     out.extend(asked);
                 }
                 _ => {}
             }
         }
-        if let (Some(typed), Some(Command::SetMode(Mode::Palette(search)))) = (typed, out.last_mut()) {
-            search.words = typed;
+        if let Some((typed, opening)) = typed.zip(out.last_mut()) {
+            typed.into_field(opening, state);
         }
         out.extend(held);
         out
     })
+}
+
+/// What was typed in the frame in which a field opens.
+#[derive(Default)]
+struct Typed {
+    words: String,
+    /// Whether Enter came behind it.
+    is_entered: bool,
+}
+
+impl Typed {
+    /// Puts it into the field that `opening` opens; what was entered is done at once, where it can be.
+    fn into_field(self, opening: &mut Command, state: &State) {
+        match opening {
+            Command::SetMode(Mode::Palette(search)) => {
+                let action = actions::find(state, &self.words).into_iter().next();
+                match action.filter(|_| self.is_entered && !self.words.is_empty()) {
+                    Some(action) => *opening = action.command,
+                    None => search.words = self.words,
+                }
+            }
+            Command::SetMode(Mode::GoTo(text)) => {
+                // The letter that opened the field comes as text, too.
+                let words = self.words.trim_start_matches(['g', 'G']);
+                match state.step_meant(words).ok().filter(|_| self.is_entered) {
+                    Some(step) => *opening = Command::Go(Go::Step(step)),
+                    None => words.clone_into(text),
+                }
+            }
+            _ => {}
+        }
+    }
 }
 
 /// What was typed before a field that has just opened has the keyboard; it would otherwise be lost.
@@ -280,6 +313,35 @@ mod tests {
         output.textures_delta.clear();
         let words = crate::command::Search { words: "tr".to_owned(), chosen: 0 };
         assert_eq!(asked, [Command::SetMode(Mode::Palette(words))], "no target is picked, nothing is run");
+    }
+
+    #[test]
+    fn what_is_entered_in_that_frame_is_done() {
+        let state = crate::tests::fixture::at_step(&Context::default(), 2);
+        let asked = |opening: (Key, Modifiers), text: &str| {
+            let key = |(key, modifiers)| Event::Key {
+                key,
+                physical_key: None,
+                pressed: true,
+                repeat: false,
+                modifiers,
+            };
+            let events = vec![key(opening), Event::Text(text.to_owned()), key((Key::Enter, Modifiers::NONE))];
+            let mut asked = Vec::new();
+            let input = egui::RawInput { events, ..Default::default() };
+            let mut output = Context::default().run_ui(input, |ui| asked = commands(ui.ctx(), &state));
+            output.textures_delta.clear();
+            asked
+        };
+        let palette = (Key::K, Modifiers::COMMAND);
+        let stereo = Command::Layout(LayoutCommand::Use(Preset::Stereo));
+        assert_eq!(asked(palette, "layout stereo"), [stereo]);
+        let go_to = (Key::G, Modifiers::NONE);
+        assert_eq!(asked(go_to, "g4"), [Command::Go(Go::Step(4))]);
+        // What cannot be done stays in the field.
+        assert_eq!(asked(go_to, "gnowhere"), [Command::SetMode(Mode::GoTo("nowhere".to_owned()))]);
+        let search = crate::command::Search { words: "xyzzy".to_owned(), chosen: 0 };
+        assert_eq!(asked(palette, "xyzzy"), [Command::SetMode(Mode::Palette(search))]);
     }
 
     #[test]

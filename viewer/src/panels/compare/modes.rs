@@ -136,7 +136,8 @@ fn wipe(ui: &Ui, canvas: &Canvas, state: &State, other: &Other<'_>, out: &mut Ve
     canvas.painter.vline(x, area.y_range(), egui::Stroke::new(2.0, colour));
     canvas.painter.circle_filled(pos2(x, area.center().y), 7.0, colour);
     response.widget_info(|| {
-        egui::WidgetInfo::slider(true, f64::from(at) * 100.0, "wipe divider, per cent of the image's width")
+        let per_cent = (f64::from(at) * 1000.0).round() / 10.0;
+        egui::WidgetInfo::slider(true, per_cent, "wipe divider, per cent of the image's width")
     });
     ui.ctx().accesskit_node_builder(response.id, |node| {
         for action in [Action::Increment, Action::Decrement, Action::SetValue] {
@@ -144,12 +145,16 @@ fn wipe(ui: &Ui, canvas: &Canvas, state: &State, other: &Other<'_>, out: &mut Ve
         }
         node.set_min_numeric_value(0.0);
         node.set_max_numeric_value(100.0);
-        node.set_numeric_value_step(f64::from(KEY_STEP) * 100.0);
+        // As a decimal: HTML takes no value between its steps.
+        node.set_numeric_value_step((f64::from(KEY_STEP) * 1000.0).round() / 10.0);
     });
     if response.clicked() || response.drag_started() {
         response.request_focus();
     }
-    let to = told(ui, response.id).or_else(|| moved(ui, &response, area).map(|by| at + by));
+    // The divider is where the pointer is: ways that add up would leave it behind.
+    let pointer = response.dragged().then(|| response.interact_pointer_pos()).flatten();
+    let dragged = pointer.map(|pointer| (pointer.x - area.left()) / area.width().max(1.0));
+    let to = told(ui, response.id).or(dragged).or_else(|| moved(ui, &response).map(|by| at + by));
     if let Some(to) = to.map(|to| to.clamp(0.0, 1.0)).filter(|&to| to != at) {
         out.push(Command::Compare(Ask::Wipe(to)));
     }
@@ -167,11 +172,8 @@ fn told(ui: &Ui, id: egui::Id) -> Option<f32> {
     })
 }
 
-/// By how much pointer, keys or a screen reader move the divider, as a share of the width.
-fn moved(ui: &Ui, response: &egui::Response, area: Rect) -> Option<f32> {
-    if response.dragged() {
-        return Some(response.drag_delta().x / area.width().max(1.0));
-    }
+/// By how much keys or a screen reader move the divider, as a share of the width.
+fn moved(ui: &Ui, response: &egui::Response) -> Option<f32> {
     let steps = ui.input(|input| {
         let count = |action: Action| input.num_accesskit_action_requests(response.id, action) as f32;
         count(Action::Increment) - count(Action::Decrement)

@@ -58,24 +58,22 @@ pub(super) fn over(ui: &mut Ui, canvas: &Canvas, at: Pos2, state: &State, out: &
 pub(super) fn strip(ui: &mut Ui, canvas: &Canvas, edge: Edge, state: &State, out: &mut Vec<Command>) {
     let Some(trial) = state.trial() else { return };
     let area = canvas.transform.rect;
-    let memory = ui.scope_id().with("height of the what-if strip");
-    let height = ui.data(|data| data.get_temp(memory)).unwrap_or(0.0_f32);
-    let top = if edge == Edge::Top { area.top() } else { (area.bottom() - height).max(area.top()) };
+    let top = if edge == Edge::Top { area.top() } else { (area.bottom() - place::STRIP).max(area.top()) };
     let builder = UiBuilder::new()
         .max_rect(area.with_min_y(top))
         .layout(Layout::top_down(Align::Min))
         .id_salt("what if strip");
     let mut inside = ui.new_child(builder);
     inside.set_clip_rect(area.intersect(ui.clip_rect()));
-    let shown = frame().show(&mut inside, |ui| {
-        ui.set_width(ui.available_width());
-        ui.horizontal_wrapped(|ui| contents(ui, state, trial, out));
+    frame().show(&mut inside, |ui| {
+        ui.set_min_size(vec2(ui.available_width(), place::STRIP - 12.0));
+        ui.spacing_mut().item_spacing.y = 2.0;
+        // The buttons come first: what is computed meanwhile must not move them.
+        ui.horizontal_wrapped(|ui| {
+            buttons(ui, out);
+            what(ui, state, trial);
+        });
     });
-    let new = shown.response.rect.height();
-    if (new - height).abs() > 1.0 {
-        ui.data_mut(|data| data.insert_temp(memory, new));
-        ui.ctx().request_repaint();
-    }
 }
 
 fn frame() -> Frame {
@@ -84,29 +82,42 @@ fn frame() -> Frame {
 }
 
 fn contents(ui: &mut Ui, state: &State, trial: &Trial, out: &mut Vec<Command>) {
+    what(ui, state, trial);
+    ui.horizontal_wrapped(|ui| buttons(ui, out));
+}
+
+/// What is tried and what comes of it.
+fn what(ui: &mut Ui, state: &State, trial: &Trial) {
     ui.label(theme::title(&format!("what if, step {}", trial.of.step)));
     for line in changes(state, trial) {
-        ui.add(Label::new(theme::note(line)).wrap());
+        sentence(ui, theme::note(line));
     }
     match (&trial.ghost, &trial.refused) {
         (_, Some(why)) => {
-            ui.add(Label::new(RichText::new(why).color(theme::lost())).wrap());
+            sentence(ui, RichText::new(why).color(theme::lost()));
         }
         (Some(ghost), None) => result(ui, ghost, ghost.what_if == trial.what_if),
         (None, None) => {
             ui.label(theme::note("computing …"));
         }
     }
-    flow(ui, |ui| {
-        let run = ui.add(Button::new("Run from here as branch").min_size(vec2(0.0, 24.0)));
-        if run.on_hover_text("Nothing recorded is overwritten. Key R").clicked() {
-            out.push(Command::Why(Ask::Branch));
-        }
-        let discard = ui.add(Button::new("Discard").min_size(vec2(0.0, 24.0)));
-        if discard.accessible_name("discard what if").on_hover_text("Key Esc").clicked() {
-            out.push(Command::Why(Ask::Discard));
-        }
-    });
+}
+
+fn buttons(ui: &mut Ui, out: &mut Vec<Command>) {
+    let run = ui.add(Button::new("Run from here as branch").min_size(vec2(0.0, 24.0)));
+    if run.on_hover_text("Nothing recorded is overwritten. Key R").clicked() {
+        out.push(Command::Why(Ask::Branch));
+    }
+    let discard = ui.add(Button::new("Discard").min_size(vec2(0.0, 24.0)));
+    if discard.accessible_name("discard what if").on_hover_text("Key Esc").clicked() {
+        out.push(Command::Why(Ask::Discard));
+    }
+}
+
+/// Words that may be long: beside others they break where the row does.
+fn sentence(ui: &mut Ui, words: RichText) {
+    let label = Label::new(words);
+    ui.add(if ui.layout().is_horizontal() { label } else { label.wrap() });
 }
 
 /// Pieces that stand beside each other: in a strip, where everything does, they are part of its row.
@@ -145,12 +156,14 @@ fn result(ui: &mut Ui, ghost: &Ghost, is_newest: bool) {
             ui.label(theme::note(format!("was {}", deltas.state_recorded)));
         }
         match ghost.is_right() {
-            Some(true) => ui.label(theme::note("right")),
-            Some(false) if ghost.row.state == "tracking" => {
-                ui.label(RichText::new("but FALSE").strong().color(theme::failed()))
+            Some(true) => {
+                ui.label(theme::note("right"));
             }
-            _ => ui.label(""),
-        };
+            Some(false) if ghost.row.state == "tracking" => {
+                ui.label(RichText::new("but FALSE").strong().color(theme::failed()));
+            }
+            _ => {}
+        }
     });
     let lines = [
         ("ncc", ghost.row.ncc, deltas.ncc, ""),
@@ -168,7 +181,7 @@ fn result(ui: &mut Ui, ghost: &Ghost, is_newest: bool) {
         ui.label(theme::number(format!("match moved {moved:.2} px")).size(11.0));
     }
     if let Some(missing) = &ghost.missing {
-        ui.add(Label::new(RichText::new(missing).small().color(theme::lost())).wrap());
+        sentence(ui, RichText::new(missing).small().color(theme::lost()));
     }
     if !is_newest {
         ui.label(theme::note("computing the newest change …"));

@@ -16,8 +16,8 @@ const ROOM: f32 = 14.0;
 const RIM: f32 = 8.0;
 /// How large the card is before it was painted, points.
 const FIRST: Vec2 = vec2(230.0, 170.0);
-/// About how high a strip is, points.
-const STRIP: f32 = 84.0;
+/// How high a strip is at least, points.
+pub(super) const STRIP: f32 = 84.0;
 
 /// Where the card lies.
 #[derive(Clone, Copy, Debug, PartialEq)]

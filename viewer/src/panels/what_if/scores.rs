@@ -21,20 +21,27 @@ use crate::{panels, theme};
 
 /// Room between the two, points.
 const GAP: f32 = 4.0;
+/// The least width at which a surface can be read, points.
+const LEAST: f32 = 190.0;
 
 /// Shows the scores while a change is tried; false where none is, or the tracker matches no template.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) -> bool {
     let Some(trial) = state.trial().filter(|_| state.tracker() == TrackerKind::Template) else {
         return false;
     };
-    let shown = state.why.scores_shown;
+    let has_room = ui.available_width() >= 2.0 * LEAST + GAP;
+    let chosen = state.why.scores_shown;
+    let shown = if chosen == Scores::Both && !has_room { Scores::Tried } else { chosen };
     let tried = state.tried_scores(ui.ctx());
     let recorded = state.trace().and_then(StepTrace::template).and_then(|e| e.match_template.as_ref());
     ui.horizontal(|ui| {
         ui.label(theme::note("scores"));
         for choice in Scores::ALL {
             let button = Button::selectable(shown == choice, choice.words()).min_size(vec2(24.0, 24.0));
-            if ui.add(button).accessible_name(format!("scores: {}", choice.words())).clicked() {
+            let button = ui.add_enabled(choice != Scores::Both || has_room, button);
+            let button =
+                button.on_disabled_hover_text("The panel is too narrow for both: let it fill the page (`)");
+            if button.accessible_name(format!("scores: {}", choice.words())).clicked() {
                 out.push(Command::Why(Ask::Scores(choice)));
             }
         }
@@ -51,6 +58,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) -> bool {
     };
     let part = |ui: &mut Ui, place: Rect, name: &str, show: &mut dyn FnMut(&mut Ui)| {
         let mut inside = ui.new_child(UiBuilder::new().max_rect(place).id_salt(name));
+        inside.set_clip_rect(place.intersect(ui.clip_rect()));
         show(&mut inside);
     };
     if shown != Scores::Tried {
