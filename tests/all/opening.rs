@@ -46,7 +46,7 @@ async fn a_bad_scenario_is_refused_in_one_sentence_and_opens_nothing() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), folder.path());
     for (text, named) in [
-        ("seed = 2\n[sun]\nheight_deg = 3.0\n", "line 3: unknown field `height_deg`"),
+        ("seed = 2\n[sun]\nheight_deg = 3.0\n", "line 3: sun.height_deg: unknown field `height_deg`"),
         ("[sun]\nelevation_deg = -3.0\n", "sun.elevation_deg"),
         ("\u{0}\u{1}", "line 1"),
     ] {

@@ -5,7 +5,7 @@
 //!
 //! - **own**: the time spent in the page's animation frames, from the key to the end of the frame that shows the step;
 //!   everything the page computes for a step happens in them;
-//! - **loading**: from the first request to the last byte of the last answer, as the browser's own resource timing says;
+//! - **loading**: how long at least one request was on its way, as the browser's own resource timing says;
 //! - **painted**: from the key to the frame after the painted one, with all waiting for the software.
 
 use serde_json::Value;
@@ -28,8 +28,10 @@ const SCRIPT: &str = "\
             const key = began, frames = watch.frames; began = null; \
             const own = frames.filter(f => f[0] >= key).reduce((sum, f) => sum + f[1], 0); \
             const asked = performance.getEntriesByType('resource').filter(e => e.startTime >= key); \
-            const loading = asked.length === 0 ? 0 : \
-                Math.max(...asked.map(e => e.responseEnd)) - Math.min(...asked.map(e => e.startTime)); \
+            let loading = 0, until = 0; \
+            for (const e of asked.sort((a, b) => a.startTime - b.startTime)) { \
+                loading += Math.max(0, e.responseEnd - Math.max(e.startTime, until)); \
+                until = Math.max(until, e.responseEnd); } \
             raf(() => raf(() => watch.laps.push([own, loading, performance.now() - key]))); \
         }).observe(canvas, {attributes: true, attributeFilter: ['data-status']}); \
     } \

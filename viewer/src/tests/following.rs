@@ -6,10 +6,11 @@ use sightline_core::session::why::Explanation;
 use sightline_core::session::wire::Problem;
 
 use super::fixture;
+use super::questions::{answer, asked};
 use crate::cache::StepKey;
 use crate::command::{Command, Go};
 use crate::net::why::{WhyReply, WhyRequest};
-use crate::net::{Arrived, Reply, Request};
+use crate::net::{Arrived, Request};
 use crate::state::State;
 use crate::state::why::{Ask, Told};
 
@@ -22,18 +23,6 @@ fn key() -> StepKey {
 
 fn lost() -> State {
     fixture::at_step(&egui::Context::default(), LOST)
-}
-
-fn answer(state: &mut State, request: WhyRequest, reply: WhyReply) {
-    state.arrived(Arrived { request: Request::Why(request), outcome: Ok(Reply::Why(reply)) }, 0.0);
-}
-
-fn asked(state: &mut State) -> Vec<WhyRequest> {
-    let why = |request| match request {
-        Request::Why(request) => Some(request),
-        _ => None,
-    };
-    state.take_requests().into_iter().filter_map(why).collect()
 }
 
 #[test]

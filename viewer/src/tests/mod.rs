@@ -20,6 +20,7 @@ mod timelines;
 mod tracking;
 mod palette;
 mod picking;
+mod questions;
 mod tour;
 mod why;
 mod undo;

@@ -9,6 +9,7 @@ use sightline_core::session::view::RunView;
 use sightline_core::session::wire::Problem;
 use sightline_core::settings::Changes;
 
+use super::questions::{answer, asked};
 use super::{Shown, fixture};
 use crate::command::Command;
 use crate::keys;
@@ -25,18 +26,6 @@ const LOST: usize = 3;
 
 fn lost() -> State {
     fixture::at_step(&egui::Context::default(), LOST)
-}
-
-fn answer(state: &mut State, request: WhyRequest, reply: WhyReply) {
-    state.arrived(Arrived { request: Request::Why(request), outcome: Ok(Reply::Why(reply)) }, 0.0);
-}
-
-fn asked(state: &mut State) -> Vec<WhyRequest> {
-    let why = |request| match request {
-        Request::Why(request) => Some(request),
-        _ => None,
-    };
-    state.take_requests().into_iter().filter_map(why).collect()
 }
 
 /// What is asked about breakpoints.

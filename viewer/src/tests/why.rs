@@ -12,13 +12,14 @@ use sightline_core::session::why::{Explanation, Node, Origin, OriginKind};
 use sightline_core::session::wire::{Event, Problem};
 use sightline_core::settings::Changes;
 
+use super::questions::{answer, asked};
 use super::{Shown, fixture};
 use crate::cache::StepKey;
 use crate::command::{Command, Go, Panel};
 use crate::keys;
 use crate::layout::Pane;
 use crate::net::why::{WhyReply, WhyRequest};
-use crate::net::{Arrived, Reply, Request};
+use crate::net::{Arrived, Request};
 use crate::state::State;
 use crate::state::why::{Ask, Told};
 use crate::view2d::View2d;
@@ -75,18 +76,6 @@ fn question(state: QuestionState, findings: Vec<Finding>) -> Question {
     };
     let StepKey { session, target, run, step } = key();
     Question { session, target, run, step, state, answer: Some(answer), problem: None }
-}
-
-fn answer(state: &mut State, request: WhyRequest, reply: WhyReply) {
-    state.arrived(Arrived { request: Request::Why(request), outcome: Ok(Reply::Why(reply)) }, 0.0);
-}
-
-fn asked(state: &mut State) -> Vec<WhyRequest> {
-    let why = |request| match request {
-        Request::Why(request) => Some(request),
-        _ => None,
-    };
-    state.take_requests().into_iter().filter_map(why).collect()
 }
 
 #[test]
