@@ -13,6 +13,7 @@ mod expressions;
 mod imports;
 mod keeping;
 mod opening;
+mod page_jobs;
 mod page_open;
 mod page;
 mod page_access;

@@ -107,10 +107,8 @@ async fn without_the_viewer_a_plain_page_of_the_same_step_is_offered() {
         }
     };
     assert!(count("table").await >= 1 && count("h1").await == 1 && count("script").await == 0);
-    let described = browser
-        .evaluate("return [...document.images].every(i => i.alt.length > 10 && i.naturalWidth > 0)")
-        .await;
-    assert_eq!(described, true, "every image is there and described");
+    let described = "return [...document.images].every(i => i.alt.length > 10 && i.naturalWidth > 0)";
+    browser.wait_for("every image, described", described).await;
     browser.shot("plain").await;
     assert_eq!(browser.console_errors().await, Vec::<String>::new());
     browser.close().await;

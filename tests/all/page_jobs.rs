@@ -1,0 +1,65 @@
+//! Long work and the tour in a real browser: a study is a job that is cancelled, survives a reload, and goes on; the tour
+//! is begun again by its name and led to its end by keys.
+
+use std::time::{Duration, Instant};
+
+use sightline_tests::bench::Bench;
+use sightline_tests::browser::Browser;
+use sightline_tests::scenario::short_approach;
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_study_is_cancelled_at_once_survives_a_reload_and_goes_on() {
+    let bench = Bench::start(&short_approach()).await;
+    let browser = Browser::start().await;
+    bench.pick(&browser).await;
+    browser.chord(&["Shift"], "6").await;
+    browser.control("button", "Start the study").await;
+    browser.click_on("button", "Start the study").await;
+    // The run of the target has no such button any more: it is complete.
+    browser.control("button", "Cancel").await;
+    browser.shot("study-running").await;
+    let start = Instant::now();
+    browser.activate("button", "Cancel").await;
+    browser.control("button", "Resume").await;
+    println!("from the cancel to its being on the page: {} ms", start.elapsed().as_millis());
+    browser.evaluate("location.reload()").await;
+    browser.wait_for_viewer().await;
+    browser.wait_status("the page again", "s.phase === 'ready' && s.target === 0").await;
+    browser.control("button", "Resume").await;
+    browser.activate("button", "Resume").await;
+    browser.gone("button", "Resume").await;
+    browser.activate("button", "Cancel").await;
+    browser.control("button", "Resume").await;
+    assert_eq!(browser.console_errors().await, Vec::<String>::new());
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_tour_is_led_to_its_end_and_back_by_keys() {
+    let bench = Bench::start(&short_approach()).await;
+    let browser = Browser::start().await;
+    bench.pick(&browser).await;
+    browser.chord(&["Control"], "k").await;
+    browser.control("textbox", "palette").await;
+    browser.type_text("tour").await;
+    browser.control("option", "Tour").await;
+    browser.press("Enter").await;
+    for bubble in 1..=6 {
+        browser.says(&format!("{bubble} of 6")).await;
+        browser.shot(&format!("tour-{bubble}")).await;
+        if bubble == 3 {
+            browser.press("Backspace").await;
+            browser.says("2 of 6").await;
+            browser.press("Enter").await;
+            browser.says("3 of 6").await;
+        }
+        browser.press("Enter").await;
+    }
+    browser.gone("button", "Done").await;
+    // It never blocks the page: the next key is a step.
+    browser.press("ArrowRight").await;
+    browser.wait_status("the next step", "s.step === 1 && s.shown").await;
+    tokio::time::sleep(Duration::from_millis(300)).await;
+    assert_eq!(browser.console_errors().await, Vec::<String>::new());
+    browser.close().await;
+}
