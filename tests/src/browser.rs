@@ -112,44 +112,31 @@ impl Browser {
 
     /// Presses and releases a key, named as JavaScript names it: `ArrowRight`, `Home`, `a`, `+` and so on.
     pub async fn press(&self, key: &str) {
-        let value = key_value(key);
-        let keyboard = KeyActions::new("keyboard".to_owned())
-            .then(KeyAction::Down { value })
-            .then(KeyAction::Up { value });
-        self.client
-            .perform_actions(keyboard)
-            .await
-            .unwrap_or_else(|error| panic!("the key {key} cannot be pressed: {error}"));
+        self.chord(&[], key).await;
     }
 
     /// Presses a key while others are held: `["Control"], "k"`.
     pub async fn chord(&self, held: &[&str], key: &str) {
-        let down = |key: &str| KeyAction::Down { value: key_value(key) };
-        let up = |key: &str| KeyAction::Up { value: key_value(key) };
-        let mut keyboard = KeyActions::new("keyboard".to_owned());
-        for key in held {
-            keyboard = keyboard.then(down(key));
-        }
-        keyboard = keyboard.then(down(key)).then(up(key));
-        for key in held.iter().rev() {
-            keyboard = keyboard.then(up(key));
-        }
-        let done = self.client.perform_actions(keyboard).await;
-        done.unwrap_or_else(|error| panic!("{held:?} and {key} cannot be pressed: {error}"));
+        let down = held.iter().chain([&key]).map(|key| KeyAction::Down { value: key_value(key) });
+        let up =
+            [&key].into_iter().chain(held.iter().rev()).map(|key| KeyAction::Up { value: key_value(key) });
+        self.type_actions(down.chain(up), key).await;
     }
 
     /// Holds a key down until [`Self::let_go`].
     pub async fn hold(&self, key: &str) {
-        let down = KeyActions::new("keyboard".to_owned()).then(KeyAction::Down { value: key_value(key) });
-        let done = self.client.perform_actions(down).await;
-        done.unwrap_or_else(|error| panic!("the key {key} cannot be held: {error}"));
+        self.type_actions([KeyAction::Down { value: key_value(key) }], key).await;
     }
 
     /// Lets a held key go.
     pub async fn let_go(&self, key: &str) {
-        let up = KeyActions::new("keyboard".to_owned()).then(KeyAction::Up { value: key_value(key) });
-        let done = self.client.perform_actions(up).await;
-        done.unwrap_or_else(|error| panic!("the key {key} cannot be let go: {error}"));
+        self.type_actions([KeyAction::Up { value: key_value(key) }], key).await;
+    }
+
+    async fn type_actions(&self, actions: impl IntoIterator<Item = KeyAction>, key: &str) {
+        let keyboard = actions.into_iter().fold(KeyActions::new("keyboard".to_owned()), InputSource::then);
+        let done = self.client.perform_actions(keyboard).await;
+        done.unwrap_or_else(|error| panic!("the key {key} cannot be pressed or let go: {error}"));
     }
 
     /// Types a text, letter by letter.

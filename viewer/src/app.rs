@@ -188,7 +188,7 @@ impl SightlineApp {
         self.carry_out(all);
         self.ask_for_missing(context.input(|input| input.time));
         // What follows is meant for the step to which they led.
-        keys::commands(context, &self.state).split_off(steps)
+        keys::commands(context, &self.state).into_iter().skip(steps).collect()
     }
 
     /// Carries out what was asked for of the page, and then of the state.
