@@ -67,6 +67,16 @@ pub struct SettingInfo {
     pub help: String,
 }
 
+impl SettingInfo {
+    /// Why `value` cannot be this setting's, as a clause that can follow its name.
+    pub fn problem_with(&self, value: &serde_json::Value) -> Option<String> {
+        let is_broken = self.default.is_u64() && !value.is_u64();
+        self.domain
+            .problem_with(value)
+            .or_else(|| is_broken.then(|| format!("must be a whole number, not {value}")))
+    }
+}
+
 /// Declares a group of settings: the struct, its defaults, and `table()` that describes it.
 #[macro_export]
 macro_rules! settings_group {

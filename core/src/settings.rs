@@ -107,13 +107,9 @@ impl Settings {
     pub fn with(&self, changes: &Changes) -> Result<Self> {
         let table = Self::table();
         let mut document = serde_json::to_value(self).map_err(|e| Error::setting("", e.to_string()))?;
-        for (key, value) in changes {
-            let info = table.iter().find(|info| info.key == *key).ok_or_else(|| unknown(key, &table))?;
-            if let Some(problem) = info.domain.problem_with(value) {
-                return Err(Error::setting(key, problem));
-            }
+        for (info, value) in checked(changes, &table)? {
             let place = if info.group == TRACKER { &mut document } else { &mut document[&info.group] };
-            place[key] = value.clone();
+            place[&info.key] = value.clone();
         }
         serde_json::from_value(document).map_err(|e| Error::setting(join_keys(changes), e.to_string()))
     }
@@ -158,7 +154,25 @@ fn join_keys(changes: &Changes) -> String {
     changes.keys().cloned().collect::<Vec<_>>().join(", ")
 }
 
-pub(crate) fn unknown(key: &str, table: &[SettingInfo]) -> Error {
+/// Every change with what the table says of its setting.
+///
+/// # Errors
+/// [`Error::Setting`] naming the first that the table does not know or whose value does not fit.
+pub(crate) fn checked<'a>(
+    changes: &'a Changes,
+    table: &'a [SettingInfo],
+) -> Result<Vec<(&'a SettingInfo, &'a Value)>> {
+    let check = |(key, value): (&'a String, &'a Value)| {
+        let info = table.iter().find(|info| info.key == *key).ok_or_else(|| unknown(key, table))?;
+        match info.problem_with(value) {
+            Some(problem) => Err(Error::setting(key, problem)),
+            None => Ok((info, value)),
+        }
+    };
+    changes.iter().map(check).collect()
+}
+
+fn unknown(key: &str, table: &[SettingInfo]) -> Error {
     let nearest = table.iter().min_by_key(|info| edit_distance(key, &info.key)).map(|info| info.key.as_str());
     let hint = nearest.map(|n| format!("; did you mean {n}?")).unwrap_or_default();
     Error::setting(key, format!("there is no such setting{hint}"))
@@ -206,6 +220,12 @@ mod tests {
     fn a_value_out_of_range_is_refused_with_the_range() {
         let message = change("template_size_px", json!(20)).unwrap_err().to_string();
         assert!(message.contains("template_size_px") && message.contains("odd"), "{message}");
+    }
+
+    #[test]
+    fn what_is_counted_is_not_halved() {
+        let message = change("motion_draws", json!(200.5)).unwrap_err().to_string();
+        assert!(message.contains("motion_draws") && message.contains("a whole number"), "{message}");
     }
 
     #[test]

@@ -10,7 +10,8 @@ use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 use sightline_core::error::Error;
 use sightline_core::image::io;
-use sightline_core::session::wire::{NewTraverse, StopView, TraverseEntry, TraverseView};
+use sightline_core::pipeline::Stops;
+use sightline_core::session::wire::{NewTraverse, StopDetail, StopView, TraverseEntry, TraverseView};
 use utoipa::{IntoParams, ToSchema};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
@@ -27,6 +28,7 @@ pub fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
         .routes(routes!(list, add))
         .routes(routes!(show))
+        .routes(routes!(stop))
         .routes(routes!(image))
         .routes(routes!(prefetch))
 }
@@ -102,6 +104,28 @@ async fn show(State(state): State<AppState>, Path(id): Path<String>) -> ApiResul
     blocking(move || Ok(Json(view(&open)))).await
 }
 
+/// A stop with its cameras, in the rover frame
+#[utoipa::path(get, operation_id = "show_stop", path = "/traverses/{id}/steps/{step}", tag = "traverses", params(
+    ("id" = String, Path), ("step" = usize, Path)), responses(
+    (status = 200, body = StopDetail), ApiError))]
+async fn stop(
+    State(state): State<AppState>,
+    Path((id, step)): Path<(String, usize)>,
+) -> ApiResult<Json<StopDetail>> {
+    let open = state.traverse(&id)?;
+    if step >= open.traverse.stop_count() {
+        return Err(no_step(step));
+    }
+    let traverse = &open.traverse;
+    let (left, right) = (traverse.left_camera(step).clone(), traverse.right_camera(step).clone());
+    let mast = traverse.mast_angles(step);
+    Ok(Json(StopDetail { stop: stop_view(&open, step), left, right, mast }))
+}
+
+fn no_step(step: usize) -> ApiError {
+    ApiError::not_found(format!("The traverse has no step {step}."))
+}
+
 /// An image of a stop as PNG
 ///
 /// An image of a simulated stop is rendered when it is first asked for, which takes some seconds.
@@ -128,7 +152,7 @@ async fn image(
         Some(bits) => return Err(ApiError::invalid("query", format!("bits: must be 8 or 16, not {bits}"))),
     };
     if step >= open.traverse.stop_count() {
-        return Err(ApiError::not_found(format!("The traverse has no step {step}.")));
+        return Err(no_step(step));
     }
     let cancel = CancelOnDrop::default();
     let flag = cancel.flag();
@@ -158,16 +182,20 @@ async fn prefetch(
     Ok(StatusCode::NO_CONTENT)
 }
 
-fn view(open: &OpenTraverse) -> TraverseView {
-    let (traverse, index) = (&open.traverse, open.traverse.index());
-    let stops = index.stops.iter().enumerate().map(|(step, stop)| StopView {
+fn stop_view(open: &OpenTraverse, step: usize) -> StopView {
+    let (traverse, stop) = (&open.traverse, &open.traverse.index().stops[step]);
+    StopView {
         time_s: stop.time_s,
         site_from_rover: stop.site_from_rover,
         true_site_from_rover: stop.truth.as_ref().map(|truth| truth.site_from_rover),
         left_size: traverse.left_camera(step).size,
         right_size: traverse.right_camera(step).size,
         ready: traverse.is_ready(step),
-    });
+    }
+}
+
+fn view(open: &OpenTraverse) -> TraverseView {
+    let (traverse, index) = (&open.traverse, open.traverse.index());
     TraverseView {
         id: open.id.clone(),
         name: index.name.clone(),
@@ -175,7 +203,7 @@ fn view(open: &OpenTraverse) -> TraverseView {
         simulated: index.scenario.is_some(),
         stereo: index.stereo,
         warnings: traverse.warnings().to_vec(),
-        stops: stops.collect(),
+        stops: (0..index.stops.len()).map(|step| stop_view(open, step)).collect(),
     }
 }
 
@@ -188,9 +216,8 @@ fn encode(
     cancel: &AtomicBool,
 ) -> sightline_core::error::Result<Vec<u8>> {
     open.make_ready(step, cancel)?;
-    let pair = open.traverse.capture(step)?;
-    let image = if is_left { &pair.left } else { &pair.right };
-    if is_deep { io::encode_png_u16(image, None) } else { io::encode_png_u8(image) }
+    let image = open.traverse.capture_one(step, is_left)?;
+    if is_deep { io::encode_png_u16(&image, None) } else { io::encode_png_u8(&image) }
 }
 
 /// An answer that the browser keeps, and asks about before it uses it again: files may be exchanged between

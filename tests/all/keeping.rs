@@ -16,15 +16,21 @@ use crate::cli::program;
 const PATIENCE: Duration = Duration::from_secs(180);
 
 /// The program itself, serving a drive.
-struct Killable {
+pub(crate) struct Killable {
     child: Child,
-    address: String,
+    /// Host and port.
+    pub address: String,
 }
 
 impl Killable {
     fn start(drive: &Path, data: &Path) -> Self {
+        Self::start_at("0", drive, data)
+    }
+
+    /// Serves at a port; 0 is any free one.
+    pub(crate) fn start_at(port: &str, drive: &Path, data: &Path) -> Self {
         let arguments =
-            ["serve", drive.to_str().unwrap(), "--port", "0", "--data-dir", data.to_str().unwrap()];
+            ["serve", drive.to_str().unwrap(), "--port", port, "--data-dir", data.to_str().unwrap()];
         let mut child = Command::new(program()).args(arguments).stdout(Stdio::piped()).spawn().unwrap();
         let mut line = String::new();
         BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
@@ -33,9 +39,8 @@ impl Killable {
     }
 
     /// SIGKILL, as the system does it when there is no memory: nothing can be said or written any more.
-    fn kill(mut self) {
-        self.child.kill().unwrap();
-        self.child.wait().unwrap();
+    pub(crate) fn kill(self) {
+        drop(self);
     }
 
     fn raw(&self, method: &str, path: &str, headers: &str, body: &str) -> String {
@@ -78,6 +83,13 @@ impl Killable {
             assert!(begun.elapsed() < PATIENCE, "{view}");
             std::thread::sleep(Duration::from_millis(30));
         }
+    }
+}
+
+impl Drop for Killable {
+    fn drop(&mut self) {
+        self.child.kill().unwrap();
+        self.child.wait().unwrap();
     }
 }
 

@@ -10,16 +10,14 @@ use sightline_core::frames::Pixel;
 use sightline_core::sim::Scenario;
 use sightline_core::trace::StepTrace;
 use sightline_server::rerun_log::{Rows, documented_entities};
-use sightline_tests::bench::Bench;
+use sightline_tests::bench::{Bench, picked};
 use sightline_tests::browser::Browser;
 use sightline_tests::rrd;
 use sightline_tests::scenario::short_approach;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_person_picks_a_rock_steps_to_the_end_and_back_and_exports() {
-    let bench = Bench::start(&short_approach()).await;
-    let browser = Browser::start().await;
-    bench.pick(&browser).await;
+    let (bench, browser) = picked(&short_approach()).await;
 
     for step in 1..bench.stop_count {
         browser.press("ArrowRight").await;
@@ -54,8 +52,7 @@ async fn a_person_picks_a_rock_steps_to_the_end_and_back_and_exports() {
     assert!(error_m < 0.06, "{error_m} m");
 
     check_export(&bench, &session);
-    assert_eq!(browser.console_errors().await, Vec::<String>::new());
-    browser.close().await;
+    browser.end().await;
 }
 
 /// Reads the exported recording back: every documented entity is there with as many rows as the steps promise.

@@ -1,7 +1,6 @@
 //! The page for those who do not see it or use no pointer: what a screen reader finds, and everything by keyboard.
 
-use sightline_tests::bench::Bench;
-use sightline_tests::browser::Browser;
+use sightline_tests::bench::picked;
 use sightline_tests::scenario::short_approach;
 
 /// Controls of which the browser itself is asked, one of each kind: role and name.
@@ -15,9 +14,7 @@ const KINDS: [(&str, &str); 5] = [
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_screen_reader_finds_controls_by_role_and_name_and_can_act_on_them() {
-    let bench = Bench::start(&short_approach()).await;
-    let browser = Browser::start().await;
-    bench.pick(&browser).await;
+    let (_bench, browser) = picked(&short_approach()).await;
 
     for (role, name) in KINDS {
         let control = browser.control(role, name).await;
@@ -51,15 +48,12 @@ async fn a_screen_reader_finds_controls_by_role_and_name_and_can_act_on_them() {
     browser.says("the palette: whatever can be asked for").await;
     browser.activate("button", "Close").await;
     browser.gone("button", "Close").await;
-    assert_eq!(browser.console_errors().await, Vec::<String>::new());
-    browser.close().await;
+    browser.end().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn arrangements_panels_and_palette_work_by_keyboard_and_survive_a_reload() {
-    let bench = Bench::start(&short_approach()).await;
-    let browser = Browser::start().await;
-    bench.pick(&browser).await;
+    let (_bench, browser) = picked(&short_approach()).await;
 
     for (key, name, panel) in [
         ("2", "match", "Match scores"),
@@ -112,15 +106,12 @@ async fn arrangements_panels_and_palette_work_by_keyboard_and_survive_a_reload()
     browser.type_text("show stereo").await;
     browser.press("Enter").await;
     browser.control("tab", "Stereo scores").await;
-    assert_eq!(browser.console_errors().await, Vec::<String>::new());
-    browser.close().await;
+    browser.end().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_link_opens_the_same_place_and_back_goes_to_the_run_before() {
-    let bench = Bench::start(&short_approach()).await;
-    let browser = Browser::start().await;
-    bench.pick(&browser).await;
+    let (bench, browser) = picked(&short_approach()).await;
     browser.press("End").await;
     let last = bench.stop_count - 1;
     browser
@@ -145,5 +136,8 @@ async fn a_link_opens_the_same_place_and_back_goes_to_the_run_before() {
     browser.evaluate("location.hash = 'session=s9999'").await;
     browser.says("There is no such session.").await;
     assert_eq!(browser.status().await["target"], 0, "what was open stays open");
+    // That there is no such session is an answer which the browser itself writes into its console, and nothing else is.
+    let errors = browser.console_errors().await;
+    assert!(errors.iter().all(|error| error.contains("/sessions/s9999")), "{errors:?}");
     browser.close().await;
 }

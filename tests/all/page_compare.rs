@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use image::RgbImage;
-use sightline_tests::bench::Bench;
+use sightline_tests::bench::{Bench, picked};
 use sightline_tests::browser::Browser;
 use sightline_tests::scenario::short_approach;
 
@@ -34,9 +34,7 @@ async fn divider(browser: &Browser) -> f64 {
 
 /// A page at [`FORK`] of a branch that loses the target there, compared with the run before.
 async fn branched() -> (Bench, Browser) {
-    let bench = Bench::start(&short_approach()).await;
-    let browser = Browser::start().await;
-    bench.pick(&browser).await;
+    let (bench, browser) = picked(&short_approach()).await;
     for _ in 0..FORK {
         browser.press("ArrowRight").await;
     }
@@ -96,8 +94,7 @@ async fn two_runs_are_wiped_and_blinked_and_their_first_divergence_is_found() {
     let again = left_image(&browser).await;
     assert!(differing(&own, &other) > 0.001, "held, X shows the other run: {}", differing(&own, &other));
     assert!(differing(&own, &again) < 0.001, "let go, it shows the own one: {}", differing(&own, &again));
-    assert_eq!(browser.console_errors().await, Vec::<String>::new());
-    browser.close().await;
+    browser.end().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -125,6 +122,5 @@ async fn a_handle_is_dragged_and_a_removed_branch_comes_back() {
     browser.shot("removed").await;
     browser.chord(&["Control"], "z").await;
     browser.control("button", "remove run B").await;
-    assert_eq!(browser.console_errors().await, Vec::<String>::new());
-    browser.close().await;
+    browser.end().await;
 }

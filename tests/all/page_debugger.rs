@@ -3,35 +3,12 @@
 
 use std::time::Duration;
 
-use sightline_tests::bench::Bench;
-use sightline_tests::browser::Browser;
+use sightline_tests::bench::picked;
 use sightline_tests::scenario::short_approach;
-
-/// A page with a run over a short approach.
-async fn page() -> (Bench, Browser) {
-    let bench = Bench::start(&short_approach()).await;
-    let browser = Browser::start().await;
-    bench.pick(&browser).await;
-    (bench, browser)
-}
-
-async fn end(browser: Browser) {
-    assert_eq!(browser.console_errors().await, Vec::<String>::new());
-    browser.close().await;
-}
-
-/// Goes to a step and waits until it is shown.
-async fn go_to(browser: &Browser, step: usize) {
-    browser.press("g").await;
-    browser.control("textbox", "go to step").await;
-    browser.type_text(&step.to_string()).await;
-    browser.press("Enter").await;
-    browser.wait_status("the step", &format!("s.step === {step} && s.shown")).await;
-}
 
 #[tokio::test(flavor = "multi_thread")]
 async fn conditions_are_written_hit_and_played_to() {
-    let (_bench, browser) = page().await;
+    let (_bench, browser) = picked(&short_approach()).await;
     browser.chord(&["Shift"], "b").await;
     browser.control("textbox", "expression").await;
     // What is wrong is said while it is typed, and nothing is lost.
@@ -69,15 +46,15 @@ async fn conditions_are_written_hit_and_played_to() {
     browser.shot("go-to").await;
     browser.press("Escape").await;
     browser.gone("textbox", "go to step").await;
-    go_to(&browser, 5).await;
-    end(browser).await;
+    browser.go_to("5", 5).await;
+    browser.end().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_change_is_tried_branched_compared_and_taken_back() {
-    let (bench, browser) = page().await;
+    let (bench, browser) = picked(&short_approach()).await;
     let last = bench.stop_count - 1;
-    go_to(&browser, 3).await;
+    browser.go_to("3", 3).await;
     browser.press("w").await;
     browser.says("Accepted").await;
     // A limit that the match does not meet: the ghost says what the step would have been.
@@ -113,13 +90,13 @@ async fn a_change_is_tried_branched_compared_and_taken_back() {
             "return JSON.parse(document.getElementById('sightline').dataset.status).run >= 0",
         )
         .await;
-    end(browser).await;
+    browser.end().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn notes_are_pinned_exports_are_listed_and_looks_are_kept() {
-    let (bench, browser) = page().await;
-    go_to(&browser, 2).await;
+    let (bench, browser) = picked(&short_approach()).await;
+    browser.go_to("2", 2).await;
     browser.press("m").await;
     browser.control("textbox", "text of the note").await;
     browser.type_text("the *shadow* comes here").await;
@@ -153,5 +130,5 @@ async fn notes_are_pinned_exports_are_listed_and_looks_are_kept() {
     let picture = image::load_from_memory(&page).unwrap().to_luma8();
     let bright = picture.pixels().filter(|pixel| pixel.0[0] > 200).count();
     assert!(bright * 2 > picture.len(), "the page is light: {bright} of {} pixels", picture.len());
-    end(browser).await;
+    browser.end().await;
 }

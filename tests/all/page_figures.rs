@@ -6,7 +6,7 @@ use std::time::Duration;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
-use sightline_tests::bench::Bench;
+use sightline_tests::bench::picked;
 use sightline_tests::browser::Browser;
 use sightline_tests::scenario::short_approach;
 
@@ -53,9 +53,7 @@ fn difference(a: &[u8], b: &[u8]) -> (f64, f64) {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_panel_is_saved_as_svg_and_png_which_look_alike_and_a_plot_is_read_as_a_table() {
-    let bench = Bench::start(&short_approach()).await;
-    let browser = Browser::start().await;
-    bench.pick(&browser).await;
+    let (_bench, browser) = picked(&short_approach()).await;
     browser.evaluate(CATCH).await;
     browser.press("ArrowRight").await;
     browser.wait_status("a step with scores", "s.step === 1 && s.shown").await;

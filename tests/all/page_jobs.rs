@@ -3,15 +3,12 @@
 
 use std::time::{Duration, Instant};
 
-use sightline_tests::bench::Bench;
-use sightline_tests::browser::Browser;
+use sightline_tests::bench::picked;
 use sightline_tests::scenario::short_approach;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_study_is_cancelled_at_once_survives_a_reload_and_goes_on() {
-    let bench = Bench::start(&short_approach()).await;
-    let browser = Browser::start().await;
-    bench.pick(&browser).await;
+    let (_bench, browser) = picked(&short_approach()).await;
     browser.chord(&["Shift"], "6").await;
     browser.control("button", "Start the study").await;
     browser.click_on("button", "Start the study").await;
@@ -30,15 +27,12 @@ async fn a_study_is_cancelled_at_once_survives_a_reload_and_goes_on() {
     browser.gone("button", "Resume").await;
     browser.activate("button", "Cancel").await;
     browser.control("button", "Resume").await;
-    assert_eq!(browser.console_errors().await, Vec::<String>::new());
-    browser.close().await;
+    browser.end().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn the_tour_is_led_to_its_end_and_back_by_keys() {
-    let bench = Bench::start(&short_approach()).await;
-    let browser = Browser::start().await;
-    bench.pick(&browser).await;
+    let (_bench, browser) = picked(&short_approach()).await;
     browser.chord(&["Control"], "k").await;
     browser.control("textbox", "palette").await;
     browser.type_text("tour").await;
@@ -60,6 +54,5 @@ async fn the_tour_is_led_to_its_end_and_back_by_keys() {
     browser.press("ArrowRight").await;
     browser.wait_status("the next step", "s.step === 1 && s.shown").await;
     tokio::time::sleep(Duration::from_millis(300)).await;
-    assert_eq!(browser.console_errors().await, Vec::<String>::new());
-    browser.close().await;
+    browser.end().await;
 }

@@ -3,7 +3,7 @@
 
 use serde_json::{Value, json};
 use sightline_core::sim::Scenario;
-use sightline_tests::bench::Bench;
+use sightline_tests::bench::picked;
 use sightline_tests::browser::Browser;
 use sightline_tests::scenario::short_approach;
 
@@ -26,9 +26,7 @@ async fn drop_one(browser: &Browser, name: &str, bytes: &[u8]) {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn files_are_opened_by_dropping_bad_ones_are_told_why_and_a_recent_session_is_one_click_away() {
-    let bench = Bench::start(&short_approach()).await;
-    let browser = Browser::start().await;
-    bench.pick(&browser).await;
+    let (bench, browser) = picked(&short_approach()).await;
     let first = browser.status().await["session"].as_str().unwrap().to_owned();
 
     files(&browser, "dragover", &[("drive.toml", b"seed = 1")]).await;
@@ -87,6 +85,5 @@ async fn files_are_opened_by_dropping_bad_ones_are_told_why_and_a_recent_session
     browser
         .wait_status("the first session", &format!("s.session === '{first}' && s.targets === 1 && s.shown"))
         .await;
-    assert_eq!(browser.console_errors().await, Vec::<String>::new());
-    browser.close().await;
+    browser.end().await;
 }

@@ -64,12 +64,7 @@ fn difference(a: &RgbImage, b: &RgbImage) -> f64 {
 
 /// Brings one panel to the front and lets it fill the page.
 async fn fill_page(browser: &Browser, panel: &str) {
-    browser.chord(&["Control"], "k").await;
-    browser.control("textbox", "palette").await;
-    browser.type_text(&format!("show {panel}")).await;
-    browser.control("option", &format!("Show {panel}")).await;
-    browser.press("Enter").await;
-    browser.gone("textbox", "palette").await;
+    browser.show_panel(panel).await;
     browser.press("`").await;
     browser.control("button", "Restore").await;
     // The pointer rests where it changes nothing.
@@ -114,8 +109,7 @@ async fn every_panel_looks_as_it_was_last_seen() {
         browser.gone("button", "Restore").await;
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-    assert_eq!(browser.console_errors().await, Vec::<String>::new());
-    browser.close().await;
+    browser.end().await;
 }
 
 #[test]

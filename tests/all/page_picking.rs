@@ -2,7 +2,7 @@
 //! the plain page of a step for whom the viewer cannot run.
 
 use sightline_core::frames::Pixel;
-use sightline_tests::bench::{Bench, place};
+use sightline_tests::bench::{Bench, picked, place};
 use sightline_tests::browser::Browser;
 use sightline_tests::scenario::short_approach;
 
@@ -58,15 +58,12 @@ async fn a_bad_place_is_refused_with_the_reason_and_the_nearest_good_one_is_take
     browser.wait_status("pick mode", "s.pick_mode").await;
     browser.press("Escape").await;
     browser.wait_status("no pick mode", "!s.pick_mode && s.targets === 2").await;
-    assert_eq!(browser.console_errors().await, Vec::<String>::new());
-    browser.close().await;
+    browser.end().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn without_the_viewer_a_plain_page_of_the_same_step_is_offered() {
-    let bench = Bench::start(&short_approach()).await;
-    let browser = Browser::start().await;
-    bench.pick(&browser).await;
+    let (bench, browser) = picked(&short_approach()).await;
     browser.press("End").await;
     browser.wait_status("the last step", &format!("s.step === {} && s.shown", bench.stop_count - 1)).await;
     // The viewer stops as it does at a fault in it: the page says so and leads on.
@@ -110,6 +107,5 @@ async fn without_the_viewer_a_plain_page_of_the_same_step_is_offered() {
     let described = "return [...document.images].every(i => i.alt.length > 10 && i.naturalWidth > 0)";
     browser.wait_for("every image, described", described).await;
     browser.shot("plain").await;
-    assert_eq!(browser.console_errors().await, Vec::<String>::new());
-    browser.close().await;
+    browser.end().await;
 }

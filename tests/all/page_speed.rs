@@ -6,7 +6,7 @@
 use std::time::Duration;
 
 use sightline_core::frames::Pixel;
-use sightline_tests::bench::Bench;
+use sightline_tests::bench::{Bench, picked};
 use sightline_tests::browser::Browser;
 use sightline_tests::scenario::short_approach;
 use sightline_tests::server::{PIXEL, long_recording};
@@ -55,9 +55,7 @@ fn tell(what: &str, laps: &[Lap]) {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn steps_are_quick_an_idle_page_rests_and_memory_is_bounded() {
-    let bench = Bench::start(&short_approach()).await;
-    let browser = Browser::start().await;
-    bench.pick(&browser).await;
+    let (bench, browser) = picked(&short_approach()).await;
     let last = bench.stop_count - 1;
 
     // What was downloaded, and how long the first picture took.
@@ -118,8 +116,7 @@ async fn steps_are_quick_an_idle_page_rests_and_memory_is_bounded() {
         );
         assert!(end.page_bytes < start.page_bytes + GROWTH_LIMIT, "the page grows without end");
     }
-    assert_eq!(browser.console_errors().await, Vec::<String>::new());
-    browser.close().await;
+    browser.end().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -157,6 +154,5 @@ async fn a_long_recording_is_scrubbed_and_its_steps_come_when_they_are_asked_for
         frames.len()
     );
     browser.shot("scrubbed").await;
-    assert_eq!(browser.console_errors().await, Vec::<String>::new());
-    browser.close().await;
+    browser.end().await;
 }

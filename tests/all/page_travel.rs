@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use sightline_tests::bench::Bench;
+use sightline_tests::bench::picked;
 use sightline_tests::browser::Browser;
 use sightline_tests::scenario::short_approach;
 
@@ -10,21 +10,9 @@ async fn at(browser: &Browser, step: usize) {
     browser.wait_status("the step", &format!("s.step === {step} && s.shown")).await;
 }
 
-/// Goes to a place as a person writes it.
-async fn go_to(browser: &Browser, place: &str, step: usize) {
-    browser.press("g").await;
-    browser.control("textbox", "go to step").await;
-    browser.type_text(place).await;
-    browser.press("Enter").await;
-    browser.gone("textbox", "go to step").await;
-    at(browser, step).await;
-}
-
 #[tokio::test(flavor = "multi_thread")]
 async fn steps_stages_and_places_are_reached_by_key() {
-    let bench = Bench::start(&short_approach()).await;
-    let browser = Browser::start().await;
-    bench.pick(&browser).await;
+    let (bench, browser) = picked(&short_approach()).await;
     let last = bench.stop_count - 1;
     for (key, step) in [("ArrowRight", 1), ("End", last), ("ArrowLeft", last - 1), ("Home", 0)] {
         browser.press(key).await;
@@ -35,11 +23,11 @@ async fn steps_stages_and_places_are_reached_by_key() {
     browser.chord(&["Shift"], "ArrowLeft").await;
     at(&browser, 0).await;
     for (place, step) in [("3", 3), ("+1", 4), ("-2", 2), ("last", last), ("first", 0)] {
-        go_to(&browser, place, step).await;
+        browser.go_to(place, step).await;
     }
 
     // Down and Up go into the stages of the step; the panel Inspector and the address follow.
-    go_to(&browser, "2", 2).await;
+    browser.go_to("2", 2).await;
     let before = browser.status().await["stage"].as_str().unwrap().to_owned();
     browser.press("ArrowDown").await;
     browser.wait_status("the next stage", &format!("s.stage !== '{before}' && s.step === 2")).await;
@@ -55,19 +43,16 @@ async fn steps_stages_and_places_are_reached_by_key() {
     }
     browser.wait_status("the last stage", "s.stage === 'update' && s.step === 2").await;
     browser.shot("stage-update").await;
-    assert_eq!(browser.console_errors().await, Vec::<String>::new());
-    browser.close().await;
+    browser.end().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn play_goes_round_in_its_loop_both_ways_and_nothing_plays_by_itself() {
-    let bench = Bench::start(&short_approach()).await;
-    let browser = Browser::start().await;
-    bench.pick(&browser).await;
+    let (bench, browser) = picked(&short_approach()).await;
     assert_eq!(browser.status().await["playing"], 0, "nothing plays by itself");
-    go_to(&browser, "1", 1).await;
+    browser.go_to("1", 1).await;
     browser.press("[").await;
-    go_to(&browser, "3", 3).await;
+    browser.go_to("3", 3).await;
     browser.press("]").await;
     browser.says("loop 1 to 3").await;
     browser.press("l").await;
@@ -86,7 +71,7 @@ async fn play_goes_round_in_its_loop_both_ways_and_nothing_plays_by_itself() {
     browser.press("Backspace").await;
     browser.gone("button", "no loop").await;
     // Backwards it ends at the first step, forwards at the last.
-    go_to(&browser, "2", 2).await;
+    browser.go_to("2", 2).await;
     browser.press("j").await;
     browser.wait_status("the beginning", "s.playing === 0 && s.step === 0").await;
     browser.press(" ").await;
@@ -96,6 +81,5 @@ async fn play_goes_round_in_its_loop_both_ways_and_nothing_plays_by_itself() {
     browser.wait_status("backwards", "s.playing === -1").await;
     browser.press(" ").await;
     browser.wait_status("a pause", "s.playing === 0").await;
-    assert_eq!(browser.console_errors().await, Vec::<String>::new());
-    browser.close().await;
+    browser.end().await;
 }

@@ -97,6 +97,14 @@ impl Bench {
     }
 }
 
+/// A page with a target on the rock of `scenario` whose run has reached the last stop.
+pub async fn picked(scenario: &Scenario) -> (Bench, Browser) {
+    let bench = Bench::start(scenario).await;
+    let browser = Browser::start().await;
+    bench.pick(&browser).await;
+    (bench, browser)
+}
+
 /// The first target that the scenario's rule chooses: on a rock, lit, seen to the end.
 fn rock(scenario: &Scenario, traverse: &Traverse) -> Pixel {
     sim::choose_targets(traverse.world().unwrap(), scenario, traverse.index())[0]

@@ -211,6 +211,36 @@ impl Browser {
         panic!("waited {} s for {what}; the page says {}", LONG_PATIENCE.as_secs(), self.status().await);
     }
 
+    /// Goes to a place of the drive as a person writes it, and waits until that step is shown.
+    pub async fn go_to(&self, place: &str, step: usize) {
+        self.press("g").await;
+        self.control("textbox", "go to step").await;
+        self.type_text(place).await;
+        self.press("Enter").await;
+        self.gone("textbox", "go to step").await;
+        self.wait_status("the step", &format!("s.step === {step} && s.shown")).await;
+    }
+
+    /// Brings a panel to the front by the palette.
+    pub async fn show_panel(&self, name: &str) {
+        self.chord(&["Control"], "k").await;
+        self.control("textbox", "palette").await;
+        self.type_text(&format!("show {name}")).await;
+        self.control("option", &format!("Show {name}")).await;
+        self.press("Enter").await;
+        self.gone("textbox", "palette").await;
+        self.control("region", name).await;
+    }
+
+    /// Ends the browser, which has received no error in its console.
+    ///
+    /// # Panics
+    /// With the errors, when there are some.
+    pub async fn end(self) {
+        assert_eq!(self.console_errors().await, Vec::<String>::new());
+        self.close().await;
+    }
+
     /// Keeps a picture of the page in the folder that `SIGHTLINE_SHOTS` names, to be looked at.
     pub async fn shot(&self, name: &str) {
         if let Some(folder) = std::env::var_os("SIGHTLINE_SHOTS") {

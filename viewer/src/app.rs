@@ -11,7 +11,7 @@ use crate::net::{Net, Request};
 use crate::panels::{bars, card, export, help, limits, notes, open, palette, timeline, tour as bubbles};
 use crate::state::{Connection, State};
 use crate::status::Publisher;
-use crate::{figure, keep, keys, picture, theme, tour};
+use crate::{figure, keep, keys, picture, pointed, theme, tour};
 
 /// Where a page begins.
 #[derive(Clone, Debug, PartialEq)]
@@ -176,6 +176,15 @@ impl SightlineApp {
         out
     }
 
+    /// Takes in what the pointer rests on: the next frame shows it in all panels.
+    fn point(&mut self, context: &Context, commands: &mut Vec<Command>) {
+        let pointed = pointed::taken_out(commands);
+        if pointed != self.state.pointed {
+            self.state.pointed = pointed;
+            context.request_repaint();
+        }
+    }
+
     /// Takes the keys in. Steps are taken at once, so that the frame of the key shows where they lead; the rest, which
     /// follows what the page shows, is returned.
     fn take_keys(&mut self, context: &Context) -> Vec<Command> {
@@ -317,6 +326,7 @@ impl eframe::App for SightlineApp {
         let keys = self.take_keys(&context);
         // What the pointer did comes first: Esc at the end of a drag takes back what the drag tried.
         let mut commands = self.lay_out(ui);
+        self.point(&context, &mut commands);
         commands.extend(keys);
         self.follow(&context, commands);
         if let Some(url) = self.state.open_url.take() {

@@ -5,7 +5,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use sightline_core::session::wire::Problem;
+use sightline_core::session::wire::{Problem, StopDetail};
 use sightline_core::trace::{ArrayName, StepTrace};
 
 use crate::raster::Raster;
@@ -64,6 +64,13 @@ pub enum Key {
         /// Which of the two.
         eye: Eye,
     },
+    /// A stop with its cameras.
+    Stop {
+        /// The traverse.
+        traverse: String,
+        /// The stop.
+        step: usize,
+    },
     /// What a step saw and decided.
     Trace(StepKey),
     /// An array of a step.
@@ -73,6 +80,8 @@ pub enum Key {
 /// Something that was loaded.
 #[derive(Clone)]
 pub enum Item {
+    /// Of [`Key::Stop`].
+    Stop(Arc<StopDetail>),
     /// Of [`Key::Trace`].
     Trace(Arc<StepTrace>),
     /// Of [`Key::Image`] and of a [`Key::Array`] that is a picture.
@@ -84,6 +93,7 @@ pub enum Item {
 impl Item {
     fn bytes(&self) -> usize {
         match self {
+            Self::Stop(_) => size_of::<StopDetail>(),
             Self::Trace(_) => TRACE_BYTES,
             Self::Raster(raster) => raster.bytes(),
             Self::Table(table) => table.bytes(),
@@ -194,11 +204,19 @@ impl Cache {
         waiting.min_by(f64::total_cmp)
     }
 
+    /// A stop with its cameras.
+    pub fn stop(&self, key: &Key) -> Slot<'_, StopDetail> {
+        self.slot(key).and(|item| match item {
+            Item::Stop(stop) => Some(stop.as_ref()),
+            _ => None,
+        })
+    }
+
     /// A step's record.
     pub fn trace(&self, key: &StepKey) -> Slot<'_, StepTrace> {
         self.slot(&Key::Trace(key.clone())).and(|item| match item {
             Item::Trace(trace) => Some(trace.as_ref()),
-            Item::Raster(_) | Item::Table(_) => None,
+            _ => None,
         })
     }
 
@@ -206,7 +224,7 @@ impl Cache {
     pub fn raster(&self, key: &Key) -> Slot<'_, Raster> {
         self.slot(key).and(|item| match item {
             Item::Raster(raster) => Some(raster.as_ref()),
-            Item::Trace(_) | Item::Table(_) => None,
+            _ => None,
         })
     }
 
@@ -214,7 +232,7 @@ impl Cache {
     pub fn table(&self, key: &Key) -> Slot<'_, Table> {
         self.slot(key).and(|item| match item {
             Item::Table(table) => Some(table.as_ref()),
-            Item::Trace(_) | Item::Raster(_) => None,
+            _ => None,
         })
     }
 

@@ -7,6 +7,7 @@ pub use crate::stage::Stage;
 
 use crate::aim::Aim;
 use crate::layout::workspace::LayoutCommand;
+use crate::pointed::Pointed;
 use crate::shape_view::ShapeView;
 use crate::state::calculator::Calculator;
 use crate::state::studies::Order;
@@ -230,6 +231,8 @@ pub enum Command {
     Table(crate::layout::Pane),
     /// The limits of trackability.
     Limits(crate::state::limits::Ask),
+    /// The pointer rests on something.
+    Point(Pointed),
 }
 
 impl Command {

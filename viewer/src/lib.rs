@@ -21,6 +21,7 @@
 //! | `theme` | colours, text styles and spacing, and nowhere else |
 //! | `access` | the page for a screen reader: egui's tree as elements of the document |
 //! | `aim` | choosing a place in the left image |
+//! | `pointed` | what the pointer rests on, which every panel shows in its own way |
 //! | `tour` | the six bubbles for a new user |
 //! | `status` | the machine-readable status for tests in a browser |
 
@@ -49,6 +50,7 @@ pub mod theme;
 pub mod access;
 pub mod status;
 pub mod aim;
+pub mod pointed;
 pub mod tour;
 pub mod as_text;
 pub mod figure;

@@ -112,6 +112,8 @@ pub struct Canvas {
     pub transform: Transform,
     /// The view that the pointer asked for, where it asked.
     pub moved: Option<View2d>,
+    /// Where the pointer is, also while it is on a handle that lies on the canvas.
+    pointer: Option<Pos2>,
 }
 
 impl Canvas {
@@ -123,7 +125,8 @@ impl Canvas {
         painter.rect_filled(rect, 0.0, theme::well());
         let transform = Transform::new(view, region, rect);
         let moved = asked_for(ui, &response, &transform, region);
-        Self { response, painter, transform, moved }
+        let pointer = ui.input(|input| input.pointer.hover_pos()).filter(|_| ui.rect_contains_pointer(rect));
+        Self { response, painter, transform, moved, pointer }
     }
 
     /// Paints a texture over the pixels of `region`.
@@ -134,7 +137,7 @@ impl Canvas {
 
     /// The pixel under the pointer, where that is on the pixels of `region`.
     pub fn hovered(&self, region: PixelRect) -> Option<Pixel> {
-        let pixel = self.transform.to_pixel(self.response.hover_pos()?);
+        let pixel = self.transform.to_pixel(self.pointer?);
         region.contains(pixel).then_some(pixel)
     }
 

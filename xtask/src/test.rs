@@ -63,7 +63,7 @@ fn name_programs(command: &mut Command, browser: &chromium::Browser) {
     command
         .env("SIGHTLINE_CHROMIUM", &browser.chromium)
         .env("SIGHTLINE_CHROMEDRIVER", &browser.chromedriver)
-        .env("SIGHTLINE_BINARY", cmd::sightline_binary());
+        .env("SIGHTLINE_BIN", cmd::sightline_binary());
 }
 
 /// How many tests ended in which way.

@@ -5,7 +5,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::camera::MastAngles;
+use crate::camera::{Camera, MastAngles};
 use crate::designate::Place;
 use crate::frames::{Pixel, PoseRecord};
 use crate::session::view::SessionView;
@@ -93,6 +93,19 @@ pub struct StopView {
     pub right_size: [u32; 2],
     /// Whether the images are there; those of a simulated traverse are rendered when they are first asked for.
     pub ready: bool,
+}
+
+/// One stop with its cameras.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct StopDetail {
+    /// What the traverse says of it.
+    pub stop: StopView,
+    /// The left camera in the rover frame, m and px.
+    pub left: Camera,
+    /// The right camera in the rover frame, m and px.
+    pub right: Camera,
+    /// The angles of the mast; none without a mast.
+    pub mast: Option<MastAngles>,
 }
 
 /// Begins a session.

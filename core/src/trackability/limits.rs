@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use crate::error::{Error, Result};
 use crate::limits::Domain;
-use crate::settings::{Changes, unknown};
+use crate::settings::{Changes, checked};
 use crate::settings_group;
 
 settings_group! {
@@ -62,15 +62,8 @@ impl TrackabilityLimits {
     pub fn with(&self, changes: &Changes) -> Result<Self> {
         let table = Self::table();
         let mut document = serde_json::to_value(self).map_err(|e| Error::setting("", e.to_string()))?;
-        for (key, value) in changes {
-            let info = table.iter().find(|info| info.key == *key).ok_or_else(|| unknown(key, &table))?;
-            if let Some(problem) = info.domain.problem_with(value) {
-                return Err(Error::setting(key, problem));
-            }
-            if info.default.is_u64() && !value.is_u64() {
-                return Err(Error::setting(key, format!("must be a whole number, not {value}")));
-            }
-            document[key] = value.clone();
+        for (info, value) in checked(changes, &table)? {
+            document[&info.key] = value.clone();
         }
         for [risky, bad] in PAIRS {
             let (from, to) = (&document[risky], &document[bad]);

@@ -211,6 +211,21 @@ impl Traverse {
         Ok(pair)
     }
 
+    /// One image of a stop, the left or the right one: what is wrong with the other does not matter.
+    ///
+    /// # Errors
+    /// As [`Self::capture`], of this image.
+    pub fn capture_one(&self, step: usize, is_left: bool) -> Result<Arc<GrayImage>> {
+        let stop = self.stop(step)?;
+        match self.capture(step) {
+            Ok(pair) => Ok(if is_left { pair.left } else { pair.right }),
+            Err(_) if is_left => {
+                self.read_image(step, "left", &stop.left, &self.cameras[step].left).map(Arc::new)
+            }
+            Err(_) => self.read_image(step, "right", &stop.right, &self.cameras[step].right).map(Arc::new),
+        }
+    }
+
     fn stop(&self, step: usize) -> Result<&Stop> {
         let count = self.stop_count();
         let missing =

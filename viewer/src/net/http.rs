@@ -146,6 +146,7 @@ fn item_path(key: &Key) -> String {
         Key::Image { traverse, step, eye } => {
             format!("traverses/{traverse}/steps/{step}/images/{}.png", eye.word())
         }
+        Key::Stop { traverse, step } => format!("traverses/{traverse}/steps/{step}"),
         Key::Trace(step) => step_path(step),
         Key::Array(step, name) => format!("{}/arrays/{}.npy", step_path(step), name.word()),
     }
@@ -211,6 +212,7 @@ fn query_of(limits: &Changes) -> String {
 
 fn read_item(key: &Key, bytes: &[u8], context: &egui::Context) -> Result<Item, Problem> {
     let raster = match key {
+        Key::Stop { .. } => return Ok(Item::Stop(Arc::new(parse(bytes)?))),
         Key::Trace(_) => return Ok(Item::Trace(Arc::new(parse(bytes)?))),
         Key::Image { step, eye, .. } => {
             Raster::from_png(context, &format!("the {} image of step {step}", eye.word()), bytes)

@@ -1,16 +1,17 @@
 //! A derived column over the steps: any expression, plotted without computing the run again.
 
 use egui::{RichText, Ui, vec2};
-use egui_plot::{HoverPosition, Line, Plot, PlotPoint, Points, VLine};
+use egui_plot::{HoverPosition, Line, Plot, PlotPoint, Points};
 use sightline_core::session::query::RunAnswer;
 
-use super::plots::{over_steps, pieces};
+use super::plots::{cursors, over_steps, pieces, point};
 use crate::command::{Command, Go};
 use crate::panels::digits;
 use crate::state::State;
 use crate::state::ask::Ask;
 use crate::state::ask::derived::Derived;
-use crate::{theme, thin};
+use crate::theme;
+use crate::thin;
 
 /// The most points that are drawn of a line: what a wide screen can tell apart, twice.
 const POINTS: usize = 4000;
@@ -34,15 +35,14 @@ pub fn show(ui: &mut Ui, state: &State, at: usize, height: f32, is_last: bool, o
             HoverPosition::Elsewhere { .. } => None,
         });
     let response = plot.show(ui, |plot| {
-        plot.vline(
-            VLine::new("", state.cursor.step as f64).color(theme::accent()).width(1.5).allow_hover(false),
-        );
+        cursors(plot, state);
         for piece in of_run.map(points).unwrap_or_default() {
             plot.line(Line::new("", piece.clone()).color(colour).width(1.5).allow_hover(false));
             plot.points(Points::new("", thin::marks(piece)).color(colour).radius(2.5));
         }
         plot.pointer_coordinate()
     });
+    point(&response, last, out);
     let pointer: Option<PlotPoint> = response.inner;
     let label = in_words(derived, of_run, state.cursor.step);
     response.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &label));

@@ -1,34 +1,26 @@
 //! The right image with the epipolar curve of the target, its range ticks and the stereo match.
 
 use egui::{Ui, vec2};
-use sightline_core::camera::Camera;
 use sightline_core::frames::Pixel;
 use sightline_core::image::PixelRect;
 use sightline_core::trace::StepTrace;
 
 use super::compare::marks as compared;
+use super::epipolar::Curve;
 use super::features::marks;
 use super::images_left::{STATUS, ready_image, status_line};
 use super::legend::{self, Entry};
 use crate::cache::Eye;
-use crate::command::{Command, Layer, Panel};
+use crate::command::{Command, Layer, Mode, Panel};
 use crate::overlay::{Line, Mark, Overlay};
+use crate::pointed::Pointed;
 use crate::raster::Raster;
 use crate::state::{State, run_letter};
 use crate::theme;
 use crate::view2d::Canvas;
 
-/// Ranges with a tick, m.
-const TICKS_M: [f64; 12] = [0.5, 1.0, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 50.0, 100.0];
-
-/// Nearest and farthest range of the whole curve, m.
-const CURVE_M: (f64, f64) = (0.4, 1000.0);
-
-/// Samples of the whole curve, at equal steps of inverse range.
-const SAMPLES: usize = 160;
-
-/// Two ticks are at least this far apart, points.
-const TICK_GAP: f32 = 34.0;
+/// From how near to the curve its range is told, px.
+const NEAR_PX: f64 = 40.0;
 
 /// Shows the right image.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
@@ -54,7 +46,13 @@ fn picture(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) 
         paint_marks(&canvas, trace, state);
     }
     compared::paint_right(&Overlay::new(&canvas.painter, &canvas.transform), state);
-    status_line(ui, &canvas, raster, region);
+    let pointed = paint_pointed(&canvas, state);
+    let here = canvas.hovered(region);
+    status_line(ui, &canvas, raster, region, pointed);
+    if let Some(pixel) = here {
+        paint_range(&canvas, state, pixel);
+        out.push(Command::Point(Pointed::Right(pixel)));
+    }
     if let Some(view) = canvas.moved {
         out.push(Command::View(Panel::Right, view));
     }
@@ -85,14 +83,12 @@ fn paint_marks(canvas: &Canvas, trace: &StepTrace, state: &State) {
     let overlay = Overlay::new(&canvas.painter, &canvas.transform);
     let (Some(pointing), Some(located)) = (&trace.point_mast, &trace.locate) else { return };
     if let Some(left_pixel) = located.left_pixel.filter(|_| state.shows(Layer::Curve)) {
-        let curve = |range_m: f64| on_curve(&pointing.left, &pointing.right, left_pixel, range_m);
-        let whole: Vec<Pixel> = ranges().filter_map(curve).collect();
-        overlay.line(&whole, theme::search(), Line::Dotted);
+        let curve = Curve { from: &pointing.left, to: &pointing.right, pixel: left_pixel };
+        curve.paint(canvas, theme::search(), Line::Dotted);
         if let Some(stereo) = trace.template().and_then(|e| e.point_stereo.as_ref()) {
             let searched: Vec<Pixel> = stereo.curve.iter().map(|point| point.pixel).collect();
             overlay.line(&searched, theme::search(), Line::Solid);
         }
-        paint_ticks(canvas, &overlay, curve);
     }
     if trace.predict.is_some()
         && state.shows(Layer::Prediction)
@@ -114,55 +110,43 @@ fn paint_marks(canvas: &Canvas, trace: &StepTrace, state: &State) {
     }
 }
 
-/// Ranges at equal steps of inverse range, far end first.
-fn ranges() -> impl Iterator<Item = f64> {
-    let (near, far) = (1.0 / CURVE_M.0, 1.0 / CURVE_M.1);
-    (0..SAMPLES).map(move |i| 1.0 / (far + (near - far) * i as f64 / (SAMPLES - 1) as f64))
+/// What is pointed at in another panel; what that is, in words.
+fn paint_pointed(canvas: &Canvas, state: &State) -> Option<String> {
+    let pointed = state.pointed.filter(|_| state.marks)?;
+    if let Pointed::Range(range_m) = pointed {
+        let pixel = target_curve(state)?.at(range_m)?;
+        let overlay = Overlay::new(&canvas.painter, &canvas.transform);
+        overlay.mark(pixel, Mark::Plus, theme::accent());
+        return Some(format!("range {range_m:.2} m"));
+    }
+    let (pixel, (from, to)) = (pointed.left()?, state.eyes()?);
+    let curve = Curve { from, to, pixel };
+    curve.paint(canvas, theme::accent(), Line::Dashed);
+    // While a target is picked the surface is known: where along its curve the other eye sees the place.
+    let cell = state.trackability_map().filter(|_| state.mode == Mode::Pick).and_then(|map| map.at(pixel));
+    if let Some(seen) = cell.and_then(|cell| curve.at(cell.range_m?)) {
+        Overlay::new(&canvas.painter, &canvas.transform).mark(seen, Mark::Ring, theme::accent());
+    }
+    Some(format!("curve of x {:.1}  y {:.1} of the left image", pixel.x, pixel.y))
 }
 
-/// Where the right camera sees the point of the left pixel's ray at a range.
-fn on_curve(left: &Camera, right: &Camera, left_pixel: Pixel, range_m: f64) -> Option<Pixel> {
-    right.project(&left.ray(left_pixel)?.at(range_m))
-}
-
-/// Ticks across the curve with their range; where they would crowd, some are left out.
-fn paint_ticks(canvas: &Canvas, overlay: &Overlay<'_>, curve: impl Fn(f64) -> Option<Pixel>) {
-    let mut last: Option<egui::Pos2> = None;
-    for range_m in TICKS_M {
-        let (Some(at), Some(beyond)) = (curve(range_m), curve(range_m * 1.01)) else { continue };
-        let screen = canvas.transform.to_screen(at);
-        if !canvas.transform.rect.contains(screen)
-            || last.is_some_and(|last| last.distance(screen) < TICK_GAP)
-        {
-            continue;
-        }
-        let length = at.distance(beyond).max(1e-9);
-        let across = (-(beyond.y - at.y) / length, (beyond.x - at.x) / length);
-        let reach = 5.0 / canvas.transform.scale;
-        let ends = [-reach, reach].map(|t| at.offset(across.0 * t, across.1 * t));
-        overlay.line(&ends, theme::search(), Line::Solid);
-        overlay.words(at, vec2(-8.0, 15.0), &format!("{range_m}"), theme::search());
-        last = Some(screen);
+/// The range of the target's curve next to the pointer, m.
+fn paint_range(canvas: &Canvas, state: &State, pixel: Pixel) {
+    let near = target_curve(state).and_then(|curve| curve.nearest(pixel));
+    if let Some((range_m, off_px)) = near.filter(|(_, off_px)| state.marks && *off_px <= NEAR_PX) {
+        let words = format!("{range_m:.2} m, {off_px:.1} px beside the curve");
+        Overlay::new(&canvas.painter, &canvas.transform).words(
+            pixel,
+            vec2(14.0, 16.0),
+            &words,
+            theme::accent(),
+        );
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_curve_is_sampled_from_far_to_near() {
-        let all: Vec<f64> = ranges().collect();
-        assert!((all[0] - CURVE_M.1).abs() < 1e-6 && (all[SAMPLES - 1] - CURVE_M.0).abs() < 1e-9);
-        assert!(all.windows(2).all(|pair| pair[0] > pair[1]));
-    }
-
-    #[test]
-    fn the_curve_of_two_parallel_eyes_ends_at_the_same_pixel_far_away() {
-        let mast = sightline_core::camera::Mast::spirit();
-        let pixel = mast.left_in_head.centre_pixel();
-        let far = on_curve(&mast.left_in_head, &mast.right_in_head, pixel, 1000.0).unwrap();
-        let near = on_curve(&mast.left_in_head, &mast.right_in_head, pixel, 2.0).unwrap();
-        assert!(far.x > near.x, "nearer points lie further left in the right image");
-    }
+/// The curve of the target's left pixel.
+pub fn target_curve(state: &State) -> Option<Curve<'_>> {
+    let trace = state.trace()?;
+    let (pointing, located) = (trace.point_mast.as_ref()?, trace.locate.as_ref()?);
+    Some(Curve { from: &pointing.left, to: &pointing.right, pixel: located.left_pixel? })
 }

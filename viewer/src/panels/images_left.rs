@@ -9,6 +9,7 @@ use sightline_core::trace::StepTrace;
 
 use super::broken;
 use super::compare::{bar, marks as compared, modes};
+use super::epipolar::Curve;
 use super::exposure;
 use super::features::marks;
 use super::legend::{self, Entry};
@@ -16,6 +17,7 @@ use super::{picking, what_if};
 use crate::cache::{Eye, Slot};
 use crate::command::{Command, Layer, Panel};
 use crate::overlay::{Line, Mark, Overlay, template_quad};
+use crate::pointed::Pointed;
 use crate::raster::Raster;
 use crate::state::{State, row_of, run_letter};
 use crate::view2d::Canvas;
@@ -66,7 +68,9 @@ fn picture(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) 
     picking::show(ui, &canvas, raster, state, out);
     marks::hover(&canvas, state, |feature| Some(feature.pixel));
     what_if::over_image(ui, &canvas, state, out);
-    status_line(ui, &canvas, raster, region);
+    let pointed = paint_pointed(&canvas, state);
+    status_line(ui, &canvas, raster, region, pointed);
+    out.extend(canvas.hovered(region).map(|pixel| Command::Point(Pointed::Left(pixel))));
     if let Some(view) = canvas.moved {
         out.push(Command::View(Panel::Left, view));
     }
@@ -283,8 +287,33 @@ fn paint_wrapped(canvas: &Canvas, at: egui::Pos2, words: &str) {
     canvas.painter.galley(corner, galley, theme::lost());
 }
 
-/// Pixel and grey value under the pointer, magnification, and the convention.
-pub fn status_line(ui: &mut Ui, canvas: &Canvas, raster: &Raster, region: PixelRect) {
+/// What is pointed at in another panel; what that is, in words.
+fn paint_pointed(canvas: &Canvas, state: &State) -> Option<String> {
+    let overlay = Overlay::new(&canvas.painter, &canvas.transform);
+    match state.pointed.filter(|_| state.marks)? {
+        Pointed::Right(pixel) => {
+            let (to, from) = state.eyes()?;
+            Curve { from, to, pixel }.paint(canvas, theme::accent(), Line::Dashed);
+            Some(format!("curve of x {:.1}  y {:.1} of the right image", pixel.x, pixel.y))
+        }
+        Pointed::Score(pixel) => {
+            let quad = template_quad(pixel, template_side(state), &nalgebra::Matrix2::identity());
+            overlay.outline(&quad, theme::accent(), Line::Dashed);
+            overlay.mark(pixel, Mark::Plus, theme::accent());
+            Some(format!("template at x {:.0}  y {:.0}", pixel.x, pixel.y))
+        }
+        _ => None,
+    }
+}
+
+/// Pixel and grey value under the pointer, else `pointed`; magnification, and the convention.
+pub fn status_line(
+    ui: &mut Ui,
+    canvas: &Canvas,
+    raster: &Raster,
+    region: PixelRect,
+    pointed: Option<String>,
+) {
     ui.horizontal(|ui| {
         ui.set_height(STATUS - 6.0);
         match canvas.hovered(region) {
@@ -296,7 +325,8 @@ pub fn status_line(ui: &mut Ui, canvas: &Canvas, raster: &Raster, region: PixelR
                 ui.label(theme::number(grey).size(11.0));
             }
             None => {
-                ui.label(theme::note(format!("{} × {} px", region.width, region.height)));
+                let size = || format!("{} × {} px", region.width, region.height);
+                ui.label(theme::note(pointed.unwrap_or_else(size)));
             }
         }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {

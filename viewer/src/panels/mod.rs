@@ -8,6 +8,7 @@ pub mod budget;
 pub mod compare;
 pub mod export;
 pub mod derived;
+pub mod epipolar;
 pub mod exposure;
 pub mod features;
 pub mod figure_menu;

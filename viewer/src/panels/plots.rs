@@ -4,8 +4,8 @@ use std::collections::HashMap;
 
 use egui::{Color32, Id, Ui, vec2};
 use egui_plot::{
-    GridInput, GridMark, HLine, HoverPosition, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotUi, Points,
-    VLine,
+    GridInput, GridMark, HLine, HoverPosition, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotResponse,
+    PlotUi, Points, VLine,
 };
 use sightline_core::session::view::RunView;
 use sightline_core::settings::TrackerKind;
@@ -16,6 +16,7 @@ use super::sheets::sheet::state_of;
 use super::sheets::{Column, Sheet};
 use crate::command::{Command, Go};
 use crate::overlay::{self, Mark};
+use crate::pointed::Pointed;
 use crate::state::State;
 use crate::state::compare::Other;
 use crate::state::tracker::confidence_of;
@@ -249,9 +250,7 @@ fn plot(
                 HoverPosition::Elsewhere { .. } => None,
             });
     let response = plot.show(ui, |plot| {
-        plot.vline(
-            VLine::new("", state.cursor.step as f64).color(theme::accent()).width(1.5).allow_hover(false),
-        );
+        cursors(plot, state);
         for &value in &chart.thresholds {
             let line = HLine::new("", value).color(theme::failed()).style(LineStyle::dashed_dense());
             plot.hline(line.width(1.0).allow_hover(false));
@@ -265,9 +264,27 @@ fn plot(
         let clicked = plot.response().clicked().then(|| plot.pointer_coordinate()).flatten();
         clicked.map(|at: PlotPoint| at.x.round().clamp(0.0, last) as usize)
     });
+    point(&response, last, out);
     let plotted: Vec<(&str, f64)> = state.row().map(|row| asked_of(chart, row)).unwrap_or_default();
     super::breakpoints::menu(&response.response, &plotted, out);
     response.inner
+}
+
+/// The cursor's step, and the one that is pointed at in another panel.
+pub(super) fn cursors(plot: &mut PlotUi<'_>, state: &State) {
+    let line = |step: usize| VLine::new("", step as f64).color(theme::accent()).allow_hover(false);
+    plot.vline(line(state.cursor.step).width(1.5));
+    if let Some(step) = state.pointed_step() {
+        plot.vline(line(step).width(1.0).style(LineStyle::dotted_dense()));
+    }
+}
+
+/// Tells the other panels at which step the pointer is.
+pub(super) fn point<T>(response: &PlotResponse<T>, last: f64, out: &mut Vec<Command>) {
+    if let Some(at) = response.response.hover_pos() {
+        let step = response.transform.value_from_position(at).x.round().clamp(0.0, last) as usize;
+        out.push(Command::Point(Pointed::Step(step)));
+    }
 }
 
 /// What a chart shows of a row, as expressions with their values.

@@ -11,10 +11,12 @@ use egui_plot::{
 use sightline_core::locate::template::point_stereo::PointStereo;
 use sightline_core::trace::StepTrace;
 
+use super::image_right::target_curve;
 use super::names;
 use super::plots::pieces;
 use crate::command::Command;
 use crate::overlay::{self, Mark};
+use crate::pointed::Pointed;
 use crate::state::State;
 use crate::{panels, theme};
 
@@ -31,7 +33,7 @@ const TICKS_M: [f64; 22] = [
 const TICK_GAP: f64 = 0.09;
 
 /// Shows the profile.
-pub fn show(ui: &mut Ui, state: &State, _out: &mut Vec<Command>) {
+pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let stereo = state.trace().and_then(StepTrace::template).and_then(|e| e.point_stereo.as_ref());
     let (Some(trace), Some(stereo)) = (state.trace(), stereo) else {
         panels::missing(ui, PURPOSE, &state.missing_template());
@@ -66,7 +68,19 @@ pub fn show(ui: &mut Ui, state: &State, _out: &mut Vec<Command>) {
             egui_plot::Corner::LeftBottom,
             egui_plot::CoordinatesFormatter::new(|at, _| format!("{:.2} m, score {:.2}", 1.0 / at.x, at.y)),
         );
-    plot.show(ui, |plot| paint(plot, stereo, predicted, threshold, run));
+    let pointed = match state.pointed.filter(|_| state.marks) {
+        Some(Pointed::Right(pixel)) => target_curve(state).and_then(|curve| curve.nearest(pixel)),
+        _ => None,
+    };
+    let hovered = plot.show(ui, |plot| {
+        paint(plot, stereo, predicted, threshold, run);
+        if let Some((range_m, _)) = pointed {
+            plot.vline(VLine::new("", 1.0 / range_m).color(theme::accent()).width(1.0).allow_hover(false));
+        }
+        plot.pointer_coordinate().filter(|_| plot.response().hovered())
+    });
+    let range_m = hovered.inner.filter(|at| at.x > 0.0).map(|at| 1.0 / at.x);
+    out.extend(range_m.map(|range_m| Command::Point(Pointed::Range(range_m))));
 }
 
 fn names_of(run: Color32, is_predicted: bool) -> Vec<(Mark, Color32, String)> {

@@ -13,6 +13,7 @@ use crate::cache::Slot;
 use crate::command::{Command, Panel};
 use crate::contour::contour;
 use crate::overlay::{Line, Mark, Overlay};
+use crate::pointed::Pointed;
 use crate::raster::{Look, Raster};
 use crate::state::State;
 use crate::view2d::Canvas;
@@ -74,7 +75,13 @@ pub(super) fn recorded(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         paint_marks(&canvas, trace, matched, theme::run(state.cursor.run));
     }
     warn_of_edge(&canvas, matched);
-    status(&mut left, &canvas, raster, region, matched);
+    let here = canvas.hovered(region).map(|pixel| Pixel::new(pixel.x.round(), pixel.y.round()));
+    let pointed = state.pointed_left().filter(|pixel| region.contains(*pixel));
+    if let Some(pixel) = pointed.filter(|_| here.is_none()) {
+        Overlay::new(&canvas.painter, &canvas.transform).mark(pixel, Mark::Plus, theme::accent());
+    }
+    status(&mut left, here.or(pointed), raster, region, matched);
+    out.extend(here.map(|pixel| Command::Point(Pointed::Score(pixel))));
     let bar = bar.shrink2(vec2(4.0, 2.0)).with_max_y(bar.bottom() - STATUS);
     colour_bar(ui, bar, matched, threshold, theme::run(state.cursor.run));
     ui.advance_cursor_after_rect(area);
@@ -166,11 +173,11 @@ fn warn_of_edge(canvas: &Canvas, matched: &TemplateMatch) {
     }
 }
 
-/// Pixel and score under the pointer, else what the surface holds.
-fn status(ui: &mut Ui, canvas: &Canvas, raster: &Raster, region: PixelRect, matched: &TemplateMatch) {
+/// The pixel that is pointed at with its score, else what the surface holds.
+fn status(ui: &mut Ui, pointed: Option<Pixel>, raster: &Raster, region: PixelRect, matched: &TemplateMatch) {
     ui.horizontal(|ui| {
         ui.set_height(STATUS - 6.0);
-        let Some(pixel) = canvas.hovered(region) else {
+        let Some(pixel) = pointed else {
             let flat = if matched.flat_positions > 0 {
                 format!(", {} flat", matched.flat_positions)
             } else {

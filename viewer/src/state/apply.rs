@@ -92,6 +92,7 @@ impl State {
             Command::CloseCard => self.messages.close_card(),
             Command::Limits(ask) => self.ask_limits(ask),
             Command::Table(pane) => self.turn_table(pane),
+            Command::Point(at) => self.pointed = Some(at),
         }
     }
 

@@ -124,7 +124,12 @@ impl State {
             Reply::Designated { target, session } => self.designated(target, *session),
             Reply::Run(run) => self.took_run(request, *run),
             Reply::Rerun(stream) => {
-                self.messages.note_with_link("Rerun shows this session.", stream.viewer_url.clone());
+                let words = format!(
+                    "Rerun shows this session. A viewer of your own takes `rerun {}`. Whoever uses this machine can read the \
+                     stream: it asks for no token.",
+                    stream.stream_url
+                );
+                self.messages.note_with_link(words, stream.viewer_url.clone());
                 self.open_url = Some(stream.viewer_url);
             }
             Reply::Done => match request {

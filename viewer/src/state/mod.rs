@@ -61,6 +61,7 @@ use crate::cache::{Cache, Eye, Key, Slot, StepKey};
 use crate::command::{Layer, Mode, Panel, Stage};
 use crate::link::Fragment;
 use crate::net::Request;
+use crate::pointed::Pointed;
 use crate::raster::Raster;
 use crate::shape_view::ShapeView;
 use crate::stretch::Stretch;
@@ -147,6 +148,8 @@ pub struct State {
     pub ask: Asking,
     /// Panels that are looked at as tables.
     pub tables: HashSet<crate::layout::Pane>,
+    /// What the pointer rests on, in whatever panel.
+    pub pointed: Option<Pointed>,
     outbox: Vec<Request>,
     sync: Sync,
     /// The aligned left camera of the step that was asked for last: it takes a while to compute.
@@ -218,6 +221,7 @@ impl State {
             files: Files::default(),
             ask: Asking::default(),
             tables: HashSet::new(),
+            pointed: None,
             outbox: Vec::new(),
             sync: Sync { linked, ..Sync::default() },
             aligned: egui::mutex::Mutex::default(),
@@ -279,6 +283,11 @@ impl State {
     /// The name of an image of a stop.
     pub fn image_key(&self, step: usize, eye: Eye) -> Option<Key> {
         Some(Key::Image { traverse: self.traverse.as_ref()?.id.clone(), step, eye })
+    }
+
+    /// The name of the cameras of a stop.
+    pub fn stop_detail_key(&self, step: usize) -> Option<Key> {
+        Some(Key::Stop { traverse: self.traverse.as_ref()?.id.clone(), step })
     }
 
     /// An image of the cursor's stop.

@@ -61,6 +61,8 @@ impl State {
     fn want_step(&self, step: usize, is_neighbour: bool, keys: &mut Vec<Key>) {
         let computed = self.row_at(step).and_then(|_| self.step_key(step));
         keys.extend(computed.clone().map(Key::Trace));
+        // A step that was computed has its cameras in its record.
+        keys.extend(self.stop_detail_key(step).filter(|_| computed.is_none()));
         // The images of a simulated stop take a while: only the one that is looked at is worth that.
         let is_ready = self.traverse.as_ref().and_then(|t| t.stops.get(step)).is_some_and(|stop| stop.ready);
         if is_ready || !is_neighbour {

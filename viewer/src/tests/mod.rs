@@ -25,6 +25,7 @@ mod tour;
 mod why;
 mod undo;
 mod following;
+mod pointed;
 mod opening;
 mod problems;
 
@@ -88,7 +89,14 @@ impl<'a> Shown<'a> {
     fn click(&mut self, label: &str) -> Vec<Command> {
         self.harness.get_by_label(label).click();
         self.harness.run_steps(2);
-        std::mem::take(self.harness.state_mut())
+        self.asked()
+    }
+
+    /// What was asked for since the last time, without what the pointer was over meanwhile.
+    fn asked(&mut self) -> Vec<Command> {
+        let mut asked = std::mem::take(self.harness.state_mut());
+        crate::pointed::taken_out(&mut asked);
+        asked
     }
 }
 

@@ -102,7 +102,7 @@ fn a_click_on_the_band_goes_to_its_step_and_one_in_the_lane_breaks_there() {
             shown.harness.run_steps(1);
         }
         shown.harness.run_steps(1);
-        shown.harness.state().clone()
+        shown.asked()
     };
     assert!(click(at(4.0, 25.0)).contains(&Command::Go(Go::Step(4))));
     assert_eq!(click(at(1.0, 8.0)), [Command::Ask(Ask::BreakAt(1))]);

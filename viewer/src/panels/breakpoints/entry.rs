@@ -30,6 +30,7 @@ pub(super) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let mut text = before.to_owned();
     let read = Expression::read(before);
     let id = Id::unique("expression box");
+    one_tab_a_frame(ui, id);
     let is_entered = ui.input(|input| input.key_pressed(Key::Enter));
     // A whole expression is set by Enter; only an unfinished one takes the suggestion by it.
     let is_whole = Expression::read(&with_typed(ui, before)).is_ok();
@@ -62,6 +63,28 @@ pub(super) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     buttons(ui, state, &read, out);
     if !before.trim().is_empty() {
         verdict(ui, before, &read);
+    }
+}
+
+/// Keeps what was typed behind Tab for the next frame: Tab takes the suggestion for what stood there when it was pressed, and
+/// who types fast sends it together with the next letters.
+fn one_tab_a_frame(ui: &Ui, field: Id) {
+    let id = field.with("held back");
+    let held = ui.data_mut(|data| data.remove_temp::<Vec<Event>>(id)).unwrap_or_default();
+    let has_focus = ui.memory(|memory| memory.has_focus(field));
+    let is_tab = |event: &Event| matches!(event, Event::Key { key: Key::Tab, pressed: true, .. });
+    let behind = ui.input_mut(|input| {
+        input.events.splice(0..0, held);
+        let tab = input.events.iter().position(is_tab).filter(|_| has_focus);
+        let mut behind = tab.map(|tab| input.events.split_off(tab + 1)).unwrap_or_default();
+        if !behind.iter().any(|event| matches!(event, Event::Text(_)) || is_tab(event)) {
+            input.events.append(&mut behind);
+        }
+        behind
+    });
+    if !behind.is_empty() {
+        ui.data_mut(|data| data.insert_temp(id, behind));
+        ui.ctx().request_repaint();
     }
 }
 

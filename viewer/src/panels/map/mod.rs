@@ -4,6 +4,7 @@
 //! Beside the whole drive stands the target's neighbourhood, where the positions converge (`convergence`).
 
 pub(in crate::panels) mod convergence;
+mod pointed;
 
 use egui::{Color32, Rect, Ui, UiBuilder, vec2};
 use egui_plot::{Arrows, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotPoints, PlotUi, Points};
@@ -15,6 +16,7 @@ use super::names;
 use super::plots::{few_marks, plain};
 use crate::command::{Command, Go};
 use crate::overlay::{self, Mark};
+use crate::pointed::Pointed;
 use crate::state::{State, run_letter};
 use crate::{panels, theme, thin};
 
@@ -114,10 +116,14 @@ fn drive(ui: &mut Ui, state: &State, stops: &[StopView], run: Option<&RunView>, 
             let points = Points::new("", on_map(&truth)).color(theme::truth()).radius(6.0);
             plot.points(points.shape(MarkerShape::Plus));
         }
-        plot.response().clicked().then(|| nearest_stop(plot, stops)).flatten()
+        nearest_stop(plot, stops)
     });
+    pointed::paint(ui, state, stops, &response.transform);
     if let Some(step) = response.inner {
-        out.push(Command::Go(Go::Step(step)));
+        out.push(Command::Point(Pointed::Step(step)));
+        if response.response.clicked() {
+            out.push(Command::Go(Go::Step(step)));
+        }
     }
 }
 
@@ -208,7 +214,7 @@ fn truth_in_site(state: &State) -> Option<(Point3, f64)> {
 
 /// The stop nearest to the pointer, where one is near.
 fn nearest_stop(plot: &PlotUi<'_>, stops: &[StopView]) -> Option<usize> {
-    let pointer = plot.response().interact_pointer_pos()?;
+    let pointer = plot.response().hover_pos().or(plot.response().interact_pointer_pos())?;
     let distance = |stop: &StopView| {
         let [east, north] = on_map(&Point3::from(stop.site_from_rover.position_m));
         plot.screen_from_plot(PlotPoint::new(east, north)).distance(pointer)

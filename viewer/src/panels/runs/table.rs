@@ -41,7 +41,11 @@ pub struct Row<'a> {
 /// How many of the runs are shown.
 pub(super) fn count(state: &State) -> String {
     let (shown, all) = (rows(state).len(), state.all_runs().count());
-    if shown == all { format!("{all} runs") } else { format!("{shown} of {all} runs") }
+    match (shown, all) {
+        (1, 1) => "1 run".to_owned(),
+        (shown, all) if shown == all => format!("{all} runs"),
+        (shown, all) => format!("{shown} of {all} runs"),
+    }
 }
 
 /// The rows that the filter lets through, as they are sorted; what has no value comes last.

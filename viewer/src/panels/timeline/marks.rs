@@ -52,6 +52,13 @@ pub(super) fn hits(state: &State, scale: &Scale) -> Vec<Hit> {
     joined
 }
 
+/// Paints the step that is pointed at, here or in another panel.
+pub(super) fn pointed(painter: &Painter, all: Rect, step: usize, scale: &Scale) {
+    let x = scale.middle_of(step);
+    let ends = [pos2(x, all.top()), pos2(x, all.bottom())];
+    painter.extend(Shape::dotted_line(&ends, theme::accent(), 4.0, 1.0));
+}
+
 /// Paints the lane above the bands: event ticks and breakpoints' marks, with a number where one stands for several.
 pub(super) fn lane(painter: &Painter, lane: Rect, state: &State, scale: &Scale) {
     painter.hline(lane.x_range(), lane.bottom() - 0.5, Stroke::new(1.0, theme::line()));

@@ -16,6 +16,7 @@ use self::cells::cell_of;
 pub use self::cells::{Cell, cell};
 use self::lod::{Scale, Span};
 use crate::command::{Command, Go};
+use crate::pointed::Pointed;
 use crate::state::ask::Ask;
 use crate::state::{State, run_letter};
 use crate::theme;
@@ -106,8 +107,12 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     }
     point(&response, state, &bands, &frames, (lane, &scale), out);
     keys_and_readers(ui, &response, state, &bands, out);
+    if let Some(step) = state.pointed_step() {
+        marks::pointed(&painter, all, step, &scale);
+    }
     if let Some(pointer) = response.hover_pos() {
         let step = scale.step_at(pointer.x);
+        out.push(Command::Point(Pointed::Step(step)));
         let band = frames.iter().position(|frame| frame.y_range().contains(pointer.y)).map(|at| &bands[at]);
         response.on_hover_text_at_pointer(words(state, band, step, lane.contains(pointer)));
     }

@@ -1,5 +1,7 @@
 //! The template strip: how the reference became what was compared, and what remained.
 
+mod pointed;
+
 use egui::{Align2, Pos2, Rect, Sense, Ui, pos2, vec2};
 use sightline_core::trace::{ArrayName, StepTrace};
 
@@ -78,7 +80,8 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         return;
     }
     let area = ui.available_rect_before_wrap();
-    let count = patches.len() as f32;
+    let has_pointer = state.trace().is_some_and(pointed::is_there);
+    let count = (patches.len() + usize::from(has_pointer)) as f32;
     let across = (area.width() - BETWEEN * (count - 1.0)) / count;
     let side = across.min(area.height() - WORDS.0 - WORDS.1).max(16.0);
     let width = side * count + BETWEEN * (count - 1.0);
@@ -90,6 +93,10 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         let frame = Rect::from_min_size(at, vec2(side, side));
         show_patch(ui, state, patch, frame, out);
         at.x += side + BETWEEN;
+    }
+    if has_pointer {
+        arrow(ui, pos2(at.x - BETWEEN / 2.0, at.y + side / 2.0), &pointed::score(state));
+        pointed::show(ui, state, Rect::from_min_size(at, vec2(side, side)));
     }
     ui.advance_cursor_after_rect(area);
 }
@@ -108,16 +115,10 @@ fn arrow(ui: &Ui, middle: Pos2, words: &str) {
 fn show_patch(ui: &mut Ui, state: &State, patch: &Patch, frame: Rect, out: &mut Vec<Command>) {
     let response = ui.interact(frame, ui.scope_id().with(("patch", patch.array)), Sense::click());
     let painter = ui.painter();
-    let above = frame.center_top() - vec2(0.0, 3.0);
-    painter.text(above, Align2::CENTER_BOTTOM, &patch.title, theme::image_font(), theme::text());
+    paint_title(ui, frame, &patch.title);
     let border = if response.hovered() { theme::accent() } else { theme::line() };
     match state.array(patch.array) {
-        Slot::Ready(raster) => {
-            view2d::checker(painter, frame);
-            let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
-            painter.image(raster.texture.id(), frame, whole, theme::UNTINTED);
-            statistics(ui, raster, frame);
-        }
+        Slot::Ready(raster) => paint_patch(ui, raster, frame),
         Slot::Failed(_) => {
             painter.rect_filled(frame, 0.0, theme::well());
             painter.text(
@@ -146,6 +147,20 @@ fn show_patch(ui: &mut Ui, state: &State, patch: &Patch, frame: Rect, out: &mut 
     if response.on_hover_text(explain(patch.array)).clicked() {
         out.push(Command::SelectStage(patch.stage));
     }
+}
+
+/// What a patch is, above it.
+fn paint_title(ui: &Ui, frame: Rect, title: &str) {
+    let above = frame.center_top() - vec2(0.0, 3.0);
+    ui.painter().text(above, Align2::CENTER_BOTTOM, title, theme::image_font(), theme::text());
+}
+
+/// A patch with its statistics below it.
+fn paint_patch(ui: &Ui, raster: &Raster, frame: Rect) {
+    view2d::checker(ui.painter(), frame);
+    let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+    ui.painter().image(raster.texture.id(), frame, whole, theme::UNTINTED);
+    statistics(ui, raster, frame);
 }
 
 /// Mean and standard deviation below a patch.

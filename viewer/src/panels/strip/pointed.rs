@@ -1,0 +1,112 @@
+//! The last place of the strip: what would be compared where the pointer rests, in the scores or in the left image.
+//!
+//! It is the left image's own pixels about the nearest whole pixel, where the match has them between pixels.
+
+use std::sync::Arc;
+
+use egui::{Align2, Id, Rect, Sense, Ui};
+use sightline_core::frames::Pixel;
+use sightline_core::image::PixelRect;
+use sightline_core::locate::template::match_template::TemplateMatch;
+use sightline_core::trace::{ArrayName, StepTrace};
+
+use super::{paint_patch, paint_title};
+use crate::cache::Eye;
+use crate::panels::images_left::template_side;
+use crate::panels::surface::region_of;
+use crate::pointed::window;
+use crate::raster::Raster;
+use crate::state::State;
+use crate::theme;
+
+/// What the place is called.
+pub(super) const TITLE: &str = "at the pointer";
+
+/// Whether the step compared windows, so that there is something to point at.
+pub(super) fn is_there(trace: &StepTrace) -> bool {
+    matched(trace).is_some()
+}
+
+fn matched(trace: &StepTrace) -> Option<&TemplateMatch> {
+    let matched = trace.template()?.match_template.as_ref()?;
+    matched.descent.is_none().then_some(matched)
+}
+
+/// The score of the place that is pointed at, in words: above the arrow.
+pub(super) fn score(state: &State) -> String {
+    let found = state.pointed_left().and_then(|pixel| score_at(state, pixel));
+    found.map_or_else(String::new, |(word, value)| match value {
+        Some(value) => format!("{word} {value:.2}"),
+        None => "excluded".to_owned(),
+    })
+}
+
+/// The measure and its value at the nearest position; none outside of the searched ones.
+fn score_at(state: &State, pixel: Pixel) -> Option<(&'static str, Option<f32>)> {
+    let matched = matched(state.trace()?)?;
+    let raster = state.array(ArrayName::Surface).ready()?;
+    let region = region_of(matched.search_window, raster.size());
+    let at = |v: f64, from: i32| v.round() as i64 - i64::from(from);
+    region
+        .contains(pixel)
+        .then(|| (matched.measure.word(), raster.at(at(pixel.x, region.x), at(pixel.y, region.y))))
+}
+
+/// Shows the place.
+pub(super) fn show(ui: &mut Ui, state: &State, frame: Rect) {
+    paint_title(ui, frame, TITLE);
+    let words = match state.pointed_left().map(|pixel| cut(ui, state, pixel)) {
+        Some(Some(raster)) => {
+            paint_patch(ui, &raster, frame);
+            let score = score(state);
+            let words = if score.is_empty() { "outside of the search window" } else { &score };
+            format!("{TITLE}: {words}")
+        }
+        Some(None) => empty(ui, frame, "leaves the image"),
+        None => empty(ui, frame, "point at the scores or at the left image"),
+    };
+    let stroke = egui::Stroke::new(1.0, theme::line());
+    ui.painter().rect_stroke(frame, 0.0, stroke, egui::StrokeKind::Outside);
+    let response = ui.interact(frame, ui.scope_id().with("pointed patch"), Sense::hover());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &words));
+    response.on_hover_text("The left image about the pixel that is pointed at, in whatever panel.");
+}
+
+/// The place without a patch, and what is missing.
+fn empty(ui: &Ui, frame: Rect, words: &str) -> String {
+    let painter = ui.painter();
+    painter.rect_filled(frame, 0.0, theme::well());
+    let galley = painter.layout(words.to_owned(), theme::image_font(), theme::weak(), frame.width() - 6.0);
+    let area = Align2::CENTER_CENTER.anchor_size(frame.center(), galley.size());
+    painter.galley(area.min, galley, theme::weak());
+    format!("{TITLE}: {words}")
+}
+
+/// The patch, made once for as long as the pointer stays on the pixel; none where it would leave the image.
+fn cut(ui: &Ui, state: &State, pixel: Pixel) -> Option<Arc<Raster>> {
+    let image = state.image(Eye::Left).ready()?;
+    let side = match state.array(ArrayName::Rolled).ready() {
+        Some(rolled) => rolled.size()[0],
+        None => template_side(state),
+    };
+    let area = window(pixel, side, image.size())?;
+    let of = (state.traverse.as_ref()?.id.clone(), state.cursor.step, area);
+    let id = Id::unique("the patch that is pointed at");
+    let kept = ui.data(|data| data.get_temp::<Kept>(id)).filter(|kept| kept.of == of);
+    let kept = kept.unwrap_or_else(|| Kept { of, raster: Arc::new(raster(ui, image, area)) });
+    ui.data_mut(|data| data.insert_temp(id, kept.clone()));
+    Some(kept.raster)
+}
+
+/// The patch of the last frame: traverse, step and pixels.
+#[derive(Clone)]
+struct Kept {
+    of: (String, usize, PixelRect),
+    raster: Arc<Raster>,
+}
+
+fn raster(ui: &Ui, image: &Raster, area: PixelRect) -> Raster {
+    let (x, y) = (area.x as u32, area.y as u32);
+    let values = image::imageops::crop_imm(&image.values, x, y, area.width, area.height).to_image();
+    Raster::from_values(ui.ctx(), ArrayName::Matched, values)
+}

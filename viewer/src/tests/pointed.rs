@@ -1,0 +1,95 @@
+//! What the pointer rests on in one panel is shown by the others.
+
+use std::sync::Arc;
+
+use sightline_core::frames::Pixel;
+use sightline_core::session::wire::StopDetail;
+
+use super::fixture::{PIXEL, at_step, trace, without_target};
+use super::{Command, Pane, Shown};
+use crate::cache::Item;
+use crate::pointed::Pointed;
+use crate::state::State;
+
+fn pointing(context: &egui::Context, at: Pointed) -> State {
+    let mut state = at_step(context, 2);
+    state.pointed = Some(at);
+    state
+}
+
+fn pane(pane: Pane, at: Pointed) -> Shown<'static> {
+    Shown::pane(pane, move |context| pointing(context, at))
+}
+
+/// What a panel tells while the pointer is in its middle.
+fn told(pane: Pane) -> Vec<Pointed> {
+    let mut shown = Shown::pane(pane, |context| at_step(context, 2));
+    shown.harness.hover_at(egui::pos2(260.0, 180.0));
+    shown.harness.run_steps(2);
+    let told = std::mem::take(shown.harness.state_mut()).into_iter();
+    told.filter_map(|command| if let Command::Point(at) = command { Some(at) } else { None }).collect()
+}
+
+#[test]
+fn a_pixel_of_the_left_image_has_its_curve_its_score_and_its_patch() {
+    let at = Pointed::Left(PIXEL.offset(4.0, -3.0));
+    pane(Pane::Right, at).says("curve of x 516.3  y 477.6 of the left image");
+    pane(Pane::Surface, at).says("x 516  y 478");
+    // The image of the fixed drive is small, so that the window about the target lies outside of it.
+    pane(Pane::Strip, at).says("at the pointer: leaves the image");
+    pane(Pane::Strip, Pointed::Left(Pixel::new(30.0, 31.0)))
+        .says("at the pointer: outside of the search window");
+}
+
+#[test]
+fn a_pixel_of_the_right_image_and_a_place_of_the_scores_are_in_the_left_one() {
+    let words = "curve of x 450.0  y 480.0 of the right image";
+    pane(Pane::Left, Pointed::Right(Pixel::new(450.0, 480.0))).says(words);
+    pane(Pane::Left, Pointed::Score(Pixel::new(515.0, 482.0))).says("template at x 515  y 482");
+    pane(Pane::Right, Pointed::Range(5.0)).says("range 5.00 m");
+}
+
+#[test]
+fn hidden_marks_hide_what_is_pointed_at() {
+    let at = Pointed::Left(PIXEL);
+    let hidden = move |context: &egui::Context| {
+        let mut state = pointing(context, at);
+        state.marks = false;
+        state
+    };
+    Shown::pane(Pane::Strip, hidden).says("at the pointer: point at the scores or at the left image");
+}
+
+#[test]
+fn panels_tell_what_the_pointer_is_over() {
+    assert!(matches!(told(Pane::Left)[..], [.., Pointed::Left(_)]));
+    assert!(matches!(told(Pane::Right)[..], [.., Pointed::Right(_)]));
+    assert!(matches!(told(Pane::StereoProfile)[..], [.., Pointed::Range(_)]));
+    assert!(matches!(told(Pane::Plots)[..], [.., Pointed::Step(_)]));
+    let [.., Pointed::Score(at)] = told(Pane::Surface)[..] else { panic!("a place of the scores") };
+    assert_eq!(at, Pixel::new(at.x.round(), at.y.round()), "scores are at whole pixels");
+}
+
+#[test]
+fn before_there_is_a_target_the_stop_tells_its_cameras() {
+    let at = Pixel::new(20.0, 30.0);
+    let mut state = without_target();
+    state.pointed = Some(Pointed::Left(at));
+    assert!(state.eyes().is_none());
+    let key = state.stop_detail_key(0).unwrap();
+    assert!(state.wanted().contains(&key), "the page asks for them");
+    let pointing = trace(0).point_mast.unwrap();
+    let stop = state.stop().unwrap().clone();
+    let detail = StopDetail { stop, left: pointing.left, right: pointing.right, mast: None };
+    state.cache.arrived(key, Ok(Item::Stop(Arc::new(detail))), 0.0);
+    assert!(state.eyes().is_some());
+    // A step that was computed has them in its record.
+    let computed = at_step(&egui::Context::default(), 2);
+    assert!(!computed.wanted().contains(&computed.stop_detail_key(2).unwrap()));
+}
+
+#[test]
+fn only_another_step_than_the_present_one_is_pointed_at() {
+    let pointed = |step| pointing(&egui::Context::default(), Pointed::Step(step)).pointed_step();
+    assert_eq!((pointed(4), pointed(2), pointed(99)), (Some(4), None, None));
+}
