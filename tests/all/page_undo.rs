@@ -121,7 +121,7 @@ async fn the_limits_of_trackability_are_changed_and_the_map_is_made_by_them() {
     // What cannot be is told at once, with the name of the field, and nothing is lost.
     browser.set_value("textbox", "edge_risky_focus", "many").await;
     browser.click_on("button", "Make the map with these").await;
-    browser.says("edge_risky_focus").await;
+    browser.says("edge_risky_focus: must be a number").await;
     browser.shot("limits-wrong").await;
     browser.set_value("textbox", "edge_risky_focus", "0").await;
     browser.set_value("textbox", "edge_bad_px", "0").await;

@@ -106,17 +106,24 @@ impl Browser {
         }
     }
 
-    /// Clicks a control with the pointer, in its middle.
+    /// Clicks a control with the pointer, in its middle, once it can be clicked and has come to rest: windows find their size
+    /// within a few frames.
+    ///
+    /// # Panics
+    /// When it stays disabled.
     pub async fn click_on(&self, role: &str, name: &str) {
         let start = Instant::now();
-        let mut control = self.control(role, name).await;
-        while control.disabled {
-            assert!(start.elapsed() < PATIENCE, "{role} “{name}” is disabled");
-            tokio::time::sleep(Duration::from_millis(50)).await;
-            control = self.control(role, name).await;
+        let mut before = self.control(role, name).await;
+        loop {
+            tokio::time::sleep(Duration::from_millis(80)).await;
+            let control = self.control(role, name).await;
+            if !control.disabled && control.rect == before.rect {
+                let (x, y) = control.middle();
+                return self.click(x, y).await;
+            }
+            assert!(start.elapsed() < PATIENCE, "{role} “{name}” is disabled, or never at rest");
+            before = control;
         }
-        let (x, y) = control.middle();
-        self.click(x, y).await;
     }
 
     /// Chooses what an open list calls so; the list of targets calls its runs the same.

@@ -1,6 +1,7 @@
 //! The bars: title and status at the top, stages and the newest message at the bottom, and the banner.
 
-use egui::{Align, Button, ComboBox, Layout, RichText, Ui};
+use egui::scroll_area::ScrollBarVisibility;
+use egui::{Align, Button, ComboBox, Layout, RichText, ScrollArea, Ui};
 use sightline_core::target::TrackingState;
 use sightline_core::trace::StepTrace;
 
@@ -13,6 +14,9 @@ use crate::state::{Connection, State, run_letter};
 use crate::state::{exports, files};
 use crate::theme;
 
+/// How wide the buttons on the right are taken to be before they were laid out once, points.
+const BUTTONS: f32 = 320.0;
+
 /// The top bar: what is open, where the cursor is, and what can be done with the whole.
 pub fn top(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.horizontal_centered(|ui| {
@@ -20,8 +24,19 @@ pub fn top(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         ui.separator();
         traverse_choice(ui, state, out);
         ui.separator();
-        choosers::show(ui, state, out);
-        status(ui, state, out);
+        // The buttons keep their place: what is left of it can be scrolled where there is too much, as with four runs.
+        let id = ui.scope_id().with("the buttons' width");
+        let buttons = ui.data(|data| data.get_temp::<f32>(id)).unwrap_or(BUTTONS);
+        let room = ui.available_width() - buttons - 2.0 * ui.spacing().item_spacing.x;
+        let middle =
+            ScrollArea::horizontal().id_salt("status").max_width(room.max(60.0)).auto_shrink([true, false]);
+        middle.scroll_bar_visibility(ScrollBarVisibility::AlwaysHidden).show(ui, |ui| {
+            ui.horizontal_centered(|ui| {
+                choosers::show(ui, state, out);
+                status(ui, state, out);
+            });
+        });
+        let right = ui.max_rect().right();
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let sheet = ui.add(Button::new("?").min_size(egui::vec2(26.0, 24.0)));
             if sheet
@@ -42,9 +57,10 @@ pub fn top(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
                 out.push(Command::Exports(exports::Ask::Open));
             }
             let open = ui.add(Button::new("Open"));
-            if open.on_hover_text("Files, recent sessions, drives (Ctrl+O)").clicked() {
+            if open.clone().on_hover_text("Files, recent sessions, drives (Ctrl+O)").clicked() {
                 out.push(Command::Files(files::Ask::Open));
             }
+            ui.data_mut(|data| data.insert_temp(id, right - open.rect.left()));
         });
     });
 }

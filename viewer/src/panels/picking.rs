@@ -141,19 +141,19 @@ pub fn words(cell: &Cell) -> String {
 /// In pick mode: verdict, loupe and aim, the designation on a click, and what a refusal offers.
 pub fn show(ui: &mut Ui, canvas: &Canvas, raster: &Raster, state: &State, out: &mut Vec<Command>) {
     let border = canvas.transform.rect.shrink(1.0);
-    let corner = border.left_bottom() + vec2(10.0, -14.0);
     if state.mode != Mode::Pick {
         if state.session.as_ref().is_some_and(|session| session.targets.is_empty()) {
-            paint_words(&canvas.painter, corner, "Press T, then click the rock to track.", theme::accent());
+            paint_hint(canvas, border, "Press T, then click the rock to track.");
         }
         return;
     }
     canvas.painter.rect_stroke(border, 0.0, Stroke::new(2.0, theme::accent()), egui::StrokeKind::Inside);
-    paint_words(&canvas.painter, corner, &hint(state), theme::accent());
+    paint_hint(canvas, border, &hint(state));
     legend(ui, canvas, state, out);
     offer(ui, canvas, state, out);
     let [width, height] = raster.size();
-    let hovered = canvas.hovered(PixelRect::whole(width, height));
+    // On a button that lies on the image nothing is picked.
+    let hovered = canvas.hovered(PixelRect::whole(width, height)).filter(|_| canvas.response.hovered());
     let described = state.trackability.aim.or(hovered);
     let text = described_words(state, described);
     canvas.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, text.clone()));
@@ -175,6 +175,19 @@ pub fn show(ui: &mut Ui, canvas: &Canvas, raster: &Raster, state: &State, out: &
             out.push(Command::Pick(pixel));
         }
     }
+}
+
+/// Words along the lower border, in as many lines as they need.
+fn paint_hint(canvas: &Canvas, border: Rect, words: &str) {
+    let room = border.shrink2(vec2(10.0, 7.0));
+    let galley = canvas.painter.layout(words.to_owned(), theme::image_font(), theme::accent(), room.width());
+    let corner = room.left_bottom() - vec2(0.0, galley.size().y);
+    canvas.painter.rect_filled(
+        Rect::from_min_size(corner, galley.size()).expand2(vec2(3.0, 1.0)),
+        2.0,
+        theme::scrim(),
+    );
+    canvas.painter.galley(corner, galley, theme::accent());
 }
 
 /// What can be done, and how far the map is.

@@ -12,6 +12,7 @@ use sightline_core::trace::{ArrayName, StepTrace};
 
 use super::{paint_patch, paint_title};
 use crate::cache::Eye;
+use crate::overlay::{Mark, paint_mark};
 use crate::panels::images_left::template_side;
 use crate::panels::surface::region_of;
 use crate::pointed::window;
@@ -21,6 +22,9 @@ use crate::theme;
 
 /// What the place is called.
 pub(super) const TITLE: &str = "at the pointer";
+
+/// From this width on an empty place has room for words, points.
+const WORDS_FROM: f32 = 100.0;
 
 /// Whether the step compared windows, so that there is something to point at.
 pub(super) fn is_there(trace: &StepTrace) -> bool {
@@ -69,13 +73,19 @@ pub(super) fn show(ui: &mut Ui, state: &State, frame: Rect) {
     ui.painter().rect_stroke(frame, 0.0, stroke, egui::StrokeKind::Outside);
     let response = ui.interact(frame, ui.scope_id().with("pointed patch"), Sense::hover());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &words));
-    response.on_hover_text("The left image about the pixel that is pointed at, in whatever panel.");
+    response.on_hover_text(format!(
+        "{words}\nThe left image about the pixel that is pointed at, in whatever panel."
+    ));
 }
 
 /// The place without a patch, and what is missing.
 fn empty(ui: &Ui, frame: Rect, words: &str) -> String {
     let painter = ui.painter();
     painter.rect_filled(frame, 0.0, theme::well());
+    if frame.width() < WORDS_FROM {
+        paint_mark(painter, frame.center(), Mark::Plus, theme::weak(), 6.0);
+        return format!("{TITLE}: {words}");
+    }
     let galley = painter.layout(words.to_owned(), theme::image_font(), theme::weak(), frame.width() - 6.0);
     let area = Align2::CENTER_CENTER.anchor_size(frame.center(), galley.size());
     painter.galley(area.min, galley, theme::weak());
