@@ -28,6 +28,7 @@ mod page_panels;
 mod page_picking;
 mod page_speed;
 mod page_travel;
+mod page_trackers;
 mod page_trouble;
 mod page_undo;
 mod recorded_cameras;

@@ -12,7 +12,7 @@ use crate::state::messages::Weight;
 use crate::state::tracker::confidence_of;
 use crate::state::{Connection, State, run_letter};
 use crate::state::{exports, files};
-use crate::theme;
+use crate::{panels, theme};
 
 /// How wide the buttons on the right are taken to be before they were laid out once, points.
 const BUTTONS: f32 = 320.0;
@@ -72,7 +72,7 @@ fn traverse_choice(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let choice = ComboBox::from_id_salt("traverse").width(170.0).selected_text(name).show_ui(ui, |ui| {
         for entry in list {
             let is_open = open.is_some_and(|traverse| traverse.id == entry.id);
-            if ui.selectable_label(is_open, &entry.name).clicked() {
+            if panels::entry(ui, is_open, &entry.name).clicked() {
                 out.push(Command::OpenTraverse(entry.id.clone()));
             }
         }

@@ -7,7 +7,7 @@ use crate::command::Command;
 use crate::raster::Raster;
 use crate::state::State;
 use crate::stretch::Stretch;
-use crate::theme;
+use crate::{panels, theme};
 
 /// Height of the row, points.
 const HEIGHT: f32 = 20.0;
@@ -44,7 +44,7 @@ fn choice(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) {
     let shown = choice.selected_text(RichText::new(present.word()).size(11.0)).show_ui(ui, |ui| {
         for stretch in [Stretch::None, Stretch::Auto, Stretch::NEUTRAL] {
             let is_present = stretch.word() == present.word();
-            if ui.selectable_label(is_present, stretch.word()).clicked() && !is_present {
+            if panels::entry(ui, is_present, stretch.word()).clicked() && !is_present {
                 out.push(Command::SetStretch(stretch));
             }
         }

@@ -66,6 +66,15 @@ pub fn missing(ui: &mut Ui, purpose: &str, sentence: &str) {
     ui.advance_cursor_after_rect(space);
 }
 
+/// An entry of an open list. Whoever chooses it closes the list: by pointer and key it closes by itself, by a screen reader not.
+pub fn entry(ui: &mut Ui, is_chosen: bool, words: &str) -> egui::Response {
+    let response = ui.selectable_label(is_chosen, words);
+    if response.clicked() {
+        ui.close();
+    }
+    response
+}
+
 /// What is smaller than this is the rounding of a computation in metres or pixels, not a measurement.
 const ROUNDING: f64 = 1e-12;
 

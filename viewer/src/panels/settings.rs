@@ -65,7 +65,7 @@ fn presets(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             ui.set_min_width(300.0);
             for preset in state.configurations.all() {
                 let is_chosen = now.is_some_and(|now| now.name == preset.name);
-                if ui.selectable_label(is_chosen, preset.name).clicked() {
+                if panels::entry(ui, is_chosen, preset.name).clicked() {
                     out.push(Command::UsePreset(preset.name));
                 }
                 ui.add(egui::Label::new(theme::note(preset.description)).wrap());
@@ -167,7 +167,9 @@ fn edit(ui: &mut Ui, info: &SettingInfo, value: &Value) -> Option<Value> {
                 .selected_text(RichText::new(&chosen).size(11.0));
             let shown = choice.show_ui(ui, |ui| {
                 for word in words {
-                    ui.selectable_value(&mut chosen, word.clone(), word);
+                    if panels::entry(ui, chosen == *word, word).clicked() {
+                        chosen.clone_from(word);
+                    }
                 }
             });
             shown.response.accessible_name(&info.key);

@@ -57,8 +57,10 @@ fn form(ui: &mut Ui, state: &State, chosen: &StudyInfo, out: &mut Vec<Command>) 
         let choice = ComboBox::from_id_salt("study").width(150.0).selected_text(&chosen.name);
         let shown = choice.show_ui(ui, |ui| {
             for info in state.studies.infos.iter().flatten() {
-                ui.selectable_value(&mut order.study, info.name.clone(), &info.name)
-                    .on_hover_text(&info.question);
+                let is_chosen = order.study == info.name;
+                if panels::entry(ui, is_chosen, &info.name).on_hover_text(&info.question).clicked() {
+                    order.study.clone_from(&info.name);
+                }
             }
         });
         shown.response.accessible_name("which study");

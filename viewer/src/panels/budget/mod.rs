@@ -46,7 +46,9 @@ fn inputs(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         let choice = ComboBox::from_id_salt("pair").width(160.0).selected_text(calculator.pair.name());
         let shown = choice.show_ui(ui, |ui| {
             for pair in Pair::all() {
-                ui.selectable_value(&mut calculator.pair, pair, pair.name());
+                if panels::entry(ui, calculator.pair == pair, pair.name()).clicked() {
+                    calculator.pair = pair;
+                }
             }
         });
         shown.response.accessible_name("cameras");

@@ -6,7 +6,7 @@ use sightline_core::session::compare::Alignment;
 use crate::command::Command;
 use crate::compare::{Ask, Closeness, View};
 use crate::state::State;
-use crate::theme;
+use crate::{panels, theme};
 
 /// Shows the row, where runs are compared or the target is held still.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
@@ -82,7 +82,7 @@ fn choice<T: Copy + PartialEq, const N: usize>(
     let choice = ComboBox::from_id_salt(salt).width(84.0).selected_text(RichText::new(word).size(11.5));
     let shown = choice.show_ui(ui, |ui| {
         for (value, word, help) in all {
-            if ui.selectable_label(value == present, word).on_hover_text(help).clicked() {
+            if panels::entry(ui, value == present, word).on_hover_text(help).clicked() {
                 chosen(value);
             }
         }

@@ -5,7 +5,7 @@ use sightline_core::session::compare::{RUNS_MAX, RunName};
 
 use crate::command::Command;
 use crate::compare::Ask;
-use crate::panels::compare::mark;
+use crate::panels::{self, compare::mark};
 use crate::state::State;
 use crate::theme;
 
@@ -19,7 +19,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.spacing_mut().item_spacing.x = 4.0;
     mark(ui, state.own_look());
     chooser(ui, state, 0, Some(own), |ui, label, name| {
-        if ui.selectable_label(name == own, label).clicked() {
+        if panels::entry(ui, name == own, label).clicked() {
             out.push(Command::Look { target: name.target, run: name.run });
         }
     });
@@ -41,7 +41,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         let present = chosen.map(|other| other.name);
         let mut asked = None;
         chooser(ui, state, place + 1, present, |ui, label, name| {
-            if name != own && ui.selectable_label(present == Some(name), label).clicked() {
+            if name != own && panels::entry(ui, present == Some(name), label).clicked() {
                 asked = Some(Some(name));
             }
         });
