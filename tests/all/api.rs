@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use axum::http::{Method, header};
 use serde_json::{Value, json};
+use sightline_core::session::wire::StopDetail;
 use sightline_tests::server::{PIXEL, TestServer, request, small_drive, small_recording};
 
 /// Where the steps of a run are.
@@ -175,10 +176,28 @@ async fn a_stop_without_its_image_is_a_fault_of_that_step_alone() {
     assert!(run["rows"][4]["ncc"].as_f64().unwrap() > 0.8, "{run}");
     let image = format!("traverses/{}/steps/2/images/right.png", server.traverse);
     assert!(server.get(&image).await.problem(422, "file").contains("step 2"));
-    assert_eq!(
-        server.get(&format!("traverses/{}/steps/3/images/right.png", server.traverse)).await.status,
-        200
-    );
+    // The other eye of that stop and the next stop are there.
+    for there in ["2/images/left.png", "3/images/right.png"] {
+        let path = format!("traverses/{}/steps/{there}", server.traverse);
+        assert_eq!(server.get(&path).await.status, 200, "{there}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_stop_tells_its_cameras() {
+    let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
+    let server = TestServer::open(drive.path(), folder.path());
+    let path = format!("traverses/{}/steps", server.traverse);
+    let detail: StopDetail =
+        serde_json::from_value(server.get(&format!("{path}/1")).await.expect(200)).unwrap();
+    let view = server.get(&format!("traverses/{}", server.traverse)).await.expect(200);
+    assert_eq!(serde_json::to_value(&detail.stop).unwrap(), view["stops"][1]);
+    let open = &server.state.traverses()[0].traverse;
+    assert_eq!((&detail.left, &detail.right), (open.left_camera(1), open.right_camera(1)));
+    // The eyes stand 15 cm apart or so, above the ground, and the mast has turned.
+    let apart_m = (detail.left.model.centre() - detail.right.model.centre()).norm();
+    assert!((0.05..0.5).contains(&apart_m) && detail.mast.is_some(), "{apart_m} m");
+    assert!(server.get(&format!("{path}/99")).await.problem(404, "not_found").contains("no step 99"));
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -14,7 +14,8 @@ async fn run_by(browser: &Browser, bench: &Bench, preset: &str, number: usize) {
     // The list is longer than the window: it scrolls to what a screen reader chooses.
     browser.control("button", preset).await;
     browser.activate("button", preset).await;
-    browser.click_on("button", "Run from here").await;
+    browser.says("changes against run").await;
+    browser.activate("button", "Run from here").await;
     let done = format!("s.run === {number} && !s.running && s.steps_done === {}", bench.stop_count);
     browser.wait_status(preset, &done).await;
 }

@@ -110,6 +110,35 @@ async fn good_percent(browser: &Browser) -> Option<f64> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn keys_that_write_a_character_can_be_switched_off() {
+    let (_bench, browser) = picked(&short_approach()).await;
+    browser.click_on("button", "View").await;
+    browser.click_on("checkbox", "Keys act without Ctrl").await;
+    browser.press("Escape").await;
+    browser.gone("checkbox", "Keys act without Ctrl").await;
+    browser.press("t").await;
+    browser.press("l").await;
+    // An arrow still steps; by then the letters would have acted.
+    browser.press("ArrowRight").await;
+    browser.wait_status("a step", "s.step === 1 && s.shown && !s.pick_mode && s.playing === 0").await;
+    // What they do is in the palette.
+    browser.chord(&["Control"], "k").await;
+    browser.control("textbox", "palette").await;
+    browser.type_text("pick a target").await;
+    browser.control("option", "Pick a target").await;
+    browser.press("Enter").await;
+    browser.wait_status("pick mode", "s.pick_mode").await;
+    browser.press("Escape").await;
+    browser.evaluate("location.reload()").await;
+    browser.wait_for_viewer().await;
+    browser.wait_status("the page again", "s.phase === 'ready' && s.target === 0 && s.shown").await;
+    browser.press("t").await;
+    browser.press("ArrowRight").await;
+    browser.wait_status("a step after the reload", "s.step === 2 && !s.pick_mode").await;
+    browser.end().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn the_limits_of_trackability_are_changed_and_the_map_is_made_by_them() {
     let (_bench, browser) = picked(&short_approach()).await;
     browser.press("t").await;
@@ -120,12 +149,12 @@ async fn the_limits_of_trackability_are_changed_and_the_map_is_made_by_them() {
     browser.control("textbox", "edge_bad_px").await;
     // What cannot be is told at once, with the name of the field, and nothing is lost.
     browser.set_value("textbox", "edge_risky_focus", "many").await;
-    browser.click_on("button", "Make the map with these").await;
+    browser.activate("button", "Make the map with these").await;
     browser.says("edge_risky_focus: must be a number").await;
     browser.shot("limits-wrong").await;
     browser.set_value("textbox", "edge_risky_focus", "0").await;
     browser.set_value("textbox", "edge_bad_px", "0").await;
-    browser.click_on("button", "Make the map with these").await;
+    browser.activate("button", "Make the map with these").await;
     browser.gone("textbox", "edge_bad_px").await;
     let start = std::time::Instant::now();
     loop {

@@ -2,6 +2,8 @@
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use serde_json::Value;
@@ -11,7 +13,10 @@ use sightline_core::traverse::{Traverse, create_simulated};
 use sightline_server::guard::Hosts;
 use sightline_server::state::AppState;
 
+use tempfile::TempDir;
+
 use crate::browser::Browser;
+use crate::server::copy_folder;
 
 /// A server with one traverse, and a rock's pixel in its first left image.
 pub struct Bench {
@@ -21,24 +26,24 @@ pub struct Bench {
     pub rock: Pixel,
     /// How many stops there are.
     pub stop_count: usize,
-    _folder: tempfile::TempDir,
+    _folder: TempDir,
 }
 
 impl Bench {
     /// Serves an approach over `scenario`.
     pub async fn start(scenario: &Scenario) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let traverse = create_simulated(scenario, &folder.path().join("approach")).unwrap();
+        let folder = rendered(scenario);
+        let traverse = Traverse::open(&folder.path().join("approach")).unwrap();
         let rock = rock(scenario, &traverse);
         Self::serve(traverse, rock, folder).await
     }
 
     /// Serves the recording in a folder, with a pixel of its first left image at which a rock is.
-    pub async fn recording(folder: tempfile::TempDir, rock: Pixel) -> Self {
+    pub async fn recording(folder: TempDir, rock: Pixel) -> Self {
         Self::serve(Traverse::open(folder.path()).unwrap(), rock, folder).await
     }
 
-    async fn serve(traverse: Traverse, rock: Pixel, folder: tempfile::TempDir) -> Self {
+    async fn serve(traverse: Traverse, rock: Pixel, folder: TempDir) -> Self {
         let stop_count = traverse.stop_count();
         let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
         let port = listener.local_addr().unwrap().port();
@@ -103,6 +108,26 @@ pub async fn picked(scenario: &Scenario) -> (Bench, Browser) {
     let browser = Browser::start().await;
     bench.pick(&browser).await;
     (bench, browser)
+}
+
+/// A folder with the drive of a scenario in `approach`, a copy of one that all tests share: it is rendered once.
+fn rendered(scenario: &Scenario) -> TempDir {
+    static KEPT: Mutex<Vec<(String, TempDir)>> = Mutex::new(Vec::new());
+    // Whoever panicked here has left nothing half done: a drive is added when it is complete.
+    let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
+    let text = scenario.to_toml();
+    if !kept.iter().any(|(known, _)| *known == text) {
+        let folder = tempfile::tempdir().unwrap();
+        let traverse = create_simulated(scenario, &folder.path().join("approach")).unwrap();
+        for step in 0..traverse.stop_count() {
+            traverse.render_step(step, &AtomicBool::new(false)).unwrap();
+        }
+        kept.push((text.clone(), folder));
+    }
+    let copy = tempfile::tempdir().unwrap();
+    let known = kept.iter().find(|(known, _)| *known == text);
+    copy_folder(known.expect("it was added").1.path(), copy.path());
+    copy
 }
 
 /// The first target that the scenario's rule chooses: on a rock, lit, seen to the end.

@@ -147,18 +147,27 @@ impl Browser {
 
     /// Activates a control as a screen reader does, without the pointer.
     pub async fn activate(&self, role: &str, name: &str) {
-        let control = self.control(role, name).await;
-        self.evaluate(&format!("document.getElementById('{}').click()", control.id)).await;
+        self.act_on(role, name, "e.click()").await;
     }
 
     /// Gives a field or slider a value as a screen reader does, without the pointer.
     pub async fn set_value(&self, role: &str, name: &str, value: &str) {
-        let id = self.control(role, name).await.id;
-        let script = format!(
-            "const e = document.getElementById('{id}'); e.value = '{value}'; \
-             e.dispatchEvent(new Event('input', {{bubbles: true}}))"
-        );
-        self.evaluate(&script).await;
+        let act = format!("e.value = '{value}'; e.dispatchEvent(new Event('input', {{bubbles: true}}))");
+        self.act_on(role, name, &act).await;
+    }
+
+    /// Does something to a control's element `e`; another element may be in its place since it was found.
+    async fn act_on(&self, role: &str, name: &str, act: &str) {
+        let start = Instant::now();
+        loop {
+            let id = self.control(role, name).await.id;
+            let script =
+                format!("const e = document.getElementById('{id}'); if (e) {{ {act} }} return e !== null");
+            if self.evaluate(&script).await == Value::Bool(true) {
+                return;
+            }
+            assert!(start.elapsed() < PATIENCE, "{role} “{name}” is never there for long enough");
+        }
     }
 
     /// Waits until a text with these words is on the page.

@@ -44,6 +44,7 @@ impl SightlineApp {
         let kept = keep::Kept::read();
         let mut state = State::new(link.origin.clone(), link.fragment.session.clone());
         state.looks = kept.looks().unwrap_or_default();
+        state.single_keys = kept.single_keys();
         theme::apply(context, state.looks);
         let mut workspace = Workspace::restored(kept.layout());
         if let Some(preset) = link.fragment.preset.filter(|preset| *preset != workspace.preset()) {
@@ -336,7 +337,7 @@ impl eframe::App for SightlineApp {
         self.reveal();
         self.keep_link();
         self.keep_tour();
-        self.kept.write(&context, self.state.looks, || self.workspace.kept());
+        self.kept.write(&context, &self.state, || self.workspace.kept());
         self.wake_for_retries(&context);
         self.wake_for_play(&context);
         self.publisher.publish(&self.state, &self.left_image, context.zoom_factor());

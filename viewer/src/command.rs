@@ -209,6 +209,8 @@ pub enum Command {
     CopyLink,
     /// Chooses the looks of the page.
     SetLooks(Looks),
+    /// Lets keys that write a character act, or only those with Ctrl.
+    SetSingleKeys(bool),
     /// Something about comparing runs.
     Compare(crate::compare::Ask),
     /// Changes or takes the place that is being chosen.

@@ -1,13 +1,16 @@
-//! What the browser keeps of the page across reloads: the arrangement of the panels and the looks.
+//! What the browser keeps of the page across reloads: the arrangement of the panels, the looks, and which keys act.
 
 use egui::Context;
 
+use crate::state::State;
 use crate::theme::Looks;
 
 /// Under which name the arrangement is kept.
 const LAYOUT: &str = "sightline.layout";
 /// Under which name the looks are kept.
 const LOOKS: &str = "sightline.looks";
+/// Under which name is kept whether keys that write a character act: `on` or `off`.
+const KEYS: &str = "sightline.keys";
 /// How long the page waits before it writes a change, s: dragging a border changes the arrangement in every frame.
 const PAUSE_S: f64 = 0.5;
 
@@ -16,13 +19,20 @@ const PAUSE_S: f64 = 0.5;
 pub struct Kept {
     layout: Option<String>,
     looks: Option<Looks>,
+    single_keys: bool,
     write_at: Option<f64>,
 }
 
 impl Kept {
     /// What the browser kept; outside a browser nothing is.
     pub fn read() -> Self {
-        Self { layout: kept(LAYOUT), looks: kept(LOOKS).as_deref().and_then(Looks::of_word), write_at: None }
+        let looks = kept(LOOKS).as_deref().and_then(Looks::of_word);
+        Self {
+            layout: kept(LAYOUT),
+            looks,
+            single_keys: kept(KEYS).as_deref() != Some("off"),
+            write_at: None,
+        }
     }
 
     /// The arrangement, as it was written.
@@ -35,8 +45,18 @@ impl Kept {
         self.looks
     }
 
+    /// Whether keys that write a character act.
+    pub fn single_keys(&self) -> bool {
+        self.single_keys
+    }
+
     /// Writes what changed, once the person has let go of it.
-    pub fn write(&mut self, context: &Context, looks: Looks, layout: impl FnOnce() -> String) {
+    pub fn write(&mut self, context: &Context, state: &State, layout: impl FnOnce() -> String) {
+        let (looks, single_keys) = (state.looks, state.single_keys);
+        if self.single_keys != single_keys {
+            self.single_keys = single_keys;
+            keep(KEYS, if single_keys { "on" } else { "off" });
+        }
         if self.looks != Some(looks) {
             self.looks = Some(looks);
             keep(LOOKS, looks.word());

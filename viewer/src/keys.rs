@@ -165,6 +165,13 @@ fn preset_of(key: Key) -> Option<Preset> {
     digits.into_iter().zip(Preset::ALL).find_map(|(digit, preset)| (digit == key).then_some(preset))
 }
 
+/// Whether a key writes a character: such keys can be switched off, for who speaks to the machine (WCAG 2.1.4).
+fn is_character(key: Key) -> bool {
+    use Key::*;
+    let moves = [ArrowLeft, ArrowRight, ArrowUp, ArrowDown, Home, End, PageUp, PageDown];
+    !moves.contains(&key) && ![Escape, Enter, Tab, Backspace, Delete].contains(&key)
+}
+
 /// What a key asks for.
 pub fn command(key: Key, modifiers: Modifiers, state: &State) -> Option<Command> {
     let is_window_open = state.exports.is_open
@@ -190,6 +197,9 @@ pub fn command(key: Key, modifiers: Modifiers, state: &State) -> Option<Command>
         return None;
     }
     let shift = modifiers.shift;
+    if !state.single_keys && is_character(key) {
+        return None;
+    }
     if !matches!(state.mode, Mode::Look | Mode::Pick) {
         return (key == Key::Escape).then_some(Command::SetMode(Mode::Look));
     }

@@ -57,7 +57,7 @@ fn field(ui: &mut Ui, form: &Form, info: &SettingInfo, out: &mut Vec<Command>) {
     };
     let help = format!("{}\n\nvalues: {range}\nsource: {}", info.help, info.source);
     ui.label(RichText::new(&info.key).size(12.0).color(colour)).on_hover_text(help);
-    let field = ui.add(TextEdit::singleline(&mut text).desired_width(80.0)).accessible_name(&info.key);
+    let field = ui.add_sized([80.0, 22.0], TextEdit::singleline(&mut text)).accessible_name(&info.key);
     if field.changed() {
         out.push(Command::Limits(Ask::Type { key: info.key.clone(), text }));
     }

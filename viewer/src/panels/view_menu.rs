@@ -34,6 +34,13 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             }
         }
         ui.separator();
+        let mut are_on = state.single_keys;
+        let check = ui.checkbox(&mut are_on, "Keys act without Ctrl");
+        let help = "Off: letters, digits and Space do nothing by themselves. The palette (Ctrl+K) has everything they do.";
+        if check.on_hover_text(help).changed() {
+            out.push(Command::SetSingleKeys(are_on));
+        }
+        ui.separator();
         if ui.button("Copy a link to this place (Y)").clicked() {
             out.push(Command::CopyLink);
         }

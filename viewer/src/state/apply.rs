@@ -79,6 +79,7 @@ impl State {
             Command::Dismiss(id) => self.messages.dismiss(id),
             Command::Reconnect => self.outbox.push(Request::Reconnect),
             Command::SetLooks(looks) => self.looks = looks,
+            Command::SetSingleKeys(are_on) => self.single_keys = are_on,
             // The page itself does these: they are no part of what is looked at.
             Command::Layout(_) | Command::CopyLink => {}
             Command::Compare(ask) => self.ask_compare(ask),

@@ -165,7 +165,7 @@ impl State {
     }
 
     /// The run looked at and those compared with it.
-    pub(super) fn compared_names(&self) -> Option<Vec<RunName>> {
+    pub fn compared_names(&self) -> Option<Vec<RunName>> {
         let own = self.own_name()?;
         let names: Vec<RunName> =
             std::iter::once(own).chain(self.others().iter().map(|other| other.name)).collect();
@@ -232,7 +232,8 @@ impl State {
         Tolerance::new(&self.tolerances()).unwrap_or_default()
     }
 
-    pub(super) fn tolerances(&self) -> BTreeMap<String, f64> {
+    /// How far values may be apart and still count as alike, by unit.
+    pub fn tolerances(&self) -> BTreeMap<String, f64> {
         self.compare.closeness.tolerances().iter().map(|(unit, value)| ((*unit).to_owned(), *value)).collect()
     }
 

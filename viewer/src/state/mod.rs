@@ -126,6 +126,8 @@ pub struct State {
     pub marks: bool,
     /// Which colours the page has.
     pub looks: Looks,
+    /// Whether keys that write a character act without Ctrl.
+    pub single_keys: bool,
     /// A page to open in a new tab.
     pub open_url: Option<String>,
     /// Runs that are compared with the one looked at.
@@ -210,6 +212,7 @@ impl State {
             hidden: HashSet::from(Layer::HIDDEN_AT_FIRST),
             marks: true,
             looks: Looks::default(),
+            single_keys: true,
             open_url: None,
             compare: compare::Compare::default(),
             trackability: Trackability::default(),

@@ -214,6 +214,8 @@ fn the_export_window_lists_files_with_sizes_and_ways_to_copy_them() {
         },
         export::show,
     );
+    // A long window finds its place within a few frames.
+    shown.harness.run_steps(4);
     shown.says("Rows, CSV").says("1 kB").says("One line a step.").says("pick ridge");
     let download = exports::Ask::Download("sessions/s1/exports/rows.csv".to_owned());
     assert_eq!(shown.click("download: Rows, CSV"), vec![Command::Exports(download)]);

@@ -1,5 +1,7 @@
 //! Any action of the page as a text for a shell: as `curl`, and as `sightline …` where the command line has it.
 
+mod asked;
+
 use sightline_core::session::exports::ExportEntry;
 use sightline_core::session::shell::{Curl, quoted, settings_arguments};
 use sightline_core::session::view::{RunView, TargetView};
@@ -89,6 +91,7 @@ pub fn actions(state: &State) -> Vec<Action> {
     if let Some(key) = state.step_key(state.cursor.step).filter(|_| state.row().is_some()) {
         requests.push((format!("read step {}", key.step), Request::Item(crate::cache::Key::Trace(key))));
     }
+    requests.extend(asked::requests(state, &session));
     let action = |(words, request): (String, Request)| {
         let http = http(&state.origin, &request)?;
         Some(Action { words, command: command(state, &request), http })
