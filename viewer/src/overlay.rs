@@ -123,21 +123,62 @@ impl<'a> Overlay<'a> {
     }
 }
 
-/// A line with its halo.
+/// A line with its halo. What lies outside of the painter's area is left out: a dash costs the same wherever it is.
 pub fn paint_line(painter: &Painter, points: &[Pos2], colour: Color32, line: Line, width: f32) {
     if points.len() < 2 {
         return;
     }
-    let shapes = |colour: Color32, width: f32| -> Vec<Shape> {
+    let pieces = match line {
+        Line::Solid => vec![points.to_vec()],
+        Line::Dashed | Line::Dotted => inside(points, painter.clip_rect().expand(2.0 * width)),
+    };
+    let shapes = |piece: &[Pos2], colour: Color32, width: f32| -> Vec<Shape> {
         let stroke = Stroke::new(width, colour);
         match line {
-            Line::Solid => vec![Shape::line(points.to_vec(), stroke)],
-            Line::Dashed => Shape::dashed_line(points, stroke, 7.0, 5.0),
-            Line::Dotted => Shape::dotted_line(points, colour, 5.0, width / 2.0),
+            Line::Solid => vec![Shape::line(piece.to_vec(), stroke)],
+            Line::Dashed => Shape::dashed_line(piece, stroke, 7.0, 5.0),
+            Line::Dotted => Shape::dotted_line(piece, colour, 5.0, width / 2.0),
         }
     };
-    painter.extend(shapes(theme::halo(), width + 2.0 * HALO));
-    painter.extend(shapes(colour, width));
+    for (colour, width) in [(theme::halo(), width + 2.0 * HALO), (colour, width)] {
+        pieces.iter().for_each(|piece| painter.extend(shapes(piece, colour, width)));
+    }
+}
+
+/// The pieces of a line that lie in an area.
+fn inside(points: &[Pos2], area: Rect) -> Vec<Vec<Pos2>> {
+    let mut pieces: Vec<Vec<Pos2>> = Vec::new();
+    for pair in points.windows(2) {
+        let Some([from, to]) = cut([pair[0], pair[1]], area) else { continue };
+        match pieces.last_mut().filter(|piece| piece.last() == Some(&from)) {
+            Some(piece) => piece.push(to),
+            None => pieces.push(vec![from, to]),
+        }
+    }
+    pieces
+}
+
+/// The part of a segment that lies in an area: between the last entry and the first exit over its four sides (Liang and
+/// Barsky 1984).
+fn cut([from, to]: [Pos2; 2], area: Rect) -> Option<[Pos2; 2]> {
+    let along = to - from;
+    let (mut enters, mut leaves) = (0.0_f32, 1.0_f32);
+    for (step, room) in [
+        (-along.x, from.x - area.left()),
+        (along.x, area.right() - from.x),
+        (-along.y, from.y - area.top()),
+        (along.y, area.bottom() - from.y),
+    ] {
+        match step {
+            0.0 if room < 0.0 => return None,
+            0.0 => {}
+            _ if step < 0.0 => enters = enters.max(room / step),
+            _ => leaves = leaves.min(room / step),
+        }
+    }
+    // Ends that are inside stay what they are, so that pieces join.
+    let at = |t: f32, end: Pos2, is_end: bool| if is_end { end } else { from + along * t };
+    (enters <= leaves).then(|| [at(enters, from, enters == 0.0), at(leaves, to, leaves == 1.0)])
 }
 
 /// A mark with its halo, `reach` points to either side.
@@ -221,6 +262,21 @@ mod tests {
         let quad = template_quad(Pixel::new(100.0, 50.0), 21, &Matrix2::identity());
         assert_eq!(quad[0], Pixel::new(89.5, 39.5));
         assert_eq!(quad[2], Pixel::new(110.5, 60.5));
+    }
+
+    #[test]
+    fn of_a_line_only_what_is_in_the_area_is_left() {
+        let area = Rect::from_min_max(pos2(0.0, 0.0), pos2(100.0, 50.0));
+        let line = |points: &[(f32, f32)]| -> Vec<Pos2> { points.iter().map(|&(x, y)| pos2(x, y)).collect() };
+        assert_eq!(inside(&line(&[(-1e6, 10.0), (1e6, 10.0)]), area), [line(&[(0.0, 10.0), (100.0, 10.0)])]);
+        let there = line(&[(10.0, 10.0), (20.0, 40.0), (90.0, 5.0)]);
+        assert_eq!(inside(&there, area), [there]);
+        // Out over one side and in again over another one: two pieces.
+        let bent = line(&[(50.0, 25.0), (50.0, 75.0), (75.0, 75.0), (75.0, 25.0)]);
+        let pieces = [line(&[(50.0, 25.0), (50.0, 50.0)]), line(&[(75.0, 50.0), (75.0, 25.0)])];
+        assert_eq!(inside(&bent, area), pieces);
+        assert!(inside(&line(&[(-5.0, 60.0), (105.0, 60.0)]), area).is_empty());
+        assert!(inside(&line(&[(-20.0, 40.0), (10.0, 80.0)]), area).is_empty(), "past a corner");
     }
 
     #[test]
