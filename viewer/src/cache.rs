@@ -204,6 +204,11 @@ impl Cache {
         waiting.min_by(f64::total_cmp)
     }
 
+    /// Whether nothing is under way for it: it is here, was refused, or is to be asked for again later.
+    pub fn is_settled(&self, key: &Key) -> bool {
+        matches!(self.entries.get(key), Some(Entry::Ready { .. } | Entry::Failed(_) | Entry::Waiting { .. }))
+    }
+
     /// A stop with its cameras.
     pub fn stop(&self, key: &Key) -> Slot<'_, StopDetail> {
         self.slot(key).and(|item| match item {

@@ -11,13 +11,19 @@ const NEAR: usize = 120;
 const AFTER: usize = 10;
 
 impl State {
-    /// What the page wants loaded, most urgent first: the cursor's step, then the next and the previous one.
+    /// What the page wants loaded, most urgent first: the cursor's step, and once that is here the next and the previous one.
+    /// A browser keeps few connections: what is asked for ahead would stand before what is looked at.
     pub fn wanted(&self) -> Vec<Key> {
         let step = self.cursor.step;
         let mut keys = Vec::new();
-        for (near, step) in [(false, Some(step)), (true, step.checked_add(1)), (true, step.checked_sub(1))] {
-            if let Some(step) = step.filter(|&step| step < self.stop_count()) {
-                self.want_step(step, near, &mut keys);
+        if step < self.stop_count() {
+            self.want_step(step, false, &mut keys);
+        }
+        if keys.iter().all(|key| self.cache.is_settled(key)) {
+            for step in [step.checked_add(1), step.checked_sub(1)].into_iter().flatten() {
+                if step < self.stop_count() {
+                    self.want_step(step, true, &mut keys);
+                }
             }
         }
         self.want_compared(&mut keys);
