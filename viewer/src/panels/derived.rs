@@ -4,14 +4,14 @@ use egui::{RichText, Ui, vec2};
 use egui_plot::{HoverPosition, Line, Plot, PlotPoint, Points};
 use sightline_core::session::query::RunAnswer;
 
-use super::plots::{cursors, over_steps, pieces, point};
+use super::plots::{over_steps, pieces};
+use super::step_marks::{cursors, point};
 use crate::command::{Command, Go};
 use crate::panels::digits;
 use crate::state::State;
 use crate::state::ask::Ask;
 use crate::state::ask::derived::Derived;
-use crate::theme;
-use crate::thin;
+use crate::{theme, thin};
 
 /// The most points that are drawn of a line: what a wide screen can tell apart, twice.
 const POINTS: usize = 4000;

@@ -5,7 +5,7 @@
 
 use egui::{Color32, vec2};
 use sightline_core::camera::Camera;
-use sightline_core::frames::Pixel;
+use sightline_core::frames::{Pixel, Ray};
 
 use crate::overlay::{Line, Overlay};
 use crate::view2d::Canvas;
@@ -24,19 +24,21 @@ const TICK_GAP: f32 = 34.0;
 
 /// The curve of a pixel of one eye in the image of the other.
 pub struct Curve<'a> {
-    /// The eye whose pixel it is.
-    pub from: &'a Camera,
-    /// The eye in whose image it lies.
-    pub to: &'a Camera,
-    /// The pixel, px.
-    pub pixel: Pixel,
+    /// The line of sight; its lens is undone once and not at every range.
+    ray: Ray,
+    to: &'a Camera,
 }
 
-impl Curve<'_> {
+impl<'a> Curve<'a> {
+    /// The curve of a pixel (px) of `from` in the image of `to`; none where the lens cannot be undone.
+    pub fn new(from: &Camera, to: &'a Camera, pixel: Pixel) -> Option<Self> {
+        Some(Self { ray: from.ray(pixel)?, to })
+    }
+
     /// The point of the curve at a range, m, px; none behind the camera, and far outside of its image, where the model of
     /// the lens means nothing.
     pub fn at(&self, range_m: f64) -> Option<Pixel> {
-        let pixel = self.to.project(&self.from.ray(self.pixel)?.at(range_m))?;
+        let pixel = self.to.project(&self.ray.at(range_m))?;
         let (width, height) = (f64::from(self.to.width()), f64::from(self.to.height()));
         let is_near = (-width..2.0 * width).contains(&pixel.x) && (-height..2.0 * height).contains(&pixel.y);
         is_near.then_some(pixel)
@@ -113,7 +115,7 @@ mod tests {
     fn the_curve_of_two_parallel_eyes_ends_at_the_same_pixel_far_away() {
         let mast = Mast::spirit();
         let pixel = mast.left_in_head.centre_pixel();
-        let curve = Curve { from: &mast.left_in_head, to: &mast.right_in_head, pixel };
+        let curve = Curve::new(&mast.left_in_head, &mast.right_in_head, pixel).unwrap();
         assert!(curve.at(1000.0).unwrap().x > curve.at(2.0).unwrap().x, "nearer points lie further left");
     }
 
@@ -121,7 +123,7 @@ mod tests {
     fn a_pixel_near_the_curve_is_told_the_range_of_its_point() {
         let mast = Mast::spirit();
         let (from, to) = (&mast.left_in_head, &mast.right_in_head);
-        let curve = Curve { from, to, pixel: Pixel::new(600.0, 700.0) };
+        let curve = Curve::new(from, to, Pixel::new(600.0, 700.0)).unwrap();
         for range_m in [1.3, 2.7, 6.0, 14.0] {
             let on_it = curve.at(range_m).unwrap();
             let (found_m, off_px) = curve.nearest(on_it.offset(0.0, 3.0)).unwrap();
@@ -135,8 +137,8 @@ mod tests {
         let mast = Mast::spirit();
         let (left, right) = (&mast.left_in_head, &mast.right_in_head);
         let pixel = Pixel::new(400.0, 800.0);
-        let there = Curve { from: left, to: right, pixel }.at(3.0).unwrap();
-        let (_, off_px) = Curve { from: right, to: left, pixel: there }.nearest(pixel).unwrap();
+        let there = Curve::new(left, right, pixel).unwrap().at(3.0).unwrap();
+        let (_, off_px) = Curve::new(right, left, there).unwrap().nearest(pixel).unwrap();
         assert!(off_px < 0.02, "{off_px} px");
     }
 }

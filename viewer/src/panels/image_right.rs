@@ -82,8 +82,7 @@ fn entries(state: &State) -> Vec<Entry> {
 fn paint_marks(canvas: &Canvas, trace: &StepTrace, state: &State) {
     let overlay = Overlay::new(&canvas.painter, &canvas.transform);
     let (Some(pointing), Some(located)) = (&trace.point_mast, &trace.locate) else { return };
-    if let Some(left_pixel) = located.left_pixel.filter(|_| state.shows(Layer::Curve)) {
-        let curve = Curve { from: &pointing.left, to: &pointing.right, pixel: left_pixel };
+    if let Some(curve) = target_curve(state).filter(|_| state.shows(Layer::Curve)) {
         curve.paint(canvas, theme::search(), Line::Dotted);
         if let Some(stereo) = trace.template().and_then(|e| e.point_stereo.as_ref()) {
             let searched: Vec<Pixel> = stereo.curve.iter().map(|point| point.pixel).collect();
@@ -120,7 +119,7 @@ fn paint_pointed(canvas: &Canvas, state: &State) -> Option<String> {
         return Some(format!("range {range_m:.2} m"));
     }
     let (pixel, (from, to)) = (pointed.left()?, state.eyes()?);
-    let curve = Curve { from, to, pixel };
+    let curve = Curve::new(from, to, pixel)?;
     curve.paint(canvas, theme::accent(), Line::Dashed);
     // While a target is picked the surface is known: where along its curve the other eye sees the place.
     let cell = state.trackability_map().filter(|_| state.mode == Mode::Pick).and_then(|map| map.at(pixel));
@@ -148,5 +147,5 @@ fn paint_range(canvas: &Canvas, state: &State, pixel: Pixel) {
 pub fn target_curve(state: &State) -> Option<Curve<'_>> {
     let trace = state.trace()?;
     let (pointing, located) = (trace.point_mast.as_ref()?, trace.locate.as_ref()?);
-    Some(Curve { from: &pointing.left, to: &pointing.right, pixel: located.left_pixel? })
+    Curve::new(&pointing.left, &pointing.right, located.left_pixel?)
 }

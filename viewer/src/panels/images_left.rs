@@ -293,7 +293,7 @@ fn paint_pointed(canvas: &Canvas, state: &State) -> Option<String> {
     match state.pointed.filter(|_| state.marks)? {
         Pointed::Right(pixel) => {
             let (to, from) = state.eyes()?;
-            Curve { from, to, pixel }.paint(canvas, theme::accent(), Line::Dashed);
+            Curve::new(from, to, pixel)?.paint(canvas, theme::accent(), Line::Dashed);
             Some(format!("curve of x {:.1}  y {:.1} of the right image", pixel.x, pixel.y))
         }
         Pointed::Score(pixel) => {

@@ -32,6 +32,7 @@ pub mod plots;
 pub mod runs;
 mod numbers;
 mod run_tree;
+mod step_marks;
 pub mod settings;
 pub mod shape;
 pub mod sheets;

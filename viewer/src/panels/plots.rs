@@ -4,8 +4,7 @@ use std::collections::HashMap;
 
 use egui::{Color32, Id, Ui, vec2};
 use egui_plot::{
-    GridInput, GridMark, HLine, HoverPosition, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotResponse,
-    PlotUi, Points, VLine,
+    GridInput, GridMark, HLine, HoverPosition, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotUi, Points,
 };
 use sightline_core::session::view::RunView;
 use sightline_core::settings::TrackerKind;
@@ -14,9 +13,9 @@ use sightline_core::trace::StepRow;
 use super::names::{self, HEIGHT as NAMES};
 use super::sheets::sheet::state_of;
 use super::sheets::{Column, Sheet};
+use super::step_marks::{cursors, point};
 use crate::command::{Command, Go};
 use crate::overlay::{self, Mark};
-use crate::pointed::Pointed;
 use crate::state::State;
 use crate::state::compare::Other;
 use crate::state::tracker::confidence_of;
@@ -268,23 +267,6 @@ fn plot(
     let plotted: Vec<(&str, f64)> = state.row().map(|row| asked_of(chart, row)).unwrap_or_default();
     super::breakpoints::menu(&response.response, &plotted, out);
     response.inner
-}
-
-/// The cursor's step, and the one that is pointed at in another panel.
-pub(super) fn cursors(plot: &mut PlotUi<'_>, state: &State) {
-    let line = |step: usize| VLine::new("", step as f64).color(theme::accent()).allow_hover(false);
-    plot.vline(line(state.cursor.step).width(1.5));
-    if let Some(step) = state.pointed_step() {
-        plot.vline(line(step).width(1.0).style(LineStyle::dotted_dense()));
-    }
-}
-
-/// Tells the other panels at which step the pointer is.
-pub(super) fn point<T>(response: &PlotResponse<T>, last: f64, out: &mut Vec<Command>) {
-    if let Some(at) = response.response.hover_pos() {
-        let step = response.transform.value_from_position(at).x.round().clamp(0.0, last) as usize;
-        out.push(Command::Point(Pointed::Step(step)));
-    }
 }
 
 /// What a chart shows of a row, as expressions with their values.
