@@ -6,14 +6,16 @@ use axum::Json;
 use axum::extract::State;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
+use serde::Deserialize;
 use sightline_core::session::Session;
 use sightline_core::session::view::RunView;
 use sightline_core::session::wire::NewRun;
+use utoipa::IntoParams;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use crate::columns;
-use crate::extract::{Body, Path};
+use crate::extract::{Body, Params, Path};
 use crate::jobs::blocking;
 use crate::live::{LiveSession, RUN_LIMIT};
 use crate::problem::{ApiError, ApiResult};
@@ -55,15 +57,26 @@ async fn fork(
     state.designations().run(move || add(&work_state, &live, target, &new)).await
 }
 
+/// What of a run is asked for.
+#[derive(Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+struct RowParams {
+    /// The first row that is sent, counted from 0: of a run that goes on, how many are there already.
+    #[serde(default)]
+    from_row: usize,
+}
+
 /// A run so far
 #[utoipa::path(get, operation_id = "show_run", path = "/sessions/{session}/targets/{target}/runs/{run}", tag = "runs", params(
-    ("session" = String, Path), ("target" = usize, Path), ("run" = usize, Path)),
+    ("session" = String, Path), ("target" = usize, Path), ("run" = usize, Path), RowParams),
     responses((status = 200, body = RunView), ApiError))]
 async fn show(
     State(state): State<AppState>,
     Path((session, target, run)): Path<RunPath>,
+    Params(rows): Params<RowParams>,
 ) -> ApiResult<Json<RunView>> {
-    Ok(Json(view(&*state.session(&session)?, target, run)?))
+    Ok(Json(view_from(&*state.session(&session)?, target, run, rows.from_row)?))
 }
 
 /// Stops a run after its last step so far
@@ -181,7 +194,14 @@ fn has_room(session: &Session, target: usize) -> ApiResult<()> {
 
 /// The run that the path names.
 fn view(live: &LiveSession, target: usize, run: usize) -> ApiResult<RunView> {
-    let found = live.with(|session| session.run(target, run).map(|found| session.run_view(run, found)));
+    view_from(live, target, run, 0)
+}
+
+/// That run with its rows from one on.
+fn view_from(live: &LiveSession, target: usize, run: usize, from_row: usize) -> ApiResult<RunView> {
+    let found = live.with(|session| {
+        session.run(target, run).map(|found| session.run_view_from(run, found, from_row))
+    });
     found.map_err(|error| ApiError::from(error).about_path())
 }
 

@@ -24,7 +24,7 @@ pub fn router() -> OpenApiRouter<AppState> {
         .routes(routes!(list, begin))
         .routes(routes!(bring))
         .routes(routes!(show))
-        .routes(routes!(move_cursor))
+        .routes(routes!(show_cursor, move_cursor))
 }
 
 /// The sessions on open traverses, oldest first
@@ -95,6 +95,13 @@ async fn bring(State(state): State<AppState>, Body(new): Body<Reproduction>) -> 
 async fn show(State(state): State<AppState>, Path(session): Path<String>) -> ApiResult<Json<SessionView>> {
     let live = state.session(&session)?;
     Ok(Json(live.with(|session| session.view())))
+}
+
+/// What is looked at
+#[utoipa::path(get, operation_id = "show_cursor", path = "/sessions/{session}/cursor", tag = "sessions", params(("session" = String, Path)),
+    responses((status = 200, body = Cursor), ApiError))]
+async fn show_cursor(State(state): State<AppState>, Path(session): Path<String>) -> ApiResult<Json<Cursor>> {
+    Ok(Json(state.session(&session)?.with(|session| session.cursor)))
 }
 
 /// Moves the cursor

@@ -271,7 +271,7 @@ impl AppState {
     pub fn cursor_moved(&self, live: &LiveSession, cursor: Cursor) {
         self.0.store.move_cursor(&live.id, cursor);
         self.touched(live);
-        self.tell(Event::SessionChanged { session: live.id.clone() });
+        self.tell(Event::CursorMoved { session: live.id.clone(), cursor });
     }
 
     /// What survives the server.

@@ -10,7 +10,7 @@ use sightline_tests::bench::{Bench, picked};
 use sightline_tests::browser::Browser;
 use sightline_tests::scenario::short_approach;
 use sightline_tests::server::{PIXEL, long_recording};
-use sightline_tests::stopwatch::{self, Lap, spread};
+use sightline_tests::stopwatch::{self, Lap, Painting, spread};
 
 /// The largest download of the page, compressed.
 const DOWNLOAD_LIMIT: u64 = 5 << 20;
@@ -39,17 +39,32 @@ async fn walk(browser: &Browser, along: &[usize]) {
     }
 }
 
-/// Prints the laps of one kind.
-fn tell(what: &str, laps: &[Lap]) {
+/// Goes ten steps on, so many times, each awaited.
+async fn stride(browser: &Browser, times: std::ops::RangeInclusive<usize>) {
+    for step in times.map(|time| 10 * time) {
+        browser.chord(&["Shift"], "ArrowRight").await;
+        browser.wait_status("ten steps on", &format!("s.step === {step} && s.complete")).await;
+        tokio::time::sleep(Duration::from_millis(400)).await;
+    }
+}
+
+/// Prints the laps of one kind, most of which must have been seen.
+fn tell(what: &str, laps: &[Lap], of: usize) {
+    assert!(3 * laps.len() >= 2 * of, "{what}: {} of {of} were seen", laps.len());
     let ms = |of: fn(&Lap) -> f64| {
         let (middle, high) = spread(laps.iter().map(of)).unwrap_or((f64::NAN, f64::NAN));
         format!("{middle:.0} ms (95 %: {high:.0})")
     };
-    let (own, loading, both) = (ms(|l| l.own_ms), ms(|l| l.loading_ms), ms(|l| l.own_ms + l.loading_ms));
-    let painted = ms(|l| l.painted_ms);
     println!(
-        "{what}, {} of them: own work {own}, loading {loading}, both {both}; painted {painted}",
-        laps.len()
+        "{what}, {} of them: own work {}; with loading {}, until the step is complete {}; \
+         with all waiting shown after {}, complete after {}; painted after {}",
+        laps.len(),
+        ms(|l| l.own_ms),
+        ms(|l| l.busy_ms),
+        ms(|l| l.all_ms),
+        ms(|l| l.shown_ms),
+        ms(|l| l.complete_ms),
+        ms(|l| l.painted_ms)
     );
 }
 
@@ -76,11 +91,9 @@ async fn steps_are_quick_an_idle_page_rests_and_memory_is_bounded() {
 
     // There and back once, so that everything is cached; then there and back again, watched.
     walk(&browser, &[0, last, 0]).await;
-    stopwatch::begin(&browser).await;
+    stopwatch::begin(&browser, Painting::On).await;
     walk(&browser, &[0, last, 0]).await;
-    let laps = stopwatch::laps(&browser).await;
-    assert!(laps.len() >= last, "{} of {} steps were seen", laps.len(), 2 * last);
-    tell("cached steps", &laps);
+    tell("cached steps", &stopwatch::laps(&browser).await, 2 * last);
 
     // An idle page computes nothing: no status changes, and next to no processor time.
     tokio::time::sleep(Duration::from_secs(2)).await;
@@ -127,20 +140,17 @@ async fn a_long_recording_is_scrubbed_and_its_steps_come_when_they_are_asked_for
     bench.pick(&browser).await;
     println!("{LONG} steps are tracked and on the page after {:.0} s", start.elapsed().as_secs_f64());
     // The first steps are cached by the pick; those ten apart are not.
-    stopwatch::begin(&browser).await;
-    for step in (10..=300).step_by(10) {
-        browser.chord(&["Shift"], "ArrowRight").await;
-        browser.wait_status("ten steps on", &format!("s.step === {step} && s.shown")).await;
-        tokio::time::sleep(Duration::from_millis(400)).await;
-    }
-    let laps = stopwatch::laps(&browser).await;
-    assert!(laps.len() >= 20, "{} of 30 steps were seen", laps.len());
-    tell("uncached steps", &laps);
+    stopwatch::begin(&browser, Painting::On).await;
+    stride(&browser, 1..=30).await;
+    tell("uncached steps", &stopwatch::laps(&browser).await, 30);
+    stopwatch::begin(&browser, Painting::Off).await;
+    stride(&browser, 31..=60).await;
+    tell("uncached steps, nothing painted", &stopwatch::laps(&browser).await, 30);
 
     // The pointer is drawn along the whole timeline and back.
     let band = browser.control("slider", "timeline").await.rect;
     let (left, right, y) = (band[0] + 2.0, band[0] + band[2] - 2.0, band[1] + band[3] / 2.0);
-    stopwatch::begin(&browser).await;
+    stopwatch::begin(&browser, Painting::On).await;
     let start = std::time::Instant::now();
     browser.drag((left, y), (right, y)).await;
     browser.wait_status("the last steps", &format!("s.step > {}", LONG * 9 / 10)).await;

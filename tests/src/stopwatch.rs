@@ -1,49 +1,79 @@
 //! A stopwatch in the page: what the page itself computes for a key or a drag, and what it waits for.
 //!
 //! Chromium paints WebGL in software where there is no graphics card, which takes longer than everything the page
-//! computes, and the next animation frame only comes when that is done. So three times are told apart:
+//! computes, and the next animation frame only comes when that is done. So these times are told apart:
 //!
 //! - **own**: the time spent in the page's animation frames, from the key to the end of the frame that shows the step;
 //!   everything the page computes for a step happens in them;
-//! - **loading**: how long at least one request was on its way, as the browser's own resource timing says;
-//! - **painted**: from the key to the frame after the painted one, with all waiting for the software.
+//! - **busy**: how long the page worked or at least one request was on its way, as the browser's own resource timing says;
+//!   what happens at the same time counts once;
+//! - **shown**: from the key to the end of the frame that shows the step, with all waiting; with [`Painting::Off`] the page
+//!   draws nothing, so that nothing of this is the software's;
+//! - **complete**: the same until the last panel has what it shows;
+//! - **painted**: from the key to the frame after the painted one.
 
 use serde_json::Value;
 
 use crate::browser::Browser;
 
-/// Wraps the animation frames, and watches keys and the page's status.
+/// Wraps the animation frames and the drawing, and watches keys and the page's status.
 const SCRIPT: &str = "\
     if (!window.stopwatch) { \
-        const watch = window.stopwatch = {frames: [], laps: []}; \
+        const watch = window.stopwatch = {frames: [], laps: [], paints: true}; \
+        performance.setResourceTimingBufferSize(1e5); \
         const raf = window.requestAnimationFrame.bind(window); \
         window.requestAnimationFrame = f => raf(t => { \
             const start = performance.now(); \
             try { f(t); } finally { watch.frames.push([start, performance.now() - start]); } }); \
-        const canvas = document.getElementById('sightline'); let began = null; \
-        window.addEventListener('keydown', e => { if (e.key !== 'Shift') began = performance.now(); }, true); \
+        const canvas = document.getElementById('sightline'); let lap = null; \
+        const gl = canvas.getContext('webgl2'); \
+        for (const name of ['drawElements', 'clear']) { \
+            const draw = gl[name].bind(gl); gl[name] = (...all) => { if (watch.paints) draw(...all); }; } \
+        window.addEventListener('keydown', e => { if (e.key !== 'Shift') lap = {key: performance.now()}; }, true); \
+        const busy = (key, now) => { \
+            const frames = watch.frames.map(f => [f[0], f[0] + f[1]]); \
+            const asked = performance.getEntriesByType('resource').map(e => [e.startTime, e.responseEnd]); \
+            const spans = frames.concat(asked).filter(s => s[0] >= key).sort((a, b) => a[0] - b[0]); \
+            let sum = 0, until = 0; \
+            for (const [from, to] of spans) { \
+                sum += Math.max(0, Math.min(to, now) - Math.max(from, until)); until = Math.max(until, to); } \
+            return sum; }; \
         new MutationObserver(() => { \
-            const s = JSON.parse(canvas.dataset.status); \
-            if (began === null || !s.shown) return; \
-            const key = began, frames = watch.frames; began = null; \
-            const own = frames.filter(f => f[0] >= key).reduce((sum, f) => sum + f[1], 0); \
-            const asked = performance.getEntriesByType('resource').filter(e => e.startTime >= key); \
-            let loading = 0, until = 0; \
-            for (const e of asked.sort((a, b) => a.startTime - b.startTime)) { \
-                loading += Math.max(0, e.responseEnd - Math.max(e.startTime, until)); \
-                until = Math.max(until, e.responseEnd); } \
-            raf(() => raf(() => watch.laps.push([own, loading, performance.now() - key]))); \
+            const s = JSON.parse(canvas.dataset.status), now = performance.now(); \
+            if (lap === null || !s.shown) return; \
+            const done = lap, key = lap.key; \
+            if (done.shown === undefined) { \
+                done.own = watch.frames.filter(f => f[0] >= key).reduce((sum, f) => sum + f[1], 0); \
+                done.busy = busy(key, now); done.shown = now - key; \
+                raf(() => raf(() => { done.painted = performance.now() - key; })); } \
+            if (!s.complete) return; \
+            done.complete = now - key; done.all = busy(key, now); lap = null; watch.laps.push(done); \
         }).observe(canvas, {attributes: true, attributeFilter: ['data-status']}); \
     } \
     window.stopwatch.frames = []; window.stopwatch.laps = []; performance.clearResourceTimings();";
+
+/// Whether the page draws.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Painting {
+    /// As a person sees it.
+    On,
+    /// The page computes every frame and leaves its drawing out.
+    Off,
+}
 
 /// From a key to the step that it leads to, ms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lap {
     /// The page's own work.
     pub own_ms: f64,
-    /// Waiting for the server's answers.
-    pub loading_ms: f64,
+    /// Own work and waiting for the server's answers, until record and left image are shown.
+    pub busy_ms: f64,
+    /// The same, until the step is complete.
+    pub all_ms: f64,
+    /// Until record and left image are shown, with all waiting.
+    pub shown_ms: f64,
+    /// Until the step is complete, with all waiting.
+    pub complete_ms: f64,
     /// Until it was painted.
     pub painted_ms: f64,
 }
@@ -58,8 +88,9 @@ pub fn spread(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
 }
 
 /// Sets the stopwatch to nothing; the first time it is put into the page.
-pub async fn begin(browser: &Browser) {
+pub async fn begin(browser: &Browser, painting: Painting) {
     browser.evaluate(SCRIPT).await;
+    browser.evaluate(&format!("window.stopwatch.paints = {}", painting == Painting::On)).await;
     // The frame that was already asked for still goes by the browser's own function.
     tokio::time::sleep(std::time::Duration::from_millis(300)).await;
 }
@@ -67,8 +98,15 @@ pub async fn begin(browser: &Browser) {
 /// The laps since the beginning, one for each key that led to a step.
 pub async fn laps(browser: &Browser) -> Vec<Lap> {
     let read = |lap: &Value| {
-        let number = |index: usize| lap[index].as_f64().unwrap_or(f64::NAN);
-        Lap { own_ms: number(0), loading_ms: number(1), painted_ms: number(2) }
+        let number = |name: &str| lap[name].as_f64().unwrap_or(f64::NAN);
+        Lap {
+            own_ms: number("own"),
+            busy_ms: number("busy"),
+            all_ms: number("all"),
+            shown_ms: number("shown"),
+            complete_ms: number("complete"),
+            painted_ms: number("painted"),
+        }
     };
     let laps = browser.evaluate("return window.stopwatch.laps").await;
     laps.as_array().map(|laps| laps.iter().map(read).collect()).unwrap_or_default()

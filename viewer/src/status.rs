@@ -14,6 +14,7 @@
 //!   "steps_done": 17,              // of the run that is looked at
 //!   "running": false,              // whether that run goes on
 //!   "shown": true,                 // whether the step's record and left image are on the screen
+//!   "complete": true,              // whether all else of it is here, too, or was refused: the right image, the arrays
 //!   "stage": "match_template",
 //!   "left_image_rect": [x, y, w, h],           // of the panel's image area, CSS px from the canvas' corner
 //!   "left_image_size": [w, h],                 // of the image, px
@@ -108,6 +109,7 @@ pub fn describe(state: &State, left_image: &LeftImage, zoom: f32) -> Value {
         "steps_done": state.run().map_or(0, |run| run.rows.len()),
         "running": state.run_progress().is_some(),
         "shown": left_image.is_some() && (state.row().is_none() || state.trace().is_some()),
+        "complete": state.is_complete(),
         "stage": state.stage().word(),
         "pick_mode": state.mode == Mode::Pick,
         "designating": state.designating.is_some(),

@@ -134,12 +134,17 @@ impl Session {
 
     /// A run as pages and scripts see it.
     pub fn run_view(&self, number: usize, run: &Run) -> RunView {
+        self.run_view_from(number, run, 0)
+    }
+
+    /// A run with its rows from the one at `from_row` on, counted from 0: what is new for somebody who has that many.
+    pub fn run_view_from(&self, number: usize, run: &Run, from_row: usize) -> RunView {
         RunView {
             number,
             fork: run.fork,
             changes: run.settings.changes(),
             settings: run.settings.as_ref().clone(),
-            rows: run.steps.iter().map(|trace| trace.row()).collect(),
+            rows: run.steps.iter().skip(from_row).map(|trace| trace.row()).collect(),
             complete: run.steps.last().is_some_and(|last| last.step + 1 == self.stop_count),
             stopped: run.why_stopped(),
             summary: summarise(run.steps.iter().map(AsRef::as_ref)),

@@ -8,6 +8,7 @@ use utoipa::ToSchema;
 use crate::camera::{Camera, MastAngles};
 use crate::designate::Place;
 use crate::frames::{Pixel, PoseRecord};
+use crate::session::Cursor;
 use crate::session::view::SessionView;
 use crate::settings::Changes;
 use crate::study::wire::StudyJob;
@@ -213,6 +214,13 @@ pub enum Event {
     SessionChanged {
         /// The session.
         session: String,
+    },
+    /// The cursor of a session was moved; nothing else of it changed.
+    CursorMoved {
+        /// The session.
+        session: String,
+        /// Where to.
+        cursor: Cursor,
     },
     /// A run went on.
     RunProgress {

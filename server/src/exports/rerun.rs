@@ -94,7 +94,8 @@ async fn follow(live: Arc<LiveSession>, stream: Arc<LiveStream>, mut events: Rec
                 Ok(Event::SessionChanged { session } | Event::RunProgress { session, .. })
                     if session != live.id => {}
                 Ok(
-                    Event::RenderProgress { .. }
+                    Event::CursorMoved { .. }
+                    | Event::RenderProgress { .. }
                     | Event::StudyProgress { .. }
                     | Event::TrackabilityProgress { .. }
                     | Event::NotesChanged { .. },

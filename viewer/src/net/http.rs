@@ -58,6 +58,10 @@ pub(crate) fn describe(request: &Request) -> (Method, String, Option<Vec<u8>>) {
         Request::Traverse(id) => get(format!("traverses/{id}")),
         Request::Sessions => get("sessions".to_owned()),
         Request::Session(id) => get(format!("sessions/{id}")),
+        Request::Cursor(session) => get(format!("sessions/{session}/cursor")),
+        Request::Rows { session, target, run, from_row } => {
+            get(format!("sessions/{session}/targets/{target}/runs/{run}?from_row={from_row}"))
+        }
         Request::NewSession(new) => (Method::POST, "sessions".to_owned(), json(new)),
         Request::PutCursor { session, cursor } => {
             (Method::PUT, format!("sessions/{session}/cursor"), json(cursor))
@@ -169,7 +173,8 @@ fn read(request: &Request, response: &ehttp::Response, context: &egui::Context) 
             let Designated { target, session, .. } = parse(bytes)?;
             Reply::Designated { target, session: Box::new(session) }
         }
-        Request::NewRun { .. } => Reply::Run(Box::new(parse(bytes)?)),
+        Request::NewRun { .. } | Request::Rows { .. } => Reply::Run(Box::new(parse(bytes)?)),
+        Request::Cursor(_) => Reply::Cursor(parse(bytes)?),
         Request::OpenRerun(_) => Reply::Rerun(parse(bytes)?),
         Request::Studies => Reply::Studies(parse(bytes)?),
         Request::StudyJobs => Reply::StudyJobs(parse(bytes)?),

@@ -52,6 +52,19 @@ pub enum Request {
     Sessions,
     /// A session.
     Session(String),
+    /// The cursor of a session.
+    Cursor(String),
+    /// The rows of a run from one on, counted from 0.
+    Rows {
+        /// The session.
+        session: String,
+        /// The target's number.
+        target: usize,
+        /// The run's number.
+        run: usize,
+        /// The first row.
+        from_row: usize,
+    },
     /// To begin a session.
     NewSession(NewSession),
     /// To move a session's cursor.
@@ -224,8 +237,10 @@ pub enum Reply {
         /// The session with it.
         session: Box<SessionView>,
     },
-    /// A run.
+    /// A run, or rows of it.
     Run(Box<RunView>),
+    /// The cursor of a session.
+    Cursor(Cursor),
     /// A stream to Rerun.
     Rerun(RerunStream),
     /// The studies that can be started.

@@ -44,9 +44,11 @@ impl State {
                 } else {
                     self.progress.insert((target, run), Progress { k, n, doing });
                 }
-                self.sync.session_stale = true;
+                self.run_went_on(target, run);
             }
             Event::RunProgress { .. } => {}
+            Event::CursorMoved { session, cursor } if is_ours(&session) => self.cursor_went(cursor),
+            Event::CursorMoved { .. } => {}
             Event::RenderProgress { traverse, k, n, ready } => self.rendered(&traverse, k, n, ready),
             Event::StudyProgress { job } => self.study_went_on(job),
             Event::TrackabilityProgress { traverse, step, .. } => self.trackability_went_on(&traverse, step),
@@ -122,7 +124,11 @@ impl State {
                 self.adopt(*view, was_read && asked.is_some_and(|count| count != self.sync.cursor_messages));
             }
             Reply::Designated { target, session } => self.designated(target, *session),
-            Reply::Run(run) => self.took_run(request, *run),
+            Reply::Run(run) => match request {
+                Request::Rows { target, from_row, .. } => self.took_rows(target, from_row, *run),
+                request => self.took_run(request, *run),
+            },
+            Reply::Cursor(cursor) => self.took_cursor(cursor),
             Reply::Rerun(stream) => {
                 let words = format!(
                     "Rerun shows this session. A viewer of your own takes `rerun {}`. Whoever uses this machine can read the \
@@ -189,13 +195,6 @@ impl State {
         }
     }
 
-    /// A cursor that was sent has its answer.
-    fn put_cursor(&mut self, cursor: Cursor) {
-        self.sync.cursor_asked = false;
-        self.sync.cursor_messages += 1;
-        self.sync.server_cursor = cursor;
-    }
-
     fn refused(&mut self, request: Request, mut problem: Problem) {
         match request.clone() {
             Request::PutCursor { cursor, .. } => {
@@ -230,6 +229,12 @@ impl State {
             }
             Request::Ask(asked) => self.refused_ask(&asked, &problem),
             Request::Files(asked) if !self.refused_file(&asked, &mut problem) => return,
+            Request::Cursor(_) => self.sync.cursor_read = None,
+            Request::Rows { .. } => {
+                // The run may be gone: what there is, is read as a whole.
+                (self.sync.rows_asked, self.sync.session_stale) = (false, true);
+                return;
+            }
             Request::Session(_) => {
                 self.sync.session_asked = None;
                 if self.session.is_none() && problem.status != 0 {
@@ -307,11 +312,8 @@ impl State {
             // A server that was ended may have lost the last move: it is told again where the page is.
             self.sync.server_cursor = view.cursor;
         }
-        let is_moved_elsewhere =
-            !self.sync.cursor_asked && !moved_meanwhile && view.cursor != self.sync.server_cursor;
-        if is_other || is_moved_elsewhere {
-            self.cursor = view.cursor;
-            self.sync.server_cursor = view.cursor;
+        if is_other || (!moved_meanwhile && self.is_moved_elsewhere(view.cursor)) {
+            self.go_where_the_server_is(view.cursor);
         }
         self.sync.linked = Some(view.id.clone());
         self.session = Some(view);

@@ -12,6 +12,7 @@ pub mod calculator;
 mod configurations;
 mod linked;
 mod rows;
+mod sync;
 mod views;
 pub mod exports;
 pub mod files;
@@ -54,12 +55,12 @@ use self::files::Files;
 use self::messages::Messages;
 use self::notes::Notes;
 use self::studies::Studies;
+use self::sync::Sync;
 use self::trackability::Trackability;
 use self::undo::Undo;
 use self::why::Why;
 use crate::cache::{Cache, Eye, Key, Slot, StepKey};
 use crate::command::{Layer, Mode, Panel, Stage};
-use crate::link::Fragment;
 use crate::net::Request;
 use crate::pointed::Pointed;
 use crate::raster::Raster;
@@ -156,29 +157,6 @@ pub struct State {
     sync: Sync,
     /// The aligned left camera of the step that was asked for last: it takes a while to compute.
     aligned: egui::mutex::Mutex<Option<(StepKey, Option<Camera>)>>,
-}
-
-/// What keeps the page and the server's session together.
-#[derive(Default)]
-struct Sync {
-    /// The session is to be read again.
-    session_stale: bool,
-    /// The session is being read, asked for at this count of cursor messages.
-    session_asked: Option<u64>,
-    /// The cursor as the server knows it.
-    server_cursor: Cursor,
-    /// A cursor is on its way to the server.
-    cursor_asked: bool,
-    /// How often a cursor was sent or its answer came in: between the two an answer may hold either cursor.
-    cursor_messages: u64,
-    /// The session named by the page's link, before it was opened.
-    linked: Option<String>,
-    /// The rest of the link, until its session is here.
-    link: Option<Fragment>,
-    /// The traverse whose latest session is to be opened.
-    opening: Option<String>,
-    /// The page's cursor counts more than the server's when the session is read next: the server was gone.
-    keeps_cursor: bool,
 }
 
 impl State {
@@ -346,24 +324,5 @@ impl State {
         self.sync_tour();
         self.sync_ask();
         std::mem::take(&mut self.outbox)
-    }
-
-    /// Asks for what keeps page and session together.
-    fn sync_session(&mut self) {
-        let Some(id) = self.session.as_ref().map(|session| session.id.clone()) else { return };
-        self.sync_compare(&id);
-        if self.sync.session_stale && self.sync.session_asked.is_none() {
-            self.sync.session_stale = false;
-            self.sync.session_asked = Some(self.sync.cursor_messages);
-            self.outbox.push(Request::Session(id.clone()));
-        }
-        if self.cursor != self.sync.server_cursor
-            && !self.sync.cursor_asked
-            && self.connection == Connection::Live
-        {
-            self.sync.cursor_asked = true;
-            self.sync.cursor_messages += 1;
-            self.outbox.push(Request::PutCursor { session: id, cursor: self.cursor });
-        }
     }
 }

@@ -15,11 +15,8 @@ impl State {
     /// A browser keeps few connections: what is asked for ahead would stand before what is looked at.
     pub fn wanted(&self) -> Vec<Key> {
         let step = self.cursor.step;
-        let mut keys = Vec::new();
-        if step < self.stop_count() {
-            self.want_step(step, false, &mut keys);
-        }
-        if keys.iter().all(|key| self.cache.is_settled(key)) {
+        let mut keys = self.wanted_here();
+        if self.are_settled(&keys) {
             for step in [step.checked_add(1), step.checked_sub(1)].into_iter().flatten() {
                 if step < self.stop_count() {
                     self.want_step(step, true, &mut keys);
@@ -37,6 +34,23 @@ impl State {
             }
         }
         keys
+    }
+
+    /// Whether everything of the cursor's step is here or was refused.
+    pub fn is_complete(&self) -> bool {
+        self.stop_count() > 0 && self.are_settled(&self.wanted_here())
+    }
+
+    fn wanted_here(&self) -> Vec<Key> {
+        let mut keys = Vec::new();
+        if self.cursor.step < self.stop_count() {
+            self.want_step(self.cursor.step, false, &mut keys);
+        }
+        keys
+    }
+
+    fn are_settled(&self, keys: &[Key]) -> bool {
+        keys.iter().all(|key| self.cache.is_settled(key))
     }
 
     /// The rows whose windows are looked at together: the pick, and as many as are kept in memory around the cursor.
