@@ -199,9 +199,8 @@ fn view(live: &LiveSession, target: usize, run: usize) -> ApiResult<RunView> {
 
 /// That run with its rows from one on.
 fn view_from(live: &LiveSession, target: usize, run: usize, from_row: usize) -> ApiResult<RunView> {
-    let found = live.with(|session| {
-        session.run(target, run).map(|found| session.run_view_from(run, found, from_row))
-    });
+    let found = live
+        .with(|session| session.run(target, run).map(|found| session.run_view_from(run, found, from_row)));
     found.map_err(|error| ApiError::from(error).about_path())
 }
 

@@ -7,8 +7,8 @@ use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
-use sightline_core::image::{GrayImage, npy};
-use sightline_core::trace::{ArrayName, StepTrace};
+use sightline_core::image::{npy, npz};
+use sightline_core::trace::{ArrayName, ArrayView, StepTrace};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
@@ -20,12 +20,16 @@ use crate::traverses::FileBytes;
 
 /// The routes of this resource.
 pub fn router() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(show)).routes(routes!(stage)).routes(routes!(array))
+    OpenApiRouter::new()
+        .routes(routes!(show))
+        .routes(routes!(stage))
+        .routes(routes!(array))
+        .routes(routes!(arrays))
 }
 
 /// A step
 ///
-/// Arrays are left out; they are fetched one by one.
+/// Arrays are left out; they are fetched one by one, or all in one file.
 #[utoipa::path(get, operation_id = "show_step", path = "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}", tag = "steps", params(
     ("session" = String, Path), ("target" = usize, Path), ("run" = usize, Path), ("step" = usize, Path)),
     responses((status = 200, body = StepTrace), ApiError))]
@@ -80,13 +84,37 @@ async fn array(
         let missing =
             || ApiError::not_found(format!("Step {step} did not come to the array {}.", name.word()));
         let view = trace.array(name).ok_or_else(missing)?;
-        let [width, height] = view.size();
-        let image = GrayImage::from_raw(width, height, view.values().to_vec())
-            .ok_or_else(|| ApiError::internal(format!("{}: size and values disagree", name.word())))?;
         let headers = [(header::CONTENT_TYPE, "application/octet-stream")];
-        Ok((headers, npy::encode(&image)?).into_response())
+        Ok((headers, npy::encode_array(view.values(), &shape_of(view))?).into_response())
     })
     .await
+}
+
+/// All arrays to which a step came, as one NumPy file (`numpy.load` gives them by name); NaN where invalid
+#[utoipa::path(get, operation_id = "show_arrays", path = "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/arrays.npz",
+    tag = "steps", params(
+    ("session" = String, Path), ("target" = usize, Path), ("run" = usize, Path), ("step" = usize, Path)),
+    responses((status = 200, content_type = "application/octet-stream", body = FileBytes), ApiError))]
+async fn arrays(
+    State(state): State<AppState>,
+    Path((session, target, run, step)): Path<(String, usize, usize, usize)>,
+) -> ApiResult<Response> {
+    let trace = find(&state, &session, target, run, step)?;
+    blocking(move || {
+        let there = ArrayName::ALL.into_iter().filter_map(|name| Some((name, trace.array(name)?)));
+        let files: Vec<(&str, Vec<u8>)> = there
+            .map(|(name, view)| Ok((name.word(), npy::encode_array(view.values(), &shape_of(view))?)))
+            .collect::<ApiResult<_>>()?;
+        let headers = [(header::CONTENT_TYPE, "application/octet-stream")];
+        Ok((headers, npz::encode(files)?).into_response())
+    })
+    .await
+}
+
+/// Rows and columns, as NumPy counts them.
+fn shape_of(view: ArrayView<'_>) -> [u32; 2] {
+    let [width, height] = view.size();
+    [height, width]
 }
 
 fn json(value: &impl Serialize) -> ApiResult<Response> {

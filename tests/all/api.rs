@@ -1,9 +1,11 @@
 //! Sessions over HTTP: pick, run, go back, fork, cancel, restart.
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use axum::http::{Method, header};
 use serde_json::{Value, json};
+use sightline_core::image::{npy, npz};
 use sightline_core::session::wire::StopDetail;
 use sightline_tests::server::{PIXEL, TestServer, request, small_drive, small_recording};
 
@@ -111,6 +113,32 @@ async fn going_back_is_a_read_of_the_same_bytes() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn rows_that_are_new_and_a_cursor_that_moved_travel_without_the_session() {
+    let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
+    let server = TestServer::open(drive.path(), folder.path());
+    let session = server.begin().await;
+    server.pick(&session).await;
+    let whole = server.ended(&session, 0, 0).await;
+    let run = format!("sessions/{session}/targets/0/runs/0");
+    let rows = |view: &Value| view["rows"].as_array().unwrap().clone();
+    let tail = server.get(&format!("{run}?from_row=3")).await.expect(200);
+    assert_eq!(rows(&tail), rows(&whole)[3..]);
+    assert_eq!((&tail["summary"], &tail["complete"]), (&whole["summary"], &whole["complete"]));
+    assert!(rows(&server.get(&format!("{run}?from_row=99")).await.expect(200)).is_empty());
+    server.get(&format!("{run}?from_row=-1")).await.problem(422, "query");
+    server.get(&format!("{run}?rows=3")).await.problem(422, "query");
+
+    let mut events = server.state.events().subscribe();
+    let (path, cursor) = (format!("sessions/{session}/cursor"), json!({ "target": 0, "run": 0, "step": 2 }));
+    server.json(Method::PUT, &path, &cursor).await.expect(200);
+    assert_eq!(server.get(&path).await.expect(200), cursor);
+    let told = serde_json::to_value(events.try_recv().unwrap()).unwrap();
+    assert_eq!(told, json!({ "event": "cursor_moved", "session": session, "cursor": cursor }));
+    assert!(events.try_recv().is_err(), "and nothing of the session");
+    server.get("sessions/s99/cursor").await.problem(404, "not_found");
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn every_array_is_a_numpy_file_of_the_size_that_the_step_says() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), folder.path());
@@ -118,9 +146,12 @@ async fn every_array_is_a_numpy_file_of_the_size_that_the_step_says() {
     server.pick(&session).await;
     server.ended(&session, 0, 0).await;
     let trace = server.get(&step(&session, 0, 1)).await.expect(200);
+    let together = server.get(&format!("{}/arrays.npz", step(&session, 0, 1))).await;
+    let mut together: BTreeMap<_, _> = npz::decode(&together.bytes, "arrays").unwrap().into_iter().collect();
     for name in ["reference", "scaled", "rolled", "matched", "difference", "right_window", "surface"] {
         let answer = server.get(&format!("{}/arrays/{name}.npy", step(&session, 0, 1))).await;
-        let image = sightline_core::image::npy::decode(&answer.bytes, name).unwrap();
+        let image = npy::decode(&answer.bytes, name).unwrap();
+        assert_eq!(together.remove(name), Some(answer.bytes), "{name}");
         // The surface has a score wherever the whole template lies in the search window.
         let window = &trace["locate"]["evidence"]["match_template"]["search_window"];
         let positions = |key: &str| window[key].as_u64().map(|side| side - 20);
@@ -128,6 +159,16 @@ async fn every_array_is_a_numpy_file_of_the_size_that_the_step_says() {
         let (width, height) = image.dimensions();
         assert_eq!((Some(width.into()), Some(height.into())), (said("width"), said("height")), "{name}");
     }
+    assert!(together.is_empty(), "{together:?}");
+    let of_pick = server.get(&format!("{}/arrays.npz", step(&session, 0, 0))).await;
+    let of_pick = npz::decode(&of_pick.bytes, "arrays").unwrap();
+    let of_pick: Vec<&str> = of_pick.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(
+        of_pick,
+        ["right_window"],
+        "a designation is found in the right image, and compared with nothing before"
+    );
+    server.get(&format!("{}/arrays.npz", step(&session, 0, 99))).await.problem(404, "not_found");
     server.get(&format!("{}/arrays/surface.npy", step(&session, 0, 0))).await.problem(404, "not_found");
     server.get(&format!("{}/arrays/nonsense.npy", step(&session, 0, 1))).await.problem(404, "not_found");
     server.get(&format!("{}/arrays/surface", step(&session, 0, 1))).await.problem(404, "not_found");

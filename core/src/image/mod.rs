@@ -12,6 +12,7 @@ pub mod gradient;
 pub mod invalid;
 pub mod io;
 pub mod npy;
+pub mod npz;
 
 pub use patch::Patch;
 pub use rect::PixelRect;

@@ -5,10 +5,12 @@ use std::sync::Arc;
 use ehttp::{Headers, Method};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use sightline_core::image::npz;
 use sightline_core::session::compare::RunName;
 use sightline_core::session::wire::{Designated, Problem};
 use sightline_core::settings::Changes;
 use sightline_core::study::wire::StudyRows;
+use sightline_core::trace::ArrayName;
 use sightline_core::trackability::TrackabilityLimits;
 
 use super::{Arrived, Reply, Request, why};
@@ -152,6 +154,7 @@ fn item_path(key: &Key) -> String {
         }
         Key::Stop { traverse, step } => format!("traverses/{traverse}/steps/{step}"),
         Key::Trace(step) => step_path(step),
+        Key::Arrays(step) => format!("{}/arrays.npz", step_path(step)),
         Key::Array(step, name) => format!("{}/arrays/{}.npy", step_path(step), name.word()),
     }
 }
@@ -216,19 +219,33 @@ fn query_of(limits: &Changes) -> String {
 }
 
 fn read_item(key: &Key, bytes: &[u8], context: &egui::Context) -> Result<Item, Problem> {
-    let raster = match key {
-        Key::Stop { .. } => return Ok(Item::Stop(Arc::new(parse(bytes)?))),
-        Key::Trace(_) => return Ok(Item::Trace(Arc::new(parse(bytes)?))),
+    match key {
+        Key::Stop { .. } => Ok(Item::Stop(Arc::new(parse(bytes)?))),
+        Key::Trace(_) => Ok(Item::Trace(Arc::new(parse(bytes)?))),
         Key::Image { step, eye, .. } => {
-            Raster::from_png(context, &format!("the {} image of step {step}", eye.word()), bytes)
+            let name = format!("the {} image of step {step}", eye.word());
+            let raster = Raster::from_png(context, &name, bytes).map_err(|why| misread(&why))?;
+            Ok(Item::Raster(Arc::new(raster)))
         }
-        Key::Array(_, name) if Table::is_table(*name) => {
-            let table = Table::from_npy(*name, bytes).map_err(|why| misread(&why))?;
-            return Ok(Item::Table(Arc::new(table)));
+        Key::Array(_, name) => read_array(*name, bytes, context),
+        Key::Arrays(step) => {
+            let name = format!("the arrays of step {}", step.step);
+            let files = npz::decode(bytes, name).map_err(|why| misread(&why.to_string()))?;
+            // One that this page does not know is for a newer one.
+            let known = files.iter().filter_map(|(word, file)| Some((ArrayName::from_word(word)?, file)));
+            let read = known.map(|(name, file)| Ok((name, read_array(name, file, context)?)));
+            read.collect::<Result<_, _>>().map(Item::Arrays)
         }
-        Key::Array(_, name) => Raster::from_npy(context, *name, bytes),
+    }
+}
+
+fn read_array(name: ArrayName, bytes: &[u8], context: &egui::Context) -> Result<Item, Problem> {
+    let item = if Table::is_table(name) {
+        Table::from_npy(name, bytes).map(|table| Item::Table(Arc::new(table)))
+    } else {
+        Raster::from_npy(context, name, bytes).map(|raster| Item::Raster(Arc::new(raster)))
     };
-    raster.map(|raster| Item::Raster(Arc::new(raster))).map_err(|why| misread(&why))
+    item.map_err(|why| misread(&why))
 }
 
 pub(super) fn parse<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
@@ -257,7 +274,6 @@ fn misread(why: &str) -> Problem {
 mod tests {
     use super::*;
     use crate::cache::Eye;
-    use sightline_core::trace::ArrayName;
 
     #[test]
     fn every_thing_has_its_path() {
@@ -266,9 +282,10 @@ mod tests {
         assert_eq!(item_path(&image), "traverses/t/steps/7/images/right.png");
         assert_eq!(item_path(&Key::Trace(step.clone())), "sessions/s1/targets/2/runs/3/steps/4");
         assert_eq!(
-            item_path(&Key::Array(step, ArrayName::RightWindow)),
+            item_path(&Key::Array(step.clone(), ArrayName::RightWindow)),
             "sessions/s1/targets/2/runs/3/steps/4/arrays/right_window.npy"
         );
+        assert_eq!(item_path(&Key::Arrays(step)), "sessions/s1/targets/2/runs/3/steps/4/arrays.npz");
     }
 
     #[test]

@@ -4,7 +4,6 @@ use sightline_core::session::Cursor;
 use sightline_core::session::compare::{Comparison, NewComparison, RUNS_MAX, RunName};
 use sightline_core::session::metrics::RunMetrics;
 use sightline_core::session::wire::Problem;
-use sightline_core::trace::ArrayName;
 
 use super::compare::{Asked, Compare};
 use super::{State, row_of};
@@ -194,8 +193,6 @@ impl State {
 
     /// What the compared runs need at a step: their records, and the arrays that are shown beside each other.
     pub(super) fn want_compared(&self, keys: &mut Vec<Key>) {
-        const SHOWN: [ArrayName; 4] =
-            [ArrayName::Surface, ArrayName::Matched, ArrayName::Rolled, ArrayName::Difference];
         let step = self.cursor.step;
         for other in self.others() {
             // The neighbours' records are small; arrays are fetched for the step that is looked at alone.
@@ -205,12 +202,7 @@ impl State {
                 keys.extend(self.other_key(other.name, there).map(Key::Trace));
                 if near == step {
                     keys.extend(self.image_key(there, Eye::Left));
-                    if let (Some(trace), Some(key)) =
-                        (self.other_trace(other.name).ready(), self.other_key(other.name, there))
-                    {
-                        let made = SHOWN.into_iter().filter(|&name| super::wanted::has_array(trace, name));
-                        keys.extend(made.map(|name| Key::Array(key.clone(), name)));
-                    }
+                    keys.extend(self.other_key(other.name, there).map(Key::Arrays));
                 }
             }
         }

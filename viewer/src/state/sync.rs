@@ -63,7 +63,8 @@ impl State {
             self.sync.cursor_sent = Some(self.cursor);
             self.sync.cursor_messages += 1;
             self.outbox.push(Request::PutCursor { session: id, cursor: self.cursor });
-        } else if self.sync.cursor_stale && self.sync.cursor_sent.is_none() && self.sync.cursor_read.is_none() {
+        } else if self.sync.cursor_stale && self.sync.cursor_sent.is_none() && self.sync.cursor_read.is_none()
+        {
             self.sync.cursor_stale = false;
             self.sync.cursor_read = Some(self.sync.cursor_messages);
             self.outbox.push(Request::Cursor(id));

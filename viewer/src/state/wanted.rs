@@ -1,7 +1,7 @@
 //! What the page wants loaded for what it shows.
 
 use sightline_core::session::view::RunView;
-use sightline_core::trace::{ArrayName, StepRow, StepTrace};
+use sightline_core::trace::{ArrayName, StepRow};
 
 use super::{State, row_of};
 use crate::cache::{Eye, Key};
@@ -80,7 +80,7 @@ impl State {
 
     fn want_step(&self, step: usize, is_neighbour: bool, keys: &mut Vec<Key>) {
         let computed = self.row_at(step).and_then(|_| self.step_key(step));
-        keys.extend(computed.clone().map(Key::Trace));
+        keys.extend(computed.iter().flat_map(|key| [Key::Trace(key.clone()), Key::Arrays(key.clone())]));
         // A step that was computed has its cameras in its record.
         keys.extend(self.stop_detail_key(step).filter(|_| computed.is_none()));
         // The images of a simulated stop take a while: only the one that is looked at is worth that.
@@ -88,38 +88,5 @@ impl State {
         if is_ready || !is_neighbour {
             keys.extend([Eye::Left, Eye::Right].into_iter().filter_map(|eye| self.image_key(step, eye)));
         }
-        if let Some((trace, key)) = self.trace_at(step).ready().zip(computed) {
-            let there = ArrayName::ALL.into_iter().filter(|&name| has_array(trace, name));
-            keys.extend(there.map(|name| Key::Array(key.clone(), name)));
-        }
-    }
-}
-
-/// Whether the stage that makes an array was reached.
-pub(super) fn has_array(trace: &StepTrace, name: ArrayName) -> bool {
-    let (template, features) = (trace.template(), trace.features());
-    let registration = trace.shape().and_then(|e| e.registration.as_ref());
-    let matched = template.and_then(|e| e.match_template.as_ref());
-    match name {
-        ArrayName::Reference | ArrayName::Scaled | ArrayName::Rolled => {
-            template.is_some_and(|e| e.scale_roll.is_some())
-        }
-        ArrayName::Matched | ArrayName::Difference => matched.is_some(),
-        // A descent along the gradient compares no window of positions.
-        ArrayName::Surface => matched.is_some_and(|m| m.descent.is_none()),
-        ArrayName::RightWindow => template.is_some_and(|e| e.point_stereo.is_some()),
-        ArrayName::Features => features.is_some_and(|e| e.detect.is_some()),
-        ArrayName::Cloud => features.is_some_and(|e| e.bootstrap.is_some()),
-        ArrayName::Disparities | ArrayName::Ranges => trace.shape().is_some_and(|e| e.surface.is_some()),
-        ArrayName::CoarseSearch => registration.is_some_and(|found| found.coarse_shift_m.is_some()),
-        ArrayName::Draped | ArrayName::DrapedMatch => {
-            registration.is_some_and(|found| found.draped.is_some())
-        }
-        ArrayName::MeshFixed | ArrayName::MeshMoving => registration.is_some(),
-        ArrayName::Sensor
-        | ArrayName::ErrorBefore
-        | ArrayName::ErrorCoarse
-        | ArrayName::ErrorFine
-        | ArrayName::RefinePath => registration.is_some_and(|found| found.mean_m[2].is_some()),
     }
 }

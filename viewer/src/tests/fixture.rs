@@ -95,11 +95,13 @@ pub(crate) fn at_step(context: &egui::Context, step: usize) -> State {
     state.cursor = Cursor { target: Some(0), run: 0, step };
     let key = StepKey { session: "s1".to_owned(), target: 0, run: 0, step };
     traces.get(step).cloned().into_iter().for_each(|trace| load(&mut state, trace));
-    for name in ArrayName::ALL.into_iter().filter(|name| !Table::is_table(*name)) {
+    let array = |name: ArrayName| {
         let side = if name == ArrayName::Surface { 31 } else { 21 };
         let raster = Raster::from_npy(context, name, &npy::encode(&bump(side)).unwrap()).unwrap();
-        state.cache.arrived(Key::Array(key.clone(), name), Ok(Item::Raster(Arc::new(raster))), 0.0);
-    }
+        (name, Item::Raster(Arc::new(raster)))
+    };
+    let arrays = ArrayName::ALL.into_iter().filter(|name| !Table::is_table(*name)).map(array).collect();
+    state.cache.arrived(Key::Arrays(key), Ok(Item::Arrays(arrays)), 0.0);
     for eye in [Eye::Left, Eye::Right] {
         let bytes = sightline_core::image::io::encode_png_u8(&bump(64)).unwrap();
         let raster = Raster::from_png(context, eye.word(), &bytes).unwrap();

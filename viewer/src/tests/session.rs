@@ -2,8 +2,9 @@
 
 use sightline_core::frames::Pixel;
 use sightline_core::session::Cursor;
+use sightline_core::session::view::RunView;
 use sightline_core::session::wire::{Event, Problem, SessionEntry};
-use sightline_core::trace::ArrayName;
+use sightline_core::trace::StepRow;
 
 use super::fixture::{STOPS, at_step, nothing, without_target};
 use crate::cache::{Eye, Key, Slot};
@@ -144,11 +145,72 @@ fn progress_of_a_run_reads_the_session_again_and_ends() {
         ended,
         doing: "step 5".to_owned(),
     };
+    let rows = |state: &State| state.run().unwrap().rows.len();
+    let (had, whole) = (rows(&state), state.run().unwrap().clone());
     state.told(progress(false));
     assert_eq!(state.run_progress().unwrap().k, 5);
-    assert!(state.take_requests().contains(&Request::Session("s1".to_owned())));
+    let asked = state.take_requests();
+    let [request @ Request::Rows { target: 0, run: 0, from_row, .. }] = &asked[..] else {
+        panic!("only the rows that are new are read, not {asked:?}")
+    };
+    assert_eq!(*from_row, had);
     state.told(progress(true));
     assert!(state.run_progress().is_none());
+    assert!(state.take_requests().is_empty(), "one question at a time");
+    let new = StepRow { step: had, ..whole.rows[had - 1].clone() };
+    let tail = RunView { rows: vec![new.clone()], complete: true, ..whole.clone() };
+    state.arrived(Arrived { request: request.clone(), outcome: Ok(Reply::Run(Box::new(tail))) }, 0.0);
+    assert_eq!(rows(&state), had + 1);
+    assert_eq!(state.run().unwrap().rows.last(), Some(&new));
+    assert!(state.run().unwrap().complete);
+    // The end was told while the rows were read: what came until then is read, too, but not added twice.
+    let [again] = rows_asked(&mut state).try_into().unwrap();
+    state
+        .arrived(Arrived { request: request.clone(), outcome: Ok(Reply::Run(Box::new(whole.clone()))) }, 0.0);
+    assert_eq!(rows(&state), had + 1, "an answer that begins elsewhere is not taken");
+    state.arrived(Arrived { request: again, outcome: Err(problem(404)) }, 0.0);
+    assert!(state.take_requests().contains(&Request::Session("s1".to_owned())), "the run may be gone");
+}
+
+fn rows_asked(state: &mut State) -> Vec<Request> {
+    let is_rows = |request: &Request| matches!(request, Request::Rows { .. });
+    state.take_requests().into_iter().filter(is_rows).collect()
+}
+
+#[test]
+fn a_cursor_that_another_page_moved_is_followed_and_the_own_one_is_not_read_back() {
+    let mut state = loaded(0);
+    let [put] = state.take_requests().try_into().unwrap();
+    state.arrived(Arrived { request: put, outcome: Ok(Reply::Done) }, 0.0);
+    let told = |step: usize| Event::CursorMoved {
+        session: "s1".to_owned(),
+        cursor: Cursor { target: Some(0), run: 0, step },
+    };
+    let read = |state: &mut State, request: Request, step: usize| {
+        let cursor = Cursor { target: Some(0), run: 0, step };
+        state.arrived(Arrived { request, outcome: Ok(Reply::Cursor(cursor)) }, 0.0);
+    };
+    state.apply(Command::Go(Go::By(1)));
+    let [put] = state.take_requests().try_into().unwrap();
+    state.told(told(1));
+    state.arrived(Arrived { request: put, outcome: Ok(Reply::Done) }, 0.0);
+    state.told(told(1));
+    assert!(state.take_requests().is_empty(), "that is this page's own cursor");
+    // Another page goes to step 4; what is told late does not count, what is read does.
+    state.told(told(3));
+    let [get] = state.take_requests().try_into().unwrap();
+    assert_eq!(get, Request::Cursor("s1".to_owned()));
+    read(&mut state, get, 4);
+    assert_eq!(state.cursor.step, 4);
+    assert!(state.take_requests().is_empty(), "and is not sent back");
+    // An answer that crossed a cursor of this page may be older than that.
+    state.told(told(2));
+    let [get] = state.take_requests().try_into().unwrap();
+    state.apply(Command::Go(Go::By(1)));
+    let [put] = state.take_requests().try_into().unwrap();
+    state.arrived(Arrived { request: put, outcome: Ok(Reply::Done) }, 0.0);
+    read(&mut state, get, 2);
+    assert_eq!(state.cursor.step, 5);
 }
 
 #[test]
@@ -157,7 +219,7 @@ fn what_is_wanted_begins_with_the_cursors_step_and_reaches_to_its_neighbours() {
     let wanted = state.wanted();
     let key = state.step_key(2).unwrap();
     assert_eq!(wanted[0], Key::Trace(key.clone()));
-    assert!(wanted[..12].contains(&Key::Array(key, ArrayName::Surface)));
+    assert_eq!(wanted[1], Key::Arrays(key));
     assert!(wanted.contains(&Key::Trace(state.step_key(1).unwrap())));
     assert!(wanted.contains(&Key::Trace(state.step_key(3).unwrap())));
     let last = loaded(STOPS - 2).wanted();

@@ -127,15 +127,16 @@ fn metrics_are_asked_for_only_while_they_are_looked_at() {
 fn what_the_compared_runs_need_is_fetched_and_no_more() {
     let state = compared(&Context::default(), 2);
     let wanted = state.wanted();
-    let of_b = |key: &&Key| matches!(key, Key::Trace(step) | Key::Array(step, _) if step.run == 1);
+    let of_b = |key: &&Key| matches!(key, Key::Trace(step) | Key::Arrays(step) if step.run == 1);
     let steps: Vec<usize> = wanted
         .iter()
         .filter(of_b)
         .filter_map(|key| if let Key::Trace(step) = key { Some(step.step) } else { None })
         .collect();
     assert_eq!(steps, [2, 3, 1]);
-    let arrays = wanted.iter().filter(of_b).filter(|key| matches!(key, Key::Array(..))).count();
-    assert_eq!(arrays, 4, "of the step that is looked at alone");
+    let arrays =
+        wanted.iter().filter(of_b).filter(|key| matches!(key, Key::Arrays(step) if step.step == 2)).count();
+    assert_eq!(arrays, 1, "of the step that is looked at alone");
     let mut alone = state;
     alone.apply(Command::Compare(Ask::Toggle(B)));
     assert!(!alone.wanted().iter().any(|key| of_b(&key)));

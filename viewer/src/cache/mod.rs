@@ -2,12 +2,18 @@
 //!
 //! Whatever the page wants at the moment stays; of the rest, what was wanted longest ago goes first.
 
-use std::collections::HashMap;
+mod names;
+#[cfg(test)]
+mod tests;
+
+use std::borrow::Cow;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 use sightline_core::session::wire::{Problem, StopDetail};
 use sightline_core::trace::{ArrayName, StepTrace};
 
+pub use self::names::{Eye, Key, StepKey};
 use crate::raster::Raster;
 use crate::tables::Table;
 
@@ -20,63 +26,6 @@ const TRACE_BYTES: usize = 32 << 10;
 /// Seconds after which something that was not ready is asked for again.
 const RETRY_S: f64 = 2.0;
 
-/// One of the two images of a stop.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Eye {
-    /// The left (or first) image.
-    Left,
-    /// The right (or second) image.
-    Right,
-}
-
-impl Eye {
-    /// The word in paths and titles.
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::Left => "left",
-            Self::Right => "right",
-        }
-    }
-}
-
-/// A step of a run of a target of a session.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct StepKey {
-    /// The session.
-    pub session: String,
-    /// The target's number.
-    pub target: usize,
-    /// The run's number.
-    pub run: usize,
-    /// The stop.
-    pub step: usize,
-}
-
-/// The name of something that can be loaded.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Key {
-    /// An image of a stop.
-    Image {
-        /// The traverse.
-        traverse: String,
-        /// The stop.
-        step: usize,
-        /// Which of the two.
-        eye: Eye,
-    },
-    /// A stop with its cameras.
-    Stop {
-        /// The traverse.
-        traverse: String,
-        /// The stop.
-        step: usize,
-    },
-    /// What a step saw and decided.
-    Trace(StepKey),
-    /// An array of a step.
-    Array(StepKey, ArrayName),
-}
-
 /// Something that was loaded.
 #[derive(Clone)]
 pub enum Item {
@@ -88,15 +37,26 @@ pub enum Item {
     Raster(Arc<Raster>),
     /// Of a [`Key::Array`] that is a table.
     Table(Arc<Table>),
+    /// Of [`Key::Arrays`]: rasters and tables.
+    Arrays(BTreeMap<ArrayName, Item>),
 }
 
 impl Item {
+    fn rasters(&self) -> Vec<&Raster> {
+        match self {
+            Self::Raster(raster) => vec![raster.as_ref()],
+            Self::Arrays(all) => all.values().flat_map(Self::rasters).collect(),
+            Self::Stop(_) | Self::Trace(_) | Self::Table(_) => Vec::new(),
+        }
+    }
+
     fn bytes(&self) -> usize {
         match self {
             Self::Stop(_) => size_of::<StopDetail>(),
             Self::Trace(_) => TRACE_BYTES,
             Self::Raster(raster) => raster.bytes(),
             Self::Table(table) => table.bytes(),
+            Self::Arrays(all) => all.values().map(Self::bytes).sum(),
         }
     }
 }
@@ -160,15 +120,20 @@ impl Cache {
         self.round += 1;
         let mut missing = Vec::new();
         for key in keys {
-            match self.entries.get_mut(key) {
-                Some(Entry::Ready { wanted, .. }) => *wanted = self.round,
-                Some(Entry::Waiting { until }) if *until <= now && room(key) => missing.push(key.clone()),
-                None if room(key) => missing.push(key.clone()),
-                _ => {}
+            let key = self.holder(key).into_owned();
+            let is_missing = match self.entries.get_mut(&key) {
+                Some(Entry::Ready { wanted, .. }) => {
+                    *wanted = self.round;
+                    false
+                }
+                Some(Entry::Waiting { until }) => *until <= now,
+                Some(_) => false,
+                None => true,
+            };
+            if is_missing && room(&key) {
+                self.entries.insert(key.clone(), Entry::Loading);
+                missing.push(key);
             }
-        }
-        for key in &missing {
-            self.entries.insert(key.clone(), Entry::Loading);
         }
         missing
     }
@@ -206,7 +171,10 @@ impl Cache {
 
     /// Whether nothing is under way for it: it is here, was refused, or is to be asked for again later.
     pub fn is_settled(&self, key: &Key) -> bool {
-        matches!(self.entries.get(key), Some(Entry::Ready { .. } | Entry::Failed(_) | Entry::Waiting { .. }))
+        matches!(
+            self.entries.get(&self.holder(key)),
+            Some(Entry::Ready { .. } | Entry::Failed(_) | Entry::Waiting { .. })
+        )
     }
 
     /// A stop with its cameras.
@@ -243,18 +211,36 @@ impl Cache {
 
     /// All that have a texture.
     pub fn rasters(&self) -> impl Iterator<Item = &Raster> {
-        self.entries.values().filter_map(|entry| match entry {
-            Entry::Ready { item: Item::Raster(raster), .. } => Some(raster.as_ref()),
+        let ready = self.entries.values().filter_map(|entry| match entry {
+            Entry::Ready { item, .. } => Some(item),
             _ => None,
-        })
+        });
+        ready.flat_map(Item::rasters)
+    }
+
+    /// Under which name something is kept or comes: an array that was not asked for by itself, with all those of its step.
+    fn holder<'a>(&self, key: &'a Key) -> Cow<'a, Key> {
+        if let Key::Array(step, _) = key
+            && !self.entries.contains_key(key)
+        {
+            let all = Key::Arrays(step.clone());
+            if self.entries.contains_key(&all) {
+                return Cow::Owned(all);
+            }
+        }
+        Cow::Borrowed(key)
     }
 
     fn slot(&self, key: &Key) -> Slot<'_, Item> {
-        match self.entries.get(key) {
-            None => Slot::Absent,
-            Some(Entry::Loading | Entry::Waiting { .. }) => Slot::Loading,
-            Some(Entry::Ready { item, .. }) => Slot::Ready(item),
-            Some(Entry::Failed(problem)) => Slot::Failed(problem),
+        let holder = self.holder(key);
+        match (self.entries.get(&holder), key) {
+            (None, _) => Slot::Absent,
+            (Some(Entry::Loading | Entry::Waiting { .. }), _) => Slot::Loading,
+            (Some(Entry::Ready { item: Item::Arrays(all), .. }), Key::Array(_, name)) => {
+                all.get(name).map_or(Slot::Absent, Slot::Ready)
+            }
+            (Some(Entry::Ready { item, .. }), _) => Slot::Ready(item),
+            (Some(Entry::Failed(problem)), _) => Slot::Failed(problem),
         }
     }
 
@@ -276,83 +262,4 @@ impl Cache {
 /// Whether the same request may succeed soon: no answer, not ready yet, or too busy.
 fn is_passing(problem: &Problem) -> bool {
     matches!(problem.status, 0 | 202 | 409 | 425 | 429 | 502..=504)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn key(step: usize) -> Key {
-        Key::Image { traverse: "t".to_owned(), step, eye: Eye::Left }
-    }
-
-    fn at_most(n: usize) -> impl FnMut(&Key) -> bool {
-        let mut left = n;
-        move |_| {
-            let is_place = left > 0;
-            left = left.saturating_sub(1);
-            is_place
-        }
-    }
-
-    fn raster(side: u32) -> Item {
-        let values = sightline_core::image::GrayImage::new(side, side);
-        let bytes = sightline_core::image::npy::encode(&values).unwrap();
-        Item::Raster(Arc::new(
-            Raster::from_npy(&egui::Context::default(), ArrayName::Surface, &bytes).unwrap(),
-        ))
-    }
-
-    fn problem(status: u16) -> Problem {
-        Problem {
-            code: "x".to_owned(),
-            title: String::new(),
-            status,
-            detail: "no".to_owned(),
-            hint: None,
-            nearest_pixel: None,
-            received: None,
-        }
-    }
-
-    #[test]
-    fn what_is_missing_is_asked_for_once_and_in_order() {
-        let mut cache = Cache::default();
-        assert_eq!(cache.want(&[key(3), key(4), key(5)], at_most(2), 0.0), vec![key(3), key(4)]);
-        assert_eq!(cache.want(&[key(3), key(4), key(5)], at_most(2), 0.0), vec![key(5)]);
-        assert!(matches!(cache.raster(&key(3)), Slot::Loading));
-        cache.arrived(key(3), Ok(raster(2)), 0.0);
-        assert!(cache.raster(&key(3)).ready().is_some());
-    }
-
-    #[test]
-    fn a_refusal_stays_and_what_is_not_ready_is_asked_for_again() {
-        let mut cache = Cache::default();
-        cache.want(&[key(1), key(2)], |_| true, 0.0);
-        cache.arrived(key(1), Err(problem(404)), 0.0);
-        cache.arrived(key(2), Err(problem(503)), 0.0);
-        assert!(matches!(cache.raster(&key(1)), Slot::Failed(_)));
-        assert_eq!(cache.next_retry(), Some(RETRY_S));
-        assert!(cache.want(&[key(1), key(2)], |_| true, 1.0).is_empty());
-        assert_eq!(cache.want(&[key(1), key(2)], |_| true, 2.5), vec![key(2)]);
-        cache.retry(|_| true);
-        assert_eq!(cache.want(&[key(1), key(2)], |_| true, 2.5), vec![key(1)]);
-    }
-
-    #[test]
-    fn memory_keeps_its_limit_and_what_is_wanted_stays() {
-        let mut cache = Cache::default();
-        for step in 0..4 {
-            cache.want(&[key(step)], |_| true, 0.0);
-            cache.arrived(key(step), Ok(raster(16)), 0.0);
-        }
-        let one = 16 * 16 * 8;
-        assert_eq!(cache.bytes(), 4 * one);
-        cache.want(&[key(0), key(3)], |_| false, 0.0);
-        cache.evict(2 * one);
-        assert_eq!(cache.bytes(), 2 * one);
-        assert!(cache.raster(&key(0)).ready().is_some() && cache.raster(&key(3)).ready().is_some());
-        cache.evict(0);
-        assert_eq!(cache.bytes(), 2 * one);
-    }
 }
