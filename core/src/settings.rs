@@ -121,14 +121,20 @@ impl Settings {
 
     /// The settings that differ from the defaults, by name.
     pub fn changes(&self) -> Changes {
-        let document = serde_json::to_value(self).unwrap_or_default();
-        Self::table()
-            .into_iter()
-            .filter_map(|info| {
-                let value = value_in(&document, &info.group, &info.key)?.clone();
-                (value != info.default).then_some((info.key, value))
-            })
-            .collect()
+        self.changes_from(&Self::default())
+    }
+
+    /// The settings that differ from those of `before`, by name: what leads from there to here.
+    pub fn changes_from(&self, before: &Self) -> Changes {
+        if self == before {
+            return Changes::new();
+        }
+        let [now, then] = [self, before].map(|settings| serde_json::to_value(settings).unwrap_or_default());
+        let differing = Self::table().into_iter().filter_map(|info| {
+            let value = value_in(&now, &info.group, &info.key)?;
+            (Some(value) != value_in(&then, &info.group, &info.key)).then(|| (info.key, value.clone()))
+        });
+        differing.collect()
     }
 }
 
@@ -208,6 +214,23 @@ mod tests {
         let settings = change("ncc_min", json!(0.55)).unwrap();
         assert_eq!(settings.limits.ncc_min, 0.55);
         assert_eq!(settings.changes(), Changes::from([("ncc_min".to_owned(), json!(0.55))]));
+    }
+
+    #[test]
+    fn changes_lead_from_settings_to_others_also_back_to_a_default() {
+        let settings = |changes: &[(&str, Value)]| {
+            let changes = changes.iter().map(|(key, value)| ((*key).to_owned(), value.clone()));
+            Settings::default().with(&changes.collect()).unwrap()
+        };
+        let from = settings(&[("ncc_min", json!(0.5)), ("scale", json!(false))]);
+        let to = settings(&[("ncc_min", json!(0.8))]);
+        let changes = to.changes_from(&from);
+        assert_eq!(
+            changes,
+            Changes::from([("ncc_min".to_owned(), json!(0.8)), ("scale".to_owned(), json!(true))])
+        );
+        assert_eq!(from.with(&changes).unwrap(), to);
+        assert!(to.changes_from(&to).is_empty());
     }
 
     #[test]

@@ -110,7 +110,8 @@ fn of_run(state: &State, session: &str, target: &TargetView, run: &RunView) -> V
     )];
     if let Some(fork) = run.fork {
         let parent = target.runs.iter().find(|other| other.number == fork.run);
-        let settings = parent.map_or_else(|| run.changes.clone(), |parent| changed(parent, run));
+        let settings =
+            parent.map_or_else(|| run.changes.clone(), |parent| run.settings.changes_from(&parent.settings));
         let prediction_px = fork.prediction_px;
         let new = NewRun { run: fork.run, from_step: fork.from_step, settings, prediction_px };
         requests.push((
@@ -134,30 +135,12 @@ fn of_run(state: &State, session: &str, target: &TargetView, run: &RunView) -> V
     requests
 }
 
-/// What takes the settings of one run to those of another.
-fn changed(from: &RunView, to: &RunView) -> Changes {
-    let mut changes: Changes = to
-        .changes
-        .iter()
-        .filter(|(key, value)| from.changes.get(*key) != Some(value))
-        .map(|(key, value)| (key.clone(), value.clone()))
-        .collect();
-    // A setting that is at its default again has to be said, too.
-    for key in from.changes.keys().filter(|key| !to.changes.contains_key(*key)) {
-        let found = sightline_core::settings::Settings::table();
-        if let Some(info) = found.iter().find(|info| info.key == *key) {
-            changes.extend(to.settings.value(&info.group, key).map(|value| (key.clone(), value)));
-        }
-    }
-    changes
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::tests::fixture;
+    use sightline_core::session::Cursor;
     use sightline_core::session::notes::EditNote;
-    use sightline_core::session::{Cursor, Fork};
 
     const ORIGIN: &str = "http://127.0.0.1:7700";
 
@@ -210,25 +193,5 @@ mod tests {
         let anew = found(&state, "run A from step 0");
         let command = "sightline track 'Six stops' --target 512.3,480.6 --set ncc_min=0.6";
         assert_eq!(anew.command.as_deref(), Some(command));
-    }
-
-    #[test]
-    fn a_fork_says_what_it_changed_also_back_to_a_default() {
-        let state = fixture::at_step(&egui::Context::default(), 2);
-        let settings =
-            |changes: Changes| sightline_core::settings::Settings::default().with(&changes).unwrap();
-        let mut parent = state.run().unwrap().clone();
-        let own = Changes::from([
-            ("ncc_min".to_owned(), serde_json::json!(0.5)),
-            ("scale".to_owned(), serde_json::json!(false)),
-        ]);
-        parent.settings = settings(own.clone());
-        parent.changes = parent.settings.changes();
-        let mut child = parent.clone();
-        child.fork = Some(Fork::new(0, 2));
-        child.settings = settings(Changes::from([("ncc_min".to_owned(), serde_json::json!(0.8))]));
-        child.changes = child.settings.changes();
-        let said = changed(&parent, &child);
-        assert_eq!(parent.settings.with(&said).unwrap().changes(), child.changes, "{said:?}");
     }
 }

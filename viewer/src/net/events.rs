@@ -70,7 +70,7 @@ impl Events {
 
     fn connect(&mut self, now: f64) {
         let context = self.context.clone();
-        let wake = move || context.request_repaint();
+        let wake = move || context.request_repaint_after(super::UNHURRIED);
         match ewebsock::connect_with_wakeup(self.url.clone(), Options::default(), wake) {
             Ok(socket) => self.socket = Some(socket),
             Err(_) => self.lose(now),

@@ -8,6 +8,7 @@ pub mod why;
 
 use std::collections::HashSet;
 use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::Duration;
 
 use sightline_core::limits::SettingInfo;
 use sightline_core::session::Cursor;
@@ -38,6 +39,10 @@ const AT_A_TIME: usize = 6;
 
 /// How many of them may be images that must be rendered first: a browser has few connections to one server.
 const SLOW_AT_A_TIME: usize = 2;
+
+/// After how long at the latest the page takes in what nobody waits for; mostly it comes with a frame that is laid out
+/// anyway.
+const UNHURRIED: Duration = Duration::from_millis(50);
 
 /// What the page asks of the server.
 #[derive(Clone, Debug, PartialEq)]
@@ -320,9 +325,12 @@ impl Net {
         }
         let (sender, context) = (self.sender.clone(), self.context.clone());
         http::send(&self.origin, request, &self.context, move |arrived| {
+            let shows_nothing = matches!(arrived.request, Request::PutCursor { .. });
             // Without a receiver the page is closing, and nobody waits for the answer.
-            if sender.send(arrived).is_ok() {
-                context.request_repaint();
+            match sender.send(arrived) {
+                Ok(()) if shows_nothing => context.request_repaint_after(UNHURRIED),
+                Ok(()) => context.request_repaint(),
+                Err(_) => {}
             }
         });
     }

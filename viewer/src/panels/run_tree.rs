@@ -27,14 +27,8 @@ pub(super) fn parent<'a>(runs: &'a [RunView], run: &RunView) -> Option<&'a RunVi
 pub(super) fn changed(runs: &[RunView], run: &RunView) -> Vec<String> {
     let defaults = Settings::default();
     let before = parent(runs, run).map_or(&defaults, |parent| &parent.settings);
-    let mut lines: Vec<String> = Settings::table()
-        .iter()
-        .filter_map(|info| {
-            let now = run.settings.value(&info.group, &info.key)?;
-            (before.value(&info.group, &info.key).as_ref() != Some(&now))
-                .then(|| format!("{} = {now}", info.key))
-        })
-        .collect();
+    let changes = run.settings.changes_from(before);
+    let mut lines: Vec<String> = changes.iter().map(|(key, now)| format!("{key} = {now}")).collect();
     let put = run.fork.and_then(|fork| fork.prediction_px);
     lines.extend(put.map(|pixel| format!("prediction at {:.1}, {:.1} px", pixel.x, pixel.y)));
     lines

@@ -125,7 +125,8 @@ fn card_of(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: 
     // A preset's name says them all.
     let unnamed = state.configurations.named(&run.settings).is_none();
     let is_branch = run_tree::parent(&target.runs, run).is_some();
-    for line in run_tree::changed(&target.runs, run).into_iter().filter(|_| unnamed || is_branch) {
+    let lines = if unnamed || is_branch { run_tree::changed(&target.runs, run) } else { Vec::new() };
+    for line in lines {
         ui.add(egui::Label::new(theme::note(line).monospace()).wrap());
     }
     if target.runs.len() > 1 {

@@ -34,7 +34,8 @@ impl Configurations {
 impl State {
     /// The settings with which the next run would go: those of the run looked at, with the draft's changes.
     pub fn pending(&self) -> Option<Settings> {
-        self.run()?.settings.with(&self.draft).ok()
+        let settings = &self.run()?.settings;
+        if self.draft.is_empty() { Some(settings.clone()) } else { settings.with(&self.draft).ok() }
     }
 
     /// The changes that take the run looked at to a named configuration.
@@ -44,12 +45,7 @@ impl State {
 
     /// The changes that take the run looked at to these settings.
     pub(super) fn changes_to_settings(&self, wanted: &Settings) -> Option<Changes> {
-        let now = &self.run()?.settings;
-        let differing = Settings::table().into_iter().filter_map(|info| {
-            let [old, new] = [now, wanted].map(|settings| settings.value(&info.group, &info.key));
-            (old != new).then_some((info.key, new?))
-        });
-        Some(differing.collect())
+        Some(wanted.changes_from(&self.run()?.settings))
     }
 }
 

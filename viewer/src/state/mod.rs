@@ -43,7 +43,7 @@ use sightline_core::limits::SettingInfo;
 use sightline_core::session::Cursor;
 use sightline_core::session::view::{RunView, SessionView, TargetView};
 use sightline_core::session::wire::{Problem, StopView, TraverseEntry, TraverseView};
-use sightline_core::settings::Changes;
+use sightline_core::settings::{Changes, Settings};
 use sightline_core::target::TrackingState;
 use sightline_core::trace::{ArrayName, StepRow, StepTrace};
 
@@ -157,7 +157,12 @@ pub struct State {
     sync: Sync,
     /// The aligned left camera of the step that was asked for last: it takes a while to compute.
     aligned: egui::mutex::Mutex<Option<(StepKey, Option<Camera>)>>,
+    /// Settings of the run that was asked about last, by group and name: reading one writes all of them as a document.
+    read_out: egui::mutex::Mutex<Option<ReadOut>>,
 }
+
+/// Settings, and those of their values that were asked for.
+type ReadOut = (Settings, BTreeMap<(String, String), Option<Value>>);
 
 impl State {
     /// Nothing known yet; `linked` is the session that the page's link names.
@@ -206,6 +211,7 @@ impl State {
             outbox: Vec::new(),
             sync: Sync { linked, ..Sync::default() },
             aligned: egui::mutex::Mutex::default(),
+            read_out: egui::mutex::Mutex::default(),
         }
     }
 
@@ -284,7 +290,17 @@ impl State {
 
     /// A setting of the run that is looked at.
     pub fn setting(&self, group: &str, key: &str) -> Option<Value> {
-        self.run()?.settings.value(group, key)
+        let settings = &self.run()?.settings;
+        let mut kept = self.read_out.lock();
+        let name = (group.to_owned(), key.to_owned());
+        match kept.as_mut().filter(|(of, _)| of == settings) {
+            Some((_, values)) => values.entry(name).or_insert_with(|| settings.value(group, key)).clone(),
+            None => {
+                let value = settings.value(group, key);
+                *kept = Some((settings.clone(), [(name, value.clone())].into()));
+                value
+            }
+        }
     }
 
     /// Whether a layer of marks is shown.
