@@ -54,6 +54,7 @@ pub(super) fn send(
 /// Method, path and body of a request.
 pub(crate) fn describe(request: &Request) -> (Method, String, Option<Vec<u8>>) {
     let get = |path: String| (Method::GET, path, None);
+    let order = |path: String| (Method::POST, path, json(&serde_json::json!({})));
     match request {
         Request::Traverses => get("traverses".to_owned()),
         Request::Settings => get("settings".to_owned()),
@@ -77,28 +78,18 @@ pub(crate) fn describe(request: &Request) -> (Method, String, Option<Vec<u8>>) {
         Request::NewRun { session, target, new } => {
             (Method::POST, format!("sessions/{session}/targets/{target}/runs"), json(new))
         }
-        Request::CancelRun { session, target, run } => (
-            Method::POST,
-            format!("sessions/{session}/targets/{target}/runs/{run}/cancel"),
-            json(&serde_json::json!({})),
-        ),
-        Request::ResumeRun { session, target, run } => (
-            Method::POST,
-            format!("sessions/{session}/targets/{target}/runs/{run}/resume"),
-            json(&serde_json::json!({})),
-        ),
-        Request::OpenRerun(session) => {
-            (Method::POST, format!("sessions/{session}/rerun"), json(&serde_json::json!({})))
+        Request::CancelRun { session, target, run } => {
+            order(format!("sessions/{session}/targets/{target}/runs/{run}/cancel"))
         }
+        Request::ResumeRun { session, target, run } => {
+            order(format!("sessions/{session}/targets/{target}/runs/{run}/resume"))
+        }
+        Request::OpenRerun(session) => order(format!("sessions/{session}/rerun")),
         Request::Studies => get("studies".to_owned()),
         Request::StudyJobs => get("studies/jobs".to_owned()),
         Request::StartStudy(new) => (Method::POST, "studies/jobs".to_owned(), json(new)),
-        Request::CancelStudy(job) => {
-            (Method::POST, format!("studies/jobs/{job}/cancel"), json(&serde_json::json!({})))
-        }
-        Request::ResumeStudy(job) => {
-            (Method::POST, format!("studies/jobs/{job}/resume"), json(&serde_json::json!({})))
-        }
+        Request::CancelStudy(job) => order(format!("studies/jobs/{job}/cancel")),
+        Request::ResumeStudy(job) => order(format!("studies/jobs/{job}/resume")),
         Request::StudyRows(job) => get(format!("studies/jobs/{job}/rows")),
         Request::Item(key) => get(item_path(key)),
         Request::Reconnect => get(String::new()),
@@ -109,11 +100,9 @@ pub(crate) fn describe(request: &Request) -> (Method, String, Option<Vec<u8>>) {
         Request::Trackability { traverse, step, limits } => {
             get(format!("traverses/{traverse}/steps/{step}/trackability{}", query_of(limits)))
         }
-        Request::CancelTrackability { traverse, step, limits } => (
-            Method::POST,
-            format!("traverses/{traverse}/steps/{step}/trackability/cancel{}", query_of(limits)),
-            json(&serde_json::json!({})),
-        ),
+        Request::CancelTrackability { traverse, step, limits } => {
+            order(format!("traverses/{traverse}/steps/{step}/trackability/cancel{}", query_of(limits)))
+        }
         Request::Why(request) => why::describe(request),
         Request::Notes(session) => get(format!("sessions/{session}/notes")),
         Request::NewNote { session, new } => (Method::POST, format!("sessions/{session}/notes"), json(new)),
@@ -123,9 +112,7 @@ pub(crate) fn describe(request: &Request) -> (Method, String, Option<Vec<u8>>) {
         Request::RemoveNote { session, id, .. } => {
             (Method::DELETE, format!("sessions/{session}/notes/{id}"), None)
         }
-        Request::RestoreNote { session, id } => {
-            (Method::POST, format!("sessions/{session}/notes/{id}/restore"), json(&serde_json::json!({})))
-        }
+        Request::RestoreNote { session, id } => order(format!("sessions/{session}/notes/{id}/restore")),
         Request::Exports { session, target, run } => {
             let target = target.map_or_else(String::new, |target| format!("?target={target}"));
             let run = run.map_or_else(String::new, |run| format!("&run={run}"));

@@ -2,7 +2,7 @@
 
 use sightline_core::session::Cursor;
 use sightline_core::session::view::{RunView, SessionView};
-use sightline_core::session::wire::{Event, NewSession, Problem, SessionEntry, TraverseEntry};
+use sightline_core::session::wire::{Event, NewSession, Problem, RerunStream, SessionEntry, TraverseEntry};
 
 use super::{Connection, Progress, Refusal, State, run_letter};
 use crate::cache::{Key, StepKey};
@@ -129,15 +129,7 @@ impl State {
                 request => self.took_run(request, *run),
             },
             Reply::Cursor(cursor) => self.took_cursor(cursor),
-            Reply::Rerun(stream) => {
-                let words = format!(
-                    "Rerun shows this session. A viewer of your own takes `rerun {}`. Whoever uses this machine can read the \
-                     stream: it asks for no token.",
-                    stream.stream_url
-                );
-                self.messages.note_with_link(words, stream.viewer_url.clone());
-                self.open_url = Some(stream.viewer_url);
-            }
+            Reply::Rerun(stream) => self.rerun_opened(stream),
             Reply::Done => match request {
                 // The server tells every page that notes changed.
                 Request::NewNote { .. } => {
@@ -193,6 +185,16 @@ impl State {
                 }
             }
         }
+    }
+
+    fn rerun_opened(&mut self, stream: RerunStream) {
+        let words = format!(
+            "Rerun shows this session. A viewer of your own takes `rerun {}`. Whoever uses this machine can read the \
+             stream: it asks for no token.",
+            stream.stream_url
+        );
+        self.messages.note_with_link(words, stream.viewer_url.clone());
+        self.open_url = Some(stream.viewer_url);
     }
 
     fn refused(&mut self, request: Request, mut problem: Problem) {
