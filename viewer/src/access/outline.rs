@@ -88,13 +88,11 @@ impl Walk<'_> {
             out.extend(entry);
             return;
         }
-        let inner = entry.as_ref().map_or(parent, |entry| Some(entry.id));
-        let is_leaf = entry.as_ref().is_some_and(|entry| entry.tag != Tag::Plain);
+        // A field of HTML has nothing in it: a list that opens below a field comes behind it.
+        let inner = entry.as_ref().filter(|entry| entry.tag == Tag::Plain).map(|entry| entry.id).or(parent);
         out.extend(entry);
-        if !is_leaf {
-            for child in node.children() {
-                self.visit(*child, inner, out);
-            }
+        for child in node.children() {
+            self.visit(*child, inner, out);
         }
     }
 
@@ -299,6 +297,24 @@ mod tests {
         let of =
             |name| field.attributes.iter().find(|(key, _)| *key == name).map(|(_, value)| value.as_str());
         assert_eq!((of("min"), of("max"), of("step")), (Some("-1"), Some("1"), Some("any")));
+    }
+
+    #[test]
+    fn what_opens_below_a_field_comes_behind_it() {
+        let mut region = node(Role::Region, &[2]);
+        region.set_label("Breakpoints");
+        let mut field = node(Role::TextInput, &[3, 4]);
+        field.set_label("expression");
+        let mut words = node(Role::TextRun, &[]);
+        words.set_value("nc");
+        let mut suggestion = node(Role::Button, &[]);
+        suggestion.set_label("ncc");
+        let nodes = vec![(0, node(Role::Window, &[1])), (1, region), (2, field), (3, words), (4, suggestion)];
+        let all = outline(&tree(nodes), 1.0);
+        let found: Vec<_> = all.iter().map(|e| (e.parent, e.role, e.name.as_str())).collect();
+        let expected =
+            [(None, "region", "Breakpoints"), (Some(1), "textbox", "expression"), (Some(1), "button", "ncc")];
+        assert_eq!(found, expected);
     }
 
     #[test]
