@@ -47,6 +47,8 @@ async fn branched() -> (Bench, Browser) {
     browser.wait_status("the loss", &format!("s.step === {FORK} && s.state !== 'tracking' && s.shown")).await;
     browser.click_on("combobox", "compared with").await;
     browser.choose("run A").await;
+    // The panels make room for what compares.
+    browser.control("button", "First divergence").await;
     (bench, browser)
 }
 

@@ -1,5 +1,7 @@
 //! Taking in what the server answers and tells.
 
+use std::collections::BTreeSet;
+
 use sightline_core::session::Cursor;
 use sightline_core::session::view::{RunView, SessionView};
 use sightline_core::session::wire::{Event, NewSession, Problem, RerunStream, SessionEntry, TraverseEntry};
@@ -125,10 +127,16 @@ impl State {
             }
             Reply::Designated { target, session } => self.designated(target, *session),
             Reply::Run(run) => match request {
-                Request::Rows { target, from_row, .. } => self.took_rows(target, from_row, *run),
+                Request::Rows { session, target, from_row, .. } => {
+                    self.took_rows(&session, target, from_row, *run);
+                }
                 request => self.took_run(request, *run),
             },
-            Reply::Cursor(cursor) => self.took_cursor(cursor),
+            Reply::Cursor(cursor) => {
+                if let Request::Cursor(session) = request {
+                    self.took_cursor(&session, cursor);
+                }
+            }
             Reply::Rerun(stream) => self.rerun_opened(stream),
             Reply::Done => match request {
                 // The server tells every page that notes changed.
@@ -299,6 +307,7 @@ impl State {
             self.open_notes(&view.id);
             self.ask.forget();
             self.progress.clear();
+            (self.sync.cursor_stale, self.sync.runs_ahead) = (false, BTreeSet::new());
             self.draft.clear();
             self.forget_comparisons(true);
             self.mode = Mode::Look;

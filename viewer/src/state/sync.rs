@@ -92,10 +92,11 @@ impl State {
         self.sync.runs_ahead.insert((target, run));
     }
 
-    /// Takes in what a run has from a row on.
-    pub(super) fn took_rows(&mut self, target: usize, from_row: usize, tail: RunView) {
+    /// Takes in what a run has from a row on, unless another session was opened meanwhile.
+    pub(super) fn took_rows(&mut self, session: &str, target: usize, from_row: usize, tail: RunView) {
         self.sync.rows_asked = false;
-        let targets = self.session.iter_mut().flat_map(|session| &mut session.targets);
+        let open = self.session.iter_mut().filter(|open| open.id == session);
+        let targets = open.flat_map(|session| &mut session.targets);
         let runs = targets.filter(|known| known.number == target).flat_map(|known| &mut known.runs);
         let Some(run) = runs.into_iter().find(|run| run.number == tail.number) else { return };
         if run.rows.len() != from_row {
@@ -117,9 +118,10 @@ impl State {
     }
 
     /// Follows a cursor that was read, where another page moved it.
-    pub(super) fn took_cursor(&mut self, read: Cursor) {
+    pub(super) fn took_cursor(&mut self, session: &str, read: Cursor) {
         let asked = self.sync.cursor_read.take();
-        if asked == Some(self.sync.cursor_messages) && self.is_moved_elsewhere(read) {
+        let is_open = self.session.as_ref().is_some_and(|open| open.id == session);
+        if is_open && asked == Some(self.sync.cursor_messages) && self.is_moved_elsewhere(read) {
             self.go_where_the_server_is(read);
             self.keep_cursor_valid();
         }

@@ -168,6 +168,11 @@ fn progress_of_a_run_reads_the_session_again_and_ends() {
     state
         .arrived(Arrived { request: request.clone(), outcome: Ok(Reply::Run(Box::new(whole.clone()))) }, 0.0);
     assert_eq!(rows(&state), had + 1, "an answer that begins elsewhere is not taken");
+    // An answer about another session is not taken either.
+    let elsewhere = Request::Rows { session: "s2".to_owned(), target: 0, run: 0, from_row: had + 1 };
+    let tail = RunView { rows: vec![new], ..whole };
+    state.arrived(Arrived { request: elsewhere, outcome: Ok(Reply::Run(Box::new(tail))) }, 0.0);
+    assert_eq!(rows(&state), had + 1);
     state.arrived(Arrived { request: again, outcome: Err(problem(404)) }, 0.0);
     assert!(state.take_requests().contains(&Request::Session("s1".to_owned())), "the run may be gone");
 }
@@ -210,6 +215,11 @@ fn a_cursor_that_another_page_moved_is_followed_and_the_own_one_is_not_read_back
     let [put] = state.take_requests().try_into().unwrap();
     state.arrived(Arrived { request: put, outcome: Ok(Reply::Done) }, 0.0);
     read(&mut state, get, 2);
+    assert_eq!(state.cursor.step, 5);
+    // Nor does a cursor of another session count.
+    state.told(told(3));
+    assert_eq!(state.take_requests(), vec![Request::Cursor("s1".to_owned())]);
+    read(&mut state, Request::Cursor("s2".to_owned()), 3);
     assert_eq!(state.cursor.step, 5);
 }
 

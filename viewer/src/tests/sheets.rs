@@ -3,12 +3,16 @@
 use egui::accesskit::Role;
 use egui_kittest::kittest::Queryable;
 
-use super::{Shown, fixture};
+use sightline_core::settings::TrackerKind;
+use sightline_core::trace::ArrayName;
+
+use super::{Shown, feature_run, fixture, shape_run};
 use crate::actions;
 use crate::command::{Command, Go};
 use crate::layout::{Pane, show_pane};
-use crate::panels::sheets::{self, Cell};
+use crate::panels::sheets::{self, Cell, Sheet};
 use crate::state::State;
+use crate::tables::Kind;
 
 fn table(pane: Pane, step: usize) -> Shown<'static> {
     Shown::new(
@@ -81,6 +85,56 @@ fn the_stereo_profile_as_a_table_marks_its_best_range() {
     assert_eq!(sheets[1].rows.len(), stereo.curve.len());
     assert!(sheets[1].rows.iter().any(|row| row.is_present));
     assert_eq!(sheets[0].rows[0].cells[1], Cell::Number(stereo.range_m));
+}
+
+#[test]
+fn what_the_feature_tracker_saw_is_counted_and_listed() {
+    let mut state = feature_run::at_step(&egui::Context::default(), 2);
+    let [residuals, draws, all] = sheets::of(&state, Pane::Features).unwrap().try_into().unwrap();
+    let features = state.features().ready().unwrap().clone();
+    let sum = |sheet: &Sheet, column: usize| -> f64 {
+        sheet.rows.iter().map(|row| number(&row.cells[column])).sum()
+    };
+    let of_kind = |kind: Kind| features.iter().filter(|feature| Kind::of(feature) == kind).count();
+    assert_eq!(sum(&residuals, 2), of_kind(Kind::Inlier) as f64);
+    assert_eq!(sum(&residuals, 3), of_kind(Kind::Outlier) as f64);
+    let motion = state.feature_evidence().unwrap().fit_motion.clone().unwrap();
+    assert_eq!(draws.rows.len(), motion.consensus_by_draw.len());
+    let best = draws.rows.iter().find(|row| row.is_present).unwrap();
+    assert_eq!(number(&best.cells[1]), f64::from(*motion.consensus_by_draw.iter().max().unwrap()));
+    assert_eq!(all.rows.len(), features.len());
+    assert_eq!(all.rows[0].cells[0], Cell::Number(features[0].pixel.x));
+    // The table shows what the filters let through.
+    state.feature_view.residual_m = [0.0, 0.0];
+    let [.., fewer] = &sheets::of(&state, Pane::Features).unwrap()[..] else { panic!("three tables") };
+    assert!(fewer.rows.len() < all.rows.len());
+}
+
+#[test]
+fn what_the_shape_tracker_saw_is_told_in_numbers() {
+    let state = shape_run::at_step(&egui::Context::default(), TrackerKind::Shape, 2);
+    let [numbers, errors, coarse, way] = sheets::of(&state, Pane::Shape).unwrap().try_into().unwrap();
+    let found = state.shape_evidence().unwrap().registration.clone().unwrap();
+    assert_eq!(numbers.rows[0].cells[1], Cell::from(found.mean_m[0].map(|m| m * 1000.0)));
+    let seen =
+        |name: ArrayName| state.array(name).ready().unwrap().values.iter().filter(|v| v.is_finite()).count();
+    let sum = |column: usize| -> f64 { errors.rows.iter().map(|row| number(&row.cells[column])).sum() };
+    assert_eq!(sum(2), seen(ArrayName::ErrorBefore) as f64);
+    assert_eq!(sum(3), seen(ArrayName::ErrorFine) as f64);
+    // The best shift is where the registration says.
+    assert_eq!(coarse.rows.len(), seen(ArrayName::CoarseSearch));
+    let best = coarse.rows.iter().find(|row| row.is_present).unwrap();
+    let least = coarse.rows.iter().map(|row| number(&row.cells[2])).fold(f64::INFINITY, f64::min);
+    assert_eq!(number(&best.cells[2]), least);
+    let path = state.refine_path().ready().unwrap();
+    assert_eq!(way.rows.len(), path.len());
+    assert_eq!(number(&way.rows[1].cells[2]), path[1].mean_m * 1000.0);
+    let shifts = [&coarse.rows[0], &coarse.rows[coarse.rows.len() - 1]].map(|row| number(&row.cells[0]));
+    assert!((shifts[0] + shifts[1]).abs() < 1e-9, "as far to either side: {shifts:?}");
+}
+
+fn number(cell: &Cell) -> f64 {
+    if let Cell::Number(value) = cell { *value } else { panic!("no number: {cell:?}") }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Why, what if, and what would have saved it: what the panels show and what the state asks for.
 
-use egui_kittest::kittest::Queryable;
+use egui_kittest::kittest::{NodeT, Queryable};
 use serde_json::json;
 use sightline_core::frames::Pixel;
 use sightline_core::session::Fork;
@@ -98,6 +98,34 @@ fn a_limit_is_tried_by_its_slider_and_a_displacement_by_its_own() {
     );
     for name in ["try ncc_min", "try search window", "try template", "move prediction x"] {
         shown.harness.get_by_role_and_label(egui::accesskit::Role::Slider, name);
+    }
+}
+
+#[test]
+fn a_slider_stays_the_same_one_when_a_value_is_explained_above_it() {
+    let sliders = |is_explained: bool| {
+        let shown = Shown::new(
+            [520.0, 900.0],
+            move |context| {
+                let mut state = fixture::at_step(context, LOST);
+                if is_explained {
+                    state.apply(Command::Why(Ask::Value { step: LOST, value: "ncc".to_owned() }));
+                }
+                state
+            },
+            |ui, state, out| {
+                crate::layout::show_pane(ui, Pane::Why, state, out);
+            },
+        );
+        ["try ncc_min", "try search window"].map(|name| {
+            let found = shown.harness.get_by_role_and_label(egui::accesskit::Role::Slider, name);
+            (found.accesskit_node().locate().0, found.rect().top())
+        })
+    };
+    let (before, after) = (sliders(false), sliders(true));
+    for ((id, top), (later, moved)) in before.into_iter().zip(after) {
+        assert!(moved > top, "something came in above it");
+        assert_eq!(id, later, "who holds it still holds it");
     }
 }
 

@@ -20,18 +20,23 @@ const BARS: usize = 30;
 
 /// How many residuals fall between equal steps, the last number being whatever is larger.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Histogram {
+pub(in super::super) struct Histogram {
     /// Width of a step, m.
-    pub(super) step_m: f64,
+    pub(in super::super) step_m: f64,
     /// Of the matches that agree with the motion.
-    pub(super) inliers: [usize; BARS],
+    pub(in super::super) inliers: [usize; BARS],
     /// Of those that do not.
-    pub(super) outliers: [usize; BARS],
+    pub(in super::super) outliers: [usize; BARS],
 }
 
 impl Histogram {
+    /// The residuals of a step about the gate of its run.
+    pub(in super::super) fn of(state: &State, features: &[Feature]) -> Self {
+        Self::new(features, gate_m(state))
+    }
+
     /// The residuals of `features` about a gate.
-    pub(super) fn new(features: &[Feature], gate_m: f64) -> Self {
+    fn new(features: &[Feature], gate_m: f64) -> Self {
         let step_m = gate_m / BARS_TO_GATE as f64;
         let mut histogram = Self { step_m, inliers: [0; BARS], outliers: [0; BARS] };
         for matched in features.iter().filter_map(|feature| feature.matched.as_ref()) {
@@ -43,9 +48,14 @@ impl Histogram {
     }
 }
 
+/// The distance of two points up to which a match agrees with the motion, m.
+fn gate_m(state: &State) -> f64 {
+    state.setting("features", "motion_inlier_m").and_then(|v| v.as_f64()).unwrap_or(0.03)
+}
+
 /// Shows the histogram with the gate and the filters.
 pub(super) fn residuals(ui: &mut Ui, state: &State, features: &[Feature]) {
-    let gate_m = state.setting("features", "motion_inlier_m").and_then(|v| v.as_f64()).unwrap_or(0.03);
+    let gate_m = gate_m(state);
     let is_distance = state.setting("features", "motion_gate").is_none_or(|gate| gate == "distance");
     let sigmas = state.setting("features", "motion_inlier_sigma").and_then(|v| v.as_f64()).unwrap_or(3.0);
     let gate = if is_distance {

@@ -8,6 +8,7 @@ mod counts;
 mod filters;
 pub mod marks;
 
+pub(super) use self::charts::Histogram;
 use egui::{ScrollArea, Ui};
 use sightline_core::locate::features::FeatureEvidence;
 use sightline_core::locate::features::rows::Feature;

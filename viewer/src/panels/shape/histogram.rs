@@ -95,6 +95,14 @@ fn bars(errors: &[f32], end_m: f64) -> [usize; BARS] {
     bars
 }
 
+/// Where each bar begins and ends, m, and how many errors it has at the start and at the end.
+pub(super) fn counts(errors: &Errors<'_>, automatic_m: f64) -> Vec<(f64, f64, [usize; 2])> {
+    let end_m = automatic_m * BEYOND;
+    let edge = |bar: usize| end_m * (2.0 * bar as f64 / BARS as f64 - 1.0);
+    let both = bars(errors.before, end_m).into_iter().zip(bars(errors.end, end_m)).enumerate();
+    both.map(|(bar, (before, end))| (edge(bar), edge(bar + 1), [before, end])).collect()
+}
+
 /// Filled bars, or only their outline.
 fn paint(painter: &Painter, plot: Rect, bars: &[usize; BARS], most: usize, fill: Option<Color32>) {
     let width = plot.width() / BARS as f32;

@@ -12,6 +12,8 @@ mod sensor;
 mod solid;
 mod surface;
 
+pub(super) use self::search::step_m as step_of_search_m;
+pub(super) use self::sensor::error_counts;
 use egui::{RichText, ScrollArea, Ui};
 use sightline_core::locate::shape_tracker::ShapeEvidence;
 use sightline_core::locate::shape_tracker::evidence::Registered;

@@ -15,6 +15,7 @@ use super::{Look, ready, why_not};
 use crate::overlay::{self, Mark};
 use crate::panels;
 use crate::raster::{self, Raster};
+use crate::state::State;
 use crate::theme;
 
 /// From this width on both stand side by side, points.
@@ -54,15 +55,20 @@ pub(super) fn show(ui: &mut Ui, look: &Look<'_>) {
     }
 }
 
+/// How far apart the shifts of a search with so many to a side are, m.
+pub(in super::super) fn step_m(state: &State, found: &Registered, side: u32) -> f64 {
+    let columns = state.array(ArrayName::Sensor).ready().map(|sensor| sensor.size()[0]);
+    // Without the sensor's picture, whose pixel is a step, the steps follow from how far the search went.
+    columns
+        .and_then(|columns| sensor_pixel_m(found, columns))
+        .unwrap_or(2.0 * found.search_m / f64::from(side.saturating_sub(1).max(1)))
+}
+
 /// J over Δx and Δy.
 fn coarse(ui: &mut Ui, look: &Look<'_>, found: &Registered, height: f32) {
     let Some(raster) = ready(ui, look.state.array(ArrayName::CoarseSearch), "coarse search") else { return };
-    let columns = look.state.array(ArrayName::Sensor).ready().map(|sensor| sensor.size()[0]);
     let side = raster.size()[0];
-    // Without the sensor's picture, whose pixel is a step, the steps follow from how far the search went.
-    let step_m = columns
-        .and_then(|columns| sensor_pixel_m(found, columns))
-        .unwrap_or(2.0 * found.search_m / f64::from(side.saturating_sub(1).max(1)));
+    let step_m = step_m(look.state, found, side);
     let run = theme::run(look.state.cursor.run);
     names::wrapped(
         ui,

@@ -69,6 +69,12 @@ pub(super) fn show(ui: &mut Ui, look: &Look<'_>, out: &mut Vec<Command>) {
     histogram::show(ui, look.state, &errors, [limit_m, automatic_m], out);
 }
 
+/// How many pixels have which error of depth: from, to, m, at the start and at the end.
+pub(in super::super) fn error_counts(before: &Raster, end: &Raster) -> Vec<(f64, f64, [usize; 2])> {
+    let errors = Errors { before: before.values.as_raw(), end: end.values.as_raw() };
+    histogram::counts(&errors, limit_m(before))
+}
+
 /// What nearly all errors of a picture keep to, m.
 fn limit_m(errors: &Raster) -> f64 {
     let [low, high] = errors.levels.map(f64::from);

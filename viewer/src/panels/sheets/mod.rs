@@ -8,10 +8,14 @@
 //! | `scores` | the surface of scores and the stereo profile |
 //! | `steps` | what is plotted over the steps |
 //! | `places` | the map, the error budget and the template's history |
+//! | `features` | residuals, draws and features |
+//! | `shape` | registration, errors of depth, coarse search and refinement |
 
+mod features;
 mod grid;
 mod places;
 mod scores;
+mod shape;
 pub mod sheet;
 mod steps;
 
@@ -25,7 +29,7 @@ use crate::panels;
 use crate::state::State;
 
 /// The panels that can be looked at as tables.
-pub const PANES: [Pane; 8] = [
+pub const PANES: [Pane; 10] = [
     Pane::Plots,
     Pane::Tolerances,
     Pane::Uncertainty,
@@ -34,6 +38,8 @@ pub const PANES: [Pane; 8] = [
     Pane::Map,
     Pane::Budget,
     Pane::History,
+    Pane::Features,
+    Pane::Shape,
 ];
 
 /// What a panel shows, as tables.
@@ -50,6 +56,8 @@ pub fn of(state: &State, pane: Pane) -> Result<Vec<Sheet>, String> {
         Pane::Map => places::map(state),
         Pane::Budget => places::budget(state),
         Pane::History => places::history(state),
+        Pane::Features => features::features(state),
+        Pane::Shape => shape::shape(state),
         _ => Err("This panel is made of words and numbers already.".to_owned()),
     }
 }

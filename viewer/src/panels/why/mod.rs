@@ -5,7 +5,7 @@ mod criteria;
 mod saved;
 mod tree;
 
-use egui::{CollapsingHeader, RichText, ScrollArea, Ui};
+use egui::{CollapsingHeader, Id, RichText, ScrollArea, Ui, UiBuilder};
 use sightline_core::session::why::sentence;
 
 use super::what_if;
@@ -48,16 +48,18 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         saved::show(ui, state, out);
         tree::show(ui, state, out);
         if let Some(verdict) = &trace.judge {
-            CollapsingHeader::new(theme::title("criteria, worst margin first"))
-                .id_salt("criteria")
-                .default_open(true)
-                .show(ui, |ui| criteria::show(ui, state, verdict, out));
+            section(ui, "criteria, worst margin first", |ui| criteria::show(ui, state, verdict, out));
         }
         if what_if::can_be_tried(trace) {
-            CollapsingHeader::new(theme::title("what if, for this step"))
-                .id_salt("what if")
-                .default_open(true)
-                .show(ui, |ui| what_if::form(ui, state, trace, out));
+            section(ui, "what if, for this step", |ui| what_if::form(ui, state, trace, out));
         }
+    });
+}
+
+/// A part of the panel under its title. Its controls stay the same ones when something comes in above them: a slider that is
+/// held is not let go because a value was explained.
+fn section(ui: &mut Ui, title: &str, show: impl FnOnce(&mut Ui)) {
+    ui.scope_builder(UiBuilder::new().scope_id(Id::unique(("why", title))), |ui| {
+        CollapsingHeader::new(theme::title(title)).id_salt(title).default_open(true).show(ui, show);
     });
 }
