@@ -20,6 +20,16 @@ async fn run_by(browser: &Browser, bench: &Bench, preset: &str, number: usize) {
     browser.wait_status(preset, &done).await;
 }
 
+/// Looks at a panel as tables, one of which has such a column, and back.
+async fn read_as_table(browser: &Browser, panel: &str, column: &str) {
+    let switch = format!("{panel} as table");
+    browser.activate("button", &switch).await;
+    browser.control("columnheader", column).await;
+    browser.shot(&format!("{}-table", panel.to_lowercase())).await;
+    browser.activate("button", &switch).await;
+    browser.gone("columnheader", column).await;
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn runs_by_features_and_by_shape_stand_beside_the_one_by_its_window() {
     let (bench, browser) = picked(&short_approach()).await;
@@ -33,6 +43,7 @@ async fn runs_by_features_and_by_shape_stand_beside_the_one_by_its_window() {
     browser.says("shown: ").await;
     browser.says("inliers").await;
     browser.shot("features").await;
+    read_as_table(&browser, "Features", "matches that agree").await;
     browser.show_panel("Match scores").await;
     browser.says("follows the features of the whole scene and matches no template").await;
     // The stages are those of this tracker.
@@ -50,6 +61,8 @@ async fn runs_by_features_and_by_shape_stand_beside_the_one_by_its_window() {
         tokio::time::sleep(std::time::Duration::from_millis(900)).await;
         browser.shot(&format!("shape-{}", part.to_lowercase().replace(' ', "-"))).await;
     }
+
+    read_as_table(&browser, "Shape", "pixels at the end").await;
 
     // All three side by side, and where they part.
     browser.show_panel("Runs").await;
