@@ -3,11 +3,11 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::LENGTH_LIMIT;
 use super::catalogue::{CATALOGUE, Name, NameKind};
 use super::functions::FUNCTIONS;
 use super::token::{Token, is_name, tokens};
 use super::unit::Unit;
+use super::{Answers, Expression, LENGTH_LIMIT};
 
 /// How many candidates are offered at a time.
 pub const CANDIDATES: usize = 12;
@@ -55,7 +55,7 @@ pub fn complete(text: &str, cursor: usize) -> Completion {
             ranked(words.collect(), &word)
         }
         Where::Joint => ranked(joints(), &word),
-        Where::Value => values(&word),
+        Where::Value => values(&word, compared(&before).as_ref()),
     };
     Completion { from, to, candidates }
 }
@@ -118,8 +118,26 @@ fn words_of(name: &str) -> Vec<String> {
     }
 }
 
-/// Names and functions that begin as the word does, or hold it.
-fn values(word: &str) -> Vec<Candidate> {
+/// The unit of what stands before a sign that takes one unit on both sides, where the text ends with such a sign.
+fn compared(before: &str) -> Option<Unit> {
+    const ALIKE: [&str; 8] = ["<", ">", "<=", ">=", "==", "!=", "+", "-"];
+    let tokens = tokens(before).ok()?;
+    let ((_, sign), left) = tokens.split_last().filter(|((last, _), _)| is_one_of(last, &ALIKE))?;
+    let begins = |token: &Token| {
+        is_one_of(token, &["&&", "||", "!", "(", ","])
+            || matches!(token, Token::Name(word) if matches!(word.as_str(), "and" | "or" | "not"))
+    };
+    let from = left.iter().rev().find(|(token, _)| begins(token)).map_or(0, |(_, place)| place.end);
+    let read = Expression::read(before.get(from..sign.start)?).ok()?;
+    (read.answers() == Answers::Number).then_some(read.unit)
+}
+
+fn is_one_of(token: &Token, signs: &[&str]) -> bool {
+    matches!(token, Token::Sign(sign) if signs.contains(sign))
+}
+
+/// Names and functions that begin as the word does, or hold it; numbers in a unit like this one come before the others.
+fn values(word: &str, unit: Option<&Unit>) -> Vec<Candidate> {
     let parent = word.rfind('.').map(|dot| &word[..dot]);
     if let Some(parent) = parent {
         let names = super::path_of(parent).map(|path| CATALOGUE.under(&path)).unwrap_or_default();
@@ -134,7 +152,12 @@ fn values(word: &str) -> Vec<Candidate> {
         unit: String::new(),
         meaning: format!("{}: {}", function.form, function.meaning),
     });
-    ranked(CATALOGUE.under(&[]).into_iter().map(candidate).chain(functions).collect(), word)
+    let mut names = CATALOGUE.under(&[]);
+    if let Some(unit) = unit {
+        let is_like = |name: &Name| Unit::of_symbol(&name.unit).is_some_and(|other| other.is_alike(unit));
+        names.sort_by_key(|name| name.kind != NameKind::Number || !is_like(name));
+    }
+    ranked(names.into_iter().map(candidate).chain(functions).collect(), word)
 }
 
 fn candidate(name: Name) -> Candidate {

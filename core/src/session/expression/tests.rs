@@ -359,6 +359,16 @@ fn completion_offers_names_with_units_words_after_a_comparison_and_parts_after_a
     assert!(texts("hyp").contains(&"hypot(".to_owned()));
     assert!(texts("sigma_m > 5 ").contains(&"cm".to_owned()));
     assert!(texts("ncc ").contains(&"< ".to_owned()));
+    // After a sign that takes one unit on both sides, what has that unit comes first.
+    for text in
+        ["ncc < ", "sigma_m >= ", "step > 2 && err_px < ", "(hypot(err_m, 2 cm) - ", "not scale * 2 == "]
+    {
+        let first = &texts(text)[0];
+        let whole = format!("{text}{first}{}", if text.starts_with('(') { ")" } else { "" });
+        assert!(Expression::read(&whole).is_ok(), "{whole}");
+    }
+    assert_eq!(texts("err_m < s")[0], "sigma_m", "a length before a scale");
+    assert_eq!(texts("ncc < s")[0], "scale");
     assert_eq!(complete("ncc", 99).to, 3);
     assert!(complete("\"open", 5).candidates.is_empty());
 }

@@ -52,6 +52,12 @@ impl Unit {
         Some(Self { dimension: Dimension(exponents), per_base, symbol: word.into() })
     }
 
+    /// The unit of a name's symbol; none where it is no symbol.
+    pub(super) fn of_symbol(symbol: &str) -> Option<Self> {
+        let known = || Self::of_word(symbol).or_else(|| Self::of_derived(symbol));
+        if symbol.is_empty() { Some(Self::NONE) } else { known() }
+    }
+
     /// The words that may follow a number.
     pub fn words() -> impl Iterator<Item = &'static str> {
         WORDS.into_iter().map(|(word, ..)| word)
