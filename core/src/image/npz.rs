@@ -33,8 +33,8 @@ pub fn encode<'a>(arrays: impl IntoIterator<Item = (&'a str, Vec<u8>)>) -> Resul
 /// the file.
 ///
 /// # Errors
-/// [`Error::Format`] when the bytes are no ZIP, are cut short or damaged, or hold something compressed: what comes out is
-/// never larger than what went in.
+/// [`Error::Format`] when the bytes are no ZIP, are cut short or damaged, or hold something compressed, which could unpack
+/// to any size.
 pub fn decode(bytes: &[u8], name: impl AsRef<Path>) -> Result<Vec<(String, Vec<u8>)>> {
     let damaged = |error: &dyn std::fmt::Display| {
         Error::format(name.as_ref(), format!("not a .npz file that can be read ({error})"))

@@ -158,7 +158,7 @@ pub struct State {
     /// The aligned left camera of the step that was asked for last: it takes a while to compute.
     aligned: egui::mutex::Mutex<Option<(StepKey, Option<Camera>)>>,
     /// Settings of the run that was asked about last, by group and name: reading one writes all of them as a document.
-    read_out: egui::mutex::Mutex<Option<ReadOut>>,
+    read_out: egui::mutex::Mutex<ReadOut>,
 }
 
 /// Settings, and those of their values that were asked for.
@@ -292,15 +292,11 @@ impl State {
     pub fn setting(&self, group: &str, key: &str) -> Option<Value> {
         let settings = &self.run()?.settings;
         let mut kept = self.read_out.lock();
-        let name = (group.to_owned(), key.to_owned());
-        match kept.as_mut().filter(|(of, _)| of == settings) {
-            Some((_, values)) => values.entry(name).or_insert_with(|| settings.value(group, key)).clone(),
-            None => {
-                let value = settings.value(group, key);
-                *kept = Some((settings.clone(), [(name, value.clone())].into()));
-                value
-            }
+        if kept.0 != *settings {
+            *kept = (settings.clone(), BTreeMap::new());
         }
+        let name = (group.to_owned(), key.to_owned());
+        kept.1.entry(name).or_insert_with(|| settings.value(group, key)).clone()
     }
 
     /// Whether a layer of marks is shown.
