@@ -11,7 +11,9 @@ pub(crate) fn golden(is_update: bool) -> Result<()> {
         command.env("SIGHTLINE_GOLDEN", "update");
         cmd::run(&mut command, "mend the tests reported above; the lists may be written in part")?;
         cmd::say("Golden lists written, except those named above as left out.");
-        cmd::say("Look at `git diff core/tests/golden/lists`, then commit it with the change that it belongs to.");
+        cmd::say(
+            "Look at `git diff core/tests/golden/lists`, then commit it with the change that it belongs to.",
+        );
     } else {
         command.env_remove("SIGHTLINE_GOLDEN");
         cmd::run(

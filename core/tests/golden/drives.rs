@@ -10,7 +10,7 @@ use std::sync::atomic::AtomicBool;
 use sightline_core::frames::Pixel;
 use sightline_core::sim::{Scenario, choose_targets};
 use sightline_core::traverse::import::{ImportOptions, import};
-use sightline_core::traverse::{Traverse, create_simulated};
+use sightline_core::traverse::{Existing, Traverse, create_simulated};
 
 /// Straight towards a rock on a plain, from 9 m to 5.4 m.
 const APPROACH: &str = r#"
@@ -161,7 +161,8 @@ fn recorded(set: &str) -> Result<PathBuf, PathBuf> {
 /// Two stops of two views, either of which is the left one in turn.
 fn in_turn([first, second]: [&str; 2]) -> ImportOptions {
     let files = [first, second, second, first].map(PathBuf::from).to_vec();
-    ImportOptions { files, ..ImportOptions::default() }
+    // Each view is written twice, with the same pixels.
+    ImportOptions { files, existing: Existing::Replace, ..ImportOptions::default() }
 }
 
 fn imported(source: &Path, options: ImportOptions, folder: &Path, pixel: Pixel) -> Drive {
