@@ -1,4 +1,4 @@
-//! The project's commands: `cargo xtask serve | test | check | web | bench | dist | screenshot`.
+//! The project's commands: `cargo xtask serve | test | golden | check | web | bench | dist | screenshot`.
 //!
 //! Each command installs or builds what it needs and says in one sentence what to do when it cannot. All native
 //! builds name the whole workspace, so that every command asks Cargo for one set of features and the large
@@ -11,6 +11,7 @@ mod debian_source;
 mod chromium;
 mod serve;
 mod test;
+mod golden;
 mod check;
 mod house_rules;
 mod imports;
@@ -45,6 +46,12 @@ enum Task {
         /// Run only the tests whose names contain this.
         filter: Option<String>,
     },
+    /// Compare every number that tracking computes with the golden lists.
+    Golden {
+        /// Write the lists anew instead.
+        #[arg(long)]
+        update: bool,
+    },
     /// Check format, lints (native and WASM), documentation and the rules of the house.
     Check,
     /// Build what the browser loads into `target/web`.
@@ -70,6 +77,7 @@ fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Task::Serve { arguments } => serve::serve(&arguments),
         Task::Test { filter } => test::test(filter.as_deref()),
+        Task::Golden { update } => golden::golden(update),
         Task::Check => check::check(),
         Task::Web => web::web(),
         Task::Bench { peers: true, json, .. } => peers::peers(json),

@@ -1,0 +1,26 @@
+//! `cargo xtask golden`: the golden lists of `core/tests/golden`, compared or written anew.
+
+use anyhow::Result;
+
+use crate::cmd;
+
+/// Compares what tracking computes now with the golden lists, or writes these anew.
+pub(crate) fn golden(is_update: bool) -> Result<()> {
+    let mut command = cmd::cargo(&["test", "--package", "sightline-core", "--test", "golden"]);
+    if is_update {
+        command.env("SIGHTLINE_GOLDEN", "update");
+        cmd::run(&mut command, "mend the tests reported above; the lists may be written in part")?;
+        cmd::say("Golden lists written, except those named above as left out.");
+        cmd::say(
+            "Look at `git diff core/tests/golden/lists`, then commit it with the change that it belongs to.",
+        );
+    } else {
+        command.env_remove("SIGHTLINE_GOLDEN");
+        cmd::run(
+            &mut command,
+            "mend the code, or write the lists anew with `cargo xtask golden --update` where the change is meant",
+        )?;
+        cmd::say("Golden lists unchanged; those named above as left out were not compared.");
+    }
+    Ok(())
+}
