@@ -52,7 +52,15 @@ pub(crate) const CASES: &[Case] = &[
     variant("approach-sdog", "sdog"),
     variant("approach-drift-correction", "drift-correction"),
     variant("approach-homography", "homography"),
-    variant("approach-three-templates", "three-templates"),
+    variant("approach-scale-roll-search", "scale-roll-search"),
+    Case {
+        name: "approach-three-templates",
+        drive: DriveName::Approach,
+        preset: "three-templates",
+        // By default this short drive never renews its template, so that there is only one.
+        changes: &["template_update=every_update"],
+        stops_max: 4,
+    },
     variant("approach-half-pixel", "half-pixel"),
     Case {
         name: "approach-optional-parts",
