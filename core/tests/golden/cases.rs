@@ -1,6 +1,6 @@
 //! The cases of the golden lists: a drive and a configuration each.
 
-use sightline_core::presets::preset;
+use sightline_core::presets::{Preset, preset};
 use sightline_core::session::track;
 use sightline_core::settings::{Settings, parse_assignment};
 use sightline_core::target::Designation;
@@ -122,7 +122,7 @@ impl Case {
 
     fn settings(&self) -> Settings {
         let parsed = self.changes.iter().map(|text| parse_assignment(text).expect("an assignment"));
-        let settings = preset(self.preset).and_then(|preset| preset.settings()).expect("a known preset");
+        let settings = preset(self.preset).and_then(Preset::settings).expect("a known preset");
         settings.with(&parsed.collect()).expect("changes of existing settings")
     }
 }
