@@ -1,6 +1,6 @@
 //! The cases of the golden lists: a drive and a configuration each.
 
-use sightline_core::presets::preset;
+use sightline_core::presets::{Preset, preset};
 use sightline_core::session::track;
 use sightline_core::settings::{Settings, parse_assignment};
 use sightline_core::target::Designation;
@@ -52,7 +52,15 @@ pub(crate) const CASES: &[Case] = &[
     variant("approach-sdog", "sdog"),
     variant("approach-drift-correction", "drift-correction"),
     variant("approach-homography", "homography"),
-    variant("approach-three-templates", "three-templates"),
+    variant("approach-scale-roll-search", "scale-roll-search"),
+    Case {
+        name: "approach-three-templates",
+        drive: DriveName::Approach,
+        preset: "three-templates",
+        // By default this short drive never renews its template, so that there is only one.
+        changes: &["template_update=every_update"],
+        stops_max: 4,
+    },
     variant("approach-half-pixel", "half-pixel"),
     Case {
         name: "approach-optional-parts",
@@ -114,7 +122,7 @@ impl Case {
 
     fn settings(&self) -> Settings {
         let parsed = self.changes.iter().map(|text| parse_assignment(text).expect("an assignment"));
-        let settings = preset(self.preset).and_then(|preset| preset.settings()).expect("a known preset");
+        let settings = preset(self.preset).and_then(Preset::settings).expect("a known preset");
         settings.with(&parsed.collect()).expect("changes of existing settings")
     }
 }
