@@ -1,10 +1,10 @@
-//! `cargo xtask golden`: the golden lists of `core/tests/golden`, compared or written anew.
+//! `cargo xtask golden`: compares the golden lists of `core/tests/golden`, or records them again.
 
 use anyhow::Result;
 
 use crate::cmd;
 
-/// Compares what tracking computes now with the golden lists, or writes these anew.
+/// Compares the golden lists with the current values, or records them again.
 pub(crate) fn golden(is_update: bool) -> Result<()> {
     let mut command = cmd::cargo(&["test", "--package", "sightline-core", "--test", "golden"]);
     if is_update {
@@ -18,7 +18,7 @@ pub(crate) fn golden(is_update: bool) -> Result<()> {
         command.env_remove("SIGHTLINE_GOLDEN");
         cmd::run(
             &mut command,
-            "mend the code, or write the lists anew with `cargo xtask golden --update` where the change is meant",
+            "mend the code, or record the lists again with `cargo xtask golden --update` if the change is intended",
         )?;
         cmd::say("Golden lists unchanged; those named above as left out were not compared.");
     }

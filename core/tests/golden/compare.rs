@@ -1,13 +1,13 @@
-//! The comparison of a golden list with what is computed now.
+//! Compares a recorded golden list with the current values.
 //!
-//! On the CPU type that wrote the list every line must be equal. On another one digests are left out and a real
-//! number a may differ from b by 1e-5 · max(1, |a|, |b|): absolutely for small numbers, relatively for large ones.
+//! On the recorded CPU type every line must be equal. On another CPU type digests are ignored and two real numbers a and b
+//! are equal if |a − b| ≤ 1e-5 · max(1, |a|, |b|); integers and words must still be equal.
 
 use std::collections::HashMap;
 
 use super::sheet::List;
 
-/// How much real numbers may differ on another CPU type.
+/// Tolerance of real numbers on another CPU type, absolute below 1 and relative above.
 const TOLERANCE: f64 = 1e-5;
 
 /// A line in which two lists differ.

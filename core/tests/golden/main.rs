@@ -1,7 +1,8 @@
-//! Golden lists: every number that tracking computes, compared with what is kept in `lists/`.
+//! Golden test: compares the values of every tracking stage with the lists recorded in `lists/`.
 //!
-//! Run as `cargo xtask golden`, or with all other tests. `cargo xtask golden --update` writes the lists anew. A list
-//! is one pair of drive and configuration; `extract*.rs` write it, `compare.rs` says when two lists are equal.
+//! Runs with `cargo xtask golden` and with the test suite; `cargo xtask golden --update` records the lists again. Each list
+//! covers one pair of drive and configuration. `extract*.rs` produce a list, `compare.rs` defines when two are equal.
+//! Names state units (`_m`, `_px`, `_rad`) and frames (`_in_rover`, `_in_site`); arrays are summarised.
 
 mod arrays;
 mod cases;
@@ -25,16 +26,16 @@ use crate::compare::{Difference, differences};
 use crate::drives::{Drive, DriveName};
 use crate::sheet::List;
 
-/// Differences that are printed for one list.
+/// Maximum number of differences printed per list.
 const SHOWN: usize = 20;
 
-/// What became of one case.
+/// The result of one case.
 enum Outcome {
-    /// The list is as before.
+    /// The list is unchanged.
     Equal,
-    /// It was written.
+    /// The list was recorded.
     Written,
-    /// Something differs: what, as text.
+    /// The list differs; contains the report.
     Different(String),
 }
 
@@ -70,12 +71,12 @@ fn golden_lists_are_unchanged() {
     say(&format!("golden: {compared} lists equal, {} different, {left_out} left out", different.len()));
     assert!(
         different.is_empty(),
-        "\n{}\nIf these changes are meant, run `cargo xtask golden --update` and commit core/tests/golden/lists.",
+        "\n{}\nIf these changes are intended, run `cargo xtask golden --update` and commit core/tests/golden/lists.",
         different.join("\n")
     );
 }
 
-/// Prints past the capture of passing tests.
+/// Prints a line that the test harness does not capture.
 fn say(line: &str) {
     writeln!(std::io::stdout(), "{line}").expect("standard output is open");
 }

@@ -11,7 +11,7 @@ use sha2::{Digest, Sha256};
 use sightline_core::camera::MastAngles;
 use sightline_core::frames::Pixel;
 
-/// Between a name and its value.
+/// Separates a name from its value.
 const ARROW: &str = " -> ";
 
 /// Evenly spaced samples of an array.
@@ -229,7 +229,7 @@ impl List {
     /// Reads a list from its text.
     ///
     /// # Errors
-    /// The first line that is none.
+    /// The first line that is neither a comment nor `name -> value`.
     pub(crate) fn from_text(text: &str) -> Result<Self, MalformedList> {
         let mut list = Self { cpu: String::new(), lines: Vec::new() };
         for (index, line) in text.lines().enumerate() {
@@ -246,7 +246,7 @@ impl List {
         Ok(list)
     }
 
-    /// The text of the file that keeps it; `title` says in one line what was computed.
+    /// Formats the list as a file; `title` is one line that names drive and configuration.
     pub(crate) fn to_text(&self, title: &str) -> String {
         let mut text = format!(
             "# Golden list: {title}\n# Written by `cargo xtask golden --update`; not edited by hand.\n# cpu: {}\n\n",
