@@ -2,7 +2,7 @@
 //!
 //! Runs with `cargo xtask golden` and with the test suite; `cargo xtask golden --update` records the lists again. Each list
 //! covers one pair of drive and configuration. `extract*.rs` produce a list, `compare.rs` defines when two are equal.
-//! Names state units (`_m`, `_px`, `_rad`) and frames (`_in_rover`, `_in_site`); arrays are summarised.
+//! Units are suffixes of the names (`_m`, `_px`, `_rad`); `position_rover` is in m, in the rover frame of the stop.
 
 mod arrays;
 mod cases;
