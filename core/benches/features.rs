@@ -20,20 +20,22 @@
 use std::sync::{Arc, OnceLock};
 
 use divan::Bencher;
-use sightline_core::camera::{Camera, Mast, MastAngles};
-use sightline_core::error::Result;
-use sightline_core::frames::{Pixel, Pose};
-use sightline_core::locate::features::detect::{StopFeatures, detect};
-use sightline_core::locate::features::motion::{MotionInput, motion};
-use sightline_core::locate::store::{Shared, SharedStore};
-use sightline_core::pipeline::{self, Stops};
-use sightline_core::presets::preset;
-use sightline_core::settings::Settings;
-use sightline_core::sim::{self, Eye, NoiseSeed, Scenario, World};
-use sightline_core::stages::capture::StereoPair;
-use sightline_core::stages::update::Updated;
-use sightline_core::target::Designation;
-use sightline_core::traverse::{OdometryError, StereoGeometry, TraverseIndex};
+use sightline_geometry::camera::{Camera, Mast, MastAngles};
+use sightline_geometry::error::Result;
+use sightline_geometry::frames::{Pixel, Pose};
+use sightline_geometry::odometry_error::OdometryError;
+use sightline_geometry::stereo_geometry::StereoGeometry;
+use sightline_rover::pipeline::{self, Stops};
+use sightline_track::locate::features::detect::{StopFeatures, detect};
+use sightline_track::locate::features::motion::{MotionInput, motion};
+use sightline_track::locate::store::{Shared, SharedStore};
+use sightline_track::presets::preset;
+use sightline_track::settings::Settings;
+use sightline_track::stages::capture::StereoPair;
+use sightline_track::stages::update::Updated;
+use sightline_track::target::Designation;
+use sightline_world::traverse::TraverseIndex;
+use sightline_world::{Eye, NoiseSeed, Scenario, World};
 
 /// Stops of the drive; the last one is the update that is timed.
 const STOPS: usize = 4;
@@ -55,14 +57,15 @@ impl Scene {
     fn new() -> Self {
         let scenario = Scenario::demo();
         let world = World::new(&scenario);
-        let index = sim::index(&scenario, &world).expect("the demonstration can be driven");
+        let index = sightline_world::index(&scenario, &world).expect("the demonstration can be driven");
         let poses: Vec<Pose> = index.stops.iter().map(|stop| stop.site_from_rover.to_pose()).collect();
         let in_site = |step: usize, eye: Eye| {
-            sim::true_camera_in_site(&index.stops[step], eye).expect("a simulated stop has a camera")
+            sightline_world::true_camera_in_site(&index.stops[step], eye)
+                .expect("a simulated stop has a camera")
         };
         let picture = |step: usize, eye: Eye| {
             let seed = NoiseSeed { step: step as u32, eye };
-            Arc::new(sim::render(&world, &scenario, &in_site(step, eye), seed))
+            Arc::new(sightline_world::render(&world, &scenario, &in_site(step, eye), seed))
         };
         let pair = |step| StereoPair { left: picture(step, Eye::Left), right: picture(step, Eye::Right) };
         // The demonstration's mast errs nowhere: the true cameras are those that the tracker is told.

@@ -20,15 +20,15 @@
 use std::sync::OnceLock;
 
 use divan::Bencher;
-use sightline_core::locate::shape_tracker::surface::StopSurface;
-use sightline_core::pipeline::Stops;
-use sightline_core::presets::preset;
-use sightline_core::session::track;
-use sightline_core::settings::Settings;
-use sightline_core::sim::{choose_targets, library};
-use sightline_core::target::Designation;
-use sightline_core::trace::StepTrace;
-use sightline_core::traverse::{Traverse, create_simulated};
+use sightline_recordings::{Traverse, create_simulated};
+use sightline_rover::pipeline::Stops;
+use sightline_session::track;
+use sightline_track::locate::shape_tracker::surface::StopSurface;
+use sightline_track::presets::preset;
+use sightline_track::settings::Settings;
+use sightline_track::target::Designation;
+use sightline_track::trace::StepTrace;
+use sightline_world::{choose_targets, library};
 
 fn main() {
     divan::main();
@@ -53,7 +53,7 @@ fn scene() -> &'static Scene {
         let world = traverse.world().expect("a simulated drive has a world");
         let pixel = choose_targets(world, &scenario, traverse.index())[0];
         let settings =
-            preset("combined").and_then(sightline_core::presets::Preset::settings).expect("a preset");
+            preset("combined").and_then(sightline_track::presets::Preset::settings).expect("a preset");
         let steps = track::run(&traverse, Designation { step: 0, pixel }, &settings).expect("a run");
         Scene { _folder: folder, traverse, settings, steps }
     })

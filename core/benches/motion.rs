@@ -11,19 +11,17 @@
 //! | `bootstrap`, sums | 200 × 400 of 34 operations (weighted: 84) | 0.3 ms (0.7 ms) |
 //! | `bootstrap`, motions | 200 eigenvectors of a 4 × 4 matrix, 1 µs each | 0.2 ms |
 //!
-//! **Reached.** 0.26 ms for a plain fit and 0.53 ms by covariance, 0.66 ms for a plain bootstrap and 0.82 ms
-//! for a weighted one (quickest; medians 0.27, 0.66, 0.92 and 1.1) on a virtual machine that was busy with other work.
-//!
-//! Run with `cargo bench -p sightline-core --profile dev --bench motion` (the profile `dev` is optimised).
+//! Run with `cargo bench -p sightline-core --profile dev --bench motion` (the profile `dev` is optimised); measured times:
+//! `docs/benchmarks.md`.
 
 use divan::Bencher;
 use nalgebra::{Matrix3, Translation3, UnitQuaternion};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use sightline_core::estimate::bootstrap::{BootstrapSettings, bootstrap};
-use sightline_core::estimate::ransac::{Gate, RansacSettings, Weighting, fit_motion};
-use sightline_core::estimate::weighted_motion::Correspondence;
-use sightline_core::frames::{Point3, Pose, Vector3};
+use sightline_geometry::estimate::bootstrap::{BootstrapSettings, bootstrap};
+use sightline_geometry::estimate::ransac::{Gate, RansacSettings, Weighting, fit_motion};
+use sightline_geometry::estimate::weighted_motion::Correspondence;
+use sightline_geometry::frames::{Point3, Pose, Vector3};
 
 fn main() {
     divan::main();

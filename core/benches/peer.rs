@@ -21,10 +21,10 @@ use std::hint::black_box;
 use std::io::{BufRead, Write};
 use std::time::Instant;
 
-use sightline_core::correlate::{PixelRect, zncc_surface};
-use sightline_core::image::{GrayImage, Patch};
-use sightline_core::sift::{Descriptor, SiftSettings, detect, nearest};
-use sightline_core::stereo::{StereoMethod, StereoSettings, disparities};
+use sightline_vision::correlate::{PixelRect, zncc_surface};
+use sightline_vision::image::{GrayImage, Patch};
+use sightline_vision::sift::{Descriptor, SiftSettings, detect, nearest};
+use sightline_vision::stereo::{StereoMethod, StereoSettings, disparities};
 
 fn main() {
     let Some(path) = std::env::args().nth(1).filter(|argument| !argument.starts_with('-')) else { return };

@@ -12,17 +12,14 @@
 //! | point to plane | 18 pictures with normals' products, 4,096 × 60 operations more | 4 ms |
 //! | covariance | normals of 4,096 windows of 25 pixels, 144 lags of 4,096 products | 1.5 ms |
 //!
-//! **Reached**, as time of the processor because seven other programs ran on the two cores: 13 ms for both meshes, 17 ms for
-//! all but the refinement, 23 ms with point to plane, 163 ms with the simplex (0.3 ms a picture: most facets are so small that
-//! finding out that they hold no pixel centre costs more than drawing).
-//!
-//! Run with `cargo bench -p sightline-core --profile dev --bench registration` (the profile `dev` is optimised).
+//! Run with `cargo bench -p sightline-core --profile dev --bench registration` (the profile `dev` is optimised); measured times:
+//! `docs/benchmarks.md`.
 
 use divan::Bencher;
-use sightline_core::frames::Pose;
-use sightline_core::locate::shape::{Mesh, Method, ShapeSettings, SimplexSettings};
-use sightline_core::study::registration::views::Stereo;
-use sightline_core::study::registration::{Case, Staging, rock_cases};
+use sightline_experiments::registration::views::Stereo;
+use sightline_experiments::registration::{Case, Staging, rock_cases};
+use sightline_geometry::frames::Pose;
+use sightline_vision::registration::{Mesh, Method, ShapeSettings, SimplexSettings};
 
 fn main() {
     divan::main();

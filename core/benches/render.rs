@@ -16,20 +16,19 @@
 //!
 //! together about 566 cycles, 4.8 million samples a second on a core at 2.7 GHz; with narrower vectors down to 2.6
 //! million without any. A 1024 × 1024 picture with 16 samples a pixel is 16.8 million samples: 5 s on one core, and 17
-//! stereo pairs under two minutes on two. Measured on a two-core machine (AMD EPYC, vectors of 16): 3.1 million at the
-//! first stop, 3.3 at the last one, 6.2 on both cores; one sample after another it was 2.0, 1.9 and 3.7 in the same hour.
-//! Between 3900 and 15 400 rocks (k from 0.05 to 0.30) the time of a picture does not grow. Building the world (0.8 million
-//! vertices, 5900 rocks) takes one to two seconds and is not counted.
+//! stereo pairs under two minutes on two. Building the world is not
+//! counted.
 //!
-//! Run with `cargo bench -p sightline-core --profile dev --bench render` (the profile `dev` is optimised).
+//! Run with `cargo bench -p sightline-core --profile dev --bench render` (the profile `dev` is optimised); measured times:
+//! `docs/benchmarks.md`.
 
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use sightline_core::camera::Camera;
-use sightline_core::sim::{self, Eye, Region, Scenario, World};
+use sightline_geometry::camera::Camera;
+use sightline_world::{Eye, Region, Scenario, World};
 
 /// Side of the rendered square in the middle of the picture, px.
 const SIDE_PX: u32 = 256;
@@ -50,9 +49,10 @@ fn scene() -> &'static Scene {
     SCENE.get_or_init(|| {
         let scenario = Scenario::demo();
         let world = World::new(&scenario);
-        let index = sim::index(&scenario, &world).expect("the demonstration can be driven");
+        let index = sightline_world::index(&scenario, &world).expect("the demonstration can be driven");
         let camera = |stop: usize| {
-            sim::true_camera_in_site(&index.stops[stop], Eye::Left).expect("a simulated stop has a camera")
+            sightline_world::true_camera_in_site(&index.stops[stop], Eye::Left)
+                .expect("a simulated stop has a camera")
         };
         let (first, last) = (camera(0), camera(index.stops.len() - 1));
         Scene { scenario, world, first, last }
@@ -69,7 +69,9 @@ fn bench(bencher: Bencher<'_, '_>, threads: usize, camera: &Camera) {
     let region = Region { x: first, y: first, width: SIDE_PX, height: SIDE_PX };
     let never = AtomicBool::new(false);
     bencher.counter(ItemsCount::new(SIDE_PX * SIDE_PX * 16)).bench_local(|| {
-        pool.install(|| sim::clean_radiance(&scene.world, &scene.scenario, camera, region, &never))
+        pool.install(|| {
+            sightline_world::clean_radiance(&scene.world, &scene.scenario, camera, region, &never)
+        })
     });
 }
 

@@ -16,17 +16,14 @@
 //! pixels above the threshold, at least 8 comparisons. A descriptor's sums take 0.6 µs; the gradient of its pixels (a
 //! root, a division, an arc tangent) and their 16 factors about as much again, at 60 operations for 16 pixels.
 //!
-//! **Reached.** 110 ms with 6,260 features, of which the scale space takes 30 and a feature about 10 µs: `detect_one_thread`
-//! with few features and with many. OpenCV takes 2.5 times as long on the same image, and 6.7 times as long for the
-//! neighbours of the same descriptors: `cargo xtask bench --peers`.
-//!
-//! Run with `cargo bench -p sightline-core --profile dev --bench sift` (the profile `dev` is optimised).
+//! Run with `cargo bench -p sightline-core --profile dev --bench sift` (the profile `dev` is optimised); measured times:
+//! `docs/benchmarks.md`.
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use image::Luma;
-use sightline_core::image::GrayImage;
-use sightline_core::sift::{Descriptor, SiftSettings, detect, nearest};
+use sightline_vision::image::GrayImage;
+use sightline_vision::sift::{Descriptor, SiftSettings, detect, nearest};
 
 const SIDE: u32 = 1024;
 

@@ -1,7 +1,7 @@
 //! Speed of dense stereo against what the processor can do.
 //!
 //! **The bound.** 1024 × 1024 pixels with 128 disparities are 134 M cells in 2.1 M blocks of 64; a 512-bit vector holds 64 of
-//! bytes, 32 of sums. The headers of `core/src/stereo/block_matching.rs` and `semi_global.rs` count the vector operations of a block:
+//! bytes, 32 of sums. The headers of `core/vision/src/stereo/block_matching.rs` and `semi_global.rs` count the vector operations of a block:
 //!
 //! | method | operations a block, and a pixel more | at four a cycle of 4.1 GHz | stores a block, at one a cycle | bytes held |
 //! |---|---|---|---|---|
@@ -11,13 +11,8 @@
 //! Beside it stand, pixel by pixel and not disparity by disparity: the bits (3 and 8 planes of two images), texture, checks,
 //! patches.
 //!
-//! **Reached.** One thread, quickest of many runs: block matching 43 ms, of which 25 are the sweep; semi-global 85 ms, of
-//! which 33 are the way to the right and 29 the way back. Both sweeps are three times their bound: besides vectors they
-//! compare lengths and fill addresses (about half of the instructions), and what a row reads lies in the second cache and, for the
-//! costs of block matching, beyond it. On the way back each pixel waits for the least L of the one before, some 45 cycles or
-//! 11 ms. `cargo xtask bench --peers` holds both methods against OpenCV's on the same pair; docs/stereo.md has the figures.
-//!
-//! Run with `cargo bench -p sightline-core --profile dev --bench stereo` (the profile `dev` is optimised).
+//! Run with `cargo bench -p sightline-core --profile dev --bench stereo` (the profile `dev` is optimised); measured times:
+//! `docs/benchmarks.md`.
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
@@ -25,9 +20,9 @@ use image::Luma;
 use image::imageops::{FilterType, resize};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use sightline_core::camera::{Mast, MastAngles};
-use sightline_core::image::GrayImage;
-use sightline_core::stereo::{StereoMethod, StereoPaths, StereoSettings, dense_stereo, disparities};
+use sightline_geometry::camera::{Mast, MastAngles};
+use sightline_vision::image::GrayImage;
+use sightline_vision::stereo::{StereoMethod, StereoPaths, StereoSettings, dense_stereo, disparities};
 
 const SIDE: u32 = 1024;
 

@@ -13,26 +13,25 @@
 //! A bicubic sample has 16 taps and two sets of weights, about 60 instructions in double precision, 5 ns when three or
 //! four go at once; an update takes about 35 000 of them. Memory is no limit: all that is read fits a cache of 1 MB.
 //!
-//! **Reached.** 1.4 ms for an update and 1.05 ms for `point_stereo` (quickest; medians 1.8 and 1.1) on a virtual machine
-//! that was busy with other work: the goal is missed. Half of it is reading samples, at about 20 ns each instead of 5.
-//!
 //! The pair is a textured plane before Spirit's navcams, 1024 × 1024 px, whose right eye sees it with a true disparity.
-//! Run with `cargo bench -p sightline-core --profile dev --bench update` (the profile `dev` is optimised).
+//! Run with `cargo bench -p sightline-core --profile dev --bench update` (the profile `dev` is optimised); measured times:
+//! `docs/benchmarks.md`.
 
 use std::sync::{Arc, OnceLock};
 
 use divan::Bencher;
 use image::Luma;
-use sightline_core::camera::{Cahv, Cahvor, Camera, CameraModel, Mast, MastAngles};
-use sightline_core::frames::{Pixel, Point3, Pose};
-use sightline_core::image::GrayImage;
-use sightline_core::locate::template::point_stereo::{self, StereoInput};
-use sightline_core::pipeline::{self, Stops};
-use sightline_core::settings::Settings;
-use sightline_core::stages::capture::StereoPair;
-use sightline_core::stages::update::Updated;
-use sightline_core::target::Designation;
-use sightline_core::traverse::{OdometryError, StereoGeometry};
+use sightline_geometry::camera::{Cahv, Cahvor, Camera, CameraModel, Mast, MastAngles};
+use sightline_geometry::frames::{Pixel, Point3, Pose};
+use sightline_geometry::odometry_error::OdometryError;
+use sightline_geometry::stereo_geometry::StereoGeometry;
+use sightline_rover::pipeline::{self, Stops};
+use sightline_track::locate::template::point_stereo::{self, StereoInput};
+use sightline_track::settings::Settings;
+use sightline_track::stages::capture::StereoPair;
+use sightline_track::stages::update::Updated;
+use sightline_track::target::Designation;
+use sightline_vision::image::GrayImage;
 
 fn main() {
     divan::main();
@@ -137,7 +136,7 @@ impl Stops for Plane {
     fn stereo(&self) -> StereoGeometry {
         StereoGeometry::Lateral
     }
-    fn capture(&self, step: usize) -> sightline_core::error::Result<StereoPair> {
+    fn capture(&self, step: usize) -> sightline_geometry::error::Result<StereoPair> {
         Ok(self.pairs[step].clone())
     }
 }

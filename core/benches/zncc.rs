@@ -16,17 +16,14 @@
 //! which alone take 10 µs at the 28 bytes a cycle that were seen.
 //! `dense_one_thread` is the number to hold against the bound; `dense` is what the tracker sees with its threads.
 //!
-//! **Reached.** 0.057 ms for 161 × 161 and 1.15 ms for 621 × 621, one thread: the products run at 20 µs, near their bound,
-//! and 37 µs go into the rest. OpenCV correlates windows of this size by Fourier transforms, whose time does not grow with
-//! the template: `cargo xtask bench --peers` (0.23 and 5.8 ms on the same machine).
-//!
-//! Run with `cargo bench -p sightline-core --profile dev --bench zncc` (the profile `dev` is optimised).
+//! Run with `cargo bench -p sightline-core --profile dev --bench zncc` (the profile `dev` is optimised); measured times:
+//! `docs/benchmarks.md`.
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use image::Luma;
-use sightline_core::correlate::{PixelRect, zncc_surface};
-use sightline_core::image::{GrayImage, Patch};
+use sightline_vision::correlate::{PixelRect, zncc_surface};
+use sightline_vision::image::{GrayImage, Patch};
 
 const TEMPLATE: u32 = 21;
 

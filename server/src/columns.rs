@@ -1,27 +1,14 @@
-//! The rows of a run as text: JSON Lines and CSV, the same for REST and the command line.
+//! The rows of a run as CSV, the same for REST and the command line.
 //!
-//! Numbers are written with all their digits, so that reading them gives the same bits; what is not known is
-//! null in JSON and empty in CSV.
+//! Numbers are written with all their digits, so that reading them gives the same bits; what is not known is empty.
 
-use std::fmt::Write;
-
-use sightline_core::trace::StepRow;
-
-/// The header of the CSV table.
-const HEADER: &str = "step,state,scale,roll_deg,ncc,stereo_score,err_px,err_m,sigma_m,nees,tracked,\
-                      position_in_rover_x_m,position_in_rover_y_m,position_in_rover_z_m,\
-                      left_pixel_x_px,left_pixel_y_px,range_m,\
-                      distance_correction_m,distance_tolerance_m,position_correction_m,position_tolerance_m,\
-                      budget_without_m,budget_with_m,inliers,confidence,reason";
-
-/// One JSON object a line.
-pub fn jsonl(rows: &[StepRow]) -> String {
-    let line = |row| serde_json::to_string(row).map(|text| text + "\n").unwrap_or_default();
-    rows.iter().map(line).collect()
-}
+use sightline_api::table::cell as text_cell;
+use sightline_record::{Column, StageRecord, Value};
+use sightline_track::records;
+use sightline_track::trace::StepRow;
 
 /// A table with a header.
-pub fn csv(rows: &[StepRow]) -> String {
+pub(crate) fn csv(rows: &[StepRow]) -> String {
     let mut table = csv_header();
     for row in rows {
         table.push_str(&csv_line(row));
@@ -30,49 +17,30 @@ pub fn csv(rows: &[StepRow]) -> String {
 }
 
 /// The header with its line end.
-pub fn csv_header() -> String {
-    format!("{HEADER}\n")
+pub(crate) fn csv_header() -> String {
+    let names: Vec<&str> = records::row_columns().iter().map(|column| column.header.as_str()).collect();
+    names.join(",") + "\n"
 }
 
 /// One row with its line end.
-pub fn csv_line(row: &StepRow) -> String {
-    let mut line = format!("{},{}", row.step, text_cell(&row.state));
-    let numbers =
-        [row.scale, row.roll_deg, row.ncc, row.stereo_score, row.err_px, row.err_m, row.sigma_m, row.nees];
-    numbers.into_iter().for_each(|number| push(&mut line, number));
-    push(&mut line, row.tracked);
-    row.position_in_rover.into_iter().for_each(|number| push(&mut line, Some(number)));
-    push(&mut line, row.left_pixel.map(|pixel| pixel.x));
-    push(&mut line, row.left_pixel.map(|pixel| pixel.y));
-    let judged = [
-        row.range_m,
-        row.distance_correction_m,
-        row.distance_tolerance_m,
-        row.position_correction_m,
-        row.position_tolerance_m,
-        row.budget_without_m,
-        row.budget_with_m,
-    ];
-    judged.into_iter().for_each(|number| push(&mut line, number));
-    push(&mut line, row.inliers);
-    push(&mut line, row.confidence);
-    push(&mut line, row.reason.as_deref().map(text_cell));
-    line + "\n"
+pub(crate) fn csv_line(row: &StepRow) -> String {
+    csv_cells(records::row_columns(), &records::row_record(row)) + "\n"
 }
 
-fn push(line: &mut String, value: Option<impl std::fmt::Display>) {
-    line.push(',');
-    if let Some(value) = value {
-        // Writing to a string does not fail.
-        let _ = write!(line, "{value}");
+/// The cells of columns, without a line end.
+pub(crate) fn csv_cells(columns: &[Column], records: &[StageRecord]) -> String {
+    let cells: Vec<String> = columns.iter().map(|column| cell(&column.cell(records))).collect();
+    cells.join(",")
+}
+
+fn cell(value: &Value) -> String {
+    match value {
+        Value::Missing | Value::Components(_) => String::new(),
+        Value::Flag(flag) => flag.to_string(),
+        Value::Count(count) => count.to_string(),
+        Value::Number(number) => number.to_string(),
+        Value::Word(word) => text_cell(word),
     }
-}
-
-/// A cell of text: in quotes where it must be, and never a formula of a spreadsheet.
-pub fn text_cell(text: &str) -> String {
-    let text =
-        if text.starts_with(['=', '+', '-', '@', '\t', '\r']) { format!("'{text}") } else { text.to_owned() };
-    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text }
 }
 
 #[cfg(test)]
@@ -84,16 +52,19 @@ mod tests {
         let number = 0.1 + 0.2;
         let row = StepRow { step: 3, state: "tracking".to_owned(), ncc: Some(number), ..empty() };
         let line = csv_line(&row);
-        assert_eq!(line.trim_end().split(',').count(), HEADER.split(',').count());
+        assert_eq!(line.trim_end().split(',').count(), csv_header().split(',').count());
         assert_eq!(line.split(',').nth(4).unwrap().parse(), Ok(number));
         assert_eq!(line.split(',').nth(2), Some(""));
     }
 
     #[test]
-    fn text_is_neither_a_formula_nor_two_cells() {
-        assert_eq!(text_cell("=1+1"), "'=1+1");
-        assert_eq!(text_cell("a, \"b\""), "\"a, \"\"b\"\"\"");
-        assert_eq!(text_cell("lost"), "lost");
+    fn the_columns_of_earlier_tables_come_first_under_their_names() {
+        let names = "step,state,scale,roll_deg,ncc,stereo_score,err_px,err_m,sigma_m,nees,tracked,\
+                     position_in_rover_x_m,position_in_rover_y_m,position_in_rover_z_m,\
+                     left_pixel_x_px,left_pixel_y_px,range_m,\
+                     distance_correction_m,distance_tolerance_m,position_correction_m,position_tolerance_m,\
+                     budget_without_m,budget_with_m,inliers,confidence,reason";
+        assert!(csv_header().starts_with(names), "{}", csv_header());
     }
 
     fn empty() -> StepRow {

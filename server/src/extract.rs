@@ -1,5 +1,6 @@
 //! How requests are read: names in paths, query parameters and JSON bodies, with problems that say what is wrong.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use axum::body::Bytes;
@@ -8,50 +9,129 @@ use axum::extract::{FromRequest, FromRequestParts, Query, Request};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, Method, StatusCode, header};
 use serde::de::DeserializeOwned;
+use sightline_api::endpoint::Endpoint;
+use sightline_api::location::{AtRun, AtSession, AtTarget};
+use sightline_session::{Run, Session};
 
+use crate::live_session::LiveSession;
 use crate::problem::{ApiError, ApiResult};
+use crate::recorded_step::RecordedStep;
+use crate::state::AppState;
 
 /// The largest body of a request, bytes.
-pub const BODY_LIMIT: usize = 1 << 20;
+pub(crate) const BODY_LIMIT: usize = 1 << 20;
 
 /// How long a body may take to arrive.
 const BODY_PATIENCE: Duration = Duration::from_secs(30);
 
-/// The names in the path; what is not even of their form is not there.
-pub struct Path<T>(pub T);
+/// The names in the path of an endpoint; what is not even of their form does not exist.
+pub(crate) struct Path<E: Endpoint>(pub E::At);
 
-impl<T: DeserializeOwned + Send, S: Send + Sync> FromRequestParts<S> for Path<T> {
+impl<E: Endpoint, S: Send + Sync> FromRequestParts<S> for Path<E> {
     type Rejection = ApiError;
 
     async fn from_request_parts(parts: &mut Parts, state: &S) -> ApiResult<Self> {
-        match axum::extract::Path::<T>::from_request_parts(parts, state).await {
-            Ok(axum::extract::Path(names)) => Ok(Self(names)),
-            Err(PathRejection::FailedToDeserializePathParams(_)) => {
-                Err(ApiError::not_found("The path names something that does not exist."))
-            }
-            Err(other) => Err(ApiError::internal(other.to_string())),
-        }
+        Ok(Self(names(parts, state).await?))
     }
 }
 
-/// The query parameters; unknown ones are refused by types that deny unknown fields.
-pub struct Params<T>(pub T);
+/// The names in the path.
+async fn names<T: DeserializeOwned + Send, S: Send + Sync>(parts: &mut Parts, state: &S) -> ApiResult<T> {
+    match axum::extract::Path::<T>::from_request_parts(parts, state).await {
+        Ok(axum::extract::Path(names)) => Ok(names),
+        Err(PathRejection::FailedToDeserializePathParams(_)) => {
+            Err(ApiError::not_found("The path names something that does not exist."))
+        }
+        Err(other) => Err(ApiError::internal(other.to_string())),
+    }
+}
 
-impl<T: DeserializeOwned, S: Send + Sync> FromRequestParts<S> for Params<T> {
+/// The session that the path names.
+pub(crate) struct SessionPath(pub Arc<LiveSession>);
+
+impl FromRequestParts<AppState> for SessionPath {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &AppState) -> ApiResult<Self> {
+        let AtSession { session } = names(parts, state).await?;
+        Ok(Self(state.session(&session)?))
+    }
+}
+
+/// The session that the path names, and the number of one of its targets.
+pub(crate) struct TargetPath {
+    /// The session.
+    pub live: Arc<LiveSession>,
+    /// The target's number; whether it exists is for the handler to say.
+    pub target: usize,
+}
+
+impl FromRequestParts<AppState> for TargetPath {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &AppState) -> ApiResult<Self> {
+        let AtTarget { session, target } = names(parts, state).await?;
+        Ok(Self { live: state.session(&session)?, target })
+    }
+}
+
+/// The session that the path names, and the numbers of one of its runs.
+pub(crate) struct RunPath {
+    /// The session.
+    pub live: Arc<LiveSession>,
+    /// The target's number.
+    pub target: usize,
+    /// The run's number; whether it exists is for `with_run` or the handler to say.
+    pub run: usize,
+}
+
+impl FromRequestParts<AppState> for RunPath {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &AppState) -> ApiResult<Self> {
+        let AtRun { session, target, run } = names(parts, state).await?;
+        Ok(Self { live: state.session(&session)?, target, run })
+    }
+}
+
+impl RunPath {
+    /// Reads the run; keep it short.
+    ///
+    /// # Errors
+    /// A problem when there is no such run.
+    pub(crate) fn with_run<T>(&self, read: impl FnOnce(&Session, &Run) -> T) -> ApiResult<T> {
+        let found =
+            self.live.with(|session| session.run(self.target, self.run).map(|run| read(session, run)));
+        found.map_err(|error| ApiError::from(error).about_path())
+    }
+}
+
+impl FromRequestParts<AppState> for RecordedStep {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &AppState) -> ApiResult<Self> {
+        Self::find(state, &names(parts, state).await?)
+    }
+}
+
+/// The query parameters of an endpoint; unknown ones are refused by types that deny unknown fields.
+pub(crate) struct Params<E: Endpoint>(pub E::Query);
+
+impl<E: Endpoint, S: Send + Sync> FromRequestParts<S> for Params<E> {
     type Rejection = ApiError;
 
     async fn from_request_parts(parts: &mut Parts, state: &S) -> ApiResult<Self> {
-        match Query::<T>::from_request_parts(parts, state).await {
+        match Query::<E::Query>::from_request_parts(parts, state).await {
             Ok(Query(params)) => Ok(Self(params)),
             Err(wrong) => Err(ApiError::invalid("query", wrong.body_text())),
         }
     }
 }
 
-/// A JSON body.
-pub struct Body<T>(pub T);
+/// The JSON body of an endpoint.
+pub(crate) struct Body<E: Endpoint>(pub E::Body);
 
-impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Body<T> {
+impl<E: Endpoint, S: Send + Sync> FromRequest<S> for Body<E> {
     type Rejection = ApiError;
 
     async fn from_request(request: Request, state: &S) -> ApiResult<Self> {
@@ -99,7 +179,7 @@ fn parse<T: DeserializeOwned>(bytes: &[u8]) -> ApiResult<T> {
 }
 
 /// Refuses bodies that are not JSON, so that a form on a foreign page cannot reach a route.
-pub fn check_content_type(method: &Method, headers: &HeaderMap) -> ApiResult<()> {
+pub(crate) fn check_content_type(method: &Method, headers: &HeaderMap) -> ApiResult<()> {
     if method.is_safe() {
         return Ok(());
     }

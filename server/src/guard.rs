@@ -5,9 +5,6 @@
 //! prove nothing); a foreign Origin may change nothing and open no WebSocket; bodies must be JSON, which a
 //! form cannot send. Scripts without a browser send no Origin and are not hindered.
 
-use std::collections::BTreeSet;
-use std::sync::Arc;
-
 use axum::extract::{Request, State};
 use axum::http::header::{self, HeaderName};
 use axum::http::{HeaderMap, HeaderValue, Method, Uri};
@@ -15,36 +12,13 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
 use crate::extract::check_content_type;
+use crate::hosts::Hosts;
 use crate::problem::{ApiError, ApiResult};
 use crate::request_id;
 use tracing::Instrument;
 
-/// The hosts under which the server may be addressed.
-#[derive(Clone, Debug)]
-pub struct Hosts(Arc<BTreeSet<String>>);
-
-impl Hosts {
-    /// This machine's own names with `port`, and `others`, each with or without a port of its own.
-    pub fn new(port: u16, others: &[String]) -> Self {
-        let own = ["localhost", "127.0.0.1", "[::1]"];
-        let others: Vec<_> = others.iter().map(|host| host.to_ascii_lowercase()).collect();
-        let named = own.into_iter().chain(others.iter().map(String::as_str));
-        let mut hosts: BTreeSet<_> = named.map(|host| format!("{host}:{port}")).collect();
-        if port == 80 {
-            // Browsers leave out the port that the scheme implies.
-            hosts.extend(own.map(str::to_owned));
-        }
-        hosts.extend(others);
-        Self(Arc::new(hosts))
-    }
-
-    fn has(&self, host: &str) -> bool {
-        self.0.contains(&host.to_ascii_lowercase())
-    }
-}
-
 /// Checks a request before it is routed, and puts the headers on its answer.
-pub async fn guard(State(hosts): State<Hosts>, request: Request, next: Next) -> Response {
+pub(crate) async fn guard(State(hosts): State<Hosts>, request: Request, next: Next) -> Response {
     let checked = check(&hosts, request.method(), request.uri(), request.headers());
     let (host, is_api) = match &checked {
         Ok(host) => (Some(host.clone()), request.uri().path().starts_with("/api/")),
@@ -55,7 +29,7 @@ pub async fn guard(State(hosts): State<Hosts>, request: Request, next: Next) -> 
         match checked {
             Ok(_) => next.run(request).await,
             Err(refusal) => {
-                tracing::warn!("refused: {}", crate::plain(&refusal.problem().detail));
+                tracing::warn!("refused: {}", crate::printable::printable(&refusal.problem().detail));
                 refusal.into_response()
             }
         }

@@ -6,11 +6,11 @@ use base64::engine::general_purpose::STANDARD;
 use pulldown_cmark::{CowStr, Event, Options, Parser, Tag, TagEnd};
 
 /// What a page that needs nothing else may do: show itself.
-pub const ALONE: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'; \
+pub(crate) const ALONE: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'; \
                          frame-ancestors 'self'; sandbox allow-popups";
 
 /// Text as it stands in a page or in an attribute.
-pub fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
@@ -28,13 +28,13 @@ pub fn escape(text: &str) -> String {
 }
 
 /// A picture as the address of itself.
-pub fn png_address(png: &[u8]) -> String {
+pub(crate) fn png_address(png: &[u8]) -> String {
     format!("data:image/png;base64,{}", STANDARD.encode(png))
 }
 
 /// A note's Markdown as a piece of a page: its own HTML is shown as it is written, pictures are their words, and links lead
 /// to the web alone.
-pub fn markdown(text: &str) -> String {
+pub(crate) fn markdown(text: &str) -> String {
     let options = Options::ENABLE_STRIKETHROUGH | Options::ENABLE_TABLES;
     let mut html = String::new();
     let mut is_in_head = false;
@@ -118,7 +118,7 @@ fn closing(tag: TagEnd, is_in_head: bool) -> &'static str {
 }
 
 /// A table with a caption, its first column the names of the rows.
-pub fn table(caption: &str, head: &[&str], rows: &[Vec<String>]) -> String {
+pub(crate) fn table(caption: &str, head: &[&str], rows: &[Vec<String>]) -> String {
     let head: String = head.iter().map(|words| format!("<th scope=\"col\">{}</th>", escape(words))).collect();
     let mut html = format!(
         "<div class=\"wide\"><table><caption>{}</caption><thead><tr>{head}</tr></thead><tbody>\n",
@@ -140,7 +140,7 @@ pub fn table(caption: &str, head: &[&str], rows: &[Vec<String>]) -> String {
 }
 
 /// A number with as many digits as make sense for its size; nothing where there is none.
-pub fn number(value: Option<f64>, digits: usize) -> String {
+pub(crate) fn number(value: Option<f64>, digits: usize) -> String {
     value
         .filter(|value| value.is_finite())
         .map_or_else(|| "–".to_owned(), |value| format!("{value:.digits$}"))

@@ -1,116 +1,44 @@
-//! Work that takes long: a few threads with a bounded queue for runs, and lanes for work that a request waits for.
+//! Work that takes long, on threads of its own: each lane does so much at a time, first come first served, and lets
+//! so much wait.
 //!
-//! The reactor computes nothing. A queue that is full refuses at once, so that nothing piles up unseen.
+//! The reactor computes nothing. A lane that is full refuses at once, so that nothing piles up unseen.
 
-use std::collections::VecDeque;
+use std::future::Future;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::pin::Pin;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::task::{Context, Poll, Waker};
 
-use tokio::sync::Semaphore;
+use tokio::runtime::Handle;
+use tokio::sync::{AcquireError, OwnedSemaphorePermit, Semaphore};
 
 use crate::problem::{ApiError, ApiResult};
 
 /// Locks, also after a panic elsewhere: what these mutexes guard is never left half changed.
-pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-type Job = Box<dyn FnOnce() + Send>;
-
-/// A few threads that work off a bounded queue, first come first served.
-pub struct Jobs {
-    queue: Arc<Queue>,
-    limit: usize,
-}
-
-#[derive(Default)]
-struct Queue {
-    waiting: Mutex<Waiting>,
-    changed: Condvar,
-}
-
-#[derive(Default)]
-struct Waiting {
-    jobs: VecDeque<Job>,
-    closed: bool,
-}
-
-impl Jobs {
-    /// Starts `workers` threads; at most `limit` jobs wait.
-    ///
-    /// # Errors
-    /// When the system starts no thread.
-    pub fn start(workers: usize, limit: usize) -> std::io::Result<Self> {
-        let queue = Arc::new(Queue::default());
-        for number in 0..workers {
-            let queue = Arc::clone(&queue);
-            std::thread::Builder::new().name(format!("run-{number}")).spawn(move || work(&queue))?;
-        }
-        Ok(Self { queue, limit })
-    }
-
-    /// Adds a job to the queue.
-    ///
-    /// # Errors
-    /// A problem when too many are waiting already.
-    pub fn submit(&self, job: impl FnOnce() + Send + 'static) -> ApiResult<()> {
-        let mut waiting = lock(&self.queue.waiting);
-        if waiting.jobs.len() >= self.limit {
-            return Err(ApiError::busy());
-        }
-        waiting.jobs.push_back(Box::new(job));
-        self.queue.changed.notify_one();
-        Ok(())
-    }
-}
-
-impl Drop for Jobs {
-    fn drop(&mut self) {
-        let mut waiting = lock(&self.queue.waiting);
-        waiting.closed = true;
-        waiting.jobs.clear();
-        self.queue.changed.notify_all();
-    }
-}
-
-fn work(queue: &Queue) {
-    while let Some(job) = next_job(queue) {
-        if catch_unwind(AssertUnwindSafe(job)).is_err() {
-            tracing::error!("a job panicked");
-        }
-    }
-}
-
-fn next_job(queue: &Queue) -> Option<Job> {
-    let mut waiting = lock(&queue.waiting);
-    while !waiting.closed {
-        if let Some(job) = waiting.jobs.pop_front() {
-            return Some(job);
-        }
-        waiting = queue.changed.wait(waiting).unwrap_or_else(PoisonError::into_inner);
-    }
-    None
-}
-
-/// Work that a request waits for, on blocking threads: so much at a time, and so much waiting.
-pub struct Lane {
-    permits: Semaphore,
-    waiting: AtomicUsize,
+/// A queue with a limited number of threads: for work that a request waits for, and for work in the background.
+#[derive(Clone)]
+pub(crate) struct Lane {
+    permits: Arc<Semaphore>,
+    waiting: Arc<AtomicUsize>,
     limit: usize,
 }
 
 impl Lane {
     /// A lane for `at_a_time` pieces of work, with at most `limit` more waiting.
-    pub fn new(at_a_time: usize, limit: usize) -> Self {
-        Self { permits: Semaphore::new(at_a_time), waiting: AtomicUsize::new(0), limit }
+    pub(crate) fn new(at_a_time: usize, limit: usize) -> Self {
+        Self { permits: Arc::new(Semaphore::new(at_a_time)), waiting: Arc::default(), limit }
     }
 
-    /// Does `work` when its turn comes.
+    /// Does `work` when its turn comes; a request that goes away gives its place in the queue back.
     ///
     /// # Errors
     /// Those of `work`, a problem when too many are waiting, and one without details when `work` panics.
-    pub async fn run<T: Send + 'static>(
+    pub(crate) async fn run<T: Send + 'static>(
         &self,
         work: impl FnOnce() -> ApiResult<T> + Send + 'static,
     ) -> ApiResult<T> {
@@ -120,20 +48,69 @@ impl Lane {
         };
         blocking(work).await
     }
+
+    /// Does `job` in the background when its turn comes, also after the request that submits it.
+    ///
+    /// The end of the program does not wait for it.
+    ///
+    /// # Errors
+    /// A problem when too many are waiting already.
+    pub(crate) fn submit(&self, job: impl FnOnce() + Send + 'static) -> ApiResult<()> {
+        let place = Place::take(&self.waiting, self.limit)?;
+        let mut turn: Pin<Box<Turn>> = Box::pin(Arc::clone(&self.permits).acquire_owned());
+        // The first poll enters the queue of the semaphore, so that jobs start in the order of their submission.
+        match turn.as_mut().poll(&mut Context::from_waker(Waker::noop())) {
+            Poll::Ready(permit) => start(permit, job),
+            Poll::Pending => {
+                let runtime = Handle::try_current();
+                let runtime = runtime.map_err(|missing| ApiError::internal(missing.to_string()))?;
+                runtime.spawn(async move {
+                    let permit = turn.await;
+                    drop(place);
+                    if let Err(problem) = start(permit, job) {
+                        tracing::error!("a job was not started: {}", problem.problem().detail);
+                    }
+                });
+                Ok(())
+            }
+        }
+    }
+}
+
+/// Waits for the right to work.
+type Turn = dyn Future<Output = Result<OwnedSemaphorePermit, AcquireError>> + Send;
+
+/// Starts `job` on a thread of its own, which gives the permit back at its end.
+fn start(
+    permit: Result<OwnedSemaphorePermit, AcquireError>,
+    job: impl FnOnce() + Send + 'static,
+) -> ApiResult<()> {
+    let permit = permit.map_err(|closed| ApiError::internal(closed.to_string()))?;
+    // Jobs submit others when a run is forked or a session is read back.
+    let runtime = Handle::try_current().ok();
+    let work = move || {
+        let _permit = permit;
+        let _inside = runtime.as_ref().map(Handle::enter);
+        if catch_unwind(AssertUnwindSafe(job)).is_err() {
+            tracing::error!("a job panicked");
+        }
+    };
+    let started = std::thread::Builder::new().name("job".to_owned()).spawn(work);
+    started.map(|_| ()).map_err(|error| ApiError::internal(format!("cannot start a thread: {error}")))
 }
 
 /// A place in the queue of a lane, also given back when the request goes away.
-struct Place<'a>(&'a AtomicUsize);
+struct Place(Arc<AtomicUsize>);
 
-impl<'a> Place<'a> {
-    fn take(waiting: &'a AtomicUsize, limit: usize) -> ApiResult<Self> {
+impl Place {
+    fn take(waiting: &Arc<AtomicUsize>, limit: usize) -> ApiResult<Self> {
         let before = waiting.fetch_add(1, Ordering::Relaxed);
-        let place = Self(waiting);
+        let place = Self(Arc::clone(waiting));
         if before < limit { Ok(place) } else { Err(ApiError::busy()) }
     }
 }
 
-impl Drop for Place<'_> {
+impl Drop for Place {
     fn drop(&mut self) {
         self.0.fetch_sub(1, Ordering::Relaxed);
     }
@@ -143,7 +120,7 @@ impl Drop for Place<'_> {
 ///
 /// # Errors
 /// Those of `work`, and one without details when it panics.
-pub async fn blocking<T: Send + 'static>(
+pub(crate) async fn blocking<T: Send + 'static>(
     work: impl FnOnce() -> ApiResult<T> + Send + 'static,
 ) -> ApiResult<T> {
     let done = tokio::task::spawn_blocking(work).await;
@@ -155,20 +132,33 @@ mod tests {
     use super::*;
     use std::sync::mpsc;
 
-    #[test]
-    fn a_job_that_panics_does_not_take_the_thread_with_it() {
-        let jobs = Jobs::start(1, 8).unwrap();
-        let (sender, receiver) = mpsc::channel();
-        jobs.submit(|| panic!("meant")).unwrap();
-        jobs.submit(move || sender.send(7).unwrap()).unwrap();
-        assert_eq!(receiver.recv().unwrap(), 7);
+    #[tokio::test]
+    async fn a_panicking_job_leaves_the_lane_working() {
+        let lane = Lane::new(1, 8);
+        let (sender, mut receiver) = tokio::sync::mpsc::unbounded_channel();
+        lane.submit(|| panic!("meant")).unwrap();
+        lane.submit(move || sender.send(7).unwrap()).unwrap();
+        assert_eq!(receiver.recv().await, Some(7));
     }
 
-    #[test]
-    fn a_full_queue_refuses_at_once() {
-        let jobs = Jobs::start(0, 2).unwrap();
-        assert!(jobs.submit(|| ()).is_ok() && jobs.submit(|| ()).is_ok());
-        assert_eq!(jobs.submit(|| ()).unwrap_err().problem().status, 503);
+    #[tokio::test(flavor = "multi_thread")]
+    async fn jobs_start_in_the_order_of_their_submission() {
+        let lane = Lane::new(1, 64);
+        let (sender, receiver) = mpsc::channel();
+        for number in 0..50 {
+            let sender = sender.clone();
+            lane.submit(move || sender.send(number).unwrap()).unwrap();
+        }
+        drop(sender);
+        let done = blocking(move || Ok(receiver.iter().collect::<Vec<_>>())).await.unwrap();
+        assert_eq!(done, (0..50).collect::<Vec<_>>());
+    }
+
+    #[tokio::test]
+    async fn a_full_lane_refuses_at_once() {
+        let lane = Lane::new(0, 2);
+        assert!(lane.submit(|| ()).is_ok() && lane.submit(|| ()).is_ok());
+        assert_eq!(lane.submit(|| ()).unwrap_err().problem().status, 503);
     }
 
     #[tokio::test]

@@ -5,13 +5,13 @@
 
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use sightline_core::error::Error;
-use sightline_core::frames::Pixel;
-use sightline_core::session::wire::{ExpressionProblem, Problem, ProblemPlace, TextRange};
+use sightline_api::wire::{ExpressionProblem, Problem, ProblemPlace, TextRange};
+use sightline_geometry::error::Error;
+use sightline_geometry::frames::Pixel;
 use utoipa::openapi::{ContentBuilder, RefOr, ResponseBuilder};
 
 /// The media type of problems.
-pub const PROBLEM_JSON: &str = "application/problem+json";
+pub(crate) const PROBLEM_JSON: &str = "application/problem+json";
 
 /// A request that cannot be answered.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,7 +23,7 @@ pub struct ApiError {
 }
 
 /// The result of a handler.
-pub type ApiResult<T> = Result<T, ApiError>;
+pub(crate) type ApiResult<T> = Result<T, ApiError>;
 
 impl ApiError {
     /// A problem of that status; `code` is its stable name for programs.
@@ -56,7 +56,7 @@ impl ApiError {
     }
 
     /// There is nothing of that name.
-    pub fn not_found(detail: impl Into<String>) -> Self {
+    pub(crate) fn not_found(detail: impl Into<String>) -> Self {
         Self::new(StatusCode::NOT_FOUND, "not_found", detail)
     }
 
@@ -66,23 +66,23 @@ impl ApiError {
     }
 
     /// The state of things does not allow it now.
-    pub fn conflict(detail: impl Into<String>) -> Self {
+    pub(crate) fn conflict(detail: impl Into<String>) -> Self {
         Self::new(StatusCode::CONFLICT, "conflict", detail)
     }
 
     /// The request may not come from there.
-    pub fn forbidden(code: &str, detail: impl Into<String>) -> Self {
+    pub(crate) fn forbidden(code: &str, detail: impl Into<String>) -> Self {
         Self::new(StatusCode::FORBIDDEN, code, detail)
     }
 
     /// Too much is waiting already.
-    pub fn busy() -> Self {
+    pub(crate) fn busy() -> Self {
         Self::new(StatusCode::SERVICE_UNAVAILABLE, "busy", "The server has too much to do already.")
             .hint("Wait until some of it is done, or cancel a run.")
     }
 
     /// A fault of the program; `cause` goes to the log only.
-    pub fn internal(cause: impl Into<String>) -> Self {
+    pub(crate) fn internal(cause: impl Into<String>) -> Self {
         let detail = "The server met a fault of its own; its log says more.";
         let problem = Self::new(StatusCode::INTERNAL_SERVER_ERROR, "internal", detail);
         Self { log: Some(cause.into()), ..problem }
@@ -90,7 +90,7 @@ impl ApiError {
 
     /// The same problem about something that the path names.
     #[must_use]
-    pub fn about_path(self) -> Self {
+    pub(crate) fn about_path(self) -> Self {
         if self.problem.status == StatusCode::UNPROCESSABLE_ENTITY.as_u16() {
             Self::not_found(self.problem.detail)
         } else {
@@ -124,7 +124,7 @@ impl From<Error> for ApiError {
 impl IntoResponse for ApiError {
     fn into_response(self) -> Response {
         if let Some(cause) = &self.log {
-            tracing::error!(code = self.problem.code, "{}", crate::plain(cause));
+            tracing::error!(code = self.problem.code, "{}", crate::printable::printable(cause));
         }
         let status = StatusCode::from_u16(self.problem.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
         let mut response = match self.place {

@@ -9,9 +9,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, OnceLock, PoisonError, Weak};
 use std::time::Duration;
 
-use sightline_core::error::{Error, Result};
-use sightline_core::session::wire::Event;
-use sightline_core::traverse::Traverse;
+use sightline_api::wire::Event;
+use sightline_geometry::error::{Error, Result};
+use sightline_recordings::Traverse;
 use tokio::sync::broadcast;
 
 use crate::jobs::lock;
@@ -50,7 +50,7 @@ impl OpenTraverse {
     ///
     /// # Errors
     /// As [`Traverse::render_step`]; [`Error::Cancelled`] soon after `cancel` is set.
-    pub fn make_ready(&self, step: usize, cancel: &AtomicBool) -> Result<()> {
+    pub(crate) fn make_ready(&self, step: usize, cancel: &AtomicBool) -> Result<()> {
         if self.is_ready(step) {
             return Ok(());
         }
@@ -132,7 +132,7 @@ fn pool() -> Option<&'static rayon::ThreadPool> {
 }
 
 /// The background thread that renders the stops ahead of where a person looks.
-pub struct Ahead {
+pub(crate) struct Ahead {
     wish: Mutex<Wish>,
     changed: Condvar,
 }
@@ -155,7 +155,7 @@ impl Ahead {
     ///
     /// # Errors
     /// When the system starts no thread.
-    pub fn start() -> std::io::Result<Arc<Self>> {
+    pub(crate) fn start() -> std::io::Result<Arc<Self>> {
         let ahead = Arc::new(Self { wish: Mutex::default(), changed: Condvar::new() });
         let own = Arc::clone(&ahead);
         std::thread::Builder::new().name("render-ahead".to_owned()).spawn(move || own.work())?;
@@ -163,14 +163,14 @@ impl Ahead {
     }
 
     /// From now on the stops of `traverse` from `from` on come first, then those before.
-    pub fn look_at(&self, traverse: &Arc<OpenTraverse>, from: usize) {
+    pub(crate) fn look_at(&self, traverse: &Arc<OpenTraverse>, from: usize) {
         let mut wish = lock(&self.wish);
         (wish.traverse, wish.from) = (Arc::downgrade(traverse), from);
         self.changed.notify_all();
     }
 
     /// Ends the thread soon.
-    pub fn close(&self) {
+    pub(crate) fn close(&self) {
         let mut wish = lock(&self.wish);
         wish.closed = true;
         wish.cancel.store(true, Ordering::Relaxed);
@@ -186,7 +186,7 @@ impl Ahead {
                 Ok(Err(error)) => error.to_string(),
                 Err(_) => "the renderer panicked".to_owned(),
             };
-            tracing::warn!(step, "cannot render ahead: {}", crate::plain(&why));
+            tracing::warn!(step, "cannot render ahead: {}", crate::printable::printable(&why));
             lock(&self.wish).failed.insert((traverse.id.clone(), step));
         }
     }

@@ -9,6 +9,7 @@ use axum::http::header::{self, HeaderName};
 use axum::http::{HeaderValue, Response};
 use serde_json::{Map, Value};
 
+use crate::clock;
 use crate::problem::PROBLEM_JSON;
 
 /// More than any problem has, bytes.
@@ -33,7 +34,7 @@ pub(crate) async fn told(response: Response<Body>, id: &str) -> Response<Body> {
     let bytes = match serde_json::from_slice::<Map<String, Value>>(&bytes) {
         Ok(mut problem) => {
             problem.insert("request_id".to_owned(), id.into());
-            problem.insert("time".to_owned(), crate::notes::now().into());
+            problem.insert("time".to_owned(), clock::now().into());
             Value::Object(problem).to_string().into_bytes()
         }
         Err(_) => bytes.to_vec(),

@@ -9,7 +9,7 @@ use crate::problem::{ApiError, ApiResult};
 /// The revision that was read: `If-Match: "3"`; `If-Match: *` is none, whichever it is; `If-None-Match: *` is 0, a thing
 /// that is not there yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Read(pub Option<u64>);
+pub(crate) struct Read(pub Option<u64>);
 
 impl<S: Send + Sync> FromRequestParts<S> for Read {
     type Rejection = ApiError;
@@ -42,12 +42,12 @@ fn read(headers: &HeaderMap) -> ApiResult<Read> {
 }
 
 /// The header that tells a revision.
-pub fn tag(revision: u64) -> [(header::HeaderName, String); 1] {
+pub(crate) fn tag(revision: u64) -> [(header::HeaderName, String); 1] {
     [(header::ETAG, format!("\"{revision}\""))]
 }
 
 /// Somebody changed it meanwhile.
-pub fn changed(what: &str, revision: u64) -> ApiError {
+pub(crate) fn changed(what: &str, revision: u64) -> ApiError {
     let detail = format!("{what} was changed meanwhile; its revision is {revision} now.");
     ApiError::new(StatusCode::PRECONDITION_FAILED, "changed", detail)
         .hint("Read it again, then change it with that revision.")

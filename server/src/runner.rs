@@ -8,71 +8,165 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use sightline_core::error::{Error, Result};
-use sightline_core::session::wire::Event;
-use sightline_core::session::{Next, Pending, Session, track};
-use sightline_core::settings::Settings;
-use sightline_core::target::Designation;
-use sightline_core::trace::StepTrace;
+use sightline_api::wire::Event;
+use sightline_geometry::error::{Error, Result};
+use sightline_session::{Next, Pending, Session, track};
+use sightline_track::settings::Settings;
+use sightline_track::target::Designation;
+use sightline_track::trace::StepTrace;
+use tokio::sync::broadcast;
 
-use crate::live::{CancelFlag, LiveSession};
+use crate::jobs::Lane;
+use crate::live_session::{CancelFlag, LiveSession};
 use crate::problem::ApiResult;
 use crate::rendering::OpenTraverse;
-use crate::state::AppState;
 
-/// Continues a run in the background.
-///
-/// # Errors
-/// A problem when too much is waiting already; the run then stays as it is.
-pub fn start(state: &AppState, live: &Arc<LiveSession>, target: usize, run: usize) -> ApiResult<()> {
-    let flag = live.begin(target, run);
-    let (owned_state, owned_live, owned_flag) = (state.clone(), Arc::clone(live), Arc::clone(&flag));
-    let job = move || compute(&owned_state, &owned_live, target, run, &owned_flag);
-    let submitted = state.jobs().submit(job);
-    if submitted.is_err() {
-        live.end(target, run, &flag);
+/// What computes runs: the lane in which they wait, and where their progress is told.
+#[derive(Clone)]
+pub(crate) struct Runner {
+    lane: Lane,
+    events: broadcast::Sender<Event>,
+}
+
+impl Runner {
+    /// A runner whose runs are computed in `lane`.
+    pub(crate) fn new(lane: Lane, events: broadcast::Sender<Event>) -> Self {
+        Self { lane, events }
     }
-    submitted
-}
 
-/// Computes all runs of a session that was read back, in the background; parents come before their forks.
-///
-/// # Errors
-/// A problem when too much is waiting already.
-pub fn restore(state: &AppState, live: &Arc<LiveSession>) -> ApiResult<()> {
-    live.set_restoring(true);
-    let restoring = Restoring(Arc::clone(live));
-    go_on(state, live, Some(restoring), every_run)
-}
+    /// The lane in which runs are computed.
+    pub(crate) fn lane(&self) -> &Lane {
+        &self.lane
+    }
 
-/// Computes what is missing of a target's runs in the background, parents before their forks; what goes on already is left
-/// alone.
-///
-/// # Errors
-/// A problem when too much is waiting already.
-pub fn go_on_with(state: &AppState, live: &Arc<LiveSession>, target: usize) -> ApiResult<()> {
-    go_on(state, live, None, move |session| {
-        every_run(session).into_iter().filter(|(own, _)| *own == target).collect()
-    })
-}
+    /// Continues a run in the background.
+    ///
+    /// # Errors
+    /// A problem when too much is waiting already; the run then stays as it is.
+    pub(crate) fn start(&self, live: &Arc<LiveSession>, target: usize, run: usize) -> ApiResult<()> {
+        let flag = live.begin(target, run);
+        let (runner, owned_live, owned_flag) = (self.clone(), Arc::clone(live), Arc::clone(&flag));
+        let submitted = self.lane.submit(move || runner.compute(&owned_live, target, run, &owned_flag));
+        if submitted.is_err() {
+            live.end(target, run, &flag);
+        }
+        submitted
+    }
 
-fn go_on(
-    state: &AppState,
-    live: &Arc<LiveSession>,
-    restoring: Option<Restoring>,
-    which: impl FnOnce(&Session) -> Vec<(usize, usize)> + Send + 'static,
-) -> ApiResult<()> {
-    let (state_in_job, live) = (state.clone(), Arc::clone(live));
-    state.jobs().submit(move || {
-        let _until_the_end = restoring;
-        let runs = live.with(|session| which(session));
-        for (target, run) in runs {
-            if !live.is_computing(target, run) {
-                let flag = live.begin(target, run);
-                compute(&state_in_job, &live, target, run, &flag);
+    /// Computes all runs of a session that was read back, in the background; parents come before their forks.
+    ///
+    /// # Errors
+    /// A problem when too much is waiting already.
+    pub(crate) fn restore(&self, live: &Arc<LiveSession>) -> ApiResult<()> {
+        live.set_restoring(true);
+        let restoring = Restoring(Arc::clone(live));
+        self.go_on(live, Some(restoring), every_run)
+    }
+
+    /// Computes what is missing of a target's runs in the background, parents before their forks; what goes on already
+    /// is left alone.
+    ///
+    /// # Errors
+    /// A problem when too much is waiting already.
+    pub(crate) fn go_on_with(&self, live: &Arc<LiveSession>, target: usize) -> ApiResult<()> {
+        self.go_on(live, None, move |session| {
+            every_run(session).into_iter().filter(|(own, _)| *own == target).collect()
+        })
+    }
+
+    fn go_on(
+        &self,
+        live: &Arc<LiveSession>,
+        restoring: Option<Restoring>,
+        which: impl FnOnce(&Session) -> Vec<(usize, usize)> + Send + 'static,
+    ) -> ApiResult<()> {
+        let (runner, live) = (self.clone(), Arc::clone(live));
+        self.lane.submit(move || {
+            let _until_the_end = restoring;
+            let runs = live.with(|session| which(session));
+            for (target, run) in runs {
+                if !live.is_computing(target, run) {
+                    let flag = live.begin(target, run);
+                    runner.compute(&live, target, run, &flag);
+                }
+            }
+        })
+    }
+
+    fn tell(&self, event: Option<Event>) {
+        if let Some(event) = event {
+            // Nobody may be listening.
+            let _ = self.events.send(event);
+        }
+    }
+
+    /// Computes what is missing of a run, until it ends or is told to.
+    fn compute(&self, live: &LiveSession, target: usize, run: usize, flag: &CancelFlag) {
+        let outcome = loop {
+            match catch_unwind(AssertUnwindSafe(|| self.one_step(live, target, run, flag))) {
+                Ok(Ok(true)) => {}
+                Ok(Ok(false) | Err(Error::Cancelled)) => break Ok(()),
+                Ok(Err(error)) => break Err(error.to_string()),
+                Err(_) => break Err("the server met a fault of its own; its log says more".to_owned()),
+            }
+        };
+        live.end(target, run, flag);
+        if let Err(why) = outcome {
+            tracing::warn!(
+                session = live.id,
+                target,
+                run,
+                "a run stopped: {}",
+                crate::printable::printable(&why)
+            );
+            // The target may have been removed meanwhile.
+            let _ = live.with(|session| session.fail(target, run, why));
+        }
+        self.tell(progress(live, target, run, "done".to_owned()));
+    }
+
+    /// Computes and records one step; false when there is nothing more to compute.
+    fn one_step(&self, live: &LiveSession, target: usize, run: usize, flag: &CancelFlag) -> Result<bool> {
+        if flag.load(Ordering::Relaxed) {
+            return Err(Error::Cancelled);
+        }
+        let trace = match live.with(|session| session.next(target, run))? {
+            Next::Nothing => return Ok(false),
+            Next::Designate { designation, settings } => designate(&live.traverse, designation, &settings)?,
+            Next::Advance(pending) => self.advance(live, (target, run), &pending, flag)?,
+        };
+        live.with(|session| {
+            if flag.load(Ordering::Relaxed) {
+                Err(Error::Cancelled)
+            } else {
+                record(session, target, run, trace)
+            }
+        })?;
+        self.tell(progress(live, target, run, "tracking".to_owned()));
+        Ok(true)
+    }
+
+    /// The step after the last one, from images that are rendered first where they are missing.
+    fn advance(
+        &self,
+        live: &LiveSession,
+        (target, run): (usize, usize),
+        pending: &Pending,
+        flag: &CancelFlag,
+    ) -> Result<StepTrace> {
+        let traverse = &live.traverse.traverse;
+        let step = pending.last.step + 1;
+        if !traverse.is_ready(step) {
+            self.tell(progress(live, target, run, format!("rendering stop {step}")));
+            // Any other failure is met again by the step itself, which records it as the stop's fault.
+            if let Err(Error::Cancelled) = live.traverse.make_ready(step, flag) {
+                return Err(Error::Cancelled);
             }
         }
-    })
+        let last = with_image(&live.traverse, &pending.last)?;
+        let (first, prediction_px) = (&pending.first, pending.prediction_px);
+        Ok(without_pair(track::advance_displaced(traverse, first, &last, &pending.settings, prediction_px)))
+    }
 }
 
 /// A session whose runs are being computed again, until this goes away, also by a panic or a queue that is full.
@@ -100,7 +194,11 @@ fn every_run(session: &Session) -> Vec<(usize, usize)> {
 ///
 /// # Errors
 /// As [`track::designate`].
-pub fn designate(open: &OpenTraverse, designation: Designation, settings: &Settings) -> Result<StepTrace> {
+pub(crate) fn designate(
+    open: &OpenTraverse,
+    designation: Designation,
+    settings: &Settings,
+) -> Result<StepTrace> {
     let (step, pixel) = (designation.step, designation.pixel);
     if step < open.traverse.stop_count() {
         let left = open.traverse.left_camera(step);
@@ -112,86 +210,15 @@ pub fn designate(open: &OpenTraverse, designation: Designation, settings: &Setti
     track::designate(&open.traverse, designation, settings).map(without_pair)
 }
 
-/// Computes what is missing of a run, until it ends or is told to.
-fn compute(state: &AppState, live: &LiveSession, target: usize, run: usize, flag: &CancelFlag) {
-    let outcome = loop {
-        match catch_unwind(AssertUnwindSafe(|| one_step(state, live, target, run, flag))) {
-            Ok(Ok(true)) => {}
-            Ok(Ok(false) | Err(Error::Cancelled)) => break Ok(()),
-            Ok(Err(error)) => break Err(error.to_string()),
-            Err(_) => break Err("the server met a fault of its own; its log says more".to_owned()),
-        }
-    };
-    live.end(target, run, flag);
-    if let Err(why) = outcome {
-        tracing::warn!(session = live.id, target, run, "a run stopped: {}", crate::plain(&why));
-        // The target may have been removed meanwhile.
-        let _ = live.with(|session| session.fail(target, run, why));
-    }
-    if let Some(event) = progress(live, target, run, "done".to_owned()) {
-        state.tell(event);
-    }
-}
-
-/// Computes and records one step; false when there is nothing more to compute.
-fn one_step(
-    state: &AppState,
-    live: &LiveSession,
-    target: usize,
-    run: usize,
-    flag: &CancelFlag,
-) -> Result<bool> {
-    if flag.load(Ordering::Relaxed) {
-        return Err(Error::Cancelled);
-    }
-    let trace = match live.with(|session| session.next(target, run))? {
-        Next::Nothing => return Ok(false),
-        Next::Designate { designation, settings } => designate(&live.traverse, designation, &settings)?,
-        Next::Advance(pending) => advance(state, live, (target, run), &pending, flag)?,
-    };
-    live.with(|session| {
-        if flag.load(Ordering::Relaxed) { Err(Error::Cancelled) } else { record(session, target, run, trace) }
-    })?;
-    if let Some(event) = progress(live, target, run, "tracking".to_owned()) {
-        state.tell(event);
-    }
-    Ok(true)
-}
-
-/// The step after the last one, from images that are rendered first where they are missing.
-fn advance(
-    state: &AppState,
-    live: &LiveSession,
-    (target, run): (usize, usize),
-    pending: &Pending,
-    flag: &CancelFlag,
-) -> Result<StepTrace> {
-    let traverse = &live.traverse.traverse;
-    let step = pending.last.step + 1;
-    if !traverse.is_ready(step) {
-        if let Some(event) = progress(live, target, run, format!("rendering stop {step}")) {
-            state.tell(event);
-        }
-        // Any other failure is met again by the step itself, which records it as the stop's fault.
-        if let Err(Error::Cancelled) = live.traverse.make_ready(step, flag) {
-            return Err(Error::Cancelled);
-        }
-    }
-    let last = with_image(&live.traverse, &pending.last)?;
-    let (first, prediction_px) = (&pending.first, pending.prediction_px);
-    Ok(without_pair(track::advance_displaced(traverse, first, &last, &pending.settings, prediction_px)))
-}
-
 /// A step with the image from which the next template is cut, which a recorded step let go of.
 ///
 /// # Errors
 /// When that image cannot be read.
-pub fn with_image(open: &OpenTraverse, step: &Arc<StepTrace>) -> Result<Arc<StepTrace>> {
+pub(crate) fn with_image(open: &OpenTraverse, step: &Arc<StepTrace>) -> Result<Arc<StepTrace>> {
     let mut step = Arc::clone(step);
-    let appearance = &step.update.target.appearance;
-    if appearance.image.is_empty() {
-        let image = open.traverse.capture(appearance.step)?.left;
-        Arc::make_mut(&mut step).update.target.appearance.image = image;
+    if let Some(stop) = step.update.target.memory.lacks_image_of() {
+        let image = open.traverse.capture(stop)?.left;
+        Arc::make_mut(&mut step).update.target.memory.set_image(image);
     }
     Ok(step)
 }
@@ -203,7 +230,7 @@ fn record(session: &mut Session, target: usize, run: usize, trace: StepTrace) ->
         None => current.steps.push(Arc::new(trace)),
         Some(last) => {
             let mut lighter = Arc::clone(last);
-            Arc::make_mut(&mut lighter).update.target.appearance.image = Arc::default();
+            Arc::make_mut(&mut lighter).update.target.memory.set_image(Arc::default());
             session.record(target, run, Arc::new(trace))?;
             let steps = &mut session.run_mut(target, run)?.steps;
             let before = steps.len() - 2;
@@ -215,7 +242,7 @@ fn record(session: &mut Session, target: usize, run: usize, trace: StepTrace) ->
 
 /// The step without the stop's images.
 fn without_pair(mut trace: StepTrace) -> StepTrace {
-    if let Some(capture) = &mut trace.capture {
+    if let Some(capture) = trace.capture_mut() {
         capture.pair = Default::default();
     }
     trace

@@ -1,29 +1,32 @@
 //! What the handlers share: the open traverses, the sessions, and the ways to compute, to save and to tell.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Arc, Mutex};
 
-use sha2::{Digest, Sha256};
-use sightline_core::error::{Error, Result};
-use sightline_core::session::wire::Event;
-use sightline_core::session::{Cursor, Session};
-use sightline_core::traverse::Traverse;
+use sightline_api::wire::Event;
+use sightline_geometry::error::{Error, Result};
+use sightline_recordings::Traverse;
+use sightline_session::{Cursor, Session};
 use tokio::sync::broadcast;
 
+use crate::clock;
 use crate::drives;
-use crate::guard::Hosts;
-use crate::jobs::{Jobs, Lane, lock};
-use crate::live::LiveSession;
+use crate::folders::Folders;
+use crate::hosts::Hosts;
+use crate::jobs::{Lane, lock};
+use crate::live_session::LiveSession;
+use crate::naming::name_of;
 use crate::problem::{ApiError, ApiResult};
 use crate::questions::Questions;
 use crate::rendering::{Ahead, OpenTraverse};
 use crate::rerun_log::LiveStream;
-use crate::runner;
+use crate::runner::Runner;
 use crate::store::{self, Store};
-use crate::study::kept::Keeper;
-use crate::study::shelf::Shelf;
-use crate::trackability::Maps;
+use crate::study::jobs::Shelf;
+use crate::study::order::order;
+use crate::study::saved::Keeper;
+use crate::trackability_maps::Maps;
 
 /// Events that a slow page may be behind before it is told to read everything again.
 const EVENT_BACKLOG: usize = 256;
@@ -33,17 +36,6 @@ const RUNS_AT_A_TIME: usize = 2;
 const RUNS_WAITING: usize = 256;
 /// How many sessions there may be.
 const SESSION_LIMIT: usize = 1000;
-
-/// Where the server keeps what it makes.
-#[derive(Clone, Debug)]
-pub struct Folders {
-    /// Sessions.
-    pub sessions: PathBuf,
-    /// Studies, with their worlds.
-    pub studies: PathBuf,
-    /// Simulated traverses.
-    pub traverses: PathBuf,
-}
 
 /// What the handlers share.
 #[derive(Clone)]
@@ -55,7 +47,7 @@ struct Inner {
     folders: Folders,
     sessions: Mutex<Sessions>,
     events: broadcast::Sender<Event>,
-    jobs: Jobs,
+    runner: Runner,
     ahead: Arc<Ahead>,
     store: Arc<Store>,
     notices: Vec<String>,
@@ -87,7 +79,7 @@ impl AppState {
     /// Opens the state: sessions are kept in `folder` and read back from it, studies in a folder inside.
     ///
     /// # Errors
-    /// As [`Self::with_folders`].
+    /// As `Self::with_folders`.
     pub fn new(traverses: Vec<Traverse>, folder: &Path, hosts: Hosts) -> Result<Self> {
         let folders = Folders {
             sessions: folder.to_owned(),
@@ -101,7 +93,7 @@ impl AppState {
     ///
     /// # Errors
     /// A folder that cannot be read or made, or a system without threads.
-    pub fn with_folders(traverses: Vec<Traverse>, folders: &Folders, hosts: Hosts) -> Result<Self> {
+    pub(crate) fn with_folders(traverses: Vec<Traverse>, folders: &Folders, hosts: Hosts) -> Result<Self> {
         let no_threads = |error: std::io::Error| Error::Request(format!("cannot start a thread: {error}"));
         let events = broadcast::Sender::new(EVENT_BACKLOG);
         let mut open: Vec<Arc<OpenTraverse>> = Vec::new();
@@ -117,7 +109,7 @@ impl AppState {
         let (sessions, mut notices) = read_back(&store, &open)?;
         notices.extend(drives_lost);
         for notice in &notices {
-            tracing::warn!("{}", crate::plain(notice));
+            tracing::warn!("{}", crate::printable::printable(notice));
         }
         let ahead = Ahead::start().map_err(no_threads)?;
         if let Some(first) = open.first() {
@@ -125,15 +117,15 @@ impl AppState {
         }
         let store = Arc::new(store);
         let keeper = Keeper::new(&store);
-        let studies = Shelf::start(folders.studies.clone(), events.clone(), keeper).map_err(no_threads)?;
-        studies.read_back(|new| crate::studies::order(&folders.studies, new))?;
+        let studies = Shelf::new(folders.studies.clone(), events.clone(), keeper);
+        studies.read_back(|new| order(&folders.studies, new))?;
         Ok(Self(Arc::new(Inner {
             hosts,
             traverses: Mutex::new(open),
             folders: folders.clone(),
             sessions: Mutex::new(sessions),
+            runner: Runner::new(Lane::new(RUNS_AT_A_TIME, RUNS_WAITING), events.clone()),
             events,
-            jobs: Jobs::start(RUNS_AT_A_TIME, RUNS_WAITING).map_err(no_threads)?,
             ahead,
             store,
             notices,
@@ -150,12 +142,12 @@ impl AppState {
     }
 
     /// The hosts under which the server may be addressed.
-    pub fn hosts(&self) -> &Hosts {
+    pub(crate) fn hosts(&self) -> &Hosts {
         &self.0.hosts
     }
 
     /// What a person should know about this start of the server, one sentence each.
-    pub fn notices(&self) -> &[String] {
+    pub(crate) fn notices(&self) -> &[String] {
         &self.0.notices
     }
 
@@ -165,7 +157,7 @@ impl AppState {
     }
 
     /// Where the server keeps what it makes.
-    pub fn folders(&self) -> &Folders {
+    pub(crate) fn folders(&self) -> &Folders {
         &self.0.folders
     }
 
@@ -173,14 +165,14 @@ impl AppState {
     ///
     /// # Errors
     /// A database that cannot be read.
-    pub fn add_traverse(&self, open: Arc<OpenTraverse>) -> Result<Arc<OpenTraverse>> {
+    pub(crate) fn add_traverse(&self, open: Arc<OpenTraverse>) -> Result<Arc<OpenTraverse>> {
         let mut traverses = lock(&self.0.traverses);
         if let Some(known) = traverses.iter().find(|known| known.id == open.id) {
             return Ok(Arc::clone(known));
         }
         let (found, notices) = read_back(&self.0.store, std::slice::from_ref(&open))?;
         for notice in &notices {
-            tracing::warn!("{}", crate::plain(notice));
+            tracing::warn!("{}", crate::printable::printable(notice));
         }
         let mut sessions = lock(&self.0.sessions);
         for (number, live) in found.by_number {
@@ -200,7 +192,7 @@ impl AppState {
     }
 
     /// The sessions, in the order in which they were begun.
-    pub fn sessions(&self) -> Vec<Arc<LiveSession>> {
+    pub(crate) fn sessions(&self) -> Vec<Arc<LiveSession>> {
         lock(&self.0.sessions).by_number.values().cloned().collect()
     }
 
@@ -208,12 +200,12 @@ impl AppState {
     ///
     /// # Errors
     /// A problem when there is none.
-    pub fn session(&self, id: &str) -> ApiResult<Arc<LiveSession>> {
+    pub(crate) fn session(&self, id: &str) -> ApiResult<Arc<LiveSession>> {
         let number = store::number_of(id);
         let found = number.and_then(|number| lock(&self.0.sessions).by_number.get(&number).cloned());
         let live = found.ok_or_else(|| ApiError::not_found("There is no such session."))?;
         if live.wake() {
-            runner::restore(self, &live).inspect_err(|_| live.sleep())?;
+            self.0.runner.restore(&live).inspect_err(|_| live.sleep())?;
         }
         Ok(live)
     }
@@ -232,7 +224,7 @@ impl AppState {
     ///
     /// # Errors
     /// A problem when there are too many already, or that of `make`.
-    pub fn enter_session(
+    pub(crate) fn enter_session(
         &self,
         traverse: Arc<OpenTraverse>,
         is_awake: bool,
@@ -264,11 +256,11 @@ impl AppState {
     /// Remembers that a session is used now.
     fn touched(&self, live: &LiveSession) {
         live.set_used(Some(jiff::Timestamp::now()));
-        self.0.store.touch(&live.id, crate::notes::now());
+        self.0.store.touch(&live.id, clock::now());
     }
 
     /// Remembers a cursor that moved, which is on disk a moment later, and tells every page.
-    pub fn cursor_moved(&self, live: &LiveSession, cursor: Cursor) {
+    pub(crate) fn cursor_moved(&self, live: &LiveSession, cursor: Cursor) {
         self.0.store.move_cursor(&live.id, cursor);
         self.touched(live);
         self.tell(Event::CursorMoved { session: live.id.clone(), cursor });
@@ -280,12 +272,12 @@ impl AppState {
     }
 
     /// Renders the stops of `traverse` from `from` on before all others.
-    pub fn look_at(&self, traverse: &Arc<OpenTraverse>, from: usize) {
+    pub(crate) fn look_at(&self, traverse: &Arc<OpenTraverse>, from: usize) {
         self.0.ahead.look_at(traverse, from);
     }
 
     /// Tells every page.
-    pub fn tell(&self, event: Event) {
+    pub(crate) fn tell(&self, event: Event) {
         // Nobody may be listening.
         let _ = self.0.events.send(event);
     }
@@ -296,84 +288,67 @@ impl AppState {
     }
 
     /// What a page must hear that may have missed anything.
-    pub fn everything_may_have_changed(&self) -> Vec<Event> {
+    pub(crate) fn everything_may_have_changed(&self) -> Vec<Event> {
         let sessions =
             self.sessions().into_iter().map(|live| Event::SessionChanged { session: live.id.clone() });
         let traverses = self.traverses().into_iter().filter(|open| open.traverse.index().scenario.is_some());
         sessions.chain(traverses.map(|open| open.progress(None))).collect()
     }
 
+    /// What computes runs.
+    pub(crate) fn runner(&self) -> &Runner {
+        &self.0.runner
+    }
+
     /// Where runs are computed.
-    pub fn jobs(&self) -> &Jobs {
-        &self.0.jobs
+    pub(crate) fn jobs(&self) -> &Lane {
+        self.0.runner.lane()
     }
 
     /// Where designations are computed.
-    pub fn designations(&self) -> &Lane {
+    pub(crate) fn designations(&self) -> &Lane {
         &self.0.designations
     }
 
     /// Where images are read.
-    pub fn pictures(&self) -> &Lane {
+    pub(crate) fn pictures(&self) -> &Lane {
         &self.0.pictures
     }
 
     /// Where expressions are asked over all steps.
-    pub fn queries(&self) -> &Lane {
+    pub(crate) fn queries(&self) -> &Lane {
         &self.0.queries
     }
 
     /// Where recordings are written.
-    pub fn exports(&self) -> &Lane {
+    pub(crate) fn exports(&self) -> &Lane {
         &self.0.exports
     }
 
     /// The studies that were started.
-    pub fn studies(&self) -> &Shelf {
+    pub(crate) fn studies(&self) -> &Shelf {
         &self.0.studies
     }
 
     /// The trackability of stops.
-    pub fn maps(&self) -> &Maps {
+    pub(crate) fn maps(&self) -> &Maps {
         &self.0.maps
     }
 
     /// The live Rerun streams, by session.
-    pub fn streams(&self) -> &Mutex<BTreeMap<String, Arc<LiveStream>>> {
+    pub(crate) fn streams(&self) -> &Mutex<BTreeMap<String, Arc<LiveStream>>> {
         &self.0.streams
     }
 
     /// Where single steps are tried.
-    pub fn tries(&self) -> &Lane {
+    pub(crate) fn tries(&self) -> &Lane {
         &self.0.tries
     }
 
     /// What would have saved steps: the questions that were asked.
-    pub fn questions(&self) -> &Questions {
+    pub(crate) fn questions(&self) -> &Questions {
         &self.0.questions
     }
-}
-
-/// The name of a traverse in paths: readable, and another one when its index is another.
-///
-/// # Errors
-/// An index that cannot be written as JSON.
-pub fn name_of(traverse: &Traverse) -> Result<String> {
-    let index = serde_json::to_vec(traverse.index()).map_err(|error| Error::Request(error.to_string()))?;
-    Ok(format!("{}-{}", slug(&traverse.index().name), &hash(&index)[..6]))
-}
-
-/// A name that can be part of a path or a file name: small letters, digits and hyphens.
-pub fn slug(name: &str) -> String {
-    let plain = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { ' ' };
-    let words: String = name.chars().map(plain).take(60).collect();
-    let joined = words.split_whitespace().collect::<Vec<_>>().join("-");
-    if joined.is_empty() { "traverse".to_owned() } else { joined }
-}
-
-/// The SHA-256 of `bytes`, as hexadecimal digits.
-pub fn hash(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// The sessions on disk whose traverses are open; the others stay where they are.

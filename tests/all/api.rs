@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use axum::http::{Method, header};
 use serde_json::{Value, json};
-use sightline_core::image::{npy, npz};
-use sightline_core::session::wire::StopDetail;
+use sightline_api::wire::StopDetail;
 use sightline_tests::server::{PIXEL, TestServer, request, small_drive, small_recording};
+use sightline_vision::image::{npy, npz};
 
 /// Where the steps of a run are.
 fn step(session: &str, run: u64, step: u64) -> String {
@@ -41,7 +41,7 @@ async fn the_same_target_can_be_named_by_pixel_by_rover_point_and_by_site_point(
     let in_rover = &picked["rows"][0]["position_in_rover"];
     let pose = server.state.traverses()[0].traverse.site_from_rover(0);
     let coordinates = [0, 1, 2].map(|k| in_rover[k].as_f64().unwrap());
-    let in_site = pose * sightline_core::frames::Point3::from(coordinates);
+    let in_site = pose * sightline_geometry::frames::Point3::from(coordinates);
     let path = format!("sessions/{session}/targets");
     for place in [json!({ "point_in_rover": in_rover }), json!({ "point_in_site": in_site })] {
         let mut new = place.clone();
@@ -96,7 +96,7 @@ async fn going_back_is_a_read_of_the_same_bytes() {
     server.pick(&session).await;
     server.ended(&session, 0, 0).await;
     let first = server.get(&step(&session, 0, 2)).await;
-    let array = server.get(&format!("{}/arrays/surface.npy", step(&session, 0, 2))).await;
+    let arrays = server.get(&format!("{}/arrays.npz", step(&session, 0, 2))).await;
     // Nothing can be computed again without images.
     std::fs::remove_dir_all(drive.path()).unwrap();
     for number in [4, 3, 2] {
@@ -104,11 +104,10 @@ async fn going_back_is_a_read_of_the_same_bytes() {
         server.json(Method::PUT, &format!("sessions/{session}/cursor"), &cursor).await.expect(200);
     }
     assert_eq!(server.get(&step(&session, 0, 2)).await, first);
-    assert_eq!(server.get(&format!("{}/arrays/surface.npy", step(&session, 0, 2))).await, array);
+    assert_eq!(server.get(&format!("{}/arrays.npz", step(&session, 0, 2))).await, arrays);
     let trace = first.expect(200);
     for stage in ["predict", "point_mast", "capture", "locate", "judge", "update"] {
-        let alone = server.get(&format!("{}/stages/{stage}", step(&session, 0, 2))).await.expect(200);
-        assert_eq!(alone, trace[stage], "{stage}");
+        assert!(trace[stage].is_object(), "{stage}");
     }
 }
 
@@ -149,9 +148,7 @@ async fn every_array_is_a_numpy_file_of_the_size_that_the_step_says() {
     let together = server.get(&format!("{}/arrays.npz", step(&session, 0, 1))).await;
     let mut together: BTreeMap<_, _> = npz::decode(&together.bytes, "arrays").unwrap().into_iter().collect();
     for name in ["reference", "scaled", "rolled", "matched", "difference", "right_window", "surface"] {
-        let answer = server.get(&format!("{}/arrays/{name}.npy", step(&session, 0, 1))).await;
-        let image = npy::decode(&answer.bytes, name).unwrap();
-        assert_eq!(together.remove(name), Some(answer.bytes), "{name}");
+        let image = npy::decode(&together.remove(name).unwrap(), name).unwrap();
         // The surface has a score wherever the whole template lies in the search window.
         let window = &trace["locate"]["evidence"]["match_template"]["search_window"];
         let positions = |key: &str| window[key].as_u64().map(|side| side - 20);
@@ -169,9 +166,28 @@ async fn every_array_is_a_numpy_file_of_the_size_that_the_step_says() {
         "a designation is found in the right image, and compared with nothing before"
     );
     server.get(&format!("{}/arrays.npz", step(&session, 0, 99))).await.problem(404, "not_found");
-    server.get(&format!("{}/arrays/surface.npy", step(&session, 0, 0))).await.problem(404, "not_found");
-    server.get(&format!("{}/arrays/nonsense.npy", step(&session, 0, 1))).await.problem(404, "not_found");
-    server.get(&format!("{}/arrays/surface", step(&session, 0, 1))).await.problem(404, "not_found");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_view_of_a_step_is_compared_with_the_earlier_templates() {
+    let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
+    let server = TestServer::open(drive.path(), folder.path());
+    let session = server.begin().await;
+    server.pick(&session).await;
+    server.ended(&session, 0, 0).await;
+    let earlier = |number: u64| format!("{}/earlier_templates", step(&session, 0, number));
+    let rows = server.get(&step(&session, 0, 4)).await.expect(200);
+    assert!(rows["locate"]["left_pixel"].is_object(), "the step found a position");
+    let found = server.get(&earlier(4)).await.expect(200);
+    let found = found.as_array().unwrap();
+    assert_eq!(found[0]["template_step"], 0, "the designated template comes first: {found:?}");
+    for one in found {
+        assert!(one["template_step"].as_u64().unwrap() < 4, "{one}");
+        let offset = |i: usize| one["offset_px"][i].as_f64().unwrap();
+        assert!(one["score"].as_f64().unwrap() > 0.7 && offset(0).hypot(offset(1)) < 3.0, "{one}");
+    }
+    assert_eq!(server.get(&earlier(0)).await.expect(200), json!([]), "there is none before the designation");
+    server.get(&earlier(99)).await.problem(404, "not_found");
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -362,11 +378,14 @@ async fn a_session_becomes_a_recording() {
     let session = server.begin().await;
     server.pick(&session).await;
     server.ended(&session, 0, 0).await;
-    let answer = server.get(&format!("sessions/{session}/export.rrd")).await;
+    let answer = server.get(&format!("sessions/{session}/exports/recording.rrd")).await;
     assert_eq!((answer.status.as_u16(), &answer.bytes[..4]), (200, &b"RRF2"[..]));
-    assert!(answer.headers[header::CONTENT_DISPOSITION].to_str().unwrap().contains("sightline-s1.rrd"));
-    let csv = server.get(&format!("sessions/{session}/targets/0/runs/0/columns.csv")).await.text();
-    assert_eq!((csv.lines().count(), csv.lines().next().unwrap().starts_with("step,state,")), (6, true));
+    assert!(
+        answer.headers[header::CONTENT_DISPOSITION].to_str().unwrap().contains("sightline-s1-recording.rrd")
+    );
+    let csv = server.get(&format!("sessions/{session}/exports/rows.csv?target=0&run=0")).await.text();
+    let header = csv.lines().next().unwrap();
+    assert_eq!((csv.lines().count(), header.starts_with("target,label,run,step,state,")), (6, true));
     let [x, _] = PIXEL;
     assert!(csv.lines().nth(1).unwrap().contains(&format!(",{x},")), "{csv}");
 }

@@ -96,8 +96,8 @@ async fn names_that_do_not_exist_are_not_found_however_they_are_written() {
         format!("sessions/{session}/targets/99999999999999999999999/runs/0"),
         format!("sessions/{session}/targets/0/runs/0/steps/77"),
         format!("sessions/{session}/targets/0/runs/0/steps/0x1"),
-        format!("sessions/{session}/targets/0/runs/0/steps/0/stages/think"),
-        format!("sessions/{session}/targets/0/runs/0/steps/0/arrays/..%2f..%2fsecret.npy"),
+        format!("sessions/{session}/targets/0/runs/0/steps/0/think"),
+        format!("sessions/{session}/exports/..%2f..%2fsecret.npy"),
         format!("traverses/{traverse}x"),
         format!("traverses/{traverse}/steps/99/images/left.png"),
         format!("traverses/{traverse}/steps/0/images/middle.png"),
@@ -175,8 +175,8 @@ async fn bound() -> (SocketAddr, TestServer, [tempfile::TempDir; 2]) {
     let folders = [small_drive(), tempfile::tempdir().unwrap()];
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = listener.local_addr().unwrap();
-    let traverse = sightline_core::traverse::Traverse::open(folders[0].path()).unwrap();
-    let hosts = sightline_server::guard::Hosts::new(address.port(), &[]);
+    let traverse = sightline_recordings::Traverse::open(folders[0].path()).unwrap();
+    let hosts = sightline_server::hosts::Hosts::new(address.port(), &[]);
     let state = sightline_server::state::AppState::new(vec![traverse], folders[1].path(), hosts).unwrap();
     let app = sightline_server::app(state.clone());
     tokio::spawn(async move { axum::serve(listener, app).await });
@@ -257,7 +257,7 @@ async fn the_document_describes_every_route_and_names_each_once() {
             assert_ne!(answer.status, StatusCode::METHOD_NOT_ALLOWED, "{method} {path}");
         }
     }
-    assert_eq!(names.len(), 75);
+    assert_eq!(names.len(), sightline_api::endpoints::ALL.len());
     let text = document.to_string();
     for reference in text.split("#/components/schemas/").skip(1) {
         let name = reference.split('"').next().unwrap();

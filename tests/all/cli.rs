@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
 use serde_json::{Value, json};
-use sightline_tests::server::{PIXEL, TestServer, small_drive, small_scenario};
+use sightline_tests::server::{PIXEL, TestServer, rows_of_run, small_drive, small_scenario};
 
 /// The program: the one named by `SIGHTLINE_BIN`, else the one beside this test.
 pub(crate) fn program() -> PathBuf {
@@ -135,7 +135,8 @@ async fn server_and_command_line_give_the_same_rows_to_the_last_digit() {
     let session = server.begin().await;
     server.pick(&session).await;
     let run_view = server.ended(&session, 0, 0).await;
-    let rest = server.get(&format!("sessions/{session}/targets/0/runs/0/columns.jsonl")).await.text();
+    let rest = server.get(&format!("sessions/{session}/exports/rows.jsonl?target=0&run=0")).await.text();
+    let rest = rows_of_run(&rest);
     let output = run(&["track", text(drive.path()), "--target", &target()]);
     let cli = String::from_utf8(output.stdout).unwrap();
     let (rows, summary) = cli.trim_end().rsplit_once('\n').unwrap();

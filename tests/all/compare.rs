@@ -112,5 +112,5 @@ fn the_page_about_comparing_defines_every_metric_by_its_name() {
         .lines()
         .filter_map(|line| line.strip_prefix("| `")?.split_once('`').map(|(name, _)| name))
         .collect();
-    assert_eq!(named, sightline_core::session::metrics::NAMES);
+    assert_eq!(named, sightline_session::metrics::NAMES);
 }

@@ -1,18 +1,22 @@
-//! Actions that were copied as `curl` are run in a shell against a real server, and do what they say.
+//! Actions that were copied as `curl` or as a command are run in a shell, and do what they say.
 
 use std::process::Command;
 
 use serde_json::{Value, json};
-use sightline_tests::server::{PIXEL, small_drive};
+use sightline_session::shell;
+use sightline_session::view::SessionView;
+use sightline_tests::server::{PIXEL, TestServer, rows_of_run, small_drive};
+
+use crate::cli::program;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn what_is_copied_as_curl_does_what_it_says() {
-    use sightline_core::session::shell::Curl;
+    use sightline_session::shell::Curl;
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
     let origin = format!("http://{}", listener.local_addr().unwrap());
-    let traverse = sightline_core::traverse::Traverse::open(drive.path()).unwrap();
-    let hosts = sightline_server::guard::Hosts::new(listener.local_addr().unwrap().port(), &[]);
+    let traverse = sightline_recordings::Traverse::open(drive.path()).unwrap();
+    let hosts = sightline_server::hosts::Hosts::new(listener.local_addr().unwrap().port(), &[]);
     let state = sightline_server::state::AppState::new(vec![traverse], folder.path(), hosts).unwrap();
     let id = state.traverses()[0].id.clone();
     let app = sightline_server::app(state);
@@ -57,4 +61,34 @@ async fn what_is_copied_as_curl_does_what_it_says() {
         shell("GET", "sessions/s1/exports/rows.csv?target=0", None, None, Some(file.clone())).await.unwrap(),
     );
     assert!(std::fs::read_to_string(file).unwrap().starts_with("target,label,run,step,state,"));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_copied_command_tracks_the_same_rows() {
+    let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
+    let server = TestServer::open(drive.path(), folder.path());
+    let session = server.begin().await;
+    server.pick(&session).await;
+    let run = server.ended(&session, 0, 0).await;
+    let view: SessionView =
+        serde_json::from_value(server.get(&format!("sessions/{session}")).await.json()).unwrap();
+    let traverse = server.get(&format!("traverses/{}", view.traverse)).await.json();
+    let source = traverse["source"].as_str().unwrap();
+    let command = shell::track(source, view.targets[0].designation, &view.targets[0].runs[0].changes);
+    let programs = program().parent().unwrap().to_owned();
+    let output = Command::new("/bin/sh")
+        .args(["-c", &command])
+        .env("PATH", programs)
+        .env("SIGHTLINE_HOME", folder.path().join("home"))
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{command}: {}", String::from_utf8_lossy(&output.stderr));
+    let tracked = String::from_utf8(output.stdout).unwrap();
+    let rows = server.get(&format!("sessions/{session}/exports/rows.jsonl?target=0&run=0")).await.text();
+    let rows = rows_of_run(&rows);
+    assert_eq!(rows.lines().count(), run["rows"].as_array().unwrap().len());
+    assert_eq!(
+        tracked.lines().take(rows.lines().count()).collect::<Vec<_>>(),
+        rows.lines().collect::<Vec<_>>()
+    );
 }

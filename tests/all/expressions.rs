@@ -3,7 +3,7 @@
 use axum::body::Body;
 use axum::http::Method;
 use serde_json::json;
-use sightline_core::traverse::create_simulated;
+use sightline_recordings::create_simulated;
 use sightline_tests::server::{Answer, TestServer, request, small_drive, small_scenario};
 
 /// A server with a session whose target was tracked to the end, and what keeps its folders.
@@ -215,7 +215,7 @@ impl Page {
 
 #[test]
 fn the_page_of_the_language_names_what_the_catalogue_has_and_nothing_else() {
-    use sightline_core::session::expression::{catalogue, functions, unit};
+    use sightline_session::expression::{catalogue, functions, unit};
     let page = Page::read();
     let known: Vec<Vec<String>> = catalogue::short_names()
         .into_iter()
@@ -235,7 +235,7 @@ fn the_page_of_the_language_names_what_the_catalogue_has_and_nothing_else() {
 
 #[test]
 fn every_example_of_the_page_is_read_and_every_bad_one_is_refused_as_it_says() {
-    use sightline_core::session::expression::Expression;
+    use sightline_session::expression::Expression;
     let page = Page::read();
     let examples = page.blocks("expression");
     assert!(examples.len() > 15, "{examples:?}");

@@ -4,10 +4,11 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Matrix3, Point3};
-use sightline_core::frames::Pixel;
-use sightline_core::traverse::import::pds3::Product;
-use sightline_core::traverse::import::{ImportOptions, Imported, import};
-use sightline_core::traverse::{StereoGeometry, Traverse};
+use sightline_geometry::frames::Pixel;
+use sightline_geometry::stereo_geometry::StereoGeometry;
+use sightline_recordings::Traverse;
+use sightline_recordings::import::pds3::Product;
+use sightline_recordings::import::{ImportOptions, Imported, import};
 use sightline_tests::data;
 
 fn imported(source: &Path, folder: &Path) -> (Imported, Traverse) {

@@ -78,7 +78,12 @@ impl Killable {
         loop {
             let view = self.get(&format!("sessions/s1/targets/0/runs/{run}"));
             if view["complete"] == json!(true) {
-                return self.raw("GET", &format!("sessions/s1/targets/0/runs/{run}/columns.jsonl"), "", "");
+                return self.raw(
+                    "GET",
+                    &format!("sessions/s1/exports/rows.jsonl?target=0&run={run}"),
+                    "",
+                    "",
+                );
             }
             assert!(begun.elapsed() < PATIENCE, "{view}");
             std::thread::sleep(Duration::from_millis(30));

@@ -33,6 +33,7 @@ mod page_trouble;
 mod page_undo;
 mod recorded_cameras;
 mod recorded_tracking;
+mod records;
 mod rerun_export;
 mod studies;
 mod trackability;

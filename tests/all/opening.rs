@@ -3,9 +3,9 @@
 
 use axum::http::header;
 use serde_json::{Value, json};
-use sightline_core::session::reproduce::Opened;
-use sightline_core::sim::Scenario;
+use sightline_session::reproduce::Opened;
 use sightline_tests::server::{TestServer, small_drive, small_recording, small_scenario};
+use sightline_world::Scenario;
 
 /// Another drive than that of [`small_drive`].
 fn other() -> Scenario {

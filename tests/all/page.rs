@@ -6,14 +6,14 @@
 use std::path::Path;
 use std::time::Duration;
 
-use sightline_core::frames::Pixel;
-use sightline_core::sim::Scenario;
-use sightline_core::trace::StepTrace;
+use sightline_geometry::frames::Pixel;
 use sightline_server::rerun_log::{Rows, documented_entities};
 use sightline_tests::bench::{Bench, picked};
 use sightline_tests::browser::Browser;
 use sightline_tests::rrd;
 use sightline_tests::scenario::short_approach;
+use sightline_track::trace::StepTrace;
+use sightline_world::Scenario;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_person_picks_a_rock_steps_to_the_end_and_back_and_exports() {
@@ -59,7 +59,7 @@ async fn a_person_picks_a_rock_steps_to_the_end_and_back_and_exports() {
 fn check_export(bench: &Bench, session: &str) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("session.rrd");
-    std::fs::write(&path, bench.get(&format!("/api/v1/sessions/{session}/export.rrd"))).unwrap();
+    std::fs::write(&path, bench.get(&format!("/api/v1/sessions/{session}/exports/recording.rrd"))).unwrap();
     let recording = rrd::read(&path);
     let read = |step: usize| -> StepTrace {
         let path = format!("/api/v1/sessions/{session}/targets/0/runs/0/steps/{step}");

@@ -1,12 +1,12 @@
 //! A new user's first minutes: from the first page to why the target was lost, and to what would have saved it, by keys and
 //! by names alone, each action counted. Nothing but what the page shows is used to find the way.
 
-use sightline_core::sim::Scenario;
-use sightline_core::traverse::create_simulated;
-use sightline_server::first;
-use sightline_server::guard::Hosts;
+use sightline_recordings::create_simulated;
+use sightline_server::first_session;
+use sightline_server::hosts::Hosts;
 use sightline_server::state::AppState;
 use sightline_tests::browser::Browser;
+use sightline_world::Scenario;
 
 /// Actions from the first page to the cause, at most.
 const TO_THE_CAUSE: usize = 6;
@@ -38,7 +38,7 @@ async fn serve(scenario: &Scenario, folder: &std::path::Path) -> u16 {
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
     let port = listener.local_addr().unwrap().port();
     let state = AppState::new(vec![traverse], &folder.join("sessions"), Hosts::new(port, &[])).unwrap();
-    first::begin(&state, scenario).unwrap();
+    first_session::begin(&state, scenario).unwrap();
     tokio::spawn(async move { axum::serve(listener, sightline_server::app(state)).await });
     port
 }
@@ -46,7 +46,7 @@ async fn serve(scenario: &Scenario, folder: &std::path::Path) -> u16 {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_new_user_finds_why_the_first_target_was_lost_and_what_saves_it() {
     let folder = tempfile::tempdir().unwrap();
-    let scenario = first::scenario().unwrap();
+    let scenario = first_session::scenario().unwrap();
     let port = serve(&scenario, folder.path()).await;
     let browser = Browser::start().await;
     browser.goto(&format!("http://127.0.0.1:{port}/")).await;

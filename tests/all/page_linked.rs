@@ -1,11 +1,11 @@
 //! What the pointer rests on, in a real browser: the same place in all panels at once, before and after a pick.
 
 use serde_json::Value;
-use sightline_core::frames::Pixel;
-use sightline_core::image::{GrayImage, npy};
+use sightline_geometry::frames::Pixel;
 use sightline_tests::bench::{Bench, picked, place};
 use sightline_tests::browser::Browser;
 use sightline_tests::scenario::short_approach;
+use sightline_vision::image::{GrayImage, npy, npz};
 
 /// Rests the pointer as near to a pixel of the left image as the screen allows. Returns the pixel on which it rests.
 async fn point_at(browser: &Browser, pixel: Pixel) -> Pixel {
@@ -19,7 +19,9 @@ async fn point_at(browser: &Browser, pixel: Pixel) -> Pixel {
 fn scores(bench: &Bench, step: usize) -> (GrayImage, Pixel, Pixel) {
     let path = format!("/api/v1/sessions/s1/targets/0/runs/0/steps/{step}");
     let matched = bench.json(&path)["locate"]["evidence"]["match_template"].clone();
-    let surface = npy::decode(&bench.get(&format!("{path}/arrays/surface.npy")), "the scores").unwrap();
+    let arrays = npz::decode(&bench.get(&format!("{path}/arrays.npz")), "the arrays").unwrap();
+    let (_, surface) = arrays.into_iter().find(|(name, _)| name == "surface").unwrap();
+    let surface = npy::decode(&surface, "the scores").unwrap();
     let number = |value: &Value| value.as_f64().unwrap();
     let peak = matched["peak"]["integer"].clone();
     let window = matched["search_window"].clone();

@@ -2,10 +2,10 @@
 //! the console for errors.
 
 use serde_json::{Value, json};
-use sightline_core::sim::Scenario;
 use sightline_tests::bench::picked;
 use sightline_tests::browser::Browser;
 use sightline_tests::scenario::short_approach;
+use sightline_world::Scenario;
 
 /// Does with the canvas what a browser does when files are dragged over it (`dragover`) or dropped (`drop`).
 async fn files(browser: &Browser, event: &str, files: &[(&str, &[u8])]) {

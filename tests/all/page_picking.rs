@@ -1,7 +1,7 @@
 //! Picking a target in a real browser: the map of good and bad places, a refusal with its way out, the aim by keys; and
 //! the plain page of a step for whom the viewer cannot run.
 
-use sightline_core::frames::Pixel;
+use sightline_geometry::frames::Pixel;
 use sightline_tests::bench::{Bench, picked, place};
 use sightline_tests::browser::Browser;
 use sightline_tests::scenario::short_approach;

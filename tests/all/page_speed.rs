@@ -5,7 +5,7 @@
 
 use std::time::Duration;
 
-use sightline_core::frames::Pixel;
+use sightline_geometry::frames::Pixel;
 use sightline_tests::bench::{Bench, picked};
 use sightline_tests::browser::Browser;
 use sightline_tests::scenario::short_approach;

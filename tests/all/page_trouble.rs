@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use sightline_core::frames::Pixel;
-use sightline_core::traverse::Traverse;
+use sightline_geometry::frames::Pixel;
+use sightline_recordings::Traverse;
 use sightline_tests::bench::{Bench, place};
 use sightline_tests::browser::Browser;
 use sightline_tests::server::{PIXEL, small_drive, small_recording};

@@ -3,9 +3,9 @@
 //! The expected pixels are given to 1e-4 px for points given to 1e-4 m, so 0.001 px leaves room for the
 //! rounding and for O made unit (2e-4 px), and for nothing else.
 
-use sightline_core::camera::{Cahv, Cahvor, Cahvore, CameraModel, Imaging};
-use sightline_core::frames::{Pixel, Point3, Vector3};
-use sightline_core::traverse::import::pds3::{Product, camera_model};
+use sightline_geometry::camera::{Cahv, Cahvor, Cahvore, CameraModel, Imaging};
+use sightline_geometry::frames::{Pixel, Point3, Vector3};
+use sightline_recordings::import::pds3::{Product, camera_model};
 use sightline_tests::data;
 
 const TOLERANCE_PX: f64 = 0.001;

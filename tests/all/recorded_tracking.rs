@@ -3,14 +3,14 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use sightline_core::frames::Pixel;
-use sightline_core::session::track;
-use sightline_core::settings::Settings;
-use sightline_core::study::calibration::median;
-use sightline_core::target::{Designation, TrackingState};
-use sightline_core::trace::{StepTrace, TruthKind};
-use sightline_core::traverse::{Traverse, import};
+use sightline_geometry::estimate::quantile::median;
+use sightline_geometry::frames::Pixel;
+use sightline_recordings::{Traverse, import};
+use sightline_session::track;
 use sightline_tests::data;
+use sightline_track::settings::Settings;
+use sightline_track::target::{Designation, TrackingState};
+use sightline_track::trace::{StepTrace, TruthKind};
 
 /// Pixels of the first frame on a scaffold (66 m), a parked car (37 m), a tree before a house (26 m), a hoarding (17 m)
 /// and a near car (13 m): five depths, all off the sky.
@@ -22,7 +22,7 @@ fn imported(set: &Path, folder: &Path) -> Traverse {
     Traverse::open(folder).unwrap()
 }
 
-fn designate(traverse: &Traverse, x: f64, y: f64) -> sightline_core::error::Result<Vec<StepTrace>> {
+fn designate(traverse: &Traverse, x: f64, y: f64) -> sightline_geometry::error::Result<Vec<StepTrace>> {
     track::run(traverse, Designation { step: 0, pixel: Pixel::new(x, y) }, &Settings::default())
 }
 
@@ -32,7 +32,7 @@ const TREE: usize = 2;
 
 /// Located minus true pixel, where both are there and the target is tracked.
 fn error_px(step: &StepTrace) -> Option<(f64, f64)> {
-    let (truth, located) = (step.truth.as_ref()?.left_pixel?, step.locate.as_ref()?.left_pixel?);
+    let (truth, located) = (step.truth.as_ref()?.left_pixel?, step.located()?.left_pixel?);
     (step.update.state == TrackingState::Tracking).then_some((located.x - truth.x, located.y - truth.y))
 }
 
@@ -94,7 +94,7 @@ fn pixels_of_one_opportunity_frame_are_found_in_the_other_within_half_a_pixel() 
         let n = &row.numbers;
         let designation = Designation { step: 0, pixel: Pixel::new(n[0], n[1]) };
         let Ok(first) = track::designate(&traverse, designation, &Settings::default()) else { continue };
-        let found = first.locate.as_ref().and_then(|located| located.right_pixel).unwrap();
+        let found = first.located().and_then(|located| located.right_pixel).unwrap();
         let score = first.row().stereo_score.unwrap();
         if score >= Settings::default().limits.stereo_ncc_min {
             distances.push(found.distance(Pixel::new(n[2], n[3])));

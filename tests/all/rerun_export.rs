@@ -9,23 +9,23 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
-use sightline_core::error::Error;
-use sightline_core::estimate::ransac::Refit;
-use sightline_core::frames::Pixel;
-use sightline_core::locate::Evidence;
-use sightline_core::locate::features::FeatureEvidence;
-use sightline_core::locate::features::evidence::{
-    Bootstrapped, CLOUD_COLUMNS, Detected, FeatureColumn, FittedMotion, Table,
-};
-use sightline_core::session::{Session, track};
-use sightline_core::settings::Settings;
-use sightline_core::target::{Designation, TrackingState};
-use sightline_core::trace::StepTrace;
+use sightline_geometry::error::Error;
+use sightline_geometry::estimate::ransac::Refit;
+use sightline_geometry::frames::Pixel;
 use sightline_server::rerun_log::{
     LiveStream, Rows, RunLog, documented_entities, entities_of, export, root, shared_entities,
 };
+use sightline_session::{Session, track};
 use sightline_tests::rrd::{self, EntityRows, Recording};
 use sightline_tests::troubled::Troubled;
+use sightline_track::locate::Evidence;
+use sightline_track::locate::features::FeatureEvidence;
+use sightline_track::locate::features::evidence::{
+    Bootstrapped, CLOUD_COLUMNS, Detected, FeatureColumn, FittedMotion, Table,
+};
+use sightline_track::settings::Settings;
+use sightline_track::target::{Designation, TrackingState};
+use sightline_track::trace::StepTrace;
 
 /// The stop whose image is missing.
 const MISSING: usize = 2;
@@ -136,7 +136,7 @@ fn an_export_holds_every_documented_entity_with_the_documented_rows_and_no_other
 /// Three features: one alone, an inlier and an outlier; a target moved by half a pixel of residual.
 fn by_features(trace: &StepTrace) -> StepTrace {
     let mut trace = trace.clone();
-    let (is_pick, Some(located)) = (trace.predict.is_none(), trace.locate.as_mut()) else { return trace };
+    let (is_pick, Some(located)) = (trace.prediction().is_none(), trace.located_mut()) else { return trace };
     const NONE: f32 = f32::NAN;
     let alone = [50.0, 60.0, 2.0, 0.5, NONE, NONE, NONE, NONE, NONE, NONE, NONE, NONE, NONE];
     let inlier = [70.0, 80.0, 3.0, 1.5, 60.0, 80.0, 4.0, 65.0, 78.0, 69.5, 80.25, 0.01, 1.0];
@@ -212,7 +212,7 @@ fn a_run_by_features_has_its_keypoints_matches_residuals_points_and_cloud() {
 #[test]
 fn the_fixture_has_a_fault_a_loss_and_a_recovery() {
     let steps = &FIXTURE.runs[0];
-    assert!(steps[MISSING].fault.as_deref().is_some_and(|fault| fault.contains("left_0002.png")));
+    assert!(steps[MISSING].fault().is_some_and(|fault| fault.contains("left_0002.png")));
     assert_eq!(steps[COVERED].update.state, TrackingState::Lost { count: 1 });
     assert_eq!(steps[COVERED + 1].update.state, TrackingState::Tracking);
 }

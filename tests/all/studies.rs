@@ -5,10 +5,10 @@ use std::process::{Command, Output};
 use std::time::Duration;
 
 use serde_json::{Value, json};
-use sightline_core::sim::Scenario;
-use sightline_core::sim::scenario::Arrangement;
 use sightline_tests::scenario::short_approach;
 use sightline_tests::server::{TestServer, small_drive};
+use sightline_world::Scenario;
+use sightline_world::scenario::Arrangement;
 
 use crate::cli::program;
 

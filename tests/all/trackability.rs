@@ -4,18 +4,18 @@ use std::time::{Duration, Instant};
 
 use axum::http::StatusCode;
 use serde_json::{Value, json};
-use sightline_core::session::track;
-use sightline_core::settings::{Settings, parse_assignment};
-use sightline_core::sim::{choose_targets, library};
-use sightline_core::study::point::Visit;
-use sightline_core::study::staged::Staged;
-use sightline_core::study::trackability::{Table, ground, measure};
-use sightline_core::target::{Designation, TrackingState};
-use sightline_core::trackability::{TrackabilityMap, Verdict};
-use sightline_core::traverse::create_simulated;
-use sightline_server::first;
+use sightline_experiments::trackability::{Table, ground, measure};
+use sightline_recordings::create_simulated;
+use sightline_rover::trackability::{TrackabilityMap, Verdict};
+use sightline_server::first_session;
+use sightline_session::track;
+use sightline_study::point::Visit;
+use sightline_study::staged::Staged;
 use sightline_tests::scenario::short_approach;
 use sightline_tests::server::{TestServer, small_drive};
+use sightline_track::settings::{Settings, parse_assignment};
+use sightline_track::target::{Designation, TrackingState};
+use sightline_world::{choose_targets, library};
 use std::sync::atomic::AtomicBool;
 
 /// A pixel of the sky in the first image of the small drive.
@@ -57,7 +57,7 @@ async fn a_map_is_made_in_the_background_and_its_nearest_good_pixel_can_be_desig
     let last = told.filter(|event| event["event"] == "trackability_progress").last().expect("an event");
     assert_eq!((&last["step"], &last["ended"]), (&json!(0), &json!(true)));
     // The sky has no range, and says so.
-    let sky = map.at(sightline_core::frames::Pixel::new(SKY[0], SKY[1])).unwrap();
+    let sky = map.at(sightline_geometry::frames::Pixel::new(SKY[0], SKY[1])).unwrap();
     assert_eq!(sky.verdict, Verdict::Bad);
     // What is kept is answered at once and is the same.
     assert_eq!(map_of(&server, 0).await, progress);
@@ -185,10 +185,10 @@ fn the_first_drive_loses_its_target_where_the_heading_jumps_and_a_wider_search_w
 #[tokio::test]
 async fn the_first_start_begins_one_session_with_a_target_at_the_first_stop() {
     let folder = tempfile::tempdir().unwrap();
-    let scenario = first::scenario().unwrap();
+    let scenario = first_session::scenario().unwrap();
     drop(create_simulated(&scenario, &folder.path().join("drive")).unwrap());
     let server = TestServer::open(&folder.path().join("drive"), &folder.path().join("sessions"));
-    first::begin(&server.state, &scenario).unwrap();
+    first_session::begin(&server.state, &scenario).unwrap();
     let begun = Instant::now();
     let view = loop {
         let view = server.get("sessions/s1").await.expect(200);
@@ -201,7 +201,7 @@ async fn the_first_start_begins_one_session_with_a_target_at_the_first_stop() {
     assert_eq!(view["cursor"], json!({ "target": 0, "run": 0, "step": 0 }));
     assert_eq!(view["targets"][0]["designation"]["step"], 0);
     // Begun again, there is still one session.
-    first::begin(&server.state, &scenario).unwrap();
+    first_session::begin(&server.state, &scenario).unwrap();
     assert_eq!(server.get("sessions").await.expect(200).as_array().unwrap().len(), 1);
     let stop = json!({});
     server.post("sessions/s1/targets/0/runs/0/cancel", &stop).await;

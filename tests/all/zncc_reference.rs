@@ -8,12 +8,12 @@
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
-use sightline_core::correlate::{PixelRect, zncc, zncc_surface};
-use sightline_core::frames::Pixel;
-use sightline_core::image::patch::extract;
-use sightline_core::image::sample::Kernel;
-use sightline_core::image::{GrayImage, io};
+use sightline_geometry::frames::Pixel;
 use sightline_tests::data;
+use sightline_vision::correlate::{PixelRect, zncc, zncc_surface};
+use sightline_vision::image::patch::extract;
+use sightline_vision::image::sample::Kernel;
+use sightline_vision::image::{GrayImage, io};
 
 /// OpenCV sums in single precision.
 const OPENCV_TOLERANCE: f64 = 1e-4;

@@ -4,7 +4,7 @@
     python -m venv venv && venv/bin/pip install numpy opencv-python-headless
     SIGHTLINE_DATA=../shared/data venv/bin/python tests/reference/sift_reference.py [image ...]
 
-writes `sift_reference.json` beside this file; `core/src/sift/recorded_tests.rs` holds our features against it. The images
+writes `sift_reference.json` beside this file; `core/vision/src/sift/recorded_tests.rs` holds our features against it. The images
 themselves are not committed. Further images (full scale 4095 where they have 16 bits) are reported and not written.
 
 OpenCV runs with Lowe's thresholds: its contrast threshold c means |D| s >= c with s = 3 scales an octave, so that 0.09 is

@@ -5,7 +5,7 @@
     mkdir pair && SIGHTLINE_STEREO_PAIR=$PWD/pair cargo test -p sightline-core a_rendered_pair
     SIGHTLINE_DATA=../shared/data venv/bin/python tests/reference/stereo_reference.py pair
 
-writes `stereo_reference.json` beside this file; `core/src/stereo/recorded_tests.rs` holds our disparities against it. The
+writes `stereo_reference.json` beside this file; `core/vision/src/stereo/recorded_tests.rs` holds our disparities against it. The
 images themselves are not committed.
 
 Pairs: Middlebury's Motorcycle at a quarter of its size (grey is 0.299 R + 0.587 G + 0.114 B, rounded to 8 bits) and a

@@ -7,11 +7,11 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use serde_json::Value;
-use sightline_core::frames::Pixel;
-use sightline_core::sim::{self, Scenario};
-use sightline_core::traverse::{Traverse, create_simulated};
-use sightline_server::guard::Hosts;
+use sightline_geometry::frames::Pixel;
+use sightline_recordings::{Traverse, create_simulated};
+use sightline_server::hosts::Hosts;
 use sightline_server::state::AppState;
+use sightline_world::Scenario;
 
 use tempfile::TempDir;
 
@@ -132,7 +132,7 @@ fn rendered(scenario: &Scenario) -> TempDir {
 
 /// The first target that the scenario's rule chooses: on a rock, lit, seen to the end.
 fn rock(scenario: &Scenario, traverse: &Traverse) -> Pixel {
-    sim::choose_targets(traverse.world().unwrap(), scenario, traverse.index())[0]
+    sightline_world::choose_targets(traverse.world().unwrap(), scenario, traverse.index())[0]
 }
 
 /// Where an image pixel of the left image lies on the canvas, CSS px.

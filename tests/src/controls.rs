@@ -202,7 +202,7 @@ impl Browser {
         hash.as_str().unwrap_or_default().trim_start_matches('#').to_owned()
     }
 
-    /// The page's status, as `viewer/src/status.rs` describes it.
+    /// The page's status, as `viewer/src/page/status.rs` describes it.
     pub async fn status(&self) -> Value {
         let text = self.evaluate("return document.getElementById('sightline').dataset.status || '{}'").await;
         serde_json::from_str(text.as_str().unwrap_or("{}")).unwrap_or_default()

@@ -1,24 +1,8 @@
-//! Where the recorded data sets are, which the repository does not hold.
-//!
-//! `$SIGHTLINE_DATA` names their folder; without it, it is `../shared/data` beside the workspace. A test
-//! whose data set is missing says so and passes: whoever has the data runs it with them.
+//! Reads the reference tables of the recorded data sets.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-/// The folder of the data set `name`; where it is missing, says what `test` leaves out.
-pub fn set(name: &str, test: &str) -> Option<PathBuf> {
-    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let beside = || workspace.join("../shared/data");
-    let folder = std::env::var_os("SIGHTLINE_DATA").map_or_else(beside, PathBuf::from).join(name);
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    println!(
-        "left out: {test} needs {} (set SIGHTLINE_DATA to the folder of the data sets)",
-        folder.display()
-    );
-    None
-}
+pub use sightline_testdata::recorded as set;
 
 /// One row of a table: the text of the leading columns, the numbers of the others.
 pub struct Row {

@@ -4,10 +4,10 @@
 #![allow(clippy::unwrap_used)]
 
 pub mod browser;
-pub mod controls;
+mod controls;
 pub mod bench;
 pub mod data;
-pub mod processes;
+mod processes;
 pub mod rrd;
 pub mod scenario;
 pub mod troubled;

@@ -13,7 +13,7 @@ pub struct Taken {
 }
 
 /// What `root` and its descendants have taken; none where the system has no `/proc`.
-pub fn taken(root: u64) -> Option<Taken> {
+pub(crate) fn taken(root: u64) -> Option<Taken> {
     let mut parents: HashMap<u64, u64> = HashMap::new();
     let mut ticks: HashMap<u64, u64> = HashMap::new();
     for entry in std::fs::read_dir("/proc").ok()?.flatten() {

@@ -1,6 +1,6 @@
 //! A simulated approach small enough to be rendered within a test.
 
-use sightline_core::sim::Scenario;
+use sightline_world::Scenario;
 
 /// From 5 m to 3.2 m with images of half the size; the targets' window is halved with them.
 pub fn short_approach() -> Scenario {

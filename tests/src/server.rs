@@ -9,12 +9,13 @@ use axum::Router;
 use axum::body::Body;
 use axum::http::{HeaderMap, Method, Request, StatusCode, header};
 use serde_json::{Value, json};
-use sightline_core::sim::Scenario;
-use sightline_core::sim::scenario::{PlacedRock, RockShape};
-use sightline_core::traverse::{Stop, Traverse, create_simulated};
+use sightline_recordings::{Traverse, create_simulated};
 use sightline_server::app;
-use sightline_server::guard::Hosts;
+use sightline_server::hosts::Hosts;
 use sightline_server::state::AppState;
+use sightline_world::Scenario;
+use sightline_world::scenario::{PlacedRock, RockShape};
+use sightline_world::traverse::Stop;
 use tempfile::TempDir;
 use tower::ServiceExt;
 
@@ -211,4 +212,13 @@ pub(crate) fn copy_folder(from: &Path, to: &Path) {
             std::fs::copy(&path, &copy).expect("a copy");
         }
     }
+}
+
+/// The rows of one run as the command line writes them, from the exported `rows.jsonl`: without target, label and run.
+pub fn rows_of_run(exported: &str) -> String {
+    let own = |line: &str| {
+        let (_, row) = line.split_once(",\"step\":").unwrap();
+        format!("{{\"step\":{row}\n")
+    };
+    exported.lines().map(own).collect()
 }

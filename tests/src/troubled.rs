@@ -3,15 +3,17 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use sightline_core::camera::{Camera, Mast, MastAngles};
-use sightline_core::error::{Error, Result};
-use sightline_core::frames::{Pixel, Point3, Pose};
-use sightline_core::image::GrayImage;
-use sightline_core::pipeline::Stops;
-use sightline_core::sim::{Scenario, choose_targets};
-use sightline_core::stages::capture::StereoPair;
-use sightline_core::study::truth::TruthSource;
-use sightline_core::traverse::{OdometryError, StereoGeometry, Traverse, create_simulated};
+use sightline_geometry::camera::{Camera, Mast, MastAngles};
+use sightline_geometry::error::{Error, Result};
+use sightline_geometry::frames::{Pixel, Point3, Pose};
+use sightline_geometry::odometry_error::OdometryError;
+use sightline_geometry::stereo_geometry::StereoGeometry;
+use sightline_recordings::{Traverse, create_simulated};
+use sightline_rover::pipeline::Stops;
+use sightline_track::stages::capture::StereoPair;
+use sightline_vision::image::GrayImage;
+use sightline_world::target_truth::TruthSource;
+use sightline_world::{Scenario, choose_targets};
 
 /// A simulated drive with trouble.
 pub struct Troubled {
@@ -41,7 +43,7 @@ impl Troubled {
 }
 
 /// The scenario of [`Troubled::short`].
-pub fn short_scenario() -> Scenario {
+pub(crate) fn short_scenario() -> Scenario {
     let mut scenario = Scenario { name: "short approach".to_owned(), ..Scenario::default() };
     scenario.camera.image_size = 512;
     scenario.camera.samples_per_axis = 1;

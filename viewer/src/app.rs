@@ -3,15 +3,32 @@
 use egui::{CentralPanel, Context, Frame, Margin, Panel, Ui};
 
 use crate::command::Command;
-use crate::inbox::Inbox;
-use crate::layout::workspace::{LayoutCommand, Workspace};
-use crate::layout::{LeftImage, Pane, Panels, region};
-use crate::link::Fragment;
-use crate::net::{Net, Request};
-use crate::panels::{bars, card, export, help, limits, notes, open, palette, timeline, tour as bubbles};
-use crate::state::{Connection, State};
-use crate::status::Publisher;
-use crate::{figure, keep, keys, picture, pointed, theme, tour};
+use crate::command::keys;
+use crate::command::{help, palette};
+use crate::exports::window as exports_window;
+use crate::figure::wish::Wish;
+use crate::files::download;
+use crate::files::inbox::Inbox;
+use crate::files::window as files_window;
+use crate::layout::command::LayoutCommand;
+use crate::layout::left_image::LeftImage;
+use crate::layout::workspace::Workspace;
+use crate::layout::{Panels, region};
+use crate::net::Net;
+use crate::net::events::Connection;
+use crate::net::request::Request;
+use crate::notes::panel as notes_panel;
+use crate::page::link::Fragment;
+use crate::page::status::Publisher;
+use crate::page::storage;
+use crate::pane::{Need, Pane};
+use crate::panels::{bars, card, timeline};
+use crate::state::State;
+use crate::state::effect::Effect;
+use crate::state::pointed::taken_out;
+use crate::tour::bubbles;
+use crate::trackability::limits_window;
+use crate::{figure, theme, tour};
 
 /// Where a page begins.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,17 +48,19 @@ pub struct SightlineApp {
     publisher: Publisher,
     /// The link as the page's address has it.
     linked: Fragment,
-    kept: keep::Kept,
+    kept: storage::Kept,
     is_tour_kept: bool,
     /// Where the panels are on the screen, points.
     places: Vec<(Pane, egui::Rect)>,
     inbox: Inbox,
+    /// Effects of answers and events that wait for the frame.
+    waiting: Vec<Effect>,
 }
 
 impl SightlineApp {
     /// The application as it is when the page opens.
     pub fn new(context: &Context, link: Link) -> Self {
-        let kept = keep::Kept::read();
+        let kept = storage::Kept::read();
         let mut state = State::new(link.origin.clone(), link.fragment.session.clone());
         state.looks = kept.looks().unwrap_or_default();
         state.single_keys = kept.single_keys();
@@ -58,7 +77,19 @@ impl SightlineApp {
         let net = Net::new(link.origin, context.clone());
         let (left_image, publisher, places) = (None, Publisher::default(), Vec::new());
         let inbox = Inbox::new(context.clone());
-        Self { state, net, workspace, left_image, publisher, linked, kept, is_tour_kept, places, inbox }
+        Self {
+            state,
+            net,
+            workspace,
+            left_image,
+            publisher,
+            linked,
+            kept,
+            is_tour_kept,
+            places,
+            inbox,
+            waiting: Vec::new(),
+        }
     }
 
     /// Takes in what arrived and asks for what is missing.
@@ -112,9 +143,40 @@ impl SightlineApp {
         }
     }
 
+    /// Sends the requests that answers and events led to; other effects wait for [`Self::settle`].
     fn send(&mut self) {
-        for request in self.state.take_requests() {
-            self.net.send(request);
+        for effect in self.state.take_effects() {
+            match effect {
+                Effect::Send(request) => self.net.send(request),
+                other => self.waiting.push(other),
+            }
+        }
+    }
+
+    /// Carries out what waits: within a frame, since only there egui takes new tabs and copied text.
+    fn settle(&mut self, context: &Context) {
+        self.send();
+        for effect in std::mem::take(&mut self.waiting) {
+            self.carry_out(context, effect);
+        }
+    }
+
+    /// Carries out one effect.
+    fn carry_out(&mut self, context: &Context, effect: Effect) {
+        match effect {
+            Effect::Send(request) => self.net.send(request),
+            Effect::OpenUrl(url) => context.open_url(egui::OpenUrl::new_tab(url)),
+            Effect::CopyLink => self.copy_link(context),
+            Effect::Layout(command) => self.workspace.apply(command),
+            Effect::UseLooks(looks) => theme::apply(context, looks),
+            Effect::SaveFigure(wish) => self.save_figure(context, wish),
+            #[cfg(target_arch = "wasm32")]
+            Effect::ChooseFile | Effect::ReadFile(_) => self.inbox.choose(),
+            #[cfg(not(target_arch = "wasm32"))]
+            Effect::ReadFile(path) => self.inbox.open_path(std::path::Path::new(&path)),
+            // Outside a browser a file is named by its path.
+            #[cfg(not(target_arch = "wasm32"))]
+            Effect::ChooseFile => {}
         }
     }
 
@@ -148,38 +210,26 @@ impl SightlineApp {
             .frame(Frame::new().fill(theme::page()))
             .show(ui, |ui| self.workspace.show(ui, &mut panels));
         self.left_image = panels.left_image;
-        let [is_history_seen, is_studies_seen, is_why_seen, is_surface_seen] =
-            [Pane::History, Pane::Studies, Pane::Why, Pane::Surface].map(|pane| panels.seen.contains(&pane));
-        let wants_metrics = [Pane::Runs, Pane::Uncertainty].iter().any(|pane| panels.seen.contains(pane));
+        let needs: Vec<Need> = panels.seen.iter().flat_map(|pane| pane.panel().needs()).copied().collect();
         let places = panels.places;
         help::show(ui, state, &mut out);
-        notes::editor(ui, state, &mut out);
-        export::show(ui, state, &mut out);
-        limits::show(ui, state, &mut out);
-        open::show(ui, state, &mut out);
+        notes_panel::editor(ui, state, &mut out);
+        exports_window::show(ui, state, &mut out);
+        limits_window::show(ui, state, &mut out);
+        files_window::show(ui, state, &mut out);
         card::show(ui, state, &mut out);
         palette::show(ui, state, &mut out);
-        open::veil(ui, state);
+        files_window::veil(ui, state);
         bubbles::show(ui, state, &mut out);
         self.places = places;
         self.state.exports.panes = self.places.iter().map(|(pane, _)| *pane).collect();
-        self.state.compare.wants_metrics = wants_metrics;
-        self.state.want_tried_scores(is_surface_seen);
-        // Every step's window is worth fetching only while the panel that shows them is on the screen.
-        self.state.wants_history = is_history_seen;
-        if is_why_seen {
-            self.state.want_question();
-            self.state.follow_why();
-        }
-        if is_studies_seen {
-            self.state.want_studies();
-        }
+        self.state.fetch_for_panels(&needs);
         out
     }
 
     /// Takes in what the pointer rests on: the next frame shows it in all panels.
     fn point(&mut self, context: &Context, commands: &mut Vec<Command>) {
-        let pointed = pointed::taken_out(commands);
+        let pointed = taken_out(commands);
         if pointed != self.state.pointed {
             self.state.pointed = pointed;
             context.request_repaint();
@@ -195,72 +245,37 @@ impl SightlineApp {
             return all;
         }
         all.truncate(steps);
-        self.carry_out(all);
+        self.apply(context, all);
         self.ask_for_missing(context.input(|input| input.time));
         // What follows is meant for the step to which they led.
         keys::commands(context, &self.state).into_iter().skip(steps).collect()
     }
 
-    /// Carries out what was asked for of the page, and then of the state.
+    /// Applies what was asked for.
     fn follow(&mut self, context: &Context, commands: Vec<Command>) {
         if commands.is_empty() {
             return;
         }
-        for command in &commands {
-            match command {
-                Command::Layout(command) => self.workspace.apply(*command),
-                Command::CopyLink => self.copy_link(context),
-                Command::SetLooks(looks) => theme::apply(context, *looks),
-                _ => {}
-            }
-        }
-        self.carry_out(commands);
+        self.apply(context, commands);
         // What was asked for shows in the next frame, which otherwise only comes with the next event.
         context.request_repaint();
     }
 
-    /// Carries out what was asked for of the state.
-    fn carry_out(&mut self, commands: Vec<Command>) {
+    /// Applies commands to the state and carries out their effects.
+    fn apply(&mut self, context: &Context, commands: Vec<Command>) {
         for command in commands {
-            self.state.apply(command);
-        }
-        if std::mem::take(&mut self.state.why.is_called) {
-            self.workspace.apply(LayoutCommand::Show(Pane::Why));
-        }
-        self.take_files();
-        if self.state.ask.take_reveal() {
-            self.workspace.apply(LayoutCommand::Show(Pane::Breakpoints));
+            for effect in self.state.apply(command) {
+                self.carry_out(context, effect);
+            }
         }
         self.send();
     }
 
-    /// Lets a file be chosen, or reads the one that was named.
-    fn take_files(&mut self) {
-        let wants_choice = std::mem::take(&mut self.state.files.wants_choice);
-        let path = self.state.files.wants_path.take();
-        #[cfg(target_arch = "wasm32")]
-        if wants_choice || path.is_some() {
-            self.inbox.choose();
-        }
-        #[cfg(not(target_arch = "wasm32"))]
-        if let Some(path) = path.filter(|_| !wants_choice) {
-            self.inbox.open_path(std::path::Path::new(&path));
-        }
-    }
-
-    /// Brings the panel to the front into which a file went.
-    fn reveal(&mut self) {
-        if let Some(pane) = self.state.files.reveal.take() {
-            self.workspace.apply(LayoutCommand::Show(pane));
-        }
-    }
-
     /// Saves the figure that was asked for.
-    fn save_figure(&mut self, context: &Context) {
-        let Some(wish) = self.state.exports.figure_of.take() else { return };
-        let file = figure::take::take(context, &self.state, &self.places, wish);
+    fn save_figure(&mut self, context: &Context, wish: Wish) {
+        let file = figure::save::take(context, &self.state, &self.places, wish);
         let kept = file.and_then(|file| {
-            picture::keep(&file.name, file.media_type, &file.bytes)?;
+            download::keep(&file.name, file.media_type, &file.bytes)?;
             Ok(file.sentence)
         });
         match kept {
@@ -297,7 +312,7 @@ impl SightlineApp {
     fn keep_link(&mut self) {
         #[cfg(target_arch = "wasm32")]
         {
-            let present = Fragment::parse(&crate::web::hash());
+            let present = Fragment::parse(&crate::page::web::hash());
             if present != self.linked && present.session.is_some() {
                 if let Some(preset) = present.preset.filter(|preset| *preset != self.workspace.preset()) {
                     self.workspace.apply(LayoutCommand::Use(preset));
@@ -310,7 +325,7 @@ impl SightlineApp {
         let fragment = self.fragment();
         if fragment.session.is_some() && fragment.text() != self.linked.text() {
             #[cfg(target_arch = "wasm32")]
-            crate::web::keep_link(&fragment.text(), fragment.is_another_place(&self.linked));
+            crate::page::web::keep_link(&fragment.text(), fragment.is_another_place(&self.linked));
             self.linked = Fragment::parse(&fragment.text());
         }
     }
@@ -330,11 +345,7 @@ impl eframe::App for SightlineApp {
         self.point(&context, &mut commands);
         commands.extend(keys);
         self.follow(&context, commands);
-        if let Some(url) = self.state.open_url.take() {
-            context.open_url(egui::OpenUrl::new_tab(url));
-        }
-        self.save_figure(&context);
-        self.reveal();
+        self.settle(&context);
         self.keep_link();
         self.keep_tour();
         self.kept.write(&context, &self.state, || self.workspace.kept());

@@ -1,67 +1,60 @@
 //! The debugger's page: data in, commands out.
 //!
-//! | file | what it does |
+//! | folder or file | contents |
 //! |---|---|
-//! | `app` | lays the panels out and carries their commands to state and network |
-//! | `state` | what is known and looked at: the one value of which every panel is a view |
-//! | `stage` | the stages, their order and their words |
-//! | `command`, `keys`, `actions` | what a person can ask for, by which key, and by which name |
-//! | `link`, `keep` | what the page's address says, and what the browser keeps across reloads |
-//! | `net` | requests and events; nothing blocks |
-//! | `cache`, `raster`, `stretch`, `tables` | what was loaded, with a limit of memory, and how pixels become a texture and tables rows |
-//! | `shape_view` | what is looked at of a registration by shape |
-//! | `panels` | one file a panel: read-only data in, commands out |
-//! | `layout` | where the panels are |
-//! | `view2d`, `overlay`, `ellipse`, `contour` | the zoomable canvas and the marks on it |
-//! | `thin` | what of a long drive is drawn |
-//! | `as_text` | any action as `curl` and as a command |
-//! | `opening`, `inbox` | what a dropped or chosen file is, and how its bytes come in |
-//! | `markdown`, `picture` | notes as text with emphasis; a file that is given to the person |
-//! | `figure` | a panel as a figure: SVG, and PNG at 1x to 4x |
-//! | `theme` | colours, text styles and spacing, and nowhere else |
+//! | `app` | the frame loop: lays the panels out, applies their commands, carries out the effects |
+//! | `command` | what the user can ask for: the commands, the table of names and keys, palette and help sheet |
+//! | `state` | the one value of which every panel is a view; `apply` returns effects |
+//! | `net`, `cache`, `tables` | requests, events, and loaded data within a limit of memory |
+//! | `pane` | the panels by name, with their constant facts |
+//! | `panels` | the trait `Panel`, the list of panels, and the panels that belong to no feature below |
+//! | `layout` | arrangements of the panels |
+//! | `compare` | comparing runs |
+//! | `why`, `what_if` | where a value came from, what would have saved a step, and changes that are tried out |
+//! | `breakpoints` | breakpoints, derived columns, and playing the drive |
+//! | `picking`, `trackability` | designating a target, and how well a target would do |
+//! | `notes`, `studies`, `tour` | notes, validation studies, and the tour for a new user |
+//! | `files`, `exports`, `figure` | opening files, exporting the session, and panels as figures |
+//! | `drawing`, `theme` | canvas, marks and textures; colours and text styles |
+//! | `stage`, `pointed`, `shape_view` | the stages; what the pointer rests on; the selection in the shape panel |
 //! | `access` | the page for a screen reader: egui's tree as elements of the document |
-//! | `aim` | choosing a place in the left image |
-//! | `pointed` | what the pointer rests on, which every panel shows in its own way |
-//! | `tour` | the six bubbles for a new user |
-//! | `status` | the machine-readable status for tests in a browser |
+//! | `page` | address, storage and status of the page |
+//!
+//! A feature's folder has its data, with what a person asks of it, in `mod.rs`, what becomes of that in `update`, its panel
+//! in `panel` or a window in `window`, and its tests in `tests`.
 
-pub mod app;
-pub mod state;
-pub mod stage;
-pub mod command;
-pub mod compare;
-pub mod keys;
-pub mod actions;
-pub mod link;
-pub mod keep;
-pub mod net;
-pub mod cache;
-pub mod raster;
-pub mod stretch;
-pub mod tables;
-pub mod shape_view;
-pub mod panels;
-pub mod layout;
-pub mod view2d;
-pub mod overlay;
-pub mod ellipse;
-pub mod contour;
-pub mod theme;
-pub mod access;
-pub mod status;
-pub mod aim;
-pub mod pointed;
-pub mod tour;
-pub mod as_text;
-pub mod figure;
-pub mod thin;
-pub mod markdown;
-pub mod picture;
-pub mod opening;
-pub mod inbox;
-#[cfg(target_arch = "wasm32")]
-pub mod web;
+mod app;
+mod breakpoints;
+mod command;
+mod compare;
+mod drawing;
+mod exports;
+mod files;
+mod notes;
+mod page;
+mod picking;
+mod studies;
+mod tour;
+mod trackability;
+mod what_if;
+mod why;
+mod state;
+mod stage;
+mod net;
+mod cache;
+mod tables;
+mod shape_view;
+mod pane;
+mod panels;
+mod layout;
+mod theme;
+mod access;
+mod pointed;
+mod figure;
 #[cfg(test)]
 mod tests;
 
-pub use app::{Link, SightlineApp};
+pub use crate::app::{Link, SightlineApp};
+pub use crate::page::link::Fragment;
+#[cfg(target_arch = "wasm32")]
+pub use page::start::start;

@@ -1,7 +1,6 @@
 //! The native viewer: `sightline-viewer [http://127.0.0.1:7700[/#session=ID]]`.
 
-use sightline_viewer::link::Fragment;
-use sightline_viewer::{Link, SightlineApp};
+use sightline_viewer::{Fragment, Link, SightlineApp};
 
 /// Where the server listens unless it is told otherwise.
 const DEFAULT: &str = "http://127.0.0.1:7700";

@@ -63,7 +63,7 @@ impl Orbit {
 
     /// Magnified by a factor.
     #[must_use]
-    pub fn zoomed(self, factor: f64) -> Self {
+    pub(crate) fn zoomed(self, factor: f64) -> Self {
         Self { zoom: (self.zoom * factor).clamp(0.2, 40.0), ..self }
     }
 }

@@ -1,6 +1,6 @@
 //! The stages and the steps of `locate`: their words, their order in each tracker, and what they answer.
 
-use sightline_core::settings::TrackerKind;
+use sightline_track::settings::TrackerKind;
 
 /// A stage or a step of `locate`, in running order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -203,13 +203,8 @@ impl Stage {
         }
     }
 
-    /// Whether it is a step of `locate` by the shape.
-    pub const fn is_step_of_shape(self) -> bool {
-        matches!(self, Self::Surface | Self::CoarseRegister | Self::RefineRegister | Self::CarriedRay)
-    }
-
     /// Whether it is a step of `locate`.
-    pub const fn is_step_of_locate(self) -> bool {
+    pub(crate) const fn is_step_of_locate(self) -> bool {
         !matches!(
             self,
             Self::Predict | Self::PointMast | Self::Capture | Self::Locate | Self::Judge | Self::Update

@@ -1,11 +1,11 @@
 //! The tables of the trackers as they come from the server, and which of their rows are looked at.
 
-use sightline_core::image::npy;
-use sightline_core::locate::features::evidence::{CLOUD_COLUMNS, FeatureColumn};
-use sightline_core::locate::features::rows::{self, CloudPoint, Feature, Matched};
-use sightline_core::locate::shape_tracker::evidence::{MESH_COLUMNS, PATH_COLUMNS};
-use sightline_core::locate::shape_tracker::rows::{self as shape_rows, Facet, PathStep};
-use sightline_core::trace::ArrayName;
+use sightline_track::locate::features::evidence::{CLOUD_COLUMNS, FeatureColumn};
+use sightline_track::locate::features::rows::{self, CloudPoint, Feature, Matched};
+use sightline_track::locate::shape_tracker::evidence::{MESH_COLUMNS, PATH_COLUMNS};
+use sightline_track::locate::shape_tracker::rows::{self as shape_rows, Facet, PathStep};
+use sightline_track::trace::ArrayName;
+use sightline_vision::image::npy;
 
 /// A table, row by row.
 pub enum Table {
@@ -21,17 +21,17 @@ pub enum Table {
 
 impl Table {
     /// Whether an array is a table and no picture.
-    pub const fn is_table(name: ArrayName) -> bool {
+    pub fn is_table(name: ArrayName) -> bool {
         Self::columns(name).is_some()
     }
 
     /// How many columns a table has; none for a picture.
-    const fn columns(name: ArrayName) -> Option<usize> {
+    fn columns(name: ArrayName) -> Option<usize> {
         match name {
-            ArrayName::Features => Some(FeatureColumn::COUNT),
-            ArrayName::Cloud => Some(CLOUD_COLUMNS),
-            ArrayName::RefinePath => Some(PATH_COLUMNS),
-            ArrayName::MeshFixed | ArrayName::MeshMoving => Some(MESH_COLUMNS),
+            ArrayName::FEATURES => Some(FeatureColumn::COUNT),
+            ArrayName::CLOUD => Some(CLOUD_COLUMNS),
+            ArrayName::REFINE_PATH => Some(PATH_COLUMNS),
+            ArrayName::MESH_FIXED | ArrayName::MESH_MOVING => Some(MESH_COLUMNS),
             _ => None,
         }
     }
@@ -48,9 +48,9 @@ impl Table {
         }
         let values = values.as_raw();
         Ok(match name {
-            ArrayName::Cloud => Self::Cloud(rows::cloud(values).collect()),
-            ArrayName::RefinePath => Self::Path(shape_rows::path(values).collect()),
-            ArrayName::MeshFixed | ArrayName::MeshMoving => {
+            ArrayName::CLOUD => Self::Cloud(rows::cloud(values).collect()),
+            ArrayName::REFINE_PATH => Self::Path(shape_rows::path(values).collect()),
+            ArrayName::MESH_FIXED | ArrayName::MESH_MOVING => {
                 Self::Facets(shape_rows::facets(values).collect())
             }
             _ => Self::Features(rows::features(values).collect()),
@@ -142,8 +142,8 @@ impl Count {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sightline_core::frames::Pixel;
-    use sightline_core::image::GrayImage;
+    use sightline_geometry::frames::Pixel;
+    use sightline_vision::image::GrayImage;
 
     fn feature(sigma_px: f64, residual_m: Option<f64>) -> Feature {
         let matched = residual_m.map(|residual_m| Matched {
@@ -172,16 +172,16 @@ mod tests {
     #[test]
     fn a_table_with_other_columns_is_refused_and_one_without_rows_is_empty() {
         let bytes = |width: u32, height: u32| npy::encode(&GrayImage::new(width, height)).unwrap();
-        let refused = Table::from_npy(ArrayName::Features, &bytes(5, 2)).err().unwrap();
+        let refused = Table::from_npy(ArrayName::FEATURES, &bytes(5, 2)).err().unwrap();
         assert_eq!(refused, "features has 5 columns, not 13");
-        let empty = Table::from_npy(ArrayName::Features, &bytes(13, 0)).unwrap();
+        let empty = Table::from_npy(ArrayName::FEATURES, &bytes(13, 0)).unwrap();
         assert!(matches!(empty, Table::Features(rows) if rows.is_empty()));
-        let cloud = Table::from_npy(ArrayName::Cloud, &bytes(5, 2)).unwrap();
+        let cloud = Table::from_npy(ArrayName::CLOUD, &bytes(5, 2)).unwrap();
         assert!(matches!(cloud, Table::Cloud(rows) if rows.len() == 2));
-        let mesh = Table::from_npy(ArrayName::MeshFixed, &bytes(9, 4)).unwrap();
+        let mesh = Table::from_npy(ArrayName::MESH_FIXED, &bytes(9, 4)).unwrap();
         assert!(matches!(mesh, Table::Facets(rows) if rows.len() == 4));
-        let path = Table::from_npy(ArrayName::RefinePath, &bytes(9, 3)).unwrap();
+        let path = Table::from_npy(ArrayName::REFINE_PATH, &bytes(9, 3)).unwrap();
         assert!(matches!(path, Table::Path(rows) if rows.len() == 3));
-        assert!(Table::from_npy(ArrayName::MeshMoving, &bytes(3, 3)).is_err());
+        assert!(Table::from_npy(ArrayName::MESH_MOVING, &bytes(3, 3)).is_err());
     }
 }

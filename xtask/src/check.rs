@@ -2,21 +2,19 @@
 
 use anyhow::{Context, Result, bail};
 
-use crate::{cmd, house_rules, wasm_std, web};
+use crate::{cmd, features, house_rules, public_functions, wasm_target, web};
 
 /// Runs every check, the quick ones first.
 pub(crate) fn check() -> Result<()> {
     keep_rules()?;
+    features::check()?;
     cmd::run(&mut cmd::cargo(&["fmt", "--all", "--check"]), "run `cargo fmt --all`")?;
     // The server's build embeds or names this folder, which a fresh clone does not have.
     std::fs::create_dir_all(web::output_dir()).context("the folder target/web cannot be made")?;
     let mend = "mend what Clippy reports above";
-    let std = wasm_std::ensure()?;
+    wasm_target::ensure()?;
     let lints = ["--", "-D", "warnings"];
-    cmd::run(
-        web::viewer_cargo("clippy", std).args(["--package", "sightline-viewer", "--lib"]).args(lints),
-        mend,
-    )?;
+    cmd::run(web::viewer_cargo("clippy").args(["--package", "sightline-viewer", "--lib"]).args(lints), mend)?;
     for crates in [&["--package", "xtask"][..], &["--workspace", "--exclude", "xtask"]] {
         cmd::run(cmd::cargo(&["clippy", "--all-targets"]).args(crates).args(lints), mend)?;
         cmd::run(
@@ -30,7 +28,8 @@ pub(crate) fn check() -> Result<()> {
 
 /// Compares the sources with the rules of the house.
 fn keep_rules() -> Result<()> {
-    let broken = house_rules::broken_rules(&cmd::root())?;
+    let mut broken = house_rules::broken_rules(&cmd::root())?;
+    broken.extend(public_functions::findings(&cmd::root())?);
     for finding in &broken {
         cmd::say(finding);
     }

@@ -8,7 +8,7 @@ use crate::{cmd, web};
 pub(crate) fn dist() -> Result<()> {
     web::web()?;
     cmd::run(
-        &mut cmd::cargo(&["build", "--workspace", "--exclude", "xtask", "--bin", "sightline", "--release"]),
+        &mut cmd::cargo(&["build", "--package", "sightline-server", "--bin", "sightline", "--release"]),
         "mend what the compiler reports above",
     )?;
     let name = format!("sightline{}", std::env::consts::EXE_SUFFIX);

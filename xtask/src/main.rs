@@ -1,13 +1,15 @@
 //! The project's commands: `cargo xtask serve | test | golden | check | web | bench | dist | screenshot`.
 //!
-//! Each command installs or builds what it needs and says in one sentence what to do when it cannot. All native
-//! builds name the whole workspace, so that every command asks Cargo for one set of features and the large
-//! dependencies compile once.
+//! Each command installs or builds what it needs and says in one sentence what to do when it cannot. `serve` builds
+//! the server alone, the other commands the whole workspace; `sightline-features` gives both the same features, so
+//! that the large dependencies compile once.
 
 mod cmd;
 mod web;
-mod wasm_std;
-mod debian_source;
+mod build;
+mod costs;
+mod features;
+mod wasm_target;
 mod chromium;
 mod serve;
 mod test;
@@ -15,6 +17,7 @@ mod golden;
 mod check;
 mod house_rules;
 mod imports;
+mod public_functions;
 mod bench;
 mod peers;
 mod dist;
@@ -35,7 +38,7 @@ struct Arguments {
 /// What can be done.
 #[derive(Subcommand)]
 enum Task {
-    /// Build everything and start the server; it prints its address.
+    /// Build the page and the server and start it; it prints its address.
     Serve {
         /// Arguments for `sightline serve`, after `--`.
         #[arg(last = true)]

@@ -1,26 +1,38 @@
-//! `cargo xtask serve`: build what changed, then become the server.
+//! `cargo xtask serve`: builds what changed, then becomes the server.
 
 use std::process::Command;
 
 use anyhow::Result;
 
+use crate::build::{self, Build};
 use crate::{cmd, web};
 
-/// Builds the page and the programs, then runs `sightline serve` in this process's place.
+/// Builds the page and the server at the same time, then runs `sightline serve` in this process's place.
 pub(crate) fn serve(arguments: &[String]) -> Result<()> {
-    web::web()?;
-    build_programs()?;
+    build_all()?;
     let mut server = cmd::program(cmd::sightline_binary());
     server.arg("serve").args(arguments);
     become_program(server)
 }
 
-/// Builds the workspace's programs.
-pub(crate) fn build_programs() -> Result<()> {
-    cmd::run(
-        &mut cmd::cargo(&["build", "--workspace", "--exclude", "xtask", "--bins"]),
-        "mend what the compiler reports above",
-    )
+/// Builds the page and the program `sightline`, and nothing else.
+pub(crate) fn build_all() -> Result<()> {
+    // The server's build script reads this folder, which a fresh clone does not have.
+    std::fs::create_dir_all(web::output_dir())?;
+    build::run(vec![web::build()?, program()])
+}
+
+/// The build of the program `sightline`.
+///
+/// `sightline-features` gives it the dependencies' features of the whole workspace, so that `cargo test` compiles
+/// none of them again.
+fn program() -> Build {
+    Build {
+        name: "server",
+        command: cmd::cargo(&["build", "--package", "sightline-server", "--bin", "sightline"]),
+        tree: vec!["--package", "sightline-server", "--edges", "normal,build"],
+        then: || Ok(()),
+    }
 }
 
 /// Replaces this process, so that a signal sent to it reaches the server.

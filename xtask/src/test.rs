@@ -1,18 +1,25 @@
 //! `cargo xtask test` and `cargo xtask screenshot`: everything built, then tested, in a browser too.
 
+use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader};
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::SystemTime;
 
 use anyhow::{Context, Result, bail};
 
-use crate::{chromium, cmd, serve, web};
+use crate::build::{self, Build};
+use crate::{chromium, cmd, serve};
 
 /// Builds everything and runs the tests whose names contain `filter`, or all of them.
 pub(crate) fn test(filter: Option<&str>) -> Result<()> {
     let browser = prepare()?;
+    build::run(vec![test_programs()])?;
+    let left_out = cmd::target_dir().join("left-out-tests");
+    std::fs::write(&left_out, "").with_context(|| format!("{} cannot be written", left_out.display()))?;
     let mut workspace = cmd::cargo(&["test", "--workspace", "--exclude", "xtask"]);
     name_programs(&mut workspace, &browser);
+    workspace.env("SIGHTLINE_LEFT_OUT", &left_out);
     let mut own = cmd::cargo(&["test", "--package", "xtask"]);
     let mut count = Count::default();
     for command in [&mut workspace, &mut own] {
@@ -25,8 +32,42 @@ pub(crate) fn test(filter: Option<&str>) -> Result<()> {
             filter.unwrap_or("")
         );
     }
-    cmd::say(format!("{} tests passed, {} ignored.", count.passed, count.ignored));
+    let left_out = read_left_out(&left_out)?;
+    for line in closing_lines(&count, &left_out) {
+        cmd::say(line);
+    }
     Ok(())
+}
+
+/// The build of all test programs.
+fn test_programs() -> Build {
+    Build {
+        name: "tests",
+        command: cmd::cargo(&["test", "--no-run", "--workspace", "--exclude", "xtask"]),
+        tree: vec!["--workspace", "--exclude", "xtask", "--edges", "normal,build,dev"],
+        then: || Ok(()),
+    }
+}
+
+/// The tests that returned early because their data are missing; `sightline-testdata` writes one line per test.
+fn read_left_out(file: &Path) -> Result<BTreeSet<String>> {
+    let noted =
+        std::fs::read_to_string(file).with_context(|| format!("{} cannot be read", file.display()))?;
+    Ok(noted.lines().map(str::to_owned).collect())
+}
+
+/// The result: the tests without data, which the test harness counts as passed, and the totals.
+fn closing_lines(count: &Count, left_out: &BTreeSet<String>) -> Vec<String> {
+    let number = left_out.len() as u64;
+    let mut lines = Vec::new();
+    if number > 0 {
+        lines.push(format!("Left out, data missing: {number} tests (set SIGHTLINE_DATA to the data sets):"));
+        lines.extend(left_out.iter().map(|test| format!("  {test}")));
+    }
+    let passed = count.passed.saturating_sub(number);
+    let missing = if number > 0 { format!(", {number} left out") } else { String::new() };
+    lines.push(format!("{passed} tests passed, {} ignored{missing}.", count.ignored));
+    lines
 }
 
 /// Runs the test that takes the README's picture.
@@ -53,8 +94,7 @@ pub(crate) fn screenshot() -> Result<()> {
 /// Builds the page and the programs, and finds the browser.
 fn prepare() -> Result<chromium::Browser> {
     let browser = chromium::ensure()?;
-    web::web()?;
-    serve::build_programs()?;
+    serve::build_all()?;
     Ok(browser)
 }
 
@@ -117,6 +157,15 @@ fn run_and_count(command: &mut Command) -> Result<Count> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn tests_without_data_do_not_count_as_passed() {
+        let count = Count { passed: 12, ignored: 3 };
+        assert_eq!(closing_lines(&count, &BTreeSet::new()), ["12 tests passed, 3 ignored."]);
+        let left_out = ["a::b".to_owned(), "c::d".to_owned()].into();
+        let lines = closing_lines(&count, &left_out);
+        assert_eq!(lines[1..], ["  a::b", "  c::d", "10 tests passed, 3 ignored, 2 left out."]);
+    }
 
     #[test]
     fn a_summary_line_gives_its_numbers() {

@@ -11,8 +11,8 @@ use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
 use wasm_bindgen_cli_support::Bindgen;
 
-use crate::cmd;
-use crate::wasm_std::{self, WasmStd};
+use crate::build::{self, Build};
+use crate::{cmd, wasm_target};
 
 /// The folder from which the server serves, or embeds, the page.
 pub(crate) fn output_dir() -> PathBuf {
@@ -21,9 +21,23 @@ pub(crate) fn output_dir() -> PathBuf {
 
 /// Builds what changed.
 pub(crate) fn web() -> Result<()> {
-    let std = wasm_std::ensure()?;
-    cmd::run(viewer_cargo("build", std).args(["--package", "sightline-viewer", "--lib"]), "mend the viewer")?;
-    let wasm = cmd::root().join("target/viewer").join(wasm_std::TARGET).join("viewer/sightline_viewer.wasm");
+    build::run(vec![build()?])
+}
+
+/// The build of the viewer's WASM and, after it, of the page.
+pub(crate) fn build() -> Result<Build> {
+    wasm_target::ensure()?;
+    let mut command = viewer_cargo("build");
+    command.args(["--package", "sightline-viewer", "--lib"]);
+    let tree =
+        vec!["--package", "sightline-viewer", "--target", wasm_target::TARGET, "--edges", "normal,build"];
+    Ok(Build { name: "page", command, tree, then: pack })
+}
+
+/// Writes the page from the viewer's WASM.
+fn pack() -> Result<()> {
+    let wasm =
+        cmd::root().join("target/viewer").join(wasm_target::TARGET).join("viewer/sightline_viewer.wasm");
     let output = output_dir();
     std::fs::create_dir_all(&output).with_context(|| format!("{} cannot be made", output.display()))?;
     bind(&wasm, &output)?;
@@ -69,10 +83,9 @@ fn unpack(packed: &Path) -> std::io::Result<Vec<u8>> {
 /// A Cargo command for the viewer in the browser, with a directory and a profile of its own.
 ///
 /// The native crates are compiled with other features and flags; apart, neither ever makes the other compile again.
-pub(crate) fn viewer_cargo(task: &str, std: WasmStd) -> Command {
-    let mut cargo = cmd::cargo(&[task, "--target", wasm_std::TARGET, "--target-dir", "target/viewer"]);
+pub(crate) fn viewer_cargo(task: &str) -> Command {
+    let mut cargo = cmd::cargo(&[task, "--target", wasm_target::TARGET, "--target-dir", "target/viewer"]);
     cargo.args(["--profile", "viewer"]);
-    std.prepare(&mut cargo);
     cargo
 }
 

@@ -1,32 +1,32 @@
 //! The arrays of a step.
 
-use sightline_core::trace::{ArrayName, StepTrace};
+use sightline_track::trace::{ArrayName, StepTrace};
 
 use super::sheet::{Sheet, Value};
 
 /// Every array with the name that it has in golden lists.
 const NAMES: [(&str, ArrayName); 21] = [
-    ("template_reference", ArrayName::Reference),
-    ("template_scaled", ArrayName::Scaled),
-    ("template_warped", ArrayName::Rolled),
-    ("match_patch", ArrayName::Matched),
-    ("match_difference", ArrayName::Difference),
-    ("match_scores", ArrayName::Surface),
-    ("stereo_patch", ArrayName::RightWindow),
-    ("scene_features", ArrayName::Features),
-    ("bootstrap_cloud", ArrayName::Cloud),
-    ("dense_disparity", ArrayName::Disparities),
-    ("dense_range", ArrayName::Ranges),
-    ("sensor_depth", ArrayName::Sensor),
-    ("depth_error_before", ArrayName::ErrorBefore),
-    ("depth_error_coarse", ArrayName::ErrorCoarse),
-    ("depth_error_fine", ArrayName::ErrorFine),
-    ("coarse_search", ArrayName::CoarseSearch),
-    ("refine_path", ArrayName::RefinePath),
-    ("mesh_earlier", ArrayName::MeshFixed),
-    ("mesh_current", ArrayName::MeshMoving),
-    ("draped_picture", ArrayName::Draped),
-    ("draped_match", ArrayName::DrapedMatch),
+    ("template_reference", ArrayName::REFERENCE),
+    ("template_scaled", ArrayName::SCALED),
+    ("template_warped", ArrayName::ROLLED),
+    ("match_patch", ArrayName::MATCHED),
+    ("match_difference", ArrayName::DIFFERENCE),
+    ("match_scores", ArrayName::SURFACE),
+    ("stereo_patch", ArrayName::RIGHT_WINDOW),
+    ("scene_features", ArrayName::FEATURES),
+    ("bootstrap_cloud", ArrayName::CLOUD),
+    ("dense_disparity", ArrayName::DISPARITIES),
+    ("dense_range", ArrayName::RANGES),
+    ("sensor_depth", ArrayName::SENSOR),
+    ("depth_error_before", ArrayName::ERROR_BEFORE),
+    ("depth_error_coarse", ArrayName::ERROR_COARSE),
+    ("depth_error_fine", ArrayName::ERROR_FINE),
+    ("coarse_search", ArrayName::COARSE_SEARCH),
+    ("refine_path", ArrayName::REFINE_PATH),
+    ("mesh_earlier", ArrayName::MESH_FIXED),
+    ("mesh_current", ArrayName::MESH_MOVING),
+    ("draped_picture", ArrayName::DRAPED),
+    ("draped_match", ArrayName::DRAPED_MATCH),
 ];
 
 /// Writes the arrays that the step has, after their names on one line.
@@ -47,7 +47,7 @@ mod tests {
 
     #[test]
     fn every_array_has_a_name() {
-        for array in ArrayName::ALL {
+        for array in ArrayName::all() {
             assert_eq!(NAMES.iter().filter(|(_, known)| *known == array).count(), 1, "{array:?}");
         }
     }

@@ -1,10 +1,10 @@
 //! The cases of the golden lists: a drive and a configuration each.
 
-use sightline_core::presets::{Preset, preset};
-use sightline_core::session::track;
-use sightline_core::settings::{Settings, parse_assignment};
-use sightline_core::target::Designation;
-use sightline_core::trace::StepTrace;
+use sightline_session::track;
+use sightline_track::presets::{Preset, preset};
+use sightline_track::settings::{Settings, parse_assignment};
+use sightline_track::target::Designation;
+use sightline_track::trace::StepTrace;
 
 use super::drives::{Drive, DriveName};
 use super::extract;

@@ -7,10 +7,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-use sightline_core::frames::Pixel;
-use sightline_core::sim::{Scenario, choose_targets};
-use sightline_core::traverse::import::{ImportOptions, import};
-use sightline_core::traverse::{Existing, Traverse, create_simulated};
+use sightline_geometry::frames::Pixel;
+use sightline_recordings::import::{ImportOptions, import};
+use sightline_recordings::{Existing, Traverse, create_simulated};
+use sightline_world::{Scenario, choose_targets};
 
 /// Straight towards a rock on a plain, from 9 m to 5.4 m.
 const APPROACH: &str = r#"

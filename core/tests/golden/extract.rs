@@ -3,16 +3,16 @@
 //! The extractor reads the typed results of the stages field by field. Its names come neither from the record's
 //! field names nor from its serialised form, so that they stay when the record changes.
 
-use sightline_core::camera::Camera;
-use sightline_core::estimate::drift::Drift;
-use sightline_core::locate::Located;
-use sightline_core::stages::capture::Capture;
-use sightline_core::stages::judge::Verdict;
-use sightline_core::stages::point_mast::Pointing;
-use sightline_core::stages::predict::Prediction;
-use sightline_core::stages::update::Updated;
-use sightline_core::target::{Target, TrackingState};
-use sightline_core::trace::{StepTrace, StepTruth, TruthKind};
+use sightline_geometry::camera::Camera;
+use sightline_geometry::estimate::drift::Drift;
+use sightline_track::locate::Located;
+use sightline_track::stages::capture::Capture;
+use sightline_track::stages::judge::Verdict;
+use sightline_track::stages::point_mast::Pointing;
+use sightline_track::stages::predict::Prediction;
+use sightline_track::stages::update::Updated;
+use sightline_track::target::{Target, TrackingState};
+use sightline_track::trace::{StepTrace, StepTruth, TruthKind};
 
 use super::sheet::{Sheet, Value};
 use super::{arrays, extract_features, extract_shape, extract_template};
@@ -20,14 +20,14 @@ use super::{arrays, extract_features, extract_shape, extract_template};
 /// Writes everything that one step computed; `folder` is the drive's folder, which sentences may name.
 pub(crate) fn step(sheet: &mut Sheet, trace: &StepTrace, folder: &str) {
     sheet.within(&format!("stop{}", trace.step), |sheet| {
-        let fault = trace.fault.as_ref().map(|fault| fault.replace(folder, "DRIVE"));
+        let fault = trace.fault().map(|fault| fault.replace(folder, "DRIVE"));
         sheet.put("time_s", trace.time_s);
         sheet.put("fault", fault);
-        sheet.optional("predicted", trace.predict.as_ref(), predicted);
-        sheet.optional("mast", trace.point_mast.as_ref(), mast);
-        sheet.optional("images", trace.capture.as_ref(), images);
-        sheet.optional("located", trace.locate.as_ref(), located);
-        sheet.optional("verdict", trace.judge.as_ref(), verdict);
+        sheet.optional("predicted", trace.prediction(), predicted);
+        sheet.optional("mast", Some(&trace.point_mast), mast);
+        sheet.optional("images", trace.capture(), images);
+        sheet.optional("located", trace.located(), located);
+        sheet.optional("verdict", trace.verdict(), verdict);
         sheet.within("next", |sheet| next(sheet, &trace.update));
         sheet.optional("truth", trace.truth.as_ref(), truth);
         arrays::all(sheet, trace);
@@ -142,12 +142,14 @@ fn target(sheet: &mut Sheet, target: &Target) {
     sheet.put("travelled_m", target.travelled_m);
     sheet.put("update_distance_m", target.last_distance_m);
     sheet.put("since_update_m", target.travelled_since_update_m);
-    sheet.within("drift", |sheet| drift(sheet, &target.drift));
+    // The other trackers have no template.
+    let Some(memory) = target.memory.template() else { return };
+    sheet.within("drift", |sheet| drift(sheet, &memory.drift));
     sheet.within("appearance", |sheet| {
-        sheet.put("stop", target.appearance.step);
-        sheet.put("px", target.appearance.pixel);
-        sheet.put("position_rover", target.appearance.position_in_rover);
-        sheet.put("surface_by_pixel", target.appearance.surface_by_pixel);
+        sheet.put("stop", memory.appearance.step);
+        sheet.put("px", memory.appearance.pixel);
+        sheet.put("position_rover", memory.appearance.position_in_rover);
+        sheet.put("surface_by_pixel", memory.appearance.surface_by_pixel);
     });
 }
 

@@ -1,8 +1,8 @@
 //! The numbers of the feature tracker.
 
-use sightline_core::locate::features::FeatureEvidence;
-use sightline_core::locate::features::anchor::Carried;
-use sightline_core::locate::features::evidence::{
+use sightline_track::locate::features::FeatureEvidence;
+use sightline_track::locate::features::anchor::Carried;
+use sightline_track::locate::features::evidence::{
     AnchorTried, Bootstrapped, Detected, FittedMotion, MatchedFeatures,
 };
 

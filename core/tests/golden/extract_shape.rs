@@ -1,12 +1,12 @@
 //! The numbers of the shape tracker and of the combined one.
 
-use sightline_core::locate::shape::Method;
-use sightline_core::locate::shape_tracker::ShapeEvidence;
-use sightline_core::locate::shape_tracker::drape::Draped;
-use sightline_core::locate::shape_tracker::evidence::Registered;
-use sightline_core::locate::shape_tracker::placement::Placement;
-use sightline_core::locate::shape_tracker::surface::SurfaceSeen;
-use sightline_core::locate::shape_tracker::view::View;
+use sightline_track::locate::shape_tracker::ShapeEvidence;
+use sightline_track::locate::shape_tracker::drape::Draped;
+use sightline_track::locate::shape_tracker::evidence::Registered;
+use sightline_track::locate::shape_tracker::placement::Placement;
+use sightline_track::locate::shape_tracker::surface::SurfaceSeen;
+use sightline_track::locate::shape_tracker::view::View;
+use sightline_vision::registration::Method;
 
 use super::sheet::{Sheet, Value};
 

@@ -1,18 +1,18 @@
 //! The numbers of the template tracker.
 
-use sightline_core::correlate::Peak;
-use sightline_core::correlate::coarse_to_fine::CoarseSearch;
-use sightline_core::locate::template::TemplateEvidence;
-use sightline_core::locate::template::affine::AffineRefinement;
-use sightline_core::locate::template::drift_correction::DriftCorrection;
-use sightline_core::locate::template::height::{Relief, WeighedPeak};
-use sightline_core::locate::template::klt::Descent;
-use sightline_core::locate::template::match_template::{TemplateMatch, TriedTemplate};
-use sightline_core::locate::template::point_stereo::PointStereo;
-use sightline_core::locate::template::scale_roll::ScaleRoll;
-use sightline_core::locate::template::settings::Measure;
-use sightline_core::locate::template::triangulate::Triangulation;
-use sightline_core::locate::template::warnings::{Warning, WarningKind};
+use sightline_track::locate::template::TemplateEvidence;
+use sightline_track::locate::template::affine::AffineRefinement;
+use sightline_track::locate::template::drift_correction::DriftCorrection;
+use sightline_track::locate::template::height::{Relief, WeighedPeak};
+use sightline_track::locate::template::klt::Descent;
+use sightline_track::locate::template::match_template::{TemplateMatch, TriedTemplate};
+use sightline_track::locate::template::point_stereo::PointStereo;
+use sightline_track::locate::template::scale_roll::ScaleRoll;
+use sightline_track::locate::template::settings::Measure;
+use sightline_track::locate::template::triangulate::Triangulation;
+use sightline_track::locate::template::warnings::{Warning, WarningKind};
+use sightline_vision::correlate::Peak;
+use sightline_vision::correlate::coarse_to_fine::CoarseSearch;
 
 use super::sheet::{Sheet, Value};
 

@@ -8,8 +8,8 @@ use std::fmt::{Display, Write};
 
 use nalgebra::{OPoint, SMatrix};
 use sha2::{Digest, Sha256};
-use sightline_core::camera::MastAngles;
-use sightline_core::frames::Pixel;
+use sightline_geometry::camera::MastAngles;
+use sightline_geometry::frames::Pixel;
 
 /// Separates a name from its value.
 const ARROW: &str = " -> ";

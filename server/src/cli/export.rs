@@ -12,23 +12,24 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use clap::Args;
-use sightline_core::error::{Error, Result};
-use sightline_core::frames::Pixel;
-use sightline_core::presets::preset;
-use sightline_core::session::Session;
-use sightline_core::session::view::SavedSession;
-use sightline_core::settings::{Changes, Settings, parse_assignment};
-use sightline_core::target::Designation;
-use sightline_core::traverse::Traverse;
+use sightline_geometry::error::{Error, Result};
+use sightline_geometry::frames::Pixel;
+use sightline_recordings::Traverse;
+use sightline_session::Session;
+use sightline_session::view::SavedSession;
+use sightline_track::presets::preset;
+use sightline_track::settings::{Changes, Settings, parse_assignment};
+use sightline_track::target::Designation;
 
-use super::say::Progress;
+use super::terminal::Progress;
 use super::track::pixel;
-use super::{open, say};
+use super::{open, terminal};
 use crate::exports::{Kind, Made, Part, Source, make};
-use crate::guard::Hosts;
-use crate::live::LiveSession;
+use crate::hosts::Hosts;
+use crate::live_session::LiveSession;
+use crate::naming::name_of;
 use crate::problem::ApiError;
-use crate::state::{AppState, name_of};
+use crate::state::AppState;
 use crate::store::{self, Store};
 
 /// How often a run that is being computed is looked at.
@@ -36,7 +37,7 @@ const GLANCE: Duration = Duration::from_millis(50);
 
 /// Write a session as a file: a recording, tables, pictures, a report, or what is needed to do the same again.
 #[derive(Debug, Args)]
-pub struct Export {
+pub(super) struct Export {
     /// The file: recording.rrd, rows.csv, rows.jsonl, rows.parquet, steps.apng, steps.png, report.html or reproduce.json.
     #[arg(value_parser = kind)]
     kind: Kind,
@@ -73,7 +74,7 @@ impl Export {
     ///
     /// # Errors
     /// A session, traverse, target or setting that does not exist, or a file that cannot be written.
-    pub fn run(self) -> Result<()> {
+    pub(super) fn run(self) -> Result<()> {
         if let Some(out) = self.out.as_ref().filter(|out| out.exists()) {
             return Err(Error::format(out, "exists already; choose another name"));
         }
@@ -96,7 +97,7 @@ impl Export {
         };
         let made = make(&source, self.kind, part, &AtomicBool::new(false), &mut tell).map_err(refused)?;
         write(&out, made)?;
-        say::line(&out.display().to_string())
+        terminal::line(&out.display().to_string())
     }
 
     /// A session of the data folder, computed again.
@@ -137,6 +138,7 @@ impl Export {
             None => Settings::default(),
         };
         let settings = own.with(&changes)?;
+        terminal::settings_without_effect(&settings, &changes);
         let traverse = open::open(path, self.data_dir.as_deref())?;
         let mut session = Session::new("s1", name_of(&traverse)?, traverse.stop_count());
         for pixel in &self.target {
@@ -144,7 +146,7 @@ impl Export {
             if self.from_step < traverse.stop_count() {
                 traverse.render_step(self.from_step, &AtomicBool::new(false))?;
             }
-            let first = sightline_core::session::track::designate(&traverse, designation, &settings)?;
+            let first = sightline_session::track::designate(&traverse, designation, &settings)?;
             session.add_target(None, settings.clone(), Arc::new(first));
         }
         session.cursor.target = Some(0);
@@ -158,6 +160,8 @@ impl Export {
 
 /// The session of that name in `folder` with all its runs, which are computed by what computes them in the server.
 fn computed(traverse: Traverse, folder: &Path, id: &str) -> Result<Arc<LiveSession>> {
+    let runtime = super::runtime()?;
+    let _inside = runtime.enter();
     let state = AppState::new(vec![traverse], folder, Hosts::new(0, &[]))?;
     let live = state.session(id).map_err(refused)?;
     let count = |session: &Session| {
@@ -182,7 +186,7 @@ fn computed(traverse: Traverse, folder: &Path, id: &str) -> Result<Arc<LiveSessi
     }
     // What stopped a run by itself is no reason to export nothing, but it has to be said.
     for (target, run, why) in live.with(|session| stopped(session)) {
-        say::error(&format!("run {run} of target {target} stopped before the last stop: {why}"));
+        terminal::error(&format!("run {run} of target {target} stopped before the last stop: {why}"));
     }
     Ok(live)
 }

@@ -4,15 +4,15 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
 use clap::{Args, ValueEnum};
-use sightline_core::error::{Error, Result};
-use sightline_core::traverse::Existing;
-use sightline_core::traverse::import::{ImportOptions, import, recognise};
+use sightline_geometry::error::{Error, Result};
+use sightline_recordings::Existing;
+use sightline_recordings::import::{ImportOptions, import, recognise};
 
-use super::say::{self, Progress};
+use super::terminal::{self, Progress};
 
 /// Turn a foreign recording into a traverse.
 #[derive(Debug, Args)]
-pub struct Import {
+pub(super) struct Import {
     /// The recording: a folder or a file.
     path: PathBuf,
     /// The folder to make.
@@ -67,7 +67,7 @@ impl Import {
     ///
     /// # Errors
     /// As [`import`], and another format than the one asked for.
-    pub fn run(self) -> Result<()> {
+    pub(super) fn run(self) -> Result<()> {
         if let Some(format) = self.format {
             check_format(format, recognise(&self.path)?.name(), &self.path)?;
         }
@@ -93,11 +93,11 @@ impl Import {
         let mut tell = |done, all| progress.tell(done, all);
         let imported = import(&self.path, &options, &self.out, &mut tell, &AtomicBool::new(false))?;
         for note in &imported.notes {
-            say::error(&format!("note: {note}"));
+            terminal::error(&format!("note: {note}"));
         }
         let (folder, stops, images) =
             (self.out.display(), imported.index.stops.len(), imported.images_written);
-        say::line(&format!("{folder}: {stops} stops, {images} images"))
+        terminal::line(&format!("{folder}: {stops} stops, {images} images"))
     }
 }
 

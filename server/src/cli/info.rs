@@ -3,16 +3,17 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use sightline_core::camera::CameraModel;
-use sightline_core::error::Result;
-use sightline_core::frames::PoseRecord;
-use sightline_core::traverse::{StereoGeometry, Traverse};
+use sightline_geometry::camera::CameraModel;
+use sightline_geometry::error::Result;
+use sightline_geometry::frames::PoseRecord;
+use sightline_geometry::stereo_geometry::StereoGeometry;
+use sightline_recordings::Traverse;
 
-use super::{open, say};
+use super::{open, terminal};
 
 /// Say what a traverse holds.
 #[derive(Debug, Args)]
-pub struct Info {
+pub(super) struct Info {
     /// The traverse: a folder, an index or a scenario.
     traverse: PathBuf,
 }
@@ -22,9 +23,9 @@ impl Info {
     ///
     /// # Errors
     /// A traverse that cannot be opened.
-    pub fn run(self) -> Result<()> {
+    pub(super) fn run(self) -> Result<()> {
         let traverse = open::open(&self.traverse, None)?;
-        summary(&traverse).iter().try_for_each(|line| say::line(line))
+        summary(&traverse).iter().try_for_each(|line| terminal::line(line))
     }
 }
 

@@ -3,38 +3,33 @@
 //! Results go to the standard output, progress and complaints to the standard error. Exit codes: 0 done,
 //! 2 the command was not written correctly, 3 bad input, said in one sentence.
 
-pub mod serve;
-pub mod scenarios;
-pub mod simulate;
-pub mod import;
-pub mod info;
-pub mod track;
-pub mod presets;
-pub mod study;
-pub mod export;
-mod real_motion;
-mod registration;
-mod realism;
-mod scenery;
-mod scenery_figure;
-mod scenery_pictures;
-mod open;
-mod say;
+mod serve;
+mod scenarios;
+mod simulate;
+mod import;
+mod info;
+mod track;
+mod presets;
+mod study;
+mod export;
+pub mod open;
+pub mod terminal;
 mod sheet;
-mod trackability;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use sightline_core::error::Error;
+use sightline_geometry::error::{Error, Result};
+
+use crate::version::VERSION;
 
 /// The exit code for bad input.
 const BAD_INPUT: u8 = 3;
 
 /// An interactive visual debugger for the visual target tracking of planetary rovers.
 #[derive(Debug, Parser)]
-#[command(name = "sightline", version, arg_required_else_help = true)]
+#[command(name = "sightline", version = VERSION, arg_required_else_help = true)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -77,23 +72,28 @@ pub fn run() -> ExitCode {
         Command::Study(command) => command.run(),
         Command::Export(command) => command.run(),
     };
+    exit_code(outcome)
+}
+
+/// The exit code of a command; what went wrong is written to the standard error.
+pub fn exit_code(outcome: Result<()>) -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         // Whoever reads our output has had enough, as `head` does.
         Err(Error::Write { path, source })
-            if path.as_os_str() == say::STDOUT && source.kind() == std::io::ErrorKind::BrokenPipe =>
+            if path.as_os_str() == terminal::STDOUT && source.kind() == std::io::ErrorKind::BrokenPipe =>
         {
             ExitCode::SUCCESS
         }
         Err(error) => {
-            say::error(&format!("sightline: {error}"));
+            terminal::error(&format!("sightline: {error}"));
             ExitCode::from(BAD_INPUT)
         }
     }
 }
 
 /// Logs warnings of our own and errors of others to the standard error; `RUST_LOG` says otherwise.
-fn start_log() {
+pub fn start_log() {
     use tracing_subscriber::EnvFilter;
     let filter =
         EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("error,sightline_server=warn"));
@@ -102,4 +102,10 @@ fn start_log() {
     let log =
         tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_ansi(colours);
     let _ = log.try_init();
+}
+
+/// What jobs and requests run on.
+fn runtime() -> Result<tokio::runtime::Runtime> {
+    let built = tokio::runtime::Builder::new_multi_thread().enable_all().build();
+    built.map_err(|error| Error::Request(format!("cannot start: {error}")))
 }

@@ -4,11 +4,11 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-use sightline_core::error::{Error, Result};
-use sightline_core::sim::{Scenario, library};
-use sightline_core::traverse::{Traverse, create_simulated};
+use sightline_geometry::error::{Error, Result};
+use sightline_recordings::{Traverse, create_simulated};
+use sightline_world::{Scenario, library};
 
-use super::say::{self, Progress};
+use super::terminal::{self, Progress};
 use crate::drives;
 
 /// The folder of simulated traverses in the data folder.
@@ -35,7 +35,7 @@ pub(super) fn data_folder(given: Option<&Path>) -> Result<PathBuf> {
 ///
 /// # Errors
 /// As [`Traverse::open`] and [`create_simulated`].
-pub(super) fn open(path: &Path, data: Option<&Path>) -> Result<Traverse> {
+pub fn open(path: &Path, data: Option<&Path>) -> Result<Traverse> {
     if let Some(name) = library_name(path).filter(|_| !path.exists()) {
         return simulated(&library::scenario(name)?, &data_folder(data)?);
     }
@@ -52,7 +52,7 @@ pub(super) fn open(path: &Path, data: Option<&Path>) -> Result<Traverse> {
 pub(super) fn simulated(scenario: &Scenario, data: &Path) -> Result<Traverse> {
     let folder = data.join(TRAVERSES).join(drives::folder_name(scenario));
     if !folder.exists() {
-        say::error(&format!("making the simulated traverse {}", folder.display()));
+        terminal::error(&format!("making the simulated traverse {}", folder.display()));
     }
     create_simulated(scenario, &folder)
 }
@@ -61,7 +61,7 @@ pub(super) fn simulated(scenario: &Scenario, data: &Path) -> Result<Traverse> {
 ///
 /// # Errors
 /// A file that cannot be read or is no scenario, or a name that is neither a file nor in the library.
-pub(super) fn scenario(path: &Path) -> Result<Scenario> {
+pub fn scenario(path: &Path) -> Result<Scenario> {
     // A folder of that name is no scenario: a study keeps its worlds in one.
     if let Some(name) = library_name(path).filter(|_| !path.is_file()) {
         return library::scenario(name);
@@ -81,7 +81,7 @@ fn library_name(path: &Path) -> Option<&'static str> {
 ///
 /// # Errors
 /// As [`Traverse::render_step`].
-pub(super) fn render(traverse: &Traverse) -> Result<()> {
+pub fn render(traverse: &Traverse) -> Result<()> {
     let missing: Vec<_> = (0..traverse.stop_count()).filter(|&step| !traverse.is_ready(step)).collect();
     let mut progress = Progress::new("rendered stop");
     for (done, step) in missing.iter().enumerate() {

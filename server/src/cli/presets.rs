@@ -1,14 +1,14 @@
 //! `sightline presets`: the named configurations of the tracker, with what each changes.
 
 use clap::{Args, ValueEnum};
-use sightline_core::error::{Error, Result};
-use sightline_core::presets::{PRESETS, Preset, preset};
+use sightline_geometry::error::{Error, Result};
+use sightline_track::presets::{PRESETS, Preset, preset};
 
-use super::say;
+use super::terminal;
 
 /// List the named configurations of the tracker, or print one.
 #[derive(Debug, Args)]
-pub struct Presets {
+pub(super) struct Presets {
     /// The configuration to print as TOML; without it all are listed.
     name: Option<String>,
     /// How they are written.
@@ -30,15 +30,15 @@ impl Presets {
     ///
     /// # Errors
     /// A name that is not listed.
-    pub fn run(self) -> Result<()> {
+    pub(super) fn run(self) -> Result<()> {
         if let Some(name) = &self.name {
-            return say::line(table(preset(name)?)?.trim_end());
+            return terminal::line(table(preset(name)?)?.trim_end());
         }
         let width = PRESETS.iter().map(|preset| preset.name.len()).max().unwrap_or_default();
         for preset in PRESETS {
             match self.format {
-                Format::Text => say::line(&format!("{:width$}  {}", preset.name, preset.description))?,
-                Format::Toml => say::line(&table(preset)?)?,
+                Format::Text => terminal::line(&format!("{:width$}  {}", preset.name, preset.description))?,
+                Format::Toml => terminal::line(&table(preset)?)?,
             }
         }
         Ok(())

@@ -1,14 +1,14 @@
 //! `sightline scenarios`: the scenarios that come with the program.
 
 use clap::Args;
-use sightline_core::error::Result;
-use sightline_core::sim::library;
+use sightline_geometry::error::Result;
+use sightline_world::library;
 
-use super::say;
+use super::terminal;
 
 /// List the scenarios that come with the program, or print one.
 #[derive(Debug, Args)]
-pub struct Scenarios {
+pub(super) struct Scenarios {
     /// The scenario to print as TOML, a start for one of your own.
     name: Option<String>,
 }
@@ -18,14 +18,14 @@ impl Scenarios {
     ///
     /// # Errors
     /// A name that the library does not have.
-    pub fn run(self) -> Result<()> {
+    pub(super) fn run(self) -> Result<()> {
         if let Some(name) = self.name {
             library::scenario(&name)?;
-            return say::line(library::toml(&name).unwrap_or_default().trim_end());
+            return terminal::line(library::toml(&name).unwrap_or_default().trim_end());
         }
         for name in library::names() {
             let scenario = library::scenario(name)?;
-            say::line(&format!("{name:22} {}", scenario.description))?;
+            terminal::line(&format!("{name:22} {}", scenario.description))?;
         }
         Ok(())
     }

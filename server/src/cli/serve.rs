@@ -5,17 +5,18 @@ use std::net::{IpAddr, SocketAddr, TcpListener};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use sightline_core::error::{Error, Result};
-use sightline_core::traverse::Traverse;
+use sightline_geometry::error::{Error, Result};
+use sightline_recordings::Traverse;
 
-use super::{open, say};
-use crate::first;
-use crate::guard::Hosts;
-use crate::state::{AppState, Folders};
+use super::{open, terminal};
+use crate::first_session;
+use crate::folders::Folders;
+use crate::hosts::Hosts;
+use crate::state::AppState;
 
 /// Open traverses in the browser.
 #[derive(Debug, Args)]
-pub struct Serve {
+pub(super) struct Serve {
     /// Folders or indexes of traverses, or scenarios to simulate; none for the first drive, with a target that is lost.
     traverses: Vec<PathBuf>,
     /// The port; 0 for any free one.
@@ -37,7 +38,7 @@ impl Serve {
     ///
     /// # Errors
     /// A traverse that cannot be opened, a data folder in use, or a port that is taken.
-    pub fn run(self) -> Result<()> {
+    pub(super) fn run(self) -> Result<()> {
         if !self.listen.is_loopback() && self.allow_host.is_empty() {
             let message = "listening beyond this machine needs --allow-host with the name by which pages will \
                            address the server; anyone who reaches it can use it";
@@ -50,23 +51,23 @@ impl Serve {
         let traverses = self.open_traverses(&data)?;
         let [sessions, studies, made] = ["sessions", "studies", open::TRAVERSES].map(|name| data.join(name));
         let folders = Folders { sessions, studies, traverses: made };
+        let runtime = super::runtime()?;
+        let _inside = runtime.enter();
         let state =
             AppState::with_folders(traverses, &folders, Hosts::new(address.port(), &self.allow_host))?;
         if !self.listen.is_loopback() {
-            say::error("warning: anyone who reaches this address can use the server");
+            terminal::error("warning: anyone who reaches this address can use the server");
         }
         if self.traverses.is_empty() {
-            let begun = first::begin(&state, &first::scenario()?);
+            let begun = first_session::begin(&state, &first_session::scenario()?);
             begun.map_err(|problem| Error::Request(problem.problem().detail.clone()))?;
         }
-        let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build();
-        let runtime = runtime.map_err(|error| Error::Request(format!("cannot start: {error}")))?;
         runtime.block_on(serve(listener, address, state))
     }
 
     fn open_traverses(&self, data: &Path) -> Result<Vec<Traverse>> {
         if self.traverses.is_empty() {
-            return Ok(vec![open::simulated(&first::scenario()?, data)?]);
+            return Ok(vec![open::simulated(&first_session::scenario()?, data)?]);
         }
         self.traverses.iter().map(|path| open::open(path, Some(data))).collect()
     }
@@ -76,7 +77,7 @@ async fn serve(listener: TcpListener, address: SocketAddr, state: AppState) -> R
     let failed = |error: std::io::Error| Error::Request(format!("the server stopped: {error}"));
     let listener = tokio::net::TcpListener::from_std(listener).map_err(failed)?;
     let app = crate::app(state.clone());
-    say::line(&format!("Sightline is ready: {}", url(address)))?;
+    terminal::line(&format!("Sightline is ready: {}", url(address)))?;
     let ended = tokio::select! {
         ended = async { axum::serve(listener, app).await } => ended.map_err(failed),
         () = told_to_end() => Ok(()),

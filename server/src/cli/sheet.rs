@@ -7,8 +7,8 @@ use std::path::Path;
 
 use image::imageops::{self, FilterType};
 use image::{GrayImage, Luma};
-use sightline_core::error::{Error, Result};
-use sightline_core::traverse::Traverse;
+use sightline_geometry::error::{Error, Result};
+use sightline_recordings::Traverse;
 
 /// Images in a row.
 const COLUMNS: u32 = 4;

@@ -4,16 +4,16 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use clap::Args;
-use sightline_core::error::{Error, Result};
-use sightline_core::sim::Scenario;
-use sightline_core::traverse::{Traverse, create_simulated};
+use sightline_geometry::error::{Error, Result};
+use sightline_recordings::{Traverse, create_simulated};
+use sightline_world::Scenario;
 
-use super::say::{self, Progress};
+use super::terminal::{self, Progress};
 use super::{open, sheet};
 
 /// Render a simulated traverse into a folder.
 #[derive(Debug, Args)]
-pub struct Simulate {
+pub(super) struct Simulate {
     /// The scenario: a file, or a name that `sightline scenarios` lists; by default that of the demonstration.
     #[arg(value_name = "SCENARIO")]
     scenario: Option<PathBuf>,
@@ -40,7 +40,7 @@ impl Simulate {
     ///
     /// # Errors
     /// A bad scenario or setting, or a folder that cannot be written or holds another traverse.
-    pub fn run(self) -> Result<()> {
+    pub(super) fn run(self) -> Result<()> {
         let mut scenario = self.scenario.as_deref().map_or_else(|| Ok(Scenario::demo()), open::scenario)?;
         scenario.seed = self.seed.unwrap_or(scenario.seed);
         let scenario = with(&scenario, &self.set)?;
@@ -53,7 +53,7 @@ impl Simulate {
             sheet::write(&traverse, path)?;
         }
         let (stops, folder) = (traverse.stop_count(), self.out.display());
-        say::line(&format!("{folder}: {stops} stops"))
+        terminal::line(&format!("{folder}: {stops} stops"))
     }
 }
 
@@ -116,7 +116,7 @@ fn set(document: &mut toml::Table, key: &str, value: &str) -> Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use sightline_core::sim::scenario::CameraRig;
+    use sightline_world::scenario::CameraRig;
 
     use super::*;
 

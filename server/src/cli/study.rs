@@ -6,25 +6,20 @@ use std::sync::atomic::AtomicBool;
 
 use clap::{Args, Subcommand, ValueEnum};
 use serde::Serialize;
-use sightline_core::error::{Error, Result};
-use sightline_core::study::hand_over_table;
-use sightline_core::study::plan::Plan;
-use sightline_core::study::row::Row;
+use sightline_geometry::error::{Error, Result};
+use sightline_study::hand_over_table;
+use sightline_study::plan::Plan;
+use sightline_study::row::Row;
 
 use super::open;
-use super::real_motion;
-use super::realism;
-use super::registration;
-use super::say::{self, Progress};
-use super::scenery;
-use super::trackability;
+use super::terminal::{self, Progress};
 use crate::jobs::lock;
-use crate::state::slug;
+use crate::naming::slug;
 use crate::study::{self, Order, Seeds, tables};
 
 /// Run a validation experiment.
 #[derive(Debug, Args)]
-pub struct Study {
+pub(super) struct Study {
     #[command(subcommand)]
     experiment: Experiment,
 }
@@ -63,16 +58,6 @@ enum Experiment {
     FeatureFaults(Experimental),
     /// Without features on the way: how far off may the target be for the shape to find it again?
     Recovery(Experimental),
-    /// How hard the simulated worlds are: plain correlation, without scale and roll, at steps of 5 % and 23 %.
-    Realism(realism::Worlds),
-    /// The simulated scenery in numbers: rocks, ground, noise and texture against their laws and real frames.
-    Scenery(scenery::Scenery),
-    /// Recorded frames: the motion that features find against the motion that is known of them.
-    RealMotion(real_motion::RealMotion),
-    /// Rocks registered by their shape: how far off it may start, how right it ends, what it makes of another rock.
-    Registration(registration::Registrations),
-    /// Targets drawn where the trackability map says good, risky or bad: which of them are tracked to the end?
-    Trackability(trackability::Worlds),
 }
 
 /// What a study over worlds, configurations and a grid takes.
@@ -128,7 +113,7 @@ impl Study {
     ///
     /// # Errors
     /// A bad scenario, configuration or grid, too few worlds with targets enough, or a folder that cannot be written.
-    pub fn run(self) -> Result<()> {
+    pub(super) fn run(self) -> Result<()> {
         match self.experiment {
             Experiment::Straight(arguments) => arguments.run("straight"),
             Experiment::Sideways(arguments) => arguments.run("sideways"),
@@ -144,11 +129,6 @@ impl Study {
             Experiment::FeatureCovariance(arguments) => arguments.run("feature-covariance"),
             Experiment::FeatureFaults(arguments) => arguments.run("feature-faults"),
             Experiment::Recovery(arguments) => arguments.run("recovery"),
-            Experiment::Realism(worlds) => worlds.run(),
-            Experiment::Scenery(scenery) => scenery.run(),
-            Experiment::RealMotion(recordings) => recordings.run(),
-            Experiment::Registration(rocks) => rocks.run(),
-            Experiment::Trackability(worlds) => worlds.run(),
         }
     }
 }
@@ -161,7 +141,7 @@ impl Experimental {
         let told = Mutex::new(Teller::new());
         let outcome =
             study::carry_out(order, &AtomicBool::new(false), &|progress| lock(&told).tell(progress))?;
-        say::error(&format!(
+        terminal::error(&format!(
             "{} units, {} of them found now; the report is {}",
             outcome.units.len(),
             outcome.found,
@@ -170,13 +150,13 @@ impl Experimental {
         match self.format {
             Format::Json => {
                 let document = serde_json::to_string(&Document { rows: &outcome.rows });
-                say::line(&document.map_err(|error| Error::Request(error.to_string()))?)
+                terminal::line(&document.map_err(|error| Error::Request(error.to_string()))?)
             }
-            Format::Csv => say::line(tables::rows_csv(&outcome.rows).trim_end()),
+            Format::Csv => terminal::line(tables::rows_csv(&outcome.rows).trim_end()),
             Format::Text => {
                 let table = hand_over_table::lines(&outcome.rows, variable);
                 let sentences = outcome.rows.iter().map(sentence);
-                sentences.chain(table).try_for_each(|line| say::line(&line))
+                sentences.chain(table).try_for_each(|line| terminal::line(&line))
             }
         }
     }
@@ -268,7 +248,7 @@ impl Teller {
         match progress {
             study::Progress::Units { k, n } => self.units.tell(k, n),
             study::Progress::Rows(_) => {}
-            study::Progress::Notice(text) => say::error(&text),
+            study::Progress::Notice(text) => terminal::error(&text),
             study::Progress::Rendering { world, k, n } => {
                 if self.rendering.as_ref().is_none_or(|(known, _)| *known != world) {
                     self.rendering = Some((world.clone(), Progress::new(format!("{world}: rendered stop"))));

@@ -12,25 +12,27 @@ use std::sync::atomic::AtomicBool;
 
 use clap::{Args, ValueEnum};
 use serde::Serialize;
-use sightline_core::camera::MastAngles;
-use sightline_core::designate::Place;
-use sightline_core::error::{Error, Result};
-use sightline_core::frames::Pixel;
-use sightline_core::presets::preset;
-use sightline_core::session::track;
-use sightline_core::settings::{Changes, Settings, TrackerKind, parse_assignment};
-use sightline_core::trace::{StepRow, StepTrace, Summary, summarise};
-use sightline_core::traverse::Traverse;
+use sightline_geometry::camera::MastAngles;
+use sightline_geometry::error::{Error, Result};
+use sightline_geometry::frames::Pixel;
+use sightline_recordings::Traverse;
+use sightline_rover::designate::Place;
+use sightline_session::track;
+use sightline_track::locate::template::compare_searches::compare_searches;
+use sightline_track::presets::{preset, validated};
+use sightline_track::settings::{Changes, Settings, TrackerKind, parse_assignment};
+use sightline_track::trace::{StepTrace, Summary, summarise};
 
 use super::open;
-use super::say::{self, Progress};
+use super::terminal::{self, Progress};
 use crate::columns;
-use crate::photometry;
+use crate::exports::rows::Row;
 use crate::rerun_log::{self, RunLog};
+use crate::routes::photometry;
 
 /// Track targets without a browser.
 #[derive(Debug, Args)]
-pub struct Track {
+pub(super) struct Track {
     /// The traverse: a folder, an index or a scenario.
     traverse: PathBuf,
     /// The position of a target in the left image, px; can be given more than once.
@@ -49,7 +51,8 @@ pub struct Track {
     /// The stop in whose left image the targets are designated.
     #[arg(long, value_name = "N", default_value_t = 0)]
     from_step: usize,
-    /// The tracker; by default the preset's, or else the template tracker.
+    /// The tracker, in its validated preset (sightline, features, shape or combined); beside --preset it replaces only the
+    /// tracker of that. By default the template tracker.
     #[arg(long)]
     tracker: Option<Tracker>,
     /// A named configuration, as `sightline presets` lists them; --set changes it further.
@@ -58,6 +61,9 @@ pub struct Track {
     /// A setting of the tracker, for example ncc_min=0.6; can be given more than once.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Also repeat the search of every step both ways, and write where coarse to fine differs from exhaustive (R65).
+    #[arg(long)]
+    compare_searches: bool,
     /// How the steps are written.
     #[arg(long, default_value = "jsonl")]
     format: Format,
@@ -94,11 +100,55 @@ enum Tracker {
 
 /// A line of a step.
 #[derive(Serialize)]
-struct StepLine<'a> {
+struct StepLine {
     #[serde(skip_serializing_if = "Option::is_none")]
     target: Option<usize>,
     #[serde(flatten)]
-    row: &'a StepRow,
+    row: Row,
+}
+
+/// A line of both searches of a step; nothing but the step where it searched nothing.
+#[derive(Serialize)]
+struct SearchLine {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    target: Option<usize>,
+    step: usize,
+    searches: Option<Searches>,
+}
+
+/// Exhaustive and coarse-to-fine search with the same template.
+#[derive(Serialize)]
+struct Searches {
+    /// Whether both found the same whole pixel.
+    is_same: bool,
+    /// Distance of both sub-pixel matches, px.
+    distance_px: f64,
+    exhaustive_score: f64,
+    coarse_to_fine_score: f64,
+    exhaustive_comparisons: u64,
+    coarse_to_fine_comparisons: u64,
+}
+
+impl SearchLine {
+    fn new(
+        target: Option<usize>,
+        traverse: &Traverse,
+        last: &StepTrace,
+        next: &StepTrace,
+        settings: &Settings,
+    ) -> Self {
+        let pose = traverse.site_from_rover(next.step);
+        let found = compare_searches(&last.update.target, next, &pose, &settings.template);
+        let searches = found.map(|found| Searches {
+            is_same: found.is_same,
+            distance_px: found.exhaustive.pixel.distance(found.coarse_to_fine.pixel),
+            exhaustive_score: found.exhaustive.score,
+            coarse_to_fine_score: found.coarse_to_fine.score,
+            exhaustive_comparisons: found.exhaustive_comparisons,
+            coarse_to_fine_comparisons: found.search.comparisons,
+        });
+        Self { target, step: next.step, searches }
+    }
 }
 
 /// The line after the last step.
@@ -114,7 +164,7 @@ impl Track {
     ///
     /// # Errors
     /// A traverse, target or setting that does not exist, or a file that cannot be written.
-    pub fn run(self) -> Result<()> {
+    pub(super) fn run(self) -> Result<()> {
         let settings = self.settings()?;
         let traverse = open::open(&self.traverse, None)?;
         if let Some(path) =
@@ -133,7 +183,7 @@ impl Track {
         let several = runs.len() > 1;
         for (number, steps) in runs.iter_mut().enumerate() {
             let target = several.then_some(number);
-            follow(&traverse, target, steps, &settings)?;
+            follow(&traverse, target, steps, &settings, self.compare_searches)?;
         }
         if let Some(path) = &self.csv {
             write_csv(path, &runs)?;
@@ -161,18 +211,21 @@ impl Track {
 
     fn settings(&self) -> Result<Settings> {
         let changes = self.set.iter().map(|text| parse_assignment(text)).collect::<Result<Changes>>()?;
-        let own = match &self.preset {
-            Some(name) => preset(name)?.settings()?,
-            None => Settings::default(),
+        let tracker = self.tracker.map(|tracker| match tracker {
+            Tracker::Template => TrackerKind::Template,
+            Tracker::Features => TrackerKind::Features,
+            Tracker::Shape => TrackerKind::Shape,
+            Tracker::Combined => TrackerKind::Combined,
+        });
+        let own = match (&self.preset, tracker) {
+            (Some(name), None) => preset(name)?.settings()?,
+            (Some(name), Some(tracker)) => Settings { tracker, ..preset(name)?.settings()? },
+            (None, Some(tracker)) => validated(tracker)?.settings()?,
+            (None, None) => Settings::default(),
         };
-        let tracker = match self.tracker {
-            None => own.tracker,
-            Some(Tracker::Template) => TrackerKind::Template,
-            Some(Tracker::Features) => TrackerKind::Features,
-            Some(Tracker::Shape) => TrackerKind::Shape,
-            Some(Tracker::Combined) => TrackerKind::Combined,
-        };
-        Settings { tracker, ..own }.with(&changes)
+        let settings = own.with(&changes)?;
+        terminal::settings_without_effect(&settings, &changes);
+        Ok(settings)
     }
 }
 
@@ -181,7 +234,7 @@ fn designate(traverse: &Traverse, step: usize, place: &Place, settings: &Setting
     let named = place.name(traverse, step)?;
     let first = track::designate(traverse, named.designation, settings)?;
     if let Some(gap_m) = named.gap_m(&first) {
-        say::error(&format!(
+        terminal::error(&format!(
             "the surface that stereo finds lies {:.1} cm from the given point",
             100.0 * gap_m
         ));
@@ -195,6 +248,7 @@ fn follow(
     target: Option<usize>,
     steps: &mut Vec<Arc<StepTrace>>,
     settings: &Settings,
+    compares: bool,
 ) -> Result<()> {
     let what =
         target.map_or_else(|| "tracked step".to_owned(), |target| format!("target {target}: tracked step"));
@@ -203,7 +257,7 @@ fn follow(
     let all = traverse.stop_count() - first.step;
     let mut last = Arc::clone(&first);
     loop {
-        say::line(&json(&StepLine { target, row: &last.row() })?)?;
+        terminal::line(&json(&StepLine { target, row: last.as_ref().into() })?)?;
         progress.tell(steps.len(), all);
         if last.step + 1 >= traverse.stop_count() {
             break;
@@ -211,18 +265,21 @@ fn follow(
         // A stop that cannot be rendered is a fault of that step, which the step itself reports.
         let _ = traverse.render_step(last.step + 1, &AtomicBool::new(false));
         let next = Arc::new(track::advance(traverse, &first, &last, settings));
+        if compares {
+            terminal::line(&json(&SearchLine::new(target, traverse, &last, &next, settings))?)?;
+        }
         steps.push(Arc::new(without_images(&next)));
         last = next;
     }
     let summary = summarise(steps.iter().map(AsRef::as_ref));
-    say::line(&json(&SummaryLine { target, summary: &summary })?)
+    terminal::line(&json(&SummaryLine { target, summary: &summary })?)
 }
 
 /// A copy without the stop's images, of which a long drive has more than fit into memory.
 fn without_images(trace: &StepTrace) -> StepTrace {
     let mut lighter = trace.clone();
-    lighter.update.target.appearance.image = Arc::default();
-    if let Some(capture) = &mut lighter.capture {
+    lighter.update.target.memory.set_image(Arc::default());
+    if let Some(capture) = lighter.capture_mut() {
         capture.pair = Default::default();
     }
     lighter

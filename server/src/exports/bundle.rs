@@ -1,19 +1,20 @@
 //! What anybody needs to get the same rows again, bit for bit: settings, seed, versions, hashes and commands, as JSON.
 
 use serde_json::{Value, json};
-use sightline_core::session::reproduce::{FORMAT, FORMAT_VERSION};
-use sightline_core::session::shell::{quoted, settings_arguments};
-use sightline_core::sim::Scenario;
-use sightline_core::study::plan::tracker_version;
+use sightline_rover::version::tracker_version;
+use sightline_session::reproduce::{FORMAT, FORMAT_VERSION};
+use sightline_session::shell;
+use sightline_world::Scenario;
 
 use super::kind::Part;
 use super::rows;
 use super::source::{NamedRun, Source};
 use crate::drives;
-use crate::state::hash;
+use crate::naming::hash;
+use crate::version::VERSION;
 
 /// The bundle as JSON text.
-pub fn json(source: &Source, part: Part) -> String {
+pub(crate) fn json(source: &Source, part: Part) -> String {
     let traverse = &source.open.traverse;
     let index = traverse.index();
     let scenario = scenario(source);
@@ -23,7 +24,7 @@ pub fn json(source: &Source, part: Part) -> String {
         "format_version": FORMAT_VERSION,
         "program": {
             "name": "sightline",
-            "version": env!("CARGO_PKG_VERSION"),
+            "version": VERSION,
             "tracker": tracker_version(),
             "same_bits": "on the same build and kind of processor, whatever the number of threads; across processors within 1e-5",
         },
@@ -62,33 +63,19 @@ fn of_run(source: &Source, run: NamedRun<'_>) -> Value {
 }
 
 /// The command line that computes a run again; none for one that left another run on the way.
-pub fn command(source: &Source, run: NamedRun<'_>) -> Option<String> {
+pub(crate) fn command(source: &Source, run: NamedRun<'_>) -> Option<String> {
     let designation = run.record.designation;
     if run.run.fork.is_some_and(|fork| fork.from_step > designation.step) {
         return None;
     }
-    let from =
-        if designation.step == 0 { String::new() } else { format!(" --from-step {}", designation.step) };
-    Some(format!(
-        "sightline track {} --target {},{}{from}{}",
-        quoted(&place_of_traverse(source)),
-        designation.pixel.x,
-        designation.pixel.y,
-        settings_arguments(&run.run.settings.changes())
-    ))
+    Some(shell::track(&place_of_traverse(source), designation, &run.run.settings.changes()))
 }
 
 /// What a person would write for the traverse: the library's name of its scenario, or a word to be replaced. Where the
 /// folder lies on this machine is nobody else's business.
 fn place_of_traverse(source: &Source) -> String {
     let own = scenario(source);
-    let in_library = own.as_ref().and_then(|own| {
-        let is_it = |name: &&str| {
-            sightline_core::sim::library::scenario(name).is_ok_and(|known| known.to_toml() == own.to_toml())
-        };
-        sightline_core::sim::library::names().find(is_it)
-    });
-    match (in_library, own) {
+    match (own.as_ref().and_then(drives::library_name), own) {
         (Some(name), _) => name.to_owned(),
         (None, Some(_)) => "scenario.toml".to_owned(),
         (None, None) => "FOLDER".to_owned(),
@@ -96,6 +83,6 @@ fn place_of_traverse(source: &Source) -> String {
 }
 
 /// The scenario of a simulated traverse.
-pub fn scenario(source: &Source) -> Option<Scenario> {
+pub(crate) fn scenario(source: &Source) -> Option<Scenario> {
     drives::scenario_of(&source.open.traverse)
 }

@@ -3,18 +3,18 @@
 //! Errors are taken over the steps after the designation that are in state `tracking` and whose truth is known; the others
 //! are counted apart. `err_px` is the distance in the left image, `err_m` that in the present rover frame.
 
-use sightline_core::trace::{StepRow, StepTrace, summarise};
+use sightline_track::trace::{StepRow, StepTrace, summarise};
 
 /// Errors in the image within which steps are counted, px.
 const WITHIN_PX: [f64; 5] = [1.0, 2.0, 4.0, 8.0, 16.0];
 /// Errors in space within which steps are counted, m.
 const WITHIN_M: [f64; 4] = [0.01, 0.02, 0.05, 0.10];
 /// How many steps are called the worst.
-pub const WORST: usize = 5;
+pub(crate) const WORST: usize = 5;
 
 /// One number about a run.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Metric {
+pub(crate) struct Metric {
     /// What it is.
     pub name: String,
     /// Its value with its unit.
@@ -24,7 +24,7 @@ pub struct Metric {
 }
 
 /// The metrics of a run.
-pub fn metrics(steps: &[std::sync::Arc<StepTrace>]) -> Vec<Metric> {
+pub(crate) fn metrics(steps: &[std::sync::Arc<StepTrace>]) -> Vec<Metric> {
     let rows: Vec<StepRow> = steps.iter().map(|trace| trace.row()).collect();
     let summary = summarise(steps.iter().map(AsRef::as_ref));
     let mut all = vec![
@@ -80,7 +80,7 @@ pub fn metrics(steps: &[std::sync::Arc<StepTrace>]) -> Vec<Metric> {
 
 /// The worst steps of a run, by their place in it, the worst first: by the error in the image where the truth is known;
 /// otherwise those that are lost, then those with the least score.
-pub fn worst(steps: &[std::sync::Arc<StepTrace>]) -> Vec<usize> {
+pub(crate) fn worst(steps: &[std::sync::Arc<StepTrace>]) -> Vec<usize> {
     let mut places: Vec<(usize, f64)> = steps
         .iter()
         .enumerate()

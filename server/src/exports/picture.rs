@@ -8,11 +8,13 @@
 //! Colours are those of Okabe and Ito, the same as in the viewer and in recordings.
 
 use nalgebra::{Matrix2, SymmetricEigen, Vector2};
-use sightline_core::frames::Pixel;
-use sightline_core::image::GrayImage;
-use sightline_core::settings::Settings;
-use sightline_core::target::TrackingState;
-use sightline_core::trace::{StepRow, StepTrace};
+use sightline_geometry::frames::Pixel;
+use sightline_record::Unit;
+use sightline_track::records;
+use sightline_track::settings::Settings;
+use sightline_track::target::TrackingState;
+use sightline_track::trace::{StepRow, StepTrace};
+use sightline_vision::image::GrayImage;
 
 use super::canvas::{Canvas, Line, Rgb, Window};
 use super::source::place_of;
@@ -38,7 +40,7 @@ const MEASUREMENT: Rgb = [0x2f, 0x8f, 0xd0];
 const TRUTH: Rgb = [0xff, 0xff, 0xff];
 
 /// What the marks mean, in words, for whoever cannot see or has no legend.
-pub const LEGEND: &str = "Blue square: where it was found, with its 3σ ellipse. Sky blue ring: the prediction, with its 3σ gate dotted. \
+pub(crate) const LEGEND: &str = "Blue square: where it was found, with its 3σ ellipse. Sky blue ring: the prediction, with its 3σ gate dotted. \
                           White plus: the truth, where it is known.";
 
 /// Width and height of a picture with its words, px.
@@ -47,7 +49,7 @@ pub(super) fn size(has_head: bool) -> [u32; 2] {
 }
 
 /// Width and height of a picture without a line above it, px.
-pub fn plain_size() -> [u32; 2] {
+pub(crate) fn plain_size() -> [u32; 2] {
     size(false)
 }
 
@@ -55,7 +57,11 @@ pub fn plain_size() -> [u32; 2] {
 ///
 /// # Errors
 /// What the encoder says.
-pub fn png(trace: &StepTrace, left: Option<&GrayImage>, settings: &Settings) -> Result<Vec<u8>, String> {
+pub(crate) fn png(
+    trace: &StepTrace,
+    left: Option<&GrayImage>,
+    settings: &Settings,
+) -> Result<Vec<u8>, String> {
     draw(trace, left, settings, None).ok_or("a picture without pixels")?.png()
 }
 
@@ -95,17 +101,15 @@ pub(super) fn draw(
 }
 
 fn marks(canvas: &mut Canvas, trace: &StepTrace, window: &Window, settings: &Settings) {
-    let predicted = trace
-        .point_mast
-        .as_ref()
-        .and_then(|pointing| pointing.predicted_left.map(|pixel| (pixel, pointing.predicted_covariance_px2)));
-    if let Some((pixel, covariance)) = predicted.filter(|_| trace.predict.is_some()) {
+    let pointing = &trace.point_mast;
+    if let Some(pixel) = pointing.predicted_left.filter(|_| trace.prediction().is_some()) {
         canvas.line(&ring(window, pixel, 2.5), true, PREDICTION, Line::Solid);
+        let covariance = pointing.predicted_covariance_px2;
         if let Some(points) = covariance.and_then(|covariance| ellipse(window, pixel, &covariance)) {
             canvas.line(&points, true, PREDICTION, Line::Dotted);
         }
     }
-    let located = trace.locate.as_ref().and_then(|located| Some((located.left_pixel?, located)));
+    let located = trace.located().and_then(|located| Some((located.left_pixel?, located)));
     if let Some((pixel, located)) = located {
         let half = f64::from(settings.template.template_size_px) / 2.0;
         let corners = [(-half, -half), (half, -half), (half, half), (-half, half)];
@@ -136,23 +140,30 @@ fn foot(canvas: &mut Canvas, trace: &StepTrace, top: f32) {
 }
 
 /// The state in capitals, with the count of bad updates.
-pub fn state_words(trace: &StepTrace) -> String {
+pub(crate) fn state_words(trace: &StepTrace) -> String {
     match trace.update.state {
         TrackingState::Lost { count } => format!("LOST {count}"),
         other => other.word().to_uppercase(),
     }
 }
 
+/// The columns of a row below a picture, each with the unit in which it is written, and its digits.
+const COLUMNS: [(&str, Unit, usize); 5] = [
+    ("ncc", Unit::One, 2),
+    ("inliers", Unit::One, 0),
+    ("err_px", Unit::Pixel, 2),
+    ("sigma_m", Unit::Centimetre, 1),
+    ("range_m", Unit::Metre, 2),
+];
+
 /// The numbers of a step that matter most, with their units.
-pub fn numbers(row: &StepRow) -> String {
-    let all = [
-        row.ncc.map(|score| format!("NCC {score:.2}")),
-        row.inliers.map(|count| format!("{count} inliers")),
-        row.err_px.map(|error| format!("error {error:.2} px")),
-        row.sigma_m.map(|sigma| format!("σ {:.1} cm", 100.0 * sigma)),
-        row.range_m.map(|range| format!("{range:.2} m")),
-    ];
-    let known: Vec<String> = all.into_iter().flatten().collect();
+pub(crate) fn numbers(row: &StepRow) -> String {
+    let words = |(name, unit, digits): &(&str, Unit, usize)| {
+        let value = records::row_value_in(row, name, *unit)?;
+        let label = &records::row_quantity(name)?.label;
+        Some(format!("{label} {value:.digits$} {}", unit.symbol()).trim_end().to_owned())
+    };
+    let known: Vec<String> = COLUMNS.iter().filter_map(words).collect();
     if known.is_empty() { "nothing was measured".to_owned() } else { known.join(" · ") }
 }
 

@@ -3,18 +3,23 @@
 use std::fmt::Write;
 use std::sync::atomic::AtomicBool;
 
-use sightline_core::session::notes::Note;
-use sightline_core::study::plan::tracker_version;
-use sightline_core::trace::StepTrace;
+use sightline_geometry::estimate::quantile::quantile;
+use sightline_record::Unit;
+use sightline_rover::version::tracker_version;
+use sightline_session::format;
+use sightline_session::notes::Note;
+use sightline_track::records::{self, StageQuantity};
+use sightline_track::trace::StepTrace;
 
 use super::kind::Part;
 use super::metrics::{metrics, worst};
 use super::source::{NamedRun, Source};
 use super::{bundle, picture, sheet};
 use crate::html::{escape, markdown, number, png_address, table};
+use crate::naming::hash;
 use crate::problem::{ApiError, ApiResult};
-use crate::state::hash;
-use crate::study::drawn::{Chart, Line};
+use crate::study::chart::{Chart, Line};
+use crate::version::VERSION;
 
 /// How many runs have a chapter; of more, the first ones.
 const MOST_RUNS: usize = 20;
@@ -36,7 +41,7 @@ a{color:inherit;text-decoration:none}tr{break-inside:avoid}}";
 ///
 /// # Errors
 /// A problem when it is cancelled or a figure cannot be drawn.
-pub fn html(source: &Source, part: Part, cancel: &AtomicBool) -> ApiResult<String> {
+pub(crate) fn html(source: &Source, part: Part, cancel: &AtomicBool) -> ApiResult<String> {
     let index = source.open.traverse.index();
     let name = escape(&index.name);
     let mut text = format!(
@@ -68,7 +73,7 @@ pub fn html(source: &Source, part: Part, cancel: &AtomicBool) -> ApiResult<Strin
 /// All runs in one table.
 fn overview(source: &Source, runs: &[NamedRun<'_>]) -> String {
     let row = |run: &NamedRun<'_>| {
-        let summary = sightline_core::trace::summarise(run.run.steps.iter().map(AsRef::as_ref));
+        let summary = sightline_track::trace::summarise(run.run.steps.iter().map(AsRef::as_ref));
         let changes = serde_json::to_string(&run.run.settings.changes()).unwrap_or_default();
         let left = run.run.fork.map_or_else(String::new, |fork| {
             format!("run {} at step {}", sheet::run_letter(fork.run), fork.from_step)
@@ -128,7 +133,7 @@ fn notes(source: &Source, part: Part) -> String {
 }
 
 /// A note with where it is pinned.
-pub fn note_html(number: usize, note: &Note, session: &sightline_core::session::Session) -> String {
+pub(crate) fn note_html(number: usize, note: &Note, session: &sightline_session::Session) -> String {
     let of = note.pin.target.map_or_else(String::new, |target| {
         let label = session.targets.get(target).map_or("a target", |record| record.label.as_str());
         format!("{label}, run {}, ", sheet::run_letter(note.pin.run))
@@ -173,6 +178,7 @@ fn chapter(text: &mut String, source: &Source, run: NamedRun<'_>, cancel: &Atomi
     }
     let _ = writeln!(text, "</div>\n<p class=\"at\">{}</p>", escape(picture::LEGEND));
     text.push_str(&step_table(steps));
+    text.push_str(&quantity_table(steps));
     text.push_str(&configuration(source, run));
     Ok(())
 }
@@ -207,36 +213,33 @@ fn figures(steps: &[std::sync::Arc<StepTrace>], run: &NamedRun<'_>) -> ApiResult
         is_thin,
         ..Line::default()
     };
+    let column = |name: &str, unit: Unit, scale: f64| {
+        points(&|k| Some(scale * records::row_value_in(&rows[k], name, unit)?))
+    };
     let limit = run.run.settings.limits.ncc_min;
-    let gate = |k: usize| rows[k].ncc.map(|_| limit);
     let charts = [
         (
             "Match score (NCC)",
             "score",
             vec![
-                line("score of the match", 0, points(&|k| rows[k].ncc), false),
-                line("least that is accepted", 1, points(&gate), true),
+                line("score of the match", 0, column("ncc", Unit::One, 1.0), false),
+                line("least that is accepted", 1, points(&|k| rows[k].ncc.map(|_| limit)), true),
             ],
         ),
         (
             "Error in the left image",
             "error, px",
             vec![
-                line("error", 0, points(&|k| rows[k].err_px), false),
-                line(
-                    "tolerance",
-                    1,
-                    points(&|k| steps[k].truth.as_ref().map(|truth| truth.tolerance_px)),
-                    true,
-                ),
+                line("error", 0, column("err_px", Unit::Pixel, 1.0), false),
+                line("tolerance", 1, points(&|k| number_of("truth.tolerance_px", &steps[k])), true),
             ],
         ),
         (
             "Error and uncertainty in space",
             "cm",
             vec![
-                line("error", 0, points(&|k| rows[k].err_m.map(|m| 100.0 * m)), false),
-                line("3σ, largest axis", 2, points(&|k| rows[k].sigma_m.map(|m| 300.0 * m)), true),
+                line("error", 0, column("err_m", Unit::Centimetre, 1.0), false),
+                line("3σ, largest axis", 2, column("sigma_m", Unit::Centimetre, 3.0), true),
             ],
         ),
     ];
@@ -257,38 +260,65 @@ fn drawn(title: &str, unit: &str, lines: Vec<Line>) -> ApiResult<Option<String>>
     Ok(Some(format!("<figure role=\"img\" aria-label=\"{label}\">{svg}</figure>\n")))
 }
 
+fn number_of(name: &str, trace: &StepTrace) -> Option<f64> {
+    StageQuantity::named(name)?.number(trace)
+}
+
+/// The columns of the table of steps: a column of the row, the unit in which it is written, and its digits.
+const COLUMNS: [(&str, Unit, usize); 8] = [
+    ("ncc", Unit::One, 3),
+    ("stereo_score", Unit::One, 3),
+    ("inliers", Unit::One, 0),
+    ("err_px", Unit::Pixel, 2),
+    ("err_m", Unit::Centimetre, 2),
+    ("sigma_m", Unit::Centimetre, 2),
+    ("nees", Unit::One, 1),
+    ("range_m", Unit::Metre, 2),
+];
+
 fn step_table(steps: &[std::sync::Arc<StepTrace>]) -> String {
     let row = |trace: &std::sync::Arc<StepTrace>| {
         let row = trace.row();
-        vec![
-            row.step.to_string(),
-            row.state.clone(),
-            number(row.ncc, 3),
-            number(row.stereo_score, 3),
-            row.inliers.map_or_else(|| "–".to_owned(), |count| count.to_string()),
-            number(row.err_px, 2),
-            number(row.err_m.map(|m| 100.0 * m), 2),
-            number(row.sigma_m.map(|m| 100.0 * m), 2),
-            number(row.nees, 1),
-            number(row.range_m, 2),
-            row.reason.unwrap_or_default(),
-        ]
+        let mut cells = vec![row.step.to_string(), row.state.clone()];
+        cells.extend(
+            COLUMNS
+                .iter()
+                .map(|(name, unit, digits)| number(records::row_value_in(&row, name, *unit), *digits)),
+        );
+        cells.push(row.reason.unwrap_or_default());
+        cells
     };
-    let head = [
-        "step",
-        "state",
-        "NCC",
-        "stereo",
-        "inliers",
-        "error, px",
-        "error, cm",
-        "σ, cm",
-        "NEES",
-        "range, m",
-        "why rejected",
-    ];
+    let heading = |(name, unit, _): &(&str, Unit, usize)| {
+        let label = records::row_quantity(name).map_or(*name, |quantity| quantity.label.as_ref());
+        if unit.symbol().is_empty() { label.to_owned() } else { format!("{label}, {}", unit.symbol()) }
+    };
+    let headings: Vec<String> = COLUMNS.iter().map(heading).collect();
+    let mut head = vec!["step", "state"];
+    head.extend(headings.iter().map(String::as_str));
+    head.push("why rejected");
     let rows: Vec<Vec<String>> = steps.iter().map(row).collect();
     format!("<h3>Steps</h3>\n{}", table("Every step of the run.", &head, &rows))
+}
+
+/// Every number that the stages declare and the run has.
+fn quantity_table(steps: &[std::sync::Arc<StepTrace>]) -> String {
+    let row = |quantity: StageQuantity| {
+        let values: Vec<f64> = steps.iter().filter_map(|trace| quantity.number(trace)).collect();
+        let of = |share: f64| Some(format::number(quantile(&values, share)?));
+        Some(vec![
+            quantity.name(),
+            quantity.declared().unit.symbol().to_owned(),
+            values.len().to_string(),
+            of(0.0)?,
+            of(0.5)?,
+            of(1.0)?,
+            quantity.declared().description.to_string(),
+        ])
+    };
+    let rows: Vec<Vec<String>> = StageQuantity::all().filter_map(row).collect();
+    let head = ["quantity", "unit", "steps", "least", "median", "greatest", "meaning"];
+    let caption = "Every number that the stages recorded, over the steps that have it.";
+    format!("<h3>Recorded numbers</h3>\n{}", table(caption, &head, &rows))
 }
 
 fn configuration(source: &Source, run: NamedRun<'_>) -> String {
@@ -315,7 +345,7 @@ fn configuration(source: &Source, run: NamedRun<'_>) -> String {
 fn origin(source: &Source) -> String {
     let index = serde_json::to_vec(source.open.traverse.index()).unwrap_or_default();
     let rows = [
-        ("program", format!("sightline {}", env!("CARGO_PKG_VERSION"))),
+        ("program", format!("sightline {VERSION}")),
         ("tracker", tracker_version()),
         ("traverse", source.open.id.clone()),
         ("SHA-256 of the traverse's index", hash(&index)),

@@ -12,13 +12,31 @@ use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::schema::parser::parse_message_type;
-use serde::Serialize;
-use sightline_core::study::plan::tracker_version;
-use sightline_core::trace::StepRow;
+use serde::{Serialize, Serializer};
+use sightline_record::{Kind, StageRecord, Value};
+use sightline_rover::version::tracker_version;
+use sightline_track::records::{columns, records, row_columns};
+use sightline_track::trace::{StepRow, StepTrace};
 
 use super::kind::Part;
 use super::source::Source;
-use crate::columns;
+use crate::columns as csv;
+use crate::version::VERSION;
+
+/// One step as a JSON object: the columns of [`StepRow`], then the quantities of every stage as `stage.quantity`.
+#[derive(Serialize)]
+pub(crate) struct Row {
+    #[serde(flatten)]
+    row: StepRow,
+    #[serde(flatten, serialize_with = "quantities")]
+    records: Vec<StageRecord>,
+}
+
+impl From<&StepTrace> for Row {
+    fn from(trace: &StepTrace) -> Self {
+        Self { row: trace.row(), records: records(trace) }
+    }
+}
 
 /// A row with where it belongs.
 #[derive(Serialize)]
@@ -27,98 +45,90 @@ struct Line<'a> {
     label: &'a str,
     run: usize,
     #[serde(flatten)]
-    row: StepRow,
+    row: Row,
 }
 
-/// How a column is read from a row.
-enum Get {
-    Whole(fn(&Line<'_>) -> Option<i64>),
-    Number(fn(&Line<'_>) -> Option<f64>),
-    Flag(fn(&Line<'_>) -> Option<bool>),
-    Word(for<'a> fn(&'a Line<'_>) -> Option<&'a str>),
-}
+/// The columns before those of the record, and how they are read.
+type Place = (&'static str, fn(&Line<'_>) -> Value);
 
-/// The columns in the order of the CSV table: name, unit, how to read it.
-const COLUMNS: [(&str, &str, Get); 29] = [
-    ("target", "", Get::Whole(|line| Some(line.target as i64))),
-    ("label", "", Get::Word(|line| Some(line.label))),
-    ("run", "", Get::Whole(|line| Some(line.run as i64))),
-    ("step", "", Get::Whole(|line| Some(line.row.step as i64))),
-    ("state", "", Get::Word(|line| Some(&line.row.state))),
-    ("scale", "1", Get::Number(|line| line.row.scale)),
-    ("roll_deg", "deg", Get::Number(|line| line.row.roll_deg)),
-    ("ncc", "1", Get::Number(|line| line.row.ncc)),
-    ("stereo_score", "1", Get::Number(|line| line.row.stereo_score)),
-    ("err_px", "px", Get::Number(|line| line.row.err_px)),
-    ("err_m", "m", Get::Number(|line| line.row.err_m)),
-    ("sigma_m", "m", Get::Number(|line| line.row.sigma_m)),
-    ("nees", "1", Get::Number(|line| line.row.nees)),
-    ("tracked", "", Get::Flag(|line| line.row.tracked)),
-    ("position_in_rover_x_m", "m", Get::Number(|line| Some(line.row.position_in_rover[0]))),
-    ("position_in_rover_y_m", "m", Get::Number(|line| Some(line.row.position_in_rover[1]))),
-    ("position_in_rover_z_m", "m", Get::Number(|line| Some(line.row.position_in_rover[2]))),
-    ("left_pixel_x_px", "px", Get::Number(|line| line.row.left_pixel.map(|pixel| pixel.x))),
-    ("left_pixel_y_px", "px", Get::Number(|line| line.row.left_pixel.map(|pixel| pixel.y))),
-    ("range_m", "m", Get::Number(|line| line.row.range_m)),
-    ("distance_correction_m", "m", Get::Number(|line| line.row.distance_correction_m)),
-    ("distance_tolerance_m", "m", Get::Number(|line| line.row.distance_tolerance_m)),
-    ("position_correction_m", "m", Get::Number(|line| line.row.position_correction_m)),
-    ("position_tolerance_m", "m", Get::Number(|line| line.row.position_tolerance_m)),
-    ("budget_without_m", "m", Get::Number(|line| line.row.budget_without_m)),
-    ("budget_with_m", "m", Get::Number(|line| line.row.budget_with_m)),
-    ("inliers", "", Get::Whole(|line| line.row.inliers.map(|count| count as i64))),
-    ("confidence", "1", Get::Number(|line| line.row.confidence)),
-    ("reason", "", Get::Word(|line| line.row.reason.as_deref())),
+const PLACES: [Place; 3] = [
+    ("target", |line| Value::Count(line.target as i64)),
+    ("label", |line| Value::Word(line.label.to_owned())),
+    ("run", |line| Value::Count(line.run as i64)),
 ];
 
+/// The quantities that the row does not have, as fields.
+fn quantities<S: Serializer>(records: &[StageRecord], serializer: S) -> Result<S::Ok, S::Error> {
+    let own = &columns()[row_columns().len()..];
+    serializer.collect_map(own.iter().map(|column| (column.name.as_str(), column.cell(records))))
+}
+
 fn lines(source: &Source, part: Part) -> Vec<Line<'_>> {
-    let of_run =
-        |run: super::source::NamedRun<'_>| run.run.steps.iter().map(|trace| trace.row()).collect::<Vec<_>>();
     let mut lines = Vec::new();
     for run in source.runs(part) {
-        let line = |row| Line { target: run.target, label: &run.record.label, run: run.number, row };
-        lines.extend(of_run(run).into_iter().map(line));
+        let label = &run.record.label;
+        let line = |trace: &Arc<StepTrace>| Line {
+            target: run.target,
+            label,
+            run: run.number,
+            row: trace.as_ref().into(),
+        };
+        lines.extend(run.run.steps.iter().map(line));
     }
     lines
 }
 
 /// One JSON object a line.
-pub fn jsonl(source: &Source, part: Part) -> String {
+pub(crate) fn jsonl(source: &Source, part: Part) -> String {
     let line = |line| serde_json::to_string(&line).map(|text| text + "\n").unwrap_or_default();
     lines(source, part).into_iter().map(line).collect()
 }
 
 /// A table with a header.
-pub fn csv(source: &Source, part: Part) -> String {
-    let mut table = format!("target,label,run,{}", columns::csv_header());
+pub(crate) fn csv(source: &Source, part: Part) -> String {
+    let mut table = header().join(",") + "\n";
     for line in lines(source, part) {
-        let label = columns::text_cell(line.label);
-        table.push_str(&format!("{},{label},{},{}", line.target, line.run, columns::csv_line(&line.row)));
+        let label = sightline_api::table::cell(line.label);
+        let cells = csv::csv_cells(columns(), &line.row.records);
+        table.push_str(&format!("{},{label},{},{cells}\n", line.target, line.run));
     }
     table
+}
+
+/// The number of columns.
+pub(crate) fn column_count() -> u64 {
+    (PLACES.len() + columns().len()) as u64
+}
+
+/// The names of all columns.
+fn header() -> Vec<&'static str> {
+    let own = columns().iter().map(|column| column.header.as_str());
+    PLACES.iter().map(|(name, _)| *name).chain(own).collect()
 }
 
 /// A Parquet file.
 ///
 /// # Errors
 /// What the library says.
-pub fn parquet(source: &Source, part: Part) -> Result<Vec<u8>, ParquetError> {
+pub(crate) fn parquet(source: &Source, part: Part) -> Result<Vec<u8>, ParquetError> {
     let lines = lines(source, part);
+    let kinds = [Kind::Count, Kind::Word, Kind::Count].into_iter();
+    let kinds: Vec<Kind> = kinds.chain(columns().iter().map(|column| column.kind)).collect();
     let mut schema = "message rows {".to_owned();
-    for (name, _, get) in &COLUMNS {
-        schema.push_str(&match get {
-            Get::Whole(_) => format!("optional int64 {name};"),
-            Get::Number(_) => format!("optional double {name};"),
-            Get::Flag(_) => format!("optional boolean {name};"),
-            Get::Word(_) => format!("optional byte_array {name} (utf8);"),
+    for (name, kind) in header().into_iter().zip(&kinds) {
+        schema.push_str(&match kind {
+            Kind::Count => format!("optional int64 {name};"),
+            Kind::Flag => format!("optional boolean {name};"),
+            Kind::Word => format!("optional byte_array {name} (utf8);"),
+            _ => format!("optional double {name};"),
         });
     }
     schema.push('}');
     let said = |key: &str, value: String| KeyValue::new(key.to_owned(), value);
-    let units = COLUMNS.iter().filter(|(_, unit, _)| !unit.is_empty());
+    let units = columns().iter().filter(|column| column.kind == Kind::Number);
     let mut about: Vec<KeyValue> =
-        units.map(|(name, unit, _)| said(&format!("unit:{name}"), (*unit).to_owned())).collect();
-    about.push(said("sightline", env!("CARGO_PKG_VERSION").to_owned()));
+        units.map(|column| said(&format!("unit:{}", column.header), column.unit.word().to_owned())).collect();
+    about.push(said("sightline", VERSION.to_owned()));
     about.push(said("tracker", tracker_version()));
     about.push(said("traverse", source.open.id.clone()));
     about.push(said("session", source.session.id.clone()));
@@ -130,9 +140,13 @@ pub fn parquet(source: &Source, part: Part) -> Result<Vec<u8>, ParquetError> {
     let schema = Arc::new(parse_message_type(&schema)?);
     let mut writer = SerializedFileWriter::new(Vec::new(), schema, Arc::new(properties))?;
     let mut group = writer.next_row_group()?;
-    for (_, _, get) in &COLUMNS {
+    for (index, kind) in kinds.into_iter().enumerate() {
         if let Some(column) = group.next_column()? {
-            write_column(column, get, &lines)?;
+            let cell = |line: &Line<'_>| match PLACES.get(index) {
+                Some((_, place)) => place(line),
+                None => columns()[index - PLACES.len()].cell(&line.row.records),
+            };
+            write_column(column, kind, lines.iter().map(cell))?;
         }
     }
     group.close()?;
@@ -141,25 +155,31 @@ pub fn parquet(source: &Source, part: Part) -> Result<Vec<u8>, ParquetError> {
 
 fn write_column(
     mut column: SerializedColumnWriter<'_>,
-    get: &Get,
-    lines: &[Line<'_>],
+    kind: Kind,
+    cells: impl Iterator<Item = Value>,
 ) -> Result<(), ParquetError> {
-    match get {
-        Get::Whole(get) => {
-            let (known, levels) = split(lines.iter().map(get));
+    match kind {
+        Kind::Count => {
+            let (known, levels) = split(cells.map(|cell| match cell {
+                Value::Count(count) => Some(count),
+                _ => None,
+            }));
             column.typed::<Int64Type>().write_batch(&known, Some(&levels), None)?;
         }
-        Get::Number(get) => {
-            let (known, levels) = split(lines.iter().map(get));
-            column.typed::<DoubleType>().write_batch(&known, Some(&levels), None)?;
-        }
-        Get::Flag(get) => {
-            let (known, levels) = split(lines.iter().map(get));
+        Kind::Flag => {
+            let (known, levels) = split(cells.map(|cell| match cell {
+                Value::Flag(flag) => Some(flag),
+                _ => None,
+            }));
             column.typed::<BoolType>().write_batch(&known, Some(&levels), None)?;
         }
-        Get::Word(get) => {
-            let (known, levels) = split(lines.iter().map(|line| get(line).map(ByteArray::from)));
+        Kind::Word => {
+            let (known, levels) = split(cells.map(|cell| cell.word().map(ByteArray::from)));
             column.typed::<ByteArrayType>().write_batch(&known, Some(&levels), None)?;
+        }
+        _ => {
+            let (known, levels) = split(cells.map(|cell| cell.number()));
+            column.typed::<DoubleType>().write_batch(&known, Some(&levels), None)?;
         }
     }
     column.close()
@@ -177,19 +197,19 @@ fn split<T>(values: impl Iterator<Item = Option<T>>) -> (Vec<T>, Vec<i16>) {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
+    use sightline_record::Unit;
 
     #[test]
-    fn both_tables_have_the_same_columns_in_the_same_order() {
-        let names: Vec<&str> = COLUMNS.iter().map(|(name, ..)| *name).collect();
-        assert_eq!(format!("target,label,run,{}", columns::csv_header()).trim_end(), names.join(","));
-    }
-
-    #[test]
-    fn a_unit_is_what_the_name_ends_with() {
-        for (name, unit, _) in &COLUMNS {
-            for ending in ["px", "m", "deg"] {
-                assert_eq!(name.ends_with(&format!("_{ending}")), *unit == ending, "{name}");
+    fn names_are_unique_and_end_with_their_unit() {
+        let names: BTreeSet<&str> = header().into_iter().collect();
+        assert_eq!(names.len(), header().len());
+        for column in columns() {
+            for unit in [Unit::Pixel, Unit::Metre, Unit::Degree] {
+                let ends = column.header.ends_with(&format!("_{}", unit.word()));
+                assert_eq!(ends, column.unit == unit, "{}", column.header);
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use sightline_core::error::Error;
+use sightline_geometry::error::Error;
 
 use super::canvas::Canvas;
 use super::kind::Part;
@@ -25,13 +25,13 @@ const STEP_MS: u16 = 700;
 const LAST_MS: u16 = 2000;
 
 /// The letter of a run, as the viewer calls it.
-pub fn run_letter(number: usize) -> String {
+pub(crate) fn run_letter(number: usize) -> String {
     let letter = char::from(b'A' + (number % 26) as u8);
     if number < 26 { letter.to_string() } else { format!("{letter}{}", number / 26) }
 }
 
 /// What a run is called.
-pub fn title(source: &Source, run: NamedRun<'_>) -> String {
+pub(crate) fn title(source: &Source, run: NamedRun<'_>) -> String {
     let name = &source.open.traverse.index().name;
     format!("{} · run {} · {name}", run.record.label, run_letter(run.number))
 }
@@ -48,7 +48,7 @@ fn shown(steps: usize, most: usize) -> Vec<usize> {
 ///
 /// # Errors
 /// A problem when there is nothing to show; [`Error::Cancelled`].
-pub fn animation(source: &Source, part: Part, cancel: &AtomicBool) -> ApiResult<Vec<u8>> {
+pub(crate) fn animation(source: &Source, part: Part, cancel: &AtomicBool) -> ApiResult<Vec<u8>> {
     let run = only_run(source, part)?;
     let places = shown(run.run.steps.len(), MOST_FRAMES);
     let [width, height] = picture::size(true);
@@ -76,7 +76,7 @@ pub fn animation(source: &Source, part: Part, cancel: &AtomicBool) -> ApiResult<
 ///
 /// # Errors
 /// A problem when there is nothing to show; [`Error::Cancelled`].
-pub fn sheet(source: &Source, part: Part, cancel: &AtomicBool) -> ApiResult<Vec<u8>> {
+pub(crate) fn sheet(source: &Source, part: Part, cancel: &AtomicBool) -> ApiResult<Vec<u8>> {
     let run = only_run(source, part)?;
     let places = shown(run.run.steps.len(), MOST_PICTURES);
     let [width, height] = sheet_size(places.len());
@@ -133,13 +133,13 @@ fn sheet_size(pictures: usize) -> [u32; 2] {
 }
 
 /// About how large the animation becomes: rock fills the picture, and PNG leaves half of that.
-pub fn bytes_of_animation(source: &Source, part: Part) -> u64 {
+pub(crate) fn bytes_of_animation(source: &Source, part: Part) -> u64 {
     let steps = source.runs(part).first().map_or(0, |run| run.run.steps.len().min(MOST_FRAMES));
     steps as u64 * bytes_of_picture()
 }
 
 /// About how large the sheet becomes.
-pub fn bytes_of_sheet(source: &Source, part: Part) -> u64 {
+pub(crate) fn bytes_of_sheet(source: &Source, part: Part) -> u64 {
     let steps = source.runs(part).first().map_or(0, |run| run.run.steps.len().min(MOST_PICTURES));
     steps as u64 * bytes_of_picture()
 }

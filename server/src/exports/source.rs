@@ -3,19 +3,19 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use sightline_core::frames::Pixel;
-use sightline_core::image::GrayImage;
-use sightline_core::session::notes::Notes;
-use sightline_core::session::{Run, Session, TargetRecord};
-use sightline_core::trace::StepTrace;
+use sightline_geometry::frames::Pixel;
+use sightline_session::notes::Notes;
+use sightline_session::{Run, Session, TargetRecord};
+use sightline_track::trace::StepTrace;
+use sightline_vision::image::GrayImage;
 
 use super::kind::{Kind, Part};
-use crate::live::LiveSession;
+use crate::live_session::LiveSession;
 use crate::problem::{ApiError, ApiResult};
 use crate::rendering::OpenTraverse;
 
 /// A session as it stands; its steps are shared, so that this costs little.
-pub struct Source {
+pub(crate) struct Source {
     /// The session.
     pub session: Session,
     /// Its notes.
@@ -26,7 +26,7 @@ pub struct Source {
 
 /// A run with its numbers.
 #[derive(Clone, Copy)]
-pub struct NamedRun<'a> {
+pub(crate) struct NamedRun<'a> {
     /// The target's number.
     pub target: usize,
     /// The target.
@@ -39,7 +39,7 @@ pub struct NamedRun<'a> {
 
 impl Source {
     /// The session as it stands now.
-    pub fn of(live: &LiveSession) -> Self {
+    pub(crate) fn of(live: &LiveSession) -> Self {
         let (session, notes) = live.with(|session| (session.clone(), live.with_notes(|notes| notes.clone())));
         Self { session, notes, open: Arc::clone(&live.traverse) }
     }
@@ -48,8 +48,8 @@ impl Source {
     ///
     /// # Errors
     /// A problem that names what is not.
-    pub fn check(&self, kind: Kind, part: Part) -> ApiResult<()> {
-        let missing = |error: sightline_core::error::Error| ApiError::from(error).about_path();
+    pub(crate) fn check(&self, kind: Kind, part: Part) -> ApiResult<()> {
+        let missing = |error: sightline_geometry::error::Error| ApiError::from(error).about_path();
         match (part.target, part.run) {
             (Some(target), Some(run)) => self.session.run(target, run).map(|_| ()).map_err(missing)?,
             (Some(target), None) => self.session.target(target).map(|_| ()).map_err(missing)?,
@@ -64,7 +64,7 @@ impl Source {
     }
 
     /// The part that a kind shows: of one run where it shows one, by default the one that is looked at.
-    pub fn narrowed(&self, kind: Kind, part: Part) -> Part {
+    pub(crate) fn narrowed(&self, kind: Kind, part: Part) -> Part {
         if !kind.is_of_one_run() {
             return part;
         }
@@ -84,7 +84,7 @@ impl Source {
     }
 
     /// The runs of a part that have steps; removed ones and those of removed targets are left out.
-    pub fn runs(&self, part: Part) -> Vec<NamedRun<'_>> {
+    pub(crate) fn runs(&self, part: Part) -> Vec<NamedRun<'_>> {
         let is_meant = |target: usize| part.target.is_none_or(|wanted| wanted == target);
         let targets = self.session.targets.iter().enumerate();
         let targets = targets.filter(|(number, record)| !record.removed && is_meant(*number));
@@ -97,7 +97,7 @@ impl Source {
     }
 
     /// The name under which a file is saved: of our own names alone.
-    pub fn file_name(&self, kind: Kind, part: Part) -> String {
+    pub(crate) fn file_name(&self, kind: Kind, part: Part) -> String {
         let of = match (part.target, part.run) {
             (Some(target), Some(run)) => format!("-target-{target}-run-{run}"),
             (Some(target), None) => format!("-target-{target}"),
@@ -110,11 +110,11 @@ impl Source {
     ///
     /// # Errors
     /// As [`OpenTraverse::make_ready`]; a damaged file.
-    pub fn images(
+    pub(crate) fn images(
         &self,
         step: usize,
         cancel: &AtomicBool,
-    ) -> sightline_core::error::Result<[Arc<GrayImage>; 2]> {
+    ) -> sightline_geometry::error::Result<[Arc<GrayImage>; 2]> {
         self.open.make_ready(step, cancel)?;
         let pair = self.open.traverse.capture(step)?;
         Ok([pair.left, pair.right])
@@ -122,9 +122,9 @@ impl Source {
 }
 
 /// Where to look in the left image to see a step's target, px: where it was found, else where it should be.
-pub fn place_of(trace: &StepTrace) -> Option<Pixel> {
-    let found = trace.locate.as_ref().and_then(|located| located.left_pixel);
-    let predicted = || trace.point_mast.as_ref().and_then(|pointing| pointing.predicted_left);
+pub(crate) fn place_of(trace: &StepTrace) -> Option<Pixel> {
+    let found = trace.located().and_then(|located| located.left_pixel);
+    let predicted = || trace.point_mast.predicted_left;
     let designated = || {
         let designation = trace.update.target.designation;
         (designation.step == trace.step).then_some(designation.pixel)

@@ -12,8 +12,8 @@ use rerun::{
     ChannelDatatype, Color, DepthImage, EncodedImage, ImageFormat, LineStrips2D, Points2D, Points3D, Radius,
     Transform3D,
 };
-use sightline_core::frames::{Pixel, Point3, Pose};
-use sightline_core::image::{GrayImage, PixelRect};
+use sightline_geometry::frames::{Pixel, Point3, Pose};
+use sightline_vision::image::{GrayImage, PixelRect};
 
 use super::palette::{HALO, Rgb, color};
 

@@ -1,9 +1,10 @@
 //! Every entity of a recording, in the order in which a step logs them: the table that the module's header
 //! prints and that a test compares with what is read back from a file.
 
-use sightline_core::trace::{ArrayName, StepTrace};
+use sightline_track::records::StageQuantity;
+use sightline_track::trace::{ArrayName, StepTrace};
 
-use super::scores::SCORES;
+use super::scores::{self, SCORES, Score};
 use super::shape;
 use super::step::path;
 
@@ -27,8 +28,27 @@ pub enum Rows {
         /// When there is a number, in words.
         when: &'static str,
         /// The number of this step.
-        value: fn(&StepTrace) -> Option<f64>,
+        value: Number,
     },
+}
+
+/// Where the number of an entity is read.
+#[derive(Clone, Copy, Debug)]
+pub struct Number(Reader);
+
+#[derive(Clone, Copy, Debug)]
+enum Reader {
+    Score(&'static Score),
+    Declared(StageQuantity),
+}
+
+impl Number {
+    fn at(self, trace: &StepTrace) -> Option<f64> {
+        match self.0 {
+            Reader::Score(score) => score.at(trace),
+            Reader::Declared(quantity) => quantity.number(trace),
+        }
+    }
 }
 
 /// What is known about one entity of a recording.
@@ -51,19 +71,8 @@ impl EntityDoc {
             Rows::Once => false,
             Rows::EachStop => true,
             Rows::EachStep { holds, .. } => holds(trace),
-            Rows::EachScore { value, .. } => value(trace).is_some_and(f64::is_finite),
+            Rows::EachScore { value, .. } => value.at(trace).is_some(),
         }
-    }
-
-    /// The entity as a row of the table: path, archetype, when.
-    pub fn table_row(&self) -> String {
-        let when = match self.rows {
-            Rows::Once => "once",
-            Rows::EachStop => "every stop",
-            Rows::EachStep { when, .. } | Rows::EachScore { when, .. } => when,
-        };
-        let style = self.style.map(|style| format!(", static `{style}`")).unwrap_or_default();
-        format!("| `{}` | `{}`{style} | {when} |", self.path, self.archetype)
     }
 }
 
@@ -71,7 +80,7 @@ impl EntityDoc {
 pub fn shared_entities() -> Vec<EntityDoc> {
     let doc =
         |path: &str, archetype, style, rows| EntityDoc { path: path.to_owned(), archetype, style, rows };
-    let captured = Rows::EachStep { when: "the stop's files are whole", holds: |t| t.capture.is_some() };
+    let captured = Rows::EachStep { when: "the stop's files are whole", holds: |t| t.capture().is_some() };
     vec![
         doc("/", "ViewCoordinates", None, Rows::Once),
         doc("/traverse", "TextDocument", None, Rows::Once),
@@ -90,15 +99,21 @@ pub fn entities_of(root: &str) -> Vec<EntityDoc> {
         let style = (archetype == "StateChange").then_some("StateConfiguration");
         EntityDoc { path: path(entity, root), archetype, style, rows: Rows::EachStep { when, holds } }
     });
-    let scores = SCORES.iter().map(|score| EntityDoc {
+    let plotted = SCORES.iter().map(|score| EntityDoc {
         path: path(score.entity, root),
         archetype: "Scalars",
         style: Some("SeriesLines"),
-        rows: Rows::EachScore { when: score.when, value: score.value },
+        rows: Rows::EachScore { when: score.when, value: Number(Reader::Score(score)) },
+    });
+    let declared = scores::declared().map(|number| EntityDoc {
+        path: path(&scores::entity_of(number), root),
+        archetype: "Scalars",
+        style: Some("SeriesLines"),
+        rows: Rows::EachScore { when: "the quantity exists", value: Number(Reader::Declared(number)) },
     });
     let label =
         EntityDoc { path: path("/{target}", root), archetype: "TextDocument", style: None, rows: Rows::Once };
-    std::iter::once(label).chain(docs).chain(scores).collect()
+    std::iter::once(label).chain(docs).chain(plotted).chain(declared).collect()
 }
 
 /// All entities of a recording with this many targets of one run each.
@@ -113,13 +128,13 @@ type Evidence = (&'static str, &'static str, &'static str, fn(&StepTrace) -> boo
 /// What is logged of a run beside its numbers, in the order of the stages.
 #[rustfmt::skip]
 const EVIDENCE: &[Evidence] = &[
-    ("/{target}/predict/position", "Points3D", "predicted", |t| t.predict.is_some()),
-    ("/{target}/predict/covariance", "Ellipsoids3D", "predicted", |t| t.predict.is_some()),
+    ("/{target}/predict/position", "Points3D", "predicted", |t| t.prediction().is_some()),
+    ("/{target}/predict/covariance", "Ellipsoids3D", "predicted", |t| t.prediction().is_some()),
     ("/{target}/predict/left", "Points2D", "predicted in front of the left camera", predicted_left),
     ("/{target}/predict/right", "Points2D", "predicted in front of the right camera", predicted_right),
     ("/{target}/point_mast/gate", "LineStrips2D", "predicted in front of the left camera", predicted_left),
-    ("/{target}/capture/subframe", "Boxes2D", "the subframe lies in the image", |t| t.capture.as_ref().is_some_and(|c| c.subframe.is_some())),
-    ("/{target}/capture/frame", "Transform3D", "the subframe lies in the image", |t| t.capture.as_ref().is_some_and(|c| c.subframe.is_some())),
+    ("/{target}/capture/subframe", "Boxes2D", "the subframe lies in the image", |t| t.capture().is_some_and(|c| c.subframe.is_some())),
+    ("/{target}/capture/frame", "Transform3D", "the subframe lies in the image", |t| t.capture().is_some_and(|c| c.subframe.is_some())),
     ("/{target}/locate/scale_roll/footprint", "LineStrips2D", "prepared", |t| prepared(t) && predicted_left(t)),
     ("/{target}/locate/scale_roll/reference", "DepthImage", "prepared", prepared),
     ("/{target}/locate/scale_roll/scaled", "DepthImage", "prepared", prepared),
@@ -148,21 +163,21 @@ const EVIDENCE: &[Evidence] = &[
     ("/{target}/locate/bootstrap/left", "Points2D", "the motion has a covariance", bootstrapped),
     ("/{target}/locate/bootstrap/position", "Points3D", "the target was moved", moved),
     ("/{target}/locate/bootstrap/covariance", "Ellipsoids3D", "the target was moved", moved),
-    ("/{target}/locate/surface/disparities", "DepthImage", "a surface was measured", |t| shape::has(t, ArrayName::Disparities)),
-    ("/{target}/locate/surface/ranges", "DepthImage", "a surface was measured", |t| shape::has(t, ArrayName::Ranges)),
-    ("/{target}/locate/coarse_register/sensor", "DepthImage", "surfaces were compared", |t| shape::has(t, ArrayName::Sensor)),
-    ("/{target}/locate/coarse_register/error_before", "Image", "surfaces were compared", |t| shape::has(t, ArrayName::ErrorBefore)),
-    ("/{target}/locate/coarse_register/coarse_search", "DepthImage", "shifts were searched", |t| shape::has(t, ArrayName::CoarseSearch)),
+    ("/{target}/locate/surface/disparities", "DepthImage", "a surface was measured", |t| shape::has(t, ArrayName::DISPARITIES)),
+    ("/{target}/locate/surface/ranges", "DepthImage", "a surface was measured", |t| shape::has(t, ArrayName::RANGES)),
+    ("/{target}/locate/coarse_register/sensor", "DepthImage", "surfaces were compared", |t| shape::has(t, ArrayName::SENSOR)),
+    ("/{target}/locate/coarse_register/error_before", "Image", "surfaces were compared", |t| shape::has(t, ArrayName::ERROR_BEFORE)),
+    ("/{target}/locate/coarse_register/coarse_search", "DepthImage", "shifts were searched", |t| shape::has(t, ArrayName::COARSE_SEARCH)),
     ("/{target}/locate/coarse_register/coarse_search/best", "Points2D", "a shift was found", |t| shape::best(t).is_some()),
-    ("/{target}/locate/coarse_register/error_coarse", "Image", "surfaces were compared", |t| shape::has(t, ArrayName::ErrorCoarse)),
-    ("/{target}/locate/refine_register/error_fine", "Image", "surfaces were compared", |t| shape::has(t, ArrayName::ErrorFine)),
-    ("/{target}/locate/refine_register/mesh_fixed", "Mesh3D", "registered to an earlier mesh", |t| shape::has(t, ArrayName::MeshFixed)),
-    ("/{target}/locate/refine_register/mesh_moving", "Mesh3D", "there is a present mesh", |t| shape::has(t, ArrayName::MeshMoving)),
+    ("/{target}/locate/coarse_register/error_coarse", "Image", "surfaces were compared", |t| shape::has(t, ArrayName::ERROR_COARSE)),
+    ("/{target}/locate/refine_register/error_fine", "Image", "surfaces were compared", |t| shape::has(t, ArrayName::ERROR_FINE)),
+    ("/{target}/locate/refine_register/mesh_fixed", "Mesh3D", "registered to an earlier mesh", |t| shape::has(t, ArrayName::MESH_FIXED)),
+    ("/{target}/locate/refine_register/mesh_moving", "Mesh3D", "there is a present mesh", |t| shape::has(t, ArrayName::MESH_MOVING)),
     ("/{target}/locate/refine_register/position", "Points3D", "the registration is used", |t| shape::registered(t).is_some()),
     ("/{target}/locate/refine_register/covariance", "Ellipsoids3D", "the registration is used", |t| shape::registered(t).is_some()),
-    ("/{target}/locate/hand_off/draped", "DepthImage", "the last picture was found at a hand-off", |t| shape::has(t, ArrayName::Draped)),
-    ("/{target}/locate/hand_off/draped_match", "DepthImage", "the last picture was found at a hand-off", |t| shape::has(t, ArrayName::DrapedMatch)),
-    ("/{target}/locate/left_covariance", "LineStrips2D", "designated or located", |t| t.locate.as_ref().is_some_and(|l| l.left_pixel.is_some())),
+    ("/{target}/locate/hand_off/draped", "DepthImage", "the last picture was found at a hand-off", |t| shape::has(t, ArrayName::DRAPED)),
+    ("/{target}/locate/hand_off/draped_match", "DepthImage", "the last picture was found at a hand-off", |t| shape::has(t, ArrayName::DRAPED_MATCH)),
+    ("/{target}/locate/left_covariance", "LineStrips2D", "designated or located", |t| t.located().is_some_and(|l| l.left_pixel.is_some())),
     ("/{target}/judge/state", "StateChange", "always", |_| true),
     ("/{target}/judge/verdict", "TextLog", "always", |_| true),
     ("/{target}/update/position", "Points3D", "always", |_| true),
@@ -171,11 +186,11 @@ const EVIDENCE: &[Evidence] = &[
 ];
 
 fn predicted_left(trace: &StepTrace) -> bool {
-    trace.predict.is_some() && trace.point_mast.as_ref().is_some_and(|p| p.predicted_left.is_some())
+    trace.prediction().is_some() && trace.point_mast.predicted_left.is_some()
 }
 
 fn predicted_right(trace: &StepTrace) -> bool {
-    trace.predict.is_some() && trace.point_mast.as_ref().is_some_and(|p| p.predicted_right.is_some())
+    trace.prediction().is_some() && trace.point_mast.predicted_right.is_some()
 }
 
 fn prepared(trace: &StepTrace) -> bool {
@@ -207,7 +222,7 @@ fn bootstrapped(trace: &StepTrace) -> bool {
 }
 
 fn moved(trace: &StepTrace) -> bool {
-    let located = trace.locate.as_ref();
+    let located = trace.located();
     bootstrapped(trace)
         && shape::registered(trace).is_none()
         && located.is_some_and(|l| l.position_in_rover.is_some() && l.covariance_in_rover.is_some())

@@ -11,8 +11,8 @@ use rerun::external::re_build_info::CrateVersion;
 use rerun::external::re_log_encoding::{Encoder, EncodingOptions};
 use rerun::log::ChunkBatcherConfig;
 use rerun::sink::MemorySinkStorage;
-use sightline_core::error::{Error, Result};
-use sightline_core::pipeline::Stops;
+use sightline_geometry::error::{Error, Result};
+use sightline_rover::pipeline::Stops;
 
 use super::recorder::{Recorder, RunLog, builder};
 

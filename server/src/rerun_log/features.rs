@@ -5,8 +5,8 @@
 //! as they are.
 
 use rerun::{Arrows2D, LineStrips2D, Points2D, Points3D, Radius};
-use sightline_core::frames::Pixel;
-use sightline_core::locate::features::rows::{self, CloudPoint, Feature, Matched};
+use sightline_geometry::frames::Pixel;
+use sightline_track::locate::features::rows::{self, CloudPoint, Feature, Matched};
 
 use super::Logged;
 use super::border::{point, point_3d, vector};
@@ -40,8 +40,8 @@ pub(super) fn log_partners(step: &Step<'_>) -> Logged {
 
 /// The points that both eyes see.
 pub(super) fn log_points(step: &Step<'_>) -> Logged {
-    let camera = step.trace.point_mast.as_ref().map(|pointing| &pointing.left);
-    let found = features(step).zip(camera).map(|(all, camera)| {
+    let camera = &step.trace.point_mast.left;
+    let found = features(step).map(|all| {
         let place = |feature: &Feature| Some(camera.ray(feature.pixel)?.at(feature.range_m?));
         let points = all.iter().filter_map(place).map(|at| point_3d(&step.in_site(&at)));
         Points3D::new(points).with_radii([Radius::new_ui_points(1.5)]).with_colors([color(KEYPOINT)])

@@ -4,10 +4,10 @@
 
 use nalgebra::Matrix2;
 use rerun::{Boxes2D, LineStrips2D, Radius};
-use sightline_core::frames::Pixel;
-use sightline_core::image::PixelRect;
-use sightline_core::locate::features::rows::moved_covariance_px2;
-use sightline_core::locate::shape_tracker::rows::registered_covariance_px2;
+use sightline_geometry::frames::Pixel;
+use sightline_track::locate::features::rows::moved_covariance_px2;
+use sightline_track::locate::shape_tracker::rows::registered_covariance_px2;
+use sightline_vision::image::PixelRect;
 
 use super::Logged;
 use super::border::{corner_frame, dot, ellipse, haloed, plus, png, point, square};
@@ -52,13 +52,13 @@ pub(super) fn log_gate(step: &Step<'_>) -> Logged {
 
 /// The subframe.
 pub(super) fn log_subframe(step: &Step<'_>) -> Logged {
-    let subframe = step.trace.capture.as_ref().and_then(|capture| capture.subframe);
+    let subframe = step.trace.capture().and_then(|capture| capture.subframe);
     step.log("/{target}/capture/subframe", subframe.map(|rect| frame(&rect, TRUTH, "subframe")))
 }
 
 /// The frame of the subframe, from which the close-up looks.
 pub(super) fn log_subframe_frame(step: &Step<'_>) -> Logged {
-    let subframe = step.trace.capture.as_ref().and_then(|capture| capture.subframe);
+    let subframe = step.trace.capture().and_then(|capture| capture.subframe);
     step.log("/{target}/capture/frame", subframe.map(|rect| corner_frame(&rect)))
 }
 
@@ -99,12 +99,11 @@ pub(super) fn log_second_peak(step: &Step<'_>) -> Logged {
 
 /// The error of the located left position, bias included; that of a position by features or by shape at 1, 2 and 3 σ (R180).
 pub(super) fn log_left_covariance(step: &Step<'_>) -> Logged {
-    let strips = step.trace.locate.as_ref().and_then(|located| {
+    let strips = step.trace.located().and_then(|located| {
         let pixel = located.left_pixel?;
-        let camera = step.trace.point_mast.as_ref().map(|pointing| &pointing.left);
-        let moved = camera.and_then(|camera| {
-            moved_covariance_px2(located, camera).or_else(|| registered_covariance_px2(located, camera))
-        });
+        let camera = &step.trace.point_mast.left;
+        let moved =
+            moved_covariance_px2(located, camera).or_else(|| registered_covariance_px2(located, camera));
         match moved {
             Some(moved) => {
                 [1.0, 2.0, SIGMAS].map(|sigmas| ellipse(pixel, &moved, sigmas)).into_iter().collect()

@@ -9,17 +9,17 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use rerun::{MemoryLimit, ServerOptions};
-use sightline_core::error::{Error, Result};
-use sightline_core::pipeline::Stops;
-use sightline_core::session::Session;
-use sightline_core::trace::StepTrace;
+use sightline_geometry::error::{Error, Result};
+use sightline_rover::pipeline::Stops;
+use sightline_session::Session;
+use sightline_track::trace::StepTrace;
 
 use super::page::ViewerPage;
 use super::recorder::{Recorder, RunLog, builder};
 
 /// How much of the stream is kept for pages that are opened later, bytes. Beyond it the oldest rows are
 /// forgotten; what is outside of all time never is.
-pub const HISTORY_BYTES: u64 = 1 << 30;
+const HISTORY_BYTES: u64 = 1 << 30;
 
 /// How long the stream may take to listen.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -82,7 +82,7 @@ impl LiveStream {
     ///
     /// # Errors
     /// As [`Self::log_session`].
-    pub fn log_run(&self, traverse_name: &str, stops: &dyn Stops, run: &RunLog<'_>) -> Result<()> {
+    pub(crate) fn log_run(&self, traverse_name: &str, stops: &dyn Stops, run: &RunLog<'_>) -> Result<()> {
         run.steps.iter().try_for_each(|trace| self.log_step(traverse_name, stops, run, trace))
     }
 
@@ -90,7 +90,7 @@ impl LiveStream {
     ///
     /// # Errors
     /// As [`Self::log_session`].
-    pub fn log_step(
+    pub(crate) fn log_step(
         &self,
         traverse_name: &str,
         stops: &dyn Stops,

@@ -5,13 +5,13 @@
 //! between the two is `err_m` and the drift of the site frame stays out of it.
 
 use nalgebra::Matrix3;
-use rerun::{Color, Ellipsoids3D, LineStrips3D, Radius, RecordingStream, TransformAxes3D, ViewCoordinates};
-use sightline_core::camera::Camera;
-use sightline_core::frames::{Pixel, Point3, Vector3};
-use sightline_core::pipeline::Stops;
+use rerun::{LineStrips3D, Radius, RecordingStream, TransformAxes3D, ViewCoordinates};
+use sightline_geometry::camera::Camera;
+use sightline_geometry::frames::{Pixel, Point3, Vector3};
+use sightline_rover::pipeline::Stops;
 
-use super::border::{dot_3d, ellipsoids, point_3d, transform};
-use super::palette::{MEASUREMENT, PREDICTION, ROVER, Rgb, TRUTH, color, faint, of_state};
+use super::border::{dot_3d, point_3d, transform};
+use super::palette::{MEASUREMENT, PREDICTION, ROVER, Rgb, TRUTH, color, of_state};
 use super::step::Step;
 use super::{Logged, shape};
 
@@ -80,14 +80,14 @@ pub(super) fn log_right_frustum(stream: &RecordingStream, stops: &dyn Stops, ste
 
 /// The predicted position.
 pub(super) fn log_predicted_position(step: &Step<'_>) -> Logged {
-    let point = step.trace.predict.as_ref().map(|p| dot_3d(p.position_in_site, PREDICTION, "predicted"));
+    let point = step.trace.prediction().map(|p| dot_3d(p.position_in_site, PREDICTION, "predicted"));
     step.log("/{target}/predict/position", point)
 }
 
 /// The covariance of the prediction.
 pub(super) fn log_predicted_covariance(step: &Step<'_>) -> Logged {
-    let predict = step.trace.predict.as_ref();
-    let found = predict.and_then(|p| spread(step, &p.position_in_rover, &p.covariance_in_rover, PREDICTION));
+    let predict = step.trace.prediction();
+    let found = predict.and_then(|p| step.spread(&p.position_in_rover, &p.covariance_in_rover, PREDICTION));
     step.log("/{target}/predict/covariance", found)
 }
 
@@ -101,7 +101,7 @@ pub(super) fn log_triangulated_position(step: &Step<'_>) -> Logged {
 /// The covariance of that position.
 pub(super) fn log_triangulated_covariance(step: &Step<'_>) -> Logged {
     let found = step.template().and_then(|e| e.triangulate.as_ref());
-    let found = found.and_then(|t| spread(step, &t.position_in_rover, &t.covariance_in_rover, MEASUREMENT));
+    let found = found.and_then(|t| step.spread(&t.position_in_rover, &t.covariance_in_rover, MEASUREMENT));
     step.log("/{target}/locate/triangulate/covariance", found)
 }
 
@@ -113,13 +113,13 @@ pub(super) fn log_moved_position(step: &Step<'_>) -> Logged {
 
 /// The covariance of that position.
 pub(super) fn log_moved_covariance(step: &Step<'_>) -> Logged {
-    let found = moved(step).and_then(|(at, covariance)| spread(step, &at, &covariance, MEASUREMENT));
+    let found = moved(step).and_then(|(at, covariance)| step.spread(&at, &covariance, MEASUREMENT));
     step.log("/{target}/locate/bootstrap/covariance", found)
 }
 
 /// Position and covariance of a target that the motion moved, in the rover frame.
 fn moved(step: &Step<'_>) -> Option<(Point3, Matrix3<f64>)> {
-    let located = step.features()?.bootstrap.as_ref().and(step.trace.locate.as_ref())?;
+    let located = step.features()?.bootstrap.as_ref().and(step.trace.located())?;
     if shape::registered(step.trace).is_some() {
         return None;
     }
@@ -139,19 +139,6 @@ pub(super) fn log_true_position(step: &Step<'_>) -> Logged {
     let truth = step.trace.truth.as_ref();
     let point = truth.map(|t| dot_3d(step.in_site(&t.position_in_rover), TRUTH, "truth"));
     step.log("/truth/{target}/position", point)
-}
-
-/// The ellipsoids of a covariance in the rover frame, turned into the site frame.
-pub(super) fn spread(
-    step: &Step<'_>,
-    point_in_rover: &Point3,
-    covariance: &Matrix3<f64>,
-    rgb: Rgb,
-) -> Option<Ellipsoids3D> {
-    let turn = step.site_from_rover.rotation.to_rotation_matrix();
-    let covariance_in_site = turn.matrix() * covariance * turn.matrix().transpose();
-    let colors: [Color; 2] = [color(rgb), faint(rgb, 110)];
-    ellipsoids(&step.in_site(point_in_rover), &covariance_in_site, colors)
 }
 
 /// The pyramid that an image's border sees, by the camera's true rays and not by a pinhole.

@@ -118,6 +118,8 @@
 //! | `/truth/{target}/tolerance_px` | `Scalars`, static `SeriesLines` | the truth is known |
 //! | `/truth/{target}/err_m` | `Scalars`, static `SeriesLines` | the truth is known |
 //! | `/truth/{target}/nees` | `Scalars`, static `SeriesLines` | the truth is known and there is a covariance |
+//!
+//! Beside these, `/{target}/record/{stage}/{quantity}` has every number that a stage declares, as `Scalars`.
 
 mod blueprint;
 mod border;
@@ -140,11 +142,11 @@ mod surface;
 mod templates;
 
 use rerun::{RecordingStream, RecordingStreamResult};
-use sightline_core::pipeline::Stops;
+use sightline_rover::pipeline::Stops;
 
 pub use entities::{EntityDoc, Rows, documented_entities, entities_of, shared_entities};
 pub use export::export;
-pub use live::{HISTORY_BYTES, LiveStream};
+pub use live::LiveStream;
 pub use recorder::RunLog;
 
 use scores::SCORES;
@@ -223,7 +225,8 @@ fn log_step(step: &Step<'_>, is_first_here: bool) -> Logged {
     images::log_true_left(step)?;
     map::log_true_position(step)?;
 
-    SCORES.iter().try_for_each(|score| scores::log_score(step, score))
+    SCORES.iter().try_for_each(|score| scores::log_score(step, score))?;
+    scores::log_declared(step)
 }
 
 /// Logs the steps of the shape tracker.
@@ -248,10 +251,24 @@ fn log_shape(step: &Step<'_>) -> Logged {
 mod tests {
     use super::*;
 
+    /// The entity as a row of the table: path, archetype, when.
+    fn table_row(doc: &EntityDoc) -> String {
+        let when = match doc.rows {
+            Rows::Once => "once",
+            Rows::EachStop => "every stop",
+            Rows::EachStep { when, .. } | Rows::EachScore { when, .. } => when,
+        };
+        let style = doc.style.map(|style| format!(", static `{style}`")).unwrap_or_default();
+        format!("| `{}` | `{}`{style} | {when} |", doc.path, doc.archetype)
+    }
+
     #[test]
     fn the_table_of_this_file_lists_every_entity() {
         let own = entities_of("{target}");
-        let rows: Vec<_> = shared_entities().iter().chain(&own).map(EntityDoc::table_row).collect();
+        // The numbers that stages declare are one rule, below the table.
+        let own = own.iter().filter(|doc| !doc.path.contains("/record/"));
+        let shared = shared_entities();
+        let rows: Vec<_> = shared.iter().chain(own).map(table_row).collect();
         let header: Vec<_> = include_str!("mod.rs")
             .lines()
             .filter_map(|line| line.strip_prefix("//! "))

@@ -15,7 +15,7 @@
 //! | truth | white, on a black halo |
 
 use rerun::Color;
-use sightline_core::target::TrackingState;
+use sightline_track::target::TrackingState;
 
 /// Red, green and blue.
 pub(super) type Rgb = [u8; 3];

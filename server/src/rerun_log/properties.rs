@@ -2,9 +2,10 @@
 
 use rerun::components::Text;
 use rerun::{AnyValues, RecordingStream};
-use sightline_core::study::plan::tracker_version;
+use sightline_rover::version::tracker_version;
 
 use super::Logged;
+use crate::version::VERSION;
 
 /// The version of Rerun for which recordings are written.
 const RERUN_VERSION: &str = "0.36";
@@ -12,7 +13,7 @@ const RERUN_VERSION: &str = "0.36";
 /// Sends the properties.
 pub(super) fn send(stream: &RecordingStream, traverse: &str) -> Logged {
     let values = [
-        ("program", format!("sightline {}", env!("CARGO_PKG_VERSION"))),
+        ("program", format!("sightline {VERSION}")),
         ("tracker", tracker_version()),
         ("traverse", traverse.to_owned()),
         ("rerun", format!("written for Rerun {RERUN_VERSION}")),

@@ -5,10 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use rerun::{RecordingStream, RecordingStreamBuilder, TextDocument};
-use sightline_core::frames::Point3;
-use sightline_core::image::GrayImage;
-use sightline_core::pipeline::Stops;
-use sightline_core::trace::StepTrace;
+use sightline_geometry::frames::Point3;
+use sightline_rover::pipeline::Stops;
+use sightline_track::trace::StepTrace;
+use sightline_vision::image::GrayImage;
 
 use super::blueprint::Lane;
 use super::map::Outlook;
@@ -61,7 +61,7 @@ struct Known {
 
 impl Known {
     fn new(first: &StepTrace) -> Self {
-        let subframe = first.capture.as_ref().and_then(|capture| capture.subframe);
+        let subframe = first.capture().and_then(|capture| capture.subframe);
         Self {
             steps: BTreeSet::new(),
             position_in_site: first.update.target.initial_position_in_site,
@@ -153,7 +153,7 @@ impl Recorder {
 /// The images of a step. Those of a run that was read back from disk are not in the trace and come from the
 /// traverse.
 fn images(trace: &StepTrace, stops: &dyn Stops) -> Option<[Arc<GrayImage>; 2]> {
-    let kept = trace.capture.as_ref()?.pair.clone();
+    let kept = trace.capture()?.pair.clone();
     let pair = if kept.left.width() > 0 { kept } else { stops.capture(trace.step).ok()? };
     Some([pair.left, pair.right])
 }

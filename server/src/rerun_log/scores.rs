@@ -1,88 +1,94 @@
 //! The numbers of a step, one scalar per entity, for the time series.
 //!
-//! They are one table, because they differ in nothing but their name and where the number is read.
+//! Every number that a stage declares is logged as `/{target}/record/{stage}/{quantity}`. Those that the layout plots have
+//! entities of their own beside the evidence, with a colour: a table of the entity and the quantity or gate that it shows.
 
 use rerun::{RecordingStream, Scalars};
-use sightline_core::camera::MastAngles;
-use sightline_core::locate::shape_tracker::evidence::{Check, Registered};
-use sightline_core::locate::template::TemplateEvidence;
-use sightline_core::stages::capture::Capture;
-use sightline_core::stages::judge::Gate;
-use sightline_core::trace::{StepTrace, StepTruth};
+use sightline_record::{Kind, Unit};
+use sightline_track::records::{self, StageQuantity};
+use sightline_track::trace::StepTrace;
 
 use super::Logged;
 use super::palette::{FAILED, LIMIT, LOST, MEASUREMENT, PREDICTION, Rgb, SECOND_PEAK, TRACKING, color};
 use super::step::{Step, log_series, path};
 
 /// One number of a step.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Score {
-    /// Its entity.
+    /// Its entity; a unit at the end of its name is the unit in which it is logged.
     pub(super) entity: &'static str,
     /// When there is such a number.
     pub(super) when: &'static str,
-    /// Where it is read.
-    pub(super) value: fn(&StepTrace) -> Option<f64>,
+    /// The number in the record: `stage.quantity`, or `stage.gates.name.value` and `.limit` of a gate.
+    source: &'static str,
     rgb: Rgb,
 }
 
-const fn score(
-    entity: &'static str,
-    when: &'static str,
-    rgb: Rgb,
-    value: fn(&StepTrace) -> Option<f64>,
-) -> Score {
-    Score { entity, when, value, rgb }
+const fn score(entity: &'static str, when: &'static str, rgb: Rgb, source: &'static str) -> Score {
+    Score { entity, when, source, rgb }
 }
 
 /// All numbers, in the order of the stages.
 #[rustfmt::skip]
 pub(super) const SCORES: &[Score] = &[
-    score("/{target}/point_mast/wanted_azimuth_deg", "there is a mast and it reaches", PREDICTION, |t| Some(wanted(t)?.azimuth_rad.to_degrees())),
-    score("/{target}/point_mast/wanted_elevation_deg", "there is a mast and it reaches", SECOND_PEAK, |t| Some(wanted(t)?.elevation_rad.to_degrees())),
-    score("/{target}/point_mast/used_azimuth_deg", "there is a mast", MEASUREMENT, |t| Some(used(t)?.azimuth_rad.to_degrees())),
-    score("/{target}/point_mast/used_elevation_deg", "there is a mast", LOST, |t| Some(used(t)?.elevation_rad.to_degrees())),
-    score("/{target}/capture/subframe_mean", "the subframe lies in the image", MEASUREMENT, |t| capture(t)?.subframe_mean.map(f64::from)),
-    score("/{target}/capture/subframe_saturated", "the subframe lies in the image", LOST, |t| capture(t)?.subframe_saturated.map(f64::from)),
-    score("/{target}/locate/scale_roll/scale", "prepared", MEASUREMENT, |t| Some(evidence(t)?.scale_roll.as_ref()?.scale)),
-    score("/{target}/locate/scale_roll/roll_deg", "prepared", SECOND_PEAK, |t| Some(evidence(t)?.scale_roll.as_ref()?.roll_rad.to_degrees())),
-    score("/{target}/locate/match_template/second_peak_ratio", "there is a second peak", LOST, |t| Some(evidence(t)?.match_template.as_ref()?.second_peak.as_ref()?.ratio)),
-    score("/{target}/locate/point_stereo/range_m", "stereo matched", MEASUREMENT, |t| Some(evidence(t)?.point_stereo.as_ref()?.range_m)),
-    score("/{target}/locate/point_stereo/across_px", "stereo matched", LOST, |t| Some(evidence(t)?.point_stereo.as_ref()?.across_px)),
-    score("/{target}/locate/triangulate/gap_px", "triangulated", SECOND_PEAK, |t| Some(evidence(t)?.triangulate.as_ref()?.gap_px)),
-    score("/{target}/locate/fit_motion/inliers", "a motion was fitted", TRACKING, |t| Some(t.features()?.fit_motion.as_ref()?.inliers as f64)),
-    score("/{target}/locate/coarse_register/mean_m", "shifts were searched and surfaces overlap", MEASUREMENT, |t| registration(t)?.mean_m[1]),
-    score("/{target}/locate/refine_register/mean_m", "surfaces were compared", SECOND_PEAK, |t| registration(t)?.mean_m[2]),
-    score("/{target}/locate/refine_register/overlap", "surfaces were compared", MEASUREMENT, |t| check(t, "shape_overlap")?.value),
-    score("/{target}/locate/refine_register/overlap/limit", "registered", LIMIT, |t| Some(check(t, "shape_overlap")?.limit)),
-    score("/{target}/locate/refine_register/misfit", "surfaces were compared", LOST, |t| check(t, "shape_misfit")?.value),
-    score("/{target}/locate/refine_register/misfit/limit", "registered", LIMIT, |t| Some(check(t, "shape_misfit")?.limit)),
-    score("/{target}/locate/refine_register/sigma_m", "the shape holds the target", TRACKING, |t| check(t, "shape_sigma_m")?.value),
-    score("/{target}/locate/refine_register/sigma_m/limit", "registered", LIMIT, |t| Some(check(t, "shape_sigma_m")?.limit)),
-    score("/{target}/locate/hand_off/score", "the last picture was found at a hand-off", MEASUREMENT, |t| Some(registration(t)?.draped.as_ref()?.score)),
-    score("/{target}/judge/ncc", "judged and matched", MEASUREMENT, |t| gate(t, "ncc")?.value),
-    score("/{target}/judge/ncc/limit", "judged", LIMIT, |t| Some(gate(t, "ncc")?.limit)),
-    score("/{target}/judge/stereo_ncc", "judged and stereo matched", SECOND_PEAK, |t| gate(t, "stereo_ncc")?.value),
-    score("/{target}/judge/stereo_ncc/limit", "judged", LIMIT, |t| Some(gate(t, "stereo_ncc")?.limit)),
-    score("/{target}/judge/distance_correction_m", "judged and triangulated", MEASUREMENT, |t| gate(t, "distance_correction_m")?.value),
-    score("/{target}/judge/distance_correction_m/limit", "judged", LIMIT, |t| Some(gate(t, "distance_correction_m")?.limit)),
-    score("/{target}/judge/position_correction_m", "judged and triangulated", SECOND_PEAK, |t| gate(t, "position_correction_m")?.value),
-    score("/{target}/judge/position_correction_m/limit", "judged", LIMIT, |t| Some(gate(t, "position_correction_m")?.limit)),
-    score("/{target}/judge/confidence", "judged by confidence and located", MEASUREMENT, |t| gate(t, "confidence")?.value),
-    score("/{target}/judge/confidence/limit", "judged by confidence", LIMIT, |t| Some(gate(t, "confidence")?.limit)),
-    score("/{target}/update/sigma_m", "always", MEASUREMENT, |t| t.row().sigma_m),
-    score("/{target}/update/correction_px", "matched and predicted in the left image", PREDICTION, |t| t.update.correction_px),
-    score("/{target}/update/correction_m", "triangulated", PREDICTION, |t| t.update.correction_m),
-    score("/truth/{target}/err_px", "matched and the truth is visible", FAILED, |t| truth(t)?.err_px),
-    score("/truth/{target}/tolerance_px", "the truth is known", LIMIT, |t| Some(truth(t)?.tolerance_px)),
-    score("/truth/{target}/err_m", "the truth is known", FAILED, |t| Some(truth(t)?.err_m)),
-    score("/truth/{target}/nees", "the truth is known and there is a covariance", TRACKING, |t| truth(t)?.nees),
+    score("/{target}/point_mast/wanted_azimuth_deg", "there is a mast and it reaches", PREDICTION, "point_mast.wanted.azimuth_rad"),
+    score("/{target}/point_mast/wanted_elevation_deg", "there is a mast and it reaches", SECOND_PEAK, "point_mast.wanted.elevation_rad"),
+    score("/{target}/point_mast/used_azimuth_deg", "there is a mast", MEASUREMENT, "point_mast.used.azimuth_rad"),
+    score("/{target}/point_mast/used_elevation_deg", "there is a mast", LOST, "point_mast.used.elevation_rad"),
+    score("/{target}/capture/subframe_mean", "the subframe lies in the image", MEASUREMENT, "capture.subframe_mean"),
+    score("/{target}/capture/subframe_saturated", "the subframe lies in the image", LOST, "capture.subframe_saturated"),
+    score("/{target}/locate/scale_roll/scale", "prepared", MEASUREMENT, "scale_roll.scale"),
+    score("/{target}/locate/scale_roll/roll_deg", "prepared", SECOND_PEAK, "scale_roll.roll_rad"),
+    score("/{target}/locate/match_template/second_peak_ratio", "there is a second peak", LOST, "match_template.second_peak.ratio"),
+    score("/{target}/locate/point_stereo/range_m", "stereo matched", MEASUREMENT, "point_stereo.range_m"),
+    score("/{target}/locate/point_stereo/across_px", "stereo matched", LOST, "point_stereo.across_px"),
+    score("/{target}/locate/triangulate/gap_px", "triangulated", SECOND_PEAK, "triangulate.gap_px"),
+    score("/{target}/locate/fit_motion/inliers", "a motion was fitted", TRACKING, "fit_motion.inliers"),
+    score("/{target}/locate/coarse_register/mean_m", "shifts were searched and surfaces overlap", MEASUREMENT, "coarse_register.mean_coarse_m"),
+    score("/{target}/locate/refine_register/mean_m", "surfaces were compared", SECOND_PEAK, "refine_register.mean_fine_m"),
+    score("/{target}/locate/refine_register/overlap", "surfaces were compared", MEASUREMENT, "refine_register.overlap"),
+    score("/{target}/locate/refine_register/overlap/limit", "registered", LIMIT, "refine_register.gates.shape_overlap.limit"),
+    score("/{target}/locate/refine_register/misfit", "surfaces were compared", LOST, "refine_register.misfit"),
+    score("/{target}/locate/refine_register/misfit/limit", "registered", LIMIT, "refine_register.gates.shape_misfit.limit"),
+    score("/{target}/locate/refine_register/sigma_m", "the shape holds the target", TRACKING, "refine_register.sigma_m"),
+    score("/{target}/locate/refine_register/sigma_m/limit", "registered", LIMIT, "refine_register.gates.shape_sigma_m.limit"),
+    score("/{target}/locate/hand_off/score", "the last picture was found at a hand-off", MEASUREMENT, "hand_off.score"),
+    score("/{target}/judge/ncc", "judged and matched", MEASUREMENT, "judge.gates.ncc.value"),
+    score("/{target}/judge/ncc/limit", "judged", LIMIT, "judge.gates.ncc.limit"),
+    score("/{target}/judge/stereo_ncc", "judged and stereo matched", SECOND_PEAK, "judge.gates.stereo_ncc.value"),
+    score("/{target}/judge/stereo_ncc/limit", "judged", LIMIT, "judge.gates.stereo_ncc.limit"),
+    score("/{target}/judge/distance_correction_m", "judged and triangulated", MEASUREMENT, "judge.gates.distance_correction_m.value"),
+    score("/{target}/judge/distance_correction_m/limit", "judged", LIMIT, "judge.gates.distance_correction_m.limit"),
+    score("/{target}/judge/position_correction_m", "judged and triangulated", SECOND_PEAK, "judge.gates.position_correction_m.value"),
+    score("/{target}/judge/position_correction_m/limit", "judged", LIMIT, "judge.gates.position_correction_m.limit"),
+    score("/{target}/judge/confidence", "judged by confidence and located", MEASUREMENT, "judge.gates.confidence.value"),
+    score("/{target}/judge/confidence/limit", "judged by confidence", LIMIT, "judge.gates.confidence.limit"),
+    score("/{target}/update/sigma_m", "always", MEASUREMENT, "step.sigma_m"),
+    score("/{target}/update/correction_px", "matched and predicted in the left image", PREDICTION, "update.correction_px"),
+    score("/{target}/update/correction_m", "triangulated", PREDICTION, "update.correction_m"),
+    score("/truth/{target}/err_px", "matched and the truth is visible", FAILED, "truth.err_px"),
+    score("/truth/{target}/tolerance_px", "the truth is known", LIMIT, "truth.tolerance_px"),
+    score("/truth/{target}/err_m", "the truth is known", FAILED, "truth.err_m"),
+    score("/truth/{target}/nees", "the truth is known and there is a covariance", TRACKING, "truth.nees"),
 ];
 
 impl Score {
     /// The number at a step; what is not finite cannot be drawn and counts as missing.
     pub(super) fn at(&self, trace: &StepTrace) -> Option<f64> {
-        (self.value)(trace).filter(|value| value.is_finite())
+        self.read(trace).filter(|value| value.is_finite())
+    }
+
+    fn read(&self, trace: &StepTrace) -> Option<f64> {
+        if let Some((stage, gate)) = self.source.split_once(".gates.") {
+            let (name, part) = gate.rsplit_once('.')?;
+            let gates = records::stage(stage)?.record(trace).gates;
+            let gate = gates.into_iter().find(|gate| gate.name == name)?;
+            return if part == "limit" { Some(gate.limit) } else { gate.value };
+        }
+        let quantity = StageQuantity::named(self.source)?;
+        let declared = quantity.declared().unit;
+        let logged = Unit::of_name(self.entity).unwrap_or(declared);
+        Some(quantity.number(trace)? * (logged.per_base() / declared.per_base()))
     }
 
     /// The last words of the entity: `ncc`, or `ncc limit` below it.
@@ -93,6 +99,30 @@ impl Score {
     }
 }
 
+/// Every number that the stages declare, in their order.
+pub(super) fn declared() -> impl Iterator<Item = StageQuantity> {
+    StageQuantity::all()
+        .filter(|quantity| matches!(quantity.declared().kind, Kind::Number | Kind::Count | Kind::Flag))
+}
+
+/// The entity of a declared number.
+pub(super) fn entity_of(quantity: StageQuantity) -> String {
+    let name = quantity.declared().name.replace('.', "/");
+    format!("/{{target}}/record/{}/{name}", quantity.stage().schema().stage)
+}
+
+fn name_of(quantity: StageQuantity) -> String {
+    let declared = quantity.declared();
+    format!("{} {}", declared.name, declared.unit.symbol()).trim_end().to_owned()
+}
+
+/// The numbers that the stages declare.
+pub(super) fn log_declared(step: &Step<'_>) -> Logged {
+    declared().try_for_each(|number| {
+        step.log(&entity_of(number), number.number(step.trace).map(|value| Scalars::new([value])))
+    })
+}
+
 /// One number of a step.
 pub(super) fn log_score(step: &Step<'_>, score: &Score) -> Logged {
     step.log(score.entity, score.at(step.trace).map(|value| Scalars::new([value])))
@@ -100,40 +130,35 @@ pub(super) fn log_score(step: &Step<'_>, score: &Score) -> Logged {
 
 /// How the numbers of a run are drawn: their names and colours, limits thinner than what they limit.
 pub(super) fn log_styles(stream: &RecordingStream, root: &str) -> Logged {
+    declared().try_for_each(|number| {
+        log_series(stream, &path(&entity_of(number), root), &name_of(number), color(MEASUREMENT), 2.0)
+    })?;
     SCORES.iter().try_for_each(|score| {
         let width = if score.rgb == LIMIT { 1.0 } else { 2.0 };
         log_series(stream, &path(score.entity, root), &score.name(), color(score.rgb), width)
     })
 }
 
-fn wanted(trace: &StepTrace) -> Option<MastAngles> {
-    trace.point_mast.as_ref()?.wanted
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-fn used(trace: &StepTrace) -> Option<MastAngles> {
-    trace.point_mast.as_ref()?.used
-}
-
-fn capture(trace: &StepTrace) -> Option<&Capture> {
-    trace.capture.as_ref()
-}
-
-fn evidence(trace: &StepTrace) -> Option<&TemplateEvidence> {
-    trace.template()
-}
-
-fn gate<'a>(trace: &'a StepTrace, name: &str) -> Option<&'a Gate> {
-    trace.judge.as_ref()?.gates.iter().find(|gate| gate.name == name)
-}
-
-fn registration(trace: &StepTrace) -> Option<&Registered> {
-    trace.shape()?.registration.as_ref()
-}
-
-fn check<'a>(trace: &'a StepTrace, name: &str) -> Option<&'a Check> {
-    registration(trace)?.checks.iter().find(|check| check.name == name)
-}
-
-fn truth(trace: &StepTrace) -> Option<&StepTruth> {
-    trace.truth.as_ref()
+    #[test]
+    fn every_score_reads_a_declared_number() {
+        for score in SCORES {
+            let is_declared = match score.source.split_once(".gates.") {
+                Some((stage, gate)) => {
+                    let (name, part) = gate.rsplit_once('.').unwrap();
+                    let gates = &records::stage(stage).unwrap().schema().gates;
+                    gates.iter().any(|gate| gate.name == name) && ["value", "limit"].contains(&part)
+                }
+                None => {
+                    let declared = StageQuantity::named(score.source).unwrap().declared();
+                    let logged = Unit::of_name(score.entity).unwrap_or(declared.unit);
+                    logged.dimension() == declared.unit.dimension()
+                }
+            };
+            assert!(is_declared, "{} ← {}", score.entity, score.source);
+        }
+    }
 }

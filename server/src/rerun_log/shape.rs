@@ -9,13 +9,12 @@
 use nalgebra::{Matrix3, Vector3};
 use rerun::components::Colormap;
 use rerun::{ColorModel, DepthImage, Image, Mesh3D};
-use sightline_core::frames::{Pixel, Point3};
-use sightline_core::locate::shape_tracker::rows;
-use sightline_core::trace::{ArrayName, ArrayView, StepTrace};
+use sightline_geometry::frames::{Pixel, Point3};
+use sightline_track::locate::shape_tracker::rows;
+use sightline_track::trace::{ArrayName, ArrayView, StepTrace};
 
 use super::Logged;
 use super::border::{dot, dot_3d, mapped, point_3d};
-use super::map::spread;
 use super::palette::{LOST, MEASUREMENT, PREDICTION, Rgb, color, of_difference};
 use super::step::Step;
 
@@ -24,23 +23,23 @@ const LEAST_LIMIT_M: f32 = 0.001;
 
 /// Disparities of the aligned left image.
 pub(super) fn log_disparities(step: &Step<'_>) -> Logged {
-    let image = viridis(step, ArrayName::Disparities);
+    let image = viridis(step, ArrayName::DISPARITIES);
     step.log("/{target}/locate/surface/disparities", image)
 }
 
 /// Distances from the left camera.
 pub(super) fn log_ranges(step: &Step<'_>) -> Logged {
-    step.log("/{target}/locate/surface/ranges", viridis(step, ArrayName::Ranges))
+    step.log("/{target}/locate/surface/ranges", viridis(step, ArrayName::RANGES))
 }
 
 /// The earlier surface in the virtual sensor.
 pub(super) fn log_sensor(step: &Step<'_>) -> Logged {
-    step.log("/{target}/locate/coarse_register/sensor", viridis(step, ArrayName::Sensor))
+    step.log("/{target}/locate/coarse_register/sensor", viridis(step, ArrayName::SENSOR))
 }
 
 /// Mean distance of the surfaces for every shift.
 pub(super) fn log_coarse_search(step: &Step<'_>) -> Logged {
-    let image = viridis(step, ArrayName::CoarseSearch);
+    let image = viridis(step, ArrayName::COARSE_SEARCH);
     step.log("/{target}/locate/coarse_register/coarse_search", image)
 }
 
@@ -52,41 +51,41 @@ pub(super) fn log_coarse_best(step: &Step<'_>) -> Logged {
 
 /// Present less earlier depth at the start.
 pub(super) fn log_error_before(step: &Step<'_>) -> Logged {
-    let image = signed(step, ArrayName::ErrorBefore);
+    let image = signed(step, ArrayName::ERROR_BEFORE);
     step.log("/{target}/locate/coarse_register/error_before", image)
 }
 
 /// The same after the coarse search.
 pub(super) fn log_error_coarse(step: &Step<'_>) -> Logged {
-    let image = signed(step, ArrayName::ErrorCoarse);
+    let image = signed(step, ArrayName::ERROR_COARSE);
     step.log("/{target}/locate/coarse_register/error_coarse", image)
 }
 
 /// The same at the end.
 pub(super) fn log_error_fine(step: &Step<'_>) -> Logged {
-    step.log("/{target}/locate/refine_register/error_fine", signed(step, ArrayName::ErrorFine))
+    step.log("/{target}/locate/refine_register/error_fine", signed(step, ArrayName::ERROR_FINE))
 }
 
 /// The earlier surface, where the registration puts it.
 pub(super) fn log_mesh_fixed(step: &Step<'_>) -> Logged {
-    let found = mesh(step, ArrayName::MeshFixed, LOST);
+    let found = mesh(step, ArrayName::MESH_FIXED, LOST);
     step.log("/{target}/locate/refine_register/mesh_fixed", found)
 }
 
 /// The present surface.
 pub(super) fn log_mesh_moving(step: &Step<'_>) -> Logged {
-    let found = mesh(step, ArrayName::MeshMoving, PREDICTION);
+    let found = mesh(step, ArrayName::MESH_MOVING, PREDICTION);
     step.log("/{target}/locate/refine_register/mesh_moving", found)
 }
 
 /// At a hand-off, the earlier image draped over the surface as the present camera would see it.
 pub(super) fn log_draped(step: &Step<'_>) -> Logged {
-    step.log("/{target}/locate/hand_off/draped", grey(step, ArrayName::Draped))
+    step.log("/{target}/locate/hand_off/draped", grey(step, ArrayName::DRAPED))
 }
 
 /// The present image where it was found.
 pub(super) fn log_draped_match(step: &Step<'_>) -> Logged {
-    step.log("/{target}/locate/hand_off/draped_match", grey(step, ArrayName::DrapedMatch))
+    step.log("/{target}/locate/hand_off/draped_match", grey(step, ArrayName::DRAPED_MATCH))
 }
 
 /// The position by registration, accepted or not.
@@ -98,23 +97,23 @@ pub(super) fn log_position(step: &Step<'_>) -> Logged {
 /// The covariance of that position.
 pub(super) fn log_covariance(step: &Step<'_>) -> Logged {
     let found =
-        registered(step.trace).and_then(|(at, covariance)| spread(step, &at, &covariance, MEASUREMENT));
+        registered(step.trace).and_then(|(at, covariance)| step.spread(&at, &covariance, MEASUREMENT));
     step.log("/{target}/locate/refine_register/covariance", found)
 }
 
 /// Position (m) and covariance (m²) of a target that was registered, in the rover frame.
 pub(super) fn registered(trace: &StepTrace) -> Option<(Point3, Matrix3<f64>)> {
     trace.shape()?.registration.as_ref().filter(|found| found.failure.is_none())?;
-    let located = trace.locate.as_ref()?;
+    let located = trace.located()?;
     located.position_in_rover.zip(located.covariance_in_rover)
 }
 
 /// The best shift of the coarse search as a pixel of its picture.
 pub(super) fn best(trace: &StepTrace) -> Option<Pixel> {
     let found = trace.shape()?.registration.as_ref()?;
-    let [columns, rows] = values(trace, ArrayName::CoarseSearch)?.size();
+    let [columns, rows] = values(trace, ArrayName::COARSE_SEARCH)?.size();
     let [x_m, y_m, _] = found.coarse_shift_m?;
-    let step_m = rows::sensor_pixel_m(found, values(trace, ArrayName::Sensor)?.size()[0])?;
+    let step_m = rows::sensor_pixel_m(found, values(trace, ArrayName::SENSOR)?.size()[0])?;
     let place = |side: u32, shift_m: f64| (f64::from(side) - 1.0) / 2.0 + shift_m / step_m;
     Some(Pixel::new(place(columns, x_m), place(rows, y_m)))
 }
@@ -142,7 +141,7 @@ fn grey(step: &Step<'_>, name: ArrayName) -> Option<DepthImage> {
 /// Blue below, white at zero, red above; what does not exist is transparent.
 fn signed(step: &Step<'_>, name: ArrayName) -> Option<Image> {
     let array = values(step.trace, name)?;
-    let [low, high] = values(step.trace, ArrayName::ErrorBefore).map_or([0.0; 2], |all| ends(all.values()));
+    let [low, high] = values(step.trace, ArrayName::ERROR_BEFORE).map_or([0.0; 2], |all| ends(all.values()));
     let limit_m = low.abs().max(high.abs()).max(LEAST_LIMIT_M);
     let rgba = array.values().iter().flat_map(|value| {
         let [r, g, b] = of_difference(value / limit_m);

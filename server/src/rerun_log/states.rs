@@ -1,8 +1,8 @@
 //! The tracking state of every step: as a band over time, and as a line of the log that says why.
 
 use rerun::{RecordingStream, StateChange, StateConfiguration, TextDocument, TextLog, TextLogLevel};
-use sightline_core::target::TrackingState;
-use sightline_core::trace::StepTrace;
+use sightline_track::target::TrackingState;
+use sightline_track::trace::StepTrace;
 
 use super::Logged;
 use super::palette::{FAILED, color, of_state};
@@ -15,7 +15,7 @@ pub(super) fn log_state(step: &Step<'_>) -> Logged {
 
 /// The verdict in words, with the reason of a rejection.
 pub(super) fn log_verdict(step: &Step<'_>) -> Logged {
-    let rgb = if step.trace.fault.is_some() { FAILED } else { of_state(step.trace.update.state) };
+    let rgb = if step.trace.fault().is_some() { FAILED } else { of_state(step.trace.update.state) };
     let words = format!("{}, {}", step.label, sentence(step.trace));
     let line = TextLog::new(words).with_level(level(step.trace)).with_color(color(rgb));
     step.log("/{target}/judge/verdict", Some(line))
@@ -50,10 +50,10 @@ fn sentence(trace: &StepTrace) -> String {
         TrackingState::Lost { count } => format!("lost ({count} in a row)"),
         state => state.word().to_owned(),
     };
-    let why = trace.fault.as_deref().or_else(|| trace.judge.as_ref().and_then(|v| v.reason.as_deref()));
+    let why = trace.fault().or_else(|| trace.verdict().and_then(|v| v.reason.as_deref()));
     match why {
         Some(why) => format!("step {}: {state}: {why}", trace.step),
-        None if trace.judge.is_none() => format!("step {}: designated", trace.step),
+        None if trace.verdict().is_none() => format!("step {}: designated", trace.step),
         None => format!("step {}: {state}", trace.step),
     }
 }
@@ -61,7 +61,7 @@ fn sentence(trace: &StepTrace) -> String {
 /// A fault of the files is an error whatever the state, because it can be mended.
 fn level(trace: &StepTrace) -> &'static str {
     match trace.update.state {
-        _ if trace.fault.is_some() => TextLogLevel::ERROR,
+        _ if trace.fault().is_some() => TextLogLevel::ERROR,
         TrackingState::Cleared => TextLogLevel::DEBUG,
         TrackingState::Tracking => TextLogLevel::INFO,
         TrackingState::Lost { .. } => TextLogLevel::WARN,

@@ -2,17 +2,20 @@
 
 use std::sync::Arc;
 
+use nalgebra::Matrix3;
 use rerun::components::AggregationPolicy;
-use rerun::{AsComponents, Clear, RecordingStream, SeriesLines};
-use sightline_core::frames::{Point3, Pose};
-use sightline_core::image::GrayImage;
-use sightline_core::locate::features::FeatureEvidence;
-use sightline_core::locate::template::TemplateEvidence;
-use sightline_core::locate::template::match_template::TemplateMatch;
-use sightline_core::stages::point_mast::Pointing;
-use sightline_core::trace::StepTrace;
+use rerun::{AsComponents, Clear, Color, Ellipsoids3D, RecordingStream, SeriesLines};
+use sightline_geometry::frames::{Point3, Pose};
+use sightline_track::locate::features::FeatureEvidence;
+use sightline_track::locate::template::TemplateEvidence;
+use sightline_track::locate::template::match_template::TemplateMatch;
+use sightline_track::stages::point_mast::Pointing;
+use sightline_track::trace::StepTrace;
+use sightline_vision::image::GrayImage;
 
 use super::Logged;
+use super::border::ellipsoids;
+use super::palette::{Rgb, color, faint};
 
 /// One step of one run.
 pub(super) struct Step<'a> {
@@ -43,7 +46,7 @@ impl Step<'_> {
 
     /// The pointing of a step that had a prediction: at the designation there is none.
     pub(super) fn predicted(&self) -> Option<&Pointing> {
-        self.trace.predict.as_ref().and(self.trace.point_mast.as_ref())
+        self.trace.prediction().map(|_| &self.trace.point_mast)
     }
 
     /// The evidence of the template locator.
@@ -64,6 +67,19 @@ impl Step<'_> {
     /// A point of the present rover frame in the site frame of the estimated pose.
     pub(super) fn in_site(&self, point_in_rover: &Point3) -> Point3 {
         self.site_from_rover * point_in_rover
+    }
+
+    /// The ellipsoids of a covariance in the rover frame, turned into the site frame.
+    pub(super) fn spread(
+        &self,
+        point_in_rover: &Point3,
+        covariance: &Matrix3<f64>,
+        rgb: Rgb,
+    ) -> Option<Ellipsoids3D> {
+        let turn = self.site_from_rover.rotation.to_rotation_matrix();
+        let covariance_in_site = turn.matrix() * covariance * turn.matrix().transpose();
+        let colors: [Color; 2] = [color(rgb), faint(rgb, 110)];
+        ellipsoids(&self.in_site(point_in_rover), &covariance_in_site, colors)
     }
 }
 

@@ -5,8 +5,8 @@
 //! map with fixed limits: viridis, at every step between the same limits of the measure (−1 and 1 for a correlation).
 
 use rerun::components::Colormap;
-use sightline_core::correlate::zncc::Surface;
-use sightline_core::frames::Pixel;
+use sightline_geometry::frames::Pixel;
+use sightline_vision::correlate::zncc::Surface;
 
 use super::Logged;
 use super::border::{dot, mapped};

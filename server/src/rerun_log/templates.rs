@@ -5,7 +5,7 @@
 
 use rerun::components::Colormap;
 use rerun::{ColorModel, DepthImage, Image};
-use sightline_core::image::Patch;
+use sightline_vision::image::Patch;
 
 use super::Logged;
 use super::border::mapped;

@@ -6,14 +6,14 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use sightline_core::error::{Error, Result};
-use sightline_core::session::Cursor;
+use sightline_geometry::error::{Error, Result};
+use sightline_session::Cursor;
 
 use super::{CURSORS, Disk, USED, put};
 use crate::jobs::lock;
 
 /// How long a cursor that moved may not be on disk.
-pub const CURSOR_PERIOD: Duration = Duration::from_millis(500);
+pub(crate) const CURSOR_PERIOD: Duration = Duration::from_millis(500);
 
 /// The cursors that are not on disk yet, with the thread that writes them.
 pub(super) struct Cursors {
@@ -93,7 +93,7 @@ impl Waiting {
             let closed = inside.closed;
             drop(inside);
             if let Err(error) = self.write(disk) {
-                tracing::error!("cursors are not saved: {}", crate::plain(&error.to_string()));
+                tracing::error!("cursors are not saved: {}", crate::printable::printable(&error.to_string()));
             }
             if closed {
                 return;

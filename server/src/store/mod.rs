@@ -5,7 +5,7 @@
 //! meta       name → number                      `version` of this form, `last_session`
 //! sessions   number → SavedSession              without runs and cursor
 //! runs       (session, target, run) → SavedRun
-//! cursors    number → Cursor                    at most [`CURSOR_PERIOD`] late
+//! cursors    number → Cursor                    at most `CURSOR_PERIOD` late
 //! notes      number → Notes
 //! studies    number → what was ordered and how it stands
 //! documents  name → Document
@@ -14,7 +14,7 @@
 //! ```
 //! Values are JSON, in which numbers come back bit for bit. Everything but cursors and times of use is on disk before the request is
 //! answered, in one transaction: a server that is killed leaves the last transaction whole. Cursors are gathered, because
-//! one moves with every key, and written [`CURSOR_PERIOD`] after the first move at the latest; an orderly end writes them.
+//! one moves with every key, and written `CURSOR_PERIOD` after the first move at the latest; an orderly end writes them.
 //! A file that is damaged, or a session that cannot be read, is moved aside under a name that says so, never removed.
 
 mod cursors;
@@ -29,21 +29,20 @@ use std::sync::Arc;
 
 use redb::{Database, ReadableTable, TableDefinition, WriteTransaction};
 use serde::Serialize;
-use sightline_core::error::{Error, Result};
-use sightline_core::session::Cursor;
-use sightline_core::session::notes::Notes;
-use sightline_core::session::view::SavedSession;
+use sightline_geometry::error::{Error, Result};
+use sightline_session::Cursor;
+use sightline_session::notes::Notes;
+use sightline_session::view::SavedSession;
 
-pub use cursors::CURSOR_PERIOD;
 use cursors::Cursors;
-pub use read::{Found, read_only};
-pub use small::Clash;
+pub(crate) use read::{Found, read_only};
+pub(crate) use small::Clash;
 
 /// The version of the database that this code reads and writes.
-pub const STORE_VERSION: u64 = 1;
+pub(crate) const STORE_VERSION: u64 = 1;
 
 /// The name of the database in its folder.
-pub const FILE_NAME: &str = "sessions.redb";
+pub(crate) const FILE_NAME: &str = "sessions.redb";
 
 const META: TableDefinition<'_, &str, u64> = TableDefinition::new("meta");
 const SESSIONS: TableDefinition<'_, u64, &[u8]> = TableDefinition::new("sessions");
@@ -94,7 +93,7 @@ impl Store {
     /// [`Error::Write`]; the database is then as it was.
     pub fn save(&self, session: &SavedSession) -> Result<()> {
         let number = number_of(&session.id).ok_or_else(|| {
-            Error::Request(format!("{} is no name of a session", crate::plain(&session.id)))
+            Error::Request(format!("{} is no name of a session", crate::printable::printable(&session.id)))
         })?;
         self.cursors.forget(number);
         self.disk.write(|transaction| {
@@ -139,7 +138,7 @@ impl Store {
     ///
     /// # Errors
     /// [`Error::Write`]; the database is then as it was.
-    pub fn save_notes(&self, session: &str, notes: &Notes) -> Result<()> {
+    pub(crate) fn save_notes(&self, session: &str, notes: &Notes) -> Result<()> {
         let Some(number) = number_of(session) else { return Ok(()) };
         self.disk.write(|transaction| put(transaction, NOTES, number, notes))
     }
@@ -158,12 +157,12 @@ impl Store {
     }
 
     /// Moves a session aside, into a file, that cannot be worked on any more; says what happened.
-    pub fn set_aside(&self, id: &str, why: &str) -> String {
+    pub(crate) fn set_aside(&self, id: &str, why: &str) -> String {
         let folder = self.disk.path.parent().unwrap_or(Path::new("."));
         let moved = number_of(id).ok_or_else(|| "it has no number".to_owned()).and_then(|number| {
             let to = open::free_name(folder, id, "damaged");
             let text = read::raw(&self.disk.database, number).map_err(|error| error.to_string())?;
-            sightline_core::traverse::files::write_atomically(&to, text.as_bytes())
+            sightline_recordings::files::write_atomically(&to, text.as_bytes())
                 .map_err(|error| error.to_string())?;
             self.disk.write(|transaction| forget(transaction, number)).map_err(|error| error.to_string())?;
             Ok(to)
@@ -252,12 +251,12 @@ fn forget(transaction: &WriteTransaction, number: u64) -> std::result::Result<bo
 }
 
 /// The name of the session with this number.
-pub fn id_of(number: u64) -> String {
+pub(crate) fn id_of(number: u64) -> String {
     format!("s{number}")
 }
 
 /// The number of a session's name.
-pub fn number_of(id: &str) -> Option<u64> {
+pub(crate) fn number_of(id: &str) -> Option<u64> {
     let number = id.strip_prefix('s')?.parse().ok()?;
     (id == id_of(number)).then_some(number)
 }

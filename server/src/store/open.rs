@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use redb::{Builder, ConcurrencyMode, Database, DatabaseError, ReadableTable, StorageError};
-use sightline_core::error::{Error, Result};
-use sightline_core::session::view::SavedSession;
+use sightline_geometry::error::{Error, Result};
+use sightline_session::view::SavedSession;
 
 use super::{
     CURSORS, DOCUMENTS, DRIVES, Disk, FILE_NAME, LAST_SESSION, META, NOTES, RUNS, SESSIONS, STORE_VERSION,
@@ -75,7 +75,7 @@ fn attempt(path: &Path) -> Result<std::result::Result<Disk, String>> {
             {
                 Err(Error::Write { path: path.to_owned(), source })
             }
-            Ok(Err(error)) => Ok(Err(crate::plain(&error.to_string()))),
+            Ok(Err(error)) => Ok(Err(crate::printable::printable(&error.to_string()))),
         };
     }
 }
@@ -156,7 +156,11 @@ impl Store {
 fn read(path: &Path, id: &str) -> std::result::Result<SavedSession, String> {
     let bytes = std::fs::read(path).map_err(|error| error.to_string())?;
     let saved: SavedSession = serde_json::from_slice(&bytes).map_err(|error| error.to_string())?;
-    if saved.id == id { Ok(saved) } else { Err(format!("it holds session {}", crate::plain(&saved.id))) }
+    if saved.id == id {
+        Ok(saved)
+    } else {
+        Err(format!("it holds session {}", crate::printable::printable(&saved.id)))
+    }
 }
 
 fn move_aside(path: &Path, id: &str, ending: &str, what: &str) -> String {

@@ -6,10 +6,10 @@ use std::path::Path;
 use redb::{ReadTransaction, ReadableDatabase, ReadableTable};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
-use sightline_core::error::Result;
-use sightline_core::session::Cursor;
-use sightline_core::session::notes::Notes;
-use sightline_core::session::view::SavedSession;
+use sightline_geometry::error::Result;
+use sightline_session::Cursor;
+use sightline_session::notes::Notes;
+use sightline_session::view::SavedSession;
 
 use super::open::{builder, failed, refused};
 use super::{CURSORS, FILE_NAME, LAST_SESSION, META, NOTES, RUNS, SESSIONS, USED, id_of};
@@ -35,7 +35,7 @@ pub struct Found {
 ///
 /// # Errors
 /// No database there, or one that cannot be read.
-pub fn read_only(folder: &Path) -> Result<Found> {
+pub(crate) fn read_only(folder: &Path) -> Result<Found> {
     let path = folder.join(FILE_NAME);
     let mut builder = builder();
     // The check would write.
@@ -97,7 +97,7 @@ fn session(
         Err(why) => return Ok(Err(why)),
     };
     if saved.id != id_of(number) {
-        return Ok(Err(format!("it holds session {}", crate::plain(&saved.id))));
+        return Ok(Err(format!("it holds session {}", crate::printable::printable(&saved.id))));
     }
     if let Some(cursor) = transaction.open_table(CURSORS)?.get(number)? {
         // A cursor that cannot be read is no reason to lose the session.

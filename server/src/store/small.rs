@@ -4,15 +4,15 @@ use redb::{ReadableDatabase, ReadableTable, ReadableTableMetadata};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
-use sightline_core::error::Result;
-use sightline_core::session::documents::{DOCUMENT_LIMIT, Document};
+use sightline_geometry::error::Result;
+use sightline_session::documents::{DOCUMENT_LIMIT, Document};
 
 use super::open::failed;
 use super::{DOCUMENTS, DRIVES, STUDIES, Store, put};
 
 /// Why a document could not be replaced.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Clash {
+pub(crate) enum Clash {
     /// Somebody changed it meanwhile; its revision now, none where it is not there.
     Changed(Option<u64>),
     /// There are too many.
@@ -23,7 +23,7 @@ impl Store {
     /// All documents, by name.
     ///
     /// # Errors
-    /// [`sightline_core::error::Error::Read`] when the database cannot be read.
+    /// [`sightline_geometry::error::Error::Read`] when the database cannot be read.
     pub fn documents(&self) -> Result<Vec<Document>> {
         let read = || {
             let table = self.disk.database.begin_read()?.open_table(DOCUMENTS)?;
@@ -40,8 +40,8 @@ impl Store {
     /// Replaces or adds a document; `revision` is the one that was read, 0 for a new one.
     ///
     /// # Errors
-    /// [`sightline_core::error::Error::Write`]; the inner error when somebody was quicker.
-    pub fn put_document(
+    /// [`sightline_geometry::error::Error::Write`]; the inner error when somebody was quicker.
+    pub(crate) fn put_document(
         &self,
         name: &str,
         value: Value,
@@ -72,8 +72,8 @@ impl Store {
     /// Removes a document; false where there is none.
     ///
     /// # Errors
-    /// [`sightline_core::error::Error::Write`]; the inner error when somebody changed it meanwhile.
-    pub fn remove_document(
+    /// [`sightline_geometry::error::Error::Write`]; the inner error when somebody changed it meanwhile.
+    pub(crate) fn remove_document(
         &self,
         name: &str,
         revision: Option<u64>,
@@ -97,7 +97,7 @@ impl Store {
     /// The scenarios of the drives that were opened from a page, as TOML, by the names of their folders.
     ///
     /// # Errors
-    /// [`sightline_core::error::Error::Read`] when the database cannot be read.
+    /// [`sightline_geometry::error::Error::Read`] when the database cannot be read.
     pub fn drives(&self) -> Result<Vec<(String, String)>> {
         let read = || {
             let table = self.disk.database.begin_read()?.open_table(DRIVES)?;
@@ -115,15 +115,15 @@ impl Store {
     /// Remembers a drive that was opened from a page.
     ///
     /// # Errors
-    /// [`sightline_core::error::Error::Write`]; the database is then as it was.
-    pub fn save_drive(&self, folder: &str, scenario: &str) -> Result<()> {
+    /// [`sightline_geometry::error::Error::Write`]; the database is then as it was.
+    pub(crate) fn save_drive(&self, folder: &str, scenario: &str) -> Result<()> {
         self.disk.write(|transaction| put(transaction, DRIVES, folder, &scenario))
     }
 
     /// The studies that were started, by number; what cannot be read is left out.
     ///
     /// # Errors
-    /// [`sightline_core::error::Error::Read`] when the database cannot be read.
+    /// [`sightline_geometry::error::Error::Read`] when the database cannot be read.
     pub fn studies<T: DeserializeOwned>(&self) -> Result<Vec<(u64, T)>> {
         let read = || {
             let table = self.disk.database.begin_read()?.open_table(STUDIES)?;
@@ -140,16 +140,16 @@ impl Store {
     /// Takes a study out of the list.
     ///
     /// # Errors
-    /// [`sightline_core::error::Error::Write`]; the database is then as it was.
-    pub fn remove_study(&self, number: u64) -> Result<()> {
+    /// [`sightline_geometry::error::Error::Write`]; the database is then as it was.
+    pub(crate) fn remove_study(&self, number: u64) -> Result<()> {
         self.disk.write(|transaction| Ok(transaction.open_table(STUDIES)?.remove(number)?.is_some()))
     }
 
     /// Writes how a study stands.
     ///
     /// # Errors
-    /// [`sightline_core::error::Error::Write`]; the database is then as it was.
-    pub fn save_study(&self, number: u64, study: &impl Serialize) -> Result<()> {
+    /// [`sightline_geometry::error::Error::Write`]; the database is then as it was.
+    pub(crate) fn save_study(&self, number: u64, study: &impl Serialize) -> Result<()> {
         self.disk.write(|transaction| put(transaction, STUDIES, number, study))
     }
 }

@@ -1,16 +1,17 @@
 //! The database: what comes back, what is moved aside, and that nothing is lost on the way.
 
+use super::cursors::CURSOR_PERIOD;
 use super::*;
-use sightline_core::session::documents::Document;
-use sightline_core::session::notes::{NewNote, Pin};
-use sightline_core::session::view::{SavedRun, SavedTarget};
-use sightline_core::session::{Fork, Session};
+use sightline_session::documents::Document;
+use sightline_session::notes::{NewNote, Pin};
+use sightline_session::view::{SavedRun, SavedTarget};
+use sightline_session::{Fork, Session};
 
 /// A session with a target, a run and a fork of it.
 fn saved(id: &str) -> SavedSession {
     let mut saved = Session::new(id, "t", 9).saved();
     let run = |fork: Option<Fork>| {
-        let settings = serde_json::to_value(sightline_core::settings::Settings::default()).unwrap();
+        let settings = serde_json::to_value(sightline_track::settings::Settings::default()).unwrap();
         let run = serde_json::json!({ "fork": fork, "settings": settings });
         serde_json::from_value::<SavedRun>(run).unwrap()
     };

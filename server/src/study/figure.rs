@@ -6,18 +6,17 @@
 use std::collections::BTreeMap;
 
 use serde_json::Value;
-use sightline_core::study::paper::PaperValue;
-use sightline_core::study::plan::{Plan, Unit};
-use sightline_core::study::row::{columns, is_tracked};
-use sightline_core::study::run::Run;
+use sightline_study::paper::PaperValue;
+use sightline_study::plan::{Plan, Unit};
+use sightline_study::row::{columns, is_tracked};
+use sightline_study::run::Run;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::drawn::{Chart, Line, merged};
-use super::step_figure::checkout;
+use super::chart::{Chart, Line, merged};
 
 /// A figure of a report.
 #[derive(Clone, Debug)]
-pub struct Figure {
+pub(crate) struct Figure {
     /// Its name, of which that of its file is made.
     pub name: &'static str,
     /// The picture.
@@ -27,7 +26,7 @@ pub struct Figure {
 }
 
 /// One configuration over the study's first variable.
-pub struct Series {
+pub(crate) struct Series {
     /// The configuration, and the values of the other variables.
     pub label: String,
     /// The configuration's name.
@@ -37,7 +36,7 @@ pub struct Series {
 }
 
 /// A series at one value of the first variable.
-pub struct SeriesPoint {
+pub(crate) struct SeriesPoint {
     /// Where it stands on the horizontal axis.
     pub x: f64,
     /// The value as words.
@@ -50,12 +49,12 @@ pub struct SeriesPoint {
 
 impl SeriesPoint {
     /// A column over all worlds.
-    pub fn value(&self, column: &str) -> Option<f64> {
+    pub(crate) fn value(&self, column: &str) -> Option<f64> {
         self.pooled.get(column)?.as_f64()
     }
 
     /// The least and the greatest value of a column in a single world.
-    pub fn range(&self, column: &str) -> Option<[f64; 2]> {
+    pub(crate) fn range(&self, column: &str) -> Option<[f64; 2]> {
         let values = self.worlds.iter().filter_map(|(_, columns)| columns.get(column)?.as_f64());
         values.fold(None, |range, v| {
             let [low, high] = range.unwrap_or([v, v]);
@@ -65,7 +64,7 @@ impl SeriesPoint {
 }
 
 /// The series of a study whose rows are points of a grid.
-pub fn series(plan: &Plan, units: &[Unit]) -> Vec<Series> {
+pub(crate) fn series(plan: &Plan, units: &[Unit]) -> Vec<Series> {
     let mut found: Vec<Series> = Vec::new();
     let mut words: Vec<String> = Vec::new();
     for configuration in &plan.configurations {
@@ -110,14 +109,11 @@ fn place(value: Option<&Value>, words: &mut Vec<String>) -> (f64, String) {
     (known as f64, word)
 }
 
-/// The figures of a study.
+/// The figures of a study of whole runs.
 ///
 /// # Errors
 /// What the drawing library says.
-pub fn figures(plan: &Plan, units: &[Unit]) -> Result<Vec<Figure>, String> {
-    if plan.study.is_by_step {
-        return checkout(plan, units);
-    }
+pub(crate) fn figures(plan: &Plan, units: &[Unit]) -> Result<Vec<Figure>, String> {
     let series = series(plan, units);
     let variable = plan.study.variable;
     let shares: (f64, f64) = (1.0, 100.0);

@@ -9,9 +9,9 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
-use sightline_core::error::{Error, Result};
-use sightline_core::study::plan::Unit;
-use sightline_core::traverse::files::write_atomically;
+use sightline_geometry::error::{Error, Result};
+use sightline_recordings::files::write_atomically;
+use sightline_study::plan::Unit;
 
 use crate::jobs::lock;
 
@@ -19,7 +19,7 @@ use crate::jobs::lock;
 const NAME: &str = "results.jsonl";
 
 /// The results of a study's folder, opened for adding to them.
-pub struct ResultLog {
+pub(crate) struct ResultLog {
     path: PathBuf,
     file: Mutex<File>,
     kept: HashMap<String, Unit>,
@@ -34,7 +34,7 @@ impl ResultLog {
     ///
     /// # Errors
     /// A folder that cannot be read or written, or that another program writes to.
-    pub fn open(folder: &Path) -> Result<Self> {
+    pub(crate) fn open(folder: &Path) -> Result<Self> {
         std::fs::create_dir_all(folder).map_err(|source| Error::Write { path: folder.to_owned(), source })?;
         let lock = lock_folder(folder)?;
         let path = folder.join(NAME);
@@ -58,7 +58,7 @@ impl ResultLog {
     }
 
     /// The unit that is kept under this key.
-    pub fn get(&self, key: &str) -> Option<&Unit> {
+    pub(crate) fn get(&self, key: &str) -> Option<&Unit> {
         self.kept.get(key)
     }
 
@@ -66,7 +66,7 @@ impl ResultLog {
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub fn add(&self, unit: &Unit) -> Result<()> {
+    pub(crate) fn add(&self, unit: &Unit) -> Result<()> {
         let mut line = serde_json::to_vec(unit).map_err(|error| Error::Request(error.to_string()))?;
         line.push(b'\n');
         let mut file = lock(&self.file);
@@ -113,7 +113,7 @@ fn read(path: &Path, text: &str) -> (HashMap<String, Unit>, Vec<String>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sightline_core::study::point::Point;
+    use sightline_study::point::Point;
 
     fn unit(key: &str) -> Unit {
         Unit {

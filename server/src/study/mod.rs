@@ -10,14 +10,16 @@
 //! A unit is one configuration at one point of the grid in one world. Its line is kept under a key of all that decides
 //! it (`core::study::plan`), so that the same folder serves other grids, seeds and configurations later.
 
-pub mod conduct;
-pub mod log;
-pub mod tables;
-pub mod figure;
-pub mod step_figure;
-pub mod drawn;
-pub mod report;
-pub mod kept;
-pub mod shelf;
+pub(crate) mod order;
+pub(crate) mod execute;
+pub(crate) mod log;
+pub(crate) mod tables;
+pub(crate) mod figure;
+pub(crate) mod step_figure;
+pub mod chart;
+pub(crate) mod report;
+pub(crate) mod saved;
+pub(crate) mod jobs;
 
-pub use conduct::{Order, Outcome, Progress, Seeds, carry_out};
+pub use execute::{Outcome, Progress, carry_out};
+pub use order::{Order, Seeds};

@@ -3,15 +3,18 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use sightline_core::error::{Error, Result};
-use sightline_core::study::plan::{Plan, Unit, tracker_version};
-use sightline_core::traverse::files::write_atomically;
+use sightline_geometry::error::{Error, Result};
+use sightline_recordings::files::write_atomically;
+use sightline_rover::version::tracker_version;
+use sightline_study::plan::{Plan, Unit};
 
-use super::conduct::Order;
 use super::figure::{Figure, Series, SeriesPoint, figures, series};
+use super::order::Order;
+use super::step_figure::checkout;
+use crate::version::VERSION;
 
 /// The name of the file.
-pub const NAME: &str = "report.html";
+pub(crate) const NAME: &str = "report.html";
 
 const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;max-width:1000px;margin:2rem auto;padding:0 1rem;color:#222;\
 background:#fff}h1{font-size:1.5rem}h2{font-size:1.15rem;margin-top:2rem}figure{margin:1rem 0}figure svg{max-width:100%;\
@@ -23,10 +26,11 @@ background:#f5f5f5;padding:.1rem .3rem;overflow-wrap:anywhere;white-space:pre-wr
 ///
 /// # Errors
 /// A folder that cannot be written, or a figure that cannot be drawn.
-pub fn write(folder: &Path, order: &Order, units: &[Unit]) -> Result<String> {
+pub(crate) fn write(folder: &Path, order: &Order, units: &[Unit]) -> Result<String> {
     let path = folder.join(NAME);
-    let figures = figures(&order.plan, units)
-        .map_err(|problem| Error::format(&path, format!("a figure: {problem}")))?;
+    let draw = if order.plan.study.is_by_step { checkout } else { figures };
+    let figures =
+        draw(&order.plan, units).map_err(|problem| Error::format(&path, format!("a figure: {problem}")))?;
     for figure in &figures {
         write_atomically(&folder.join(format!("{}.svg", figure.name)), figure.svg.as_bytes())?;
     }
@@ -211,14 +215,15 @@ fn step_table(plan: &Plan, units: &[Unit]) -> String {
     text
 }
 
-fn is_at(value: &sightline_core::study::paper::PaperValue, column: &str, position: usize) -> bool {
+fn is_at(value: &sightline_study::paper::PaperValue, column: &str, position: usize) -> bool {
     value.column == column && value.at == position as f64
 }
 
 /// The exact settings, and how to do the same again.
 fn settings(order: &Order) -> String {
     let mut text = format!(
-        "<h2>Settings</h2>\n<p>Tracker {}. Each configuration changes the defaults so:</p>\n<table>",
+        "<h2>Settings</h2>\n<p>sightline {}, tracker {}. Each configuration changes the defaults so:</p>\n<table>",
+        escape(VERSION),
         escape(&tracker_version())
     );
     for configuration in &order.plan.configurations {

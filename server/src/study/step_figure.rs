@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use sightline_core::study::plan::{Plan, Unit};
-use sightline_core::study::row::{Row, rows};
+use sightline_study::plan::{Plan, Unit};
+use sightline_study::row::{Row, rows};
 
-use super::drawn::{Chart, Line};
+use super::chart::{Chart, Line};
 use super::figure::{Figure, axis};
 
 /// Columns of a checkout over the rover's positions: each configuration, the truth of the staged drive, the paper.

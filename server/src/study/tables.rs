@@ -14,16 +14,17 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::schema::parser::parse_message_type;
 use serde_json::Value;
-use sightline_core::error::{Error, Result};
-use sightline_core::study::plan::Unit;
-use sightline_core::study::row::Row;
-use sightline_core::traverse::files::write_atomically;
+use sightline_api::table;
+use sightline_geometry::error::{Error, Result};
+use sightline_recordings::files::write_atomically;
+use sightline_study::plan::Unit;
+use sightline_study::row::Row;
 
 /// Writes `rows.csv`, `rows.parquet` and `runs.csv`.
 ///
 /// # Errors
 /// A folder that cannot be written.
-pub fn write(folder: &Path, rows: &[Row], units: &[Unit]) -> Result<()> {
+pub(crate) fn write(folder: &Path, rows: &[Row], units: &[Unit]) -> Result<()> {
     let table = Table::of(rows);
     write_atomically(&folder.join("rows.csv"), table.csv().as_bytes())?;
     let path = folder.join("rows.parquet");
@@ -33,7 +34,7 @@ pub fn write(folder: &Path, rows: &[Row], units: &[Unit]) -> Result<()> {
 }
 
 /// The rows as CSV, for the standard output.
-pub fn rows_csv(rows: &[Row]) -> String {
+pub(crate) fn rows_csv(rows: &[Row]) -> String {
     Table::of(rows).csv()
 }
 
@@ -71,7 +72,7 @@ impl Table {
     }
 
     fn csv(&self) -> String {
-        let mut text = self.columns.iter().map(|(name, _)| field(name)).collect::<Vec<_>>().join(",");
+        let mut text = self.columns.iter().map(|(name, _)| table::cell(name)).collect::<Vec<_>>().join(",");
         text.push('\n');
         for row in 0..self.rows {
             let line: Vec<String> = self.columns.iter().map(|(_, values)| cell(&values[row])).collect();
@@ -144,16 +145,7 @@ fn word(value: &Value) -> String {
 }
 
 fn cell(value: &Value) -> String {
-    if value.is_null() { String::new() } else { field(&word(value)) }
-}
-
-/// A field of a CSV table, in quotes where it must be.
-fn field(text: &str) -> String {
-    if text.contains([',', '"', '\n']) {
-        format!("\"{}\"", text.replace('"', "\"\""))
-    } else {
-        text.to_owned()
-    }
+    if value.is_null() { String::new() } else { table::cell(&word(value)) }
 }
 
 /// One line a target.

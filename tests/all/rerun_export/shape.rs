@@ -2,15 +2,15 @@
 
 use std::sync::Arc;
 
-use sightline_core::frames::{Pixel, Point3};
-use sightline_core::locate::Evidence;
-use sightline_core::locate::features::evidence::Table;
-use sightline_core::locate::shape::Method;
-use sightline_core::locate::shape_tracker::ShapeEvidence;
-use sightline_core::locate::shape_tracker::drape::Draped;
-use sightline_core::locate::shape_tracker::evidence::{Check, MESH_COLUMNS, Registered};
-use sightline_core::locate::shape_tracker::surface::SurfaceSeen;
-use sightline_core::trace::StepTrace;
+use sightline_geometry::frames::{Pixel, Point3};
+use sightline_track::locate::features::evidence::Table;
+use sightline_track::locate::shape_tracker::ShapeEvidence;
+use sightline_track::locate::shape_tracker::drape::Draped;
+use sightline_track::locate::shape_tracker::evidence::{MESH_COLUMNS, Registered};
+use sightline_track::locate::shape_tracker::surface::SurfaceSeen;
+use sightline_track::locate::{Evidence, gate_kinds};
+use sightline_track::trace::StepTrace;
+use sightline_vision::registration::Method;
 
 use super::{FIXTURE, MISSING, exported_as_promised};
 
@@ -22,12 +22,8 @@ fn picture(columns: u32, first: f32) -> Table {
 
 /// Whatever the surfaces give a registration.
 fn registered() -> Registered {
-    let check = |name: &str, value: f64, limit: f64| Check {
-        name: name.to_owned(),
-        unit: String::new(),
-        value: Some(value),
-        limit,
-        at_least: false,
+    let check = |name: &str, value: f64, limit: f64| {
+        gate_kinds().into_iter().find(|kind| kind.name == name).unwrap().judge(Some(value), limit)
     };
     Registered {
         to_step: 0,
@@ -63,7 +59,7 @@ fn registered() -> Registered {
 /// A surface of two by two pixels, registered with a sensor of four by four and found again at a hand-off.
 fn by_shape(trace: &StepTrace) -> StepTrace {
     let mut trace = trace.clone();
-    let (is_pick, Some(located)) = (trace.predict.is_none(), trace.locate.as_mut()) else { return trace };
+    let (is_pick, Some(located)) = (trace.prediction().is_none(), trace.located_mut()) else { return trace };
     let mut evidence = ShapeEvidence { why: "made up".to_owned(), ..ShapeEvidence::default() };
     evidence.surface = Some(SurfaceSeen {
         size: [2, 2],

@@ -12,8 +12,7 @@ use wasm_bindgen::JsCast;
 use wasm_bindgen::prelude::*;
 use web_sys::{Document, Element, HtmlElement, HtmlInputElement, HtmlTextAreaElement, KeyboardEvent};
 
-use super::mirror::request;
-use super::outline::{Entry, Tag};
+use crate::access::outline::{Entry, Tag};
 
 /// The element in which the mirror lies.
 const ROOT: &str = "sightline-mirror";
@@ -24,15 +23,27 @@ const NUMBER: &str = "data-node";
 
 thread_local! {
     static DOM: RefCell<Option<Dom>> = const { RefCell::new(None) };
+    /// What was done to elements since the last frame.
+    static REQUESTED: RefCell<Vec<Event>> = const { RefCell::new(Vec::new()) };
+}
+
+/// Passes on what was done to an element; the caller wakes the page.
+fn request(event: Event) {
+    REQUESTED.with_borrow_mut(|events| events.push(event));
+}
+
+/// What was done to elements since the last frame.
+pub(crate) fn take_requests() -> Vec<Event> {
+    REQUESTED.take()
 }
 
 /// Begins the mirror; the page works all the same where the document refuses it.
-pub(super) fn begin(context: &egui::Context) {
+pub(crate) fn begin(context: &egui::Context) {
     DOM.with_borrow_mut(|dom| *dom = Dom::begin(context).ok());
 }
 
 /// Makes the elements what `entries` say; `focus` is the number of the node that has the keyboard.
-pub(super) fn show(entries: &[Entry], focus: u64) {
+pub(crate) fn show(entries: &[Entry], focus: u64) {
     DOM.with_borrow_mut(|dom| {
         if let Some(dom) = dom {
             // An element that the browser refuses is missing for the screen reader; the canvas is not touched.

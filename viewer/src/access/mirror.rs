@@ -1,20 +1,8 @@
 //! The plugin of egui that hands the tree of each frame to the document, and the document's requests to egui.
 
-use std::cell::RefCell;
+use egui::{Context, FullOutput, Plugin, RawInput};
 
-use egui::{Context, Event, FullOutput, Plugin, RawInput};
-
-use super::{dom, outline};
-
-thread_local! {
-    /// What was done to elements since the last frame.
-    static REQUESTED: RefCell<Vec<Event>> = const { RefCell::new(Vec::new()) };
-}
-
-/// Passes on what was done to an element; the caller wakes the page.
-pub(super) fn request(event: Event) {
-    REQUESTED.with_borrow_mut(|events| events.push(event));
-}
+use crate::access::{dom, outline};
 
 /// Keeps the document's elements in step with what egui shows.
 #[derive(Default)]
@@ -31,7 +19,7 @@ impl Plugin for Mirror {
     }
 
     fn input_hook(&mut self, _context: &Context, input: &mut RawInput) {
-        REQUESTED.with_borrow_mut(|events| input.events.append(events));
+        input.events.extend(dom::take_requests());
     }
 
     fn output_hook(&mut self, context: &Context, output: &mut FullOutput) {

@@ -14,4 +14,5 @@
 pub(crate) mod dom;
 #[cfg(target_arch = "wasm32")]
 pub(crate) mod mirror;
-pub mod outline;
+#[cfg(any(test, target_arch = "wasm32"))]
+pub(crate) mod outline;

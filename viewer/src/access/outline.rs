@@ -12,7 +12,7 @@ const LONGEST: usize = 2_000;
 
 /// Which element of HTML an entry becomes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Tag {
+pub(crate) enum Tag {
     /// A box or a control that the page draws itself.
     Plain,
     /// A field for a line of text.
@@ -27,7 +27,8 @@ pub enum Tag {
 
 impl Tag {
     /// The name of the element, and the kind of input where it is one.
-    pub const fn element(self) -> (&'static str, Option<&'static str>) {
+    #[cfg(target_arch = "wasm32")]
+    pub(crate) const fn element(self) -> (&'static str, Option<&'static str>) {
         match self {
             Self::Plain => ("div", None),
             Self::TextField | Self::NumberField => ("input", Some("text")),
@@ -39,7 +40,7 @@ impl Tag {
 
 /// An element of the mirror.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Entry {
+pub(crate) struct Entry {
     /// AccessKit's number of the node.
     pub id: u64,
     /// The entry in which it lies; none for what lies in the page itself.
@@ -61,7 +62,7 @@ pub struct Entry {
 }
 
 /// The entries of a tree, every parent before its children; `zoom` is CSS px per point.
-pub fn outline(update: &TreeUpdate, zoom: f32) -> Vec<Entry> {
+pub(crate) fn outline(update: &TreeUpdate, zoom: f32) -> Vec<Entry> {
     let nodes: HashMap<NodeId, &Node> = update.nodes.iter().map(|(id, node)| (*id, node)).collect();
     let mut entries = Vec::new();
     if let Some(tree) = &update.tree {

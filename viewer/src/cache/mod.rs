@@ -10,15 +10,16 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
-use sightline_core::session::wire::{Problem, StopDetail};
-use sightline_core::trace::{ArrayName, StepTrace};
+use sightline_api::wire::{Problem, StopDetail};
+use sightline_track::locate::template::history::AgainstEarlier;
+use sightline_track::trace::{ArrayName, StepTrace};
 
-pub use self::names::{Eye, Key, StepKey};
-use crate::raster::Raster;
+pub(crate) use self::names::{Eye, Key, StepKey};
+use crate::drawing::raster::Raster;
 use crate::tables::Table;
 
 /// Memory that loaded things may take, bytes.
-pub const LIMIT_BYTES: usize = 256 << 20;
+pub(crate) const LIMIT_BYTES: usize = 256 << 20;
 
 /// What a step's record counts as, bytes: it is small beside its images.
 const TRACE_BYTES: usize = 32 << 10;
@@ -39,6 +40,8 @@ pub enum Item {
     Table(Arc<Table>),
     /// Of [`Key::Arrays`]: rasters and tables.
     Arrays(BTreeMap<ArrayName, Item>),
+    /// Of [`Key::EarlierTemplates`].
+    EarlierTemplates(Vec<AgainstEarlier>),
 }
 
 impl Item {
@@ -46,7 +49,7 @@ impl Item {
         match self {
             Self::Raster(raster) => vec![raster.as_ref()],
             Self::Arrays(all) => all.values().flat_map(Self::rasters).collect(),
-            Self::Stop(_) | Self::Trace(_) | Self::Table(_) => Vec::new(),
+            Self::Stop(_) | Self::Trace(_) | Self::Table(_) | Self::EarlierTemplates(_) => Vec::new(),
         }
     }
 
@@ -57,12 +60,13 @@ impl Item {
             Self::Raster(raster) => raster.bytes(),
             Self::Table(table) => table.bytes(),
             Self::Arrays(all) => all.values().map(Self::bytes).sum(),
+            Self::EarlierTemplates(all) => size_of_val(all.as_slice()),
         }
     }
 }
 
 /// How far something is.
-pub enum Slot<'a, T> {
+pub enum Slot<'a, T: ?Sized> {
     /// Not asked for.
     Absent,
     /// Asked for.
@@ -73,7 +77,7 @@ pub enum Slot<'a, T> {
     Failed(&'a Problem),
 }
 
-impl<'a, T> Slot<'a, T> {
+impl<'a, T: ?Sized> Slot<'a, T> {
     /// What is there, if it is.
     pub fn ready(self) -> Option<&'a T> {
         match self {
@@ -209,6 +213,16 @@ impl Cache {
         })
     }
 
+    /// The view of a step against the earlier templates of its run.
+    pub fn earlier_templates(&self, key: &StepKey) -> Slot<'_, [AgainstEarlier]> {
+        match self.slot(&Key::EarlierTemplates(key.clone())) {
+            Slot::Ready(Item::EarlierTemplates(all)) => Slot::Ready(all),
+            Slot::Ready(_) | Slot::Absent => Slot::Absent,
+            Slot::Loading => Slot::Loading,
+            Slot::Failed(problem) => Slot::Failed(problem),
+        }
+    }
+
     /// All that have a texture.
     pub fn rasters(&self) -> impl Iterator<Item = &Raster> {
         let ready = self.entries.values().filter_map(|entry| match entry {
@@ -218,17 +232,12 @@ impl Cache {
         ready.flat_map(Item::rasters)
     }
 
-    /// Under which name something is kept or comes: an array that was not asked for by itself, with all those of its step.
+    /// The name under which something is kept or loaded: an array comes with all arrays of its step.
     fn holder<'a>(&self, key: &'a Key) -> Cow<'a, Key> {
-        if let Key::Array(step, _) = key
-            && !self.entries.contains_key(key)
-        {
-            let all = Key::Arrays(step.clone());
-            if self.entries.contains_key(&all) {
-                return Cow::Owned(all);
-            }
+        match key {
+            Key::Array(step, _) if !self.entries.contains_key(key) => Cow::Owned(Key::Arrays(step.clone())),
+            _ => Cow::Borrowed(key),
         }
-        Cow::Borrowed(key)
     }
 
     fn slot(&self, key: &Key) -> Slot<'_, Item> {

@@ -1,6 +1,7 @@
 //! The names of what can be loaded.
 
-use sightline_core::trace::ArrayName;
+pub(crate) use sightline_api::location::AtStep as StepKey;
+use sightline_track::trace::ArrayName;
 
 /// One of the two images of a stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -19,19 +20,6 @@ impl Eye {
             Self::Right => "right",
         }
     }
-}
-
-/// A step of a run of a target of a session.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct StepKey {
-    /// The session.
-    pub session: String,
-    /// The target's number.
-    pub target: usize,
-    /// The run's number.
-    pub run: usize,
-    /// The stop.
-    pub step: usize,
 }
 
 /// The name of something that can be loaded.
@@ -59,4 +47,6 @@ pub enum Key {
     Array(StepKey, ArrayName),
     /// All arrays to which a step came.
     Arrays(StepKey),
+    /// The view of a step against the earlier templates of its run.
+    EarlierTemplates(StepKey),
 }

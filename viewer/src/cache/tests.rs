@@ -1,6 +1,6 @@
 //! What the cache keeps, asks for and forgets.
 
-use super::*;
+use crate::cache::*;
 
 fn key(step: usize) -> Key {
     Key::Image { traverse: "t".to_owned(), step, eye: Eye::Left }
@@ -16,9 +16,9 @@ fn at_most(n: usize) -> impl FnMut(&Key) -> bool {
 }
 
 fn raster(side: u32) -> Item {
-    let values = sightline_core::image::GrayImage::new(side, side);
-    let bytes = sightline_core::image::npy::encode(&values).unwrap();
-    Item::Raster(Arc::new(Raster::from_npy(&egui::Context::default(), ArrayName::Surface, &bytes).unwrap()))
+    let values = sightline_vision::image::GrayImage::new(side, side);
+    let bytes = sightline_vision::image::npy::encode(&values).unwrap();
+    Item::Raster(Arc::new(Raster::from_npy(&egui::Context::default(), ArrayName::SURFACE, &bytes).unwrap()))
 }
 
 fn problem(status: u16) -> Problem {
@@ -75,15 +75,15 @@ fn memory_keeps_its_limit_and_what_is_wanted_stays() {
 }
 
 #[test]
-fn arrays_come_with_their_step_and_one_alone_that_is_wanted_first() {
+fn an_array_comes_with_all_arrays_of_its_step() {
     let mut cache = Cache::default();
     let step = |step: usize| StepKey { session: "s1".to_owned(), target: 0, run: 0, step };
-    let (all, one) = (Key::Arrays(step(1)), Key::Array(step(1), ArrayName::Surface));
-    let other = Key::Array(step(1), ArrayName::Matched);
+    let (all, one) = (Key::Arrays(step(1)), Key::Array(step(1), ArrayName::SURFACE));
+    let other = Key::Array(step(1), ArrayName::MATCHED);
     assert_eq!(cache.want(&[all.clone(), all.clone()], |_| true, 0.0), vec![all.clone()], "once");
     assert!(cache.want(std::slice::from_ref(&one), |_| true, 0.0).is_empty(), "it comes with the others");
     assert!(matches!(cache.raster(&one), Slot::Loading));
-    let arrays = [(ArrayName::Surface, raster(4))].into();
+    let arrays = [(ArrayName::SURFACE, raster(4))].into();
     cache.arrived(all.clone(), Ok(Item::Arrays(arrays)), 0.0);
     assert_eq!(cache.raster(&one).ready().unwrap().size(), [4, 4]);
     assert!(matches!(cache.raster(&other), Slot::Absent), "the step did not come to it");
@@ -96,5 +96,5 @@ fn arrays_come_with_their_step_and_one_alone_that_is_wanted_first() {
     cache.want(&[], |_| true, 0.0);
     cache.evict(0);
     assert!(matches!(cache.raster(&one), Slot::Absent));
-    assert_eq!(cache.want(std::slice::from_ref(&one), |_| true, 0.0), vec![one], "by itself");
+    assert_eq!(cache.want(std::slice::from_ref(&one), |_| true, 0.0), vec![all], "with the others");
 }

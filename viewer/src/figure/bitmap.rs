@@ -8,11 +8,11 @@ use tiny_skia::{
     Shader, SpreadMode, Transform,
 };
 
-use super::faces::Faces;
-use super::{Figure, Form, Ink, Words};
+use crate::figure::faces::Faces;
+use crate::figure::{Figure, Form, Ink, Words};
 
 /// The most pixels of a picture: four bytes each while it is drawn.
-pub const PIXELS_MAX: f64 = 48e6;
+pub(crate) const PIXELS_MAX: f64 = 48e6;
 
 /// How far a circle's handles reach: of a quarter that is drawn as one Bézier curve.
 const QUARTER: f32 = 0.552_284_8;
@@ -24,7 +24,7 @@ const LEAN: f32 = 0.2;
 ///
 /// # Errors
 /// A sentence when there would be too many pixels.
-pub fn size_px(figure: &Figure, scale: u8) -> Result<[u32; 2], String> {
+pub(crate) fn size_px(figure: &Figure, scale: u8) -> Result<[u32; 2], String> {
     let side = |points: f32| (f64::from(points) * f64::from(scale)).round().max(1.0);
     let [width, height] = [side(figure.size.x), side(figure.size.y)];
     if width * height > PIXELS_MAX {
@@ -45,7 +45,7 @@ pub fn size_px(figure: &Figure, scale: u8) -> Result<[u32; 2], String> {
 ///
 /// # Errors
 /// A sentence when it would be too large.
-pub fn png(figure: &Figure, scale: u8, fonts: &FontDefinitions) -> Result<Vec<u8>, String> {
+pub(crate) fn png(figure: &Figure, scale: u8, fonts: &FontDefinitions) -> Result<Vec<u8>, String> {
     let pixmap = drawn(figure, scale, fonts)?;
     let pixels: Vec<u8> =
         pixmap.pixels().iter().flat_map(|pixel| [pixel.red(), pixel.green(), pixel.blue()]).collect();
@@ -57,7 +57,7 @@ pub fn png(figure: &Figure, scale: u8, fonts: &FontDefinitions) -> Result<Vec<u8
 ///
 /// # Errors
 /// A sentence when they cannot be encoded.
-pub fn png_of(pixels: &ColorImage) -> Result<Vec<u8>, String> {
+pub(crate) fn png_of(pixels: &ColorImage) -> Result<Vec<u8>, String> {
     let [width, height] = pixels.size.map(|side| side as u32);
     let is_opaque = pixels.pixels.iter().all(|colour| colour.a() == u8::MAX);
     let colours = pixels.pixels.iter().map(Color32::to_srgba_unmultiplied);

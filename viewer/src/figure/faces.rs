@@ -7,7 +7,7 @@ use egui::{FontDefinitions, FontFamily};
 use tiny_skia::{Path, PathBuilder};
 
 /// The fonts of every family, in the order in which a letter is looked for.
-pub(super) struct Faces<'a> {
+pub(crate) struct Faces<'a> {
     families: HashMap<FontFamily, Vec<Face<'a>>>,
     outlines: HashMap<(FontFamily, char), Option<Path>>,
 }
@@ -20,7 +20,7 @@ struct Face<'a> {
 
 impl<'a> Faces<'a> {
     /// The fonts of these definitions; one that cannot be read is left out.
-    pub(super) fn new(definitions: &'a FontDefinitions) -> Self {
+    pub(crate) fn new(definitions: &'a FontDefinitions) -> Self {
         let face = |name: &String| {
             let data = definitions.font_data.get(name)?;
             let bytes: &[u8] = data.font.as_ref().as_ref();
@@ -35,7 +35,7 @@ impl<'a> Faces<'a> {
     }
 
     /// The outline of a letter one point large, y down from the baseline; none for a blank.
-    pub(super) fn outline(&mut self, family: &FontFamily, letter: char) -> Option<&Path> {
+    pub(crate) fn outline(&mut self, family: &FontFamily, letter: char) -> Option<&Path> {
         let key = (family.clone(), letter);
         let families = &self.families;
         self.outlines.entry(key).or_insert_with(|| outline(families.get(family)?, letter)).as_ref()

@@ -11,16 +11,18 @@
 //! | `svg` | a figure as a self-contained SVG file |
 //! | `bitmap` | a figure as an opaque PNG file |
 //! | `faces` | the outlines of the letters |
-//! | `take` | the figure of a panel: on the screen or not, with a title or without; its file name |
+//! | `wish` | what is wanted of a figure |
+//! | `save` | the figure of a panel: on the screen or not, with a title or without; its file name |
 //!
 //! The figure is made of the layer in which panels are painted: menus and tips that lie above it are no part of it.
 
-pub mod bitmap;
+pub(crate) mod bitmap;
 mod faces;
-pub mod shapes;
-pub mod svg;
-pub mod take;
-pub mod words;
+pub(crate) mod shapes;
+pub(crate) mod save;
+pub(crate) mod svg;
+pub(crate) mod wish;
+pub(crate) mod words;
 
 use std::sync::Arc;
 
@@ -28,7 +30,7 @@ use egui::{Color32, ColorImage, FontFamily, Pos2, Rect, Stroke, Vec2};
 
 /// What is painted of a panel, in points from the figure's upper left corner.
 #[derive(Clone, Debug)]
-pub struct Figure {
+pub(crate) struct Figure {
     /// Width and height, points.
     pub size: Vec2,
     /// What it is called.
@@ -45,7 +47,7 @@ pub struct Figure {
 
 /// One shape with the rectangle to which it is cut.
 #[derive(Clone, Debug)]
-pub struct Piece {
+pub(crate) struct Piece {
     /// Where it may be seen.
     pub clip: Rect,
     /// What it is.
@@ -54,7 +56,7 @@ pub struct Piece {
 
 /// A shape.
 #[derive(Clone, Debug)]
-pub enum Ink {
+pub(crate) enum Ink {
     /// An outline, filled or drawn.
     Area {
         /// Its form.
@@ -77,7 +79,7 @@ pub enum Ink {
 
 /// The form of an outline.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Form {
+pub(crate) enum Form {
     /// A rectangle with the radii of its corners: upper left, upper right, lower right, lower left.
     Rect(Rect, [f32; 4]),
     /// An ellipse: its middle, its half axes, and by how much it is turned clockwise, rad.
@@ -90,7 +92,7 @@ pub enum Form {
 
 /// Words on one line in one look.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Words {
+pub(crate) struct Words {
     /// What they say.
     pub text: String,
     /// Where the baseline begins, points.
@@ -149,7 +151,7 @@ impl Ink {
     }
 
     /// A box around it.
-    pub fn bounds(&self) -> Rect {
+    pub(crate) fn bounds(&self) -> Rect {
         match self {
             Self::Area { form, stroke, .. } => form.bounds().expand(stroke.width),
             Self::Words(words) => {

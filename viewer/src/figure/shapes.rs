@@ -12,16 +12,16 @@ use egui::epaint::{
 };
 use egui::{Color32, ColorImage, Pos2, Rect, Shape, Stroke, TextureId, Vec2, pos2, vec2};
 
-use super::{Figure, Form, Ink, Piece, words};
+use crate::figure::{Figure, Form, Ink, Piece, words};
 
 /// Finds the pixels of a texture.
-pub type Textures<'a> = &'a dyn Fn(TextureId) -> Option<ColorImage>;
+pub(crate) type Textures<'a> = &'a dyn Fn(TextureId) -> Option<ColorImage>;
 
 /// Widest line that closes the seam between two triangles, points.
 const SEAM: f32 = 0.5;
 
 /// Gathers inks.
-pub struct Gatherer<'a> {
+pub(crate) struct Gatherer<'a> {
     textures: Textures<'a>,
     scale: f32,
     pieces: Vec<Piece>,
@@ -31,7 +31,7 @@ pub struct Gatherer<'a> {
 }
 
 /// What was painted inside `frame`; `scale` is how many pixels a point will have.
-pub fn figure<'s>(
+pub(crate) fn figure<'s>(
     shapes: impl IntoIterator<Item = &'s ClippedShape>,
     frame: Rect,
     scale: f32,

@@ -10,7 +10,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use egui::{Color32, FontFamily, Pos2, Rect, Stroke};
 
-use super::{Figure, Form, Ink, Words};
+use crate::figure::{Figure, Form, Ink, Words};
 
 /// Fonts that stand in where the page's own are missing.
 const PROPORTIONAL: &str = "Ubuntu, 'Ubuntu Light', 'DejaVu Sans', Verdana, sans-serif";
@@ -20,7 +20,7 @@ const MONOSPACE: &str = "Hack, 'DejaVu Sans Mono', Menlo, Consolas, monospace";
 ///
 /// # Errors
 /// A sentence when a picture cannot be encoded.
-pub fn text(figure: &Figure) -> Result<String, String> {
+pub(crate) fn text(figure: &Figure) -> Result<String, String> {
     let [width, height] = [figure.size.x, figure.size.y].map(number);
     let mut body = String::new();
     let mut clips: HashMap<[u32; 4], usize> = HashMap::new();

@@ -4,7 +4,7 @@ use egui::epaint::TextShape;
 use egui::epaint::text::{Glyph, PlacedRow, TextFormat};
 use egui::{Color32, Stroke, Vec2, vec2};
 
-use super::{Form, Ink, Words};
+use crate::figure::{Form, Ink, Words};
 
 /// Letters of one look that stand beside each other.
 struct Run<'a> {
@@ -13,7 +13,7 @@ struct Run<'a> {
 }
 
 /// The words of a text with what underlines them and lies behind them.
-pub fn inks(shape: &TextShape) -> Vec<Ink> {
+pub(crate) fn inks(shape: &TextShape) -> Vec<Ink> {
     let mut characters = shape.galley.job.text.char_indices().peekable();
     let mut inks = Vec::new();
     for row in &shape.galley.rows {

@@ -2,178 +2,44 @@
 //!
 //! | file | what it does |
 //! |---|---|
+//! | `command` | what can be asked of the arrangement |
+//! | `left_image` | where the left image is on the screen |
 //! | `presets` | the seven arrangements that come with the page, and the one for narrow windows |
 //! | `workspace` | the arrangement in use: presets, the panel with the keyboard, the one that fills the page; kept across reloads |
 
-pub mod presets;
-pub mod workspace;
+pub(crate) mod command;
+pub(crate) mod left_image;
+pub(crate) mod presets;
+pub(crate) mod workspace;
 
-use egui::{Color32, Frame, Margin, RichText, Stroke, Ui, Visuals, WidgetText};
+use egui::{Color32, Frame, RichText, Stroke, Ui, Visuals, WidgetText};
 use egui_tiles::{Behavior, SimplificationOptions, TabState, TileId, Tiles, UiResponse};
-use serde::{Deserialize, Serialize};
 
-use self::workspace::LayoutCommand;
+use self::command::LayoutCommand;
+use self::left_image::{LeftImage, take_left_image};
 use crate::command::Command;
+use crate::pane::Pane;
 use crate::panels;
 use crate::state::State;
-use crate::state::messages::Weight;
 use crate::theme;
-use crate::view2d::Transform;
 
-/// A panel that can be dragged around.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Pane {
-    /// Targets and runs.
-    Targets,
-    /// Settings.
-    Settings,
-    /// The left image.
-    Left,
-    /// The right image.
-    Right,
-    /// The template strip.
-    Strip,
-    /// The template's history.
-    History,
-    /// The surface of scores.
-    Surface,
-    /// What the feature tracker saw.
-    Features,
-    /// What the shape tracker saw.
-    Shape,
-    /// The error budget.
-    Budget,
-    /// The validation experiments.
-    Studies,
-    /// The stereo scores along the epipolar curve.
-    StereoProfile,
-    /// The map.
-    Map,
-    /// Plots over steps.
-    Plots,
-    /// The growing tolerances.
-    Tolerances,
-    /// The gates.
-    Gates,
-    /// The state machine of loss.
-    Machine,
-    /// The selected stage's record.
-    Inspector,
-    /// Messages.
-    Messages,
-    /// The table of runs with their metrics.
-    Runs,
-    /// Whether the covariances hold.
-    Uncertainty,
-    /// Why a step came out as it did.
-    Why,
-    /// Notes.
-    Notes,
-    /// Breakpoints and expressions.
-    Breakpoints,
-}
-
-impl Pane {
-    /// All of them.
-    pub const ALL: [Self; 24] = [
-        Self::Targets,
-        Self::Settings,
-        Self::Left,
-        Self::Right,
-        Self::Features,
-        Self::Shape,
-        Self::Budget,
-        Self::Studies,
-        Self::Strip,
-        Self::History,
-        Self::Surface,
-        Self::StereoProfile,
-        Self::Map,
-        Self::Plots,
-        Self::Tolerances,
-        Self::Gates,
-        Self::Machine,
-        Self::Inspector,
-        Self::Messages,
-        Self::Runs,
-        Self::Uncertainty,
-        Self::Why,
-        Self::Notes,
-        Self::Breakpoints,
-    ];
-
-    /// Its title.
-    pub const fn title(self) -> &'static str {
-        match self {
-            Self::Targets => "Targets and runs",
-            Self::Settings => "Settings",
-            Self::Left => "Left image",
-            Self::Right => "Right image",
-            Self::Budget => "Error budget",
-            Self::Studies => "Studies",
-            Self::Strip => "Template strip",
-            Self::History => "Template history",
-            Self::Surface => "Match scores",
-            Self::Features => "Features",
-            Self::Shape => "Shape",
-            Self::StereoProfile => "Stereo scores",
-            Self::Map => "Map, site frame",
-            Self::Plots => "Over the steps",
-            Self::Tolerances => "Tolerances",
-            Self::Gates => "Gates",
-            Self::Machine => "State machine",
-            Self::Inspector => "Inspector",
-            Self::Messages => "Messages",
-            Self::Runs => "Runs",
-            Self::Uncertainty => "Uncertainty",
-            Self::Why => "Why",
-            Self::Notes => "Notes",
-            Self::Breakpoints => "Breakpoints",
-        }
-    }
-}
-
-/// Where the left image is on the screen, for whoever needs to click into it.
-pub type LeftImage = Option<(Transform, [u32; 2])>;
-
-/// Shows one panel.
-pub fn show_pane(ui: &mut Ui, pane: Pane, state: &State, out: &mut Vec<Command>) -> LeftImage {
+/// Shows one panel: itself, its values as tables, or why there is nothing to show.
+///
+/// Returns where the left image is, if the panel showed it.
+pub(crate) fn show_pane(ui: &mut Ui, pane: Pane, state: &State, out: &mut Vec<Command>) -> LeftImage {
+    let panel = pane.panel();
     if state.is_table(pane) {
-        panels::sheets::show(ui, state, pane, out);
-        return None;
+        panels::sheets::of_panel::show(ui, state, pane, out);
+    } else if let Some(sentence) = panel.missing(state) {
+        panels::missing(ui, pane.about().help, &sentence);
+    } else {
+        panel.show(ui, state, out);
     }
-    match pane {
-        Pane::Left => return panels::images_left::show(ui, state, out),
-        Pane::Targets => panels::targets::show(ui, state, out),
-        Pane::Settings => panels::settings::show(ui, state, out),
-        Pane::Right => panels::image_right::show(ui, state, out),
-        Pane::Strip => panels::strip::show(ui, state, out),
-        Pane::History => panels::history::show(ui, state, out),
-        Pane::Surface => panels::surface::show(ui, state, out),
-        Pane::Features => panels::features::show(ui, state, out),
-        Pane::Shape => panels::shape::show(ui, state, out),
-        Pane::Budget => panels::budget::show(ui, state, out),
-        Pane::Studies => panels::studies::show(ui, state, out),
-        Pane::StereoProfile => panels::stereo_profile::show(ui, state, out),
-        Pane::Map => panels::map::show(ui, state, out),
-        Pane::Plots => panels::plots::show(ui, state, out),
-        Pane::Tolerances => panels::tolerances::show(ui, state, out),
-        Pane::Machine => panels::machine::show(ui, state, out),
-        Pane::Gates => panels::gates::show(ui, state, out),
-        Pane::Inspector => panels::inspector::show(ui, state, out),
-        Pane::Messages => panels::messages::show(ui, state, out),
-        Pane::Runs => panels::runs::show(ui, state, out),
-        Pane::Uncertainty => panels::uncertainty::show(ui, state, out),
-        Pane::Why => panels::why::show(ui, state, out),
-        Pane::Notes => panels::notes::show(ui, state, out),
-        Pane::Breakpoints => panels::breakpoints::show(ui, state, out),
-    }
-    None
+    take_left_image(ui)
 }
 
 /// Shows the panels and gathers their commands.
-pub struct Panels<'a> {
+pub(crate) struct Panels<'a> {
     /// What they show.
     pub state: &'a State,
     /// What they ask for.
@@ -196,7 +62,7 @@ pub struct Panels<'a> {
 
 impl<'a> Panels<'a> {
     /// Shows `state` and puts what is asked for into `out`.
-    pub fn new(state: &'a State, out: &'a mut Vec<Command>) -> Self {
+    pub(crate) fn new(state: &'a State, out: &'a mut Vec<Command>) -> Self {
         let (seen, places, closed) = (Vec::new(), Vec::new(), Vec::new());
         let (left_image, current, maximised) = (None, None, None);
         Self { state, out, left_image, seen, places, current, takes_keyboard: false, closed, maximised }
@@ -204,11 +70,7 @@ impl<'a> Panels<'a> {
 
     /// Shows a panel's contents on its ground, as a region that a screen reader and the keyboard find.
     fn framed(&mut self, ui: &mut Ui, pane: Pane, show: impl FnOnce(&mut Self, &mut Ui)) {
-        let margin = match pane {
-            Pane::Strip | Pane::History => Margin::symmetric(theme::MARGIN, 3),
-            Pane::Left | Pane::Right | Pane::Surface => Margin { left: 4, right: 4, top: 4, bottom: 0 },
-            _ => Margin::same(theme::MARGIN),
-        };
+        let margin = pane.panel().margin();
         let place = ui.max_rect();
         self.places.push((pane, place));
         crate::tour::here(ui.ctx(), pane.title(), place);
@@ -253,7 +115,7 @@ impl<'a> Panels<'a> {
                     self.out.push(Command::Layout(LayoutCommand::Close(pane)));
                 }
                 ui.separator();
-                panels::figure_menu::entries(ui, self.state, pane, self.out);
+                crate::exports::figure_menu::entries(ui, self.state, pane, self.out);
             }
             if !self.closed.is_empty() {
                 ui.separator();
@@ -268,7 +130,7 @@ impl<'a> Panels<'a> {
 }
 
 /// Makes what `ui` holds a region with a name.
-pub fn region(ui: &Ui, name: &str, place: egui::Rect) {
+pub(crate) fn region(ui: &Ui, name: &str, place: egui::Rect) {
     ui.ctx().accesskit_node_builder(ui.unique_id(), |node| {
         node.set_role(egui::Role::Region);
         node.set_label(name);
@@ -288,15 +150,11 @@ impl Behavior<Pane> for Panels<'_> {
     }
 
     fn tab_title_for_pane(&mut self, pane: &Pane) -> WidgetText {
-        let problems = self.state.messages.all().iter().filter(|m| m.weight == Weight::Problem).count();
-        match pane {
-            Pane::Messages if problems > 0 => {
-                theme::title(&format!("Messages ({problems})")).color(theme::lost()).into()
+        match pane.panel().badge(self.state) {
+            Some((count, colour)) => {
+                theme::title(&format!("{} ({count})", pane.title())).color(colour).into()
             }
-            Pane::Settings if !self.state.draft.is_empty() => {
-                theme::title(&format!("Settings ({})", self.state.draft.len())).color(theme::accent()).into()
-            }
-            pane => theme::title(pane.title()).into(),
+            None => theme::title(pane.title()).into(),
         }
     }
 
@@ -329,7 +187,7 @@ impl Behavior<Pane> for Panels<'_> {
         let front = tabs.active.and_then(|tile| tiles.get_pane(&tile)).copied();
         self.menu(ui, front);
         if let Some(pane) = front {
-            panels::sheets::switch(ui, self.state, pane, self.out);
+            panels::sheets::of_panel::switch(ui, self.state, pane, self.out);
         }
     }
 

@@ -6,7 +6,7 @@
 use egui_tiles::{Container, Linear, LinearDir, TileId, Tiles, Tree};
 use serde::{Deserialize, Serialize};
 
-use super::Pane;
+use crate::pane::{Group, Pane};
 
 /// An arrangement by name; Shift and its number calls it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -94,7 +94,7 @@ impl Preset {
 }
 
 /// All panels as the tabs of one group: for windows too narrow for two columns.
-pub fn narrow() -> Tree<Pane> {
+pub(crate) fn narrow() -> Tree<Pane> {
     let mut tiles = Tiles::default();
     let root = build(&mut tiles, &Area::Tabs(&Pane::ALL));
     Tree::new(egui::Id::unique("panels of a narrow window"), root, tiles)
@@ -102,53 +102,28 @@ pub fn narrow() -> Tree<Pane> {
 
 /// A part of an arrangement; numbers are shares of its width or height.
 enum Area {
+    /// The panels whose home is this group.
+    Home(Group),
+    /// These panels.
     Tabs(&'static [Pane]),
     Row(&'static [(Area, f32)]),
     Column(&'static [(Area, f32)]),
 }
 
-use Area::{Column, Row, Tabs};
+use Area::{Column, Home, Row, Tabs};
 
+/// Every panel where it says that its home is.
 const OVERVIEW: Area = Row(&[
-    (Tabs(&[Pane::Targets, Pane::Settings]), 0.17),
+    (Home(Group::Lists), 0.17),
     (
         Column(&[
-            (
-                Row(&[
-                    (Tabs(&[Pane::Left]), 1.0),
-                    (
-                        Tabs(&[
-                            Pane::Right,
-                            Pane::Features,
-                            Pane::Shape,
-                            Pane::Budget,
-                            Pane::Studies,
-                            Pane::Runs,
-                        ]),
-                        1.0,
-                    ),
-                ]),
-                0.53,
-            ),
-            (Tabs(&[Pane::Strip, Pane::History]), 0.175),
-            (
-                Row(&[
-                    (Tabs(&[Pane::Surface, Pane::StereoProfile]), 1.0),
-                    (Tabs(&[Pane::Map]), 1.1),
-                    (Tabs(&[Pane::Plots, Pane::Tolerances, Pane::Uncertainty]), 1.1),
-                ]),
-                0.295,
-            ),
+            (Row(&[(Home(Group::LeftImage), 1.0), (Home(Group::Views), 1.0)]), 0.53),
+            (Home(Group::Strip), 0.175),
+            (Row(&[(Home(Group::Scores), 1.0), (Home(Group::Map), 1.1), (Home(Group::Plots), 1.1)]), 0.295),
         ]),
         0.63,
     ),
-    (
-        Column(&[
-            (Tabs(&[Pane::Gates, Pane::Machine, Pane::Breakpoints]), 0.38),
-            (Tabs(&[Pane::Inspector, Pane::Why, Pane::Notes, Pane::Messages]), 0.62),
-        ]),
-        0.2,
-    ),
+    (Column(&[(Home(Group::Verdict), 0.38), (Home(Group::Details), 0.62)]), 0.2),
 ]);
 
 const MATCH: Area = Row(&[
@@ -241,13 +216,16 @@ const REPORT: Area = Row(&[
 
 fn build(tiles: &mut Tiles<Pane>, area: &Area) -> TileId {
     match area {
-        Tabs(panes) => {
-            let children = panes.iter().map(|&pane| tiles.insert_pane(pane)).collect();
-            tiles.insert_tab_tile(children)
-        }
+        Home(group) => tabs(tiles, &Pane::of_group(*group)),
+        Tabs(panes) => tabs(tiles, panes),
         Row(parts) => linear(tiles, LinearDir::Horizontal, parts),
         Column(parts) => linear(tiles, LinearDir::Vertical, parts),
     }
+}
+
+fn tabs(tiles: &mut Tiles<Pane>, panes: &[Pane]) -> TileId {
+    let children = panes.iter().map(|&pane| tiles.insert_pane(pane)).collect();
+    tiles.insert_tab_tile(children)
 }
 
 fn linear(tiles: &mut Tiles<Pane>, direction: LinearDir, parts: &[(Area, f32)]) -> TileId {

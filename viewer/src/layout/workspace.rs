@@ -5,8 +5,10 @@ use egui::Ui;
 use egui_tiles::{Container, Tile, TileId, Tree};
 use serde::{Deserialize, Serialize};
 
-use super::presets::{Preset, narrow};
-use super::{Pane, Panels, show_pane};
+use crate::layout::command::LayoutCommand;
+use crate::layout::presets::{Preset, narrow};
+use crate::layout::{Panels, show_pane};
+use crate::pane::Pane;
 use crate::theme;
 
 /// Windows narrower than this have one column, points.
@@ -15,23 +17,8 @@ const NARROW: f32 = 900.0;
 /// The version of the kept form.
 const KEPT_FORMAT: u32 = 1;
 
-/// What can be asked of the arrangement.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LayoutCommand {
-    /// Arranges the panels as they came with the page.
-    Use(Preset),
-    /// Brings a panel to the front; one that was closed comes back.
-    Show(Pane),
-    /// Closes a panel.
-    Close(Pane),
-    /// Moves the keyboard by so many panels.
-    Panel(isize),
-    /// Lets the panel with the keyboard fill the page, or gives the others their place back.
-    Maximise(Option<Pane>),
-}
-
 /// The arrangement in use.
-pub struct Workspace {
+pub(crate) struct Workspace {
     tree: Tree<Pane>,
     narrow: Tree<Pane>,
     preset: Preset,
@@ -69,7 +56,7 @@ impl Default for Workspace {
 
 impl Workspace {
     /// The arrangement that was kept; the overview where there is none, or none that can be used.
-    pub fn restored(kept: Option<&str>) -> Self {
+    pub(crate) fn restored(kept: Option<&str>) -> Self {
         let kept = kept.and_then(|text| serde_json::from_str::<Kept>(text).ok());
         let usable = kept.filter(|kept| kept.format == KEPT_FORMAT && is_sound(&kept.tree));
         usable.map_or_else(Self::default, |kept| Self {
@@ -80,33 +67,23 @@ impl Workspace {
     }
 
     /// What the browser is to keep.
-    pub fn kept(&self) -> String {
+    pub(crate) fn kept(&self) -> String {
         let kept = Kept { format: KEPT_FORMAT, preset: self.preset, tree: self.tree.clone() };
         serde_json::to_string(&kept).unwrap_or_default()
     }
 
     /// The arrangement that was chosen last.
-    pub fn preset(&self) -> Preset {
+    pub(crate) fn preset(&self) -> Preset {
         self.preset
     }
 
-    /// The panel that fills the page.
-    pub fn maximised(&self) -> Option<Pane> {
-        self.maximised
-    }
-
-    /// The panels on the screen, in reading order.
-    pub fn seen(&self) -> &[Pane] {
-        &self.seen
-    }
-
     /// The panels that are closed.
-    pub fn closed(&self) -> Vec<Pane> {
+    pub(crate) fn closed(&self) -> Vec<Pane> {
         Pane::ALL.into_iter().filter(|pane| self.tree.tiles.find_pane(pane).is_none()).collect()
     }
 
     /// Carries out one command.
-    pub fn apply(&mut self, command: LayoutCommand) {
+    pub(crate) fn apply(&mut self, command: LayoutCommand) {
         match command {
             LayoutCommand::Use(preset) => {
                 (self.tree, self.preset, self.maximised) = (preset.tree(), preset, None);
@@ -157,7 +134,7 @@ impl Workspace {
     }
 
     /// Lays the panels out.
-    pub fn show(&mut self, ui: &mut Ui, panels: &mut Panels<'_>) {
+    pub(crate) fn show(&mut self, ui: &mut Ui, panels: &mut Panels<'_>) {
         self.is_narrow = ui.ctx().content_rect().width() < NARROW;
         panels.current = self.current;
         panels.takes_keyboard = std::mem::take(&mut self.wants_keyboard);
@@ -236,7 +213,7 @@ impl Panels<'_> {
             ui.label(theme::title(pane.title()));
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 self.menu(ui, Some(pane));
-                crate::panels::sheets::switch(ui, self.state, pane, self.out);
+                crate::panels::sheets::of_panel::switch(ui, self.state, pane, self.out);
                 if ui.button("Restore (`)").clicked() {
                     self.out.push(crate::command::Command::Layout(LayoutCommand::Maximise(None)));
                 }

@@ -1,12 +1,31 @@
 //! The server's events over a WebSocket, connected again with growing patience when it is lost.
 
-use ewebsock::{Options, WsEvent, WsMessage, WsReceiver, WsSender};
-use sightline_core::session::wire::Event;
+use std::time::Duration;
 
-use crate::state::Connection;
+use ewebsock::{Options, WsEvent, WsMessage, WsReceiver, WsSender};
+use sightline_api::wire::Event;
 
 /// The longest pause between two attempts, s.
 const PATIENCE_S: f64 = 10.0;
+
+/// After how long at the latest the page takes in what nobody waits for; mostly it comes with a frame that is laid out
+/// anyway.
+pub(super) const UNHURRIED: Duration = Duration::from_millis(50);
+
+/// How the server's events come in.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Connection {
+    /// The first attempt is under way.
+    #[default]
+    Connecting,
+    /// Events come in.
+    Live,
+    /// The server does not answer.
+    Gone {
+        /// Attempts so far.
+        attempts: u32,
+    },
+}
 
 /// The events of one server.
 pub(super) struct Events {
@@ -70,7 +89,7 @@ impl Events {
 
     fn connect(&mut self, now: f64) {
         let context = self.context.clone();
-        let wake = move || context.request_repaint_after(super::UNHURRIED);
+        let wake = move || context.request_repaint_after(UNHURRIED);
         match ewebsock::connect_with_wakeup(self.url.clone(), Options::default(), wake) {
             Ok(socket) => self.socket = Some(socket),
             Err(_) => self.lose(now),

@@ -1,24 +1,28 @@
 //! The bars: title and status at the top, stages and the newest message at the bottom, and the banner.
 
 use egui::scroll_area::ScrollBarVisibility;
-use egui::{Align, Button, ComboBox, Layout, RichText, ScrollArea, Ui};
-use sightline_core::target::TrackingState;
-use sightline_core::trace::StepTrace;
+use egui::{Align, Button, ComboBox, Layout, Response, RichText, ScrollArea, Ui};
+use sightline_track::target::TrackingState;
+use sightline_track::trace::StepTrace;
 
-use super::compare::{choosers, readouts};
-use super::{inspector, messages, numbers, playing, view_menu};
-use crate::command::{Command, Go, Mode, Stage};
+use crate::command::table::{
+    EXPORT, FIRST_STEP, HELP, LAST_STEP, NEXT_EVENT, NEXT_STEP, OPEN, OPEN_RERUN, PREVIOUS_EVENT,
+    PREVIOUS_STEP, UserCommand,
+};
+use crate::command::{Command, Stage};
+use crate::compare::panel::{choosers, readouts};
+use crate::net::events::Connection;
+use crate::panels::{inspector, messages, numbers, playing, view_menu};
 use crate::state::messages::Weight;
 use crate::state::tracker::confidence_of;
-use crate::state::{Connection, State, run_letter};
-use crate::state::{exports, files};
+use crate::state::{State, run_letter};
 use crate::{panels, theme};
 
 /// How wide the buttons on the right are taken to be before they were laid out once, points.
 const BUTTONS: f32 = 320.0;
 
 /// The top bar: what is open, where the cursor is, and what can be done with the whole.
-pub fn top(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+pub(crate) fn top(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.horizontal_centered(|ui| {
         ui.label(RichText::new("Sightline").size(16.0).strong().color(theme::accent()));
         ui.separator();
@@ -38,31 +42,24 @@ pub fn top(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         });
         let right = ui.max_rect().right();
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let sheet = ui.add(Button::new("?").min_size(egui::vec2(26.0, 24.0)));
-            if sheet
-                .accessible_name("Keys and conventions")
-                .on_hover_text("Keys and conventions (?)")
-                .clicked()
-            {
-                out.push(Command::SetMode(Mode::Help));
-            }
+            let sheet = ui.add(Button::new(HELP.icon).min_size(egui::vec2(26.0, 24.0)));
+            give(&HELP, sheet.accessible_name(HELP.name), state, out);
             view_menu::show(ui, state, out);
             let has_targets = state.session.as_ref().is_some_and(|session| !session.targets.is_empty());
-            let rerun = ui.add_enabled(has_targets, Button::new("Open in Rerun"));
-            if rerun.on_hover_text("Streams this session to a Rerun viewer in a new tab").clicked() {
-                out.push(Command::OpenRerun);
-            }
-            let export = ui.add_enabled(state.session.is_some(), Button::new("Export"));
-            if export.on_hover_text("Files, pictures, and any action as a command (Ctrl+S)").clicked() {
-                out.push(Command::Exports(exports::Ask::Open));
-            }
-            let open = ui.add(Button::new("Open"));
-            if open.clone().on_hover_text("Files, recent sessions, drives (Ctrl+O)").clicked() {
-                out.push(Command::Files(files::Ask::Open));
-            }
+            give(&OPEN_RERUN, ui.add_enabled(has_targets, Button::new(OPEN_RERUN.icon)), state, out);
+            give(&EXPORT, ui.add_enabled(state.session.is_some(), Button::new(EXPORT.icon)), state, out);
+            let open = ui.add(Button::new(OPEN.icon));
+            give(&OPEN, open.clone(), state, out);
             ui.data_mut(|data| data.insert_temp(id, right - open.rect.left()));
         });
     });
+}
+
+/// Explains a button by the tooltip of its command, and gives the command when it is clicked.
+fn give(command: &UserCommand, button: Response, state: &State, out: &mut Vec<Command>) {
+    if button.on_hover_text(command.tooltip()).clicked() {
+        out.push((command.command)(state));
+    }
 }
 
 fn traverse_choice(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
@@ -88,7 +85,7 @@ fn traverse_choice(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 }
 
 /// The status line: step, state, score and error.
-pub fn status(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+pub(crate) fn status(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let Some(last) = state.stop_count().checked_sub(1) else {
         ui.label(theme::label(state.missing_target()));
         return;
@@ -127,7 +124,7 @@ pub fn status(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 }
 
 /// The banner that says the server is gone.
-pub fn banner(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+pub(crate) fn banner(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     if let Connection::Gone { attempts } = state.connection {
         ui.horizontal(|ui| {
             let words =
@@ -141,21 +138,13 @@ pub fn banner(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 }
 
 /// Buttons along the drive, and how far run and rendering are.
-pub fn transport(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+pub(crate) fn transport(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 3.0;
-        for (words, help, go) in [
-            ("|<", "first step (Home)", Go::First),
-            ("<<", "previous event (PgUp)", Go::PreviousEvent),
-            ("<", "one step back (Left)", Go::By(-1)),
-            (">", "one step on (Right)", Go::By(1)),
-            (">>", "next event (PgDn)", Go::NextEvent),
-            (">|", "last step (End)", Go::Last),
-        ] {
-            let button = Button::new(RichText::new(words).monospace()).min_size(egui::vec2(30.0, 22.0));
-            if ui.add(button).on_hover_text(help).clicked() {
-                out.push(Command::Go(go));
-            }
+        for command in [FIRST_STEP, PREVIOUS_EVENT, PREVIOUS_STEP, NEXT_STEP, NEXT_EVENT, LAST_STEP] {
+            let words = RichText::new(command.icon).monospace();
+            let button = ui.add(Button::new(words).min_size(egui::vec2(30.0, 22.0)));
+            give(&command, button, state, out);
         }
         playing::controls(ui, state, out);
         ui.add_space(8.0);
@@ -203,7 +192,7 @@ fn newest_message(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 }
 
 /// The stages in running order; the steps of `locate` stand in brackets after it.
-pub fn stages(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+pub(crate) fn stages(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 3.0;
         for (i, &stage) in Stage::of(state.tracker()).iter().enumerate() {
@@ -243,9 +232,9 @@ fn stage_button(ui: &mut Ui, state: &State, stage: Stage, out: &mut Vec<Command>
 fn has_failed(trace: Option<&StepTrace>, stage: Stage) -> bool {
     let Some(trace) = trace else { return false };
     match stage {
-        Stage::Capture => trace.fault.is_some(),
-        Stage::Locate => trace.locate.as_ref().is_some_and(|located| located.missing.is_some()),
-        Stage::Judge => trace.judge.as_ref().is_some_and(|verdict| !verdict.good),
+        Stage::Capture => trace.fault().is_some(),
+        Stage::Locate => trace.located().is_some_and(|located| located.missing.is_some()),
+        Stage::Judge => trace.verdict().is_some_and(|verdict| !verdict.good),
         _ => false,
     }
 }

@@ -2,17 +2,17 @@
 //! Stepping goes on; only this step is hatched.
 
 use egui::{Align, Button, Label, Layout, RichText, Stroke, Ui, UiBuilder, pos2, vec2};
-use sightline_core::session::wire::Problem;
+use sightline_api::wire::Problem;
 
 use crate::command::Command;
-use crate::state::files::Ask;
+use crate::files::Ask;
 use crate::theme;
 
 /// Distance of the hatching's lines, points.
 const APART: f32 = 14.0;
 
 /// Fills the panel.
-pub fn show(ui: &mut Ui, word: &str, step: usize, problem: &Problem, out: &mut Vec<Command>) {
+pub(crate) fn show(ui: &mut Ui, word: &str, step: usize, problem: &Problem, out: &mut Vec<Command>) {
     let space = ui.available_rect_before_wrap();
     let painter = ui.painter().with_clip_rect(space);
     let count = ((space.width() + space.height()) / APART) as usize;

@@ -14,7 +14,7 @@ const WIDTH: f32 = 380.0;
 const AWAY: [f32; 2] = [-14.0, -130.0];
 
 /// Shows the card of the problem that was met last, until it is closed.
-pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let Some(message) = state.messages.card() else { return };
     let area = Area::new(Id::unique("card of a problem")).order(Order::Foreground);
     area.anchor(Align2::RIGHT_BOTTOM, AWAY).show(ui.ctx(), |ui| {
@@ -39,7 +39,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 }
 
 /// A button that copies all that is known of a message.
-pub fn copy(ui: &mut Ui, message: &Message) {
+pub(crate) fn copy(ui: &mut Ui, message: &Message) {
     let name = format!("copy message: {}", message.text);
     let button = egui::Button::new("Copy").min_size(vec2(24.0, 24.0));
     if ui.add(button).accessible_name(name).clicked() {
@@ -48,7 +48,7 @@ pub fn copy(ui: &mut Ui, message: &Message) {
 }
 
 /// The sentence, what to do, the code and the details.
-pub fn body(ui: &mut Ui, message: &Message) {
+pub(crate) fn body(ui: &mut Ui, message: &Message) {
     let is_problem = message.weight == Weight::Problem;
     let colour = if is_problem { theme::lost() } else { theme::text() };
     ui.add(Label::new(RichText::new(&message.text).color(colour)).wrap().selectable(true));

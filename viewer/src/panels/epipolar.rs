@@ -4,11 +4,11 @@
 //! bend the line to a curve (R73). It is sampled at equal steps of inverse range 1/R, along which disparity grows evenly.
 
 use egui::{Color32, vec2};
-use sightline_core::camera::Camera;
-use sightline_core::frames::{Pixel, Ray};
+use sightline_geometry::camera::Camera;
+use sightline_geometry::frames::{Pixel, Ray};
 
-use crate::overlay::{Line, Overlay};
-use crate::view2d::Canvas;
+use crate::drawing::overlay::{Line, Overlay};
+use crate::drawing::view2d::Canvas;
 
 /// Ranges with a tick, m.
 const TICKS_M: [f64; 12] = [0.5, 1.0, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 50.0, 100.0];
@@ -23,7 +23,7 @@ const SAMPLES: usize = 160;
 const TICK_GAP: f32 = 34.0;
 
 /// The curve of a pixel of one eye in the image of the other.
-pub struct Curve<'a> {
+pub(crate) struct Curve<'a> {
     /// The line of sight; its lens is undone once and not at every range.
     ray: Ray,
     to: &'a Camera,
@@ -31,13 +31,13 @@ pub struct Curve<'a> {
 
 impl<'a> Curve<'a> {
     /// The curve of a pixel (px) of `from` in the image of `to`; none where the lens cannot be undone.
-    pub fn new(from: &Camera, to: &'a Camera, pixel: Pixel) -> Option<Self> {
+    pub(crate) fn new(from: &Camera, to: &'a Camera, pixel: Pixel) -> Option<Self> {
         Some(Self { ray: from.ray(pixel)?, to })
     }
 
     /// The point of the curve at a range, m, px; none behind the camera, and far outside of its image, where the model of
     /// the lens means nothing.
-    pub fn at(&self, range_m: f64) -> Option<Pixel> {
+    pub(crate) fn at(&self, range_m: f64) -> Option<Pixel> {
         let pixel = self.to.project(&self.ray.at(range_m))?;
         let (width, height) = (f64::from(self.to.width()), f64::from(self.to.height()));
         let is_near = (-width..2.0 * width).contains(&pixel.x) && (-height..2.0 * height).contains(&pixel.y);
@@ -50,7 +50,7 @@ impl<'a> Curve<'a> {
     }
 
     /// The range of the point nearest to a pixel, m, and how far that is away, px.
-    pub fn nearest(&self, pixel: Pixel) -> Option<(f64, f64)> {
+    pub(crate) fn nearest(&self, pixel: Pixel) -> Option<(f64, f64)> {
         let points: Vec<(f64, Pixel)> = self.points().collect();
         let between = |pair: &[(f64, Pixel)]| {
             let [(far_m, a), (near_m, b)] = [pair[0], pair[1]];
@@ -64,7 +64,7 @@ impl<'a> Curve<'a> {
     }
 
     /// Paints it with its ticks.
-    pub fn paint(&self, canvas: &Canvas, colour: Color32, line: Line) {
+    pub(crate) fn paint(&self, canvas: &Canvas, colour: Color32, line: Line) {
         let overlay = Overlay::new(&canvas.painter, &canvas.transform);
         let whole: Vec<Pixel> = self.points().map(|(_, pixel)| pixel).collect();
         overlay.line(&whole, colour, line);
@@ -72,7 +72,7 @@ impl<'a> Curve<'a> {
     }
 
     /// Ticks across the curve with their range; where they would crowd, some are left out.
-    pub fn paint_ticks(&self, canvas: &Canvas, overlay: &Overlay<'_>, colour: Color32) {
+    pub(crate) fn paint_ticks(&self, canvas: &Canvas, overlay: &Overlay<'_>, colour: Color32) {
         let mut last: Option<egui::Pos2> = None;
         for range_m in TICKS_M {
             let (Some(at), Some(beyond)) = (self.at(range_m), self.at(range_m * 1.01)) else { continue };
@@ -102,7 +102,7 @@ fn ranges() -> impl Iterator<Item = f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sightline_core::camera::Mast;
+    use sightline_geometry::camera::Mast;
 
     #[test]
     fn the_curve_is_sampled_from_far_to_near() {

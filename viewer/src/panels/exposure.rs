@@ -1,12 +1,12 @@
 //! The row above an image: how it was exposed where it matters, and the stretch with which it is shown.
 
 use egui::{Align, ComboBox, DragValue, Layout, RichText, Ui};
-use sightline_core::stages::capture::Capture;
+use sightline_track::stages::capture::Capture;
 
 use crate::command::Command;
-use crate::raster::Raster;
+use crate::drawing::raster::Raster;
+use crate::drawing::stretch::Stretch;
 use crate::state::State;
-use crate::stretch::Stretch;
 use crate::{panels, theme};
 
 /// Height of the row, points.
@@ -16,7 +16,7 @@ const HEIGHT: f32 = 20.0;
 const SATURATED_SHARE: f32 = 0.01;
 
 /// Shows the row.
-pub fn show(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) {
+pub(crate) fn show(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) {
     ui.horizontal(|ui| {
         ui.set_height(HEIGHT);
         ui.spacing_mut().item_spacing.x = 4.0;
@@ -25,7 +25,7 @@ pub fn show(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>)
             by_hand(ui, [brightness, contrast, gamma], out);
         }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let words = state.trace().and_then(|trace| trace.capture.as_ref()).map(exposure);
+            let words = state.trace().and_then(|trace| trace.capture()).map(exposure);
             if let Some((words, is_bad)) = words {
                 let colour = if is_bad { theme::lost() } else { theme::weak() };
                 let label = egui::Label::new(RichText::new(&words).small().color(colour)).truncate();

@@ -1,30 +1,46 @@
 //! The gates: the loss criteria with value, limit and margin, and the verdict as a sentence.
 
+use std::sync::LazyLock;
+
 use egui::{Align2, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
-use sightline_core::stages::judge::{Gate, Verdict};
-use sightline_core::target::TrackingState;
+use sightline_track::gate::GateKind;
+use sightline_track::locate::gate_kinds;
+use sightline_track::stages::judge::{Gate, Verdict};
+use sightline_track::target::TrackingState;
 
-use super::compare::readouts;
-use super::numbers;
 use crate::command::Command;
+use crate::compare::panel::readouts;
+use crate::panels::numbers;
+use crate::panels::panel::Panel;
 use crate::state::State;
-use crate::{panels, theme};
-
-/// What the panel is for.
-const PURPOSE: &str = "Whether the match can be trusted: the criteria with their limits.";
+use crate::theme;
 
 /// Room for the margin in digits, points.
 const MARGIN: f32 = 50.0;
 /// Height of a margin bar, points.
 const BAR: f32 = 8.0;
 
+/// The panel “Gates”.
+pub(crate) struct Gates;
+
+impl Panel for Gates {
+    fn show(&self, ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+        show(ui, state, out);
+    }
+
+    fn missing(&self, state: &State) -> Option<String> {
+        verdict(state).is_none().then(|| state.missing_step())
+    }
+}
+
+/// The verdict on the current step.
+fn verdict(state: &State) -> Option<&Verdict> {
+    state.trace()?.verdict()
+}
+
 /// Shows the gates.
-pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    let verdict = state.trace().and_then(|trace| trace.judge.as_ref());
-    let Some(verdict) = verdict else {
-        panels::missing(ui, PURPOSE, &state.missing_step());
-        return;
-    };
+pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let Some(verdict) = verdict(state) else { return };
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 1.0;
         sentence(ui, verdict, state);
@@ -54,7 +70,7 @@ fn sentence(ui: &mut Ui, verdict: &Verdict, state: &State) {
 
 /// The change of state, with how many retries remain.
 fn transition(verdict: &Verdict, state: &State) -> String {
-    let retries = state.setting("limits", "n_retry").and_then(|v| v.as_u64()).unwrap_or(2);
+    let retries = state.run_settings().limits.n_retry;
     let before = verdict.state_before.word();
     match verdict.state {
         TrackingState::Lost { count } => {
@@ -125,25 +141,21 @@ fn fractions(gate: &Gate) -> (Option<f32>, f32) {
 }
 
 /// A gate's name in words.
-fn readable(name: &str) -> &str {
-    match name {
-        "ncc" => "match score",
-        "stereo_ncc" => "stereo score",
-        "distance_correction_m" => "range change",
-        "position_correction_m" => "site position",
-        "left_right_px" => "left–right check",
-        "second_peak_ratio" => "second peak",
-        "match_sigma_px" => "match σ",
-        "edge_distance_px" => "from the edge",
-        "shape_overlap" => "shape overlap",
-        "shape_misfit" => "shape misfit",
-        "shape_sigma_m" => "shape σ",
-        "shape_turn_deg" => "shape turn",
-        "shape_other_minimum" => "next minimum ×",
-        "shape_edge_distance_m" => "from the edge",
-        "picture_ncc" => "draped picture",
-        other => other,
-    }
+pub(crate) fn readable(name: &str) -> &str {
+    static KINDS: LazyLock<Vec<GateKind>> = LazyLock::new(gate_kinds);
+    KINDS.iter().find(|kind| kind.name == name).map_or(name, |kind| kind.label)
+}
+
+/// Name, value and limit of a gate that was not met, lengths in centimetres: `range change 25.0 > 12.0 cm`.
+pub(crate) fn failed_words(gate: &Gate) -> String {
+    let relation = if gate.at_least { "<" } else { ">" };
+    let name = readable(&gate.name);
+    let Some(value) = gate.value else { return format!("{name}: nothing was found to judge") };
+    let words = match gate.unit.as_str() {
+        "m" => format!("{name} {:.1} {relation} {:.1} cm", value * 100.0, gate.limit * 100.0),
+        unit => format!("{name} {value:.3} {relation} {:.3} {unit}", gate.limit),
+    };
+    words.trim_end().to_owned()
 }
 
 #[cfg(test)]
@@ -152,7 +164,7 @@ mod tests {
 
     fn gate(value: Option<f64>, limit: f64, at_least: bool) -> Gate {
         let (name, unit) = ("ncc".to_owned(), String::new());
-        Gate { criterion: 1, name, unit, value, limit, at_least, margin: None, passed: true }
+        Gate { criterion: 1, name, unit, value, limit, at_least, margin: None, passed: true, setting: None }
     }
 
     #[test]

@@ -1,29 +1,45 @@
 //! The right image with the epipolar curve of the target, its range ticks and the stereo match.
 
-use egui::{Ui, vec2};
-use sightline_core::frames::Pixel;
-use sightline_core::image::PixelRect;
-use sightline_core::trace::StepTrace;
+use egui::{Margin, Ui, vec2};
+use sightline_geometry::frames::Pixel;
+use sightline_track::trace::StepTrace;
+use sightline_vision::image::PixelRect;
 
-use super::compare::marks as compared;
-use super::epipolar::Curve;
-use super::features::marks;
-use super::images_left::{STATUS, ready_image, status_line};
-use super::legend::{self, Entry};
 use crate::cache::Eye;
-use crate::command::{Command, Layer, Mode, Panel};
-use crate::overlay::{Line, Mark, Overlay};
+use crate::command::{Command, Layer, Mode, Zoomable};
+use crate::compare::panel::marks as compared;
+use crate::drawing::overlay::{Line, Mark, Overlay};
+use crate::drawing::raster::Raster;
+use crate::drawing::view2d::Canvas;
+use crate::panels::epipolar::Curve;
+use crate::panels::features::marks;
+use crate::panels::images_left::ready_image;
+use crate::panels::legend;
+use crate::panels::legend::Entry;
+use crate::panels::panel::Panel;
+use crate::panels::status_line::{STATUS, status_line};
 use crate::pointed::Pointed;
-use crate::raster::Raster;
 use crate::state::{State, run_letter};
 use crate::theme;
-use crate::view2d::Canvas;
 
 /// From how near to the curve its range is told, px.
 const NEAR_PX: f64 = 40.0;
 
+/// The panel of the right image.
+pub(crate) struct RightView;
+
+impl Panel for RightView {
+    fn show(&self, ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+        show(ui, state, out);
+    }
+
+    fn margin(&self) -> Margin {
+        Margin { left: 4, right: 4, top: 4, bottom: 0 }
+    }
+}
+
 /// Shows the right image.
-pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let Some(raster) = ready_image(ui, state, Eye::Right, out) else { return };
     raster.stretch(state.stretch);
     let [width, height] = raster.size();
@@ -35,7 +51,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 fn picture(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) {
     let [width, height] = raster.size();
     let region = PixelRect::whole(width, height);
-    let canvas = Canvas::new(ui, state.view(Panel::Right), region, STATUS);
+    let canvas = Canvas::new(ui, state.view(Zoomable::Right), region, STATUS);
     canvas.texture(&raster.texture, region);
     canvas.pixel_grid(region);
     if state.marks {
@@ -54,23 +70,23 @@ fn picture(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) 
         out.push(Command::Point(Pointed::Right(pixel)));
     }
     if let Some(view) = canvas.moved {
-        out.push(Command::View(Panel::Right, view));
+        out.push(Command::View(Zoomable::Right, view));
     }
 }
 
 fn entries(state: &State) -> Vec<Entry> {
     let Some(trace) = state.trace() else { return Vec::new() };
     let mut entries = Vec::new();
-    if trace.locate.as_ref().is_some_and(|l| l.right_pixel.is_some()) {
-        let is_moved = trace.predict.is_some() && trace.features().is_some();
+    if trace.located().is_some_and(|l| l.right_pixel.is_some()) {
+        let is_moved = trace.prediction().is_some() && trace.features().is_some();
         let what = if is_moved { "moved here" } else { "stereo match" };
         let word = format!("{what} · run {}", run_letter(state.cursor.run));
         entries.push(Entry::new(Layer::Match, Mark::Ring, theme::run(state.cursor.run), word));
     }
-    if trace.predict.is_some() && trace.point_mast.as_ref().is_some_and(|p| p.predicted_right.is_some()) {
+    if trace.prediction().is_some() && trace.point_mast.predicted_right.is_some() {
         entries.push(Entry::new(Layer::Prediction, Mark::Cross, theme::prediction(), "predicted"));
     }
-    if trace.locate.as_ref().is_some_and(|l| l.left_pixel.is_some()) {
+    if trace.located().is_some_and(|l| l.left_pixel.is_some()) {
         let word = "epipolar curve, range in m";
         entries.push(Entry::new(Layer::Curve, Mark::Stroke(Line::Solid), theme::search(), word));
     }
@@ -81,7 +97,8 @@ fn entries(state: &State) -> Vec<Entry> {
 
 fn paint_marks(canvas: &Canvas, trace: &StepTrace, state: &State) {
     let overlay = Overlay::new(&canvas.painter, &canvas.transform);
-    let (Some(pointing), Some(located)) = (&trace.point_mast, &trace.locate) else { return };
+    let pointing = &trace.point_mast;
+    let Some(located) = trace.located() else { return };
     if let Some(curve) = target_curve(state).filter(|_| state.shows(Layer::Curve)) {
         curve.paint(canvas, theme::search(), Line::Dotted);
         if let Some(stereo) = trace.template().and_then(|e| e.point_stereo.as_ref()) {
@@ -89,7 +106,7 @@ fn paint_marks(canvas: &Canvas, trace: &StepTrace, state: &State) {
             overlay.line(&searched, theme::search(), Line::Solid);
         }
     }
-    if trace.predict.is_some()
+    if trace.prediction().is_some()
         && state.shows(Layer::Prediction)
         && let Some(pixel) = pointing.predicted_right
     {
@@ -144,8 +161,8 @@ fn paint_range(canvas: &Canvas, state: &State, pixel: Pixel) {
 }
 
 /// The curve of the target's left pixel.
-pub fn target_curve(state: &State) -> Option<Curve<'_>> {
+pub(crate) fn target_curve(state: &State) -> Option<Curve<'_>> {
     let trace = state.trace()?;
-    let (pointing, located) = (trace.point_mast.as_ref()?, trace.locate.as_ref()?);
+    let (pointing, located) = (&trace.point_mast, trace.located()?);
     Curve::new(&pointing.left, &pointing.right, located.left_pixel?)
 }

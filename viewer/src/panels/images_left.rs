@@ -1,37 +1,53 @@
 //! The left image with all that the tracker knew of the target in it.
 
-use egui::{Align, Layout, Rect, Ui, pos2, vec2};
-use sightline_core::frames::Pixel;
-use sightline_core::image::PixelRect;
-use sightline_core::locate::features::rows::moved_covariance_px2;
-use sightline_core::locate::shape_tracker::rows::{basin, registered_covariance_px2};
-use sightline_core::trace::StepTrace;
+use egui::{Margin, Rect, Ui, pos2, vec2};
+use sightline_geometry::frames::Pixel;
+use sightline_track::locate::features::rows::moved_covariance_px2;
+use sightline_track::locate::shape_tracker::rows::{basin, registered_covariance_px2};
+use sightline_track::trace::StepTrace;
+use sightline_vision::image::PixelRect;
 
-use super::broken;
-use super::compare::{bar, marks as compared, modes};
-use super::epipolar::Curve;
-use super::exposure;
-use super::features::marks;
-use super::legend::{self, Entry};
-use super::{picking, what_if};
 use crate::cache::{Eye, Slot};
-use crate::command::{Command, Layer, Panel};
-use crate::overlay::{Line, Mark, Overlay, template_quad};
+use crate::command::{Command, Layer, Zoomable};
+use crate::compare::panel::{bar, marks as compared, modes};
+use crate::drawing::overlay::{Line, Mark, Overlay, template_quad};
+use crate::drawing::raster::Raster;
+use crate::drawing::view2d::Canvas;
+use crate::layout::left_image::keep_left_image;
+use crate::panels::broken;
+use crate::panels::epipolar::Curve;
+use crate::panels::exposure;
+use crate::panels::features::marks;
+use crate::panels::legend;
+use crate::panels::legend::Entry;
+use crate::panels::panel::Panel;
+use crate::panels::status_line::{STATUS, status_line};
+use crate::picking;
 use crate::pointed::Pointed;
-use crate::raster::Raster;
 use crate::state::{State, row_of, run_letter};
-use crate::view2d::Canvas;
+use crate::what_if::panel;
 use crate::{panels, theme};
 
-/// Height of the status line below an image, points.
-pub const STATUS: f32 = 24.0;
+/// The panel of the left image.
+pub(crate) struct LeftView;
+
+impl Panel for LeftView {
+    fn show(&self, ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+        let place = show(ui, state, out);
+        keep_left_image(ui, place);
+    }
+
+    fn margin(&self) -> Margin {
+        Margin { left: 4, right: 4, top: 4, bottom: 0 }
+    }
+}
 
 /// Shows the left image. Returns its canvas' transform and size, from which a test can compute where to click.
-pub fn show(
+pub(crate) fn show(
     ui: &mut Ui,
     state: &State,
     out: &mut Vec<Command>,
-) -> Option<(crate::view2d::Transform, [u32; 2])> {
+) -> Option<(crate::drawing::view2d::Transform, [u32; 2])> {
     let raster = ready_image(ui, state, Eye::Left, out)?;
     raster.stretch(state.stretch);
     exposure::show(ui, state, raster, out);
@@ -47,10 +63,15 @@ pub fn show(
 }
 
 /// The image itself with its marks and the line below it.
-fn picture(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) -> crate::view2d::Transform {
+fn picture(
+    ui: &mut Ui,
+    state: &State,
+    raster: &Raster,
+    out: &mut Vec<Command>,
+) -> crate::drawing::view2d::Transform {
     let [width, height] = raster.size();
     let region = PixelRect::whole(width, height);
-    let view = state.held_view(state.view(Panel::Left), state.trace());
+    let view = state.held_view(state.view(Zoomable::Left), state.trace());
     let canvas = Canvas::new(ui, view, region, STATUS);
     canvas.texture(&raster.texture, region);
     modes::under(&canvas, state);
@@ -67,18 +88,18 @@ fn picture(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) 
     paint_designation(&canvas, state);
     picking::show(ui, &canvas, raster, state, out);
     marks::hover(&canvas, state, |feature| Some(feature.pixel));
-    what_if::over_image(ui, &canvas, state, out);
+    panel::over_image(ui, &canvas, state, out);
     let pointed = paint_pointed(&canvas, state);
     status_line(ui, &canvas, raster, region, pointed);
     out.extend(canvas.hovered(region).map(|pixel| Command::Point(Pointed::Left(pixel))));
     if let Some(view) = canvas.moved {
-        out.push(Command::View(Panel::Left, view));
+        out.push(Command::View(Zoomable::Left, view));
     }
     canvas.transform
 }
 
 /// An image of the cursor's stop, or the sentence that says why it is not there yet.
-pub fn ready_image<'a>(
+pub(crate) fn ready_image<'a>(
     ui: &mut Ui,
     state: &'a State,
     eye: Eye,
@@ -113,7 +134,6 @@ fn waiting_words(state: &State, word: &str, step: usize) -> String {
 /// What the legend of the left image lists.
 fn entries(state: &State) -> Vec<Entry> {
     let Some(trace) = state.trace() else { return Vec::new() };
-    let pointing = trace.point_mast.as_ref();
     let evidence = trace.template();
     let matched = evidence.and_then(|e| e.match_template.as_ref());
     let run = theme::run(state.cursor.run);
@@ -121,10 +141,10 @@ fn entries(state: &State) -> Vec<Entry> {
     if trace.truth.as_ref().is_some_and(|t| t.left_pixel.is_some()) {
         entries.push(Entry::new(Layer::Truth, Mark::Plus, theme::truth(), "truth"));
     }
-    if trace.locate.as_ref().is_some_and(|l| l.left_pixel.is_some()) {
+    if trace.located().is_some_and(|l| l.left_pixel.is_some()) {
         let by_shape =
             trace.shape().is_some_and(|shape| shape.registration.is_some() && shape.is_judged_by_shape);
-        let word = match (trace.predict.is_some(), trace.features().is_some()) {
+        let word = match (trace.prediction().is_some(), trace.features().is_some()) {
             (false, _) => "picked",
             (true, _) if by_shape => "registered here, 1σ 2σ 3σ",
             (true, false) => "match, 3σ",
@@ -133,7 +153,7 @@ fn entries(state: &State) -> Vec<Entry> {
         let word = format!("{word} · run {}", run_letter(state.cursor.run));
         entries.push(Entry::new(Layer::Match, Mark::Ring, run, word));
     }
-    if trace.predict.is_some() && pointing.is_some_and(|p| p.predicted_left.is_some()) {
+    if trace.prediction().is_some() && trace.point_mast.predicted_left.is_some() {
         entries.push(Entry::new(
             Layer::Prediction,
             Mark::Stroke(Line::Dotted),
@@ -154,7 +174,7 @@ fn entries(state: &State) -> Vec<Entry> {
             "search window",
         ));
     }
-    if trace.capture.as_ref().is_some_and(|c| c.subframe.is_some()) {
+    if trace.capture().is_some_and(|c| c.subframe.is_some()) {
         entries.push(Entry::new(Layer::Subframe, Mark::Stroke(Line::Dotted), theme::subframe(), "subframe"));
     }
     if state.session.as_ref().is_some_and(|s| s.targets.len() > 1) {
@@ -170,15 +190,14 @@ fn paint_marks(overlay: &Overlay<'_>, trace: &StepTrace, state: &State) {
     let run = theme::run(state.cursor.run);
     let evidence = trace.template();
     let matched = evidence.and_then(|e| e.match_template.as_ref());
-    if let Some(subframe) =
-        trace.capture.as_ref().and_then(|c| c.subframe).filter(|_| state.shows(Layer::Subframe))
+    if let Some(subframe) = trace.capture().and_then(|c| c.subframe).filter(|_| state.shows(Layer::Subframe))
     {
         overlay.rectangle(subframe, theme::subframe(), Line::Dotted);
     }
     if let Some(found) = matched.filter(|_| state.shows(Layer::SearchWindow)) {
         overlay.rectangle(found.search_window, theme::search(), Line::Dashed);
     }
-    if state.shows(Layer::Prediction) && trace.predict.is_some() {
+    if state.shows(Layer::Prediction) && trace.prediction().is_some() {
         paint_prediction(overlay, trace);
     }
     if let Some((outline, _)) = basin_of(trace).filter(|_| state.shows(Layer::Basin)) {
@@ -188,16 +207,16 @@ fn paint_marks(overlay: &Overlay<'_>, trace: &StepTrace, state: &State) {
         && state.shows(Layer::Template)
     {
         // What was compared is an upright square; the quad is where the reference's own window went.
-        let (at, side) = (found.pixel, template_side(state));
+        let (at, side) = (found.pixel, state.template_side_px());
         overlay.outline(&template_quad(at, side, &nalgebra::Matrix2::identity()), run, Line::Solid);
         overlay.outline(&template_quad(at, side, &prepared.prepared_from_template()), run, Line::Dotted);
     }
-    if let Some((located, pixel)) = trace.locate.as_ref().and_then(|l| Some((l, l.left_pixel?)))
+    if let Some((located, pixel)) = trace.located().and_then(|l| Some((l, l.left_pixel?)))
         && state.shows(Layer::Match)
     {
-        let moved = trace.point_mast.as_ref().and_then(|p| {
-            moved_covariance_px2(located, &p.left).or_else(|| registered_covariance_px2(located, &p.left))
-        });
+        let camera = &trace.point_mast.left;
+        let moved =
+            moved_covariance_px2(located, camera).or_else(|| registered_covariance_px2(located, camera));
         match moved {
             Some(moved) => {
                 for sigmas in [1.0, 2.0, 3.0] {
@@ -218,16 +237,16 @@ fn paint_marks(overlay: &Overlay<'_>, trace: &StepTrace, state: &State) {
 /// another place (R155).
 fn basin_of(trace: &StepTrace) -> Option<(Vec<Pixel>, f64)> {
     let half_width_m = trace.shape()?.registration.as_ref()?.half_width_m;
-    let predicted = &trace.predict.as_ref()?.position_in_rover;
-    Some((basin(predicted, half_width_m, &trace.point_mast.as_ref()?.left), half_width_m))
+    let predicted = &trace.prediction()?.position_in_rover;
+    Some((basin(predicted, half_width_m, &trace.point_mast.left), half_width_m))
 }
 
 fn paint_prediction(overlay: &Overlay<'_>, trace: &StepTrace) {
-    let Some(pointing) = &trace.point_mast else { return };
+    let pointing = &trace.point_mast;
     let Some(pixel) = pointing.predicted_left else { return };
     if let Some(covariance) = &pointing.predicted_covariance_px2 {
         overlay.ellipse(pixel, covariance, 3.0, theme::prediction(), Line::Dotted);
-        if let Some([long, _]) = crate::ellipse::axes(covariance) {
+        if let Some([long, _]) = crate::drawing::ellipse::axes(covariance) {
             let end = pixel.offset(3.0 * long.x.abs(), 3.0 * long.x.signum() * long.y);
             if overlay.length(pixel, end) > 24.0 {
                 overlay.words(end, vec2(6.0, 0.0), "3σ", theme::prediction());
@@ -235,12 +254,6 @@ fn paint_prediction(overlay: &Overlay<'_>, trace: &StepTrace) {
         }
     }
     overlay.mark(pixel, Mark::Cross, theme::prediction());
-}
-
-/// Side of the template, px.
-pub fn template_side(state: &State) -> u32 {
-    let value = state.setting("template", "template_size_px").and_then(|v| v.as_u64());
-    value.and_then(|v| u32::try_from(v).ok()).unwrap_or(21)
 }
 
 /// The other targets, where their latest runs place them.
@@ -297,41 +310,11 @@ fn paint_pointed(canvas: &Canvas, state: &State) -> Option<String> {
             Some(format!("curve of x {:.1}  y {:.1} of the right image", pixel.x, pixel.y))
         }
         Pointed::Score(pixel) => {
-            let quad = template_quad(pixel, template_side(state), &nalgebra::Matrix2::identity());
+            let quad = template_quad(pixel, state.template_side_px(), &nalgebra::Matrix2::identity());
             overlay.outline(&quad, theme::accent(), Line::Dashed);
             overlay.mark(pixel, Mark::Plus, theme::accent());
             Some(format!("template at x {:.0}  y {:.0}", pixel.x, pixel.y))
         }
         _ => None,
     }
-}
-
-/// Pixel and grey value under the pointer, else `pointed`; magnification, and the convention.
-pub fn status_line(
-    ui: &mut Ui,
-    canvas: &Canvas,
-    raster: &Raster,
-    region: PixelRect,
-    pointed: Option<String>,
-) {
-    ui.horizontal(|ui| {
-        ui.set_height(STATUS - 6.0);
-        match canvas.hovered(region) {
-            Some(pixel) => {
-                let value = raster.at(pixel.x.round() as i64, pixel.y.round() as i64);
-                let grey = value.map_or_else(|| "no data".to_owned(), |v| format!("{v:.4}"));
-                ui.label(theme::number(format!("x {:7.1}  y {:7.1}", pixel.x, pixel.y)).size(11.0));
-                ui.label(theme::note("grey"));
-                ui.label(theme::number(grey).size(11.0));
-            }
-            None => {
-                let size = || format!("{} × {} px", region.width, region.height);
-                ui.label(theme::note(pointed.unwrap_or_else(size)));
-            }
-        }
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            ui.label(theme::note(format!("×{:.2}", canvas.transform.scale)))
-                .on_hover_text("Points on the screen per pixel. (0, 0) is the centre of the first pixel.");
-        });
-    });
 }

@@ -5,13 +5,13 @@
 use egui::{Rect, Sense, Ui, UiBuilder, vec2};
 
 use crate::command::{Command, Layer};
-use crate::overlay::{Mark, paint_legend_row};
+use crate::drawing::overlay::{Mark, paint_legend_row};
 use crate::state::State;
 use crate::theme;
 
 /// One entry of a legend.
 #[derive(Clone, Debug)]
-pub struct Entry {
+pub(crate) struct Entry {
     /// What it switches.
     pub layer: Layer,
     /// Its shape.
@@ -24,7 +24,7 @@ pub struct Entry {
 
 impl Entry {
     /// An entry.
-    pub fn new(layer: Layer, mark: Mark, colour: egui::Color32, word: impl Into<String>) -> Self {
+    pub(crate) fn new(layer: Layer, mark: Mark, colour: egui::Color32, word: impl Into<String>) -> Self {
         Self { layer, mark, colour, word: word.into() }
     }
 }
@@ -37,7 +37,7 @@ const MARK: f32 = 32.0;
 
 /// Lays the legend out and gives the rest of the room to `show`: the image, `width_by_height` in shape, with
 /// `below` points under it.
-pub fn beside<R>(
+pub(crate) fn beside<R>(
     ui: &mut Ui,
     entries: &[Entry],
     (width_by_height, below): (f32, f32),
@@ -73,7 +73,7 @@ fn has_column(area: Rect, widest: f32, height: f32, width_by_height: f32, below:
 }
 
 /// What an entry takes beside others, points.
-pub fn width_of(ui: &Ui, entry: &Entry) -> f32 {
+pub(crate) fn width_of(ui: &Ui, entry: &Entry) -> f32 {
     let galley = ui.painter().layout_no_wrap(entry.word.clone(), theme::image_font(), theme::text());
     galley.size().x + MARK
 }
@@ -93,7 +93,7 @@ fn rows(ui: &mut Ui, entries: &[Entry], widths: &[f32], state: &State, out: &mut
 }
 
 /// One entry in an area of its own; a click hides or shows its layer.
-pub fn row(ui: &Ui, row: Rect, entry: &Entry, state: &State, out: &mut Vec<Command>) {
+pub(crate) fn row(ui: &Ui, row: Rect, entry: &Entry, state: &State, out: &mut Vec<Command>) {
     let shown = !state.hidden.contains(&entry.layer);
     paint_legend_row(ui.painter(), row.min, entry.mark, entry.colour, &entry.word, shown);
     let response = ui.interact(row, ui.scope_id().with(("legend", entry.layer)), Sense::click());

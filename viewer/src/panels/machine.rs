@@ -7,41 +7,40 @@
 //! one that detects the loss does not count among them unless `count_detecting_update` says so (R91).
 
 use egui::{Align2, Color32, Pos2, Rect, RichText, ScrollArea, Sense, Stroke, StrokeKind, Ui, pos2, vec2};
-use sightline_core::session::view::RunView;
-use sightline_core::target::TrackingState;
-use sightline_core::trace::StepRow;
+use sightline_session::view::RunView;
+use sightline_track::target::TrackingState;
+use sightline_track::trace::StepRow;
 
 use crate::command::{Command, Go};
-use crate::state::{State, state_of_word};
-use crate::{panels, theme};
-
-/// What the panel is for.
-const PURPOSE: &str = "Where tracking stands, and which criterion fired at each past update.";
+use crate::panels::gates;
+use crate::panels::panel::Panel;
+use crate::state::{State, state_of};
+use crate::theme;
 
 /// Height of the diagram, points.
 const DIAGRAM: f32 = 96.0;
 /// Height of a state's box, points.
 const BOX: f32 = 34.0;
 
-/// A criterion that fired at an update.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Fired {
-    /// Its number in K§4.6.
-    pub criterion: u8,
-    /// Its name, value and threshold.
-    pub words: String,
+/// The panel “State machine”.
+pub(crate) struct Machine;
+
+impl Panel for Machine {
+    fn show(&self, ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+        show(ui, state, out);
+    }
+
+    fn missing(&self, state: &State) -> Option<String> {
+        state.run().is_none().then(|| state.missing_target())
+    }
 }
 
 /// Shows diagram and history.
-pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    let Some(run) = state.run() else {
-        panels::missing(ui, PURPOSE, &state.missing_target());
-        return;
-    };
+pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let Some(run) = state.run() else { return };
     let now = state.tracking().unwrap_or_default();
-    let count = bad_in_a_row(run, state.cursor.step);
-    diagram(ui, state, now, count);
-    ui.label(RichText::new(sentence(state, now, count)).color(theme::text()));
+    diagram(ui, state, now);
+    ui.label(RichText::new(sentence(state, now)).color(theme::text()));
     ui.separator();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let past = run.rows.iter().filter(|row| row.step <= state.cursor.step).rev();
@@ -51,27 +50,25 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     });
 }
 
-/// How many updates in a row, up to a step, were bad.
-fn bad_in_a_row(run: &RunView, step: usize) -> u32 {
-    let past = run.rows.iter().filter(|row| row.step <= step).rev();
-    past.take_while(|row| state_of_word(&row.state).is_lost()).count() as u32
-}
-
 /// How many updates may follow the one that detects a loss.
 fn retries(state: &State) -> u32 {
-    let allowed = state.setting("limits", "n_retry").and_then(|v| v.as_u64()).unwrap_or(2) as u32;
-    let counts = state.setting("limits", "count_detecting_update").and_then(|v| v.as_bool()) == Some(true);
-    allowed.saturating_sub(u32::from(counts))
+    let limits = &state.run_settings().limits;
+    limits.n_retry.saturating_sub(u32::from(limits.count_detecting_update))
+}
+
+/// How many of these retries are used up after `count` rejected updates in a row.
+fn used(count: u32, retries: u32) -> u32 {
+    count.saturating_sub(1).min(retries)
 }
 
 /// The present state in words, with what comes next.
-fn sentence(state: &State, now: TrackingState, count: u32) -> String {
+fn sentence(state: &State, now: TrackingState) -> String {
     let n = retries(state);
     match now {
         TrackingState::Cleared => "Nothing is tracked at this step.".to_owned(),
         TrackingState::Tracking => format!("Tracking; a bad update leads to lost, with {n} retries."),
-        TrackingState::Lost { .. } => {
-            let k = count.saturating_sub(1).min(n);
+        TrackingState::Lost { count } => {
+            let k = used(count, n);
             format!("Lost: retry {k} of {n} is used. A good update leads back to tracking.")
         }
         TrackingState::Failed => "Failed until the target is cleared: no retry is left.".to_owned(),
@@ -79,12 +76,10 @@ fn sentence(state: &State, now: TrackingState, count: u32) -> String {
 }
 
 /// The four states with their transitions.
-fn diagram(ui: &mut Ui, state: &State, now: TrackingState, count: u32) {
+fn diagram(ui: &mut Ui, state: &State, now: TrackingState) {
     let (area, response) = ui.allocate_exact_size(vec2(ui.available_width(), DIAGRAM), Sense::hover());
     let lost = match now {
-        TrackingState::Lost { .. } => {
-            format!("{} of {}", count.saturating_sub(1).min(retries(state)), retries(state))
-        }
+        TrackingState::Lost { count } => format!("{} of {}", used(count, retries(state)), retries(state)),
         _ => format!("k of {}", retries(state)),
     };
     let boxes = [
@@ -103,7 +98,7 @@ fn diagram(ui: &mut Ui, state: &State, now: TrackingState, count: u32) {
         paint_state(ui, frame(i), word, below, theme::state(*of), now.word() == of.word());
     }
     paint_transitions(ui, [frame(0), frame(1), frame(2), frame(3)]);
-    let words = format!("state {}: {}", now.word(), sentence(state, now, count));
+    let words = format!("state {}: {}", now.word(), sentence(state, now));
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, &words));
     response.on_hover_text("Clear leads to CLEARED from every state: remove the target.");
 }
@@ -173,37 +168,19 @@ fn history(ui: &mut Ui, state: &State, run: &RunView, row: &StepRow, out: &mut V
         if ui.add(button).clicked() {
             out.push(Command::Go(Go::Step(row.step)));
         }
-        let colour = theme::state(state_of_word(&row.state));
+        let colour = theme::state(state_of(row));
         let state_word = ui.label(RichText::new(&row.state).size(12.0).color(colour));
         if let Some(reason) = &row.reason {
             state_word.on_hover_text(reason);
         }
-        let fired = fired(state, row);
         if run.rows.first().is_some_and(|first| first.step == row.step) {
             ui.label(theme::note("picked here"));
-        } else if fired.is_empty() {
+        } else if row.failed_gates.is_empty() {
             ui.label(theme::note(row.reason.as_deref().unwrap_or("no criterion fired")));
         }
-        for fired in fired {
-            let words = format!("criterion {}: {}", fired.criterion, fired.words);
+        for gate in &row.failed_gates {
+            let words = format!("criterion {}: {}", gate.criterion, gates::failed_words(gate));
             ui.add(egui::Label::new(RichText::new(words).size(11.5).color(theme::lost())).wrap());
         }
     });
-}
-
-/// The criteria that fired at an update, with value and threshold.
-pub fn fired(state: &State, row: &StepRow) -> Vec<Fired> {
-    let limit = |key: &str| state.setting("limits", key).and_then(|v| v.as_f64());
-    let below = |value: Option<f64>, limit: Option<f64>| value.zip(limit).filter(|(v, l)| v < l);
-    let above = |value: Option<f64>, limit: Option<f64>| value.zip(limit).filter(|(v, l)| v > l);
-    let score = |name: &str, (v, l): (f64, f64)| format!("{name} {v:.3} < {l:.3}");
-    let length = |name: &str, (v, l): (f64, f64)| format!("{name} {:.1} > {:.1} cm", v * 100.0, l * 100.0);
-    let all = [
-        below(row.ncc, limit("ncc_min")).map(|pair| score("match score", pair)),
-        below(row.stereo_score, limit("stereo_ncc_min")).map(|pair| score("stereo score", pair)),
-        above(row.distance_correction_m, row.distance_tolerance_m).map(|pair| length("range change", pair)),
-        above(row.position_correction_m, row.position_tolerance_m).map(|pair| length("site position", pair)),
-    ];
-    let numbered = (1..).zip(all);
-    numbered.filter_map(|(criterion, words)| Some(Fired { criterion, words: words? })).collect()
 }

@@ -1,16 +1,32 @@
 //! The list of messages: what was said to the person, the newest first.
 
-use egui::{Align, Layout, ScrollArea, Ui};
+use egui::{Align, Color32, Layout, ScrollArea, Ui};
 
-use super::card;
 use crate::command::Command;
+use crate::command::table::UNDO;
+use crate::panels::card;
+use crate::panels::panel::Panel;
 use crate::state::State;
 use crate::state::messages::{Message, Weight};
-use crate::state::why::Ask;
+use crate::why::Ask;
 use crate::{panels, theme};
 
+/// The panel “Messages”.
+pub(crate) struct Messages;
+
+impl Panel for Messages {
+    fn show(&self, ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+        show(ui, state, out);
+    }
+
+    fn badge(&self, state: &State) -> Option<(usize, Color32)> {
+        let problems = state.messages.all().iter().filter(|m| m.weight == Weight::Problem).count();
+        (problems > 0).then(|| (problems, theme::lost()))
+    }
+}
+
 /// Shows the list.
-pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     if state.messages.all().is_empty() {
         panels::missing(
             ui,
@@ -50,10 +66,10 @@ fn show_message(ui: &mut Ui, state: &State, message: &Message, out: &mut Vec<Com
 }
 
 /// A button that takes back what a message tells of, as long as that was the last deed.
-pub fn undo(ui: &mut Ui, state: &State, message: &Message, out: &mut Vec<Command>) {
+pub(crate) fn undo(ui: &mut Ui, state: &State, message: &Message, out: &mut Vec<Command>) {
     if message.deed.is_some_and(|deed| state.undo.is_last(deed)) {
         let button = egui::Button::new("Undo").min_size(egui::vec2(24.0, 22.0));
-        if ui.add(button).on_hover_text("Takes it back (Ctrl+Z)").clicked() {
+        if ui.add(button).on_hover_text(UNDO.with_keys("Takes it back")).clicked() {
             out.push(Command::Why(Ask::Undo));
         }
     }

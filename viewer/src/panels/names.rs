@@ -2,14 +2,14 @@
 
 use egui::{Color32, Sense, Ui, vec2};
 
-use crate::overlay::{Mark, paint_mark};
+use crate::drawing::overlay::{Mark, paint_mark};
 use crate::theme;
 
 /// Height of the row, points.
-pub const HEIGHT: f32 = 15.0;
+pub(crate) const HEIGHT: f32 = 15.0;
 
 /// Shows the title and the names in one row.
-pub fn show(ui: &mut Ui, title: &str, names: &[(Mark, Color32, String)]) {
+pub(crate) fn show(ui: &mut Ui, title: &str, names: &[(Mark, Color32, String)]) {
     ui.horizontal(|ui| {
         ui.set_height(HEIGHT);
         contents(ui, title, names);
@@ -17,7 +17,7 @@ pub fn show(ui: &mut Ui, title: &str, names: &[(Mark, Color32, String)]) {
 }
 
 /// Shows the title and the names in as many rows as they need.
-pub fn wrapped(ui: &mut Ui, title: &str, names: &[(Mark, Color32, String)]) {
+pub(crate) fn wrapped(ui: &mut Ui, title: &str, names: &[(Mark, Color32, String)]) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.y = 1.0;
         ui.spacing_mut().interact_size.y = HEIGHT;

@@ -2,14 +2,14 @@
 
 use egui::{Button, DragValue, RichText, Ui, vec2};
 
+use crate::breakpoints::Ask;
+use crate::breakpoints::play::{RATES, Shuttle};
 use crate::command::Command;
 use crate::state::State;
-use crate::state::ask::Ask;
-use crate::state::ask::play::{RATES, Shuttle};
 use crate::theme;
 
 /// Shows the controls in a row.
-pub fn controls(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+pub(crate) fn controls(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let play = &state.ask.play;
     ui.add_space(6.0);
     let (words, name) = if play.is_playing() { ("||", "pause") } else { ("▶", "play") };

@@ -1,10 +1,10 @@
 //! Runs as a tree: a branch stands below what it left, with only what it changed.
 
-use sightline_core::session::view::RunView;
-use sightline_core::settings::Settings;
+use sightline_session::view::RunView;
+use sightline_track::settings::Settings;
 
 /// The runs in the order of the tree, each with how deep it stands. A branch of a removed run stands with the roots.
-pub(super) fn order(runs: &[RunView]) -> Vec<(usize, &RunView)> {
+pub(crate) fn order(runs: &[RunView]) -> Vec<(usize, &RunView)> {
     let is_root = |run: &&RunView| parent(runs, run).is_none();
     let mut ordered = Vec::new();
     runs.iter().filter(is_root).for_each(|root| add(runs, root, 0, &mut ordered));
@@ -18,13 +18,13 @@ fn add<'a>(runs: &'a [RunView], run: &'a RunView, depth: usize, ordered: &mut Ve
 }
 
 /// The run that a run left, where that is shown; always an earlier one.
-pub(super) fn parent<'a>(runs: &'a [RunView], run: &RunView) -> Option<&'a RunView> {
+pub(crate) fn parent<'a>(runs: &'a [RunView], run: &RunView) -> Option<&'a RunView> {
     let left = run.fork.filter(|fork| fork.run < run.number)?.run;
     runs.iter().find(|other| other.number == left)
 }
 
 /// What a run changed: against what it left, or against the defaults where it left none; with where its prediction was put.
-pub(super) fn changed(runs: &[RunView], run: &RunView) -> Vec<String> {
+pub(crate) fn changed(runs: &[RunView], run: &RunView) -> Vec<String> {
     let defaults = Settings::default();
     let before = parent(runs, run).map_or(&defaults, |parent| &parent.settings);
     let changes = run.settings.changes_from(before);
@@ -38,9 +38,9 @@ pub(super) fn changed(runs: &[RunView], run: &RunView) -> Vec<String> {
 mod tests {
     use super::*;
     use serde_json::json;
-    use sightline_core::frames::Pixel;
-    use sightline_core::session::Fork;
-    use sightline_core::settings::Changes;
+    use sightline_geometry::frames::Pixel;
+    use sightline_session::Fork;
+    use sightline_track::settings::Changes;
 
     fn run(number: usize, fork: Option<Fork>, changes: &[(&str, serde_json::Value)]) -> RunView {
         let changes: Changes = changes.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect();

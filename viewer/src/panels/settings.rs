@@ -1,27 +1,40 @@
 //! The settings of the run, made from the table of settings: change some and run again from the cursor's step.
 
-use egui::{Align, CollapsingHeader, ComboBox, DragValue, Layout, RichText, ScrollArea, Ui, vec2};
+use egui::{Align, CollapsingHeader, Color32, ComboBox, DragValue, Layout, RichText, ScrollArea, Ui, vec2};
 use serde_json::{Value, json};
-use sightline_core::limits::{Domain, SettingInfo};
-use sightline_core::settings::TrackerKind;
+use sightline_track::limits::{Domain, SettingInfo};
+use sightline_track::settings::TrackerKind;
 
 use crate::command::Command;
+use crate::panels::panel::Panel;
 use crate::state::{State, run_letter};
 use crate::{panels, theme};
 
 /// Width of the column of units, points.
 const UNIT: f32 = 24.0;
 
+/// The panel “Settings”.
+pub(crate) struct Settings;
+
+impl Panel for Settings {
+    fn show(&self, ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+        show(ui, state, out);
+    }
+
+    fn missing(&self, state: &State) -> Option<String> {
+        if state.settings.is_empty() {
+            return Some("Asking the server for its settings …".to_owned());
+        }
+        state.run().is_none().then(|| state.missing_target())
+    }
+
+    fn badge(&self, state: &State) -> Option<(usize, Color32)> {
+        (!state.draft.is_empty()).then(|| (state.draft.len(), theme::accent()))
+    }
+}
+
 /// Shows the form.
-pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    if state.settings.is_empty() {
-        panels::missing(ui, "Thresholds and parameters of a run", "Asking the server for its settings …");
-        return;
-    }
-    if state.run().is_none() {
-        panels::missing(ui, "Thresholds and parameters of a run", &state.missing_target());
-        return;
-    }
+pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     presets(ui, state, out);
     foot(ui, state, out);
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
@@ -114,7 +127,9 @@ fn show_setting(ui: &mut Ui, state: &State, info: &SettingInfo, out: &mut Vec<Co
     let in_run = state.setting(&info.group, &info.key).unwrap_or_else(|| info.default.clone());
     let drafted = state.draft.get(&info.key);
     let value = drafted.unwrap_or(&in_run).clone();
+    let idle = (!has_effect(state, info)).then(|| info.condition()).flatten();
     let colour = match (drafted, in_run == info.default) {
+        _ if idle.is_some() => theme::weak(),
         (Some(_), _) => theme::accent(),
         (None, false) => theme::strong(),
         (None, true) => theme::text(),
@@ -146,9 +161,22 @@ fn show_setting(ui: &mut Ui, state: &State, info: &SettingInfo, out: &mut Vec<Co
             });
         });
     });
+    if let Some(condition) = idle.filter(|_| drafted.is_some()) {
+        ui.label(theme::note(format!("{} has an effect only if {condition}", info.key)));
+    }
     if let Some(problem) = problem(state, info) {
         ui.label(RichText::new(format!("{} {problem}", info.key)).small().color(theme::lost()));
     }
+}
+
+/// Whether a setting has an effect beside the others, the changed ones among them.
+fn has_effect(state: &State, info: &SettingInfo) -> bool {
+    let value = |info: &SettingInfo| {
+        let drafted = state.draft.get(&info.key).cloned();
+        let in_run = || state.setting(&info.group, &info.key);
+        drafted.or_else(in_run).unwrap_or_else(|| info.default.clone())
+    };
+    info.has_effect(&state.settings, &value)
 }
 
 /// The control of a setting. Returns the new value where the person gave one.
@@ -212,8 +240,10 @@ fn help(info: &SettingInfo, in_run: &Value) -> String {
         Domain::Choice(words) => words.join(", "),
     };
     let unit = if info.unit.is_empty() { String::new() } else { format!(" {}", info.unit) };
+    let condition =
+        info.condition().map(|words| format!("\nhas an effect only if: {words}")).unwrap_or_default();
     format!(
-        "{}\n\nthis run: {in_run}{unit}\ndefault: {}{unit}\nvalues: {range}\nsource: {}",
+        "{}\n\nthis run: {in_run}{unit}\ndefault: {}{unit}\nvalues: {range}{condition}\nsource: {}",
         info.help, info.default, info.source
     )
 }

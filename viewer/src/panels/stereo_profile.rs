@@ -8,20 +8,20 @@ use egui_plot::{
     Axis, GridInput, GridMark, HLine, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotUi, Points, Span,
     Text, VLine,
 };
-use sightline_core::locate::template::point_stereo::PointStereo;
-use sightline_core::trace::StepTrace;
+use sightline_track::locate::template::point_stereo::PointStereo;
+use sightline_track::trace::StepTrace;
 
-use super::image_right::target_curve;
-use super::names;
-use super::plots::pieces;
 use crate::command::Command;
-use crate::overlay::{self, Mark};
+use crate::drawing::overlay;
+use crate::drawing::overlay::Mark;
+use crate::panels::chart::pieces;
+use crate::panels::image_right::target_curve;
+use crate::panels::names;
+use crate::panels::panel::{Panel, TableOf};
+use crate::panels::sheets;
 use crate::pointed::Pointed;
 use crate::state::State;
-use crate::{panels, theme};
-
-/// What the panel is for.
-const PURPOSE: &str = "The stereo score of every range that was searched.";
+use crate::theme;
 
 /// Ranges that may have a tick, m.
 const TICKS_M: [f64; 22] = [
@@ -32,14 +32,32 @@ const TICKS_M: [f64; 22] = [
 /// Two ticks are at least this share of the axis apart.
 const TICK_GAP: f64 = 0.09;
 
+/// The panel “Stereo scores”.
+pub(crate) struct StereoProfile;
+
+impl Panel for StereoProfile {
+    fn show(&self, ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+        show(ui, state, out);
+    }
+
+    fn missing(&self, state: &State) -> Option<String> {
+        searched(state).is_none().then(|| state.missing_template())
+    }
+
+    fn table(&self) -> Option<TableOf> {
+        Some(sheets::scores::stereo_profile)
+    }
+}
+
+/// The stereo search at the current step.
+fn searched(state: &State) -> Option<&PointStereo> {
+    state.trace()?.template()?.point_stereo.as_ref()
+}
+
 /// Shows the profile.
-pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    let stereo = state.trace().and_then(StepTrace::template).and_then(|e| e.point_stereo.as_ref());
-    let (Some(trace), Some(stereo)) = (state.trace(), stereo) else {
-        panels::missing(ui, PURPOSE, &state.missing_template());
-        return;
-    };
-    let threshold = state.setting("limits", "stereo_ncc_min").and_then(|v| v.as_f64());
+pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let (Some(trace), Some(stereo)) = (state.trace(), searched(state)) else { return };
+    let threshold = state.run_settings().limits.stereo_ncc_min;
     let predicted = predicted_range(trace);
     let run = theme::run(state.cursor.run);
     names::wrapped(ui, "", &names_of(run, predicted.is_some()));
@@ -120,7 +138,7 @@ fn sentences(stereo: &PointStereo, predicted: Option<(f64, f64)>) -> [RichText; 
 
 /// Predicted distance from the left camera and its 1 σ along the line of sight, m.
 fn predicted_range(trace: &StepTrace) -> Option<(f64, f64)> {
-    let (prediction, pointing) = (trace.predict.as_ref()?, trace.point_mast.as_ref()?);
+    let (prediction, pointing) = (trace.prediction()?, &trace.point_mast);
     let away = prediction.position_in_rover - pointing.left.model.centre();
     let range_m = away.norm();
     let along = away / range_m.max(1e-9);
@@ -147,7 +165,7 @@ fn paint(
     plot: &mut PlotUi<'_>,
     stereo: &PointStereo,
     predicted: Option<(f64, f64)>,
-    threshold: Option<f64>,
+    threshold: f64,
     run: Color32,
 ) {
     if let Some((range_m, sigma_m)) = predicted {
@@ -158,11 +176,9 @@ fn paint(
         let line = VLine::new("", 1.0 / range_m).color(theme::prediction()).style(LineStyle::dotted_dense());
         plot.vline(line.width(1.5).allow_hover(false));
     }
-    if let Some(threshold) = threshold {
-        let line = HLine::new("", threshold).color(theme::failed()).style(LineStyle::dashed_dense());
-        plot.hline(line.width(1.0).allow_hover(false));
-    }
-    let point = |p: &sightline_core::locate::template::point_stereo::CurvePoint| {
+    let line = HLine::new("", threshold).color(theme::failed()).style(LineStyle::dashed_dense());
+    plot.hline(line.width(1.0).allow_hover(false));
+    let point = |p: &sightline_track::locate::template::point_stereo::CurvePoint| {
         Some([1.0 / p.range_m, f64::from(p.score.filter(|score| score.is_finite())?)])
     };
     for piece in pieces(&stereo.curve.iter().map(point).collect::<Vec<_>>()) {

@@ -1,45 +1,68 @@
 //! The surface of match scores over the search window, with its peaks, the threshold and the prediction.
 
-use egui::{Align2, Rect, Ui, pos2, vec2};
-use nalgebra::Matrix2;
-use sightline_core::frames::Pixel;
-use sightline_core::image::PixelRect;
-use sightline_core::locate::template::match_template::TemplateMatch;
-use sightline_core::locate::template::settings::Measure;
-use sightline_core::trace::{ArrayName, StepTrace};
+use egui::{Align2, Margin, Rect, Ui, pos2, vec2};
+use sightline_geometry::frames::Pixel;
+use sightline_track::locate::template::match_template::TemplateMatch;
+use sightline_track::locate::template::settings::Measure;
+use sightline_track::trace::{ArrayName, StepTrace};
+use sightline_vision::image::PixelRect;
 
-use super::images_left::STATUS;
 use crate::cache::Slot;
-use crate::command::{Command, Panel};
-use crate::contour::contour;
-use crate::overlay::{Line, Mark, Overlay};
+use crate::command::{Command, Zoomable};
+use crate::drawing::overlay::{Mark, Overlay};
+use crate::drawing::raster::{Look, Raster};
+use crate::drawing::view2d::Canvas;
+use crate::pane::{Need, Pane};
+use crate::panels::panel::{Panel, TableOf};
+use crate::panels::score_marks::{paint_contour, paint_marks, region_of};
+use crate::panels::sheets;
+use crate::panels::status_line::STATUS;
 use crate::pointed::Pointed;
-use crate::raster::{Look, Raster};
 use crate::state::State;
-use crate::view2d::Canvas;
 use crate::{panels, theme};
 
 /// What the panel is for.
-const PURPOSE: &str = "The match score of every position in the search window.";
+const PURPOSE: &str = Pane::Surface.about().help;
 
 /// Width of the colour bar with its numbers, points.
 const BAR: f32 = 62.0;
 /// Ticks of the colour bar, both ends among them.
 const TICKS: u32 = 5;
 
+/// The panel of match scores.
+pub(crate) struct Scores;
+
+impl Panel for Scores {
+    fn show(&self, ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+        show(ui, state, out);
+    }
+
+    fn table(&self) -> Option<TableOf> {
+        Some(sheets::scores::surface)
+    }
+
+    fn needs(&self) -> &'static [Need] {
+        &[Need::TriedScores]
+    }
+
+    fn margin(&self) -> Margin {
+        Margin { left: 4, right: 4, top: 4, bottom: 0 }
+    }
+}
+
 /// Shows the surface.
-pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    if super::compare::surfaces::show(ui, state, out) {
+pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    if crate::compare::panel::surfaces::show(ui, state, out) {
         return;
     }
-    if super::what_if::scores::show(ui, state, out) {
+    if crate::what_if::panel::scores::show(ui, state, out, recorded) {
         return;
     }
     recorded(ui, state, out);
 }
 
 /// Shows the scores of the run.
-pub(super) fn recorded(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+pub(crate) fn recorded(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let matched = state.trace().and_then(StepTrace::template).and_then(|e| e.match_template.as_ref());
     let (Some(trace), Some(matched)) = (state.trace(), matched) else {
         panels::missing(ui, PURPOSE, &state.missing_template());
@@ -50,7 +73,7 @@ pub(super) fn recorded(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
                    positions. The Inspector has its steps.";
         return panels::missing(ui, PURPOSE, why);
     }
-    let raster = match state.array(ArrayName::Surface) {
+    let raster = match state.array(ArrayName::SURFACE) {
         Slot::Ready(raster) => raster,
         Slot::Failed(problem) => {
             return panels::missing(ui, PURPOSE, &format!("The scores cannot be shown: {}", problem.detail));
@@ -62,10 +85,10 @@ pub(super) fn recorded(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let (rest, bar) = area.split_left_right_at_x(area.right() - BAR);
     let mut left = ui.new_child(egui::UiBuilder::new().max_rect(rest).id_salt("scores"));
     let region = region_of(matched.search_window, raster.size());
-    let canvas = Canvas::new(&mut left, state.view(Panel::Surface), region, STATUS);
+    let canvas = Canvas::new(&mut left, state.view(Zoomable::Surface), region, STATUS);
     canvas.checker(region);
     canvas.texture(&raster.texture, region);
-    let threshold = state.setting("limits", "ncc_min").and_then(|v| v.as_f64()).unwrap_or(0.7) as f32;
+    let threshold = state.run_settings().limits.ncc_min as f32;
     // The threshold is one of correlation.
     let threshold = (matched.measure == Measure::Ncc).then_some(threshold);
     if state.marks {
@@ -86,72 +109,7 @@ pub(super) fn recorded(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     colour_bar(ui, bar, matched, threshold, theme::run(state.cursor.run));
     ui.advance_cursor_after_rect(area);
     if let Some(view) = canvas.moved {
-        out.push(Command::View(Panel::Surface, view));
-    }
-}
-
-/// The pixels on which the template's centre lay: the search window less half a template on each side.
-pub fn region_of(search_window: PixelRect, size: [u32; 2]) -> PixelRect {
-    let inset = |whole: u32, inner: u32| (whole.saturating_sub(inner) / 2) as i32;
-    PixelRect::new(
-        search_window.x + inset(search_window.width, size[0]),
-        search_window.y + inset(search_window.height, size[1]),
-        size[0],
-        size[1],
-    )
-}
-
-/// The line along which the scores have the threshold's height.
-pub(super) fn paint_contour(canvas: &Canvas, raster: &Raster, region: PixelRect, threshold: f32) {
-    let (x, y) = (f64::from(region.x), f64::from(region.y));
-    let stroke = egui::Stroke::new(1.5, theme::strong());
-    for segment in contour(raster.values.as_raw(), raster.values.width() as usize, threshold) {
-        let ends = segment.map(|[dx, dy]| canvas.transform.to_screen(Pixel::new(x + dx, y + dy)));
-        canvas.painter.line_segment(ends, stroke);
-    }
-}
-
-/// Prediction, peaks and truth on the scores.
-pub(super) fn paint_marks(canvas: &Canvas, trace: &StepTrace, matched: &TemplateMatch, run: egui::Color32) {
-    let pointing = trace.point_mast.as_ref();
-    let predicted = pointing.and_then(|p| Some((p.predicted_left?, p.predicted_covariance_px2)));
-    let truth = trace.truth.as_ref().and_then(|t| t.left_pixel);
-    paint_peaks(canvas, &Marked { predicted, matched, truth, colour: run });
-}
-
-/// What is marked on scores.
-pub(super) struct Marked<'a> {
-    /// The prediction with its covariance, px and px².
-    pub predicted: Option<(Pixel, Option<Matrix2<f64>>)>,
-    /// The match.
-    pub matched: &'a TemplateMatch,
-    /// The truth, px.
-    pub truth: Option<Pixel>,
-    /// The colour of the match.
-    pub colour: egui::Color32,
-}
-
-/// Prediction, peaks and truth.
-pub(super) fn paint_peaks(canvas: &Canvas, marked: &Marked<'_>) {
-    let (matched, run) = (marked.matched, marked.colour);
-    let overlay = Overlay::new(&canvas.painter, &canvas.transform);
-    if let Some((pixel, covariance)) = marked.predicted {
-        if let Some(covariance) = &covariance {
-            overlay.ellipse(pixel, covariance, 3.0, theme::prediction(), Line::Dotted);
-        }
-        overlay.mark(pixel, Mark::Cross, theme::prediction());
-    }
-    if let Some(second) = &matched.second_peak {
-        overlay.mark(second.pixel, Mark::Square, theme::strong());
-        let words = format!("2nd: {:.0} % at {:.0} px", second.ratio * 100.0, second.distance_px);
-        overlay.words(second.pixel, vec2(12.0, 12.0), &words, theme::strong());
-    }
-    let peak = &matched.peak;
-    overlay.ellipse(peak.pixel, &matched.covariance_px2, 3.0, run, Line::Solid);
-    overlay.mark(peak.pixel, Mark::Ring, run);
-    overlay.words(peak.pixel, vec2(12.0, -12.0), &format!("peak {:.3}", peak.score), theme::strong());
-    if let Some(pixel) = marked.truth {
-        overlay.mark(pixel, Mark::Plus, theme::truth());
+        out.push(Command::View(Zoomable::Surface, view));
     }
 }
 
@@ -226,15 +184,4 @@ fn colour_bar(ui: &Ui, area: Rect, matched: &TemplateMatch, threshold: Option<f3
     let tip = pos2(strip.left() - 1.0, at(matched.peak.score as f32));
     let arrow = vec![tip, tip + vec2(-5.0, -4.0), tip + vec2(-5.0, 4.0)];
     painter.add(egui::Shape::convex_polygon(arrow, run, egui::Stroke::NONE));
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_region_of_the_scores_is_the_window_less_half_a_template() {
-        let window = PixelRect::new(100, 50, 143, 143);
-        assert_eq!(region_of(window, [123, 123]), PixelRect::new(110, 60, 123, 123));
-    }
 }

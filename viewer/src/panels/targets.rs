@@ -1,25 +1,38 @@
 //! Targets and their runs.
 
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui, vec2};
-use sightline_core::session::view::{RunView, TargetView};
+use sightline_session::view::{RunView, TargetView};
 
-use super::{run_tree, timeline};
+use crate::command::table::PICK;
 use crate::command::{Command, Mode};
-use crate::overlay::{Mark, paint_mark};
-use crate::state::why::Ask;
+use crate::drawing::overlay::{paint_mark, run_mark};
+use crate::pane::Pane;
+use crate::panels::panel::Panel;
+use crate::panels::{run_tree, timeline};
 use crate::state::{State, run_letter};
+use crate::why::Ask;
 use crate::{panels, theme};
 
 /// What the panel is for.
-const PURPOSE: &str = "What is tracked, and each configuration tried on it.";
+const PURPOSE: &str = Pane::Targets.about().help;
 
 /// How much a branch stands in from what it left, points.
 const INDENT: f32 = 12.0;
 
+/// The panel “Targets and runs”.
+pub(crate) struct Targets;
+
+impl Panel for Targets {
+    fn show(&self, ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+        show(ui, state, out);
+    }
+}
+
 /// Shows the targets.
-pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let is_picking = state.mode == Mode::Pick;
-    let words = if is_picking { "Cancel picking  (Esc)" } else { "Pick a target  (T)" };
+    let pick = format!("{}  ({})", PICK.name, PICK.keys());
+    let words = if is_picking { "Cancel picking  (Esc)" } else { &pick };
     let button = egui::Button::new(words).selected(is_picking).min_size(vec2(ui.available_width(), 26.0));
     if ui.add_enabled(state.session.is_some(), button).clicked() {
         out.push(Command::SetMode(if is_picking { Mode::Look } else { Mode::Pick }));
@@ -78,7 +91,7 @@ fn show_target(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Co
 fn warnings<'a>(state: &'a State, target: &TargetView) -> Vec<&'a str> {
     let is_selected = state.cursor.target == Some(target.number);
     let pick = state.trace_at(target.designation.step).ready().filter(|_| is_selected);
-    let evidence = pick.and_then(sightline_core::trace::StepTrace::template);
+    let evidence = pick.and_then(sightline_track::trace::StepTrace::template);
     evidence.map_or_else(Vec::new, |e| e.warnings.iter().map(|warning| warning.sentence.as_str()).collect())
 }
 
@@ -137,11 +150,6 @@ fn card_of(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: 
             out.push(Command::Why(Ask::RemoveRun { target: target.number, run: run.number }));
         }
     }
-}
-
-/// The shape that goes with a run's colour.
-pub fn run_mark(number: usize) -> Mark {
-    [Mark::Ring, Mark::Square, Mark::Triangle, Mark::Diamond][number % 4]
 }
 
 /// How far a run is, with a way to stop it.

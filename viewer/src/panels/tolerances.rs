@@ -5,20 +5,20 @@
 
 use egui::{Align2, Color32, RichText, Ui, vec2};
 use egui_plot::{Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotUi, Points, Text, VLine};
-use sightline_core::session::view::RunView;
-use sightline_core::settings::TrackerKind;
-use sightline_core::trace::StepRow;
+use sightline_session::view::RunView;
+use sightline_track::settings::TrackerKind;
+use sightline_track::trace::StepRow;
 
-use super::names;
-use super::plots::{few_marks, over_steps, pieces, plain};
-use super::sheets::{Cell, Column, Sheet};
 use crate::command::{Command, Go};
-use crate::overlay::{self, Mark};
+use crate::drawing::decimate;
+use crate::drawing::overlay;
+use crate::drawing::overlay::Mark;
+use crate::panels::chart::{few_marks, over_steps, pieces, plain};
+use crate::panels::names;
+use crate::panels::panel::{Panel, TableOf};
+use crate::panels::sheets::{Cell, Column, Sheet};
 use crate::state::State;
-use crate::{panels, theme, thin};
-
-/// What the panel is for.
-const PURPOSE: &str = "Criteria 3 and 4: each correction against its tolerance, step by step.";
+use crate::theme;
 
 /// Room for the numbers of the steps below the lower plot, points.
 const AXIS: f32 = 16.0;
@@ -63,13 +63,19 @@ impl Criterion {
 /// The most firings that are marked: more would cover the plot.
 const FIRED: usize = 100;
 
-/// Shows both criteria, one below the other over the same steps.
-pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    let Some(run) = state.run() else {
-        panels::missing(ui, PURPOSE, &state.missing_target());
-        return;
-    };
-    if run.rows.iter().all(|row| row.distance_tolerance_m.is_none()) {
+/// The panel “Tolerances”.
+pub(crate) struct Tolerances;
+
+impl Panel for Tolerances {
+    fn show(&self, ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+        show(ui, state, out);
+    }
+
+    fn missing(&self, state: &State) -> Option<String> {
+        let Some(run) = state.run() else { return Some(state.missing_target()) };
+        if run.rows.iter().any(|row| row.distance_tolerance_m.is_some()) {
+            return None;
+        }
         let sentence = match run.settings.tracker {
             TrackerKind::Template => {
                 "No update was judged yet: tolerances belong to the steps after the pick."
@@ -83,9 +89,17 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
                  see “Gates”."
             }
         };
-        panels::missing(ui, PURPOSE, sentence);
-        return;
+        Some(sentence.to_owned())
     }
+
+    fn table(&self) -> Option<TableOf> {
+        Some(sheets)
+    }
+}
+
+/// Shows both criteria, one below the other over the same steps.
+pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let Some(run) = state.run() else { return };
     names::wrapped(ui, "", &names_of(run.number));
     ui.spacing_mut().item_spacing.y = 1.0;
     let count = CRITERIA.len() as f32;
@@ -103,7 +117,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 }
 
 /// Both criteria as one table.
-pub(super) fn sheets(state: &State) -> Result<Vec<Sheet>, String> {
+pub(crate) fn sheets(state: &State) -> Result<Vec<Sheet>, String> {
     let run = state.run().ok_or_else(|| state.missing_target())?;
     let columns = CRITERIA.iter().flat_map(|criterion| {
         let name = criterion.title.trim_end_matches(", cm");
@@ -196,9 +210,11 @@ fn paint(plot: &mut PlotUi<'_>, run: &RunView, criterion: &Criterion) {
     for piece in line(criterion.value_m) {
         let colour = theme::run(run.number);
         plot.line(Line::new("", piece.clone()).color(colour).width(1.5));
-        plot.points(Points::new("", thin::marks(piece)).color(colour).radius(2.5).shape(MarkerShape::Circle));
+        plot.points(
+            Points::new("", decimate::marks(piece)).color(colour).radius(2.5).shape(MarkerShape::Circle),
+        );
     }
-    for &[step, value_cm] in thin::evenly(&criterion.fired(run), FIRED) {
+    for &[step, value_cm] in decimate::evenly(&criterion.fired(run), FIRED) {
         let mark = Points::new("", [step, value_cm]).color(theme::failed()).radius(6.0);
         plot.points(mark.shape(MarkerShape::Cross));
         let word = Text::new("", PlotPoint::new(step, value_cm), theme::note("fired").color(theme::failed()));

@@ -1,22 +1,27 @@
 //! Whether the covariances hold: NEES and NIS step by step with their chi-square bands, coverage, and one sentence.
 
 use egui::{Id, RichText, Ui, UiBuilder, vec2};
-use egui_plot::{HLine, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotUi, Points, VLine};
-use sightline_core::session::compare::RunName;
-use sightline_core::session::metrics::uncertainty::{Consistency, Uncertainty};
+use egui_plot::{HLine, Line, LineStyle, Plot, PlotPoint, PlotUi, Points, VLine};
+use sightline_session::compare::RunName;
+use sightline_session::metrics::uncertainty::{Consistency, Uncertainty};
 
-use super::compare::mark;
-use super::names;
-use super::plots::{few_marks, over_steps, plain};
 use crate::command::{Command, Go};
-use crate::overlay::{self, Mark};
+use crate::compare::panel::mark;
+use crate::compare::state::Look;
+use crate::drawing::decimate;
+use crate::drawing::overlay;
+use crate::drawing::overlay::Mark;
+use crate::pane::{Need, Pane};
 use crate::panels;
+use crate::panels::chart::{few_marks, over_steps, plain, shape};
+use crate::panels::names;
+use crate::panels::panel::{Panel, TableOf};
+use crate::panels::sheets;
 use crate::state::State;
-use crate::state::compare::Look;
-use crate::{theme, thin};
+use crate::theme;
 
 /// What the panel is for.
-const PURPOSE: &str = "Whether errors are as large as the covariances say.";
+const PURPOSE: &str = Pane::Uncertainty.about().help;
 
 /// A run whose covariances are shown.
 struct Shown<'a> {
@@ -25,12 +30,30 @@ struct Shown<'a> {
     found: &'a Uncertainty,
 }
 
+/// The panel “Uncertainty”.
+pub(crate) struct UncertaintyPanel;
+
+impl Panel for UncertaintyPanel {
+    fn show(&self, ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+        show(ui, state, out);
+    }
+
+    fn missing(&self, state: &State) -> Option<String> {
+        state.own_name().is_none().then(|| state.missing_target())
+    }
+
+    fn table(&self) -> Option<TableOf> {
+        Some(sheets::steps::uncertainty)
+    }
+
+    fn needs(&self) -> &'static [Need] {
+        &[Need::Metrics]
+    }
+}
+
 /// Shows the verdicts and the plots.
-pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    let Some(own) = state.own_name() else {
-        panels::missing(ui, PURPOSE, &state.missing_target());
-        return;
-    };
+pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let Some(own) = state.own_name() else { return };
     let mut names = vec![(own, state.own_look())];
     names.extend(state.others().iter().map(|other| (other.name, other.look)));
     let shown: Vec<Shown<'_>> = names
@@ -163,19 +186,11 @@ fn plot(
 }
 
 fn series(plot: &mut PlotUi<'_>, points: Vec<[f64; 2]>, look: Look) {
-    let points = thin::curve(points);
+    let points = decimate::curve(points);
     plot.line(Line::new("", points.clone()).color(look.colour).width(1.5).allow_hover(false));
-    plot.points(Points::new("", thin::marks(points)).color(look.colour).radius(3.0).shape(shape(look.mark)));
-}
-
-/// The plotted shape of a run's mark.
-pub fn shape(mark: Mark) -> MarkerShape {
-    match mark {
-        Mark::Square => MarkerShape::Square,
-        Mark::Triangle => MarkerShape::Up,
-        Mark::Diamond => MarkerShape::Diamond,
-        _ => MarkerShape::Circle,
-    }
+    plot.points(
+        Points::new("", decimate::marks(points)).color(look.colour).radius(3.0).shape(shape(look.mark)),
+    );
 }
 
 /// The share of errors within k σ against the share that is to be expected.

@@ -2,28 +2,29 @@
 
 use egui::Ui;
 
-use crate::actions;
-use crate::command::{Command, Mode};
+use crate::command::Command;
+use crate::command::table;
+use crate::command::table::{COPY_LINK, HELP, PALETTE, UserCommand};
+use crate::layout::command::LayoutCommand;
 use crate::layout::presets::Preset;
-use crate::layout::workspace::LayoutCommand;
 use crate::state::State;
-use crate::theme::{self, Looks};
+use crate::theme;
+use crate::theme::Looks;
 use crate::tour::Turn;
 
 /// Shows the menu's button, and the menu while it is open.
-pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let button = egui::Button::new("View").min_size(egui::vec2(26.0, 24.0));
     let (response, _) = egui::containers::menu::MenuButton::from_button(button).ui(ui, |ui| {
         ui.set_min_width(230.0);
-        if ui.button("Everything by name (Ctrl+K)").clicked() {
-            out.push(actions::palette());
-        }
+        entry(ui, &PALETTE, state, out);
         ui.separator();
         ui.label(theme::title("Arrangement"));
-        for (number, preset) in (1..).zip(Preset::ALL) {
-            let words = format!("{} (Shift+{number})", preset.title());
+        for preset in Preset::ALL {
+            let command = Command::Layout(LayoutCommand::Use(preset));
+            let words = format!("{} ({})", preset.title(), table::keys_of(state, &command));
             if ui.button(words).on_hover_text(preset.purpose()).clicked() {
-                out.push(Command::Layout(LayoutCommand::Use(preset)));
+                out.push(command);
             }
         }
         ui.separator();
@@ -36,20 +37,26 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         ui.separator();
         let mut are_on = state.single_keys;
         let check = ui.checkbox(&mut are_on, "Keys act without Ctrl");
-        let help = "Off: letters, digits and Space do nothing by themselves. The palette (Ctrl+K) has everything they do.";
+        let help = format!(
+            "Off: letters, digits and Space do nothing by themselves. The palette ({}) has everything they do.",
+            PALETTE.keys()
+        );
         if check.on_hover_text(help).changed() {
             out.push(Command::SetSingleKeys(are_on));
         }
         ui.separator();
-        if ui.button("Copy a link to this place (Y)").clicked() {
-            out.push(Command::CopyLink);
-        }
+        entry(ui, &COPY_LINK, state, out);
         if ui.button("Tour").clicked() {
             out.push(Command::Tour(Turn::Begin));
         }
-        if ui.button("Keys and conventions (?)").clicked() {
-            out.push(Command::SetMode(Mode::Help));
-        }
+        entry(ui, &HELP, state, out);
     });
     response.on_hover_text("Arrangements, colours, and where everything else is found");
+}
+
+/// An entry of the menu: the name of a command with its keys.
+fn entry(ui: &mut Ui, command: &UserCommand, state: &State, out: &mut Vec<Command>) {
+    if ui.button(command.with_keys(command.name)).clicked() {
+        out.push((command.command)(state));
+    }
 }

@@ -1,18 +1,28 @@
 //! Carrying out what the person asked for.
 
-use sightline_core::frames::Pixel;
-use sightline_core::session::Cursor;
-use sightline_core::session::wire::{NewRun, NewTarget};
-use sightline_core::settings::Changes;
+use sightline_api::endpoints::StreamRecording;
+use sightline_api::wire::{NewRun, NewTarget};
+use sightline_geometry::frames::Pixel;
+use sightline_session::Cursor;
+use sightline_track::settings::Changes;
 
-use super::ask::play::Shuttle;
-use super::{Place, State, Views, events, run_letter};
-use crate::command::{Command, Go, Mode, Panel};
-use crate::net::Request;
+use crate::breakpoints::play::Shuttle;
+use crate::command::{Command, Go, Mode, Zoomable};
+use crate::exports::update::stream_to_rerun;
+use crate::net::request::Request;
+use crate::state::effect::Effect;
+use crate::state::{Place, State, Views, events, run_letter};
 
 impl State {
-    /// Carries out one command.
-    pub fn apply(&mut self, command: Command) {
+    /// Applies one command and returns what the page has to do for it, in order.
+    #[must_use = "the page carries the effects out"]
+    pub fn apply(&mut self, command: Command) -> Vec<Effect> {
+        self.perform(command);
+        self.outbox.take()
+    }
+
+    /// Applies one command; its effects wait with those of answers and events ([`State::take_effects`]).
+    pub(crate) fn perform(&mut self, command: Command) {
         let is_draft = matches!(command, Command::Draft { .. } | Command::UsePreset(_) | Command::ClearDraft);
         let draft = is_draft.then(|| self.draft.clone());
         self.carry_out(command);
@@ -49,9 +59,9 @@ impl State {
                 self.ask(|session| Request::ResumeRun { session, target, run });
             }
             Command::View(panel, view) => match panel {
-                Panel::Left => self.views.left = view,
-                Panel::Right => self.views.right = view,
-                Panel::Surface => self.views.surface = view,
+                Zoomable::Left => self.views.left = view,
+                Zoomable::Right => self.views.right = view,
+                Zoomable::Surface => self.views.surface = view,
             },
             Command::SetCalculator(calculator) => self.calculator = calculator,
             Command::SetStretch(stretch) => self.stretch = stretch,
@@ -59,11 +69,11 @@ impl State {
             Command::SetShapeView(view) => self.shape_view = view,
             Command::OrderStudy(order) => self.studies.order = order,
             Command::StartStudy => self.start_study(),
-            Command::CancelStudy(job) => self.outbox.push(Request::CancelStudy(job)),
-            Command::ResumeStudy(job) => self.outbox.push(Request::ResumeStudy(job)),
+            Command::CancelStudy(job) => self.cancel_study(job),
+            Command::ResumeStudy(job) => self.resume_study(job),
             Command::LookAtStudy(job) => self.look_at_study(job),
             Command::OpenReport(job) => {
-                self.open_url = Some(format!("{}/api/v1/studies/jobs/{job}/report.html", self.origin));
+                self.open_path(&format!("studies/jobs/{job}/report.html"));
             }
             Command::FitAll => self.views = Views::default(),
             Command::ToggleLayer(layer) => {
@@ -73,15 +83,20 @@ impl State {
             }
             Command::ToggleMarks => self.marks = !self.marks,
             Command::OpenRerun => {
-                self.ask(Request::OpenRerun);
+                if let Some(session) = self.session_id() {
+                    self.call::<StreamRecording>(stream_to_rerun(session), Self::rerun_opened);
+                }
                 self.messages.note("Opening the session in Rerun …");
             }
             Command::Dismiss(id) => self.messages.dismiss(id),
             Command::Reconnect => self.outbox.push(Request::Reconnect),
-            Command::SetLooks(looks) => self.looks = looks,
+            Command::SetLooks(looks) => {
+                self.looks = looks;
+                self.outbox.add(Effect::UseLooks(looks));
+            }
             Command::SetSingleKeys(are_on) => self.single_keys = are_on,
-            // The page itself does these: they are no part of what is looked at.
-            Command::Layout(_) | Command::CopyLink => {}
+            Command::Layout(command) => self.outbox.add(Effect::Layout(command)),
+            Command::CopyLink => self.outbox.add(Effect::CopyLink),
             Command::Compare(ask) => self.ask_compare(ask),
             Command::Aim(aim) => self.aim(aim),
             Command::Tour(turn) => self.turn_tour(turn),
@@ -139,7 +154,7 @@ impl State {
         }
     }
 
-    pub(super) fn set_mode(&mut self, mode: Mode) {
+    pub(crate) fn set_mode(&mut self, mode: Mode) {
         if mode == Mode::Look && self.mode == Mode::Look {
             self.refusal = None;
             self.messages.close_card();
@@ -163,7 +178,7 @@ impl State {
     }
 
     /// Has the server designate a place.
-    pub(super) fn designate(&mut self, place: Place) {
+    pub(crate) fn designate(&mut self, place: Place) {
         if self.designating.is_some() {
             self.messages.note("The last designation is still being computed.");
             return;
@@ -189,17 +204,16 @@ impl State {
         }
     }
 
+    /// Opens a path below `/api/v1/` in a new tab.
+    pub(crate) fn open_path(&mut self, path: &str) {
+        self.outbox.add(Effect::OpenUrl(format!("{}/api/v1/{path}", self.origin)));
+    }
+
     /// Puts a request about the open session into the outbox; says so when there is none.
-    pub(super) fn ask(&mut self, request: impl FnOnce(String) -> Request) -> bool {
-        match self.session.as_ref().map(|session| session.id.clone()) {
-            Some(session) => {
-                self.outbox.push(request(session));
-                true
-            }
-            None => {
-                self.messages.problem("No session is open yet.", None);
-                false
-            }
-        }
+    pub(crate) fn ask(&mut self, request: impl FnOnce(String) -> Request) -> bool {
+        let session = self.session_id();
+        let is_open = session.is_some();
+        self.outbox.extend(session.map(request));
+        is_open
     }
 }

@@ -2,21 +2,27 @@
 
 use std::collections::BTreeSet;
 
-use sightline_core::session::Cursor;
-use sightline_core::session::view::{RunView, SessionView};
-use sightline_core::session::wire::{Event, NewSession, Problem, RerunStream, SessionEntry, TraverseEntry};
+use sightline_api::endpoint::{Call, Method};
+use sightline_api::endpoints::{BeginSession, ListSessions, ListSettings, ListTraverses, ShowTraverse};
+use sightline_api::location::{Anywhere, AtTraverse};
+use sightline_api::wire::{Event, NewSession, Problem, RerunStream, SessionEntry, TraverseEntry};
+use sightline_session::Cursor;
+use sightline_session::view::{RunView, SessionView};
 
-use super::{Connection, Progress, Refusal, State, run_letter};
+use crate::breakpoints::AskRequest;
 use crate::cache::{Key, StepKey};
 use crate::command::Mode;
-use crate::net::{Arrived, Reply, Request};
-use crate::state::ask::AskRequest;
-use crate::state::undo::Deed;
+use crate::net::events::Connection;
+use crate::net::request::{Arrived, Reply, Request};
+use crate::state::deeds::Deed;
+use crate::state::effect::Effect;
+use crate::state::{Progress, Refusal, State, run_letter};
 
 impl State {
     /// Asks for what a page needs first.
     pub fn begin(&mut self) {
-        self.outbox.extend([Request::Settings, Request::Traverses]);
+        self.read_settings();
+        self.read_traverses();
         if let Some(session) = self.sync.linked.clone() {
             self.outbox.push(Request::Session(session));
         }
@@ -27,6 +33,7 @@ impl State {
         match (arrived.request, arrived.outcome) {
             (Request::Item(key), Ok(Reply::Item(item))) => self.cache.arrived(key, Ok(item), now),
             (Request::Item(key), Err(problem)) => self.cache.arrived(key, Err(problem), now),
+            (Request::Call { ticket, .. }, outcome) => self.answered_call(ticket, outcome),
             (request, Ok(reply)) => self.answered(request, reply),
             (request, Err(problem)) => self.refused(request, problem),
         }
@@ -93,13 +100,13 @@ impl State {
         self.sync.session_stale = true;
         self.trackability_stale();
         if self.settings.is_empty() {
-            self.outbox.push(Request::Settings);
+            self.read_settings();
         }
         if self.traverses.is_none() {
-            self.outbox.push(Request::Traverses);
+            self.read_traverses();
         }
         match (&self.session, &self.traverse, &self.sync.linked) {
-            (Some(session), None, _) => self.outbox.push(Request::Traverse(session.traverse.clone())),
+            (Some(session), None, _) => self.read_traverse(session.traverse.clone()),
             (None, _, Some(linked)) => self.outbox.push(Request::Session(linked.clone())),
             _ => {}
         }
@@ -116,10 +123,6 @@ impl State {
 
     fn answered(&mut self, request: Request, reply: Reply) {
         match reply {
-            Reply::Traverses(list) => self.took_traverses(list),
-            Reply::Settings(table) => self.settings = table,
-            Reply::Traverse(traverse) => self.traverse = Some(*traverse),
-            Reply::Sessions(list) => self.took_sessions(&list),
             Reply::Session(view) => {
                 let asked = self.sync.session_asked.take();
                 let was_read = matches!(request, Request::Session(_));
@@ -137,7 +140,6 @@ impl State {
                     self.took_cursor(&session, cursor);
                 }
             }
-            Reply::Rerun(stream) => self.rerun_opened(stream),
             Reply::Done => match request {
                 // The server tells every page that notes changed.
                 Request::NewNote { .. } => {
@@ -151,14 +153,6 @@ impl State {
                     self.sync.session_stale = true;
                 }
             },
-            Reply::Studies(infos) => self.studies.infos = Some(infos),
-            Reply::StudyJobs(jobs) => self.studies.jobs = jobs,
-            Reply::StudyJob(job) => self.studies.took(job),
-            Reply::StudyRows(rows) => {
-                if let Request::StudyRows(job) = request {
-                    self.studies.rows.insert(job, rows);
-                }
-            }
             Reply::Trackability(progress) => {
                 if let Request::Trackability { traverse, step, limits } = request {
                     self.took_trackability((traverse, step, limits), Ok(*progress));
@@ -174,8 +168,7 @@ impl State {
                     self.took_notes(&session, list);
                 }
             }
-            Reply::Exports(entries) => self.exports.entries = Some(entries),
-            Reply::Item(_) => {}
+            Reply::Item(_) | Reply::Body(_) => {}
             Reply::Compared(found) => self.took_comparison(&request, Ok(*found)),
             Reply::Metrics(found) => {
                 if let Request::Metrics { run, .. } = request {
@@ -187,25 +180,20 @@ impl State {
                     self.answered_ask(asked, reply);
                 }
             }
-            Reply::Files(reply) => {
-                if let Request::Files(asked) = request {
-                    self.answered_file(asked, reply);
-                }
-            }
         }
     }
 
-    fn rerun_opened(&mut self, stream: RerunStream) {
+    pub(crate) fn rerun_opened(&mut self, stream: RerunStream) {
         let words = format!(
             "Rerun shows this session. A viewer of your own takes `rerun {}`. Whoever uses this machine can read the \
              stream: it asks for no token.",
             stream.stream_url
         );
         self.messages.note_with_link(words, stream.viewer_url.clone());
-        self.open_url = Some(stream.viewer_url);
+        self.outbox.add(Effect::OpenUrl(stream.viewer_url));
     }
 
-    fn refused(&mut self, request: Request, mut problem: Problem) {
+    fn refused(&mut self, request: Request, problem: Problem) {
         match request.clone() {
             Request::PutCursor { cursor, .. } => {
                 // The page keeps its cursor and tells the server of the next one.
@@ -219,7 +207,6 @@ impl State {
                         Some(Refusal { place, sentence: problem.detail.clone(), nearest, is_advice: false });
                 }
             }
-            Request::Studies => self.studies.infos = Some(Vec::new()),
             Request::Compare { .. } => return self.took_comparison(&request, Err(&problem)),
             Request::Metrics { run, .. } => return self.took_metrics(run, Err(&problem)),
             Request::Trackability { traverse, step, limits } => {
@@ -230,15 +217,10 @@ impl State {
             Request::CancelTrackability { .. } => return,
             Request::Why(asked) if !self.refused_why(asked.clone(), &problem) => return,
             Request::RemoveTarget { .. } => self.forget_refused(&request),
-            Request::Exports { .. } => {
-                self.exports.refused = Some(problem.detail);
-                return;
-            }
             request @ (Request::NewNote { .. } | Request::EditNote { .. } | Request::RemoveNote { .. }) => {
                 self.note_refused(&request);
             }
             Request::Ask(asked) => self.refused_ask(&asked, &problem),
-            Request::Files(asked) if !self.refused_file(&asked, &mut problem) => return,
             Request::Cursor(_) => self.sync.cursor_read = None,
             Request::Rows { .. } => {
                 // The run may be gone: what there is, is read as a whole.
@@ -255,15 +237,19 @@ impl State {
             }
             _ => {}
         }
-        let (method, path, _) = crate::net::describe(&request);
+        let Some(call) = request.call() else { return };
+        let is_shown_in_place = matches!(
+            request,
+            Request::NewTarget { .. } | Request::Ask(AskRequest::Query { .. } | AskRequest::Breakpoints(_))
+        );
+        self.show_refusal(&call, &problem, is_shown_in_place);
+    }
+
+    /// Says what the server refused, unless it is shown elsewhere.
+    pub(crate) fn show_refusal(&mut self, call: &Call, problem: &Problem, is_shown_in_place: bool) {
         if problem.status != 0 {
-            let is_shown_in_place = matches!(
-                request,
-                Request::NewTarget { .. }
-                    | Request::Ask(AskRequest::Query { .. } | AskRequest::Breakpoints(_))
-            );
-            self.messages.refused(&problem, format!("{method:?} {path}"), !is_shown_in_place);
-        } else if method != ehttp::Method::GET {
+            self.messages.refused(problem, format!("{} {}", call.method, call.path), !is_shown_in_place);
+        } else if call.method != Method::Get {
             // That the server is gone is said by the banner, but not that something came to nothing.
             let hint = "Do it again when the banner has gone.".to_owned();
             self.messages.problem("The server does not answer, so that nothing was changed.", Some(hint));
@@ -285,22 +271,48 @@ impl State {
     }
 
     /// Opens the latest session of a traverse, or begins one.
-    pub(super) fn open(&mut self, traverse: String) {
+    pub(crate) fn open(&mut self, traverse: String) {
         self.sync.opening = Some(traverse);
-        self.outbox.push(Request::Sessions);
+        let sessions = Call::to::<ListSessions>(&Anywhere {});
+        self.call::<ListSessions>(sessions, |state, list| state.took_sessions(&list));
     }
 
     fn took_sessions(&mut self, list: &[SessionEntry]) {
         let Some(traverse) = self.sync.opening.take() else { return };
         let latest = list.iter().rev().find(|entry| entry.traverse == traverse);
-        self.outbox.push(match latest {
-            Some(entry) => Request::Session(entry.id.clone()),
-            None => Request::NewSession(NewSession { traverse }),
+        match latest {
+            Some(entry) => self.outbox.push(Request::Session(entry.id.clone())),
+            None => self.begin_session(traverse),
+        }
+    }
+
+    /// Begins a session on a traverse.
+    pub(crate) fn begin_session(&mut self, traverse: String) {
+        let begin = Call::with_body::<BeginSession>(&Anywhere {}, &NewSession { traverse });
+        self.call::<BeginSession>(begin, |state, view| {
+            state.sync.session_asked = None;
+            state.adopt(view, false);
         });
     }
 
+    fn read_settings(&mut self) {
+        let settings = Call::to::<ListSettings>(&Anywhere {});
+        self.call::<ListSettings>(settings, |state, table| state.settings = table);
+    }
+
+    /// Reads which traverses the server has.
+    pub(crate) fn read_traverses(&mut self) {
+        let traverses = Call::to::<ListTraverses>(&Anywhere {});
+        self.call::<ListTraverses>(traverses, Self::took_traverses);
+    }
+
+    fn read_traverse(&mut self, id: String) {
+        let traverse = Call::to::<ShowTraverse>(&AtTraverse { id });
+        self.call::<ShowTraverse>(traverse, |state, view| state.traverse = Some(view));
+    }
+
     /// Takes a session over; the cursor stays where the person put it unless somebody else moved it.
-    pub(super) fn adopt(&mut self, view: SessionView, moved_meanwhile: bool) {
+    pub(crate) fn adopt(&mut self, view: SessionView, moved_meanwhile: bool) {
         let is_other = self.session.as_ref().is_none_or(|open| open.id != view.id);
         self.ask.make_stale();
         if is_other {
@@ -316,7 +328,7 @@ impl State {
         }
         if self.traverse.as_ref().is_none_or(|open| open.id != view.traverse) {
             self.traverse = None;
-            self.outbox.push(Request::Traverse(view.traverse.clone()));
+            self.read_traverse(view.traverse.clone());
         }
         let is_kept = std::mem::take(&mut self.sync.keeps_cursor) && !is_other;
         if is_kept {
@@ -333,7 +345,7 @@ impl State {
     }
 
     /// Moves the cursor off a target or run that is no more.
-    pub(super) fn keep_cursor_valid(&mut self) {
+    pub(crate) fn keep_cursor_valid(&mut self) {
         let Some(session) = &self.session else { return };
         if self.target().is_none() {
             let newest = session.targets.last();

@@ -1,9 +1,7 @@
-//! Named configurations: which one a run is, and what must change so that a run becomes one.
+//! Named configurations, and which one a run is.
 
-use sightline_core::presets::{PRESETS, Preset};
-use sightline_core::settings::{Changes, Settings};
-
-use super::State;
+use sightline_track::presets::{PRESETS, Preset};
+use sightline_track::settings::Settings;
 
 /// The named configurations with the settings that they stand for.
 pub struct Configurations(Vec<(&'static Preset, Settings)>);
@@ -26,26 +24,8 @@ impl Configurations {
         self.0.iter().find(|(_, of_preset)| of_preset == settings).map(|(preset, _)| *preset)
     }
 
-    fn settings(&self, name: &str) -> Option<&Settings> {
+    pub(super) fn settings(&self, name: &str) -> Option<&Settings> {
         self.0.iter().find(|(preset, _)| preset.name == name).map(|(_, settings)| settings)
-    }
-}
-
-impl State {
-    /// The settings with which the next run would go: those of the run looked at, with the draft's changes.
-    pub fn pending(&self) -> Option<Settings> {
-        let settings = &self.run()?.settings;
-        if self.draft.is_empty() { Some(settings.clone()) } else { settings.with(&self.draft).ok() }
-    }
-
-    /// The changes that take the run looked at to a named configuration.
-    pub(super) fn changes_to(&self, name: &str) -> Option<Changes> {
-        self.changes_to_settings(self.configurations.settings(name)?)
-    }
-
-    /// The changes that take the run looked at to these settings.
-    pub(super) fn changes_to_settings(&self, wanted: &Settings) -> Option<Changes> {
-        Some(wanted.changes_from(&self.run()?.settings))
     }
 }
 

@@ -1,21 +1,11 @@
-//! Small things that are known: how the server is reached, how far a run is, where a target could not be picked.
+//! Small things that are known: how far a run is, where a target could not be picked, how page and server stand.
 
-use sightline_core::frames::Pixel;
+use std::collections::BTreeSet;
 
-/// How the server's events come in.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Connection {
-    /// The first attempt is under way.
-    #[default]
-    Connecting,
-    /// Events come in.
-    Live,
-    /// The server does not answer.
-    Gone {
-        /// Attempts so far.
-        attempts: u32,
-    },
-}
+use sightline_geometry::frames::Pixel;
+use sightline_session::Cursor;
+
+use crate::page::link::Fragment;
 
 /// How far a run is.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,4 +38,35 @@ pub struct Refusal {
     pub nearest: Option<Pixel>,
     /// Whether the place was not tried: a person may insist on it.
     pub is_advice: bool,
+}
+
+/// How page and server stand to each other.
+#[derive(Default)]
+pub(crate) struct Sync {
+    /// The session is to be read again.
+    pub session_stale: bool,
+    /// The session is being read, asked for at this count of cursor messages.
+    pub session_asked: Option<u64>,
+    /// The cursor as the server knows it.
+    pub server_cursor: Cursor,
+    /// The cursor that is on its way to the server.
+    pub cursor_sent: Option<Cursor>,
+    /// How often a cursor was sent or its answer came in: between the two an answer may hold either cursor.
+    pub cursor_messages: u64,
+    /// The server's cursor is to be read: perhaps another page moved it.
+    pub cursor_stale: bool,
+    /// It is being read, asked for at this count of cursor messages.
+    pub cursor_read: Option<u64>,
+    /// Runs with more rows than the page has: target and run.
+    pub runs_ahead: BTreeSet<(usize, usize)>,
+    /// Rows of a run are being read.
+    pub rows_asked: bool,
+    /// The session named by the page's link, before it was opened.
+    pub linked: Option<String>,
+    /// The rest of the link, until its session is here.
+    pub link: Option<Fragment>,
+    /// The traverse whose latest session is to be opened.
+    pub opening: Option<String>,
+    /// The page's cursor counts more than the server's when the session is read next: the server was gone.
+    pub keeps_cursor: bool,
 }

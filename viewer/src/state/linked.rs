@@ -1,13 +1,13 @@
 //! What the page's address says, and how an address becomes what is looked at.
 
-use sightline_core::session::compare::RunName;
+use sightline_session::compare::RunName;
 
-use super::State;
 use crate::compare;
-use crate::link::Fragment;
-use crate::net::Request;
+use crate::drawing::view2d::View2d;
+use crate::net::request::Request;
+use crate::page::link::Fragment;
+use crate::state::State;
 use crate::state::run_letter;
-use crate::view2d::View2d;
 
 impl State {
     /// What a link to this place says, but for the arrangement of the panels.
@@ -32,7 +32,7 @@ impl State {
     }
 
     /// Goes where a link says: at once where its session is open, else when that is here.
-    pub fn open_link(&mut self, link: Fragment) {
+    pub(crate) fn open_link(&mut self, link: Fragment) {
         for part in &link.damaged {
             self.messages.problem(
                 format!("A part of the link cannot be read and was left out: `{}`.", shown(part)),
@@ -55,7 +55,7 @@ impl State {
     }
 
     /// Carries the link out once its session is here.
-    pub(super) fn follow_link(&mut self) {
+    pub(crate) fn follow_link(&mut self) {
         let Some(session) = &self.session else { return };
         let is_for_this = |link: &mut Fragment| link.session.as_ref() == Some(&session.id);
         let Some(link) = self.sync.link.take_if(is_for_this) else { return };

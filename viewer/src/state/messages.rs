@@ -1,6 +1,6 @@
 //! What was said to the person, newest last. The problem that was met last also has a card, until it is closed.
 
-use sightline_core::session::wire::Problem;
+use sightline_api::wire::Problem;
 
 /// How much a message matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,7 +76,7 @@ impl Messages {
     }
 
     /// Something happened as asked, and there is a page to it.
-    pub fn note_with_link(&mut self, text: impl Into<String>, link: impl Into<String>) {
+    pub(crate) fn note_with_link(&mut self, text: impl Into<String>, link: impl Into<String>) {
         self.add(Weight::Note, text.into(), None, Some(link.into()));
     }
 
@@ -106,7 +106,7 @@ impl Messages {
     }
 
     /// A file cannot be opened; the sentence names it and says what to do.
-    pub fn refused_file(&mut self, sentence: impl Into<String>) {
+    pub(crate) fn refused_file(&mut self, sentence: impl Into<String>) {
         self.about(sentence.into(), None, "file".to_owned(), Vec::new(), true);
     }
 
@@ -134,12 +134,12 @@ impl Messages {
     }
 
     /// Closes the card; the message stays.
-    pub fn close_card(&mut self) {
+    pub(crate) fn close_card(&mut self) {
         self.card = None;
     }
 
     /// Takes a message away.
-    pub fn dismiss(&mut self, id: u64) {
+    pub(crate) fn dismiss(&mut self, id: u64) {
         self.list.retain(|message| message.id != id);
     }
 

@@ -1,11 +1,11 @@
 //! Why there is nothing to show, as sentences that say how to get it.
 
-use super::State;
 use crate::cache::Slot;
+use crate::state::State;
 
 impl State {
     /// Why the panels of a step have nothing to show, as a sentence that says how to get it.
-    pub fn missing_step(&self) -> String {
+    pub(crate) fn missing_step(&self) -> String {
         let Some(target) = self.target() else { return self.missing_target() };
         let step = self.cursor.step;
         if step < target.designation.step {
@@ -30,12 +30,12 @@ impl State {
         }
         match self.trace_at(step) {
             Slot::Failed(problem) => format!("Step {step} cannot be shown: {}", problem.detail),
-            Slot::Ready(trace) => match (&trace.fault, &trace.locate) {
+            Slot::Ready(trace) => match (trace.fault(), trace.located()) {
                 (Some(fault), _) => format!("The files of step {step} are at fault: {fault}"),
                 (None, Some(located)) if located.missing.is_some() => {
                     located.missing.clone().unwrap_or_default()
                 }
-                _ if trace.predict.is_none() => {
+                _ if trace.prediction().is_none() => {
                     "Here the target was picked: nothing had to be matched. Go one step on (Right) to see a match.".to_owned()
                 }
                 _ => "This stage was not reached at this step.".to_owned(),
@@ -45,7 +45,7 @@ impl State {
     }
 
     /// Why there is no target, as a sentence that says how to get one.
-    pub fn missing_target(&self) -> String {
+    pub(crate) fn missing_target(&self) -> String {
         match (&self.traverse, &self.traverses) {
             (None, None) => "Asking the server for its traverses …".to_owned(),
             (None, Some(list)) if list.is_empty() => {

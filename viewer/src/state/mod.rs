@@ -1,75 +1,73 @@
 //! What is known and what is looked at: the one value of which every panel is a view.
 //!
 //! Three things change it: commands of the person (`apply`), answers of the server (`arrive`) and its events.
-//! What it wants from the server it puts into an outbox; it does no input or output itself.
+//! What it wants from the server or the page it returns as effects (`effect`); it does no input or output itself.
 
 mod apply;
 mod arrive;
-pub mod compare;
-mod comparing;
-pub mod ask;
-pub mod calculator;
+pub(crate) mod effect;
+pub(crate) mod calculator;
+mod calls;
 mod configurations;
+pub(crate) mod deeds;
+mod draft;
 mod linked;
 mod rows;
 mod sync;
 mod views;
-pub mod exports;
-pub mod files;
-mod following;
 mod known;
-pub mod ghost;
-pub mod limits;
-pub mod messages;
+pub(crate) mod messages;
 mod missing;
-pub mod notes;
-pub mod studies;
-pub mod tracker;
-pub mod trackability;
-mod tour;
-pub mod undo;
+mod panels;
+pub(crate) mod pointed;
+pub(crate) mod tracker;
+mod undo;
 mod wanted;
-pub mod why;
 
-pub use self::known::{Connection, Place, Progress, Refusal};
-pub use self::rows::{events, row_of, run_letter, state_of_word};
-pub use self::views::Views;
+pub(crate) use self::known::{Place, Progress, Refusal};
+pub(crate) use self::rows::{events, row_of, run_letter, state_of};
+pub(crate) use self::views::Views;
 
 use std::collections::{BTreeMap, HashSet};
+use std::sync::LazyLock;
 
 use serde_json::Value;
-use sightline_core::camera::Camera;
-use sightline_core::limits::SettingInfo;
-use sightline_core::session::Cursor;
-use sightline_core::session::view::{RunView, SessionView, TargetView};
-use sightline_core::session::wire::{Problem, StopView, TraverseEntry, TraverseView};
-use sightline_core::settings::{Changes, Settings};
-use sightline_core::target::TrackingState;
-use sightline_core::trace::{ArrayName, StepRow, StepTrace};
+use sightline_api::wire::{StopView, TraverseEntry, TraverseView};
+use sightline_geometry::camera::Camera;
+use sightline_session::Cursor;
+use sightline_session::view::{RunView, SessionView, TargetView};
+use sightline_track::limits::SettingInfo;
+use sightline_track::locate::template::history::AgainstEarlier;
+use sightline_track::settings::{Changes, Settings};
+use sightline_track::target::TrackingState;
+use sightline_track::trace::{ArrayName, StepRow, StepTrace};
 
-use self::ask::Asking;
 use self::calculator::Calculator;
 use self::configurations::Configurations;
-use self::exports::Exports;
-use self::files::Files;
+use self::deeds::Undo;
+use self::effect::{Effect, Outbox};
+use self::known::Sync;
 use self::messages::Messages;
-use self::notes::Notes;
-use self::studies::Studies;
-use self::sync::Sync;
-use self::trackability::Trackability;
-use self::undo::Undo;
-use self::why::Why;
+use crate::breakpoints::Asking;
 use crate::cache::{Cache, Eye, Key, Slot, StepKey};
-use crate::command::{Layer, Mode, Panel, Stage};
-use crate::net::Request;
+use crate::command::{Layer, Mode, Stage, Zoomable};
+use crate::compare::Compare;
+use crate::drawing::raster::Raster;
+use crate::drawing::stretch::Stretch;
+use crate::drawing::view2d::View2d;
+use crate::exports::Exports;
+use crate::files::Files;
+use crate::net::calls::Calls;
+use crate::net::events::Connection;
+use crate::notes::Notes;
 use crate::pointed::Pointed;
-use crate::raster::Raster;
 use crate::shape_view::ShapeView;
-use crate::stretch::Stretch;
+use crate::studies::Studies;
 use crate::tables::FeatureView;
 use crate::theme::Looks;
 use crate::tour::Tour;
-use crate::view2d::View2d;
+use crate::trackability::Trackability;
+use crate::why::Why;
 
 /// Everything that is known and looked at.
 pub struct State {
@@ -129,10 +127,8 @@ pub struct State {
     pub looks: Looks,
     /// Whether keys that write a character act without Ctrl.
     pub single_keys: bool,
-    /// A page to open in a new tab.
-    pub open_url: Option<String>,
     /// Runs that are compared with the one looked at.
-    pub compare: compare::Compare,
+    pub compare: Compare,
     /// How well a target would do at the stop that is looked at.
     pub trackability: Trackability,
     /// Where the tour is.
@@ -150,11 +146,12 @@ pub struct State {
     /// Breakpoints, derived columns, and time travel.
     pub ask: Asking,
     /// Panels that are looked at as tables.
-    pub tables: HashSet<crate::layout::Pane>,
+    pub tables: HashSet<crate::pane::Pane>,
     /// What the pointer rests on, in whatever panel.
     pub pointed: Option<Pointed>,
-    outbox: Vec<Request>,
-    sync: Sync,
+    pub(crate) outbox: Outbox,
+    calls: Calls<State>,
+    pub(crate) sync: Sync,
     /// The aligned left camera of the step that was asked for last: it takes a while to compute.
     aligned: egui::mutex::Mutex<Option<(StepKey, Option<Camera>)>>,
     /// Settings of the run that was asked about last, by group and name: reading one writes all of them as a document.
@@ -196,8 +193,7 @@ impl State {
             marks: true,
             looks: Looks::default(),
             single_keys: true,
-            open_url: None,
-            compare: compare::Compare::default(),
+            compare: Compare::default(),
             trackability: Trackability::default(),
             tour: Tour::default(),
             why: Why::default(),
@@ -208,7 +204,8 @@ impl State {
             ask: Asking::default(),
             tables: HashSet::new(),
             pointed: None,
-            outbox: Vec::new(),
+            outbox: Outbox::default(),
+            calls: Calls::default(),
             sync: Sync { linked, ..Sync::default() },
             aligned: egui::mutex::Mutex::default(),
             read_out: egui::mutex::Mutex::default(),
@@ -251,6 +248,11 @@ impl State {
         self.progress.get(&(self.cursor.target?, self.cursor.run))
     }
 
+    /// Whether the selected run is still being computed. A page that opens during a run reads rows before its first progress event.
+    pub(crate) fn is_running(&self) -> bool {
+        self.run_progress().is_some() || self.run().is_some_and(|run| !run.complete && run.stopped.is_none())
+    }
+
     /// The name of a step of the run that is looked at.
     pub fn step_key(&self, step: usize) -> Option<StepKey> {
         let (session, target) = (self.session.as_ref()?, self.target()?);
@@ -265,6 +267,12 @@ impl State {
     /// What the cursor's step saw and decided, once it is here.
     pub fn trace(&self) -> Option<&StepTrace> {
         self.trace_at(self.cursor.step).ready()
+    }
+
+    /// The view of the cursor's step against the earlier templates of its run.
+    pub fn earlier_templates(&self) -> Slot<'_, [AgainstEarlier]> {
+        let key = self.row().and_then(|_| self.step_key(self.cursor.step));
+        key.map_or(Slot::Absent, |key| self.cache.earlier_templates(&key))
     }
 
     /// The name of an image of a stop.
@@ -288,7 +296,9 @@ impl State {
         key.map_or(Slot::Absent, |key| self.cache.raster(&key))
     }
 
-    /// A setting of the run that is looked at.
+    /// A setting of the run that is looked at by its name, for forms that are made from the table of settings.
+    ///
+    /// Code that knows the setting reads the field of [`State::run_settings`].
     pub fn setting(&self, group: &str, key: &str) -> Option<Value> {
         let settings = &self.run()?.settings;
         let mut kept = self.read_out.lock();
@@ -299,17 +309,23 @@ impl State {
         kept.1.entry(name).or_insert_with(|| settings.value(group, key)).clone()
     }
 
+    /// The settings of the run that is looked at; the defaults without a run.
+    pub(crate) fn run_settings(&self) -> &Settings {
+        static DEFAULTS: LazyLock<Settings> = LazyLock::new(Settings::default);
+        self.run().map_or(&DEFAULTS, |run| &run.settings)
+    }
+
     /// Whether a layer of marks is shown.
     pub fn shows(&self, layer: Layer) -> bool {
         self.marks && !self.hidden.contains(&layer)
     }
 
     /// The view of a panel.
-    pub fn view(&self, panel: Panel) -> View2d {
+    pub fn view(&self, panel: Zoomable) -> View2d {
         match panel {
-            Panel::Left => self.views.left,
-            Panel::Right => self.views.right,
-            Panel::Surface => self.views.surface,
+            Zoomable::Left => self.views.left,
+            Zoomable::Right => self.views.right,
+            Zoomable::Surface => self.views.surface,
         }
     }
 
@@ -318,23 +334,27 @@ impl State {
         if let Some(trace) = self.trace() {
             return Some(trace.update.state);
         }
-        self.row().map(|row| state_of_word(&row.state))
+        self.row().map(state_of)
     }
 
-    /// What the server last refused about the cursor's images, if it did.
-    pub fn image_problem(&self, eye: Eye) -> Option<&Problem> {
-        match self.image(eye) {
-            Slot::Failed(problem) => Some(problem),
-            _ => None,
-        }
+    /// What answers and events led to, with the requests that bring server and page into step.
+    #[must_use = "the page carries the effects out"]
+    pub fn take_effects(&mut self) -> Vec<Effect> {
+        self.sync_all();
+        self.outbox.take()
     }
 
-    /// What to ask the server, taken out of the outbox.
-    pub fn take_requests(&mut self) -> Vec<Request> {
+    /// The requests among these effects; the others keep waiting.
+    #[cfg(test)]
+    pub fn take_requests(&mut self) -> Vec<crate::net::request::Request> {
+        self.sync_all();
+        self.outbox.take_requests()
+    }
+
+    fn sync_all(&mut self) {
         self.sync_session();
         self.sync_trackability();
         self.sync_tour();
         self.sync_ask();
-        std::mem::take(&mut self.outbox)
     }
 }

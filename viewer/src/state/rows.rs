@@ -1,17 +1,17 @@
 //! Rows of a run and the words for them.
 
-use sightline_core::session::view::RunView;
-use sightline_core::target::TrackingState;
-use sightline_core::trace::StepRow;
+use sightline_session::view::RunView;
+use sightline_track::target::TrackingState;
+use sightline_track::trace::StepRow;
 
 /// A step of a run as one line.
-pub fn row_of(run: &RunView, step: usize) -> Option<&StepRow> {
+pub(crate) fn row_of(run: &RunView, step: usize) -> Option<&StepRow> {
     let first = run.rows.first()?.step;
     run.rows.get(step.checked_sub(first)?)
 }
 
 /// The steps at which a run's state changes, its designation and its faults included.
-pub fn events(run: &RunView) -> Vec<usize> {
+pub(crate) fn events(run: &RunView) -> Vec<usize> {
     let mut events: Vec<usize> = run.rows.first().map(|row| row.step).into_iter().collect();
     for pair in run.rows.windows(2) {
         if pair[0].state != pair[1].state || pair[1].fault {
@@ -21,18 +21,19 @@ pub fn events(run: &RunView) -> Vec<usize> {
     events
 }
 
-/// The state that a row's word names.
-pub fn state_of_word(word: &str) -> TrackingState {
-    match word {
+/// The tracking state of a row, with its recorded count of rejected updates.
+pub(crate) fn state_of(row: &StepRow) -> TrackingState {
+    match row.state.as_str() {
         "tracking" => TrackingState::Tracking,
-        "lost" => TrackingState::Lost { count: 1 },
+        // Rows of sessions that were stored without the count have at least one rejected update.
+        "lost" => TrackingState::Lost { count: row.lost_count.unwrap_or(1) },
         "failed" => TrackingState::Failed,
         _ => TrackingState::Cleared,
     }
 }
 
 /// The letter of a run.
-pub fn run_letter(number: usize) -> String {
+pub(crate) fn run_letter(number: usize) -> String {
     let letter = char::from(b'A' + (number % 26) as u8);
     if number < 26 { letter.to_string() } else { format!("{letter}{}", number / 26) }
 }

@@ -1,50 +1,17 @@
 //! What keeps the page and the server's session together: the session is read as a whole when it changed, but a cursor that
 //! moved, and the rows of a run that goes on, by themselves. A session of a long drive is megabytes.
 
-use std::collections::BTreeSet;
+use sightline_session::Cursor;
+use sightline_session::compare::RunName;
+use sightline_session::view::RunView;
 
-use sightline_core::session::Cursor;
-use sightline_core::session::compare::RunName;
-use sightline_core::session::view::RunView;
-
-use super::{Connection, State};
-use crate::link::Fragment;
-use crate::net::Request;
-
-/// How page and server stand to each other.
-#[derive(Default)]
-pub(super) struct Sync {
-    /// The session is to be read again.
-    pub session_stale: bool,
-    /// The session is being read, asked for at this count of cursor messages.
-    pub session_asked: Option<u64>,
-    /// The cursor as the server knows it.
-    pub server_cursor: Cursor,
-    /// The cursor that is on its way to the server.
-    pub cursor_sent: Option<Cursor>,
-    /// How often a cursor was sent or its answer came in: between the two an answer may hold either cursor.
-    pub cursor_messages: u64,
-    /// The server's cursor is to be read: perhaps another page moved it.
-    pub cursor_stale: bool,
-    /// It is being read, asked for at this count of cursor messages.
-    pub cursor_read: Option<u64>,
-    /// Runs with more rows than the page has: target and run.
-    pub runs_ahead: BTreeSet<(usize, usize)>,
-    /// Rows of a run are being read.
-    pub rows_asked: bool,
-    /// The session named by the page's link, before it was opened.
-    pub linked: Option<String>,
-    /// The rest of the link, until its session is here.
-    pub link: Option<Fragment>,
-    /// The traverse whose latest session is to be opened.
-    pub opening: Option<String>,
-    /// The page's cursor counts more than the server's when the session is read next: the server was gone.
-    pub keeps_cursor: bool,
-}
+use crate::net::events::Connection;
+use crate::net::request::Request;
+use crate::state::State;
 
 impl State {
     /// Asks for what keeps page and session together.
-    pub(super) fn sync_session(&mut self) {
+    pub(crate) fn sync_session(&mut self) {
         let Some(id) = self.session.as_ref().map(|session| session.id.clone()) else { return };
         self.sync_compare(&id);
         if self.sync.session_stale && self.sync.session_asked.is_none() {
@@ -88,12 +55,12 @@ impl State {
     }
 
     /// A run goes on, or has ended.
-    pub(super) fn run_went_on(&mut self, target: usize, run: usize) {
+    pub(crate) fn run_went_on(&mut self, target: usize, run: usize) {
         self.sync.runs_ahead.insert((target, run));
     }
 
     /// Takes in what a run has from a row on, unless another session was opened meanwhile.
-    pub(super) fn took_rows(&mut self, session: &str, target: usize, from_row: usize, tail: RunView) {
+    pub(crate) fn took_rows(&mut self, session: &str, target: usize, from_row: usize, tail: RunView) {
         self.sync.rows_asked = false;
         let open = self.session.iter_mut().filter(|open| open.id == session);
         let targets = open.flat_map(|session| &mut session.targets);
@@ -112,13 +79,13 @@ impl State {
 
     /// The server tells that a cursor moved: that of this page, if it is the one that was sent, else that of another page. What
     /// is told may be older than an answer: only what is read tells where the cursor is.
-    pub(super) fn cursor_went(&mut self, to: Cursor) {
+    pub(crate) fn cursor_went(&mut self, to: Cursor) {
         let is_own = to == self.sync.server_cursor || Some(to) == self.sync.cursor_sent;
         self.sync.cursor_stale |= !is_own;
     }
 
     /// Follows a cursor that was read, where another page moved it.
-    pub(super) fn took_cursor(&mut self, session: &str, read: Cursor) {
+    pub(crate) fn took_cursor(&mut self, session: &str, read: Cursor) {
         let asked = self.sync.cursor_read.take();
         let is_open = self.session.as_ref().is_some_and(|open| open.id == session);
         if is_open && asked == Some(self.sync.cursor_messages) && self.is_moved_elsewhere(read) {
@@ -129,16 +96,16 @@ impl State {
 
     /// Whether the server's cursor was moved by another page; to be asked only of an answer that no cursor of this page has
     /// crossed.
-    pub(super) fn is_moved_elsewhere(&self, read: Cursor) -> bool {
+    pub(crate) fn is_moved_elsewhere(&self, read: Cursor) -> bool {
         self.sync.cursor_sent.is_none() && read != self.sync.server_cursor
     }
 
-    pub(super) fn go_where_the_server_is(&mut self, to: Cursor) {
+    pub(crate) fn go_where_the_server_is(&mut self, to: Cursor) {
         (self.cursor, self.sync.server_cursor) = (to, to);
     }
 
     /// A cursor that was sent has its answer.
-    pub(super) fn put_cursor(&mut self, cursor: Cursor) {
+    pub(crate) fn put_cursor(&mut self, cursor: Cursor) {
         self.sync.cursor_sent = None;
         self.sync.cursor_messages += 1;
         self.sync.server_cursor = cursor;

@@ -1,21 +1,26 @@
 //! What the run that is looked at was tracked with, and what only one of the trackers has.
 
-use sightline_core::camera::Camera;
-use sightline_core::locate::features::FeatureEvidence;
-use sightline_core::locate::features::rows::{CloudPoint, Feature};
-use sightline_core::locate::shape_tracker::ShapeEvidence;
-use sightline_core::locate::shape_tracker::rows::{Facet, PathStep};
-use sightline_core::session::view::RunView;
-use sightline_core::settings::TrackerKind;
-use sightline_core::stereo::{AlignSettings, Alignment};
-use sightline_core::trace::{ArrayName, StepRow, StepTrace};
+use sightline_geometry::camera::Camera;
+use sightline_session::view::RunView;
+use sightline_track::locate::features::FeatureEvidence;
+use sightline_track::locate::features::rows::{CloudPoint, Feature};
+use sightline_track::locate::shape_tracker::ShapeEvidence;
+use sightline_track::locate::shape_tracker::rows::{Facet, PathStep};
+use sightline_track::settings::TrackerKind;
+use sightline_track::trace::{ArrayName, StepRow, StepTrace};
+use sightline_vision::stereo::{AlignSettings, Alignment};
 
-use super::State;
 use crate::cache::{Key, Slot};
 use crate::command::Stage;
+use crate::state::State;
 use crate::tables::Table;
 
 impl State {
+    /// Side of the template, px.
+    pub(crate) fn template_side_px(&self) -> u32 {
+        self.run_settings().template.template_size_px
+    }
+
     /// The tracker of the run that is looked at; without a run the default.
     pub fn tracker(&self) -> TrackerKind {
         self.run().map_or_else(TrackerKind::default, |run| run.settings.tracker)
@@ -33,7 +38,7 @@ impl State {
 
     /// The features of the cursor's step.
     pub fn features(&self) -> Slot<'_, Vec<Feature>> {
-        self.table(ArrayName::Features, |table| match table {
+        self.table(ArrayName::FEATURES, |table| match table {
             Table::Features(rows) => Some(rows),
             _ => None,
         })
@@ -41,7 +46,7 @@ impl State {
 
     /// Where the bootstrap puts the target at the cursor's step.
     pub fn cloud(&self) -> Slot<'_, Vec<CloudPoint>> {
-        self.table(ArrayName::Cloud, |table| match table {
+        self.table(ArrayName::CLOUD, |table| match table {
             Table::Cloud(rows) => Some(rows),
             _ => None,
         })
@@ -49,7 +54,7 @@ impl State {
 
     /// The way of the refinement at the cursor's step.
     pub fn refine_path(&self) -> Slot<'_, Vec<PathStep>> {
-        self.table(ArrayName::RefinePath, |table| match table {
+        self.table(ArrayName::REFINE_PATH, |table| match table {
             Table::Path(rows) => Some(rows),
             _ => None,
         })
@@ -75,7 +80,7 @@ impl State {
         if let Some((_, camera)) = kept.as_ref().filter(|(of, _)| *of == key) {
             return camera.clone();
         }
-        let pointing = self.trace()?.point_mast.as_ref()?;
+        let pointing = &self.trace()?.point_mast;
         let aligned = Alignment::new(&pointing.left, &pointing.right, &AlignSettings::default());
         let camera = aligned.ok().map(|aligned| aligned.left);
         *kept = Some((key, camera.clone()));
@@ -88,7 +93,7 @@ impl State {
     }
 
     /// Why a panel about the template has nothing to show, as a sentence that says where to look.
-    pub fn missing_template(&self) -> String {
+    pub(crate) fn missing_template(&self) -> String {
         match (self.tracker(), self.row()) {
             (TrackerKind::Shape, Some(_)) => {
                 "This run registers the shape of the target’s surroundings and matches no template. The panel \
@@ -105,7 +110,7 @@ impl State {
     }
 
     /// Why a panel about features has nothing to show, as a sentence that says how to get them.
-    pub fn missing_features(&self) -> String {
+    pub(crate) fn missing_features(&self) -> String {
         match (self.tracker(), self.row()) {
             (TrackerKind::Shape, Some(_)) => {
                 "This run registers the shape of the target’s surroundings and looks for no features. Choose the \
@@ -122,7 +127,7 @@ impl State {
     }
 
     /// Why a panel about the shape has nothing to show, as a sentence that says how to get it.
-    pub fn missing_shape(&self) -> String {
+    pub(crate) fn missing_shape(&self) -> String {
         match (self.tracker(), self.row()) {
             (TrackerKind::Template | TrackerKind::Features, Some(_)) => {
                 "This run does not ask for the shape of the target’s surroundings. Choose the preset “combined” or \
@@ -135,7 +140,7 @@ impl State {
 }
 
 /// The feature tracker's confidence in a step; the designation, by point stereo, has none of its own.
-pub fn confidence_of(run: &RunView, row: &StepRow) -> Option<f64> {
+pub(crate) fn confidence_of(run: &RunView, row: &StepRow) -> Option<f64> {
     let is_pick = run.rows.first().is_some_and(|first| first.step == row.step);
     row.confidence.filter(|_| run.settings.tracker != TrackerKind::Template && !is_pick)
 }

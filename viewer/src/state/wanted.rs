@@ -1,10 +1,10 @@
 //! What the page wants loaded for what it shows.
 
-use sightline_core::session::view::RunView;
-use sightline_core::trace::{ArrayName, StepRow};
+use sightline_session::view::RunView;
+use sightline_track::trace::{ArrayName, StepRow};
 
-use super::{State, row_of};
 use crate::cache::{Eye, Key};
+use crate::state::{State, row_of};
 
 /// How many windows of a long run are loaded at once, and how many of them lie after the cursor.
 const NEAR: usize = 120;
@@ -28,10 +28,8 @@ impl State {
         let pick = self.run().and_then(|run| run.rows.first()).map(|row| row.step);
         keys.extend(pick.and_then(|step| self.step_key(step)).map(Key::Trace));
         if let Some(run) = self.run().filter(|_| self.wants_history) {
-            for row in self.near_rows(run) {
-                keys.extend(self.step_key(row.step).map(Key::Trace));
-                keys.extend(self.window_key(run, row));
-            }
+            keys.extend(self.row().and_then(|_| self.step_key(step)).map(Key::EarlierTemplates));
+            keys.extend(self.near_rows(run).filter_map(|row| self.window_key(run, row)));
         }
         keys
     }
@@ -54,7 +52,7 @@ impl State {
     }
 
     /// The rows whose windows are looked at together: the pick, and as many as are kept in memory around the cursor.
-    pub fn near_rows<'a>(&self, run: &'a RunView) -> impl Iterator<Item = &'a StepRow> {
+    pub(crate) fn near_rows<'a>(&self, run: &'a RunView) -> impl Iterator<Item = &'a StepRow> {
         let here = run.rows.partition_point(|row| row.step < self.cursor.step);
         let from = (here + AFTER).min(run.rows.len()).saturating_sub(NEAR).max(1);
         let near = run.rows.iter().skip(from).take(NEAR);
@@ -62,10 +60,10 @@ impl State {
     }
 
     /// The name of the window that a step matched: at the pick, the template that the next step took from there.
-    pub fn window_key(&self, run: &RunView, row: &StepRow) -> Option<Key> {
+    pub(crate) fn window_key(&self, run: &RunView, row: &StepRow) -> Option<Key> {
         let is_pick = run.rows.first().is_some_and(|first| first.step == row.step);
         let (step, name) =
-            if is_pick { (row.step + 1, ArrayName::Reference) } else { (row.step, ArrayName::Matched) };
+            if is_pick { (row.step + 1, ArrayName::REFERENCE) } else { (row.step, ArrayName::MATCHED) };
         let has_window = row_of(run, step).is_some_and(|row| row.ncc.is_some());
         has_window.then(|| self.step_key(step)).flatten().map(|key| Key::Array(key, name))
     }

@@ -1,10 +1,10 @@
 //! The panels of exposure, stereo score and error budget.
 
-use super::{Shown, fixture};
 use crate::command::Command;
-use crate::layout::Pane;
+use crate::drawing::stretch::Stretch;
+use crate::pane::Pane;
 use crate::state::calculator::{Calculator, Pair};
-use crate::stretch::Stretch;
+use crate::tests::{Shown, fixture};
 
 #[test]
 fn the_left_image_says_how_the_subframe_is_exposed_and_which_stretch_is_on() {
@@ -12,13 +12,13 @@ fn the_left_image_says_how_the_subframe_is_exposed_and_which_stretch_is_on() {
     shown.says("subframe 161 × 161 px: mean 0.40, 0.0 % saturated").says("as recorded: 0 is black");
     let stretched = Shown::pane(Pane::Left, |context| {
         let mut state = fixture::at_step(context, 2);
-        state.apply(Command::SetStretch(Stretch::Auto));
+        state.perform(Command::SetStretch(Stretch::Auto));
         state
     });
     stretched.says("is black").says("automatic");
     let by_hand = Shown::pane(Pane::Left, |context| {
         let mut state = fixture::at_step(context, 2);
-        state.apply(Command::SetStretch(Stretch::NEUTRAL));
+        state.perform(Command::SetStretch(Stretch::NEUTRAL));
         state
     });
     by_hand.says("brightness").says("contrast").says("gamma");
@@ -45,7 +45,7 @@ fn the_budget_of_the_test_beds_navcam_is_that_of_the_paper() {
     let shown = Shown::pane(Pane::Budget, |context| {
         let mut state = fixture::at_step(context, 2);
         let calculator = Calculator { pair: Pair::TableOne(1), ..Calculator::default() };
-        state.apply(Command::SetCalculator(calculator));
+        state.perform(Command::SetCalculator(calculator));
         state
     });
     shown.says("38.75 cm").says("41.92 cm").says("2.19 cm").says("below the 3 cm").says("2.50 px");

@@ -3,22 +3,21 @@
 use std::sync::Arc;
 
 use nalgebra::{Matrix3, Matrix6};
-use sightline_core::estimate::ransac::Refit;
-use sightline_core::frames::{Pixel, Point3};
-use sightline_core::image::{GrayImage, npy};
-use sightline_core::locate::Evidence;
-use sightline_core::locate::features::FeatureEvidence;
-use sightline_core::locate::features::evidence::{
+use sightline_geometry::estimate::ransac::Refit;
+use sightline_geometry::frames::{Pixel, Point3};
+use sightline_track::locate::features::FeatureEvidence;
+use sightline_track::locate::features::evidence::{
     AnchorTried, Bootstrapped, CLOUD_COLUMNS, Detected, FeatureColumn, FittedMotion, MatchedFeatures, Table,
 };
-use sightline_core::settings::{Settings, TrackerKind};
-use sightline_core::stages::judge::Gate;
-use sightline_core::trace::{ArrayName, StepTrace, summarise};
+use sightline_track::locate::{Evidence, gate_kinds};
+use sightline_track::settings::{Settings, TrackerKind};
+use sightline_track::trace::{ArrayName, StepKind, StepTrace, summarise};
+use sightline_vision::image::{GrayImage, npy};
 
-use super::fixture;
 use crate::cache::{Item, Key, StepKey};
 use crate::state::State;
 use crate::tables;
+use crate::tests::fixture;
 
 /// Features of the left image.
 pub(crate) const FEATURES: usize = 60;
@@ -45,7 +44,7 @@ pub(crate) fn at_step(context: &egui::Context, step: usize) -> State {
     }
     let Some(trace) = traces.into_iter().nth(step) else { return state };
     let key = StepKey { session: "s1".to_owned(), target: 0, run: 0, step };
-    for name in [ArrayName::Features, ArrayName::Cloud] {
+    for name in [ArrayName::FEATURES, ArrayName::CLOUD] {
         let Some(view) = trace.array(name) else { continue };
         let [width, height] = view.size();
         let array = GrayImage::from_raw(width, height, view.values().to_vec()).unwrap();
@@ -59,7 +58,7 @@ pub(crate) fn at_step(context: &egui::Context, step: usize) -> State {
 /// The record of a step: the designation by point stereo, then motions from the one or two stops before.
 pub(crate) fn trace(step: usize) -> StepTrace {
     let mut trace = fixture::trace(step);
-    let located = trace.locate.as_mut().unwrap();
+    let located = trace.located_mut().unwrap();
     let is_pick = step == 0;
     let designation = match std::mem::take(&mut located.evidence) {
         Evidence::Template(evidence) if is_pick => Some(evidence),
@@ -89,11 +88,9 @@ pub(crate) fn trace(step: usize) -> StepTrace {
         located.covariance_in_rover = Some(Matrix3::from_diagonal(&nalgebra::Vector3::new(4e-4, 1e-4, 1e-4)));
     }
     located.evidence = Evidence::Features(Box::new(evidence));
-    if let Some(verdict) = &mut trace.judge {
-        let (name, unit) = ("confidence".to_owned(), String::new());
-        let (value, limit, margin) = (Some(0.354), 0.5, Some(0.354 - 0.5));
-        verdict.gates =
-            vec![Gate { criterion: 10, name, unit, value, limit, at_least: true, margin, passed: false }];
+    if let StepKind::Tracked { judge: verdict, .. } = &mut trace.kind {
+        let confidence = gate_kinds().into_iter().find(|kind| kind.name == "confidence").unwrap();
+        verdict.gates = vec![confidence.judge(Some(0.354), 0.5)];
     }
     trace
 }

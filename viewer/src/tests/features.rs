@@ -2,20 +2,21 @@
 
 use egui::Shape;
 use serde_json::json;
-use sightline_core::frames::Pixel;
-use sightline_core::locate::features::rows::{Feature, moved_covariance_px2};
-use sightline_core::trace::StepTrace;
+use sightline_geometry::frames::Pixel;
+use sightline_track::locate::features::rows::{Feature, moved_covariance_px2};
+use sightline_track::trace::StepTrace;
 
-use super::feature_run::{self, FIRST_INLIER, INLIERS, MATCHES};
-use super::{Shown, fixture};
 use crate::command::{Command, Layer, Stage};
-use crate::layout::Pane;
+use crate::drawing::view2d::View2d;
+use crate::pane::Pane;
 use crate::panels::features::marks;
 use crate::panels::{bars, inspector};
 use crate::state::State;
 use crate::tables::FeatureView;
+use crate::tests::feature_run;
+use crate::tests::feature_run::{FIRST_INLIER, INLIERS, MATCHES};
+use crate::tests::{Shown, fixture};
 use crate::theme;
-use crate::view2d::View2d;
 
 /// Residuals up to 10.5 mm, which ten inliers have and no outlier has.
 fn small_residuals() -> FeatureView {
@@ -85,7 +86,7 @@ fn without_features_the_panel_says_how_to_get_them() {
 fn filters_hide_features_in_the_panel_and_on_the_image() {
     let filtered = |context: &egui::Context| {
         let mut state = in_view(context);
-        state.apply(Command::SetFeatureView(small_residuals()));
+        state.perform(Command::SetFeatureView(small_residuals()));
         state
     };
     panel(in_view).says("shown: 24 inliers, 6 outliers, 30 features without a match");
@@ -111,7 +112,7 @@ fn inliers_and_outliers_are_layers_of_their_own_and_what_would_drown_the_picture
     };
     let with_all = left_image(|context| {
         let mut state = in_view(context);
-        state.apply(Command::ToggleLayer(Layer::Keypoints));
+        state.perform(Command::ToggleLayer(Layer::Keypoints));
         state
     });
     assert_eq!(circles(&shown), 0);
@@ -121,10 +122,8 @@ fn inliers_and_outliers_are_layers_of_their_own_and_what_would_drown_the_picture
 
 #[test]
 fn the_covariance_of_a_moved_target_is_projected_and_that_of_a_match_is_its_own() {
-    let of = |trace: &StepTrace| {
-        moved_covariance_px2(trace.locate.as_ref().unwrap(), &trace.point_mast.as_ref().unwrap().left)
-    };
-    let [long, short] = crate::ellipse::axes(&of(&feature_run::trace(2)).unwrap()).unwrap();
+    let of = |trace: &StepTrace| moved_covariance_px2(trace.located().unwrap(), &trace.point_mast.left);
+    let [long, short] = crate::drawing::ellipse::axes(&of(&feature_run::trace(2)).unwrap()).unwrap();
     // 1 cm across the line of sight at 6 m, by a camera of some 1200 px focal length.
     assert!((1.0..6.0).contains(&short.norm()) && long.norm() < 10.0, "{long} {short}");
     assert!(of(&fixture::trace(2)).is_none());
@@ -181,14 +180,14 @@ fn the_stage_bar_has_the_steps_of_the_tracker_and_keeps_the_place_of_the_other_o
 #[test]
 fn every_step_of_the_feature_tracker_has_a_record() {
     let trace = feature_run::trace(2);
-    for stage in Stage::of(sightline_core::settings::TrackerKind::Features) {
+    for stage in Stage::of(sightline_track::settings::TrackerKind::Features) {
         assert!(inspector::is_reached(&trace, *stage), "{}", stage.word());
         assert!(inspector::record(&trace, *stage).is_some(), "{}", stage.word());
     }
     let matched = inspector::record(&trace, Stage::MatchFeatures).unwrap();
-    assert_eq!((&matched["stereo_matches"], &matched["matches"]), (&json!(48), &json!(30)));
-    let pick = inspector::record(&feature_run::trace(0), Stage::Triangulate).unwrap();
-    assert!(pick["pick_by_point_stereo"]["point_stereo"]["range_m"].is_number());
+    assert_eq!((&matched["detect"]["stereo_matches"], &matched["matches"]), (&json!(48), &json!(30)));
+    let pick = inspector::record(&feature_run::trace(0), Stage::Locate).unwrap();
+    assert!(pick["point_stereo"]["range_m"].is_number());
     let shown = Shown::pane(Pane::Inspector, |context| {
         let mut state = feature_run::at_step(context, 2);
         state.stage = Stage::FitMotion;
@@ -208,7 +207,7 @@ fn confidence_and_inliers_are_plotted_with_their_limits() {
 #[test]
 fn the_preset_chooses_the_tracker_and_settings_of_the_other_one_are_folded() {
     let mut state = fixture::at_step(&egui::Context::default(), 2);
-    state.apply(Command::UsePreset("features"));
+    state.perform(Command::UsePreset("features"));
     assert_eq!(state.draft["tracker"], json!("features"));
     let shown = |state: fn(&egui::Context) -> State| {
         Shown::new([420.0, 2400.0], state, |ui, state, out| {
@@ -218,7 +217,7 @@ fn the_preset_chooses_the_tracker_and_settings_of_the_other_one_are_folded() {
     shown(|context| fixture::at_step(context, 2)).says("FEATURES: NOT USED BY THIS TRACKER").says("ncc_min");
     let drafted = shown(|context| {
         let mut state = fixture::at_step(context, 2);
-        state.apply(Command::UsePreset("features"));
+        state.perform(Command::UsePreset("features"));
         state
     });
     drafted.says("TEMPLATE: NOT USED BY THIS TRACKER").says("motion_draws");

@@ -7,13 +7,15 @@ use egui::epaint::ClippedShape;
 use egui::{Rect, Shape};
 use egui_kittest::kittest::Queryable;
 
-use super::{Shown, fixture};
 use crate::command::Command;
-use crate::figure::take::{self, Kind, Wish};
+use crate::exports::Ask;
+use crate::figure::save;
+use crate::figure::wish::{Kind, Wish};
 use crate::figure::{Figure, Form, Ink, bitmap, shapes, svg};
-use crate::layout::{Pane, show_pane};
+use crate::layout::show_pane;
+use crate::pane::Pane;
 use crate::state::State;
-use crate::state::exports::Ask;
+use crate::tests::{Shown, fixture};
 use crate::theme;
 
 /// A panel as it was painted last, with its figure and the fonts.
@@ -29,8 +31,8 @@ fn taken(pane: Pane, scale: f32, state: impl FnOnce(&egui::Context) -> State + '
     let shown = Shown::new([520.0, 420.0], state, move |ui, state, out| {
         let place = ui.max_rect();
         show_pane(ui, pane, state, out);
-        let figure = take::of_layer(ui.ctx(), state, place, scale);
-        *kept.borrow_mut() = Some((figure, take::fonts(ui.ctx())));
+        let figure = save::of_layer(ui.ctx(), state, place, scale);
+        *kept.borrow_mut() = Some((figure, save::fonts(ui.ctx())));
     });
     let (figure, fonts) = last.borrow_mut().take().unwrap();
     Taken { shown, figure, fonts }
@@ -97,7 +99,7 @@ fn every_panel_becomes_well_formed_xml_with_all_its_words() {
             }
         }
         // The strip and the state machine paint their words; they are no labels.
-        let is_painted_only = matches!(pane, Pane::Strip | Pane::Machine);
+        let is_painted_only = [Pane::Strip, Pane::Machine].contains(&pane);
         assert!(checked > 0 || is_painted_only && all.lines().count() > 5, "{pane:?} has words: {all}");
         assert!(
             !text.contains("href=\"http") && !text.contains("NaN"),
@@ -251,7 +253,7 @@ fn a_file_says_in_its_name_and_above_it_of_what_it_is() {
     output.textures_delta.clear();
     let mut state = fixture::at_step(&context, 2);
     let wish = |kind| Wish { pane: Pane::Map, kind };
-    let svg = take::take(&context, &state, &[], wish(Kind::Svg)).unwrap();
+    let svg = save::take(&context, &state, &[], wish(Kind::Svg)).unwrap();
     assert_eq!(svg.name, "sightline-s1-target-0-run-a-step-2-map-site-frame.svg");
     assert!(svg.sentence.contains("not on the screen: it was drawn apart"), "{}", svg.sentence);
     let text = String::from_utf8(svg.bytes).unwrap();
@@ -262,12 +264,12 @@ fn a_file_says_in_its_name_and_above_it_of_what_it_is() {
     assert!(word("desc").contains("Session s1. The target is tracking."), "{}", word("desc"));
     assert_eq!(document.root_element().attribute("height"), Some("480"));
 
-    state.apply(Command::Exports(Ask::BurnIn(true)));
-    let png = take::take(&context, &state, &[], wish(Kind::Png(3))).unwrap();
+    state.perform(Command::Exports(Ask::BurnIn(true)));
+    let png = save::take(&context, &state, &[], wish(Kind::Png(3))).unwrap();
     assert_eq!(png.name, "sightline-s1-target-0-run-a-step-2-map-site-frame-3x.png");
     let picture = image::load_from_memory(&png.bytes).unwrap();
     assert!(picture.width() == 3 * 720 && picture.height() > 3 * 480, "the line is above the panel");
-    let svg = take::take(&context, &state, &[], wish(Kind::Svg)).unwrap();
+    let svg = save::take(&context, &state, &[], wish(Kind::Svg)).unwrap();
     let text = String::from_utf8(svg.bytes).unwrap();
     assert!(text.contains(">Map, site frame: Six stops, ridge run A, step 2 of 5</text>"), "{text}");
 }
@@ -289,14 +291,14 @@ fn a_picture_that_is_too_large_is_refused_with_what_would_fit() {
 #[test]
 fn the_menu_and_the_palette_save_every_panel() {
     let mut shown = Shown::new([520.0, 300.0], at_two, |ui, state, out| {
-        crate::panels::figure_menu::entries(ui, state, Pane::Gates, out);
+        crate::exports::figure_menu::entries(ui, state, Pane::Gates, out);
     });
     let wish = |kind| vec![Command::Exports(Ask::Figure(Wish { pane: Pane::Gates, kind }))];
     assert_eq!(shown.click("save Gates as SVG"), wish(Kind::Svg));
     assert_eq!(shown.click("save Gates as PNG 4x"), wish(Kind::Png(4)));
     let burn = shown.click("with a line above: panel, drive, run, step");
     assert_eq!(burn, vec![Command::Exports(Ask::BurnIn(true))]);
-    let found = crate::actions::find(&fixture::without_target(), "save gates svg");
+    let found = crate::command::actions::find(&fixture::without_target(), "save gates svg");
     assert_eq!(vec![found[0].command.clone()], wish(Kind::Svg));
 }
 

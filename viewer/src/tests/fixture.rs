@@ -3,34 +3,38 @@
 use std::sync::Arc;
 
 use nalgebra::{Matrix2, Matrix3, Vector2};
-use sightline_core::camera::{Camera, Mast};
-use sightline_core::correlate::peak::{Peak, SecondPeak};
-use sightline_core::estimate::drift::Drift;
-use sightline_core::frames::{Pixel, Point3, Pose, PoseRecord};
-use sightline_core::image::{GrayImage, PixelRect, npy};
-use sightline_core::locate::template::TemplateEvidence;
-use sightline_core::locate::template::match_template::TemplateMatch;
-use sightline_core::locate::template::point_stereo::{CurvePoint, PointStereo};
-use sightline_core::locate::template::scale_roll::ScaleRoll;
-use sightline_core::locate::template::settings::Measure;
-use sightline_core::locate::template::triangulate::Triangulation;
-use sightline_core::locate::{Evidence, Located};
-use sightline_core::session::Cursor;
-use sightline_core::session::view::{RunView, SessionView, TargetView};
-use sightline_core::session::wire::{StopView, TraverseEntry, TraverseView};
-use sightline_core::settings::{Changes, Settings};
-use sightline_core::stages::capture::Capture;
-use sightline_core::stages::judge::{Gate, Verdict};
-use sightline_core::stages::point_mast::Pointing;
-use sightline_core::stages::predict::Prediction;
-use sightline_core::stages::update::Updated;
-use sightline_core::target::{Appearance, Designation, Target, TrackingState};
-use sightline_core::trace::{ArrayName, StepTrace, StepTruth, TruthKind, summarise};
-use sightline_core::traverse::StereoGeometry;
+use sightline_api::wire::{StopView, TraverseEntry, TraverseView};
+use sightline_geometry::camera::{Camera, Mast};
+use sightline_geometry::estimate::drift::Drift;
+use sightline_geometry::frames::{Pixel, Point3, Pose, PoseRecord};
+use sightline_geometry::stereo_geometry::StereoGeometry;
+use sightline_session::Cursor;
+use sightline_session::view::{RunView, SessionView, TargetView};
+use sightline_track::locate::template::TemplateEvidence;
+use sightline_track::locate::template::history::AgainstEarlier;
+use sightline_track::locate::template::match_template::TemplateMatch;
+use sightline_track::locate::template::memory::{Appearance, TemplateMemory};
+use sightline_track::locate::template::point_stereo::{CurvePoint, PointStereo};
+use sightline_track::locate::template::scale_roll::ScaleRoll;
+use sightline_track::locate::template::settings::Measure;
+use sightline_track::locate::template::triangulate::Triangulation;
+use sightline_track::locate::{Evidence, Located, TrackerMemory, gate_kinds};
+use sightline_track::settings::{Changes, Settings};
+use sightline_track::stages::capture::Capture;
+use sightline_track::stages::judge::Verdict;
+use sightline_track::stages::point_mast::Pointing;
+use sightline_track::stages::predict::Prediction;
+use sightline_track::stages::update::Updated;
+use sightline_track::target::{Designation, Target, TrackingState};
+use sightline_track::trace::{ArrayName, StepKind, StepTrace, StepTruth, TruthKind, summarise};
+use sightline_vision::correlate::peak::{Peak, SecondPeak};
+use sightline_vision::image::{GrayImage, PixelRect, npy};
 
 use crate::cache::{Eye, Item, Key, StepKey};
-use crate::raster::Raster;
-use crate::state::{Connection, State};
+use crate::drawing::raster::Raster;
+use crate::net::events::Connection;
+use crate::net::request::Reply;
+use crate::state::State;
 use crate::tables::Table;
 
 /// How many stops the drive has.
@@ -42,6 +46,11 @@ const POSITION: [f64; 3] = [6.0, 0.4, 0.2];
 /// A server that said nothing yet.
 pub(crate) fn nothing() -> State {
     State::new("http://localhost".to_owned(), None)
+}
+
+/// The body of a reply.
+pub(crate) fn reply(body: &impl serde::Serialize) -> Reply {
+    Reply::Body(serde_json::to_vec(body).unwrap())
 }
 
 /// The drive in the server's list.
@@ -96,14 +105,14 @@ pub(crate) fn at_step(context: &egui::Context, step: usize) -> State {
     let key = StepKey { session: "s1".to_owned(), target: 0, run: 0, step };
     traces.get(step).cloned().into_iter().for_each(|trace| load(&mut state, trace));
     let array = |name: ArrayName| {
-        let side = if name == ArrayName::Surface { 31 } else { 21 };
+        let side = if name == ArrayName::SURFACE { 31 } else { 21 };
         let raster = Raster::from_npy(context, name, &npy::encode(&bump(side)).unwrap()).unwrap();
         (name, Item::Raster(Arc::new(raster)))
     };
-    let arrays = ArrayName::ALL.into_iter().filter(|name| !Table::is_table(*name)).map(array).collect();
+    let arrays = ArrayName::all().filter(|name| !Table::is_table(*name)).map(array).collect();
     state.cache.arrived(Key::Arrays(key), Ok(Item::Arrays(arrays)), 0.0);
     for eye in [Eye::Left, Eye::Right] {
-        let bytes = sightline_core::image::io::encode_png_u8(&bump(64)).unwrap();
+        let bytes = sightline_vision::image::io::encode_png_u8(&bump(64)).unwrap();
         let raster = Raster::from_png(context, eye.word(), &bytes).unwrap();
         let key = state.image_key(step, eye).unwrap();
         state.cache.arrived(key, Ok(Item::Raster(Arc::new(raster))), 0.0);
@@ -115,15 +124,18 @@ pub(crate) fn at_step(context: &egui::Context, step: usize) -> State {
 pub(crate) fn with_history(context: &egui::Context, step: usize) -> State {
     let mut state = at_step(context, step);
     for other in 0..STOPS - 1 {
-        let mut trace = trace(other);
-        if let Some(Evidence::Template(evidence)) = trace.locate.as_mut().map(|located| &mut located.evidence)
-            && let Some(prepared) = &mut evidence.scale_roll
-        {
-            (prepared.image_from_template, prepared.template_step) = (Matrix2::identity(), other - 1);
-        }
         let key = StepKey { session: "s1".to_owned(), target: 0, run: 0, step: other };
-        load(&mut state, trace);
-        for name in [ArrayName::Reference, ArrayName::Matched] {
+        load(&mut state, trace(other));
+        let earlier = (0..other).map(|template_step| AgainstEarlier {
+            template_step,
+            scale: 1.1,
+            roll_rad: 0.0,
+            score: 0.96,
+            offset_px: [0.3, 0.4],
+        });
+        let item = Item::EarlierTemplates(earlier.collect());
+        state.cache.arrived(Key::EarlierTemplates(key.clone()), Ok(item), 0.0);
+        for name in [ArrayName::REFERENCE, ArrayName::MATCHED] {
             let raster = Raster::from_npy(context, name, &npy::encode(&bump(21)).unwrap()).unwrap();
             state.cache.arrived(Key::Array(key.clone(), name), Ok(Item::Raster(Arc::new(raster))), 0.0);
         }
@@ -163,6 +175,7 @@ fn traverse() -> TraverseView {
         name: "Six stops".to_owned(),
         description: "A fixed drive.".to_owned(),
         simulated: true,
+        source: "/drives/six-stops".to_owned(),
         stereo: StereoGeometry::Lateral,
         warnings: Vec::new(),
         stops: (0..STOPS).map(stop).collect(),
@@ -189,12 +202,26 @@ pub(crate) fn trace(step: usize) -> StepTrace {
         travelled_since_update_m: 1.0,
         travelled_m: step as f64,
     };
+    let capture = Capture {
+        left_size: [1024, 1024],
+        right_size: [1024, 1024],
+        subframe: Some(PixelRect::centred(PIXEL, 161)),
+        subframe_mean: Some(0.4),
+        subframe_saturated: Some(0.0),
+        pair: Default::default(),
+    };
+    let locate = located(is_designation, is_good, covariance);
+    let kind = match is_designation {
+        true => StepKind::Designation { capture, locate },
+        false => {
+            let judge = verdict(is_good, state);
+            StepKind::Tracked { predict: prediction, capture, locate, judge }
+        }
+    };
     StepTrace {
         step,
         time_s: 60.0 * step as f64,
-        fault: None,
-        predict: (!is_designation).then_some(prediction),
-        point_mast: Some(Pointing {
+        point_mast: Pointing {
             wanted: None,
             used: None,
             left: left.clone(),
@@ -202,17 +229,8 @@ pub(crate) fn trace(step: usize) -> StepTrace {
             predicted_left: Some(PIXEL.offset(3.0, -2.0)),
             predicted_right: Some(PIXEL.offset(-60.0, -2.0)),
             predicted_covariance_px2: Some(Matrix2::new(60.0, 10.0, 10.0, 30.0)),
-        }),
-        capture: Some(Capture {
-            left_size: [1024, 1024],
-            right_size: [1024, 1024],
-            subframe: Some(PixelRect::centred(PIXEL, 161)),
-            subframe_mean: Some(0.4),
-            subframe_saturated: Some(0.0),
-            pair: Default::default(),
-        }),
-        locate: Some(located(is_designation, is_good, covariance)),
-        judge: (!is_designation).then(|| verdict(is_good, state)),
+        },
+        kind,
         update: updated(step, state, is_good, covariance, left),
         truth: Some(StepTruth {
             kind: TruthKind::Surface,
@@ -304,6 +322,7 @@ fn template_match(score: f64) -> TemplateMatch {
         weighed: Vec::new(),
         covariance_px2: Matrix2::identity() * 0.04,
         bias_px: Vector2::zeros(),
+        edge_distance_px: Some(15.0),
         surface: Default::default(),
         matched: Default::default(),
         difference: Default::default(),
@@ -332,24 +351,17 @@ fn point_stereo() -> PointStereo {
 }
 
 fn verdict(is_good: bool, state: TrackingState) -> Verdict {
-    let gate =
-        |criterion: u8, name: &str, unit: &str, value: f64, limit: f64, at_least: bool, passed: bool| Gate {
-            criterion,
-            name: name.to_owned(),
-            unit: unit.to_owned(),
-            value: Some(value),
-            limit,
-            at_least,
-            margin: Some(if at_least { value - limit } else { limit - value }),
-            passed,
-        };
+    let gate = |name: &str, value: f64, limit: f64| {
+        let kind = gate_kinds().into_iter().find(|kind| kind.name == name).unwrap();
+        kind.judge(Some(value), limit)
+    };
     let ncc = if is_good { 0.83 } else { 0.41 };
     Verdict {
         gates: vec![
-            gate(1, "ncc", "", ncc, 0.7, true, is_good),
-            gate(2, "stereo_ncc", "", 0.91, 0.7, true, true),
-            gate(3, "distance_correction_m", "m", 0.03, 0.12, false, true),
-            gate(4, "position_correction_m", "m", 0.05, 0.2, false, true),
+            gate("ncc", ncc, 0.7),
+            gate("stereo_ncc", 0.91, 0.7),
+            gate("distance_correction_m", 0.03, 0.12),
+            gate("position_correction_m", 0.05, 0.2),
         ],
         good: is_good,
         accepted: is_good,
@@ -377,20 +389,20 @@ fn updated(
             travelled_m: step as f64,
             last_distance_m: 6.0,
             travelled_since_update_m: 0.0,
-            drift: Drift::default(),
-            appearance: Appearance {
-                step,
-                pixel: PIXEL,
-                position_in_rover: Point3::from(POSITION),
-                camera,
-                surface_by_pixel: None,
-                relief: None,
-                site_from_rover: Default::default(),
-                image: Arc::default(),
-            },
-            memory: Default::default(),
-            anchors: Default::default(),
-            views: Default::default(),
+            memory: TrackerMemory::Template(Box::new(TemplateMemory {
+                appearance: Appearance {
+                    step,
+                    pixel: PIXEL,
+                    position_in_rover: Point3::from(POSITION),
+                    camera,
+                    surface_by_pixel: None,
+                    relief: None,
+                    site_from_rover: Default::default(),
+                    image: Arc::default(),
+                },
+                drift: Drift::default(),
+                replaced: Default::default(),
+            })),
         },
         state,
         template_renewed: renewed,

@@ -1,9 +1,12 @@
 //! The panels that look back along the run: the template's history and the converging map.
 
-use super::{Shown, fixture};
+use sightline_api::wire::Problem;
+
 use crate::cache::Key;
 use crate::command::{Command, Go};
-use crate::layout::Pane;
+use crate::pane::Pane;
+use crate::tests::session::problem;
+use crate::tests::{Shown, fixture};
 
 #[test]
 fn the_history_lists_every_window_and_says_what_is_loading() {
@@ -15,21 +18,38 @@ fn the_history_lists_every_window_and_says_what_is_loading() {
         },
     );
     shown.says("window of step 1: ×1.13 +1.1°, ncc 0.83");
-    shown.says("loading the windows before step 2: 0 of 2 are here");
+    shown.says("comparing step 2 with the earlier templates …");
     assert_eq!(shown.click("window of step 3: ×1.13 +1.1°, ncc 0.41"), vec![Command::Go(Go::Step(3))]);
-    Shown::pane(Pane::History, |context| fixture::at_step(context, 0)).says("no earlier window");
+    let first = |context: &egui::Context| fixture::with_history(context, 0);
+    Shown::pane(Pane::History, first).says("step 0 has no earlier template to compare with");
 }
 
 #[test]
-fn a_loaded_history_says_score_and_shift_against_the_first_window() {
+fn a_comparison_that_is_refused_says_why() {
+    let shown = Shown::pane(Pane::History, |context| {
+        let mut state = fixture::at_step(context, 2);
+        let key = Key::EarlierTemplates(state.step_key(2).unwrap());
+        let problem = Problem { detail: "The image of step 0 is missing.".to_owned(), ..problem(422) };
+        state.cache.arrived(key, Err(problem), 0.0);
+        state
+    });
+    shown.says("step 2 cannot be compared with earlier templates: The image of step 0 is missing.");
+}
+
+#[test]
+fn a_loaded_history_says_score_and_shift_against_the_first_template() {
     let shown = Shown::pane(Pane::History, |context| fixture::with_history(context, 3));
-    shown.says("step 3 against step 0: score 1.00, shift 0.0");
+    shown.says("step 3 against the template of step 0: score 0.96, shift 0.50 px");
 }
 
 #[test]
 fn all_windows_are_fetched_only_while_they_are_looked_at() {
     let mut state = fixture::at_step(&egui::Context::default(), 1);
-    let far = |key: &Key| matches!(key, Key::Array(step, _) if step.step == 4);
+    let far = |key: &Key| match key {
+        Key::Array(step, _) => step.step == 4,
+        Key::EarlierTemplates(step) => step.step == 1,
+        _ => false,
+    };
     assert!(!state.wanted().iter().any(far));
     state.wants_history = true;
     assert!(state.wanted().iter().any(far));

@@ -1,20 +1,24 @@
 //! Notes and exports: what they show, what they ask of the server, and that no words are lost.
 
-use sightline_core::session::exports::{ExportEntry, Size};
-use sightline_core::session::notes::{Note, Pin, STAGES};
-use sightline_core::session::wire::{Event, Problem};
+use sightline_api::endpoints::ListExports;
+use sightline_api::location::AtSession;
+use sightline_api::wire::{Event, Problem};
+use sightline_session::exports::{ExportEntry, Size};
+use sightline_session::notes::{Note, Pin, STAGES};
 
 use egui_kittest::kittest::Queryable;
 
-use super::{Shown, fixture};
 use crate::command::{Command, Stage};
-use crate::figure::take::{Kind, Wish};
-use crate::layout::Pane;
-use crate::net::{Arrived, Reply, Request};
-use crate::panels::{export, notes as panel};
+use crate::exports;
+use crate::exports::window;
+use crate::figure::wish::{Kind, Wish};
+use crate::net::request::{Arrived, Reply, Request};
+use crate::notes::Ask;
+use crate::notes::panel;
+use crate::pane::Pane;
 use crate::state::State;
-use crate::state::exports;
-use crate::state::notes::Ask;
+use crate::state::effect::Effect;
+use crate::tests::{Shown, fixture};
 
 fn note(id: u64, step: usize, target: Option<usize>, text: &str) -> Note {
     let stage = target.map(|_| "judge".to_owned());
@@ -35,7 +39,7 @@ fn noted(context: &egui::Context) -> State {
 }
 
 fn do_(state: &mut State, ask: Ask) {
-    state.apply(Command::Notes(ask));
+    state.perform(Command::Notes(ask));
 }
 
 fn refuse(state: &mut State, request: Request) {
@@ -169,7 +173,7 @@ fn notes_that_changed_elsewhere_are_read_again() {
 
 #[test]
 fn every_stage_of_the_viewer_is_one_to_which_a_note_can_be_pinned() {
-    for tracker in sightline_core::settings::TrackerKind::ALL {
+    for tracker in sightline_track::settings::TrackerKind::ALL {
         for stage in Stage::of(tracker) {
             assert!(STAGES.contains(&stage.word()), "{}", stage.word());
         }
@@ -198,8 +202,9 @@ fn the_export_window_lists_files_with_sizes_and_ways_to_copy_them() {
         [900.0, 800.0],
         |context| {
             let mut state = noted(context);
-            state.apply(Command::Exports(exports::Ask::Open));
-            assert!(state.take_requests().iter().any(|request| matches!(request, Request::Exports { .. })));
+            state.perform(Command::Exports(exports::Ask::Open));
+            let at = AtSession { session: "s1".to_owned() };
+            assert!(state.take_requests().iter().any(|request| request.calls::<ListExports>(&at)));
             state.exports.panes = vec![Pane::Map];
             state.exports.entries = Some(vec![ExportEntry {
                 name: "rows.csv".to_owned(),
@@ -212,7 +217,7 @@ fn the_export_window_lists_files_with_sizes_and_ways_to_copy_them() {
             }]);
             state
         },
-        export::show,
+        window::show,
     );
     // A long window finds its place within a few frames.
     shown.harness.run_steps(4);
@@ -243,7 +248,7 @@ fn the_export_window_lists_files_with_sizes_and_ways_to_copy_them() {
 #[test]
 fn the_plain_page_of_what_is_looked_at_is_opened() {
     let mut state = noted(&egui::Context::default());
-    state.apply(Command::Exports(exports::Ask::PlainPage));
+    state.perform(Command::Exports(exports::Ask::PlainPage));
     let expected = "http://localhost/api/v1/sessions/s1/targets/0/runs/0/steps/2/page";
-    assert_eq!(state.open_url.as_deref(), Some(expected));
+    assert!(state.take_effects().contains(&Effect::OpenUrl(expected.to_owned())));
 }

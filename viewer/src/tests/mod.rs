@@ -1,41 +1,55 @@
 //! Smoke tests of the panels from a fixed drive: what each says when it has data, and when it has none.
 
 mod accuracy;
+#[path = "../compare/tests/mod.rs"]
 mod compare;
+#[path = "../breakpoints/tests.rs"]
 mod ask;
 pub(crate) mod feature_run;
 mod features;
 mod figures;
 pub(crate) mod fixture;
+#[path = "../what_if/tests.rs"]
 mod ghost;
 mod history;
 mod keeping;
 mod playing;
+mod records;
 mod session;
 mod sheets;
 mod shape;
 mod shape_run;
+#[path = "../studies/tests.rs"]
 mod studies;
 mod timelines;
 mod tracking;
+#[path = "../command/palette_tests.rs"]
 mod palette;
+#[path = "../picking/tests.rs"]
 mod picking;
 mod questions;
+#[path = "../tour/tests.rs"]
 mod tour;
+#[path = "../why/tests.rs"]
 mod why;
 mod undo;
+#[path = "../why/follow_tests.rs"]
 mod following;
 mod pointed;
+#[path = "../files/tests.rs"]
 mod opening;
 mod problems;
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
+use crate::command::help;
 use crate::command::{Command, Go, Layer, Mode, Stage};
-use crate::layout::{Pane, show_pane};
-use crate::panels::{bars, help, timeline};
-use crate::state::{Connection, Progress, State};
+use crate::layout::show_pane;
+use crate::net::events::Connection;
+use crate::pane::Pane;
+use crate::panels::{bars, timeline};
+use crate::state::{Progress, State};
 use crate::theme;
 
 /// A panel on a screen of its own, with the commands that it gave.
@@ -95,7 +109,7 @@ impl<'a> Shown<'a> {
     /// What was asked for since the last time, without what the pointer was over meanwhile.
     fn asked(&mut self) -> Vec<Command> {
         let mut asked = std::mem::take(self.harness.state_mut());
-        crate::pointed::taken_out(&mut asked);
+        crate::state::pointed::taken_out(&mut asked);
         asked
     }
 }
@@ -209,7 +223,7 @@ fn settings_are_listed_by_group_and_run_from_here_forks() {
         [420.0, 900.0],
         |context| {
             let mut state = fixture::at_step(context, 2);
-            state.apply(Command::Draft { key: "ncc_min".to_owned(), value: Some(serde_json::json!(0.6)) });
+            state.perform(Command::Draft { key: "ncc_min".to_owned(), value: Some(serde_json::json!(0.6)) });
             state
         },
         |ui, state, out| {

@@ -1,13 +1,13 @@
 //! Playing the steps against a clock that the test holds.
 
-use super::ask::breakpoint;
-use super::{Shown, fixture};
+use crate::breakpoints::Ask;
+use crate::breakpoints::play::Shuttle;
+use crate::command::keys;
 use crate::command::{Command, Go};
-use crate::keys;
 use crate::panels::bars;
 use crate::state::State;
-use crate::state::ask::Ask;
-use crate::state::ask::play::Shuttle;
+use crate::tests::ask::breakpoint;
+use crate::tests::{Shown, fixture};
 
 /// The fixed drive at a step, with every step loaded; its run has come to step 4.
 fn drive(step: usize) -> State {
@@ -17,7 +17,7 @@ fn drive(step: usize) -> State {
 }
 
 fn shuttle(state: &mut State, shuttle: Shuttle) {
-    state.apply(Command::Ask(Ask::Shuttle(shuttle)));
+    state.perform(Command::Ask(Ask::Shuttle(shuttle)));
 }
 
 /// The steps that are shown at these times, s.
@@ -85,7 +85,7 @@ fn it_stops_at_a_hit_and_says_which() {
 fn a_loop_is_played_round_in_both_directions() {
     let mut state = drive(1);
     shuttle(&mut state, Shuttle::LoopIn);
-    state.apply(Command::Go(Go::Step(3)));
+    state.perform(Command::Go(Go::Step(3)));
     shuttle(&mut state, Shuttle::LoopOut);
     shuttle(&mut state, Shuttle::Forward);
     state.tick(0.0);
@@ -93,7 +93,7 @@ fn a_loop_is_played_round_in_both_directions() {
     shuttle(&mut state, Shuttle::Reverse);
     state.tick(10.0);
     assert_eq!(at_times(&mut state, &[10.5, 11.0]), [1, 3]);
-    state.apply(Command::Go(Go::Step(0)));
+    state.perform(Command::Go(Go::Step(0)));
     shuttle(&mut state, Shuttle::LoopOut);
     assert_eq!(
         (state.ask.play.loop_in, state.ask.play.loop_out),
@@ -108,7 +108,7 @@ fn a_loop_is_played_round_in_both_directions() {
 fn stepping_by_hand_stops_playing() {
     let mut state = drive(0);
     shuttle(&mut state, Shuttle::Toggle);
-    state.apply(Command::Go(Go::By(1)));
+    state.perform(Command::Go(Go::By(1)));
     assert!(!state.ask.play.is_playing());
 }
 
@@ -142,7 +142,8 @@ fn every_key_of_time_travel_is_on_the_sheet_and_means_what_it_says() {
     assert_eq!(press(Key::N, Modifiers::SHIFT), Some(Command::Ask(Ask::PreviousHit)));
     assert_eq!(press(Key::B, plain), Some(Command::Ask(Ask::BreakAt(2))));
     assert_eq!(press(Key::B, Modifiers::SHIFT), Some(Command::Ask(Ask::Focus)));
-    let sheet: Vec<&str> = keys::SHEET.iter().flat_map(|(keys, _)| keys.split_whitespace()).collect();
+    let lines: Vec<(String, &str)> = crate::command::table::sheet().collect();
+    let sheet: Vec<&str> = lines.iter().flat_map(|(keys, _)| keys.split_whitespace()).collect();
     for key in
         ["Space", "J", "K", "L", "[", "]", "Backspace", "N", "Shift+N", "B", "Shift+B", "G", "PgUp", "PgDn"]
     {

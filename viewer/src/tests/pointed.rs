@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use sightline_core::frames::Pixel;
-use sightline_core::session::wire::StopDetail;
+use sightline_api::wire::StopDetail;
+use sightline_geometry::frames::Pixel;
 
-use super::fixture::{PIXEL, at_step, trace, without_target};
-use super::{Command, Pane, Shown};
 use crate::cache::Item;
 use crate::pointed::Pointed;
 use crate::state::State;
+use crate::tests::fixture::{PIXEL, at_step, trace, without_target};
+use crate::tests::{Command, Pane, Shown};
 
 fn pointing(context: &egui::Context, at: Pointed) -> State {
     let mut state = at_step(context, 2);
@@ -78,7 +78,7 @@ fn before_there_is_a_target_the_stop_tells_its_cameras() {
     assert!(state.eyes().is_none());
     let key = state.stop_detail_key(0).unwrap();
     assert!(state.wanted().contains(&key), "the page asks for them");
-    let pointing = trace(0).point_mast.unwrap();
+    let pointing = trace(0).point_mast;
     let stop = state.stop().unwrap().clone();
     let detail = StopDetail { stop, left: pointing.left, right: pointing.right, mast: None };
     state.cache.arrived(key, Ok(Item::Stop(Arc::new(detail))), 0.0);

@@ -1,15 +1,16 @@
 //! What a person sees of a problem: the card, the list of messages, and a server that is gone.
 
-use sightline_core::session::wire::{Problem, Received};
+use sightline_api::wire::{Problem, Received};
 
-use super::{Shown, fixture};
 use crate::cache::Eye;
 use crate::command::{Command, Go, Mode};
-use crate::layout::Pane;
-use crate::net::{Arrived, Reply, Request};
+use crate::files::Ask;
+use crate::net::events::Connection;
+use crate::net::request::{Arrived, Reply, Request};
+use crate::pane::Pane;
 use crate::panels::card;
-use crate::state::files::Ask;
-use crate::state::{Connection, State};
+use crate::state::State;
+use crate::tests::{Shown, fixture};
 
 fn problem() -> Problem {
     let received = Received { request_id: "6a-17".to_owned(), time: "2026-11-22T15:00:00Z".to_owned() };
@@ -22,7 +23,7 @@ fn problem() -> Problem {
 fn refused(context: &egui::Context) -> State {
     let mut state = fixture::at_step(context, 2);
     state.take_requests();
-    state.apply(Command::RunFromHere(state.draft.clone()));
+    state.perform(Command::RunFromHere(state.draft.clone()));
     let request = state.take_requests().into_iter().find(|r| matches!(r, Request::NewRun { .. })).unwrap();
     state.arrived(Arrived { request, outcome: Err(problem()) }, 0.0);
     state
@@ -45,7 +46,7 @@ fn a_problem_has_a_card_with_sentence_remedy_code_and_details_until_it_is_closed
     {
         assert!(words.contains(part), "{words}");
     }
-    state.apply(Command::SetMode(Mode::Look));
+    state.perform(Command::SetMode(Mode::Look));
     assert!(state.messages.card().is_none(), "Esc closes it");
     assert_eq!(
         state.messages.newest().unwrap().text,
@@ -62,7 +63,7 @@ fn a_problem_has_a_card_with_sentence_remedy_code_and_details_until_it_is_closed
 fn a_file_that_cannot_be_opened_has_a_card_of_its_own() {
     let dropped = |context: &egui::Context| {
         let mut state = fixture::at_step(context, 2);
-        state.file_arrived(crate::inbox::Arrival::Refused("“a.rrd” is a Rerun recording.".to_owned()));
+        state.file_arrived(crate::files::inbox::Arrival::Refused("“a.rrd” is a Rerun recording.".to_owned()));
         state
     };
     Shown::new([900.0, 700.0], dropped, card::show).says("problem: “a.rrd” is a Rerun").says("code file");
@@ -88,7 +89,7 @@ fn the_cursor_is_kept_when_a_server_comes_back_that_forgot_its_last_move() {
     let mut state = fixture::at_step(&egui::Context::default(), 2);
     state.connected(Connection::Gone { attempts: 1 });
     state.take_requests();
-    state.apply(Command::Go(Go::By(2)));
+    state.perform(Command::Go(Go::By(2)));
     state.connected(Connection::Live);
     let requests = state.take_requests();
     let request = Request::Session("s1".to_owned());
@@ -136,6 +137,6 @@ fn an_image_that_cannot_be_read_names_file_and_remedy_and_can_be_tried_again() {
     let mut state = broken(&egui::Context::default());
     let key = state.image_key(2, Eye::Left).unwrap();
     assert!(state.cache.want(std::slice::from_ref(&key), |_| true, 1.0).is_empty(), "a refusal stays");
-    state.apply(Command::Files(Ask::TryAgain));
+    state.perform(Command::Files(Ask::TryAgain));
     assert_eq!(state.cache.want(std::slice::from_ref(&key), |_| true, 1.0), vec![key]);
 }

@@ -1,22 +1,25 @@
 //! What commands and answers do to the state: cursor, targets, refusals and what is asked of the server.
 
-use sightline_core::frames::Pixel;
-use sightline_core::session::Cursor;
-use sightline_core::session::view::RunView;
-use sightline_core::session::wire::{Event, Problem, SessionEntry};
-use sightline_core::trace::StepRow;
+use sightline_api::endpoints::{ListSessions, ListSettings, ListTraverses};
+use sightline_api::location::Anywhere;
+use sightline_api::wire::{Event, Problem, SessionEntry};
+use sightline_geometry::frames::Pixel;
+use sightline_session::Cursor;
+use sightline_session::view::RunView;
+use sightline_track::trace::StepRow;
 
-use super::fixture::{STOPS, at_step, nothing, without_target};
 use crate::cache::{Eye, Key, Slot};
 use crate::command::{Command, Go, Mode};
-use crate::net::{Arrived, Reply, Request};
-use crate::state::{Connection, State, events};
+use crate::net::events::Connection;
+use crate::net::request::{Arrived, Reply, Request};
+use crate::state::{State, events};
+use crate::tests::fixture::{STOPS, at_step, nothing, reply, without_target};
 
 fn loaded(step: usize) -> State {
     at_step(&egui::Context::default(), step)
 }
 
-fn problem(status: u16) -> Problem {
+pub(super) fn problem(status: u16) -> Problem {
     Problem {
         code: "target".to_owned(),
         title: String::new(),
@@ -32,7 +35,7 @@ fn problem(status: u16) -> Problem {
 fn the_cursor_stays_on_the_drive_and_jumps_between_events() {
     let mut state = loaded(0);
     let mut go = |go: Go| {
-        state.apply(Command::Go(go));
+        state.perform(Command::Go(go));
         state.cursor.step
     };
     assert_eq!(go(Go::By(1)), 1);
@@ -52,10 +55,12 @@ fn the_cursor_stays_on_the_drive_and_jumps_between_events() {
 fn a_page_without_a_link_opens_the_latest_session_of_the_first_traverse() {
     let mut state = nothing();
     state.begin();
-    assert_eq!(state.take_requests(), vec![Request::Settings, Request::Traverses]);
-    let list = vec![super::fixture::entry()];
-    state.arrived(Arrived { request: Request::Traverses, outcome: Ok(Reply::Traverses(list)) }, 0.0);
-    assert_eq!(state.take_requests(), vec![Request::Sessions]);
+    let [settings, traverses] = state.take_requests().try_into().unwrap();
+    assert!(settings.calls::<ListSettings>(&Anywhere {}) && traverses.calls::<ListTraverses>(&Anywhere {}));
+    let list = reply(&[super::fixture::entry()]);
+    state.arrived(Arrived { request: traverses, outcome: Ok(list) }, 0.0);
+    let [sessions] = state.take_requests().try_into().unwrap();
+    assert!(sessions.calls::<ListSessions>(&Anywhere {}));
     let entry = |id: &str, traverse: &str| SessionEntry {
         id: id.to_owned(),
         traverse: traverse.to_owned(),
@@ -67,16 +72,16 @@ fn a_page_without_a_link_opens_the_latest_session_of_the_first_traverse() {
         used: None,
         idle_s: None,
     };
-    let list = vec![entry("a", "drive"), entry("b", "drive"), entry("c", "other")];
-    state.arrived(Arrived { request: Request::Sessions, outcome: Ok(Reply::Sessions(list)) }, 0.0);
+    let list = reply(&[entry("a", "drive"), entry("b", "drive"), entry("c", "other")]);
+    state.arrived(Arrived { request: sessions, outcome: Ok(list) }, 0.0);
     assert_eq!(state.take_requests(), vec![Request::Session("b".to_owned())]);
 }
 
 #[test]
 fn a_refused_designation_is_shown_at_its_place_with_the_servers_sentence() {
     let mut state = without_target();
-    state.apply(Command::SetMode(Mode::Pick));
-    state.apply(Command::Pick(Pixel::new(10.0, 20.0)));
+    state.perform(Command::SetMode(Mode::Pick));
+    state.perform(Command::Pick(Pixel::new(10.0, 20.0)));
     assert!(state.designating.is_some());
     let request = state.take_requests().into_iter().find(|r| matches!(r, Request::NewTarget { .. })).unwrap();
     state.arrived(Arrived { request, outcome: Err(problem(422)) }, 0.0);
@@ -84,8 +89,8 @@ fn a_refused_designation_is_shown_at_its_place_with_the_servers_sentence() {
     assert_eq!((refusal.place.pixel, refusal.sentence.as_str()), (Pixel::new(10.0, 20.0), "no 3-D position"));
     assert_eq!(state.messages.newest().unwrap().text, "no 3-D position");
     assert_eq!(state.mode, Mode::Pick, "another pixel can be tried at once");
-    state.apply(Command::SetMode(Mode::Look));
-    state.apply(Command::SetMode(Mode::Look));
+    state.perform(Command::SetMode(Mode::Look));
+    state.perform(Command::SetMode(Mode::Look));
     assert!(state.refusal.is_none());
 }
 
@@ -94,10 +99,10 @@ fn the_cursor_is_sent_once_at_a_time_and_an_older_answer_does_not_move_it_back()
     let mut state = loaded(0);
     let [put] = state.take_requests().try_into().unwrap();
     state.arrived(Arrived { request: put, outcome: Ok(Reply::Done) }, 0.0);
-    state.apply(Command::Go(Go::By(1)));
+    state.perform(Command::Go(Go::By(1)));
     let first = state.take_requests();
     assert!(state.take_requests().is_empty(), "nothing is sent while one is under way");
-    state.apply(Command::Go(Go::By(1)));
+    state.perform(Command::Go(Go::By(1)));
     let mut view = state.session.clone().unwrap();
     view.cursor = Cursor::default();
     let request = Request::Session("s1".to_owned());
@@ -116,7 +121,7 @@ fn an_answer_from_before_the_cursor_was_taken_does_not_move_it_back() {
     let mut state = loaded(0);
     let [put] = state.take_requests().try_into().unwrap();
     state.arrived(Arrived { request: put, outcome: Ok(Reply::Done) }, 0.0);
-    state.apply(Command::Go(Go::By(1)));
+    state.perform(Command::Go(Go::By(1)));
     let [put] = state.take_requests().try_into().unwrap();
     state.told(Event::SessionChanged { session: "s1".to_owned() });
     let [get] = state.take_requests().try_into().unwrap();
@@ -195,7 +200,7 @@ fn a_cursor_that_another_page_moved_is_followed_and_the_own_one_is_not_read_back
         let cursor = Cursor { target: Some(0), run: 0, step };
         state.arrived(Arrived { request, outcome: Ok(Reply::Cursor(cursor)) }, 0.0);
     };
-    state.apply(Command::Go(Go::By(1)));
+    state.perform(Command::Go(Go::By(1)));
     let [put] = state.take_requests().try_into().unwrap();
     state.told(told(1));
     state.arrived(Arrived { request: put, outcome: Ok(Reply::Done) }, 0.0);
@@ -211,7 +216,7 @@ fn a_cursor_that_another_page_moved_is_followed_and_the_own_one_is_not_read_back
     // An answer that crossed a cursor of this page may be older than that.
     state.told(told(2));
     let [get] = state.take_requests().try_into().unwrap();
-    state.apply(Command::Go(Go::By(1)));
+    state.perform(Command::Go(Go::By(1)));
     let [put] = state.take_requests().try_into().unwrap();
     state.arrived(Arrived { request: put, outcome: Ok(Reply::Done) }, 0.0);
     read(&mut state, get, 2);
@@ -244,7 +249,7 @@ fn loaded_steps_stay_when_the_server_goes_and_all_is_asked_again_when_it_comes_b
     state.connected(Connection::Gone { attempts: 1 });
     assert!(state.messages.newest().unwrap().text.contains("does not answer"));
     assert!(matches!(state.trace_at(2), Slot::Ready(_)));
-    state.apply(Command::Go(Go::By(1)));
+    state.perform(Command::Go(Go::By(1)));
     assert_eq!(state.cursor.step, 3);
     assert!(state.take_requests().is_empty());
     state.connected(Connection::Live);

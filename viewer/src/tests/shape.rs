@@ -1,15 +1,18 @@
 //! A run that asks the shape: the panel about it with all its parts, its marks on the left image, its gates and stages.
 
 use egui_kittest::kittest::Queryable;
-use sightline_core::settings::TrackerKind;
+use sightline_track::settings::TrackerKind;
+use sightline_track::trace::StepKind;
 
-use super::shape_run::{self, HAND_OFF, REFUSED};
-use super::{Shown, fixture};
 use crate::command::{Command, Layer, Stage};
-use crate::layout::{Pane, show_pane};
+use crate::layout::show_pane;
+use crate::pane::Pane;
 use crate::panels::{bars, inspector};
 use crate::shape_view::{Part, ShapeView};
 use crate::state::State;
+use crate::tests::shape_run;
+use crate::tests::shape_run::{HAND_OFF, REFUSED};
+use crate::tests::{Shown, fixture};
 
 /// The panel with a part of a step of the combined tracker.
 fn part(part: Part, step: usize) -> Shown<'static> {
@@ -153,7 +156,7 @@ fn the_parts_are_chosen_by_their_names() {
     let chosen = Command::SetShapeView(ShapeView { part: Part::Meshes, ..ShapeView::default() });
     assert_eq!(shown.click("Meshes"), vec![chosen]);
     let mut state = fixture::nothing();
-    state.apply(Command::SetShapeView(ShapeView { part: Part::HandOff, ..ShapeView::default() }));
+    state.perform(Command::SetShapeView(ShapeView { part: Part::HandOff, ..ShapeView::default() }));
     assert_eq!(state.shape_view.part, Part::HandOff);
 }
 
@@ -165,7 +168,8 @@ fn a_prediction_that_may_lie_outside_the_basin_is_warned_of() {
         |context| {
             let mut state = shape_run::at_step(context, TrackerKind::Shape, 2);
             let mut trace = shape_run::trace(TrackerKind::Shape, 2);
-            trace.predict.as_mut().unwrap().covariance_in_rover *= 100.0;
+            let StepKind::Tracked { predict, .. } = &mut trace.kind else { panic!("step 2 is tracked") };
+            predict.covariance_in_rover *= 100.0;
             fixture::load(&mut state, trace);
             state
         },

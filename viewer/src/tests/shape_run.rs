@@ -3,25 +3,25 @@
 use std::sync::Arc;
 
 use nalgebra::{Matrix2, Matrix3, Vector3};
-use sightline_core::image::{GrayImage, npy};
-use sightline_core::locate::Evidence;
-use sightline_core::locate::features::FeatureEvidence;
-use sightline_core::locate::features::evidence::Table;
-use sightline_core::locate::shape::{Failure, Method};
-use sightline_core::locate::shape_tracker::ShapeEvidence;
-use sightline_core::locate::shape_tracker::carried_ray::RayMeeting;
-use sightline_core::locate::shape_tracker::drape::Draped;
-use sightline_core::locate::shape_tracker::evidence::{Check, Registered, ShapeArrays};
-use sightline_core::locate::shape_tracker::surface::SurfaceSeen;
-use sightline_core::settings::{Settings, TrackerKind};
-use sightline_core::stages::judge::Gate;
-use sightline_core::trace::{ArrayName, StepTrace, summarise};
+use sightline_track::gate::{Gate, GateKind};
+use sightline_track::locate::features::FeatureEvidence;
+use sightline_track::locate::features::evidence::Table;
+use sightline_track::locate::shape_tracker::ShapeEvidence;
+use sightline_track::locate::shape_tracker::carried_ray::RayMeeting;
+use sightline_track::locate::shape_tracker::drape::Draped;
+use sightline_track::locate::shape_tracker::evidence::{Registered, ShapeArrays};
+use sightline_track::locate::shape_tracker::surface::SurfaceSeen;
+use sightline_track::locate::{Evidence, gate_kinds};
+use sightline_track::settings::{Settings, TrackerKind};
+use sightline_track::trace::{ArrayName, StepKind, StepTrace, summarise};
+use sightline_vision::image::{GrayImage, npy};
+use sightline_vision::registration::{Failure, Method};
 
-use super::{feature_run, fixture};
 use crate::cache::{Item, Key, StepKey};
-use crate::raster::Raster;
+use crate::drawing::raster::Raster;
 use crate::state::State;
 use crate::tables;
+use crate::tests::{feature_run, fixture};
 
 /// Side of the virtual sensor, px.
 const SENSOR: u32 = 16;
@@ -50,7 +50,7 @@ pub(crate) fn at_step(context: &egui::Context, tracker: TrackerKind, step: usize
     }
     let Some(trace) = traces.into_iter().nth(step) else { return state };
     let key = StepKey { session: "s1".to_owned(), target: 0, run: 0, step };
-    for name in ArrayName::ALL {
+    for name in ArrayName::all() {
         let Some(view) = trace.array(name) else { continue };
         let [width, height] = view.size();
         let array = GrayImage::from_raw(width, height, view.values().to_vec()).unwrap();
@@ -72,7 +72,7 @@ pub(crate) fn trace(tracker: TrackerKind, step: usize) -> StepTrace {
         TrackerKind::Combined => feature_run::trace(step),
         _ => fixture::trace(step),
     };
-    let Some(located) = trace.locate.as_mut() else { return trace };
+    let Some(located) = trace.located_mut() else { return trace };
     let mut evidence = ShapeEvidence { why: why(step), ..ShapeEvidence::default() };
     match std::mem::take(&mut located.evidence) {
         Evidence::Features(features) => evidence.features = Some(features),
@@ -94,11 +94,14 @@ pub(crate) fn trace(tracker: TrackerKind, step: usize) -> StepTrace {
     if step == REFUSED {
         (located.position_in_rover, located.left_pixel, located.covariance_in_rover) = (None, None, None);
     }
-    if let (Some(verdict), Some(found)) = (&mut trace.judge, &evidence.registration) {
-        verdict.gates =
-            found.checks.iter().zip(11..).map(|(check, criterion)| gate(check, criterion)).collect();
+    let checks = evidence.registration.as_ref().map(|found| found.checks.clone());
+    located.evidence = match tracker {
+        TrackerKind::Combined => Evidence::Combined(Box::new(evidence)),
+        _ => Evidence::Shape(Box::new(evidence)),
+    };
+    if let (StepKind::Tracked { judge, .. }, Some(checks)) = (&mut trace.kind, checks) {
+        judge.gates = checks;
     }
-    located.evidence = Evidence::Shape(Box::new(evidence));
     trace
 }
 
@@ -112,12 +115,9 @@ fn why(step: usize) -> String {
     why.to_owned()
 }
 
-fn gate(check: &Check, criterion: u8) -> Gate {
-    let value = check.value;
-    let margin = value.map(|v| if check.at_least { v - check.limit } else { check.limit - v });
-    let passed = margin.is_some_and(|margin| margin >= 0.0);
-    let (name, unit) = (check.name.clone(), check.unit.clone());
-    Gate { criterion, name, unit, value, limit: check.limit, at_least: check.at_least, margin, passed }
+fn gate(name: &str, value: f64, limit: f64) -> Gate {
+    let kind: GateKind = gate_kinds().into_iter().find(|kind| kind.name == name).unwrap();
+    kind.judge(Some(value), limit)
 }
 
 fn surface() -> SurfaceSeen {
@@ -135,13 +135,6 @@ fn surface() -> SurfaceSeen {
 fn registered(step: usize) -> Registered {
     let is_hand_off = step == HAND_OFF;
     let failure = (step == REFUSED).then_some(Failure::DoesNotFit { misfit: 2.6, limit: 1.8 });
-    let check = |name: &str, unit: &str, value: f64, limit: f64, at_least: bool| Check {
-        name: name.to_owned(),
-        unit: unit.to_owned(),
-        value: Some(value),
-        limit,
-        at_least,
-    };
     Registered {
         to_step: if is_hand_off { step - 1 } else { 0 },
         is_hand_off,
@@ -160,12 +153,12 @@ fn registered(step: usize) -> Registered {
         draped: is_hand_off.then(draped),
         draped_missing: None,
         checks: vec![
-            check("shape_overlap", "", 0.63, 0.25, true),
-            check("shape_misfit", "", if failure.is_some() { 2.6 } else { 1.1 }, 1.8, false),
-            check("shape_sigma_m", "m", 0.004, 0.02, false),
-            check("shape_turn_deg", "°", 1.2, 8.6, false),
-            check("shape_other_minimum", "", 1.9, 1.15, true),
-            check("shape_edge_distance_m", "m", 0.09, 0.005, true),
+            gate("shape_overlap", 0.63, 0.25),
+            gate("shape_misfit", if failure.is_some() { 2.6 } else { 1.1 }, 1.8),
+            gate("shape_sigma_m", 0.004, 0.02),
+            gate("shape_turn_deg", 1.2, 8.6),
+            gate("shape_other_minimum", 1.9, 1.15),
+            gate("shape_edge_distance_m", 0.09, 0.005),
         ],
         failure,
         reason: failure.map(|failure| failure.to_string()),

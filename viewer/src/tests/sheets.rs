@@ -3,23 +3,25 @@
 use egui::accesskit::Role;
 use egui_kittest::kittest::Queryable;
 
-use sightline_core::settings::TrackerKind;
-use sightline_core::trace::ArrayName;
+use sightline_track::settings::TrackerKind;
+use sightline_track::trace::ArrayName;
 
-use super::{Shown, feature_run, fixture, shape_run};
-use crate::actions;
+use crate::command::actions;
 use crate::command::{Command, Go};
-use crate::layout::{Pane, show_pane};
-use crate::panels::sheets::{self, Cell, Sheet};
+use crate::layout::show_pane;
+use crate::pane::Pane;
+use crate::panels::sheets::of_panel as sheets;
+use crate::panels::sheets::{Cell, Sheet};
 use crate::state::State;
 use crate::tables::Kind;
+use crate::tests::{Shown, feature_run, fixture, shape_run};
 
 fn table(pane: Pane, step: usize) -> Shown<'static> {
     Shown::new(
         [900.0, 420.0],
         move |context| {
             let mut state = fixture::at_step(context, step);
-            state.apply(Command::Table(pane));
+            state.perform(Command::Table(pane));
             state
         },
         move |ui, state, out| {
@@ -119,10 +121,10 @@ fn what_the_shape_tracker_saw_is_told_in_numbers() {
     let seen =
         |name: ArrayName| state.array(name).ready().unwrap().values.iter().filter(|v| v.is_finite()).count();
     let sum = |column: usize| -> f64 { errors.rows.iter().map(|row| number(&row.cells[column])).sum() };
-    assert_eq!(sum(2), seen(ArrayName::ErrorBefore) as f64);
-    assert_eq!(sum(3), seen(ArrayName::ErrorFine) as f64);
+    assert_eq!(sum(2), seen(ArrayName::ERROR_BEFORE) as f64);
+    assert_eq!(sum(3), seen(ArrayName::ERROR_FINE) as f64);
     // The best shift is where the registration says.
-    assert_eq!(coarse.rows.len(), seen(ArrayName::CoarseSearch));
+    assert_eq!(coarse.rows.len(), seen(ArrayName::COARSE_SEARCH));
     let best = coarse.rows.iter().find(|row| row.is_present).unwrap();
     let least = coarse.rows.iter().map(|row| number(&row.cells[2])).fold(f64::INFINITY, f64::min);
     assert_eq!(number(&best.cells[2]), least);
@@ -139,7 +141,7 @@ fn number(cell: &Cell) -> f64 {
 
 #[test]
 fn a_table_without_data_says_how_to_fill_it() {
-    for pane in sheets::PANES {
+    for pane in sheets::panes() {
         let sentence = sheets::of(&fixture::without_target(), pane);
         if pane == Pane::Map {
             assert!(sentence.is_ok(), "the drive is known without a target");
@@ -201,8 +203,8 @@ fn ten_thousand_steps_are_made_row_by_row() {
             let mut state = fixture::at_step(context, 2);
             let run = &mut state.session.as_mut().unwrap().targets[0].runs[0];
             let row = run.rows[2].clone();
-            run.rows.extend((5..10_000).map(|step| sightline_core::trace::StepRow { step, ..row.clone() }));
-            state.apply(Command::Table(Pane::Plots));
+            run.rows.extend((5..10_000).map(|step| sightline_track::trace::StepRow { step, ..row.clone() }));
+            state.perform(Command::Table(Pane::Plots));
             state
         },
         |ui, state, out| {

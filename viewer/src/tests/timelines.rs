@@ -3,13 +3,13 @@
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
-use super::ask::breakpoint;
-use super::{Shown, fixture};
+use crate::breakpoints::Ask;
 use crate::command::{Command, Go};
-use crate::layout::Pane;
+use crate::pane::Pane;
 use crate::panels::timeline;
 use crate::state::State;
-use crate::state::ask::Ask;
+use crate::tests::ask::breakpoint;
+use crate::tests::{Shown, fixture};
 
 const SIZE: [f32; 2] = [1400.0, 160.0];
 
@@ -122,13 +122,11 @@ fn every_run_of_the_target_has_a_band_and_other_targets_have_one_when_they_are_a
     other.number = 1;
     targets.push(other);
     let before = timeline::height(&many);
-    many.apply(Command::Ask(Ask::ShowOthers(true)));
+    many.perform(Command::Ask(Ask::ShowOthers(true)));
     assert!(timeline::height(&many) > before);
     let target = &mut many.session.as_mut().unwrap().targets[0];
     let run = target.runs[0].clone();
-    target
-        .runs
-        .extend((5..200).map(|number| sightline_core::session::view::RunView { number, ..run.clone() }));
+    target.runs.extend((5..200).map(|number| sightline_session::view::RunView { number, ..run.clone() }));
     many.cursor.run = 150;
     assert!(timeline::height(&many) < 180.0, "no more bands than fit");
 }

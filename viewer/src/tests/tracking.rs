@@ -1,17 +1,22 @@
 //! The panels of configurations, tolerances and the state machine.
 
 use serde_json::json;
+use sightline_track::stages::judge::Gate;
 
-use super::{Shown, fixture};
 use crate::command::{Command, Go};
-use crate::layout::Pane;
+use crate::pane::Pane;
 use crate::state::State;
+use crate::tests::{Shown, fixture};
 
 /// The fixed drive at step 3, where criterion 3 fires besides criterion 1.
 fn fires_at_three(context: &egui::Context) -> State {
     let mut state = fixture::at_step(context, 3);
     let session = state.session.as_mut().unwrap();
-    session.targets[0].runs[0].rows[3].distance_correction_m = Some(0.25);
+    let row = &mut session.targets[0].runs[0].rows[3];
+    row.distance_correction_m = Some(0.25);
+    let verdict = fixture::trace(3).verdict().cloned().unwrap();
+    let recorded = verdict.gates.into_iter().find(|gate| gate.criterion == 3).unwrap();
+    row.failed_gates.push(Gate { value: Some(0.25), margin: Some(0.12 - 0.25), passed: false, ..recorded });
     state
 }
 
@@ -22,7 +27,7 @@ fn a_run_is_named_by_its_preset_and_a_draft_shows_the_preset_that_it_leads_to() 
     shown.says("The defaults: scale, roll");
     let chosen = Shown::pane(Pane::Settings, |context| {
         let mut state = fixture::at_step(context, 2);
-        state.apply(Command::UsePreset("ncc-scale"));
+        state.perform(Command::UsePreset("ncc-scale"));
         state
     });
     chosen.says("Correlation of the scaled window");
@@ -31,12 +36,12 @@ fn a_run_is_named_by_its_preset_and_a_draft_shows_the_preset_that_it_leads_to() 
 #[test]
 fn a_preset_becomes_the_changes_that_lead_from_the_run_to_it() {
     let mut state = fixture::at_step(&egui::Context::default(), 2);
-    state.apply(Command::UsePreset("half-pixel"));
+    state.perform(Command::UsePreset("half-pixel"));
     assert_eq!(state.draft, [("noise_model".to_owned(), json!("half_pixel"))].into());
     // From another run the way back to the defaults is the opposite change.
     let settings = state.pending().unwrap();
     state.session.as_mut().unwrap().targets[0].runs[0].settings = settings;
-    state.apply(Command::UsePreset("sightline"));
+    state.perform(Command::UsePreset("sightline"));
     assert_eq!(state.draft, [("noise_model".to_owned(), json!("measured"))].into());
 }
 
@@ -50,7 +55,7 @@ fn the_list_of_presets_has_a_sentence_for_each_and_a_choice_drafts_it() {
         },
     );
     shown.click("configuration preset");
-    for preset in sightline_core::presets::PRESETS {
+    for preset in sightline_track::presets::PRESETS {
         shown.says(preset.name).says(preset.description);
     }
     assert_eq!(shown.click("ncc-roll"), vec![Command::UsePreset("ncc-roll")]);
@@ -77,13 +82,35 @@ fn the_state_machine_shows_state_counter_and_what_fired() {
 }
 
 #[test]
+fn the_state_machine_counts_rejected_updates_as_recorded() {
+    let shown = Shown::pane(Pane::Machine, |context| {
+        let mut state = fixture::at_step(context, 3);
+        let mut trace = fixture::trace(3);
+        trace.update.state = sightline_track::target::TrackingState::Lost { count: 2 };
+        state.session.as_mut().unwrap().targets[0].runs[0].rows[3] = trace.row();
+        fixture::load(&mut state, trace);
+        state
+    });
+    shown.says("retry 1 of 2");
+}
+
+#[test]
+fn no_gate_is_shown_at_the_designation() {
+    let designation = fixture::trace(0).row();
+    assert!(designation.failed_gates.is_empty(), "nothing is judged there");
+    let lost = fixture::trace(3).row();
+    assert_eq!(lost.failed_gates.iter().map(|gate| gate.criterion).collect::<Vec<_>>(), [1]);
+    assert_eq!(lost.lost_count, Some(1));
+}
+
+#[test]
 fn the_warnings_about_a_pick_stand_under_its_target() {
-    use sightline_core::locate::Evidence;
-    use sightline_core::locate::template::warnings::{Warning, WarningKind};
+    use sightline_track::locate::Evidence;
+    use sightline_track::locate::template::warnings::{Warning, WarningKind};
     let shown = Shown::pane(Pane::Targets, |context| {
         let mut state = fixture::at_step(context, 2);
         let mut trace = fixture::trace(0);
-        if let Some(Evidence::Template(evidence)) = trace.locate.as_mut().map(|l| &mut l.evidence) {
+        if let Some(Evidence::Template(evidence)) = trace.located_mut().map(|l| &mut l.evidence) {
             let sentence = "The window ranges over 14 % of its distance.".to_owned();
             evidence.warnings =
                 vec![Warning { kind: WarningKind::DepthRange, value: 0.14, limit: 0.1, sentence }];

@@ -2,24 +2,25 @@
 
 use egui_kittest::kittest::Queryable;
 use serde_json::json;
-use sightline_core::session::Fork;
-use sightline_core::session::breakpoints::BreakpointView;
-use sightline_core::session::notes::{Note, Pin};
-use sightline_core::session::view::RunView;
-use sightline_core::session::wire::Problem;
-use sightline_core::settings::Changes;
+use sightline_api::wire::Problem;
+use sightline_session::Fork;
+use sightline_session::breakpoints::BreakpointView;
+use sightline_session::notes::{Note, Pin};
+use sightline_session::view::RunView;
+use sightline_track::settings::Changes;
 
-use super::questions::{answer, asked};
-use super::{Shown, fixture};
+use crate::breakpoints::{AskReply, AskRequest};
 use crate::command::Command;
-use crate::keys;
-use crate::layout::Pane;
+use crate::command::keys;
+use crate::net::request::{Arrived, Reply, Request};
 use crate::net::why::{WhyReply, WhyRequest};
-use crate::net::{Arrived, Reply, Request};
-use crate::state::ask::{AskReply, AskRequest};
-use crate::state::undo::Deed;
-use crate::state::why::Ask;
-use crate::state::{State, ask, notes};
+use crate::pane::Pane;
+use crate::state::State;
+use crate::state::deeds::Deed;
+use crate::tests::questions::{answer, asked};
+use crate::tests::{Shown, fixture};
+use crate::why::Ask;
+use crate::{breakpoints, notes};
 
 /// The step that is lost.
 const LOST: usize = 3;
@@ -38,11 +39,11 @@ fn asked_of_breakpoints(state: &mut State) -> Vec<AskRequest> {
 }
 
 fn undo(state: &mut State) {
-    state.apply(Command::Why(Ask::Undo));
+    state.perform(Command::Why(Ask::Undo));
 }
 
 fn redo(state: &mut State) {
-    state.apply(Command::Why(Ask::Redo));
+    state.perform(Command::Why(Ask::Redo));
 }
 
 fn breakpoint(number: usize, expression: &str, on: bool) -> BreakpointView {
@@ -57,12 +58,12 @@ fn deeds_are_taken_back_and_done_again() {
     assert_eq!(keys::command(egui::Key::Z, ctrl, &state), Some(Command::Why(Ask::Undo)));
     assert_eq!(keys::command(egui::Key::Y, ctrl, &state), Some(Command::Why(Ask::Redo)));
     // A removed target comes back, and its undoing is no deed of its own.
-    state.apply(Command::RemoveTarget(0));
+    state.perform(Command::RemoveTarget(0));
     let request =
         state.take_requests().into_iter().find(|r| matches!(r, Request::RemoveTarget { .. })).unwrap();
     state.arrived(Arrived { request, outcome: Ok(Reply::Done) }, 0.0);
     assert_eq!(state.undo.ends().0, Some(&Deed::RemovedTarget { target: 0 }));
-    state.apply(Command::Why(Ask::Undo));
+    state.perform(Command::Why(Ask::Undo));
     let restore = WhyRequest::RestoreTarget { session: "s1".to_owned(), target: 0 };
     assert_eq!(asked(&mut state), vec![restore.clone()]);
     let view = Box::new(state.session.clone().unwrap());
@@ -70,14 +71,14 @@ fn deeds_are_taken_back_and_done_again() {
     assert_eq!(state.undo.ends(), (None, Some(&Deed::RemovedTarget { target: 0 })));
     // The draft goes back value by value, a drag as one.
     for value in [0.6, 0.5, 0.4] {
-        state.apply(Command::Draft { key: "ncc_min".to_owned(), value: Some(json!(value)) });
+        state.perform(Command::Draft { key: "ncc_min".to_owned(), value: Some(json!(value)) });
     }
-    state.apply(Command::Draft { key: "roll".to_owned(), value: Some(json!(false)) });
-    state.apply(Command::Why(Ask::Undo));
+    state.perform(Command::Draft { key: "roll".to_owned(), value: Some(json!(false)) });
+    state.perform(Command::Why(Ask::Undo));
     assert_eq!(state.draft, Changes::from([("ncc_min".to_owned(), json!(0.4))]));
-    state.apply(Command::Why(Ask::Undo));
+    state.perform(Command::Why(Ask::Undo));
     assert!(state.draft.is_empty());
-    state.apply(Command::Why(Ask::Redo));
+    state.perform(Command::Why(Ask::Redo));
     assert_eq!(state.draft, Changes::from([("ncc_min".to_owned(), json!(0.4))]));
 }
 
@@ -94,13 +95,13 @@ fn a_removed_run_leaves_the_list_and_can_be_taken_back() {
     let remove = Ask::RemoveRun { target: 0, run: 1 };
     assert_eq!(shown.click("remove run B"), vec![Command::Why(remove.clone())]);
     let mut state = two_runs(&egui::Context::default());
-    state.apply(Command::Why(remove));
+    state.perform(Command::Why(remove));
     let request = asked(&mut state).remove(0);
     let mut view = state.session.clone().unwrap();
     view.targets[0].runs.truncate(1);
     answer(&mut state, request, WhyReply::Session(Box::new(view)));
     assert_eq!(state.target().unwrap().runs.len(), 1);
-    state.apply(Command::Why(Ask::Undo));
+    state.perform(Command::Why(Ask::Undo));
     assert_eq!(
         asked(&mut state),
         vec![WhyRequest::RestoreRun { session: "s1".to_owned(), target: 0, run: 1 }]
@@ -112,7 +113,7 @@ fn a_removed_breakpoint_comes_back_as_it_was_also_where_it_was_off() {
     let mut state = lost();
     state.ask.breakpoints = vec![breakpoint(4, "ncc < 0.5", false)];
     state.take_requests();
-    state.apply(Command::Ask(ask::Ask::Remove(4)));
+    state.perform(Command::Ask(breakpoints::Ask::Remove(4)));
     let removal = asked_of_breakpoints(&mut state);
     assert_eq!(removal, vec![AskRequest::Remove { session: "s1".to_owned(), number: 4 }]);
     let message = state.messages.newest().unwrap();
@@ -141,7 +142,7 @@ fn a_removed_breakpoint_comes_back_as_it_was_also_where_it_was_off() {
 fn a_removal_of_a_breakpoint_that_is_refused_is_no_deed() {
     let mut state = lost();
     state.ask.breakpoints = vec![breakpoint(4, "ncc < 0.5", true)];
-    state.apply(Command::Ask(ask::Ask::Remove(4)));
+    state.perform(Command::Ask(breakpoints::Ask::Remove(4)));
     let request = Request::Ask(asked_of_breakpoints(&mut state).remove(0));
     state.arrived(Arrived { request, outcome: Err(Problem::new(500, "internal", "", "a fault")) }, 0.0);
     assert_eq!(state.undo.ends().0, None);
@@ -151,13 +152,13 @@ fn a_removal_of_a_breakpoint_that_is_refused_is_no_deed() {
 fn a_removed_plot_comes_back_at_its_place() {
     let mut state = lost();
     for text in ["ncc", "err_px", "sigma_m"] {
-        state.apply(Command::Ask(ask::Ask::Plot(text.to_owned())));
+        state.perform(Command::Ask(breakpoints::Ask::Plot(text.to_owned())));
     }
     let texts = |state: &State| -> Vec<String> {
         state.ask.derived.iter().map(|derived| derived.expression.clone()).collect()
     };
     let before = texts(&state);
-    state.apply(Command::Ask(ask::Ask::Unplot(1)));
+    state.perform(Command::Ask(breakpoints::Ask::Unplot(1)));
     assert_eq!(texts(&state), ["ncc", "sigma_m"]);
     undo(&mut state);
     assert_eq!(texts(&state), before);
@@ -179,7 +180,7 @@ fn a_removed_note_comes_back_by_undo_or_by_its_button_but_not_twice() {
     state.notes.list = Some(vec![note]);
     state.take_requests();
     let remove = |state: &mut State| {
-        state.apply(Command::Notes(notes::Ask::Remove(5)));
+        state.perform(Command::Notes(notes::Ask::Remove(5)));
         let request = state.take_requests().into_iter().find(|r| matches!(r, Request::RemoveNote { .. }));
         state.arrived(Arrived { request: request.unwrap(), outcome: Ok(Reply::Done) }, 0.0);
     };
@@ -190,7 +191,7 @@ fn a_removed_note_comes_back_by_undo_or_by_its_button_but_not_twice() {
     remove(&mut state);
     assert_eq!(state.undo.ends().0, Some(&Deed::RemovedNote { id: 5, step: 2 }));
     assert_eq!(state.messages.newest().unwrap().text, "Removed the note at step 2.");
-    state.apply(Command::Notes(notes::Ask::Restore(5)));
+    state.perform(Command::Notes(notes::Ask::Restore(5)));
     assert_eq!(restored(&mut state), 1);
     undo(&mut state);
     assert_eq!(restored(&mut state), 0, "the button took the deed back already");
@@ -208,10 +209,10 @@ fn only_the_message_of_the_last_deed_offers_to_take_it_back() {
     let removed = |with_another: bool| {
         move |context: &egui::Context| {
             let mut state = fixture::at_step(context, LOST);
-            state.apply(Command::Ask(ask::Ask::Plot("ncc".to_owned())));
-            state.apply(Command::Ask(ask::Ask::Unplot(0)));
+            state.perform(Command::Ask(breakpoints::Ask::Plot("ncc".to_owned())));
+            state.perform(Command::Ask(breakpoints::Ask::Unplot(0)));
             if with_another {
-                state.apply(Command::Draft { key: "ncc_min".to_owned(), value: Some(json!(0.6)) });
+                state.perform(Command::Draft { key: "ncc_min".to_owned(), value: Some(json!(0.6)) });
             }
             state
         }

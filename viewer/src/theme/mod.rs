@@ -8,53 +8,53 @@ use egui::{
     Color32, CornerRadius, FontDefinitions, FontFamily, FontId, Margin, RichText, Stroke, TextStyle, Theme,
     Visuals,
 };
-use sightline_core::target::TrackingState;
-use sightline_core::trackability::Verdict;
+use sightline_rover::trackability::Verdict;
+use sightline_track::target::TrackingState;
 
 mod palette;
 
-pub use self::palette::*;
+pub(crate) use self::palette::*;
 
 /// A match that agrees with the motion: a dot and solid lines.
-pub fn inlier() -> Color32 {
+pub(crate) fn inlier() -> Color32 {
     tracking()
 }
 
 /// A match that does not: a cross and dashed lines.
-pub fn outlier() -> Color32 {
+pub(crate) fn outlier() -> Color32 {
     failed()
 }
 
 /// The surface of an earlier step: lines.
-pub fn mesh_earlier() -> Color32 {
+pub(crate) fn mesh_earlier() -> Color32 {
     lost()
 }
 
 /// The surface of the step: filled and shaded.
-pub fn mesh_present() -> Color32 {
+pub(crate) fn mesh_present() -> Color32 {
     prediction()
 }
 
 /// How far from the prediction a registration by shape can start.
-pub fn basin() -> Color32 {
+pub(crate) fn basin() -> Color32 {
     search()
 }
 
 /// What is only tried: dashed.
-pub fn ghost() -> Color32 {
+pub(crate) fn ghost() -> Color32 {
     accent()
 }
 
 /// The tint of the step before, where it shines through.
-pub const ONION: Color32 = Color32::from_rgba_premultiplied(0x80, 0x80, 0x80, 0x80);
+pub(crate) const ONION: Color32 = Color32::from_rgba_premultiplied(0x80, 0x80, 0x80, 0x80);
 /// A texture in its own colours.
-pub const UNTINTED: Color32 = Color32::WHITE;
+pub(crate) const UNTINTED: Color32 = Color32::WHITE;
 
 /// Distance between a panel's border and its contents, points.
-pub const MARGIN: i8 = 8;
+pub(crate) const MARGIN: i8 = 8;
 
 /// The colour of a tracking state.
-pub fn state(state: TrackingState) -> Color32 {
+pub(crate) fn state(state: TrackingState) -> Color32 {
     match state {
         TrackingState::Cleared => weak(),
         TrackingState::Tracking => tracking(),
@@ -64,34 +64,34 @@ pub fn state(state: TrackingState) -> Color32 {
 }
 
 /// The colour of met and unmet.
-pub fn verdict(good: bool) -> Color32 {
+pub(crate) fn verdict(good: bool) -> Color32 {
     if good { tracking() } else { failed() }
 }
 
 /// The colour of a breakpoint's hits; its shape is another one where the colours repeat.
-pub fn breakpoint(number: usize) -> Color32 {
+pub(crate) fn breakpoint(number: usize) -> Color32 {
     [failed(), run(1), search(), prediction()][number % 4]
 }
 
 /// A colour between a fifth and all of its brightness.
-pub fn shaded(colour: Color32, share: f64) -> Color32 {
+pub(crate) fn shaded(colour: Color32, share: f64) -> Color32 {
     let bright = 0.2 + 0.8 * share.clamp(0.0, 1.0);
     let level = |value: u8| (f64::from(value) * bright).round() as u8;
     Color32::from_rgb(level(colour.r()), level(colour.g()), level(colour.b()))
 }
 
 /// Viridis, from 0 for the least score that is shown to 1 for the greatest; transparent where there is none.
-pub fn score(share: f32) -> Color32 {
+pub(crate) fn score(share: f32) -> Color32 {
     ramp(colorous::VIRIDIS, f64::from(share))
 }
 
 /// Blue–white–red over signed values from −`limit` to `limit`.
-pub fn signed(value: f32, limit: f32) -> Color32 {
+pub(crate) fn signed(value: f32, limit: f32) -> Color32 {
     ramp(colorous::RED_BLUE, 0.5 - f64::from(value / limit) / 2.0)
 }
 
 /// How well a target would do.
-pub fn trackability(verdict: Verdict) -> Color32 {
+pub(crate) fn trackability(verdict: Verdict) -> Color32 {
     match verdict {
         Verdict::Good => tracking(),
         Verdict::Risky => lost(),
@@ -100,12 +100,12 @@ pub fn trackability(verdict: Verdict) -> Color32 {
 }
 
 /// The same laid over an image, which stays visible.
-pub fn trackability_fill(verdict: Verdict) -> Color32 {
+pub(crate) fn trackability_fill(verdict: Verdict) -> Color32 {
     trackability(verdict).gamma_multiply(0.16)
 }
 
 /// Grey from black (0) to white (1); transparent where there is no value.
-pub fn grey(value: f32) -> Color32 {
+pub(crate) fn grey(value: f32) -> Color32 {
     if value.is_nan() {
         Color32::TRANSPARENT
     } else {
@@ -122,7 +122,7 @@ fn ramp(gradient: colorous::Gradient, t: f64) -> Color32 {
 }
 
 /// Gives the context its looks.
-pub fn apply(context: &egui::Context, looks: Looks) {
+pub(crate) fn apply(context: &egui::Context, looks: Looks) {
     palette::choose(looks);
     let mut fonts = FontDefinitions::default();
     // Arrows and dots, which the proportional font lacks, come from the one with equal widths.
@@ -192,32 +192,32 @@ fn visuals() -> Visuals {
 }
 
 /// A panel's title: small capitals, widely set.
-pub fn title(text: &str) -> RichText {
+pub(crate) fn title(text: &str) -> RichText {
     RichText::new(text.to_uppercase()).size(10.5).extra_letter_spacing(1.1).color(weak())
 }
 
 /// A label beside a value.
-pub fn label(text: impl Into<String>) -> RichText {
+pub(crate) fn label(text: impl Into<String>) -> RichText {
     RichText::new(text).color(weak())
 }
 
 /// A value with digits of equal width.
-pub fn number(text: impl Into<String>) -> RichText {
+pub(crate) fn number(text: impl Into<String>) -> RichText {
     RichText::new(text).monospace().color(strong())
 }
 
 /// A unit or remark, small.
-pub fn note(text: impl Into<String>) -> RichText {
+pub(crate) fn note(text: impl Into<String>) -> RichText {
     RichText::new(text).small().color(weak())
 }
 
 /// The font of words painted on images.
-pub fn image_font() -> FontId {
+pub(crate) fn image_font() -> FontId {
     FontId::new(11.0, FontFamily::Proportional)
 }
 
 /// The font of digits painted on images.
-pub fn digit_font() -> FontId {
+pub(crate) fn digit_font() -> FontId {
     FontId::new(10.5, FontFamily::Monospace)
 }
 

@@ -54,12 +54,12 @@ thread_local! {
 }
 
 /// The looks in use.
-pub fn looks() -> Looks {
+pub(crate) fn looks() -> Looks {
     IN_USE.get()
 }
 
 /// Chooses the looks for all that is painted from now on.
-pub(super) fn choose(looks: Looks) {
+pub(crate) fn choose(looks: Looks) {
     IN_USE.set(looks);
 }
 
@@ -71,7 +71,7 @@ fn of(colours: [u32; 3]) -> Color32 {
 
 macro_rules! colours {
     ($($(#[$doc:meta])* $name:ident: $dark:literal, $light:literal, $contrast:literal;)*) => {
-        $($(#[$doc])* pub fn $name() -> Color32 { of([$dark, $light, $contrast]) })*
+        $($(#[$doc])* pub(crate) fn $name() -> Color32 { of([$dark, $light, $contrast]) })*
     };
 }
 
@@ -131,12 +131,12 @@ const RUNS: [[u32; 3]; 4] = [
 ];
 
 /// The colour of a run's measurements.
-pub fn run(number: usize) -> Color32 {
+pub(crate) fn run(number: usize) -> Color32 {
     of(RUNS[number % RUNS.len()])
 }
 
 /// The two greys of the pattern that stands for no data.
-pub fn checker(odd: bool) -> Color32 {
+pub(crate) fn checker(odd: bool) -> Color32 {
     of(if odd { [0x32_35_3b, 0xc4_c8_ce, 0x50_50_50] } else { [0x24_26_2a, 0xda_dd_e1, 0x20_20_20] })
 }
 
@@ -149,27 +149,27 @@ fn ground(alpha: u8) -> Color32 {
 }
 
 /// The halo under every line on an image.
-pub fn halo() -> Color32 {
+pub(crate) fn halo() -> Color32 {
     ground(0xc8)
 }
 
 /// Behind words on an image.
-pub fn scrim() -> Color32 {
+pub(crate) fn scrim() -> Color32 {
     ground(0xd8)
 }
 
 /// Behind a modal window.
-pub fn shade() -> Color32 {
+pub(crate) fn shade() -> Color32 {
     Color32::from_black_alpha(0x90)
 }
 
 /// A colour whose red, green and blue are multiplied by its opacity already.
-pub fn premultiplied([r, g, b, a]: [u8; 4]) -> Color32 {
+pub(crate) fn premultiplied([r, g, b, a]: [u8; 4]) -> Color32 {
     Color32::from_rgba_premultiplied(r, g, b, a)
 }
 
 /// The pixel grid of a magnified image.
-pub fn grid() -> Color32 {
+pub(crate) fn grid() -> Color32 {
     Color32::from_rgba_unmultiplied(0x66, 0x66, 0x66, 0x50)
 }
 

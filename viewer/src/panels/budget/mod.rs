@@ -5,25 +5,55 @@ mod plot;
 mod table;
 
 use egui::{ComboBox, DragValue, Grid, RichText, ScrollArea, Ui};
-use sightline_core::estimate::error_budget::{Approach, ErrorBudget, PLACEMENT_NEED_M, StereoPair};
+use sightline_geometry::estimate::error_budget::{
+    Approach, ErrorBudget, MAKER_PIXEL_UM, PLACEMENT_NEED_M, StereoPair, TABLE_ONE,
+};
 
 use crate::command::Command;
+use crate::panels::panel::{Panel, TableOf};
+use crate::panels::sheets;
 use crate::state::State;
 use crate::state::calculator::Pair;
 use crate::{panels, theme};
 
-/// What the panel is for.
-const PURPOSE: &str = "What accuracy stereo, driving and drift leave.";
+/// The MER navcam: its effective focal length, px, and baseline, m (R226).
+const MER_NAVCAM: StereoPair = StereoPair { focal_px: 1223.28, baseline_m: 0.20 };
+
+/// The panel “Error budget”.
+pub(crate) struct Budget;
+
+impl Panel for Budget {
+    fn show(&self, ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+        show(ui, state, out);
+    }
+
+    fn missing(&self, state: &State) -> Option<String> {
+        state.traverse.is_none().then(|| state.missing_target())
+    }
+
+    fn table(&self) -> Option<TableOf> {
+        Some(sheets::places::budget)
+    }
+}
+
+/// Focal length and baseline; none for the present cameras where no step is loaded.
+fn stereo(pair: Pair, state: &State) -> Option<StereoPair> {
+    match pair {
+        Pair::Present => {
+            let pointing = &state.trace()?.point_mast;
+            let pixel = pointing.predicted_left.unwrap_or_else(|| pointing.left.centre_pixel());
+            StereoPair::from_cameras(&pointing.left, &pointing.right, pixel)
+        }
+        Pair::TableOne(row) => Some(TABLE_ONE[row].pair(MAKER_PIXEL_UM)),
+        Pair::MerNavcam => Some(MER_NAVCAM),
+    }
+}
 
 /// Shows the calculator, the overlay and the table.
-pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    if state.traverse.is_none() {
-        panels::missing(ui, PURPOSE, &state.missing_target());
-        return;
-    }
+pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         inputs(ui, state, out);
-        let stereo = state.calculator.pair.stereo(state);
+        let stereo = stereo(state.calculator.pair, state);
         match stereo {
             Some(pair) => results(ui, &pair, &state.calculator.approach),
             None => {
@@ -145,7 +175,7 @@ mod tests {
 
     #[test]
     fn the_verdict_compares_with_the_three_centimetres_of_instrument_placement() {
-        let navcam = Pair::TableOne(1).stereo(&State::new(String::new(), None)).unwrap();
+        let navcam = stereo(Pair::TableOne(1), &State::new(String::new(), None)).unwrap();
         let (words, is_enough) = verdict(&navcam.budget(&Approach::default()));
         assert!(is_enough && words.contains("×19.1"), "{words}");
         let (words, is_enough) = verdict(&navcam.budget(&Approach { drift_px: 20.0, ..Approach::default() }));

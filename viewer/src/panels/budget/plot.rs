@@ -5,15 +5,17 @@
 
 use egui::{Color32, Ui, vec2};
 use egui_plot::{GridInput, GridMark, HLine, Line, LineStyle, MarkerShape, Plot, PlotUi, Points};
-use sightline_core::estimate::error_budget::{Approach, PLACEMENT_NEED_M, StereoPair};
-use sightline_core::session::view::RunView;
-use sightline_core::trace::StepRow;
+use sightline_geometry::estimate::error_budget::{Approach, PLACEMENT_NEED_M, StereoPair};
+use sightline_session::view::RunView;
+use sightline_track::trace::StepRow;
 
-use crate::overlay::{self, Mark};
+use crate::drawing::decimate;
+use crate::drawing::overlay;
+use crate::drawing::overlay::Mark;
+use crate::panels::chart::{few_marks, plain};
 use crate::panels::names;
-use crate::panels::plots::{few_marks, plain};
 use crate::state::{State, run_letter};
-use crate::{theme, thin};
+use crate::theme;
 
 /// Height of the plot, points.
 const HEIGHT: f32 = 190.0;
@@ -35,7 +37,7 @@ struct Curves {
 }
 
 /// Shows the plot: of the run that is looked at, or of the calculator where there is none.
-pub(super) fn show(ui: &mut Ui, state: &State, pair: Option<&StereoPair>) {
+pub(crate) fn show(ui: &mut Ui, state: &State, pair: Option<&StereoPair>) {
     let of_run = state.run().map(of_run).filter(|curves| !curves.with.is_empty());
     let source = match (&of_run, state.run()) {
         (Some(_), Some(run)) => format!("run {} over range, 3σ, cm", run_letter(run.number)),
@@ -108,7 +110,7 @@ fn sentence(curves: &Curves) -> String {
 
 fn of_run(run: &RunView) -> Curves {
     let column = |of: fn(&StepRow) -> Option<f64>| -> Vec<[f64; 2]> {
-        let rows = thin::evenly(&run.rows, thin::PLACES);
+        let rows = decimate::evenly(&run.rows, decimate::PLACES);
         rows.filter_map(|row| Some([row.range_m?, of(row)?])).collect()
     };
     Curves {

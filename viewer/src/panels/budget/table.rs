@@ -1,7 +1,7 @@
 //! The paper's Table I, printed and computed with both pixel sizes (R43, R44).
 
 use egui::{Grid, RichText, ScrollArea, Ui};
-use sightline_core::estimate::error_budget::{
+use sightline_geometry::estimate::error_budget::{
     Approach, DERIVED_PIXEL_UM, ErrorBudget, MAKER_PIXEL_UM, TABLE_ONE, TableOneRow,
 };
 
@@ -58,7 +58,7 @@ const QUANTITIES: [Quantity; 5] = [
 ];
 
 /// Shows the table.
-pub(super) fn show(ui: &mut Ui) {
+pub(crate) fn show(ui: &mut Ui) {
     ui.horizontal(|ui| {
         ui.label(theme::title("Table I of the paper, cm"));
         ui.label(RichText::new("errata").small().underline().color(theme::accent())).on_hover_text(ERRATA);

@@ -2,12 +2,13 @@
 
 use egui::{Color32, Stroke, Ui, vec2};
 use egui_plot::{Bar, BarChart, HLine, LineStyle, MarkerShape, Plot, Points, VLine};
-use sightline_core::locate::features::evidence::FittedMotion;
-use sightline_core::locate::features::rows::Feature;
+use sightline_track::locate::features::evidence::FittedMotion;
+use sightline_track::locate::features::rows::Feature;
+use sightline_track::locate::features::settings::MotionGate;
 
-use super::super::names;
-use super::super::plots::{few_marks, plain};
-use crate::overlay::{Line, Mark};
+use crate::drawing::overlay::{Line, Mark};
+use crate::panels::chart::{few_marks, plain};
+use crate::panels::names;
 use crate::state::State;
 use crate::theme;
 
@@ -20,18 +21,18 @@ const BARS: usize = 30;
 
 /// How many residuals fall between equal steps, the last number being whatever is larger.
 #[derive(Clone, Debug, PartialEq)]
-pub(in super::super) struct Histogram {
+pub(crate) struct Histogram {
     /// Width of a step, m.
-    pub(in super::super) step_m: f64,
+    pub(crate) step_m: f64,
     /// Of the matches that agree with the motion.
-    pub(in super::super) inliers: [usize; BARS],
+    pub(crate) inliers: [usize; BARS],
     /// Of those that do not.
-    pub(in super::super) outliers: [usize; BARS],
+    pub(crate) outliers: [usize; BARS],
 }
 
 impl Histogram {
     /// The residuals of a step about the gate of its run.
-    pub(in super::super) fn of(state: &State, features: &[Feature]) -> Self {
+    pub(crate) fn of(state: &State, features: &[Feature]) -> Self {
         Self::new(features, gate_m(state))
     }
 
@@ -50,14 +51,15 @@ impl Histogram {
 
 /// The distance of two points up to which a match agrees with the motion, m.
 fn gate_m(state: &State) -> f64 {
-    state.setting("features", "motion_inlier_m").and_then(|v| v.as_f64()).unwrap_or(0.03)
+    state.run_settings().features.motion_inlier_m
 }
 
 /// Shows the histogram with the gate and the filters.
-pub(super) fn residuals(ui: &mut Ui, state: &State, features: &[Feature]) {
+pub(crate) fn residuals(ui: &mut Ui, state: &State, features: &[Feature]) {
     let gate_m = gate_m(state);
-    let is_distance = state.setting("features", "motion_gate").is_none_or(|gate| gate == "distance");
-    let sigmas = state.setting("features", "motion_inlier_sigma").and_then(|v| v.as_f64()).unwrap_or(3.0);
+    let settings = &state.run_settings().features;
+    let is_distance = settings.motion_gate == MotionGate::Distance;
+    let sigmas = settings.motion_inlier_sigma;
     let gate = if is_distance {
         format!("gate {:.1} cm", gate_m * 100.0)
     } else {
@@ -98,7 +100,7 @@ pub(super) fn residuals(ui: &mut Ui, state: &State, features: &[Feature]) {
 }
 
 /// Shows how many matches agreed with each draw of three.
-pub(super) fn consensus(ui: &mut Ui, motion: &FittedMotion) {
+pub(crate) fn consensus(ui: &mut Ui, motion: &FittedMotion) {
     let best = motion.consensus_by_draw.iter().max().copied().unwrap_or_default();
     let title = format!("matches that agree, by draw of three ({} draws)", motion.consensus_by_draw.len());
     names::wrapped(
@@ -143,8 +145,8 @@ fn still(name: &'static str) -> Plot<'static> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sightline_core::frames::Pixel;
-    use sightline_core::locate::features::rows::Matched;
+    use sightline_geometry::frames::Pixel;
+    use sightline_track::locate::features::rows::Matched;
 
     #[test]
     fn a_third_of_the_histogram_lies_within_the_gate_and_its_last_bar_holds_what_is_beyond() {

@@ -1,25 +1,25 @@
 //! What remained of the features from step to step, the earlier stops that were tried, and the motion (R169, R170).
 
 use egui::{Grid, RichText, Ui};
-use sightline_core::locate::features::FeatureEvidence;
-use sightline_core::locate::features::evidence::{AnchorTried, FittedMotion};
+use sightline_track::locate::features::FeatureEvidence;
+use sightline_track::locate::features::evidence::{AnchorTried, FittedMotion};
 
 use crate::command::{Command, Stage};
 use crate::state::State;
 use crate::theme;
 
 /// A line of the counts: the step that it belongs to, what is counted, and how many.
-pub(super) struct Line {
+pub(crate) struct Line {
     /// The step.
-    pub(super) stage: Stage,
+    pub(crate) stage: Stage,
     /// What is counted.
-    pub(super) words: String,
+    pub(crate) words: String,
     /// How many, with the share of what came before.
-    pub(super) count: String,
+    pub(crate) count: String,
 }
 
 /// The counts in the order of the steps; those that were not reached are left out.
-pub(super) fn lines(evidence: &FeatureEvidence) -> Vec<Line> {
+pub(crate) fn lines(evidence: &FeatureEvidence) -> Vec<Line> {
     let mut lines = Vec::new();
     let mut add = |stage, words: String, count: String| lines.push(Line { stage, words, count });
     if let Some(found) = &evidence.detect {
@@ -53,7 +53,7 @@ fn share(count: usize, of: usize) -> String {
 }
 
 /// Shows the counts; a click on a step opens its record in the Inspector.
-pub(super) fn show(ui: &mut Ui, state: &State, evidence: &FeatureEvidence, out: &mut Vec<Command>) {
+pub(crate) fn show(ui: &mut Ui, state: &State, evidence: &FeatureEvidence, out: &mut Vec<Command>) {
     ui.label(theme::title("from the images to the motion"));
     Grid::new("counts").num_columns(3).spacing([10.0, 1.0]).show(ui, |ui| {
         for line in lines(evidence) {
@@ -70,7 +70,7 @@ pub(super) fn show(ui: &mut Ui, state: &State, evidence: &FeatureEvidence, out: 
 }
 
 /// Shows the earlier stops from which a motion was measured.
-pub(super) fn anchors(ui: &mut Ui, evidence: &FeatureEvidence) {
+pub(crate) fn anchors(ui: &mut Ui, evidence: &FeatureEvidence) {
     ui.label(theme::title("earlier stops tried"));
     if evidence.anchors.is_empty() {
         ui.label(theme::note("None: here the target was picked, and its position comes from point stereo."));
@@ -115,7 +115,7 @@ fn anchor(ui: &mut Ui, tried: &AnchorTried) {
 }
 
 /// Shows the motion with its 1 σ, and how well it fits.
-pub(super) fn motion(ui: &mut Ui, evidence: &FeatureEvidence) {
+pub(crate) fn motion(ui: &mut Ui, evidence: &FeatureEvidence) {
     ui.label(theme::title("motion and its deviation"));
     let Some(motion) = &evidence.fit_motion else {
         ui.label(theme::note("No motion was fitted at this step."));
@@ -149,7 +149,7 @@ fn row(ui: &mut Ui, name: &str, unit: &str, values: [f64; 3], sigmas: Option<([f
 }
 
 /// How well the motion fits, how it settled, and what it does to the target.
-pub(super) fn sentences(motion: &FittedMotion) -> [String; 2] {
+pub(crate) fn sentences(motion: &FittedMotion) -> [String; 2] {
     let mm = |m: f64| format!("{:.1} mm", m * 1000.0);
     let fit = format!(
         "residuals: {} root mean square, {} median; the target is moved by {:.1} cm against the prediction",

@@ -4,8 +4,8 @@ use std::ops::RangeInclusive;
 
 use egui::{Slider, Ui};
 
-use super::super::digits;
 use crate::command::Command;
+use crate::panels::digits;
 use crate::state::State;
 use crate::tables::FeatureView;
 use crate::theme;
@@ -29,7 +29,7 @@ const RESIDUAL: Filter = Filter { name: "residual", unit: "mm", factor: 1000.0, 
 const SCALE: Filter = Filter { name: "scale", unit: "px", factor: 1.0, range: [0.1, 64.0] };
 
 /// Shows the sliders: in one row where there is room, else one below the other.
-pub(super) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let mut view = state.feature_view;
     ui.spacing_mut().slider_width = SLIDER;
     let mut rows = |ui: &mut Ui| {

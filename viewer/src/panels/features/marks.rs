@@ -9,16 +9,16 @@
 //! | small dots about the target | where the sets of the bootstrap put it |
 
 use egui::{Color32, Stroke, vec2};
-use sightline_core::frames::Pixel;
-use sightline_core::locate::features::rows::{Feature, Matched};
+use sightline_geometry::frames::Pixel;
+use sightline_track::locate::features::rows::{Feature, Matched};
 
-use super::super::legend::Entry;
 use crate::command::{Layer, Mode};
-use crate::overlay::{Line, Mark, Overlay, paint_mark};
+use crate::drawing::overlay::{Line, Mark, Overlay, paint_mark};
+use crate::drawing::view2d::Canvas;
+use crate::panels::legend::Entry;
 use crate::state::State;
 use crate::tables::Kind;
 use crate::theme;
-use crate::view2d::Canvas;
 
 /// Half the size of the mark of a match, points: many of them stand close together.
 const REACH: f32 = 4.0;
@@ -28,7 +28,7 @@ const HOVER_REACH: f32 = 9.0;
 const TIP: f32 = 4.0;
 
 /// What the legend of the left image lists of the features.
-pub fn left_entries(state: &State) -> Vec<Entry> {
+pub(crate) fn left_entries(state: &State) -> Vec<Entry> {
     let mut entries = kinds(state, "features with scale and orientation");
     let matched = state.feature_evidence().and_then(|e| e.match_features.as_ref());
     if let Some(matched) = matched.filter(|_| state.features().ready().is_some()) {
@@ -49,7 +49,7 @@ pub fn left_entries(state: &State) -> Vec<Entry> {
 }
 
 /// What the legend of the right image lists of the features.
-pub fn right_entries(state: &State) -> Vec<Entry> {
+pub(crate) fn right_entries(state: &State) -> Vec<Entry> {
     kinds(state, "partners of features")
 }
 
@@ -79,13 +79,13 @@ fn looks(kind: Kind) -> (Layer, Mark, Color32) {
 }
 
 /// Whether a feature has a mark: it passes the filters, and a layer that shows it is on.
-pub fn is_drawn(state: &State, feature: &Feature) -> bool {
+pub(crate) fn is_drawn(state: &State, feature: &Feature) -> bool {
     let (layer, ..) = looks(Kind::of(feature));
     (state.shows(layer) || state.shows(Layer::Keypoints)) && state.feature_view.shows(feature)
 }
 
 /// Paints the features of the left image and the cloud of the bootstrap.
-pub fn paint_left(canvas: &Canvas, state: &State) {
+pub(crate) fn paint_left(canvas: &Canvas, state: &State) {
     let features = state.features().ready().map_or(&[][..], Vec::as_slice);
     let shown = || features.iter().filter(|feature| state.feature_view.shows(feature));
     if state.shows(Layer::Keypoints) {
@@ -116,7 +116,7 @@ pub fn paint_left(canvas: &Canvas, state: &State) {
 }
 
 /// Paints the partners of the features in the right image.
-pub fn paint_right(canvas: &Canvas, state: &State) {
+pub(crate) fn paint_right(canvas: &Canvas, state: &State) {
     let features = state.features().ready().map_or(&[][..], Vec::as_slice);
     for feature in features.iter().filter(|feature| is_drawn(state, feature)) {
         let (_, mark, colour) = looks(Kind::of(feature));
@@ -167,7 +167,7 @@ fn residual(canvas: &Canvas, feature: &Feature, matched: &Matched, magnification
 }
 
 /// Says what the feature under the pointer is; `place` is where it lies on this image.
-pub fn hover(canvas: &Canvas, state: &State, place: fn(&Feature) -> Option<Pixel>) {
+pub(crate) fn hover(canvas: &Canvas, state: &State, place: fn(&Feature) -> Option<Pixel>) {
     let Some(pointer) = canvas.response.hover_pos().filter(|_| state.mode == Mode::Look && state.marks)
     else {
         return;
@@ -188,7 +188,7 @@ pub fn hover(canvas: &Canvas, state: &State, place: fn(&Feature) -> Option<Pixel
 }
 
 /// The numbers of a feature, a line each.
-pub fn words(feature: &Feature, from_step: Option<usize>) -> String {
+pub(crate) fn words(feature: &Feature, from_step: Option<usize>) -> String {
     let place = |pixel: Pixel| format!("{:.1}, {:.1}", pixel.x, pixel.y);
     let mut lines = vec![
         format!("feature at {}", place(feature.pixel)),

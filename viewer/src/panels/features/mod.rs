@@ -3,36 +3,51 @@
 //!
 //! The filters at the top act on the images as well.
 
-mod charts;
+pub(crate) mod charts;
 mod counts;
 mod filters;
-pub mod marks;
+pub(crate) mod marks;
 
-pub(super) use self::charts::Histogram;
 use egui::{ScrollArea, Ui};
-use sightline_core::locate::features::FeatureEvidence;
-use sightline_core::locate::features::rows::Feature;
+use sightline_track::locate::features::FeatureEvidence;
+use sightline_track::locate::features::rows::Feature;
 
 use crate::cache::Slot;
 use crate::command::Command;
-use crate::panels;
+use crate::panels::panel::{Panel, TableOf};
+use crate::panels::sheets;
 use crate::state::State;
 use crate::tables::Kind;
 use crate::theme;
 
-/// What the panel is for.
-const PURPOSE: &str = "What the feature tracker saw: features, matches, the motion, and how certain it is.";
-
 /// From this width on tables and plots stand side by side, points.
 const TWO_COLUMNS: f32 = 620.0;
 
+/// The panel “Features”.
+pub(crate) struct Features;
+
+impl Panel for Features {
+    fn show(&self, ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+        show(ui, state, out);
+    }
+
+    fn missing(&self, state: &State) -> Option<String> {
+        detected(state).is_none().then(|| state.missing_features())
+    }
+
+    fn table(&self) -> Option<TableOf> {
+        Some(sheets::features::features)
+    }
+}
+
+/// The feature tracker's evidence at the current step, once features were detected.
+fn detected(state: &State) -> Option<&FeatureEvidence> {
+    state.feature_evidence().filter(|evidence| evidence.detect.is_some())
+}
+
 /// Shows the panel.
-pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    let evidence = state.feature_evidence().filter(|evidence| evidence.detect.is_some());
-    let Some(evidence) = evidence else {
-        panels::missing(ui, PURPOSE, &state.missing_features());
-        return;
-    };
+pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let Some(evidence) = detected(state) else { return };
     filters::show(ui, state, out);
     let features = match state.features() {
         Slot::Ready(features) => Ok(features.as_slice()),

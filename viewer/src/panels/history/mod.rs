@@ -1,26 +1,24 @@
-//! The template's history: the window that every step matched, and how the present view correlates with each of the
-//! earlier ones (R72).
+//! The template's history: the window that every step matched, and how the current view correlates with each earlier
+//! template of the run (R72), which the server computes.
 //!
-//! The matched windows are fetched when this panel is looked at for the first time.
+//! Both are fetched while this panel is looked at.
 
-pub mod drift;
-
-use egui::{Align2, Rect, ScrollArea, Sense, Ui, UiBuilder, pos2, vec2};
+use egui::{Align2, Margin, Rect, ScrollArea, Sense, Ui, UiBuilder, pos2, vec2};
 use egui_plot::{GridMark, Line, MarkerShape, Plot, Points};
-use sightline_core::session::view::RunView;
-use sightline_core::settings::TrackerKind;
-use sightline_core::trace::StepRow;
+use sightline_session::view::RunView;
+use sightline_track::locate::template::history::AgainstEarlier;
+use sightline_track::settings::TrackerKind;
+use sightline_track::trace::StepRow;
 
-use self::drift::Comparison;
-use super::plots::{few_marks, pieces, plain};
 use crate::cache::Slot;
 use crate::command::{Command, Go};
-use crate::raster::Raster;
+use crate::drawing::{decimate, view2d};
+use crate::pane::Need;
+use crate::panels::chart::{few_marks, pieces, plain};
+use crate::panels::panel::{Panel, TableOf};
+use crate::panels::sheets;
 use crate::state::State;
-use crate::{panels, theme, thin, view2d};
-
-/// What the panel is for.
-const PURPOSE: &str = "Every step’s matched window, and how today’s view compares with them.";
+use crate::theme;
 
 /// Width of the two plots, points.
 const PLOTS: f32 = 330.0;
@@ -29,16 +27,38 @@ const WORDS: (f32, f32) = (14.0, 26.0);
 /// Least width of a frame, points: its words must fit.
 const FRAME: f32 = 76.0;
 
-/// Shows strip and plots.
-pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    let Some(run) = state.run() else {
-        panels::missing(ui, PURPOSE, &state.missing_target());
-        return;
-    };
-    if run.settings.tracker != TrackerKind::Template {
-        panels::missing(ui, PURPOSE, &state.missing_template());
-        return;
+/// The panel “Template history”.
+pub(crate) struct History;
+
+impl Panel for History {
+    fn show(&self, ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+        show(ui, state, out);
     }
+
+    fn missing(&self, state: &State) -> Option<String> {
+        match state.run() {
+            None => Some(state.missing_target()),
+            Some(run) if run.settings.tracker != TrackerKind::Template => Some(state.missing_template()),
+            Some(_) => None,
+        }
+    }
+
+    fn table(&self) -> Option<TableOf> {
+        Some(sheets::places::history)
+    }
+
+    fn needs(&self) -> &'static [Need] {
+        &[Need::MatchedWindows]
+    }
+
+    fn margin(&self) -> Margin {
+        Margin::symmetric(theme::MARGIN, 3)
+    }
+}
+
+/// Shows strip and plots.
+pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let Some(run) = state.run() else { return };
     let area = ui.available_rect_before_wrap();
     let (film, plots) =
         area.split_left_right_at_x((area.right() - PLOTS).max(area.left() + area.width() * 0.4));
@@ -122,63 +142,47 @@ fn frame(ui: &Ui, state: &State, run: &RunView, row: &StepRow, (place, window): 
 }
 
 fn state_is_lost(row: &StepRow) -> bool {
-    crate::state::state_of_word(&row.state).is_lost()
+    crate::state::state_of(row).is_lost()
 }
 
-/// The present view against every earlier window: score and shift.
+/// The current view against every earlier template: score and shift.
 fn comparisons(ui: &mut Ui, state: &State, run: &RunView) {
-    let all = compare_all(state, run);
-    let known: Vec<&Comparison> = all.iter().flatten().collect();
-    let mut words = sentence(state, &all, &known);
-    let shown = state.near_rows(run).count();
-    if shown < run.rows.len() {
-        words += &format!("; of {} windows the pick and {} near it", run.rows.len(), shown - 1);
-    }
-    ui.add(egui::Label::new(theme::note(words)).truncate());
+    let found = state.earlier_templates().ready().unwrap_or_default();
+    ui.add(egui::Label::new(theme::note(sentence(state, found))).truncate());
     let size = vec2((ui.available_width() - 6.0) / 2.0, ui.available_height());
     let colour = theme::run(run.number);
+    let points = |of: &dyn Fn(&AgainstEarlier) -> f64| -> Vec<Option<[f64; 2]>> {
+        found.iter().map(|one| Some([one.template_step as f64, of(one)])).collect()
+    };
     ui.horizontal_top(|ui| {
-        let score = |c: &Comparison| [c.step as f64, c.score];
-        chart(ui, "score, by earlier step", size, [0.0, 1.0], &points(&all, score), colour);
-        let shift = |c: &Comparison| [c.step as f64, c.shift_px];
-        chart(ui, "shift, px, by earlier step", size, [0.0, 1.0], &points(&all, shift), theme::lost());
+        chart(ui, "score, by step of the template", size, [0.0, 1.0], &points(&|one| one.score), colour);
+        chart(
+            ui,
+            "shift, px, by step of the template",
+            size,
+            [0.0, 1.0],
+            &points(&AgainstEarlier::shift_px),
+            theme::lost(),
+        );
     });
 }
 
-fn points(all: &[Option<Comparison>], of: impl Fn(&Comparison) -> [f64; 2]) -> Vec<Option<[f64; 2]>> {
-    all.iter().map(|comparison| comparison.as_ref().map(&of)).collect()
-}
-
-fn sentence(state: &State, all: &[Option<Comparison>], known: &[&Comparison]) -> String {
+fn sentence(state: &State, found: &[AgainstEarlier]) -> String {
     let step = state.cursor.step;
-    match (known.first(), known.len()) {
-        (Some(first), n) => {
-            let loading =
-                if n < all.len() { format!("; {} of {} loaded", n, all.len()) } else { String::new() };
-            format!(
-                "step {step} against step {}: score {:.2}, shift {:.2} px{loading}",
-                first.step, first.score, first.shift_px
-            )
+    match (found.first(), state.earlier_templates()) {
+        (Some(first), _) => format!(
+            "step {step} against the template of step {}: score {:.2}, shift {:.2} px",
+            first.template_step,
+            first.score,
+            first.shift_px()
+        ),
+        (None, Slot::Ready(_)) => format!("step {step} has no earlier template to compare with"),
+        (None, Slot::Failed(problem)) => {
+            format!("step {step} cannot be compared with earlier templates: {}", problem.detail)
         }
-        (None, _) if all.is_empty() => format!("step {step} has no earlier window to compare with"),
-        (None, _) => format!("loading the windows before step {step}: 0 of {} are here", all.len()),
+        (None, _) if state.row().is_none() => state.missing_step(),
+        (None, _) => format!("comparing step {step} with the earlier templates …"),
     }
-}
-
-/// One entry for every earlier window; none where it, or what leads from it to now, is not loaded.
-pub(in crate::panels) fn compare_all(state: &State, run: &RunView) -> Vec<Option<Comparison>> {
-    let here = state.row().filter(|row| row.ncc.is_some());
-    let Some(here) = here else { return Vec::new() };
-    let window =
-        |row: &StepRow| -> Option<&Raster> { state.cache.raster(&state.window_key(run, row)?).ready() };
-    let now = window(here);
-    let earlier =
-        state.near_rows(run).filter(|row| row.step < here.step && state.window_key(run, row).is_some());
-    let compare = |row: &StepRow| {
-        let now_from_then = drift::now_from_then(state, run, row.step, here.step)?;
-        drift::compare(row.step, &window(row)?.values, &now?.values, &now_from_then)
-    };
-    earlier.map(compare).collect()
 }
 
 fn chart(
@@ -214,7 +218,10 @@ fn chart(
             for piece in pieces(points) {
                 plot.line(Line::new("", piece.clone()).color(colour).width(1.5));
                 plot.points(
-                    Points::new("", thin::marks(piece)).color(colour).radius(2.5).shape(MarkerShape::Circle),
+                    Points::new("", decimate::marks(piece))
+                        .color(colour)
+                        .radius(2.5)
+                        .shape(MarkerShape::Circle),
                 );
             }
         });

@@ -7,22 +7,23 @@
 use egui::{Align2, Color32, Ui, vec2};
 use egui_plot::{Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotUi, Points, Polygon, Text};
 use nalgebra::Matrix2;
-use sightline_core::frames::Point3;
-use sightline_core::session::view::RunView;
-use sightline_core::session::wire::StopView;
-use sightline_core::trace::StepRow;
+use sightline_api::wire::StopView;
+use sightline_geometry::frames::Point3;
+use sightline_session::view::RunView;
+use sightline_track::trace::StepRow;
 
-use super::{in_site, on_map, truth_in_site};
-use crate::panels::uncertainty::shape;
+use crate::compare::state::{Look, Other};
+use crate::drawing::{decimate, ellipse};
+use crate::panels::chart::shape;
+use crate::panels::map::site::{in_site, on_map, truth_in_site};
 use crate::state::State;
-use crate::state::compare::{Look, Other};
-use crate::{ellipse, theme, thin};
+use crate::theme;
 
 /// The view reaches at least this far to either side, cm: no smaller error is worth magnifying.
 const LEAST_HALF_CM: f64 = 0.5;
 
 /// Where a step placed the target.
-pub(in crate::panels) struct Position {
+pub(crate) struct Position {
     /// The step.
     pub step: usize,
     /// The position in the site frame, m.
@@ -32,13 +33,13 @@ pub(in crate::panels) struct Position {
 }
 
 /// The positions of a run, step by step.
-pub(in crate::panels) fn positions(run: &RunView, stops: &[StopView]) -> Vec<Position> {
+pub(crate) fn positions(run: &RunView, stops: &[StopView]) -> Vec<Position> {
     run.rows.iter().filter_map(|row| position(row, stops)).collect()
 }
 
 /// As many of them as a map shows.
-pub(super) fn shown(run: &RunView, stops: &[StopView]) -> Vec<Position> {
-    thin::evenly(&run.rows, thin::PLACES).filter_map(|row| position(row, stops)).collect()
+pub(crate) fn shown(run: &RunView, stops: &[StopView]) -> Vec<Position> {
+    decimate::evenly(&run.rows, decimate::PLACES).filter_map(|row| position(row, stops)).collect()
 }
 
 /// Where a step placed the target.
@@ -55,13 +56,13 @@ fn position(row: &StepRow, stops: &[StopView]) -> Option<Position> {
 }
 
 /// Shows the target's neighbourhood.
-pub(super) fn show(ui: &mut Ui, state: &State, stops: &[StopView], run: &RunView) {
+pub(crate) fn show(ui: &mut Ui, state: &State, stops: &[StopView], run: &RunView) {
     let positions = shown(run, stops);
     let Some(last) = positions.last() else { return };
     let origin = on_map(&last.point_in_site);
     let here = state.row().and_then(|row| position(row, stops));
     let mut words = sentence(&positions, here.as_ref());
-    if let Some(thinned) = thin::words(run.rows.len(), thin::PLACES) {
+    if let Some(thinned) = decimate::words(run.rows.len(), decimate::PLACES) {
         words += &format!("; {thinned}");
     }
     ui.add(egui::Label::new(theme::note(words)).truncate());
@@ -113,12 +114,14 @@ fn paint(plot: &mut PlotUi<'_>, state: &State, (run, positions, here): Shown<'_>
     let cloud = cloud_in_site(state).map(|point| place(&point)).collect::<Vec<_>>();
     plot.points(Points::new("", cloud).color(colour).radius(1.0).allow_hover(false));
     let trail: Vec<[f64; 2]> = positions.iter().map(|at| place(&at.point_in_site)).collect();
-    for piece in thin::path(&trail) {
+    for piece in decimate::path(&trail) {
         plot.line(Line::new("", piece).color(colour.gamma_multiply(0.6)).width(1.0));
     }
-    plot.points(Points::new("", thin::marks(trail)).color(colour).radius(2.0).shape(MarkerShape::Diamond));
-    let count = positions.len().clamp(2, thin::ELLIPSES) as f32 - 1.0;
-    for (i, at) in thin::evenly(positions, thin::ELLIPSES).enumerate() {
+    plot.points(
+        Points::new("", decimate::marks(trail)).color(colour).radius(2.0).shape(MarkerShape::Diamond),
+    );
+    let count = positions.len().clamp(2, decimate::ELLIPSES) as f32 - 1.0;
+    for (i, at) in decimate::evenly(positions, decimate::ELLIPSES).enumerate() {
         // Later ellipses are stronger; the cursor's is the thick one.
         let strength = 0.4 + 0.6 * i as f32 / count;
         if here.is_none_or(|here| here.step != at.step) {
@@ -151,10 +154,12 @@ fn positions_of(other: &Other<'_>, state: &State) -> Vec<Position> {
 /// The trail of a compared run with its last ellipse.
 fn paint_other(plot: &mut PlotUi<'_>, all: &[Position], look: Look, place: impl Fn(&Point3) -> [f64; 2]) {
     let trail: Vec<[f64; 2]> = all.iter().map(|at| place(&at.point_in_site)).collect();
-    for piece in thin::path(&trail) {
+    for piece in decimate::path(&trail) {
         plot.line(Line::new("", piece).color(look.colour.gamma_multiply(0.6)).width(1.0));
     }
-    plot.points(Points::new("", thin::marks(trail)).color(look.colour).radius(2.5).shape(shape(look.mark)));
+    plot.points(
+        Points::new("", decimate::marks(trail)).color(look.colour).radius(2.5).shape(shape(look.mark)),
+    );
     if let Some(last) = all.last() {
         outline(plot, last, place(&last.point_in_site), look.colour, 1.5);
     }
@@ -184,8 +189,8 @@ mod tests {
         let mut run = state.run().unwrap().clone();
         // A rover that heads east: its forward axis, along which the target is uncertain, is the map's east.
         let heading = nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.0, std::f64::consts::FRAC_PI_2);
-        let pose = sightline_core::frames::Pose::from_parts(Default::default(), heading);
-        stops[0].site_from_rover = sightline_core::frames::PoseRecord::from(&pose);
+        let pose = sightline_geometry::frames::Pose::from_parts(Default::default(), heading);
+        stops[0].site_from_rover = sightline_geometry::frames::PoseRecord::from(&pose);
         run.rows[0].covariance_in_rover =
             nalgebra::Matrix3::from_diagonal(&nalgebra::Vector3::new(4e-4, 1e-4, 0.0));
         let positions = positions(&run, &stops);

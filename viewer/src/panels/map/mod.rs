@@ -3,25 +3,27 @@
 //! Site frame: +x north, +y east, +z down. On the map east is to the right, so a site point is drawn at (y, x).
 //! Beside the whole drive stands the target's neighbourhood, where the positions converge (`convergence`).
 
-pub(in crate::panels) mod convergence;
+pub(crate) mod convergence;
 mod pointed;
+mod site;
 
 use egui::{Color32, Rect, Ui, UiBuilder, vec2};
 use egui_plot::{Arrows, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotPoints, PlotUi, Points};
-use sightline_core::frames::{Point3, Pose, PoseRecord};
-use sightline_core::session::view::RunView;
-use sightline_core::session::wire::StopView;
+use sightline_api::wire::StopView;
+use sightline_geometry::frames::{Point3, Pose, PoseRecord};
+use sightline_session::view::RunView;
 
-use super::names;
-use super::plots::{few_marks, plain};
 use crate::command::{Command, Go};
-use crate::overlay::{self, Mark};
+use crate::drawing::decimate;
+use crate::drawing::overlay;
+use crate::drawing::overlay::Mark;
+use crate::panels::map::site::{in_site, on_map, truth_in_site};
+use crate::panels::names;
+use crate::panels::panel::{Panel, TableOf};
+use crate::panels::sheets;
 use crate::pointed::Pointed;
 use crate::state::{State, run_letter};
-use crate::{panels, theme, thin};
-
-/// What the panel is for.
-const PURPOSE: &str = "The rover’s path and the target, seen from above.";
+use crate::theme;
 
 /// How near to a stop a click must be to go there, points.
 const CLICK_REACH: f32 = 14.0;
@@ -29,18 +31,32 @@ const CLICK_REACH: f32 = 14.0;
 /// Room between the two maps, points.
 const GAP: f32 = 8.0;
 
-/// East and north of a point of the site frame.
-fn on_map(point_in_site: &Point3) -> [f64; 2] {
-    [point_in_site.y, point_in_site.x]
+/// The panel “Map, site frame”.
+pub(crate) struct Map;
+
+impl Panel for Map {
+    fn show(&self, ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+        show(ui, state, out);
+    }
+
+    fn missing(&self, state: &State) -> Option<String> {
+        driven(state).is_none().then(|| state.missing_target())
+    }
+
+    fn table(&self) -> Option<TableOf> {
+        Some(sheets::places::map)
+    }
+}
+
+/// The stops of the drive; `None` without any.
+fn driven(state: &State) -> Option<&[StopView]> {
+    let stops = state.traverse.as_ref()?.stops.as_slice();
+    (!stops.is_empty()).then_some(stops)
 }
 
 /// Shows the map.
-pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    let Some(traverse) = state.traverse.as_ref().filter(|t| !t.stops.is_empty()) else {
-        panels::missing(ui, PURPOSE, &state.missing_target());
-        return;
-    };
-    let stops = &traverse.stops;
+pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let Some(stops) = driven(state) else { return };
     names::wrapped(ui, "", &names_of(state, stops));
     let run = state.run().filter(|run| !run.rows.is_empty());
     let Some(run) = run else {
@@ -78,21 +94,6 @@ fn split(area: Rect, width_by_height: f32) -> (Rect, Rect) {
         let share = (area.width() / width_by_height / area.height() * 1.3 + 0.12).clamp(0.35, 0.5);
         area.split_top_bottom_at_fraction(share)
     }
-}
-
-/// A plot seen from above: few marks, and the place under the pointer in words.
-fn in_site<'a>(plot: Plot<'a>, words: fn(&PlotPoint) -> String) -> Plot<'a> {
-    plot.y_axis_min_width(22.0)
-        .x_grid_spacer(few_marks)
-        .x_axis_formatter(plain)
-        .y_grid_spacer(few_marks)
-        .y_axis_formatter(plain)
-        .allow_boxed_zoom(false)
-        .label_formatter(|_| None)
-        .coordinates_formatter(
-            egui_plot::Corner::RightBottom,
-            egui_plot::CoordinatesFormatter::new(move |at, _| words(at)),
-        )
 }
 
 /// The whole drive.
@@ -150,22 +151,22 @@ fn names_of(state: &State, stops: &[StopView]) -> Vec<(Mark, Color32, String)> {
 }
 
 fn poses<'a>(stops: &'a [StopView], of: impl Fn(&StopView) -> Option<PoseRecord> + 'a) -> Vec<[f64; 2]> {
-    let shown = thin::evenly(stops, thin::PLACES);
+    let shown = decimate::evenly(stops, decimate::PLACES);
     shown.filter_map(of).map(|pose| on_map(&Point3::from(pose.position_m))).collect()
 }
 
 fn paint_paths(plot: &mut PlotUi<'_>, stops: &[StopView], step: usize) {
     let truth = poses(stops, |stop| stop.true_site_from_rover);
-    for piece in thin::path(&truth) {
+    for piece in decimate::path(&truth) {
         let line = Line::new("true path", piece).color(theme::truth());
         plot.line(line.style(LineStyle::dotted_loose()).width(1.5));
     }
     let estimated = poses(stops, |stop| Some(stop.site_from_rover));
-    for piece in thin::path(&estimated) {
+    for piece in decimate::path(&estimated) {
         plot.line(Line::new("estimated path", piece).color(theme::weak()).width(1.5));
     }
     plot.points(
-        Points::new("estimated path", thin::marks(estimated))
+        Points::new("estimated path", decimate::marks(estimated))
             .color(theme::weak())
             .radius(2.0)
             .shape(MarkerShape::Circle),
@@ -198,18 +199,12 @@ fn span_m(stops: &[StopView]) -> f64 {
 fn paint_trail(plot: &mut PlotUi<'_>, stops: &[StopView], run: &RunView, colour: Color32) {
     let trail: Vec<[f64; 2]> =
         convergence::shown(run, stops).iter().map(|at| on_map(&at.point_in_site)).collect();
-    for piece in thin::path(&trail) {
+    for piece in decimate::path(&trail) {
         plot.line(Line::new("", piece).color(colour).width(1.0));
     }
-    plot.points(Points::new("", thin::marks(trail)).color(colour).radius(2.5).shape(MarkerShape::Diamond));
-}
-
-/// The true position, carried by the true pose, and the estimate's distance from it in the site frame, m.
-fn truth_in_site(state: &State) -> Option<(Point3, f64)> {
-    let (trace, stop) = (state.trace()?, state.stop()?);
-    let point = stop.true_site_from_rover?.to_pose() * trace.truth.as_ref()?.position_in_rover;
-    let estimate = stop.site_from_rover.to_pose() * trace.update.target.position_in_rover;
-    Some((point, (estimate - point).norm()))
+    plot.points(
+        Points::new("", decimate::marks(trail)).color(colour).radius(2.5).shape(MarkerShape::Diamond),
+    );
 }
 
 /// The stop nearest to the pointer, where one is near.
@@ -234,10 +229,5 @@ mod tests {
         assert!(drive.height() == 300.0 && drive.width() <= 0.31 * 400.0 && target.width() > 0.6 * 400.0);
         let (drive, target) = split(area, 8.0);
         assert!(drive.width() == 400.0 && drive.height() < target.height());
-    }
-
-    #[test]
-    fn north_is_up_and_east_is_right() {
-        assert_eq!(on_map(&Point3::new(3.0, 1.0, 0.0)), [1.0, 3.0]);
     }
 }

@@ -4,11 +4,11 @@
 
 use egui::{Painter, Pos2, Ui};
 use egui_plot::{PlotPoint, PlotTransform};
-use sightline_core::frames::{Point3, Pose};
-use sightline_core::session::wire::StopView;
+use sightline_api::wire::StopView;
+use sightline_geometry::frames::{Point3, Pose};
 
-use super::on_map;
-use crate::overlay::{Line, Mark, paint_line, paint_mark, paint_words};
+use crate::drawing::overlay::{Line, Mark, paint_line, paint_mark, paint_words};
+use crate::panels::map::site::on_map;
 use crate::state::State;
 use crate::theme;
 
@@ -20,7 +20,7 @@ const TICKS_M: [f64; 6] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0];
 const TICK_GAP: f32 = 28.0;
 
 /// Paints it.
-pub(super) fn paint(ui: &Ui, state: &State, stops: &[StopView], transform: &PlotTransform) {
+pub(crate) fn paint(ui: &Ui, state: &State, stops: &[StopView], transform: &PlotTransform) {
     let painter = ui.painter_at(*transform.frame());
     let place = |point: &Point3| {
         let [east, north] = on_map(point);

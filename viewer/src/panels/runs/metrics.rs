@@ -1,16 +1,16 @@
 //! Every metric of the run that is looked at and of those compared with it, with protocol and excluded steps.
 
 use egui::{Grid, Ui};
-use sightline_core::session::compare::RunName;
-use sightline_core::session::metrics::{Excluded, NAMES, RunMetrics};
+use sightline_session::compare::RunName;
+use sightline_session::metrics::{Excluded, NAMES, RunMetrics};
 
-use super::table;
 use crate::command::Command;
+use crate::panels::runs::table;
 use crate::state::State;
 use crate::theme;
 
 /// Shows the metrics.
-pub(super) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let Some(own) = state.own_name() else { return };
     ui.label(theme::title("Metrics"));
     let Some(found) = state.metrics(own) else {
@@ -73,10 +73,10 @@ fn settings(ui: &mut Ui, state: &State) {
 fn header(found: &RunMetrics) -> Vec<String> {
     let truth = match found.truth {
         None => "no truth is known: only survival_steps and mean_nis can be given",
-        Some(sightline_core::trace::TruthKind::Surface) => {
+        Some(sightline_track::trace::TruthKind::Surface) => {
             "the truth is the surface point that was designated"
         }
-        Some(sightline_core::trace::TruthKind::Carried) => {
+        Some(sightline_track::trace::TruthKind::Carried) => {
             "the truth is the first estimate carried along by true poses: errors are drift"
         }
     };

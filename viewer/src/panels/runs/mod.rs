@@ -2,25 +2,36 @@
 //! runs that are compared. Each number leads to the step at which its run does worst by it.
 
 mod metrics;
-pub mod table;
+pub(crate) mod table;
 
 use egui::{ScrollArea, TextEdit, Ui};
 
 use crate::command::Command;
 use crate::compare::Ask;
-use crate::panels;
+use crate::pane::Need;
+use crate::panels::panel::Panel;
 use crate::state::State;
 use crate::theme;
 
-/// What the panel is for.
-const PURPOSE: &str = "What each run is worth, and which settings make the difference.";
+/// The panel “Runs”.
+pub(crate) struct Runs;
+
+impl Panel for Runs {
+    fn show(&self, ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+        show(ui, state, out);
+    }
+
+    fn missing(&self, state: &State) -> Option<String> {
+        state.all_runs().next().is_none().then(|| state.missing_target())
+    }
+
+    fn needs(&self) -> &'static [Need] {
+        &[Need::Metrics]
+    }
+}
 
 /// Shows the table and the metrics.
-pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    if state.all_runs().next().is_none() {
-        panels::missing(ui, PURPOSE, &state.missing_target());
-        return;
-    }
+pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.horizontal(|ui| {
         let label = ui.label(theme::label("show runs with"));
         let mut words = state.compare.filter.clone();

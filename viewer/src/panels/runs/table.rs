@@ -2,44 +2,31 @@
 
 use egui::{Button, Grid, Link, RichText, Sense, Ui, vec2};
 use serde_json::Value;
-use sightline_core::session::compare::RunName;
-use sightline_core::session::metrics::Metric;
-use sightline_core::session::view::{RunView, TargetView};
-use sightline_core::settings::Changes;
+use sightline_session::compare::RunName;
+use sightline_session::metrics::Metric;
+use sightline_session::view::{RunView, TargetView};
+use sightline_track::settings::Changes;
 
 use crate::command::Command;
-use crate::compare::{Ask, Sort};
-use crate::panels::compare::{chip, mark};
+use crate::compare::panel::{chip, mark};
+use crate::compare::state::Look;
+use crate::compare::{Ask, METRICS, Sort};
+use crate::drawing::overlay::run_mark;
 use crate::panels::digits;
-use crate::panels::targets::run_mark;
 use crate::panels::timeline;
-use crate::state::compare::Look;
 use crate::state::{State, run_letter};
 use crate::theme;
 
-/// The metrics of the table with their headings, and whether more is better.
-pub const COLUMNS: [(&str, &str, bool); 9] = [
-    ("tracked_steps", "tracked", true),
-    ("survival_steps", "survived", true),
-    ("ade_px", "mean, px", false),
-    ("max_px", "max, px", false),
-    ("ade_cm", "mean, cm", false),
-    ("pck_4px", "in 4 px", true),
-    ("false_lost", "false lost", false),
-    ("false_tracking", "false tracking", false),
-    ("mean_nees", "NEES", false),
-];
-
 /// A row.
 #[derive(Clone, Copy)]
-pub struct Row<'a> {
+pub(crate) struct Row<'a> {
     name: RunName,
     target: &'a TargetView,
     run: &'a RunView,
 }
 
 /// How many of the runs are shown.
-pub(super) fn count(state: &State) -> String {
+pub(crate) fn count(state: &State) -> String {
     let (shown, all) = (rows(state).len(), state.all_runs().count());
     match (shown, all) {
         (1, 1) => "1 run".to_owned(),
@@ -67,7 +54,8 @@ fn rows(state: &State) -> Vec<Row<'_>> {
 }
 
 /// The names of the runs in the order of the table.
-pub fn order(state: &State) -> Vec<RunName> {
+#[cfg(test)]
+pub(crate) fn order(state: &State) -> Vec<RunName> {
     rows(state).into_iter().map(|row| row.name).collect()
 }
 
@@ -79,7 +67,7 @@ fn text(state: &State, row: &Row<'_>) -> String {
 }
 
 /// Shows the table.
-pub(super) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let rows = rows(state);
     if rows.is_empty() {
         ui.label(theme::label("No run has these words. Empty the field to see all of them."));
@@ -89,7 +77,7 @@ pub(super) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         for heading in ["base", "vs", "run", "states"] {
             ui.label(theme::note(heading));
         }
-        COLUMNS.iter().for_each(|column| heading(ui, state, column, out));
+        METRICS.iter().for_each(|column| heading(ui, state, column, out));
         ui.label(theme::note(match state.compare.baseline {
             Some(name) => format!("settings unlike {}", state.run_label(name)),
             None => "settings unlike the defaults".to_owned(),
@@ -154,7 +142,7 @@ fn show_row(ui: &mut Ui, state: &State, row: &Row<'_>, out: &mut Vec<Command>) {
         }
     });
     states(ui, row, state.stop_count());
-    for (metric, ..) in COLUMNS {
+    for (metric, ..) in METRICS {
         cell(ui, state, row.name, metric, &label, out);
     }
     ui.add(egui::Label::new(theme::note(changes(state, row)).monospace())).on_hover_text(text(state, row));
@@ -223,7 +211,7 @@ fn in_words(run: &RunView) -> String {
 }
 
 /// A metric: a link to its worst step, with its difference to the baseline.
-pub(super) fn cell(
+pub(crate) fn cell(
     ui: &mut Ui,
     state: &State,
     name: RunName,
@@ -269,7 +257,7 @@ pub(super) fn cell(
 }
 
 /// A value as it is written: shares in per cent.
-pub(super) fn words(metric: &Metric, value: f64) -> String {
+pub(crate) fn words(metric: &Metric, value: f64) -> String {
     let is_share = metric.name.starts_with("pck_")
         || matches!(metric.name.as_str(), "average_jaccard" | "occlusion_accuracy" | "inside_3_sigma");
     if is_share { format!("{:.0} %", value * 100.0) } else { digits(value) }
@@ -294,11 +282,11 @@ fn changes(state: &State, row: &Row<'_>) -> String {
 }
 
 /// A setting's value as it is written.
-pub(super) fn plain(value: &Value) -> String {
+pub(crate) fn plain(value: &Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 
 /// A run's mark with its name, as the head of a column.
-pub(super) fn head(ui: &mut Ui, state: &State, name: RunName) {
+pub(crate) fn head(ui: &mut Ui, state: &State, name: RunName) {
     ui.horizontal(|ui| chip(ui, look(state, name), &state.run_label(name)));
 }

@@ -2,14 +2,14 @@
 //! it was found (R205).
 
 use egui::{Grid, Ui};
-use sightline_core::locate::shape_tracker::drape::Draped;
-use sightline_core::session::wire::StopView;
-use sightline_core::trace::ArrayName;
+use sightline_api::wire::StopView;
+use sightline_track::locate::shape_tracker::drape::Draped;
+use sightline_track::trace::ArrayName;
 
-use super::picture::{Picture, Unit, side_by_side};
-use super::{Look, ready};
-use crate::overlay::Mark;
+use crate::drawing::overlay::Mark;
 use crate::panels;
+use crate::panels::shape::look::{Look, ready};
+use crate::panels::shape::picture::{Picture, Unit, side_by_side};
 use crate::theme;
 
 /// What the part is for.
@@ -17,14 +17,14 @@ const PURPOSE: &str =
     "The last image of the old cameras in that of the new one, where other cameras take over.";
 
 /// Shows the part.
-pub(super) fn show(ui: &mut Ui, look: &Look<'_>) {
+pub(crate) fn show(ui: &mut Ui, look: &Look<'_>) {
     let found = look.evidence.registration.as_ref();
     let Some(draped) = found.and_then(|found| found.draped.as_ref()) else {
         panels::missing(ui, PURPOSE, &why_none(look));
         return;
     };
-    let Some(picture) = ready(ui, look.state.array(ArrayName::Draped), "draped picture") else { return };
-    let Some(matched) = ready(ui, look.state.array(ArrayName::DrapedMatch), "present image") else { return };
+    let Some(picture) = ready(ui, look.state.array(ArrayName::DRAPED), "draped picture") else { return };
+    let Some(matched) = ready(ui, look.state.array(ArrayName::DRAPED_MATCH), "present image") else { return };
     let size = side_by_side(ui, 2, ui.available_height() - 76.0);
     let from = found.map_or(0, |found| found.to_step);
     let titles = [format!("step {from}, draped"), format!("step {}, where it was found", look.trace.step)];
@@ -40,9 +40,8 @@ pub(super) fn show(ui: &mut Ui, look: &Look<'_>) {
 }
 
 fn numbers(ui: &mut Ui, look: &Look<'_>, draped: &Draped) {
-    let least = look.state.setting("shape", "hand_off_score_min").and_then(|value| value.as_f64());
-    let least = least.map_or_else(String::new, |least| format!("at least {least:.2}"));
-    let sigmas = crate::ellipse::axes(&draped.covariance_px2);
+    let least = format!("at least {:.2}", look.state.run_settings().shape.hand_off_score_min);
+    let sigmas = crate::drawing::ellipse::axes(&draped.covariance_px2);
     let sigmas =
         sigmas.map_or_else(String::new, |[a, b]| format!("1σ {:.2} and {:.2} px", a.norm(), b.norm()));
     let rows = [

@@ -2,15 +2,15 @@
 
 use egui::{Align2, Color32, CursorIcon, Id, Painter, Rect, Sense, Stroke, StrokeKind, Ui, pos2, vec2};
 
-use super::super::names;
 use crate::command::Command;
-use crate::overlay::Mark;
+use crate::drawing::overlay::Mark;
+use crate::panels::names;
 use crate::shape_view::ShapeView;
 use crate::state::State;
 use crate::theme;
 
 /// Height of the histogram with its axis, points.
-pub(super) const HEIGHT: f32 = 96.0;
+pub(crate) const HEIGHT: f32 = 96.0;
 /// Height of the axis, points.
 const AXIS: f32 = 15.0;
 /// Bars.
@@ -23,15 +23,15 @@ const BEYOND: f64 = 1.25;
 const LEAST: f64 = 0.01;
 
 /// Errors of depth, m; NaN where there is none.
-pub(super) struct Errors<'a> {
+pub(crate) struct Errors<'a> {
     /// Before the registration.
-    pub(super) before: &'a [f32],
+    pub(crate) before: &'a [f32],
     /// At its end.
-    pub(super) end: &'a [f32],
+    pub(crate) end: &'a [f32],
 }
 
 /// Shows the histogram; `limit_m` is that of the colours, `automatic_m` the one they have by themselves.
-pub(super) fn show(
+pub(crate) fn show(
     ui: &mut Ui,
     state: &State,
     errors: &Errors<'_>,
@@ -96,7 +96,7 @@ fn bars(errors: &[f32], end_m: f64) -> [usize; BARS] {
 }
 
 /// Where each bar begins and ends, m, and how many errors it has at the start and at the end.
-pub(super) fn counts(errors: &Errors<'_>, automatic_m: f64) -> Vec<(f64, f64, [usize; 2])> {
+pub(crate) fn counts(errors: &Errors<'_>, automatic_m: f64) -> Vec<(f64, f64, [usize; 2])> {
     let end_m = automatic_m * BEYOND;
     let edge = |bar: usize| end_m * (2.0 * bar as f64 / BARS as f64 - 1.0);
     let both = bars(errors.before, end_m).into_iter().zip(bars(errors.end, end_m)).enumerate();

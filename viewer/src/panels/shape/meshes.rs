@@ -3,16 +3,17 @@
 
 use egui::{Align2, Sense, Shape, Stroke, Ui, vec2};
 use nalgebra::Matrix3;
-use sightline_core::frames::{Point3, Vector3};
-use sightline_core::locate::shape_tracker::rows::Facet;
-use sightline_core::trace::ArrayName;
+use sightline_geometry::frames::{Point3, Vector3};
+use sightline_track::locate::shape_tracker::rows::Facet;
+use sightline_track::trace::ArrayName;
 
-use super::super::names;
-use super::solid::{Eye, Scene};
-use super::{Look, ready, why_not};
 use crate::command::Command;
-use crate::overlay::{self, Mark, paint_line, paint_mark};
+use crate::drawing::overlay;
+use crate::drawing::overlay::{Mark, paint_line, paint_mark};
 use crate::panels;
+use crate::panels::names;
+use crate::panels::shape::look::{Look, ready, why_not};
+use crate::panels::shape::solid::{Eye, Scene};
 use crate::shape_view::{Orbit, ShapeView};
 use crate::theme;
 
@@ -28,13 +29,13 @@ const NEAR: f64 = 0.75;
 const SIGMAS: f64 = 3.0;
 
 /// Shows the part.
-pub(super) fn show(ui: &mut Ui, look: &Look<'_>, out: &mut Vec<Command>) {
+pub(crate) fn show(ui: &mut Ui, look: &Look<'_>, out: &mut Vec<Command>) {
     let Some(found) = &look.evidence.registration else {
         panels::missing(ui, PURPOSE, &why_not(look, "registration"));
         return;
     };
-    let Some(fixed) = ready(ui, look.state.facets(ArrayName::MeshFixed), "earlier mesh") else { return };
-    let Some(moving) = ready(ui, look.state.facets(ArrayName::MeshMoving), "present mesh") else { return };
+    let Some(fixed) = ready(ui, look.state.facets(ArrayName::MESH_FIXED), "earlier mesh") else { return };
+    let Some(moving) = ready(ui, look.state.facets(ArrayName::MESH_MOVING), "present mesh") else { return };
     let all = [fixed.len(), moving.len()];
     let start = Point3::from(found.start_in_rover);
     let near_m = found.sensor_side_m.map_or(f64::INFINITY, |side_m| NEAR * side_m);
@@ -71,8 +72,8 @@ pub(super) fn show(ui: &mut Ui, look: &Look<'_>, out: &mut Vec<Command>) {
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, "meshes in space"));
     let painter = ui.painter_at(rect);
     painter.rect_filled(rect, 0.0, theme::well());
-    let camera = look.trace.point_mast.as_ref().map(|pointing| pointing.left.model.centre());
-    let eye = Eye::new(&camera.unwrap_or_else(Point3::origin), middle, reach_m, orbit, rect);
+    let camera = look.trace.point_mast.left.model.centre();
+    let eye = Eye::new(&camera, middle, reach_m, orbit, rect);
     let mut scene = Scene::new(eye);
     scene.facets(moving.iter().step_by(every_moving), theme::mesh_present(), true);
     scene.facets(fixed.iter().step_by(every_fixed), theme::mesh_earlier(), false);
@@ -109,7 +110,7 @@ fn extent(fixed: &[Facet], moving: &[Facet]) -> Option<(Point3, f64)> {
 
 /// The target with the axes of its covariance.
 fn target(painter: &egui::Painter, look: &Look<'_>, eye: &Eye, colour: egui::Color32) {
-    let located = look.trace.locate.as_ref();
+    let located = look.trace.located();
     let position = located.and_then(|located| located.position_in_rover);
     let Some(position) = position else {
         let at = painter.clip_rect().left_top() + vec2(8.0, 8.0);

@@ -5,44 +5,47 @@
 
 mod hand_off;
 mod histogram;
+mod look;
 mod meshes;
 mod picture;
-mod search;
-mod sensor;
+pub(crate) mod search;
+pub(crate) mod sensor;
 mod solid;
 mod surface;
 
-pub(super) use self::search::step_m as step_of_search_m;
-pub(super) use self::sensor::error_counts;
 use egui::{RichText, ScrollArea, Ui};
-use sightline_core::locate::shape_tracker::ShapeEvidence;
-use sightline_core::locate::shape_tracker::evidence::Registered;
-use sightline_core::trace::StepTrace;
+use sightline_track::locate::shape_tracker::ShapeEvidence;
+use sightline_track::locate::shape_tracker::evidence::Registered;
+use sightline_track::trace::StepTrace;
 
-use crate::cache::Slot;
 use crate::command::Command;
-use crate::panels;
+use crate::panels::panel::{Panel, TableOf};
+use crate::panels::shape::look::Look;
+use crate::panels::sheets;
 use crate::shape_view::{Part, ShapeView};
 use crate::state::State;
 use crate::theme;
 
-/// What the panel is for.
-const PURPOSE: &str = "What the shape tracker saw: surface, sensor, search, meshes, and the hand-off.";
+/// The panel “Shape”.
+pub(crate) struct Shape;
 
-/// What a part of the panel is given.
-#[derive(Clone, Copy)]
-struct Look<'a> {
-    state: &'a State,
-    trace: &'a StepTrace,
-    evidence: &'a ShapeEvidence,
+impl Panel for Shape {
+    fn show(&self, ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+        show(ui, state, out);
+    }
+
+    fn missing(&self, state: &State) -> Option<String> {
+        (state.trace().is_none() || state.shape_evidence().is_none()).then(|| state.missing_shape())
+    }
+
+    fn table(&self) -> Option<TableOf> {
+        Some(sheets::shape::shape)
+    }
 }
 
 /// Shows the panel.
-pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    let (Some(trace), Some(evidence)) = (state.trace(), state.shape_evidence()) else {
-        panels::missing(ui, PURPOSE, &state.missing_shape());
-        return;
-    };
+pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let (Some(trace), Some(evidence)) = (state.trace(), state.shape_evidence()) else { return };
     let look = Look { state, trace, evidence };
     parts(ui, state, out);
     if let Some(words) = warning(trace, evidence) {
@@ -78,7 +81,7 @@ fn parts(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 /// The prediction against the basin in which a registration settles on the right place (R155).
 fn warning(trace: &StepTrace, evidence: &ShapeEvidence) -> Option<String> {
     let half_width_m = evidence.registration.as_ref()?.half_width_m;
-    let covariance = &trace.predict.as_ref()?.covariance_in_rover;
+    let covariance = &trace.prediction()?.covariance_in_rover;
     let sigma_m = covariance.symmetric_eigenvalues().max().max(0.0).sqrt();
     (sigma_m > half_width_m).then(|| {
         format!(
@@ -108,24 +111,4 @@ fn summary(ui: &mut Ui, found: &Registered) {
         let reason = format!("Not used: {reason}.");
         ui.add(egui::Label::new(RichText::new(reason).small().color(theme::failed())).wrap());
     }
-}
-
-/// Why a part of this step has no data.
-fn why_not(look: &Look<'_>, what: &str) -> String {
-    let evidence = look.evidence;
-    let reason = evidence.registration.as_ref().and_then(|found| found.reason.as_ref());
-    let why = reason.or(evidence.missing.as_ref()).unwrap_or(&evidence.why);
-    format!("No {what} at step {}: {why}.", look.trace.step)
-}
-
-/// What is in a slot; a sentence on the screen where it is not there.
-fn ready<'a, T>(ui: &mut Ui, slot: Slot<'a, T>, what: &str) -> Option<&'a T> {
-    match slot {
-        Slot::Ready(item) => return Some(item),
-        Slot::Failed(problem) => {
-            panels::missing(ui, "", &format!("The {what} cannot be shown: {}", problem.detail));
-        }
-        Slot::Absent | Slot::Loading => panels::missing(ui, "", &format!("Loading the {what} …")),
-    }
-    None
 }

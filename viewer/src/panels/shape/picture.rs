@@ -4,12 +4,14 @@
 
 use egui::{Align2, Painter, Pos2, Rect, Response, Sense, Stroke, StrokeKind, Ui, Vec2, pos2, vec2};
 
-use crate::overlay::{Mark, paint_mark};
-use crate::raster::{self, Raster};
-use crate::{theme, view2d};
+use crate::drawing::overlay::{Mark, paint_mark};
+use crate::drawing::raster;
+use crate::drawing::raster::Raster;
+use crate::drawing::view2d;
+use crate::theme;
 
 /// Width of the colour bar with its numbers, points.
-pub(super) const BAR: f32 = 70.0;
+pub(crate) const BAR: f32 = 70.0;
 /// The least that a picture takes, points.
 const LEAST: f32 = 110.0;
 /// Height of the title, points.
@@ -17,21 +19,21 @@ const TITLE: f32 = 16.0;
 
 /// How values are said: so many of the unit one of theirs is.
 #[derive(Clone, Copy)]
-pub(super) struct Unit {
+pub(crate) struct Unit {
     /// The unit.
-    pub(super) word: &'static str,
+    pub(crate) word: &'static str,
     /// How many of it one of the array's is.
-    pub(super) factor: f32,
+    pub(crate) factor: f32,
 }
 
 impl Unit {
     /// A value with the unit.
-    pub(super) fn say(self, value: f32) -> String {
+    pub(crate) fn say(self, value: f32) -> String {
         format!("{} {}", self.number(value), self.word)
     }
 
     /// A value in the unit, to three digits: a colour tells no more.
-    pub(super) fn number(self, value: f32) -> String {
+    pub(crate) fn number(self, value: f32) -> String {
         let value = f64::from(value * self.factor);
         let decimals = match value.abs() {
             size if size < 1e-9 => 0,
@@ -46,35 +48,35 @@ impl Unit {
 }
 
 /// An array and how it is shown.
-pub(super) struct Picture<'a> {
+pub(crate) struct Picture<'a> {
     /// What it is.
-    pub(super) title: &'a str,
+    pub(crate) title: &'a str,
     /// The values.
-    pub(super) raster: &'a Raster,
+    pub(crate) raster: &'a Raster,
     /// How they are coloured; none: in grey, without a bar.
-    pub(super) look: Option<raster::Look>,
+    pub(crate) look: Option<raster::Look>,
     /// Their unit.
-    pub(super) unit: Unit,
+    pub(crate) unit: Unit,
 }
 
 /// A picture that was laid out.
-pub(super) struct Placed {
+pub(crate) struct Placed {
     /// Where its pixels are on the screen.
-    pub(super) area: Rect,
+    pub(crate) area: Rect,
     /// Pointer and words.
-    pub(super) response: Response,
+    pub(crate) response: Response,
     painter: Painter,
     scale: f32,
 }
 
 impl Placed {
     /// Where a place of the array is on the screen; (0, 0) is the middle of its first pixel.
-    pub(super) fn to_screen(&self, x: f64, y: f64) -> Pos2 {
+    pub(crate) fn to_screen(&self, x: f64, y: f64) -> Pos2 {
         self.area.min + vec2(x as f32 + 0.5, y as f32 + 0.5) * self.scale
     }
 
     /// A mark at a place of the array; nothing outside of it.
-    pub(super) fn mark(&self, x: f64, y: f64, mark: Mark, colour: egui::Color32) {
+    pub(crate) fn mark(&self, x: f64, y: f64, mark: Mark, colour: egui::Color32) {
         let at = self.to_screen(x, y);
         if self.area.contains(at) {
             paint_mark(&self.painter, at, mark, colour, 6.0);
@@ -84,7 +86,7 @@ impl Placed {
 
 impl Picture<'_> {
     /// Shows the picture in an area of this size.
-    pub(super) fn show(&self, ui: &mut Ui, size: Vec2) -> Placed {
+    pub(crate) fn show(&self, ui: &mut Ui, size: Vec2) -> Placed {
         let bar = if self.look.is_some() { BAR } else { 0.0 };
         let [width, height] = self.raster.size().map(|side| side.max(1) as f32);
         let scale = ((size.x - bar) / width).min((size.y - TITLE - 2.0) / height).max(0.01);
@@ -126,7 +128,7 @@ impl Picture<'_> {
 }
 
 /// The colours with both ends and the middle in words.
-pub(super) fn colour_bar(painter: &Painter, area: Rect, look: raster::Look, unit: Unit) {
+pub(crate) fn colour_bar(painter: &Painter, area: Rect, look: raster::Look, unit: Unit) {
     const STEPS: u16 = 48;
     let strip = Rect::from_min_max(area.min, pos2(area.left() + 10.0, area.bottom()));
     let [low, high] = look.limits();
@@ -153,13 +155,13 @@ pub(super) fn colour_bar(painter: &Painter, area: Rect, look: raster::Look, unit
 }
 
 /// The most that each of `count` pictures side by side may take of the room there is, at most `height` points high.
-pub(super) fn side_by_side(ui: &Ui, count: usize, height: f32) -> Vec2 {
+pub(crate) fn side_by_side(ui: &Ui, count: usize, height: f32) -> Vec2 {
     let gaps = ui.spacing().item_spacing.x * (count - 1) as f32;
     let width = ((ui.available_width() - gaps) / count as f32 - 1.0).max(LEAST);
     vec2(width, height.max(LEAST))
 }
 
 /// The longest side that a square picture with its bar has in an area of this size, points.
-pub(super) fn square(size: Vec2) -> f32 {
+pub(crate) fn square(size: Vec2) -> f32 {
     (size.x - BAR).min(size.y - TITLE - 2.0)
 }

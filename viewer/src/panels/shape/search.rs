@@ -3,18 +3,20 @@
 
 use egui::{Color32, Rect, Ui, UiBuilder, vec2};
 use egui_plot::{Line, LineStyle, MarkerShape, Plot, PlotImage, PlotPoint, Points};
-use sightline_core::locate::shape::Method;
-use sightline_core::locate::shape_tracker::evidence::Registered;
-use sightline_core::locate::shape_tracker::rows::{PathStep, sensor_pixel_m};
-use sightline_core::trace::ArrayName;
+use sightline_track::locate::shape_tracker::evidence::Registered;
+use sightline_track::locate::shape_tracker::rows::{PathStep, sensor_pixel_m};
+use sightline_track::trace::ArrayName;
+use sightline_vision::registration::Method;
 
-use super::super::names;
-use super::super::plots::plain;
-use super::picture::{BAR, Unit, colour_bar};
-use super::{Look, ready, why_not};
-use crate::overlay::{self, Mark};
+use crate::drawing::overlay;
+use crate::drawing::overlay::Mark;
+use crate::drawing::raster;
+use crate::drawing::raster::Raster;
 use crate::panels;
-use crate::raster::{self, Raster};
+use crate::panels::chart::plain;
+use crate::panels::names;
+use crate::panels::shape::look::{Look, ready, why_not};
+use crate::panels::shape::picture::{BAR, Unit, colour_bar};
 use crate::state::State;
 use crate::theme;
 
@@ -56,8 +58,8 @@ pub(super) fn show(ui: &mut Ui, look: &Look<'_>) {
 }
 
 /// How far apart the shifts of a search with so many to a side are, m.
-pub(in super::super) fn step_m(state: &State, found: &Registered, side: u32) -> f64 {
-    let columns = state.array(ArrayName::Sensor).ready().map(|sensor| sensor.size()[0]);
+pub(crate) fn step_m(state: &State, found: &Registered, side: u32) -> f64 {
+    let columns = state.array(ArrayName::SENSOR).ready().map(|sensor| sensor.size()[0]);
     // Without the sensor's picture, whose pixel is a step, the steps follow from how far the search went.
     columns
         .and_then(|columns| sensor_pixel_m(found, columns))
@@ -66,7 +68,7 @@ pub(in super::super) fn step_m(state: &State, found: &Registered, side: u32) -> 
 
 /// J over Δx and Δy.
 fn coarse(ui: &mut Ui, look: &Look<'_>, found: &Registered, height: f32) {
-    let Some(raster) = ready(ui, look.state.array(ArrayName::CoarseSearch), "coarse search") else { return };
+    let Some(raster) = ready(ui, look.state.array(ArrayName::COARSE_SEARCH), "coarse search") else { return };
     let side = raster.size()[0];
     let step_m = step_m(look.state, found, side);
     let run = theme::run(look.state.cursor.run);

@@ -2,15 +2,17 @@
 //! coarse search and at the end (D-Fig 5; R202).
 
 use egui::Ui;
-use sightline_core::trace::ArrayName;
+use sightline_track::trace::ArrayName;
 
-use super::histogram::{self, Errors};
-use super::picture::{Picture, Unit, side_by_side, square};
-use super::{Look, ready, why_not};
 use crate::command::Command;
-use crate::overlay::Mark;
+use crate::drawing::overlay::Mark;
+use crate::drawing::raster;
+use crate::drawing::raster::Raster;
 use crate::panels;
-use crate::raster::{self, Raster};
+use crate::panels::shape::histogram;
+use crate::panels::shape::histogram::Errors;
+use crate::panels::shape::look::{Look, ready, why_not};
+use crate::panels::shape::picture::{Picture, Unit, side_by_side, square};
 use crate::theme;
 
 /// The sensor is asked for where both surfaces were compared.
@@ -28,10 +30,10 @@ pub(super) fn show(ui: &mut Ui, look: &Look<'_>, out: &mut Vec<Command>) {
         return;
     }
     let array = |ui: &mut Ui, name: ArrayName| ready(ui, look.state.array(name), "virtual sensor");
-    let Some(sensor) = array(ui, ArrayName::Sensor) else { return };
-    let Some(before) = array(ui, ArrayName::ErrorBefore) else { return };
-    let Some(coarse) = array(ui, ArrayName::ErrorCoarse) else { return };
-    let Some(end) = array(ui, ArrayName::ErrorFine) else { return };
+    let Some(sensor) = array(ui, ArrayName::SENSOR) else { return };
+    let Some(before) = array(ui, ArrayName::ERROR_BEFORE) else { return };
+    let Some(coarse) = array(ui, ArrayName::ERROR_COARSE) else { return };
+    let Some(end) = array(ui, ArrayName::ERROR_FINE) else { return };
     let automatic_m = limit_m(before);
     let limit_m = look.state.shape_view.error_limit_m.unwrap_or(automatic_m);
     let cm = Unit { word: "cm", factor: 100.0 };
@@ -70,7 +72,7 @@ pub(super) fn show(ui: &mut Ui, look: &Look<'_>, out: &mut Vec<Command>) {
 }
 
 /// How many pixels have which error of depth: from, to, m, at the start and at the end.
-pub(in super::super) fn error_counts(before: &Raster, end: &Raster) -> Vec<(f64, f64, [usize; 2])> {
+pub(crate) fn error_counts(before: &Raster, end: &Raster) -> Vec<(f64, f64, [usize; 2])> {
     let errors = Errors { before: before.values.as_raw(), end: end.values.as_raw() };
     histogram::counts(&errors, limit_m(before))
 }

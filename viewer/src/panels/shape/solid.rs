@@ -7,8 +7,8 @@
 
 use egui::{Color32, Mesh, Pos2, Rect, Shape, pos2};
 use nalgebra::{Rotation3, Unit};
-use sightline_core::frames::{Point3, Vector3};
-use sightline_core::locate::shape_tracker::rows::Facet;
+use sightline_geometry::frames::{Point3, Vector3};
+use sightline_track::locate::shape_tracker::rows::Facet;
 
 use crate::shape_view::Orbit;
 use crate::theme;
@@ -18,19 +18,19 @@ const LINE: f32 = 0.6;
 
 /// Takes points of the rover frame to the screen.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Eye {
+pub(crate) struct Eye {
     right: Vector3,
     down: Vector3,
     away: Vector3,
     middle: Point3,
     /// Points for a metre.
-    pub(super) scale: f64,
+    pub(crate) scale: f64,
     rect: Rect,
 }
 
 impl Eye {
     /// From `camera` to `middle`, turned by `orbit`; `reach_m` about the middle fits into `rect`.
-    pub(super) fn new(camera: &Point3, middle: Point3, reach_m: f64, orbit: Orbit, rect: Rect) -> Self {
+    pub(crate) fn new(camera: &Point3, middle: Point3, reach_m: f64, orbit: Orbit, rect: Rect) -> Self {
         let sight = (middle - camera).try_normalize(1e-9).unwrap_or_else(Vector3::x);
         let sideways = sight.cross(&Vector3::z()).try_normalize(1e-9).unwrap_or_else(Vector3::y);
         // Seen from above, z down: a positive turn about z goes to the right.
@@ -44,7 +44,7 @@ impl Eye {
     }
 
     /// The place on the screen, and how far from the middle along the line of sight, m.
-    pub(super) fn see(&self, point: &Point3) -> (Pos2, f64) {
+    pub(crate) fn see(&self, point: &Point3) -> (Pos2, f64) {
         let from = point - self.middle;
         let place = |axis: &Vector3| (from.dot(axis) * self.scale) as f32;
         let centre = self.rect.center();
@@ -53,19 +53,19 @@ impl Eye {
 }
 
 /// What is painted, with its distance.
-pub(super) struct Scene {
+pub(crate) struct Scene {
     eye: Eye,
     parts: Vec<(f64, [Pos2; 3], Color32, bool)>,
 }
 
 impl Scene {
     /// An empty scene.
-    pub(super) fn new(eye: Eye) -> Self {
+    pub(crate) fn new(eye: Eye) -> Self {
         Self { eye, parts: Vec::new() }
     }
 
     /// Facets, filled and shaded by how they face the eye, or as three lines each.
-    pub(super) fn facets<'a>(
+    pub(crate) fn facets<'a>(
         &mut self,
         facets: impl Iterator<Item = &'a Facet>,
         colour: Color32,
@@ -85,7 +85,7 @@ impl Scene {
     }
 
     /// The shapes, the farthest first.
-    pub(super) fn shape(mut self) -> Shape {
+    pub(crate) fn shape(mut self) -> Shape {
         self.parts.sort_by(|a, b| b.0.total_cmp(&a.0));
         let mut mesh = Mesh::default();
         for (_, [a, b, c], colour, is_filled) in self.parts {

@@ -1,14 +1,14 @@
 //! The surface of the stop: disparities and ranges, and what became of the pixels (R187).
 
 use egui::{Grid, Ui};
-use sightline_core::locate::shape_tracker::surface::SurfaceSeen;
-use sightline_core::trace::ArrayName;
+use sightline_track::locate::shape_tracker::surface::SurfaceSeen;
+use sightline_track::trace::ArrayName;
 
-use super::picture::{Picture, Unit, side_by_side};
-use super::{Look, ready, why_not};
-use crate::overlay::Mark;
+use crate::drawing::overlay::Mark;
+use crate::drawing::raster;
 use crate::panels;
-use crate::raster;
+use crate::panels::shape::look::{Look, ready, why_not};
+use crate::panels::shape::picture::{Picture, Unit, side_by_side};
 use crate::theme;
 
 /// What becomes of a pixel, in the order of [`SurfaceSeen::pixels`], and what that means.
@@ -23,15 +23,15 @@ const KINDS: [(&str, &str); 7] = [
 ];
 
 /// Shows the part.
-pub(super) fn show(ui: &mut Ui, look: &Look<'_>) {
+pub(crate) fn show(ui: &mut Ui, look: &Look<'_>) {
     let Some(seen) = &look.evidence.surface else {
         panels::missing(ui, "Dense stereo of the stop.", &why_not(look, "surface"));
         return;
     };
-    let Some(disparities) = ready(ui, look.state.array(ArrayName::Disparities), "disparities") else {
+    let Some(disparities) = ready(ui, look.state.array(ArrayName::DISPARITIES), "disparities") else {
         return;
     };
-    let Some(ranges) = ready(ui, look.state.array(ArrayName::Ranges), "ranges") else { return };
+    let Some(ranges) = ready(ui, look.state.array(ArrayName::RANGES), "ranges") else { return };
     let size = side_by_side(ui, 2, ui.available_height() - 112.0);
     let target = target(look, seen);
     ui.horizontal_top(|ui| {
@@ -53,8 +53,8 @@ pub(super) fn show(ui: &mut Ui, look: &Look<'_>) {
 /// The target in the pictures, which are aligned and thinned.
 fn target(look: &Look<'_>, seen: &SurfaceSeen) -> Option<[f64; 2]> {
     let camera = look.state.aligned_left()?;
-    let located = look.trace.locate.as_ref().and_then(|located| located.position_in_rover);
-    let predicted = look.trace.predict.as_ref().map(|predicted| predicted.position_in_rover);
+    let located = look.trace.located().and_then(|located| located.position_in_rover);
+    let predicted = look.trace.prediction().map(|predicted| predicted.position_in_rover);
     let pixel = camera.project(&located.or(predicted)?)?;
     let every = seen.shown_every.max(1) as f64;
     (camera.size == seen.size).then(|| [pixel.x / every, pixel.y / every])

@@ -1,15 +1,15 @@
 //! What the feature tracker saw at one step as tables: residuals, draws, and every feature.
 
-use sightline_core::locate::features::rows::{Feature, Matched};
+use sightline_track::locate::features::rows::{Feature, Matched};
 
-use super::{Cell, Column, Sheet};
 use crate::cache::Slot;
-use crate::panels::features::Histogram;
+use crate::panels::features::charts::Histogram;
+use crate::panels::sheets::{Cell, Column, Sheet};
 use crate::state::State;
 use crate::tables::Kind;
 
 /// The residuals of the matches as counts, how many matches agreed with each draw, and the features that are shown.
-pub(super) fn features(state: &State) -> Result<Vec<Sheet>, String> {
+pub(crate) fn features(state: &State) -> Result<Vec<Sheet>, String> {
     let evidence = state.feature_evidence().filter(|evidence| evidence.detect.is_some());
     let evidence = evidence.ok_or_else(|| state.missing_features())?;
     let all = match state.features() {

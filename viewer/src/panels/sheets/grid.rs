@@ -3,8 +3,8 @@
 
 use egui::{Button, Label, RichText, ScrollArea, Ui, vec2};
 
-use super::{Row, Sheet};
 use crate::command::{Command, Go};
+use crate::panels::sheets::{Row, Sheet};
 use crate::theme;
 
 /// Height of a row, points.
@@ -15,7 +15,7 @@ const LETTER: f32 = 7.2;
 const TALL: f32 = 14.0;
 
 /// Shows tables, one below the other.
-pub(super) fn show(ui: &mut Ui, sheets: &[Sheet], out: &mut Vec<Command>) {
+pub(crate) fn show(ui: &mut Ui, sheets: &[Sheet], out: &mut Vec<Command>) {
     let tall =
         if sheets.len() == 1 { (ui.available_height() - 3.0 * ROW).max(4.0 * ROW) } else { TALL * ROW };
     ScrollArea::both().id_salt("tables").auto_shrink(false).show(ui, |ui| {

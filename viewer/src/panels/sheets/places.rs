@@ -1,15 +1,14 @@
 //! Where rover and target are, what the error budget predicts, and how the template held, as tables by step.
 
-use sightline_core::frames::Point3;
+use sightline_geometry::frames::Point3;
 
-use super::sheet::state_of;
-use super::{Cell, Column, Sheet};
-use crate::panels::history;
 use crate::panels::map::convergence::positions;
+use crate::panels::sheets::sheet::state_of;
+use crate::panels::sheets::{Cell, Column, Sheet};
 use crate::state::{State, row_of};
 
 /// The rover and the target at every stop, in the site frame.
-pub(super) fn map(state: &State) -> Result<Vec<Sheet>, String> {
+pub(crate) fn map(state: &State) -> Result<Vec<Sheet>, String> {
     let Some(traverse) = &state.traverse else { return Err(state.missing_target()) };
     let columns = [
         "rover east",
@@ -43,7 +42,7 @@ pub(super) fn map(state: &State) -> Result<Vec<Sheet>, String> {
 }
 
 /// Predicted with and without tracking, and achieved.
-pub(super) fn budget(state: &State) -> Result<Vec<Sheet>, String> {
+pub(crate) fn budget(state: &State) -> Result<Vec<Sheet>, String> {
     let run = state.run().ok_or_else(|| state.missing_target())?;
     let columns =
         [("range", "m"), ("3σ without tracking", "cm"), ("3σ with tracking", "cm"), ("achieved", "cm")];
@@ -57,20 +56,20 @@ pub(super) fn budget(state: &State) -> Result<Vec<Sheet>, String> {
     Ok(vec![sheet])
 }
 
-/// How well each earlier window is found in the present one, and how far from the middle.
-pub(super) fn history(state: &State) -> Result<Vec<Sheet>, String> {
+/// How well each earlier template is found in the current view, and how far from the position of the step.
+pub(crate) fn history(state: &State) -> Result<Vec<Sheet>, String> {
     let run = state.run().ok_or_else(|| state.missing_target())?;
     let columns = vec![Column::new("state", ""), Column::new("score", ""), Column::new("shift", "px")];
-    let title = format!("Earlier windows in that of step {}", state.cursor.step);
+    let title = format!("Earlier templates in the view of step {}", state.cursor.step);
     let mut sheet = Sheet::over_steps(title, columns);
-    for found in history::compare_all(state, run).into_iter().flatten() {
-        let word = row_of(run, found.step).map_or(Cell::Nothing, state_of);
-        let cells = [word, Cell::Number(found.score), Cell::Number(found.shift_px)];
-        sheet.step(found.step, state.cursor.step, cells);
+    for found in state.earlier_templates().ready().unwrap_or_default() {
+        let word = row_of(run, found.template_step).map_or(Cell::Nothing, state_of);
+        let cells = [word, Cell::Number(found.score), Cell::Number(found.shift_px())];
+        sheet.step(found.template_step, state.cursor.step, cells);
     }
     if sheet.rows.is_empty() {
         return Err(format!(
-            "No earlier window is loaded to compare with that of step {}: look at the panel first.",
+            "No earlier template is compared with the view of step {}: look at the panel first.",
             state.cursor.step
         ));
     }

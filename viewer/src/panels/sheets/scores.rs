@@ -1,17 +1,17 @@
 //! The scores of a match as tables: of the template over the search window, and of point stereo along the curve.
 
-use sightline_core::frames::Pixel;
-use sightline_core::trace::{ArrayName, StepTrace};
+use sightline_geometry::frames::Pixel;
+use sightline_track::trace::{ArrayName, StepTrace};
 
-use super::{Cell, Column, Sheet};
-use crate::panels::surface::region_of;
+use crate::panels::score_marks::region_of;
+use crate::panels::sheets::{Cell, Column, Sheet};
 use crate::state::State;
 
 /// Scores that are read, to either side of the peak; the copy has all of them.
 const NEAR_PX: i64 = 4;
 
 /// The marks on the surface, the scores about the peak, and all scores for the copy.
-pub(super) fn surface(state: &State) -> Result<Vec<Sheet>, String> {
+pub(crate) fn surface(state: &State) -> Result<Vec<Sheet>, String> {
     let matched = state.trace().and_then(StepTrace::template).and_then(|e| e.match_template.as_ref());
     let (Some(trace), Some(matched)) = (state.trace(), matched) else { return Err(state.missing_template()) };
     let measure = matched.measure.word();
@@ -24,7 +24,7 @@ pub(super) fn surface(state: &State) -> Result<Vec<Sheet>, String> {
             vec![Cell::Word(what.to_owned()), Cell::Number(pixel.x), Cell::Number(pixel.y), score.into()];
         marks.row(what == "peak", cells);
     };
-    let raster = state.array(ArrayName::Surface).ready();
+    let raster = state.array(ArrayName::SURFACE).ready();
     let region = raster.map(|raster| region_of(matched.search_window, raster.size()));
     let score_at = |pixel: Pixel| {
         let (raster, region) = raster.zip(region)?;
@@ -35,7 +35,7 @@ pub(super) fn surface(state: &State) -> Result<Vec<Sheet>, String> {
     if let Some(second) = &matched.second_peak {
         mark("second peak", second.pixel, Some(second.score));
     }
-    if let Some(pixel) = trace.point_mast.as_ref().and_then(|p| p.predicted_left) {
+    if let Some(pixel) = trace.point_mast.predicted_left {
         mark("predicted", pixel, score_at(pixel));
     }
     if let Some(pixel) = trace.truth.as_ref().and_then(|t| t.left_pixel) {
@@ -56,8 +56,8 @@ pub(super) fn surface(state: &State) -> Result<Vec<Sheet>, String> {
 }
 
 fn about_the_peak(
-    raster: &crate::raster::Raster,
-    region: sightline_core::image::PixelRect,
+    raster: &crate::drawing::raster::Raster,
+    region: sightline_vision::image::PixelRect,
     [x, y]: [i64; 2],
     measure: &'static str,
 ) -> Sheet {
@@ -83,7 +83,7 @@ fn about_the_peak(
 }
 
 /// The scores along the epipolar curve.
-pub(super) fn stereo_profile(state: &State) -> Result<Vec<Sheet>, String> {
+pub(crate) fn stereo_profile(state: &State) -> Result<Vec<Sheet>, String> {
     let stereo = state.trace().and_then(StepTrace::template).and_then(|e| e.point_stereo.as_ref());
     let Some(stereo) = stereo else { return Err(state.missing_template()) };
     let columns =

@@ -1,17 +1,18 @@
 //! What the shape tracker saw at one step as tables: the registration in numbers, the errors of depth, the coarse search and
 //! the way of the refinement.
 
-use sightline_core::locate::shape_tracker::evidence::Registered;
-use sightline_core::locate::shape_tracker::rows::PathStep;
-use sightline_core::trace::ArrayName;
+use sightline_track::locate::shape_tracker::evidence::Registered;
+use sightline_track::locate::shape_tracker::rows::PathStep;
+use sightline_track::trace::ArrayName;
 
-use super::{Cell, Column, Sheet};
-use crate::panels::shape::{error_counts, step_of_search_m};
-use crate::raster::Raster;
+use crate::drawing::raster::Raster;
+use crate::panels::shape::search::step_m;
+use crate::panels::shape::sensor::error_counts;
+use crate::panels::sheets::{Cell, Column, Sheet};
 use crate::state::State;
 
 /// The tables of the step's registration; of what is not loaded there is none.
-pub(super) fn shape(state: &State) -> Result<Vec<Sheet>, String> {
+pub(crate) fn shape(state: &State) -> Result<Vec<Sheet>, String> {
     let evidence = state.shape_evidence().ok_or_else(|| state.missing_shape())?;
     let Some(found) = &evidence.registration else {
         let why = evidence.missing.as_ref().unwrap_or(&evidence.why);
@@ -19,11 +20,11 @@ pub(super) fn shape(state: &State) -> Result<Vec<Sheet>, String> {
     };
     let mut sheets = vec![numbers(state, found)];
     let array = |name: ArrayName| state.array(name).ready();
-    if let Some((before, end)) = array(ArrayName::ErrorBefore).zip(array(ArrayName::ErrorFine)) {
+    if let Some((before, end)) = array(ArrayName::ERROR_BEFORE).zip(array(ArrayName::ERROR_FINE)) {
         sheets.push(errors(before, end));
     }
-    if let Some(raster) = array(ArrayName::CoarseSearch) {
-        sheets.push(coarse(raster, step_of_search_m(state, found, raster.size()[0])));
+    if let Some(raster) = array(ArrayName::COARSE_SEARCH) {
+        sheets.push(coarse(raster, step_m(state, found, raster.size()[0])));
     }
     if let Some(path) = state.refine_path().ready().filter(|path| !path.is_empty()) {
         sheets.push(refinement(path));

@@ -1,6 +1,7 @@
 //! A table of values, and the same as CSV (RFC 4180): full digits, units in the head, nothing where there is no value.
 
-use sightline_core::trace::StepRow;
+use sightline_api::table;
+use sightline_track::trace::StepRow;
 
 use crate::panels::digits;
 
@@ -28,7 +29,7 @@ impl Cell {
     fn csv(&self) -> String {
         match self {
             Self::Number(value) => value.to_string(),
-            Self::Word(word) => quoted(word),
+            Self::Word(word) => table::cell(word),
             Self::Nothing => String::new(),
         }
     }
@@ -87,7 +88,7 @@ pub struct Sheet {
 
 impl Sheet {
     /// A table whose first column is the step.
-    pub fn over_steps(title: impl Into<String>, columns: Vec<Column>) -> Self {
+    pub(crate) fn over_steps(title: impl Into<String>, columns: Vec<Column>) -> Self {
         let columns = std::iter::once(Column::new("step", "")).chain(columns).collect();
         Self { title: title.into(), columns, rows: Vec::new(), more: None }
     }
@@ -114,7 +115,7 @@ impl Sheet {
             return more.csv();
         }
         let mut text = String::new();
-        let head: Vec<String> = self.columns.iter().map(|column| quoted(&column.head())).collect();
+        let head: Vec<String> = self.columns.iter().map(|column| table::cell(&column.head())).collect();
         text += &(head.join(",") + "\r\n");
         for row in &self.rows {
             let cells: Vec<String> = row.cells.iter().map(Cell::csv).collect();
@@ -125,17 +126,9 @@ impl Sheet {
 }
 
 /// The state of a step, and why, as it is read.
-pub fn state_of(row: &StepRow) -> Cell {
+pub(crate) fn state_of(row: &StepRow) -> Cell {
     let word = if row.fault { "fault" } else { &row.state };
     Cell::Word(word.to_owned())
-}
-
-/// A field of CSV. What a spreadsheet would take for a formula begins with an apostrophe.
-fn quoted(text: &str) -> String {
-    let is_formula =
-        text.starts_with(['=', '+', '@']) || text.starts_with('-') && text.parse::<f64>().is_err();
-    let text = if is_formula { format!("'{text}") } else { text.to_owned() };
-    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text }
 }
 
 #[cfg(test)]

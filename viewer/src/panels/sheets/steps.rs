@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use sightline_core::session::compare::RunName;
-use sightline_core::session::metrics::uncertainty::{Consistency, Uncertainty};
+use sightline_session::compare::RunName;
+use sightline_session::metrics::uncertainty::{Consistency, Uncertainty};
 
-use super::{Cell, Column, Sheet};
+use crate::panels::sheets::{Cell, Column, Sheet};
 use crate::state::State;
 
 /// NEES and NIS of the run and of those that it is compared with, and how often errors lie within k σ.
-pub(super) fn uncertainty(state: &State) -> Result<Vec<Sheet>, String> {
+pub(crate) fn uncertainty(state: &State) -> Result<Vec<Sheet>, String> {
     let own = state.own_name().ok_or_else(|| state.missing_target())?;
     let names: Vec<RunName> =
         std::iter::once(own).chain(state.others().iter().map(|other| other.name)).collect();

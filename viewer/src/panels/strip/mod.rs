@@ -1,27 +1,27 @@
 //! The template strip: how the reference became what was compared, and what remained.
 
+mod patch;
 mod pointed;
 
-use egui::{Align2, Pos2, Rect, Sense, Ui, pos2, vec2};
-use sightline_core::trace::{ArrayName, StepTrace};
+use egui::{Align2, Margin, Pos2, Rect, Sense, Ui, pos2, vec2};
+use sightline_record::{ArrayKind, Unit, label};
+use sightline_track::records::{self, StageQuantity};
+use sightline_track::trace::{ArrayName, StepTrace};
 
 use crate::cache::Slot;
 use crate::command::{Command, Stage};
-use crate::raster::{DIFFERENCE_LIMIT, PATCH_SIGMAS, Raster};
+use crate::drawing::raster::{DIFFERENCE_LIMIT, PATCH_SIGMAS};
+use crate::panels::panel::Panel;
+use crate::panels::strip::patch::{BETWEEN, paint_patch, paint_title};
 use crate::state::State;
-use crate::{panels, theme, view2d};
+use crate::theme;
 
-/// What the panel is for.
-const PURPOSE: &str = "The template from its reference to what was compared.";
-
-/// Room for the arrow and the number between two patches, points.
-const BETWEEN: f32 = 68.0;
 /// Room for the words above and below a patch, points.
 const WORDS: (f32, f32) = (16.0, 18.0);
 
 /// One patch of the strip.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Patch {
+pub(crate) struct Patch {
     /// The array.
     pub array: ArrayName,
     /// What it is.
@@ -32,53 +32,76 @@ pub struct Patch {
     pub stage: Stage,
 }
 
-/// The patches of a step, in their order; those that were not reached are left out.
-pub fn patches(trace: &StepTrace) -> Vec<Patch> {
-    let Some(evidence) = trace.template() else { return Vec::new() };
-    let mut patches = Vec::new();
-    let mut add =
-        |array, title: String, step: String, stage| patches.push(Patch { array, title, step, stage });
-    if let Some(s) = &evidence.scale_roll {
-        let applied = |is_on: bool, words: String| if is_on { words } else { "off".to_owned() };
-        add(
-            ArrayName::Reference,
-            format!("reference, step {}", s.template_step),
-            String::new(),
-            Stage::ScaleRoll,
-        );
-        let scale = applied(s.applied_scale == s.scale, format!("×{:.3}", s.applied_scale));
-        add(ArrayName::Scaled, "scaled".to_owned(), scale, Stage::ScaleRoll);
-        if s.warped {
-            add(ArrayName::Rolled, "warped".to_owned(), "slope".to_owned(), Stage::ScaleRoll);
-        } else {
-            let roll = format!("{:+.2}°", s.applied_roll_rad.to_degrees());
-            let roll = applied(s.applied_roll_rad == s.roll_rad, roll);
-            add(ArrayName::Rolled, "rolled".to_owned(), roll, Stage::ScaleRoll);
+/// The stages whose patches are shown.
+const STAGES: [Stage; 3] = [Stage::ScaleRoll, Stage::MatchTemplate, Stage::PointStereo];
+
+/// The patches of a step, in the order in which the stages declare them; those that were not reached are left out.
+pub(crate) fn patches(trace: &StepTrace) -> Vec<Patch> {
+    let reached = STAGES.into_iter().filter_map(|stage| Some((stage, records::stage(stage.word())?)));
+    let of_stage = |(stage, recorded): (Stage, &'static sightline_record::Stage<StepTrace>)| {
+        let arrays = recorded.schema().arrays.iter().filter(|_| recorded.is_reached(trace));
+        let patches = arrays.filter(|array| matches!(array.kind, ArrayKind::Patch | ArrayKind::Difference));
+        patches.filter_map(move |array| {
+            let array = ArrayName::from_word(&array.name)?;
+            let (title, step) = caption(trace, array);
+            Some(Patch { array, title, step, stage })
+        })
+    };
+    reached.flat_map(of_stage).collect()
+}
+
+/// The title of a patch, and what happened on the way to it.
+fn caption(trace: &StepTrace, array: ArrayName) -> (String, String) {
+    let number = |name: &str| StageQuantity::named(name)?.number(trace);
+    let applied = |[applied, computed]: [&str; 2], words: fn(f64) -> String| {
+        let is_on = number(applied) == number(computed);
+        number(applied).filter(|_| is_on).map_or_else(|| "off".to_owned(), words)
+    };
+    let score = |name: &str| number(name).map_or_else(String::new, |score| format!("ncc {score:.2}"));
+    let (title, step) = match array {
+        ArrayName::REFERENCE => {
+            let step = number("scale_roll.template_step").unwrap_or_default();
+            return (format!("reference, step {step}"), String::new());
         }
+        ArrayName::SCALED => {
+            let scale = applied(["scale_roll.applied_scale", "scale_roll.scale"], |v| format!("×{v:.3}"));
+            ("scaled", scale)
+        }
+        ArrayName::ROLLED if number("scale_roll.warped") == Some(1.0) => ("warped", "slope".to_owned()),
+        ArrayName::ROLLED => {
+            let roll = applied(["scale_roll.applied_roll_rad", "scale_roll.roll_rad"], |v| {
+                format!("{:+.2}°", v.to_degrees())
+            });
+            ("rolled", roll)
+        }
+        ArrayName::MATCHED => ("matched", score("match_template.score")),
+        ArrayName::DIFFERENCE => ("difference", "−".to_owned()),
+        ArrayName::RIGHT_WINDOW => ("right image", score("point_stereo.score")),
+        other => return (label(other.word(), Unit::One), String::new()),
+    };
+    (title.to_owned(), step)
+}
+
+/// The panel “Template strip”.
+pub(crate) struct Strip;
+
+impl Panel for Strip {
+    fn show(&self, ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+        show(ui, state, out);
     }
-    if let Some(m) = &evidence.match_template {
-        let score = format!("ncc {:.2}", m.score);
-        add(ArrayName::Matched, "matched".to_owned(), score, Stage::MatchTemplate);
-        add(ArrayName::Difference, "difference".to_owned(), "−".to_owned(), Stage::MatchTemplate);
+
+    fn missing(&self, state: &State) -> Option<String> {
+        state.trace().map(patches).unwrap_or_default().is_empty().then(|| state.missing_template())
     }
-    if let Some(s) = &evidence.point_stereo {
-        add(
-            ArrayName::RightWindow,
-            "right image".to_owned(),
-            format!("ncc {:.2}", s.score),
-            Stage::PointStereo,
-        );
+
+    fn margin(&self) -> Margin {
+        Margin::symmetric(theme::MARGIN, 3)
     }
-    patches
 }
 
 /// Shows the strip.
-pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let patches = state.trace().map(patches).unwrap_or_default();
-    if patches.is_empty() {
-        panels::missing(ui, PURPOSE, &state.missing_template());
-        return;
-    }
     let area = ui.available_rect_before_wrap();
     let has_pointer = state.trace().is_some_and(pointed::is_there);
     let count = (patches.len() + usize::from(has_pointer)) as f32;
@@ -149,65 +172,13 @@ fn show_patch(ui: &mut Ui, state: &State, patch: &Patch, frame: Rect, out: &mut 
     }
 }
 
-/// What a patch is, above it.
-fn paint_title(ui: &Ui, frame: Rect, title: &str) {
-    let above = frame.center_top() - vec2(0.0, 3.0);
-    ui.painter().text(above, Align2::CENTER_BOTTOM, title, theme::image_font(), theme::text());
-}
-
-/// A patch with its statistics below it.
-fn paint_patch(ui: &Ui, raster: &Raster, frame: Rect) {
-    view2d::checker(ui.painter(), frame);
-    let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
-    ui.painter().image(raster.texture.id(), frame, whole, theme::UNTINTED);
-    statistics(ui, raster, frame);
-}
-
-/// Mean and standard deviation below a patch.
-fn statistics(ui: &Ui, raster: &Raster, frame: Rect) {
-    let below = frame.center_bottom() + vec2(0.0, 4.0);
-    let words = match frame.width() + BETWEEN {
-        room if room > 170.0 => format!("mean {:.3}  σ {:.3}", raster.mean, raster.sigma),
-        _ => format!("{:.3} ±{:.3}", raster.mean, raster.sigma),
-    };
-    ui.painter().text(below, Align2::CENTER_TOP, words, theme::digit_font(), theme::text());
-}
-
 fn explain(array: ArrayName) -> String {
-    let what = match array {
-        ArrayName::Reference => "The template as it was taken.",
-        ArrayName::Scaled => {
-            "The template magnified by the ratio of distances, so that it has the size expected now."
-        }
-        ArrayName::Rolled => "Then turned by the roll of the camera: this is what was searched for.",
-        ArrayName::Matched => "The left image at the match.",
-        ArrayName::Difference => {
-            "Matched minus rolled, both with mean 0 and deviation 1: blue is darker, red brighter."
-        }
-        ArrayName::RightWindow => {
-            "The right image at the stereo match, resampled as the left camera sees it."
-        }
-        ArrayName::Surface => "The scores of all positions.",
-        ArrayName::Features => "The features of the left image.",
-        ArrayName::Cloud => "Where the bootstrap puts the target.",
-        ArrayName::Disparities => "The disparities of the aligned left image.",
-        ArrayName::Ranges => "The distances from the left camera.",
-        ArrayName::Sensor => "The earlier surface as the virtual range sensor sees it.",
-        ArrayName::ErrorBefore => "Present less earlier depth before the registration.",
-        ArrayName::ErrorCoarse => "Present less earlier depth after the coarse search.",
-        ArrayName::ErrorFine => "Present less earlier depth at the end.",
-        ArrayName::CoarseSearch => "How far the surfaces are apart for every shift of the search.",
-        ArrayName::RefinePath => "The way of the refinement.",
-        ArrayName::MeshFixed => "The earlier surface.",
-        ArrayName::MeshMoving => "The present surface.",
-        ArrayName::Draped => "The earlier image draped over the surface, as this camera would see it.",
-        ArrayName::DrapedMatch => "This camera's image where that was found.",
-    };
-    if array == ArrayName::Difference {
-        format!("{what}\nShown from −{DIFFERENCE_LIMIT} (blue) over 0 (white) to +{DIFFERENCE_LIMIT} (red).")
+    let what = array.declaration().map_or("", |array| array.description.as_ref());
+    if array == ArrayName::DIFFERENCE {
+        format!("{what}.\nShown from −{DIFFERENCE_LIMIT} (blue) over 0 (white) to +{DIFFERENCE_LIMIT} (red).")
     } else {
         format!(
-            "{what}\nShown from {PATCH_SIGMAS} σ below its mean to {PATCH_SIGMAS} σ above: correlation ignores both."
+            "{what}.\nShown from {PATCH_SIGMAS} σ below its mean to {PATCH_SIGMAS} σ above: correlation ignores both."
         )
     }
 }

@@ -5,29 +5,28 @@
 use std::sync::Arc;
 
 use egui::{Align2, Id, Rect, Sense, Ui};
-use sightline_core::frames::Pixel;
-use sightline_core::image::PixelRect;
-use sightline_core::locate::template::match_template::TemplateMatch;
-use sightline_core::trace::{ArrayName, StepTrace};
+use sightline_geometry::frames::Pixel;
+use sightline_track::locate::template::match_template::TemplateMatch;
+use sightline_track::trace::{ArrayName, StepTrace};
+use sightline_vision::image::PixelRect;
 
-use super::{paint_patch, paint_title};
 use crate::cache::Eye;
-use crate::overlay::{Mark, paint_mark};
-use crate::panels::images_left::template_side;
-use crate::panels::surface::region_of;
+use crate::drawing::overlay::{Mark, paint_mark};
+use crate::drawing::raster::Raster;
+use crate::panels::score_marks::region_of;
+use crate::panels::strip::patch::{paint_patch, paint_title};
 use crate::pointed::window;
-use crate::raster::Raster;
 use crate::state::State;
 use crate::theme;
 
 /// What the place is called.
-pub(super) const TITLE: &str = "at the pointer";
+pub(crate) const TITLE: &str = "at the pointer";
 
 /// From this width on an empty place has room for words, points.
 const WORDS_FROM: f32 = 100.0;
 
 /// Whether the step compared windows, so that there is something to point at.
-pub(super) fn is_there(trace: &StepTrace) -> bool {
+pub(crate) fn is_there(trace: &StepTrace) -> bool {
     matched(trace).is_some()
 }
 
@@ -37,7 +36,7 @@ fn matched(trace: &StepTrace) -> Option<&TemplateMatch> {
 }
 
 /// The score of the place that is pointed at, in words: above the arrow.
-pub(super) fn score(state: &State) -> String {
+pub(crate) fn score(state: &State) -> String {
     let found = state.pointed_left().and_then(|pixel| score_at(state, pixel));
     found.map_or_else(String::new, |(word, value)| match value {
         Some(value) => format!("{word} {value:.2}"),
@@ -48,7 +47,7 @@ pub(super) fn score(state: &State) -> String {
 /// The measure and its value at the nearest position; none outside of the searched ones.
 fn score_at(state: &State, pixel: Pixel) -> Option<(&'static str, Option<f32>)> {
     let matched = matched(state.trace()?)?;
-    let raster = state.array(ArrayName::Surface).ready()?;
+    let raster = state.array(ArrayName::SURFACE).ready()?;
     let region = region_of(matched.search_window, raster.size());
     let at = |v: f64, from: i32| v.round() as i64 - i64::from(from);
     region
@@ -57,7 +56,7 @@ fn score_at(state: &State, pixel: Pixel) -> Option<(&'static str, Option<f32>)> 
 }
 
 /// Shows the place.
-pub(super) fn show(ui: &mut Ui, state: &State, frame: Rect) {
+pub(crate) fn show(ui: &mut Ui, state: &State, frame: Rect) {
     paint_title(ui, frame, TITLE);
     let words = match state.pointed_left().map(|pixel| cut(ui, state, pixel)) {
         Some(Some(raster)) => {
@@ -95,9 +94,9 @@ fn empty(ui: &Ui, frame: Rect, words: &str) -> String {
 /// The patch, made once for as long as the pointer stays on the pixel; none where it would leave the image.
 fn cut(ui: &Ui, state: &State, pixel: Pixel) -> Option<Arc<Raster>> {
     let image = state.image(Eye::Left).ready()?;
-    let side = match state.array(ArrayName::Rolled).ready() {
+    let side = match state.array(ArrayName::ROLLED).ready() {
         Some(rolled) => rolled.size()[0],
-        None => template_side(state),
+        None => state.template_side_px(),
     };
     let area = window(pixel, side, image.size())?;
     let of = (state.traverse.as_ref()?.id.clone(), state.cursor.step, area);
@@ -118,5 +117,5 @@ struct Kept {
 fn raster(ui: &Ui, image: &Raster, area: PixelRect) -> Raster {
     let (x, y) = (area.x as u32, area.y as u32);
     let values = image::imageops::crop_imm(&image.values, x, y, area.width, area.height).to_image();
-    Raster::from_values(ui.ctx(), ArrayName::Matched, values)
+    Raster::from_values(ui.ctx(), ArrayName::MATCHED, values)
 }

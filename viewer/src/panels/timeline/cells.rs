@@ -1,14 +1,14 @@
 //! What a stop shows on a state band, by colour, pattern and word.
 
 use egui::{Color32, Painter, Rect, Shape, Stroke, pos2, vec2};
-use sightline_core::session::view::{RunView, TargetView};
+use sightline_session::view::{RunView, TargetView};
 
 use crate::state::{State, row_of};
 use crate::theme;
 
 /// What a cell shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Cell {
+pub(crate) enum Cell {
     /// Before the target was picked, or without a target.
     Before,
     /// Not computed yet.
@@ -25,7 +25,7 @@ pub enum Cell {
 
 impl Cell {
     /// The word for tooltips.
-    pub const fn word(self) -> &'static str {
+    pub(crate) const fn word(self) -> &'static str {
         match self {
             Self::Before => "before the pick",
             Self::Unknown => "not computed yet",
@@ -37,7 +37,7 @@ impl Cell {
     }
 
     /// How serious it is: of steps that share a column the most serious is shown.
-    pub(super) const fn weight(self) -> u8 {
+    pub(crate) const fn weight(self) -> u8 {
         match self {
             Self::Before => 0,
             Self::Unknown => 1,
@@ -50,12 +50,12 @@ impl Cell {
 }
 
 /// The cell of a stop in the run that is looked at.
-pub fn cell(state: &State, step: usize) -> Cell {
+pub(crate) fn cell(state: &State, step: usize) -> Cell {
     state.target().map_or(Cell::Before, |target| cell_of(target, state.run(), step))
 }
 
 /// The cell of a stop in a run.
-pub(super) fn cell_of(target: &TargetView, run: Option<&RunView>, step: usize) -> Cell {
+pub(crate) fn cell_of(target: &TargetView, run: Option<&RunView>, step: usize) -> Cell {
     if step < target.designation.step {
         return Cell::Before;
     }
@@ -72,7 +72,7 @@ pub(super) fn cell_of(target: &TargetView, run: Option<&RunView>, step: usize) -
 }
 
 /// Paints a stretch of equal cells.
-pub(super) fn paint(painter: &Painter, frame: Rect, cell: Cell) {
+pub(crate) fn paint(painter: &Painter, frame: Rect, cell: Cell) {
     let fill = |colour: Color32, strength: f32| {
         painter.rect_filled(frame, 1.0, colour.gamma_multiply(strength));
     };

@@ -5,14 +5,14 @@
 
 use egui::Rangef;
 
-use super::Cell;
+use crate::panels::timeline::Cell;
 
 /// Width of a column, points: what can be told apart.
-pub const COLUMN: f32 = 2.0;
+pub(crate) const COLUMN: f32 = 2.0;
 
 /// Where the steps of a drive lie on the screen.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Scale {
+pub(crate) struct Scale {
     left: f32,
     width: f32,
     count: usize,
@@ -20,27 +20,27 @@ pub struct Scale {
 
 impl Scale {
     /// `count` steps, at least one, over a stretch of the screen.
-    pub fn new(stretch: Rangef, count: usize) -> Self {
+    pub(crate) fn new(stretch: Rangef, count: usize) -> Self {
         Self { left: stretch.min, width: stretch.span().max(1.0), count: count.max(1) }
     }
 
     /// Width of a step, points.
-    pub fn step_width(&self) -> f32 {
+    pub(crate) fn step_width(&self) -> f32 {
         self.width / self.count as f32
     }
 
     /// Where a step begins.
-    pub fn left_of(&self, step: usize) -> f32 {
+    pub(crate) fn left_of(&self, step: usize) -> f32 {
         self.left + self.width * (step as f32 / self.count as f32)
     }
 
     /// The middle of a step.
-    pub fn middle_of(&self, step: usize) -> f32 {
+    pub(crate) fn middle_of(&self, step: usize) -> f32 {
         (self.left_of(step) + self.left_of(step + 1)) / 2.0
     }
 
     /// The step under a place; the nearest one beside the drive.
-    pub fn step_at(&self, x: f32) -> usize {
+    pub(crate) fn step_at(&self, x: f32) -> usize {
         let share = f64::from((x - self.left) / self.width).clamp(0.0, 1.0);
         ((share * self.count as f64) as usize).min(self.count - 1)
     }
@@ -51,7 +51,7 @@ impl Scale {
     }
 
     /// The stretches of steps that show the same.
-    pub fn spans(&self, cell: impl Fn(usize) -> Cell) -> Vec<Span> {
+    pub(crate) fn spans(&self, cell: impl Fn(usize) -> Cell) -> Vec<Span> {
         let columns = self.columns();
         let mut spans: Vec<Span> = Vec::new();
         for column in 0..columns {
@@ -67,7 +67,7 @@ impl Scale {
     }
 
     /// Those of `steps` (in order) that are at least `gap` points apart, each with how many stand for it.
-    pub fn thinned(&self, steps: impl IntoIterator<Item = usize>, gap: f32) -> Vec<(usize, usize)> {
+    pub(crate) fn thinned(&self, steps: impl IntoIterator<Item = usize>, gap: f32) -> Vec<(usize, usize)> {
         let mut kept: Vec<(usize, usize)> = Vec::new();
         for step in steps {
             match kept.last_mut() {
@@ -81,7 +81,7 @@ impl Scale {
 
 /// A stretch of steps that show the same.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Span {
+pub(crate) struct Span {
     /// The first step.
     pub from: usize,
     /// The first step after it.

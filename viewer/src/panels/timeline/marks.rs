@@ -2,14 +2,17 @@
 
 use egui::{Align2, Painter, Rect, Shape, Stroke, pos2, vec2};
 
-use super::lod::Scale;
-use super::{LANE, NUMBERS};
-use crate::overlay::paint_mark;
-use crate::panels::breakpoints::mark;
-use crate::state::ask::Asking;
+use crate::breakpoints::Asking;
+use crate::breakpoints::panel::mark;
+use crate::drawing::overlay::paint_mark;
+use crate::panels::timeline::lod::Scale;
 use crate::state::{State, events};
 use crate::theme;
 
+/// Height of the lane above the bands, points.
+pub(super) const LANE: f32 = 16.0;
+/// Height of the step numbers, points.
+pub(super) const NUMBERS: f32 = 15.0;
 /// Room for one mark of a breakpoint, points: nearer ones share it.
 const MARK: f32 = 9.0;
 /// Least distance of two event ticks, points.
@@ -17,7 +20,7 @@ const TICK: f32 = 3.0;
 
 /// A place of the lane at which breakpoints hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Hit {
+pub(crate) struct Hit {
     /// The first of its steps.
     pub step: usize,
     /// Hits that stand here.
@@ -27,7 +30,7 @@ pub(super) struct Hit {
 }
 
 /// The hits of all breakpoints in the run that is looked at, as far apart as their marks need.
-pub(super) fn hits(state: &State, scale: &Scale) -> Vec<Hit> {
+pub(crate) fn hits(state: &State, scale: &Scale) -> Vec<Hit> {
     let Some(target) = state.cursor.target else { return Vec::new() };
     let mut places: Vec<Hit> = Vec::new();
     for (at, breakpoint) in state.ask.watched() {
@@ -53,14 +56,14 @@ pub(super) fn hits(state: &State, scale: &Scale) -> Vec<Hit> {
 }
 
 /// Paints the step that is pointed at, here or in another panel.
-pub(super) fn pointed(painter: &Painter, all: Rect, step: usize, scale: &Scale) {
+pub(crate) fn pointed(painter: &Painter, all: Rect, step: usize, scale: &Scale) {
     let x = scale.middle_of(step);
     let ends = [pos2(x, all.top()), pos2(x, all.bottom())];
     painter.extend(Shape::dotted_line(&ends, theme::accent(), 4.0, 1.0));
 }
 
 /// Paints the lane above the bands: event ticks and breakpoints' marks, with a number where one stands for several.
-pub(super) fn lane(painter: &Painter, lane: Rect, state: &State, scale: &Scale) {
+pub(crate) fn lane(painter: &Painter, lane: Rect, state: &State, scale: &Scale) {
     painter.hline(lane.x_range(), lane.bottom() - 0.5, Stroke::new(1.0, theme::line()));
     let events = state.run().map(events).unwrap_or_default();
     for (event, _) in scale.thinned(events, TICK) {
@@ -89,7 +92,7 @@ pub(super) fn lane(painter: &Painter, lane: Rect, state: &State, scale: &Scale) 
 }
 
 /// Paints the loop: what is outside is shaded, its ends are brackets.
-pub(super) fn loop_range(painter: &Painter, bands: Rect, state: &State, scale: &Scale, count: usize) {
+pub(crate) fn loop_range(painter: &Painter, bands: Rect, state: &State, scale: &Scale, count: usize) {
     let play = &state.ask.play;
     if play.loop_in.is_none() && play.loop_out.is_none() {
         return;
@@ -109,7 +112,7 @@ pub(super) fn loop_range(painter: &Painter, bands: Rect, state: &State, scale: &
 }
 
 /// Paints the playhead: an outline of the step where it is wide, else a line, and a triangle above.
-pub(super) fn playhead(painter: &Painter, bands: Rect, step: usize, scale: &Scale) {
+pub(crate) fn playhead(painter: &Painter, bands: Rect, step: usize, scale: &Scale) {
     let stroke = Stroke::new(2.0, theme::accent());
     let frame = Rect::from_x_y_ranges(scale.left_of(step)..=scale.left_of(step + 1), bands.y_range());
     if frame.width() > 6.0 {
@@ -123,7 +126,7 @@ pub(super) fn playhead(painter: &Painter, bands: Rect, step: usize, scale: &Scal
 }
 
 /// Paints step numbers below the bands, as many as fit.
-pub(super) fn numbers(painter: &Painter, below: Rect, count: usize, scale: &Scale) {
+pub(crate) fn numbers(painter: &Painter, below: Rect, count: usize, scale: &Scale) {
     let room = |n: usize| n as f32 * scale.step_width() >= 34.0;
     let rounds = (0..9).flat_map(|power| [1, 2, 5].map(|n| n * 10_usize.pow(power)));
     let every = rounds.into_iter().find(|n| room(*n)).unwrap_or(count.max(1));
@@ -134,8 +137,8 @@ pub(super) fn numbers(painter: &Painter, below: Rect, count: usize, scale: &Scal
 }
 
 /// A line under the steps whose images are there.
-pub(super) fn rendered(painter: &Painter, y: f32, scale: &Scale, is_ready: impl Fn(usize) -> bool) {
-    use super::Cell;
+pub(crate) fn rendered(painter: &Painter, y: f32, scale: &Scale, is_ready: impl Fn(usize) -> bool) {
+    use crate::panels::timeline::Cell;
     let ready = |step: usize| if is_ready(step) { Cell::Before } else { Cell::Unknown };
     for span in scale.spans(ready).into_iter().filter(|span| span.cell == Cell::Before) {
         let x = scale.left_of(span.from)..=scale.left_of(span.to);
@@ -144,7 +147,7 @@ pub(super) fn rendered(painter: &Painter, y: f32, scale: &Scale, is_ready: impl 
 }
 
 /// The lane's middle colour while the pointer is over it.
-pub(super) fn lane_hint(painter: &Painter, lane: Rect, x: f32) {
+pub(crate) fn lane_hint(painter: &Painter, lane: Rect, x: f32) {
     let at = pos2(x, lane.top() + LANE / 2.0 - 2.0);
     painter.circle_stroke(at, 4.0, Stroke::new(1.5, theme::weak()));
 }

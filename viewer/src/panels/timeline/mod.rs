@@ -6,31 +6,28 @@
 //! 1,000 steps as for 10,000 and 40,000 (`tests/timelines.rs` holds a bound of 13,220).
 
 mod cells;
-pub mod lod;
+pub(crate) mod lod;
 mod marks;
 
 use egui::{Align2, EventFilter, Painter, Rect, Response, Role, Sense, Ui, WidgetInfo, pos2, vec2};
-use sightline_core::session::view::{RunView, TargetView};
+use sightline_session::view::{RunView, TargetView};
 
 use self::cells::cell_of;
-pub use self::cells::{Cell, cell};
+pub(crate) use self::cells::{Cell, cell};
 use self::lod::{Scale, Span};
+use self::marks::{LANE, NUMBERS};
+use crate::breakpoints::Ask;
 use crate::command::{Command, Go};
 use crate::pointed::Pointed;
-use crate::state::ask::Ask;
 use crate::state::{State, run_letter};
 use crate::theme;
 
-/// Height of the lane above the bands, points.
-const LANE: f32 = 16.0;
 /// Height of the band of the run that is looked at, points.
 const BAND: f32 = 18.0;
 /// Height of the band of another run, points.
 const LOW_BAND: f32 = 10.0;
 /// Room between two bands, points.
 const GAP: f32 = 2.0;
-/// Height of the step numbers, points.
-const NUMBERS: f32 = 15.0;
 /// Room for the bands' names on the left, points.
 const GUTTER: f32 = 78.0;
 /// How many runs of the target have a band, and how many other targets.
@@ -73,13 +70,13 @@ fn bands(state: &State) -> Vec<Band<'_>> {
 }
 
 /// Height of the timeline as it is now, points.
-pub fn height(state: &State) -> f32 {
+pub(crate) fn height(state: &State) -> f32 {
     let bands: f32 = bands(state).iter().map(|band| band.height() + GAP).sum();
     LANE + bands.max(BAND + GAP) + NUMBERS
 }
 
 /// Shows the timeline.
-pub fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let count = state.stop_count();
     let size = vec2(ui.available_width(), height(state));
     let (rect, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
@@ -174,7 +171,13 @@ fn paint_spans(painter: &Painter, spans: &[Span], band: Rect, scale: &Scale) {
 }
 
 /// The states of a run as a band too thin for patterns; what is not well is lower, so that the shape tells it too.
-pub fn thin_band(painter: &Painter, band: Rect, target: &TargetView, run: &RunView, stop_count: usize) {
+pub(crate) fn thin_band(
+    painter: &Painter,
+    band: Rect,
+    target: &TargetView,
+    run: &RunView,
+    stop_count: usize,
+) {
     painter.rect_filled(band, 1.0, theme::before());
     let scale = Scale::new(band.x_range(), stop_count);
     for span in scale.spans(|step| cells::cell_of(target, Some(run), step)) {

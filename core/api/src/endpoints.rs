@@ -1,0 +1,224 @@
+//! All endpoints, one type each: method, path, then the types of names in the path, query, body and reply.
+//!
+//! A new endpoint is one entry here, one handler in `server/src/routes`, and its call in the viewer.
+
+use serde_json::Value;
+use sightline_rover::trackability::{MapProgress, PixelVerdict};
+use sightline_session::Cursor;
+use sightline_session::breakpoints::{BreakpointChange, BreakpointView, NewBreakpoint};
+use sightline_session::compare::{Comparison, NewComparison};
+use sightline_session::counterfactual::wire::Question;
+use sightline_session::documents::Document;
+use sightline_session::exports::ExportEntry;
+use sightline_session::expression::complete::Completion;
+use sightline_session::metrics::RunMetrics;
+use sightline_session::notes::{EditNote, NewNote, Note};
+use sightline_session::query::{CompletionQuery, Language, Query, QueryAnswer};
+use sightline_session::reproduce::Reproduction;
+use sightline_session::view::{RunView, SessionView};
+use sightline_session::what_if::{Ghost, WhatIf};
+use sightline_session::why::Explanation;
+use sightline_study::wire::{NewStudy, StudyInfo, StudyJob, StudyRows};
+use sightline_track::limits::SettingInfo;
+use sightline_track::locate::template::history::AgainstEarlier;
+use sightline_track::trace::StepTrace;
+
+use crate::endpoint::{Done, Endpoint, File, Method, NoBody, NoQuery};
+use crate::location::{
+    Anywhere, AtBreakpoint, AtDocument, AtExport, AtImage, AtNote, AtRun, AtSession, AtStep, AtStop,
+    AtStudyJob, AtTarget, AtTraverse,
+};
+use crate::program::{Health, Version};
+use crate::query::{FirstRow, FirstStop, ImageDepth, MapLimits, MapPixel, SessionPart, ValueName};
+use crate::wire::{
+    Designated, Event, NewRun, NewSession, NewTarget, NewTraverse, RerunStream, SessionEntry, StopDetail,
+    TraverseEntry, TraverseView,
+};
+
+/// Declares a type for each endpoint, and the list of all of them.
+macro_rules! endpoints {
+    ($($(#[$doc:meta])* $name:ident: $method:ident $path:literal, $at:ty $(, query $query:ty)? $(, body $body:ty)?
+        => $reply:ty;)*) => {
+        $(
+            $(#[$doc])*
+            #[derive(Clone, Copy, Debug)]
+            pub struct $name;
+
+            impl Endpoint for $name {
+                const METHOD: Method = Method::$method;
+                const PATH: &'static str = $path;
+                type At = $at;
+                type Query = endpoints!(@or NoQuery $(, $query)?);
+                type Body = endpoints!(@or NoBody $(, $body)?);
+                type Reply = $reply;
+            }
+        )*
+
+        /// Method and path of every endpoint.
+        pub const ALL: &[(Method, &str)] = &[$(($name::METHOD, $name::PATH)),*];
+    };
+    (@or $default:ty) => { $default };
+    (@or $default:ty, $given:ty) => { $given };
+}
+
+endpoints! {
+    /// What this program is.
+    ShowVersion: Get "/version", Anywhere => Version;
+    /// Whether the server is well.
+    ShowHealth: Get "/health", Anywhere => Health;
+    /// The OpenAPI document.
+    ShowOpenApi: Get "/openapi.json", Anywhere => Value;
+    /// The WebSocket of events; not called as a request.
+    ListenToEvents: Get "/events", Anywhere => Event;
+    /// The table of settings.
+    ListSettings: Get "/settings", Anywhere => Vec<SettingInfo>;
+
+    /// The traverses that are open.
+    ListTraverses: Get "/traverses", Anywhere => Vec<TraverseEntry>;
+    /// Opens a simulated drive by its scenario.
+    AddTraverse: Post "/traverses", Anywhere, body NewTraverse => TraverseEntry;
+    /// A traverse with its stops.
+    ShowTraverse: Get "/traverses/{id}", AtTraverse => TraverseView;
+    /// A stop with its cameras.
+    ShowStop: Get "/traverses/{id}/steps/{step}", AtStop => StopDetail;
+    /// An image of a stop as PNG.
+    ShowImage: Get "/traverses/{id}/steps/{step}/images/{file}", AtImage, query ImageDepth => File;
+    /// Renders the stops from this one on before all others.
+    Prefetch: Post "/traverses/{id}/prefetch", AtTraverse, query FirstStop => Done;
+    /// The trackability of a stop's left image, as far as it is computed.
+    ShowTrackability: Get "/traverses/{id}/steps/{step}/trackability", AtStop, query MapLimits => MapProgress;
+    /// The verdict at one pixel.
+    ShowTrackabilityAtPixel: Get "/traverses/{id}/steps/{step}/trackability/pixel", AtStop, query MapPixel
+        => PixelVerdict;
+    /// Stops computing a map.
+    CancelTrackability: Post "/traverses/{id}/steps/{step}/trackability/cancel", AtStop, query MapLimits => Done;
+
+    /// The sessions on open traverses.
+    ListSessions: Get "/sessions", Anywhere => Vec<SessionEntry>;
+    /// Begins a session.
+    BeginSession: Post "/sessions", Anywhere, body NewSession => SessionView;
+    /// Begins a session from an exported `reproduce.json`.
+    BringSession: Post "/sessions/reproduced", Anywhere, body Reproduction => SessionView;
+    /// A session with its targets and runs.
+    ShowSession: Get "/sessions/{session}", AtSession => SessionView;
+    /// The cursor of a session.
+    ShowCursor: Get "/sessions/{session}/cursor", AtSession => Cursor;
+    /// Moves the cursor.
+    MoveCursor: Put "/sessions/{session}/cursor", AtSession, body Cursor => Cursor;
+    /// Opens a live Rerun stream.
+    StreamRecording: Post "/sessions/{session}/rerun", AtSession => RerunStream;
+    /// What a session can be exported as.
+    ListExports: Get "/sessions/{session}/exports", AtSession, query SessionPart => Vec<ExportEntry>;
+    /// A session, or a part of it, as a file.
+    ExportFile: Get "/sessions/{session}/exports/{file}", AtExport, query SessionPart => File;
+    /// A plain page with all sessions.
+    ShowSessionsPage: Get "/page", Anywhere => File;
+    /// A plain page of a session.
+    ShowSessionPage: Get "/sessions/{session}/page", AtSession => File;
+
+    /// Designates a target.
+    DesignateTarget: Post "/sessions/{session}/targets", AtSession, body NewTarget => Designated;
+    /// Removes a target.
+    RemoveTarget: Delete "/sessions/{session}/targets/{target}", AtTarget => SessionView;
+    /// Takes the removal of a target back.
+    RestoreTarget: Post "/sessions/{session}/targets/{target}/restore", AtTarget => SessionView;
+
+    /// Runs a target again from a step with changed settings.
+    ForkRun: Post "/sessions/{session}/targets/{target}/runs", AtTarget, body NewRun => RunView;
+    /// A run so far.
+    ShowRun: Get "/sessions/{session}/targets/{target}/runs/{run}", AtRun, query FirstRow => RunView;
+    /// Removes a run.
+    RemoveRun: Delete "/sessions/{session}/targets/{target}/runs/{run}", AtRun => SessionView;
+    /// Takes the removal of a run back.
+    RestoreRun: Post "/sessions/{session}/targets/{target}/runs/{run}/restore", AtRun => SessionView;
+    /// Stops a run.
+    CancelRun: Post "/sessions/{session}/targets/{target}/runs/{run}/cancel", AtRun => RunView;
+    /// Lets a stopped run go on.
+    ResumeRun: Post "/sessions/{session}/targets/{target}/runs/{run}/resume", AtRun => RunView;
+    /// The metrics of a run.
+    ShowMetrics: Get "/sessions/{session}/targets/{target}/runs/{run}/metrics", AtRun => RunMetrics;
+    /// The target's brightness over a run as CSV.
+    ShowPhotometry: Get "/sessions/{session}/targets/{target}/runs/{run}/photometry.csv", AtRun => File;
+    /// Compares two to four runs of a session.
+    CompareRuns: Post "/sessions/{session}/compare", AtSession, body NewComparison => Comparison;
+
+    /// A step.
+    ShowStep: Get "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}", AtStep => StepTrace;
+    /// All arrays of a step as one NumPy archive.
+    ShowArrays: Get "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/arrays.npz", AtStep => File;
+    /// The view of a step against the earlier templates of its run.
+    ShowEarlierTemplates: Get "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/earlier_templates", AtStep
+        => Vec<AgainstEarlier>;
+    /// A plain page of a step.
+    ShowStepPage: Get "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/page", AtStep => File;
+    /// Where a value of a step came from.
+    ShowWhy: Get "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/why", AtStep, query ValueName
+        => Explanation;
+    /// Tries a step with changed settings or a displaced prediction.
+    TryStep: Post "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/what_if", AtStep, body WhatIf
+        => Ghost;
+    /// What would have saved a step, as far as it is known.
+    ShowCounterfactual: Get "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/counterfactual", AtStep
+        => Question;
+    /// Searches for what would have saved a step.
+    AskCounterfactual: Post "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/counterfactual", AtStep
+        => Question;
+    /// Stops that search.
+    CancelCounterfactual: Post
+        "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/counterfactual/cancel", AtStep => Question;
+
+    /// The notes of a session.
+    ListNotes: Get "/sessions/{session}/notes", AtSession => Vec<Note>;
+    /// Pins a note.
+    AddNote: Post "/sessions/{session}/notes", AtSession, body NewNote => Note;
+    /// A note.
+    ShowNote: Get "/sessions/{session}/notes/{note}", AtNote => Note;
+    /// Changes a note of the revision that was read.
+    ChangeNote: Patch "/sessions/{session}/notes/{note}", AtNote, body EditNote => Note;
+    /// Removes a note of the revision that was read.
+    RemoveNote: Delete "/sessions/{session}/notes/{note}", AtNote => Done;
+    /// Brings a removed note back.
+    RestoreNote: Post "/sessions/{session}/notes/{note}/restore", AtNote => Note;
+
+    /// The breakpoints of a session.
+    ListBreakpoints: Get "/sessions/{session}/breakpoints", AtSession => Vec<BreakpointView>;
+    /// Sets a breakpoint.
+    AddBreakpoint: Post "/sessions/{session}/breakpoints", AtSession, body NewBreakpoint => BreakpointView;
+    /// Changes a breakpoint.
+    ChangeBreakpoint: Patch "/sessions/{session}/breakpoints/{breakpoint}", AtBreakpoint, body BreakpointChange
+        => BreakpointView;
+    /// Removes a breakpoint.
+    RemoveBreakpoint: Delete "/sessions/{session}/breakpoints/{breakpoint}", AtBreakpoint => Done;
+    /// The language of expressions.
+    ShowExpressions: Get "/expressions", Anywhere => Language;
+    /// What could be written at a position of an expression.
+    CompleteExpression: Post "/expressions/complete", Anywhere, body CompletionQuery => Completion;
+    /// Evaluates an expression at every step of every run.
+    QuerySession: Post "/sessions/{session}/query", AtSession, body Query => QueryAnswer;
+
+    /// All documents, by name.
+    ListDocuments: Get "/documents", Anywhere => Vec<Document>;
+    /// A document.
+    ShowDocument: Get "/documents/{name}", AtDocument => Document;
+    /// Replaces a document, or adds one.
+    PutDocument: Put "/documents/{name}", AtDocument, body Value => Document;
+    /// Removes a document.
+    RemoveDocument: Delete "/documents/{name}", AtDocument => Done;
+
+    /// The studies that can be started.
+    ListStudies: Get "/studies", Anywhere => Vec<StudyInfo>;
+    /// The studies that were started.
+    ListStudyJobs: Get "/studies/jobs", Anywhere => Vec<StudyJob>;
+    /// Starts a study.
+    StartStudy: Post "/studies/jobs", Anywhere, body NewStudy => StudyJob;
+    /// The state of a study.
+    ShowStudyJob: Get "/studies/jobs/{job}", AtStudyJob => StudyJob;
+    /// Stops a study.
+    CancelStudy: Post "/studies/jobs/{job}/cancel", AtStudyJob => StudyJob;
+    /// Lets a stopped study go on.
+    ResumeStudy: Post "/studies/jobs/{job}/resume", AtStudyJob => StudyJob;
+    /// The table of a study, as far as it is computed.
+    ShowStudyRows: Get "/studies/jobs/{job}/rows", AtStudyJob => StudyRows;
+    /// The report of a study that is done.
+    ShowStudyReport: Get "/studies/jobs/{job}/report.html", AtStudyJob => File;
+}

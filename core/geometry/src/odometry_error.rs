@@ -1,0 +1,22 @@
+//! The error model of the pose estimates of wheel odometry and inertial measurement.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// The error model of the pose estimate, from which `predict` grows the covariance (domain.md 5.5).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct OdometryError {
+    /// 1σ error along the way, as a fraction of the distance driven.
+    pub along_fraction: f64,
+    /// 1σ error across the way, as a fraction of the distance driven.
+    pub across_fraction: f64,
+    /// 1σ error of each attitude angle per step, deg.
+    pub attitude_deg: f64,
+}
+
+impl Default for OdometryError {
+    fn default() -> Self {
+        Self { along_fraction: 0.02, across_fraction: 0.02, attitude_deg: 0.2 }
+    }
+}

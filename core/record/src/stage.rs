@@ -1,0 +1,316 @@
+//! A stage of a step: a declaration with the way from the step to its evidence.
+
+use std::borrow::Cow;
+
+use serde::Serialize;
+
+use super::{ArrayView, Declaration, Mark, Record, StageRecord, StageSchema, Value};
+
+/// A stage of the step type `S`, whatever its evidence types are.
+pub struct Stage<S> {
+    schema: StageSchema,
+    parts: Vec<Part<S>>,
+    evidence: Option<Evidence<S>>,
+}
+
+/// Serialises the evidence of a step.
+type Evidence<S> = Box<dyn Fn(&S) -> Option<serde_json::Value> + Send + Sync>;
+
+/// A declaration of the stage, with the positions of its first quantity and array in the schema.
+struct Part<S> {
+    first_quantity: usize,
+    first_array: usize,
+    reader: Box<dyn Read<S> + Send + Sync>,
+}
+
+/// The part of a stage that knows an evidence type.
+trait Read<S> {
+    fn is_reached(&self, step: &S) -> bool;
+    fn value(&self, step: &S, index: usize) -> Option<Value>;
+    fn array<'a>(&self, step: &'a S, index: usize) -> Option<ArrayView<'a>>;
+    fn record(&self, step: &S) -> StageRecord;
+}
+
+/// Evidence that the step contains.
+struct Borrowed<S, E> {
+    find: for<'a> fn(&'a S) -> Option<&'a E>,
+    declaration: Declaration<E>,
+}
+
+/// Evidence that is computed from the step.
+struct Computed<S, E> {
+    make: fn(&S) -> E,
+    declaration: Declaration<E>,
+}
+
+impl<S: 'static> Stage<S> {
+    /// A stage whose evidence is a part of the step.
+    pub fn of<E: Record + Serialize>(
+        name: &'static str,
+        question: &'static str,
+        find: for<'a> fn(&'a S) -> Option<&'a E>,
+    ) -> Self {
+        let evidence: Evidence<S> = Box::new(move |step| serde_json::to_value(find(step)?).ok());
+        Self { evidence: Some(evidence), ..Self::of_parts(name, question).with(find, E::declare) }
+    }
+
+    /// A stage whose quantities are computed from the step; it has no arrays.
+    pub fn computed<E: Record>(name: &'static str, question: &'static str, make: fn(&S) -> E) -> Self {
+        let declaration = Declaration::by(E::declare);
+        let mut stage = Self::of_parts(name, question);
+        let schema = declaration.schema.clone();
+        stage.add(schema, Box::new(Computed { make, declaration }));
+        stage
+    }
+
+    /// The same stage with what else declares something for it: evidence that is stored elsewhere in the step.
+    #[must_use]
+    pub fn with<E: 'static>(
+        mut self,
+        find: for<'a> fn(&'a S) -> Option<&'a E>,
+        declare: fn(&mut Declaration<E>),
+    ) -> Self {
+        let declaration = Declaration::by(declare);
+        let schema = declaration.schema.clone();
+        self.add(schema, Box::new(Borrowed { find, declaration }));
+        self
+    }
+
+    /// The same stage with the path of its evidence in the serialised step, or a further one in steps of another tracker.
+    #[must_use]
+    pub fn at(mut self, path: impl Into<Cow<'static, str>>) -> Self {
+        if self.schema.path.is_empty() {
+            self.schema.path = path.into();
+        } else {
+            self.schema.other_paths.push(path.into());
+        }
+        self
+    }
+
+    /// A stage whose evidence follows by [`Self::with`].
+    pub fn of_parts(name: &'static str, question: &'static str) -> Self {
+        let schema = StageSchema { stage: name.into(), question: question.into(), ..StageSchema::default() };
+        Self { schema, parts: Vec::new(), evidence: None }
+    }
+
+    fn add(&mut self, part: StageSchema, reader: Box<dyn Read<S> + Send + Sync>) {
+        let schema = &mut self.schema;
+        let (first_quantity, first_array) = (schema.quantities.len(), schema.arrays.len());
+        schema.quantities.extend(part.quantities);
+        schema.fields.extend(part.fields);
+        schema.arrays.extend(part.arrays);
+        schema.marks.extend(part.marks);
+        schema.gates.extend(part.gates);
+        self.parts.push(Part { first_quantity, first_array, reader });
+    }
+
+    /// The schema.
+    pub fn schema(&self) -> &StageSchema {
+        &self.schema
+    }
+
+    /// Whether the step reached the stage: whether its first evidence exists.
+    pub fn is_reached(&self, step: &S) -> bool {
+        self.parts.first().is_some_and(|part| part.reader.is_reached(step))
+    }
+
+    /// The value of the quantity at `index` of the schema; missing where the stage was not reached.
+    pub fn value(&self, step: &S, index: usize) -> Value {
+        let part = self.parts.iter().rev().find(|part| part.first_quantity <= index);
+        part.and_then(|part| part.reader.value(step, index - part.first_quantity)).unwrap_or_default()
+    }
+
+    /// The value of the quantity of a name; `None` where the stage declares no such quantity.
+    pub fn value_of(&self, step: &S, name: &str) -> Option<Value> {
+        let index = self.schema.quantities.iter().position(|quantity| quantity.name == name)?;
+        Some(self.value(step, index))
+    }
+
+    /// The serialised evidence of a step, arrays left out; `None` where the stage was not reached or has none of its own.
+    pub fn evidence(&self, step: &S) -> Option<serde_json::Value> {
+        self.evidence.as_ref()?(step)
+    }
+
+    /// The array of a name.
+    pub fn array<'a>(&self, step: &'a S, name: &str) -> Option<ArrayView<'a>> {
+        let index = self.schema.arrays.iter().position(|array| array.name == name)?;
+        let part = self.parts.iter().rev().find(|part| part.first_array <= index)?;
+        part.reader.array(step, index - part.first_array)
+    }
+
+    /// The plain values of a step.
+    pub fn record(&self, step: &S) -> StageRecord {
+        let mut whole = StageRecord { reached: self.is_reached(step), ..StageRecord::default() };
+        for part in &self.parts {
+            let record = part.reader.record(step);
+            whole.values.extend(record.values);
+            whole.arrays.extend(record.arrays);
+            whole.marks.extend(record.marks);
+            whole.gates.extend(record.gates);
+            whole.reason = whole.reason.or(record.reason);
+        }
+        whole
+    }
+}
+
+impl<E: 'static> Declaration<E> {
+    fn by(declare: fn(&mut Self)) -> Self {
+        let mut declaration = Self::default();
+        declare(&mut declaration);
+        declaration
+    }
+
+    /// The record of an instance, or of a stage that was not reached.
+    fn record(&self, evidence: Option<&E>) -> StageRecord {
+        let Some(evidence) = evidence else {
+            return StageRecord {
+                values: vec![Value::Missing; self.values.len()],
+                arrays: vec![None; self.arrays.len()],
+                ..StageRecord::default()
+            };
+        };
+        let marks = self.shapes.iter().zip(&self.schema.marks).filter_map(|(shape, mark)| {
+            let shape = shape(evidence)?;
+            Some(Mark { name: mark.name.clone(), eye: mark.eye, role: mark.role, shape })
+        });
+        StageRecord {
+            reached: true,
+            values: self.values.iter().map(|value| value(evidence)).collect(),
+            arrays: self.arrays.iter().map(|array| array(evidence).map(|view| view.size())).collect(),
+            marks: marks.collect(),
+            gates: self.gates.iter().flat_map(|gates| gates(evidence)).collect(),
+            reason: self.reason.as_ref().and_then(|reason| reason(evidence)),
+        }
+    }
+}
+
+impl<S: 'static, E: 'static> Read<S> for Borrowed<S, E> {
+    fn is_reached(&self, step: &S) -> bool {
+        (self.find)(step).is_some()
+    }
+
+    fn value(&self, step: &S, index: usize) -> Option<Value> {
+        Some(self.declaration.values.get(index)?((self.find)(step)?))
+    }
+
+    fn array<'a>(&self, step: &'a S, index: usize) -> Option<ArrayView<'a>> {
+        self.declaration.arrays.get(index)?((self.find)(step)?)
+    }
+
+    fn record(&self, step: &S) -> StageRecord {
+        self.declaration.record((self.find)(step))
+    }
+}
+
+impl<S: 'static, E: 'static> Read<S> for Computed<S, E> {
+    fn is_reached(&self, _: &S) -> bool {
+        true
+    }
+
+    fn value(&self, step: &S, index: usize) -> Option<Value> {
+        Some(self.declaration.values.get(index)?(&(self.make)(step)))
+    }
+
+    fn array<'a>(&self, _: &'a S, _: usize) -> Option<ArrayView<'a>> {
+        None
+    }
+
+    fn record(&self, step: &S) -> StageRecord {
+        self.declaration.record(Some(&(self.make)(step)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ArrayKind, Eye, GateRecord, Kind, Role, Shape, ShapeKind, Side, Unit};
+    use sightline_geometry::frames::Pixel;
+
+    #[derive(Serialize)]
+    struct Found {
+        pixel: Pixel,
+        #[serde(skip)]
+        scores: Vec<f32>,
+    }
+
+    struct Step {
+        found: Option<Found>,
+    }
+
+    impl Record for Found {
+        fn declare(r: &mut Declaration<Self>) {
+            r.quantity("pixel", Unit::Pixel, |f| f.pixel).describe("The match.");
+            r.quantity("best", Unit::One, |f| f.scores.iter().copied().reduce(f32::max))
+                .formula("max score", &["scores"]);
+            r.array("scores", ArrayKind::ScoreMap, "Scores.", |f| ArrayView::new(2, &f.scores));
+            r.mark("match", (Eye::Left, Role::Measurement, ShapeKind::Dot), |f| {
+                Some(Shape::Dot { at: f.pixel })
+            });
+            r.gate("best", Unit::One, Side::AtLeast, "limits.best_min");
+            r.gates(|f| {
+                vec![GateRecord {
+                    name: "best".to_owned(),
+                    value: f.scores.first().map(|&s| s.into()),
+                    limit: 0.5,
+                }]
+            });
+        }
+    }
+
+    fn stage() -> Stage<Step> {
+        Stage::of("find", "Where is it?", |step: &Step| step.found.as_ref()).at("locate.find")
+    }
+
+    #[test]
+    fn one_declaration_gives_schema_and_values() {
+        let stage = stage();
+        let schema = stage.schema();
+        assert_eq!((schema.stage.as_ref(), schema.path.as_ref()), ("find", "locate.find"));
+        assert_eq!(schema.quantity("pixel").unwrap().kind, Kind::Pixel);
+        assert_eq!(schema.quantity("pixel").unwrap().columns(), ["pixel.x", "pixel.y"]);
+        assert_eq!(schema.quantity("best").unwrap().inputs, ["scores"]);
+        let step =
+            Step { found: Some(Found { pixel: Pixel::new(1.5, 2.0), scores: vec![0.25, 0.75, 0.5, 0.0] }) };
+        let record = stage.record(&step);
+        assert_eq!(record.values, [Value::Components(vec![1.5, 2.0]), Value::Number(0.75)]);
+        assert_eq!(record.arrays, [Some([2, 2])]);
+        assert_eq!(stage.evidence(&step), Some(serde_json::json!({ "pixel": { "x": 1.5, "y": 2.0 } })));
+        assert_eq!(stage.array(&step, "scores").unwrap().values()[1], 0.75);
+        assert_eq!(record.marks[0].shape, Shape::Dot { at: Pixel::new(1.5, 2.0) });
+        assert_eq!(record.marks[0].shape.kind(), schema.marks[0].kind);
+        assert_eq!((record.gates[0].value, record.gates[0].limit), (Some(0.25), 0.5));
+    }
+
+    #[test]
+    fn a_stage_that_was_not_reached_has_missing_values() {
+        let record = stage().record(&Step { found: None });
+        assert!(!record.reached);
+        assert_eq!(record.values, [Value::Missing, Value::Missing]);
+        assert_eq!((record.arrays, record.marks.len(), record.gates.len()), (vec![None], 0, 0));
+        assert!(stage().array(&Step { found: None }, "scores").is_none());
+        assert_eq!(stage().evidence(&Step { found: None }), None);
+    }
+
+    #[test]
+    fn evidence_of_two_places_makes_one_stage() {
+        fn more(r: &mut Declaration<Step>) {
+            r.quantity("count", Unit::One, |step| step.found.as_ref().map(|f| f.scores.len()));
+            r.array("row", ArrayKind::Table, "Scores.", |step| {
+                step.found.as_ref().map_or(ArrayView::new(0, &[]), |f| ArrayView::new(4, &f.scores))
+            });
+        }
+        let stage = stage().with(|step| Some(step), more);
+        let step = Step { found: Some(Found { pixel: Pixel::new(0.0, 0.0), scores: vec![0.0; 4] }) };
+        assert_eq!(stage.value_of(&step, "count"), Some(Value::Count(4)));
+        assert_eq!(stage.value(&step, 1), Value::Number(0.0), "of the first evidence");
+        assert_eq!(stage.record(&step).arrays, [Some([2, 2]), Some([4, 1])]);
+        assert_eq!(stage.array(&step, "row").unwrap().size(), [4, 1]);
+        assert_eq!(stage.value_of(&step, "nothing"), None);
+    }
+
+    #[test]
+    fn a_schema_survives_its_serialised_form() {
+        let text = serde_json::to_string(stage().schema()).unwrap();
+        assert_eq!(&serde_json::from_str::<StageSchema>(&text).unwrap(), stage().schema());
+    }
+}

@@ -1,0 +1,177 @@
+//! Whether an index makes sense, and its cameras resolved.
+//!
+//! Each problem is one sentence that begins with the field (`stops[3].left.camera: …`). What a person
+//! should know but can work with becomes a warning.
+
+use std::path::Path;
+
+use super::files::resolve;
+use sightline_geometry::camera::{Camera, text};
+use sightline_geometry::frames::PoseRecord;
+use sightline_world::traverse::{CameraSource, FORMAT_VERSION, Stop, StopLight, TraverseIndex, View};
+
+/// The largest width or height of an image, px.
+const IMAGE_SIDE_LIMIT: u32 = 16_384;
+/// The largest camera file that is read, bytes.
+const CAMERA_FILE_LIMIT: u64 = 1 << 20;
+
+/// The cameras of one stop, in the rover frame, with O made unit.
+#[derive(Clone, Debug)]
+pub(super) struct StopCameras {
+    pub(super) left: Camera,
+    pub(super) right: Camera,
+    pub(super) true_left: Option<Camera>,
+    pub(super) true_right: Option<Camera>,
+}
+
+impl StopCameras {
+    /// The true camera of the left image; the given one where no truth is recorded.
+    pub(super) fn true_left(&self) -> &Camera {
+        self.true_left.as_ref().unwrap_or(&self.left)
+    }
+
+    /// The true camera of the right image; the given one where no truth is recorded.
+    pub(super) fn true_right(&self) -> &Camera {
+        self.true_right.as_ref().unwrap_or(&self.right)
+    }
+}
+
+/// Checks the parts of an index that do not belong to one stop.
+pub(super) fn check_index(index: &TraverseIndex) -> Result<(), String> {
+    if index.format != FORMAT_VERSION {
+        let version = index.format;
+        return Err(format!(
+            "format: version {version} is unknown; this program reads version {FORMAT_VERSION}"
+        ));
+    }
+    if index.stops.is_empty() {
+        return Err("stops: there is none, but a traverse has at least one".to_owned());
+    }
+    if let Some(dn) = index.full_scale_dn.filter(|dn| !(dn.is_finite() && *dn > 0.0)) {
+        return Err(format!("full_scale_dn: is {dn}, but it must be a positive number"));
+    }
+    let error = index.odometry_error;
+    for (field, value) in [
+        ("along_fraction", error.along_fraction),
+        ("across_fraction", error.across_fraction),
+        ("attitude_deg", error.attitude_deg),
+    ] {
+        if !(value.is_finite() && value >= 0.0) {
+            return Err(format!("odometry_error.{field}: is {value}, but it must be a number from 0"));
+        }
+    }
+    if let Some(mast) = &index.mast {
+        if !mast.origin_in_rover.iter().all(|v| v.is_finite()) {
+            return Err("mast.origin_in_rover: must be three finite numbers".to_owned());
+        }
+        check_camera(&mast.left_in_head).map_err(|problem| format!("mast.left_in_head: {problem}"))?;
+        check_camera(&mast.right_in_head).map_err(|problem| format!("mast.right_in_head: {problem}"))?;
+    }
+    Ok(())
+}
+
+/// Checks the time, the poses and the mast angles of one stop.
+pub(super) fn check_stop_numbers(stop: &Stop) -> Result<(), String> {
+    if !stop.time_s.is_finite() {
+        return Err(format!("time_s: is {}, but it must be a finite number", stop.time_s));
+    }
+    check_pose("site_from_rover", &stop.site_from_rover)?;
+    if let Some(angles) = stop.mast_angles
+        && !(angles.azimuth_rad.is_finite() && angles.elevation_rad.is_finite())
+    {
+        return Err("mast_angles: must be finite numbers".to_owned());
+    }
+    if let Some(light) = &stop.light {
+        check_light(light)?;
+    }
+    match &stop.truth {
+        Some(truth) => check_pose("truth.site_from_rover", &truth.site_from_rover),
+        None => Ok(()),
+    }
+}
+
+fn check_light(light: &StopLight) -> Result<(), String> {
+    if !light.sun_azimuth_deg.is_finite() || !(-90.0..=90.0).contains(&light.sun_elevation_deg) {
+        return Err(
+            "light: the sun's azimuth must be a number, and its elevation from -90 to 90 deg".to_owned()
+        );
+    }
+    match light.exposure_s.filter(|time_s| !(time_s.is_finite() && *time_s > 0.0)) {
+        Some(time_s) => Err(format!("light.exposure_s: is {time_s}, but it must be greater than 0")),
+        None => Ok(()),
+    }
+}
+
+/// Checks one stop and reads its cameras.
+pub(super) fn check_stop(stop: &Stop, folder: &Path) -> Result<StopCameras, String> {
+    check_stop_numbers(stop)?;
+    let truth = stop.truth.as_ref();
+    let true_camera = |side: &str, camera: Option<&Camera>| {
+        camera.cloned().map(|camera| checked(camera).map_err(|problem| format!("truth.{side}: {problem}")))
+    };
+    Ok(StopCameras {
+        left: check_view("left", &stop.left, folder)?,
+        right: check_view("right", &stop.right, folder)?,
+        true_left: true_camera("left_camera", truth.and_then(|truth| truth.left_camera.as_ref()))
+            .transpose()?,
+        true_right: true_camera("right_camera", truth.and_then(|truth| truth.right_camera.as_ref()))
+            .transpose()?,
+    })
+}
+
+fn check_pose(field: &str, pose: &PoseRecord) -> Result<(), String> {
+    let expected = "must have a finite position_m and a quaternion_sxyz of unit length";
+    if pose.is_plausible() { Ok(()) } else { Err(format!("{field}: {expected}")) }
+}
+
+fn check_view(side: &str, view: &View, folder: &Path) -> Result<Camera, String> {
+    resolve(folder, &view.image).map_err(|problem| format!("{side}.image: {problem}"))?;
+    let camera = match &view.camera {
+        CameraSource::Inline(camera) => Ok(camera.clone()),
+        CameraSource::File { file } => read_camera(folder, file),
+    };
+    camera.and_then(checked).map_err(|problem| format!("{side}.camera: {problem}"))
+}
+
+fn read_camera(folder: &Path, name: &str) -> Result<Camera, String> {
+    let path = resolve(folder, name)?;
+    let unreadable = |error: std::io::Error| format!("{name} cannot be read ({error})");
+    if std::fs::metadata(&path).map_err(unreadable)?.len() > CAMERA_FILE_LIMIT {
+        return Err(format!("{name} is too large for a camera file"));
+    }
+    let content = std::fs::read_to_string(&path).map_err(unreadable)?;
+    text::read_text(&content, Path::new(name)).map_err(|error| error.to_string())
+}
+
+fn checked(camera: Camera) -> Result<Camera, String> {
+    check_camera(&camera)?;
+    Ok(camera.normalised())
+}
+
+fn check_camera(camera: &Camera) -> Result<(), String> {
+    if !camera.size.iter().all(|side| (1..=IMAGE_SIDE_LIMIT).contains(side)) {
+        let [width, height] = camera.size;
+        return Err(format!("size is {width} × {height}, but each must be 1 to {IMAGE_SIDE_LIMIT}"));
+    }
+    camera.model.validate()
+}
+
+/// What a person should know about an index that can be used nevertheless.
+pub(super) fn warnings(index: &TraverseIndex, folder: &Path) -> Vec<String> {
+    let mut warnings = Vec::new();
+    for (step, pair) in index.stops.windows(2).enumerate() {
+        if pair[1].time_s < pair[0].time_s {
+            warnings.push(format!("stops[{}].time_s: is earlier than the stop before", step + 1));
+        }
+    }
+    if index.scenario.is_none() {
+        let missing = |view: &View| !folder.join(&view.image).is_file();
+        let views = |stop: &Stop| usize::from(missing(&stop.left)) + usize::from(missing(&stop.right));
+        let count: usize = index.stops.iter().map(views).sum();
+        if count > 0 {
+            let total = 2 * index.stops.len();
+            warnings.push(format!("{count} of {total} images are missing; their stops cannot be tracked"));
+        }
+    }
+    warnings
+}

@@ -1,0 +1,22 @@
+//! A traverse: the stops of one drive, each with a pose estimate, a stereo pair and, perhaps, the truth.
+//!
+//! Everything is opened through the native folder (`native.rs` documents the format): a simulated traverse
+//! is a folder whose images are rendered when they are first asked for, and a foreign recording is turned
+//! into a folder by its importer (`import/`, one file per format).
+
+mod check;
+pub mod files;
+mod image_cache;
+pub mod import;
+mod index_file;
+mod native;
+mod render_cache;
+mod simulated;
+mod simulated_traverse;
+mod stops;
+mod truth_files;
+
+pub use index_file::{Existing, IndexFormat};
+pub use native::{Traverse, write};
+pub use render_cache::RenderCache;
+pub use simulated_traverse::create_simulated;

@@ -1,0 +1,278 @@
+//! The native folder of a traverse: one index, one PNG per image, and perhaps camera files.
+//!
+//! The index is `traverse.toml` or `traverse.json` with the same fields ([`TraverseIndex`]); unknown fields
+//! are refused. All names in it are relative to the folder, with `/` and without `..`.
+//!
+//! ```toml
+//! format = 1                                # version of this format
+//! name = "two stops"
+//! description = "an example"                # optional
+//! full_scale_dn = 4095.0                    # grey value of full scale; default 255 or 65535 by PNG depth
+//! stereo = "lateral"                        # or "convergent": two freely placed views; default lateral
+//! # scenario = "scenario.toml"              # simulated: missing images are rendered from this file
+//!
+//! [odometry_error]                          # 1σ error of the pose estimates; these are the defaults
+//! along_fraction = 0.02                     # of the way driven
+//! across_fraction = 0.02
+//! attitude_deg = 0.2                        # per step and axis
+//!
+//! [[stops]]                                 # in driving order, at least one
+//! time_s = 0.0                              # since the first stop
+//! [stops.site_from_rover]                   # the pose estimate that the tracker is given
+//! position_m = [0.0, 0.0, 0.0]              # origin of the rover frame in the site frame
+//! quaternion_sxyz = [1.0, 0.0, 0.0, 0.0]    # scalar first, rotates rover vectors into the site frame
+//! [stops.left]
+//! image = "images/0000_left.png"            # 8 or 16 bits, grey (colour becomes luma)
+//! [stops.left.camera]                       # in the rover frame, as JPL prints it; O is made unit on opening
+//! model = "CAHVOR"                          # CAHV (no O, R), CAHVOR, CAHVORE (also E, T, P)
+//! size = [1024, 1024]                       # width and height of the image
+//! C = [0.442604, -0.0611635, -1.25106]
+//! A = [0.93995, -0.338133, 0.0464979]
+//! H = [884.72, 981.763, 24.1472]
+//! V = [418.579, -152.039, 1245.75]
+//! O = [0.946551, -0.315595, 0.0666419]
+//! R = [0.00096, -0.002183, 0.018547]
+//! [stops.right]
+//! image = "images/0000_right.png"
+//! camera = { file = "right.cahvor" }        # or a file in JPL's text form
+//!
+//! [stops.truth.site_from_rover]             # optional: the true pose, and true cameras where they differ
+//! position_m = [0.0, 0.0, 0.0]
+//! quaternion_sxyz = [1.0, 0.0, 0.0, 0.0]
+//! ```
+//!
+//! Optional besides: `[mast]` (origin and head cameras), `stops.mast_angles` (azimuth and elevation, rad) and
+//! `stops.light` (`sun_azimuth_deg`, `sun_elevation_deg` in the site frame, `exposure_s` of the left image).
+//!
+//! A simulated folder also gets `cache/`, from which nothing but time is lost when it is removed, and on demand
+//! `truth/`, the truth of every pixel (`truth_files.rs` documents it).
+//!
+//! Opening reads the index and the cameras, never an image: a traverse with missing images opens, and the
+//! stops that have theirs can be used. Images are decoded when asked for; the pairs used last are kept, up to
+//! [`CACHE_LIMIT_BYTES`].
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::check::{self, StopCameras};
+use super::files::resolve;
+use super::image_cache::ImageCache;
+use super::index_file::{self, Existing, IndexFormat};
+use super::simulated::{Simulated, Stops};
+use sightline_geometry::camera::Camera;
+use sightline_geometry::error::{Error, Result};
+use sightline_geometry::frames::Pose;
+use sightline_track::locate::store::SharedStore;
+use sightline_track::stages::capture::StereoPair;
+use sightline_vision::image::{GrayImage, io};
+use sightline_world::World;
+use sightline_world::traverse::{Stop, TraverseIndex, View};
+
+/// The most memory that decoded pairs may take, bytes (32 pairs of 1024 × 1024).
+pub(crate) const CACHE_LIMIT_BYTES: usize = 256 << 20;
+
+/// An opened traverse.
+pub struct Traverse {
+    folder: PathBuf,
+    index_path: PathBuf,
+    index: TraverseIndex,
+    cameras: Vec<StopCameras>,
+    warnings: Vec<String>,
+    cache: Mutex<ImageCache>,
+    pub(super) features: SharedStore,
+    pub(super) simulated: Option<Simulated>,
+}
+
+impl Traverse {
+    /// Opens a traverse by its folder or its index.
+    ///
+    /// # Errors
+    /// A missing or malformed index, an unknown version, no stop, an implausible pose or camera, a camera file
+    /// that cannot be read, or a name that leaves the folder; the sentence names the file and the field.
+    pub fn open(path: &Path) -> Result<Self> {
+        let (index_path, format) = index_file::find(path)?;
+        let index = index_file::read(&index_path, format)?;
+        let folder = match index_path.parent() {
+            Some(folder) if folder != Path::new("") => folder.to_owned(),
+            _ => PathBuf::from("."),
+        };
+        let problem = |problem| Error::format(&index_path, problem);
+        check::check_index(&index).map_err(problem)?;
+        let read_stop = |(step, stop): (usize, &Stop)| {
+            check::check_stop(stop, &folder).map_err(|problem| format!("stops[{step}].{problem}"))
+        };
+        let cameras = index.stops.iter().enumerate().map(read_stop).collect::<Result<_, _>>();
+        let cameras = cameras.map_err(problem)?;
+        let read_scenario = |name: &String| Simulated::open(&index, name, &folder);
+        let simulated = index.scenario.as_ref().map(read_scenario).transpose().map_err(problem)?;
+        let warnings = check::warnings(&index, &folder);
+        let cache = Mutex::new(ImageCache::new(CACHE_LIMIT_BYTES));
+        let features = SharedStore::default();
+        Ok(Self { folder, index_path, index, cameras, warnings, cache, features, simulated })
+    }
+
+    /// The index as it was read.
+    pub fn index(&self) -> &TraverseIndex {
+        &self.index
+    }
+
+    /// The folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// What a person should know about this traverse, one sentence each.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// The number of stops; all functions below take a `step` smaller than this and panic otherwise, except
+    /// those that return a `Result`.
+    pub fn stop_count(&self) -> usize {
+        self.index.stops.len()
+    }
+
+    /// The left camera in the rover frame, O made unit.
+    pub fn left_camera(&self, step: usize) -> &Camera {
+        &self.cameras[step].left
+    }
+
+    /// The right camera in the rover frame, O made unit.
+    pub fn right_camera(&self, step: usize) -> &Camera {
+        &self.cameras[step].right
+    }
+
+    /// The estimated pose of the rover in the site frame.
+    pub fn site_from_rover(&self, step: usize) -> Pose {
+        self.index.stops[step].site_from_rover.to_pose()
+    }
+
+    /// The true pose of the rover in the site frame, where it is known.
+    pub fn true_site_from_rover(&self, step: usize) -> Option<Pose> {
+        Some(self.index.stops[step].truth.as_ref()?.site_from_rover.to_pose())
+    }
+
+    /// The camera in the rover frame that truly took the left image, as far as is known: the given one where
+    /// the index says nothing else.
+    pub fn true_left_camera(&self, step: usize) -> &Camera {
+        self.cameras[step].true_left()
+    }
+
+    /// The simulated world, whose surface is the truth; `None` for a recorded traverse.
+    ///
+    /// It is built when it is first asked for, which may take seconds.
+    pub fn world(&self) -> Option<&World> {
+        self.simulated.as_ref().map(Simulated::world)
+    }
+
+    /// Whether the images of a stop need no rendering: always for recorded ones, whether they exist or not.
+    pub fn is_ready(&self, step: usize) -> bool {
+        let exists = |view: &View| resolve(&self.folder, &view.image).is_ok_and(|path| path.exists());
+        let stop = &self.index.stops[step];
+        self.simulated.is_none() || (exists(&stop.left) && exists(&stop.right))
+    }
+
+    /// Renders the images of a simulated stop that are missing; does nothing for a recorded one.
+    ///
+    /// # Errors
+    /// No such stop, images that cannot be written, or [`Error::Cancelled`] soon after `cancel` is set.
+    pub fn render_step(&self, step: usize, cancel: &AtomicBool) -> Result<()> {
+        self.stop(step)?;
+        match &self.simulated {
+            Some(simulated) if !self.is_ready(step) => simulated.render_missing(&self.stops(), step, cancel),
+            _ => Ok(()),
+        }
+    }
+
+    /// The stereo pair of a stop, in fractions of full scale; a simulated one is rendered where it is missing.
+    ///
+    /// # Errors
+    /// No such stop, or an image that is missing, damaged or not of its camera's size; the sentence names it.
+    pub fn capture(&self, step: usize) -> Result<StereoPair> {
+        let stop = self.stop(step)?;
+        if let Some(pair) = self.cached(|cache| cache.get(step)) {
+            return Ok(pair);
+        }
+        self.render_step(step, &AtomicBool::new(false))?;
+        let cameras = &self.cameras[step];
+        let pair = StereoPair {
+            left: Arc::new(self.read_image(step, "left", &stop.left, &cameras.left)?),
+            right: Arc::new(self.read_image(step, "right", &stop.right, &cameras.right)?),
+        };
+        self.cached(|cache| cache.insert(step, pair.clone()));
+        Ok(pair)
+    }
+
+    /// One image of a stop, the left or the right one: what is wrong with the other does not matter.
+    ///
+    /// # Errors
+    /// As [`Self::capture`], of this image.
+    pub fn capture_one(&self, step: usize, is_left: bool) -> Result<Arc<GrayImage>> {
+        let stop = self.stop(step)?;
+        match self.capture(step) {
+            Ok(pair) => Ok(if is_left { pair.left } else { pair.right }),
+            Err(_) if is_left => {
+                self.read_image(step, "left", &stop.left, &self.cameras[step].left).map(Arc::new)
+            }
+            Err(_) => self.read_image(step, "right", &stop.right, &self.cameras[step].right).map(Arc::new),
+        }
+    }
+
+    /// The stops as the renderer sees them.
+    pub(super) fn stops(&self) -> Stops<'_> {
+        Stops { folder: &self.folder, index: &self.index, cameras: &self.cameras }
+    }
+
+    fn stop(&self, step: usize) -> Result<&Stop> {
+        let count = self.stop_count();
+        let missing =
+            || Error::Request(format!("there is no step {step}; the traverse has 0 to {}", count - 1));
+        self.index.stops.get(step).ok_or_else(missing)
+    }
+
+    fn cached<T>(&self, work: impl FnOnce(&mut ImageCache) -> T) -> T {
+        // A panic elsewhere cannot leave the cache half changed.
+        work(&mut self.cache.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    fn read_image(&self, step: usize, side: &str, view: &View, camera: &Camera) -> Result<GrayImage> {
+        let which = format!("the {side} image of step {step}");
+        // Checked again, because a link may have been put there since the folder was opened.
+        let path = resolve(&self.folder, &view.image).map_err(|problem| {
+            Error::format(&self.index_path, format!("stops[{step}].{side}.image: {problem}"))
+        })?;
+        let image = io::read_png(&path, self.index.full_scale_dn).map_err(|error| match error {
+            Error::Read { path, source } => Error::format(path, format!("{which} cannot be read ({source})")),
+            Error::Format { path, problem } => Error::format(path, format!("{which}: {problem}")),
+            other => other,
+        })?;
+        if image.dimensions() != (camera.width(), camera.height()) {
+            let ((width, height), [wanted_width, wanted_height]) = (image.dimensions(), camera.size);
+            let problem = format!(
+                "{which} has {width} × {height} pixels, but its camera is for {wanted_width} × {wanted_height}"
+            );
+            return Err(Error::format(path, problem));
+        }
+        Ok(image)
+    }
+}
+
+/// Writes an index into `folder`, which is made where it is missing; images are written by the caller.
+///
+/// # Errors
+/// An index with an implausible number in it, one that is there already and may not be replaced, or a folder that
+/// cannot be written.
+pub fn write(index: &TraverseIndex, folder: &Path, format: IndexFormat, existing: Existing) -> Result<()> {
+    let problem = |problem| Error::format(folder.join(format.file_name()), problem);
+    check::check_index(index).map_err(problem)?;
+    for (step, stop) in index.stops.iter().enumerate() {
+        let numbers = check::check_stop_numbers(stop);
+        numbers.map_err(|sentence| problem(format!("stops[{step}].{sentence}")))?;
+    }
+    index_file::write(index, folder, format, existing)
+}
+
+#[cfg(test)]
+#[path = "native_tests.rs"]
+mod tests;

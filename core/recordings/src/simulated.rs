@@ -1,0 +1,242 @@
+//! A simulated traverse: a native folder whose images are rendered when they are first asked for.
+//!
+//! The folder holds `scenario.toml` and the index that follows from it. An image that is missing is rendered
+//! from the true camera, written under a temporary name and renamed; from then on the file is the image, so a
+//! pair is the same whether it was rendered just now or long ago.
+//!
+//! Rendering makes clean radiance, which is kept ([`RenderCache`]); the image is developed from it. A scenario
+//! that differs in exposure, detector or noise alone finds the radiance there, in a folder that both share
+//! (`Traverse::with_render_cache`). Radiance from there is used if sixteen of its pixels, rendered again, have
+//! the same bits: the same sources may have rendered otherwise on another processor.
+//!
+//! Under automatic exposure both eyes take the exposure of the left one, and each stop starts from the stop
+//! before: an image needs the left radiance of all stops up to its own.
+//!
+//! Each stop has a lock, so that two who ask for the same stop do not render it twice. The lock is not waited
+//! for inside the thread pool: a pool thread that waits for rendering may be given other work to do, and if
+//! that asks for the same stop it would wait for itself. It renders the stop again instead, with the same
+//! bits, and whichever file is renamed last stays. The exposures are known by a lock that is never held while
+//! anything is rendered.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError, TryLockError};
+
+use serde::Serialize;
+
+use super::check::StopCameras;
+use super::files::{resolve, write_atomically};
+use super::render_cache::{self, RenderCache};
+use sightline_geometry::camera::Camera;
+use sightline_geometry::error::{Error, Result};
+use sightline_vision::image::{GrayImage, io};
+use sightline_world::camera::exposure::{Rates, automatic, fixed_s};
+use sightline_world::moment::Moment;
+use sightline_world::scenario::ExposureMode;
+use sightline_world::traverse::{Stop, TraverseIndex};
+use sightline_world::{Eye, NoiseSeed, Region, Scenario, World, clean_radiance, develop};
+
+/// Pixels of a kept picture that are rendered anew before it is believed.
+const PROBES: u32 = 16;
+
+/// The largest scenario file that is read, bytes.
+const SCENARIO_LIMIT: u64 = 1 << 20;
+
+/// The stops whose images are rendered, each with its cameras, and the folder of the images.
+pub(super) struct Stops<'a> {
+    pub(super) folder: &'a Path,
+    pub(super) index: &'a TraverseIndex,
+    pub(super) cameras: &'a [StopCameras],
+}
+
+/// What a simulated traverse has besides its index.
+pub(super) struct Simulated {
+    pub(super) scenario: Scenario,
+    pub(super) world: OnceLock<World>,
+    locks: Vec<Mutex<()>>,
+    pub(super) cache: RenderCache,
+    /// Times of exposure of the first stops, as far as they are known, s.
+    exposures_s: Mutex<Vec<f64>>,
+    pub(super) rendered: AtomicU32,
+}
+
+impl Simulated {
+    /// Reads the scenario of an index that names one; the world is built when it is first needed.
+    pub(super) fn open(index: &TraverseIndex, name: &str, folder: &Path) -> Result<Self, String> {
+        let path = resolve(folder, name).map_err(|problem| format!("scenario: {problem}"))?;
+        let scenario = read_scenario(&path).map_err(|error| format!("scenario: {error}"))?;
+        check_images(index)?;
+        Ok(Self {
+            scenario,
+            world: OnceLock::new(),
+            locks: index.stops.iter().map(|_| Mutex::new(())).collect(),
+            cache: RenderCache::of_traverse(folder),
+            exposures_s: Mutex::new(Vec::new()),
+            rendered: AtomicU32::new(0),
+        })
+    }
+
+    pub(super) fn world(&self) -> &World {
+        self.world.get_or_init(|| World::new(&self.scenario))
+    }
+
+    /// Renders and writes the images of a stop that are not there yet.
+    pub(super) fn render_missing(&self, stops: &Stops<'_>, step: usize, cancel: &AtomicBool) -> Result<()> {
+        let _guard = lock(&self.locks[step]);
+        let stop = &stops.index.stops[step];
+        for (eye, name) in [(Eye::Left, &stop.left.image), (Eye::Right, &stop.right.image)] {
+            let path = resolve(stops.folder, name).map_err(|problem| Error::format(stops.folder, problem))?;
+            if !path.exists() {
+                let time_s = self.exposure_s(stops, step, cancel)?;
+                let (camera, radiance) = self.radiance(stops, step, eye, cancel)?;
+                let seed = NoiseSeed { step: step as u32, eye };
+                let image = develop(&radiance, &self.scenario, &camera, time_s, seed);
+                write_atomically(&path, &self.encode(&image)?)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The time for which both pictures of a stop are exposed, s.
+    pub(super) fn exposure_s(&self, stops: &Stops<'_>, step: usize, cancel: &AtomicBool) -> Result<f64> {
+        let settings = &self.scenario.camera;
+        if settings.exposure == ExposureMode::Fixed {
+            return Ok(fixed_s(self.world(), &self.scenario));
+        }
+        let (first, mut time_s) = {
+            let known = self.exposures_s.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some(time_s) = known.get(step) {
+                return Ok(*time_s);
+            }
+            (known.len(), known.last().copied().unwrap_or(settings.auto_exposure.start_s))
+        };
+        for stop in first..=step {
+            let (camera, radiance) = self.radiance(stops, stop, Eye::Left, cancel)?;
+            let rates = Rates::new(&radiance, &self.scenario, &camera, Eye::Left, [0, 0]);
+            time_s = automatic(&rates, settings, time_s).time_s;
+            let mut known = self.exposures_s.lock().unwrap_or_else(PoisonError::into_inner);
+            // Whoever else was at this stop found the same.
+            if known.len() == stop {
+                known.push(time_s);
+            }
+        }
+        Ok(time_s)
+    }
+
+    /// The camera of a picture in the site and its clean radiance: what was kept, or else rendered and kept.
+    fn radiance(
+        &self,
+        stops: &Stops<'_>,
+        step: usize,
+        eye: Eye,
+        cancel: &AtomicBool,
+    ) -> Result<(Camera, GrayImage)> {
+        if cancel.load(Ordering::Relaxed) {
+            return Err(Error::Cancelled);
+        }
+        let camera = camera_in_site(stops, step, eye)?;
+        let stop = &stops.index.stops[step];
+        let moment = Moment::of(step, stop).ok_or_else(|| Error::Request(needs_truth(step)))?;
+        let world = self.world().at(&moment, &self.scenario);
+        let render = |region: Region| clean_radiance(&world, &self.scenario, &camera, region, cancel);
+        let key = render_cache::key(&self.scenario, &stop_key(stop, step), &camera);
+        if let Some(kept) = self.cache.load(&key, &camera)
+            && renders_alike(&kept, render)?
+        {
+            return Ok((camera, kept));
+        }
+        let radiance = render(Region::whole(&camera))?;
+        self.rendered.fetch_add(1, Ordering::Relaxed);
+        self.cache.store(&key, &radiance);
+        Ok((camera, radiance))
+    }
+
+    /// One image as the bytes of its file.
+    fn encode(&self, image: &GrayImage) -> Result<Vec<u8>> {
+        let full_scale_dn = self.scenario.camera.recorded_full_scale_dn();
+        if full_scale_dn <= 255.0 {
+            io::encode_png_u8(image)
+        } else {
+            io::encode_png_u16(image, Some(full_scale_dn))
+        }
+    }
+}
+
+/// Whether sixteen pixels, spread over a kept picture, are rendered with the same bits.
+fn renders_alike(kept: &GrayImage, render: impl Fn(Region) -> Result<GrayImage>) -> Result<bool> {
+    for probe in 0..PROBES {
+        // Multiples of these two numbers fill a square evenly (Roberts' sequence).
+        let at = |step: f64, side: u32| {
+            let place = (0.5 + step * f64::from(probe)).fract() * f64::from(side);
+            (place as u32).min(side.saturating_sub(1))
+        };
+        let (x, y) = (at(0.754_877_67, kept.width()), at(0.569_840_29, kept.height()));
+        let anew = render(Region { x, y, width: 1, height: 1 })?;
+        if anew.get_pixel(0, 0).0[0].to_bits() != kept.get_pixel(x, y).0[0].to_bits() {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// What a stop's light and scenery can depend on besides the scenario: its number, time and truth.
+pub(super) fn stop_key(stop: &Stop, step: usize) -> impl Serialize {
+    (step, stop.time_s, stop.truth.clone())
+}
+
+/// The camera that truly takes a picture of a stop, in the site frame.
+pub(super) fn camera_in_site(stops: &Stops<'_>, step: usize, eye: Eye) -> Result<Camera> {
+    let truth = stops.index.stops[step].truth.as_ref();
+    let truth = truth.ok_or_else(|| Error::Request(needs_truth(step)))?;
+    let cameras = &stops.cameras[step];
+    let in_rover = match eye {
+        Eye::Left => cameras.true_left(),
+        Eye::Right => cameras.true_right(),
+    };
+    Ok(in_rover.moved(&truth.site_from_rover.to_pose()))
+}
+
+/// Waits for a stop's lock, except inside the thread pool (header).
+fn lock(stop: &Mutex<()>) -> Option<MutexGuard<'_, ()>> {
+    match stop.try_lock() {
+        Ok(guard) => Some(guard),
+        Err(TryLockError::Poisoned(poisoned)) => Some(poisoned.into_inner()),
+        Err(TryLockError::WouldBlock) if rayon::current_thread_index().is_some() => None,
+        Err(TryLockError::WouldBlock) => Some(stop.lock().unwrap_or_else(PoisonError::into_inner)),
+    }
+}
+
+pub(super) fn read_scenario(path: &Path) -> Result<Scenario> {
+    let unreadable = |source| Error::Read { path: path.to_owned(), source };
+    if std::fs::metadata(path).map_err(unreadable)?.len() > SCENARIO_LIMIT {
+        return Err(Error::format(path, "is too large for a scenario"));
+    }
+    let text = std::fs::read_to_string(path).map_err(unreadable)?;
+    Scenario::from_toml(&text, path)
+}
+
+pub(super) fn needs_truth(step: usize) -> String {
+    format!("stops[{step}].truth: is missing, but a simulated stop is rendered from it")
+}
+
+/// Whether all images of an index can be rendered into files of their own.
+fn check_images(index: &TraverseIndex) -> Result<(), String> {
+    let mut names = std::collections::HashSet::new();
+    for (step, stop) in index.stops.iter().enumerate() {
+        if stop.truth.is_none() {
+            return Err(needs_truth(step));
+        }
+        for (side, view) in [("left", &stop.left), ("right", &stop.right)] {
+            if !view.image.ends_with(".png") {
+                return Err(format!("stops[{step}].{side}.image: must end in .png, because it is rendered"));
+            }
+            if !names.insert(view.image.as_str()) {
+                let name = &view.image;
+                return Err(format!(
+                    "stops[{step}].{side}.image: {name} is the image of another view already"
+                ));
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,93 @@
+//! A traverse as the pipeline and the comparison with the truth see it.
+//!
+//! The pipeline is given estimates only: poses, cameras and images. The truth stands in a trait of its own,
+//! so that no stage can look at it. A recorded traverse knows true poses at most: it has no surface, and
+//! nothing is known to hide a point.
+
+use sightline_geometry::camera::{Camera, Mast, MastAngles};
+use sightline_geometry::error::Result;
+use sightline_geometry::frames::{Pixel, Point3, Pose};
+use sightline_rover::pipeline::Stops;
+use sightline_track::locate::store::Shared;
+use sightline_track::stages::capture::StereoPair;
+use sightline_world::surface_point;
+use sightline_world::target_truth::TruthSource;
+
+use super::Traverse;
+use sightline_geometry::odometry_error::OdometryError;
+use sightline_geometry::stereo_geometry::StereoGeometry;
+
+/// Rays along each side of a window by which its shadow is measured.
+const SHADOW_SAMPLES: u32 = 9;
+
+impl Stops for Traverse {
+    fn stop_count(&self) -> usize {
+        self.stop_count()
+    }
+    fn time_s(&self, step: usize) -> f64 {
+        self.index().stops[step].time_s
+    }
+    fn site_from_rover(&self, step: usize) -> Pose {
+        self.site_from_rover(step)
+    }
+    fn cameras(&self, step: usize) -> (&Camera, &Camera) {
+        (self.left_camera(step), self.right_camera(step))
+    }
+    fn mast(&self) -> Option<&Mast> {
+        self.index().mast.as_ref()
+    }
+    fn mast_angles(&self, step: usize) -> Option<MastAngles> {
+        self.index().stops[step].mast_angles
+    }
+    fn odometry_error(&self) -> OdometryError {
+        self.index().odometry_error
+    }
+    fn stereo(&self) -> StereoGeometry {
+        self.index().stereo
+    }
+    fn shared(&self, step: usize) -> Option<Shared<'_>> {
+        Some(Shared { store: &self.features, stop: step })
+    }
+    fn capture(&self, step: usize) -> Result<StereoPair> {
+        self.capture(step)
+    }
+}
+
+impl TruthSource for Traverse {
+    fn true_site_from_rover(&self, step: usize) -> Option<Pose> {
+        self.true_site_from_rover(step)
+    }
+    fn true_left_camera(&self, step: usize) -> &Camera {
+        self.true_left_camera(step)
+    }
+    fn surface_point_in_site(&self, step: usize, pixel: Pixel) -> Option<Point3> {
+        let site_from_rover = self.true_site_from_rover(step)?;
+        surface_point(self.world()?, &self.true_left_camera(step).moved(&site_from_rover), pixel)
+    }
+    fn is_visible(&self, step: usize, point_in_site: &Point3) -> bool {
+        // What an event puts in the way stands there at some stops only.
+        let at_stop = if self.has_occluders() { self.world_at(step).ok() } else { None };
+        let (Some(world), Some(site_from_rover)) =
+            (at_stop.as_ref().or_else(|| self.world()), self.true_site_from_rover(step))
+        else {
+            return true;
+        };
+        let camera_in_site = self.true_left_camera(step).moved(&site_from_rover);
+        // The ray of the point's pixel starts where the light enters, which is not C in a fisheye lens.
+        let ray = camera_in_site.project(point_in_site).and_then(|pixel| camera_in_site.ray(pixel));
+        ray.is_some_and(|ray| world.is_visible(&ray.origin, point_in_site))
+    }
+    fn shadow_share(&self, step: usize, centre: Pixel, size_px: u32) -> Option<f64> {
+        let site_from_rover = self.true_site_from_rover(step)?;
+        let world = self.world_at(step).ok()?;
+        let camera_in_site = self.true_left_camera(step).moved(&site_from_rover);
+        let half_px = f64::from(size_px / 2);
+        let offset = |k: u32| half_px * (2.0 * f64::from(k) / f64::from(SHADOW_SAMPLES - 1) - 1.0);
+        let places = (0..SHADOW_SAMPLES * SHADOW_SAMPLES)
+            .map(|k| centre.offset(offset(k % SHADOW_SAMPLES), offset(k / SHADOW_SAMPLES)));
+        let points: Vec<Point3> =
+            places.filter_map(|pixel| surface_point(&world, &camera_in_site, pixel)).collect();
+        let dark = points.iter().filter(|point| world.in_shadow(point)).count();
+        (!points.is_empty()).then(|| dark as f64 / points.len() as f64)
+    }
+}

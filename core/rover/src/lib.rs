@@ -1,0 +1,9 @@
+//! The loop over the stops of a drive: it obtains images and poses from a drive and calls the stages of `sightline_track`.
+//!
+//! [`pipeline`] is one stop on one page. [`designate`] resolves the three ways to name a target, [`trackability`] rates each
+//! pixel of an image as a target before one is designated.
+
+pub mod pipeline;
+pub mod designate;
+pub mod trackability;
+pub mod version;

@@ -1,0 +1,271 @@
+//! One step, on one page: the six stages in running order, from values to a value.
+//!
+//! ```text
+//! designate:   capture → locate (stereo only) → target
+//! run_step:    predict → point_mast → capture → locate → judge → update
+//! ```
+//! The comparison with the truth is not a stage: `session::track` adds it to the record.
+//! Everything is a function of the traverse, the target as the last stop left it, and the settings: the same
+//! input gives the same bits, and going back is a read of what was recorded.
+
+use std::borrow::Cow;
+
+use sightline_geometry::camera::{Camera, Mast, MastAngles};
+use sightline_geometry::error::{Error, Result};
+use sightline_geometry::frames::{Pixel, Pose};
+use sightline_geometry::odometry_error::OdometryError;
+use sightline_geometry::stereo_geometry::StereoGeometry;
+use sightline_track::locate::store::Shared;
+use sightline_track::locate::{self, DesignateInput, LocateInput, Located, Place, TrackerMemory};
+use sightline_track::settings::Settings;
+use sightline_track::stages::capture::{self, Capture, StereoPair};
+use sightline_track::stages::judge;
+use sightline_track::stages::point_mast::{self, Pointing, UsedPointing};
+use sightline_track::stages::predict;
+use sightline_track::stages::update::{self, Updated};
+use sightline_track::target::{Designation, Target, TrackingState};
+use sightline_track::trace::{StepKind, StepTrace};
+
+/// The stops of a drive, as the stages see them.
+pub trait Stops {
+    /// How many stops there are.
+    fn stop_count(&self) -> usize;
+    /// Time since the first stop, s.
+    fn time_s(&self, step: usize) -> f64;
+    /// The estimated pose.
+    fn site_from_rover(&self, step: usize) -> Pose;
+    /// The left and right camera in the rover frame, at the pointing in use.
+    fn cameras(&self, step: usize) -> (&Camera, &Camera);
+    /// The mast, where it is known.
+    fn mast(&self) -> Option<&Mast>;
+    /// The mast angles in use.
+    fn mast_angles(&self, step: usize) -> Option<MastAngles>;
+    /// The error model of the pose estimates.
+    fn odometry_error(&self) -> OdometryError;
+    /// How the two images of a stop relate.
+    fn stereo(&self) -> StereoGeometry;
+    /// Where the targets of the traverse keep what they share, and which stop of the recording this one is.
+    fn shared(&self, _step: usize) -> Option<Shared<'_>> {
+        None
+    }
+    /// The stereo pair.
+    ///
+    /// # Errors
+    /// A sentence that names the missing or damaged file.
+    fn capture(&self, step: usize) -> Result<StereoPair>;
+}
+
+/// The first step of a run: the 3-D position and template of a designated pixel (R16, R19).
+///
+/// # Errors
+/// [`Error::Target`] when the pixel or step does not exist or no 3-D position is found; file errors of the stop.
+pub fn designate(stops: &dyn Stops, designation: Designation, settings: &Settings) -> Result<StepTrace> {
+    let step = designation.step;
+    if step >= stops.stop_count() {
+        return Err(Error::Target(format!(
+            "step {step} does not exist: the traverse has {} stops",
+            stops.stop_count()
+        )));
+    }
+    let (capture, located, memory) = designated(stops, designation, settings)?;
+    let target = first_target(stops, designation, &located, memory)?;
+    let pointing = pointing(stops, step, &target);
+    let update = Updated {
+        target,
+        state: TrackingState::Tracking,
+        template_renewed: true,
+        correction_m: None,
+        correction_px: None,
+    };
+    Ok(StepTrace {
+        step,
+        time_s: stops.time_s(step),
+        point_mast: pointing,
+        kind: StepKind::Designation { capture, locate: located },
+        update,
+        truth: None,
+    })
+}
+
+/// Finds the position of a designated pixel by the tracker of the settings.
+fn designated(
+    stops: &dyn Stops,
+    designation: Designation,
+    settings: &Settings,
+) -> Result<(Capture, Located, Option<TrackerMemory>)> {
+    let step = designation.step;
+    let (left, right) = stops.cameras(step);
+    let pixel = check_pixel(designation, left)?;
+    let capture = capture::capture(stops.capture(step)?, Some(pixel), settings.template.subframe_px);
+    let (located, memory) = locate::designate(&DesignateInput {
+        step,
+        site_from_rover: &stops.site_from_rover(step),
+        pixel,
+        capture: &capture,
+        left,
+        right,
+        stereo: stops.stereo(),
+        shared: stops.shared(step),
+        settings,
+    });
+    Ok((capture, located, memory))
+}
+
+/// One later step of a run: what `last` left behind is found again at the next stop.
+pub fn run_step(stops: &dyn Stops, last: &Updated, settings: &Settings) -> StepTrace {
+    run_step_displaced(stops, last, settings, None)
+}
+
+/// The same from a prediction that a person put at a pixel of the left image, where they did.
+pub fn run_step_displaced(
+    stops: &dyn Stops,
+    last: &Updated,
+    settings: &Settings,
+    prediction_px: Option<Pixel>,
+) -> StepTrace {
+    let target = &*with_own_memory(stops, &last.target, settings);
+    let step = target.step + 1;
+    let site_from_rover = stops.site_from_rover(step);
+    let prediction = prediction(stops, target, prediction_px);
+    let carried = update::carry(target, step, &prediction);
+    let pointing = pointing(stops, step, &carried);
+    let time_s = stops.time_s(step);
+    let pair = match stops.capture(step) {
+        Ok(pair) => pair,
+        Err(error) => {
+            let kind = StepKind::Damaged { predict: prediction, fault: error.to_string() };
+            let update = unseen(carried, last.state);
+            return StepTrace { step, time_s, point_mast: pointing, kind, update, truth: None };
+        }
+    };
+    let capture = capture::capture(pair, pointing.predicted_left, settings.template.subframe_px);
+    let input = LocateInput {
+        prediction: &prediction,
+        pointing: &pointing,
+        capture: &capture,
+        site_from_rover: &site_from_rover,
+        stereo: stops.stereo(),
+        shared: stops.shared(step),
+        place: place(stops, step, settings),
+        lost_count: lost_count(last.state),
+        settings,
+    };
+    let locate = locate::locate(&input, &target.memory);
+    let judge =
+        judge::judge(target, &prediction, &pointing, &locate, &site_from_rover, last.state, &settings.limits);
+    let update = update::update(carried, &pointing, &capture, &locate, &judge, &site_from_rover, settings);
+    let kind = StepKind::Tracked { predict: prediction, capture, locate, judge };
+    StepTrace { step, time_s, point_mast: pointing, kind, update, truth: None }
+}
+
+/// The update of a stop without images: the target is where the prediction puts it, the state stays.
+fn unseen(carried: Target, state: TrackingState) -> Updated {
+    Updated { target: carried, state, template_renewed: false, correction_m: None, correction_px: None }
+}
+
+/// Where the target should be at the next stop, perhaps displaced.
+fn prediction(stops: &dyn Stops, target: &Target, prediction_px: Option<Pixel>) -> predict::Prediction {
+    let step = target.step + 1;
+    let [then, now] = [target.step, step].map(|step| stops.site_from_rover(step));
+    let predicted = predict::predict(target, &then, &now, &stops.odometry_error());
+    let left = stops.cameras(step).0;
+    let displaced = prediction_px.and_then(|pixel| predict::displaced(&predicted, left, pixel, &now));
+    displaced.unwrap_or(predicted)
+}
+
+/// The target with a memory of the settings' tracker.
+///
+/// A run may change its tracker on the way. The new one cannot read the other's memory; it begins with its own of the
+/// designation, and keeps the position that the other one left. Where it finds no position there, the memory stays, and
+/// with it the tracker.
+fn with_own_memory<'a>(stops: &dyn Stops, target: &'a Target, settings: &Settings) -> Cow<'a, Target> {
+    if target.memory.tracker() == settings.tracker {
+        return Cow::Borrowed(target);
+    }
+    match designated(stops, target.designation, settings) {
+        Ok((_, _, Some(memory))) => Cow::Owned(Target { memory, ..target.clone() }),
+        _ => Cow::Borrowed(target),
+    }
+}
+
+/// The target that a designation makes.
+fn first_target(
+    stops: &dyn Stops,
+    designation: Designation,
+    located: &Located,
+    memory: Option<TrackerMemory>,
+) -> Result<Target> {
+    let Designation { step, pixel } = designation;
+    let (Some(position_in_rover), Some(covariance_in_rover), Some(memory)) =
+        (located.position_in_rover, located.covariance_in_rover, memory)
+    else {
+        let why = located.missing.as_deref().unwrap_or("no 3-D position");
+        return Err(Error::Target(format!(
+            "no 3-D position at pixel ({:.1}, {:.1}): {why}",
+            pixel.x, pixel.y
+        )));
+    };
+    let (left, _) = stops.cameras(step);
+    let distance_m = (position_in_rover - left.model.centre()).norm();
+    Ok(Target {
+        designation,
+        step,
+        position_in_rover,
+        covariance_in_rover,
+        initial_position_in_site: stops.site_from_rover(step) * position_in_rover,
+        initial_distance_m: distance_m,
+        travelled_m: 0.0,
+        last_distance_m: distance_m,
+        travelled_since_update_m: 0.0,
+        memory,
+    })
+}
+
+/// The designated pixel, if the left image has it.
+fn check_pixel(designation: Designation, left: &Camera) -> Result<Pixel> {
+    let pixel = designation.pixel;
+    if pixel.x.is_finite() && pixel.y.is_finite() && pixel.is_inside(left.width(), left.height()) {
+        return Ok(pixel);
+    }
+    Err(Error::Target(format!(
+        "pixel ({}, {}) lies outside the left image of {} x {} pixels",
+        pixel.x,
+        pixel.y,
+        left.width(),
+        left.height()
+    )))
+}
+
+/// Cameras and wanted pointing for a target that was carried to `step`.
+fn pointing(stops: &dyn Stops, step: usize, carried: &Target) -> Pointing {
+    let (left, right) = stops.cameras(step);
+    let used = UsedPointing { mast: stops.mast(), angles: stops.mast_angles(step), left, right };
+    point_mast::point_mast(&carried.position_in_rover, &carried.covariance_in_rover, used)
+}
+
+/// A stop among those of its drive.
+fn place(stops: &dyn Stops, step: usize, settings: &Settings) -> Place {
+    let share = settings.limits.same_camera_focal_share;
+    let changes = |from: usize, to: usize| !is_same_pair(stops.cameras(from).0, stops.cameras(to).0, share);
+    let is_last = step + 1 >= stops.stop_count();
+    Place {
+        step,
+        is_hand_over: step > 0 && changes(step - 1, step),
+        is_last_of_pair: is_last || changes(step, step + 1),
+    }
+}
+
+/// Whether two left cameras are the same one, however it points: equal image size and kind of model, focal lengths that
+/// differ by less than `share`.
+fn is_same_pair(a: &Camera, b: &Camera, share: f64) -> bool {
+    let focal_px = |camera: &Camera| camera.model.focal_length_px(camera.centre_pixel());
+    let is_near = focal_px(a).zip(focal_px(b)).is_none_or(|(a, b)| (a / b - 1.0).abs() < share);
+    a.size == b.size && std::mem::discriminant(&a.model) == std::mem::discriminant(&b.model) && is_near
+}
+
+fn lost_count(state: TrackingState) -> u32 {
+    match state {
+        TrackingState::Lost { count } => count,
+        _ => 0,
+    }
+}

@@ -1,0 +1,182 @@
+//! What is looked at when a place is judged, with its word, its unit and its sentence.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::Verdict;
+use sightline_vision::stereo::Outcome;
+
+/// What a place is judged by, in the order in which reasons are given; the table is in the header of the module above.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Aspect {
+    /// What the designation itself says.
+    Refused,
+    /// The distance from the image's rim.
+    Rim,
+    /// Pixels without data.
+    Data,
+    /// Whether there is a range.
+    Range,
+    /// The nearest depth edge.
+    DepthEdge,
+    /// Pixels at full scale.
+    Saturation,
+    /// Contrast at all.
+    Contrast,
+    /// The expected error of a match.
+    Texture,
+    /// Another place that looks alike.
+    Likeness,
+    /// Relief beyond a plane.
+    Relief,
+    /// Pixels that are much darker than the ground.
+    Dark,
+    /// The error of the range.
+    RangeError,
+    /// The spread of the ranges.
+    DepthRange,
+    /// How far the surface is turned away.
+    Slant,
+}
+
+/// One criterion of a place.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Criterion {
+    /// What is looked at.
+    pub aspect: Aspect,
+    /// What was measured; null where it could not be.
+    pub value: Option<f64>,
+    /// Its unit; empty for shares and scores.
+    pub unit: String,
+    /// From where on it is risky.
+    pub risky: Option<f64>,
+    /// From where on it is bad.
+    pub bad: Option<f64>,
+    /// Whether larger values are better.
+    pub at_least: bool,
+    /// The verdict on this alone.
+    pub verdict: Verdict,
+    /// Where the limit comes from.
+    pub source: String,
+}
+
+impl Aspect {
+    /// All of them.
+    pub const ALL: [Self; 14] = [
+        Self::Refused,
+        Self::Rim,
+        Self::Data,
+        Self::Range,
+        Self::DepthEdge,
+        Self::Saturation,
+        Self::Contrast,
+        Self::Texture,
+        Self::Likeness,
+        Self::Relief,
+        Self::Dark,
+        Self::RangeError,
+        Self::DepthRange,
+        Self::Slant,
+    ];
+
+    /// Its word.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Refused => "designation",
+            Self::Rim => "distance from the rim",
+            Self::Data => "pixels without data",
+            Self::Range => "range",
+            Self::DepthEdge => "distance from a depth edge",
+            Self::Saturation => "overexposed share",
+            Self::Contrast => "contrast",
+            Self::Texture => "expected match 1σ",
+            Self::Likeness => "likeness of another place",
+            Self::Relief => "relief",
+            Self::Dark => "dark share",
+            Self::RangeError => "range error, 3σ",
+            Self::DepthRange => "spread of ranges",
+            Self::Slant => "slant",
+        }
+    }
+
+    /// Its letter in a map.
+    pub fn letter(self) -> char {
+        let place = Self::ALL.iter().position(|aspect| *aspect == self).unwrap_or(0);
+        char::from(b'A' + place as u8)
+    }
+
+    /// The aspect of a letter.
+    pub fn of_letter(letter: u8) -> Option<Self> {
+        Self::ALL.get(usize::from(letter.checked_sub(b'A')?)).copied()
+    }
+
+    /// The unit of its value; empty for shares and scores.
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::Rim | Self::DepthEdge | Self::Texture => "px",
+            Self::Slant => "deg",
+            _ => "",
+        }
+    }
+
+    /// Whether larger values are better.
+    pub const fn at_least(self) -> bool {
+        matches!(self, Self::Rim | Self::DepthEdge | Self::Contrast)
+    }
+
+    /// Where its limit comes from.
+    pub const fn source(self) -> &'static str {
+        match self {
+            Self::Refused => "R16, R21",
+            Self::Rim | Self::Saturation | Self::Texture => "ours",
+            Self::Data => "R66",
+            Self::Range => "R19, R187",
+            Self::RangeError => "K-Eq 1, R35",
+            Self::DepthEdge | Self::Relief => "R119",
+            Self::Slant => "ours, R20",
+            Self::DepthRange | Self::Dark | Self::Contrast => "R21",
+            Self::Likeness => "R68",
+        }
+    }
+
+    /// The reason in one sentence, for what was measured.
+    pub fn sentence(self, value: Option<f64>, verdict: Verdict) -> String {
+        let v = value.unwrap_or(0.0);
+        let percent = 100.0 * v;
+        match self {
+            Self::Refused => "the designation is refused".to_owned(),
+            Self::Rim if verdict == Verdict::Bad => {
+                format!("the window reaches over the image’s rim, {v:.0} px away")
+            }
+            Self::Rim => format!("{v:.0} px from the image’s rim: a step may carry it out"),
+            Self::Data => "pixels without data in the window".to_owned(),
+            Self::Range => format!("no range here: stereo hole ({})", hole(v)),
+            Self::RangeError => format!("far off: the range is known to {percent:.0} % only"),
+            Self::DepthEdge => format!("depth edge {v:.0} px away"),
+            Self::Relief => format!("deep relief in the window: {percent:.0} % of the distance"),
+            Self::DepthRange => format!("the ranges in the window differ by {percent:.0} %"),
+            Self::Slant => {
+                format!("the surface is turned away by {v:.0}°: it will look different from nearby")
+            }
+            Self::Saturation => format!("{percent:.0} % of the window is overexposed"),
+            Self::Dark => format!("{percent:.0} % of the window is dark, perhaps shadow"),
+            Self::Contrast => format!("hardly any contrast: {percent:.1} % of full scale"),
+            Self::Texture => format!("weak texture: a match would be known to {v:.2} px"),
+            Self::Likeness => format!("another place nearby looks the same: {v:.2}"),
+        }
+    }
+}
+
+/// Why dense stereo has no range, by the number of its outcome.
+fn hole(outcome: f64) -> &'static str {
+    match outcome {
+        v if v == f64::from(Outcome::Outside as u8) => "the right image does not show it",
+        v if v == f64::from(Outcome::NoTexture as u8) => "no texture along the row",
+        v if v == f64::from(Outcome::NotUnique as u8) => "several places fit",
+        v if v == f64::from(Outcome::LeftRight as u8) => "the eyes disagree",
+        v if v == f64::from(Outcome::Speckle as u8) => "too small a patch",
+        v if v == f64::from(Outcome::OutOfRange as u8) => "too far away",
+        _ => "not measured",
+    }
+}

@@ -1,0 +1,315 @@
+//! What lies under the pixels of a stop's left image, made once, and the judgement of any of them.
+//!
+//! ```text
+//! longest step = min( step_share · R,  step_stretch · R / (tan θ │sin ε│) )
+//! ```
+//! The first is the papers' rule (R104, R105). The second: driving s along the level turns the line of sight by
+//! s │sin ε│/R in the vertical, which foreshortens a window whose surface is seen at θ from its normal by tan θ times
+//! that; R60's nominal change is 10 %.
+//!
+//! | symbol | name | unit |
+//! |---|---|---|
+//! | R | `range_m` | m |
+//! | θ | `incidence_rad` | rad |
+//! | ε | angle of the line of sight with the level of the rover frame | rad |
+
+use std::sync::Arc;
+
+use super::depth::{Ranges, WindowRanges, edge_distances};
+use super::{Aspect, Criterion, TrackabilityLimits, Verdict, texture};
+use crate::pipeline::Stops;
+use sightline_geometry::camera::Camera;
+use sightline_geometry::error::{Error, Result};
+use sightline_geometry::estimate::quantile::upper_median;
+use sightline_geometry::frames::Pixel;
+use sightline_track::locate::shape_tracker::surface::StopSurface;
+use sightline_track::settings::Settings;
+use sightline_vision::correlate::Focus;
+use sightline_vision::image::GrayImage;
+use sightline_vision::image::patch::{self, Patch};
+use sightline_vision::stereo::StereoSettings;
+
+/// A pixel's way in a step of 10 % towards what is straight ahead, as a share of its distance from the image's middle: 1/(1 − 0.1) − 1.
+const STEP_FLOW: f64 = 0.11;
+
+/// What lies under the pixels of a left image.
+pub struct Ground {
+    /// The stop.
+    pub step: usize,
+    /// The settings with which a target would be designated and tracked.
+    pub settings: Settings,
+    /// The limits.
+    pub limits: TrackabilityLimits,
+    image: Arc<GrayImage>,
+    left: Camera,
+    right: Camera,
+    surface: Arc<StopSurface>,
+    edges_px: Vec<f32>,
+    focus: Focus,
+    noise: f64,
+    level: f64,
+}
+
+/// A place as it was judged.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Assessment {
+    /// Where, px.
+    pub pixel: Pixel,
+    /// The worst verdict of its criteria.
+    pub verdict: Verdict,
+    /// The first criterion with that verdict; none where all are good.
+    pub reason: Option<Aspect>,
+    /// Its criteria.
+    pub criteria: Vec<Measured>,
+    /// The distance from the left camera, m.
+    pub range_m: Option<f64>,
+    /// The longest safe step, m.
+    pub longest_step_m: Option<f64>,
+}
+
+/// One criterion as it was measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measured {
+    /// What was looked at.
+    pub aspect: Aspect,
+    /// What was measured.
+    pub value: Option<f64>,
+    /// From where on it is risky.
+    pub risky: Option<f64>,
+    /// From where on it is bad.
+    pub bad: Option<f64>,
+    /// The verdict on this alone.
+    pub verdict: Verdict,
+}
+
+impl Measured {
+    /// A value against its limits; what could not be measured speaks against nothing.
+    pub fn new(aspect: Aspect, value: Option<f64>, risky: Option<f64>, bad: Option<f64>) -> Self {
+        let beyond = |limit: Option<f64>| {
+            value.zip(limit).is_some_and(|(v, limit)| if aspect.at_least() { v < limit } else { v > limit })
+        };
+        let verdict = match (beyond(bad), beyond(risky)) {
+            (true, _) => Verdict::Bad,
+            (false, true) => Verdict::Risky,
+            _ => Verdict::Good,
+        };
+        Self { aspect, value, risky, bad, verdict }
+    }
+
+    /// The same as it travels.
+    pub fn criterion(&self) -> Criterion {
+        Criterion {
+            aspect: self.aspect,
+            value: self.value.filter(|value| value.is_finite()),
+            unit: self.aspect.unit().to_owned(),
+            risky: self.risky,
+            bad: self.bad,
+            at_least: self.aspect.at_least(),
+            verdict: self.verdict,
+            source: self.aspect.source().to_owned(),
+        }
+    }
+}
+
+impl Assessment {
+    fn new(pixel: Pixel, criteria: Vec<Measured>, seen: Option<(f64, f64)>) -> Self {
+        let verdict = criteria.iter().map(|one| one.verdict).max().unwrap_or_default();
+        let of_worst = criteria.iter().filter(|one| one.verdict == verdict && verdict != Verdict::Good);
+        let reason = of_worst.map(|one| one.aspect).min();
+        let (range_m, longest_step_m) = seen.unzip();
+        Self { pixel, verdict, reason, criteria, range_m, longest_step_m }
+    }
+
+    /// What was measured of the reason.
+    pub fn value(&self) -> Option<f64> {
+        let one = self.criteria.iter().find(|one| Some(one.aspect) == self.reason)?;
+        one.value
+    }
+
+    /// The reason in one sentence; none where the place is good.
+    pub fn sentence(&self) -> Option<String> {
+        self.reason.map(|aspect| aspect.sentence(self.value(), self.verdict))
+    }
+}
+
+impl Ground {
+    /// Looks at a stop. Its surface is shared with the trackers of the traverse.
+    ///
+    /// # Errors
+    /// [`Error::Target`] when there is no such stop, [`Error::Request`] for a pair that cannot be aligned; file errors.
+    pub fn new(
+        stops: &dyn Stops,
+        step: usize,
+        settings: &Settings,
+        limits: &TrackabilityLimits,
+    ) -> Result<Self> {
+        let count = stops.stop_count();
+        if step >= count {
+            return Err(Error::Target(format!("step {step} does not exist: the traverse has {count} stops")));
+        }
+        if let Some(contradiction) = settings.template.contradiction() {
+            return Err(Error::Target(contradiction));
+        }
+        let pair = stops.capture(step)?;
+        let (left, right) = stops.cameras(step);
+        let stereo = StereoSettings::default();
+        let surface = StopSurface::shared(stops.shared(step), &pair, [left, right], &stereo)?;
+        let (image, edges_px) = (pair.left, edge_distances(&surface.disparities, limits));
+        let ranges = Ranges { surface: &surface, left };
+        Ok(Self {
+            step,
+            focus: Focus::new(settings.template.template_size_px, settings.template.focus_px),
+            noise: texture::noise(&image),
+            level: ground_level(&image, &ranges),
+            settings: settings.clone(),
+            limits: limits.clone(),
+            left: left.clone(),
+            right: right.clone(),
+            image,
+            surface,
+            edges_px,
+        })
+    }
+
+    /// Width and height of the left image, px.
+    pub fn size(&self) -> [u32; 2] {
+        self.image.dimensions().into()
+    }
+
+    /// Judges a place by all criteria of the images, or until its verdict is as good as certain.
+    pub fn assess(&self, pixel: Pixel, all: bool) -> Assessment {
+        let mut criteria = vec![self.rim(pixel)];
+        let is_over = |criteria: &[Measured]| {
+            !all && criteria.last().is_some_and(|one: &Measured| one.verdict == Verdict::Bad)
+        };
+        let half = self.settings.template.template_size_px / 2;
+        let window = patch::extract(&self.image, pixel, half, self.settings.template.kernel);
+        let missing = 1.0 - window.valid_share();
+        if criteria[0].verdict != Verdict::Bad {
+            criteria.push(Measured::new(Aspect::Data, Some(missing), None, Some(0.0)));
+        }
+        if is_over(&criteria) {
+            return Assessment::new(pixel, criteria, None);
+        }
+        let seen = self.depth(pixel, &mut criteria);
+        if is_over(&criteria) || missing > 0.0 {
+            return Assessment::new(pixel, criteria, seen);
+        }
+        self.grey_values(&window, &mut criteria);
+        // The dearest one: what is risky already is seldom made worse by it.
+        if all || criteria.iter().all(|one| one.verdict == Verdict::Good) {
+            let (template, limits) = (&self.settings.template, &self.settings.limits);
+            let likeness = texture::likeness(&self.image, pixel, &window, template.search_window_px);
+            let limits = [limits.far_ncc_min, template.renew_ncc];
+            criteria.push(Measured::new(Aspect::Likeness, likeness, Some(limits[0]), Some(limits[1])));
+        }
+        Assessment::new(pixel, criteria, seen)
+    }
+
+    fn rim(&self, pixel: Pixel) -> Measured {
+        let [width, height] = self.size().map(|side| f64::from(side) - 1.0);
+        let distance = pixel.x.min(pixel.y).min(width - pixel.x).min(height - pixel.y);
+        let half = f64::from(self.settings.template.template_size_px / 2);
+        let flow = STEP_FLOW * pixel.distance(Pixel::new(width / 2.0, height / 2.0));
+        Measured::new(Aspect::Rim, Some(distance), Some(half + flow), Some(half + 1.0))
+    }
+
+    /// Range, edges and the window's plane; returns the range and the longest safe step.
+    fn depth(&self, pixel: Pixel, criteria: &mut Vec<Measured>) -> Option<(f64, f64)> {
+        let ranges = Ranges { surface: &self.surface, left: &self.left };
+        let hole = |outcome: sightline_vision::stereo::Outcome| Measured {
+            aspect: Aspect::Range,
+            value: Some(f64::from(outcome as u8)),
+            risky: None,
+            bad: None,
+            verdict: Verdict::Bad,
+        };
+        let Some(at) = ranges.aligned(pixel) else {
+            criteria.push(hole(sightline_vision::stereo::Outcome::Outside));
+            return None;
+        };
+        let Some(point) = ranges.point(at) else {
+            criteria.push(hole(ranges.outcome(at)));
+            return None;
+        };
+        let (range_m, half) =
+            (ranges.range_m(&point), f64::from(self.settings.template.template_size_px / 2));
+        let (limits, own) = (&self.settings.limits, &self.limits);
+        let edge = f64::from(self.edges_px[(at[1] * self.surface.disparities.width + at[0]) as usize]);
+        // Beyond the focus of the refinement an edge has little say.
+        let focus_px = self.settings.template.focus_px;
+        let near = if focus_px > 0.0 { (own.edge_risky_focus * focus_px).min(half) } else { half };
+        let window = ranges.window(at, range_m, half);
+        let error = self.range_error(pixel, range_m);
+        // What stereo errs by looks like relief; far away it is most of it.
+        let noise = error.unwrap_or(0.0);
+        criteria.extend([
+            Measured::new(Aspect::RangeError, error, Some(own.range_error_risky), Some(own.range_error_bad)),
+            Measured::new(Aspect::Relief, window.departure, Some(limits.warn_boundary + noise), None),
+            Measured::new(Aspect::DepthRange, window.spread, Some(limits.warn_depth_range + noise), None),
+            Measured::new(
+                Aspect::Slant,
+                window.incidence_rad.map(f64::to_degrees),
+                Some(own.slant_risky_deg),
+                None,
+            ),
+            Measured::new(Aspect::DepthEdge, Some(edge), Some(near), Some(own.edge_bad_px)),
+        ]);
+        Some((range_m, self.longest_step_m(pixel, range_m, &window)))
+    }
+
+    /// 3σ of the range over the range (K-Eq 1).
+    fn range_error(&self, pixel: Pixel, range_m: f64) -> Option<f64> {
+        let focal_px = self.left.model.focal_length_px(pixel)?;
+        let baseline_m = (self.right.model.centre() - self.left.model.centre()).norm();
+        Some(range_m * self.settings.limits.disparity_error_px / (focal_px * baseline_m))
+    }
+
+    fn longest_step_m(&self, pixel: Pixel, range_m: f64, window: &WindowRanges) -> f64 {
+        let by_range_m = self.limits.step_share * range_m;
+        let sine = self.left.ray(pixel).map_or(0.0, |ray| ray.direction.z.abs());
+        let turn = window.incidence_rad.map_or(0.0, |incidence| incidence.tan().abs() * sine);
+        by_range_m.min(self.limits.step_stretch * range_m / turn.max(1e-9))
+    }
+
+    fn grey_values(&self, window: &Patch, criteria: &mut Vec<Measured>) {
+        let (limits, own) = (&self.settings.limits, &self.limits);
+        let saturated = texture::share(window, |value| f64::from(value) >= own.saturated_level);
+        let dark = texture::share(window, |value| f64::from(value) < own.dark_level * self.level);
+        let sigma = texture::match_sigma_px(window, self.noise, own.step_score, &self.focus);
+        // Without a gradient in some direction a match may lie anywhere in the search window.
+        let sigma = sigma.unwrap_or(f64::from(self.settings.template.search_window_px));
+        let flat = patch::FLAT_STD;
+        criteria.extend([
+            Measured::new(
+                Aspect::Saturation,
+                Some(saturated),
+                Some(own.saturated_risky),
+                Some(own.saturated_bad),
+            ),
+            Measured::new(Aspect::Dark, Some(dark), Some(limits.warn_shadow_share), None),
+            Measured::new(Aspect::Contrast, window.std(), Some(limits.warn_contrast), Some(flat)),
+            Measured::new(
+                Aspect::Texture,
+                Some(sigma),
+                Some(own.match_sigma_risky_px),
+                Some(own.match_sigma_bad_px),
+            ),
+        ]);
+    }
+}
+
+/// The middle grey level of what has a range: the ground, not the sky.
+fn ground_level(image: &GrayImage, ranges: &Ranges<'_>) -> f64 {
+    let mut levels = Vec::new();
+    for y in (0..image.height()).step_by(8) {
+        for x in (0..image.width()).step_by(8) {
+            let value = image.get_pixel(x, y)[0];
+            let place = ranges.aligned(Pixel::new(f64::from(x), f64::from(y)));
+            if value.is_finite() && place.and_then(|place| ranges.point(place)).is_some() {
+                levels.push(value);
+            }
+        }
+    }
+    upper_median(&mut levels).map_or(0.0, f64::from)
+}

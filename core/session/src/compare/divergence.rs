@@ -1,0 +1,168 @@
+//! Where two runs differ first: step, stage and value.
+//!
+//! Stages are compared in running order, so that what is found is the cause rather than what follows from it: a run
+//! that was forked with another search window differs first in `match_template` of its fork step. What stages hand on
+//! without recording it (images, remembered templates) shows in the first stage that makes use of it.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use utoipa::ToSchema;
+
+use super::differ::{self, Difference, Tolerance};
+use super::stages::{PLACES, Place};
+use super::{Compared, Moment, RunName};
+use sightline_record::{ArrayDecl, ArrayKind, ArrayView};
+use sightline_track::records;
+use sightline_track::trace::StepTrace;
+
+/// The most values of a stage that are listed.
+const VALUES_MAX: usize = 40;
+
+/// Where a run and the first one differ first.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct FirstDivergence {
+    /// The run.
+    pub run: RunName,
+    /// How many stops of the two were compared.
+    pub compared: usize,
+    /// Where they differ; null where they do not.
+    pub divergence: Option<Divergence>,
+    /// The same as one sentence.
+    pub sentence: String,
+}
+
+/// A stage in which two runs differ, and how.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Divergence {
+    /// The stop of the first run.
+    pub step: usize,
+    /// The stop of the other run.
+    pub other_step: usize,
+    /// The stage.
+    pub stage: String,
+    /// The step of `locate`, where it is one.
+    pub part: Option<String>,
+    /// The values that differ, the most telling first.
+    pub values: Vec<Difference>,
+    /// How many differ in this stage.
+    pub count: usize,
+}
+
+/// Where run `other` and the first one differ first.
+pub(crate) fn first(
+    runs: &[Compared],
+    other: usize,
+    moments: &[Moment],
+    tolerance: &Tolerance,
+) -> FirstDivergence {
+    let (a, b) = (&runs[0], &runs[other]);
+    let mut compared = 0;
+    let mut divergence = None;
+    for moment in moments {
+        let steps =
+            moment.steps[0].and_then(|step| a.step(step)).zip(moment.steps[other].and_then(|s| b.step(s)));
+        let Some((left, right)) = steps else { continue };
+        compared += 1;
+        // Steps that a fork shares are the very same values.
+        if !Arc::ptr_eq(left, right) {
+            divergence = of_step(left, right, tolerance);
+        }
+        if divergence.is_some() {
+            break;
+        }
+    }
+    let sentence = sentence(divergence.as_ref(), compared);
+    FirstDivergence { run: b.name, compared, divergence, sentence }
+}
+
+/// The first stage in which two steps differ.
+pub(crate) fn of_step(a: &StepTrace, b: &StepTrace, tolerance: &Tolerance) -> Option<Divergence> {
+    PLACES.iter().find_map(|place| {
+        let mut values = of_place(place, a, b, tolerance);
+        let count = values.len();
+        values.truncate(VALUES_MAX);
+        (count > 0).then(|| Divergence {
+            step: a.step,
+            other_step: b.step,
+            stage: place.stage.to_owned(),
+            part: place.part.map(str::to_owned),
+            values,
+            count,
+        })
+    })
+}
+
+/// The values of a stage that differ, the most telling first.
+fn of_place(place: &Place, a: &StepTrace, b: &StepTrace, tolerance: &Tolerance) -> Vec<Difference> {
+    let mut values = differ::differences(&(place.record)(a), &(place.record)(b), tolerance);
+    values.extend(place.arrays().filter_map(|array| of_array(array, a, b, tolerance)));
+    let rank = |value: &Difference| {
+        // A limit that was changed tells more than what was decided by it.
+        let is_limit = value.path.ends_with(".limit");
+        let telling = place.telling.iter().position(|beginning| value.path.starts_with(beginning));
+        (!is_limit, telling.unwrap_or(place.telling.len()))
+    };
+    values.sort_by_key(rank);
+    values
+}
+
+/// How an array differs: in size, or in the first value that does.
+fn of_array(array: &ArrayDecl, a: &StepTrace, b: &StepTrace, tolerance: &Tolerance) -> Option<Difference> {
+    let (name, unit) = (array.name.as_ref(), array.unit.symbol());
+    let path = format!("arrays.{name}");
+    let different = |a: Value, b: Value, delta: Option<f64>, path: String| {
+        Some(Difference { path, unit: delta.map_or("", |_| unit).to_owned(), a, b, delta })
+    };
+    let (left, right) = match (records::array(a, name), records::array(b, name)) {
+        (Some(left), Some(right)) => (left, right),
+        (None, None) => return None,
+        (left, right) => {
+            let there = |view: Option<ArrayView<'_>>| view.map_or(Value::Null, |view| size_of(&view).into());
+            return different(there(left), there(right), None, path);
+        }
+    };
+    if left.size() != right.size() {
+        return different(size_of(&left).into(), size_of(&right).into(), None, path);
+    }
+    // The columns of a table have units of their own: only bits can be compared.
+    if matches!(array.kind, ArrayKind::Table | ArrayKind::Mesh) && !tolerance.is_exact() {
+        return None;
+    }
+    let is_alike = |a: f32, b: f32| {
+        a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()) || tolerance.holds(unit, a.into(), b.into())
+    };
+    let mut pairs = left.values().iter().zip(right.values());
+    let at = pairs.position(|(a, b)| !is_alike(*a, *b))?;
+    let (a, b) = (left.values()[at], right.values()[at]);
+    let columns = left.size()[0].max(1) as usize;
+    let path = format!("{path}.row {} column {}", at / columns, at % columns);
+    different(json!(a), json!(b), Some(f64::from(b) - f64::from(a)).filter(|d| d.is_finite()), path)
+}
+
+fn size_of(view: &ArrayView<'_>) -> String {
+    let [width, height] = view.size();
+    format!("{width} × {height}")
+}
+
+fn sentence(divergence: Option<&Divergence>, compared: usize) -> String {
+    let Some(found) = divergence else {
+        return match compared {
+            0 => "cannot be compared: the two have no stop side by side".to_owned(),
+            1 => "do not differ: the one stop compared is alike".to_owned(),
+            count => format!("do not differ: all {count} stops compared are alike"),
+        };
+    };
+    let place = found.part.as_ref().unwrap_or(&found.stage);
+    let beside = match found.step == found.other_step {
+        true => String::new(),
+        false => format!(" (step {} of the other)", found.other_step),
+    };
+    let value = found.values.first().map_or_else(String::new, |value| {
+        let [a, b] = differ::told_apart(&value.a, &value.b);
+        let line = format!(": {} {a} and {b} {}", differ::words_of(&value.path), value.unit);
+        line.trim_end().to_owned()
+    });
+    format!("first differ at step {}{beside} in {place}{value}", found.step)
+}

@@ -1,0 +1,185 @@
+//! Two to four runs side by side: which stops belong together, every column with its difference, where the first run
+//! and each other one differ first, and which settings do.
+//!
+//! ```text
+//! align        which stops stand side by side: by step, by distance driven, or by time
+//! columns      the lines of a run as columns, gates included
+//! differ       where two records differ, with unit and tolerance
+//! stages       what each stage of a step returned, in running order
+//! divergence   the first step, stage and value at which two runs differ
+//! ```
+//! Runs may be of different targets and trackers, but of one session, whose stops they share. Nothing is interpolated.
+
+pub(crate) mod align;
+pub(crate) mod columns;
+pub mod differ;
+pub(crate) mod divergence;
+pub(crate) mod stages;
+
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use utoipa::ToSchema;
+
+pub use self::align::{Alignment, Moment};
+pub use self::columns::{Column, WordColumn};
+pub use self::differ::{Difference, Tolerance};
+pub use self::divergence::{Divergence, FirstDivergence};
+use super::{Run, Session};
+use sightline_geometry::error::{Error, Result};
+use sightline_track::settings::Settings;
+use sightline_track::trace::StepTrace;
+
+/// The most runs that are compared at a time: there are four marks for them.
+pub const RUNS_MAX: usize = 4;
+
+/// A run of a session.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RunName {
+    /// The target's number.
+    pub target: usize,
+    /// The run's number within it.
+    pub run: usize,
+}
+
+/// Asks for a comparison.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewComparison {
+    /// Two to four runs; the others are compared with the first.
+    pub runs: Vec<RunName>,
+    /// Which stops stand side by side.
+    #[serde(default)]
+    pub align: Alignment,
+    /// By how much values of a unit (`px`, `px2`, `m`, `m2`, `rad`, `deg`, `s`, or `1` for none) may differ and still
+    /// count as equal; a unit that is left out must agree in every bit.
+    #[serde(default)]
+    pub tolerance: BTreeMap<String, f64>,
+    /// The columns to give, by name; left out: all of them.
+    #[serde(default)]
+    pub columns: Option<Vec<String>>,
+}
+
+/// Runs side by side.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Comparison {
+    /// The runs, as they were asked for.
+    pub runs: Vec<RunName>,
+    /// Which stops stand side by side.
+    pub align: Alignment,
+    /// The same as one sentence.
+    pub aligned_by: String,
+    /// The stops that stand side by side.
+    pub moments: Vec<Moment>,
+    /// Numbers, a column each.
+    pub columns: Vec<Column>,
+    /// Words, a column each.
+    pub words: Vec<WordColumn>,
+    /// For each run but the first: where it and the first differ first.
+    pub first: Vec<FirstDivergence>,
+    /// The settings that are not alike.
+    pub settings: Vec<SettingDifference>,
+}
+
+/// A setting that is not alike in all runs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct SettingDifference {
+    /// Its name.
+    pub key: String,
+    /// Its group.
+    pub group: String,
+    /// Its unit; empty for pure numbers and words.
+    pub unit: String,
+    /// Its value in each run.
+    #[schema(value_type = Vec<Object>)]
+    pub values: Vec<Value>,
+}
+
+/// A run that is compared: its configuration and its steps so far.
+#[derive(Clone, Debug)]
+pub struct Compared {
+    /// Which run it is.
+    pub name: RunName,
+    /// Its configuration.
+    pub settings: Arc<Settings>,
+    /// Its steps, the designation first.
+    pub steps: Vec<Arc<StepTrace>>,
+}
+
+impl Compared {
+    /// A run to compare.
+    pub fn new(name: RunName, run: &Run) -> Self {
+        Self { name, settings: Arc::clone(&run.settings), steps: run.steps.clone() }
+    }
+
+    /// The record of a stop, where it was computed.
+    pub fn step(&self, step: usize) -> Option<&Arc<StepTrace>> {
+        let first = self.steps.first()?.step;
+        self.steps.get(step.checked_sub(first)?)
+    }
+}
+
+impl Session {
+    /// The runs that a comparison names.
+    ///
+    /// # Errors
+    /// [`Error::Request`] for fewer than two or more than four, one named twice, or one that does not exist.
+    pub fn compared(&self, runs: &[RunName]) -> Result<Vec<Compared>> {
+        if !(2..=RUNS_MAX).contains(&runs.len()) {
+            let count = runs.len();
+            return Err(Error::Request(format!("runs: name two to {RUNS_MAX} runs to compare, not {count}")));
+        }
+        for (i, name) in runs.iter().enumerate() {
+            if runs[..i].contains(name) {
+                let RunName { target, run } = name;
+                return Err(Error::Request(format!("runs: run {run} of target {target} is named twice")));
+            }
+        }
+        runs.iter().map(|&name| Ok(Compared::new(name, self.run(name.target, name.run)?))).collect()
+    }
+}
+
+/// Compares runs; the others with the first.
+///
+/// # Errors
+/// [`Error::Request`] for a unit or a column that does not exist, or a tolerance that is no size.
+pub fn compare(runs: &[Compared], asked: &NewComparison) -> Result<Comparison> {
+    let tolerance = Tolerance::new(&asked.tolerance)?;
+    let moments = align::moments(runs, asked.align);
+    let (columns, words) = columns::columns(runs, &moments, asked.columns.as_deref())?;
+    let first = (1..runs.len()).map(|other| divergence::first(runs, other, &moments, &tolerance)).collect();
+    Ok(Comparison {
+        runs: runs.iter().map(|run| run.name).collect(),
+        align: asked.align,
+        aligned_by: asked.align.sentence().to_owned(),
+        moments,
+        columns,
+        words,
+        first,
+        settings: settings(runs),
+    })
+}
+
+/// The settings that are not alike in all runs.
+fn settings(runs: &[Compared]) -> Vec<SettingDifference> {
+    let documents: Vec<Value> =
+        runs.iter().map(|run| serde_json::to_value(run.settings.as_ref()).unwrap_or_default()).collect();
+    let value = |document: &Value, group: &str, key: &str| {
+        let inside = document.get(group).and_then(|place| place.get(key));
+        // The choice of the tracker is a group of its own.
+        inside.or_else(|| document.get(key)).cloned().unwrap_or_default()
+    };
+    let differing = |info: sightline_track::limits::SettingInfo| {
+        let values: Vec<Value> =
+            documents.iter().map(|document| value(document, &info.group, &info.key)).collect();
+        let is_alike = values.windows(2).all(|pair| pair[0] == pair[1]);
+        (!is_alike).then_some(SettingDifference { key: info.key, group: info.group, unit: info.unit, values })
+    };
+    Settings::table().into_iter().filter_map(differing).collect()
+}

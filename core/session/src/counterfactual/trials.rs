@@ -1,0 +1,134 @@
+//! Trials of a step: each computes it with a change and says what came of it.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::{Finding, Goal, Moved, Outcome, SettingChange, is_accepted, wording};
+use crate::track::Drive;
+use crate::what_if::{Base, WhatIf, try_step};
+use crate::why::gates::{self, Margin};
+use sightline_geometry::error::{Error, Result};
+use sightline_geometry::frames::Pixel;
+use sightline_track::limits::Limits;
+use sightline_track::settings::Changes;
+use sightline_track::stages::judge;
+use sightline_track::trace::StepTrace;
+
+/// How near a trial came to the goal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Reach {
+    /// Not there.
+    Not,
+    /// Accepted, but false against the truth.
+    ButFalse,
+    /// There.
+    Yes,
+}
+
+/// Computes a step again and again.
+pub(super) struct Trials<'a, D: Drive> {
+    drive: &'a D,
+    /// From what.
+    pub base: Base<'a>,
+    /// To what end.
+    pub goal: Goal,
+    /// How many times so far.
+    pub runs: usize,
+    cancel: &'a AtomicBool,
+}
+
+impl<'a, D: Drive> Trials<'a, D> {
+    pub(super) fn new(drive: &'a D, base: Base<'a>, goal: Goal, cancel: &'a AtomicBool) -> Self {
+        Self { drive, base, goal, runs: 0, cancel }
+    }
+
+    /// Ends the search once it was cancelled.
+    pub(super) fn check(&self) -> Result<()> {
+        if self.cancel.load(Ordering::Relaxed) { Err(Error::Cancelled) } else { Ok(()) }
+    }
+
+    /// The step with changes; none where they are no settings.
+    pub(super) fn run(
+        &mut self,
+        changes: &Changes,
+        prediction_px: Option<Pixel>,
+    ) -> Result<Option<StepTrace>> {
+        self.check()?;
+        self.runs += 1;
+        let what_if = WhatIf { settings: changes.clone(), prediction_px, arrays: Vec::new() };
+        match try_step(self.drive, self.base, &what_if) {
+            Err(Error::Setting { .. }) => Ok(None),
+            tried => tried.map(Some),
+        }
+    }
+
+    /// How near a computed step came.
+    pub(super) fn reach(&self, trace: &StepTrace) -> Reach {
+        let tracked = trace.truth.as_ref().and_then(|truth| truth.tracked);
+        self.reach_of(is_accepted(trace), tracked)
+    }
+
+    /// How near the recorded match would come under other limits; the stage `judge` alone is asked.
+    pub(super) fn rejudged(&self, limits: &Limits) -> Option<Reach> {
+        let trace = self.base.recorded;
+        let verdict = judge::judge(
+            &self.base.last?.update.target,
+            trace.prediction()?,
+            &trace.point_mast,
+            trace.located()?,
+            &self.drive.site_from_rover(trace.step),
+            trace.verdict()?.state_before,
+            limits,
+        );
+        let truth = trace.truth.as_ref();
+        let is_visible = truth.is_some_and(|truth| truth.tracked.is_some());
+        let is_within = truth.is_some_and(|truth| truth.err_px.is_some_and(|e| e <= truth.tolerance_px));
+        Some(self.reach_of(verdict.accepted, is_visible.then_some(verdict.accepted && is_within)))
+    }
+
+    fn reach_of(&self, is_accepted: bool, tracked: Option<bool>) -> Reach {
+        match (self.goal, is_accepted, tracked) {
+            (Goal::Accepted, false, _) | (Goal::NotFalse, true, Some(false)) => Reach::Not,
+            (Goal::Accepted, true, Some(false)) => Reach::ButFalse,
+            _ => Reach::Yes,
+        }
+    }
+
+    /// The gate that failed worst in the recorded step.
+    pub(super) fn worst_gate(&self) -> Option<Margin<'a>> {
+        let verdict = self.base.recorded.verdict()?;
+        gates::by_margin(&verdict.gates).into_iter().find(|margin| !margin.gate.passed)
+    }
+
+    /// What a change brought, in words and numbers.
+    pub(super) fn finding(
+        &self,
+        changes: Vec<SettingChange>,
+        moved: Option<Moved>,
+        relative: f64,
+        (trace, runs): (&StepTrace, usize),
+    ) -> Finding {
+        let outcome = match (is_accepted(trace), trace.truth.as_ref().and_then(|truth| truth.tracked)) {
+            (false, _) => Outcome::Rejected,
+            (true, Some(true)) => Outcome::Right,
+            (true, Some(false)) => Outcome::False,
+            (true, None) => Outcome::Unknown,
+        };
+        let worst = self.worst_gate().map(|margin| margin.gate);
+        let after = trace.verdict().into_iter().flat_map(|verdict| &verdict.gates);
+        let after = worst.and_then(|gate| after.into_iter().find(|after| after.name == gate.name));
+        let mut finding = Finding {
+            changes,
+            moved,
+            relative,
+            outcome,
+            gate: worst.map(|gate| gate.name.clone()),
+            gate_unit: worst.map_or_else(String::new, |gate| gate.unit.clone()),
+            margin_after: after.and_then(|gate| gate.margin),
+            row: trace.row(),
+            runs,
+            sentence: String::new(),
+        };
+        finding.sentence = wording::sentence(&finding, trace);
+        finding
+    }
+}

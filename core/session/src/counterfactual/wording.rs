@@ -1,0 +1,51 @@
+//! A finding as one sentence.
+
+use serde_json::Value;
+
+use super::{Finding, Outcome};
+use crate::why::words::{number, signed};
+use sightline_track::trace::StepTrace;
+
+/// What changes, what came of it, and how sure that is.
+pub(super) fn sentence(finding: &Finding, trace: &StepTrace) -> String {
+    let mut what: Vec<String> = finding
+        .changes
+        .iter()
+        .map(|change| {
+            let unit = if change.unit.is_empty() { String::new() } else { format!(" {}", change.unit) };
+            format!("{} {} instead of {}{unit}", change.setting, plain(&change.to), plain(&change.from))
+        })
+        .collect();
+    if let Some(moved) = &finding.moved {
+        let (dx, dy) = (moved.to.x - moved.from.x, moved.to.y - moved.from.y);
+        let way = number(moved.from.distance(moved.to));
+        what.push(format!(
+            "the prediction moved by ({}, {}) px, {way} px ({})",
+            signed(dx),
+            signed(dy),
+            moved.because
+        ));
+    }
+    let truth = trace.truth.as_ref().and_then(|truth| truth.err_px);
+    let off = truth.map_or_else(String::new, |err_px| format!(", {} px from the truth", number(err_px)));
+    let outcome = match finding.outcome {
+        Outcome::Right => format!("accepted and right{off}"),
+        Outcome::Rejected => "rejected, as it should be".to_owned(),
+        Outcome::Unknown => "accepted; whether it is right is not known".to_owned(),
+        Outcome::False => format!("accepted, but FALSE tracking{off}"),
+    };
+    let margin =
+        finding.gate.as_ref().zip(finding.margin_after).map_or_else(String::new, |(gate, margin)| {
+            format!("; {gate} has a margin of {} {}", signed(margin), finding.gate_unit).trim_end().to_owned()
+        });
+    format!("{}: {outcome}{margin}.", what.join(" and "))
+}
+
+/// A value of a setting without quotation marks.
+fn plain(value: &Value) -> String {
+    match (value.as_f64(), value.as_str()) {
+        (Some(number), _) => format!("{number}"),
+        (None, Some(word)) => word.to_owned(),
+        (None, None) => value.to_string(),
+    }
+}

@@ -1,0 +1,235 @@
+//! One person's work on one traverse: targets, their runs, and the cursor. Without a network and without files.
+//!
+//! A *run* is one configuration over one target. Its steps are recorded as they are computed, so that going
+//! back is a read. Changing a setting never overwrites: it forks a new run that shares the steps before the
+//! fork. What is worth keeping is small: [`Session::saved`] is the list of what the person did, from which
+//! the same session comes again bit for bit, since every step is a function of its input.
+
+pub mod counterfactual;
+pub mod documents;
+pub mod exports;
+pub mod notes;
+pub mod progress;
+mod removal;
+mod run;
+pub mod shell;
+pub mod track;
+pub mod view;
+pub mod photometry;
+pub mod format;
+pub mod what_if;
+pub mod why;
+pub mod compare;
+pub mod metrics;
+pub mod expression;
+pub mod breakpoints;
+pub mod query;
+pub mod reproduce;
+#[cfg(test)]
+mod breakpoint_tests;
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+pub use self::breakpoints::Breakpoints;
+pub use self::progress::Next;
+pub use self::run::{Fork, Run};
+use sightline_geometry::error::{Error, Result};
+use sightline_geometry::frames::Pixel;
+use sightline_track::settings::{Changes, Settings};
+use sightline_track::target::Designation;
+use sightline_track::trace::StepTrace;
+
+/// What every panel is a view of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cursor {
+    /// The target looked at, by its number; null before the first is picked.
+    pub target: Option<usize>,
+    /// The run looked at, by its number within the target.
+    pub run: usize,
+    /// The stop looked at.
+    pub step: usize,
+}
+
+/// A designated target with its runs.
+#[derive(Clone, Debug)]
+pub struct TargetRecord {
+    /// What the person calls it.
+    pub label: String,
+    /// How it was designated.
+    pub designation: Designation,
+    /// Its runs; forks are later than what they forked from.
+    pub runs: Vec<Run>,
+    /// Whether the person removed it; numbers of the others stay as they are.
+    pub removed: bool,
+}
+
+/// One person's work on one traverse.
+#[derive(Clone, Debug)]
+pub struct Session {
+    /// The session's name in paths.
+    pub id: String,
+    /// The traverse's name in paths.
+    pub traverse: String,
+    /// How many stops the traverse has.
+    pub stop_count: usize,
+    /// The targets, by number.
+    pub targets: Vec<TargetRecord>,
+    /// What is looked at.
+    pub cursor: Cursor,
+    /// The conditions that are looked for.
+    pub breakpoints: Breakpoints,
+}
+
+/// What a run needs for its next step.
+#[derive(Clone, Debug)]
+pub struct Pending {
+    /// The designation.
+    pub first: Arc<StepTrace>,
+    /// The last step so far.
+    pub last: Arc<StepTrace>,
+    /// The run's configuration.
+    pub settings: Arc<Settings>,
+    /// Where a person put the prediction of the step in the left image, px.
+    pub prediction_px: Option<Pixel>,
+}
+
+impl Session {
+    /// A session without targets.
+    pub fn new(id: impl Into<String>, traverse: impl Into<String>, stop_count: usize) -> Self {
+        let (targets, cursor, breakpoints) = (Vec::new(), Cursor::default(), Breakpoints::default());
+        Self { id: id.into(), traverse: traverse.into(), stop_count, targets, cursor, breakpoints }
+    }
+
+    /// Adds a target whose designation was computed, and looks at it. Returns its number.
+    pub fn add_target(&mut self, label: Option<String>, settings: Settings, first: Arc<StepTrace>) -> usize {
+        let number = self.targets.len();
+        let designation = first.update.target.designation;
+        let label =
+            label.filter(|l| !l.trim().is_empty()).unwrap_or_else(|| format!("target {}", number + 1));
+        let run = Run::new(Arc::new(settings), None, vec![first]);
+        self.targets.push(TargetRecord { label, designation, runs: vec![run], removed: false });
+        self.cursor = Cursor { target: Some(number), run: 0, step: designation.step };
+        number
+    }
+
+    /// Removes a target; its number is not used again.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when there is no such target.
+    pub fn remove_target(&mut self, target: usize) -> Result<()> {
+        self.target_mut(target)?.removed = true;
+        if self.cursor.target == Some(target) {
+            let other = self.targets.iter().rposition(|record| !record.removed);
+            self.cursor = Cursor { target: other, run: 0, step: self.cursor.step };
+        }
+        Ok(())
+    }
+
+    /// Forks `run`: the steps before `from_step` are shared, the later ones are computed with changed settings.
+    /// At the designation's own step `redesignated` must hold the designation under the new settings.
+    /// Returns the number of the new run.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when there is no such target, run or step; [`Error::Setting`] for a bad change.
+    pub fn fork(
+        &mut self,
+        target: usize,
+        run: usize,
+        from_step: usize,
+        changes: &Changes,
+        redesignated: Option<Arc<StepTrace>>,
+    ) -> Result<usize> {
+        let parent = self.run(target, run)?;
+        let settings = Arc::new(parent.settings.with(changes)?);
+        let kept: Vec<_> = match redesignated {
+            Some(first) => vec![first],
+            None => parent.steps.iter().filter(|trace| trace.step < from_step).cloned().collect(),
+        };
+        if kept.is_empty() || kept.last().is_some_and(|last| last.step + 1 < from_step) {
+            return Err(Error::Request(format!(
+                "run {run} of target {target} has no step before step {from_step} yet"
+            )));
+        }
+        let forked = Run::new(settings, Some(Fork::new(run, from_step)), kept);
+        let record = self.target_mut(target)?;
+        record.runs.push(forked);
+        Ok(record.runs.len() - 1)
+    }
+
+    /// What the next step of a run needs; none when the run is complete or stopped.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when there is no such target or run.
+    pub fn pending(&self, target: usize, run: usize) -> Result<Option<Pending>> {
+        let run = self.any_run(target, run)?;
+        let end = run.stop_after.map_or(self.stop_count, |stop| self.stop_count.min(stop + 1));
+        let last = run.steps.last().filter(|last| last.step + 1 < end && run.stopped.is_none());
+        Ok(last.map(|last| Pending {
+            first: Arc::clone(&run.steps[0]),
+            last: Arc::clone(last),
+            settings: Arc::clone(&run.settings),
+            prediction_px: run.displaced_at(last.step + 1),
+        }))
+    }
+
+    /// Records the next step of a run; a step that does not follow the last one is refused.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when there is no such target or run, or the step is not the next one.
+    pub fn record(&mut self, target: usize, run: usize, trace: Arc<StepTrace>) -> Result<()> {
+        let run = self.run_mut(target, run)?;
+        let expected = run.steps.last().map(|last| last.step + 1);
+        if expected != Some(trace.step) {
+            return Err(Error::Request(format!("step {} does not follow the run's last one", trace.step)));
+        }
+        run.steps.push(trace);
+        Ok(())
+    }
+
+    /// Moves the cursor; going back is a read.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when it names what does not exist.
+    pub fn move_cursor(&mut self, cursor: Cursor) -> Result<()> {
+        if let Some(target) = cursor.target {
+            self.run(target, cursor.run)?;
+        }
+        if cursor.step >= self.stop_count {
+            let count = self.stop_count;
+            return Err(Error::Request(format!(
+                "step {} does not exist: the traverse has {count} stops",
+                cursor.step
+            )));
+        }
+        self.cursor = cursor;
+        Ok(())
+    }
+
+    /// A target that was not removed.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when there is none of that number.
+    pub fn target(&self, target: usize) -> Result<&TargetRecord> {
+        let found = self.targets.get(target).filter(|record| !record.removed);
+        found.ok_or_else(|| Error::Request(format!("session {} has no target {target}", self.id)))
+    }
+
+    /// A run of a target that was not removed.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when there is none of that number.
+    pub fn run(&self, target: usize, run: usize) -> Result<&Run> {
+        let found = self.any_run(target, run).ok().filter(|found| !found.removed);
+        found.ok_or_else(|| self.no_run(target, run))
+    }
+
+    fn target_mut(&mut self, target: usize) -> Result<&mut TargetRecord> {
+        let message = format!("session {} has no target {target}", self.id);
+        let found = self.targets.get_mut(target).filter(|record| !record.removed);
+        found.ok_or(Error::Request(message))
+    }
+}

@@ -1,0 +1,105 @@
+//! Removing targets and runs, and taking that back: nothing that was recorded is overwritten or lost.
+//!
+//! Runs are a tree: a run shares the steps before its fork with the one it left. A removed run is hidden, its number is
+//! not used again, and it is still computed after a restart where a run that left it needs its steps.
+
+use crate::{Cursor, Run, Session};
+use sightline_geometry::error::{Error, Result};
+use sightline_geometry::frames::Pixel;
+
+impl Session {
+    /// Takes the removal of a target back, and looks at it.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when there is no such target, or it was not removed.
+    pub fn restore_target(&mut self, target: usize) -> Result<()> {
+        let id = self.id.clone();
+        let found = self.targets.get_mut(target).filter(|record| record.removed);
+        let record =
+            found.ok_or_else(|| Error::Request(format!("session {id} has no removed target {target}")))?;
+        record.removed = false;
+        let run = record.runs.iter().rposition(|run| !run.removed).unwrap_or(0);
+        self.cursor = Cursor { target: Some(target), run, step: self.cursor.step };
+        Ok(())
+    }
+
+    /// Removes a run; what left it keeps the steps that both share. The cursor goes to the run that it left.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when there is no such run, or no other one.
+    pub fn remove_run(&mut self, target: usize, run: usize) -> Result<()> {
+        let parent = self.run(target, run)?.fork.map(|fork| fork.run);
+        let record = self.target(target)?;
+        let others: Vec<usize> =
+            (0..record.runs.len()).filter(|&other| other != run && !record.runs[other].removed).collect();
+        let next = parent.filter(|parent| others.contains(parent)).or(others.first().copied());
+        let next = next.ok_or_else(|| {
+            Error::Request(format!("run {run} is the only one of target {target}: remove the target instead"))
+        })?;
+        self.run_mut(target, run)?.removed = true;
+        if (self.cursor.target, self.cursor.run) == (Some(target), run) {
+            self.cursor.run = next;
+        }
+        Ok(())
+    }
+
+    /// Takes the removal of a run back.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when there is no such run, or it was not removed.
+    pub fn restore_run(&mut self, target: usize, run: usize) -> Result<()> {
+        if !self.any_run(target, run)?.removed {
+            return Err(Error::Request(format!("run {run} of target {target} was not removed")));
+        }
+        self.run_mut(target, run)?.removed = false;
+        Ok(())
+    }
+
+    /// Whether somebody looks at a run, or at one that left it, so that its steps must be computed.
+    pub fn is_needed(&self, target: usize, run: usize) -> bool {
+        let Ok(record) = self.target(target) else { return false };
+        let leaves = |child: &Run| child.fork.is_some_and(|fork| fork.run == run);
+        record.runs.get(run).is_some_and(|found| !found.removed)
+            || (run + 1..record.runs.len())
+                .any(|child| leaves(&record.runs[child]) && self.is_needed(target, child))
+    }
+
+    /// Puts the prediction of a run's first own step at a pixel of the left image; before that step was computed.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when there is no such run, or it begins with a designation, which has no prediction.
+    pub fn displace(&mut self, target: usize, run: usize, prediction_px: Pixel) -> Result<()> {
+        let designated = self.target(target)?.designation.step;
+        let fork = self.run_mut(target, run)?.fork.as_mut().filter(|fork| fork.from_step > designated);
+        let fork = fork.ok_or_else(|| Error::Request(NO_PREDICTION.to_owned()))?;
+        fork.prediction_px = Some(prediction_px);
+        Ok(())
+    }
+
+    /// A run of a target, removed or not.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when there is none of that number.
+    pub(crate) fn any_run(&self, target: usize, run: usize) -> Result<&Run> {
+        let found = self.target(target)?.runs.get(run);
+        found.ok_or_else(|| self.no_run(target, run))
+    }
+
+    pub(super) fn no_run(&self, target: usize, run: usize) -> Error {
+        match self.target(target) {
+            Ok(_) => Error::Request(format!("target {target} has no run {run}")),
+            Err(error) => error,
+        }
+    }
+}
+
+/// Why a designation cannot be displaced.
+pub(super) const NO_PREDICTION: &str =
+    "prediction_px: the target is designated at this step, so that nothing is predicted: leave it out";
+
+impl Run {
+    /// Where a person put the prediction of a step in the left image, px.
+    pub fn displaced_at(&self, step: usize) -> Option<Pixel> {
+        self.fork.filter(|fork| fork.from_step == step).and_then(|fork| fork.prediction_px)
+    }
+}

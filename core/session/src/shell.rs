@@ -1,0 +1,89 @@
+//! Commands as a person can paste them into a shell.
+
+use serde_json::Value;
+
+use sightline_track::settings::Changes;
+use sightline_track::target::Designation;
+
+/// A word as a POSIX shell reads it, in quotes where it must be.
+pub fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:,=@%+".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', "'\\''"))
+    }
+}
+
+/// Changed settings as arguments of `sightline track` and `sightline export`, each behind a space.
+pub(crate) fn settings_arguments(changes: &Changes) -> String {
+    let argument = |(key, value): (&String, &Value)| {
+        let value = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+        format!(" --set {}", quoted(&format!("{key}={value}")))
+    };
+    changes.iter().map(argument).collect()
+}
+
+/// The command that designates a target and tracks it; `drive` is what the command line opens.
+pub fn track(drive: &str, designation: Designation, changes: &Changes) -> String {
+    let Designation { step, pixel } = designation;
+    let from = if step == 0 { String::new() } else { format!(" --from-step {step}") };
+    let settings = settings_arguments(changes);
+    format!("sightline track {} --target {},{}{from}{settings}", quoted(drive), pixel.x, pixel.y)
+}
+
+/// A request over HTTP, to be written as `curl`.
+#[derive(Clone, Copy, Debug)]
+pub struct Curl<'a> {
+    /// Its method.
+    pub method: &'a str,
+    /// Its whole address.
+    pub url: &'a str,
+    /// Its JSON body.
+    pub body: Option<&'a str>,
+    /// The revision that was read, for `If-Match`.
+    pub revision: Option<u64>,
+    /// The file into which the answer goes; none for the standard output.
+    pub file: Option<&'a str>,
+}
+
+impl Curl<'_> {
+    /// The command: silent but for problems, which make it fail.
+    pub fn text(&self) -> String {
+        let mut text = "curl -fsS".to_owned();
+        if self.method != "GET" {
+            text.push_str(&format!(" -X {}", self.method));
+        }
+        if let Some(file) = self.file {
+            text.push_str(&format!(" -o {}", quoted(file)));
+        }
+        text.push_str(&format!(" {}", quoted(self.url)));
+        if let Some(revision) = self.revision {
+            text.push_str(&format!(" -H {}", quoted(&format!("If-Match: \"{revision}\""))));
+        }
+        if let Some(body) = self.body {
+            // Raw, because a body that begins with @ would be the name of a file.
+            text.push_str(&format!(" -H 'Content-Type: application/json' --data-raw {}", quoted(body)));
+        }
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_words_that_need_quotes_have_them() {
+        assert_eq!(quoted("s1/rows.csv"), "s1/rows.csv");
+        assert_eq!(quoted("it's $HOME"), "'it'\\''s $HOME'");
+        assert_eq!(quoted(""), "''");
+    }
+
+    #[test]
+    fn settings_are_given_as_a_person_writes_them() {
+        let changes =
+            [("ncc_min".to_owned(), Value::from(0.6)), ("tracker".to_owned(), Value::from("features"))];
+        assert_eq!(settings_arguments(&changes.into()), " --set ncc_min=0.6 --set tracker=features");
+    }
+}

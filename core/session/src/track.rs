@@ -1,0 +1,77 @@
+//! The tracker over a traverse: one step of a run with its comparison against the truth.
+//!
+//! Page, REST and command line all come through these two functions, so that they show the same numbers.
+
+use sightline_geometry::error::Result;
+use sightline_geometry::frames::Pixel;
+use sightline_rover::pipeline::{self, Stops};
+use sightline_track::locate::template::warnings;
+use sightline_track::settings::Settings;
+use sightline_track::target::Designation;
+use sightline_track::trace::StepTrace;
+use sightline_world::target_truth::{TargetTruth, TruthSource};
+
+/// A traverse that can be tracked and, where its truth is known, judged.
+pub trait Drive: Stops + TruthSource {}
+impl<T: Stops + TruthSource> Drive for T {}
+
+/// The first step of a run.
+///
+/// # Errors
+/// [`sightline_geometry::error::Error::Target`] when there is no such pixel or no 3-D position under it; file errors.
+pub fn designate<D: Drive>(drive: &D, designation: Designation, settings: &Settings) -> Result<StepTrace> {
+    let mut trace = pipeline::designate(drive, designation, settings)?;
+    compare(drive, &mut trace, None);
+    warn_of_shadow(drive, &mut trace, settings);
+    Ok(trace)
+}
+
+/// Adds the warning of a shadow on the window (R21), which only a source of truth knows.
+fn warn_of_shadow<D: Drive>(drive: &D, trace: &mut StepTrace, settings: &Settings) {
+    let Designation { step, pixel } = trace.update.target.designation;
+    let warning = drive
+        .shadow_share(step, pixel, settings.template.template_size_px)
+        .and_then(|share| warnings::of_shadow(share, &settings.limits));
+    let evidence = trace.located_mut().and_then(|located| located.evidence.template_mut());
+    if let (Some(evidence), Some(warning)) = (evidence, warning) {
+        evidence.warnings.push(warning);
+    }
+}
+
+/// The step after `last`; `first` is the run's designation.
+pub fn advance<D: Drive>(drive: &D, first: &StepTrace, last: &StepTrace, settings: &Settings) -> StepTrace {
+    advance_displaced(drive, first, last, settings, None)
+}
+
+/// The same from a prediction that a person put at a pixel of the left image, where they did.
+pub fn advance_displaced<D: Drive>(
+    drive: &D,
+    first: &StepTrace,
+    last: &StepTrace,
+    settings: &Settings,
+    prediction_px: Option<Pixel>,
+) -> StepTrace {
+    let mut trace = pipeline::run_step_displaced(drive, &last.update, settings, prediction_px);
+    compare(drive, &mut trace, Some(first));
+    trace
+}
+
+/// All steps of a run, from the designation to the last stop.
+///
+/// # Errors
+/// As [`designate`].
+pub fn run<D: Drive>(drive: &D, designation: Designation, settings: &Settings) -> Result<Vec<StepTrace>> {
+    let mut steps = vec![designate(drive, designation, settings)?];
+    while let Some(last) = steps.last().filter(|last| last.step + 1 < drive.stop_count()) {
+        let next = advance(drive, &steps[0], last, settings);
+        steps.push(next);
+    }
+    Ok(steps)
+}
+
+fn compare<D: Drive>(drive: &D, trace: &mut StepTrace, first: Option<&StepTrace>) {
+    let first = first.unwrap_or(trace);
+    let target = &first.update.target;
+    let truth = TargetTruth::new(drive, target.designation, Some(&target.position_in_rover));
+    trace.truth = truth.and_then(|truth| truth.compare(trace));
+}

@@ -1,0 +1,11 @@
+//! Hands the digest of the sources that decide the row of a study to the compiler.
+
+use std::io;
+use std::path::Path;
+
+use sightline_sources::{emit, with_dependencies};
+
+fn main() -> io::Result<()> {
+    let package = Path::new(env!("CARGO_MANIFEST_DIR"));
+    emit("SIGHTLINE_STUDY_SOURCES", &with_dependencies(package, &package.join(".."))?)
+}

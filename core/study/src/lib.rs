@@ -1,0 +1,29 @@
+//! The validation experiments: grid in, table and figure out. One-off experiments are in `experiments/`.
+//!
+//! ```text
+//! catalogue   the studies by name        point       one point of a grid
+//! plan        what is to be done, keys   staged      a drive as a study stages it
+//! picks       which pixels, and faults   run         one target tracked and judged     step_record   one step of it
+//! row         the table's rows           evenness    rows of targets                   calibration   NEES
+//! wire        what page and server say to each other about studies
+//! randomised  approaches that the seed draws
+//! ```
+
+pub mod calibration;
+pub mod staged;
+pub mod point;
+pub mod catalogue;
+mod confidence;
+pub mod randomised;
+pub mod paper;
+pub mod plan;
+pub mod picks;
+mod step_record;
+pub mod run;
+mod evenness;
+mod hand_over;
+mod hand_over_row;
+pub mod hand_over_table;
+mod spread;
+pub mod row;
+pub mod wire;

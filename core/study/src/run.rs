@@ -1,0 +1,275 @@
+//! One target tracked in one configuration, judged at every step: the engine of the studies.
+//!
+//! All targets of a unit are tracked at the same time, each by the very functions of `session::track`. A step lets go of
+//! its images when the next is there. Judged is by R116 (`truth.rs`); beside it stand
+//!
+//! * drift: `│ x_end − T_true x_0 │`, where x_0 is the first estimate in the rover frame of the designation and T_true
+//!   the true motion of the rover since: what tracking added to the error of the designation, m;
+//! * the error along the line of sight of the left camera, m; positive: estimated too far.
+//!
+//! At the step of a fault the target is *tracked* (state `tracking`, within the tolerance of R116), *lost* (declared so)
+//! or *false* (says tracked, is not). There the truth is projected even where something hides it: a window of which a
+//! corner is hidden may be tracked rightly.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::confidence::Trust;
+use super::hand_over::HandOver;
+use super::point::{Fault, Point};
+use super::staged::Staged;
+use super::step_record::StepRecord;
+use sightline_geometry::error::{Error, Result};
+use sightline_geometry::frames::{Pixel, Point3};
+use sightline_session::track::{self, Drive};
+use sightline_track::settings::Settings;
+use sightline_track::target::{Designation, TrackingState};
+use sightline_track::trace::{StepTrace, Summary, summarise};
+
+/// A pixel that is to be tracked.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Chosen {
+    /// The pixel of the first left image.
+    pub pixel: Pixel,
+    /// What it belongs to: `row-1`, `boundary`, or `all`.
+    pub group: String,
+    /// The stop of the drive at which something happens to it, where something does.
+    pub fault_step: Option<usize>,
+}
+
+/// What became of a target at one step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Fate {
+    /// State `tracking`, and right.
+    Tracked,
+    /// Declared lost or failed.
+    Lost,
+    /// State `tracking`, and wrong.
+    False,
+}
+
+/// One target's run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Run {
+    /// The target's number in its world.
+    pub target: usize,
+    /// What it belongs to.
+    pub group: String,
+    /// The designated pixel.
+    pub pixel: Pixel,
+    /// Why no run was possible: the sentence of the refusal.
+    pub refused: Option<String>,
+    /// Distance from the left camera at designation and at the last step, m.
+    pub distance_m: Option<[f64; 2]>,
+    /// The verdict on the whole run.
+    pub summary: Summary,
+    /// The tracking state after the last step.
+    pub state: Option<String>,
+    /// Located pixel at the last step.
+    pub end_pixel: Option<Pixel>,
+    /// The truth's pixel at the last step.
+    pub true_end_pixel: Option<Pixel>,
+    /// What tracking added to the error, m.
+    pub drift_m: Option<f64>,
+    /// Error at the last step along the line of sight, m.
+    pub err_range_m: Option<f64>,
+    /// Largest 1σ axis of the covariance at the last step, m.
+    pub sigma_m: Option<f64>,
+    /// Squared Mahalanobis distance of the error at the last step.
+    pub nees: Option<f64>,
+    /// What the confidence was worth, and how far the measured motions were off.
+    #[serde(default)]
+    pub trust: Trust,
+    /// What the shape was worth, where it was asked.
+    #[serde(default)]
+    pub hand_over: HandOver,
+    /// What became of it at the last step; null without truth.
+    pub end: Option<Fate>,
+    /// Whether the last step was lost although its evidence was right.
+    pub end_is_false_loss: bool,
+    /// The step of the fault, where there was one.
+    pub fault_step: Option<usize>,
+    /// What became of it at that step.
+    pub at_fault: Option<Fate>,
+    /// Steps from the fault on that were false.
+    pub false_after_fault: usize,
+    /// Every step, where the study asks for them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub steps: Vec<StepRecord>,
+}
+
+/// Who waits for a study: told after every run, and able to stop it.
+pub struct Watch<'a> {
+    /// Stops the study soon after it is set.
+    pub cancel: &'a AtomicBool,
+    /// Called after every run, from several threads.
+    pub tell: &'a (dyn Fn() + Sync),
+}
+
+/// Tracks every target of a point through a drive.
+///
+/// # Errors
+/// [`Error::Cancelled`] soon after the watch is told to end.
+pub fn measure<D: Drive>(
+    drive: &D,
+    point: &Point,
+    chosen: &[Chosen],
+    settings: &Settings,
+    keep_steps: bool,
+    watch: &Watch<'_>,
+) -> Result<Vec<Run>> {
+    let staged = Staged::new(drive, point.visit.by(settings.tracker));
+    let staged = match point.fault {
+        Some(Fault::HeadingJump { step, yaw_deg }) => staged.with_heading_jump(step, yaw_deg.to_radians()),
+        Some(Fault::PositionJump { across_m }) => staged.with_position_jump(across_m),
+        _ => staged,
+    };
+    let one = |(target, chosen): (usize, &Chosen)| -> Result<Run> {
+        let mut follower = Follower::new(target, chosen, keep_steps);
+        follower.follow(&staged, settings, watch.cancel)?;
+        (watch.tell)();
+        Ok(follower.run)
+    };
+    chosen.par_iter().enumerate().map(one).collect()
+}
+
+/// A run that is being made.
+struct Follower {
+    run: Run,
+    keep_steps: bool,
+}
+
+impl Follower {
+    fn new(target: usize, chosen: &Chosen, keep_steps: bool) -> Self {
+        let run = Run {
+            target,
+            group: chosen.group.clone(),
+            pixel: chosen.pixel,
+            refused: None,
+            distance_m: None,
+            summary: Summary::default(),
+            state: None,
+            end_pixel: None,
+            true_end_pixel: None,
+            drift_m: None,
+            err_range_m: None,
+            sigma_m: None,
+            nees: None,
+            trust: Trust::default(),
+            hand_over: HandOver::default(),
+            end: None,
+            end_is_false_loss: false,
+            fault_step: chosen.fault_step,
+            at_fault: None,
+            false_after_fault: 0,
+            steps: Vec::new(),
+        };
+        Self { run, keep_steps }
+    }
+
+    fn follow<D: Drive>(&mut self, drive: &D, settings: &Settings, cancel: &AtomicBool) -> Result<()> {
+        let designation = Designation { step: 0, pixel: self.run.pixel };
+        let first = match track::designate(drive, designation, settings) {
+            Ok(first) => first,
+            Err(error) => {
+                self.run.refused = Some(error.to_string());
+                return Ok(());
+            }
+        };
+        let mut last = first.clone();
+        self.record(drive, None, &first, &last);
+        while last.step + 1 < drive.stop_count() {
+            if cancel.load(Ordering::Relaxed) {
+                return Err(Error::Cancelled);
+            }
+            let next = track::advance(drive, &first, &last, settings);
+            self.record(drive, Some(&last), &first, &next);
+            last = next;
+        }
+        self.conclude(drive, &first, &last);
+        Ok(())
+    }
+
+    fn record<D: Drive>(
+        &mut self,
+        drive: &D,
+        before: Option<&StepTrace>,
+        first: &StepTrace,
+        trace: &StepTrace,
+    ) {
+        if let Some(before) = before {
+            self.run.hand_over.add(drive, [first, before, trace]);
+            self.run.trust.add(drive, trace, drift_m(drive, first, trace));
+        }
+        add(&mut self.run.summary, &summarise([trace]));
+        let fate = fate(drive, trace);
+        if let Some(at) = self.run.fault_step.filter(|at| trace.step >= *at) {
+            self.run.at_fault = if trace.step == at { fate } else { self.run.at_fault };
+            self.run.false_after_fault += usize::from(fate == Some(Fate::False));
+        }
+        (self.run.end, self.run.end_is_false_loss) = (fate, trace.is_false_loss());
+        if self.keep_steps {
+            self.run.steps.push(StepRecord::of(drive, before, trace));
+        }
+    }
+
+    fn conclude<D: Drive>(&mut self, drive: &D, first: &StepTrace, last: &StepTrace) {
+        let row = last.row();
+        let run = &mut self.run;
+        run.state = Some(row.state);
+        run.end_pixel = row.left_pixel;
+        (run.sigma_m, run.nees) = (row.sigma_m, row.nees);
+        run.drift_m = drift_m(drive, first, last);
+        let Some(truth) = last.truth.as_ref().map(|truth| truth.position_in_rover) else { return };
+        let camera = drive.true_left_camera(last.step);
+        run.true_end_pixel = camera.project(&truth);
+        let centre = camera.model.centre();
+        let sight = truth - centre;
+        run.distance_m = Some([first.update.target.initial_distance_m, sight.norm()]);
+        let error = last.update.target.position_in_rover - truth;
+        run.err_range_m = sight.try_normalize(0.0).map(|sight| error.dot(&sight));
+    }
+}
+
+/// Adds a later part of a run to the summary of what came before.
+fn add(sum: &mut Summary, part: &Summary) {
+    let more = |sum: Option<usize>, part: Option<usize>| match (sum, part) {
+        (None, None) => None,
+        (a, b) => Some(a.unwrap_or(0) + b.unwrap_or(0)),
+    };
+    sum.steps += part.steps;
+    sum.steps_lost += part.steps_lost;
+    sum.steps_tracked = more(sum.steps_tracked, part.steps_tracked);
+    sum.false_tracked = more(sum.false_tracked, part.false_tracked);
+    sum.false_lost = more(sum.false_lost, part.false_lost);
+    (sum.run_tracked, sum.final_err_px, sum.final_err_m) =
+        (part.run_tracked, part.final_err_px, part.final_err_m);
+}
+
+/// What became of the target at a step; none without truth.
+fn fate<D: Drive>(drive: &D, trace: &StepTrace) -> Option<Fate> {
+    let truth = trace.truth.as_ref()?;
+    if trace.update.state != TrackingState::Tracking {
+        return Some(Fate::Lost);
+    }
+    let pixel = drive.true_left_camera(trace.step).project(&truth.position_in_rover);
+    let located = trace.located().and_then(|located| located.left_pixel);
+    let error_px = pixel.zip(located).map(|(a, b)| a.distance(b));
+    Some(if error_px.is_some_and(|error| error <= truth.tolerance_px) { Fate::Tracked } else { Fate::False })
+}
+
+/// How far the last estimate lies from the first one, carried by the true motion, m.
+fn drift_m<D: Drive>(drive: &D, first: &StepTrace, last: &StepTrace) -> Option<f64> {
+    let site_from_first = drive.true_site_from_rover(first.step)?;
+    let site_from_last = drive.true_site_from_rover(last.step)?;
+    let carried: Point3 =
+        site_from_last.inverse() * (site_from_first * first.update.target.position_in_rover);
+    Some((last.update.target.position_in_rover - carried).norm())
+}
+
+#[cfg(test)]
+#[path = "run_tests.rs"]
+mod tests;

@@ -1,0 +1,16 @@
+//! Tests of the trackers over complete drives: they need the loop, the simulator and the recordings together.
+
+#![allow(clippy::unwrap_used)]
+
+mod designate;
+mod template;
+mod template_configurations;
+mod features;
+mod shape_tracker;
+mod shape_tracker_recorded;
+mod trackability;
+mod records;
+mod registration;
+mod stereo_rendered;
+mod stereo_recorded;
+mod hand_over;

@@ -1,0 +1,226 @@
+//! Every threshold and parameter that a person may change: unit, default, range and source, said once.
+//!
+//! `settings_group!` turns a table into a struct, its defaults and its description, so that the viewer's
+//! form, `--set key=value` and the documentation are the same table. Values marked *(ours)* are not from the
+//! papers (R228).
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// Which values a setting may take.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Domain {
+    /// A number between two bounds, both included.
+    Between(f64, f64),
+    /// An odd whole number between two bounds, both included.
+    OddBetween(u32, u32),
+    /// On or off.
+    Switch,
+    /// One of these words.
+    Choice(Vec<String>),
+}
+
+impl Domain {
+    /// One of `words`.
+    pub fn choice(words: &[&str]) -> Self {
+        Self::Choice(words.iter().map(|&w| w.to_owned()).collect())
+    }
+
+    /// Why `value` does not fit, as a clause that can follow the setting's name.
+    pub fn problem_with(&self, value: &serde_json::Value) -> Option<String> {
+        match self {
+            Self::Between(low, high) => match value.as_f64() {
+                Some(v) if (*low..=*high).contains(&v) => None,
+                _ => Some(format!("must be a number from {low} to {high}, not {value}")),
+            },
+            Self::OddBetween(low, high) => match value.as_u64() {
+                Some(v) if v % 2 == 1 && (u64::from(*low)..=u64::from(*high)).contains(&v) => None,
+                _ => Some(format!("must be an odd whole number from {low} to {high}, not {value}")),
+            },
+            Self::Switch => (!value.is_boolean()).then(|| format!("must be true or false, not {value}")),
+            Self::Choice(words) => {
+                let known = value.as_str().is_some_and(|v| words.iter().any(|w| w == v));
+                (!known).then(|| format!("must be one of {}, not {value}", words.join(", ")))
+            }
+        }
+    }
+}
+
+/// Values of another setting under which a setting has an effect.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Condition {
+    /// The other setting.
+    pub key: String,
+    /// Its values.
+    #[schema(value_type = Vec<Object>)]
+    pub values: Vec<serde_json::Value>,
+    /// Whether it must have none of these values, instead of one of them.
+    pub excluded: bool,
+}
+
+impl Condition {
+    /// Whether it is met by a value of the other setting.
+    pub(crate) fn is_met_by(&self, value: &serde_json::Value) -> bool {
+        let equal = |wanted: &serde_json::Value| match (wanted.as_f64(), value.as_f64()) {
+            (Some(wanted), Some(value)) => wanted == value,
+            _ => wanted == value,
+        };
+        self.values.iter().any(equal) != self.excluded
+    }
+}
+
+impl std::fmt::Display for Condition {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let word =
+            |value: &serde_json::Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+        let values: Vec<_> = self.values.iter().map(word).collect();
+        write!(f, "{} {} {}", self.key, if self.excluded { "≠" } else { "=" }, values.join(" or "))
+    }
+}
+
+/// What is known about one setting.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct SettingInfo {
+    /// The name, unique over all groups.
+    pub key: String,
+    /// The group it belongs to: `limits` or the locator's name.
+    pub group: String,
+    /// The unit, empty for pure numbers.
+    pub unit: String,
+    /// The default.
+    #[schema(value_type = Object)]
+    pub default: serde_json::Value,
+    /// The values it may take.
+    pub domain: Domain,
+    /// Where the default comes from.
+    pub source: String,
+    /// What it does, and what one sees when it is wrong.
+    pub help: String,
+    /// The setting has an effect only where one of these is met; always where there is none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub only_if: Vec<Condition>,
+}
+
+impl SettingInfo {
+    /// Why `value` cannot be this setting's, as a clause that can follow its name.
+    pub fn problem_with(&self, value: &serde_json::Value) -> Option<String> {
+        let is_broken = self.default.is_u64() && !value.is_u64();
+        self.domain
+            .problem_with(value)
+            .or_else(|| is_broken.then(|| format!("must be a whole number, not {value}")))
+    }
+
+    /// Whether the setting has an effect beside the values of the others in `table`.
+    pub fn has_effect(&self, table: &[Self], value: &dyn Fn(&Self) -> serde_json::Value) -> bool {
+        let is_met = |condition: &Condition| {
+            let other = table.iter().find(|other| other.key == condition.key);
+            other.is_some_and(|other| condition.is_met_by(&value(other)) && other.has_effect(table, value))
+        };
+        self.only_if.is_empty() || self.only_if.iter().any(is_met)
+    }
+
+    /// When the setting has an effect, in words: `measure = sdog`; none where it always has.
+    pub fn condition(&self) -> Option<String> {
+        let words: Vec<_> = self.only_if.iter().map(Condition::to_string).collect();
+        (!words.is_empty()).then(|| words.join(", or "))
+    }
+}
+
+/// Declares a group of settings: the struct, its defaults, and `table()` that describes it.
+///
+/// A setting that matters under some values of another one ends with `, if other = "word" | "word"` or `, unless other = 0.0`;
+/// several of these are alternatives.
+#[macro_export]
+macro_rules! settings_group {
+    ($(#[$meta:meta])* $name:ident as $group:literal {
+        $( $(#[doc = $help:literal])+ $key:ident: $ty:ty = $default:expr, $unit:literal, $domain:expr, $source:literal
+           $(, if $parent:ident = $($value:literal)|+ )* $(, unless $other:ident = $excluded:literal )*; )*
+    }) => {
+        $(#[$meta])*
+        #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize, utoipa::ToSchema)]
+        #[serde(default, deny_unknown_fields)]
+        pub struct $name { $( $(#[doc = $help])+ pub $key: $ty, )* }
+
+        impl Default for $name {
+            fn default() -> Self { Self { $( $key: $default, )* } }
+        }
+
+        impl $name {
+            /// The description of every setting of this group, in the order of declaration.
+            pub fn table() -> Vec<$crate::limits::SettingInfo> {
+                let defaults = Self::default();
+                vec![ $( $crate::limits::SettingInfo {
+                    key: stringify!($key).to_owned(),
+                    group: $group.to_owned(),
+                    unit: $unit.to_owned(),
+                    default: serde_json::to_value(&defaults.$key).unwrap_or_default(),
+                    domain: $domain,
+                    source: $source.to_owned(),
+                    help: [$($help.trim()),+].join(" "),
+                    only_if: vec![
+                        $( $crate::limits::Condition {
+                            key: stringify!($parent).to_owned(),
+                            values: vec![$(serde_json::json!($value)),+],
+                            excluded: false,
+                        }, )*
+                        $( $crate::limits::Condition {
+                            key: stringify!($other).to_owned(),
+                            values: vec![serde_json::json!($excluded)],
+                            excluded: true,
+                        }, )*
+                    ],
+                }, )* ]
+            }
+        }
+    };
+}
+
+settings_group! {
+    /// The thresholds of `judge`: the four loss criteria of K§4.6 and the state machine.
+    Limits as "limits" {
+        /// Criterion 1: a match below this score is a loss. Too high: false losses; too low: false tracking.
+        ncc_min: f64 = 0.7, "", Domain::Between(-1.0, 1.0), "K§4.6, R81";
+        /// Criterion 2: a point-stereo match below this score is a loss.
+        stereo_ncc_min: f64 = 0.7, "", Domain::Between(-1.0, 1.0), "K§4.6, R82";
+        /// A point-stereo match that leads back farther than this from the left pixel is a loss; 0: not judged.
+        left_right_max_px: f64 = 0.0, "px", Domain::Between(0.0, 100.0), "ours, domain.md 7";
+        /// Safety factor on the distance and position tolerances (criteria 3 and 4).
+        tolerance_factor: f64 = 1.5, "", Domain::Between(0.1, 100.0), "ours, R87";
+        /// Disparity error that the tolerances assume, as a 3σ value.
+        disparity_error_px: f64 = 1.0, "px", Domain::Between(0.01, 20.0), "K§4.2, R35";
+        /// Navigation error that the tolerances assume, as a fraction of the distance driven.
+        navigation_error_fraction: f64 = 0.02, "", Domain::Between(0.0, 1.0), "K§4.2, R38";
+        /// A match far from the prediction is a loss below this score; -1: judged like any other.
+        far_ncc_min: f64 = 0.85, "", Domain::Between(-1.0, 1.0), "ours; docs/tracking.md";
+        /// What is far: standard deviations of the prediction and the match together.
+        far_sigma: f64 = 3.0, "", Domain::Between(0.0, 1000.0), "ours; docs/tracking.md", unless far_ncc_min = -1.0;
+        /// A match is a loss whose second peak scores more than this share of the best (near 1: it may be the other one);
+        /// 1: off.
+        second_peak_ratio_max: f64 = 1.0, "", Domain::Between(0.0, 1.0), "ours, R68; off";
+        /// A match is a loss whose position is less sharply known, 1σ along its worst direction; 0: off.
+        match_sigma_max_px: f64 = 0.0, "px", Domain::Between(0.0, 100.0), "ours; off";
+        /// A match is a loss that lies nearer to the edge of the search window: the true one may lie beyond it; 0: off.
+        edge_distance_min_px: f64 = 0.0, "px", Domain::Between(0.0, 100.0), "ours; off";
+        /// A designation is warned of when the ranges in its window differ by a larger share of the distance.
+        warn_depth_range: f64 = 0.1, "", Domain::Between(0.0, 10.0), "ours, R21";
+        /// A designation is warned of when its window's standard deviation is a smaller share of full scale.
+        warn_contrast: f64 = 0.01, "", Domain::Between(0.0, 1.0), "ours, R21";
+        /// A designation is warned of when a larger share of its window lies in shadow, where the light is known.
+        warn_shadow_share: f64 = 0.2, "", Domain::Between(0.0, 1.0), "ours, R21";
+        /// A designation is warned of when the ranges in its window leave a plane by a larger share of the distance:
+        /// an occluding boundary runs through it.
+        warn_boundary: f64 = 0.03, "", Domain::Between(0.0, 10.0), "ours, R119";
+        /// The feature tracker loses the target below this confidence, and dead reckoning takes over.
+        confidence_min: f64 = 0.5, "", Domain::Between(0.0, 1.0), "ours, R185";
+        /// Once lost, it returns at this confidence.
+        confidence_return: f64 = 0.7, "", Domain::Between(0.0, 1.0), "ours, R185";
+        /// Two stops have the same cameras where their focal lengths differ by a smaller share than this; else the target is
+        /// handed off. Too large: a change of cameras is missed.
+        same_camera_focal_share: f64 = 0.02, "", Domain::Between(0.0001, 1.0), "ours, R205";
+        /// Updates that may follow a loss before failure is declared.
+        n_retry: u32 = 2, "updates", Domain::Between(0.0, 100.0), "K§4.6, R90";
+        /// Whether the update that detects the loss counts among them (the stricter reading).
+        count_detecting_update: bool = false, "", Domain::Switch, "E16, R91";
+    }
+}

@@ -1,0 +1,109 @@
+//! The stops from which a motion may be measured: where the target was there, and what features they have (R186).
+//!
+//! After an occlusion the stops between are of no use; the last good one is tried again at every stop. Of several
+//! remembered ones the motion is taken that leaves the target most certain, so that fewer motions are chained.
+
+use std::sync::Arc;
+
+use nalgebra::{Matrix3, UnitQuaternion, Vector6};
+use serde::{Deserialize, Serialize};
+
+use super::detect::StopFeatures;
+use sightline_geometry::estimate::bootstrap::Bootstrap;
+use sightline_geometry::estimate::carry::carry;
+use sightline_geometry::estimate::motion_parameters::MotionParameters;
+use sightline_geometry::frames::{Point3, Pose};
+
+/// A stop at which the target was found.
+///
+/// Serialised, the features are left out: `detect` finds the same ones again in the images of that stop.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Anchor {
+    /// The stop, from 0.
+    pub step: usize,
+    /// Which stop of the recording it is, where the traverse has a store.
+    pub stop: Option<usize>,
+    /// The features and points of that stop.
+    #[serde(skip)]
+    pub features: Arc<StopFeatures>,
+    /// The estimated pose there.
+    pub site_from_rover: Pose,
+    /// Where the target was, in the rover frame of that stop.
+    pub carried: Carried,
+}
+
+/// A target's position as motions carried it from the designation to a stop.
+///
+/// What the features of one stop share (`feature_common_px`) they share with those of the next, since it is the same stones
+/// that are seen from nearly the same side: it adds up along a run, whereas what scatters from feature to feature adds up in
+/// squares.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Carried {
+    /// The position, m, rover frame.
+    pub position_in_rover: Point3,
+    /// The covariance of the designation and of what scatters, m².
+    pub scattered: Matrix3<f64>,
+    /// How the shared errors move it, one column each: 1σ, m.
+    pub shared_m: Matrix3<f64>,
+    /// How the rover frame turned since the designation: takes directions of that into the present one.
+    pub now_from_first: UnitQuaternion<f64>,
+}
+
+impl Carried {
+    /// A designated position.
+    pub fn designated(position_in_rover: Point3, covariance_in_rover: Matrix3<f64>) -> Self {
+        Self {
+            position_in_rover,
+            scattered: covariance_in_rover,
+            shared_m: Matrix3::zeros(),
+            now_from_first: UnitQuaternion::identity(),
+        }
+    }
+
+    /// The position after a motion; `by_shared_error` says how its parameters change with 1σ of each.
+    ///
+    /// None where a covariance is not positive semidefinite.
+    pub fn after(&self, motion: &Bootstrap, by_shared_error: Option<[Vector6<f64>; 3]>) -> Option<Self> {
+        let (theta, point) = (motion.parameters, &self.position_in_rover);
+        let (position_in_rover, scattered) = carry(point, &self.scattered, theta, &motion.covariance)?;
+        let moved = |change: Vector6<f64>| {
+            let at = |sign: f64| {
+                MotionParameters::from_vector(&(theta.to_vector() + sign * change)).to_pose() * point
+            };
+            (at(1.0) - at(-1.0)) / 2.0
+        };
+        let turn = theta.to_pose().rotation;
+        let turned = turn.to_rotation_matrix() * self.shared_m;
+        let added =
+            by_shared_error.map_or_else(Matrix3::zeros, |changes| Matrix3::from_columns(&changes.map(moved)));
+        let now_from_first = turn * self.now_from_first;
+        Some(Self { position_in_rover, scattered, shared_m: turned + added, now_from_first })
+    }
+
+    /// The covariance of the position, m².
+    pub fn covariance_in_rover(&self) -> Matrix3<f64> {
+        self.scattered + self.shared_m * self.shared_m.transpose()
+    }
+}
+
+/// The remembered stops, oldest first.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Anchors {
+    stops: Vec<Anchor>,
+}
+
+impl Anchors {
+    /// Adds a stop and forgets all but the newest `count`.
+    #[must_use]
+    pub fn with(mut self, anchor: Anchor, count: usize) -> Self {
+        self.stops.push(anchor);
+        let forgotten = self.stops.len().saturating_sub(count.max(1));
+        self.stops.drain(..forgotten);
+        self
+    }
+
+    /// The remembered stops, newest first.
+    pub fn newest(&self) -> impl Iterator<Item = &Anchor> {
+        self.stops.iter().rev()
+    }
+}

@@ -1,0 +1,120 @@
+//! Steps `detect`, `match_features` (left to right) and `triangulate`: the points of one stop (D§2, R157–R160).
+//!
+//! ```text
+//! z_i = (l_iᵀ, r_iᵀ)ᵀ          x_i = f(z_i)                                                     D-Eq 1
+//! P_i = (σ² + (σ_s s_i)²) J Jᵀ,  J = ∂f/∂z    by differences of one pixel
+//! ```
+//! f is the midpoint of the two rays. The left feature's descriptor stands for the point (R160).
+//!
+//! | symbol | name | unit, frame |
+//! |---|---|---|
+//! | l, r | keypoints of `left` and `right` | px |
+//! | x | `Point::position_in_rover` | m, rover frame of the stop |
+//! | σ, σ_s | `feature_sigma_px`, `feature_sigma_per_scale` | px, 1 |
+//! | s | `Keypoint::sigma_px` of the left feature | px |
+
+use nalgebra::{Matrix3, SMatrix};
+
+use super::match_stereo::{StereoMatch, match_stereo, pixel_of};
+use super::settings::FeatureSettings;
+use crate::stages::capture::StereoPair;
+use sightline_geometry::camera::Camera;
+use sightline_geometry::estimate::triangulate::midpoint;
+use sightline_geometry::frames::{Pixel, Point3, Vector3};
+use sightline_vision::sift::{self, Features, Keypoint};
+
+/// A feature that both eyes see.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Point {
+    /// Which keypoints, of the left and of the right image.
+    pub stereo: StereoMatch,
+    /// Position in the rover frame of the stop, m.
+    pub position_in_rover: Point3,
+    /// Its covariance, m².
+    pub covariance_in_rover: Matrix3<f64>,
+    /// Distance from the left camera, m.
+    pub range_m: f64,
+    /// How it moves when both pixels go right, when both go down, and when the right one alone goes right, m per px.
+    pub by_shift_m: [Vector3; 3],
+}
+
+/// What one stop offers: all features of both eyes, and those that became points.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct StopFeatures {
+    /// Features of the left image.
+    pub left: Features,
+    /// Features of the right image.
+    pub right: Features,
+    /// The points.
+    pub points: Vec<Point>,
+    /// Left features whose partner lies beyond the ranges or not in front of the cameras.
+    pub out_of_range: usize,
+}
+
+impl StopFeatures {
+    /// Where a keypoint lies.
+    pub fn pixel(keypoint: &Keypoint) -> Pixel {
+        pixel_of(keypoint)
+    }
+
+    /// The keypoint of a point in the left image.
+    pub fn left_of(&self, point: &Point) -> &Keypoint {
+        &self.left.keypoints[point.stereo.left as usize]
+    }
+}
+
+/// Finds the features of a stereo pair and their points in the rover frame.
+pub fn detect(pair: &StereoPair, cameras: [&Camera; 2], settings: &FeatureSettings) -> StopFeatures {
+    let sift = settings.sift();
+    let (left, right) = (sift::detect(&pair.left, &sift), sift::detect(&pair.right, &sift));
+    let matched = match_stereo(&left, &right, cameras, settings);
+    let found = matched.len();
+    let points: Vec<Point> = matched
+        .into_iter()
+        .filter_map(|stereo| {
+            let l = StopFeatures::pixel(&left.keypoints[stereo.left as usize]);
+            let r = StopFeatures::pixel(&right.keypoints[stereo.right as usize]);
+            let scale_px = f64::from(left.keypoints[stereo.left as usize].sigma_px);
+            triangulate(stereo, [l, r], scale_px, cameras, settings)
+        })
+        .collect();
+    let out_of_range = found - points.len();
+    StopFeatures { left, right, points, out_of_range }
+}
+
+/// The point of a match; none beyond the ranges or behind a camera.
+fn triangulate(
+    stereo: StereoMatch,
+    [l, r]: [Pixel; 2],
+    scale_px: f64,
+    [left, right]: [&Camera; 2],
+    settings: &FeatureSettings,
+) -> Option<Point> {
+    let meet = |l: Pixel, r: Pixel| midpoint(&left.ray(l)?, &right.ray(r)?);
+    let found = meet(l, r)?;
+    let ranges = settings.feature_range_min_m..=settings.feature_range_max_m;
+    if !ranges.contains(&found.range_left_m) {
+        return None;
+    }
+    let along =
+        |l: [Pixel; 2], r: [Pixel; 2]| Some((meet(l[1], r[1])?.point - meet(l[0], r[0])?.point) / 2.0);
+    let to_both_sides = |p: Pixel, dx: f64, dy: f64| [p.offset(-dx, -dy), p.offset(dx, dy)];
+    let jacobian = SMatrix::<f64, 3, 4>::from_columns(&[
+        along(to_both_sides(l, 1.0, 0.0), [r, r])?,
+        along(to_both_sides(l, 0.0, 1.0), [r, r])?,
+        along([l, l], to_both_sides(r, 1.0, 0.0))?,
+        along([l, l], to_both_sides(r, 0.0, 1.0))?,
+    ]);
+    let sigma_px = settings.feature_sigma_px.hypot(settings.feature_sigma_per_scale * scale_px);
+    Some(Point {
+        stereo,
+        position_in_rover: found.point,
+        covariance_in_rover: jacobian * jacobian.transpose() * (sigma_px * sigma_px),
+        range_m: found.range_left_m,
+        by_shift_m: [
+            jacobian.column(0) + jacobian.column(2),
+            jacobian.column(1) + jacobian.column(3),
+            jacobian.column(2).into(),
+        ],
+    })
+}

@@ -1,0 +1,278 @@
+//! What the feature locator saw, step by step, and the tables that the views draw from it (R170).
+
+use std::sync::Arc;
+
+use nalgebra::SMatrix;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::anchor::Carried;
+use super::detect::StopFeatures;
+use crate::array_name::ArrayName;
+use crate::locate::template::evidence::TemplateEvidence;
+use sightline_geometry::estimate::motion_parameters::MotionParameters;
+use sightline_geometry::estimate::ransac::Refit;
+use sightline_geometry::frames::Pose;
+use sightline_record::{ArrayKind, ArrayView, Declaration, Record, Unit};
+
+/// What the feature locator saw; a step that was not reached is null.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct FeatureEvidence {
+    /// Point stereo of the designated pixel; at the designation only.
+    pub designation: Option<Box<TemplateEvidence>>,
+    /// The features of this stop.
+    pub detect: Option<Detected>,
+    /// The remembered stops from which a motion was measured, newest first.
+    pub anchors: Vec<AnchorTried>,
+    /// The matches with the chosen one.
+    pub match_features: Option<MatchedFeatures>,
+    /// The motion from it.
+    pub fit_motion: Option<FittedMotion>,
+    /// How certain that is.
+    pub bootstrap: Option<Bootstrapped>,
+    /// Which stop of the recording this is, where the traverse has a store.
+    #[serde(skip)]
+    #[schema(ignore)]
+    pub stop: Option<usize>,
+    /// The target as the motions carried it here.
+    #[serde(skip)]
+    #[schema(ignore)]
+    pub carried: Option<Carried>,
+    /// The features themselves.
+    #[serde(skip)]
+    #[schema(ignore)]
+    pub features: Option<Arc<StopFeatures>>,
+    /// A row for every feature of the left image.
+    #[serde(skip)]
+    #[schema(ignore)]
+    pub table: Table,
+    /// A row for every set of the bootstrap: where it puts the target.
+    #[serde(skip)]
+    #[schema(ignore)]
+    pub cloud: Table,
+}
+
+/// Counts of step `detect` and of the matches between the eyes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Detected {
+    /// Features of the left image.
+    pub left: usize,
+    /// Features of the right image.
+    pub right: usize,
+    /// Features with a partner in the other eye.
+    pub stereo_matches: usize,
+    /// Those of them that became points.
+    pub points: usize,
+    /// Median distance of the points from the left camera, m; null without any.
+    pub median_range_m: Option<f64>,
+}
+
+/// A remembered stop, tried.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct AnchorTried {
+    /// The stop.
+    pub step: usize,
+    /// Matched points.
+    pub matches: usize,
+    /// Those that agree with the motion.
+    pub inliers: usize,
+    /// The confidence that follows.
+    pub confidence: f64,
+    /// Largest 1σ axis of the target's position by this motion, m; null without one.
+    pub sigma_m: Option<f64>,
+    /// Why there is no motion, as one sentence.
+    pub missing: Option<String>,
+    /// Whether the target was taken from here.
+    pub chosen: bool,
+}
+
+/// The matches with the features of an earlier stop.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct MatchedFeatures {
+    /// The earlier stop.
+    pub from_step: usize,
+    /// Its points.
+    pub then: usize,
+    /// The points of this stop.
+    pub now: usize,
+    /// Matches of the two.
+    pub matches: usize,
+    /// Whether too little agreed with the pose estimates, so that the features were looked for everywhere.
+    #[serde(default)]
+    pub prior_given_up: bool,
+}
+
+/// The rigid motion since the earlier stop.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct FittedMotion {
+    /// Translation: the earlier rover frame's origin in the present one, m.
+    pub translation_m: [f64; 3],
+    /// Roll, pitch and yaw, deg.
+    pub roll_pitch_yaw_deg: [f64; 3],
+    /// Matches that agree with it.
+    pub inliers: usize,
+    /// Root mean square of their residuals, m.
+    pub rms_m: f64,
+    /// Median of the residuals of those that agree, m.
+    pub median_m: f64,
+    /// Matches that agreed with each random draw.
+    pub consensus_by_draw: Vec<u32>,
+    /// How the motion and the set that agrees with it settled.
+    pub refits: Vec<Refit>,
+    /// What it moves the target away from the prediction by, m.
+    pub correction_m: f64,
+}
+
+impl FittedMotion {
+    /// The motion: takes points of the earlier rover frame into the present one.
+    pub fn now_from_then(&self) -> Pose {
+        let [roll_rad, pitch_rad, yaw_rad] = self.roll_pitch_yaw_deg.map(f64::to_radians);
+        MotionParameters { translation_m: self.translation_m, roll_rad, pitch_rad, yaw_rad }.to_pose()
+    }
+}
+
+/// The covariance of the motion.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Bootstrapped {
+    /// Sets that were drawn.
+    pub sets: usize,
+    /// Of translation (m) and roll, pitch, yaw (rad).
+    #[schema(value_type = Vec<f64>)]
+    pub covariance: SMatrix<f64, 6, 6>,
+    /// 1σ of each coordinate of the translation, m.
+    pub sigma_translation_m: [f64; 3],
+    /// 1σ of each angle, deg.
+    pub sigma_rotation_deg: [f64; 3],
+}
+
+/// Numbers row by row.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Table {
+    /// Numbers of a row.
+    pub columns: u32,
+    /// All rows; NaN where a number does not exist.
+    pub values: Vec<f32>,
+}
+
+/// The columns of [`FeatureEvidence::table`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(usize)]
+pub enum FeatureColumn {
+    /// Column of the feature in the left image, px.
+    X,
+    /// Its row, px.
+    Y,
+    /// Its scale, px.
+    Sigma,
+    /// Its orientation, rad, clockwise on screen from +x.
+    Orientation,
+    /// Column of its partner in the right image, px.
+    RightX,
+    /// Its row, px.
+    RightY,
+    /// Distance from the left camera, m.
+    Range,
+    /// Column in the left image of the earlier stop, px.
+    ThenX,
+    /// Its row, px.
+    ThenY,
+    /// Where the motion puts the earlier point in the left image, px.
+    MovedX,
+    /// Its row, px.
+    MovedY,
+    /// Distance of the two points under the motion, m.
+    Residual,
+    /// 1 where the match agrees with the motion, 0 where not.
+    Inlier,
+}
+
+impl FeatureColumn {
+    /// How many there are.
+    pub const COUNT: usize = Self::Inlier as usize + 1;
+}
+
+/// The columns of [`FeatureEvidence::cloud`]: the target's position in the rover frame, m, and its pixel in the left image.
+pub const CLOUD_COLUMNS: usize = 5;
+
+impl<'a> From<&'a Table> for ArrayView<'a> {
+    fn from(table: &'a Table) -> Self {
+        Self::new(table.columns, &table.values)
+    }
+}
+
+impl FeatureEvidence {
+    /// Declares the arrays of `detect`.
+    pub(crate) fn declare_features(r: &mut Declaration<Self>) {
+        r.array(
+            "features",
+            ArrayKind::Table,
+            "The features of the left image, a row each: position, scale, orientation, partners and residual",
+            |e| (&e.table).into(),
+        );
+    }
+
+    /// Declares the arrays of `bootstrap`.
+    pub(crate) fn declare_cloud(r: &mut Declaration<Self>) {
+        r.array(
+            "cloud",
+            ArrayKind::Table,
+            "Target positions of the bootstrap sets, a row each: position in the rover frame and pixel",
+            |e| (&e.cloud).into(),
+        );
+    }
+}
+
+impl Record for Detected {
+    fn declare(r: &mut Declaration<Self>) {
+        r.quantity("left", Unit::One, |d| d.left).describe("Number of features of the left image.");
+        r.quantity("right", Unit::One, |d| d.right).describe("Number of features of the right image.");
+        r.quantity("stereo_matches", Unit::One, |d| d.stereo_matches)
+            .describe("Number of features with a partner in the other eye.");
+        r.quantity("points", Unit::One, |d| d.points).describe("Number of triangulated features.");
+        r.quantity("median_range_m", Unit::Metre, |d| d.median_range_m)
+            .describe("Median distance of the points from the left camera.");
+    }
+}
+
+impl Record for MatchedFeatures {
+    fn declare(r: &mut Declaration<Self>) {
+        r.quantity("from_step", Unit::One, |m| m.from_step).describe("The earlier stop.");
+        r.quantity("then", Unit::One, |m| m.then).describe("Number of points of the earlier stop.");
+        r.quantity("now", Unit::One, |m| m.now).describe("Number of points of this stop.");
+        r.quantity("matches", Unit::One, |m| m.matches).describe("Number of matches of the two.");
+        r.quantity("prior_given_up", Unit::One, |m| m.prior_given_up)
+            .describe("Whether the prior was dropped because too few matches were consistent with it.");
+    }
+}
+
+impl Record for FittedMotion {
+    fn declare(r: &mut Declaration<Self>) {
+        r.quantity("translation_m", Unit::Metre, |m| m.translation_m)
+            .describe("Translation: the earlier rover frame's origin in the present one.");
+        r.quantity("roll_pitch_yaw_deg", Unit::Degree, |m| m.roll_pitch_yaw_deg)
+            .describe("Roll, pitch and yaw.");
+        r.quantity("inliers", Unit::One, |m| m.inliers).describe("Number of inliers.");
+        r.quantity("rms_m", Unit::Metre, |m| m.rms_m).describe("RMS residual of the inliers.");
+        r.quantity("median_m", Unit::Metre, |m| m.median_m).describe("Median residual of the inliers.");
+        r.quantity("correction_m", Unit::Metre, |m| m.correction_m)
+            .describe("Distance between the target moved by the motion and the prediction.");
+    }
+}
+
+impl Record for Bootstrapped {
+    fn declare(r: &mut Declaration<Self>) {
+        r.quantity("sets", Unit::One, |b| b.sets).describe("Number of bootstrap sets.");
+        r.quantity("sigma_translation_m", Unit::Metre, |b| b.sigma_translation_m)
+            .describe("Standard deviation of each coordinate of the translation.");
+        r.quantity("sigma_rotation_deg", Unit::Degree, |b| b.sigma_rotation_deg)
+            .describe("Standard deviation of roll, pitch and yaw.");
+    }
+}
+
+/// The arrays of this stage that panels draw by themselves.
+impl ArrayName {
+    /// The features of the left image: a row each, with the columns of [`FeatureColumn`].
+    pub const FEATURES: Self = Self::new("features");
+    /// Target positions of the bootstrap: a row each, position and pixel.
+    pub const CLOUD: Self = Self::new("cloud");
+}

@@ -1,0 +1,298 @@
+//! One stop registered to an earlier view: where that begins, the surfaces, the ray or the picture, and what is kept of it.
+//!
+//! | begins by | position | attitude | how well that is known |
+//! |---|---|---|---|
+//! | features that are sure | theirs | turned as their motions say | their covariance, 0.2° |
+//! | dead reckoning | the prediction | by the pose estimates | its covariance and half the basin, `shape_attitude_deg` |
+//! | a hand-off: the rover stands still | the target's | by the pose estimates | `hand_off_shift_m`, `hand_off_turn_deg` |
+//!
+//! Source: R189, R197, R205; what is known of the start is ours.
+
+use std::sync::Arc;
+
+use nalgebra::{Matrix3, UnitQuaternion};
+
+use super::evidence::{Registered, ShapeEvidence};
+use super::failure::ShapeFailure;
+use super::look::{Look, least_confidence, note, region};
+use super::placement::placement;
+use super::view::{View, Views};
+use super::{carried_ray, drape, gates};
+use crate::locate::features::FeatureEvidence;
+use crate::locate::tracker::{LocateInput, Sighting};
+use sightline_geometry::frames::Point3;
+use sightline_vision::registration::{
+    Failure, Mesh, Prior, Registration, RegistrationInput, ShapeSettings, register,
+};
+
+/// Attitude since the designation as the features carry it, 1σ about each axis, deg: several times what they err by.
+const FEATURES_ATTITUDE_DEG: f64 = 0.2;
+
+/// The target by registration; none where that is not to be used, and why is in the evidence.
+pub(super) fn by_shape(
+    input: &LocateInput<'_>,
+    views: &Views,
+    base: &Sighting<ShapeEvidence>,
+    evidence: &mut ShapeEvidence,
+) -> Option<Sighting<ShapeEvidence>> {
+    // A target that the stop before did not find may be anywhere: it is looked for by its first view, like any lost one.
+    let is_of_the_stop_before = views.last.as_ref().is_some_and(|last| last.step + 1 == input.place.step);
+    let is_hand_off = input.place.is_hand_over && is_of_the_stop_before;
+    let Some(view) = (if is_hand_off { &views.last } else { &views.first }) else {
+        evidence.missing = Some(ShapeFailure::NoFirstView.to_string());
+        return None;
+    };
+    let tried = match Tried::new(input, base, view, evidence, is_hand_off) {
+        Ok(tried) => tried,
+        Err(why) => {
+            evidence.missing = Some(why.to_string());
+            return None;
+        }
+    };
+    let found = &tried.found;
+    let settings = &input.settings.shape;
+    let mut registered = registered(found, view, (&tried.expected, is_hand_off), &tried.settings);
+    let by_surface = || carried(found, view, &tried.mesh, settings.carried_ray);
+    let mut target = found.failure.is_none().then(by_surface).flatten();
+    if is_hand_off && settings.hand_off_picture && is_left_to_the_picture(found.failure.as_ref()) {
+        target = by_picture(input, view, found, &mut registered).or(target);
+    }
+    if let Some(target) = &target {
+        registered.correction_m = Some((target.position - tried.expected).norm());
+        registered.ray = target.ray;
+        let there = found.fixed_from_moving * target.position;
+        evidence.placement = is_hand_off.then(|| placement(&view.mesh, &there));
+    }
+    evidence.registration = Some(registered);
+    evidence.arrays.add(found, [&view.mesh, &tried.mesh], &found.fixed_from_moving.inverse());
+    let (overlap, left, right) = (found.agreement[2], &input.pointing.left, &input.pointing.right);
+    // Kept with the position that this stop ends with.
+    evidence.view = Some(Arc::new(View {
+        step: input.place.step,
+        site_from_rover: *input.site_from_rover,
+        position_in_rover: tried.expected,
+        covariance_in_rover: input.prediction.covariance_in_rover,
+        ray: None,
+        half_width_m: view.half_width_m,
+        mesh: tried.mesh,
+        left: left.clone(),
+        image: Arc::clone(&input.capture.pair.left),
+    }));
+    let target = target?;
+    Some(Sighting {
+        left_pixel: left.project(&target.position),
+        right_pixel: right.project(&target.position),
+        position_in_rover: Some(target.position),
+        covariance_in_rover: Some(target.covariance),
+        confidence: overlap.map_or(0.0, |agreement| agreement.overlap),
+        ..Sighting::default()
+    })
+}
+
+/// A registration with an earlier view, whether it is to be used or not.
+struct Tried {
+    found: Registration,
+    /// The present surface.
+    mesh: Mesh,
+    /// Where the target was thought to be.
+    expected: Point3,
+    settings: ShapeSettings,
+}
+
+impl Tried {
+    /// # Errors
+    /// A sentence where the stop shows no surface.
+    fn new(
+        input: &LocateInput<'_>,
+        base: &Sighting<ShapeEvidence>,
+        view: &View,
+        evidence: &mut ShapeEvidence,
+        is_hand_off: bool,
+    ) -> Result<Self, ShapeFailure> {
+        let own = &input.settings.shape;
+        let begin = Start::new(input, base, view, evidence.features.as_deref(), is_hand_off);
+        let expected = begin.position;
+        let sigma_m = begin.prior.target_m2.symmetric_eigenvalues().max().max(0.0).sqrt();
+        let search_m = own.search_m(sigma_m, view.half_width_m);
+        let settings = ShapeSettings { search_half_range_m: Some(search_m), ..own.registration() };
+        let cameras = [&input.pointing.left, &input.pointing.right];
+        let look = Look { capture: input.capture, cameras, shared: input.shared, settings: input.settings };
+        let surface = look.surface(&expected)?;
+        let mesh = surface.mesh(&region(expected, view.half_width_m, &settings), own);
+        note(evidence, &surface, &mesh);
+        let registration = RegistrationInput {
+            fixed: &view.mesh,
+            moving: &mesh,
+            start_fixed_from_moving: &view.start_from(begin.fixed_from_moving, &expected),
+            target_in_fixed: &view.position_in_rover,
+            half_width_m: view.half_width_m,
+            prior: Some(begin.prior).filter(|_| own.shape_prior),
+            sensor: None,
+        };
+        let found = register(&registration, &settings);
+        Ok(Self { found, mesh, expected, settings })
+    }
+}
+
+/// Where the target is thought to be before it is registered.
+struct Start {
+    /// Position, m, present rover frame.
+    position: Point3,
+    /// How the present rover frame is turned in that of the earlier view.
+    fixed_from_moving: UnitQuaternion<f64>,
+    /// How well both are known.
+    prior: Prior,
+}
+
+impl Start {
+    /// By the features where they are sure, else by dead reckoning; where cameras change, by the rover that stands still.
+    fn new(
+        input: &LocateInput<'_>,
+        base: &Sighting<ShapeEvidence>,
+        view: &View,
+        features: Option<&FeatureEvidence>,
+        is_hand_off: bool,
+    ) -> Self {
+        let settings = &input.settings.shape;
+        let prediction = input.prediction;
+        // Wheels slip and gyros jump by more than their model says; beyond the basin nothing would be found anyway (R155).
+        let basin_m2 = (view.half_width_m / 2.0).powi(2);
+        let by_poses = view.turn_to(input.site_from_rover);
+        if is_hand_off {
+            let target_m2 = Matrix3::identity() * settings.hand_off_shift_m.powi(2);
+            let prior = Prior { target_m2, attitude_rad: settings.hand_off_turn_deg.to_radians() };
+            return Self { position: prediction.position_in_rover, fixed_from_moving: by_poses, prior };
+        }
+        let by_features = base.position_in_rover.zip(base.covariance_in_rover);
+        let carried = features.and_then(|features| features.carried);
+        match by_features.zip(carried).filter(|_| base.confidence >= least_confidence(input)) {
+            Some(((position, target_m2), carried)) => Self {
+                position,
+                fixed_from_moving: carried.now_from_first.inverse(),
+                prior: Prior { target_m2, attitude_rad: FEATURES_ATTITUDE_DEG.to_radians() },
+            },
+            None => Self {
+                position: prediction.position_in_rover,
+                fixed_from_moving: by_poses,
+                prior: Prior {
+                    target_m2: prediction.covariance_in_rover + Matrix3::identity() * basin_m2,
+                    attitude_rad: settings.shape_attitude_deg.to_radians(),
+                },
+            },
+        }
+    }
+}
+
+/// Whether a picture may decide: the surfaces fit, though they may let the target slide.
+const fn is_left_to_the_picture(failure: Option<&Failure>) -> bool {
+    matches!(
+        failure,
+        None | Some(
+            Failure::NotEnoughShape { .. } | Failure::NotIsolated { .. } | Failure::AtSearchEdge { .. }
+        )
+    )
+}
+
+/// The target in the present image by the earlier one draped over the surface; none where it is not found.
+fn by_picture(
+    input: &LocateInput<'_>,
+    view: &View,
+    found: &Registration,
+    registered: &mut Registered,
+) -> Option<CarriedTarget> {
+    let settings = &input.settings.shape;
+    let covariance = &found.covariance_in_moving?;
+    let drape = drape::DrapeInput {
+        view,
+        fixed_from_moving: &found.fixed_from_moving,
+        registered: &found.target_in_moving,
+        covariance,
+        camera: &input.pointing.left,
+        image: &input.capture.pair.left,
+        window_px: settings.hand_off_window_px,
+        score_min: settings.hand_off_score_min,
+    };
+    match drape::drape(&drape) {
+        Ok((position, covariance, draped)) => {
+            gates::add_picture(
+                &mut registered.checks,
+                draped.score,
+                &covariance,
+                settings.hand_off_score_min,
+            );
+            registered.add_picture(draped);
+            let covariance = covariance + view_covariance(found, view);
+            Some(CarriedTarget { position, covariance, ray: None })
+        }
+        Err(why) => {
+            registered.draped_missing = Some(why.to_string());
+            None
+        }
+    }
+}
+
+/// The covariance that the target had in the earlier view, turned into the present rover frame, m².
+fn view_covariance(found: &Registration, view: &View) -> Matrix3<f64> {
+    let turn = found.fixed_from_moving.rotation.inverse().to_rotation_matrix();
+    turn.matrix() * view.covariance_in_rover * turn.matrix().transpose()
+}
+
+/// A target that a registration carried here.
+struct CarriedTarget {
+    position: Point3,
+    covariance: Matrix3<f64>,
+    ray: Option<carried_ray::RayMeeting>,
+}
+
+/// The target in the present rover frame; none where the registration has no covariance.
+fn carried(found: &Registration, view: &View, mesh: &Mesh, with_ray: bool) -> Option<CarriedTarget> {
+    let covariance = found.covariance_in_moving? + view_covariance(found, view);
+    let registered = found.target_in_moving;
+    let met = view.ray.as_ref().filter(|_| with_ray).and_then(|ray| {
+        let (fixed_from_moving, half_width_m) = (&found.fixed_from_moving, view.half_width_m);
+        carried_ray::meet(
+            &carried_ray::Carried { ray, fixed_from_moving, registered, covariance, half_width_m },
+            mesh,
+        )
+    });
+    Some(met.map_or(CarriedTarget { position: registered, covariance, ray: None }, |met| CarriedTarget {
+        position: met.position,
+        covariance: met.covariance,
+        ray: Some(met.meeting),
+    }))
+}
+
+/// A registration in numbers.
+fn registered(
+    found: &Registration,
+    view: &View,
+    (expected, is_hand_off): (&Point3, bool),
+    settings: &ShapeSettings,
+) -> Registered {
+    let sigmas_m = found.covariance_in_moving.map(|covariance| {
+        let mut squares: [f64; 3] = covariance.symmetric_eigenvalues().into();
+        squares.sort_by(|a, b| b.total_cmp(a));
+        squares.map(|square| square.max(0.0).sqrt())
+    });
+    Registered {
+        to_step: view.step,
+        is_hand_off,
+        method: settings.method,
+        half_width_m: view.half_width_m,
+        sensor_side_m: found.sensor.map(|sensor| sensor.pixel_m(1.0) * sensor.width as f64),
+        start_in_rover: expected.coords.into(),
+        correction_m: None,
+        coarse_shift_m: found.coarse.best.map(|best| best.shift_m),
+        search_m: settings.search_half_range_m.unwrap_or(view.half_width_m),
+        mean_m: found.agreement.map(|agreement| agreement.map(|agreement| agreement.mean_m)),
+        evaluations: found.path.last().map_or(0, |step| step.evaluations),
+        turn_deg: found.turn_rad.to_degrees(),
+        sigmas_m,
+        ray: None,
+        draped: None,
+        draped_missing: None,
+        checks: gates::checks(found, view.half_width_m, settings),
+        failure: found.failure,
+        reason: found.failure.map(|failure| failure.to_string()),
+    }
+}

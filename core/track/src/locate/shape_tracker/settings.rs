@@ -1,0 +1,148 @@
+//! The settings of the shape tracker, with unit, default and source.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::limits::Domain;
+use crate::settings_group;
+use sightline_vision::registration::{CheckSettings, MeshSettings, Method, ShapeSettings};
+use sightline_vision::stereo::{StereoMethod, StereoSettings};
+
+/// At which stops the target is found by the shape of its surroundings.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ShapeUse {
+    /// At the last stop of a camera pair, and where another pair takes over.
+    #[default]
+    AtEnd,
+    /// There, and wherever the features lose the target.
+    WhenLost,
+    /// At every stop.
+    EveryStop,
+}
+
+/// What the cameras of two pairs may disagree by, and the least that the coarse search covers, m.
+const SEARCH_LEAST_M: f64 = 0.04;
+
+settings_group! {
+    /// How a target is found by the shape of its surroundings (Deans et al. 2005).
+    ShapeTrackerSettings as "shape" {
+        /// At which stops the combined tracker asks the shape; the shape tracker asks it at every one.
+        shape_use: ShapeUse = ShapeUse::AtEnd, "", Domain::choice(&["at_end", "when_lost", "every_stop"]), "D§4, R154, R189", if tracker = "combined";
+        /// Carry the line of sight of the designation along and meet the near surface with it, so that the error of the first
+        /// range does not stay.
+        carried_ray: bool = true, "", Domain::Switch, "ours, D§2";
+        /// How the motion is refined: the paper's simplex over absolute differences, or robust least squares along the normals.
+        shape_method: Method = Method::PointToPlane, "", Domain::choice(&["simplex_l1", "point_to_plane"]), "R195, R201; ours";
+        /// Half the width of what is to be recognised; 0: measured on the first surface, and 0.25 m where that is not possible.
+        shape_half_width_m: f64 = 0.0, "m", Domain::Between(0.0, 2.0), "ours, R200";
+        /// How far the coarse search goes to each side; 0: three standard deviations of the start and 4 cm, at most the half
+        /// width.
+        shape_search_m: f64 = 0.0, "m", Domain::Between(0.0, 2.0), "R200";
+        /// Hold the motion to its start as far as that is known; the paper's simplex never does.
+        shape_prior: bool = true, "", Domain::Switch, "ours, R197";
+        /// Attitude of the pose estimates since the earlier view, 1σ about each axis.
+        shape_attitude_deg: f64 = 1.0, "°", Domain::Between(0.01, 30.0), "ours, R198", if shape_prior = true;
+        /// What two pairs of cameras may disagree by about where a target is, 1σ on each axis.
+        hand_off_shift_m: f64 = 0.02, "m", Domain::Between(0.0001, 1.0), "ours, R205";
+        /// And about its attitude, 1σ about each axis.
+        hand_off_turn_deg: f64 = 0.3, "°", Domain::Between(0.01, 30.0), "ours, R205";
+        /// At a hand-off, find the target in the other camera's image by the last image draped over the surface.
+        hand_off_picture: bool = true, "", Domain::Switch, "ours, R205";
+        /// Side of that picture.
+        hand_off_window_px: u32 = 31, "px", Domain::OddBetween(7, 101), "ours", if hand_off_picture = true;
+        /// A picture that agrees less is not used.
+        hand_off_score_min: f64 = 0.7, "", Domain::Between(-1.0, 1.0), "ours", if hand_off_picture = true;
+        /// Pixels of a side of the virtual sensor.
+        shape_sensor_px: u32 = 64, "px", Domain::Between(16.0, 256.0), "ours, R191";
+        /// What the sensor spans beyond the half width, as a share of it: ground holds the height and the tilt.
+        shape_margin: f64 = 0.4, "", Domain::Between(0.0, 3.0), "ours";
+        /// Least share of the target's pixels that both surfaces must cover. R196 asks for 0.4; the
+        /// default is lower, as it was chosen on the simulated worlds 501 and 502.
+        shape_overlap_min: f64 = 0.25, "", Domain::Between(0.05, 1.0), "ours; deviates from R196; docs/shape.md";
+        /// Distance of neighbouring vertices; never less than twice the error of their range.
+        mesh_spacing_m: f64 = 0.01, "m", Domain::Between(0.0, 0.2), "ours, R188";
+        /// Neighbours whose ranges have a greater ratio are not joined.
+        mesh_ratio_max: f64 = 1.05, "", Domain::Between(1.001, 2.0), "R188";
+        /// How pixels are compared in dense stereo.
+        surface_method: StereoMethod = StereoMethod::SemiGlobal, "", Domain::choice(&["block_matching", "semi_global"]), "domain.md 7";
+        /// Nearest depth that dense stereo looks at; a far target raises it to three tenths of its distance.
+        surface_range_min_m: f64 = 0.4, "m", Domain::Between(0.05, 100.0), "ours";
+        /// Noise of a disparity, from which that of the points follows.
+        surface_sigma_px: f64 = 0.1, "px", Domain::Between(0.01, 5.0), "ours";
+        /// Error that all points of a surface share, 1σ on each axis: stereo's window makes what is convex smaller.
+        shape_common_m: f64 = 0.0008, "m", Domain::Between(0.0, 0.1), "ours";
+        /// Triangles that a surface needs.
+        shape_triangles_min: u32 = 100, "", Domain::Between(1.0, 10_000.0), "ours";
+        /// A registration is not used that holds the target less sharply, 1σ in its weakest direction.
+        shape_sigma_max_m: f64 = 0.02, "m", Domain::Between(0.0001, 1.0), "ours";
+        /// A registration is not used whose surfaces differ so many times as much as their noise explains.
+        shape_misfit_max: f64 = 1.8, "", Domain::Between(0.1, 100.0), "ours";
+        /// A registration is not used that turned farther from the pose estimates.
+        shape_turn_max_deg: f64 = 8.6, "°", Domain::Between(0.1, 90.0), "ours, R198";
+        /// A registration is not used where another place fits nearly as well: by this factor it must differ more.
+        shape_other_min: f64 = 1.15, "", Domain::Between(1.0, 10.0), "ours";
+    }
+}
+
+impl ShapeTrackerSettings {
+    /// How surfaces are measured around a target at a distance.
+    ///
+    /// Disparities nearer than the target's surroundings only cost time. Limits go in halves, so that targets at similar
+    /// distances share their surfaces.
+    pub fn stereo(&self, distance_m: f64) -> StereoSettings {
+        let nearest_m = (0.3 * distance_m).max(0.01);
+        let range_min_m = 2f64.powf(nearest_m.log2().floor()).max(self.surface_range_min_m);
+        StereoSettings { method: self.surface_method, range_min_m, ..StereoSettings::default() }
+    }
+
+    /// How far the coarse search goes where the start is known to `sigma_m`, m.
+    pub fn search_m(&self, sigma_m: f64, half_width_m: f64) -> f64 {
+        if self.shape_search_m > 0.0 {
+            self.shape_search_m
+        } else {
+            (3.0 * sigma_m + SEARCH_LEAST_M).min(half_width_m)
+        }
+    }
+
+    /// How they are registered.
+    pub fn registration(&self) -> ShapeSettings {
+        let defaults = ShapeSettings::default();
+        ShapeSettings {
+            mesh: MeshSettings {
+                spacing_m: self.mesh_spacing_m,
+                depth_ratio_max: self.mesh_ratio_max,
+                ..defaults.mesh
+            },
+            sensor_px: self.shape_sensor_px as usize,
+            margin: self.shape_margin,
+            overlap_min: self.shape_overlap_min,
+            common_sigma_m: self.shape_common_m,
+            method: self.shape_method,
+            checks: CheckSettings {
+                triangles_min: self.shape_triangles_min as usize,
+                sigma_max_m: self.shape_sigma_max_m,
+                misfit_max: self.shape_misfit_max,
+                turn_max_rad: self.shape_turn_max_deg.to_radians(),
+                other_min: self.shape_other_min,
+                ..defaults.checks
+            },
+            ..defaults
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_defaults_are_those_of_the_registration_but_for_its_method_its_overlap_and_a_rounded_angle() {
+        let own = ShapeTrackerSettings::default().registration();
+        let mut other =
+            ShapeSettings { method: Method::PointToPlane, overlap_min: 0.25, ..ShapeSettings::default() };
+        assert!((own.checks.turn_max_rad - other.checks.turn_max_rad).abs() < 1e-3);
+        other.checks.turn_max_rad = own.checks.turn_max_rad;
+        assert_eq!(own, other);
+    }
+}

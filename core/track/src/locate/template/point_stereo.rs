@@ -1,0 +1,332 @@
+//! Step `point_stereo`: the one target point in the right image, along the epipolar curve (K§4.4, R73–R76).
+//!
+//! The left pixel's ray, sampled by range, projects into the right image as a curve; with real models it is
+//! not an image row (E38). Along that curve, and up to the tolerance to either side of it, the left window is
+//! compared with right windows by normalised correlation (R76). Each right window is resampled through
+//! `A = ∂right/∂left` at the candidate's range, so that cameras which are turned against each other still see
+//! the same patch; for two parallel eyes A is the identity. The best position is refined by a quadratic fit
+//! along and across the curve, and then followed to the next maximum of scores that count the window's centre
+//! most (`correlate::focus`).
+//!
+//! The interval searched is one of disparity for two eyes side by side: as wide as half the search window,
+//! centred on the predicted range (R74, R75, E13), and the whole of the curve at designation or where the two
+//! views are free. The slope of the surface (how the right position moves when the left one does) comes from
+//! the same search at four neighbours: it turns an error of the left pixel into one of range, and with
+//! `surface_warp` the windows near the best position are compared once more, resampled as on that surface; the
+//! better score stands. `stereo_search` says how the windows are compared.
+//!
+//! **Left–right check.** The right pixel is looked for in the left image in the same way, with the eyes exchanged and
+//! the surface seen from the other side. How far from the first pixel it leads is recorded: a wrong match seldom
+//! leads back. It becomes a criterion with `left_right_max_px`. **Disparity** is the arc length from where a point
+//! at infinity would lie, for two parallel eyes the difference of the columns.
+//!
+//! | symbol | name | unit |
+//! |---|---|---|
+//! | curve parameter | arc length from the far end | px in the right image |
+//! | A | `right_from_left` | px per px |
+
+use nalgebra::{Matrix2, RowVector2};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::failure::TemplateFailure;
+use super::match_noise::match_noise;
+use super::settings::{DisparityInterval, StereoReference, TemplateSettings};
+use super::stereo_curve::{Curve, CurveInput};
+pub use super::stereo_input::{CurvePoint, StereoInput};
+use super::stereo_search::{Best, StereoTemplate, Windows};
+use crate::array_name::ArrayName;
+use sightline_geometry::frames::Pixel;
+use sightline_geometry::stereo_geometry::StereoGeometry;
+use sightline_record::{ArrayKind, Declaration, Eye, Record, Role, Shape, ShapeKind, Unit};
+use sightline_vision::correlate::Focus;
+use sightline_vision::image::patch::{self, Patch};
+use sightline_vision::image::resample;
+
+/// Distance of the neighbours from which the slope is measured, px in the left image.
+const SLOPE_BASE_PX: f64 = 8.0;
+
+/// How far along the curve a neighbour's match may differ from the target's, px.
+const SLOPE_REACH_PX: f64 = 5.0;
+
+/// A neighbour below this score says nothing about the slope.
+const SLOPE_SCORE_MIN: f32 = 0.6;
+
+/// The corresponding point in the right image.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct PointStereo {
+    /// The part of the epipolar curve that was searched, far end first, about a pixel apart.
+    pub curve: Vec<CurvePoint>,
+    /// The best position, px.
+    pub right_pixel: Pixel,
+    /// Its score.
+    pub score: f64,
+    /// Its range along the left ray on the curve, m.
+    pub range_m: f64,
+    /// Disparity: the way along the curve from where a point at infinity would lie, px.
+    #[serde(default)]
+    pub disparity_px: Option<f64>,
+    /// How far it lies beside the curve, px.
+    pub across_px: f64,
+    /// How far from the left pixel the right one leads back to, px; null where nothing was found there.
+    #[serde(default)]
+    pub left_right_px: Option<f64>,
+    /// Whether the best position is at an end of the searched interval.
+    pub at_end: bool,
+    /// Covariance of the right position for a given left one, px².
+    #[schema(value_type = Vec<f64>)]
+    pub covariance_px2: Matrix2<f64>,
+    /// How the right position moves with the left one on the target's surface, px per px.
+    #[schema(value_type = Vec<f64>)]
+    pub right_from_left: Matrix2<f64>,
+    /// The right image at the match, resampled as the left sees it.
+    #[serde(skip)]
+    #[schema(ignore)]
+    pub right_window: Patch,
+}
+
+/// A slope that stretches the window by more than this is not believed, px per px.
+const STRETCH_LIMIT: f64 = 0.5;
+
+/// Finds the left pixel's point in the right image.
+///
+/// # Errors
+/// A sentence saying why there is nothing to compare.
+pub fn point_stereo(
+    input: &StereoInput<'_>,
+    settings: &TemplateSettings,
+) -> Result<PointStereo, TemplateFailure> {
+    let half = settings.template_size_px / 2;
+    let patch = patch::extract(input.left_image, input.left_pixel, half, settings.kernel);
+    let focus = Focus::new(settings.template_size_px, settings.focus_px);
+    let template = StereoTemplate::new(patch, &focus).ok_or(TemplateFailure::StereoWindowOutside)?;
+    let curve = curve(input, settings).ok_or(TemplateFailure::RayUnseen)?;
+    let interval = search_interval(&curve, input, settings)?;
+    let facing = Windows {
+        curve: &curve,
+        template: &template,
+        input,
+        slope: RowVector2::zeros(),
+        tolerance_px: settings.epipolar_tolerance_px,
+        settings,
+    };
+    let (points, best) = facing.search(interval);
+    let best = best.map(|best| facing.in_focus(interval, best)).ok_or(TemplateFailure::NoStereoWindow)?;
+    let slope = surface_slope(&curve, best.along, input, &focus, settings);
+    let (windows, best) = on_surface(facing, interval, best, slope);
+    let (right_pixel, range_m) = curve.at(best.along, best.across);
+    let prepared = windows.right_from_left(best.along);
+    let right_window =
+        resample::window(input.right_image, right_pixel, &prepared, half, settings.kernel).into();
+    let right_from_left =
+        slope.map_or(prepared, |slope| Windows { slope, ..facing }.right_from_left(best.along));
+    let misfit = prepared
+        .try_inverse()
+        .map_or_else(Matrix2::zeros, |inverse| inverse * right_from_left - Matrix2::identity());
+    let noise = match_noise(template.patch(), &right_window, &misfit, &focus);
+    let seen = noise.covariance_px2 + noise.bias_px * noise.bias_px.transpose();
+    let found = Found { right_pixel, range_m, right_from_left };
+    Ok(PointStereo {
+        curve: points,
+        right_pixel,
+        score: best.score,
+        range_m,
+        disparity_px: curve.along_of_infinity().map(|infinity| best.along - infinity),
+        across_px: best.across,
+        left_right_px: left_again(input, &found, &focus, settings)
+            .map(|left| left.distance(input.left_pixel)),
+        at_end: best.at_end,
+        covariance_px2: prepared * seen * prepared.transpose(),
+        right_from_left,
+        right_window,
+    })
+}
+
+/// The whole epipolar curve, or the image row in its place.
+fn curve(input: &StereoInput<'_>, settings: &TemplateSettings) -> Option<Curve> {
+    let mut curve = Curve::new(&curve_input(input, settings))?;
+    if settings.stereo_reference == StereoReference::ImageRow {
+        curve.flatten_to_row(input.left_pixel.y);
+    }
+    Some(curve)
+}
+
+fn curve_input<'a>(input: &StereoInput<'a>, settings: &TemplateSettings) -> CurveInput<'a> {
+    CurveInput {
+        left: input.left,
+        right: input.right,
+        left_pixel: input.left_pixel,
+        ranges_m: [settings.range_min_m, settings.range_max_m],
+    }
+}
+
+/// The part of the curve to search: first and last arc length, px.
+fn search_interval(
+    curve: &Curve,
+    input: &StereoInput<'_>,
+    settings: &TemplateSettings,
+) -> Result<(f64, f64), TemplateFailure> {
+    let whole = (0.0, curve.length_px());
+    let range_m = match (input.geometry, input.predicted_range_m) {
+        (StereoGeometry::Lateral, Some(range_m)) => range_m,
+        _ => return Ok(whole),
+    };
+    let width = settings.disparity_range_px;
+    let (from, to) = match settings.disparity_interval {
+        DisparityInterval::Centred => {
+            let centre = curve.along_of_range(range_m);
+            (centre - width / 2.0, centre + width / 2.0)
+        }
+        DisparityInterval::FromZero => {
+            let zero = curve.along_of_infinity().unwrap_or(0.0);
+            (zero, zero + width)
+        }
+    };
+    let cut = (from.max(whole.0), to.min(whole.1));
+    if cut.0 < cut.1 { Ok(cut) } else { Err(TemplateFailure::IntervalOffCurve) }
+}
+
+/// The best position once more, near where it was, with windows resampled as on a surface of this slope; what
+/// was found before stands unless that scores better.
+fn on_surface<'a>(
+    facing: Windows<'a>,
+    (from, to): (f64, f64),
+    best: Best,
+    slope: Option<RowVector2<f64>>,
+) -> (Windows<'a>, Best) {
+    let believed = slope.filter(|slope| facing.settings.surface_warp && slope.norm() <= STRETCH_LIMIT);
+    let Some(slope) = believed.filter(|_| !best.at_end) else { return (facing, best) };
+    let windows = Windows { slope, ..facing };
+    let near = ((best.along - SLOPE_REACH_PX).max(from), (best.along + SLOPE_REACH_PX).min(to));
+    let (_, again) = windows.search(near);
+    match again.filter(|again| !again.at_end && again.score >= best.score) {
+        Some(again) => (windows, windows.in_focus(near, again)),
+        None => (facing, best),
+    }
+}
+
+/// How the place on the curve moves with the left pixel, from the matches of four neighbours of the target, px per
+/// px; beside what a surface that faces the camera makes it.
+fn surface_slope(
+    curve: &Curve,
+    along: f64,
+    input: &StereoInput<'_>,
+    focus: &Focus,
+    settings: &TemplateSettings,
+) -> Option<RowVector2<f64>> {
+    let (_, range_m) = curve.at(along, 0.0);
+    let half = settings.template_size_px / 2;
+    let neighbour = |dx: f64, dy: f64| -> Option<f64> {
+        let left_pixel = input.left_pixel.offset(dx, dy);
+        let patch = patch::extract(input.left_image, left_pixel, half, settings.kernel);
+        let shifted = StereoInput { left_pixel, ..*input };
+        let reach_px = SLOPE_REACH_PX + f64::from(half) + 1.0;
+        let own = Curve::near(&curve_input(&shifted, settings), range_m, reach_px)?;
+        let expected = own.along_of_range(range_m);
+        let interval =
+            ((expected - SLOPE_REACH_PX).max(0.0), (expected + SLOPE_REACH_PX).min(own.length_px()));
+        let windows = Windows {
+            curve: &own,
+            template: &StereoTemplate::new(patch, focus)?,
+            input: &shifted,
+            slope: RowVector2::zeros(),
+            tolerance_px: 0.0,
+            settings,
+        };
+        let best = windows.place(interval)?;
+        (best.score as f32 >= SLOPE_SCORE_MIN && !best.at_end).then_some(best.along - expected)
+    };
+    // Opposite neighbours of a plane lie as far on either side of the target, which is at 0; at an edge they do not.
+    let slope = |a: Option<f64>, b: Option<f64>| {
+        let (a, b) = (a?, b?);
+        let bend_px = (a + b).abs() / 2.0;
+        (bend_px <= settings.slope_bend_px).then_some((b - a) / (2.0 * SLOPE_BASE_PX))
+    };
+    let du = slope(neighbour(-SLOPE_BASE_PX, 0.0), neighbour(SLOPE_BASE_PX, 0.0))?;
+    let dv = slope(neighbour(0.0, -SLOPE_BASE_PX), neighbour(0.0, SLOPE_BASE_PX))?;
+    Some(RowVector2::new(du, dv))
+}
+
+/// A point of the right image and the surface there.
+struct Found {
+    right_pixel: Pixel,
+    range_m: f64,
+    right_from_left: Matrix2<f64>,
+}
+
+/// The left pixel to which the right one leads back, searched as the right one was, with the eyes exchanged; `None`
+/// where there is nothing to compare.
+fn left_again(
+    input: &StereoInput<'_>,
+    found: &Found,
+    focus: &Focus,
+    settings: &TemplateSettings,
+) -> Option<Pixel> {
+    let back = StereoInput {
+        left_pixel: found.right_pixel,
+        left_image: input.right_image,
+        right_image: input.left_image,
+        left: input.right,
+        right: input.left,
+        ..*input
+    };
+    let half = settings.template_size_px / 2;
+    let patch = patch::extract(back.left_image, back.left_pixel, half, settings.kernel);
+    let template = StereoTemplate::new(patch, focus)?;
+    let curve = curve(&back, settings)?;
+    let interval = search_interval(&curve, &back, settings).ok()?;
+    let along = curve.along_of_range(found.range_m);
+    // The surface of the first search, seen from the other side.
+    let beside = found.right_from_left.try_inverse()? - curve.right_from_left(back.right, found.range_m);
+    let slope = curve.tangent(along).transpose() * beside;
+    let is_believed = settings.surface_warp && slope.norm() <= STRETCH_LIMIT;
+    let windows = Windows {
+        curve: &curve,
+        template: &template,
+        input: &back,
+        slope: if is_believed { slope } else { RowVector2::zeros() },
+        tolerance_px: settings.epipolar_tolerance_px,
+        settings,
+    };
+    let best = windows.place(interval)?;
+    Some(curve.at(best.along, best.across).0)
+}
+
+impl Record for PointStereo {
+    fn declare(r: &mut Declaration<Self>) {
+        r.quantity("right_pixel", Unit::Pixel, |s| s.right_pixel).describe("The match in the right image.");
+        r.quantity("score", Unit::One, |s| s.score).describe("Normalised correlation of the stereo match.");
+        r.quantity("range_m", Unit::Metre, |s| s.range_m)
+            .describe("Range along the left ray on the epipolar curve.");
+        r.quantity("disparity_px", Unit::Pixel, |s| s.disparity_px)
+            .describe("Distance along the curve from the image of a point at infinity.");
+        r.quantity("across_px", Unit::Pixel, |s| s.across_px)
+            .describe("Offset of the match across the curve.");
+        r.quantity("left_right_px", Unit::Pixel, |s| s.left_right_px)
+            .describe("Distance between the left pixel and the match of the right one in the left image.");
+        r.quantity("at_end", Unit::One, |s| s.at_end)
+            .describe("Whether the best position is at an end of the searched interval.");
+        r.quantity("covariance_px2", Unit::SquarePixel, |s| s.covariance_px2)
+            .describe("Covariance of the right position for a given left one.");
+        r.quantity("right_from_left", Unit::One, |s| s.right_from_left)
+            .describe("Derivative of the right position by the left one on the target's surface.");
+        r.array(
+            "right_window",
+            ArrayKind::Patch,
+            "The right image at the stereo match, as the left eye would see it",
+            |s| (&s.right_window).into(),
+        );
+        r.mark("match", (Eye::Right, Role::Measurement, ShapeKind::Dot), |s| {
+            Some(Shape::Dot { at: s.right_pixel })
+        });
+        r.mark("curve", (Eye::Right, Role::Search, ShapeKind::Curve), |s| {
+            Some(Shape::Curve { points: s.curve.iter().map(|point| point.pixel).collect() })
+        });
+    }
+}
+
+/// The arrays of this stage that panels draw by themselves.
+impl ArrayName {
+    /// The right image at the stereo match.
+    pub const RIGHT_WINDOW: Self = Self::new("right_window");
+}

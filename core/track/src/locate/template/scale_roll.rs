@@ -1,0 +1,297 @@
+//! Step `scale_roll`: the template as the target should look now (K§4.3.1, K-Eq 6–10, R48–R59).
+//!
+//! ```text
+//! s     = |p_old − C_old| / |p_new − C_new|                      K-Eq 6
+//! H_x   = (H − (A·H) A) / |A × H|        of the old left camera  K-Eq 7–9
+//! p_adj = p_0 + k H_x,  k = 0.05 m                               K-Eq 10
+//! ρ     = atan2(dy, dx) of p_0 → p_adj in the new left image, clockwise on screen positive (R56)
+//! ```
+//! The window keeps its size in pixels; the image content is magnified by s and turned by ρ (R51, R58).
+//! Only the prediction is used, never the stereo result to come (R50). Scale and roll do not compensate
+//! out-of-plane change (R60). Where stereo measured the slope of the target's surface, the map between the two
+//! images is known to first order,
+//! ```text
+//! F = ∂pixel_new/∂p · R · ∂p/∂pixel_old
+//! ```
+//! and with `surface_warp` the window is resampled through F instead: foreshortening changes with the line of
+//! sight, most on surfaces seen at a grazing angle. With `warp_model = homography` each pixel goes through the plane of the
+//! surface and both camera models instead (`window_map`). `image_from_template` is F (or s R(ρ) where the slope is not
+//! known), which also carries the uncertainty of the target's position in the image.
+//!
+//! | symbol | name | unit, frame |
+//! |---|---|---|
+//! | p_old, C_old | `appearance.position_in_rover`, `appearance.camera` | m, rover frame of the template's stop |
+//! | p_new, C_new | `now_from_template * p_old`, `left` | m, present rover frame |
+//! | s | `scale` | – |
+//! | ρ | `roll_rad` | rad |
+//! | R | rotation of `now_from_template` | – |
+//! | ∂p/∂pixel_old | `appearance.surface_by_pixel` | m/px |
+
+use nalgebra::{Matrix2, Rotation2};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::failure::TemplateFailure;
+use super::memory::Appearance;
+use super::settings::{RollReference, TemplateSettings, WarpModel};
+use super::window_map::{PlaneMap, WindowMap, WindowSource};
+use crate::array_name::ArrayName;
+use sightline_geometry::camera::Camera;
+use sightline_geometry::frames::{Pixel, Point3, Pose};
+use sightline_record::{ArrayKind, Declaration, Record, Unit};
+use sightline_vision::image::patch::{self, Patch};
+
+/// Length of the helper vector, m (K-Eq 10).
+const HELPER_LENGTH_M: f64 = 0.05;
+
+/// A slope that stretches the template by more than this beside scale and roll is not believed, px per px.
+const STRETCH_LIMIT: f64 = 0.5;
+
+/// The template, scaled and rolled, or warped by the target's surface.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ScaleRoll {
+    /// Scale by the ratio of distances; applied only where the setting `scale` is on.
+    pub scale: f64,
+    /// Roll, rad, clockwise on screen; applied only where the setting `roll` is on.
+    pub roll_rad: f64,
+    /// Scale that was applied.
+    pub applied_scale: f64,
+    /// Roll that was applied, rad.
+    pub applied_roll_rad: f64,
+    /// Whether the window was warped by the surface's slope instead: through `image_from_template`.
+    pub warped: bool,
+    /// Distance from the left camera when the template was taken, m.
+    pub old_distance_m: f64,
+    /// Predicted distance from the left camera now, m.
+    pub new_distance_m: f64,
+    /// The stop at which the template was taken.
+    pub template_step: usize,
+    /// How offsets in the old image move on the target's surface, px per px; `s R(ρ)` where its slope is not known.
+    #[schema(value_type = Vec<f64>)]
+    pub image_from_template: Matrix2<f64>,
+    /// The window as it was in the image from which it was taken.
+    #[serde(skip)]
+    #[schema(ignore)]
+    pub reference: Patch,
+    /// The window after scaling.
+    #[serde(skip)]
+    #[schema(ignore)]
+    pub scaled: Patch,
+    /// The window after scaling and rolling, or after warping: what is matched.
+    #[serde(skip)]
+    #[schema(ignore)]
+    pub rolled: Patch,
+}
+
+impl ScaleRoll {
+    /// How the template was prepared: `s R(ρ)`, or F where it was warped, px per px.
+    pub fn prepared_from_template(&self) -> Matrix2<f64> {
+        if self.warped {
+            return self.image_from_template;
+        }
+        Rotation2::new(self.applied_roll_rad).into_inner() * self.applied_scale
+    }
+
+    /// By how much the surface stretches the prepared template further: `F (s R)⁻¹ − I`, px per px; 0 where it
+    /// was warped.
+    pub fn misfit(&self) -> Matrix2<f64> {
+        let inverse = self.prepared_from_template().try_inverse().unwrap_or_else(Matrix2::identity);
+        self.image_from_template * inverse - Matrix2::identity()
+    }
+}
+
+/// How offsets in the old image move on the target's surface: `∂pixel_new/∂p · R · ∂p/∂pixel_old`, px per px.
+fn surface_map(appearance: &Appearance, now_from_template: &Pose, left: &Camera) -> Option<Matrix2<f64>> {
+    let slope = appearance.surface_by_pixel?;
+    let (_, jacobian) =
+        left.model.project_with_jacobian(&(now_from_template * appearance.position_in_rover))?;
+    Some(jacobian * now_from_template.rotation.to_rotation_matrix().matrix() * slope)
+}
+
+/// The scale and roll of the geometry alone: `(s, ρ in rad, D_old in m, D_new in m)`.
+///
+/// # Errors
+/// A sentence when the prediction lies behind the camera.
+pub fn geometry(
+    position_then: &Point3,
+    camera_then: &Camera,
+    now_from_then: &Pose,
+    camera_now: &Camera,
+    roll_reference: RollReference,
+) -> Result<(f64, f64, f64, f64), TemplateFailure> {
+    let position_now = now_from_then * position_then;
+    let old_distance_m = (position_then - camera_then.model.centre()).norm();
+    let new_distance_m = (position_now - camera_now.model.centre()).norm();
+    let helper_then = position_then + camera_then.model.horizontal_axis() * HELPER_LENGTH_M;
+    let direction = |camera: &Camera, from: &Point3, to: &Point3| -> Option<f64> {
+        let (a, b): (Pixel, Pixel) = (camera.project(from)?, camera.project(to)?);
+        Some((b.y - a.y).atan2(b.x - a.x))
+    };
+    let now = direction(camera_now, &position_now, &(now_from_then * helper_then))
+        .ok_or(TemplateFailure::PredictionUnseen)?;
+    let then = match roll_reference {
+        RollReference::Horizontal => 0.0,
+        RollReference::OldImage => direction(camera_then, position_then, &helper_then).unwrap_or(0.0),
+    };
+    Ok((old_distance_m / new_distance_m, now - then, old_distance_m, new_distance_m))
+}
+
+/// Scales and rolls the template of `appearance` for the present left camera, or warps it by its surface.
+///
+/// `tried` is a scale and a roll (rad) to take instead of what the geometry and the switches say (R224).
+///
+/// # Errors
+/// A sentence saying why there is no template.
+pub fn scale_roll<'a>(
+    appearance: &'a Appearance,
+    now_from_template: &Pose,
+    left: &'a Camera,
+    settings: &TemplateSettings,
+    tried: Option<(f64, f64)>,
+) -> Result<Prepared<'a>, TemplateFailure> {
+    let (scale, roll_rad, old_distance_m, new_distance_m) = geometry(
+        &appearance.position_in_rover,
+        &appearance.camera,
+        now_from_template,
+        left,
+        settings.roll_reference,
+    )?;
+    let by_geometry = (if settings.scale { scale } else { 1.0 }, if settings.roll { roll_rad } else { 0.0 });
+    let (applied_scale, applied_roll_rad) = tried.unwrap_or(by_geometry);
+    let (image, pixel) = (appearance.image.as_ref(), appearance.pixel);
+    let (size, kernel) = (settings.template_size_px, settings.kernel);
+    let similarity = Rotation2::new(roll_rad).into_inner() * scale;
+    let surface = surface_map(appearance, now_from_template, left).filter(|map| {
+        similarity
+            .try_inverse()
+            .is_some_and(|inverse| (map * inverse - Matrix2::identity()).norm() <= STRETCH_LIMIT)
+    });
+    let is_wanted = settings.surface_warp && settings.scale && settings.roll && tried.is_none();
+    let warp = surface.filter(|_| is_wanted);
+    let plane = warp
+        .filter(|_| settings.warp_model == WarpModel::Homography)
+        .and_then(|map| PlaneMap::new(appearance, now_from_template, left, &map));
+    let map = match (plane, &warp) {
+        (Some(plane), _) => WindowMap::Plane(Box::new(plane)),
+        (None, Some(map)) => WindowMap::Linear(*map),
+        (None, None) => WindowMap::Linear(Rotation2::new(applied_roll_rad).into_inner() * applied_scale),
+    };
+    let source = WindowSource { appearance, map, kernel };
+    Ok(Prepared {
+        record: ScaleRoll {
+            image_from_template: surface.unwrap_or(similarity),
+            warped: warp.is_some(),
+            scale,
+            roll_rad,
+            applied_scale,
+            applied_roll_rad,
+            old_distance_m,
+            new_distance_m,
+            template_step: appearance.step,
+            reference: patch::extract(image, pixel, size / 2, kernel),
+            scaled: patch::scale_roll(image, pixel, applied_scale, 0.0, size, kernel),
+            rolled: source.window(size),
+        },
+        source,
+    })
+}
+
+/// The prepared template with where it comes from, so that its surroundings can be prepared as it was.
+#[derive(Clone, Debug)]
+pub struct Prepared<'a> {
+    /// What the trace keeps.
+    pub record: ScaleRoll,
+    source: WindowSource<'a>,
+}
+
+impl Prepared<'_> {
+    /// The appearance from which it was prepared.
+    pub(super) fn appearance(&self) -> &Appearance {
+        self.source.appearance
+    }
+
+    /// The template with its surroundings: a window of `size` × `size` px with the same middle.
+    pub fn window(&self, size: u32) -> Patch {
+        if size == self.record.rolled.width() { self.record.rolled.clone() } else { self.source.window(size) }
+    }
+}
+
+impl Record for ScaleRoll {
+    fn declare(r: &mut Declaration<Self>) {
+        r.quantity("scale", Unit::One, |s| s.scale)
+            .describe("Scale by the ratio of distances; applied only where the setting `scale` is on.")
+            .formula("D_old / D_new [Kim09 Eq. 6]", &["old_distance_m", "new_distance_m"]);
+        r.quantity("roll_rad", Unit::Radian, |s| s.roll_rad)
+            .describe("Roll, clockwise on screen; applied only where the setting `roll` is on.")
+            .formula(
+                "angle in the new left image of a helper 5 cm long that was level in the old one [Kim09 Eq. 7–10]",
+                &["setting.roll_reference", "point_mast.predicted_left"],
+            );
+        r.quantity("applied_scale", Unit::One, |s| s.applied_scale).describe("Scale that was applied.");
+        r.quantity("applied_roll_rad", Unit::Radian, |s| s.applied_roll_rad)
+            .describe("Roll that was applied.");
+        r.quantity("warped", Unit::One, |s| s.warped)
+            .describe("Whether the window was warped by the slope of the surface instead.");
+        r.quantity("old_distance_m", Unit::Metre, |s| s.old_distance_m)
+            .describe("Distance from the left camera when the template was taken.");
+        r.quantity("new_distance_m", Unit::Metre, |s| s.new_distance_m)
+            .describe("Predicted distance from the left camera now.");
+        r.quantity("template_step", Unit::One, |s| s.template_step)
+            .describe("The stop at which the template was taken.");
+        r.array("reference", ArrayKind::Patch, "The template as it was taken", |s| (&s.reference).into());
+        r.array("scaled", ArrayKind::Patch, "The template, scaled to the present distance", |s| {
+            (&s.scaled).into()
+        });
+        r.array("rolled", ArrayKind::Patch, "The template, scaled and rolled: what was matched", |s| {
+            (&s.rolled).into()
+        });
+    }
+}
+
+/// The arrays of this stage that panels draw by themselves.
+impl ArrayName {
+    /// The template as it was taken.
+    pub const REFERENCE: Self = Self::new("reference");
+    /// The template, scaled.
+    pub const SCALED: Self = Self::new("scaled");
+    /// The template, scaled and rolled: what was matched.
+    pub const ROLLED: Self = Self::new("rolled");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sightline_geometry::camera::{Cahv, Cahvor, CameraModel};
+    use sightline_geometry::frames::{PoseRecord, Vector3};
+
+    /// Opportunity's left navcam, vectors as printed (domain.md, TV1).
+    fn navcam() -> Camera {
+        let linear = Cahv::as_printed(
+            Point3::new(0.442604, -0.0611635, -1.25106),
+            Vector3::new(0.93995, -0.338133, 0.0464979),
+            Vector3::new(884.72, 981.763, 24.1472),
+            Vector3::new(418.579, -152.039, 1245.75),
+        );
+        let optical_axis = Vector3::new(0.946551, -0.315595, 0.0666419);
+        let model = Cahvor::as_printed(linear, optical_axis, [0.00096, -0.002183, 0.018547]);
+        Camera::new(CameraModel::Cahvor(model), 1024, 1024)
+    }
+
+    #[test]
+    fn scale_and_roll_of_test_vector_five_agree_to_its_last_digit() {
+        let new_pose = PoseRecord {
+            position_m: [0.9, 0.05, -0.02],
+            quaternion_sxyz: [0.9985338374, 0.0440542148, -0.0162881723, 0.026909053],
+        };
+        let now_from_then = new_pose.to_pose().inverse();
+        let target = Point3::new(8.0, -2.6, 0.1);
+        let (scale, roll, old_m, new_m) =
+            geometry(&target, &navcam(), &now_from_then, &navcam(), RollReference::Horizontal).unwrap();
+        assert!((scale - 1.1102799965).abs() < 1e-9, "{scale}");
+        assert!((roll.to_degrees() + 5.9429401632).abs() < 1e-6, "{}", roll.to_degrees());
+        assert!((old_m - 8.0861170037).abs() < 1e-9 && (new_m - 7.2829529754).abs() < 1e-8);
+        let (_, against_old, ..) =
+            geometry(&target, &navcam(), &now_from_then, &navcam(), RollReference::OldImage).unwrap();
+        assert!(((roll - against_old).to_degrees() + 0.0237861221).abs() < 1e-6);
+    }
+}

@@ -1,0 +1,199 @@
+//! The trait that every tracker implements, and its inputs.
+//!
+//! A tracker owns three things: its *memory*, which is all that it carries from stop to stop; its *evidence*, which is
+//! everything it observed at one stop; and its *gates*. The stages around it use neither memory nor evidence.
+//!
+//! A tracker never fails: where it finds nothing, `Sighting::missing` gives the reason and `judge` rejects the update. The
+//! same input gives the same bits.
+
+use nalgebra::{Matrix3, Matrix3x2};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::store::Shared;
+use crate::gate::{Gate, GateKind};
+use crate::limits::Limits;
+use crate::settings::Settings;
+use crate::stages::capture::Capture;
+use crate::stages::point_mast::Pointing;
+use crate::stages::prediction::Prediction;
+use sightline_geometry::camera::Camera;
+use sightline_geometry::estimate::drift::Drift;
+use sightline_geometry::frames::{Pixel, Point3, Pose};
+use sightline_geometry::stereo_geometry::StereoGeometry;
+
+/// A way of finding a target again.
+pub trait Tracker {
+    /// What is carried from stop to stop. Serialised, it may leave out what can be computed again from the images of the
+    /// stops that it names.
+    type Memory: Clone + PartialEq + Serialize + DeserializeOwned;
+    /// Everything that was observed at one stop.
+    type Evidence: Clone + PartialEq + Default + Serialize + DeserializeOwned;
+
+    /// The gates of this tracker.
+    const GATES: &'static [GateKind];
+
+    /// Finds the position of a designated pixel; no memory where there is no position.
+    fn designate(&self, input: &DesignateInput<'_>) -> (Sighting<Self::Evidence>, Option<Self::Memory>);
+
+    /// Finds the target again after a move.
+    fn locate(&self, input: &LocateInput<'_>, memory: &Self::Memory) -> Sighting<Self::Evidence>;
+
+    /// The gates of an update, in the order in which they are shown. A value that was not reached is `None`, and fails.
+    fn gates(&self, evidence: &Self::Evidence, input: &GateInput<'_>) -> Vec<Gate>;
+
+    /// The memory after an accepted update; a rejected one leaves it as it is.
+    fn remember(
+        &self,
+        memory: Self::Memory,
+        evidence: &Self::Evidence,
+        update: &Accepted<'_>,
+    ) -> Self::Memory;
+}
+
+/// Where a tracker found the target, with its evidence; by default nowhere.
+///
+/// The fields are those of [`super::Located`], which holds the evidence of any tracker.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sighting<E> {
+    /// Position in the left image, px.
+    pub left_pixel: Option<Pixel>,
+    /// Position in the right image, px.
+    pub right_pixel: Option<Pixel>,
+    /// The error of the left position against the designated point, template drift included.
+    pub left_error: Drift,
+    /// Position in the rover frame, m.
+    pub position_in_rover: Option<Point3>,
+    /// Covariance of that position, m².
+    pub covariance_in_rover: Option<Matrix3<f64>>,
+    /// Derivative of the surface point by the left pixel, m per px.
+    pub surface_by_pixel: Option<Matrix3x2<f64>>,
+    /// Confidence, from 0 to 1.
+    pub confidence: f64,
+    /// Why there is no position: a failure of the tracker, as one sentence.
+    pub missing: Option<String>,
+    /// What was observed.
+    pub evidence: E,
+}
+
+impl<E> Sighting<E> {
+    /// The same sighting with other evidence, and the evidence it had.
+    pub fn replace<F>(self, evidence: F) -> (Sighting<F>, E) {
+        let sighting = Sighting {
+            left_pixel: self.left_pixel,
+            right_pixel: self.right_pixel,
+            left_error: self.left_error,
+            position_in_rover: self.position_in_rover,
+            covariance_in_rover: self.covariance_in_rover,
+            surface_by_pixel: self.surface_by_pixel,
+            confidence: self.confidence,
+            missing: self.missing,
+            evidence,
+        };
+        (sighting, self.evidence)
+    }
+}
+
+impl<E: Default> Sighting<E> {
+    /// No position, for a reason.
+    pub fn nothing(missing: impl std::fmt::Display, evidence: E) -> Self {
+        Self { missing: Some(missing.to_string()), evidence, ..Self::default() }
+    }
+}
+
+/// What a tracker's gates may depend on beside its evidence.
+#[derive(Clone, Debug)]
+pub struct GateInput<'a> {
+    /// Whether a position was found.
+    pub is_located: bool,
+    /// The confidence of the sighting.
+    pub confidence: f64,
+    /// The gates on the corrections of distance and position, which `judge` computes for every tracker.
+    pub corrections: [Gate; 2],
+    /// Camera models and the predicted pixels.
+    pub pointing: &'a Pointing,
+    /// Whether the target was lost before this update.
+    pub was_lost: bool,
+    /// The limits.
+    pub limits: &'a Limits,
+}
+
+/// An accepted update, as a tracker remembers it.
+#[derive(Clone, Copy, Debug)]
+pub struct Accepted<'a> {
+    /// The stop, from 0.
+    pub step: usize,
+    /// The left camera.
+    pub left: &'a Camera,
+    /// The stereo pair.
+    pub capture: &'a Capture,
+    /// The estimated pose.
+    pub site_from_rover: &'a Pose,
+    /// Position in the left image, px.
+    pub left_pixel: Option<Pixel>,
+    /// The error of the left position against the designated point.
+    pub left_error: Drift,
+    /// Position in the rover frame, m.
+    pub position_in_rover: Point3,
+    /// Derivative of the surface point by the left pixel, m per px.
+    pub surface_by_pixel: Option<Matrix3x2<f64>>,
+    /// The configuration.
+    pub settings: &'a Settings,
+}
+
+/// What a tracker is given at the stop of the designation.
+#[derive(Clone, Copy, Debug)]
+pub struct DesignateInput<'a> {
+    /// The stop.
+    pub step: usize,
+    /// The estimated pose there.
+    pub site_from_rover: &'a Pose,
+    /// The designated position in the left image, px.
+    pub pixel: Pixel,
+    /// The stereo pair.
+    pub capture: &'a Capture,
+    /// The left camera.
+    pub left: &'a Camera,
+    /// The right camera.
+    pub right: &'a Camera,
+    /// How the two images relate.
+    pub stereo: StereoGeometry,
+    /// What the targets of the traverse share.
+    pub shared: Option<Shared<'a>>,
+    /// The configuration.
+    pub settings: &'a Settings,
+}
+
+/// What a tracker is given at every later stop.
+#[derive(Clone, Copy, Debug)]
+pub struct LocateInput<'a> {
+    /// Where it should be.
+    pub prediction: &'a Prediction,
+    /// Camera models and the predicted pixels.
+    pub pointing: &'a Pointing,
+    /// The stereo pair.
+    pub capture: &'a Capture,
+    /// The estimated pose at this stop.
+    pub site_from_rover: &'a Pose,
+    /// How the two images relate.
+    pub stereo: StereoGeometry,
+    /// What the targets of the traverse share.
+    pub shared: Option<Shared<'a>>,
+    /// Which stop of the drive this is.
+    pub place: Place,
+    /// Updates in a row that were bad so far.
+    pub lost_count: u32,
+    /// The configuration.
+    pub settings: &'a Settings,
+}
+
+/// A stop among those of its drive.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Place {
+    /// The stop, from 0.
+    pub step: usize,
+    /// Whether its cameras are others than those of the stop before: the target is handed over (R205).
+    pub is_hand_over: bool,
+    /// Whether the drive ends here, or other cameras take over at the next stop.
+    pub is_last_of_pair: bool,
+}

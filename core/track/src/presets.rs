@@ -1,0 +1,283 @@
+//! Named configurations of the tracker: the eight of the paper's comparison and those beside them (R129, R216–R225).
+//!
+//! A preset is a list of changes to the default settings and nothing else; whatever it leaves out keeps its default.
+//! What the papers flew comes first, so that a default of ours never slips into a configuration that is called theirs:
+//! the presets named `ncc…` all begin with [`AS_PUBLISHED`].
+
+use crate::settings::{Changes, Settings, TrackerKind, parse_assignment};
+use sightline_geometry::error::{Error, Result};
+
+/// A named configuration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Preset {
+    /// Its name: words joined by hyphens.
+    pub name: &'static str,
+    /// One sentence that says what it does, with its source.
+    pub description: &'static str,
+    /// What it begins with, as others do.
+    base: &'static [&'static str],
+    /// What it changes, as `key=value`.
+    changes: &'static [&'static str],
+}
+
+/// What the paper leaves out and the defaults switch on (K§4.3, K§4.4).
+pub const AS_PUBLISHED: [&str; 4] =
+    ["surface_warp=false", "focus_px=0", "template_update=every_update", "far_ncc_min=-1"];
+
+const fn published(
+    name: &'static str,
+    description: &'static str,
+    changes: &'static [&'static str],
+) -> Preset {
+    Preset { name, description, base: &AS_PUBLISHED, changes }
+}
+
+const fn ours(name: &'static str, description: &'static str, changes: &'static [&'static str]) -> Preset {
+    Preset { name, description, base: &[], changes }
+}
+
+/// Features weighed by range, over the last three good stops.
+const FEATURES: [&str; 6] = [
+    "sift_contrast_min=0.015",
+    "n_retry=100",
+    "motion_gate=mahalanobis",
+    "feature_sigma_px=0.15",
+    "feature_sigma_per_scale=0.08",
+    "feature_common_px=0.65",
+];
+
+/// Features as the K9 rover had them (D§2).
+const FEATURES_PAPER: [&str; 8] = [
+    "sift_contrast_min=0.015",
+    "n_retry=100",
+    "stereo_along_curve=false",
+    "ratio_max=1",
+    "mutual_matches=false",
+    "motion_weighting=none",
+    "feature_memory=1",
+    "noise_model=half_pixel",
+];
+
+const fn following(
+    base: &'static [&'static str],
+    name: &'static str,
+    description: &'static str,
+    changes: &'static [&'static str],
+) -> Preset {
+    Preset { name, description, base, changes }
+}
+
+/// Every preset, in the order in which they are listed.
+pub const PRESETS: &[Preset] = &[
+    ours(
+        "sightline",
+        "The defaults: scale, roll and the surface's slope, in focus, renewed on condition.",
+        &[],
+    ),
+    published("ncc", "Correlation of the unchanged window (R112).", &["scale=false", "roll=false"]),
+    published(
+        "ncc-scale",
+        "Correlation of the scaled window, the paper's best (R112, R128).",
+        &["roll=false"],
+    ),
+    published("ncc-roll", "Correlation of the rolled window (R129).", &["scale=false"]),
+    published(
+        "ncc-scale-roll",
+        "Correlation of the scaled and rolled window, as flown (K§4.3.1, R129).",
+        &[],
+    ),
+    published(
+        "ncc-affine",
+        "Correlation of the unchanged window, then the affine second stage (R129, R221).",
+        &["scale=false", "roll=false", "refine=affine"],
+    ),
+    published(
+        "ncc-scale-affine",
+        "Correlation of the scaled window, then the affine second stage (R129, R221).",
+        &["roll=false", "refine=affine"],
+    ),
+    published(
+        "ncc-roll-affine",
+        "Correlation of the rolled window, then the affine second stage (R129, R221).",
+        &["scale=false", "refine=affine"],
+    ),
+    published(
+        "ncc-scale-roll-affine",
+        "Correlation of the scaled and rolled window, then the affine second stage (R129, R221).",
+        &["refine=affine"],
+    ),
+    published(
+        "coarse-to-fine",
+        "As flown, searched coarse to fine over two halvings (K§4.3.2, R64, R65).",
+        &["search=coarse_to_fine"],
+    ),
+    published("sad", "As flown, by sums of absolute differences (R216).", &["measure=sad"]),
+    published("ssd", "As flown, by sums of squared differences (R216).", &["measure=ssd"]),
+    published(
+        "sdog",
+        "As flown, by the sign of the difference of Gaussians, Marsokhod's tracker (R219).",
+        &["measure=sdog"],
+    ),
+    published(
+        "klt-translation",
+        "Pyramidal Lucas-Kanade by shift of the unchanged window, from the prediction (R217, R218).",
+        &["scale=false", "roll=false", "first_stage=klt_translation"],
+    ),
+    published(
+        "klt-affine",
+        "Pyramidal Lucas-Kanade by affine map of the unchanged window, from the prediction (R217, R218).",
+        &["scale=false", "roll=false", "first_stage=klt_affine"],
+    ),
+    published(
+        "scale-roll-search",
+        "Correlation over a brute-force grid of scales and rolls, without the geometry (R224).",
+        &["transform=search"],
+    ),
+    published(
+        "drift-correction",
+        "As flown, and every match corrected against the first window (R71).",
+        &["template_update=drift_corrected"],
+    ),
+    published(
+        "integer-peak",
+        "As flown, with peaks in whole pixels: shows the random walk of rounding (R67).",
+        &["sub_pixel=false"],
+    ),
+    published(
+        "never-update",
+        "As flown, but the first window is kept for the whole run (R71).",
+        &["template_update=never"],
+    ),
+    ours(
+        "sightline-affine",
+        "The defaults, then the affine second stage from the match in focus.",
+        &["refine=affine"],
+    ),
+    ours(
+        "homography",
+        "The defaults, warped through the surface's plane and both camera models pixel by pixel (beyond R60).",
+        &["warp_model=homography"],
+    ),
+    ours(
+        "three-templates",
+        "The defaults, and of the template and the two before it the one that scores best.",
+        &["reference_templates=3"],
+    ),
+    following(
+        &FEATURES,
+        "features",
+        "The motion of the whole scene by its features, weighed by range, over the last three good stops.",
+        &["tracker=features"],
+    ),
+    following(
+        &FEATURES_PAPER,
+        "features-paper",
+        "Features as the K9 rover had them: no constraint on matches, 3 cm, half a pixel, one stop (D§2).",
+        &["tracker=features"],
+    ),
+    ours(
+        "shape",
+        "The shape of the target's surroundings, registered to the first view at every stop (R189).",
+        &["tracker=shape"],
+    ),
+    following(
+        &FEATURES,
+        "combined",
+        "Features on the way, the shape at the end, and the target where the first line of sight meets the near surface.",
+        &["tracker=combined"],
+    ),
+    following(
+        &FEATURES_PAPER,
+        "combined-paper",
+        "The same as the K9 rover had it: its features, a simplex over absolute differences, no ray, no picture (D§2, D§4).",
+        &[
+            "tracker=combined",
+            "shape_method=simplex_l1",
+            "shape_prior=false",
+            "carried_ray=false",
+            "hand_off_picture=false",
+        ],
+    ),
+    ours(
+        "half-pixel",
+        "The defaults with the papers' noise of half a pixel (R170).",
+        &["noise_model=half_pixel"],
+    ),
+];
+
+impl Preset {
+    /// What it changes, by setting.
+    ///
+    /// # Errors
+    /// None for a preset of [`PRESETS`]; a test holds that.
+    pub fn changes(&self) -> Result<Changes> {
+        self.base.iter().chain(self.changes).map(|text| parse_assignment(text)).collect()
+    }
+
+    /// The settings it stands for.
+    ///
+    /// # Errors
+    /// As [`Preset::changes`].
+    pub fn settings(&self) -> Result<Settings> {
+        Settings::default().with(&self.changes()?)
+    }
+}
+
+/// The preset of that name.
+///
+/// # Errors
+/// A name that is not listed; the sentence lists those that are.
+pub fn preset(name: &str) -> Result<&'static Preset> {
+    PRESETS.iter().find(|preset| preset.name == name).ok_or_else(|| {
+        let known = PRESETS.iter().map(|preset| preset.name).collect::<Vec<_>>().join(", ");
+        Error::setting("preset", format!("there is no configuration {name}; known are {known}"))
+    })
+}
+
+/// The validated preset of a tracker: the configuration that the studies of docs/ recommend for it.
+///
+/// # Errors
+/// None; a test checks every tracker.
+pub fn validated(tracker: TrackerKind) -> Result<&'static Preset> {
+    preset(match tracker {
+        TrackerKind::Template => "sightline",
+        TrackerKind::Features => "features",
+        TrackerKind::Shape => "shape",
+        TrackerKind::Combined => "combined",
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_preset_makes_settings_and_has_a_name_of_its_own() {
+        for preset in PRESETS {
+            assert!(preset.settings().is_ok(), "{}", preset.name);
+            assert_eq!(
+                PRESETS.iter().filter(|other| other.name == preset.name).count(),
+                1,
+                "{}",
+                preset.name
+            );
+        }
+        let all: Vec<Settings> = PRESETS.iter().map(|preset| preset.settings().unwrap()).collect();
+        for (index, settings) in all.iter().enumerate() {
+            assert!(!all[..index].contains(settings), "{} repeats another", PRESETS[index].name);
+        }
+    }
+
+    #[test]
+    fn the_validated_preset_of_a_tracker_uses_that_tracker() {
+        for tracker in TrackerKind::ALL {
+            assert_eq!(validated(tracker).unwrap().settings().unwrap().tracker, tracker);
+        }
+    }
+
+    #[test]
+    fn an_unknown_preset_is_refused_with_the_known_ones() {
+        let message = preset("ncc-scalee").unwrap_err().to_string();
+        assert!(message.contains("ncc-scalee") && message.contains("ncc-scale-roll"), "{message}");
+    }
+}

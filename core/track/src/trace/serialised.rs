@@ -1,0 +1,215 @@
+//! The serialised form of a step: one flat record in which a stage that was not reached is null.
+
+use std::borrow::Cow;
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use utoipa::openapi::RefOr;
+use utoipa::openapi::schema::Schema;
+use utoipa::{PartialSchema, ToSchema};
+
+use super::{StepKind, StepTrace, StepTruth};
+use crate::locate::Located;
+use crate::stages::capture::Capture;
+use crate::stages::point_mast::Pointing;
+use crate::stages::prediction::Prediction;
+use crate::stages::update::Updated;
+use crate::verdict::Verdict;
+
+/// One step of a run. At the designation there is no `predict` and no `judge`; at a stop whose files are
+/// damaged there is a `fault` and nothing after `point_mast`.
+#[derive(Serialize, Deserialize, ToSchema)]
+#[schema(as = StepTrace)]
+struct SerialisedStep<'a> {
+    /// The stop, from 0.
+    step: usize,
+    /// Time since the first stop, s.
+    time_s: f64,
+    /// What is wrong with the stop's files, as one sentence.
+    fault: Option<Cow<'a, str>>,
+    /// Stage 1.
+    predict: Option<Cow<'a, Prediction>>,
+    /// Stage 2.
+    point_mast: Option<Cow<'a, Pointing>>,
+    /// Stage 3.
+    capture: Option<Cow<'a, Capture>>,
+    /// Stage 4.
+    locate: Option<Cow<'a, Located>>,
+    /// Stage 5.
+    judge: Option<Cow<'a, Verdict>>,
+    /// Stage 6.
+    update: Cow<'a, Updated>,
+    /// The comparison with the truth, where that is known.
+    truth: Option<Cow<'a, StepTruth>>,
+}
+
+impl<'a> From<&'a StepTrace> for SerialisedStep<'a> {
+    fn from(trace: &'a StepTrace) -> Self {
+        Self {
+            step: trace.step,
+            time_s: trace.time_s,
+            fault: trace.fault().map(Cow::Borrowed),
+            predict: trace.prediction().map(Cow::Borrowed),
+            point_mast: Some(Cow::Borrowed(&trace.point_mast)),
+            capture: trace.capture().map(Cow::Borrowed),
+            locate: trace.located().map(Cow::Borrowed),
+            judge: trace.verdict().map(Cow::Borrowed),
+            update: Cow::Borrowed(&trace.update),
+            truth: trace.truth.as_ref().map(Cow::Borrowed),
+        }
+    }
+}
+
+impl SerialisedStep<'_> {
+    /// The step; `None` where its stages are those of no kind of step.
+    fn into_trace(self) -> Option<StepTrace> {
+        let fault = self.fault.map(Cow::into_owned);
+        let (predict, capture) = (self.predict.map(Cow::into_owned), self.capture.map(Cow::into_owned));
+        let (locate, judge) = (self.locate.map(Cow::into_owned), self.judge.map(Cow::into_owned));
+        let kind = match (predict, capture, locate, judge, fault) {
+            (None, Some(capture), Some(locate), None, None) => StepKind::Designation { capture, locate },
+            (Some(predict), Some(capture), Some(locate), Some(judge), None) => {
+                StepKind::Tracked { predict, capture, locate, judge }
+            }
+            (Some(predict), None, None, None, Some(fault)) => StepKind::Damaged { predict, fault },
+            _ => return None,
+        };
+        Some(StepTrace {
+            step: self.step,
+            time_s: self.time_s,
+            point_mast: self.point_mast?.into_owned(),
+            kind,
+            update: self.update.into_owned(),
+            truth: self.truth.map(Cow::into_owned),
+        })
+    }
+}
+
+impl Serialize for StepTrace {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        SerialisedStep::from(self).serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for StepTrace {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let step = SerialisedStep::deserialize(deserializer)?;
+        step.into_trace()
+            .ok_or_else(|| de::Error::custom("the stages of the step are those of no kind of step"))
+    }
+}
+
+impl PartialSchema for StepTrace {
+    fn schema() -> RefOr<Schema> {
+        SerialisedStep::schema()
+    }
+}
+
+impl ToSchema for StepTrace {
+    fn name() -> Cow<'static, str> {
+        SerialisedStep::name()
+    }
+
+    fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
+        SerialisedStep::schemas(schemas);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Matrix3;
+    use serde_json::Value;
+
+    use super::*;
+    use crate::locate::TrackerMemory;
+    use crate::locate::features::anchor::Anchors;
+    use crate::stages::point_mast::{UsedPointing, point_mast};
+    use crate::target::{Designation, Target, TrackingState};
+    use crate::testing;
+    use sightline_geometry::frames::{Pixel, Point3};
+
+    fn step(kind: StepKind) -> StepTrace {
+        let position = Point3::new(5.0, 0.0, 0.0);
+        let covariance = Matrix3::identity() * 1e-4;
+        let camera = testing::camera();
+        let used = UsedPointing { mast: None, angles: None, left: &camera, right: &camera };
+        let target = Target {
+            designation: Designation { step: 0, pixel: Pixel::new(1.0, 2.0) },
+            step: 3,
+            position_in_rover: position,
+            covariance_in_rover: covariance,
+            initial_position_in_site: position,
+            initial_distance_m: 5.0,
+            travelled_m: 0.0,
+            last_distance_m: 5.0,
+            travelled_since_update_m: 0.0,
+            memory: TrackerMemory::Features(Anchors::default()),
+        };
+        let state = TrackingState::Tracking;
+        let update =
+            Updated { target, state, template_renewed: false, correction_m: None, correction_px: None };
+        let point_mast = point_mast(&position, &covariance, used);
+        StepTrace { step: 3, time_s: 60.0, point_mast, kind, update, truth: None }
+    }
+
+    fn kinds() -> [StepKind; 3] {
+        let predict = Prediction {
+            position_in_rover: Point3::new(5.0, 0.0, 0.0),
+            position_in_site: Point3::new(5.0, 0.0, 0.0),
+            covariance_in_rover: Matrix3::identity(),
+            step_length_m: 1.0,
+            travelled_since_update_m: 1.0,
+            travelled_m: 1.0,
+        };
+        let capture = Capture {
+            left_size: [256, 256],
+            right_size: [256, 256],
+            subframe: None,
+            subframe_mean: None,
+            subframe_saturated: None,
+            pair: Default::default(),
+        };
+        let judge = Verdict {
+            gates: Vec::new(),
+            good: true,
+            accepted: true,
+            reason: None,
+            state_before: TrackingState::Tracking,
+            state: TrackingState::Tracking,
+        };
+        let locate = Located::default();
+        [
+            StepKind::Designation { capture: capture.clone(), locate: locate.clone() },
+            StepKind::Tracked { predict: predict.clone(), capture, locate, judge },
+            StepKind::Damaged { predict, fault: "left_0003.png is missing".to_owned() },
+        ]
+    }
+
+    #[test]
+    fn each_kind_of_step_has_all_fields_and_is_read_back() {
+        let reached = [
+            vec!["point_mast", "capture", "locate"],
+            vec!["predict", "point_mast", "capture", "locate", "judge"],
+            vec!["fault", "predict", "point_mast"],
+        ];
+        for (kind, reached) in kinds().into_iter().zip(reached) {
+            let step = step(kind);
+            let value = serde_json::to_value(&step).unwrap();
+            assert_eq!(value.as_object().unwrap().len(), 10);
+            for stage in ["fault", "predict", "point_mast", "capture", "locate", "judge"] {
+                assert_eq!(value[stage].is_null(), !reached.contains(&stage), "{stage}");
+            }
+            assert_eq!(serde_json::from_value::<StepTrace>(value).unwrap(), step);
+        }
+    }
+
+    #[test]
+    fn stages_of_no_kind_of_step_are_refused() {
+        let [_, tracked, _] = kinds().map(|kind| serde_json::to_value(step(kind)).unwrap());
+        for stage in ["predict", "point_mast", "capture", "locate", "judge"] {
+            let mut without = tracked.clone();
+            without[stage] = Value::Null;
+            let error = serde_json::from_value::<StepTrace>(without).unwrap_err();
+            assert!(error.to_string().contains("no kind of step"), "{stage}: {error}");
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! Reading and writing PNG files.
+//!
+//! Detector numbers become fractions of full scale: value = DN / full scale. Full scale is 255 for 8 bits and
+//! 65535 for 16 bits unless the caller knows better (12-bit data in 16-bit files: 4095). Colour becomes
+//! luma = 0.2126 R + 0.7152 G + 0.0722 B (ITU-R BT.709); transparency is ignored.
+//!
+//! A file says how much memory it wants before it shows a pixel, so the size is checked first: nothing above
+//! [`MAX_PIXELS`] is decoded, and the decoder may not allocate more than [`MAX_ALLOCATION_BYTES`].
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, Cursor, Seek};
+use std::path::Path;
+
+use image::codecs::png::PngDecoder;
+use image::{DynamicImage, ImageBuffer, ImageDecoder, ImageError, ImageFormat, Limits, Luma};
+
+use super::GrayImage;
+use sightline_geometry::error::{Error, Result};
+
+/// Largest image that is read, pixels.
+pub const MAX_PIXELS: u64 = 64_000_000;
+
+/// Most memory the decoder may allocate at a time, bytes: four 16-bit channels of the largest image.
+pub const MAX_ALLOCATION_BYTES: u64 = MAX_PIXELS * 8;
+
+/// Reads an 8- or 16-bit PNG file; `full_scale_dn` is the detector number that becomes 1.
+///
+/// # Errors
+/// [`Error::Read`] when the file cannot be opened; [`Error::Format`] when it is no PNG, is damaged or too large.
+pub fn read_png(path: impl AsRef<Path>, full_scale_dn: Option<f64>) -> Result<GrayImage> {
+    let path = path.as_ref();
+    let file = File::open(path).map_err(|source| Error::Read { path: path.into(), source })?;
+    decode(BufReader::new(file), path, full_scale_dn)
+}
+
+/// Decodes the bytes of a PNG file; `name` is what messages call it.
+///
+/// # Errors
+/// [`Error::Format`] when the bytes are no PNG, are damaged or hold too large an image.
+pub fn decode_png(bytes: &[u8], name: impl AsRef<Path>, full_scale_dn: Option<f64>) -> Result<GrayImage> {
+    decode(Cursor::new(bytes), name.as_ref(), full_scale_dn)
+}
+
+/// Writes 8 bits: 1 becomes 255; values are cut to 0…1, invalid pixels become 0.
+///
+/// # Errors
+/// [`Error::Write`] when the file cannot be written; [`Error::Format`] for an image without pixels.
+pub fn write_png_u8(path: impl AsRef<Path>, image: &GrayImage) -> Result<()> {
+    write(path.as_ref(), &to_u8(image))
+}
+
+/// Writes 16 bits: 1 becomes `full_scale_dn` (default 65535); values are cut to 0…1, invalid pixels become 0.
+///
+/// # Errors
+/// [`Error::Write`] when the file cannot be written; [`Error::Format`] for an image without pixels.
+pub fn write_png_u16(path: impl AsRef<Path>, image: &GrayImage, full_scale_dn: Option<f64>) -> Result<()> {
+    write(path.as_ref(), &to_u16(image, full_scale_dn))
+}
+
+/// The bytes of an 8-bit PNG file, as [`write_png_u8`] writes them.
+///
+/// # Errors
+/// [`Error::Format`] for an image without pixels.
+pub fn encode_png_u8(image: &GrayImage) -> Result<Vec<u8>> {
+    encode(&to_u8(image), Path::new("image"))
+}
+
+/// The bytes of a 16-bit PNG file, as [`write_png_u16`] writes them.
+///
+/// # Errors
+/// [`Error::Format`] for an image without pixels.
+pub fn encode_png_u16(image: &GrayImage, full_scale_dn: Option<f64>) -> Result<Vec<u8>> {
+    encode(&to_u16(image, full_scale_dn), Path::new("image"))
+}
+
+fn decode(reader: impl BufRead + Seek, path: &Path, full_scale_dn: Option<f64>) -> Result<GrayImage> {
+    if let Some(dn) = full_scale_dn.filter(|dn| !(*dn > 0.0 && dn.is_finite())) {
+        return Err(Error::format(path, format!("full scale must be a positive number, not {dn}")));
+    }
+    let mut limits = Limits::default();
+    limits.max_alloc = Some(MAX_ALLOCATION_BYTES);
+    let damaged =
+        |error: ImageError| Error::format(path, format!("not a PNG image that can be read ({error})"));
+    let decoder = PngDecoder::with_limits(reader, limits).map_err(damaged)?;
+    let (width, height) = decoder.dimensions();
+    if u64::from(width) * u64::from(height) > MAX_PIXELS {
+        let limit = MAX_PIXELS / 1_000_000;
+        let problem = format!("the image has {width} × {height} pixels; at most {limit} million can be read");
+        return Err(Error::format(path, problem));
+    }
+    let decoded = DynamicImage::from_decoder(decoder).map_err(damaged)?;
+    Ok(to_gray(decoded, full_scale_dn))
+}
+
+/// Fractions of full scale from whatever the file held.
+fn to_gray(decoded: DynamicImage, full_scale_dn: Option<f64>) -> GrayImage {
+    let scale8 = 1.0 / full_scale_dn.unwrap_or(255.0);
+    let scale16 = 1.0 / full_scale_dn.unwrap_or(65_535.0);
+    match decoded {
+        DynamicImage::ImageLuma8(grey) => from_samples(&grey, |p: &Luma<u8>| f64::from(p[0]) * scale8),
+        DynamicImage::ImageLuma16(grey) => from_samples(&grey, |p: &Luma<u16>| f64::from(p[0]) * scale16),
+        DynamicImage::ImageLumaA8(grey) => from_samples(&grey, |p| f64::from(p[0]) * scale8),
+        DynamicImage::ImageLumaA16(grey) => from_samples(&grey, |p| f64::from(p[0]) * scale16),
+        DynamicImage::ImageRgb8(colour) => from_samples(&colour, |p| luma(p.0.map(f64::from)) * scale8),
+        DynamicImage::ImageRgba8(colour) => {
+            from_samples(&colour, |p| luma([p[0], p[1], p[2]].map(f64::from)) * scale8)
+        }
+        other => from_samples(&other.into_rgb16(), |p| luma(p.0.map(f64::from)) * scale16),
+    }
+}
+
+fn from_samples<P: image::Pixel>(
+    image: &ImageBuffer<P, Vec<P::Subpixel>>,
+    value: impl Fn(&P) -> f64,
+) -> GrayImage {
+    GrayImage::from_fn(image.width(), image.height(), |x, y| Luma([value(image.get_pixel(x, y)) as f32]))
+}
+
+fn luma([red, green, blue]: [f64; 3]) -> f64 {
+    0.2126 * red + 0.7152 * green + 0.0722 * blue
+}
+
+fn to_u8(image: &GrayImage) -> DynamicImage {
+    // Rounding casts saturate, and NaN becomes 0.
+    let pixel = |x, y| Luma([(image.get_pixel(x, y)[0].clamp(0.0, 1.0) * 255.0).round() as u8]);
+    ImageBuffer::from_fn(image.width(), image.height(), pixel).into()
+}
+
+fn to_u16(image: &GrayImage, full_scale_dn: Option<f64>) -> DynamicImage {
+    let full_scale = full_scale_dn.unwrap_or(65_535.0);
+    let dn = |value: f32| (f64::from(value).clamp(0.0, 1.0) * full_scale).round() as u16;
+    let pixel = |x, y| Luma([dn(image.get_pixel(x, y)[0])]);
+    DynamicImage::ImageLuma16(ImageBuffer::from_fn(image.width(), image.height(), pixel))
+}
+
+fn encode(image: &DynamicImage, name: &Path) -> Result<Vec<u8>> {
+    let mut bytes = Cursor::new(Vec::new());
+    image
+        .write_to(&mut bytes, ImageFormat::Png)
+        .map_err(|error| Error::format(name, format!("cannot be written as PNG ({error})")))?;
+    Ok(bytes.into_inner())
+}
+
+fn write(path: &Path, image: &DynamicImage) -> Result<()> {
+    let bytes = encode(image, path)?;
+    std::fs::write(path, bytes).map_err(|source| Error::Write { path: path.into(), source })
+}
+
+#[cfg(test)]
+#[path = "io_tests.rs"]
+mod tests;

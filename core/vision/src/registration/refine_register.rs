@@ -1,0 +1,131 @@
+//! The refinement over all six parameters: the paper's (R201), and a modern one to compare.
+//!
+//! | method | what is minimised | how |
+//! |---|---|---|
+//! | [`Method::SimplexL1`] | mean absolute difference of depth, D-Eq 12 | Nelder–Mead with two restarts |
+//! | [`Method::PointToPlane`] | Σ ρ(r_i / s σ_i), distances along the normal | Gauss–Newton, reweighted |
+//!
+//! **Point to plane.** The partner of a pixel is what the sensor sees of the moving mesh on the same ray ("projective
+//! association"): no search among neighbours, and holes and occlusion are those of the sensor. The scale s is measured
+//! anew at every step (median), so that it falls as the surfaces close in: first everything counts, then what disagrees
+//! counts less and less. Steps are bounded, and damped where the shape does not hold them.
+//!
+//! ```text
+//! (H + Λ' + λ diag) δ = −Σ w r ∂r/∂p − Λ' p     H = Σ w ∂r/∂p ∂r/∂pᵀ,   Λ' of `held`,   w = ρ'(r/(s σ)) / σ²,   λ = 1e-4
+//! T ← T_δ T                              until |δt| < 10 µm and |δω| < 10 µrad, or 40 steps
+//! ```
+//! **What is drawn.** Facets farther from the picture than 15 cm at the start of the refinement are left out.
+//!
+//! | symbol | our name | unit, frame |
+//! |---|---|---|
+//! | p = (t, ω) | [`Offset`] | m, rad; sensor |
+//! | s | `scale` | – |
+//!
+//! Source: R195, R196, R201; point to plane: Chen & Medioni 1992; projective: Blais & Levine 1995; `small_gicp` for its
+//! form.
+
+use nalgebra::{Matrix6, Vector6};
+
+use super::held::Held;
+use super::nelder_mead::{PathStep, SimplexSettings, minimise};
+use super::objective::{Objective, Offset, motion, offset};
+use super::pairs::{Moving, Pair, Template, robust_scale};
+use super::settings::{Method, PlaneSettings};
+use sightline_geometry::estimate::weighted_motion::Loss;
+
+/// How far beside the picture facets may begin that are still drawn, m.
+const REACH_M: f64 = 0.15;
+/// The longest step, m.
+const STEP_MAX_M: f64 = 0.05;
+/// The widest turn of a step, rad.
+const TURN_MAX_RAD: f64 = 0.1;
+/// λ.
+const DAMPING: f64 = 1e-4;
+/// The scale does not fall below this share of the noise that the surfaces claim.
+const SCALE_MIN: f64 = 0.1;
+
+/// The part of the moving surface that the refinement from a start can see.
+pub(super) fn near(template: &Template, moving: &Moving, start: &Offset) -> Moving {
+    let reach_px = (REACH_M / template.sensor.pixel_m(template.pivot.z)).ceil() as usize;
+    moving.near(&template.sensor, &motion(start, &template.pivot), reach_px)
+}
+
+/// Refines the motion from a start by one method: where it ends, and the way.
+pub(super) fn refine_register(
+    template: &Template,
+    moving: &Moving,
+    start: &Offset,
+    overlap_min: f64,
+    how: (Method, &SimplexSettings, &PlaneSettings),
+    held: &Held,
+) -> (Offset, Vec<PathStep>) {
+    let (method, simplex, plane) = how;
+    match method {
+        Method::SimplexL1 => {
+            let fixed_m = &template.image.depth_m;
+            let facets = &moving.facets;
+            let mut objective =
+                Objective::new(&template.sensor, fixed_m, facets, template.pivot, overlap_min);
+            let (end, _, path) = minimise(|p| objective.at(p).mean_m, start, simplex);
+            (end, path)
+        }
+        Method::PointToPlane => point_to_plane(template, moving, start, plane, held),
+    }
+}
+
+/// Reweighted Gauss–Newton steps.
+fn point_to_plane(
+    template: &Template,
+    moving: &Moving,
+    start: &Offset,
+    settings: &PlaneSettings,
+    held: &Held,
+) -> (Offset, Vec<PathStep>) {
+    let mut at = *start;
+    let mut path = Vec::new();
+    for step in 0..settings.steps_max {
+        let (_, pairs) = template.pairs(moving, &at);
+        path.push(PathStep {
+            evaluations: step + 1,
+            run: 0,
+            value_m: mean_depth_m(&pairs),
+            offset: at.into(),
+        });
+        let Some(change) = gauss_newton_step(&pairs, settings.loss, &at, held) else { break };
+        let moved = motion(&change, &template.pivot) * motion(&at, &template.pivot);
+        at = offset(&moved, &template.pivot);
+        if change.amax() < settings.small {
+            break;
+        }
+    }
+    (at, path)
+}
+
+/// J over pairs, m.
+fn mean_depth_m(pairs: &[Pair]) -> f64 {
+    let sum: f64 = pairs.iter().map(|pair| (pair.residual_m / pair.slant).abs()).sum();
+    if pairs.is_empty() { f64::INFINITY } else { sum / pairs.len() as f64 }
+}
+
+/// δ; none where the pairs determine none.
+fn gauss_newton_step(pairs: &[Pair], loss: Loss, at: &Offset, held: &Held) -> Option<Offset> {
+    let scale =
+        robust_scale(pairs).max(if pairs.iter().all(|pair| pair.sigma_m == 1.0) { 1e-9 } else { SCALE_MIN });
+    let (mut information, mut pull) = (Matrix6::zeros(), Vector6::zeros());
+    for pair in pairs {
+        let gradient = pair.gradient(&pair.normal);
+        let weight = loss.weight((pair.distance() / scale).powi(2)) / (pair.sigma_m * pair.sigma_m);
+        information += gradient * gradient.transpose() * weight;
+        pull -= gradient * (weight * pair.residual_m);
+    }
+    let (known, back) = held.pull(at, scale);
+    information += known;
+    pull += back;
+    for k in 0..6 {
+        information[(k, k)] *= 1.0 + DAMPING;
+    }
+    let change = information.cholesky()?.solve(&pull);
+    let (shift_m, turn_rad) = (change.fixed_rows::<3>(0).norm(), change.fixed_rows::<3>(3).norm());
+    let part = (STEP_MAX_M / shift_m).min(TURN_MAX_RAD / turn_rad).min(1.0);
+    Some(change * part)
+}

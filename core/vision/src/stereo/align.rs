@@ -1,0 +1,277 @@
+//! Epipolar alignment: two linear cameras in whose images a point lies in the same row of both.
+//!
+//! ```text
+//! x̂ = unit(C2 − C1), along H1'     ŷ = unit of the part of V1' + V2' across x̂     n̂ = x̂ × ŷ, along A1
+//! t = ± (axis · u)/(n̂ · u) of the rays u at the corners and the middle of each side, at most tan(field_max)
+//! t_L, t_R, t_T, t_B: the least of both cameras and three rays of a side            what both see
+//! hs = (W − 1)/(t_R + t_L)   hc = hs t_L   H = hs x̂ + hc n̂   A = n̂                  V alike from ŷ
+//! depth along A = hs B/(x_L − x_R)                                                  B = |C2 − C1|
+//! ```
+//! | symbol | our name | unit, frame |
+//! |---|---|---|
+//! | C, A, H, V | [`Alignment::left`], [`Alignment::right`] | m, –, px, px; that of the cameras |
+//! | W, H | [`AlignSettings::size`], without it the left camera's | px |
+//! | field_max | [`AlignSettings::field_max_deg`] | deg |
+//! | B | [`Alignment::baseline_m`] | m |
+//!
+//! **Resampling.** A pixel of an aligned image shows what the real camera sees along its ray. Where that is in the real image
+//! is computed exactly at every eighth pixel and by cubics in between (Lagrange), which errs by less than 1e-4 px for
+//! lenses such as the hazcams'. Rays of a CAHVORE model do not start at C: its pixels are those of points at
+//! [`AlignSettings::range_m`]. What lies nearer or farther is off its row by little (the pupil moves by 6 mm at the edge);
+//! ranges are not touched by that, since they come from the pixels of the real images and the true cameras (`ranges`).
+//!
+//! Sources: domain.md 3.3, the five steps of JPL's `cmod_cahvor_warp_models`, which limits the field to 75°. Departure: hazcams are
+//! aligned like any other pair, within a field that can be set.
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::image::GrayImage;
+use crate::image::resample::at_places;
+use crate::image::sample::Kernel;
+use sightline_geometry::camera::{Cahv, Camera, CameraModel};
+use sightline_geometry::error::{Error, Result};
+use sightline_geometry::frames::{Pixel, Vector3};
+
+/// Pixels between two exact places of a warp.
+const STEP: usize = 8;
+/// Where the pixels of a camera with one centre are looked at, m: anywhere.
+const REMOTE_M: f64 = 1e4;
+
+/// How a pair is aligned.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct AlignSettings {
+    /// Width and height of the aligned images, px (those of the left camera).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size: Option<[u32; 2]>,
+    /// Largest angle from the aligned axis at which a side may lie, degrees, 5 to 80 (60: domain.md 3.3). Wider: fewer
+    /// pixels for the middle of a fisheye; narrower: what lies at its sides is left out.
+    pub field_max_deg: f64,
+    /// Range at which the rows of a fisheye pair agree exactly, m, 0.1 to 1000 (2: ours, an arm's work space and more).
+    pub range_m: f64,
+}
+
+impl Default for AlignSettings {
+    fn default() -> Self {
+        Self { size: None, field_max_deg: 60.0, range_m: 2.0 }
+    }
+}
+
+/// Two aligned cameras, and where their pixels lie in the images of the real ones.
+#[derive(Clone, Debug)]
+pub struct Alignment {
+    /// The aligned left camera, in the frame of the real ones.
+    pub left: Camera,
+    /// The aligned right camera: as the left one, but for its centre.
+    pub right: Camera,
+    warps: [Warp; 2],
+}
+
+impl Alignment {
+    /// Aligns two cameras whose models are in one frame.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when they stand in one place, look along the line between them, or see nothing in common.
+    pub fn new(left: &Camera, right: &Camera, settings: &AlignSettings) -> Result<Self> {
+        let size = settings.size.unwrap_or(left.size);
+        if !(5.0..=80.0).contains(&settings.field_max_deg) || !(0.1..=1000.0).contains(&settings.range_m) {
+            return Err(Error::setting(
+                "field_max_deg",
+                "must be from 5 to 80, and range_m from 0.1 to 1000",
+            ));
+        }
+        if size.iter().any(|side| !(16..=8192).contains(side)) {
+            return Err(Error::setting("size", "must be from 16 to 8192 px"));
+        }
+        let cannot = |why: &str| Error::Request(format!("the pair cannot be aligned: {why}"));
+        let axes = Axes::of(left, right).ok_or_else(|| cannot("its cameras do not stand side by side"))?;
+        let at_most = settings.field_max_deg.to_radians().tan();
+        let [x, y] = [[-axes.x, axes.x], [-axes.y, axes.y]]
+            .map(|sides| sides.map(|side| axes.extent(&[left, right], &side, at_most)));
+        let (Some(t_left), Some(t_right), Some(t_top), Some(t_bottom)) = (x[0], x[1], y[0], y[1]) else {
+            return Err(cannot("a side of an image has no rays"));
+        };
+        if !(t_left + t_right > 1e-3 && t_top + t_bottom > 1e-3) {
+            return Err(cannot("its cameras see nothing in common"));
+        }
+        let [hs, vs] = [(size[0], t_left + t_right), (size[1], t_top + t_bottom)]
+            .map(|(side, extent)| (f64::from(side) - 1.0) / extent);
+        let horizontal = axes.x * hs + axes.n * (hs * t_left);
+        let vertical = axes.y * vs + axes.n * (vs * t_top);
+        let aligned = |real: &Camera| {
+            let model = Cahv::as_printed(real.model.centre(), axes.n, horizontal, vertical);
+            Camera { model: CameraModel::Cahv(model), size }
+        };
+        let (aligned_left, aligned_right) = (aligned(left), aligned(right));
+        let warps = [
+            Warp::new(&aligned_left, left, settings.range_m),
+            Warp::new(&aligned_right, right, settings.range_m),
+        ];
+        Ok(Self { left: aligned_left, right: aligned_right, warps })
+    }
+
+    /// B, m.
+    pub fn baseline_m(&self) -> f64 {
+        (self.right.model.centre() - self.left.model.centre()).norm()
+    }
+
+    /// The disparity of a depth along A (m), px.
+    pub fn disparity_px(&self, depth_m: f64) -> f64 {
+        self.left.model.image_plane().hs * self.baseline_m() / depth_m
+    }
+
+    /// Both images as the aligned cameras see them; NaN where the real ones see nothing.
+    pub fn images(&self, left: &GrayImage, right: &GrayImage) -> [GrayImage; 2] {
+        let (left, right) = rayon::join(|| self.warps[0].image(left), || self.warps[1].image(right));
+        [left, right]
+    }
+
+    /// Where a row of the aligned left image lies in the real one.
+    pub fn left_row(&self, y: f64) -> WarpRow {
+        self.warps[0].row(y)
+    }
+
+    /// Where a row of the aligned right image lies in the real one.
+    pub fn right_row(&self, y: f64) -> WarpRow {
+        self.warps[1].row(y)
+    }
+}
+
+/// The axes of the aligned pair.
+struct Axes {
+    x: Vector3,
+    y: Vector3,
+    n: Vector3,
+}
+
+impl Axes {
+    fn of(left: &Camera, right: &Camera) -> Option<Self> {
+        let along = |vector: Vector3, like: Vector3| if vector.dot(&like) < 0.0 { -vector } else { vector };
+        let vertical = |camera: &Camera| {
+            let (plane, linear) = (camera.model.image_plane(), camera.model.linear());
+            (linear.vertical - linear.axis * plane.vc) / plane.vs
+        };
+        let x = (right.model.centre() - left.model.centre()).try_normalize(1e-6)?;
+        let x = along(x, left.model.horizontal_axis());
+        let down = vertical(left) + vertical(right);
+        let y = (down - x * x.dot(&down)).try_normalize(1e-3)?;
+        let n = along(x.cross(&y), left.model.axis());
+        // An axis along the baseline sees no depth.
+        (n.dot(&left.model.axis()) > 0.2).then_some(Self { x, y, n })
+    }
+
+    /// How far both cameras see towards `side`, as a tangent; `None` where a ray is missing.
+    fn extent(&self, cameras: &[&Camera; 2], side: &Vector3, at_most: f64) -> Option<f64> {
+        let mut least = at_most;
+        for camera in cameras {
+            let (plane, linear) = (camera.model.image_plane(), camera.model.linear());
+            let [last_x, last_y] = camera.size.map(|side| f64::from(side) - 1.0);
+            let is_across = side.dot(&self.x).abs() > 0.5;
+            let axis = if is_across { linear.horizontal } else { linear.vertical };
+            let is_last =
+                axis.dot(side) - linear.axis.dot(side) * if is_across { plane.hc } else { plane.vc } > 0.0;
+            let pixels = if is_across {
+                let x = if is_last { last_x } else { 0.0 };
+                [0.0, plane.vc.clamp(0.0, last_y), last_y].map(|y| Pixel::new(x, y))
+            } else {
+                let y = if is_last { last_y } else { 0.0 };
+                [0.0, plane.hc.clamp(0.0, last_x), last_x].map(|x| Pixel::new(x, y))
+            };
+            for pixel in pixels {
+                let direction = camera.ray(pixel)?.direction;
+                let forward = self.n.dot(&direction);
+                let tangent = if forward > 0.0 { side.dot(&direction) / forward } else { f64::INFINITY };
+                least = least.min(tangent);
+            }
+        }
+        Some(least)
+    }
+}
+
+/// Where the pixels of an aligned image lie in the real one: exactly at every eighth, NaN where they do not.
+#[derive(Clone, Debug)]
+struct Warp {
+    size: [usize; 2],
+    columns: usize,
+    /// Row by row; the first one is `STEP` before pixel (0, 0).
+    nodes: Vec<[f64; 2]>,
+}
+
+impl Warp {
+    fn new(aligned: &Camera, real: &Camera, range_m: f64) -> Self {
+        let size = aligned.size.map(|side| side as usize);
+        let [columns, rows] = size.map(|side| side.div_ceil(STEP) + 3);
+        let range_m = if matches!(real.model, CameraModel::Cahvore(_)) { range_m } else { REMOTE_M };
+        let place = |node: usize| (node as f64 - 1.0) * STEP as f64;
+        let node = |at: usize| {
+            let ray = aligned.ray(Pixel::new(place(at % columns), place(at / columns)));
+            let pixel = ray.and_then(|ray| real.project(&ray.at(range_m)));
+            pixel.map_or([f64::NAN; 2], |pixel| [pixel.x, pixel.y])
+        };
+        Self { size, columns, nodes: (0..columns * rows).into_par_iter().map(node).collect() }
+    }
+
+    /// The places of row `y`, from 0 to the height less 1.
+    fn row(&self, y: f64) -> WarpRow {
+        let (first, weights) = taps(y);
+        let rows = &self.nodes[first * self.columns..][..4 * self.columns];
+        let node = |x: usize| {
+            let mut sum = [0.0; 2];
+            for (k, weight) in weights.iter().enumerate() {
+                let node = rows[k * self.columns + x];
+                sum = [sum[0] + weight * node[0], sum[1] + weight * node[1]];
+            }
+            sum
+        };
+        WarpRow { nodes: (0..self.columns).map(node).collect() }
+    }
+
+    fn image(&self, real: &GrayImage) -> GrayImage {
+        let [width, height] = self.size;
+        let rows: Vec<Vec<f32>> = (0..height)
+            .into_par_iter()
+            .map(|y| {
+                let row = self.row(y as f64);
+                at_places(real, [width as u32, 1], Kernel::Bicubic, |x, _| row.at(f64::from(x))).into_raw()
+            })
+            .collect();
+        GrayImage::from_raw(width as u32, height as u32, rows.concat()).unwrap_or_default()
+    }
+}
+
+/// The places of a row of an aligned image in the real one.
+#[derive(Clone, Debug)]
+pub struct WarpRow {
+    nodes: Vec<[f64; 2]>,
+}
+
+impl WarpRow {
+    /// The place of column `x`, from 0 to the width less 1, px; NaN where the real image has none.
+    #[inline]
+    pub fn at(&self, x: f64) -> Pixel {
+        let (first, weights) = taps(x);
+        let Some(nodes) = self.nodes.get(first..).and_then(|nodes| nodes.first_chunk::<4>()) else {
+            return Pixel::new(f64::NAN, f64::NAN);
+        };
+        let sum = |axis: usize| {
+            (weights[0] * nodes[0][axis] + weights[1] * nodes[1][axis])
+                + (weights[2] * nodes[2][axis] + weights[3] * nodes[3][axis])
+        };
+        Pixel::new(sum(0), sum(1))
+    }
+}
+
+/// The first of four nodes around a place, and their weights (Lagrange).
+#[inline(always)]
+fn taps(place: f64) -> (usize, [f64; 4]) {
+    let cell = (place / STEP as f64).max(0.0) as usize;
+    let t = place / STEP as f64 - cell as f64;
+    let (a, b, c) = (t + 1.0, t - 1.0, t - 2.0);
+    (cell, [-t * b * c / 6.0, a * b * c / 2.0, -a * t * c / 2.0, a * t * b / 6.0])
+}
+
+#[cfg(test)]
+#[path = "align_tests.rs"]
+mod tests;

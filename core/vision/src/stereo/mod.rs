@@ -1,0 +1,217 @@
+//! Dense stereo: a depth for every pixel of the left image that has a partner in the right one (R187, D§3).
+//!
+//! ```text
+//! two images, two cameras ─► align ─► census ─► block_matching │ semi_global ─► checks ─► ranges ─► points
+//! ```
+//! | file | what it does |
+//! |---|---|
+//! | `align` | two linear cameras whose rows agree, and the images as they see them |
+//! | `census` | the surroundings of a pixel in bits, and how many of them differ: the cost of a disparity |
+//! | `scene` | what both methods read |
+//! | `block_matching` | sums of costs over a window |
+//! | `semi_global` | sums of costs along paths |
+//! | `winner`, `row` | the cheapest disparity, seen from both eyes |
+//! | `subpixel` | its fraction |
+//! | `texture`, `checks`, `speckle` | which pixels have none, and why |
+//! | `ranges` | points by the true cameras |
+//! | `lanes` | bytes side by side |
+//!
+//! | symbol | our name | unit |
+//! |---|---|---|
+//! | d = x_L − x_R | [`DisparityMap::disparity_px`] | px of the aligned images |
+//! | – | [`DenseStereo::points_m`] | m, in the frame of the cameras |
+//!
+//! A pixel without a disparity is NaN, and its [`Outcome`] says why: holes are left as they are, nothing is filled in.
+//! Sums are whole numbers: the same images give the same bits on every processor and any number of threads.
+//!
+//! Sources: domain.md 3.3 and 7 (JPL's stereo); Hirschmüller 2008. What it reaches is in docs/stereo.md.
+
+mod lanes;
+pub mod settings;
+pub mod align;
+mod census;
+mod scene;
+mod winner;
+mod row;
+mod block_matching;
+mod semi_global;
+mod subpixel;
+mod texture;
+mod checks;
+mod speckle;
+mod ranges;
+#[cfg(test)]
+mod tests;
+#[cfg(test)]
+mod vector_tests;
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::image::GrayImage;
+use sightline_geometry::camera::Camera;
+use sightline_geometry::error::{Error, Result};
+use sightline_geometry::frames::Point3;
+
+pub use align::{AlignSettings, Alignment};
+pub use settings::{StereoMethod, StereoPaths, StereoSettings};
+
+use row::RowResult;
+use scene::Scene;
+
+/// What became of a pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+#[repr(u8)]
+pub enum Outcome {
+    /// It has a disparity.
+    #[default]
+    Found,
+    /// It, or the partner that it found, is beside its image or invalid.
+    Outside,
+    /// Its surroundings have no slope along the row.
+    NoTexture,
+    /// Another disparity is nearly as good.
+    NotUnique,
+    /// Its partner finds another pixel.
+    LeftRight,
+    /// It belongs to a patch that is too small.
+    Speckle,
+    /// Its rays do not meet in front of the cameras, or too far away.
+    OutOfRange,
+}
+
+/// The disparities of an aligned left image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DisparityMap {
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// x_L − x_R, px, row by row; NaN where there is none.
+    pub disparity_px: Vec<f32>,
+    /// What became of every pixel.
+    pub outcome: Vec<Outcome>,
+}
+
+impl DisparityMap {
+    /// How many pixels have this outcome.
+    pub fn count(&self, outcome: Outcome) -> usize {
+        self.outcome.iter().filter(|found| **found == outcome).count()
+    }
+
+    /// The disparity of a pixel, px.
+    pub fn at(&self, x: u32, y: u32) -> Option<f32> {
+        let disparity = *self.disparity_px.get((y * self.width + x) as usize).filter(|_| x < self.width)?;
+        disparity.is_finite().then_some(disparity)
+    }
+}
+
+/// What dense stereo saw and found.
+#[derive(Clone, Debug)]
+pub struct DenseStereo {
+    /// The aligned cameras.
+    pub alignment: Alignment,
+    /// The images as they see them.
+    pub images: [GrayImage; 2],
+    /// The disparities of the aligned left image.
+    pub disparities: DisparityMap,
+    /// For each of its pixels the point, m, in the frame of the cameras; NaN where there is none.
+    pub points_m: Vec<[f32; 3]>,
+}
+
+impl DenseStereo {
+    /// The point that a pixel of the aligned left image shows, m, in the frame of the cameras.
+    pub fn point(&self, x: u32, y: u32) -> Option<Point3> {
+        let map = &self.disparities;
+        let point = self.points_m.get((y * map.width + x) as usize).filter(|_| x < map.width)?;
+        point[0].is_finite().then(|| Point3::from(point.map(f64::from)))
+    }
+}
+
+/// Aligns a pair, matches it, and places what it shows by the true cameras, which are in one frame.
+///
+/// # Errors
+/// [`Error::Setting`] for a setting that cannot be used; [`Error::Request`] for a pair that cannot be aligned, or images that
+/// are not as large as their cameras say.
+pub fn dense_stereo(
+    [left, right]: [&GrayImage; 2],
+    cameras: [&Camera; 2],
+    settings: &StereoSettings,
+) -> Result<DenseStereo> {
+    for (image, camera) in [left, right].into_iter().zip(cameras) {
+        if <[u32; 2]>::from(image.dimensions()) != camera.size {
+            return Err(Error::Request("an image of the pair is not as large as its camera says".to_owned()));
+        }
+    }
+    let alignment = Alignment::new(cameras[0], cameras[1], &settings.align)?;
+    let mut settings = settings.clone();
+    if settings.disparity_count == 0 {
+        let nearest = alignment.disparity_px(settings.range_min_m) - f64::from(settings.disparity_first_px);
+        settings.disparity_count = (nearest.ceil() as u32 + 1).clamp(8, 512);
+    }
+    let images = alignment.images(left, right);
+    let mut disparities = disparities([&images[0], &images[1]], &settings)?;
+    let points_m = ranges::points(&mut disparities, &alignment, cameras, settings.range_max_m);
+    Ok(DenseStereo { alignment, images, disparities, points_m })
+}
+
+/// The disparities of a pair whose rows agree already. Images of different widths must have the left border in common.
+///
+/// # Errors
+/// [`Error::Setting`] for a setting that cannot be used; [`Error::Request`] for images without pixels or of unequal height.
+pub fn disparities([left, right]: [&GrayImage; 2], settings: &StereoSettings) -> Result<DisparityMap> {
+    settings.check()?;
+    if left.height() != right.height() || left.is_empty() || right.is_empty() {
+        return Err(Error::Request(
+            "the images of an aligned pair must have pixels and the same height".to_owned(),
+        ));
+    }
+    let (scene, texture) = rayon::join(
+        || Scene::new(left, right, settings),
+        || if settings.texture_min > 0.0 { texture::texture(left) } else { Vec::new() },
+    );
+    let pixels = left.as_raw().len();
+    let mut map = DisparityMap {
+        width: left.width(),
+        height: left.height(),
+        disparity_px: vec![f32::NAN; pixels],
+        outcome: vec![Outcome::Found; pixels],
+    };
+    match scene.cells {
+        64 => match_all::<1>(&scene, &texture, &mut map),
+        128 => match_all::<2>(&scene, &texture, &mut map),
+        256 => match_all::<4>(&scene, &texture, &mut map),
+        _ => match_all::<8>(&scene, &texture, &mut map),
+    }
+    checks::remove_speckles(&mut map, settings.speckle_px as usize, settings.speckle_step_px as f32);
+    Ok(map)
+}
+
+/// Matches all rows, whose pixels have `N` blocks of cells.
+fn match_all<const N: usize>(scene: &Scene<'_>, texture: &[f32], map: &mut DisparityMap) {
+    let width = scene.size[0];
+    let of_row = |y: usize| texture.get(y * width..(y + 1) * width).unwrap_or_default();
+    match scene.settings.method {
+        StereoMethod::SemiGlobal => semi_global::match_rows::<N>(scene, |y, row: &RowResult| {
+            let at = y * width..(y + 1) * width;
+            let (disparities, outcomes) = (&mut map.disparity_px[at.clone()], &mut map.outcome[at]);
+            checks::finish_row(scene, (y, row), of_row(y), disparities, outcomes);
+        }),
+        StereoMethod::BlockMatching => {
+            let band = block_matching::BAND * width;
+            let bands = map.disparity_px.par_chunks_mut(band).zip(map.outcome.par_chunks_mut(band));
+            let room = || block_matching::Band::new(scene);
+            bands.enumerate().for_each_init(room, |room, (number, (disparities, outcomes))| {
+                let first = number * block_matching::BAND;
+                let rows = first..first + disparities.len() / width;
+                block_matching::match_rows::<N>(scene, room, rows, |y, row: &RowResult| {
+                    let at = (y - first) * width..(y - first + 1) * width;
+                    let (disparities, outcomes) = (&mut disparities[at.clone()], &mut outcomes[at]);
+                    checks::finish_row(scene, (y, row), of_row(y), disparities, outcomes);
+                });
+            });
+        }
+    }
+}

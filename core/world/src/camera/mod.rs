@@ -1,0 +1,10 @@
+//! The cameras that see it: which pair, samples of a pixel's area, the optics, the exposure, the detector.
+
+pub(crate) mod picture;
+pub mod rig;
+pub(crate) mod sampling;
+mod shading;
+pub(crate) mod optics;
+pub mod render;
+pub mod exposure;
+pub(crate) mod noise;

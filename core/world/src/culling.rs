@@ -1,0 +1,210 @@
+//! Which rocks a ray can meet at all: a tree for any ray, a grid for the rays to the sun, a cone for a tile.
+//!
+//! All three only leave out rocks whose bounding sphere the ray misses, so results never depend on them.
+//!
+//! * [`Tree`]: bounding boxes of spheres, split at the median of the longest axis.
+//! * [`SunGrid`]: all rays to the sun are parallel. The rocks' spheres are projected along them on a plane,
+//!   whose cells list the discs that touch them: a shadow ray looks into one cell.
+//! * [`in_cone`]: a tile of the image sees a narrow cone; a sphere of radius r at distance |v| is in it when
+//!   the angle from the cone's axis is at most the cone's half angle plus asin(r/|v|), below 180° in sum.
+//!
+//! Frames: site, m. Sources: ours.
+
+use sightline_geometry::frames::{Point3, Ray, Vector3};
+
+use crate::ground::rocks::Rock;
+
+/// A node of the tree: a box with either two children or a run of rocks.
+#[derive(Clone, Debug)]
+struct Node {
+    low: [f64; 3],
+    high: [f64; 3],
+    /// First rock of a leaf in `order`, or the index of the first of two neighbouring children.
+    first: usize,
+    /// Rocks in a leaf; 0 for an inner node.
+    count: usize,
+}
+
+/// A tree of boxes over the rocks.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Tree {
+    nodes: Vec<Node>,
+    order: Vec<usize>,
+}
+
+/// Rocks in a leaf of the tree.
+const LEAF: usize = 4;
+
+impl Tree {
+    /// Builds the tree.
+    pub(crate) fn new(rocks: &[Rock]) -> Self {
+        let mut tree = Self { nodes: Vec::new(), order: (0..rocks.len()).collect() };
+        if !rocks.is_empty() {
+            tree.nodes.push(Node { low: [0.0; 3], high: [0.0; 3], first: 0, count: rocks.len() });
+            tree.split(rocks, 0);
+        }
+        tree
+    }
+
+    fn split(&mut self, rocks: &[Rock], index: usize) {
+        let (first, count) = (self.nodes[index].first, self.nodes[index].count);
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for rock in self.order[first..first + count].iter().map(|&k| &rocks[k]) {
+            for k in 0..3 {
+                low[k] = low[k].min(rock.centre[k] - rock.radius_m);
+                high[k] = high[k].max(rock.centre[k] + rock.radius_m);
+            }
+        }
+        (self.nodes[index].low, self.nodes[index].high) = (low, high);
+        if count <= LEAF {
+            return;
+        }
+        let axis = (0..3).max_by(|&a, &b| (high[a] - low[a]).total_cmp(&(high[b] - low[b]))).unwrap_or(0);
+        self.order[first..first + count]
+            .sort_by(|&a, &b| rocks[a].centre[axis].total_cmp(&rocks[b].centre[axis]));
+        let half = count / 2;
+        let child = self.nodes.len();
+        for (first, count) in [(first, half), (first + half, count - half)] {
+            self.nodes.push(Node { low: [0.0; 3], high: [0.0; 3], first, count });
+        }
+        (self.nodes[index].first, self.nodes[index].count) = (child, 0);
+        self.split(rocks, child);
+        self.split(rocks, child + 1);
+    }
+
+    /// Calls `visit` with every rock whose box the ray meets before the distance that `visit` returns, m.
+    ///
+    /// `visit` gets the rock's index and returns how far the ray still matters.
+    pub(crate) fn along(&self, ray: &Ray, mut to_m: f64, mut visit: impl FnMut(usize) -> f64) {
+        let mut open = [0usize; 64];
+        let mut depth = usize::from(!self.nodes.is_empty());
+        while depth > 0 {
+            depth -= 1;
+            let node = &self.nodes[open[depth]];
+            if !meets_box(node, ray, to_m) {
+                continue;
+            }
+            if node.count > 0 {
+                for &rock in &self.order[node.first..node.first + node.count] {
+                    to_m = visit(rock);
+                }
+            } else {
+                open[depth] = node.first;
+                open[depth + 1] = node.first + 1;
+                depth += 2;
+            }
+        }
+    }
+}
+
+/// Whether the ray passes through the node's box within [0, `to_m`].
+fn meets_box(node: &Node, ray: &Ray, to_m: f64) -> bool {
+    let (mut enter_m, mut leave_m) = (0.0f64, to_m);
+    for k in 0..3 {
+        let (origin, speed) = (ray.origin[k], ray.direction[k]);
+        if speed == 0.0 {
+            if origin < node.low[k] || origin > node.high[k] {
+                return false;
+            }
+            continue;
+        }
+        let (a, b) = ((node.low[k] - origin) / speed, (node.high[k] - origin) / speed);
+        enter_m = enter_m.max(a.min(b));
+        leave_m = leave_m.min(a.max(b));
+    }
+    enter_m <= leave_m
+}
+
+/// The rocks by where the sun's rays meet them.
+#[derive(Clone, Debug)]
+pub(crate) struct SunGrid {
+    across: [Vector3; 2],
+    low_m: [f64; 2],
+    cells: [usize; 2],
+    /// Where the list of each cell starts in `rocks`; one more than there are cells.
+    starts: Vec<u32>,
+    rocks: Vec<u32>,
+}
+
+impl SunGrid {
+    /// Side of a cell, m: near the size of the rocks that cover most ground.
+    const CELL_M: f64 = 0.25;
+
+    /// Projects the rocks along `sun_direction` (unit, towards the sun).
+    pub(crate) fn new(rocks: &[Rock], sun_direction: &Vector3) -> Self {
+        let aside = if sun_direction.z.abs() < 0.9 { Vector3::z() } else { Vector3::x() };
+        let first = sun_direction.cross(&aside).normalize();
+        let across = [first, sun_direction.cross(&first)];
+        let span = |rock: &Rock, k: usize| {
+            let middle_m = rock.centre.coords.dot(&across[k]);
+            [middle_m - rock.radius_m, middle_m + rock.radius_m]
+        };
+        let (mut low_m, mut high_m) = ([0.0f64; 2], [0.0f64; 2]);
+        for k in 0..2 {
+            low_m[k] = rocks.iter().map(|rock| span(rock, k)[0]).fold(f64::INFINITY, f64::min);
+            high_m[k] = rocks.iter().map(|rock| span(rock, k)[1]).fold(f64::NEG_INFINITY, f64::max);
+        }
+        if rocks.is_empty() {
+            return Self { across, low_m: [0.0; 2], cells: [0; 2], starts: vec![0], rocks: Vec::new() };
+        }
+        let cells: [usize; 2] = std::array::from_fn(|k| ((high_m[k] - low_m[k]) / Self::CELL_M) as usize + 1);
+        let mut lists = vec![Vec::new(); cells[0] * cells[1]];
+        for (index, rock) in rocks.iter().enumerate() {
+            let range: [[usize; 2]; 2] = std::array::from_fn(|k| {
+                span(rock, k).map(|m| (((m - low_m[k]) / Self::CELL_M).max(0.0) as usize).min(cells[k] - 1))
+            });
+            for y in range[1][0]..=range[1][1] {
+                for x in range[0][0]..=range[0][1] {
+                    lists[y * cells[0] + x].push(index as u32);
+                }
+            }
+        }
+        let mut starts = vec![0u32];
+        for list in &lists {
+            starts.push(starts[starts.len() - 1] + list.len() as u32);
+        }
+        Self { across, low_m, cells, starts, rocks: lists.concat() }
+    }
+
+    /// The rocks that may stand between a point and the sun.
+    #[inline(always)]
+    pub(crate) fn towards_sun(&self, point: &Point3) -> &[u32] {
+        let mut cell = [0usize; 2];
+        for (k, cell) in cell.iter_mut().enumerate() {
+            let position = (point.coords.dot(&self.across[k]) - self.low_m[k]) / Self::CELL_M;
+            if position < 0.0 || position >= self.cells[k] as f64 {
+                return &[];
+            }
+            *cell = position as usize;
+        }
+        let at = cell[1] * self.cells[0] + cell[0];
+        &self.rocks[self.starts[at] as usize..self.starts[at + 1] as usize]
+    }
+}
+
+/// A cone of rays: what a tile of an image sees.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cone {
+    /// Where the rays start, m; for a fisheye, where the middle one does.
+    pub apex: Point3,
+    /// How far the origins of the rays lie from the apex at most, m.
+    pub apex_radius_m: f64,
+    /// Unit direction of the middle ray.
+    pub axis: Vector3,
+    /// Cosine of half the opening angle, which is at most a right angle.
+    pub half_angle_cos: f64,
+    /// Its sine.
+    pub half_angle_sin: f64,
+}
+
+/// Whether any ray of the cone can meet a sphere.
+pub(crate) fn in_cone(cone: &Cone, centre: &Point3, radius_m: f64) -> bool {
+    let v = centre - cone.apex;
+    let (distance_m2, radius_m) = (v.norm_squared(), radius_m + cone.apex_radius_m);
+    if distance_m2 <= radius_m * radius_m {
+        return true;
+    }
+    // cos(half angle + asin(r/d)) · d, without trigonometry: this runs for every rock of every tile.
+    let tangent_m = (distance_m2 - radius_m * radius_m).sqrt();
+    v.dot(&cone.axis) >= cone.half_angle_cos * tangent_m - cone.half_angle_sin * radius_m
+}

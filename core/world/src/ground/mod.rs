@@ -1,0 +1,18 @@
+//! What there is to see: the ground, its rocks, and how their surfaces look.
+
+mod value_noise;
+pub(crate) mod level;
+pub mod texture;
+mod relief;
+pub(crate) mod terrain;
+mod terrain_cast;
+mod far;
+pub mod rocks;
+mod shape;
+pub mod rock_law;
+pub(crate) mod around;
+pub(crate) mod rock_field;
+pub(crate) mod footing;
+mod details;
+pub(crate) mod surface;
+pub(crate) mod imprint;

@@ -1,0 +1,160 @@
+//! The index of a simulated traverse: stops, poses, mast angles, cameras and the names of the images.
+//!
+//! Each stop carries what the tracker may know (estimated pose, measured mast angles and the cameras that
+//! follow from them) and, apart from it, the truth. The true cameras stand in the truth only where they
+//! differ from the ones that the tracker is given, which is when the scenario has a pointing error.
+//!
+//! With `camera.hand_over` one more stop follows the last: the same poses, true and estimated, and the other pair of
+//! cameras, which is fixed to the body and therefore has no mast angles (R205, R209).
+//!
+//! Time: the rover drives at 3.75 cm/s and turns at 2.1°/s along its wheels' way (domain.md 5.4) and stands
+//! for 60 s at each stop (the pause is ours).
+//! Frames: poses in the site frame, cameras in the rover frame. Sources: domain.md 4, 5; R104–R106, R205.
+
+use crate::traverse::{CameraSource, FORMAT_VERSION, Stop, StopTruth, TraverseIndex, View};
+use sightline_geometry::camera::{Camera, MastAngles};
+use sightline_geometry::error::Result;
+use sightline_geometry::frames::PoseRecord;
+use sightline_geometry::stereo_geometry::StereoGeometry;
+
+use crate::camera::picture::Eye;
+use crate::camera::rig::Rig;
+use crate::rover::{drive, mast_error, odometry};
+use crate::scenario::{CameraRig, CameraSettings, Course, Scenario};
+use crate::world::World;
+
+/// The name of the scenario's file within a traverse folder.
+pub const SCENARIO_FILE: &str = "scenario.toml";
+
+/// Time spent at a stop, s (ours).
+const PAUSE_S: f64 = 60.0;
+
+/// Builds the index of a scenario's traverse; fails where the drive is impossible on this ground.
+pub fn index(scenario: &Scenario, world: &World) -> Result<TraverseIndex> {
+    let rig = Rig::new(&scenario.camera);
+    let drive = drive::true_drive(world, scenario)?;
+    let estimates = odometry::believed(&drive, scenario);
+    let told: Vec<MastAngles> = drive.stops.iter().filter_map(|stop| stop.angles).collect();
+    let true_angles = mast_error::true_angles(&told, scenario);
+    let mut stops = Vec::with_capacity(drive.stops.len());
+    let mut time_s = 0.0;
+    for (number, (truth, estimate)) in drive.stops.iter().zip(&estimates).enumerate() {
+        if let Some(leg) = number.checked_sub(1).and_then(|before| drive.legs.get(before)) {
+            time_s += PAUSE_S + leg.duration_s;
+        }
+        let (left, right) = rig.cameras_in_rover(truth.angles);
+        let mut stop_truth = StopTruth {
+            site_from_rover: PoseRecord::from(&truth.site_from_rover),
+            left_camera: None,
+            right_camera: None,
+        };
+        if let Some(angles) = true_angles.get(number).filter(|_| mast_error::is_present(&scenario.drive)) {
+            let (left, right) = rig.cameras_in_rover(Some(*angles));
+            (stop_truth.left_camera, stop_truth.right_camera) = (Some(left), Some(right));
+        }
+        stops.push(Stop {
+            time_s,
+            site_from_rover: PoseRecord::from(estimate),
+            mast_angles: truth.angles,
+            left: view("left", number, left),
+            right: view("right", number, right),
+            light: None,
+            truth: Some(stop_truth),
+        });
+    }
+    let handed_over = stops.last().and_then(|last| handed_over(last, stops.len(), &scenario.camera));
+    stops.extend(handed_over);
+    Ok(TraverseIndex {
+        format: FORMAT_VERSION,
+        name: scenario.name.clone(),
+        description: describe(scenario, stops.len()),
+        full_scale_dn: Some(scenario.camera.recorded_full_scale_dn()),
+        stereo: StereoGeometry::Lateral,
+        odometry_error: scenario.odometry_error,
+        mast: match rig {
+            Rig::Mast(mast) => Some(mast),
+            Rig::Body { .. } => None,
+        },
+        scenario: Some(SCENARIO_FILE.into()),
+        stops,
+    })
+}
+
+/// An image of a stop by its eye and number, with its camera.
+fn view(eye: &str, number: usize, camera: Camera) -> View {
+    View { image: format!("images/{eye}_{number:04}.png"), camera: CameraSource::Inline(camera) }
+}
+
+/// The stop `number` at which the rover stands as at the last one and looks with the other pair; nothing where the
+/// target is not handed over.
+fn handed_over(last: &Stop, number: usize, settings: &CameraSettings) -> Option<Stop> {
+    let (left, right) = Rig::of(settings.hand_over?, settings.image_size).cameras_in_rover(None);
+    let truth = last.truth.as_ref()?;
+    Some(Stop {
+        time_s: last.time_s + PAUSE_S,
+        site_from_rover: last.site_from_rover,
+        mast_angles: None,
+        left: view("left", number, left),
+        right: view("right", number, right),
+        light: None,
+        truth: Some(StopTruth {
+            site_from_rover: truth.site_from_rover,
+            left_camera: None,
+            right_camera: None,
+        }),
+    })
+}
+
+/// One sentence for people.
+fn describe(scenario: &Scenario, stops: usize) -> String {
+    let drive = &scenario.drive;
+    let course = match drive.course {
+        Course::Approach => format!(
+            "straight approach from {:.1} m in {stops} stops, steps of {:.0} % of the distance",
+            drive.start_distance_m,
+            100.0 * drive.step_fraction,
+        ),
+        Course::Moves => format!(
+            "{stops} stops along a list of moves that starts at {:.1} m, the targets {:.0}° from straight ahead",
+            drive.start_distance_m, drive.start_bearing_deg,
+        ),
+    };
+    let cameras = cameras_of(scenario.camera.rig);
+    let then = match scenario.camera.hand_over {
+        Some(rig) => format!(", at the last stop {}", cameras_of(rig)),
+        None => String::new(),
+    };
+    let made = format!(
+        "Simulated: {course}, {cameras}{then}, images {size} px wide, seed {}.",
+        scenario.seed,
+        size = scenario.camera.image_size,
+    );
+    format!("{} {made}", scenario.description).trim_start().to_owned()
+}
+
+/// A pair of cameras in words.
+fn cameras_of(rig: CameraRig) -> &'static str {
+    match rig {
+        CameraRig::MerNavcam => "Spirit's navcams",
+        CameraRig::MerPancam => "Opportunity's pancams",
+        CameraRig::MerFrontHazcam => "Opportunity's front hazcams",
+        CameraRig::Table1Pancam => "the paper's f = 16 mm pair",
+        CameraRig::Table1Navcam => "the paper's f = 6 mm pair",
+    }
+}
+
+/// The camera that truly takes an image of a simulated stop, in the site frame.
+///
+/// `None` where the stop carries no truth, or where its camera is in a file.
+pub fn true_camera_in_site(stop: &Stop, eye: Eye) -> Option<Camera> {
+    let truth = stop.truth.as_ref()?;
+    let (view, camera) = match eye {
+        Eye::Left => (&stop.left, &truth.left_camera),
+        Eye::Right => (&stop.right, &truth.right_camera),
+    };
+    let in_rover = match (camera, &view.camera) {
+        (Some(camera), _) | (None, CameraSource::Inline(camera)) => camera,
+        (None, CameraSource::File { .. }) => return None,
+    };
+    Some(in_rover.moved(&truth.site_from_rover.to_pose()))
+}

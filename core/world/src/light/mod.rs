@@ -1,0 +1,6 @@
+//! The light on it: sun, sky and reflection.
+
+pub(crate) mod sky;
+pub(crate) mod law;
+pub(crate) mod reflection;
+pub(crate) mod openness;

@@ -1,0 +1,90 @@
+//! Where the mast truly looks when it is told where to look.
+//!
+//! ```text
+//! true = play(told) + offset + noise
+//! play: q_i = clamp(q_{i−1}, told_i − B/2, told_i + B/2), from q = 0 on before the first stop
+//! ```
+//!
+//! The play of a gear lets the head rest until the drive has moved beyond it: after turning to the right it
+//! lags by half the play, after turning to the left it leads by as much. The tracker is given what was told;
+//! only the renderer knows the rest.
+//!
+//! | symbol | name | unit |
+//! |---|---|---|
+//! | B | `drive.mast_backlash_deg` | rad here |
+//! | q | the head's angle | rad |
+//!
+//! Frame: azimuth and elevation of the mast in the rover frame. Source: domain.md 4.2, 4.5.
+
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
+
+use crate::ground::texture::mix;
+use crate::scenario::{DriveSettings, Scenario};
+use sightline_geometry::camera::MastAngles;
+
+/// Whether the true mast angles differ from the measured ones.
+pub(crate) fn is_present(drive: &DriveSettings) -> bool {
+    drive.pointing_error_deg > 0.0 || drive.mast_backlash_deg > 0.0 || drive.mast_offset_deg != [0.0; 2]
+}
+
+/// The angles that the mast truly takes when told `told`, one after the other, the mast starting straight ahead.
+pub(crate) fn true_angles(told: &[MastAngles], scenario: &Scenario) -> Vec<MastAngles> {
+    let half_play_rad = 0.5 * scenario.drive.mast_backlash_deg.to_radians();
+    let [azimuth_rad, elevation_rad] = scenario.drive.mast_offset_deg.map(f64::to_radians);
+    let follow =
+        |head_rad: f64, told_rad: f64| head_rad.max(told_rad - half_play_rad).min(told_rad + half_play_rad);
+    let mut head = MastAngles { azimuth_rad: 0.0, elevation_rad: 0.0 };
+    told.iter()
+        .enumerate()
+        .map(|(stop, told)| {
+            head = MastAngles {
+                azimuth_rad: follow(head.azimuth_rad, told.azimuth_rad),
+                elevation_rad: follow(head.elevation_rad, told.elevation_rad),
+            };
+            let pointed = MastAngles {
+                azimuth_rad: head.azimuth_rad + azimuth_rad,
+                elevation_rad: head.elevation_rad + elevation_rad,
+            };
+            with_noise(pointed, scenario, stop)
+        })
+        .collect()
+}
+
+/// The angles with the random error of one stop.
+fn with_noise(angles: MastAngles, scenario: &Scenario, stop: usize) -> MastAngles {
+    let sigma_rad = scenario.drive.pointing_error_deg.to_radians();
+    let mut random = Pcg64::new(u128::from(mix(scenario.seed ^ mix(stop as u64 ^ 0x9a57))), 0x9a57_9a57);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+    MastAngles {
+        azimuth_rad: angles.azimuth_rad + sigma_rad * normal(),
+        elevation_rad: angles.elevation_rad + sigma_rad * normal(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_head_lags_by_half_the_play_and_rests_when_the_drive_turns_back() {
+        let mut scenario = Scenario::default();
+        scenario.drive.mast_backlash_deg = 0.2;
+        scenario.drive.mast_offset_deg = [0.5, -0.3];
+        let told = [10.0, 20.0, 19.9, 19.7, -5.0f64]
+            .map(|deg| MastAngles { azimuth_rad: deg.to_radians(), elevation_rad: -deg.to_radians() });
+        let expected_deg = [9.9, 19.9, 19.9, 19.8, -4.9];
+        for (angles, deg) in true_angles(&told, &scenario).iter().zip(expected_deg) {
+            assert!((angles.azimuth_rad.to_degrees() - (deg + 0.5)).abs() < 1e-9, "{angles:?}");
+            assert!((angles.elevation_rad.to_degrees() - (-deg - 0.3)).abs() < 1e-9, "{angles:?}");
+        }
+    }
+
+    #[test]
+    fn a_perfect_mast_looks_where_it_is_told() {
+        let scenario = Scenario::default();
+        let told = [MastAngles { azimuth_rad: 0.123, elevation_rad: -0.456 }];
+        assert_eq!(true_angles(&told, &scenario), told);
+        assert!(!is_present(&scenario.drive));
+    }
+}

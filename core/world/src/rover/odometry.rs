@@ -1,0 +1,187 @@
+//! What the rover believes of its way: the pose estimates.
+//!
+//! **Stated.** The first estimate is true. Each step's motion `t, R` (rover frame of the stop before) is
+//! seen as `t + a e_a + b e_b + c e_c` and `R · δR`: e_a along the motion, e_b and e_c across it, with
+//! a ~ N(0, (along · |t|)²), b, c ~ N(0, (across · |t|)²), and δR of roll, pitch and yaw ~ N(0, attitude²)
+//! each. Errors add up from step to step, as the tracker's prediction assumes (domain.md 5.5).
+//!
+//! **Wheels and IMU.** The first estimate is true. The way of a leg is what the wheels advanced, laid out along
+//! the believed attitude Â: `ŵ = Σ_k Â_k w_k`. Wheels that slip are believed, so slip is an error of this
+//! estimate and in no covariance. The position grows by `ŵ + a e_a + b e_b + c e_c` with a ~ N(0, (along · L)²),
+//! b, c ~ N(0, (across · L)²). Attitude: roll and pitch are the true ones plus N(0, attitude²), drawn anew by the
+//! accelerometers at each stop and kept until the next; yaw is the true one plus the gyro's error, which grows
+//! over a leg of duration T by `bias · T + walk · sqrt(T) · N(0, 1)`, evenly within it. The gyro is read while
+//! the rover drives (domain.md 5.4), not at stops.
+//!
+//! **Heading jumps** (`rover.heading_jumps`) turn the estimate about the rover's own vertical from their stop on; the way
+//! that follows is laid out along the turned heading.
+//!
+//! | symbol | name | unit, frame |
+//! |---|---|---|
+//! | t, R | motion and turn between two stops | m, rover frame of the first |
+//! | w, Â | `wheels_m`, believed attitude | m, rover frame; site from rover |
+//! | L, T | `driven_m`, `duration_s` of a leg | m, s |
+//!
+//! Frames: site and rover. Sources: domain.md 5.5 (noise, gyro); papers.md R10, R126.
+
+use nalgebra::{Translation3, UnitQuaternion};
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
+
+use sightline_geometry::frames::{Pose, Vector3, attitude_from_roll_pitch_yaw};
+use sightline_geometry::odometry_error::OdometryError;
+
+use crate::ground::texture::mix;
+use crate::rover::scene::{Leg, TrueDrive};
+use crate::scenario::{HeadingJump, OdometryModel, RoverSettings, Scenario};
+
+/// Seconds of an hour.
+const HOUR_S: f64 = 3600.0;
+
+/// The pose estimates of a scenario's drive, one for each stop.
+pub fn believed(drive: &TrueDrive, scenario: &Scenario) -> Vec<Pose> {
+    let believed = match scenario.rover.odometry {
+        OdometryModel::Stated => {
+            let true_poses: Vec<Pose> = drive.stops.iter().map(|stop| stop.site_from_rover).collect();
+            estimates(&true_poses, &scenario.odometry_error, scenario.seed)
+        }
+        OdometryModel::WheelsAndImu => {
+            wheels_and_imu(drive, &scenario.odometry_error, &scenario.rover, scenario.seed)
+        }
+    };
+    if scenario.rover.heading_jumps.is_empty() {
+        return believed;
+    }
+    with_heading_jumps(&believed, &scenario.rover.heading_jumps)
+}
+
+/// The estimates with their heading turned from some stops on.
+pub(crate) fn with_heading_jumps(estimates: &[Pose], jumps: &[HeadingJump]) -> Vec<Pose> {
+    let mut turned: Vec<Pose> = estimates.first().copied().into_iter().collect();
+    for (number, pair) in estimates.windows(2).enumerate() {
+        let yaw_deg: f64 =
+            jumps.iter().filter(|jump| jump.stop as usize == number + 1).map(|jump| jump.yaw_deg).sum();
+        let step = pair[0].inv_mul(&pair[1]) * attitude_from_roll_pitch_yaw(0.0, 0.0, yaw_deg.to_radians());
+        turned.push(turned[turned.len() - 1] * step);
+    }
+    turned
+}
+
+/// The pose estimates of a drive through `true_poses`; the first is true.
+pub fn estimates(true_poses: &[Pose], error: &OdometryError, seed: u64) -> Vec<Pose> {
+    let mut random = Pcg64::new(u128::from(mix(seed ^ 0x0d0_3e72)), 0x0d03_e72b_b3c0_a700);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+    let mut estimates: Vec<Pose> = true_poses.first().copied().into_iter().collect();
+    for pair in true_poses.windows(2) {
+        let before_from_after = pair[0].inv_mul(&pair[1]);
+        let motion = before_from_after.translation.vector;
+        let length_m = motion.norm();
+        let [along, across, upright] = axes_of(&motion);
+        let seen = motion
+            + along * (normal() * error.along_fraction * length_m)
+            + across * (normal() * error.across_fraction * length_m)
+            + upright * (normal() * error.across_fraction * length_m);
+        let attitude_rad = error.attitude_deg.to_radians();
+        let tilt = attitude_from_roll_pitch_yaw(
+            normal() * attitude_rad,
+            normal() * attitude_rad,
+            normal() * attitude_rad,
+        );
+        let step = Pose::from_parts(Translation3::from(seen), before_from_after.rotation * tilt);
+        let last = estimates[estimates.len() - 1];
+        estimates.push(last * step);
+    }
+    estimates
+}
+
+/// The unit vectors along a motion, across it in the level, and across both; forward for none.
+fn axes_of(motion: &Vector3) -> [Vector3; 3] {
+    let length_m = motion.norm();
+    let along = if length_m > 0.0 { motion / length_m } else { Vector3::x() };
+    let across = Vector3::z().cross(&along).normalize();
+    [along, across, along.cross(&across)]
+}
+
+/// What is wrong with the believed attitude, rad.
+#[derive(Clone, Copy, Default)]
+struct AttitudeError {
+    roll: f64,
+    pitch: f64,
+    yaw: f64,
+}
+
+impl AttitudeError {
+    fn seen(self, attitude: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+        let (roll, pitch, yaw) = attitude.euler_angles();
+        attitude_from_roll_pitch_yaw(roll + self.roll, pitch + self.pitch, yaw + self.yaw)
+    }
+}
+
+/// The pose estimates from wheels, gyro and accelerometers.
+pub(crate) fn wheels_and_imu(
+    drive: &TrueDrive,
+    error: &OdometryError,
+    rover: &RoverSettings,
+    seed: u64,
+) -> Vec<Pose> {
+    let mut random = Pcg64::new(u128::from(mix(seed ^ 0x13a0_0d03)), 0x13a0_0d03_5ee1_0e55);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+    let bias_rad_per_s = rover.gyro_bias_deg_per_hour.to_radians() / HOUR_S * normal();
+    let walk_rad = rover.gyro_walk_deg_per_root_hour.to_radians() / HOUR_S.sqrt();
+    let tilt_rad = error.attitude_deg.to_radians();
+    let Some(first) = drive.stops.first() else { return Vec::new() };
+    let mut believed = AttitudeError::default();
+    let mut position = first.site_from_rover.translation.vector;
+    let mut estimates = vec![first.site_from_rover];
+    for (leg, stop) in drive.legs.iter().zip(drive.stops.iter().skip(1)) {
+        let drift_rad = bias_rad_per_s * leg.duration_s + walk_rad * leg.duration_s.sqrt() * normal();
+        let way = believed_way(leg, believed, drift_rad);
+        let [along, across, upright] = axes_of(&way);
+        position += way
+            + along * (normal() * error.along_fraction * leg.driven_m)
+            + across * (normal() * error.across_fraction * leg.driven_m)
+            + upright * (normal() * error.across_fraction * leg.driven_m);
+        believed = AttitudeError {
+            roll: tilt_rad * normal(),
+            pitch: tilt_rad * normal(),
+            yaw: believed.yaw + drift_rad,
+        };
+        let attitude = believed.seen(&stop.site_from_rover.rotation);
+        estimates.push(Pose::from_parts(Translation3::from(position), attitude));
+    }
+    estimates
+}
+
+/// The wheels' way of a leg along the believed attitude, site frame, m.
+fn believed_way(leg: &Leg, at_start: AttitudeError, drift_rad: f64) -> Vector3 {
+    let pieces = leg.wheels_m.len() as f64;
+    let ways = leg.stands.windows(2).zip(&leg.wheels_m).enumerate().map(|(k, (ends, [x, y]))| {
+        let [before, after] = [&ends[0], &ends[1]].map(|stand| stand.site_from_rover.rotation);
+        let halfway =
+            before * UnitQuaternion::from_scaled_axis(0.5 * (before.inverse() * after).scaled_axis());
+        let yaw = at_start.yaw + drift_rad * (k as f64 + 0.5) / pieces;
+        AttitudeError { yaw, ..at_start }.seen(&halfway) * Vector3::new(*x, *y, 0.0)
+    });
+    ways.sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_heading_jump_turns_the_way_that_follows_and_leaves_the_steps_lengths() {
+        let drive: Vec<Pose> = (0..5).map(|stop| Pose::translation(f64::from(stop), 0.0, 0.0)).collect();
+        let jumps = [HeadingJump { stop: 2, yaw_deg: 30.0 }];
+        let turned = with_heading_jumps(&drive, &jumps);
+        // The jump happens at the stop: the way there is untouched, the next metre leads 30° to the right.
+        for stop in 0..2 {
+            assert!((turned[stop].translation.vector - drive[stop].translation.vector).norm() < 1e-12);
+        }
+        assert!((turned[2].translation.vector - drive[2].translation.vector).norm() < 1e-12);
+        let way = turned[3].translation.vector - turned[2].translation.vector;
+        let (sine, cosine) = 30.0_f64.to_radians().sin_cos();
+        assert!((way - Vector3::new(cosine, sine, 0.0)).norm() < 1e-12, "{way}");
+        assert!((turned[4].rotation.angle() - 30.0_f64.to_radians()).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,193 @@
+//! The scene of a drive: ground, targets' centre and mast, and places found on it.
+//!
+//! A place is x, y of the rover frame's origin and its yaw. The distance D of a place is that from the left
+//! camera's centre, the suspension settled and the mast pointed, to the targets' centre. On a line towards the
+//! centre D grows with the level distance ρ of the rover's origin; the ρ with a given D is found by false
+//! position, where the end that stays counts half the next time (Illinois).
+//!
+//! | symbol | name | unit, frame |
+//! |---|---|---|
+//! | D | `distance_m` | m |
+//! | ρ | `level_m` | m, in the level |
+//!
+//! Frames: site and rover. Source: papers.md R25, R104.
+
+use sightline_geometry::camera::MastAngles;
+use sightline_geometry::frames::{Point3, Pose, Vector3};
+
+use crate::camera::rig::Rig;
+use crate::rover::suspension::{Stand, SuspensionAngles, WHEEL_RADIUS_M, axles_in_rover, settle};
+use crate::scenario::{DriveSettings, RoverSettings};
+
+/// The longest piece of a leg, m.
+const PIECE_M: f64 = 0.05;
+/// The largest turn within a piece, rad.
+const PIECE_RAD: f64 = 5.0 * std::f64::consts::PI / 180.0;
+/// How exactly a distance is met, m, where the ground lets it.
+const EXACT_M: f64 = 1e-11;
+/// How far a distance may be missed, m, where the wheels hop from one bump to the next.
+const ACCEPTED_M: f64 = 1e-6;
+
+/// What a drive needs to know of the world.
+pub(crate) struct Scene<'a> {
+    /// Height of what wheels stand on at a place of the site frame (x, y, m), m down.
+    pub ground_z_m: &'a dyn Fn(f64, f64) -> f64,
+    /// Height of a rock at a place that is too high for a wheel to climb, m.
+    pub blocked_by_m: &'a dyn Fn(f64, f64) -> Option<f64>,
+    /// The targets' centre, site frame, m.
+    pub centre: Point3,
+    /// The cameras, of which the left one looks at it where they can be pointed.
+    pub rig: &'a Rig,
+    /// How the rover drives.
+    pub drive: &'a DriveSettings,
+    /// How its wheels slip.
+    pub rover: &'a RoverSettings,
+}
+
+/// Where the rover truly stands and where its mast is told to look.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrueStop {
+    /// The rover in the site frame.
+    pub site_from_rover: Pose,
+    /// The angles that put the targets' centre on the centre of the left image; nothing where cameras are fixed to
+    /// the body.
+    pub angles: Option<MastAngles>,
+    /// The angles of the suspension.
+    pub suspension: SuspensionAngles,
+}
+
+/// The way from one stop to the next.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Leg {
+    /// The rover at the ends of the pieces, the start first: one more than there are pieces.
+    pub stands: Vec<Stand>,
+    /// By what the wheels advanced in each piece, along its chord: x and y of the rover frame, m.
+    pub wheels_m: Vec<[f64; 2]>,
+    /// How long the wheels' way is, m.
+    pub driven_m: f64,
+    /// How long it took, s.
+    pub duration_s: f64,
+}
+
+/// A drive as it truly went.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrueDrive {
+    /// The stops.
+    pub stops: Vec<TrueStop>,
+    /// The ways between them: one fewer than there are stops.
+    pub legs: Vec<Leg>,
+}
+
+/// The rover in the level, site frame.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    pub(super) x_m: f64,
+    pub(super) y_m: f64,
+    pub(super) yaw_rad: f64,
+}
+
+/// The angle within (−π, π], rad.
+pub(super) fn wrapped(angle_rad: f64) -> f64 {
+    use std::f64::consts::{PI, TAU};
+    let turned = angle_rad.rem_euclid(TAU);
+    if turned > PI { turned - TAU } else { turned }
+}
+
+impl Place {
+    /// The place a part of the way to another.
+    pub(super) fn towards(self, to: Self, part: f64) -> Self {
+        Self {
+            x_m: self.x_m + part * (to.x_m - self.x_m),
+            y_m: self.y_m + part * (to.y_m - self.y_m),
+            yaw_rad: self.yaw_rad + part * wrapped(to.yaw_rad - self.yaw_rad),
+        }
+    }
+
+    /// The places on the way to another, the last one included, in pieces of the length of a leg's.
+    pub(super) fn way_to(self, to: Self) -> impl Iterator<Item = Self> {
+        let length_m = (to.x_m - self.x_m).hypot(to.y_m - self.y_m);
+        let turn_rad = wrapped(to.yaw_rad - self.yaw_rad).abs();
+        let pieces = pieces(length_m, turn_rad);
+        (1..=pieces).map(
+            move |k| {
+                if k == pieces { to } else { self.towards(to, f64::from(k) / f64::from(pieces)) }
+            },
+        )
+    }
+
+    /// The level motion to another place, along and to the right of the heading halfway, m.
+    pub(super) fn motion_to(self, to: Self) -> [f64; 2] {
+        let half = self.towards(to, 0.5).yaw_rad;
+        let (dx, dy) = (to.x_m - self.x_m, to.y_m - self.y_m);
+        [half.cos() * dx + half.sin() * dy, half.cos() * dy - half.sin() * dx]
+    }
+}
+
+/// Into how many pieces a motion is divided, at least one.
+pub(super) fn pieces(length_m: f64, turn_rad: f64) -> u32 {
+    (length_m.abs() / PIECE_M).max(turn_rad.abs() / PIECE_RAD).ceil().max(1.0) as u32
+}
+
+impl Scene<'_> {
+    /// The angles that point the mast of a standing rover at the targets' centre, and the distance D, m.
+    pub(super) fn look(&self, site_from_rover: &Pose) -> Option<(Option<MastAngles>, f64)> {
+        let angles = self.rig.point_at(&site_from_rover.inverse_transform_point(&self.centre)).ok()?;
+        let (left, _) = self.rig.cameras_in_rover(angles);
+        Some((angles, (site_from_rover * left.model.centre() - self.centre).norm()))
+    }
+
+    /// The azimuth of the targets' centre as seen from a place, site frame, rad.
+    pub(super) fn azimuth_rad(&self, place: Place) -> f64 {
+        (self.centre.y - place.y_m).atan2(self.centre.x - place.x_m)
+    }
+
+    pub(super) fn settle(&self, place: Place) -> Option<Stand> {
+        settle(self.ground_z_m, place.x_m, place.y_m, place.yaw_rad)
+    }
+
+    /// The first wheel that a rock stands in the way of: where, site frame, m, and how high the rock is, m.
+    ///
+    /// A wheel is asked for at its axle and at the front and the rear of its rim.
+    pub(super) fn blocked(&self, stand: &Stand) -> Option<(Point3, f64)> {
+        axles_in_rover(&stand.angles).into_iter().find_map(|axle| {
+            [-WHEEL_RADIUS_M, 0.0, WHEEL_RADIUS_M].into_iter().find_map(|ahead_m| {
+                let point = stand.site_from_rover * (axle + ahead_m * Vector3::x());
+                Some((point, (self.blocked_by_m)(point.x, point.y)?))
+            })
+        })
+    }
+
+    /// The place at a distance D, the targets' centre lying in the direction `azimuth_rad` from it.
+    pub(super) fn place_at_distance(&self, azimuth_rad: f64, yaw_rad: f64, distance_m: f64) -> Option<Place> {
+        let (sine, cosine) = azimuth_rad.sin_cos();
+        let place = |level_m: f64| Place {
+            x_m: self.centre.x - level_m * cosine,
+            y_m: self.centre.y - level_m * sine,
+            yaw_rad,
+        };
+        let excess_m = |level_m: f64| -> Option<f64> {
+            Some(self.look(&self.settle(place(level_m))?.site_from_rover)?.1 - distance_m)
+        };
+        let (mut near_m, mut far_m) = (0.8, distance_m + 2.0);
+        let (mut near_excess_m, mut far_excess_m) = (excess_m(near_m)?, excess_m(far_m)?);
+        if near_excess_m > 0.0 || far_excess_m < 0.0 {
+            return None;
+        }
+        for _ in 0..100 {
+            let level_m = (near_m * far_excess_m - far_m * near_excess_m) / (far_excess_m - near_excess_m);
+            let found_m = excess_m(level_m)?;
+            if found_m.abs() <= EXACT_M || (far_m - near_m < 1e-12 && found_m.abs() <= ACCEPTED_M) {
+                return Some(place(level_m));
+            }
+            // Without the halving one end would stay and the other creep.
+            if found_m > 0.0 {
+                (far_m, far_excess_m) = (level_m, found_m);
+                near_excess_m *= 0.5;
+            } else {
+                (near_m, near_excess_m) = (level_m, found_m);
+                far_excess_m *= 0.5;
+            }
+        }
+        None
+    }
+}

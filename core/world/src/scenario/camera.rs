@@ -1,0 +1,268 @@
+//! The cameras: which pair, its optics, its exposure and its detector.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::range::{MAX_SEED, within};
+use sightline_geometry::error::{Error, Result};
+
+/// The largest number of the 12-bit converter.
+pub const FULL_SCALE_DN: f64 = 4095.0;
+/// Full scale of the 8-bit converter's table, DN.
+const BYTE_DN: f64 = 255.0;
+
+/// A pair of cameras and where it sits; the models are in `sim/camera/rig.rs`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CameraRig {
+    /// Spirit's navcams on the mast, 1024 × 1024 px, 46° (domain.md 4.3).
+    #[default]
+    MerNavcam,
+    /// Opportunity's pancams on the mast, 1024 × 1024 px, 16°; the right eye is ours (domain.md 4.3, 5.1).
+    MerPancam,
+    /// Opportunity's front hazcams on the body, 1024 × 1024 px, 126°; the right eye is ours (domain.md 5.1).
+    MerFrontHazcam,
+    /// Kim et al.'s example "Pancam" on the mast, 1024 × 768 px, f = 16 mm, baseline 0.30 m (R42).
+    #[serde(rename = "table1_pancam")]
+    Table1Pancam,
+    /// Kim et al.'s example "Navcam" on the mast, 1024 × 768 px, f = 6 mm, baseline 0.20 m (R42).
+    #[serde(rename = "table1_navcam")]
+    Table1Navcam,
+}
+
+/// How a recorded number comes from the 12-bit one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Quantisation {
+    /// Scaled: DN8 = round(DN12 · 255/4095).
+    #[default]
+    Linear,
+    /// 8 bits by the table DN8 = round(255 √(DN12/4095)), recorded through the table's inverse as 12 bits.
+    SquareRoot,
+}
+
+/// Who chooses the time of exposure.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ExposureMode {
+    /// One time for all pictures: the first left one has the mean `mean_level`.
+    #[default]
+    Fixed,
+    /// Automatic at each stop, from the whole left picture.
+    FullFrame,
+    /// Automatic at each stop, from a square around the centre of the left picture (R79).
+    Subframe,
+}
+
+/// The automatic exposure; names and values are those of real labels (domain.md 5.2).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct AutoExposureSettings {
+    /// The number that the brightest pixels are brought to, DN of 12 bits (2000: labels).
+    pub data_cut_dn: f64,
+    /// Part of the pixels that may lie above it, percent (1: labels).
+    pub pixel_fraction_percent: f64,
+    /// A change of the exposure smaller than this ends the search, percent (5: labels).
+    pub change_percent: f64,
+    /// Most exposures that are tried (6: labels).
+    pub iterations: u32,
+    /// Time of exposure before the first stop, s (0.43: between the 0.420 s and 0.445 s of real labels).
+    pub start_s: f64,
+    /// Side of the square of `subframe`, px of the image (161: domain.md 5.2).
+    pub subframe_px: u32,
+}
+
+impl Default for AutoExposureSettings {
+    fn default() -> Self {
+        Self {
+            data_cut_dn: 2000.0,
+            pixel_fraction_percent: 1.0,
+            change_percent: 5.0,
+            iterations: 6,
+            start_s: 0.43,
+            subframe_px: 161,
+        }
+    }
+}
+
+/// The cameras (domain.md 5.1, 5.2, 5.3 and 11.3).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct CameraSettings {
+    /// Which pair of cameras.
+    pub rig: CameraRig,
+    /// A pair on the body to which the target is handed over: after the last stop the rover stays where it is and
+    /// this pair takes one more stop (none; `mer_front_hazcam`: R205, R209).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hand_over: Option<CameraRig>,
+    /// Width of the image, px: 1024, 512, 256 or 128; smaller ones are block averages (domain.md 2.1). The
+    /// height is the same for the square cameras and three quarters of it for those of 1024 × 768 px.
+    pub image_size: u32,
+    /// σ of the optics' Gaussian blur, px of the image (0.5–0.7: domain.md 11.3).
+    pub blur_px: f64,
+    /// Samples along each axis of a pixel, 1 to 8; the pixel's value is their mean over its area.
+    pub samples_per_axis: u32,
+    /// How much of the cos⁴ fall-off towards the corners is left, 0 to 1 (0: corrected on board).
+    pub vignetting: f64,
+    /// What the correction of the flat field leaves, rms over the image, relative (0.025: domain.md 5.1).
+    pub flat_field_residue: f64,
+    /// Electrons per second of exposure and unit of radiance (600 000, ours: exposes the demonstration for
+    /// about as long as real labels say, 0.4 s). A white surface facing all the light has radiance 1.
+    pub electrons_per_s: f64,
+    /// Electrons per second of exposure that come without light (0: negligible below −55 °C, domain.md 5.1).
+    pub dark_electrons_per_s: f64,
+    /// Time for which light falls in while the picture is moved to the storage, s (0: corrected on board;
+    /// 0.00512 where it is not, domain.md 11.3).
+    pub smear_s: f64,
+    /// Electrons that a pixel holds at most (200 000: domain.md 5.1).
+    pub full_well_electrons: f64,
+    /// Bits of a recorded pixel: 12, or 8.
+    pub bit_depth: u32,
+    /// The way to 8 bits; with 12 bits only `linear` is possible.
+    pub quantisation: Quantisation,
+    /// Electrons per number of the 12-bit converter (42: 170 ke⁻ / 4095).
+    pub gain_electrons_per_dn: f64,
+    /// Read noise, electrons (30).
+    pub read_noise_electrons: f64,
+    /// Number that the converter gives in the dark, DN of 12 bits (20).
+    pub bias_dn: f64,
+    /// Pixel-to-pixel spread of the response, relative, fixed for each camera (0.01).
+    pub response_spread: f64,
+    /// Who chooses the time of exposure.
+    pub exposure: ExposureMode,
+    /// Mean of the first left image under `fixed` exposure, fraction of full scale (ours).
+    pub mean_level: f64,
+    /// The seed of shot and read noise; that of the scenario where it is left out. The cameras' own response
+    /// follows the scenario's seed in any case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_seed: Option<u64>,
+    /// The automatic exposure.
+    pub auto_exposure: AutoExposureSettings,
+}
+
+impl Default for CameraSettings {
+    fn default() -> Self {
+        Self {
+            rig: CameraRig::default(),
+            hand_over: None,
+            image_size: 1024,
+            blur_px: 0.6,
+            samples_per_axis: 4,
+            vignetting: 0.0,
+            flat_field_residue: 0.025,
+            electrons_per_s: 600_000.0,
+            dark_electrons_per_s: 0.0,
+            smear_s: 0.0,
+            full_well_electrons: 200_000.0,
+            bit_depth: 12,
+            quantisation: Quantisation::default(),
+            gain_electrons_per_dn: 42.0,
+            read_noise_electrons: 30.0,
+            bias_dn: 20.0,
+            response_spread: 0.01,
+            exposure: ExposureMode::default(),
+            mean_level: 0.4,
+            noise_seed: None,
+            auto_exposure: AutoExposureSettings::default(),
+        }
+    }
+}
+
+impl CameraSettings {
+    /// The number that full scale has in a recorded file, DN: 255 for 8 linear bits, else 4095.
+    pub fn recorded_full_scale_dn(&self) -> f64 {
+        match (self.bit_depth, self.quantisation) {
+            (8, Quantisation::Linear) => BYTE_DN,
+            _ => FULL_SCALE_DN,
+        }
+    }
+
+    /// The same settings without those that the clean radiance does not depend on: these have their defaults.
+    pub fn of_radiance(&self) -> Self {
+        Self {
+            rig: self.rig,
+            image_size: self.image_size,
+            blur_px: self.blur_px,
+            samples_per_axis: self.samples_per_axis,
+            ..Self::default()
+        }
+    }
+
+    pub(crate) fn validate(&self) -> Result<()> {
+        if ![1024, 512, 256, 128].contains(&self.image_size) {
+            return Err(Error::setting("camera.image_size", "choose 1024, 512, 256 or 128"));
+        }
+        if self.hand_over.is_some_and(|rig| rig != CameraRig::MerFrontHazcam || rig == self.rig) {
+            let problem = "choose mer_front_hazcam, beside a camera.rig on the mast";
+            return Err(Error::setting("camera.hand_over", problem));
+        }
+        if ![12, 8].contains(&self.bit_depth) {
+            return Err(Error::setting("camera.bit_depth", "choose 12 or 8"));
+        }
+        if self.bit_depth == 12 && self.quantisation == Quantisation::SquareRoot {
+            return Err(Error::setting("camera.quantisation", "square_root needs camera.bit_depth = 8"));
+        }
+        if self.noise_seed.is_some_and(|seed| seed > MAX_SEED) {
+            return Err(Error::setting("camera.noise_seed", "is above 2^53"));
+        }
+        within("camera.blur_px", self.blur_px, 0.0, 3.0)?;
+        within("camera.samples_per_axis", f64::from(self.samples_per_axis), 1.0, 8.0)?;
+        within("camera.vignetting", self.vignetting, 0.0, 1.0)?;
+        within("camera.flat_field_residue", self.flat_field_residue, 0.0, 0.1)?;
+        within("camera.electrons_per_s", self.electrons_per_s, 1e3, 1e9)?;
+        within("camera.dark_electrons_per_s", self.dark_electrons_per_s, 0.0, 1e6)?;
+        within("camera.smear_s", self.smear_s, 0.0, 0.1)?;
+        within("camera.full_well_electrons", self.full_well_electrons, 1e3, 1e7)?;
+        within("camera.gain_electrons_per_dn", self.gain_electrons_per_dn, 0.1, 1000.0)?;
+        within("camera.read_noise_electrons", self.read_noise_electrons, 0.0, 1000.0)?;
+        within("camera.bias_dn", self.bias_dn, 0.0, 1000.0)?;
+        within("camera.response_spread", self.response_spread, 0.0, 0.2)?;
+        within("camera.mean_level", self.mean_level, 0.02, 0.9)?;
+        self.auto_exposure.validate()
+    }
+}
+
+impl AutoExposureSettings {
+    fn validate(&self) -> Result<()> {
+        // Above the largest bias, so that the cut is a light that can be reached.
+        within("camera.auto_exposure.data_cut_dn", self.data_cut_dn, 1001.0, 4000.0)?;
+        within("camera.auto_exposure.pixel_fraction_percent", self.pixel_fraction_percent, 0.0, 50.0)?;
+        within("camera.auto_exposure.change_percent", self.change_percent, 0.1, 50.0)?;
+        within("camera.auto_exposure.iterations", f64::from(self.iterations), 1.0, 20.0)?;
+        within("camera.auto_exposure.start_s", self.start_s, 0.00512, 30.0)?;
+        within("camera.auto_exposure.subframe_px", f64::from(self.subframe_px), 5.0, 1024.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use crate::Scenario;
+
+    #[test]
+    fn impossible_cameras_are_refused_by_name() {
+        for (text, key) in [
+            ("bit_depth = 12\nquantisation = \"square_root\"", "camera.quantisation"),
+            ("noise_seed = 9100000000000000", "camera.noise_seed"),
+            ("vignetting = 1.5", "camera.vignetting"),
+            ("smear_s = nan", "camera.smear_s"),
+            ("[camera.auto_exposure]\niterations = 0", "camera.auto_exposure.iterations"),
+            ("rig = \"mer_rear_hazcam\"", "mer_front_hazcam"),
+            ("hand_over = \"mer_pancam\"", "camera.hand_over"),
+            ("rig = \"mer_front_hazcam\"\nhand_over = \"mer_front_hazcam\"", "camera.hand_over"),
+        ] {
+            let error = Scenario::from_toml(&format!("[camera]\n{text}\n"), Path::new("s.toml")).unwrap_err();
+            assert!(error.to_string().contains(key), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_changed_camera_survives_toml() {
+        let text = "[camera]\nrig = \"table1_pancam\"\nnoise_seed = 5\nexposure = \"subframe\"\nbit_depth = 8\n\
+                    quantisation = \"square_root\"\n[camera.auto_exposure]\nsubframe_px = 99\n";
+        let read = Scenario::from_toml(text, Path::new("s.toml")).unwrap();
+        assert_eq!((read.camera.noise_seed, read.camera.auto_exposure.subframe_px), (Some(5), 99));
+        assert_eq!(Scenario::from_toml(&read.to_toml(), Path::new("s.toml")).unwrap(), read);
+    }
+}

@@ -1,0 +1,89 @@
+//! What changes during a drive: the sun moves, clouds pass, something stands in the way, the rover casts its shadow.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::range::within;
+use sightline_geometry::error::{Error, Result};
+
+/// What changes from stop to stop. By default nothing does.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct EventSettings {
+    /// How fast the sun's azimuth changes, degrees per hour of the drive (0; a sol on Mars: 14.6).
+    pub sun_azimuth_deg_per_h: f64,
+    /// How fast the sun's elevation changes, degrees per hour of the drive (0).
+    pub sun_elevation_deg_per_h: f64,
+    /// Whether the rover's body casts its shadow, and is seen where a camera looks down on it.
+    pub rover_body: bool,
+    /// Clouds that pass the sun (R126).
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub clouds: Vec<Cloud>,
+    /// Things that stand between the cameras and the targets' centre (R88, R126, R208).
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub occluders: Vec<Occluder>,
+}
+
+/// A cloud before the sun, from one stop to another.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cloud {
+    /// The first stop that it darkens.
+    pub from_stop: u32,
+    /// The last stop that it darkens.
+    pub to_stop: u32,
+    /// What it leaves of the direct light, 0 to 1 (0.05: domain.md 11.1).
+    #[serde(default = "opaque")]
+    pub direct: f64,
+}
+
+fn opaque() -> f64 {
+    0.05
+}
+
+/// A grey block on the line of sight from the left camera to the targets' centre, upright and facing the camera.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Occluder {
+    /// The first stop at which it stands there.
+    pub from_stop: u32,
+    /// The last stop at which it stands there.
+    pub to_stop: u32,
+    /// Where on the line of sight its middle lies: 0 at the camera, 1 at the targets' centre.
+    pub at: f64,
+    /// How wide it is, m.
+    pub width_m: f64,
+    /// How high it is, m.
+    pub height_m: f64,
+    /// How far its middle lies to the right of the line of sight, m.
+    #[serde(default)]
+    pub aside_m: f64,
+}
+
+impl EventSettings {
+    pub(crate) fn validate(&self) -> Result<()> {
+        within("events.sun_azimuth_deg_per_h", self.sun_azimuth_deg_per_h, -360.0, 360.0)?;
+        within("events.sun_elevation_deg_per_h", self.sun_elevation_deg_per_h, -90.0, 90.0)?;
+        for (index, cloud) in self.clouds.iter().enumerate() {
+            let key = |field: &str| format!("events.clouds[{index}].{field}");
+            in_order(&key("to_stop"), cloud.from_stop, cloud.to_stop)?;
+            within(&key("direct"), cloud.direct, 0.0, 1.0)?;
+        }
+        for (index, occluder) in self.occluders.iter().enumerate() {
+            let key = |field: &str| format!("events.occluders[{index}].{field}");
+            in_order(&key("to_stop"), occluder.from_stop, occluder.to_stop)?;
+            within(&key("at"), occluder.at, 0.05, 0.98)?;
+            within(&key("width_m"), occluder.width_m, 0.01, 10.0)?;
+            within(&key("height_m"), occluder.height_m, 0.01, 10.0)?;
+            within(&key("aside_m"), occluder.aside_m, -10.0, 10.0)?;
+        }
+        Ok(())
+    }
+}
+
+fn in_order(key: &str, from_stop: u32, to_stop: u32) -> Result<()> {
+    if to_stop >= from_stop {
+        return Ok(());
+    }
+    Err(Error::setting(key, format!("{to_stop} is before from_stop, which is {from_stop}")))
+}

@@ -1,0 +1,247 @@
+//! The ground: relief, rocks and their texture.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::range::within;
+use sightline_geometry::error::Result;
+
+/// The relief of the ground: a fractal height field on a regular grid, a plane beyond it, and level ground far away.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct TerrainSettings {
+    /// Side of a cell of the height field, m (0.01 to 0.10; ours).
+    pub cell_m: f64,
+    /// RMS difference of height between two places 1 m apart, m (0.02: domain.md 10.4).
+    pub rms_at_1m_m: f64,
+    /// Hurst exponent: the RMS difference grows as distance to this power (0.8: domain.md 10.4).
+    pub hurst: f64,
+    /// The longest wavelength of the relief, m; beyond it the ground is level on average (ours).
+    pub longest_wavelength_m: f64,
+    /// Slope of the mean plane, deg (6 to 10 is a shallow incline, 15 to 20 a steep one: papers.md R124).
+    pub slope_deg: f64,
+    /// Direction of steepest ascent, deg clockwise from above: 0 ahead, 90 to the right, 180 behind.
+    pub slope_azimuth_deg: f64,
+    /// How far from the first stop the slope reaches, m; beyond, the ground returns to the level of the planet, so that the
+    /// horizon is level (60, ours: outside of what surrounds a target at 10 m).
+    pub slope_reach_m: f64,
+    /// Height of ripples of sand from trough to crest, m; 0 = none (ours; on Meridiani 0.01 to 0.05).
+    pub ripple_height_m: f64,
+    /// Mean distance of their crests, m (ours).
+    pub ripple_wavelength_m: f64,
+    /// Direction across the crests, deg clockwise from above, 0 ahead.
+    pub ripple_azimuth_deg: f64,
+}
+
+impl Default for TerrainSettings {
+    fn default() -> Self {
+        Self {
+            cell_m: 0.02,
+            rms_at_1m_m: 0.02,
+            hurst: 0.8,
+            longest_wavelength_m: 6.0,
+            slope_deg: 0.0,
+            slope_azimuth_deg: 0.0,
+            slope_reach_m: 60.0,
+            ripple_height_m: 0.0,
+            ripple_wavelength_m: 0.5,
+            ripple_azimuth_deg: 0.0,
+        }
+    }
+}
+
+/// The kinds of rocks (`sim/ground/shape.rs`).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RockShape {
+    /// Broken rock with facets of all directions.
+    Angular,
+    /// A box with chamfered edges; placed, it turns a flat face to where it looks.
+    #[default]
+    Block,
+    /// A low block with a flat top.
+    Slab,
+    /// A rounded rock.
+    Cobble,
+}
+
+/// A rock that stands where the scenario puts it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PlacedRock {
+    /// Place relative to the targets' centre, m ahead.
+    pub x_m: f64,
+    /// Place relative to the targets' centre, m to the right.
+    pub y_m: f64,
+    /// Width across the direction in which it looks, m.
+    pub diameter_m: f64,
+    /// Height above the ground, m.
+    pub height_m: f64,
+    /// Where its face looks, deg clockwise from above: 0 ahead, 180 towards the rover.
+    #[serde(default = "towards_the_rover_deg")]
+    pub yaw_deg: f64,
+    /// Its kind.
+    #[serde(default)]
+    pub shape: RockShape,
+}
+
+fn towards_the_rover_deg() -> f64 {
+    180.0
+}
+
+/// Rocks by the size distribution of Golombek & Rapp, a cluster near the targets' centre, and single ones.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct RockSettings {
+    /// Fraction k of the area that rocks cover (0.09; Spirit's plain 0.05, Pathfinder 0.19: domain.md 10.2).
+    pub area_fraction: f64,
+    /// The smallest rock near the approach, m of diameter; grows with distance from it. A pixel spans 1.6 mm at 2 m
+    /// and 8 mm at 10 m (ours: a pebble of 2 cm).
+    pub smallest_m: f64,
+    /// The largest rock, m of diameter (ours: a boulder).
+    pub largest_m: f64,
+    /// How far rocks are scattered ahead of the first stop, m (ours).
+    pub farthest_m: f64,
+    /// Mean height above ground over diameter, for large rocks (0.5: domain.md 10.3, Viking 2; Viking 1 0.365).
+    pub height_ratio: f64,
+    /// What every rock is higher than that on average, m (0.008: domain.md 10.3).
+    pub height_offset_m: f64,
+    /// Rocks of the cluster around the targets' centre (ours).
+    pub cluster_count: u32,
+    /// Radius of the cluster, m (ours).
+    pub cluster_radius_m: f64,
+    /// The smallest rock of the cluster, m of diameter (ours).
+    pub cluster_smallest_m: f64,
+    /// The largest rock of the cluster, m of diameter (ours: a rock worth driving to).
+    pub cluster_largest_m: f64,
+    /// Rocks that stand where the scenario puts them; scattered rocks give way to them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub placed: Vec<PlacedRock>,
+}
+
+impl Default for RockSettings {
+    fn default() -> Self {
+        Self {
+            area_fraction: 0.09,
+            smallest_m: 0.02,
+            largest_m: 1.0,
+            farthest_m: 100.0,
+            height_ratio: 0.5,
+            height_offset_m: 0.008,
+            cluster_count: 14,
+            cluster_radius_m: 1.3,
+            cluster_smallest_m: 0.25,
+            cluster_largest_m: 0.9,
+            placed: Vec::new(),
+        }
+    }
+}
+
+/// Albedo and micro-relief.
+///
+/// Contrast on Mars is low: in windows of 21 × 21 px, standard deviation over mean has the median 0.04 to 0.05 in
+/// Opportunity's navcam frames of sol 4087 and 0.045 to 0.085 in Spirit's of sols 1869 and 1907; power falls as f^−1.7 to
+/// f^−2.8 (`experiments/src/picture.rs`). The defaults put pictures of soil among them.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct TextureSettings {
+    /// Mean albedo of the soil, without unit.
+    pub soil_albedo: f64,
+    /// Mean albedo of the rocks, without unit; each rock differs by 15 % (1σ).
+    pub rock_albedo: f64,
+    /// Standard deviation of the albedo within one surface, relative, all octaves together.
+    pub albedo_std: f64,
+    /// β of the albedo's power spectrum f^−β in two dimensions (2.1: as much contrast in every octave; ours).
+    pub spectrum_slope: f64,
+    /// The part of the soil that grains of 2 to 18 mm cover, 0 to 0.4 (ours).
+    pub grain_cover: f64,
+    /// The part of the soil that smooth drifts of dust cover, 0 to 0.9 (ours).
+    pub drift_cover: f64,
+    /// Standard deviation of one component of the soil's micro-slope, m/m, all octaves together.
+    pub soil_slope_std: f64,
+    /// The same for rocks.
+    pub rock_slope_std: f64,
+    /// How much of the soil's albedo lies as dust on a rock's face that looks straight up, 0 to 1.
+    pub dust: f64,
+    /// The longest wavelength of the texture, m.
+    pub longest_m: f64,
+    /// The shortest wavelength of the texture, m (below the 1.6 mm that a pixel spans at 2 m).
+    pub shortest_m: f64,
+}
+
+impl Default for TextureSettings {
+    fn default() -> Self {
+        Self {
+            soil_albedo: 0.26,
+            rock_albedo: 0.23,
+            albedo_std: 0.05,
+            spectrum_slope: 2.1,
+            grain_cover: 0.15,
+            drift_cover: 0.25,
+            soil_slope_std: 0.08,
+            rock_slope_std: 0.25,
+            dust: 0.45,
+            longest_m: 0.4,
+            shortest_m: 0.0015,
+        }
+    }
+}
+
+impl TerrainSettings {
+    pub(crate) fn validate(&self) -> Result<()> {
+        within("terrain.cell_m", self.cell_m, 0.01, 0.10)?;
+        within("terrain.rms_at_1m_m", self.rms_at_1m_m, 0.0, 0.2)?;
+        within("terrain.hurst", self.hurst, 0.1, 1.5)?;
+        within("terrain.longest_wavelength_m", self.longest_wavelength_m, 0.1, 50.0)?;
+        within("terrain.slope_deg", self.slope_deg, 0.0, 30.0)?;
+        within("terrain.slope_azimuth_deg", self.slope_azimuth_deg, -360.0, 360.0)?;
+        within("terrain.slope_reach_m", self.slope_reach_m, 30.0, 10_000.0)?;
+        within("terrain.ripple_height_m", self.ripple_height_m, 0.0, 0.3)?;
+        // A crest needs eight vertices, or the grid would shape it.
+        let least_m = if self.ripple_height_m > 0.0 { 8.0 * self.cell_m } else { 0.01 };
+        within("terrain.ripple_wavelength_m", self.ripple_wavelength_m, least_m, 20.0)?;
+        within("terrain.ripple_azimuth_deg", self.ripple_azimuth_deg, -360.0, 360.0)
+    }
+}
+
+impl PlacedRock {
+    fn validate(&self) -> Result<()> {
+        within("rocks.placed.x_m", self.x_m, -100.0, 150.0)?;
+        within("rocks.placed.y_m", self.y_m, -100.0, 100.0)?;
+        within("rocks.placed.diameter_m", self.diameter_m, 0.02, 2.0)?;
+        within("rocks.placed.height_m", self.height_m, 0.01, 2.0)?;
+        within("rocks.placed.yaw_deg", self.yaw_deg, -360.0, 360.0)
+    }
+}
+
+impl RockSettings {
+    pub(crate) fn validate(&self) -> Result<()> {
+        within("rocks.area_fraction", self.area_fraction, 0.0, 0.4)?;
+        within("rocks.smallest_m", self.smallest_m, 0.02, 0.5)?;
+        within("rocks.largest_m", self.largest_m, self.smallest_m * 1.01, 2.0)?;
+        within("rocks.farthest_m", self.farthest_m, 1.0, 150.0)?;
+        within("rocks.height_ratio", self.height_ratio, 0.1, 1.0)?;
+        within("rocks.height_offset_m", self.height_offset_m, 0.0, 0.05)?;
+        within("rocks.cluster_count", f64::from(self.cluster_count), 0.0, 200.0)?;
+        within("rocks.cluster_radius_m", self.cluster_radius_m, 0.1, 10.0)?;
+        within("rocks.cluster_smallest_m", self.cluster_smallest_m, 0.02, self.cluster_largest_m / 1.01)?;
+        within("rocks.cluster_largest_m", self.cluster_largest_m, 0.03, 2.0)?;
+        self.placed.iter().try_for_each(PlacedRock::validate)
+    }
+}
+
+impl TextureSettings {
+    pub(crate) fn validate(&self) -> Result<()> {
+        within("texture.soil_albedo", self.soil_albedo, 0.02, 0.9)?;
+        within("texture.rock_albedo", self.rock_albedo, 0.02, 0.9)?;
+        within("texture.albedo_std", self.albedo_std, 0.0, 0.5)?;
+        within("texture.spectrum_slope", self.spectrum_slope, 0.0, 5.0)?;
+        within("texture.grain_cover", self.grain_cover, 0.0, 0.4)?;
+        within("texture.drift_cover", self.drift_cover, 0.0, 0.9)?;
+        within("texture.soil_slope_std", self.soil_slope_std, 0.0, 1.0)?;
+        within("texture.rock_slope_std", self.rock_slope_std, 0.0, 1.0)?;
+        within("texture.dust", self.dust, 0.0, 1.0)?;
+        within("texture.longest_m", self.longest_m, 0.01, 10.0)?;
+        within("texture.shortest_m", self.shortest_m, 0.0005, self.longest_m)
+    }
+}

@@ -1,0 +1,126 @@
+//! The rover: how its wheels slip, what it knows of its way, and the tracks that it leaves.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::range::within;
+use sightline_geometry::error::Result;
+
+/// The soil that the wheels stand on (domain.md 5.5).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Soil {
+    /// Loose sand: 45 % of slip on 15°.
+    LooseSand,
+    /// Firm soil with rocks: 15 % of slip on 15°.
+    #[default]
+    FirmSoil,
+    /// Bedrock: 3 % of slip on 15°.
+    Bedrock,
+}
+
+/// Where the pose estimate comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum OdometryModel {
+    /// The true motion with the errors that `odometry_error` states: exactly what the tracker assumes.
+    #[default]
+    Stated,
+    /// What the wheels advance, laid out along an attitude from gyro and accelerometers: slip is an error (R10).
+    WheelsAndImu,
+}
+
+/// A slip that is staged for the way to one stop.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ForcedSlip {
+    /// The number of the stop at which the motion ends; the first stop is 0, so 1 or more.
+    pub stop: u32,
+    /// Part of the motion that is lost: 1 = the wheels turn and the rover stays (0 to 1.25: domain.md 5.5).
+    pub slip: f64,
+}
+
+/// A jump of the estimated heading that is staged for the way to one stop: the attitude is set anew, for example by a
+/// sighting of the sun, and not to what it was.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct HeadingJump {
+    /// The number of the stop from which on the estimate is turned; the first stop is 0, so 1 or more.
+    pub stop: u32,
+    /// By how much, deg, positive to the right (−45 to 45).
+    pub yaw_deg: f64,
+}
+
+/// The rover's wheels and its sense of place.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct RoverSettings {
+    /// The soil that the wheels stand on (`firm_soil`, ours).
+    pub soil: Soil,
+    /// Factor on the slip of the soil: 1 takes domain.md 5.5 as it is, 0 means none (0, ours).
+    pub slip_scale: f64,
+    /// From the way to this stop on nothing but the wheels turns: 100 % of slip; 0 means never (0; R126).
+    pub stuck_from_stop: u32,
+    /// Where the pose estimate comes from (`stated`).
+    pub odometry: OdometryModel,
+    /// Angle random walk of the gyro, deg/√h, for `wheels_and_imu` (0.1: domain.md 5.5).
+    pub gyro_walk_deg_per_root_hour: f64,
+    /// 1σ bias of the gyro, deg/h, one draw for the drive, for `wheels_and_imu` (1: domain.md 5.5).
+    pub gyro_bias_deg_per_hour: f64,
+    /// Whether the wheels leave tracks (false: the demonstration shows untouched ground; R142).
+    pub tracks: bool,
+    /// Width of a wheel's track, m (0.16, as wide as a wheel; ours).
+    pub track_width_m: f64,
+    /// How deep a wheel sinks in, m (0.01, ours).
+    pub track_depth_m: f64,
+    /// Slips staged for single stops, in any order (none; R126).
+    pub forced_slip: Vec<ForcedSlip>,
+    /// Jumps of the estimated heading staged for single stops, in any order (none); no covariance knows of them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub heading_jumps: Vec<HeadingJump>,
+}
+
+impl Default for RoverSettings {
+    fn default() -> Self {
+        Self {
+            soil: Soil::FirmSoil,
+            slip_scale: 0.0,
+            stuck_from_stop: 0,
+            odometry: OdometryModel::Stated,
+            gyro_walk_deg_per_root_hour: 0.1,
+            gyro_bias_deg_per_hour: 1.0,
+            tracks: false,
+            track_width_m: 0.16,
+            track_depth_m: 0.01,
+            forced_slip: Vec::new(),
+            heading_jumps: Vec::new(),
+        }
+    }
+}
+
+impl RoverSettings {
+    pub(crate) fn validate(&self) -> Result<()> {
+        within("rover.slip_scale", self.slip_scale, 0.0, 5.0)?;
+        within("rover.stuck_from_stop", f64::from(self.stuck_from_stop), 0.0, 10_000.0)?;
+        for (index, forced) in self.forced_slip.iter().enumerate() {
+            within(&format!("rover.forced_slip[{index}].stop"), f64::from(forced.stop), 1.0, 10_000.0)?;
+            within(&format!("rover.forced_slip[{index}].slip"), forced.slip, 0.0, 1.25)?;
+        }
+        for (index, jump) in self.heading_jumps.iter().enumerate() {
+            within(&format!("rover.heading_jumps[{index}].stop"), f64::from(jump.stop), 1.0, 10_000.0)?;
+            within(&format!("rover.heading_jumps[{index}].yaw_deg"), jump.yaw_deg, -45.0, 45.0)?;
+        }
+        within("rover.gyro_walk_deg_per_root_hour", self.gyro_walk_deg_per_root_hour, 0.0, 10.0)?;
+        within("rover.gyro_bias_deg_per_hour", self.gyro_bias_deg_per_hour, 0.0, 100.0)?;
+        within("rover.track_width_m", self.track_width_m, 0.01, 0.5)?;
+        within("rover.track_depth_m", self.track_depth_m, 0.0, 0.1)
+    }
+
+    /// The slip staged for the way to a stop, if any.
+    pub(crate) fn forced_slip_to(&self, stop: usize) -> Option<f64> {
+        if self.stuck_from_stop > 0 && stop >= self.stuck_from_stop as usize {
+            return Some(1.0);
+        }
+        self.forced_slip.iter().find(|forced| forced.stop as usize == stop).map(|forced| forced.slip)
+    }
+}

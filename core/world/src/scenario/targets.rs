@@ -1,0 +1,89 @@
+//! The rule that chooses the targets.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::range::within;
+use sightline_geometry::error::Result;
+
+/// Which of the pixels that satisfy the rule of the window become targets; `sim/targets` states each in full.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Arrangement {
+    /// Drawn by the seed around the targets' centre.
+    #[default]
+    Drawn,
+    /// In straight, evenly spaced rows on the large rock (R110).
+    Rows,
+    /// On the large rock, some on an occluding boundary (R119).
+    Face,
+    /// The middle of what is seen of the rock on which the targets' centre lies.
+    Centre,
+}
+
+/// The rule that chooses targets; `sim/targets` states it in full.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct TargetRule {
+    /// How many targets.
+    pub count: u32,
+    /// Which of the pixels that satisfy the rule become targets (drawn).
+    pub arrangement: Arrangement,
+    /// Rows of the arrangement `rows` (2: R110).
+    pub rows: u32,
+    /// Targets of the arrangement `face` that lie on an occluding boundary (1: R119).
+    pub boundary: u32,
+    /// Greatest distance of a target's surface point from the targets' centre, m.
+    pub radius_m: f64,
+    /// Side of the square window on which the rule is tested, px of this image (21: R21; reduce it together
+    /// with the image, 11 at 512 and 7 at 256, or few windows are even enough).
+    pub window_px: u32,
+    /// Greatest part of the window in shadow (0.20: R21).
+    pub shadow_fraction: f64,
+    /// Greatest range of depth inside the window, as a part of the distance (0.10: R21).
+    pub depth_range_fraction: f64,
+    /// Whether targets must lie on rocks, off their occluding boundaries (true: R20).
+    pub on_rocks: bool,
+    /// Least part of the window that lies on the same rock as the target (0.90, ours).
+    pub same_rock_fraction: f64,
+    /// Greatest angle between normal and line of sight, at the first and at the last stop, in 90 % of the window,
+    /// degrees (70, ours): a face that turns its edge to the rover is no place to drive to.
+    pub incidence_deg: f64,
+}
+
+impl Default for TargetRule {
+    fn default() -> Self {
+        Self {
+            count: 20,
+            arrangement: Arrangement::Drawn,
+            rows: 2,
+            boundary: 1,
+            radius_m: 1.6,
+            window_px: 21,
+            shadow_fraction: 0.20,
+            depth_range_fraction: 0.10,
+            on_rocks: true,
+            same_rock_fraction: 0.90,
+            incidence_deg: 70.0,
+        }
+    }
+}
+
+impl TargetRule {
+    /// How many targets a world has to offer to serve: `count`, or the one that lies in the centre.
+    pub fn wanted(&self) -> u32 {
+        if self.arrangement == Arrangement::Centre { self.count.min(1) } else { self.count }
+    }
+
+    pub(crate) fn validate(&self) -> Result<()> {
+        within("targets.rows", f64::from(self.rows), 1.0, 100.0)?;
+        within("targets.boundary", f64::from(self.boundary), 0.0, 10_000.0)?;
+        within("targets.count", f64::from(self.count), 0.0, 10_000.0)?;
+        within("targets.radius_m", self.radius_m, 0.05, 20.0)?;
+        within("targets.window_px", f64::from(self.window_px), 1.0, 201.0)?;
+        within("targets.shadow_fraction", self.shadow_fraction, 0.0, 1.0)?;
+        within("targets.same_rock_fraction", self.same_rock_fraction, 0.0, 1.0)?;
+        within("targets.incidence_deg", self.incidence_deg, 0.0, 90.0)?;
+        within("targets.depth_range_fraction", self.depth_range_fraction, 0.0, 10.0)
+    }
+}

@@ -1,0 +1,89 @@
+//! Reads and checks a scenario: the range of every setting, and whether its drive is possible on flat ground.
+
+use std::path::Path;
+
+use crate::rover::plan::planned;
+use crate::scenario::range::{MAX_SEED, within};
+use crate::scenario::{Course, Scenario};
+use crate::toml_text;
+use sightline_geometry::error::{Error, Result};
+
+impl Scenario {
+    /// Reads and checks a scenario; `path` only names the culprit in the message, beside key and allowed range.
+    pub fn from_toml(text: &str, path: &Path) -> Result<Self> {
+        let scenario: Self = toml_text::read(text).map_err(|problem| Error::format(path, problem))?;
+        scenario.validate().map_err(|problem| Error::format(path, problem.to_string()))?;
+        Ok(scenario)
+    }
+
+    /// Refuses settings that no world can be made of, naming the first bad one. The ranges keep sizes finite and
+    /// geometry possible; they say nothing of what is plausible on Mars.
+    pub fn validate(&self) -> Result<()> {
+        if self.seed > MAX_SEED {
+            return Err(Error::setting("seed", format!("{} is above 2^53", self.seed)));
+        }
+        self.terrain.validate()?;
+        self.rocks.validate()?;
+        self.texture.validate()?;
+        self.sun.validate()?;
+        self.camera.validate()?;
+        self.drive.validate()?;
+        if self.drive.course == Course::Moves {
+            // Whether a move is possible depends on where those before it led: the plan on flat ground tells.
+            planned(&self.drive)?;
+        }
+        self.rover.validate()?;
+        self.events.validate()?;
+        self.fiducials.iter().enumerate().try_for_each(|(index, fiducial)| fiducial.validate(index))?;
+        let error = &self.odometry_error;
+        within("odometry_error.along_fraction", error.along_fraction, 0.0, 1.0)?;
+        within("odometry_error.across_fraction", error.across_fraction, 0.0, 1.0)?;
+        within("odometry_error.attitude_deg", error.attitude_deg, 0.0, 10.0)?;
+        self.targets.validate()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::RockSettings;
+
+    #[test]
+    fn a_scenario_survives_toml() {
+        let mut scenario = Scenario::demo();
+        scenario.sun.azimuth_deg = -33.25;
+        let read = Scenario::from_toml(&scenario.to_toml(), Path::new("scenario.toml"));
+        assert_eq!(read.unwrap(), scenario);
+    }
+
+    #[test]
+    fn what_is_left_out_takes_its_default() {
+        let read =
+            Scenario::from_toml("seed = 9\n[sun]\nelevation_deg = 20.0\n", Path::new("s.toml")).unwrap();
+        assert_eq!((read.seed, read.sun.elevation_deg), (9, 20.0));
+        assert_eq!(read.rocks, RockSettings::default());
+    }
+
+    #[test]
+    fn unknown_and_impossible_settings_are_refused_by_name() {
+        let refused =
+            |text: &str| Scenario::from_toml(text, Path::new("s.toml")).expect_err("refused").to_string();
+        let unknown = refused("seed = 2\n[sun]\nheight_deg = 3.0\n");
+        assert!(
+            unknown.starts_with("s.toml: line 3: sun.height_deg: unknown field `height_deg`"),
+            "{unknown}"
+        );
+        assert!(!unknown.contains('\n'), "one sentence: {unknown}");
+        assert!(refused("[sun]\nelevation_deg = -3.0\n").contains("sun.elevation_deg"));
+        assert!(refused("[camera]\nimage_size = 1000\n").contains("camera.image_size"));
+        assert!(refused("[drive]\nend_distance_m = nan\n").contains("drive.end_distance_m"));
+        let cover = refused("[rocks]\narea_fraction = -0.1\n");
+        assert!(
+            ["s.toml", "rocks.area_fraction", "0 to 0.4"].iter().all(|part| cover.contains(part)),
+            "{cover}"
+        );
+        let below =
+            "[[fiducials]]\nkind = \"sphere\"\nx_m = 0.0\ny_m = 0.0\nheight_m = -1.0\nradius_m = 0.1\n";
+        assert!(refused(below).contains("fiducials[0].height_m"));
+    }
+}

@@ -1,0 +1,100 @@
+//! The truth of a target, and the comparison of a step with it (the words of the house; R116).
+//!
+//! *Truth of a target*: the surface point under the designated sub-pixel, seen through the true camera. Where no
+//! surface is known but the true poses are, the first estimate carried by the true poses stands in for it, and
+//! the error is then the drift: what tracking added.
+//!
+//! `err_m` is measured in the present rover frame, so that the drift of the site frame is not counted:
+//! `│ p_estimated,rover − (site_from_rover,true)⁻¹ T_site │`. A target counts as tracked when its pixel error is
+//! at most max(5 px, 0.5 px × magnification so far).
+
+use sightline_geometry::camera::Camera;
+use sightline_geometry::frames::{Point3, Pose};
+use sightline_track::target::TrackingState;
+use sightline_track::trace::{StepTrace, StepTruth, TruthKind};
+
+/// What is true of a traverse.
+pub trait TruthSource: Send + Sync {
+    /// The true pose at a stop, where it is known.
+    fn true_site_from_rover(&self, step: usize) -> Option<Pose>;
+    /// The true left camera in the rover frame.
+    fn true_left_camera(&self, step: usize) -> &Camera;
+    /// The surface point under a pixel of the left image, in the site frame; none where no surface is known.
+    fn surface_point_in_site(&self, step: usize, pixel: sightline_geometry::frames::Pixel) -> Option<Point3>;
+    /// Whether a point of the site frame is unoccluded in the left image of a stop.
+    fn is_visible(&self, step: usize, point_in_site: &Point3) -> bool;
+    /// The share of a square window of the left image that lies in shadow, 0 to 1; none where no light is known.
+    fn shadow_share(
+        &self,
+        _step: usize,
+        _centre: sightline_geometry::frames::Pixel,
+        _size_px: u32,
+    ) -> Option<f64> {
+        None
+    }
+}
+
+/// The truth of one target.
+pub struct TargetTruth<'a> {
+    source: &'a dyn TruthSource,
+    kind: TruthKind,
+    position_in_site: Point3,
+    initial_distance_m: f64,
+}
+
+impl<'a> TargetTruth<'a> {
+    /// The surface point under the designated pixel, or else `estimate_in_rover` carried by the true poses;
+    /// none where not even the true poses are known.
+    pub fn new(
+        source: &'a dyn TruthSource,
+        designation: sightline_track::target::Designation,
+        estimate_in_rover: Option<&Point3>,
+    ) -> Option<Self> {
+        let step = designation.step;
+        let site_from_rover = source.true_site_from_rover(step)?;
+        let surface = source.surface_point_in_site(step, designation.pixel);
+        let (kind, position_in_site) = match surface {
+            Some(point) => (TruthKind::Surface, point),
+            None => (TruthKind::Carried, site_from_rover * estimate_in_rover?),
+        };
+        let centre_in_site = site_from_rover * source.true_left_camera(step).model.centre();
+        let initial_distance_m = (position_in_site - centre_in_site).norm();
+        Some(Self { source, kind, position_in_site, initial_distance_m })
+    }
+
+    /// The truth's position in the true site frame, m.
+    pub fn position_in_site(&self) -> Point3 {
+        self.position_in_site
+    }
+
+    /// Compares a step with the truth; none where the true pose of that stop is not known.
+    pub fn compare(&self, trace: &StepTrace) -> Option<StepTruth> {
+        let site_from_rover = self.source.true_site_from_rover(trace.step)?;
+        let camera = self.source.true_left_camera(trace.step);
+        let position_in_rover = site_from_rover.inverse() * self.position_in_site;
+        let distance_m = (position_in_rover - camera.model.centre()).norm();
+        let magnification = self.initial_distance_m / distance_m;
+        let tolerance_px = (0.5 * magnification).max(5.0);
+        let visible =
+            camera.sees(&position_in_rover) && self.source.is_visible(trace.step, &self.position_in_site);
+        let left_pixel = if visible { camera.project(&position_in_rover) } else { None };
+        let located = trace.located().and_then(|l| l.left_pixel);
+        let err_px = left_pixel.zip(located).map(|(a, b)| a.distance(b));
+        let target = &trace.update.target;
+        let error = target.position_in_rover - position_in_rover;
+        let nees = target.covariance_in_rover.try_inverse().map(|inverse| error.dot(&(inverse * error)));
+        let within = err_px.is_some_and(|e| e <= tolerance_px);
+        let tracking = trace.update.state == TrackingState::Tracking;
+        Some(StepTruth {
+            kind: self.kind,
+            position_in_rover,
+            left_pixel,
+            err_m: error.norm(),
+            err_px,
+            nees: nees.filter(|n| n.is_finite()),
+            magnification,
+            tolerance_px,
+            tracked: visible.then_some(tracking && within),
+        })
+    }
+}

@@ -1,0 +1,166 @@
+//! The index of a traverse: stops with time, estimated pose, mast angles, camera models, image names and optional truth.
+//!
+//! The simulator produces it, `sightline_recordings` reads and writes it as TOML or JSON. It contains ground truth, which is
+//! why no crate with stages can depend on this one.
+
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
+use utoipa::ToSchema;
+
+use sightline_geometry::camera::{Camera, Mast, MastAngles};
+use sightline_geometry::frames::{PoseRecord, Vector3};
+use sightline_geometry::odometry_error::OdometryError;
+use sightline_geometry::stereo_geometry::StereoGeometry;
+
+/// The version of the folder format that this code writes.
+pub const FORMAT_VERSION: u32 = 1;
+
+/// The index of a traverse: `traverse.toml` or `traverse.json` of the folder.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TraverseIndex {
+    /// Version of the format.
+    pub format: u32,
+    /// A short name.
+    pub name: String,
+    /// What was recorded, where, by which camera.
+    #[serde(default)]
+    pub description: String,
+    /// The grey value that counts as full scale; by default the largest of the PNG's depth.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub full_scale_dn: Option<f64>,
+    /// How the two images of a stop relate.
+    #[serde(default)]
+    pub stereo: StereoGeometry,
+    /// The error model of the pose estimates.
+    #[serde(default)]
+    pub odometry_error: OdometryError,
+    /// The mast that carries the cameras, where it is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mast: Option<Mast>,
+    /// The file with the simulated scenario from which missing images are rendered.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scenario: Option<String>,
+    /// The stops in driving order.
+    pub stops: Vec<Stop>,
+}
+
+/// One stop of the rover.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Stop {
+    /// Time since the first stop, s.
+    pub time_s: f64,
+    /// The estimated pose of the rover in the site frame.
+    pub site_from_rover: PoseRecord,
+    /// The mast angles at which the pair was taken, where there is a mast.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mast_angles: Option<MastAngles>,
+    /// The left (or first) image.
+    pub left: View,
+    /// The right (or second) image.
+    pub right: View,
+    /// How the pair was lit and exposed, where the recording says so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub light: Option<StopLight>,
+    /// What is known to be true, where anything is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub truth: Option<StopTruth>,
+}
+
+/// The light of one stop.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StopLight {
+    /// Where the sun stands, clockwise from the site frame's +x seen from above, deg.
+    pub sun_azimuth_deg: f64,
+    /// Its height over the level, deg.
+    pub sun_elevation_deg: f64,
+    /// For how long the left image was exposed, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exposure_s: Option<f64>,
+}
+
+impl StopLight {
+    /// The unit direction to the sun, site frame.
+    pub fn to_sun_in_site(&self) -> Vector3 {
+        let (azimuth, elevation) = (self.sun_azimuth_deg.to_radians(), self.sun_elevation_deg.to_radians());
+        Vector3::new(elevation.cos() * azimuth.cos(), elevation.cos() * azimuth.sin(), -elevation.sin())
+    }
+}
+
+/// One image with its camera model in the rover frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct View {
+    /// The PNG file, relative to the folder.
+    pub image: String,
+    /// The camera model in the rover frame at this stop.
+    pub camera: CameraSource,
+}
+
+/// A camera model, written in the index or in a file of JPL's text form beside it.
+///
+/// Read by hand below, because an untagged enum could not say which field is wrong.
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum CameraSource {
+    /// Written in the index itself.
+    Inline(Camera),
+    /// The name of a `.cahv`, `.cahvor` or `.cahvore` file, relative to the folder.
+    File {
+        /// The file's name.
+        file: String,
+    },
+}
+
+/// The truth of one stop.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StopTruth {
+    /// The true pose of the rover in the site frame.
+    pub site_from_rover: PoseRecord,
+    /// The true left camera in the rover frame, where it differs from the one the tracker is given.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "optional_camera")]
+    pub left_camera: Option<Camera>,
+    /// The true right camera in the rover frame, alike.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "optional_camera")]
+    pub right_camera: Option<Camera>,
+}
+
+impl<'de> Deserialize<'de> for CameraSource {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let table = serde_json::Map::deserialize(deserializer)?;
+        if let Some(file) = table.get("file") {
+            if let Some(other) = table.keys().find(|key| *key != "file") {
+                return Err(D::Error::custom(format!(
+                    "`{other}` beside `file`; give the camera in one place"
+                )));
+            }
+            let file = file.as_str().ok_or_else(|| D::Error::custom("`file` must be the name of a file"))?;
+            return Ok(Self::File { file: file.to_owned() });
+        }
+        camera_from_table(table).map(Self::Inline).map_err(D::Error::custom)
+    }
+}
+
+/// Reads a camera that may be left out, and refuses fields that cameras do not have.
+fn optional_camera<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Camera>, D::Error> {
+    let table = Option::<serde_json::Map<_, _>>::deserialize(deserializer)?;
+    table.map(camera_from_table).transpose().map_err(D::Error::custom)
+}
+
+fn camera_from_table(table: serde_json::Map<String, serde_json::Value>) -> Result<Camera, String> {
+    let fields: &[&str] = match table.get("model").and_then(serde_json::Value::as_str) {
+        Some("CAHV") => &["C", "A", "H", "V"],
+        Some("CAHVOR") => &["C", "A", "H", "V", "O", "R"],
+        Some("CAHVORE") => &["C", "A", "H", "V", "O", "R", "E", "T", "P"],
+        Some(other) => return Err(format!("the model is `{other}`, but it must be CAHV, CAHVOR or CAHVORE")),
+        None => return Err("give the camera's `model` (CAHV, CAHVOR or CAHVORE) or its `file`".to_owned()),
+    };
+    let known = |key: &str| matches!(key, "model" | "size") || fields.contains(&key);
+    if let Some(unknown) = table.keys().find(|key| !known(key)) {
+        return Err(format!("unknown field `{unknown}`, expected model, size, {}", fields.join(", ")));
+    }
+    serde_json::from_value(serde_json::Value::Object(table)).map_err(|error| error.to_string())
+}

@@ -1,0 +1,25 @@
+//! One-off experiments: how single figures and tables of `docs/` were measured. The studies that the product repeats are
+//! in `sightline_study`.
+//!
+//! | module | experiment |
+//! |---|---|
+//! | `scenery`, `picture`, `exposure` | the simulated scenery against its laws and real frames |
+//! | `realism` | the difficulty of simulated worlds for plain correlation |
+//! | `real_motion` | motions between recorded frames against their poses |
+//! | [`registration`] | registration of rocks by their shape, where the motion is known |
+//! | [`trackability`] | targets drawn where the map says good, risky or bad, tracked against the truth |
+
+#[cfg(feature = "command-line")]
+mod scenery;
+#[cfg(feature = "command-line")]
+mod picture;
+#[cfg(feature = "command-line")]
+mod exposure;
+#[cfg(feature = "command-line")]
+mod realism;
+#[cfg(feature = "command-line")]
+mod real_motion;
+pub mod registration;
+pub mod trackability;
+#[cfg(feature = "command-line")]
+pub mod cli;

@@ -1,0 +1,132 @@
+//! Opening what a page brings: a simulated drive by its scenario, and a session from an exported `reproduce.json`.
+//!
+//! What is brought was written by anybody, so that everything in it is checked as if it came bit by bit through the other
+//! routes: the scenario's ranges, every run's settings, the numbers of targets and runs, labels, breakpoints and notes. A drive is
+//! remembered in the database, so that its sessions are there again after a restart.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use sightline_geometry::error::{Error, Result};
+use sightline_recordings::create_simulated;
+use sightline_session::Session;
+use sightline_session::breakpoints::BREAKPOINT_LIMIT;
+use sightline_session::notes::Notes;
+use sightline_session::reproduce::{ReproducedTraverse, Reproduction};
+use sightline_session::view::{SavedRun, SavedSession};
+use sightline_track::settings::Settings;
+use sightline_world::Scenario;
+
+use crate::drives::{folder_name, scenario_of};
+use crate::live_session::{LABEL_LIMIT, LiveSession, RUN_LIMIT, TARGET_LIMIT};
+use crate::naming::name_of;
+use crate::problem::{ApiError, ApiResult};
+use crate::rendering::OpenTraverse;
+use crate::routes::what_if;
+use crate::state::AppState;
+
+/// How many drives may be opened from pages.
+const DRIVE_LIMIT: usize = 64;
+
+/// Opens the drive of a scenario; says whether it was not open before.
+///
+/// # Errors
+/// A problem that names what is wrong with the scenario, or when there are too many drives.
+pub(crate) fn open(state: &AppState, text: &str) -> ApiResult<(Arc<OpenTraverse>, bool)> {
+    let scenario = Scenario::from_toml(text, Path::new("scenario")).map_err(|error| {
+        ApiError::invalid("field", error.to_string())
+            .hint("`sightline scenarios` writes scenarios to begin with.")
+    })?;
+    let text = scenario.to_toml();
+    let known = state.traverses();
+    let same = |open: &&Arc<OpenTraverse>| scenario_of(&open.traverse).is_some_and(|own| own == scenario);
+    if let Some(open) = known.iter().find(same) {
+        return Ok((Arc::clone(open), false));
+    }
+    if state.store().drives()?.len() >= DRIVE_LIMIT {
+        let detail = format!("There are {DRIVE_LIMIT} drives already that were opened from pages.");
+        return Err(ApiError::conflict(detail).hint("Begin with another data folder: --data-dir."));
+    }
+    let name = folder_name(&scenario);
+    let traverse = create_simulated(&scenario, &state.folders().traverses.join(&name))?;
+    let id = name_of(&traverse)?;
+    let open = Arc::new(OpenTraverse::new(id, traverse, state.events().clone()));
+    state.store().save_drive(&name, &text)?;
+    Ok((state.add_traverse(open)?, true))
+}
+
+/// Begins the session of a file that was exported elsewhere.
+///
+/// # Errors
+/// A problem that names what is wrong with it; nothing is begun then.
+pub(crate) fn bring(state: &AppState, new: Reproduction) -> ApiResult<Arc<LiveSession>> {
+    let Reproduction { traverse, session, notes } = new;
+    check(&session)?;
+    let open = drive(state, &traverse)?;
+    let stops = open.traverse.stop_count();
+    let name = open.id.clone();
+    let mut kept = Notes::default();
+    let live = state.enter_session(open, false, |id| {
+        let session = SavedSession { id, traverse: name, ..session };
+        let session = Session::restored(&session, stops)?;
+        kept = Notes::brought(notes, &session)?;
+        Ok(session)
+    })?;
+    live.with_notes(|own| *own = kept);
+    live.save_notes(state.store())?;
+    state.changed(&live)?;
+    // Asking for it begins its runs.
+    state.session(&live.id)
+}
+
+/// The drive of a file: opened by its scenario, or one that is open.
+fn drive(state: &AppState, traverse: &ReproducedTraverse) -> ApiResult<Arc<OpenTraverse>> {
+    if let Some(open) = state.traverses().into_iter().find(|open| open.id == traverse.id) {
+        return Ok(open);
+    }
+    match &traverse.scenario_toml {
+        Some(text) => Ok(open(state, text)?.0),
+        None => {
+            let name: String = crate::printable::printable(&traverse.name).chars().take(100).collect();
+            let detail = format!("The file belongs to the recorded drive “{name}”, which is not open here.");
+            Err(ApiError::invalid("traverse", detail)
+                .hint("Start the server with that drive's folder, `sightline serve FOLDER`, and open the file again."))
+        }
+    }
+}
+
+/// Refuses what the other routes would refuse.
+fn check(session: &SavedSession) -> ApiResult<()> {
+    let wrong = |what: String| Err(ApiError::invalid("field", what));
+    if session.targets.len() > TARGET_LIMIT {
+        return wrong(format!("session.targets: may be at most {TARGET_LIMIT}"));
+    }
+    if session.breakpoints.len() > BREAKPOINT_LIMIT {
+        return wrong(format!("session.breakpoints: may be at most {BREAKPOINT_LIMIT}"));
+    }
+    for (number, target) in session.targets.iter().enumerate() {
+        let place = format!("session.targets[{number}]");
+        if target.label.chars().count() > LABEL_LIMIT {
+            return wrong(format!("{place}.label: may have at most {LABEL_LIMIT} characters"));
+        }
+        if target.runs.len() > RUN_LIMIT {
+            return wrong(format!("{place}.runs: may be at most {RUN_LIMIT}"));
+        }
+        for (run, saved) in target.runs.iter().enumerate() {
+            check_run(saved)
+                .map_err(|error| ApiError::invalid("field", format!("{place}.runs[{run}]: {error}")))?;
+            what_if::check_pixel(saved.fork.and_then(|fork| fork.prediction_px))?;
+        }
+    }
+    Ok(())
+}
+
+/// Every setting of a run must be one that a person could have chosen.
+fn check_run(saved: &SavedRun) -> Result<()> {
+    let again = Settings::default().with(&saved.settings.changes())?;
+    if again == saved.settings {
+        Ok(())
+    } else {
+        Err(Error::Request("its settings are none that can be chosen".to_owned()))
+    }
+}

@@ -1,0 +1,74 @@
+//! The catalogue of exports: every file that can be made of a part of a session, and how large it will be.
+
+use sightline_api::endpoint;
+use sightline_api::endpoints::ExportFile;
+use sightline_api::location::AtExport;
+use sightline_session::exports::{ExportEntry, Size};
+
+use super::kind::{Kind, Part};
+use super::source::Source;
+use super::{bundle, rows, sheet};
+
+/// How large the file will be, known or estimated.
+fn size(kind: Kind, source: &Source, part: Part) -> Size {
+    let exact = |bytes: usize| Size { bytes: bytes as u64, is_exact: true };
+    let about = |bytes: u64| Size { bytes, is_exact: false };
+    let steps: usize = source.runs(part).iter().map(|run| run.run.steps.len()).sum();
+    match kind {
+        Kind::Jsonl => exact(rows::jsonl(source, part).len()),
+        Kind::Csv => exact(rows::csv(source, part).len()),
+        Kind::Bundle => exact(bundle::json(source, part).len()),
+        // A page a column with its own head, then eight bytes a number.
+        Kind::Parquet => about(rows::column_count() * (310 + 7 * steps as u64)),
+        Kind::Animation => about(sheet::bytes_of_animation(source, part)),
+        Kind::Sheet => about(sheet::bytes_of_sheet(source, part)),
+        Kind::Report => about(25_000 + source.runs(part).len() as u64 * 530_000 + 330 * steps as u64),
+        Kind::Recording => about(recording_bytes(source, part)),
+    }
+}
+
+/// The images of every stop as PNG, and what the steps saw.
+fn recording_bytes(source: &Source, part: Part) -> u64 {
+    let runs = source.runs(part);
+    let mut stops: Vec<usize> = runs.iter().flat_map(|run| &run.run.steps).map(|trace| trace.step).collect();
+    let steps = stops.len() as u64;
+    stops.sort_unstable();
+    stops.dedup();
+    let pixels = |step: usize| {
+        let traverse = &source.open.traverse;
+        [traverse.left_camera(step), traverse.right_camera(step)]
+            .iter()
+            .map(|camera| u64::from(camera.size[0]) * u64::from(camera.size[1]))
+            .sum::<u64>()
+    };
+    let images: u64 = stops.iter().map(|step| pixels(*step) * 7 / 10).sum();
+    400_000 + images + 45_000 * steps
+}
+
+/// Everything that can be exported of a part of a session.
+pub(crate) fn catalogue(source: &Source, part: Part) -> Vec<ExportEntry> {
+    let entry = |kind: Kind| {
+        let part = source.narrowed(kind, part);
+        let session = &source.session.id;
+        let at = AtExport { session: session.clone(), file: kind.name().to_owned() };
+        ExportEntry {
+            name: kind.name().to_owned(),
+            title: kind.title().to_owned(),
+            sentence: kind.sentence().to_owned(),
+            file: source.file_name(kind, part),
+            size: size(kind, source, part),
+            path: endpoint::path::<ExportFile>(&at, &part),
+            command: format!("sightline export {} --session {session}{}", kind.name(), arguments(part)),
+        }
+    };
+    Kind::ALL.into_iter().map(entry).collect()
+}
+
+/// Arguments of the command line that mean this part, behind a space.
+fn arguments(part: Part) -> String {
+    match (part.target, part.run) {
+        (Some(target), Some(run)) => format!(" --run {target}/{run}"),
+        (Some(target), None) => format!(" --run {target}"),
+        _ => String::new(),
+    }
+}

@@ -1,0 +1,68 @@
+//! The first start without a traverse: a simulated drive of sixty short stops, with a target that is tracked and then lost.
+//!
+//! The drive is the library's scenario [`library::FIRST`], the target the one that its rule chooses, the configuration the default:
+//! what becomes of it is computed, not told. The session is begun once; a person who changes or empties it finds it so again.
+
+use std::sync::Arc;
+
+use sightline_geometry::error::{Error, Result};
+use sightline_session::Cursor;
+use sightline_track::settings::Settings;
+use sightline_track::target::Designation;
+use sightline_world::{Scenario, choose_targets, library};
+
+use crate::live_session::LiveSession;
+use crate::problem::ApiResult;
+use crate::runner;
+use crate::state::AppState;
+
+/// What its target is called.
+const LABEL: &str = "first target";
+
+/// The scenario with which a new user begins.
+///
+/// # Errors
+/// As [`library::scenario`].
+pub fn scenario() -> Result<Scenario> {
+    library::scenario(library::FIRST)
+}
+
+/// Begins the session of the first traverse, if it has none: its target is designated in the background and its run follows.
+///
+/// # Errors
+/// A session that cannot be written, or too much waiting already.
+pub fn begin(state: &AppState, scenario: &Scenario) -> ApiResult<()> {
+    let Some(open) = state.traverses().first().cloned() else { return Ok(()) };
+    if state.sessions().iter().any(|live| live.traverse.id == open.id) {
+        return Ok(());
+    }
+    let live = state.begin_session(open)?;
+    state.changed(&live)?;
+    let (own, scenario) = (state.clone(), scenario.clone());
+    state.jobs().submit(move || {
+        if let Err(error) = designate(&own, &live, &scenario) {
+            // The drive is there without a target; the page says how to pick one.
+            tracing::warn!(
+                "the first target cannot be designated: {}",
+                crate::printable::printable(&error.to_string())
+            );
+        }
+    })
+}
+
+/// Designates the target that the scenario's rule chooses, and begins its run.
+fn designate(state: &AppState, live: &Arc<LiveSession>, scenario: &Scenario) -> Result<()> {
+    let traverse = &live.traverse.traverse;
+    let world = traverse.world().ok_or_else(|| Error::Request("the traverse has no world".to_owned()))?;
+    let pixel = choose_targets(world, scenario, traverse.index()).first().copied();
+    let pixel = pixel.ok_or_else(|| Error::Request("the scenario's rule finds no target".to_owned()))?;
+    let settings = Settings::default();
+    let first = runner::designate(&live.traverse, Designation { step: 0, pixel }, &settings)?;
+    let target = live.with(|session| {
+        let target = session.add_target(Some(LABEL.to_owned()), settings, Arc::new(first));
+        session.move_cursor(Cursor { target: Some(target), run: 0, step: 0 }).map(|()| target)
+    })?;
+    let problem = |error: crate::problem::ApiError| Error::Request(error.problem().detail.clone());
+    state.changed(live).map_err(problem)?;
+    state.runner().start(live, target, 0).map_err(problem)
+}

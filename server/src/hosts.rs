@@ -1,0 +1,28 @@
+//! The hosts under which the server may be addressed.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+/// The hosts under which the server may be addressed.
+#[derive(Clone, Debug)]
+pub struct Hosts(Arc<BTreeSet<String>>);
+
+impl Hosts {
+    /// This machine's own names with `port`, and `others`, each with or without a port of its own.
+    pub fn new(port: u16, others: &[String]) -> Self {
+        let own = ["localhost", "127.0.0.1", "[::1]"];
+        let others: Vec<_> = others.iter().map(|host| host.to_ascii_lowercase()).collect();
+        let named = own.into_iter().chain(others.iter().map(String::as_str));
+        let mut hosts: BTreeSet<_> = named.map(|host| format!("{host}:{port}")).collect();
+        if port == 80 {
+            // Browsers leave out the port that the scheme implies.
+            hosts.extend(own.map(str::to_owned));
+        }
+        hosts.extend(others);
+        Self(Arc::new(hosts))
+    }
+
+    pub(crate) fn has(&self, host: &str) -> bool {
+        self.0.contains(&host.to_ascii_lowercase())
+    }
+}

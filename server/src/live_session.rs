@@ -1,0 +1,147 @@
+//! A session that people work on: the domain's [`Session`] under a lock, beside what is being computed for it.
+
+use std::collections::HashMap;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+
+use sightline_geometry::error::Result;
+use sightline_session::Session;
+use sightline_session::notes::Notes;
+
+use crate::jobs::lock;
+use crate::rendering::OpenTraverse;
+use crate::store::Store;
+
+/// How many targets a session may have, the removed ones included.
+pub(crate) const TARGET_LIMIT: usize = 256;
+/// How many characters the label of a target may have.
+pub(crate) const LABEL_LIMIT: usize = 100;
+/// How many runs a target may have.
+pub(crate) const RUN_LIMIT: usize = 256;
+
+/// Tells one computation of one run to end.
+pub(crate) type CancelFlag = Arc<AtomicBool>;
+
+/// A session with its traverse.
+pub struct LiveSession {
+    /// Its name in paths.
+    pub id: String,
+    /// What it works on.
+    pub traverse: Arc<OpenTraverse>,
+    session: Mutex<Session>,
+    notes: Mutex<Notes>,
+    /// The runs, by target and number, that are computed now or wait for it.
+    computing: Mutex<HashMap<(usize, usize), CancelFlag>>,
+    saving: Mutex<()>,
+    is_awake: AtomicBool,
+    is_restoring: AtomicBool,
+    used: Mutex<Option<jiff::Timestamp>>,
+}
+
+impl LiveSession {
+    /// A session; one that was read back sleeps until somebody asks for it.
+    pub fn new(session: Session, traverse: Arc<OpenTraverse>, is_awake: bool) -> Self {
+        Self {
+            id: session.id.clone(),
+            traverse,
+            session: Mutex::new(session),
+            notes: Mutex::default(),
+            computing: Mutex::default(),
+            saving: Mutex::default(),
+            is_awake: AtomicBool::new(is_awake),
+            is_restoring: AtomicBool::new(false),
+            used: Mutex::default(),
+        }
+    }
+
+    /// Looks at or changes the session; keep it short.
+    pub fn with<T>(&self, work: impl FnOnce(&mut Session) -> T) -> T {
+        work(&mut lock(&self.session))
+    }
+
+    /// When something of it was changed or stepped through last.
+    pub fn used(&self) -> Option<jiff::Timestamp> {
+        *lock(&self.used)
+    }
+
+    /// Remembers when it was used last.
+    pub(crate) fn set_used(&self, used: Option<jiff::Timestamp>) {
+        *lock(&self.used) = used;
+    }
+
+    /// Writes what the person did. The last write holds the last state, whoever comes first.
+    ///
+    /// # Errors
+    /// When the database cannot be written.
+    pub fn save(&self, store: &Store) -> Result<()> {
+        let _saving = lock(&self.saving);
+        let saved = self.with(|session| session.saved());
+        store.save(&saved)
+    }
+
+    /// Looks at or changes the notes; keep it short. Where both are needed, the session comes first.
+    pub(crate) fn with_notes<T>(&self, work: impl FnOnce(&mut Notes) -> T) -> T {
+        work(&mut lock(&self.notes))
+    }
+
+    /// Writes the notes. The last write holds the last state, whoever comes first.
+    ///
+    /// # Errors
+    /// When the database cannot be written.
+    pub(crate) fn save_notes(&self, store: &Store) -> Result<()> {
+        let _saving = lock(&self.saving);
+        let notes = self.with_notes(|notes| notes.clone());
+        store.save_notes(&self.id, &notes)
+    }
+
+    /// Whether this is the first time that somebody asks for it.
+    pub fn wake(&self) -> bool {
+        !self.is_awake.swap(true, Ordering::Relaxed)
+    }
+
+    /// Says whether the runs of a session that was read back are being computed again.
+    pub(crate) fn set_restoring(&self, is_restoring: bool) {
+        self.is_restoring.store(is_restoring, Ordering::Release);
+    }
+
+    /// Whether they are.
+    pub(crate) fn is_restoring(&self) -> bool {
+        self.is_restoring.load(Ordering::Acquire)
+    }
+
+    /// Lets the next one who asks for it be the first again.
+    pub fn sleep(&self) {
+        self.is_awake.store(false, Ordering::Relaxed);
+    }
+
+    /// Marks a run as being computed, in place of what may still be ending.
+    pub fn begin(&self, target: usize, run: usize) -> CancelFlag {
+        let flag = CancelFlag::default();
+        if let Some(earlier) = lock(&self.computing).insert((target, run), Arc::clone(&flag)) {
+            earlier.store(true, Ordering::Relaxed);
+        }
+        flag
+    }
+
+    /// Marks a run as not being computed any more, unless it was begun anew.
+    pub fn end(&self, target: usize, run: usize, flag: &CancelFlag) {
+        let mut computing = lock(&self.computing);
+        if computing.get(&(target, run)).is_some_and(|present| Arc::ptr_eq(present, flag)) {
+            computing.remove(&(target, run));
+        }
+    }
+
+    /// Whether a run is being computed or waits for it.
+    pub(crate) fn is_computing(&self, target: usize, run: usize) -> bool {
+        lock(&self.computing).contains_key(&(target, run))
+    }
+
+    /// Tells the computation of a run, or of all runs of a target, to end.
+    pub(crate) fn tell_to_end(&self, target: usize, run: Option<usize>) {
+        let computing = lock(&self.computing);
+        let meant = computing.iter().filter(|((t, r), _)| *t == target && run.is_none_or(|run| run == *r));
+        for (_, flag) in meant {
+            flag.store(true, Ordering::Relaxed);
+        }
+    }
+}

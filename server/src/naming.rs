@@ -1,0 +1,27 @@
+//! The names of traverses and folders, and the digest that tells contents apart.
+
+use sha2::{Digest, Sha256};
+use sightline_geometry::error::{Error, Result};
+use sightline_recordings::Traverse;
+
+/// The name of a traverse in paths: readable, and another one when its index is another.
+///
+/// # Errors
+/// An index that cannot be written as JSON.
+pub(crate) fn name_of(traverse: &Traverse) -> Result<String> {
+    let index = serde_json::to_vec(traverse.index()).map_err(|error| Error::Request(error.to_string()))?;
+    Ok(format!("{}-{}", slug(&traverse.index().name), &hash(&index)[..6]))
+}
+
+/// A name that can be part of a path or a file name: small letters, digits and hyphens.
+pub(crate) fn slug(name: &str) -> String {
+    let plain = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { ' ' };
+    let words: String = name.chars().map(plain).take(60).collect();
+    let joined = words.split_whitespace().collect::<Vec<_>>().join("-");
+    if joined.is_empty() { "traverse".to_owned() } else { joined }
+}
+
+/// The SHA-256 of `bytes`, as hexadecimal digits.
+pub fn hash(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}

@@ -1,0 +1,90 @@
+//! `GET events`: a WebSocket on which the server tells every open page what has changed.
+//!
+//! Nothing is ever waited for here: events go through a bounded channel, and a page too slow for it is told
+//! to read everything again instead. What a page sends is not read, beyond the answers to our pings.
+
+use std::time::Duration;
+
+use axum::extract::State;
+use axum::extract::ws::rejection::WebSocketUpgradeRejection;
+use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
+use axum::http::StatusCode;
+use axum::response::Response;
+use sightline_api::endpoint::Endpoint;
+use sightline_api::endpoints::ListenToEvents;
+use sightline_api::wire::Event;
+use tokio::sync::broadcast::Receiver;
+use tokio::sync::broadcast::error::RecvError;
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+
+use crate::problem::{ApiError, ApiResult};
+use crate::routes::route::route;
+use crate::state::AppState;
+
+/// The largest message that a page may send, bytes.
+const MESSAGE_LIMIT: usize = 64 << 10;
+/// How many pages may listen at a time.
+const LISTENER_LIMIT: usize = 64;
+/// How often a page is asked whether it is still there.
+const PING_PERIOD: Duration = Duration::from_secs(15);
+/// How long a page may be silent, or take for one message.
+const PATIENCE: Duration = Duration::from_secs(40);
+
+/// The routes of this resource.
+pub(crate) fn router() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new().routes(route::<ListenToEvents>(routes!(listen)))
+}
+
+/// Opens a WebSocket on which events arrive as JSON texts.
+#[utoipa::path(get, operation_id = "listen_to_events", path = ListenToEvents::PATH, tag = "events", responses(
+    (status = 101, description = "From then on every message is one event", body = Event), ApiError))]
+async fn listen(
+    State(state): State<AppState>,
+    upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
+) -> ApiResult<Response> {
+    let upgrade = upgrade.map_err(|_| {
+        ApiError::new(StatusCode::UPGRADE_REQUIRED, "websocket", "Events are told over a WebSocket only.")
+    })?;
+    if state.events().receiver_count() >= LISTENER_LIMIT {
+        return Err(ApiError::busy().hint("Close some pages."));
+    }
+    let events = state.events().subscribe();
+    let upgrade = upgrade.max_message_size(MESSAGE_LIMIT).max_frame_size(MESSAGE_LIMIT);
+    Ok(upgrade.on_upgrade(move |socket| tell(socket, events, state)))
+}
+
+/// Tells one page until it goes away.
+async fn tell(mut socket: WebSocket, mut events: Receiver<Event>, state: AppState) {
+    let mut ping = tokio::time::interval(PING_PERIOD);
+    let mut heard = tokio::time::Instant::now();
+    let mut queue = state.everything_may_have_changed();
+    loop {
+        for event in queue.drain(..) {
+            let Ok(text) = serde_json::to_string(&event) else { continue };
+            if !send(&mut socket, Message::Text(text.into())).await {
+                return;
+            }
+        }
+        tokio::select! {
+            event = events.recv() => match event {
+                Ok(event) => queue.push(event),
+                Err(RecvError::Lagged(_)) => queue = state.everything_may_have_changed(),
+                Err(RecvError::Closed) => return,
+            },
+            message = socket.recv() => match message {
+                Some(Ok(Message::Close(_)) | Err(_)) | None => return,
+                Some(Ok(_)) => heard = tokio::time::Instant::now(),
+            },
+            _ = ping.tick() => {
+                if heard.elapsed() > PATIENCE || !send(&mut socket, Message::Ping(Vec::new().into())).await {
+                    return;
+                }
+            }
+        }
+    }
+}
+
+async fn send(socket: &mut WebSocket, message: Message) -> bool {
+    matches!(tokio::time::timeout(PATIENCE, socket.send(message)).await, Ok(Ok(())))
+}

@@ -1,0 +1,154 @@
+//! `sessions/{session}/notes`: what a person wrote about places of the drive.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Response};
+use sightline_api::endpoint::Endpoint;
+use sightline_api::endpoints::{AddNote, ChangeNote, ListNotes, RemoveNote, RestoreNote, ShowNote};
+use sightline_api::location::AtNote;
+use sightline_api::wire::Event;
+use sightline_session::notes::{EditNote, NewNote, Note, Notes, Refused};
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+
+use crate::clock::now;
+use crate::extract::{Body, Path, SessionPath};
+use crate::jobs::blocking;
+use crate::live_session::LiveSession;
+use crate::problem::{ApiError, ApiResult};
+use crate::revision::{self, Read};
+use crate::routes::route::{location, route};
+use crate::state::AppState;
+
+/// The routes of this resource.
+pub(crate) fn router() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new()
+        .routes(route::<ListNotes>(routes!(list)))
+        .routes(route::<AddNote>(routes!(add)))
+        .routes(route::<ShowNote>(routes!(show)))
+        .routes(route::<ChangeNote>(routes!(edit)))
+        .routes(route::<RemoveNote>(routes!(remove)))
+        .routes(route::<RestoreNote>(routes!(restore)))
+}
+
+/// The notes of a session, in their order
+#[utoipa::path(get, operation_id = "list_notes", path = ListNotes::PATH, tag = "notes", responses((status = 200, body = Vec<Note>), ApiError))]
+async fn list(SessionPath(live): SessionPath) -> ApiResult<Json<Vec<Note>>> {
+    Ok(Json(live.with_notes(|notes| notes.list.clone())))
+}
+
+/// Pins a note; it comes last
+#[utoipa::path(post, operation_id = "add_note", path = AddNote::PATH, tag = "notes", request_body = NewNote, responses((status = 201, body = Note), ApiError))]
+async fn add(
+    State(state): State<AppState>,
+    SessionPath(live): SessionPath,
+    Body(new): Body<AddNote>,
+) -> ApiResult<Response> {
+    blocking(move || {
+        let note = live.with(|session| live.with_notes(|notes| notes.add(new, session, &now())))?;
+        keep(&state, &live)?;
+        let at = AtNote { session: live.id.clone(), note: note.id };
+        let headers = (revision::tag(note.revision), location::<ShowNote>(&at));
+        Ok((StatusCode::CREATED, headers.0, headers.1, Json(note)).into_response())
+    })
+    .await
+}
+
+/// A note
+#[utoipa::path(get, operation_id = "show_note", path = ShowNote::PATH, tag = "notes", responses((status = 200, body = Note), ApiError))]
+async fn show(
+    State(state): State<AppState>,
+    Path(AtNote { session, note }): Path<ShowNote>,
+) -> ApiResult<Response> {
+    let found = state.session(&session)?.with_notes(|notes| notes.get(note).cloned());
+    Ok(tagged(found.ok_or_else(|| missing(note))?))
+}
+
+/// Changes a note's words or its place in the list
+///
+/// The header `If-Match` names the revision that was read.
+#[utoipa::path(patch, operation_id = "edit_note", path = ChangeNote::PATH, tag = "notes", params(("If-Match" = String, Header, description = "The revision in quotes, or *")),
+    request_body = EditNote, responses((status = 200, body = Note), ApiError))]
+async fn edit(
+    State(state): State<AppState>,
+    Path(AtNote { session, note }): Path<ChangeNote>,
+    Read(read): Read,
+    Body(change): Body<ChangeNote>,
+) -> ApiResult<Response> {
+    let live = state.session(&session)?;
+    blocking(move || {
+        let edited = live.with_notes(|notes| notes.edit(note, read, change, &now()));
+        let edited = edited.map_err(|refused| problem(note, refused))?;
+        keep(&state, &live)?;
+        Ok(tagged(edited))
+    })
+    .await
+}
+
+/// Removes a note, which can be brought back
+///
+/// The header `If-Match` names the revision that was read.
+#[utoipa::path(delete, operation_id = "remove_note", path = RemoveNote::PATH, tag = "notes", params(("If-Match" = String, Header, description = "The revision in quotes, or *")),
+    responses((status = 204), ApiError))]
+async fn remove(
+    State(state): State<AppState>,
+    Path(AtNote { session, note }): Path<RemoveNote>,
+    Read(read): Read,
+) -> ApiResult<StatusCode> {
+    let live = state.session(&session)?;
+    blocking(move || {
+        live.with_notes(|notes| notes.remove(note, read)).map_err(|refused| problem(note, refused))?;
+        keep(&state, &live)?;
+        Ok(StatusCode::NO_CONTENT)
+    })
+    .await
+}
+
+/// Brings a removed note back to its place
+#[utoipa::path(post, operation_id = "restore_note", path = RestoreNote::PATH, tag = "notes", responses((status = 200, body = Note), ApiError))]
+async fn restore(
+    State(state): State<AppState>,
+    Path(AtNote { session, note }): Path<RestoreNote>,
+) -> ApiResult<Response> {
+    let live = state.session(&session)?;
+    blocking(move || {
+        let back = live.with_notes(|notes| notes.restore(note)).map_err(|refused| problem(note, refused))?;
+        keep(&state, &live)?;
+        Ok(tagged(back))
+    })
+    .await
+}
+
+fn tagged(note: Note) -> Response {
+    (revision::tag(note.revision), Json(note)).into_response()
+}
+
+fn missing(note: u64) -> ApiError {
+    ApiError::not_found(format!("This session has no note {note}."))
+}
+
+fn problem(note: u64, refused: Refused) -> ApiError {
+    match refused {
+        Refused::Missing => missing(note),
+        Refused::Changed(now) => revision::changed(&format!("Note {note}"), now.revision),
+        Refused::Bad(why) => ApiError::invalid("field", why),
+    }
+}
+
+/// Writes the notes and tells every page.
+fn keep(state: &AppState, live: &Arc<LiveSession>) -> ApiResult<()> {
+    live.save_notes(state.store())?;
+    state.tell(Event::NotesChanged { session: live.id.clone() });
+    Ok(())
+}
+
+/// The notes that are pinned to a step of a run, or to the stop alone.
+pub(crate) fn at_step(notes: &Notes, target: usize, run: usize, step: usize) -> Vec<Note> {
+    let is_here = |note: &&Note| {
+        note.pin.step == step && note.pin.target.is_none_or(|t| t == target && note.pin.run == run)
+    };
+    notes.list.iter().filter(is_here).cloned().collect()
+}

@@ -1,0 +1,105 @@
+//! All routes with their description: the OpenAPI document is made from the very router that answers.
+
+use std::sync::LazyLock;
+
+use axum::http::header;
+use axum::response::IntoResponse;
+use sightline_api::endpoint::Endpoint;
+use sightline_api::endpoints::ShowOpenApi;
+use sightline_api::wire::{Event, Problem};
+use utoipa::OpenApi;
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+
+use super::{
+    about, breakpoints, compare, counterfactual, documents, events, exports, expressions, notes, photometry,
+    plain, removal, rerun, runs, sessions, settings, steps, studies, targets, trackability, traverses,
+    what_if, why,
+};
+use crate::routes::route::route;
+use crate::state::AppState;
+
+#[derive(OpenApi)]
+#[openapi(
+    info(title = "Sightline", description = "Sessions of the visual debugger for rover target tracking. \
+        Units are in the names of fields (`_px`, `_m`, `_deg`, `_s`); `a_from_b` takes points of frame b into \
+        frame a; pixel (0, 0) is the centre of the first pixel; what is not known is null."),
+    servers((url = "/api/v1")),
+    components(schemas(Problem, Event))
+)]
+struct Document;
+
+static JSON: LazyLock<String> =
+    LazyLock::new(|| router().into_openapi().to_json().unwrap_or_else(|error| error.to_string()));
+
+/// The routes below `/api/v1`.
+pub(crate) fn router() -> OpenApiRouter<AppState> {
+    OpenApiRouter::with_openapi(Document::openapi())
+        .merge(about::router())
+        .routes(route::<ShowOpenApi>(routes!(document)))
+        .merge(settings::router())
+        .merge(traverses::router())
+        .merge(sessions::router())
+        .merge(targets::router())
+        .merge(runs::router())
+        .merge(photometry::router())
+        .merge(compare::router())
+        .merge(steps::router())
+        .merge(exports::router())
+        .merge(rerun::router())
+        .merge(studies::router())
+        .merge(notes::router())
+        .merge(documents::router())
+        .merge(plain::router())
+        .merge(events::router())
+        .merge(trackability::router())
+        .merge(what_if::router())
+        .merge(why::router())
+        .merge(counterfactual::router())
+        .merge(removal::router())
+        .merge(breakpoints::router())
+        .merge(expressions::router())
+}
+
+/// This document
+#[utoipa::path(get, operation_id = "show_openapi", path = ShowOpenApi::PATH, tag = "about", responses(
+    (status = 200, description = "The OpenAPI document", body = serde_json::Value)))]
+async fn document() -> impl IntoResponse {
+    ([(header::CONTENT_TYPE, "application/json")], JSON.as_str())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use serde_json::Value;
+    use sightline_api::endpoints::ALL;
+
+    use super::*;
+
+    #[test]
+    fn the_router_has_exactly_the_declared_endpoints() {
+        let document: Value = serde_json::from_str(&JSON).unwrap();
+        let paths = document["paths"].as_object().unwrap();
+        let described = paths.iter().flat_map(|(path, item)| {
+            item.as_object().unwrap().keys().map(move |method| (method.to_uppercase(), path.clone()))
+        });
+        let declared = ALL.iter().map(|(method, path)| (method.to_string(), (*path).to_owned()));
+        assert_eq!(described.collect::<BTreeSet<_>>(), declared.collect::<BTreeSet<_>>());
+    }
+
+    #[test]
+    fn every_name_in_a_path_is_described() {
+        let document: Value = serde_json::from_str(&JSON).unwrap();
+        for (method, path) in ALL {
+            let method = method.to_string().to_lowercase();
+            let operation = &document["paths"][*path][&method];
+            let all = operation["parameters"].as_array().cloned().unwrap_or_default();
+            let of_path = all.iter().filter(|parameter| parameter["in"] == "path");
+            let described: Vec<_> = of_path.map(|parameter| parameter["name"].as_str().unwrap()).collect();
+            let named: Vec<_> = path.split('{').skip(1).filter_map(|rest| rest.split_once('}')).collect();
+            let named: Vec<_> = named.into_iter().map(|(name, _)| name).collect();
+            assert_eq!(described, named, "{method} {path}");
+        }
+    }
+}

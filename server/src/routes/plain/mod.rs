@@ -1,0 +1,140 @@
+//! Pages of plain HTML, made by the server: every step of every run with headings, tables and described pictures. They need
+//! neither JavaScript nor WebGL, follow the reader's choice of light and dark, and read well aloud.
+//!
+//! `/page` lists the sessions, `…/sessions/{s}/page` the targets, runs and notes of one, `…/steps/{n}/page` shows a step.
+
+mod arrays;
+mod overview;
+mod step;
+mod values;
+
+use std::sync::LazyLock;
+
+use axum::extract::State;
+use axum::http::{StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use sha2::{Digest, Sha256};
+use sightline_api::endpoint::Endpoint;
+use sightline_api::endpoints::{ShowSessionPage, ShowSessionsPage, ShowStepPage};
+use sightline_api::location::{AtSession, AtStep};
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+
+use crate::exports::Source;
+use crate::extract::Path;
+use crate::html::escape;
+use crate::jobs::blocking;
+use crate::problem::{ApiError, ApiResult};
+use crate::routes::route::route;
+use crate::routes::traverses::CancelOnDrop;
+use crate::state::AppState;
+
+/// The only style that these pages may have.
+const STYLE: &str = include_str!("plain.css");
+
+/// What the pages may do: show themselves and the images of this server.
+static POLICY: LazyLock<String> = LazyLock::new(|| {
+    let hash = STANDARD.encode(Sha256::digest(STYLE.as_bytes()));
+    format!(
+        "default-src 'none'; style-src 'sha256-{hash}'; img-src 'self' data:; base-uri 'none'; form-action 'none'; \
+         frame-ancestors 'none'"
+    )
+});
+
+/// The routes of this resource.
+pub(crate) fn router() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new()
+        .routes(route::<ShowSessionsPage>(routes!(all)))
+        .routes(route::<ShowSessionPage>(routes!(session)))
+        .routes(route::<ShowStepPage>(routes!(step)))
+}
+
+/// A plain page with all sessions
+#[utoipa::path(get, operation_id = "plain_sessions", path = ShowSessionsPage::PATH, tag = "plain pages", responses(
+    (status = 200, content_type = "text/html", body = String)))]
+async fn all(State(state): State<AppState>) -> Response {
+    answer(blocking(move || Ok(overview::all(&state))).await, None)
+}
+
+/// A plain page with the targets, runs and notes of a session
+#[utoipa::path(get, operation_id = "plain_session", path = ShowSessionPage::PATH, tag = "plain pages",
+    responses((status = 200, content_type = "text/html", body = String)))]
+async fn session(
+    State(state): State<AppState>,
+    Path(AtSession { session }): Path<ShowSessionPage>,
+) -> Response {
+    let work = move || {
+        let live = state.session(&session)?;
+        Ok(overview::session(&Source::of(&live)))
+    };
+    answer(blocking(work).await, None)
+}
+
+/// A plain page with everything that a step saw and decided
+#[utoipa::path(get, operation_id = "plain_step", path = ShowStepPage::PATH,
+    tag = "plain pages", responses((status = 200, content_type = "text/html", body = String)))]
+async fn step(
+    State(state): State<AppState>,
+    Path(AtStep { session, target, run, step }): Path<ShowStepPage>,
+) -> Response {
+    let cancel = CancelOnDrop::default();
+    let flag = cancel.flag();
+    let id = session.clone();
+    let find = state.session(&session);
+    let made = match find {
+        Ok(live) => {
+            let work = move || step::html(&Source::of(&live), target, run, step, &flag);
+            state.pictures().run(work).await
+        }
+        Err(problem) => Err(problem),
+    };
+    answer(made, Some(&id))
+}
+
+/// The page, or a page that says why there is none.
+fn answer(made: ApiResult<String>, session: Option<&str>) -> Response {
+    let headers = [
+        (header::CONTENT_TYPE, "text/html; charset=utf-8"),
+        (header::CONTENT_SECURITY_POLICY, POLICY.as_str()),
+    ];
+    match made {
+        Ok(html) => (headers, html).into_response(),
+        Err(problem) => {
+            let status = StatusCode::from_u16(problem.problem().status);
+            (status.unwrap_or(StatusCode::INTERNAL_SERVER_ERROR), headers, refused(&problem, session))
+                .into_response()
+        }
+    }
+}
+
+fn refused(problem: &ApiError, session: Option<&str>) -> String {
+    let said = problem.problem();
+    let hint = said.hint.as_ref().map_or_else(String::new, |hint| format!("<p>{}</p>\n", escape(hint)));
+    let back = session.filter(|id| crate::store::number_of(id).is_some()).map_or_else(String::new, |id| {
+        format!("<li><a href=\"/api/v1/sessions/{id}/page\">Session {id}</a></li>")
+    });
+    let links = format!(
+        "<nav aria-label=\"Elsewhere\"><ul>{back}<li><a href=\"/api/v1/page\">All sessions</a></li></ul></nav>"
+    );
+    page(
+        "Not there",
+        &format!("<h1>{}</h1>\n<p>{}</p>\n{hint}{links}", escape(&said.title), escape(&said.detail)),
+    )
+}
+
+/// A whole page around its contents; `title` is not escaped yet.
+fn page(title: &str, contents: &str) -> String {
+    format!(
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
+         content=\"width=device-width, initial-scale=1\">\n<meta name=\"color-scheme\" content=\"light dark\">\n<link rel=\"icon\" type=\"image/svg+xml\" href=\"/icon.svg\">\n<title>{} · \
+         Sightline</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<main>\n{contents}</main>\n</body>\n</html>\n",
+        escape(title)
+    )
+}
+
+/// The path of a step's page.
+fn step_path(session: &str, target: usize, run: usize, step: usize) -> String {
+    format!("/api/v1/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/page")
+}

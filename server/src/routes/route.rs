@@ -1,0 +1,54 @@
+//! Registers a handler for an endpoint: method and path are those of the type.
+
+use axum::http::header::{self, HeaderName};
+use sightline_api::endpoint::{self, Endpoint, Method};
+use utoipa::IntoParams;
+use utoipa::openapi::RefOr;
+use utoipa::openapi::path::{Operation, ParameterIn, PathItem};
+use utoipa_axum::router::UtoipaMethodRouter;
+
+use crate::state::AppState;
+
+/// The handler that `routes!` describes, as the route of `E`; its description gains the names in the path.
+///
+/// # Panics
+/// A handler that declares another method or path than `E`.
+pub(crate) fn route<E: Endpoint<At: IntoParams>>(
+    described: UtoipaMethodRouter<AppState>,
+) -> UtoipaMethodRouter<AppState> {
+    let (schemas, mut paths, handler) = described;
+    let operation = paths.paths.get_mut(E::PATH).and_then(|item| operation(item, E::METHOD));
+    assert!(operation.is_some(), "the handler of {} {} declares another route", E::METHOD, E::PATH);
+    if let Some(operation) = operation {
+        let declared = operation.parameters.take().unwrap_or_default();
+        let is_missing = |name: &str| {
+            declared.iter().all(|known| !matches!(known, RefOr::T(parameter) if parameter.name == name))
+        };
+        let of_path = E::At::into_params(|| Some(ParameterIn::Path)).into_iter();
+        let mut all: Vec<_> = of_path.filter(|parameter| is_missing(&parameter.name)).collect();
+        // The names say it all; the documents of the fields are for readers of the sources.
+        all.iter_mut().for_each(|parameter| parameter.description = None);
+        let mut all: Vec<_> = all.into_iter().map(RefOr::T).collect();
+        all.extend(declared);
+        operation.parameters = (!all.is_empty()).then_some(all);
+    }
+    (schemas, paths, handler)
+}
+
+fn operation(item: &mut PathItem, method: Method) -> Option<&mut Operation> {
+    match method {
+        Method::Get => item.get.as_mut(),
+        Method::Post => item.post.as_mut(),
+        Method::Put => item.put.as_mut(),
+        Method::Patch => item.patch.as_mut(),
+        Method::Delete => item.delete.as_mut(),
+    }
+}
+
+/// The header that names the resource of `E` at this location.
+pub(crate) fn location<E: Endpoint>(at: &E::At) -> [(HeaderName, String); 1] {
+    let path = endpoint::path::<E>(at, &E::Query::default());
+    // Defaults of query parameters are no part of the name.
+    let name = path.split('?').next().unwrap_or_default();
+    [(header::LOCATION, format!("/api/v1/{name}"))]
+}

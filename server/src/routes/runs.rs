@@ -1,0 +1,162 @@
+//! `…/targets/{target}/runs`: running a target again from a step, cancelling and resuming.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Response};
+use sightline_api::endpoint::Endpoint;
+use sightline_api::endpoints::{CancelRun, ForkRun, ResumeRun, ShowRun};
+use sightline_api::location::AtRun;
+use sightline_api::query::FirstRow;
+use sightline_api::wire::NewRun;
+use sightline_session::Session;
+use sightline_session::view::RunView;
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+
+use crate::extract::{Body, Params, RunPath, TargetPath};
+use crate::jobs::blocking;
+use crate::live_session::{LiveSession, RUN_LIMIT};
+use crate::problem::{ApiError, ApiResult};
+use crate::routes::route::{location, route};
+use crate::routes::targets::start_or_say;
+use crate::routes::what_if;
+use crate::runner;
+use crate::state::AppState;
+
+/// The routes of this resource.
+pub(crate) fn router() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new()
+        .routes(route::<ForkRun>(routes!(fork)))
+        .routes(route::<ShowRun>(routes!(show)))
+        .routes(route::<CancelRun>(routes!(cancel)))
+        .routes(route::<ResumeRun>(routes!(resume)))
+}
+
+/// Runs a target again from a step with changed settings
+///
+/// Nothing is overwritten: a new run shares the steps before that one. From the designation's own step on,
+/// the target is designated anew.
+#[utoipa::path(post, operation_id = "fork_run", path = ForkRun::PATH, tag = "runs", request_body = NewRun, responses((status = 202, body = RunView), ApiError))]
+async fn fork(
+    State(state): State<AppState>,
+    TargetPath { live, target }: TargetPath,
+    Body(new): Body<ForkRun>,
+) -> ApiResult<Response> {
+    live.with(|session| session.target(target).map(|_| ()))
+        .map_err(|error| ApiError::from(error).about_path())?;
+    let work_state = state.clone();
+    state.designations().run(move || add(&work_state, &live, target, &new)).await
+}
+
+/// A run so far
+#[utoipa::path(get, operation_id = "show_run", path = ShowRun::PATH, tag = "runs", params(FirstRow),
+    responses((status = 200, body = RunView), ApiError))]
+async fn show(
+    RunPath { live, target, run }: RunPath,
+    Params(rows): Params<ShowRun>,
+) -> ApiResult<Json<RunView>> {
+    Ok(Json(view_from(&live, target, run, rows.from_row)?))
+}
+
+/// Stops a run after its last step so far
+#[utoipa::path(post, operation_id = "cancel_run", path = CancelRun::PATH, tag = "runs", responses((status = 200, body = RunView), ApiError))]
+async fn cancel(
+    State(state): State<AppState>,
+    RunPath { live, target, run }: RunPath,
+) -> ApiResult<Json<RunView>> {
+    blocking(move || {
+        let before = view(&live, target, run)?;
+        if before.complete || before.stopped.is_some() {
+            return Err(ApiError::conflict("The run has ended already."));
+        }
+        live.with(|session| {
+            // Told under the session's lock, so that no step is recorded after this.
+            live.tell_to_end(target, Some(run));
+            session.cancel(target, run)
+        })?;
+        state.changed(&live)?;
+        Ok(Json(view(&live, target, run)?))
+    })
+    .await
+}
+
+/// Lets a stopped run go on
+#[utoipa::path(post, operation_id = "resume_run", path = ResumeRun::PATH, tag = "runs", responses((status = 202, body = RunView), ApiError))]
+async fn resume(
+    State(state): State<AppState>,
+    RunPath { live, target, run }: RunPath,
+) -> ApiResult<(StatusCode, Json<RunView>)> {
+    blocking(move || {
+        if view(&live, target, run)?.stopped.is_none() {
+            return Err(ApiError::conflict("The run was not stopped."));
+        }
+        live.with(|session| session.resume(target, run))?;
+        start_or_say(&state, &live, target, run);
+        state.changed(&live)?;
+        Ok((StatusCode::ACCEPTED, Json(view(&live, target, run)?)))
+    })
+    .await
+}
+
+fn add(state: &AppState, live: &Arc<LiveSession>, target: usize, new: &NewRun) -> ApiResult<Response> {
+    let (designation, settings) = live.with(|session| {
+        let (record, parent) = (session.target(target)?, session.run(target, new.run)?);
+        Ok::<_, ApiError>((record.designation, parent.settings.with(&new.settings)?))
+    })?;
+    let stops = live.traverse.traverse.stop_count();
+    if !(designation.step..stops).contains(&new.from_step) {
+        let (first, last, given) = (designation.step, stops - 1, new.from_step);
+        return Err(ApiError::invalid(
+            "field",
+            format!("from_step: must be from {first} to {last}, not {given}"),
+        ));
+    }
+    what_if::check_pixel(new.prediction_px)?;
+    if new.prediction_px.is_some() && new.from_step == designation.step {
+        let detail = "prediction_px: the target is designated at this step, so that nothing is predicted";
+        return Err(ApiError::invalid("field", detail).hint("Leave it out, or run from a later step."));
+    }
+    let redesignated = if new.from_step == designation.step {
+        Some(Arc::new(runner::designate(&live.traverse, designation, &settings)?))
+    } else {
+        None
+    };
+    let run = live.with(|session| {
+        has_room(session, target)?;
+        // A run again from the very step at which its parent was displaced is displaced alike, unless it says where.
+        let inherited = session.run(target, new.run)?.displaced_at(new.from_step);
+        let run = session.fork(target, new.run, new.from_step, &new.settings, redesignated)?;
+        if let Some(pixel) = new.prediction_px.or(inherited) {
+            session.displace(target, run, pixel)?;
+        }
+        Ok::<_, ApiError>(run)
+    })?;
+    start_or_say(state, live, target, run);
+    state.changed(live)?;
+    let location = location::<ShowRun>(&AtRun { session: live.id.clone(), target, run });
+    Ok((StatusCode::ACCEPTED, location, Json(view(live, target, run)?)).into_response())
+}
+
+fn has_room(session: &Session, target: usize) -> ApiResult<()> {
+    let full = session.target(target)?.runs.len() >= RUN_LIMIT;
+    if full {
+        Err(ApiError::conflict(format!("A target may have at most {RUN_LIMIT} runs.")))
+    } else {
+        Ok(())
+    }
+}
+
+/// The run that the path names.
+fn view(live: &LiveSession, target: usize, run: usize) -> ApiResult<RunView> {
+    view_from(live, target, run, 0)
+}
+
+/// That run with its rows from one on.
+fn view_from(live: &LiveSession, target: usize, run: usize, from_row: usize) -> ApiResult<RunView> {
+    let found = live
+        .with(|session| session.run(target, run).map(|found| session.run_view_from(run, found, from_row)));
+    found.map_err(|error| ApiError::from(error).about_path())
+}

@@ -1,0 +1,132 @@
+//! `sessions`: a person's work on a traverse, and its cursor.
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Response};
+use sightline_api::endpoint::Endpoint;
+use sightline_api::endpoints::{
+    BeginSession, BringSession, ListSessions, MoveCursor, ShowCursor, ShowSession,
+};
+use sightline_api::location::AtSession;
+use sightline_api::wire::{NewSession, SessionEntry};
+use sightline_session::Cursor;
+use sightline_session::reproduce::Reproduction;
+use sightline_session::view::SessionView;
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+
+use crate::brought;
+use crate::extract::{Body, SessionPath};
+use crate::jobs::blocking;
+use crate::live_session::LiveSession;
+use crate::problem::{ApiError, ApiResult};
+use crate::routes::route::{location, route};
+use crate::state::AppState;
+
+/// The routes of this resource.
+pub(crate) fn router() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new()
+        .routes(route::<ListSessions>(routes!(list)))
+        .routes(route::<BeginSession>(routes!(begin)))
+        .routes(route::<BringSession>(routes!(bring)))
+        .routes(route::<ShowSession>(routes!(show)))
+        .routes(route::<ShowCursor>(routes!(show_cursor)))
+        .routes(route::<MoveCursor>(routes!(move_cursor)))
+}
+
+/// The sessions on open traverses, oldest first
+#[utoipa::path(get, operation_id = "list_sessions", path = ListSessions::PATH, tag = "sessions", responses((status = 200, body = Vec<SessionEntry>)))]
+async fn list(State(state): State<AppState>) -> Json<Vec<SessionEntry>> {
+    Json(state.sessions().iter().map(|live| entry(live)).collect())
+}
+
+fn entry(live: &LiveSession) -> SessionEntry {
+    let traverse = &live.traverse.traverse;
+    let used = live.used();
+    let (target_count, run_count, step) = live.with(|session| {
+        let targets = || session.targets.iter().filter(|target| !target.removed);
+        let runs = targets().flat_map(|target| &target.runs).filter(|run| !run.removed);
+        (targets().count(), runs.count(), session.cursor.step)
+    });
+    SessionEntry {
+        id: live.id.clone(),
+        traverse: live.traverse.id.clone(),
+        target_count,
+        traverse_name: traverse.index().name.clone(),
+        run_count,
+        step,
+        stop_count: traverse.stop_count(),
+        used: used.map(|used| used.to_string()),
+        // A clock that was set back has nothing in the future.
+        idle_s: used.map(|used| jiff::Timestamp::now().duration_since(used).as_secs_f64().max(0.0)),
+    }
+}
+
+/// Begins a session
+#[utoipa::path(post, operation_id = "begin_session", path = BeginSession::PATH, tag = "sessions", request_body = NewSession, responses(
+    (status = 201, body = SessionView), ApiError))]
+async fn begin(State(state): State<AppState>, Body(new): Body<BeginSession>) -> ApiResult<Response> {
+    let traverse = state.traverse(&new.traverse).map_err(|_| {
+        let name = crate::printable::printable(&new.traverse);
+        ApiError::invalid("field", format!("traverse: there is no traverse {name}"))
+    })?;
+    blocking(move || {
+        let live = state.begin_session(traverse)?;
+        state.look_at(&live.traverse, 0);
+        state.changed(&live)?;
+        let location = location::<ShowSession>(&AtSession { session: live.id.clone() });
+        Ok((StatusCode::CREATED, location, Json(live.with(|session| session.view()))).into_response())
+    })
+    .await
+}
+
+/// Begins a session as it was elsewhere, from an exported `reproduce.json`
+///
+/// A simulated drive comes with its scenario; a recorded one must be open already. Targets, runs, breakpoints, cursor and
+/// notes are as they were, and the runs are computed again.
+#[utoipa::path(post, operation_id = "bring_session", path = BringSession::PATH, tag = "sessions", request_body = Reproduction, responses(
+    (status = 201, body = SessionView), ApiError))]
+async fn bring(State(state): State<AppState>, Body(new): Body<BringSession>) -> ApiResult<Response> {
+    let work_state = state.clone();
+    let work = move || {
+        let live = brought::bring(&work_state, new)?;
+        let location = location::<ShowSession>(&AtSession { session: live.id.clone() });
+        Ok((StatusCode::CREATED, location, Json(live.with(|session| session.view()))).into_response())
+    };
+    state.designations().run(work).await
+}
+
+/// A session with its targets and runs
+#[utoipa::path(get, operation_id = "show_session", path = ShowSession::PATH, tag = "sessions", responses(
+    (status = 200, body = SessionView), ApiError))]
+async fn show(SessionPath(live): SessionPath) -> ApiResult<Json<SessionView>> {
+    Ok(Json(live.with(|session| session.view())))
+}
+
+/// What is looked at
+#[utoipa::path(get, operation_id = "show_cursor", path = ShowCursor::PATH, tag = "sessions", responses((status = 200, body = Cursor), ApiError))]
+async fn show_cursor(SessionPath(live): SessionPath) -> ApiResult<Json<Cursor>> {
+    Ok(Json(live.with(|session| session.cursor)))
+}
+
+/// Moves the cursor
+#[utoipa::path(put, operation_id = "move_cursor", path = MoveCursor::PATH, tag = "sessions", request_body = Cursor, responses((status = 200, body = Cursor), ApiError))]
+async fn move_cursor(
+    State(state): State<AppState>,
+    SessionPath(live): SessionPath,
+    Body(cursor): Body<MoveCursor>,
+) -> ApiResult<Json<Cursor>> {
+    blocking(move || {
+        let before = live.with(|session| {
+            let before = session.cursor;
+            session.move_cursor(cursor).map(|()| before)
+        })?;
+        if before != cursor {
+            state.look_at(&live.traverse, cursor.step);
+            state.cursor_moved(&live, cursor);
+        }
+        Ok(Json(cursor))
+    })
+    .await
+}

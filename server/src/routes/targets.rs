@@ -1,0 +1,102 @@
+//! `sessions/{session}/targets`: designating targets and removing them.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Response};
+use sightline_api::endpoint::Endpoint;
+use sightline_api::endpoints::{DesignateTarget, RemoveTarget};
+use sightline_api::location::AtTarget;
+use sightline_api::wire::{Designated, NewTarget};
+use sightline_session::view::SessionView;
+use sightline_track::settings::Settings;
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+
+use crate::extract::{Body, SessionPath, TargetPath};
+use crate::jobs::blocking;
+use crate::live_session::{LABEL_LIMIT, LiveSession, TARGET_LIMIT};
+use crate::problem::{ApiError, ApiResult};
+use crate::routes::route::{location, route};
+use crate::routes::trackability;
+use crate::runner;
+use crate::state::AppState;
+
+/// The routes of this resource.
+pub(crate) fn router() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new()
+        .routes(route::<DesignateTarget>(routes!(designate)))
+        .routes(route::<RemoveTarget>(routes!(remove)))
+}
+
+/// Designates a target
+///
+/// The designation is computed before the answer; the steps after it follow in the background.
+#[utoipa::path(post, operation_id = "designate_target", path = DesignateTarget::PATH, tag = "targets", request_body = NewTarget, responses((status = 201, body = Designated), ApiError))]
+async fn designate(
+    State(state): State<AppState>,
+    SessionPath(live): SessionPath,
+    Body(new): Body<DesignateTarget>,
+) -> ApiResult<Response> {
+    if new.label.as_ref().is_some_and(|label| label.chars().count() > LABEL_LIMIT) {
+        return Err(ApiError::invalid("field", format!("label: may have at most {LABEL_LIMIT} characters")));
+    }
+    let settings = Settings::default().with(&new.settings)?;
+    let work_state = state.clone();
+    state.designations().run(move || add(&work_state, &live, new, settings)).await
+}
+
+/// Removes a target; its number is not used again
+#[utoipa::path(delete, operation_id = "remove_target", path = RemoveTarget::PATH, tag = "targets", responses((status = 200, body = SessionView), ApiError))]
+async fn remove(
+    State(state): State<AppState>,
+    TargetPath { live, target }: TargetPath,
+) -> ApiResult<Json<SessionView>> {
+    blocking(move || {
+        let removed = live.with(|session| session.remove_target(target));
+        removed.map_err(|error| ApiError::from(error).about_path())?;
+        live.tell_to_end(target, None);
+        state.changed(&live)?;
+        Ok(Json(live.with(|session| session.view())))
+    })
+    .await
+}
+
+fn add(state: &AppState, live: &Arc<LiveSession>, new: NewTarget, settings: Settings) -> ApiResult<Response> {
+    let has_room = |count: usize| {
+        let full = || ApiError::conflict(format!("A session may have at most {TARGET_LIMIT} targets."));
+        (count < TARGET_LIMIT).then_some(()).ok_or_else(full)
+    };
+    has_room(live.with(|session| session.targets.len()))?;
+    let named = new.place().name(&live.traverse.traverse, new.step)?;
+    let designation = named.designation;
+    let first = runner::designate(&live.traverse, designation, &settings)
+        .map_err(|error| trackability::refusal(state, &live.traverse, designation, &settings, error))?;
+    let first = Arc::new(first);
+    let gap_m = named.gap_m(&first);
+    let (target, view) = live.with(|session| {
+        has_room(session.targets.len())?;
+        let target = session.add_target(new.label, settings, first);
+        Ok::<_, ApiError>((target, session.view()))
+    })?;
+    state.look_at(&live.traverse, designation.step);
+    state.changed(live)?;
+    start_or_say(state, live, target, 0);
+    let at = AtTarget { session: live.id.clone(), target };
+    Ok((
+        StatusCode::CREATED,
+        location::<RemoveTarget>(&at),
+        Json(Designated { target, gap_m, session: view }),
+    )
+        .into_response())
+}
+
+/// Continues a run; when too much is waiting, the run says so and can be resumed.
+pub(crate) fn start_or_say(state: &AppState, live: &Arc<LiveSession>, target: usize, run: usize) {
+    if let Err(busy) = state.runner().start(live, target, run) {
+        // The target may have been removed meanwhile.
+        let _ = live.with(|session| session.fail(target, run, busy.problem().detail.clone()));
+    }
+}

@@ -1,0 +1,239 @@
+//! `traverses`: what was recorded or is simulated, and its images.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use sightline_api::endpoint::Endpoint;
+use sightline_api::endpoints::{AddTraverse, ListTraverses, Prefetch, ShowImage, ShowStop, ShowTraverse};
+use sightline_api::location::{AtImage, AtStop, AtTraverse};
+use sightline_api::query::{FirstStop, ImageDepth};
+use sightline_api::wire::{NewTraverse, StopDetail, StopView, TraverseEntry, TraverseView};
+use sightline_geometry::error::Error;
+use sightline_rover::pipeline::Stops;
+use sightline_vision::image::io;
+use utoipa::ToSchema;
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+
+use crate::brought;
+use crate::drives;
+use crate::extract::{Body, Params, Path};
+use crate::jobs::blocking;
+use crate::naming::hash;
+use crate::problem::{ApiError, ApiResult};
+use crate::rendering::OpenTraverse;
+use crate::routes::route::{location, route};
+use crate::state::AppState;
+
+/// The routes of this resource.
+pub(crate) fn router() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new()
+        .routes(route::<ListTraverses>(routes!(list)))
+        .routes(route::<AddTraverse>(routes!(add)))
+        .routes(route::<ShowTraverse>(routes!(show)))
+        .routes(route::<ShowStop>(routes!(stop)))
+        .routes(route::<ShowImage>(routes!(image)))
+        .routes(route::<Prefetch>(routes!(prefetch)))
+}
+
+/// What to do about an image that cannot be read.
+const MEND: &str =
+    "Put the file back or mend it, then try again; the other steps can be looked at as they are.";
+
+/// The bytes of a file, for the OpenAPI document.
+#[derive(ToSchema)]
+#[schema(value_type = String, format = Binary)]
+pub(crate) struct FileBytes(#[allow(dead_code)] Vec<u8>);
+
+/// The traverses that are open
+#[utoipa::path(get, operation_id = "list_traverses", path = ListTraverses::PATH, tag = "traverses", responses(
+    (status = 200, body = Vec<TraverseEntry>), ApiError))]
+async fn list(State(state): State<AppState>) -> Json<Vec<TraverseEntry>> {
+    Json(state.traverses().iter().map(|open| entry(open)).collect())
+}
+
+fn entry(open: &OpenTraverse) -> TraverseEntry {
+    let index = open.traverse.index();
+    TraverseEntry {
+        id: open.id.clone(),
+        name: index.name.clone(),
+        description: index.description.clone(),
+        simulated: index.scenario.is_some(),
+        stop_count: index.stops.len(),
+    }
+}
+
+/// Opens a simulated drive by its scenario
+///
+/// The same scenario is the same drive. It stays open across restarts; its images are rendered when they are looked at.
+#[utoipa::path(post, operation_id = "open_traverse", path = AddTraverse::PATH, tag = "traverses", request_body = NewTraverse, responses(
+    (status = 200, description = "It was open already", body = TraverseEntry),
+    (status = 201, body = TraverseEntry), ApiError))]
+async fn add(State(state): State<AppState>, Body(new): Body<AddTraverse>) -> ApiResult<Response> {
+    let work_state = state.clone();
+    let work = move || {
+        let (open, is_new) = brought::open(&work_state, &new.scenario)?;
+        let status = if is_new { StatusCode::CREATED } else { StatusCode::OK };
+        let location = location::<ShowTraverse>(&AtTraverse { id: open.id.clone() });
+        Ok((status, location, Json(entry(&open))).into_response())
+    };
+    state.designations().run(work).await
+}
+
+/// A traverse with its stops
+#[utoipa::path(get, operation_id = "show_traverse", path = ShowTraverse::PATH, tag = "traverses", responses(
+    (status = 200, body = TraverseView), ApiError))]
+async fn show(
+    State(state): State<AppState>,
+    Path(AtTraverse { id }): Path<ShowTraverse>,
+) -> ApiResult<Json<TraverseView>> {
+    let open = state.traverse(&id)?;
+    blocking(move || Ok(Json(view(&open)))).await
+}
+
+/// A stop with its cameras, in the rover frame
+#[utoipa::path(get, operation_id = "show_stop", path = ShowStop::PATH, tag = "traverses", responses(
+    (status = 200, body = StopDetail), ApiError))]
+async fn stop(
+    State(state): State<AppState>,
+    Path(AtStop { id, step }): Path<ShowStop>,
+) -> ApiResult<Json<StopDetail>> {
+    let open = state.traverse(&id)?;
+    if step >= open.traverse.stop_count() {
+        return Err(no_step(step));
+    }
+    let traverse = &open.traverse;
+    let (left, right) = (traverse.left_camera(step).clone(), traverse.right_camera(step).clone());
+    let mast = traverse.mast_angles(step);
+    Ok(Json(StopDetail { stop: stop_view(&open, step), left, right, mast }))
+}
+
+fn no_step(step: usize) -> ApiError {
+    ApiError::not_found(format!("The traverse has no step {step}."))
+}
+
+/// An image of a stop as PNG
+///
+/// An image of a simulated stop is rendered when it is first asked for, which takes some seconds.
+#[utoipa::path(get, operation_id = "show_image", path = ShowImage::PATH, tag = "traverses", params(("file" = String, Path, description = "left.png or right.png"),
+    ImageDepth), responses(
+    (status = 200, content_type = "image/png", body = FileBytes),
+    (status = 304, description = "It is the one that you have (If-None-Match)"), ApiError))]
+async fn image(
+    State(state): State<AppState>,
+    Path(AtImage { id, step, file }): Path<ShowImage>,
+    Params(params): Params<ShowImage>,
+    headers: HeaderMap,
+) -> ApiResult<Response> {
+    let open = state.traverse(&id)?;
+    let is_left = match file.as_str() {
+        "left.png" => true,
+        "right.png" => false,
+        _ => return Err(ApiError::not_found("A stop has the images left.png and right.png.")),
+    };
+    let is_deep = match params.bits {
+        None | Some(8) => false,
+        Some(16) => true,
+        Some(bits) => return Err(ApiError::invalid("query", format!("bits: must be 8 or 16, not {bits}"))),
+    };
+    if step >= open.traverse.stop_count() {
+        return Err(no_step(step));
+    }
+    let cancel = CancelOnDrop::default();
+    let flag = cancel.flag();
+    let png = state
+        .pictures()
+        .run(move || {
+            encode(&open, step, is_left, is_deep, &flag).map_err(|error| {
+                let is_of_file = matches!(error, Error::Read { .. } | Error::Format { .. });
+                let problem = ApiError::from(error);
+                if is_of_file { problem.hint(MEND) } else { problem }
+            })
+        })
+        .await?;
+    Ok(picture(png, &headers))
+}
+
+/// Renders the stops from this one on before all others
+#[utoipa::path(post, operation_id = "prefetch", path = Prefetch::PATH, tag = "traverses", params(FirstStop), responses((status = 204), ApiError))]
+async fn prefetch(
+    State(state): State<AppState>,
+    Path(AtTraverse { id }): Path<Prefetch>,
+    Params(params): Params<Prefetch>,
+) -> ApiResult<StatusCode> {
+    let open = state.traverse(&id)?;
+    state.look_at(&open, params.from);
+    Ok(StatusCode::NO_CONTENT)
+}
+
+fn stop_view(open: &OpenTraverse, step: usize) -> StopView {
+    let (traverse, stop) = (&open.traverse, &open.traverse.index().stops[step]);
+    StopView {
+        time_s: stop.time_s,
+        site_from_rover: stop.site_from_rover,
+        true_site_from_rover: stop.truth.as_ref().map(|truth| truth.site_from_rover),
+        left_size: traverse.left_camera(step).size,
+        right_size: traverse.right_camera(step).size,
+        ready: traverse.is_ready(step),
+    }
+}
+
+fn view(open: &OpenTraverse) -> TraverseView {
+    let (traverse, index) = (&open.traverse, open.traverse.index());
+    TraverseView {
+        id: open.id.clone(),
+        name: index.name.clone(),
+        description: index.description.clone(),
+        simulated: index.scenario.is_some(),
+        source: drives::argument(traverse),
+        stereo: index.stereo,
+        warnings: traverse.warnings().to_vec(),
+        stops: (0..index.stops.len()).map(|step| stop_view(open, step)).collect(),
+    }
+}
+
+/// The image as the bytes of a PNG file; whatever the file on disk is, a full scale of 1 becomes the brightest.
+fn encode(
+    open: &OpenTraverse,
+    step: usize,
+    is_left: bool,
+    is_deep: bool,
+    cancel: &AtomicBool,
+) -> sightline_geometry::error::Result<Vec<u8>> {
+    open.make_ready(step, cancel)?;
+    let image = open.traverse.capture_one(step, is_left)?;
+    if is_deep { io::encode_png_u16(&image, None) } else { io::encode_png_u8(&image) }
+}
+
+/// An answer that the browser keeps, and asks about before it uses it again: files may be exchanged between
+/// two starts of the server.
+fn picture(png: Vec<u8>, headers: &HeaderMap) -> Response {
+    let tag = format!("\"{}\"", &hash(&png)[..32]);
+    let known = headers.get(header::IF_NONE_MATCH).and_then(|value| value.to_str().ok());
+    let caching = [(header::ETAG, tag.clone()), (header::CACHE_CONTROL, "private, no-cache".to_owned())];
+    if known.is_some_and(|known| known.split(',').any(|one| one.trim().trim_start_matches("W/") == tag)) {
+        return (StatusCode::NOT_MODIFIED, caching).into_response();
+    }
+    ([(header::CONTENT_TYPE, "image/png")], caching, png).into_response()
+}
+
+/// Cancels the work for a request that goes away.
+#[derive(Default)]
+pub(crate) struct CancelOnDrop(Arc<AtomicBool>);
+
+impl CancelOnDrop {
+    /// What is set when the request goes away.
+    pub(crate) fn flag(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.0)
+    }
+}
+
+impl Drop for CancelOnDrop {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}

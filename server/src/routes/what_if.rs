@@ -1,0 +1,69 @@
+//! `…/steps/{step}/what_if`: one step computed again with changed settings or a displaced prediction, not stored.
+
+use axum::Json;
+use axum::extract::State;
+use sightline_api::endpoint::Endpoint;
+use sightline_api::endpoints::TryStep;
+use sightline_geometry::frames::Pixel;
+use sightline_session::what_if::{Ghost, WhatIf, try_step};
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+
+use crate::extract::Body;
+use crate::live_session::CancelFlag;
+use crate::problem::{ApiError, ApiResult};
+use crate::recorded_step::RecordedStep;
+use crate::routes::route::route;
+use crate::state::AppState;
+
+/// How far outside every image a prediction may be put, px.
+const PIXEL_LIMIT: f64 = 1e5;
+/// How many arrays may be asked for at a time.
+const ARRAY_LIMIT: usize = 8;
+
+/// The routes of this resource.
+pub(crate) fn router() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new().routes(route::<TryStep>(routes!(what_if)))
+}
+
+/// Tries a step with changed settings or a displaced prediction
+///
+/// From what the run's previous step left; nothing is stored. To go on like that, run the target again from this step
+/// with the same settings and prediction.
+#[utoipa::path(post, operation_id = "what_if", path = TryStep::PATH,
+    tag = "why", request_body = WhatIf, responses((status = 200, body = Ghost), ApiError))]
+async fn what_if(
+    State(state): State<AppState>,
+    mut asked: RecordedStep,
+    Body(what_if): Body<TryStep>,
+) -> ApiResult<Json<Ghost>> {
+    check_pixel(what_if.prediction_px)?;
+    if what_if.arrays.len() > ARRAY_LIMIT {
+        let detail = format!("arrays: at most {ARRAY_LIMIT} can be asked for at a time");
+        return Err(ApiError::invalid("field", detail));
+    }
+    let settings = asked.settings.with(&what_if.settings)?;
+    state
+        .tries()
+        .run(move || {
+            asked.prepare(&CancelFlag::default())?;
+            let tried = try_step(&asked.live.traverse.traverse, asked.base(), &what_if)?;
+            Ok(Json(Ghost::new(what_if, &tried, &asked.recorded, &settings)))
+        })
+        .await
+}
+
+/// Refuses a pixel that no prediction can have.
+///
+/// # Errors
+/// A problem that names the field.
+pub(crate) fn check_pixel(pixel: Option<Pixel>) -> ApiResult<()> {
+    let is_far = |v: f64| !(-PIXEL_LIMIT..=PIXEL_LIMIT).contains(&v);
+    match pixel.filter(|pixel| is_far(pixel.x) || is_far(pixel.y)) {
+        Some(_) => Err(ApiError::invalid(
+            "field",
+            format!("prediction_px: x and y must be from -{PIXEL_LIMIT} to {PIXEL_LIMIT} px"),
+        )),
+        None => Ok(()),
+    }
+}

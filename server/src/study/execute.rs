@@ -1,0 +1,281 @@
+//! Carries out a study: world after world is made, rendered where anything is missing, and tracked unit by unit.
+//!
+//! Where so many worlds are asked for, one that offers fewer targets than its scenario asks for is passed over, which
+//! depends on its surface and its light alone; seeds that were named are taken as they are.
+
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+use sightline_geometry::error::{Error, Result};
+use sightline_recordings::{Traverse, create_simulated};
+use sightline_study::picks;
+use sightline_study::plan::{Configuration, Plan, Unit, key};
+use sightline_study::point::{Picks, Point};
+use sightline_study::randomised;
+use sightline_study::row::{Row, rows};
+use sightline_study::run::{Chosen, Watch, measure};
+use sightline_world::Scenario;
+
+use super::log::ResultLog;
+use super::order::{Order, Seeds};
+use super::report;
+use super::tables;
+
+/// Seeds that are tried for each world asked for.
+const SEEDS_PER_WORLD: u64 = 10;
+
+/// How far a study has come.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Progress {
+    /// Units done, of all.
+    Units {
+        /// Done.
+        k: usize,
+        /// All.
+        n: usize,
+    },
+    /// Stops of a world rendered, of those that were missing.
+    Rendering {
+        /// The world.
+        world: String,
+        /// Done.
+        k: usize,
+        /// All.
+        n: usize,
+    },
+    /// Rows that were found or kept.
+    Rows(Vec<Row>),
+    /// Something that a person should know, as a sentence.
+    Notice(String),
+}
+
+/// What a study found.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The units, by configuration, point and world.
+    pub units: Vec<Unit>,
+    /// The table.
+    pub rows: Vec<Row>,
+    /// The report, a whole HTML page.
+    pub report: String,
+    /// How many units were found in this run; the others were kept.
+    pub found: usize,
+}
+
+/// Carries out a study and writes its tables and its report.
+///
+/// # Errors
+/// Bad input, a folder that cannot be written, or [`Error::Cancelled`] soon after `cancel` is set.
+pub fn carry_out(mut order: Order, cancel: &AtomicBool, tell: &(dyn Fn(Progress) + Sync)) -> Result<Outcome> {
+    take_other_scenario(&mut order)?;
+    let folder = order.folder.join(order.plan.study.name);
+    let log = ResultLog::open(&folder)?;
+    log.notices.iter().for_each(|notice| tell(Progress::Notice(notice.clone())));
+    let conduct =
+        Conduct { order: &order, log, cancel, tell, done: AtomicUsize::new(0), found: AtomicUsize::new(0) };
+    let mut units = Vec::new();
+    for name in order.plan.scenarios() {
+        units.extend(conduct.scenario(name)?);
+    }
+    let place = |unit: &Unit| {
+        let configuration = order.plan.configurations.iter().position(|c| c.name == unit.configuration);
+        (configuration, order.plan.points.iter().position(|point| *point == unit.point), unit.seed)
+    };
+    units.sort_by_key(place);
+    let rows: Vec<Row> = units.iter().flat_map(|unit| rows(order.plan.study, unit)).collect();
+    tables::write(&folder, &rows, &units)?;
+    let report = report::write(&folder, &order, &units)?;
+    Ok(Outcome { units, rows, report, found: conduct.found.load(Ordering::Relaxed) })
+}
+
+/// Puts another scenario in the place of the study's own.
+fn take_other_scenario(order: &mut Order) -> Result<()> {
+    let Some((name, _)) = &order.scenario else { return Ok(()) };
+    if order.plan.scenarios().len() > 1 {
+        let problem = "this study compares several scenarios; none can take the place of all";
+        return Err(Error::setting("scenario", problem));
+    }
+    order.plan.points.iter_mut().for_each(|point| point.scenario.clone_from(name));
+    Ok(())
+}
+
+struct Conduct<'a> {
+    order: &'a Order,
+    log: ResultLog,
+    cancel: &'a AtomicBool,
+    tell: &'a (dyn Fn(Progress) + Sync),
+    done: AtomicUsize,
+    found: AtomicUsize,
+}
+
+/// One unit that is to be had.
+struct Task<'a> {
+    configuration: &'a Configuration,
+    point: &'a Point,
+    key: String,
+}
+
+impl Conduct<'_> {
+    /// All units of the points in one scenario.
+    fn scenario(&self, name: &str) -> Result<Vec<Unit>> {
+        let scenario = match &self.order.scenario {
+            Some((_, scenario)) => scenario.clone(),
+            None => randomised::base(name)?,
+        };
+        let points: Vec<&Point> =
+            self.order.plan.points.iter().filter(|point| point.scenario == name).collect();
+        match &self.order.seeds {
+            Seeds::Named(seeds) => {
+                let mut units = Vec::new();
+                for &seed in seeds {
+                    units.extend(
+                        self.world(name, &randomised::world(name, &scenario, seed), &points, true)?
+                            .unwrap_or_default(),
+                    );
+                }
+                Ok(units)
+            }
+            &Seeds::Count { worlds, first } => {
+                let seeds = first..first.saturating_add(worlds.saturating_mul(SEEDS_PER_WORLD));
+                let (mut units, mut count) = (Vec::new(), 0);
+                for seed in seeds.clone() {
+                    if count == worlds {
+                        break;
+                    }
+                    let of_world =
+                        self.world(name, &randomised::world(name, &scenario, seed), &points, false)?;
+                    count += u64::from(of_world.is_some());
+                    units.extend(of_world.unwrap_or_default());
+                }
+                if count < worlds {
+                    return Err(Error::Request(format!(
+                        "only {count} of {worlds} worlds of {name} with seeds from {first} to {} offer {} targets: \
+                         name the seeds, or change targets.count in the scenario",
+                        seeds.end - 1,
+                        scenario.targets.wanted()
+                    )));
+                }
+                Ok(units)
+            }
+        }
+    }
+
+    /// The units of one world; none where it is passed over.
+    fn world(
+        &self,
+        name: &str,
+        scenario: &Scenario,
+        points: &[&Point],
+        is_named: bool,
+    ) -> Result<Option<Vec<Unit>>> {
+        let tasks = self.tasks(scenario, points)?;
+        // The same settings may have been kept under another name.
+        let kept_of = |task: &Task<'_>| {
+            let configuration = task.configuration.name.clone();
+            self.log.get(&task.key).map(|unit| Unit { configuration, ..unit.clone() })
+        };
+        let kept: Vec<Unit> = tasks.iter().filter_map(kept_of).collect();
+        if kept.len() == tasks.len() {
+            self.count(&kept);
+            return Ok(Some(kept));
+        }
+        let world = format!("{name}/world-{}", scenario.seed);
+        let traverse = create_simulated(scenario, &self.order.folder.join(&world))?;
+        let mut chosen: Vec<(&Point, Vec<Chosen>)> = Vec::new();
+        for &point in points {
+            // Without a fault the targets of all points are the same.
+            let same = chosen.iter().find(|(other, _)| {
+                other.picks == point.picks && other.fault.is_none() && point.fault.is_none()
+            });
+            let of_point = match same {
+                Some((_, known)) => known.clone(),
+                None => picks::choose(&traverse, scenario, point)?,
+            };
+            if point.picks == Picks::Rule && of_point.len() < scenario.targets.wanted() as usize {
+                let outcome = if is_named { "taken as they are" } else { "passed over" };
+                (self.tell)(Progress::Notice(format!("{world}: {} targets, {outcome}", of_point.len())));
+                if !is_named {
+                    return Ok(None);
+                }
+            }
+            chosen.push((point, of_point));
+        }
+        self.count(&kept);
+        self.render(&traverse, &world)?;
+        let missing: Vec<&Task<'_>> = tasks.iter().filter(|task| self.log.get(&task.key).is_none()).collect();
+        let found: Result<Vec<Unit>> = missing
+            .par_iter()
+            .map(|task| {
+                let of_point = chosen.iter().find(|(point, _)| *point == task.point);
+                self.unit(&traverse, scenario, task, of_point.map_or(&[], |(_, chosen)| chosen.as_slice()))
+            })
+            .collect();
+        Ok(Some(kept.into_iter().chain(found?).collect()))
+    }
+
+    fn tasks(&self, scenario: &Scenario, points: &[&Point]) -> Result<Vec<Task<'_>>> {
+        let mut tasks = Vec::new();
+        for configuration in &self.order.plan.configurations {
+            for point in self.order.plan.points.iter().filter(|point| points.contains(point)) {
+                let settings = Plan::settings(configuration, point)?;
+                tasks.push(Task { configuration, point, key: key(scenario, point, &settings) });
+            }
+        }
+        Ok(tasks)
+    }
+
+    fn unit(
+        &self,
+        traverse: &Traverse,
+        scenario: &Scenario,
+        task: &Task<'_>,
+        chosen: &[Chosen],
+    ) -> Result<Unit> {
+        let settings = Plan::settings(task.configuration, task.point)?;
+        let keep_steps = self.order.plan.study.is_by_step;
+        let watch = Watch { cancel: self.cancel, tell: &|| () };
+        let runs = measure(traverse, task.point, chosen, &settings, keep_steps, &watch)?;
+        let unit = Unit {
+            key: task.key.clone(),
+            scenario: task.point.scenario.clone(),
+            seed: scenario.seed,
+            configuration: task.configuration.name.clone(),
+            point: task.point.clone(),
+            runs,
+        };
+        self.log.add(&unit)?;
+        self.found.fetch_add(1, Ordering::Relaxed);
+        self.count(std::slice::from_ref(&unit));
+        Ok(unit)
+    }
+
+    fn render(&self, traverse: &Traverse, world: &str) -> Result<()> {
+        let missing: Vec<_> = (0..traverse.stop_count()).filter(|&step| !traverse.is_ready(step)).collect();
+        for (k, &step) in missing.iter().enumerate() {
+            (self.tell)(Progress::Rendering { world: world.to_owned(), k, n: missing.len() });
+            traverse.render_step(step, self.cancel)?;
+        }
+        Ok(())
+    }
+
+    /// Tells that these units are done.
+    fn count(&self, units: &[Unit]) {
+        if units.is_empty() {
+            return;
+        }
+        let k = self.done.fetch_add(units.len(), Ordering::Relaxed) + units.len();
+        (self.tell)(Progress::Rows(
+            units.iter().flat_map(|unit| rows(self.order.plan.study, unit)).collect(),
+        ));
+        (self.tell)(Progress::Units { k, n: self.all() });
+    }
+
+    /// How many units the study has.
+    fn all(&self) -> usize {
+        let worlds = match &self.order.seeds {
+            Seeds::Named(seeds) => seeds.len(),
+            Seeds::Count { worlds, .. } => *worlds as usize,
+        };
+        worlds * self.order.plan.points.len() * self.order.plan.configurations.len()
+    }
+}

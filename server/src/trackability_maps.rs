@@ -1,0 +1,124 @@
+//! The trackability maps that were made or are being made, and the surfaces behind the newest.
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex};
+
+use sightline_api::wire::Event;
+use sightline_geometry::error::Result;
+use sightline_rover::trackability::{Ground, MapProgress, TrackabilityLimits};
+use sightline_track::settings::Settings;
+
+use crate::jobs::{Lane, lock};
+use crate::live_session::CancelFlag;
+use crate::rendering::OpenTraverse;
+
+/// Maps that are kept: about half a megabyte each.
+const MAPS: usize = 64;
+/// Surfaces that are kept for judging single pixels: about twenty megabytes each.
+const GROUNDS: usize = 2;
+/// Maps that may wait for their turn.
+const WAITING: usize = 8;
+
+/// The maps that were made or are being made, and the surfaces behind the newest.
+pub(crate) struct Maps {
+    making: Mutex<VecDeque<Arc<Making>>>,
+    grounds: Mutex<VecDeque<(String, Arc<Ground>)>>,
+    pub(crate) turn: Lane,
+}
+
+/// A map that is made, or was.
+pub(crate) struct Making {
+    traverse: String,
+    pub(crate) step: usize,
+    pub(crate) limits: TrackabilityLimits,
+    pub(crate) progress: Mutex<MapProgress>,
+    pub(crate) cancel: CancelFlag,
+}
+
+impl Default for Maps {
+    fn default() -> Self {
+        Self { making: Mutex::default(), grounds: Mutex::default(), turn: Lane::new(1, WAITING) }
+    }
+}
+
+impl Maps {
+    pub(crate) fn find_or_begin(
+        &self,
+        traverse: &str,
+        step: usize,
+        limits: TrackabilityLimits,
+    ) -> (Arc<Making>, bool) {
+        let mut making = lock(&self.making);
+        if let Some(known) = making.iter().find(|one| one.is_of(traverse, step, &limits)) {
+            return (Arc::clone(known), false);
+        }
+        let progress = MapProgress { k: 0, n: 0, ended: false, failed: None, map: None };
+        let (traverse, cancel) = (traverse.to_owned(), CancelFlag::default());
+        let new = Arc::new(Making { traverse, step, limits, progress: Mutex::new(progress), cancel });
+        making.push_back(Arc::clone(&new));
+        // The oldest that is complete goes; those under way are few.
+        if making.len() > MAPS
+            && let Some(place) = making.iter().position(|one| lock(&one.progress).ended)
+        {
+            making.remove(place);
+        }
+        (new, true)
+    }
+
+    /// A map that is under way, taken out, so that the next who asks begins anew.
+    pub(crate) fn take_unfinished(
+        &self,
+        traverse: &str,
+        step: usize,
+        limits: &TrackabilityLimits,
+    ) -> Option<Arc<Making>> {
+        let mut making = lock(&self.making);
+        let place =
+            making.iter().position(|one| one.is_of(traverse, step, limits) && !lock(&one.progress).ended)?;
+        making.remove(place)
+    }
+
+    /// What lies under the pixels of a stop, kept for the newest.
+    pub(crate) fn ground(
+        &self,
+        open: &OpenTraverse,
+        step: usize,
+        (settings, limits): (&Settings, &TrackabilityLimits),
+        cancel: &CancelFlag,
+    ) -> Result<Arc<Ground>> {
+        let grounds = &self.grounds;
+        let is_same = |(id, ground): &&(String, Arc<Ground>)| {
+            *id == open.id && ground.step == step && ground.settings == *settings && ground.limits == *limits
+        };
+        if let Some((_, known)) = lock(grounds).iter().find(is_same) {
+            return Ok(Arc::clone(known));
+        }
+        open.make_ready(step, cancel)?;
+        let made = Arc::new(Ground::new(&open.traverse, step, settings, limits)?);
+        let mut grounds = lock(grounds);
+        grounds.push_back((open.id.clone(), Arc::clone(&made)));
+        let surplus = grounds.len().saturating_sub(GROUNDS);
+        grounds.drain(..surplus);
+        Ok(made)
+    }
+}
+
+impl Making {
+    pub(crate) fn is_of(&self, traverse: &str, step: usize, limits: &TrackabilityLimits) -> bool {
+        self.traverse == traverse && self.step == step && self.limits == *limits
+    }
+
+    /// Nothing more will come; the first reason stands.
+    pub(crate) fn end(&self, why: Option<String>) {
+        let mut progress = lock(&self.progress);
+        if !progress.ended {
+            (progress.ended, progress.failed) = (true, why);
+        }
+    }
+
+    pub(crate) fn event(&self) -> Event {
+        let progress = lock(&self.progress);
+        let (traverse, step) = (self.traverse.clone(), self.step);
+        Event::TrackabilityProgress { traverse, step, k: progress.k, n: progress.n, ended: progress.ended }
+    }
+}

@@ -1,0 +1,65 @@
+//! Plots expressions over the steps, and asks the server for their values.
+
+use sightline_session::expression::Expression;
+use sightline_session::query::{Query, QueryAnswer};
+
+use crate::breakpoints::AskRequest;
+use crate::breakpoints::derived::Derived;
+use crate::net::request::Request;
+use crate::state::State;
+
+/// How many derived columns there may be: each is a plot of its own.
+const LIMIT: usize = 8;
+
+/// A run that goes on is asked again when it has grown by this share, so that asking does not grow with its square.
+const GROWTH: usize = 50;
+
+impl State {
+    pub(crate) fn plot_expression(&mut self, text: String) {
+        let text = text.trim().to_owned();
+        if let Err(refused) = Expression::column(&text) {
+            self.messages.problem(format!("`{text}` cannot be plotted: {refused}."), refused.hint);
+            return;
+        }
+        if self.ask.derived.iter().any(|derived| derived.expression == text) {
+            self.messages.note(format!("`{text}` is plotted already."));
+        } else if self.ask.derived.len() >= LIMIT {
+            let hint = "Remove one in the panel Breakpoints.".to_owned();
+            self.messages.problem(format!("There are {LIMIT} derived plots already."), Some(hint));
+        } else {
+            self.messages.note(format!("`{text}` is plotted over the steps."));
+            self.ask.derived.push(Derived::new(text));
+        }
+    }
+
+    pub(crate) fn sync_derived(&mut self, session: &str) {
+        let Some(target) = self.target() else { return };
+        let (number, steps) = (target.number, target.runs.iter().map(|run| run.rows.len()).sum::<usize>());
+        let grows = self.progress.keys().any(|(target, _)| *target == number);
+        for derived in self.ask.derived.iter_mut().filter(|derived| !derived.is_asked) {
+            let enough = match derived.asked_for {
+                Some((target, before)) if target == number => {
+                    derived.is_stale && steps != before && (!grows || steps >= before + before / GROWTH)
+                }
+                _ => true,
+            };
+            if enough {
+                (derived.asked_for, derived.is_asked, derived.is_stale) =
+                    (Some((number, steps)), true, false);
+                let query =
+                    Query { expression: derived.expression.clone(), target: Some(number), values: true };
+                self.outbox.push(Request::Ask(AskRequest::Query { session: session.to_owned(), query }));
+            }
+        }
+    }
+
+    pub(crate) fn took_column(&mut self, query: &Query, outcome: Result<QueryAnswer, String>) {
+        let asked = self.ask.derived.iter_mut().find(|derived| derived.expression == query.expression);
+        let Some(derived) = asked else { return };
+        derived.is_asked = false;
+        match outcome {
+            Ok(answer) => (derived.answer, derived.problem) = (Some(answer), None),
+            Err(problem) => derived.problem = Some(problem),
+        }
+    }
+}

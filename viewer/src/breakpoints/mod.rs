@@ -1,0 +1,156 @@
+//! What the person asks of the steps: breakpoints, derived columns, and how time is travelled.
+
+pub(crate) mod panel;
+pub(crate) mod derived_plot;
+
+mod columns;
+pub(crate) mod derived;
+pub(crate) mod goto;
+pub(crate) mod play;
+mod playing;
+mod removal;
+mod update;
+
+use sightline_session::breakpoints::{BreakpointChange, BreakpointView, NewBreakpoint};
+use sightline_session::query::{Query, QueryAnswer};
+
+use self::derived::Derived;
+use self::play::{Play, Shuttle};
+
+/// What a person can ask for.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Ask {
+    /// Changes the text of the expression box.
+    Type(String),
+    /// Shows the expression box and puts the cursor there.
+    Focus,
+    /// Puts a text into the expression box, to be looked at before it is set.
+    Propose(String),
+    /// Takes a breakpoint into the box, to change its condition.
+    Edit(usize),
+    /// Leaves the breakpoint that is being changed as it was.
+    CancelEdit,
+    /// Sets the breakpoint of the box, or changes the one that was taken into it.
+    Set,
+    /// Sets a breakpoint at a stop, or removes it.
+    BreakAt(usize),
+    /// Switches a breakpoint on or off.
+    Switch {
+        /// The breakpoint's number.
+        number: usize,
+        /// Whether it is looked for.
+        on: bool,
+    },
+    /// Removes a breakpoint.
+    Remove(usize),
+    /// Plots the expression over the steps.
+    Plot(String),
+    /// Takes a derived column out of the plots.
+    Unplot(usize),
+    /// Goes to the next hit of any breakpoint.
+    NextHit,
+    /// Goes to the previous one.
+    PreviousHit,
+    /// Plays, stops, loops.
+    Shuttle(Shuttle),
+    /// Shows or hides the state bands of the other targets.
+    ShowOthers(bool),
+}
+
+/// What is asked of the server.
+#[derive(Clone, Debug, PartialEq)]
+pub enum AskRequest {
+    /// The breakpoints with their hits.
+    Breakpoints(String),
+    /// To set a breakpoint.
+    Add {
+        /// The session.
+        session: String,
+        /// The breakpoint.
+        new: NewBreakpoint,
+    },
+    /// To change a breakpoint.
+    Change {
+        /// The session.
+        session: String,
+        /// The breakpoint's number.
+        number: usize,
+        /// What changes.
+        change: BreakpointChange,
+    },
+    /// To remove a breakpoint.
+    Remove {
+        /// The session.
+        session: String,
+        /// The breakpoint's number.
+        number: usize,
+    },
+    /// An expression at every step.
+    Query {
+        /// The session.
+        session: String,
+        /// The expression.
+        query: Query,
+    },
+}
+
+/// What the server answered.
+#[derive(Clone, Debug, PartialEq)]
+pub enum AskReply {
+    /// The breakpoints with their hits.
+    Breakpoints(Vec<BreakpointView>),
+    /// A breakpoint that was set or changed.
+    Breakpoint(BreakpointView),
+    /// An expression at every step.
+    Answer(QueryAnswer),
+    /// It is done.
+    Done,
+}
+
+/// Breakpoints, derived columns, and time travel.
+#[derive(Default)]
+pub struct Asking {
+    /// The breakpoints with their hits, as last heard.
+    pub breakpoints: Vec<BreakpointView>,
+    /// The text of the expression box.
+    pub text: String,
+    /// The breakpoint whose condition is in the box.
+    pub edited: Option<usize>,
+    /// Whether the expression box is to get the keyboard.
+    pub wants_focus: bool,
+    /// The derived columns.
+    pub derived: Vec<Derived>,
+    /// How time is travelled.
+    pub play: Play,
+    /// Whether the state bands of the other targets are shown.
+    pub shows_others: bool,
+    stale: bool,
+    asked: bool,
+}
+
+impl Asking {
+    /// Everything is to be asked again.
+    pub(crate) fn make_stale(&mut self) {
+        self.stale = true;
+        self.derived.iter_mut().for_each(Derived::make_stale);
+    }
+
+    /// Nothing of another session stays, but the texts that the person wrote.
+    pub(crate) fn forget(&mut self) {
+        self.breakpoints.clear();
+        (self.edited, self.asked) = (None, false);
+        self.play.forget();
+        self.derived.iter_mut().for_each(Derived::forget);
+    }
+
+    /// Breakpoints that are on, each with its place in the list.
+    pub fn watched(&self) -> impl Iterator<Item = (usize, &BreakpointView)> {
+        self.breakpoints.iter().enumerate().filter(|(_, breakpoint)| breakpoint.on)
+    }
+
+    /// The stops that a breakpoint hit in a run, in order.
+    pub fn hits(breakpoint: &BreakpointView, target: usize, run: usize) -> &[usize] {
+        let of_run = breakpoint.hits.iter().find(|hits| hits.target == target && hits.run == run);
+        of_run.map_or(&[], |hits| &hits.steps)
+    }
+}

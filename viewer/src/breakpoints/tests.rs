@@ -1,0 +1,325 @@
+//! Breakpoints, the expression box, derived plots and going to a step: what is shown, said and asked.
+
+use egui_kittest::kittest::Queryable;
+use sightline_api::wire::Event;
+use sightline_session::breakpoints::{Breakpoint, BreakpointView, NewBreakpoint, RunHits};
+use sightline_session::expression::Answers;
+use sightline_session::query::{QueryAnswer, RunAnswer};
+
+use crate::breakpoints::{Ask, AskReply, AskRequest};
+use crate::command::help;
+use crate::command::{Command, Go};
+use crate::net::request::{Arrived, Reply, Request};
+use crate::pane::Pane;
+use crate::panels::plots;
+use crate::state::State;
+use crate::tests::{Shown, fixture};
+
+/// A breakpoint with its hits in the first run.
+pub(crate) fn breakpoint(number: usize, expression: &str, steps: &[usize]) -> BreakpointView {
+    let hits = RunHits { target: 0, run: 0, steps: steps.to_vec() };
+    BreakpointView {
+        number,
+        expression: expression.to_owned(),
+        on: true,
+        count: steps.len(),
+        hits: if steps.is_empty() { vec![] } else { vec![hits] },
+        problem: None,
+    }
+}
+
+/// The fixed drive with two breakpoints.
+fn watched(context: &egui::Context, step: usize) -> State {
+    let mut state = fixture::at_step(context, step);
+    state.ask.breakpoints = vec![breakpoint(0, "ncc < 0.6", &[3, 4]), breakpoint(3, "step == 2", &[2])];
+    state
+}
+
+fn loaded(step: usize) -> State {
+    let mut state = watched(&egui::Context::default(), step);
+    state.take_requests();
+    state
+}
+
+fn ask(state: &mut State, ask: Ask) -> Vec<AskRequest> {
+    state.perform(Command::Ask(ask));
+    let asked = |request| match request {
+        Request::Ask(asked) => Some(asked),
+        _ => None,
+    };
+    state.take_requests().into_iter().filter_map(asked).collect()
+}
+
+fn answer(state: &mut State, request: AskRequest, reply: AskReply) {
+    state.arrived(Arrived { request: Request::Ask(request), outcome: Ok(Reply::Ask(reply)) }, 0.0);
+}
+
+#[test]
+fn the_list_has_every_breakpoint_with_its_hits_and_can_switch_edit_and_remove_it() {
+    let mut shown = Shown::pane(Pane::Breakpoints, |context| watched(context, 2));
+    shown.says("ncc < 0.6").says("2 hits").says("step == 2").says("1 hit").says("3 hits in all runs");
+    assert_eq!(shown.click("ncc < 0.6"), [Command::Ask(Ask::Switch { number: 0, on: false })]);
+    assert_eq!(shown.click("remove breakpoint step == 2"), [Command::Ask(Ask::Remove(3))]);
+    assert_eq!(shown.click("edit breakpoint ncc < 0.6"), [Command::Ask(Ask::Edit(0))]);
+    assert_eq!(shown.click("Next hit"), [Command::Ask(Ask::NextHit)]);
+    assert_eq!(shown.click("Break at step 2"), [Command::Ask(Ask::BreakAt(2))]);
+}
+
+#[test]
+fn without_breakpoints_the_panel_says_how_to_get_one() {
+    Shown::pane(Pane::Breakpoints, |context| fixture::at_step(context, 2))
+        .says("press B to break at this step");
+}
+
+fn with_text(text: &'static str) -> Shown<'static> {
+    Shown::pane(Pane::Breakpoints, move |context| {
+        let mut state = fixture::at_step(context, 2);
+        state.perform(Command::Ask(Ask::Type(text.to_owned())));
+        state
+    })
+}
+
+#[test]
+fn the_box_says_what_an_expression_is_and_what_is_wrong_with_it_and_where() {
+    with_text("ncc < 0.6").says("a condition");
+    with_text("sigma_m * 2").says("a number in m");
+    with_text("step > 1 && nccc < 0.6")
+        .says("At character 13: there is no name `nccc`")
+        .says("Did you mean `ncc`?");
+    with_text("sigma_m < err_px").says("`sigma_m` is in m and `err_px` is in px");
+    let mut whole = with_text("ncc < 0.6");
+    assert_eq!(whole.click("Break when true"), [Command::Ask(Ask::Set)]);
+    assert_eq!(whole.click("Plot over the steps"), [Command::Ask(Ask::Plot("ncc < 0.6".to_owned()))]);
+    let mut bad = with_text("ncc <");
+    assert_eq!(bad.click("Break when true"), [], "what cannot be read cannot be set");
+}
+
+/// The whole state behind the panel, so that what is typed stays.
+fn live_box() -> egui_kittest::Harness<'static, State> {
+    let state = fixture::at_step(&egui::Context::default(), 2);
+    let mut harness = egui_kittest::Harness::builder().with_size([520.0, 500.0]).build_ui_state(
+        |ui, state: &mut State| {
+            let mut out = Vec::new();
+            crate::layout::show_pane(ui, Pane::Breakpoints, state, &mut out);
+            out.into_iter().for_each(|command| state.perform(command));
+        },
+        state,
+    );
+    harness.run_steps(2);
+    harness
+}
+
+#[test]
+fn completion_is_taken_by_arrow_keys_tab_and_enter_and_a_whole_condition_is_set_by_enter() {
+    let mut harness = live_box();
+    harness.state_mut().perform(Command::Ask(Ask::Focus));
+    harness.run_steps(3);
+    let box_ = || egui_kittest::kittest::by().role(egui::accesskit::Role::TextInput);
+    harness.get(box_()).type_text("sig");
+    harness.run_steps(3);
+    let offered =
+        harness.query_all_by(|node| node.label().is_some_and(|label| label.contains("sigma_m"))).count();
+    assert!(offered > 0, "suggestions are shown");
+    harness.key_press(egui::Key::Tab);
+    harness.run_steps(3);
+    assert_eq!(harness.state().ask.text, "sigma_m");
+    harness.get(box_()).type_text(" > 5 c");
+    harness.run_steps(3);
+    harness.key_press(egui::Key::ArrowDown);
+    harness.key_press(egui::Key::ArrowUp);
+    harness.key_press(egui::Key::Tab);
+    harness.run_steps(3);
+    assert_eq!(harness.state().ask.text, "sigma_m > 5 cm");
+    harness.state_mut().take_requests();
+    harness.key_press(egui::Key::Enter);
+    harness.run_steps(3);
+    let new = NewBreakpoint { expression: Some("sigma_m > 5 cm".to_owned()), step: None };
+    let expected = Request::Ask(AskRequest::Add { session: "s1".to_owned(), new });
+    assert!(harness.state_mut().take_requests().contains(&expected));
+    assert_eq!(harness.state().ask.text, "", "the box is free for the next one");
+}
+
+#[test]
+fn letters_and_the_enter_behind_them_may_come_in_one_frame() {
+    // While suggestions are open for the unfinished text before, and for letters that finish it with none open.
+    for (before, last) in
+        [("step == 2 or step", " == 4"), ("step == 2 or step == ", "4"), ("err_px >", " 2 px")]
+    {
+        let mut harness = live_box();
+        harness.state_mut().perform(Command::Ask(Ask::Focus));
+        harness.run_steps(3);
+        let box_ = || egui_kittest::kittest::by().role(egui::accesskit::Role::TextInput);
+        harness.get(box_()).type_text(before);
+        harness.run_steps(3);
+        harness.state_mut().take_requests();
+        let (key, modifiers) = (egui::Key::Enter, egui::Modifiers::NONE);
+        let enter = egui::Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers };
+        harness.input_mut().events.extend([egui::Event::Text(last.to_owned()), enter]);
+        harness.run_steps(3);
+        let new = NewBreakpoint { expression: Some(format!("{before}{last}")), step: None };
+        let expected = Request::Ask(AskRequest::Add { session: "s1".to_owned(), new });
+        assert!(harness.state_mut().take_requests().contains(&expected), "{before}{last}");
+        assert!(!harness.ctx.text_edit_focused(), "keys mean steps again");
+    }
+}
+
+#[test]
+fn breaking_at_a_step_twice_takes_the_breakpoint_back() {
+    let mut state = loaded(4);
+    let new = NewBreakpoint { expression: None, step: Some(4) };
+    assert_eq!(ask(&mut state, Ask::BreakAt(4)), [AskRequest::Add { session: "s1".to_owned(), new }]);
+    assert_eq!(
+        ask(&mut state, Ask::BreakAt(2)),
+        [AskRequest::Remove { session: "s1".to_owned(), number: 3 }]
+    );
+    assert_eq!(state.ask.breakpoints.len(), 1, "it is gone at once");
+}
+
+#[test]
+fn hits_are_visited_in_order_whichever_breakpoint_they_belong_to() {
+    let mut state = loaded(0);
+    let mut visit = |question: Ask| {
+        state.perform(Command::Ask(question));
+        state.cursor.step
+    };
+    assert_eq!([visit(Ask::NextHit), visit(Ask::NextHit), visit(Ask::NextHit)], [2, 3, 4]);
+    assert_eq!(visit(Ask::NextHit), 4, "there is none after it");
+    assert_eq!([visit(Ask::PreviousHit), visit(Ask::PreviousHit)], [3, 2]);
+    state.ask.breakpoints[1].on = false;
+    state.cursor.step = 0;
+    state.perform(Command::Ask(Ask::NextHit));
+    assert_eq!(state.cursor.step, 3, "what is off does not hit");
+}
+
+#[test]
+fn hits_are_asked_again_when_the_session_changes_and_once_at_a_time() {
+    let mut state = loaded(2);
+    let mut view = state.session.clone().unwrap();
+    view.breakpoints = vec![Breakpoint { number: 0, expression: "ncc < 0.6".to_owned(), on: true }];
+    let heard = |state: &mut State, view: &sightline_session::view::SessionView| {
+        state.told(Event::SessionChanged { session: "s1".to_owned() });
+        state.take_requests();
+        let request = Request::Session("s1".to_owned());
+        let reply = Ok(Reply::Session(Box::new(view.clone())));
+        state.arrived(Arrived { request, outcome: reply }, 0.0);
+        state.take_requests()
+    };
+    let wanted = Request::Ask(AskRequest::Breakpoints("s1".to_owned()));
+    assert!(heard(&mut state, &view).contains(&wanted));
+    assert!(!heard(&mut state, &view).contains(&wanted), "one is under way");
+    answer(
+        &mut state,
+        AskRequest::Breakpoints("s1".to_owned()),
+        AskReply::Breakpoints(vec![breakpoint(0, "ncc < 0.6", &[1, 3])]),
+    );
+    assert_eq!(state.hit_from(1, true), Some(3));
+    assert!(state.take_requests().contains(&wanted), "what changed meanwhile is asked for");
+}
+
+/// A column over the first run whose values are the steps.
+fn column(expression: &str, unit: &str) -> AskReply {
+    let of_run = RunAnswer {
+        target: 0,
+        run: 0,
+        first_step: 0,
+        steps: 5,
+        hits: vec![],
+        values: vec![None, Some(1.0), Some(2.5), Some(3.0), Some(4.0)],
+    };
+    AskReply::Answer(QueryAnswer {
+        expression: expression.to_owned(),
+        answers: Answers::Number,
+        unit: unit.to_owned(),
+        count: 0,
+        runs: vec![of_run],
+    })
+}
+
+#[test]
+fn any_expression_becomes_a_plot_that_can_be_taken_away() {
+    let mut state = loaded(2);
+    let asked = ask(&mut state, Ask::Plot("sigma_m * 2".to_owned()));
+    let [AskRequest::Query { query, .. }] = asked.as_slice() else { panic!("{asked:?}") };
+    assert_eq!((query.target, query.values), (Some(0), true));
+    assert_eq!(ask(&mut state, Ask::Plot("sigma_m * 2".to_owned())), [], "it is plotted already");
+    assert_eq!(ask(&mut state, Ask::Plot("state".to_owned())), []);
+    assert!(state.messages.newest().unwrap().text.contains("cannot be plotted"));
+    let request = asked[0].clone();
+    let mut shown = Shown::new(
+        [520.0, 520.0],
+        move |context| {
+            let mut state = watched(context, 2);
+            state.perform(Command::Ask(Ask::Plot("sigma_m * 2".to_owned())));
+            state.take_requests();
+            answer(&mut state, request, column("sigma_m * 2", "m"));
+            state
+        },
+        plots::show,
+    );
+    shown.says("sigma_m * 2, m").says("2.500").says("plot of sigma_m * 2: 2.500 at step 2, from 1 to 4 m");
+    assert_eq!(shown.click("remove plot sigma_m * 2"), [Command::Ask(Ask::Unplot(0))]);
+}
+
+#[test]
+fn a_derived_plot_is_asked_again_when_its_runs_grow() {
+    let mut state = loaded(2);
+    let asked = ask(&mut state, Ask::Plot("ncc".to_owned()));
+    assert_eq!(state.take_requests(), [], "it is under way");
+    answer(&mut state, asked[0].clone(), column("ncc", ""));
+    assert_eq!(state.take_requests(), []);
+    let mut view = state.session.clone().unwrap();
+    let rows = &mut view.targets[0].runs[0].rows;
+    let mut next = rows[4].clone();
+    next.step = 5;
+    rows.push(next);
+    state.told(Event::SessionChanged { session: "s1".to_owned() });
+    state.take_requests();
+    let request = Request::Session("s1".to_owned());
+    state.arrived(Arrived { request, outcome: Ok(Reply::Session(Box::new(view))) }, 0.0);
+    assert!(
+        state.take_requests().iter().any(|request| matches!(request, Request::Ask(AskRequest::Query { .. })))
+    );
+}
+
+#[test]
+fn a_step_is_reached_by_number_difference_time_and_event() {
+    let state = loaded(1);
+    let go = |text: &str| state.step_meant(text);
+    assert_eq!((go("4"), go("+2"), go("-5"), go("−1")), (Ok(4), Ok(3), Ok(0), Ok(0)));
+    assert_eq!((go("last"), go("End"), go("first")), (Ok(5), Ok(5), Ok(0)));
+    assert_eq!((go("t=130"), go("t = 59.9 s"), go("t=1e9")), (Ok(2), Ok(1), Ok(5)));
+    assert_eq!(
+        (go("lost"), go("failed"), go("pick"), go("hit"), go("worst")),
+        (Ok(3), Ok(4), Ok(0), Ok(2), Ok(4))
+    );
+    assert!(go("99").unwrap_err().contains("the last one is 5"));
+    assert!(go("fault").unwrap_err().contains("No stop of this run"));
+    assert!(go("tracking").unwrap_err().contains("never comes into the state tracking"));
+    assert!(go("soon").unwrap_err().contains("t=3.5"));
+    assert!(go("t=now").unwrap_err().contains("no time in seconds"));
+}
+
+#[test]
+fn the_go_to_box_shows_what_is_meant_and_keeps_what_cannot_be() {
+    let go_to = |text: &'static str| {
+        Shown::new(
+            [500.0, 400.0],
+            move |context| {
+                let mut state = watched(context, 1);
+                state.mode = crate::command::Mode::GoTo(text.to_owned());
+                state
+            },
+            help::show,
+        )
+    };
+    go_to("lost").says("step 3");
+    let mut bad = go_to("nowhere");
+    bad.says("is no step");
+    bad.harness.key_press(egui::Key::Enter);
+    bad.harness.run_steps(2);
+    assert!(!bad.harness.state().contains(&Command::SetMode(crate::command::Mode::Look)));
+    let mut good = go_to("+2");
+    good.harness.key_press(egui::Key::Enter);
+    good.harness.run_steps(2);
+    assert!(good.harness.state().contains(&Command::Go(Go::Step(3))));
+}

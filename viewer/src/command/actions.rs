@@ -1,0 +1,202 @@
+//! Everything a person can ask for, by name: what the palette finds, with the keys that do the same.
+
+use sightline_track::trace::StepRow;
+
+use crate::command::table;
+use crate::command::{Command, Go, Stage};
+use crate::exports;
+use crate::figure::wish::{Kind, Wish};
+use crate::layout::command::LayoutCommand;
+use crate::layout::presets::Preset;
+use crate::pane::Pane;
+use crate::panels::digits;
+use crate::panels::sheets::of_panel;
+use crate::state::{State, events, run_letter};
+use crate::theme::Looks;
+
+/// How many findings the palette lists.
+const LISTED: usize = 12;
+
+/// One thing that can be asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Action {
+    /// What it does, in words that are looked for.
+    pub title: String,
+    /// The keys that do the same; empty without.
+    pub keys: String,
+    /// What it asks for.
+    pub command: Command,
+}
+
+/// An action without keys.
+fn action(title: impl Into<String>, command: Command) -> Action {
+    Action { title: title.into(), keys: String::new(), command }
+}
+
+/// The actions that match the words, best first.
+pub(crate) fn find(state: &State, words: &str) -> Vec<Action> {
+    let mut found = goes(state, words);
+    let wanted: Vec<String> = words.split_whitespace().map(str::to_lowercase).collect();
+    let mut ranked: Vec<(usize, Action)> = all(state)
+        .into_iter()
+        .filter_map(|action| rank(&action.title.to_lowercase(), &wanted).map(|rank| (rank, action)))
+        .collect();
+    ranked.sort_by_key(|(rank, _)| *rank);
+    found.extend(ranked.into_iter().map(|(_, action)| action));
+    found.truncate(LISTED);
+    found
+}
+
+/// Where the words begin in a title, added up; none where one of them is not in it.
+fn rank(title: &str, wanted: &[String]) -> Option<usize> {
+    wanted.iter().map(|word| title.find(word.as_str())).sum()
+}
+
+/// Going to the step that a number names.
+fn goes(state: &State, words: &str) -> Vec<Action> {
+    let step = words.trim().parse::<usize>().ok().filter(|step| *step < state.stop_count());
+    step.map(|step| Action {
+        keys: "G".to_owned(),
+        ..action(format!("Go to step {step}"), Command::Go(Go::Step(step)))
+    })
+    .into_iter()
+    .collect()
+}
+
+/// Every action there is at the moment.
+pub(crate) fn all(state: &State) -> Vec<Action> {
+    let mut all = of_table(state);
+    all.extend(moves(state));
+    all.extend(works(state));
+    all.extend(places(state));
+    all.extend(values(state));
+    all
+}
+
+/// The commands of the table that have a name.
+fn of_table(state: &State) -> Vec<Action> {
+    let named = table::all().filter(|entry| !entry.name.is_empty());
+    named
+        .map(|entry| Action {
+            title: entry.name.to_owned(),
+            keys: entry.keys(),
+            command: (entry.command)(state),
+        })
+        .collect()
+}
+
+fn moves(state: &State) -> Vec<Action> {
+    let mut all = Vec::new();
+    for step in state.run().map(events).unwrap_or_default() {
+        let row = state.row_at(step);
+        let word = row.map_or("fault", |row| if row.fault { "fault" } else { row.state.as_str() });
+        all.push(action(format!("Go to step {step}: {word}"), Command::Go(Go::Step(step))));
+    }
+    for &stage in Stage::of(state.tracker()) {
+        let title = format!("Stage {}: {}", stage.word(), stage.question());
+        all.push(action(title, Command::SelectStage(stage)));
+    }
+    all
+}
+
+fn works(state: &State) -> Vec<Action> {
+    let mut all = Vec::new();
+    for target in state.session.iter().flat_map(|session| &session.targets) {
+        for run in &target.runs {
+            let title = format!("Look at {}, run {}", target.label, run_letter(run.number));
+            all.push(action(title, Command::Look { target: target.number, run: run.number }));
+        }
+        all.push(action(format!("Remove {}", target.label), Command::RemoveTarget(target.number)));
+    }
+    for entry in state.traverses.iter().flatten() {
+        all.push(action(
+            format!("Open the traverse {}", entry.name),
+            Command::OpenTraverse(entry.id.clone()),
+        ));
+    }
+    all
+}
+
+fn places(state: &State) -> Vec<Action> {
+    let arrange = |command| Command::Layout(command);
+    let mut all: Vec<Action> = Preset::ALL
+        .into_iter()
+        .map(|preset| {
+            let command = arrange(LayoutCommand::Use(preset));
+            Action {
+                title: format!("Layout {}: {}", preset.title(), preset.purpose()),
+                keys: table::keys_of(state, &command),
+                command,
+            }
+        })
+        .collect();
+    all.extend(
+        Pane::ALL.map(|pane| action(format!("Show {}", pane.title()), arrange(LayoutCommand::Show(pane)))),
+    );
+    for pane in of_panel::panes() {
+        all.push(action(format!("{} as table, or as it was", pane.title()), Command::Table(pane)));
+    }
+    for pane in Pane::ALL {
+        all.extend(Kind::ALL.map(|kind| {
+            let title = format!("Save {} as {}", pane.title(), kind.word());
+            action(title, Command::Exports(exports::Ask::Figure(Wish { pane, kind })))
+        }));
+    }
+    all.extend(Looks::ALL.map(|looks| action(format!("Looks: {}", looks.title()), Command::SetLooks(looks))));
+    let settings = state.settings.iter().map(|info| {
+        let title = format!("Setting {}: {}", info.key, info.help);
+        action(title, arrange(LayoutCommand::Show(Pane::Settings)))
+    });
+    all.extend(settings);
+    all
+}
+
+/// The numbers of the cursor's step, which lead to the panel that plots them.
+fn values(state: &State) -> Vec<Action> {
+    let Some(row) = state.row() else { return Vec::new() };
+    let numbers = |row: &StepRow| {
+        [
+            ("ncc, score of the match", row.ncc, ""),
+            ("stereo_score", row.stereo_score, ""),
+            ("confidence", row.confidence, ""),
+            ("err_px, error in the image", row.err_px, " px"),
+            ("err_m, error in space", row.err_m, " m"),
+            ("sigma_m, largest axis of the covariance", row.sigma_m, " m"),
+            ("nees", row.nees, ""),
+            ("range_m, distance", row.range_m, " m"),
+            ("scale", row.scale, ""),
+            ("roll_deg", row.roll_deg, " deg"),
+        ]
+    };
+    let known = numbers(row).into_iter().filter_map(|(name, value, unit)| Some((name, value?, unit)));
+    known
+        .map(|(name, value, unit)| {
+            let title = format!("Value {name}: {}{unit} at step {}", digits(value), row.step);
+            action(title, Command::Layout(LayoutCommand::Show(Pane::Plots)))
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::fixture;
+
+    #[test]
+    fn all_words_must_be_there_and_the_earliest_come_first() {
+        let state = fixture::without_target();
+        let titles = |words: &str| find(&state, words).into_iter().map(|a| a.title).collect::<Vec<_>>();
+        assert_eq!(titles("next panel"), ["Next panel"]);
+        assert_eq!(titles("stereo layout")[0], "Layout Stereo: how the point was found in space");
+        assert!(titles("no such thing at all").is_empty());
+    }
+
+    #[test]
+    fn a_number_goes_to_that_step_and_one_too_large_goes_nowhere() {
+        let state = fixture::without_target();
+        assert_eq!(find(&state, "3")[0].command, Command::Go(Go::Step(3)));
+        assert!(
+            find(&state, "900").iter().all(|action| !matches!(action.command, Command::Go(Go::Step(900))))
+        );
+    }
+}

@@ -1,0 +1,104 @@
+//! The help sheet and the field in which a step is typed.
+
+use egui::{Id, Key, Modal, RichText, Ui};
+
+use crate::breakpoints::goto;
+use crate::command::{Command, Go, Mode};
+use crate::command::{keys, table};
+use crate::state::State;
+use crate::tour::Turn;
+use crate::{cache, theme};
+
+/// Shows the sheet or the field, whichever is open.
+pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    match &state.mode {
+        Mode::Help => sheet(ui, state, out),
+        Mode::GoTo(typed) => go_to(ui, state, typed, out),
+        Mode::Look | Mode::Pick | Mode::Palette(_) => {}
+    }
+}
+
+fn sheet(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let modal = Modal::new(Id::unique("help")).backdrop_color(theme::shade()).show(ui.ctx(), |ui| {
+        ui.set_width(470.0);
+        // What follows the list stays on the screen, however small that is.
+        let height = (ui.ctx().content_rect().height() - 260.0).max(120.0);
+        ui.label(theme::title("Keys and pointer"));
+        egui::ScrollArea::vertical().max_height(height).auto_shrink([false, true]).show(ui, key_list);
+        ui.add_space(6.0);
+        ui.label(theme::title("Conventions"));
+        for line in [
+            "Pixels: x right, y down; (0, 0) is the centre of the first pixel.",
+            "Rover frame: x forward, y right, z down. Site frame: x north, y east, z down.",
+            "Ellipses are 3σ in images, 1σ (solid) and 3σ (dashed) on the map.",
+            "Scores are viridis from −1 to 1; a checker is no data.",
+        ] {
+            ui.add(egui::Label::new(line).wrap());
+        }
+        ui.add_space(6.0);
+        let (used, limit) = (state.cache.bytes() >> 20, cache::LIMIT_BYTES >> 20);
+        ui.label(theme::note(format!(
+            "This page keeps up to {limit} MiB of steps and images; it holds {used} MiB now."
+        )));
+        ui.horizontal(|ui| {
+            if ui.button("Take the tour").clicked() {
+                out.extend([Command::SetMode(Mode::Look), Command::Tour(Turn::Begin)]);
+            }
+            ui.button("Close").clicked()
+        })
+        .inner
+    });
+    if modal.inner || modal.should_close() {
+        out.push(Command::SetMode(Mode::Look));
+    }
+}
+
+/// Every key with its meaning.
+fn key_list(ui: &mut Ui) {
+    egui::Grid::new("keys").num_columns(2).spacing([20.0, 3.0]).show(ui, |ui| {
+        for (keys, meaning) in table::sheet() {
+            ui.label(RichText::new(keys).monospace().color(theme::accent()));
+            ui.label(meaning);
+            ui.end_row();
+        }
+    });
+}
+
+fn go_to(ui: &mut Ui, state: &State, typed: &str, out: &mut Vec<Command>) {
+    // What was typed before the field had the focus would otherwise be lost.
+    let ahead = keys::typed_ahead(ui.ctx(), |c| !c.is_control());
+    // The letter that opened the field may come as text, too.
+    let ahead = if typed.is_empty() { ahead.trim_start_matches(['g', 'G']) } else { &ahead };
+    let mut text = format!("{typed}{ahead}");
+    let modal = Modal::new(Id::unique("go to")).backdrop_color(theme::shade()).show(ui.ctx(), |ui| {
+        ui.set_width(330.0);
+        ui.label(theme::title("Go to step"));
+        let field = ui.add(egui::TextEdit::singleline(&mut text).hint_text("12, +5, t=3.5, lost"));
+        field.accessible_name("go to step").request_focus();
+        let meant = state.step_meant(&text);
+        match &meant {
+            Ok(step) => ui.label(theme::note(format!("step {step}"))),
+            Err(_) if text.is_empty() => ui.add(egui::Label::new(theme::note(goto::FORMS)).wrap()),
+            Err(why) => ui.add(egui::Label::new(RichText::new(why).small().color(theme::lost())).wrap()),
+        };
+        ui.label(theme::note("Enter goes, Esc cancels"));
+        (ui.input(|input| input.key_pressed(Key::Enter)), meant)
+    });
+    match modal.inner {
+        // What is wrong stays on the screen, so that it can be mended.
+        (true, Err(_)) if !text.trim().is_empty() => {}
+        (true, meant) => {
+            out.extend(meant.ok().map(|step| Command::Go(Go::Step(step))));
+            out.push(Command::SetMode(Mode::Look));
+            return;
+        }
+        (false, _) if modal.should_close() => {
+            out.push(Command::SetMode(Mode::Look));
+            return;
+        }
+        (false, _) => {}
+    }
+    if text != typed {
+        out.push(Command::SetMode(Mode::GoTo(text)));
+    }
+}

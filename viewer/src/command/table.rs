@@ -1,0 +1,480 @@
+//! The table of user commands: name, icon, shortcuts and help text of each, in one place.
+//!
+//! Keyboard, help sheet, palette and tooltips are views of [`TABLE`]; a new command is one entry here. Commands that
+//! belong to data (a step, a run, a panel, a setting) are added to the palette by [`crate::command::actions`].
+
+use egui::{Key, Modifiers};
+
+use crate::breakpoints::play::Shuttle;
+use crate::command::{Command, Go, Mode, Search};
+use crate::compare;
+use crate::drawing::stretch::Stretch;
+use crate::layout::command::LayoutCommand;
+use crate::layout::presets::Preset;
+use crate::state::State;
+use crate::tour::Turn;
+use crate::trackability::limits;
+use crate::{breakpoints, exports, files, notes, why};
+
+/// A key with its modifiers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Shortcut {
+    /// The key.
+    pub key: Key,
+    /// Whether Ctrl (or Command) is held.
+    pub ctrl: bool,
+    /// Whether Shift is held; `None`: either way.
+    pub shift: Option<bool>,
+}
+
+impl Shortcut {
+    const fn plain(key: Key) -> Self {
+        Self { key, ctrl: false, shift: None }
+    }
+
+    const fn no_shift(key: Key) -> Self {
+        Self { key, ctrl: false, shift: Some(false) }
+    }
+
+    const fn shift(key: Key) -> Self {
+        Self { key, ctrl: false, shift: Some(true) }
+    }
+
+    const fn ctrl(key: Key) -> Self {
+        Self { key, ctrl: true, shift: Some(false) }
+    }
+
+    const fn ctrl_shift(key: Key) -> Self {
+        Self { key, ctrl: true, shift: Some(true) }
+    }
+
+    /// Whether `key` with `modifiers` is this shortcut.
+    pub(crate) fn matches(self, key: Key, modifiers: Modifiers) -> bool {
+        let has_ctrl = modifiers.ctrl || modifiers.command;
+        self.key == key
+            && self.ctrl == has_ctrl
+            && !modifiers.alt
+            && self.shift.is_none_or(|shift| shift == modifiers.shift)
+    }
+
+    /// The words on the help sheet and in tooltips, such as `Ctrl+S`.
+    pub(crate) fn words(self) -> String {
+        let key = match self.key {
+            Key::ArrowRight => "Right",
+            Key::ArrowLeft => "Left",
+            Key::ArrowUp => "Up",
+            Key::ArrowDown => "Down",
+            Key::PageUp => "PgUp",
+            Key::PageDown => "PgDn",
+            Key::Escape => "Esc",
+            Key::OpenBracket => "[",
+            Key::CloseBracket => "]",
+            Key::Backtick => "`",
+            Key::Questionmark => "?",
+            key => key.name(),
+        };
+        let ctrl = if self.ctrl { "Ctrl+" } else { "" };
+        let shift = if self.shift == Some(true) { "Shift+" } else { "" };
+        format!("{ctrl}{shift}{key}")
+    }
+}
+
+/// A command that the user can give by key or by name.
+#[derive(Clone, Copy)]
+pub(crate) struct UserCommand {
+    /// Name in the palette and in menus; empty: only a key gives the command.
+    pub name: &'static str,
+    /// Text of the button in the bars that gives the command; empty without such a button.
+    pub icon: &'static str,
+    /// Tooltip of that button, without the keys.
+    pub tip: &'static str,
+    /// Keys, the one that is shown first.
+    pub shortcuts: &'static [Shortcut],
+    /// What it asks for in this state.
+    pub command: fn(&State) -> Command,
+}
+
+impl UserCommand {
+    /// The shortcut that is shown; empty without one.
+    pub(crate) fn keys(&self) -> String {
+        self.shortcuts.first().map(|shortcut| shortcut.words()).unwrap_or_default()
+    }
+
+    /// The tooltip of its button: what it does, and the keys in brackets.
+    pub(crate) fn tooltip(&self) -> String {
+        self.with_keys(self.tip)
+    }
+
+    /// A text with the keys in brackets after it.
+    pub(crate) fn with_keys(&self, text: &str) -> String {
+        let keys = self.keys();
+        if keys.is_empty() { text.to_owned() } else { format!("{text} ({keys})") }
+    }
+}
+
+/// A line of the help sheet with the commands that it explains.
+#[derive(Clone, Copy)]
+pub(crate) struct Line {
+    /// The explanation on the help sheet; empty: the commands have no line there.
+    pub help: &'static str,
+    /// Keys or gestures that are no shortcut of a command; empty: the shortcuts of the commands are shown.
+    pub gesture: &'static str,
+    /// The commands.
+    pub commands: &'static [UserCommand],
+}
+
+impl Line {
+    /// Keys or gestures as the help sheet shows them.
+    pub(crate) fn keys(&self) -> String {
+        if self.gesture.is_empty() {
+            self.commands.iter().map(UserCommand::keys).collect::<Vec<_>>().join("  ")
+        } else {
+            self.gesture.to_owned()
+        }
+    }
+}
+
+impl UserCommand {
+    const fn new(name: &'static str, shortcuts: &'static [Shortcut], command: fn(&State) -> Command) -> Self {
+        Self { name, icon: "", tip: "", shortcuts, command }
+    }
+
+    const fn button(self, icon: &'static str, tip: &'static str) -> Self {
+        Self { icon, tip, ..self }
+    }
+}
+
+const fn line(help: &'static str, commands: &'static [UserCommand]) -> Line {
+    Line { help, gesture: "", commands }
+}
+
+const fn gesture(gesture: &'static str, help: &'static str) -> Line {
+    Line { help, gesture, commands: &[] }
+}
+
+use Shortcut as On;
+use UserCommand as Do;
+
+/// One step forward.
+pub(crate) const NEXT_STEP: Do =
+    Do::new("Next step", &[On::no_shift(Key::ArrowRight)], |_| Command::Go(Go::By(1)))
+        .button(">", "one step on");
+/// One step back.
+pub(crate) const PREVIOUS_STEP: Do =
+    Do::new("Previous step", &[On::no_shift(Key::ArrowLeft)], |_| Command::Go(Go::By(-1)))
+        .button("<", "one step back");
+/// To the first step.
+pub(crate) const FIRST_STEP: Do =
+    Do::new("First step", &[On::plain(Key::Home)], |_| Command::Go(Go::First)).button("|<", "first step");
+/// To the last step.
+pub(crate) const LAST_STEP: Do =
+    Do::new("Last step", &[On::plain(Key::End)], |_| Command::Go(Go::Last)).button(">|", "last step");
+/// To the next change of state.
+pub(crate) const NEXT_EVENT: Do =
+    Do::new("Next event", &[On::plain(Key::PageDown)], |_| Command::Go(Go::NextEvent))
+        .button(">>", "next event");
+/// To the previous change of state.
+pub(crate) const PREVIOUS_EVENT: Do =
+    Do::new("Previous event", &[On::plain(Key::PageUp)], |_| Command::Go(Go::PreviousEvent))
+        .button("<<", "previous event");
+/// Begins or ends the designation of a target.
+pub(crate) const PICK: Do = Do::new("Pick a target", &[On::plain(Key::T)], |state| {
+    Command::SetMode(if state.mode == Mode::Pick { Mode::Look } else { Mode::Pick })
+});
+/// Pins a note to what is shown.
+pub(crate) const PIN_NOTE: Do =
+    Do::new("Pin a note here", &[On::plain(Key::M)], |_| Command::Notes(notes::Ask::Pin));
+/// Takes the last change back.
+pub(crate) const UNDO: Do =
+    Do::new("Take the last deed back (undo)", &[On::ctrl(Key::Z)], |_| Command::Why(why::Ask::Undo));
+/// Opens the window of exports.
+pub(crate) const EXPORT: Do =
+    Do::new("Export: recording, tables, report, pictures", &[On::ctrl(Key::S)], |_| {
+        Command::Exports(exports::Ask::Open)
+    })
+    .button("Export", "Files, pictures, and any action as a command");
+/// Opens the window of files, sessions and drives.
+pub(crate) const OPEN: Do = Do::new("Open: a file, a recent session, a drive", &[On::ctrl(Key::O)], |_| {
+    Command::Files(files::Ask::Open)
+})
+.button("Open", "Files, recent sessions, drives");
+/// Opens the help sheet.
+pub(crate) const HELP: Do =
+    Do::new("Keys and conventions", &[On::plain(Key::Questionmark), On::shift(Key::Slash)], |_| {
+        Command::SetMode(Mode::Help)
+    })
+    .button("?", "Keys and conventions");
+/// Opens the palette.
+pub(crate) const PALETTE: Do = Do::new("Everything by name", &[On::ctrl(Key::K)], |_| {
+    Command::SetMode(Mode::Palette(Search::default()))
+});
+/// Copies the link to what is shown.
+pub(crate) const COPY_LINK: Do =
+    Do::new("Copy a link to this place", &[On::plain(Key::Y)], |_| Command::CopyLink);
+/// Opens the session in Rerun.
+pub(crate) const OPEN_RERUN: Do = Do::new("Open the session in Rerun", &[], |_| Command::OpenRerun)
+    .button("Open in Rerun", "Streams this session to a Rerun viewer in a new tab");
+/// Lets the current panel fill the page, or restores the others.
+pub(crate) const MAXIMISE: Do =
+    Do::new("Fill the page with the current panel", &[On::plain(Key::Backtick)], |_| {
+        Command::Layout(LayoutCommand::Maximise(None))
+    });
+
+/// Every user command, in the order of the help sheet.
+pub(crate) static TABLE: &[Line] = &[
+    line("next, previous step", &[NEXT_STEP, PREVIOUS_STEP]),
+    line(
+        "ten steps on, back",
+        &[
+            Do::new("Ten steps on", &[On::shift(Key::ArrowRight)], |_| Command::Go(Go::By(10))),
+            Do::new("Ten steps back", &[On::shift(Key::ArrowLeft)], |_| Command::Go(Go::By(-10))),
+        ],
+    ),
+    line("first, last step", &[FIRST_STEP, LAST_STEP]),
+    line("next, previous event (change of state)", &[NEXT_EVENT, PREVIOUS_EVENT]),
+    line(
+        "go to a step: 12, +5, last, t=3.5, or an event such as lost",
+        &[Do::new("Go to a step", &[On::plain(Key::G)], |_| Command::SetMode(Mode::GoTo(String::new())))],
+    ),
+    line("play, pause", &[Do::new("Play or pause", &[On::plain(Key::Space)], |_| shuttle(Shuttle::Toggle))]),
+    line(
+        "play backwards, stop, play forwards; again: twice as fast",
+        &[
+            Do::new("Play backwards", &[On::plain(Key::J)], |_| shuttle(Shuttle::Reverse)),
+            Do::new("Stop playing", &[On::plain(Key::K)], |_| shuttle(Shuttle::Stop)),
+            Do::new("Play forwards", &[On::plain(Key::L)], |_| shuttle(Shuttle::Forward)),
+        ],
+    ),
+    line(
+        "a loop begins, ends at this step",
+        &[
+            Do::new("Begin the loop here", &[On::plain(Key::OpenBracket)], |_| shuttle(Shuttle::LoopIn)),
+            Do::new("End the loop here", &[On::plain(Key::CloseBracket)], |_| shuttle(Shuttle::LoopOut)),
+        ],
+    ),
+    line(
+        "no loop any more",
+        &[Do::new("Remove the loop", &[On::plain(Key::Backspace)], |_| shuttle(Shuttle::ClearLoop))],
+    ),
+    line(
+        "next, previous hit of a breakpoint",
+        &[
+            Do::new("Breakpoints: next hit", &[On::no_shift(Key::N)], |_| {
+                Command::Ask(breakpoints::Ask::NextHit)
+            }),
+            Do::new("Breakpoints: previous hit", &[On::shift(Key::N)], |_| {
+                Command::Ask(breakpoints::Ask::PreviousHit)
+            }),
+        ],
+    ),
+    line(
+        "break at this step, or no longer",
+        &[Do::new("Breakpoints: break here, or no longer", &[On::no_shift(Key::B)], |state| {
+            Command::Ask(breakpoints::Ask::BreakAt(state.cursor.step))
+        })],
+    ),
+    line(
+        "break when: write a condition",
+        &[Do::new("Breakpoints: write a condition", &[On::shift(Key::B)], |_| {
+            Command::Ask(breakpoints::Ask::Focus)
+        })],
+    ),
+    gesture("Tab  Enter", "in the expression box: take the suggestion, set the breakpoint"),
+    gesture("Click above the timeline", "break at that step, or no longer"),
+    line(
+        "previous, next stage",
+        &[
+            Do::new("Stage before", &[On::plain(Key::ArrowUp)], |_| Command::StageBy(-1)),
+            Do::new("Stage after", &[On::plain(Key::ArrowDown)], |_| Command::StageBy(1)),
+        ],
+    ),
+    line("pick a target: then click in the left image", &[PICK]),
+    gesture("Arrows, Enter", "while picking: move the aim by 0.1 px (Shift 1 px), take it"),
+    gesture("Enter  Backspace  Esc", "in the tour: next, back, skip"),
+    line(
+        "run from this step with the changed settings, or as a branch with what is tried",
+        &[Do::new("Run from this step with the changed settings", &[On::plain(Key::R)], run_or_branch)],
+    ),
+    line(
+        "why: where the selected value came from",
+        &[Do::new("Why: where the selected value came from", &[On::plain(Key::W)], |_| {
+            Command::Why(why::Ask::Selected)
+        })],
+    ),
+    line(
+        "what would have saved this step",
+        &[Do::new("What would have saved this step?", &[On::plain(Key::C)], |_| {
+            Command::Why(why::Ask::Saved)
+        })],
+    ),
+    line(
+        "take the last deed back, do it again",
+        &[
+            UNDO,
+            Do::new("Do it again (redo)", &[On::ctrl(Key::Y), On::ctrl_shift(Key::Z)], |_| {
+                Command::Why(why::Ask::Redo)
+            }),
+        ],
+    ),
+    line(
+        "fit all images to their panels",
+        &[Do::new("Fit all images", &[On::plain(Key::F)], |_| Command::FitAll)],
+    ),
+    line("pin a note here", &[PIN_NOTE]),
+    line("export: files, pictures, commands", &[EXPORT]),
+    line("open: a file, a recent session, a drive; or drop a file on the page", &[OPEN]),
+    line(
+        "hide or show all marks",
+        &[Do::new("Hide or show all marks", &[On::plain(Key::H)], |_| Command::ToggleMarks)],
+    ),
+    line(
+        "stretch dark images automatically, or show them as recorded",
+        &[Do::new("Stretch dark images, or show them as recorded", &[On::plain(Key::I)], |state| {
+            Command::SetStretch(if state.stretch == Stretch::None { Stretch::Auto } else { Stretch::None })
+        })],
+    ),
+    line("cancel what was begun", &[Do::new("", &[On::plain(Key::Escape)], cancel)]),
+    line("this sheet", &[HELP]),
+    line("the palette: whatever can be asked for, by name", &[PALETTE]),
+    Line {
+        help: "arrangements of the panels, from the overview to the report",
+        gesture: "Shift+1 … Shift+7",
+        commands: &[
+            Do::new("", &[On::shift(Key::Num1)], |_| arrange(Preset::Overview)),
+            Do::new("", &[On::shift(Key::Num2)], |_| arrange(Preset::Match)),
+            Do::new("", &[On::shift(Key::Num3)], |_| arrange(Preset::Stereo)),
+            Do::new("", &[On::shift(Key::Num4)], |_| arrange(Preset::Map)),
+            Do::new("", &[On::shift(Key::Num5)], |_| arrange(Preset::Compare)),
+            Do::new("", &[On::shift(Key::Num6)], |_| arrange(Preset::Sweep)),
+            Do::new("", &[On::shift(Key::Num7)], |_| arrange(Preset::Report)),
+        ],
+    },
+    Line {
+        help: "next, previous panel; Tab goes on inside it",
+        gesture: "",
+        commands: &[
+            Do::new("Next panel", &[On::no_shift(Key::Q)], |_| Command::Layout(LayoutCommand::Panel(1))),
+            Do::new("Previous panel", &[On::shift(Key::Q)], |_| Command::Layout(LayoutCommand::Panel(-1))),
+        ],
+    },
+    line("let the panel fill the page, and again to restore", &[MAXIMISE]),
+    line("copy a link to what is looked at", &[COPY_LINK]),
+    gesture("Wheel", "zoom at the pointer"),
+    gesture("Drag", "pan"),
+    gesture("Double click", "fit the image or plot"),
+    line(
+        "first divergence of the compared runs: step and stage",
+        &[Do::new("Compare: first divergence", &[On::plain(Key::D)], |_| {
+            Command::Compare(compare::Ask::FirstDivergence)
+        })],
+    ),
+    line(
+        "next way of comparing the left image",
+        &[Do::new("Compare: next way of the left image", &[On::plain(Key::V)], |_| {
+            Command::Compare(compare::Ask::NextView)
+        })],
+    ),
+    gesture("X (hold)", "show the other run while the key is held"),
+    line(
+        "hold the target still in the left image",
+        &[Do::new("Hold the target still in the left image", &[On::plain(Key::S)], |_| {
+            Command::Compare(compare::Ask::Stabilise)
+        })],
+    ),
+    // Commands without a key are in the palette only.
+    line(
+        "",
+        &[
+            Do::new("Trackability: limits of the map", &[], |_| Command::Limits(limits::Ask::Open)),
+            Do::new("Take the changed settings back", &[], |_| Command::ClearDraft),
+            Do::new("Open the plain page of this step", &[], |_| Command::Exports(exports::Ask::PlainPage)),
+            OPEN_RERUN,
+            Do::new("Tour: six bubbles from a lost target to a saved one", &[], |_| {
+                Command::Tour(Turn::Begin)
+            }),
+        ],
+    ),
+];
+
+fn shuttle(what: Shuttle) -> Command {
+    Command::Ask(breakpoints::Ask::Shuttle(what))
+}
+
+fn arrange(preset: Preset) -> Command {
+    Command::Layout(LayoutCommand::Use(preset))
+}
+
+fn run_or_branch(state: &State) -> Command {
+    if state.trial().is_some() {
+        Command::Why(why::Ask::Branch)
+    } else {
+        Command::RunFromHere(state.draft.clone())
+    }
+}
+
+fn cancel(state: &State) -> Command {
+    if state.mode == Mode::Look && state.trial().is_some() {
+        Command::Why(why::Ask::Discard)
+    } else {
+        Command::SetMode(Mode::Look)
+    }
+}
+
+/// All commands of the table.
+pub(crate) fn all() -> impl Iterator<Item = &'static UserCommand> {
+    TABLE.iter().flat_map(|line| line.commands)
+}
+
+/// The command of a key.
+pub(crate) fn of_key(key: Key, modifiers: Modifiers) -> Option<&'static UserCommand> {
+    all().find(|entry| entry.shortcuts.iter().any(|shortcut| shortcut.matches(key, modifiers)))
+}
+
+/// The keys of a command as the palette shows them; empty without any.
+pub(crate) fn keys_of(state: &State, command: &Command) -> String {
+    let entry = all().find(|entry| !entry.shortcuts.is_empty() && (entry.command)(state) == *command);
+    entry.map(UserCommand::keys).unwrap_or_default()
+}
+
+/// The lines of the help sheet: keys or gestures, and the explanation.
+pub(crate) fn sheet() -> impl Iterator<Item = (String, &'static str)> {
+    TABLE.iter().filter(|line| !line.help.is_empty()).map(|line| (line.keys(), line.help))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_shortcut_has_two_commands() {
+        let shortcuts: Vec<(&str, Shortcut)> =
+            all().flat_map(|entry| entry.shortcuts.iter().map(|shortcut| (entry.name, *shortcut))).collect();
+        for (at, (name, a)) in shortcuts.iter().enumerate() {
+            for (other, b) in &shortcuts[..at] {
+                let is_shift_apart = a.shift.zip(b.shift).is_some_and(|(a, b)| a != b);
+                let is_same = a.key == b.key && a.ctrl == b.ctrl && !is_shift_apart;
+                assert!(!is_same, "{} gives {name:?} and {other:?}", a.words());
+            }
+        }
+    }
+
+    #[test]
+    fn names_in_the_palette_are_unique() {
+        let mut names: Vec<&str> = all().map(|entry| entry.name).filter(|name| !name.is_empty()).collect();
+        let count = names.len();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), count);
+    }
+
+    #[test]
+    fn the_sheet_shows_the_keys_that_act() {
+        let lines: Vec<(String, &str)> = sheet().collect();
+        let keys = |help: &str| lines.iter().find(|(_, of)| *of == help).unwrap().0.as_str();
+        assert_eq!(keys("next, previous step"), "Right  Left");
+        assert_eq!(keys("take the last deed back, do it again"), "Ctrl+Z  Ctrl+Y");
+        assert_eq!(keys("this sheet"), "?");
+        assert_eq!(keys("next, previous panel; Tab goes on inside it"), "Q  Shift+Q");
+        assert_eq!(lines.len(), 42);
+    }
+}

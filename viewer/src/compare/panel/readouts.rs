@@ -1,0 +1,167 @@
+//! The difference to the first compared run in every readout: Δ is this run less the other.
+
+use egui::{CollapsingHeader, Grid, RichText, Ui};
+use serde_json::Value;
+use sightline_session::compare::Difference;
+use sightline_session::compare::differ::{differences, told_apart, words_of};
+use sightline_track::stages::judge::Gate;
+use sightline_track::trace::{StepRow, StepTrace};
+
+use crate::compare::panel::{chip, mark};
+use crate::compare::state::Other;
+use crate::panels::digits;
+use crate::state::{State, state_of};
+use crate::theme;
+
+/// The most values of a stage that are listed.
+const VALUES_MAX: usize = 60;
+
+/// A signed number as differences are written.
+fn signed(value: f64) -> String {
+    if value == 0.0 {
+        "±0".to_owned()
+    } else {
+        format!("{}{}", if value > 0.0 { "+" } else { "−" }, digits(value.abs()))
+    }
+}
+
+/// The first compared run, where there is one.
+fn first(state: &State) -> Option<Other<'_>> {
+    state.others().into_iter().next()
+}
+
+/// Behind a value of the status line: its difference, in `unit`s.
+pub(crate) fn after(ui: &mut Ui, state: &State, name: &str) {
+    let Some(other) = first(state) else { return };
+    let Some(delta) =
+        state.row().zip(state.other_row(&other)).and_then(|(own, other)| delta(name, own, other))
+    else {
+        return;
+    };
+    let words = RichText::new(format!("Δ{}", signed(delta))).monospace().size(11.0).color(other.look.colour);
+    let help = format!("{name}: this run less {}", state.run_label(other.name));
+    ui.label(words).on_hover_text(help);
+}
+
+/// The difference of a value of the status line.
+fn delta(name: &str, own: &StepRow, other: &StepRow) -> Option<f64> {
+    let value = |row: &StepRow| match name {
+        "ncc" => row.ncc,
+        "inliers" => row.inliers.map(|count| count as f64),
+        "confidence" => row.confidence,
+        "err" => row.err_px,
+        "σ" => row.sigma_m.map(|sigma_m| sigma_m * 100.0),
+        _ => None,
+    };
+    Some(value(own)? - value(other)?)
+}
+
+/// At the end of the status line: the states of the compared runs.
+pub(crate) fn states(ui: &mut Ui, state: &State) {
+    for other in state.others() {
+        let row = state.other_row(&other);
+        let word = row.map_or_else(|| "not computed".to_owned(), |row| row.state.to_uppercase());
+        let colour = row.map_or(theme::weak(), |row| theme::state(state_of(row)));
+        mark(ui, other.look);
+        ui.label(RichText::new(word).strong().size(11.0).color(colour))
+            .on_hover_text(format!("the state of {} here", state.run_label(other.name)));
+    }
+}
+
+/// Below a gate: value, limit and verdict of the first compared run.
+pub(crate) fn gate(ui: &mut Ui, state: &State, gate: &Gate) {
+    let Some(other) = first(state) else { return };
+    let trace = state.other_trace(other.name).ready();
+    let found = trace.and_then(|trace| trace.verdict()?.gates.iter().find(|found| found.name == gate.name));
+    let label = state.run_label(other.name);
+    let words = match found {
+        None => format!("{label} has no such gate here"),
+        Some(found) => {
+            let by = |own: Option<f64>, other: Option<f64>| {
+                own.zip(other).map_or_else(|| "none".to_owned(), |(own, other)| signed(own - other))
+            };
+            let verdict = if found.passed { "passes" } else { "FAILS" };
+            let limit = by(Some(gate.limit), Some(found.limit));
+            let limit = if limit == "±0" { String::new() } else { format!(", limit Δ {limit}") };
+            format!("Δ vs {label}: {}{limit}; it {verdict} there", by(gate.value, found.value))
+        }
+    };
+    ui.horizontal(|ui| {
+        mark(ui, other.look);
+        ui.add(egui::Label::new(theme::note(words)).truncate());
+    });
+}
+
+/// In the inspector: the values of the selected stage, as `record` reads them, that differ from those of the first
+/// compared run.
+pub(crate) fn record(ui: &mut Ui, state: &State, record: impl Fn(&StepTrace) -> Option<Value>) {
+    let Some(other) = first(state) else { return };
+    let label = state.run_label(other.name);
+    let (own, there) = (state.trace(), state.other_trace(other.name).ready());
+    let (Some(own), Some(there)) = (own, there) else {
+        ui.horizontal(|ui| chip(ui, other.look, &format!("{label}: no record of this step yet")));
+        return;
+    };
+    let (own, there) = (record(own).unwrap_or_default(), record(there).unwrap_or_default());
+    let found = differences(&there, &own, &state.tolerance());
+    let title = match found.len() {
+        0 => format!("Δ vs {label}: alike ({})", state.compare.closeness.word()),
+        1 => format!("Δ vs {label}: 1 value differs"),
+        count => format!("Δ vs {label}: {count} values differ"),
+    };
+    ui.horizontal(|ui| chip(ui, other.look, &title));
+    if found.is_empty() {
+        return;
+    }
+    let header = CollapsingHeader::new(theme::note("the values that differ"))
+        .id_salt("differing")
+        .default_open(found.len() <= 12);
+    header.show(ui, |ui| {
+        Grid::new("differences").num_columns(4).spacing([8.0, 2.0]).show(ui, |ui| {
+            for (name, colour) in [
+                ("value", theme::weak()),
+                ("this", state.own_look().colour),
+                (label.as_str(), other.look.colour),
+                ("Δ", theme::weak()),
+            ] {
+                ui.label(RichText::new(name).small().color(colour));
+            }
+            ui.end_row();
+            found.iter().take(VALUES_MAX).for_each(|difference| row(ui, difference));
+        });
+        if found.len() > VALUES_MAX {
+            ui.label(theme::note(format!("and {} more", found.len() - VALUES_MAX)));
+        }
+    });
+    ui.separator();
+}
+
+/// One value: `a` is the other run's, `b` this one's.
+fn row(ui: &mut Ui, difference: &Difference) {
+    let [there, own] = told_apart(&difference.a, &difference.b);
+    let unit = &difference.unit;
+    let words = format!(
+        "{} {}",
+        words_of(&difference.path),
+        if unit.is_empty() { String::new() } else { format!("({unit})") }
+    );
+    ui.add(egui::Label::new(theme::label(words.trim_end()).size(11.5)).truncate())
+        .on_hover_text(&difference.path);
+    ui.label(theme::number(own).size(11.0));
+    ui.label(theme::number(there).size(11.0));
+    // Of a list it is a length, which has no sign.
+    let is_list = matches!(difference.a, Value::Array(_));
+    let delta = difference.delta.map(|delta| if is_list { digits(delta) } else { signed(delta) });
+    ui.label(theme::number(delta.unwrap_or_default()).size(11.0));
+    ui.end_row();
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::compare::panel::readouts::signed;
+
+    #[test]
+    fn a_difference_always_has_its_sign() {
+        assert_eq!([0.25, -0.25, 0.0].map(signed), ["+0.250", "−0.250", "±0"]);
+    }
+}

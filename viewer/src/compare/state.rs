@@ -1,0 +1,229 @@
+//! Runs that are compared with the one that is looked at: which, where they stand, and what the server says of them.
+
+use std::collections::BTreeMap;
+
+use egui::Color32;
+use sightline_geometry::frames::Pixel;
+use sightline_session::compare::{Alignment, Comparison, RUNS_MAX, RunName, Tolerance};
+use sightline_session::metrics::{Metric, RunMetrics};
+use sightline_session::view::{RunView, TargetView};
+use sightline_track::trace::{ArrayName, StepRow, StepTrace};
+
+use crate::cache::{Eye, Key, Slot, StepKey};
+use crate::drawing::overlay::{Mark, run_mark};
+use crate::drawing::raster::Raster;
+use crate::drawing::view2d::View2d;
+use crate::state::{State, row_of, run_letter};
+use crate::theme;
+
+/// Magnification at which a held target is shown where the person chose none.
+const HELD_SCALE: f64 = 4.0;
+
+/// How a compared run is marked everywhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look {
+    /// Its colour.
+    pub colour: Color32,
+    /// Its shape.
+    pub mark: Mark,
+}
+
+/// A run that the one looked at is compared with.
+#[derive(Clone, Copy)]
+pub struct Other<'a> {
+    /// Which run it is.
+    pub name: RunName,
+    /// Its target.
+    pub target: &'a TargetView,
+    /// The run.
+    pub run: &'a RunView,
+    /// How it is marked.
+    pub look: Look,
+}
+
+impl State {
+    /// The run that is looked at.
+    pub fn own_name(&self) -> Option<RunName> {
+        self.run().and(self.cursor.target).map(|target| RunName { target, run: self.cursor.run })
+    }
+
+    /// The run of that name, with its target.
+    pub(crate) fn run_named(&self, name: RunName) -> Option<(&TargetView, &RunView)> {
+        let target = self.session.as_ref()?.targets.iter().find(|target| target.number == name.target)?;
+        Some((target, target.runs.iter().find(|run| run.number == name.run)?))
+    }
+
+    /// All runs of the session.
+    pub(crate) fn all_runs(&self) -> impl Iterator<Item = (RunName, &TargetView, &RunView)> {
+        let targets = self.session.iter().flat_map(|session| &session.targets);
+        targets.flat_map(|target| {
+            target
+                .runs
+                .iter()
+                .map(move |run| (RunName { target: target.number, run: run.number }, target, run))
+        })
+    }
+
+    /// What a run is called: its letter, and its target where that is not the one looked at.
+    pub(crate) fn run_label(&self, name: RunName) -> String {
+        let letter = run_letter(name.run);
+        match self.run_named(name) {
+            Some((target, _)) if Some(name.target) != self.cursor.target => {
+                format!("{} · run {letter}", target.label)
+            }
+            _ => format!("run {letter}"),
+        }
+    }
+
+    /// The runs that the one looked at is compared with. Each keeps the mark of its number where no run before it has it.
+    pub fn others(&self) -> Vec<Other<'_>> {
+        let Some(own) = self.own_name() else { return Vec::new() };
+        let mut taken = vec![own.run % RUNS_MAX];
+        let mut others = Vec::new();
+        for &name in self.compare.others.iter().filter(|&&name| name != own) {
+            let Some((target, run)) = self.run_named(name) else { continue };
+            let number = (0..RUNS_MAX).map(|i| (name.run + i) % RUNS_MAX).find(|n| !taken.contains(n));
+            let number = number.unwrap_or(name.run);
+            taken.push(number);
+            let look = Look { colour: theme::run(number), mark: run_mark(number) };
+            others.push(Other { name, target, run, look });
+        }
+        others
+    }
+
+    /// How the run that is looked at is marked.
+    pub fn own_look(&self) -> Look {
+        Look { colour: theme::run(self.cursor.run), mark: run_mark(self.cursor.run) }
+    }
+
+    /// Whether there is a run to compare with.
+    pub fn is_comparing(&self) -> bool {
+        self.own_name().is_some_and(|own| {
+            self.compare.others.iter().any(|&name| name != own && self.run_named(name).is_some())
+        })
+    }
+
+    /// What the server says of the comparison, once it has.
+    pub fn comparison(&self) -> Option<&Comparison> {
+        let (asked, answer) = self.compare.answer.as_ref()?;
+        // An answer about other runs would be taken for one about these.
+        (Some(&asked.new.runs) == self.compared_names().as_ref() && asked.new.align == self.compare.align)
+            .then_some(answer.as_ref().ok())
+            .flatten()
+    }
+
+    /// Why there is no comparison, where the server refused one.
+    pub fn comparison_problem(&self) -> Option<&str> {
+        self.compare.answer.as_ref().and_then(|(_, answer)| answer.as_ref().err()).map(String::as_str)
+    }
+
+    /// The run looked at and those compared with it.
+    pub(crate) fn compared_names(&self) -> Option<Vec<RunName>> {
+        let own = self.own_name()?;
+        let names: Vec<RunName> =
+            std::iter::once(own).chain(self.others().iter().map(|other| other.name)).collect();
+        (names.len() > 1).then_some(names)
+    }
+
+    /// The stop of another run that stands beside a stop of this one.
+    pub fn beside(&self, other: RunName, step: usize) -> Option<usize> {
+        if self.compare.align == Alignment::Step {
+            return Some(step);
+        }
+        let (comparison, at) = self.place_of(other)?;
+        comparison.moments.iter().find(|moment| moment.steps[0] == Some(step))?.steps[at]
+    }
+
+    /// The stop of this run beside which a stop of another one stands.
+    pub fn own_beside(&self, other: RunName, step: usize) -> Option<usize> {
+        if self.compare.align == Alignment::Step {
+            return Some(step);
+        }
+        let (comparison, at) = self.place_of(other)?;
+        comparison.moments.iter().find(|moment| moment.steps[at] == Some(step))?.steps[0]
+    }
+
+    fn place_of(&self, other: RunName) -> Option<(&Comparison, usize)> {
+        let comparison = self.comparison()?;
+        Some((comparison, comparison.runs.iter().position(|&name| name == other)?))
+    }
+
+    /// The line of another run beside the cursor's step.
+    pub(crate) fn other_row(&self, other: &Other<'_>) -> Option<&StepRow> {
+        let (_, run) = self.run_named(other.name)?;
+        row_of(run, self.beside(other.name, self.cursor.step)?)
+    }
+
+    pub(crate) fn other_key(&self, other: RunName, step: usize) -> Option<StepKey> {
+        let session = self.session.as_ref()?.id.clone();
+        Some(StepKey { session, target: other.target, run: other.run, step })
+    }
+
+    /// The record of another run beside the cursor's step.
+    pub fn other_trace(&self, other: RunName) -> Slot<'_, StepTrace> {
+        let step = self.beside(other, self.cursor.step);
+        let key = step.and_then(|step| self.other_key(other, step));
+        key.map_or(Slot::Absent, |key| self.cache.trace(&key))
+    }
+
+    /// An array of another run beside the cursor's step.
+    pub(crate) fn other_array(&self, other: RunName, name: ArrayName) -> Slot<'_, Raster> {
+        let step = self.beside(other, self.cursor.step);
+        let key = step.and_then(|step| self.other_key(other, step)).map(|key| Key::Array(key, name));
+        key.map_or(Slot::Absent, |key| self.cache.raster(&key))
+    }
+
+    /// The left image of another run's stop.
+    pub(crate) fn other_image(&self, other: RunName) -> Slot<'_, Raster> {
+        let step = self.beside(other, self.cursor.step);
+        let key = step.and_then(|step| self.image_key(step, Eye::Left));
+        key.map_or(Slot::Absent, |key| self.cache.raster(&key))
+    }
+
+    /// From which difference on values count as different.
+    pub fn tolerance(&self) -> Tolerance {
+        Tolerance::new(&self.tolerances()).unwrap_or_default()
+    }
+
+    /// How far values may be apart and still count as alike, by unit.
+    pub(crate) fn tolerances(&self) -> BTreeMap<String, f64> {
+        self.compare.closeness.tolerances().iter().map(|(unit, value)| ((*unit).to_owned(), *value)).collect()
+    }
+
+    /// The metrics of a run, once they are here.
+    pub fn metrics(&self, name: RunName) -> Option<&RunMetrics> {
+        self.compare.metrics.get(&name)?.1.as_ref().ok()
+    }
+
+    /// Why a run's metrics cannot be shown.
+    pub(crate) fn metrics_problem(&self, name: RunName) -> Option<&str> {
+        self.compare.metrics.get(&name)?.1.as_ref().err().map(String::as_str)
+    }
+
+    /// One metric of a run.
+    pub fn metric(&self, name: RunName, metric: &str) -> Option<&Metric> {
+        self.metrics(name)?.metrics.iter().find(|found| found.name == metric)
+    }
+
+    /// The view of the left image: about the target where that is held still.
+    pub(crate) fn held_view(&self, view: View2d, trace: Option<&StepTrace>) -> View2d {
+        match trace.and_then(place_of_target).filter(|_| self.compare.is_held) {
+            Some(centre) => View2d::At { centre, scale: scale_of(view) },
+            None => view,
+        }
+    }
+}
+
+/// Where a run sees the target: the match, or else the prediction.
+pub(crate) fn place_of_target(trace: &StepTrace) -> Option<Pixel> {
+    let located = trace.located().filter(|_| !trace.update.state.is_lost()).and_then(|l| l.left_pixel);
+    located.or(trace.point_mast.predicted_left)
+}
+
+/// The magnification of a view; of a fitted one that at which a target is looked at.
+pub(crate) fn scale_of(view: View2d) -> f64 {
+    match view {
+        View2d::Fit => HELD_SCALE,
+        View2d::At { scale, .. } => scale,
+    }
+}

@@ -1,0 +1,209 @@
+//! What is asked of the server about compared runs, what it answers, and what the person asks for.
+
+use sightline_api::wire::Problem;
+use sightline_session::Cursor;
+use sightline_session::compare::{Comparison, NewComparison, RUNS_MAX, RunName};
+use sightline_session::metrics::RunMetrics;
+
+use crate::cache::{Eye, Key};
+use crate::command::{Command, Go, Stage};
+use crate::compare::{Ask, Asked, Compare};
+use crate::net::request::Request;
+use crate::state::{State, row_of};
+
+/// Requests for metrics that are under way at a time.
+const METRICS_AT_A_TIME: usize = 2;
+
+impl State {
+    /// Asks for what comparing needs and is not known.
+    pub(crate) fn sync_compare(&mut self, session: &str) {
+        self.ask_for_comparison(session);
+        self.ask_for_metrics(session);
+    }
+
+    fn ask_for_comparison(&mut self, session: &str) {
+        let Some(runs) = self.compared_names() else { return };
+        let rows =
+            runs.iter().map(|&name| self.run_named(name).map_or(0, |(_, run)| run.rows.len())).collect();
+        let (align, tolerance) = (self.compare.align, self.tolerances());
+        // Values come from the records; asked for are only the alignment, the first divergence and the settings.
+        let new = NewComparison { runs, align, tolerance, columns: Some(Vec::new()) };
+        let asked = Asked { session: session.to_owned(), new, rows };
+        let is_known = self.compare.answer.as_ref().is_some_and(|(known, _)| *known == asked);
+        if is_known || self.compare.under_way.is_some() {
+            return;
+        }
+        self.outbox
+            .push(Request::Compare { session: asked.session.clone(), new: Box::new(asked.new.clone()) });
+        self.compare.under_way = Some(asked);
+    }
+
+    fn ask_for_metrics(&mut self, session: &str) {
+        if !self.compare.wants_metrics {
+            return;
+        }
+        let missing: Vec<(RunName, usize)> = self
+            .all_runs()
+            .map(|(name, _, run)| (name, run.rows.len()))
+            .filter(|(name, rows)| {
+                let known = self.compare.metrics.get(name).is_some_and(|(known, _)| known == rows);
+                *rows > 0 && !known && !self.compare.metrics_asked.contains_key(name)
+            })
+            .take(METRICS_AT_A_TIME.saturating_sub(self.compare.metrics_asked.len()))
+            .collect();
+        for (run, rows) in missing {
+            self.compare.metrics_asked.insert(run, rows);
+            self.outbox.push(Request::Metrics { session: session.to_owned(), run });
+        }
+    }
+
+    /// Takes in a comparison, or why there is none.
+    pub(crate) fn took_comparison(&mut self, request: &Request, outcome: Result<Comparison, &Problem>) {
+        let is_meant = |asked: &mut Asked| matches!(request, Request::Compare { session, new } if *session == asked.session && **new == asked.new);
+        let Some(asked) = self.compare.under_way.take_if(is_meant) else { return };
+        self.compare.answer = Some((asked, outcome.map_err(|problem| problem.detail.clone())));
+        if std::mem::take(&mut self.compare.jumps) {
+            self.go_to_first_divergence();
+        }
+    }
+
+    /// Takes in the metrics of a run, or why there are none.
+    pub(crate) fn took_metrics(&mut self, run: RunName, outcome: Result<RunMetrics, &Problem>) {
+        if let Some(rows) = self.compare.metrics_asked.remove(&run) {
+            self.compare.metrics.insert(run, (rows, outcome.map_err(|problem| problem.detail.clone())));
+        }
+    }
+
+    /// Forgets what belongs to another session, or may have been missed while the server was gone.
+    pub(crate) fn forget_comparisons(&mut self, is_other_session: bool) {
+        if is_other_session {
+            let (wants_metrics, view) = (self.compare.wants_metrics, self.compare.view);
+            self.compare = Compare { wants_metrics, view, ..Compare::default() };
+        } else {
+            (self.compare.answer, self.compare.under_way) = (None, None);
+            self.compare.metrics_asked.clear();
+        }
+    }
+
+    /// Keeps the comparison when another run is looked at: the one looked at before takes its place.
+    pub(crate) fn looked_elsewhere(&mut self, before: Option<RunName>, now: Cursor) {
+        let now = now.target.map(|target| RunName { target, run: now.run });
+        let place = self.compare.others.iter().position(|&name| Some(name) == now);
+        match (place, before.filter(|&name| Some(name) != now)) {
+            (Some(place), Some(before)) => self.compare.others[place] = before,
+            (Some(place), None) => drop(self.compare.others.remove(place)),
+            (None, _) => {}
+        }
+    }
+
+    /// Carries out what was asked for.
+    pub(crate) fn ask_compare(&mut self, ask: Ask) {
+        match ask {
+            Ask::With { place, run } => self.compare_with(place, run),
+            Ask::Toggle(name) => match self.compare.others.iter().position(|&other| other == name) {
+                Some(place) => self.compare_with(place, None),
+                None => self.compare_with(self.compare.others.len(), Some(name)),
+            },
+            Ask::View(view) => self.compare.view = view,
+            Ask::NextView if self.is_comparing() => {
+                self.compare.view = self.compare.view.next();
+                let view = self.compare.view;
+                self.messages.note(format!("Comparing by {}: {}.", view.word(), view.help()));
+            }
+            Ask::NextView => self.say_how_to_compare(),
+            Ask::Align(align) => self.compare.align = align,
+            Ask::Closeness(closeness) => self.compare.closeness = closeness,
+            Ask::FirstDivergence => self.go_to_first_divergence(),
+            Ask::Blink(is_blinking) => self.compare.is_blinking = is_blinking,
+            Ask::Wipe(at) => self.compare.wipe = Some(at.clamp(0.0, 1.0)),
+            Ask::Stabilise => self.compare.is_held = !self.compare.is_held,
+            Ask::OnionSkin => self.compare.has_onion_skin = !self.compare.has_onion_skin,
+            Ask::Baseline(name) => {
+                let is_baseline = self.compare.baseline == Some(name);
+                self.compare.baseline = (!is_baseline).then_some(name);
+            }
+            Ask::Sort(sort) => self.compare.sort = sort,
+            Ask::Filter(words) => self.compare.filter = words,
+            Ask::Visit { run, step } => {
+                self.perform(Command::Look { target: run.target, run: run.run });
+                self.perform(Command::Go(Go::Step(step)));
+            }
+        }
+    }
+
+    fn say_how_to_compare(&mut self) {
+        let hint =
+            "Choose a run beside “vs” in the top bar. A second run comes from “Run from here” in Settings.";
+        self.messages.problem("There is no run to compare with yet.", Some(hint.to_owned()));
+    }
+
+    fn compare_with(&mut self, place: usize, run: Option<RunName>) {
+        let others = &mut self.compare.others;
+        match run {
+            None if place < others.len() => drop(others.remove(place)),
+            None => {}
+            Some(name) => {
+                let was = others.iter().position(|&other| other == name);
+                if let Some(was) = was.filter(|&was| was != place) {
+                    others.remove(was);
+                }
+                let place = place.min(others.len());
+                if place < others.len() {
+                    others[place] = name;
+                } else if others.len() + 1 < RUNS_MAX {
+                    others.push(name);
+                } else {
+                    let hint = Some("Take one of them out first.".to_owned());
+                    self.messages.problem(format!("At most {RUNS_MAX} runs can be compared."), hint);
+                }
+            }
+        }
+    }
+
+    fn go_to_first_divergence(&mut self) {
+        if !self.is_comparing() {
+            self.say_how_to_compare();
+            return;
+        }
+        if let Some(problem) = self.comparison_problem().map(str::to_owned) {
+            self.messages.problem(problem, None);
+            return;
+        }
+        let other = self.others().first().map(|other| other.name);
+        let found = self
+            .comparison()
+            .and_then(|found| found.first.iter().find(|first| Some(first.run) == other))
+            .cloned();
+        let Some(found) = found else {
+            self.compare.jumps = true;
+            self.messages.note("Comparing the runs …");
+            return;
+        };
+        let labels =
+            [self.own_name(), other].map(|name| name.map_or_else(String::new, |name| self.run_label(name)));
+        let [own, other] = labels;
+        self.messages.note(format!("{own} and {other} {}.", found.sentence));
+        let Some(divergence) = found.divergence else { return };
+        self.cursor.step = divergence.step.min(self.stop_count().saturating_sub(1));
+        let word = divergence.part.unwrap_or(divergence.stage);
+        let stage = Stage::of(self.tracker()).iter().find(|stage| stage.word() == word);
+        self.stage = stage.copied().unwrap_or(Stage::Locate);
+    }
+
+    /// What the compared runs need at a step: their records, and the arrays that are shown beside each other.
+    pub(crate) fn want_compared(&self, keys: &mut Vec<Key>) {
+        let step = self.cursor.step;
+        for other in self.others() {
+            // The neighbours' records are small; arrays are fetched for the step that is looked at alone.
+            for near in [Some(step), step.checked_add(1), step.checked_sub(1)].into_iter().flatten() {
+                let there = self.beside(other.name, near).filter(|&step| row_of(other.run, step).is_some());
+                let Some(there) = there else { continue };
+                keys.extend(self.other_key(other.name, there).map(Key::Trace));
+                if near == step {
+                    keys.extend(self.image_key(there, Eye::Left));
+                    keys.extend(self.other_key(other.name, there).map(Key::Arrays));
+                }
+            }
+        }
+    }
+}

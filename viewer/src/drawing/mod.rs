@@ -1,0 +1,16 @@
+//! Images and marks on the screen.
+//!
+//! | file | contents |
+//! |---|---|
+//! | `raster`, `stretch` | images and arrays as textures, and the stretching of grey values |
+//! | `view2d` | the zoomable canvas |
+//! | `overlay`, `ellipse`, `contour` | marks on the canvas |
+//! | `decimate` | the points of a long drive that are worth drawing |
+
+pub(crate) mod view2d;
+pub(crate) mod overlay;
+pub(crate) mod ellipse;
+pub(crate) mod contour;
+pub(crate) mod raster;
+pub(crate) mod stretch;
+pub(crate) mod decimate;

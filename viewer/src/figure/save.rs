@@ -1,0 +1,170 @@
+//! The figure of a panel: as it is on the screen, or, where it is not, drawn apart at a size of its own; with a line
+//! that says what it is of, where that is wanted; as a file with a name that says the same.
+
+use egui::epaint::{ClippedShape, TextShape};
+use egui::{Context, FontDefinitions, Frame, LayerId, Margin, RawInput, Rect, Stroke, Vec2, pos2, vec2};
+
+use crate::figure::wish::{Kind, Wish};
+use crate::figure::{Figure, Form, Ink, Piece, bitmap, shapes, svg, words};
+use crate::layout::show_pane;
+use crate::pane::Pane;
+use crate::state::{State, run_letter};
+use crate::theme;
+
+/// Size of the figure of a panel that is not on the screen, points.
+const APART: Vec2 = vec2(720.0, 480.0);
+/// Frames that are painted of it: the first ones only measure.
+const FRAMES: usize = 3;
+/// Room around the words of the line above a figure, points.
+const ROOM: f32 = 5.0;
+
+/// A figure as a file.
+#[derive(Clone, Debug)]
+pub(crate) struct File {
+    /// Its name.
+    pub name: String,
+    /// What it is, for a browser.
+    pub media_type: &'static str,
+    /// Its contents.
+    pub bytes: Vec<u8>,
+    /// What is to be said of it.
+    pub sentence: String,
+}
+
+/// Makes the file; `places` are the panels on the screen, points.
+///
+/// # Errors
+/// A sentence when it would be too large.
+pub(crate) fn take(
+    context: &Context,
+    state: &State,
+    places: &[(Pane, Rect)],
+    wish: Wish,
+) -> Result<File, String> {
+    let scale = if let Kind::Png(scale) = wish.kind { scale } else { 1 };
+    let place = places.iter().find(|(pane, _)| *pane == wish.pane).map(|(_, place)| *place);
+    let figure = match place {
+        Some(place) => of_layer(context, state, place, f32::from(scale)),
+        None => apart(state, wish.pane, f32::from(scale)),
+    };
+    let figure = named(context, state, wish.pane, figure);
+    let fonts = fonts(context);
+    let (bytes, size, media_type) = match wish.kind {
+        Kind::Svg => {
+            let size = format!("{:.0} × {:.0} points", figure.size.x, figure.size.y);
+            (svg::text(&figure)?.into_bytes(), size, "image/svg+xml")
+        }
+        Kind::Png(scale) => {
+            let [width, height] = bitmap::size_px(&figure, scale)?;
+            (bitmap::png(&figure, scale, &fonts)?, format!("{width} × {height} px"), "image/png")
+        }
+    };
+    let name = file_name(state, wish);
+    let mut sentence = format!("Saved {name}: {size}, {} kB.", bytes.len().div_ceil(1000));
+    if place.is_none() {
+        sentence +=
+            &format!(" {} is not on the screen: it was drawn apart, with what is loaded.", wish.pane.title());
+    }
+    if figure.left_out > 0 {
+        sentence += &format!(" {} shapes could not be taken over.", figure.left_out);
+    }
+    Ok(File { name, media_type, bytes, sentence })
+}
+
+/// What the fonts are.
+pub(crate) fn fonts(context: &Context) -> FontDefinitions {
+    context.fonts(|fonts| fonts.definitions().clone())
+}
+
+/// What is painted inside a rectangle of the layer of the panels.
+pub(crate) fn of_layer(context: &Context, state: &State, place: Rect, scale: f32) -> Figure {
+    let painted: Vec<ClippedShape> = context.graphics(|layers| {
+        layers
+            .get(LayerId::background())
+            .map(|list| list.all_entries().cloned().collect())
+            .unwrap_or_default()
+    });
+    shapes::figure(&painted, place, scale, &|id| state.pixels_of(id))
+}
+
+/// A panel painted where nobody sees it.
+fn apart(state: &State, pane: Pane, scale: f32) -> Figure {
+    let context = Context::default();
+    theme::apply(&context, state.looks);
+    let screen = Rect::from_min_size(pos2(0.0, 0.0), APART);
+    let mut painted = Vec::new();
+    for _ in 0..FRAMES {
+        let input = RawInput { screen_rect: Some(screen), ..RawInput::default() };
+        let mut output = context.run_ui(input, |ui| {
+            let ground = Frame::new().fill(theme::panel()).inner_margin(Margin::same(theme::MARGIN));
+            ground.show(ui, |ui| {
+                // What it asks for is nobody's wish.
+                show_pane(ui, pane, state, &mut Vec::new());
+                ui.take_available_space();
+            });
+        });
+        output.textures_delta.clear();
+        painted = output.shapes;
+    }
+    shapes::figure(&painted, screen, scale, &|id| state.pixels_of(id))
+}
+
+/// The figure with its title and description, and the line above it where that is wanted.
+fn named(context: &Context, state: &State, pane: Pane, mut figure: Figure) -> Figure {
+    let of = place_words(state);
+    figure.title = if of.is_empty() { pane.title().to_owned() } else { format!("{}: {of}", pane.title()) };
+    let session =
+        state.session.as_ref().map(|session| format!(" Session {}.", session.id)).unwrap_or_default();
+    let row = state.row().map(|row| format!(" The target is {}.", row.state)).unwrap_or_default();
+    figure.description = format!("The panel “{}” of Sightline.{session}{row}", pane.title());
+    if state.exports.burns_in {
+        let words = figure.title.clone();
+        figure = under_a_line(context, figure, words);
+    }
+    figure
+}
+
+/// Drive, target, run and step.
+pub(crate) fn place_words(state: &State) -> String {
+    let Some(traverse) = &state.traverse else { return String::new() };
+    let run = state.target().map(|target| format!(", {} run {}", target.label, run_letter(state.cursor.run)));
+    let last = state.stop_count().saturating_sub(1);
+    format!("{}{}, step {} of {last}", traverse.name, run.unwrap_or_default(), state.cursor.step)
+}
+
+/// Puts a line of words above a figure.
+fn under_a_line(context: &Context, figure: Figure, words: String) -> Figure {
+    let width = (figure.size.x - 2.0 * ROOM).max(40.0);
+    let (font, colour) = (theme::image_font(), theme::text());
+    let galley = context.fonts_mut(|fonts| fonts.layout(words, font, colour, width));
+    let height = (galley.size().y + 2.0 * ROOM).round();
+    let line = Rect::from_min_size(pos2(0.0, 0.0), vec2(figure.size.x, height));
+    let ground = Ink::Area { form: Form::Rect(line, [0.0; 4]), fill: theme::bar(), stroke: Stroke::NONE };
+    let text = TextShape::new(pos2(ROOM, ROOM), galley, colour);
+    let above = std::iter::once(ground).chain(words::inks(&text)).map(|ink| Piece { clip: line, ink });
+    let down = vec2(0.0, height);
+    let moved = |piece: Piece| Piece { clip: piece.clip.translate(down), ink: piece.ink.moved(down) };
+    let pieces = above.chain(figure.pieces.into_iter().map(moved)).collect();
+    Figure { size: figure.size + down, pieces, ..figure }
+}
+
+/// A file's name: session, target, run, step, panel, and the scale of a picture.
+pub(crate) fn file_name(state: &State, wish: Wish) -> String {
+    let mut parts = vec!["sightline".to_owned()];
+    parts.extend(state.session.as_ref().map(|session| session.id.clone()));
+    if let Some(target) = state.cursor.target {
+        parts.push(format!("target-{target}-run-{}", run_letter(state.cursor.run)));
+    }
+    if state.session.is_some() {
+        parts.push(format!("step-{}", state.cursor.step));
+    }
+    parts.push(wish.pane.title().to_owned());
+    let ending = match wish.kind {
+        Kind::Svg => ".svg".to_owned(),
+        Kind::Png(scale) => format!("-{scale}x.png"),
+    };
+    let name = parts.join("-").to_lowercase();
+    let plain: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
+    let words: Vec<&str> = plain.split('-').filter(|word| !word.is_empty()).collect();
+    words.join("-") + &ending
+}

@@ -1,0 +1,121 @@
+//! Files on their way into the page: dropped on it, chosen in the browser's dialog, or named by their path.
+//!
+//! Name and size are judged before a byte is read, so that a file of a gigabyte costs nothing. What was read, or the sentence
+//! why not, arrives through a channel.
+
+use std::sync::mpsc::{Receiver, Sender, channel};
+
+use egui::Context;
+
+use crate::files::documents;
+
+/// What came of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Arrival {
+    /// It is not read, and why.
+    Refused(String),
+    /// Its contents.
+    Read {
+        /// Its name.
+        name: String,
+        /// Its bytes.
+        bytes: Vec<u8>,
+    },
+}
+
+/// Where files arrive.
+pub(crate) struct Inbox {
+    sender: Sender<Arrival>,
+    receiver: Receiver<Arrival>,
+    context: Context,
+}
+
+impl Inbox {
+    /// Nothing has arrived; `context` is woken when something does.
+    pub(crate) fn new(context: Context) -> Self {
+        let (sender, receiver) = channel();
+        Self { sender, receiver, context }
+    }
+
+    /// What arrived since the last time, with what was dropped in this frame.
+    pub(crate) fn poll(&mut self) -> Vec<Arrival> {
+        let dropped = self.context.input(|input| input.raw.dropped_files.clone());
+        let names: Vec<String> = dropped.iter().map(|file| name_of(file.path())).collect();
+        match documents::only_one(&names) {
+            Err(why) => self.refuse(why),
+            Ok(()) => dropped.iter().for_each(|file| self.take(file)),
+        }
+        self.receiver.try_iter().collect()
+    }
+
+    /// Whether files are being dragged over the page.
+    pub(crate) fn is_hovered(&self) -> bool {
+        self.context.input(|input| !input.raw.hovered_files.is_empty())
+    }
+
+    fn refuse(&self, why: String) {
+        tell(&self.sender, &self.context, Arrival::Refused(why));
+    }
+}
+
+/// Hands something over and wakes the page; without a receiver the page is closing, and nobody waits for it.
+fn tell(sender: &Sender<Arrival>, context: &Context, arrival: Arrival) {
+    if sender.send(arrival).is_ok() {
+        context.request_repaint();
+    }
+}
+
+fn name_of(path: &std::path::Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}
+
+#[cfg(not(target_arch = "wasm32"))]
+impl Inbox {
+    fn take(&self, file: &egui::DroppedFileHandle) {
+        self.open_path(file.path());
+    }
+
+    /// Reads a file by its path.
+    pub(crate) fn open_path(&self, path: &std::path::Path) {
+        let name = name_of(path);
+        let read = std::fs::metadata(path).map_err(|_| documents::unreadable(&name)).and_then(|about| {
+            documents::before_reading(&name, about.len(), about.is_dir())?;
+            std::fs::read(path).map_err(|_| documents::unreadable(&name))
+        });
+        match read {
+            Ok(bytes) => tell(&self.sender, &self.context, Arrival::Read { name, bytes }),
+            Err(why) => self.refuse(why),
+        }
+    }
+}
+
+#[cfg(target_arch = "wasm32")]
+impl Inbox {
+    fn take(&self, file: &egui::DroppedFileHandle) {
+        if let Some(file) = file.web_file() {
+            read_file(file.clone(), self.sender.clone(), self.context.clone());
+        }
+    }
+
+    /// Lets the person choose a file in the browser's dialog.
+    pub(crate) fn choose(&self) {
+        let (sender, context) = (self.sender.clone(), self.context.clone());
+        crate::page::web::choose_file(move |file| read_file(file, sender, context));
+    }
+}
+
+#[cfg(target_arch = "wasm32")]
+fn read_file(file: web_sys::File, sender: Sender<Arrival>, context: Context) {
+    let name = file.name();
+    // What a browser gives for a folder cannot be told from a file until it is read.
+    if let Err(why) = documents::before_reading(&name, file.size() as u64, false) {
+        return tell(&sender, &context, Arrival::Refused(why));
+    }
+    wasm_bindgen_futures::spawn_local(async move {
+        let arrival = match wasm_bindgen_futures::JsFuture::from(file.array_buffer()).await {
+            Ok(buffer) => Arrival::Read { name, bytes: js_sys::Uint8Array::new(&buffer).to_vec() },
+            Err(_) => Arrival::Refused(documents::unreadable(&name)),
+        };
+        tell(&sender, &context, arrival);
+    });
+}

@@ -1,0 +1,49 @@
+//! Opening: the window with recent sessions and drives, and what comes of a file that was dropped or chosen.
+//!
+//! Whatever a file holds, the open session stays as it is until there is something better: a refusal changes nothing.
+
+pub(crate) mod documents;
+pub(crate) mod inbox;
+pub(crate) mod window;
+pub(crate) mod download;
+mod update;
+
+use sightline_api::wire::SessionEntry;
+
+/// What a person asks of files and sessions.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Ask {
+    /// Opens the window.
+    Open,
+    /// Closes it.
+    Close,
+    /// Lets the person choose a file.
+    Choose,
+    /// Opens the file at this path; only where the page runs as a program of its own.
+    Path(String),
+    /// Changes the path that is being typed.
+    Type(String),
+    /// Goes on with a session.
+    Resume(String),
+    /// Begins a new session on a traverse.
+    Begin(String),
+    /// Asks again for what of the cursor's stop could not be shown.
+    TryAgain,
+}
+
+/// What is known of files and sessions.
+#[derive(Clone, Debug, Default)]
+pub struct Files {
+    /// Whether the window is open.
+    pub is_open: bool,
+    /// The sessions, the one used last first; none before the server has said.
+    pub recent: Option<Vec<SessionEntry>>,
+    /// Why there are none.
+    pub refused: Option<String>,
+    /// Whether files are dragged over the page.
+    pub is_hovered: bool,
+    /// The file that the server works on.
+    pub opening: Option<String>,
+    /// The path that is being typed.
+    pub path: String,
+}

@@ -1,0 +1,75 @@
+//! Images, arrays and records: their endpoints, and how the files become rasters and tables.
+
+use std::sync::Arc;
+
+use sightline_api::endpoint::Call;
+use sightline_api::endpoints::{ShowArrays, ShowEarlierTemplates, ShowImage, ShowStep, ShowStop};
+use sightline_api::location::{AtImage, AtStop};
+use sightline_api::wire::Problem;
+use sightline_track::trace::ArrayName;
+use sightline_vision::image::npz;
+
+use crate::cache::{Item, Key};
+use crate::drawing::raster::Raster;
+use crate::net::reply::{misread, parse};
+use crate::tables::Table;
+
+/// The request for an item. A single array comes with all arrays of its step.
+pub(super) fn call(key: &Key) -> Call {
+    match key {
+        Key::Image { traverse, step, eye } => {
+            let (id, file) = (traverse.clone(), format!("{}.png", eye.word()));
+            Call::to::<ShowImage>(&AtImage { id, step: *step, file })
+        }
+        Key::Stop { traverse, step } => Call::to::<ShowStop>(&AtStop { id: traverse.clone(), step: *step }),
+        Key::Trace(step) => Call::to::<ShowStep>(step),
+        Key::Array(step, _) | Key::Arrays(step) => Call::to::<ShowArrays>(step),
+        Key::EarlierTemplates(step) => Call::to::<ShowEarlierTemplates>(step),
+    }
+}
+
+/// Reads the body of an answer.
+pub(super) fn read(key: &Key, bytes: &[u8], context: &egui::Context) -> Result<Item, Problem> {
+    match key {
+        Key::Stop { .. } => Ok(Item::Stop(Arc::new(parse::<ShowStop>(bytes)?))),
+        Key::EarlierTemplates(_) => Ok(Item::EarlierTemplates(parse::<ShowEarlierTemplates>(bytes)?)),
+        Key::Trace(_) => Ok(Item::Trace(Arc::new(parse::<ShowStep>(bytes)?))),
+        Key::Image { step, eye, .. } => {
+            let name = format!("the {} image of step {step}", eye.word());
+            let raster = Raster::from_png(context, &name, bytes).map_err(|why| misread(&why))?;
+            Ok(Item::Raster(Arc::new(raster)))
+        }
+        Key::Array(step, _) | Key::Arrays(step) => {
+            let name = format!("the arrays of step {}", step.step);
+            let files = npz::decode(bytes, name).map_err(|why| misread(&why.to_string()))?;
+            // One that this page does not know is for a newer one.
+            let known = files.iter().filter_map(|(word, file)| Some((ArrayName::from_word(word)?, file)));
+            let read = known.map(|(name, file)| Ok((name, read_array(name, file, context)?)));
+            read.collect::<Result<_, _>>().map(Item::Arrays)
+        }
+    }
+}
+
+fn read_array(name: ArrayName, bytes: &[u8], context: &egui::Context) -> Result<Item, Problem> {
+    let item = if Table::is_table(name) {
+        Table::from_npy(name, bytes).map(|table| Item::Table(Arc::new(table)))
+    } else {
+        Raster::from_npy(context, name, bytes).map(|raster| Item::Raster(Arc::new(raster)))
+    };
+    item.map_err(|why| misread(&why))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cache::{Eye, StepKey};
+
+    #[test]
+    fn every_thing_has_its_path() {
+        let step = StepKey { session: "s1".to_owned(), target: 2, run: 3, step: 4 };
+        let image = Key::Image { traverse: "t".to_owned(), step: 7, eye: Eye::Right };
+        assert_eq!(call(&image).path, "traverses/t/steps/7/images/right.png");
+        assert_eq!(call(&Key::Trace(step.clone())).path, "sessions/s1/targets/2/runs/3/steps/4");
+        assert_eq!(call(&Key::Arrays(step)).path, "sessions/s1/targets/2/runs/3/steps/4/arrays.npz");
+    }
+}

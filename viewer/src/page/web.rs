@@ -1,0 +1,102 @@
+//! The calls into the browser: address, storage, files, and the attributes of the canvas.
+
+use std::sync::OnceLock;
+
+use wasm_bindgen::prelude::*;
+
+/// The canvas on which the application runs.
+static CANVAS: OnceLock<String> = OnceLock::new();
+
+/// Keeps the id of the canvas on which the application runs.
+pub(crate) fn keep_canvas(id: String) {
+    CANVAS.get_or_init(|| id);
+}
+
+/// What the address has after its `#`.
+pub(crate) fn hash() -> String {
+    let location = web_sys::window().map(|window| window.location());
+    location.and_then(|location| location.hash().ok()).unwrap_or_default().trim_start_matches('#').to_owned()
+}
+
+/// Writes what is looked at into the page's address: as a new place of the browser's history, or in place of the
+/// present one.
+pub(crate) fn keep_link(fragment: &str, is_another_place: bool) {
+    let history = web_sys::window().and_then(|window| window.history().ok());
+    if let Some(history) = history {
+        let url = format!("#{fragment}");
+        let kept = if is_another_place {
+            history.push_state_with_url(&JsValue::NULL, "", Some(&url))
+        } else {
+            history.replace_state_with_url(&JsValue::NULL, "", Some(&url))
+        };
+        // Where the browser forbids it, or has enough of it, the page works all the same.
+        kept.unwrap_or_default();
+    }
+}
+
+/// What the browser keeps for this page under a name.
+pub(crate) fn kept(name: &str) -> Option<String> {
+    web_sys::window()?.local_storage().ok()??.get_item(name).ok()?
+}
+
+/// Lets the browser keep a text for this page.
+pub(crate) fn keep(name: &str, text: &str) {
+    let storage = web_sys::window().and_then(|window| window.local_storage().ok().flatten());
+    if let Some(storage) = storage {
+        // A browser that keeps nothing shows the overview the next time.
+        storage.set_item(name, text).unwrap_or_default();
+    }
+}
+
+/// Offers bytes to the person as a file of that name.
+pub(crate) fn download(name: &str, media_type: &str, bytes: &[u8]) {
+    // Where the browser refuses, nothing is saved, which it says itself.
+    let _ = try_download(name, media_type, bytes);
+}
+
+fn try_download(name: &str, media_type: &str, bytes: &[u8]) -> Result<(), JsValue> {
+    let document = web_sys::window().and_then(|window| window.document()).ok_or(JsValue::NULL)?;
+    let parts = js_sys::Array::of1(&js_sys::Uint8Array::from(bytes));
+    let about = web_sys::BlobPropertyBag::new();
+    about.set_type(media_type);
+    let blob = web_sys::Blob::new_with_u8_array_sequence_and_options(&parts, &about)?;
+    let url = web_sys::Url::create_object_url_with_blob(&blob)?;
+    let anchor: web_sys::HtmlAnchorElement = document.create_element("a")?.dyn_into()?;
+    anchor.set_href(&url);
+    anchor.set_download(name);
+    anchor.click();
+    // The address lives as long as the page: some browsers save nothing when it is taken back at once.
+    Ok(())
+}
+
+/// Sets an attribute of the canvas.
+pub(crate) fn publish(name: &str, value: &str) {
+    let document = web_sys::window().and_then(|window| window.document());
+    let canvas = CANVAS.get().and_then(|id| document?.get_element_by_id(id));
+    if let Some(canvas) = canvas {
+        // Only tests read it; without it the page is the same.
+        canvas.set_attribute(name, value).unwrap_or_default();
+    }
+}
+
+/// Lets the person choose a file; `chosen` gets it, and is never called where none is chosen.
+pub(crate) fn choose_file(chosen: impl FnOnce(web_sys::File) + 'static) {
+    // Where the browser refuses, no dialog opens, and dropping a file works all the same.
+    let _ = try_choose_file(chosen);
+}
+
+fn try_choose_file(chosen: impl FnOnce(web_sys::File) + 'static) -> Result<(), JsValue> {
+    let document = web_sys::window().and_then(|window| window.document()).ok_or(JsValue::NULL)?;
+    let input: web_sys::HtmlInputElement = document.create_element("input")?.dyn_into()?;
+    input.set_type("file");
+    input.set_accept(".toml,.json");
+    let from = input.clone();
+    let changed = Closure::once_into_js(move || {
+        if let Some(file) = from.files().and_then(|files| files.get(0)) {
+            chosen(file);
+        }
+    });
+    input.add_event_listener_with_callback("change", changed.unchecked_ref())?;
+    input.click();
+    Ok(())
+}

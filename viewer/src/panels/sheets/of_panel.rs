@@ -1,0 +1,49 @@
+//! A panel as tables, and the switch between the two.
+
+use egui::{Button, Ui, vec2};
+
+use crate::command::Command;
+use crate::pane::Pane;
+use crate::panels;
+use crate::panels::sheets::{Sheet, grid};
+use crate::state::State;
+
+/// The panels that can be looked at as tables.
+pub(crate) fn panes() -> impl Iterator<Item = Pane> {
+    Pane::ALL.into_iter().filter(|pane| pane.has_table())
+}
+
+/// What a panel shows, as tables.
+///
+/// # Errors
+/// The sentence that says why there is nothing yet, and how to fill it.
+pub(crate) fn of(state: &State, pane: Pane) -> Result<Vec<Sheet>, String> {
+    match pane.panel().table() {
+        Some(table) => table(state),
+        None => Err("This panel is made of words and numbers already.".to_owned()),
+    }
+}
+
+/// Shows a panel as tables.
+pub(crate) fn show(ui: &mut Ui, state: &State, pane: Pane, out: &mut Vec<Command>) {
+    match of(state, pane) {
+        Ok(sheets) => grid::show(ui, &sheets, out),
+        Err(sentence) => panels::missing(ui, "The values of this panel as a table.", &sentence),
+    }
+}
+
+/// The switch between a panel and its table; nothing for a panel that has none.
+pub(crate) fn switch(ui: &mut Ui, state: &State, pane: Pane, out: &mut Vec<Command>) {
+    if !pane.has_table() {
+        return;
+    }
+    let is_table = state.is_table(pane);
+    let words = egui::RichText::new("table").size(11.0);
+    let button = ui.add(Button::selectable(is_table, words).min_size(vec2(24.0, 20.0)));
+    let button = button.on_hover_text("The values as a table, to be read and copied");
+    let name = format!("{} as table", pane.title());
+    button.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, is_table, &name));
+    if button.clicked() {
+        out.push(Command::Table(pane));
+    }
+}

@@ -1,0 +1,330 @@
+//! Picking: the map is asked for and given up, its verdicts are said in words, a refusal offers a way out, keys do all of it.
+
+use egui::{Key, Modifiers};
+use egui_kittest::kittest::Queryable;
+use sightline_api::wire::{Event, Problem};
+use sightline_geometry::frames::Pixel;
+use sightline_rover::trackability::{Aspect, MapProgress, TrackabilityMap, Verdict};
+
+use crate::command::keys;
+use crate::command::{Command, Layer, Mode};
+use crate::net::request::{Arrived, Reply, Request};
+use crate::pane::Pane;
+use crate::picking;
+use crate::picking::aim::Aim;
+use crate::state::{Place, Refusal, State};
+use crate::tests::{Shown, fixture};
+use crate::trackability::limits;
+
+const PLACE: Pixel = Pixel::new(20.0, 30.0);
+const GOOD: Pixel = Pixel::new(44.0, 36.0);
+
+/// A map of the fixture's image of 64 px: the left half is bad, then a risky column, the rest is good.
+fn map(rows_done: usize) -> TrackabilityMap {
+    let (columns, rows) = (8, 8);
+    let letters: Vec<char> = (0..columns * rows_done)
+        .map(|cell| match cell % columns {
+            0..4 => Verdict::Bad.letter(),
+            4 => Verdict::Risky.letter(),
+            _ => Verdict::Good.letter(),
+        })
+        .collect();
+    let edge = Aspect::DepthEdge.letter();
+    TrackabilityMap {
+        step: 0,
+        cell_px: 8,
+        columns,
+        rows,
+        limits: Default::default(),
+        template_size_px: 21,
+        verdicts: letters.iter().collect(),
+        reasons: letters.iter().map(|letter| if *letter == 'g' { '-' } else { edge }).collect(),
+        values: letters.iter().map(|letter| (*letter != 'g').then_some(2.0)).collect(),
+        ranges_m: vec![Some(6.0); letters.len()],
+        longest_steps_m: vec![Some(0.6); letters.len()],
+        words: Default::default(),
+    }
+}
+
+fn progress(k: usize) -> MapProgress {
+    MapProgress { k, n: 8, ended: k == 8, failed: None, map: Some(map(k)) }
+}
+
+fn requests(state: &mut State) -> Vec<Request> {
+    state.take_requests()
+}
+
+fn asked(state: &mut State) -> bool {
+    requests(state).iter().any(|request| matches!(request, Request::Trackability { .. }))
+}
+
+fn answer(state: &mut State, outcome: Result<MapProgress, Problem>) {
+    let limits = state.trackability.limits.clone();
+    let request = Request::Trackability { traverse: "drive".to_owned(), step: state.cursor.step, limits };
+    let outcome = outcome.map(|progress| Reply::Trackability(Box::new(progress)));
+    state.arrived(Arrived { request, outcome }, 0.0);
+}
+
+fn picking(context: &egui::Context) -> State {
+    let mut state = fixture::at_step(context, 0);
+    state.perform(Command::SetMode(Mode::Pick));
+    state.take_requests();
+    answer(&mut state, Ok(progress(8)));
+    state
+}
+
+fn refused(context: &egui::Context) -> State {
+    let mut state = picking(context);
+    let place = Place { step: 0, pixel: PLACE };
+    state.refusal = Some(Refusal {
+        place,
+        sentence: "no 3-D position here".to_owned(),
+        nearest: Some(GOOD),
+        is_advice: false,
+    });
+    state
+}
+
+#[test]
+fn the_map_is_asked_for_while_picking_again_with_new_rows_and_given_up_with_the_pick() {
+    let mut state = fixture::at_step(&egui::Context::default(), 0);
+    assert!(!asked(&mut state), "nobody picks");
+    state.perform(Command::SetMode(Mode::Pick));
+    assert!(asked(&mut state));
+    assert!(!asked(&mut state), "once");
+    answer(&mut state, Ok(progress(3)));
+    assert_eq!(state.trackability_map().unwrap().rows_done(), 3);
+    let rows =
+        |step| Event::TrackabilityProgress { traverse: "drive".to_owned(), step, k: 5, n: 8, ended: false };
+    state.told(rows(4));
+    assert!(!asked(&mut state), "another stop");
+    state.told(rows(0));
+    assert!(asked(&mut state));
+    answer(&mut state, Ok(progress(5)));
+    state.perform(Command::SetMode(Mode::Look));
+    let cancel =
+        Request::CancelTrackability { traverse: "drive".to_owned(), step: 0, limits: Default::default() };
+    assert!(requests(&mut state).contains(&cancel), "nobody wants the rest");
+    assert!(state.trackability_map().is_none());
+    // A map that is complete needs no cancelling.
+    let mut state = picking(&egui::Context::default());
+    state.told(rows(0));
+    assert!(!asked(&mut state));
+    state.perform(Command::SetMode(Mode::Look));
+    assert!(!requests(&mut state).contains(&cancel));
+}
+
+#[test]
+fn without_a_map_picking_works_and_the_panel_says_why_there_is_none() {
+    let state = |context: &egui::Context| {
+        let mut state = fixture::at_step(context, 0);
+        state.perform(Command::SetMode(Mode::Pick));
+        state.take_requests();
+        let problem = Problem {
+            code: "request".to_owned(),
+            title: String::new(),
+            status: 422,
+            detail: "the pair cannot be aligned".to_owned(),
+            hint: None,
+            nearest_pixel: None,
+            received: None,
+        };
+        answer(&mut state, Err(problem));
+        assert!(state.messages.newest().is_none(), "it is no problem of the person's");
+        state
+    };
+    Shown::pane(Pane::Left, state);
+    let mut state = state(&egui::Context::default());
+    assert!(state.trackability.progress.as_ref().unwrap().failed.is_some());
+    state.perform(Command::Pick(GOOD));
+    assert!(requests(&mut state).iter().any(|request| matches!(request, Request::NewTarget { .. })));
+}
+
+#[test]
+fn verdict_reason_range_and_longest_step_are_said_in_words_and_the_layer_can_be_switched_off() {
+    let map = map(8);
+    assert_eq!(
+        picking::words(&map.at(PLACE).unwrap()),
+        "bad: depth edge 2 px away · 6.00 m away · longest safe step 0.60 m"
+    );
+    assert!(picking::words(&map.at(Pixel::new(36.0, 30.0)).unwrap()).starts_with("risky: depth edge"));
+    assert_eq!(picking::words(&map.at(GOOD).unwrap()), "good · 6.00 m away · longest safe step 0.60 m");
+    let mut shown = Shown::pane(Pane::Left, |context| {
+        let mut state = picking(context);
+        state.perform(Command::Aim(Aim::Put(PLACE)));
+        state
+    });
+    shown
+        .says("trackability: 38 % good, 12 % risky, 50 % bad")
+        .says("at 20.0, 30.0: bad: depth edge 2 px away");
+    assert_eq!(shown.click("risky place, hatched (legend)"), vec![Command::ToggleLayer(Layer::Trackability)]);
+}
+
+#[test]
+fn a_refused_pick_offers_the_nearest_good_pixel_by_button_and_by_enter() {
+    let mut shown = Shown::pane(Pane::Left, refused);
+    assert_eq!(shown.click("Take the nearest good pixel (44, 36)"), vec![Command::Aim(Aim::TakeNearest)]);
+    for aim in [Aim::TakeNearest, Aim::Accept] {
+        let mut state = refused(&egui::Context::default());
+        state.perform(Command::Aim(aim));
+        let picked = requests(&mut state).into_iter().find_map(|request| match request {
+            Request::NewTarget { target, .. } => target.pixel,
+            _ => None,
+        });
+        assert_eq!(picked, Some(GOOD));
+    }
+    let mut state = fixture::without_target();
+    state.perform(Command::SetMode(Mode::Pick));
+    state.perform(Command::Aim(Aim::Accept));
+    assert!(state.designating.is_none(), "nothing was aimed at");
+}
+
+#[test]
+fn the_servers_refusal_brings_the_nearest_good_pixel_along() {
+    let mut state = fixture::without_target();
+    state.perform(Command::SetMode(Mode::Pick));
+    state.perform(Command::Pick(PLACE));
+    let request = requests(&mut state).into_iter().find(|r| matches!(r, Request::NewTarget { .. })).unwrap();
+    let problem = Problem {
+        code: "target".to_owned(),
+        title: String::new(),
+        status: 422,
+        detail: "no 3-D position".to_owned(),
+        hint: Some("The nearest good pixel is (44, 36).".to_owned()),
+        nearest_pixel: Some(Box::new(GOOD)),
+        received: None,
+    };
+    state.arrived(Arrived { request, outcome: Err(problem) }, 0.0);
+    assert_eq!(state.refusal.as_ref().unwrap().nearest, Some(GOOD));
+}
+
+#[test]
+fn arrows_nudge_the_aim_by_a_tenth_of_a_pixel_and_enter_takes_it() {
+    let mut state = refused(&egui::Context::default());
+    let mut press = |key: Key, modifiers: Modifiers| {
+        let command = keys::command(key, modifiers, &state).expect("a command");
+        state.perform(command);
+        state.trackability.aim
+    };
+    assert_eq!(press(Key::ArrowRight, Modifiers::NONE), Some(Pixel::new(20.1, 30.0)));
+    assert_eq!(press(Key::ArrowDown, Modifiers::SHIFT), Some(Pixel::new(20.1, 31.0)));
+    assert_eq!(press(Key::ArrowLeft, Modifiers::NONE), Some(Pixel::new(20.0, 31.0)));
+    assert_eq!(press(Key::Enter, Modifiers::NONE), None);
+    let refusal = state.refusal.clone().unwrap();
+    assert_eq!(refusal.place.pixel, Pixel::new(20.0, 31.0), "the aim comes before the offer");
+    assert!(refusal.is_advice, "the left half of the map is bad");
+    state.perform(Command::Aim(Aim::Put(Pixel::new(50.0, 31.0))));
+    let command = keys::command(Key::Enter, Modifiers::NONE, &state).unwrap();
+    state.perform(command);
+    assert_eq!(state.designating.unwrap().pixel, Pixel::new(50.0, 31.0));
+    // Outside of picking the arrows step along the drive.
+    let look = fixture::without_target();
+    assert!(matches!(keys::command(Key::ArrowRight, Modifiers::NONE, &look), Some(Command::Go(_))));
+}
+
+#[test]
+fn the_hint_tells_how_far_the_map_is() {
+    let shown = Shown::pane(Pane::Left, |context| {
+        let mut state = picking(context);
+        state.trackability.progress = Some(progress(3));
+        state
+    });
+    // Painted words have no node of their own; the image says what is there so far.
+    shown.says("trackability: 38 % good");
+    assert!(shown.harness.query_by_label_contains("left image of step 0").is_some());
+}
+
+fn typed(state: &mut State, key: &str, text: &str) {
+    let (key, text) = (key.to_owned(), text.to_owned());
+    state.perform(Command::Limits(limits::Ask::Type { key, text }));
+}
+
+#[test]
+fn limits_are_typed_refused_in_a_sentence_and_used_for_a_map_of_their_own() {
+    let mut state = picking(&egui::Context::default());
+    state.perform(Command::Limits(limits::Ask::Open));
+    assert_eq!(keys::command(Key::T, Modifiers::NONE, &state), None, "the window has the keyboard");
+    typed(&mut state, "edge_bad_px", "99");
+    typed(&mut state, "cell_px", "16");
+    state.perform(Command::Limits(limits::Ask::Use));
+    let form = state.trackability.form.clone().unwrap();
+    assert!(form.refused.unwrap().contains("edge_bad_px: must be a number from 0 to 50, not 99"));
+    assert_eq!(form.texts["cell_px"], "16", "nothing typed is lost");
+    typed(&mut state, "edge_bad_px", "4,5");
+    state.perform(Command::Limits(limits::Ask::Use));
+    assert!(state.trackability.form.is_none());
+    assert!(state.trackability_map().is_none() || asked(&mut state));
+    let limits = state.trackability.limits.clone();
+    let text = sightline_rover::trackability::TrackabilityLimits::text(&limits);
+    assert_eq!(text, "cell_px=16,edge_bad_px=4.5");
+    let request = Request::Trackability { traverse: "drive".to_owned(), step: 0, limits };
+    let curl = crate::exports::as_text::http("http://localhost", request.call().unwrap());
+    assert!(
+        curl.contains("/traverses/drive/steps/0/trackability?limits=cell_px%3D16%2Cedge_bad_px%3D4.5"),
+        "{curl}"
+    );
+    // An answer for the limits before is no answer.
+    let before = Request::Trackability { traverse: "drive".to_owned(), step: 0, limits: Default::default() };
+    state.arrived(Arrived { request: before, outcome: Ok(Reply::Trackability(Box::new(progress(8)))) }, 0.0);
+    assert!(state.trackability_map().is_none());
+    answer(&mut state, Ok(progress(8)));
+    assert!(state.trackability_map().is_some());
+}
+
+#[test]
+fn the_map_says_by_which_limits_it_was_made() {
+    let default = Shown::pane(Pane::Left, picking);
+    default.says("Map made with the default limits");
+    let mut changed = Shown::pane(Pane::Left, |context| {
+        let mut state = picking(context);
+        let mut progress = progress(8);
+        progress.map.as_mut().unwrap().limits.insert("edge_bad_px".to_owned(), serde_json::json!(4.5));
+        answer(&mut state, Ok(progress));
+        state
+    });
+    changed.says("Map made with edge_bad_px 4.5 px");
+    assert_eq!(changed.click("limits of trackability"), vec![Command::Limits(limits::Ask::Open)]);
+    let mut window = Shown::new(
+        [800.0, 900.0],
+        |context| {
+            let mut state = picking(context);
+            state.perform(Command::Limits(limits::Ask::Open));
+            state
+        },
+        crate::trackability::limits_window::show,
+    );
+    window.harness.get_by_role_and_label(egui::accesskit::Role::TextInput, "slant_risky_deg");
+    window.says("default 80.0").says("deg");
+    assert_eq!(window.click("Make the map with these"), vec![Command::Limits(limits::Ask::Use)]);
+    assert_eq!(window.click("Put the defaults"), vec![Command::Limits(limits::Ask::Defaults)]);
+}
+
+#[test]
+fn a_place_that_the_map_calls_bad_is_refused_before_it_is_asked_for_unless_one_insists() {
+    let mut state = picking(&egui::Context::default());
+    let map = state.trackability_map().unwrap();
+    let bad = map.cells().find(|cell| cell.verdict == Verdict::Bad).unwrap();
+    let nearest = map.nearest_good(bad.pixel);
+    assert!(nearest.is_some());
+    let is_asked = |state: &mut State| {
+        let asked = requests(state);
+        asked.iter().any(|request| matches!(request, Request::NewTarget { .. }))
+    };
+    state.perform(Command::Pick(bad.pixel));
+    assert!(!is_asked(&mut state), "nothing is designated");
+    let refusal = state.refusal.clone().unwrap();
+    assert_eq!((refusal.place.pixel, refusal.nearest, refusal.is_advice), (bad.pixel, nearest, true));
+    assert_eq!(Some(refusal.sentence), bad.sentence());
+    assert_eq!(state.mode, Mode::Pick, "the person chooses on");
+    state.perform(Command::Aim(Aim::Insist));
+    assert!(is_asked(&mut state) && state.refusal.is_none());
+
+    let mut state = picking(&egui::Context::default());
+    state.perform(Command::Pick(bad.pixel));
+    state.perform(Command::Aim(Aim::TakeNearest));
+    assert!(is_asked(&mut state), "the nearest good one is no place to be refused");
+    // What the server refused was tried: there is nothing to insist on.
+    let mut state = refused(&egui::Context::default());
+    state.perform(Command::Aim(Aim::Insist));
+    assert!(!is_asked(&mut state) && state.refusal.is_some());
+}

@@ -1,0 +1,59 @@
+//! What the pointer rests on, as the panels ask for it and as the page takes it out of the commands of a frame.
+
+use sightline_geometry::camera::Camera;
+use sightline_geometry::frames::Pixel;
+
+use crate::command::Command;
+use crate::pointed::Pointed;
+use crate::state::State;
+
+impl State {
+    /// The pixel of the left image that is pointed at, in whatever panel.
+    pub(crate) fn pointed_left(&self) -> Option<Pixel> {
+        self.pointed.filter(|_| self.marks)?.left()
+    }
+
+    /// The step that is pointed at, where that is another one than the cursor's.
+    pub fn pointed_step(&self) -> Option<usize> {
+        match self.pointed {
+            Some(Pointed::Step(step)) if step != self.cursor.step && step < self.stop_count() => Some(step),
+            _ => None,
+        }
+    }
+
+    /// The two cameras of the cursor's step in the rover frame, once they are here.
+    pub fn eyes(&self) -> Option<(&Camera, &Camera)> {
+        if let Some(pointing) = self.trace().map(|trace| &trace.point_mast) {
+            return Some((&pointing.left, &pointing.right));
+        }
+        let stop = self.cache.stop(&self.stop_detail_key(self.cursor.step)?).ready()?;
+        Some((&stop.left, &stop.right))
+    }
+}
+
+/// Takes what was pointed at out of the commands of a frame.
+pub(crate) fn taken_out(commands: &mut Vec<Command>) -> Option<Pointed> {
+    let mut pointed = None;
+    commands.retain(|command| match command {
+        Command::Point(at) => {
+            pointed = Some(*at);
+            false
+        }
+        _ => true,
+    });
+    pointed
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_thing_pointed_at_is_taken_and_the_other_commands_stay() {
+        let (here, there) = (Pointed::Step(3), Pointed::Left(Pixel::new(1.0, 2.0)));
+        let mut commands = vec![Command::Point(here), Command::FitAll, Command::Point(there)];
+        assert_eq!(taken_out(&mut commands), Some(there));
+        assert_eq!(commands, [Command::FitAll]);
+        assert_eq!(taken_out(&mut commands), None);
+    }
+}

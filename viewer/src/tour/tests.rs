@@ -1,0 +1,105 @@
+//! The tour: walked and skipped by keyboard and by buttons, right about what is there, and never begun twice by itself.
+
+use egui::{Key, Modifiers};
+use sightline_world::library;
+
+use crate::command::help;
+use crate::command::keys;
+use crate::command::{Command, Mode};
+use crate::state::State;
+use crate::tests::{Shown, fixture};
+use crate::tour::bubbles;
+use crate::tour::{Bubble, Turn};
+
+fn touring(at: usize) -> impl FnOnce(&egui::Context) -> State {
+    move |context| {
+        let mut state = fixture::at_step(context, 0);
+        state.tour.at = Some(at);
+        state
+    }
+}
+
+fn shown(at: usize) -> Shown<'static> {
+    Shown::new([1280.0, 720.0], touring(at), |ui, state, out| bubbles::show(ui, state, out))
+}
+
+#[test]
+fn every_bubble_says_where_in_the_tour_it_is_and_the_buttons_lead_on_back_and_out() {
+    for (at, bubble) in Bubble::ALL.into_iter().enumerate() {
+        let mut bubbles = shown(at);
+        bubbles.says(bubble.title()).says(&format!("{} of 6", at + 1));
+        let next = if at == 5 { "Done" } else { "Next" };
+        assert_eq!(bubbles.click(next), vec![Command::Tour(Turn::Next)]);
+    }
+    assert_eq!(shown(2).click("Back"), vec![Command::Tour(Turn::Back)]);
+    assert_eq!(shown(2).click("Skip"), vec![Command::Tour(Turn::End)]);
+}
+
+#[test]
+fn the_tour_is_walked_and_skipped_by_keyboard() {
+    let mut state = fixture::at_step(&egui::Context::default(), 0);
+    state.perform(Command::Tour(Turn::Begin));
+    let press = |state: &mut State, key: Key| {
+        let command = keys::command(key, Modifiers::NONE, state).expect("a command");
+        state.perform(command);
+        state.tour.at
+    };
+    assert_eq!(press(&mut state, Key::Enter), Some(1));
+    assert_eq!(press(&mut state, Key::Backspace), Some(0));
+    assert_eq!(press(&mut state, Key::Escape), None);
+    assert!(state.tour.is_seen);
+    state.perform(Command::Tour(Turn::Begin));
+    for _ in 0..5 {
+        press(&mut state, Key::Enter);
+    }
+    assert_eq!(state.tour.bubble(), Some(Bubble::Share));
+    assert_eq!(press(&mut state, Key::Enter), None);
+    // Without a tour Enter means nothing, and the drive can be stepped while one is open.
+    assert_eq!(keys::command(Key::Enter, Modifiers::NONE, &state), None);
+    state.perform(Command::Tour(Turn::Begin));
+    assert!(matches!(keys::command(Key::ArrowRight, Modifiers::NONE, &state), Some(Command::Go(_))));
+}
+
+#[test]
+fn the_second_bubble_names_the_step_at_which_the_target_is_lost() {
+    shown(1).says("lost at step 3");
+    let words = Bubble::Lost.words(&fixture::without_target());
+    assert!(words.contains("press T"), "{words}");
+}
+
+#[test]
+fn the_help_sheet_begins_the_tour_again() {
+    let mut sheet = Shown::new(
+        [900.0, 900.0],
+        |context| {
+            let mut state = fixture::at_step(context, 2);
+            state.mode = Mode::Help;
+            state
+        },
+        help::show,
+    );
+    let commands = sheet.click("Take the tour");
+    assert!(commands.contains(&Command::Tour(Turn::Begin)), "{commands:?}");
+}
+
+#[test]
+fn it_begins_by_itself_on_the_first_drive_alone_and_only_once() {
+    let mut state = fixture::at_step(&egui::Context::default(), 0);
+    state.take_requests();
+    assert_eq!(state.tour.at, None, "another drive");
+    if let Some(traverse) = &mut state.traverse {
+        traverse.name = library::FIRST_NAME.to_owned();
+    }
+    state.take_requests();
+    assert_eq!(state.tour.at, Some(0));
+    state.perform(Command::Tour(Turn::End));
+    state.take_requests();
+    assert_eq!(state.tour.at, None);
+    // Before the target is there, the tour would speak of what cannot be seen.
+    let mut early = fixture::without_target();
+    if let Some(traverse) = &mut early.traverse {
+        traverse.name = library::FIRST_NAME.to_owned();
+    }
+    early.take_requests();
+    assert_eq!(early.tour.at, None);
+}

@@ -1,0 +1,30 @@
+//! The trackability of the stop that is looked at, and the place that is being chosen in it.
+//!
+//! The map is asked for while a target is picked, again whenever the server tells of new rows, and given up with the pick.
+
+pub(crate) mod limits;
+pub(crate) mod limits_window;
+mod update;
+
+use sightline_geometry::frames::Pixel;
+use sightline_rover::trackability::MapProgress;
+use sightline_track::settings::Changes;
+
+use crate::trackability::limits::Form;
+
+/// What is known of a stop's trackability.
+#[derive(Clone, Debug, Default)]
+pub struct Trackability {
+    /// The traverse and the stop that it is of, and the limits by which it is made, where they are not the defaults.
+    pub place: Option<(String, usize, Changes)>,
+    /// The limits that are not the defaults.
+    pub limits: Changes,
+    /// The limits as they are typed, while their window is open.
+    pub form: Option<Form>,
+    /// How far the map is; none before the first answer.
+    pub progress: Option<MapProgress>,
+    /// The place chosen by keys.
+    pub aim: Option<Pixel>,
+    is_asked: bool,
+    is_stale: bool,
+}

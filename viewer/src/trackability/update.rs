@@ -1,0 +1,170 @@
+//! Asks for the trackability of the stop that is looked at, and moves the place that is being chosen in it.
+
+use sightline_api::wire::Problem;
+use sightline_geometry::frames::Pixel;
+use sightline_rover::trackability::map::Cell;
+use sightline_rover::trackability::{MapProgress, TrackabilityMap, Verdict};
+use sightline_track::settings::Changes;
+
+use crate::command::{Command, Mode};
+use crate::drawing::view2d::View2d;
+use crate::net::request::Request;
+use crate::picking::aim::Aim;
+use crate::state::{Place, Refusal, State};
+use crate::trackability::Trackability;
+use crate::trackability::limits::{Ask, Form};
+
+impl State {
+    /// The map of the stop that is looked at, as far as it was made.
+    pub fn trackability_map(&self) -> Option<&TrackabilityMap> {
+        let (traverse, step, _) = self.trackability.place.as_ref()?;
+        let is_here =
+            self.traverse.as_ref().is_some_and(|open| open.id == *traverse) && *step == self.cursor.step;
+        self.trackability.progress.as_ref().filter(|_| is_here)?.map.as_ref()
+    }
+
+    /// What the map says of a pixel of the left image.
+    pub(crate) fn trackability_at(&self, pixel: Pixel) -> Option<Cell> {
+        self.trackability_map()?.at(pixel)
+    }
+
+    /// Carries out what was asked of the place that is being chosen.
+    pub(crate) fn aim(&mut self, aim: Aim) {
+        let nearest = self.refusal.as_ref().and_then(|refusal| refusal.nearest);
+        match aim {
+            Aim::Put(pixel) => self.trackability.aim = Some(pixel),
+            Aim::Nudge { dx, dy } => {
+                let from = self.trackability.aim.unwrap_or_else(|| self.first_aim());
+                let [width, height] = self.stop().map_or([1, 1], |stop| stop.left_size);
+                let hold = |v: f64, size: u32| ((v * 10.0).round() / 10.0).clamp(0.0, f64::from(size) - 1.0);
+                self.trackability.aim = Some(Pixel::new(hold(from.x + dx, width), hold(from.y + dy, height)));
+            }
+            Aim::Accept => match self.trackability.aim.take() {
+                Some(pixel) => self.perform(Command::Pick(pixel)),
+                None => self.aim(Aim::TakeNearest),
+            },
+            Aim::Insist => {
+                if let Some(refusal) = self.refusal.clone().filter(|refusal| refusal.is_advice) {
+                    self.trackability.aim = None;
+                    self.designate(refusal.place);
+                }
+            }
+            Aim::TakeNearest => {
+                if let Some(pixel) = nearest {
+                    self.trackability.aim = None;
+                    self.designate(Place { step: self.cursor.step, pixel });
+                }
+            }
+        }
+    }
+
+    /// What speaks against a place that the map calls bad. Where there is no map yet, nothing does.
+    pub(crate) fn advised_against(&self, place: Place) -> Option<Refusal> {
+        let cell = self.trackability_at(place.pixel).filter(|cell| cell.verdict == Verdict::Bad)?;
+        let sentence = cell.sentence().unwrap_or_else(|| "a bad place".to_owned());
+        let nearest = self.trackability_map().and_then(|map| map.nearest_good(place.pixel));
+        Some(Refusal { place, sentence, nearest, is_advice: true })
+    }
+
+    /// Where the keys begin: at the refused pixel, else in the middle of what is shown.
+    fn first_aim(&self) -> Pixel {
+        let [width, height] = self.stop().map_or([1, 1], |stop| stop.left_size);
+        let middle = match self.views.left {
+            View2d::Fit => Pixel::new(f64::from(width / 2), f64::from(height / 2)),
+            View2d::At { centre, .. } => centre,
+        };
+        self.refusal.as_ref().map_or(middle, |refusal| refusal.place.pixel)
+    }
+
+    /// Asks for the map while a target is picked, and gives it up with the pick.
+    pub(crate) fn sync_trackability(&mut self) {
+        let limits = &self.trackability.limits;
+        let here = self.traverse.as_ref().map(|open| (open.id.clone(), self.cursor.step, limits.clone()));
+        let wanted = here.filter(|_| self.mode == Mode::Pick);
+        if wanted.is_none() {
+            self.trackability.aim = None;
+        }
+        let known = &mut self.trackability;
+        if known.place != wanted {
+            let is_made = known.progress.as_ref().is_none_or(|progress| progress.ended);
+            if let Some((traverse, step, limits)) = known.place.take().filter(|_| !is_made) {
+                self.outbox.push(Request::CancelTrackability { traverse, step, limits });
+            }
+            let (limits, form) = (std::mem::take(&mut known.limits), known.form.take());
+            let aim = known.aim.filter(|_| wanted.is_some());
+            *known = Trackability { aim, limits, form, ..Trackability::default() };
+            (known.is_stale, known.place) = (wanted.is_some(), wanted);
+        }
+        if let Some((traverse, step, limits)) =
+            known.place.clone().filter(|_| known.is_stale && !known.is_asked)
+        {
+            (known.is_asked, known.is_stale) = (true, false);
+            self.outbox.push(Request::Trackability { traverse, step, limits });
+        }
+    }
+
+    /// The server told of new rows.
+    pub(crate) fn trackability_went_on(&mut self, traverse: &str, step: usize) {
+        let known = &mut self.trackability;
+        let is_ours = known.place.as_ref().is_some_and(|(own, at, _)| own == traverse && *at == step);
+        let is_made = known.progress.as_ref().is_some_and(|progress| progress.ended);
+        known.is_stale |= is_ours && !is_made;
+    }
+
+    /// What may have been missed is asked for again.
+    pub(crate) fn trackability_stale(&mut self) {
+        let is_made = self.trackability.progress.as_ref().is_some_and(|progress| progress.ended);
+        self.trackability.is_stale |= self.trackability.place.is_some() && !is_made;
+    }
+
+    /// Takes an answer in; picking works all the same without one.
+    pub(crate) fn took_trackability(
+        &mut self,
+        place: (String, usize, Changes),
+        answer: Result<MapProgress, Problem>,
+    ) {
+        let known = &mut self.trackability;
+        if known.place.as_ref() != Some(&place) {
+            return;
+        }
+        known.is_asked = false;
+        match answer {
+            Ok(progress) => known.progress = Some(progress),
+            // The server is gone: asked again when it is back.
+            Err(problem) if problem.status == 0 => {}
+            Err(problem) => {
+                known.progress =
+                    Some(MapProgress { k: 0, n: 0, ended: true, failed: Some(problem.detail), map: None });
+            }
+        }
+    }
+}
+
+impl State {
+    /// Carries out what was asked of the limits.
+    pub(crate) fn ask_limits(&mut self, ask: Ask) {
+        let known = &mut self.trackability;
+        match ask {
+            Ask::Open => known.form = Some(Form::of(&known.limits)),
+            Ask::Close => known.form = None,
+            Ask::Type { key, text } => {
+                if let Some(form) = &mut known.form {
+                    form.texts.insert(key, text);
+                    form.refused = None;
+                }
+            }
+            Ask::Defaults => known.form = Some(Form::of(&Changes::new())),
+            Ask::Use => {
+                let Some(form) = &mut known.form else { return };
+                match form.changes() {
+                    Ok(limits) => {
+                        (known.limits, known.form) = (limits, None);
+                        // The map is shown while a target is picked.
+                        self.set_mode(Mode::Pick);
+                    }
+                    Err(sentence) => form.refused = Some(sentence),
+                }
+            }
+        }
+    }
+}

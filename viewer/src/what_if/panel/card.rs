@@ -1,0 +1,191 @@
+//! The ghost of what is tried, dashed over the image, and a small card that says what changed.
+
+use egui::{Align, Button, Frame, Label, Layout, Margin, Pos2, Rect, RichText, Ui, UiBuilder, vec2};
+use sightline_session::what_if::Ghost;
+use sightline_session::why::words::signed;
+
+use crate::command::Command;
+use crate::drawing::overlay::{Line, Mark, Overlay, template_quad};
+use crate::drawing::view2d::Canvas;
+use crate::state::State;
+use crate::state::state_of;
+use crate::theme;
+use crate::what_if::Trial;
+use crate::what_if::panel::place;
+use crate::what_if::panel::place::Edge;
+use crate::why::Ask;
+
+/// Width of the card, points.
+const WIDTH: f32 = 230.0;
+
+/// Paints what was tried.
+pub(crate) fn ghost(canvas: &Canvas, trial: &Trial) {
+    let Some(ghost) = &trial.ghost else { return };
+    let overlay = Overlay::new(&canvas.painter, &canvas.transform);
+    if let Some(window) = ghost.search_window {
+        overlay.rectangle(window, theme::ghost(), Line::Dashed);
+    }
+    if let Some(pixel) = ghost.predicted_left.filter(|_| trial.what_if.prediction_px.is_some()) {
+        overlay.mark(pixel, Mark::Cross, theme::ghost());
+        if let Some(covariance) = &ghost.predicted_covariance_px2 {
+            overlay.ellipse(pixel, covariance, 3.0, theme::ghost(), Line::Dotted);
+        }
+    }
+    if let Some(pixel) = ghost.left_pixel {
+        if let Some(map) = &ghost.prepared_from_template {
+            let quad = template_quad(pixel, ghost.template_size_px, map);
+            overlay.outline(&quad, theme::ghost(), Line::Dashed);
+        }
+        if let Some(covariance) = &ghost.left_covariance_px2 {
+            overlay.ellipse(pixel, covariance, 3.0, theme::ghost(), Line::Dashed);
+        }
+        overlay.mark(pixel, Mark::Diamond, theme::ghost());
+    }
+}
+
+/// Shows the card in a corner of the image.
+pub(crate) fn over(ui: &mut Ui, canvas: &Canvas, at: Pos2, state: &State, out: &mut Vec<Command>) {
+    let Some(trial) = state.trial() else { return };
+    let area = canvas.transform.rect;
+    let corner = Rect::from_min_max(at, area.max).with_max_x((at.x + WIDTH).min(area.right()));
+    let builder =
+        UiBuilder::new().max_rect(corner).layout(Layout::top_down(Align::Min)).id_salt("what if card");
+    let mut inside = ui.new_child(builder);
+    inside.set_clip_rect(area.intersect(ui.clip_rect()));
+    let shown = frame().show(&mut inside, |ui| contents(ui, state, trial, out));
+    place::remember(ui, shown.response.rect.size());
+}
+
+/// Shows it as a strip along an edge of the image.
+pub(crate) fn strip(ui: &mut Ui, canvas: &Canvas, edge: Edge, state: &State, out: &mut Vec<Command>) {
+    let Some(trial) = state.trial() else { return };
+    let area = canvas.transform.rect;
+    let top = if edge == Edge::Top { area.top() } else { (area.bottom() - place::STRIP).max(area.top()) };
+    let builder = UiBuilder::new()
+        .max_rect(area.with_min_y(top))
+        .layout(Layout::top_down(Align::Min))
+        .id_salt("what if strip");
+    let mut inside = ui.new_child(builder);
+    inside.set_clip_rect(area.intersect(ui.clip_rect()));
+    frame().show(&mut inside, |ui| {
+        ui.set_min_size(vec2(ui.available_width(), place::STRIP - 12.0));
+        ui.spacing_mut().item_spacing.y = 2.0;
+        // The buttons come first: what is computed meanwhile must not move them.
+        ui.horizontal_wrapped(|ui| {
+            buttons(ui, out);
+            what(ui, state, trial);
+        });
+    });
+}
+
+fn frame() -> Frame {
+    let stroke = egui::Stroke::new(1.0, theme::ghost());
+    Frame::new().fill(theme::scrim()).stroke(stroke).corner_radius(4).inner_margin(Margin::same(6))
+}
+
+fn contents(ui: &mut Ui, state: &State, trial: &Trial, out: &mut Vec<Command>) {
+    what(ui, state, trial);
+    ui.horizontal_wrapped(|ui| buttons(ui, out));
+}
+
+/// What is tried and what comes of it.
+fn what(ui: &mut Ui, state: &State, trial: &Trial) {
+    ui.label(theme::title(&format!("what if, step {}", trial.of.step)));
+    for line in changes(state, trial) {
+        sentence(ui, theme::note(line));
+    }
+    match (&trial.ghost, &trial.refused) {
+        (_, Some(why)) => {
+            sentence(ui, RichText::new(why).color(theme::lost()));
+        }
+        (Some(ghost), None) => result(ui, ghost, ghost.what_if == trial.what_if),
+        (None, None) => {
+            ui.label(theme::note("computing …"));
+        }
+    }
+}
+
+fn buttons(ui: &mut Ui, out: &mut Vec<Command>) {
+    let run = ui.add(Button::new("Run from here as branch").min_size(vec2(0.0, 24.0)));
+    if run.on_hover_text("Nothing recorded is overwritten. Key R").clicked() {
+        out.push(Command::Why(Ask::Branch));
+    }
+    let discard = ui.add(Button::new("Discard").min_size(vec2(0.0, 24.0)));
+    if discard.accessible_name("discard what if").on_hover_text("Key Esc").clicked() {
+        out.push(Command::Why(Ask::Discard));
+    }
+}
+
+/// Words that may be long: beside others they break where the row does.
+fn sentence(ui: &mut Ui, words: RichText) {
+    let label = Label::new(words);
+    ui.add(if ui.layout().is_horizontal() { label } else { label.wrap() });
+}
+
+/// Pieces that stand beside each other: in a strip, where everything does, they are part of its row.
+fn flow(ui: &mut Ui, contents: impl FnOnce(&mut Ui)) {
+    if ui.layout().is_horizontal() {
+        contents(ui);
+    } else {
+        ui.horizontal_wrapped(contents);
+    }
+}
+
+/// What is changed against the run.
+fn changes(state: &State, trial: &Trial) -> Vec<String> {
+    let group = |key: &str| state.settings.iter().find(|info| info.key == key).map(|info| info.group.clone());
+    let settings = trial.what_if.settings.iter().map(|(key, value)| {
+        let before = group(key).and_then(|group| state.setting(&group, key));
+        format!("{key} = {value} instead of {}", before.unwrap_or_default())
+    });
+    let moved = trial.what_if.prediction_px.map(|to| {
+        let from = state.trace().and_then(|trace| trace.point_mast.predicted_left);
+        let way = from.map_or_else(String::new, |from| {
+            format!(", moved by {}, {} px", signed(to.x - from.x), signed(to.y - from.y))
+        });
+        format!("prediction at {:.1}, {:.1}{way}", to.x, to.y)
+    });
+    settings.chain(moved).collect()
+}
+
+/// State, score and place of the ghost, with what changed.
+fn result(ui: &mut Ui, ghost: &Ghost, is_newest: bool) {
+    let tracking = state_of(&ghost.row);
+    let deltas = &ghost.deltas;
+    flow(ui, |ui| {
+        ui.label(RichText::new(ghost.row.state.to_uppercase()).strong().color(theme::state(tracking)));
+        if deltas.state_recorded != ghost.row.state {
+            ui.label(theme::note(format!("was {}", deltas.state_recorded)));
+        }
+        match ghost.is_right() {
+            Some(true) => {
+                ui.label(theme::note("right"));
+            }
+            Some(false) if ghost.row.state == "tracking" => {
+                ui.label(RichText::new("but FALSE").strong().color(theme::failed()));
+            }
+            _ => {}
+        }
+    });
+    let lines = [
+        ("ncc", ghost.row.ncc, deltas.ncc, ""),
+        ("stereo", ghost.row.stereo_score, deltas.stereo_score, ""),
+        ("confidence", ghost.row.confidence.filter(|_| ghost.row.ncc.is_none()), deltas.confidence, ""),
+        ("err", ghost.row.err_px, deltas.err_px, " px"),
+    ];
+    for (name, value, delta, unit) in lines {
+        if let Some(value) = value {
+            let change = delta.map_or_else(String::new, |delta| format!("  Δ {delta:+.3}{unit}"));
+            ui.label(theme::number(format!("{name} {value:.3}{unit}{change}")).size(11.0));
+        }
+    }
+    if let Some(moved) = deltas.moved_px {
+        ui.label(theme::number(format!("match moved {moved:.2} px")).size(11.0));
+    }
+    if let Some(missing) = &ghost.missing {
+        sentence(ui, RichText::new(missing).small().color(theme::lost()));
+    }
+    if !is_newest {
+        ui.label(theme::note("computing the newest change …"));
+    }
+}

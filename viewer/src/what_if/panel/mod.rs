@@ -1,0 +1,40 @@
+//! What if: the handles in the left image, the form in the panel “Why”, and the ghost of what came of it.
+
+mod card;
+mod form;
+mod handles;
+mod place;
+mod tried;
+pub(crate) mod scores;
+
+use sightline_track::trace::StepTrace;
+
+pub(crate) use self::form::form;
+use self::place::Place;
+
+use egui::Ui;
+
+use crate::command::{Command, Mode};
+use crate::drawing::view2d::Canvas;
+use crate::state::State;
+
+/// Shows handles and ghost over the left image.
+pub(crate) fn over_image(ui: &mut Ui, canvas: &Canvas, state: &State, out: &mut Vec<Command>) {
+    let Some(trace) = state.trace().filter(|_| state.marks && state.mode == Mode::Look) else { return };
+    if can_be_tried(trace) {
+        handles::show(ui, canvas, state, trace, out);
+    }
+    if let Some(trial) = state.trial() {
+        card::ghost(canvas, trial);
+        match place::of(ui, state, &canvas.transform) {
+            Some(Place::Over(at)) => card::over(ui, canvas, at, state, out),
+            Some(Place::Strip(edge)) => card::strip(ui, canvas, edge, state, out),
+            None => {}
+        }
+    }
+}
+
+/// Whether a step has a prediction that can be put elsewhere and settings that can be tried.
+pub(crate) fn can_be_tried(trace: &StepTrace) -> bool {
+    trace.prediction().is_some() && trace.fault().is_none()
+}

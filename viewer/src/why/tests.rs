@@ -1,0 +1,374 @@
+//! Why, what if, and what would have saved it: what the panels show and what the state asks for.
+
+use egui_kittest::kittest::{NodeT, Queryable};
+use serde_json::json;
+use sightline_api::wire::{Event, Problem};
+use sightline_geometry::frames::Pixel;
+use sightline_session::Fork;
+use sightline_session::counterfactual::wire::{Question, QuestionState};
+use sightline_session::counterfactual::{Answer, Finding, Goal, Moved, Outcome, SettingChange};
+use sightline_session::view::RunView;
+use sightline_session::what_if::{Deltas, Ghost, WhatIf};
+use sightline_session::why::{Explanation, Node, Origin, OriginKind};
+use sightline_track::settings::Changes;
+
+use crate::cache::StepKey;
+use crate::command::keys;
+use crate::command::{Command, Go, Zoomable};
+use crate::drawing::view2d::View2d;
+use crate::net::request::{Arrived, Request};
+use crate::net::why::{WhyReply, WhyRequest};
+use crate::pane::Pane;
+use crate::state::State;
+use crate::state::effect::Effect;
+use crate::tests::questions::{answer, asked};
+use crate::tests::{Shown, fixture};
+use crate::why::{Ask, Told};
+
+/// The step that is lost.
+const LOST: usize = 3;
+
+fn key() -> StepKey {
+    StepKey { session: "s1".to_owned(), target: 0, run: 0, step: LOST }
+}
+
+fn lost() -> State {
+    fixture::at_step(&egui::Context::default(), LOST)
+}
+
+fn changing(setting: &str, value: serde_json::Value) -> WhatIf {
+    WhatIf { settings: Changes::from([(setting.to_owned(), value)]), ..WhatIf::default() }
+}
+
+fn ghost(what_if: WhatIf) -> Ghost {
+    let tried = fixture::trace(2);
+    let deltas = Deltas { state_recorded: "lost".to_owned(), ncc: Some(0.42), ..Deltas::default() };
+    let mut ghost = Ghost::new(what_if, &tried, &fixture::trace(LOST), &Default::default());
+    ghost.deltas = deltas;
+    ghost
+}
+
+fn finding(setting: &str, to: f64, outcome: Outcome) -> Finding {
+    let change =
+        SettingChange { setting: setting.to_owned(), from: json!(0.7), to: json!(to), unit: String::new() };
+    Finding {
+        changes: vec![change],
+        moved: None,
+        relative: 0.42,
+        outcome,
+        gate: Some("ncc".to_owned()),
+        gate_unit: String::new(),
+        margin_after: Some(0.01),
+        row: fixture::trace(2).row(),
+        runs: 3,
+        sentence: format!("{setting} {to} instead of 0.7: accepted."),
+    }
+}
+
+fn question(state: QuestionState, findings: Vec<Finding>) -> Question {
+    let answer = Answer {
+        goal: Goal::Accepted,
+        k: 4,
+        n: 31,
+        doing: "kernel".to_owned(),
+        runs: 55,
+        findings,
+        without: vec!["roll".to_owned()],
+    };
+    let StepKey { session, target, run, step } = key();
+    Question { session, target, run, step, state, answer: Some(answer), problem: None }
+}
+
+#[test]
+fn the_panel_says_the_verdict_and_lists_the_criteria_worst_first() {
+    let mut shown = Shown::pane(Pane::Why, |context| fixture::at_step(context, LOST));
+    shown.says("Rejected: ncc 0.410 is below 0.700 by 0.290").says("prediction off by").says("rightly so");
+    let value = |name: &str| vec![Command::Why(Ask::Value { step: LOST, value: name.to_owned() })];
+    assert_eq!(shown.click("Why this state?"), value("state"));
+    assert_eq!(shown.click("What would have saved it?"), vec![Command::Why(Ask::Saved)]);
+}
+
+#[test]
+fn a_limit_is_tried_by_its_slider_and_a_displacement_by_its_own() {
+    let shown = Shown::new(
+        [520.0, 900.0],
+        |context| fixture::at_step(context, LOST),
+        |ui, state, out| {
+            crate::layout::show_pane(ui, Pane::Why, state, out);
+        },
+    );
+    for name in ["try ncc_min", "try search window", "try template", "move prediction x"] {
+        shown.harness.get_by_role_and_label(egui::accesskit::Role::Slider, name);
+    }
+}
+
+#[test]
+fn a_slider_stays_the_same_one_when_a_value_is_explained_above_it() {
+    let sliders = |is_explained: bool| {
+        let shown = Shown::new(
+            [520.0, 900.0],
+            move |context| {
+                let mut state = fixture::at_step(context, LOST);
+                if is_explained {
+                    state.perform(Command::Why(Ask::Value { step: LOST, value: "ncc".to_owned() }));
+                }
+                state
+            },
+            |ui, state, out| {
+                crate::layout::show_pane(ui, Pane::Why, state, out);
+            },
+        );
+        ["try ncc_min", "try search window"].map(|name| {
+            let found = shown.harness.get_by_role_and_label(egui::accesskit::Role::Slider, name);
+            (found.accesskit_node().locate().0, found.rect().top())
+        })
+    };
+    let (before, after) = (sliders(false), sliders(true));
+    for ((id, top), (later, moved)) in before.into_iter().zip(after) {
+        assert!(moved > top, "something came in above it");
+        assert_eq!(id, later, "who holds it still holds it");
+    }
+}
+
+#[test]
+fn while_a_change_is_tried_only_the_newest_is_asked_for_next() {
+    let mut state = lost();
+    let side = |side: u64| changing("search_window_px", json!(side));
+    for value in [61, 81, 101] {
+        state.perform(Command::Why(Ask::Change {
+            key: "search_window_px".to_owned(),
+            value: Some(json!(value)),
+        }));
+    }
+    let first = asked(&mut state);
+    assert_eq!(first, vec![WhyRequest::WhatIf { of: key(), what_if: side(61) }], "one at a time");
+    answer(&mut state, first[0].clone(), WhyReply::Ghost(Box::new(ghost(side(61)))));
+    assert_eq!(state.trial().unwrap().ghost.as_ref().unwrap().what_if, side(61), "the last answer stands");
+    let next = asked(&mut state);
+    assert_eq!(next, vec![WhyRequest::WhatIf { of: key(), what_if: side(101) }], "the newest, not the next");
+    answer(&mut state, next[0].clone(), WhyReply::Ghost(Box::new(ghost(side(101)))));
+    assert!(asked(&mut state).is_empty());
+    // Dragging is one deed.
+    state.perform(Command::Why(Ask::Undo));
+    assert!(state.trial().is_none());
+    state.perform(Command::Why(Ask::Redo));
+    assert_eq!(state.trial().unwrap().what_if, side(101));
+    // At another step nothing is tried.
+    state.perform(Command::Go(Go::By(-1)));
+    assert!(state.trial().is_none());
+}
+
+#[test]
+fn a_change_that_is_refused_says_so_in_the_card_and_loses_nothing() {
+    let mut state = lost();
+    state.perform(Command::Why(Ask::Try(changing("search_window_px", json!(61)))));
+    let request = Request::Why(asked(&mut state).remove(0));
+    let (code, title, detail) =
+        ("setting".to_owned(), String::new(), "search_window_px must be odd".to_owned());
+    let problem =
+        Problem { code, title, status: 422, detail, hint: None, nearest_pixel: None, received: None };
+    state.arrived(Arrived { request, outcome: Err(problem) }, 0.0);
+    assert_eq!(state.trial().unwrap().refused.as_deref(), Some("search_window_px must be odd"));
+    assert!(asked(&mut state).is_empty(), "it is not asked for again and again");
+}
+
+#[test]
+fn the_ghost_has_a_card_with_what_changed_and_what_can_be_done() {
+    let mut shown = Shown::pane(Pane::Left, |context| {
+        let mut state = fixture::at_step(context, LOST);
+        let what_if = changing("search_window_px", json!(81));
+        state.perform(Command::Why(Ask::Try(what_if.clone())));
+        let request = WhyRequest::WhatIf { of: key(), what_if: what_if.clone() };
+        answer(&mut state, request, WhyReply::Ghost(Box::new(ghost(what_if))));
+        state
+    });
+    shown.says("search_window_px = 81 instead of 143").says("TRACKING").says("was lost").says("Δ +0.420");
+    assert_eq!(shown.click("Run from here as branch"), vec![Command::Why(Ask::Branch)]);
+    assert_eq!(shown.click("discard what if"), vec![Command::Why(Ask::Discard)]);
+}
+
+#[test]
+fn the_left_image_has_handles_with_names() {
+    let shown = Shown::pane(Pane::Left, |context| {
+        let mut state = fixture::at_step(context, LOST);
+        let view = View2d::At { centre: fixture::PIXEL, scale: 1.0 };
+        state.perform(Command::View(Zoomable::Left, view));
+        state
+    });
+    let roles = [
+        (egui::accesskit::Role::Slider, "search window size handle, px"),
+        (egui::accesskit::Role::Slider, "template size handle, px"),
+    ];
+    for (role, name) in roles {
+        shown.harness.get_by_role_and_label(role, name);
+    }
+    shown.says("prediction handle, at 515.3, 478.6 px");
+}
+
+#[test]
+fn a_branch_takes_settings_and_prediction_along() {
+    let mut state = lost();
+    let pixel = Pixel::new(500.0, 470.0);
+    state.perform(Command::Why(Ask::Change { key: "ncc_min".to_owned(), value: Some(json!(0.4)) }));
+    state.perform(Command::Why(Ask::Displace(Some(pixel))));
+    assert_eq!(keys::command(egui::Key::R, egui::Modifiers::NONE, &state), Some(Command::Why(Ask::Branch)));
+    assert_eq!(
+        keys::command(egui::Key::Escape, egui::Modifiers::NONE, &state),
+        Some(Command::Why(Ask::Discard))
+    );
+    state.perform(Command::Why(Ask::Branch));
+    let new = state.take_requests().into_iter().find_map(|request| match request {
+        Request::NewRun { new, .. } => Some(new),
+        _ => None,
+    });
+    let new = new.unwrap();
+    assert_eq!((new.run, new.from_step, new.prediction_px), (0, LOST, Some(pixel)));
+    assert_eq!(new.settings, Changes::from([("ncc_min".to_owned(), json!(0.4))]));
+}
+
+#[test]
+fn the_findings_can_be_tried_and_run_from_here() {
+    let false_one = finding("ncc_min", 0.4, Outcome::False);
+    let moved = Moved {
+        from: Pixel::new(510.0, 480.0),
+        to: Pixel::new(515.0, 480.0),
+        because: "the truth lies that way".to_owned(),
+    };
+    let right = Finding { changes: Vec::new(), moved: Some(moved), ..finding("none", 0.0, Outcome::Right) };
+    let (tried, run) = (right.what_if(), false_one.what_if());
+    let mut shown = Shown::new(
+        [520.0, 900.0],
+        move |context| {
+            let mut state = fixture::at_step(context, LOST);
+            let question = question(QuestionState::Done, vec![right, false_one]);
+            answer(&mut state, WhyRequest::AskQuestion(key()), WhyReply::Question(Box::new(question)));
+            state
+        },
+        |ui, state, out| {
+            crate::layout::show_pane(ui, Pane::Why, state, out);
+        },
+    );
+    shown.says("RIGHT").says("FALSE").says("the step computed 55 times").says("1 without effect");
+    assert_eq!(shown.click("try finding 1"), vec![Command::Why(Ask::Try(tried))]);
+    assert_eq!(shown.click("run from here with finding 2"), vec![Command::Why(Ask::BranchWith(run))]);
+}
+
+#[test]
+fn a_finding_that_was_branched_says_how_long_it_stays_tracked() {
+    let mut state = lost();
+    let what_if = changing("ncc_min", json!(0.4));
+    let settings = state.run().unwrap().settings.with(&what_if.settings).unwrap();
+    let branch = RunView {
+        number: 1,
+        fork: Some(Fork::new(0, LOST)),
+        changes: what_if.settings.clone(),
+        settings,
+        ..state.run().unwrap().clone()
+    };
+    assert!(state.branch_of(&what_if).is_none());
+    state.session.as_mut().unwrap().targets[0].runs.push(branch);
+    assert_eq!(state.branch_of(&what_if).unwrap().number, 1);
+    let elsewhere = WhatIf { prediction_px: Some(Pixel::new(1.0, 2.0)), ..what_if };
+    assert!(state.branch_of(&elsewhere).is_none());
+}
+
+#[test]
+fn a_question_that_goes_on_shows_how_far_and_can_be_cancelled() {
+    let mut shown = Shown::pane(Pane::Why, |context| {
+        let mut state = fixture::at_step(context, LOST);
+        let question = question(QuestionState::Running, vec![finding("ncc_min", 0.4, Outcome::Unknown)]);
+        answer(&mut state, WhyRequest::Question(key()), WhyReply::Question(Box::new(question)));
+        state
+    });
+    shown.says("4 of 31: kernel").says("ncc_min 0.4 instead of 0.7");
+    assert_eq!(shown.click("Cancel search"), vec![Command::Why(Ask::CancelSaved)]);
+}
+
+#[test]
+fn a_question_is_asked_once_followed_by_events_and_found_again_by_a_new_page() {
+    let mut state = lost();
+    state.want_question();
+    state.want_question();
+    assert_eq!(asked(&mut state), vec![WhyRequest::Question(key())], "looked for once");
+    state.perform(Command::Why(Ask::Saved));
+    state.perform(Command::Why(Ask::Saved));
+    assert_eq!(asked(&mut state), vec![WhyRequest::AskQuestion(key())]);
+    let StepKey { session, target, run, step } = key();
+    state.told(Event::QuestionProgress { session, target, run, step, k: 1, n: 9, ended: false });
+    assert_eq!(asked(&mut state), vec![WhyRequest::Question(key())]);
+    assert_eq!(state.question(), Some(&Told::Waiting));
+    // A page that missed events reads the session again, and what is still being answered with it.
+    let running = question(QuestionState::Running, Vec::new());
+    answer(&mut state, WhyRequest::Question(key()), WhyReply::Question(Box::new(running)));
+    state.told(Event::SessionChanged { session: "s1".to_owned() });
+    assert_eq!(asked(&mut state), vec![WhyRequest::Question(key())]);
+    let done = question(QuestionState::Done, Vec::new());
+    answer(&mut state, WhyRequest::Question(key()), WhyReply::Question(Box::new(done)));
+    state.told(Event::SessionChanged { session: "s1".to_owned() });
+    assert!(asked(&mut state).is_empty());
+}
+
+#[test]
+fn a_value_shows_its_tree_and_each_line_of_it_can_be_asked_about() {
+    let input = Node {
+        value: "peak_score".to_owned(),
+        step: LOST,
+        label: "score at the peak".to_owned(),
+        numbers: vec![Some(0.41)],
+        text: None,
+        unit: String::new(),
+        formula: Some("normalised correlation".to_owned()),
+        is_closed_form: false,
+        stage: "match_template".to_owned(),
+        origin: Some(Origin {
+            kind: OriginKind::Image,
+            name: "images/left_0003.png".to_owned(),
+            step: Some(LOST),
+        }),
+        has_more: false,
+        inputs: Vec::new(),
+    };
+    let tree = Node {
+        value: "ncc".to_owned(),
+        label: "score of the match".to_owned(),
+        formula: Some("the score of the peak".to_owned()),
+        is_closed_form: true,
+        origin: None,
+        inputs: vec![input.clone()],
+        ..input
+    };
+    let explanation = Explanation {
+        step: LOST,
+        sentence: String::new(),
+        gates: Vec::new(),
+        values: Vec::new(),
+        tree: Some(tree),
+    };
+    let mut shown = Shown::pane(Pane::Why, move |context| {
+        let mut state = fixture::at_step(context, LOST);
+        state.perform(Command::Why(Ask::Value { step: LOST, value: "ncc".to_owned() }));
+        let request = asked(&mut state).remove(0);
+        assert!(state.take_effects().contains(&Effect::reveal(Pane::Why)), "the panel comes to the front");
+        assert_eq!(request, WhyRequest::Explain { of: key(), value: "ncc".to_owned() });
+        answer(&mut state, request, WhyReply::Explanation(Box::new(explanation)));
+        state
+    });
+    shown.says("= the score of the peak").says("from file: images/left_0003.png").says("· match_template");
+    let next = vec![Command::Why(Ask::Value { step: LOST, value: "peak_score".to_owned() })];
+    assert_eq!(shown.click("score at the peak"), next);
+}
+
+#[test]
+fn w_asks_for_the_worst_criterion_first_and_numbers_elsewhere_lead_to_why() {
+    let mut state = lost();
+    assert_eq!(keys::command(egui::Key::W, egui::Modifiers::NONE, &state), Some(Command::Why(Ask::Selected)));
+    assert_eq!(keys::command(egui::Key::C, egui::Modifiers::NONE, &state), Some(Command::Why(Ask::Saved)));
+    state.perform(Command::Why(Ask::Selected));
+    assert_eq!(asked(&mut state), vec![WhyRequest::Explain { of: key(), value: "gate.ncc".to_owned() }]);
+    let value = |name: &str| vec![Command::Why(Ask::Value { step: LOST, value: name.to_owned() })];
+    let mut gates = Shown::pane(Pane::Gates, |context| fixture::at_step(context, LOST));
+    assert_eq!(gates.click("match score"), value("gate.ncc"));
+    let mut status =
+        Shown::new([1200.0, 60.0], |context| fixture::at_step(context, LOST), crate::panels::bars::top);
+    assert_eq!(status.click("0.41"), value("ncc"));
+}

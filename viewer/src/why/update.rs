@@ -1,0 +1,273 @@
+//! Carries out what a person asks about a step, and takes in what the server answers.
+
+use serde_json::Value;
+use sightline_api::wire::{NewRun, Problem};
+use sightline_session::counterfactual::wire::{Question, QuestionState};
+use sightline_session::view::RunView;
+use sightline_session::what_if::WhatIf;
+use sightline_session::why::{Explanation, gates};
+
+use crate::cache::StepKey;
+use crate::net::request::Request;
+use crate::net::why::{WhyReply, WhyRequest};
+use crate::pane::Pane;
+use crate::state::effect::Effect;
+use crate::state::{State, run_letter};
+use crate::what_if::Trial;
+use crate::why::{Ask, Told};
+
+/// How many values are remembered for the way back.
+const REMEMBERED: usize = 50;
+/// How many trees are kept.
+const KEPT: usize = 400;
+
+impl State {
+    /// What is tried at the cursor's step.
+    pub fn trial(&self) -> Option<&Trial> {
+        let key = self.step_key(self.cursor.step)?;
+        self.why.trial.as_ref().filter(|trial| trial.of == key)
+    }
+
+    /// The question about the cursor's step.
+    pub fn question(&self) -> Option<&Told<Question>> {
+        self.why.questions.get(&self.step_key(self.cursor.step)?)
+    }
+
+    /// The value that is shown, with its tree.
+    pub fn explained(&self) -> Option<(&StepKey, &str, &Told<Explanation>)> {
+        let (key, value) = self.why.asked.last()?;
+        let tree = self.why.trees.get(&(key.clone(), value.clone()))?;
+        Some((key, value, tree))
+    }
+
+    /// The branch that left the run at the cursor with this very change, where there is one.
+    pub fn branch_of(&self, what_if: &WhatIf) -> Option<&RunView> {
+        let (step, parent) = (self.cursor.step, self.run()?);
+        let is_it = |run: &&RunView| {
+            let left_here = run.fork.is_some_and(|fork| {
+                (fork.run, fork.from_step, fork.prediction_px) == (parent.number, step, what_if.prediction_px)
+            });
+            left_here
+                && parent.settings.with(&what_if.settings).is_ok_and(|settings| settings == run.settings)
+        };
+        self.target()?.runs.iter().find(is_it)
+    }
+
+    /// A setting as it is tried, else as it is in the run.
+    pub(crate) fn tried_setting(&self, group: &str, key: &str) -> Option<Value> {
+        let tried = self.trial().and_then(|trial| trial.what_if.settings.get(key)).cloned();
+        tried.or_else(|| self.setting(group, key))
+    }
+
+    /// Carries out what was asked.
+    pub(crate) fn ask_why(&mut self, ask: Ask) {
+        match ask {
+            Ask::Value { step, value } => self.ask_value(step, value),
+            Ask::Back => {
+                self.why.asked.pop();
+            }
+            Ask::Selected => self.ask_selected(),
+            Ask::Saved => self.ask_what_saves(),
+            Ask::CancelSaved => {
+                let key = self.step_key(self.cursor.step);
+                self.outbox.extend(key.map(|key| Request::Why(WhyRequest::CancelQuestion(key))));
+            }
+            Ask::Try(what_if) => self.try_out(what_if),
+            Ask::Change { key, value } => {
+                let mut what_if = self.trial().map(|trial| trial.what_if.clone()).unwrap_or_default();
+                match value {
+                    Some(value) => what_if.settings.insert(key, value),
+                    None => what_if.settings.remove(&key),
+                };
+                self.try_out(what_if);
+            }
+            Ask::Displace(pixel) => {
+                let what_if = self.trial().map(|trial| trial.what_if.clone()).unwrap_or_default();
+                self.try_out(WhatIf { prediction_px: pixel, ..what_if });
+            }
+            Ask::Scores(shown) => self.why.scores_shown = shown,
+            Ask::Discard => self.try_out(WhatIf::default()),
+            Ask::Branch => {
+                if let Some(what_if) = self.trial().map(|trial| trial.what_if.clone()) {
+                    self.branch(&what_if);
+                }
+            }
+            Ask::BranchWith(what_if) => self.branch(&what_if),
+            Ask::RemoveRun { target, run } => {
+                self.ask(|session| Request::Why(WhyRequest::RemoveRun { session, target, run }));
+            }
+            Ask::Undo => self.undo_last(),
+            Ask::Redo => self.redo_last(),
+        }
+    }
+
+    fn ask_value(&mut self, step: usize, value: String) {
+        self.outbox.add(Effect::reveal(Pane::Why));
+        let Some(key) = self.step_key(step) else { return };
+        self.why.followed = self.step_key(self.cursor.step);
+        self.want_tree(&key, &value);
+        let place = (key, value);
+        if self.why.asked.last() != Some(&place) {
+            self.why.asked.push(place);
+        }
+        if self.why.asked.len() > REMEMBERED {
+            self.why.asked.remove(0);
+        }
+    }
+
+    pub(crate) fn want_tree(&mut self, key: &StepKey, value: &str) {
+        let place = (key.clone(), value.to_owned());
+        if matches!(self.why.trees.get(&place), Some(Told::Waiting | Told::Here(_))) {
+            return;
+        }
+        if self.why.trees.len() >= KEPT {
+            self.why.trees.pop_first();
+        }
+        let (of, value) = place.clone();
+        self.why.trees.insert(place, Told::Waiting);
+        self.outbox.push(Request::Why(WhyRequest::Explain { of, value }));
+    }
+
+    /// The last value asked for, at this step; before the first the worst criterion, else the state.
+    fn ask_selected(&mut self) {
+        let last = self.why.asked.last().map(|(_, value)| value.clone());
+        let worst = || {
+            let verdict = self.trace()?.verdict()?;
+            gates::by_margin(&verdict.gates).first().map(|margin| format!("gate.{}", margin.gate.name))
+        };
+        let value = last.or_else(worst).unwrap_or_else(|| "state".to_owned());
+        self.ask_value(self.cursor.step, value);
+    }
+
+    fn ask_what_saves(&mut self) {
+        self.outbox.add(Effect::reveal(Pane::Why));
+        let Some(key) = self.step_key(self.cursor.step).filter(|_| self.row().is_some()) else {
+            let missing = self.missing_step();
+            self.messages.problem(missing, None);
+            return;
+        };
+        if self.target().is_some_and(|target| target.designation.step == key.step) {
+            self.messages.note("The target was picked at this step: nothing was judged that could be saved.");
+            return;
+        }
+        let goes_on = match self.why.questions.get(&key) {
+            Some(Told::Waiting) => true,
+            Some(Told::Here(question)) => {
+                matches!(
+                    question.state,
+                    QuestionState::Waiting | QuestionState::Running | QuestionState::Done
+                )
+            }
+            _ => false,
+        };
+        if !goes_on {
+            self.why.questions.insert(key.clone(), Told::Waiting);
+            self.outbox.push(Request::Why(WhyRequest::AskQuestion(key)));
+        }
+    }
+
+    /// Forks the run at the cursor's step with a change.
+    fn branch(&mut self, what_if: &WhatIf) {
+        let Some((target, run)) = self.target().map(|t| t.number).zip(self.run().map(|r| r.number)) else {
+            return;
+        };
+        let from_step = self.cursor.step;
+        let (settings, prediction_px) = (what_if.settings.clone(), what_if.prediction_px);
+        let new = NewRun { run, from_step, settings, prediction_px };
+        if self.ask(|session| Request::NewRun { session, target, new }) {
+            self.messages.note(format!("Running {} from step {from_step} as a branch …", run_letter(run)));
+        }
+    }
+
+    /// Takes in an answer.
+    pub(crate) fn told_why(&mut self, request: WhyRequest, reply: WhyReply) {
+        match (request, reply) {
+            (WhyRequest::Explain { of, value }, WhyReply::Explanation(explanation)) => {
+                self.why.trees.insert((of, value), Told::Here(*explanation));
+            }
+            (WhyRequest::WhatIf { of, mut what_if }, WhyReply::Ghost(mut ghost)) => {
+                self.why.trying = None;
+                let has_scores = !what_if.arrays.is_empty();
+                // What is sent along is no part of the change.
+                what_if.arrays.clear();
+                ghost.what_if.arrays.clear();
+                let ours = self.why.trial.as_mut().filter(|trial| trial.of == of);
+                if let Some(trial) = ours {
+                    (trial.ghost, trial.has_scores) = (Some(*ghost), has_scores);
+                    if trial.what_if == what_if {
+                        trial.refused = None;
+                    }
+                }
+                self.send_trial();
+            }
+            (
+                WhyRequest::Question(key) | WhyRequest::AskQuestion(key) | WhyRequest::CancelQuestion(key),
+                WhyReply::Question(question),
+            ) if question.state != QuestionState::Unasked => {
+                self.why.questions.insert(key, Told::Here(*question));
+            }
+            (request, WhyReply::Session(view)) => {
+                self.removed(&request);
+                self.adopt(*view, true);
+                self.sync.session_stale = true;
+            }
+            _ => {}
+        }
+    }
+
+    /// Takes in a refusal; true where it is to be said among the messages as well.
+    pub(crate) fn refused_why(&mut self, request: WhyRequest, problem: &Problem) -> bool {
+        match request {
+            WhyRequest::Explain { of, value } => {
+                self.why.trees.insert((of, value), Told::Refused(problem.detail.clone()));
+                false
+            }
+            WhyRequest::WhatIf { of, mut what_if } => {
+                self.why.trying = None;
+                what_if.arrays.clear();
+                let ours = self.why.trial.as_mut().filter(|trial| trial.of == of && trial.what_if == what_if);
+                if let Some(trial) = ours {
+                    trial.refused = Some(problem.detail.clone());
+                }
+                self.send_trial();
+                false
+            }
+            WhyRequest::AskQuestion(key) => {
+                self.why.questions.insert(key, Told::Refused(problem.detail.clone()));
+                false
+            }
+            // Nobody has asked, or it ended meanwhile.
+            WhyRequest::Question(_) | WhyRequest::CancelQuestion(_) => false,
+            WhyRequest::RemoveRun { .. }
+            | WhyRequest::RestoreRun { .. }
+            | WhyRequest::RestoreTarget { .. } => {
+                self.forget_silent(&request);
+                true
+            }
+        }
+    }
+
+    /// Takes in that a question went on.
+    pub(crate) fn question_went_on(&mut self, key: StepKey) {
+        if self.session.as_ref().is_some_and(|session| session.id == key.session) {
+            self.outbox.push(Request::Why(WhyRequest::Question(key)));
+        }
+    }
+
+    /// Asks again for what is still being answered: a page that missed events is told that the session changed.
+    pub(crate) fn follow_questions(&mut self) {
+        let is_open =
+            |told: &Told<Question>| matches!(told, Told::Here(question) if !question.state.is_over());
+        let open = self.why.questions.iter().filter(|(_, told)| is_open(told));
+        self.outbox.extend(open.map(|(key, _)| Request::Why(WhyRequest::Question(key.clone()))));
+    }
+
+    /// Asks once whether somebody has asked what saves the cursor's step: a page that was loaded again finds its answer.
+    pub fn want_question(&mut self) {
+        let is_lost = self.row().is_some_and(|row| row.state != "tracking" || row.tracked == Some(false));
+        let Some(key) = self.step_key(self.cursor.step).filter(|_| is_lost) else { return };
+        if self.why.looked_for.insert(key.clone()) {
+            self.outbox.push(Request::Why(WhyRequest::Question(key)));
+        }
+    }
+}
