@@ -94,6 +94,13 @@ pub enum AskRequest {
     },
 }
 
+impl AskRequest {
+    /// Whether this changes the list of breakpoints.
+    pub(super) const fn is_change(&self) -> bool {
+        matches!(self, Self::Add { .. } | Self::Change { .. } | Self::Remove { .. })
+    }
+}
+
 /// What the server answered.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AskReply {
@@ -125,7 +132,23 @@ pub struct Asking {
     /// Whether the state bands of the other targets are shown.
     pub shows_others: bool,
     stale: bool,
-    asked: bool,
+    /// The list is being read, asked for after this many changes.
+    asked: Option<u64>,
+    /// Changes of the list that were asked for.
+    changes: u64,
+    /// How many breakpoints are being set.
+    adding: usize,
+    /// Conditions of breakpoints that are being set, with what is to be done to them then.
+    pub(super) when_set: Vec<(String, WhenSet)>,
+}
+
+/// What is to be done to a breakpoint as soon as the server says that it is set, and with which number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum WhenSet {
+    /// It is switched off: so it was before it was removed, or so it is in the file that lists it.
+    SwitchOff,
+    /// It is removed.
+    Remove,
 }
 
 impl Asking {
@@ -138,7 +161,8 @@ impl Asking {
     /// Nothing of another session stays, but the texts that the person wrote.
     pub(crate) fn forget(&mut self) {
         self.breakpoints.clear();
-        (self.edited, self.asked) = (None, false);
+        (self.edited, self.asked, self.adding) = (None, None, 0);
+        self.when_set.clear();
         self.play.forget();
         self.derived.iter_mut().for_each(Derived::forget);
     }

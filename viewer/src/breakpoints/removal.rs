@@ -2,7 +2,7 @@
 
 use sightline_session::breakpoints::{BreakpointChange, BreakpointView, NewBreakpoint};
 
-use crate::breakpoints::AskRequest;
+use crate::breakpoints::{AskRequest, WhenSet};
 use crate::breakpoints::derived::Derived;
 use crate::state::State;
 use crate::state::deeds::Deed;
@@ -20,29 +20,50 @@ impl State {
         Some(self.ask.breakpoints.remove(at))
     }
 
-    /// Removes the breakpoint with a condition again; it may have another number by now.
+    /// Removes the breakpoint with a condition again; it may have another number by now, or none yet.
     pub(crate) fn unset(&mut self, expression: &str) {
         let found = self.ask.breakpoints.iter().find(|known| known.expression == expression);
-        if let Some(number) = found.map(|known| known.number) {
-            self.take_breakpoint_out(number);
+        match found.map(|known| known.number) {
+            Some(number) => {
+                self.take_breakpoint_out(number);
+            }
+            None if self.ask.adding > 0 => {
+                self.ask.when_set.push((expression.to_owned(), WhenSet::Remove));
+            }
+            None => {}
         }
     }
 
-    /// Sets a breakpoint that was removed, as it was.
+    /// Sets a breakpoint that was removed, or that a file lists, as it was.
     pub(crate) fn set_again(&mut self, expression: &str, is_on: bool) {
+        self.ask.when_set.retain(|(waiting, _)| waiting != expression);
         if !is_on {
-            self.undo.switch_off(expression);
+            self.ask.when_set.push((expression.to_owned(), WhenSet::SwitchOff));
         }
         let new = NewBreakpoint { expression: Some(expression.to_owned()), step: None };
         self.ask_server(|session| AskRequest::Add { session, new });
     }
 
-    /// Switches a breakpoint off that was off before it was removed, or is off in the file that lists it.
-    pub(crate) fn switch_off_again(&mut self, view: &BreakpointView) {
-        if view.on && self.undo.take_switch_off(&view.expression) {
-            let (number, change) = (view.number, BreakpointChange { on: Some(false), expression: None });
+    /// Takes out what was to be done to a breakpoint as soon as it is set: it is set, or refused.
+    pub(super) fn take_when_set(&mut self, expression: Option<&str>) -> Vec<WhenSet> {
+        self.ask.adding = self.ask.adding.saturating_sub(1);
+        let is_meant = |waiting: &mut (String, WhenSet)| Some(waiting.0.as_str()) == expression;
+        self.ask.when_set.extract_if(.., is_meant).map(|(_, what)| what).collect()
+    }
+
+    /// Does what was to be done to a breakpoint as soon as it is set; whether it is removed.
+    pub(super) fn change_when_set(&mut self, view: &BreakpointView) -> bool {
+        let number = view.number;
+        let waiting = self.take_when_set(Some(&view.expression));
+        let is_removed = waiting.contains(&WhenSet::Remove);
+        if is_removed {
+            self.ask.breakpoints.retain(|known| known.number != number);
+            self.ask_server(|session| AskRequest::Remove { session, number });
+        } else if waiting.contains(&WhenSet::SwitchOff) {
+            let change = BreakpointChange { on: Some(false), expression: None };
             self.ask_server(|session| AskRequest::Change { session, number, change });
         }
+        is_removed
     }
 
     pub(crate) fn unplot(&mut self, place: usize) {

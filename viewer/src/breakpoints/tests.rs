@@ -2,7 +2,7 @@
 
 use egui_kittest::kittest::Queryable;
 use sightline_api::wire::Event;
-use sightline_session::breakpoints::{Breakpoint, BreakpointView, NewBreakpoint, RunHits};
+use sightline_session::breakpoints::{Breakpoint, BreakpointChange, BreakpointView, NewBreakpoint, RunHits};
 use sightline_session::expression::Answers;
 use sightline_session::query::{QueryAnswer, RunAnswer};
 
@@ -214,6 +214,30 @@ fn hits_are_asked_again_when_the_session_changes_and_once_at_a_time() {
     );
     assert_eq!(state.hit_from(1, true), Some(3));
     assert!(state.take_requests().contains(&wanted), "what changed meanwhile is asked for");
+}
+
+#[test]
+fn a_list_that_was_read_before_a_removal_does_not_bring_the_breakpoint_back() {
+    let mut state = loaded(2);
+    let mut view = state.session.clone().unwrap();
+    view.breakpoints = vec![Breakpoint { number: 0, expression: "ncc < 0.6".to_owned(), on: true }];
+    state.session = Some(view);
+    state.ask.breakpoints = vec![breakpoint(0, "ncc < 0.6", &[1])];
+    state.ask.make_stale();
+    state.sync_ask();
+    let list = AskRequest::Breakpoints("s1".to_owned());
+    assert!(state.take_requests().contains(&Request::Ask(list.clone())));
+    ask(&mut state, Ask::Remove(0));
+    answer(&mut state, list.clone(), AskReply::Breakpoints(vec![breakpoint(0, "ncc < 0.6", &[1])]));
+    assert!(state.ask.breakpoints.is_empty());
+    state.sync_ask();
+    assert!(state.take_requests().contains(&Request::Ask(list.clone())), "it is read again");
+    answer(&mut state, list, AskReply::Breakpoints(vec![]));
+    // The answer to a change that was asked for before the removal does not bring it back either.
+    let change = BreakpointChange { on: Some(false), expression: None };
+    let change = AskRequest::Change { session: "s1".to_owned(), number: 0, change };
+    answer(&mut state, change, AskReply::Breakpoint(breakpoint(0, "ncc < 0.6", &[1])));
+    assert!(state.ask.breakpoints.is_empty());
 }
 
 /// A column over the first run whose values are the steps.

@@ -141,7 +141,10 @@ impl State {
     pub(super) fn ask_server(&mut self, request: impl FnOnce(String) -> AskRequest) -> bool {
         match self.session.as_ref().map(|session| session.id.clone()) {
             Some(session) => {
-                self.outbox.push(Request::Ask(request(session)));
+                let request = request(session);
+                self.ask.changes += u64::from(request.is_change());
+                self.ask.adding += usize::from(matches!(request, AskRequest::Add { .. }));
+                self.outbox.push(Request::Ask(request));
                 true
             }
             None => {
@@ -158,13 +161,13 @@ impl State {
             return;
         }
         let id = session.id.clone();
-        if self.ask.stale && !self.ask.asked {
+        if self.ask.stale && self.ask.asked.is_none() {
             self.ask.stale = false;
-            // Without any there is nothing to hear.
-            if session.breakpoints.is_empty() {
+            // Without any there is nothing to hear. A session that was read before a change of this page does not know.
+            if session.breakpoints.is_empty() && self.ask.changes == 0 {
                 self.ask.breakpoints.clear();
             } else {
-                self.ask.asked = true;
+                self.ask.asked = Some(self.ask.changes);
                 self.outbox.push(Request::Ask(AskRequest::Breakpoints(id.clone())));
             }
         }
@@ -175,14 +178,23 @@ impl State {
     pub(crate) fn answered_ask(&mut self, request: &AskRequest, reply: AskReply) {
         match (request, reply) {
             (AskRequest::Breakpoints(_), AskReply::Breakpoints(list)) => {
-                self.ask.asked = false;
-                self.ask.breakpoints = list;
+                // A list that was read before a later change would bring back what is removed.
+                if self.ask.asked.take().is_none_or(|changes| changes == self.ask.changes) {
+                    self.ask.breakpoints = list;
+                } else {
+                    self.ask.stale = true;
+                }
             }
             (_, AskReply::Breakpoint(view)) => {
-                self.switch_off_again(&view);
+                let is_new = matches!(request, AskRequest::Add { .. });
+                if is_new && self.change_when_set(&view) {
+                    return;
+                }
                 match self.ask.breakpoints.iter_mut().find(|known| known.number == view.number) {
                     Some(known) => *known = view,
-                    None => self.ask.breakpoints.push(view),
+                    None if is_new => self.ask.breakpoints.push(view),
+                    // It was removed after this change was asked for.
+                    None => {}
                 }
             }
             (AskRequest::Query { query, .. }, AskReply::Answer(answer)) => {
@@ -195,14 +207,18 @@ impl State {
     /// Takes in a refusal.
     pub(crate) fn refused_ask(&mut self, request: &AskRequest, problem: &Problem) {
         match request {
-            AskRequest::Breakpoints(_) => self.ask.asked = false,
+            AskRequest::Breakpoints(_) => self.ask.asked = None,
             AskRequest::Query { query, .. } => self.took_column(query, Err(problem.detail.clone())),
             // What the page believed of the list may be wrong now.
             AskRequest::Remove { .. } => {
                 self.undo.forget_last(|deed| matches!(deed, Deed::RemovedBreakpoint { .. }));
                 self.ask.stale = true;
             }
-            _ => self.ask.stale = true,
+            AskRequest::Add { new, .. } => {
+                self.take_when_set(new.expression.as_deref());
+                self.ask.stale = true;
+            }
+            AskRequest::Change { .. } => self.ask.stale = true,
         }
     }
 }

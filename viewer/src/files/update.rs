@@ -4,11 +4,9 @@ use sightline_api::endpoint::{Call, Endpoint};
 use sightline_api::endpoints::{AddTraverse, BringSession, ListSessions};
 use sightline_api::location::Anywhere;
 use sightline_api::wire::{NewTraverse, Problem, SessionEntry};
-use sightline_session::breakpoints::NewBreakpoint;
 use sightline_session::reproduce::{Opened, Reproduction};
 use sightline_track::settings::{Changes, Settings};
 
-use crate::breakpoints::AskRequest;
 use crate::cache::Key;
 use crate::files::documents::Document;
 use crate::files::inbox::Arrival;
@@ -187,13 +185,7 @@ impl State {
         self.outbox.add(Effect::reveal(Pane::Breakpoints));
         let count = list.len();
         for (expression, is_on) in list {
-            if !is_on {
-                self.undo.switch_off(&expression);
-            }
-            self.ask(|session| {
-                let new = NewBreakpoint { expression: Some(expression), step: None };
-                Request::Ask(AskRequest::Add { session, new })
-            });
+            self.set_again(&expression, is_on);
         }
         let what = if count == 1 { "One breakpoint".to_owned() } else { format!("{count} breakpoints") };
         self.messages.note(format!("{what} of {file} set."));

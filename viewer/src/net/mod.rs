@@ -4,6 +4,7 @@ pub(crate) mod events;
 pub(crate) mod calls;
 mod exchange;
 mod http;
+mod in_order;
 mod items;
 mod reply;
 pub(crate) mod request;
@@ -15,6 +16,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use sightline_api::wire::Event;
 
 use self::events::{Connection, Events, UNHURRIED};
+use self::in_order::InOrder;
 use self::request::{Arrived, Request};
 use crate::cache::Key;
 
@@ -32,6 +34,7 @@ pub(crate) struct Net {
     receiver: Receiver<Arrived>,
     under_way: HashSet<Key>,
     slow: HashSet<Key>,
+    in_order: InOrder,
     events: Events,
 }
 
@@ -40,7 +43,8 @@ impl Net {
     pub(crate) fn new(origin: String, context: egui::Context) -> Self {
         let (sender, receiver) = channel();
         let events = Events::new(&origin, context.clone());
-        Self { origin, context, sender, receiver, under_way: HashSet::new(), slow: HashSet::new(), events }
+        let (under_way, slow, in_order) = (HashSet::new(), HashSet::new(), InOrder::default());
+        Self { origin, context, sender, receiver, under_way, slow, in_order, events }
     }
 
     /// Takes a place for something that is asked for next, where there is one.
@@ -59,8 +63,16 @@ impl Net {
     pub(crate) fn send(&mut self, request: Request) {
         if request == Request::Reconnect {
             self.events.reconnect_now();
-            return;
+        } else if request.is_in_order() {
+            if let Some(first) = self.in_order.add(request) {
+                self.send_now(first);
+            }
+        } else {
+            self.send_now(request);
         }
+    }
+
+    fn send_now(&self, request: Request) {
         let (sender, context) = (self.sender.clone(), self.context.clone());
         http::send(&self.origin, request, &self.context, move |arrived| {
             let shows_nothing = matches!(arrived.request, Request::PutCursor { .. });
@@ -80,6 +92,9 @@ impl Net {
             if let Request::Item(key) = &answer.request {
                 self.under_way.remove(key);
                 self.slow.remove(key);
+            }
+            if let Some(next) = self.in_order.answered(&answer.request) {
+                self.send_now(next);
             }
         }
         arrived

@@ -165,6 +165,28 @@ pub enum Request {
     Ask(AskRequest),
 }
 
+impl Request {
+    /// Whether this may only be sent when those of its kind before it are answered: quick changes that a user makes and
+    /// takes back, and the list that they change. Connections are parallel, so that a removal could overtake what it undoes.
+    pub(crate) const fn is_in_order(&self) -> bool {
+        match self {
+            Self::RemoveTarget { .. }
+            | Self::NewNote { .. }
+            | Self::EditNote { .. }
+            | Self::RemoveNote { .. }
+            | Self::RestoreNote { .. } => true,
+            Self::Why(request) => matches!(
+                request,
+                WhyRequest::RemoveRun { .. }
+                    | WhyRequest::RestoreRun { .. }
+                    | WhyRequest::RestoreTarget { .. }
+            ),
+            Self::Ask(request) => !matches!(request, AskRequest::Query { .. }),
+            _ => false,
+        }
+    }
+}
+
 /// What the server answered.
 pub enum Reply {
     /// A session.

@@ -83,8 +83,6 @@ pub struct Undo {
     pub(super) undone: Vec<Deed>,
     /// Requests that take a deed back or do it again, and are no deeds themselves.
     pub(super) silent: Vec<Request>,
-    /// Conditions of breakpoints that are to be switched off when they are set.
-    to_switch_off: Vec<String>,
     /// Raised by every deed, and by taking one back.
     pub(super) changes: u64,
 }
@@ -98,17 +96,6 @@ impl Undo {
     /// Whether the deed with this number is the one that would be taken back next.
     pub fn is_last(&self, deed: u64) -> bool {
         self.changes == deed && !self.done.is_empty()
-    }
-
-    /// A breakpoint with this condition is to be switched off when it is set.
-    pub(crate) fn switch_off(&mut self, expression: &str) {
-        self.to_switch_off.push(expression.to_owned());
-    }
-
-    /// Whether a breakpoint that was set is to be switched off, which is asked once.
-    pub(crate) fn take_switch_off(&mut self, expression: &str) -> bool {
-        let place = self.to_switch_off.iter().position(|waiting| waiting == expression);
-        place.map(|place| self.to_switch_off.remove(place)).is_some()
     }
 
     /// Forgets the last deed, where it is this one: it was refused.

@@ -139,6 +139,22 @@ fn a_removed_breakpoint_comes_back_as_it_was_also_where_it_was_off() {
 }
 
 #[test]
+fn a_removal_is_done_again_also_before_the_server_has_set_the_breakpoint() {
+    let mut state = lost();
+    state.ask.breakpoints = vec![breakpoint(4, "ncc < 0.5", true)];
+    state.perform(Command::Ask(breakpoints::Ask::Remove(4)));
+    undo(&mut state);
+    let add = asked_of_breakpoints(&mut state).pop().unwrap();
+    redo(&mut state);
+    assert!(asked_of_breakpoints(&mut state).is_empty(), "its number is not known yet");
+    let reply = Reply::Ask(AskReply::Breakpoint(breakpoint(5, "ncc < 0.5", true)));
+    state.arrived(Arrived { request: Request::Ask(add), outcome: Ok(reply) }, 0.0);
+    let removal = AskRequest::Remove { session: "s1".to_owned(), number: 5 };
+    assert_eq!(asked_of_breakpoints(&mut state), vec![removal]);
+    assert!(state.ask.breakpoints.is_empty());
+}
+
+#[test]
 fn a_removal_of_a_breakpoint_that_is_refused_is_no_deed() {
     let mut state = lost();
     state.ask.breakpoints = vec![breakpoint(4, "ncc < 0.5", true)];

@@ -1,0 +1,49 @@
+//! Requests that are sent one after the other. Connections are parallel, so that a removal could otherwise overtake the
+//! change that it takes back.
+
+use std::collections::VecDeque;
+
+use crate::net::request::Request;
+
+/// The requests that were not answered yet; the first one is under way.
+#[derive(Default)]
+pub(super) struct InOrder(VecDeque<Request>);
+
+impl InOrder {
+    /// Takes a request in; it is returned where it can be sent at once.
+    pub(super) fn add(&mut self, request: Request) -> Option<Request> {
+        self.0.push_back(request);
+        if self.0.len() == 1 { self.0.front().cloned() } else { None }
+    }
+
+    /// Takes in that a request was answered; returns the one that can be sent next.
+    pub(super) fn answered(&mut self, request: &Request) -> Option<Request> {
+        if self.0.front() != Some(request) {
+            return None;
+        }
+        self.0.pop_front();
+        self.0.front().cloned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn note(id: u64) -> Request {
+        Request::RestoreNote { session: "s1".to_owned(), id }
+    }
+
+    #[test]
+    fn a_request_is_sent_when_those_before_it_are_answered() {
+        let mut requests = InOrder::default();
+        assert_eq!(requests.add(note(1)), Some(note(1)));
+        assert_eq!(requests.add(note(2)), None);
+        assert_eq!(requests.add(note(2)), None, "the same request twice is sent twice");
+        assert_eq!(requests.answered(&note(7)), None, "another request");
+        assert_eq!(requests.answered(&note(1)), Some(note(2)));
+        assert_eq!(requests.answered(&note(2)), Some(note(2)));
+        assert_eq!(requests.answered(&note(2)), None);
+        assert_eq!(requests.add(note(3)), Some(note(3)));
+    }
+}
