@@ -21,7 +21,7 @@ use crate::notes::panel as notes_panel;
 use crate::page::link::Fragment;
 use crate::page::status::Publisher;
 use crate::page::storage;
-use crate::pane::{Need, Pane};
+use crate::panels::pane::{Need, Pane};
 use crate::panels::{bars, card, timeline};
 use crate::state::State;
 use crate::state::effect::Effect;

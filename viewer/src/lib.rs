@@ -6,8 +6,7 @@
 //! | `command` | what the user can ask for: the commands, the table of names and keys, palette and help sheet |
 //! | `state` | the one value of which every panel is a view; `apply` returns effects |
 //! | `net`, `cache`, `tables` | requests, events, and loaded data within a limit of memory |
-//! | `pane` | the panels by name, with their constant facts |
-//! | `panels` | the trait `Panel`, the list of panels, and the panels that belong to no feature below |
+//! | `panels` | the table of panels, the trait `Panel`, and the panels that belong to no feature below |
 //! | `layout` | arrangements of the panels |
 //! | `compare` | comparing runs |
 //! | `why`, `what_if` | where a value came from, what would have saved a step, and changes that are tried out |
@@ -44,7 +43,6 @@ mod net;
 mod cache;
 mod tables;
 mod shape_view;
-mod pane;
 mod panels;
 mod layout;
 mod theme;

@@ -10,7 +10,7 @@ use crate::breakpoints::{Ask, AskReply, AskRequest};
 use crate::command::help;
 use crate::command::{Command, Go};
 use crate::net::request::{Arrived, Reply, Request};
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::panels::plots;
 use crate::state::State;
 use crate::tests::{Shown, fixture};

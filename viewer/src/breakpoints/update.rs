@@ -8,7 +8,7 @@ use crate::breakpoints::{Ask, AskReply, AskRequest, Asking};
 use crate::command::{Command, Go};
 use crate::net::events::Connection;
 use crate::net::request::Request;
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::state::deeds::Deed;
 use crate::state::effect::Effect;

@@ -8,7 +8,7 @@ use crate::exports;
 use crate::figure::wish::{Kind, Wish};
 use crate::layout::command::LayoutCommand;
 use crate::layout::presets::Preset;
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::panels::digits;
 use crate::panels::sheets::of_panel;
 use crate::state::{State, events, run_letter};

@@ -236,7 +236,7 @@ pub enum Command {
     /// Closes the card of a problem.
     CloseCard,
     /// Shows a panel as a table, or as it is painted again.
-    Table(crate::pane::Pane),
+    Table(crate::panels::pane::Pane),
     /// The limits of trackability.
     Limits(crate::trackability::limits::Ask),
     /// The pointer rests on something.

@@ -5,7 +5,7 @@ use egui::{Button, Ui, vec2};
 use crate::command::Command;
 use crate::exports::Ask;
 use crate::figure::wish::{Kind, Wish};
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::theme;
 

@@ -8,7 +8,7 @@ pub(crate) mod update;
 use sightline_session::exports::ExportEntry;
 
 use crate::figure::wish::{Kind, Wish};
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 
 /// What a person asks of exports.
 #[derive(Clone, Debug, PartialEq)]

@@ -8,7 +8,7 @@ use crate::exports::as_text;
 use crate::exports::figure_menu;
 use crate::exports::{Ask, Part};
 use crate::figure::wish::{Kind, Wish};
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::theme;
 

@@ -7,7 +7,7 @@ use egui::{Context, FontDefinitions, Frame, LayerId, Margin, RawInput, Rect, Str
 use crate::figure::wish::{Kind, Wish};
 use crate::figure::{Figure, Form, Ink, Piece, bitmap, shapes, svg, words};
 use crate::layout::show_pane;
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::state::{State, run_letter};
 use crate::theme;
 

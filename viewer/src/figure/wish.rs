@@ -1,6 +1,6 @@
 //! What is wanted of a figure: of which panel, and as what.
 
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 
 /// What a figure is saved as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

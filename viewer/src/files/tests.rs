@@ -17,7 +17,7 @@ use crate::files::documents::{Document, TEXT_LIMIT, before_reading, only_one, re
 use crate::files::inbox::Arrival;
 use crate::files::window;
 use crate::net::request::{Arrived, Request};
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::state::effect::Effect;
 use crate::state::messages::Weight;

@@ -12,7 +12,7 @@ use crate::files::documents::Document;
 use crate::files::inbox::Arrival;
 use crate::files::{Ask, documents};
 use crate::net::request::Request;
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::state::effect::Effect;
 

@@ -1,7 +1,7 @@
 //! What can be asked of the arrangement of the panels.
 
 use crate::layout::presets::Preset;
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 
 /// What can be asked of the arrangement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

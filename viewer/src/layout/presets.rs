@@ -6,7 +6,7 @@
 use egui_tiles::{Container, Linear, LinearDir, TileId, Tiles, Tree};
 use serde::{Deserialize, Serialize};
 
-use crate::pane::{Group, Pane};
+use crate::panels::pane::{Group, Pane};
 
 /// An arrangement by name; Shift and its number calls it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::layout::command::LayoutCommand;
 use crate::layout::presets::{Preset, narrow};
 use crate::layout::{Panels, show_pane};
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::theme;
 
 /// Windows narrower than this have one column, points.

@@ -7,7 +7,7 @@ use crate::command::Command;
 use crate::command::table::PIN_NOTE;
 use crate::notes::markdown;
 use crate::notes::{Ask, Draft};
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::panels::panel::Panel;
 use crate::state::{State, run_letter};
 use crate::{panels, theme};

@@ -1,5 +1,88 @@
-//! The panels: read-only data in, commands out. Each file shows one thing.
+//! The panels: read-only data in, commands out. Each file shows one thing. To add a panel: its own file, which
+//! implements [`panel::Panel`], its `mod` line, and its entry in the table below.
 
+/// The panels in the order of the menus: variant of [`pane::Pane`], identifier in stored arrangements, title, home in
+/// the overview, purpose, and path of the implementation in this crate. `$with` is a macro that takes the whole table.
+macro_rules! panel_table {
+    ($with:ident) => {
+        $with! {
+            Targets: "targets", "Targets and runs", Home(Group::Lists, 0),
+                "What is tracked, and each configuration tried on it.",
+                panels::targets::Targets;
+            Settings: "settings", "Settings", Home(Group::Lists, 1),
+                "Thresholds and parameters of a run",
+                panels::settings::Settings;
+            Left: "left", "Left image", Home(Group::LeftImage, 0),
+                "The left image with what the tracker knew of the target",
+                panels::images_left::LeftView;
+            Right: "right", "Right image", Home(Group::Views, 0),
+                "The right image with the epipolar curve and the stereo match",
+                panels::image_right::RightView;
+            Features: "features", "Features", Home(Group::Views, 1),
+                "What the feature tracker saw: features, matches, the motion, and how certain it is.",
+                panels::features::Features;
+            Shape: "shape", "Shape", Home(Group::Views, 2),
+                "What the shape tracker saw: surface, sensor, search, meshes, and the hand-off.",
+                panels::shape::Shape;
+            Budget: "budget", "Error budget", Home(Group::Views, 3),
+                "What accuracy stereo, driving and drift leave.",
+                panels::budget::Budget;
+            Studies: "studies", "Studies", Home(Group::Views, 4),
+                "The paper’s experiments, over worlds whose truth is known.",
+                studies::panel::Studies;
+            Strip: "strip", "Template strip", Home(Group::Strip, 0),
+                "The template from its reference to what was compared.",
+                panels::strip::Strip;
+            History: "history", "Template history", Home(Group::Strip, 1),
+                "Every step’s matched window, and how the current view compares with the earlier templates.",
+                panels::history::History;
+            Surface: "surface", "Match scores", Home(Group::Scores, 0),
+                "The match score of every position in the search window.",
+                panels::surface::Scores;
+            StereoProfile: "stereo_profile", "Stereo scores", Home(Group::Scores, 1),
+                "The stereo score of every range that was searched.",
+                panels::stereo_profile::StereoProfile;
+            Map: "map", "Map, site frame", Home(Group::Map, 0),
+                "The rover’s path and the target, seen from above.",
+                panels::map::Map;
+            Plots: "plots", "Over the steps", Home(Group::Plots, 0),
+                "Scores or confidence, and errors of the run, step by step.",
+                panels::plots::Plots;
+            Tolerances: "tolerances", "Tolerances", Home(Group::Plots, 1),
+                "Criteria 3 and 4: each correction against its tolerance, step by step.",
+                panels::tolerances::Tolerances;
+            Gates: "gates", "Gates", Home(Group::Verdict, 0),
+                "Whether the match can be trusted: the criteria with their limits.",
+                panels::gates::Gates;
+            Machine: "machine", "State machine", Home(Group::Verdict, 1),
+                "Where tracking stands, and which criterion fired at each past update.",
+                panels::machine::Machine;
+            Inspector: "inspector", "Inspector", Home(Group::Details, 0),
+                "The record of the selected stage: values with units, formulas and origins",
+                panels::inspector::Inspector;
+            Messages: "messages", "Messages", Home(Group::Details, 3),
+                "What was refused or failed, with how to mend it",
+                panels::messages::Messages;
+            Runs: "runs", "Runs", Home(Group::Views, 5),
+                "What each run is worth, and which settings make the difference.",
+                panels::runs::Runs;
+            Uncertainty: "uncertainty", "Uncertainty", Home(Group::Plots, 2),
+                "Whether errors are as large as the covariances say.",
+                panels::uncertainty::UncertaintyPanel;
+            Why: "why", "Why", Home(Group::Details, 1),
+                "Why a step was accepted or rejected, what would have saved it, and where a number comes from.",
+                why::panel::Why;
+            Notes: "notes", "Notes", Home(Group::Details, 2),
+                "What you wrote about places of the drive; the list is a tour that can be stepped through.",
+                notes::panel::Notes;
+            Breakpoints: "breakpoints", "Breakpoints", Home(Group::Verdict, 2),
+                "Conditions that are looked for at all steps of all runs at once.",
+                breakpoints::panel::Breakpoints;
+        }
+    };
+}
+
+pub(crate) mod pane;
 pub(crate) mod panel;
 pub(crate) mod list;
 pub(crate) mod bars;

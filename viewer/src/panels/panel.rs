@@ -6,7 +6,7 @@
 use egui::{Color32, Margin, Ui};
 
 use crate::command::Command;
-use crate::pane::Need;
+use crate::panels::pane::Need;
 use crate::panels::sheets::Sheet;
 use crate::state::State;
 use crate::theme;

@@ -12,7 +12,7 @@ use crate::command::{Command, Zoomable};
 use crate::drawing::overlay::{Mark, Overlay};
 use crate::drawing::raster::{Look, Raster};
 use crate::drawing::view2d::Canvas;
-use crate::pane::{Need, Pane};
+use crate::panels::pane::{Need, Pane};
 use crate::panels::panel::{Panel, TableOf};
 use crate::panels::score_marks::{paint_contour, paint_marks, region_of};
 use crate::panels::sheets;

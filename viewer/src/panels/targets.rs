@@ -6,7 +6,7 @@ use sightline_session::view::{RunView, TargetView};
 use crate::command::table::PICK;
 use crate::command::{Command, Mode};
 use crate::drawing::overlay::{paint_mark, run_mark};
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::panels::panel::Panel;
 use crate::panels::{run_tree, timeline};
 use crate::state::{State, run_letter};

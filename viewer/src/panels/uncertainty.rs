@@ -11,7 +11,7 @@ use crate::compare::state::Look;
 use crate::drawing::decimate;
 use crate::drawing::overlay;
 use crate::drawing::overlay::Mark;
-use crate::pane::{Need, Pane};
+use crate::panels::pane::{Need, Pane};
 use crate::panels;
 use crate::panels::chart::{few_marks, over_steps, plain, shape};
 use crate::panels::names;

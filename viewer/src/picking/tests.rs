@@ -9,7 +9,7 @@ use sightline_rover::trackability::{Aspect, MapProgress, TrackabilityMap, Verdic
 use crate::command::keys;
 use crate::command::{Command, Layer, Mode};
 use crate::net::request::{Arrived, Reply, Request};
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::picking;
 use crate::picking::aim::Aim;
 use crate::state::{Place, Refusal, State};

@@ -3,7 +3,7 @@
 use crate::figure::wish::Wish;
 use crate::layout::command::LayoutCommand;
 use crate::net::request::Request;
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::theme::Looks;
 
 /// Something that the page does for the state.

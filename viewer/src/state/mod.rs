@@ -146,7 +146,7 @@ pub struct State {
     /// Breakpoints, derived columns, and time travel.
     pub ask: Asking,
     /// Panels that are looked at as tables.
-    pub tables: HashSet<crate::pane::Pane>,
+    pub tables: HashSet<crate::panels::pane::Pane>,
     /// What the pointer rests on, in whatever panel.
     pub pointed: Option<Pointed>,
     pub(crate) outbox: Outbox,

@@ -3,7 +3,7 @@
 use egui::{ColorImage, TextureId};
 
 use crate::drawing::raster::Raster;
-use crate::pane::{Need, Pane};
+use crate::panels::pane::{Need, Pane};
 use crate::state::State;
 
 impl State {

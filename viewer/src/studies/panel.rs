@@ -5,7 +5,7 @@ use sightline_study::row::Row;
 use sightline_study::wire::{StudyInfo, StudyJob, StudyState};
 
 use crate::command::Command;
-use crate::pane::Need;
+use crate::panels::pane::Need;
 use crate::panels::panel::Panel;
 use crate::state::State;
 use crate::{panels, theme};

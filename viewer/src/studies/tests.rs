@@ -8,7 +8,7 @@ use sightline_study::wire::{StudyInfo, StudyJob, StudyRows, StudyState};
 
 use crate::command::Command;
 use crate::net::request::{Arrived, Request};
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::studies::Order;
 use crate::tests::{Shown, fixture};

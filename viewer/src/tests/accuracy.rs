@@ -2,7 +2,7 @@
 
 use crate::command::Command;
 use crate::drawing::stretch::Stretch;
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::state::calculator::{Calculator, Pair};
 use crate::tests::{Shown, fixture};
 

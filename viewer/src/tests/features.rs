@@ -8,7 +8,7 @@ use sightline_track::trace::StepTrace;
 
 use crate::command::{Command, Layer, Stage};
 use crate::drawing::view2d::View2d;
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::panels::features::marks;
 use crate::panels::{bars, inspector};
 use crate::state::State;

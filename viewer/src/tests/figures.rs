@@ -13,7 +13,7 @@ use crate::figure::save;
 use crate::figure::wish::{Kind, Wish};
 use crate::figure::{Figure, Form, Ink, bitmap, shapes, svg};
 use crate::layout::show_pane;
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::tests::{Shown, fixture};
 use crate::theme;

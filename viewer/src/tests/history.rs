@@ -4,7 +4,7 @@ use sightline_api::wire::Problem;
 
 use crate::cache::Key;
 use crate::command::{Command, Go};
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::tests::session::problem;
 use crate::tests::{Shown, fixture};
 

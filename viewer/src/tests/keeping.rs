@@ -15,7 +15,7 @@ use crate::figure::wish::{Kind, Wish};
 use crate::net::request::{Arrived, Reply, Request};
 use crate::notes::Ask;
 use crate::notes::panel;
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::state::effect::Effect;
 use crate::tests::{Shown, fixture};

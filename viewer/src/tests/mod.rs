@@ -47,7 +47,7 @@ use crate::command::help;
 use crate::command::{Command, Go, Layer, Mode, Stage};
 use crate::layout::show_pane;
 use crate::net::events::Connection;
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::panels::{bars, timeline};
 use crate::state::{Progress, State};
 use crate::theme;

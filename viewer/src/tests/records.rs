@@ -4,7 +4,7 @@ use sightline_track::records::{self, StageQuantity};
 
 use super::{Shown, fixture};
 use crate::command::{Command, Stage};
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::panels::plots;
 use crate::why::Ask;
 

@@ -6,7 +6,7 @@ use sightline_track::trace::StepKind;
 
 use crate::command::{Command, Layer, Stage};
 use crate::layout::show_pane;
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::panels::{bars, inspector};
 use crate::shape_view::{Part, ShapeView};
 use crate::state::State;

@@ -9,7 +9,7 @@ use sightline_track::trace::ArrayName;
 use crate::command::actions;
 use crate::command::{Command, Go};
 use crate::layout::show_pane;
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::panels::sheets::of_panel as sheets;
 use crate::panels::sheets::{Cell, Sheet};
 use crate::state::State;

@@ -5,7 +5,7 @@ use egui_kittest::kittest::Queryable;
 
 use crate::breakpoints::Ask;
 use crate::command::{Command, Go};
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::panels::timeline;
 use crate::state::State;
 use crate::tests::ask::breakpoint;

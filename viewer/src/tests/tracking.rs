@@ -4,7 +4,7 @@ use serde_json::json;
 use sightline_track::stages::judge::Gate;
 
 use crate::command::{Command, Go};
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::tests::{Shown, fixture};
 

@@ -14,7 +14,7 @@ use crate::command::Command;
 use crate::command::keys;
 use crate::net::request::{Arrived, Reply, Request};
 use crate::net::why::{WhyReply, WhyRequest};
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::state::deeds::Deed;
 use crate::tests::questions::{answer, asked};

@@ -13,7 +13,7 @@ use crate::command::{Command, Zoomable};
 use crate::drawing::view2d::View2d;
 use crate::net::request::{Arrived, Reply, Request};
 use crate::net::why::{WhyReply, WhyRequest};
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::tests::{Shown, fixture};
 use crate::what_if::Scores;

@@ -18,7 +18,7 @@ use crate::command::{Command, Go, Zoomable};
 use crate::drawing::view2d::View2d;
 use crate::net::request::{Arrived, Request};
 use crate::net::why::{WhyReply, WhyRequest};
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::state::effect::Effect;
 use crate::tests::questions::{answer, asked};

@@ -10,7 +10,7 @@ use sightline_session::why::{Explanation, gates};
 use crate::cache::StepKey;
 use crate::net::request::Request;
 use crate::net::why::{WhyReply, WhyRequest};
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::state::effect::Effect;
 use crate::state::{State, run_letter};
 use crate::what_if::Trial;

@@ -25,7 +25,7 @@ use crate::drawing::raster::Raster;
 use crate::drawing::view2d::View2d;
 use crate::layout::show_pane;
 use crate::net::request::{Arrived, Reply, Request};
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::panels::{bars, images_left, runs};
 use crate::state::State;
 use crate::tests::Shown;

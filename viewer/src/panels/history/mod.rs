@@ -13,7 +13,7 @@ use sightline_track::trace::StepRow;
 use crate::cache::Slot;
 use crate::command::{Command, Go};
 use crate::drawing::{decimate, view2d};
-use crate::pane::Need;
+use crate::panels::pane::Need;
 use crate::panels::chart::{few_marks, pieces, plain};
 use crate::panels::panel::{Panel, TableOf};
 use crate::panels::sheets;

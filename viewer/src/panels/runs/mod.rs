@@ -8,7 +8,7 @@ use egui::{ScrollArea, TextEdit, Ui};
 
 use crate::command::Command;
 use crate::compare::Ask;
-use crate::pane::Need;
+use crate::panels::pane::Need;
 use crate::panels::panel::Panel;
 use crate::state::State;
 use crate::theme;

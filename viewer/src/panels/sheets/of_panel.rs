@@ -3,7 +3,7 @@
 use egui::{Button, Ui, vec2};
 
 use crate::command::Command;
-use crate::pane::Pane;
+use crate::panels::pane::Pane;
 use crate::panels;
 use crate::panels::sheets::{Sheet, grid};
 use crate::state::State;

@@ -9,7 +9,7 @@ use egui::{CollapsingHeader, Id, RichText, ScrollArea, Ui, UiBuilder};
 use sightline_session::why::sentence;
 
 use crate::command::Command;
-use crate::pane::Need;
+use crate::panels::pane::Need;
 use crate::panels::panel::Panel;
 use crate::state::State;
 use crate::theme;

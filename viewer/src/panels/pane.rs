@@ -1,5 +1,4 @@
-//! The panels by name, with their constant facts. A panel's contents are in its own file, behind the trait
-//! [`crate::panels::panel::Panel`]; the list in [`crate::panels::list`] says which file has which panel.
+//! The panels by name, with their constant facts, as the table in [`super`] has them.
 
 use std::fmt;
 
@@ -61,9 +60,9 @@ pub enum Need {
     Studies,
 }
 
-/// Makes the enum of the panels from their facts: name, title, home and help.
+/// Makes the enum of the panels from their table.
 macro_rules! panes {
-    ($($variant:ident: $name:literal, $title:literal, $home:expr, $help:literal;)*) => {
+    ($($variant:ident: $name:literal, $title:literal, $home:expr, $help:literal, $($panel:ident)::+;)*) => {
         /// A panel.
         #[derive(Clone, Copy, PartialEq, Eq, Hash)]
         pub enum Pane {
@@ -84,56 +83,7 @@ macro_rules! panes {
     };
 }
 
-panes! {
-    Targets: "targets", "Targets and runs", Home(Group::Lists, 0),
-        "What is tracked, and each configuration tried on it.";
-    Settings: "settings", "Settings", Home(Group::Lists, 1),
-        "Thresholds and parameters of a run";
-    Left: "left", "Left image", Home(Group::LeftImage, 0),
-        "The left image with what the tracker knew of the target";
-    Right: "right", "Right image", Home(Group::Views, 0),
-        "The right image with the epipolar curve and the stereo match";
-    Features: "features", "Features", Home(Group::Views, 1),
-        "What the feature tracker saw: features, matches, the motion, and how certain it is.";
-    Shape: "shape", "Shape", Home(Group::Views, 2),
-        "What the shape tracker saw: surface, sensor, search, meshes, and the hand-off.";
-    Budget: "budget", "Error budget", Home(Group::Views, 3),
-        "What accuracy stereo, driving and drift leave.";
-    Studies: "studies", "Studies", Home(Group::Views, 4),
-        "The paper’s experiments, over worlds whose truth is known.";
-    Strip: "strip", "Template strip", Home(Group::Strip, 0),
-        "The template from its reference to what was compared.";
-    History: "history", "Template history", Home(Group::Strip, 1),
-        "Every step’s matched window, and how the current view compares with the earlier templates.";
-    Surface: "surface", "Match scores", Home(Group::Scores, 0),
-        "The match score of every position in the search window.";
-    StereoProfile: "stereo_profile", "Stereo scores", Home(Group::Scores, 1),
-        "The stereo score of every range that was searched.";
-    Map: "map", "Map, site frame", Home(Group::Map, 0),
-        "The rover’s path and the target, seen from above.";
-    Plots: "plots", "Over the steps", Home(Group::Plots, 0),
-        "Scores or confidence, and errors of the run, step by step.";
-    Tolerances: "tolerances", "Tolerances", Home(Group::Plots, 1),
-        "Criteria 3 and 4: each correction against its tolerance, step by step.";
-    Gates: "gates", "Gates", Home(Group::Verdict, 0),
-        "Whether the match can be trusted: the criteria with their limits.";
-    Machine: "machine", "State machine", Home(Group::Verdict, 1),
-        "Where tracking stands, and which criterion fired at each past update.";
-    Inspector: "inspector", "Inspector", Home(Group::Details, 0),
-        "The record of the selected stage: values with units, formulas and origins";
-    Messages: "messages", "Messages", Home(Group::Details, 3),
-        "What was refused or failed, with how to mend it";
-    Runs: "runs", "Runs", Home(Group::Views, 5),
-        "What each run is worth, and which settings make the difference.";
-    Uncertainty: "uncertainty", "Uncertainty", Home(Group::Plots, 2),
-        "Whether errors are as large as the covariances say.";
-    Why: "why", "Why", Home(Group::Details, 1),
-        "Why a step was accepted or rejected, what would have saved it, and where a number comes from.";
-    Notes: "notes", "Notes", Home(Group::Details, 2),
-        "What you wrote about places of the drive; the list is a tour that can be stepped through.";
-    Breakpoints: "breakpoints", "Breakpoints", Home(Group::Verdict, 2),
-        "Conditions that are looked for at all steps of all runs at once.";
-}
+panel_table!(panes);
 
 impl Pane {
     /// Identifier in stored arrangements.
