@@ -18,8 +18,8 @@ use egui_tiles::{Behavior, SimplificationOptions, TabState, TileId, Tiles, UiRes
 use self::command::LayoutCommand;
 use self::left_image::{LeftImage, take_left_image};
 use crate::command::Command;
-use crate::panels::pane::Pane;
 use crate::panels;
+use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::theme;
 

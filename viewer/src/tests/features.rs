@@ -8,8 +8,8 @@ use sightline_track::trace::StepTrace;
 
 use crate::command::{Command, Layer, Stage};
 use crate::drawing::view2d::View2d;
-use crate::panels::pane::Pane;
 use crate::panels::features::marks;
+use crate::panels::pane::Pane;
 use crate::panels::{bars, inspector};
 use crate::state::State;
 use crate::tables::FeatureView;

@@ -7,8 +7,8 @@ use crate::command::{Command, Go, Mode};
 use crate::files::Ask;
 use crate::net::events::Connection;
 use crate::net::request::{Arrived, Reply, Request};
-use crate::panels::pane::Pane;
 use crate::panels::card;
+use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::tests::{Shown, fixture};
 

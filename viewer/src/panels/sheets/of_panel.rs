@@ -3,8 +3,8 @@
 use egui::{Button, Ui, vec2};
 
 use crate::command::Command;
-use crate::panels::pane::Pane;
 use crate::panels;
+use crate::panels::pane::Pane;
 use crate::panels::sheets::{Sheet, grid};
 use crate::state::State;
 
