@@ -11,6 +11,8 @@ use utoipa::ToSchema;
 use super::Session;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
+use sightline_track::records;
+use sightline_track::settings::TrackerKind;
 
 /// How many notes a session may have.
 pub(crate) const NOTE_LIMIT: usize = 500;
@@ -20,28 +22,6 @@ pub const TEXT_LIMIT: usize = 4000;
 const TIME_LIMIT: usize = 40;
 /// How many removed notes are kept.
 const REMOVED_KEPT: usize = 50;
-
-/// The words of the stages and of the steps of `locate`, to which a note can be pinned.
-pub const STAGES: [&str; 18] = [
-    "predict",
-    "point_mast",
-    "capture",
-    "locate",
-    "scale_roll",
-    "match_template",
-    "point_stereo",
-    "detect",
-    "match_features",
-    "triangulate",
-    "fit_motion",
-    "bootstrap",
-    "surface",
-    "coarse_register",
-    "refine_register",
-    "carried_ray",
-    "judge",
-    "update",
-];
 
 /// A note.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -251,6 +231,14 @@ fn checked(text: &str) -> Result<String, String> {
     Ok(text.to_owned())
 }
 
+/// The names of the stages to which a note can be pinned, those of all trackers.
+fn stages() -> impl Iterator<Item = &'static str> {
+    let is_of = |name: &&str| {
+        TrackerKind::ALL.iter().any(|tracker| records::stages_of(*tracker).any(|of| of == *name))
+    };
+    records::stages().iter().map(|stage| stage.schema().stage.as_ref()).filter(is_of)
+}
+
 fn check_pin(pin: &Pin, session: &Session) -> Result<()> {
     let wrong = |why: String| Err(Error::Request(why));
     if let Some(target) = pin.target {
@@ -259,9 +247,9 @@ fn check_pin(pin: &Pin, session: &Session) -> Result<()> {
     if pin.step >= session.stop_count {
         return wrong(format!("step: must be below {}, not {}", session.stop_count, pin.step));
     }
-    if let Some(stage) = pin.stage.as_deref().filter(|stage| !STAGES.contains(stage)) {
+    if let Some(stage) = pin.stage.as_deref().filter(|stage| !stages().any(|known| known == *stage)) {
         let shown: String = stage.chars().take(40).collect();
-        return wrong(format!("stage: {shown:?} is none of {}", STAGES.join(", ")));
+        return wrong(format!("stage: {shown:?} is none of {}", stages().collect::<Vec<_>>().join(", ")));
     }
     match pin.pixel {
         Some(pixel) if !(pixel.x.is_finite() && pixel.y.is_finite()) => {

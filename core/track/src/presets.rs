@@ -239,12 +239,7 @@ pub fn preset(name: &str) -> Result<&'static Preset> {
 /// # Errors
 /// None; a test checks every tracker.
 pub fn validated(tracker: TrackerKind) -> Result<&'static Preset> {
-    preset(match tracker {
-        TrackerKind::Template => "sightline",
-        TrackerKind::Features => "features",
-        TrackerKind::Shape => "shape",
-        TrackerKind::Combined => "combined",
-    })
+    preset(tracker.preset())
 }
 
 #[cfg(test)]

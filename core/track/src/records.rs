@@ -17,9 +17,11 @@ use sightline_record::{
     ArrayDecl, ArrayView, Column, Quantity, Stage, StageRecord, StageSchema, Unit, Value,
 };
 
+use crate::locate;
 use crate::locate::features::FeatureEvidence;
 use crate::locate::shape_tracker::evidence::{Registered, ShapeArrays};
 use crate::locate::template::memory::TemplateMemory;
+use crate::settings::TrackerKind;
 use crate::trace::{StepRow, StepTrace};
 
 static STAGES: LazyLock<Vec<Stage<StepTrace>>> = LazyLock::new(|| {
@@ -81,6 +83,12 @@ pub fn stages() -> &'static [Stage<StepTrace>] {
 /// The stage of a name.
 pub fn stage(name: &str) -> Option<&'static Stage<StepTrace>> {
     STAGES.iter().find(|stage| stage.schema().stage == name)
+}
+
+/// The stages that a user sees of a tracker, in running order: the six of every tracker, with its own steps after `locate`.
+pub fn stages_of(tracker: TrackerKind) -> impl Iterator<Item = &'static str> {
+    let before = ["predict", "point_mast", "capture", "locate"].into_iter();
+    before.chain(locate::steps(tracker).iter().copied()).chain(["judge", "update"])
 }
 
 /// The schemas of all stages, in running order.
@@ -315,6 +323,15 @@ mod tests {
 
     use super::*;
     use crate::settings::Settings;
+
+    #[test]
+    fn every_step_of_a_tracker_is_a_stage_of_the_record() {
+        for tracker in TrackerKind::ALL {
+            for name in stages_of(tracker) {
+                assert!(stage(name).is_some(), "{}: {name}", tracker.word());
+            }
+        }
+    }
 
     #[test]
     fn names_are_unique_within_a_stage_and_arrays_within_the_record() {

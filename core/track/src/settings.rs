@@ -44,6 +44,26 @@ impl TrackerKind {
         }
     }
 
+    /// How it finds the target, in a few words.
+    pub const fn about(self) -> &'static str {
+        match self {
+            Self::Template => "Normalised correlation of a scaled and rolled template",
+            Self::Features => "The motion of the whole scene by its features",
+            Self::Shape => "The shape of the target's surroundings",
+            Self::Combined => "Features on the way, the shape at the end",
+        }
+    }
+
+    /// The name of the validated preset: the configuration that the studies of docs/ recommend.
+    pub const fn preset(self) -> &'static str {
+        match self {
+            Self::Template => "sightline",
+            Self::Features => "features",
+            Self::Shape => "shape",
+            Self::Combined => "combined",
+        }
+    }
+
     /// Whether features are followed on the way.
     pub const fn follows_features(self) -> bool {
         matches!(self, Self::Features | Self::Combined)

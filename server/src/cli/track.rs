@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use sightline_geometry::camera::MastAngles;
@@ -53,8 +54,8 @@ pub(super) struct Track {
     from_step: usize,
     /// The tracker, in its validated preset (sightline, features, shape or combined); beside --preset it replaces only the
     /// tracker of that. By default the template tracker.
-    #[arg(long)]
-    tracker: Option<Tracker>,
+    #[arg(long, value_parser = trackers())]
+    tracker: Option<TrackerKind>,
     /// A named configuration, as `sightline presets` lists them; --set changes it further.
     #[arg(long, value_name = "NAME")]
     preset: Option<String>,
@@ -85,17 +86,11 @@ enum Format {
     Jsonl,
 }
 
-/// Which tracker runs.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Tracker {
-    /// Normalised correlation of a scaled and rolled template.
-    Template,
-    /// The motion of the whole scene by its features.
-    Features,
-    /// The shape of the target's surroundings.
-    Shape,
-    /// Features on the way, the shape at the end.
-    Combined,
+/// Reads the word of a tracker.
+fn trackers() -> impl TypedValueParser<Value = TrackerKind> {
+    let words = TrackerKind::ALL.map(|tracker| PossibleValue::new(tracker.word()).help(tracker.about()));
+    let of_word = |word: String| TrackerKind::ALL.into_iter().find(|tracker| tracker.word() == word);
+    PossibleValuesParser::new(words).try_map(move |word| of_word(word).ok_or("no tracker has this word"))
 }
 
 /// A line of a step.
@@ -211,13 +206,7 @@ impl Track {
 
     fn settings(&self) -> Result<Settings> {
         let changes = self.set.iter().map(|text| parse_assignment(text)).collect::<Result<Changes>>()?;
-        let tracker = self.tracker.map(|tracker| match tracker {
-            Tracker::Template => TrackerKind::Template,
-            Tracker::Features => TrackerKind::Features,
-            Tracker::Shape => TrackerKind::Shape,
-            Tracker::Combined => TrackerKind::Combined,
-        });
-        let own = match (&self.preset, tracker) {
+        let own = match (&self.preset, self.tracker) {
             (Some(name), None) => preset(name)?.settings()?,
             (Some(name), Some(tracker)) => Settings { tracker, ..preset(name)?.settings()? },
             (None, Some(tracker)) => validated(tracker)?.settings()?,

@@ -92,7 +92,7 @@ fn moves(state: &State) -> Vec<Action> {
         let word = row.map_or("fault", |row| if row.fault { "fault" } else { row.state.as_str() });
         all.push(action(format!("Go to step {step}: {word}"), Command::Go(Go::Step(step))));
     }
-    for &stage in Stage::of(state.tracker()) {
+    for stage in Stage::of(state.tracker()) {
         let title = format!("Stage {}: {}", stage.word(), stage.question());
         all.push(action(title, Command::SelectStage(stage)));
     }

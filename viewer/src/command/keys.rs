@@ -266,12 +266,12 @@ mod tests {
         };
         let input = egui::RawInput { events: vec![down; 3], ..Default::default() };
         let mut state = state();
-        state.stage = Stage::Predict;
+        state.stage = Stage::PREDICT;
         let mut output = context.run_ui(input, |ui| {
             commands(ui.ctx(), &state).into_iter().for_each(|command| state.perform(command));
         });
         output.textures_delta.clear();
-        assert_eq!(state.stage(), Stage::Locate, "three stages below the first");
+        assert_eq!(state.stage(), Stage::LOCATE, "three stages below the first");
     }
 
     #[test]

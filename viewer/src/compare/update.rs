@@ -186,8 +186,7 @@ impl State {
         let Some(divergence) = found.divergence else { return };
         self.cursor.step = divergence.step.min(self.stop_count().saturating_sub(1));
         let word = divergence.part.unwrap_or(divergence.stage);
-        let stage = Stage::of(self.tracker()).iter().find(|stage| stage.word() == word);
-        self.stage = stage.copied().unwrap_or(Stage::Locate);
+        self.stage = Stage::of(self.tracker()).find(|stage| stage.word() == word).unwrap_or(Stage::LOCATE);
     }
 
     /// What the compared runs need at a step: their records, and the arrays that are shown beside each other.

@@ -210,9 +210,3 @@ impl State {
         Some(list[next].id)
     }
 }
-
-/// The stage that a word names.
-fn stage_of_word(word: &str) -> Option<Stage> {
-    let trackers = sightline_track::settings::TrackerKind::ALL;
-    trackers.into_iter().flat_map(Stage::of).copied().find(|stage| stage.word() == word)
-}

@@ -90,7 +90,7 @@ impl Fragment {
             "tg" => put(&mut self.target, value.parse().ok()),
             "run" => put(&mut self.run, value.parse().ok()),
             "step" => put(&mut self.step, value.parse().ok()),
-            "stage" => put(&mut self.stage, Stage::ALL.into_iter().find(|stage| stage.word() == value)),
+            "stage" => put(&mut self.stage, Stage::named(value)),
             "lay" => put(&mut self.preset, Preset::ALL.into_iter().find(|preset| preset.word() == value)),
             "vs" => runs(value).map(|others| self.others = others).is_some(),
             "cmp" => {
@@ -230,7 +230,7 @@ mod tests {
         let link = Fragment::parse(&format!("#{text}"));
         assert_eq!(link.text(), text);
         assert_eq!((link.target, link.run, link.step), (Some(0), Some(2), Some(12)));
-        assert_eq!(link.stage, Some(Stage::Judge));
+        assert_eq!(link.stage, Some(Stage::JUDGE));
         assert_eq!(link.left, Some(View2d::At { centre: Pixel::new(512.5, 300.2), scale: 8.0 }));
         let sort = compare::Sort { metric: Some("ade_px".to_owned()), is_descending: true };
         assert_eq!((link.sort.clone(), link.filter.as_deref()), (Some(sort), Some("ridge ncc_min=0.6")));

@@ -195,11 +195,11 @@ fn newest_message(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 pub(crate) fn stages(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 3.0;
-        for (i, &stage) in Stage::of(state.tracker()).iter().enumerate() {
+        for (i, stage) in Stage::of(state.tracker()).enumerate() {
             if i > 0 {
                 let between = match stage {
-                    Stage::ScaleRoll | Stage::Detect => "(",
-                    Stage::Judge => ")  ›",
+                    Stage::JUDGE => ")  ›",
+                    step if step.is_first_step(state.tracker()) => "(",
                     _ => "›",
                 };
                 ui.label(theme::note(between));
@@ -232,9 +232,9 @@ fn stage_button(ui: &mut Ui, state: &State, stage: Stage, out: &mut Vec<Command>
 fn has_failed(trace: Option<&StepTrace>, stage: Stage) -> bool {
     let Some(trace) = trace else { return false };
     match stage {
-        Stage::Capture => trace.fault().is_some(),
-        Stage::Locate => trace.located().is_some_and(|located| located.missing.is_some()),
-        Stage::Judge => trace.verdict().is_some_and(|verdict| !verdict.good),
+        Stage::CAPTURE => trace.fault().is_some(),
+        Stage::LOCATE => trace.located().is_some_and(|located| located.missing.is_some()),
+        Stage::JUDGE => trace.verdict().is_some_and(|verdict| !verdict.good),
         _ => false,
     }
 }

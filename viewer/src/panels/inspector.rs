@@ -64,14 +64,14 @@ type RecordedStage = &'static sightline_record::Stage<StepTrace>;
 /// no place of their own in the bar of the tracker.
 fn recorded(trace: &StepTrace, stage: Stage) -> Vec<RecordedStage> {
     let tracker = trace.located().map_or_else(TrackerKind::default, |l| l.evidence.tracker());
-    let mut of = Stage::Predict;
+    let mut of = Stage::PREDICT;
     let mut shown: Vec<RecordedStage> = Vec::new();
     for recorded in records::stages().iter().filter(|recorded| is_in_bar(recorded)) {
         let word = recorded.schema().stage.as_ref();
-        let own = Stage::of(tracker).iter().find(|stage| stage.word() == word);
-        of = own.copied().unwrap_or(if of.is_step_of_locate() { of } else { Stage::Locate });
+        let own = Stage::of(tracker).find(|stage| stage.word() == word);
+        of = own.unwrap_or(if of.is_step_of_locate() { of } else { Stage::LOCATE });
         // The detection counts what its next two steps made of the features.
-        let counts = matches!(stage, Stage::MatchFeatures | Stage::Triangulate) && of == Stage::Detect;
+        let counts = matches!(stage, Stage::MATCH_FEATURES | Stage::TRIANGULATE) && of == Stage::DETECT;
         if (of == stage || counts) && recorded.is_reached(trace) {
             shown.push(recorded);
         }
@@ -185,11 +185,8 @@ fn not_reached(trace: &StepTrace, state: &State) -> String {
     match (trace.fault(), trace.prediction().is_none()) {
         (Some(fault), _) => format!("{word} was not reached: {fault}"),
         (None, true) => {
-            let other = match state.tracker() {
-                TrackerKind::Template => "point_stereo",
-                TrackerKind::Features | TrackerKind::Combined => "triangulate",
-                TrackerKind::Shape => "surface",
-            };
+            let mut steps = Stage::of(state.tracker()).filter(|stage| stage.is_step_of_locate());
+            let other = steps.find(|stage| is_reached(trace, *stage)).unwrap_or(Stage::LOCATE).word();
             format!(
                 "{word} is not part of the designation. Go one step on (Right) to see it, or select `{other}`."
             )
@@ -202,12 +199,12 @@ fn not_reached(trace: &StepTrace, state: &State) -> String {
 pub(crate) fn is_reached(trace: &StepTrace, stage: Stage) -> bool {
     match stage {
         // The evidence of the registration exists before its refinement has an end.
-        Stage::RefineRegister => trace
+        Stage::REFINE_REGISTER => trace
             .shape()
             .and_then(|evidence| evidence.registration.as_ref())
             .is_some_and(|found| found.mean_m[2].is_some()),
         // The feature tracker triangulates what it detects.
-        Stage::Triangulate if trace.features().is_some() => is_reached(trace, Stage::Detect),
+        Stage::TRIANGULATE if trace.features().is_some() => is_reached(trace, Stage::DETECT),
         _ => records::stage(stage.word()).is_some_and(|recorded| recorded.is_reached(trace)),
     }
 }

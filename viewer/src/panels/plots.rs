@@ -217,7 +217,7 @@ fn charts(state: &State, run: &RunView) -> Vec<Chart> {
         TrackerKind::Features | TrackerKind::Combined => {
             vec![confidence(state, colour), inliers(state, colour)]
         }
-        TrackerKind::Shape => vec![confidence(state, colour)],
+        _ => vec![confidence(state, colour)],
     };
     let mut position = vec![series("sigma_m", theme::weak(), diamond, MarkerShape::Diamond)];
     if run.rows.iter().any(|row| row.err_m.is_some()) {

@@ -84,10 +84,7 @@ impl Panel for Tolerances {
                 "Criteria 3 and 4 belong to the template tracker. This run is judged by its confidence alone: see \
                  “Gates” and “Over the steps”."
             }
-            TrackerKind::Shape => {
-                "Criteria 3 and 4 belong to the template tracker. This run is judged by the numbers of its registration: \
-                 see “Gates”."
-            }
+            _ => "Criteria 3 and 4 belong to the template tracker. “Gates” shows what this run is judged by.",
         };
         Some(sentence.to_owned())
     }

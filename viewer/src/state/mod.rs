@@ -173,7 +173,7 @@ impl State {
             settings: Vec::new(),
             configurations: Configurations::default(),
             cursor: Cursor::default(),
-            stage: Stage::MatchTemplate,
+            stage: Stage::MATCH_TEMPLATE,
             mode: Mode::default(),
             draft: Changes::new(),
             cache: Cache::default(),

@@ -67,7 +67,7 @@ fn the_panel_counts_from_the_images_to_the_motion() {
     shown.says("best draw 22, then 23 (9.0 mm) → 24 (8.0 mm)").says("by 5.0 cm against the prediction");
     shown.says("± 1 mm").says("gate 3.0 cm").says("in the end 24");
     let mut shown = shown;
-    assert_eq!(shown.click("fit_motion"), vec![Command::SelectStage(Stage::FitMotion)]);
+    assert_eq!(shown.click("fit_motion"), vec![Command::SelectStage(Stage::FIT_MOTION)]);
 }
 
 #[test]
@@ -168,29 +168,29 @@ fn panels_about_the_template_say_where_to_look_instead() {
 #[test]
 fn the_stage_bar_has_the_steps_of_the_tracker_and_keeps_the_place_of_the_other_one() {
     let mut shown = Shown::new([1400.0, 60.0], |context| feature_run::at_step(context, 2), bars::stages);
-    assert_eq!(shown.click("bootstrap"), vec![Command::SelectStage(Stage::Bootstrap)]);
+    assert_eq!(shown.click("bootstrap"), vec![Command::SelectStage(Stage::BOOTSTRAP)]);
     let mut state = feature_run::at_step(&egui::Context::default(), 2);
-    state.stage = Stage::MatchTemplate;
-    assert_eq!(state.stage(), Stage::MatchFeatures);
+    state.stage = Stage::MATCH_TEMPLATE;
+    assert_eq!(state.stage(), Stage::MATCH_FEATURES);
     let mut template = fixture::at_step(&egui::Context::default(), 2);
-    template.stage = Stage::Detect;
-    assert_eq!(template.stage(), Stage::ScaleRoll);
+    template.stage = Stage::DETECT;
+    assert_eq!(template.stage(), Stage::SCALE_ROLL);
 }
 
 #[test]
 fn every_step_of_the_feature_tracker_has_a_record() {
     let trace = feature_run::trace(2);
     for stage in Stage::of(sightline_track::settings::TrackerKind::Features) {
-        assert!(inspector::is_reached(&trace, *stage), "{}", stage.word());
-        assert!(inspector::record(&trace, *stage).is_some(), "{}", stage.word());
+        assert!(inspector::is_reached(&trace, stage), "{}", stage.word());
+        assert!(inspector::record(&trace, stage).is_some(), "{}", stage.word());
     }
-    let matched = inspector::record(&trace, Stage::MatchFeatures).unwrap();
+    let matched = inspector::record(&trace, Stage::MATCH_FEATURES).unwrap();
     assert_eq!((&matched["detect"]["stereo_matches"], &matched["matches"]), (&json!(48), &json!(30)));
-    let pick = inspector::record(&feature_run::trace(0), Stage::Locate).unwrap();
+    let pick = inspector::record(&feature_run::trace(0), Stage::LOCATE).unwrap();
     assert!(pick["point_stereo"]["range_m"].is_number());
     let shown = Shown::pane(Pane::Inspector, |context| {
         let mut state = feature_run::at_step(context, 2);
-        state.stage = Stage::FitMotion;
+        state.stage = Stage::FIT_MOTION;
         state
     });
     shown.says("fit_motion").says("roll pitch yaw").says("consensus by draw (20)");

@@ -187,8 +187,8 @@ fn the_strip_shows_its_patches_in_order_and_a_click_goes_to_the_stage() {
         crate::panels::strip::patches(&fixture::trace(2)).into_iter().map(|patch| patch.title).collect();
     assert_eq!(titles, ["reference, step 1", "scaled", "rolled", "matched", "difference", "right image"]);
     let mut shown = Shown::pane(Pane::Strip, |context| fixture::at_step(context, 2));
-    assert_eq!(shown.click("rolled patch"), vec![Command::SelectStage(Stage::ScaleRoll)]);
-    assert_eq!(shown.click("matched patch"), vec![Command::SelectStage(Stage::MatchTemplate)]);
+    assert_eq!(shown.click("rolled patch"), vec![Command::SelectStage(Stage::SCALE_ROLL)]);
+    assert_eq!(shown.click("matched patch"), vec![Command::SelectStage(Stage::MATCH_TEMPLATE)]);
 }
 
 #[test]
@@ -203,7 +203,7 @@ fn the_gates_give_value_limit_and_verdict_in_words() {
 fn the_inspector_shows_the_record_of_the_selected_stage_with_units() {
     let shown = Shown::pane(Pane::Inspector, |context| {
         let mut state = fixture::at_step(context, 2);
-        state.stage = Stage::Triangulate;
+        state.stage = Stage::TRIANGULATE;
         state
     });
     shown.says("triangulate").says("range").says("m, rover");
@@ -247,8 +247,8 @@ fn the_status_line_tells_step_state_score_and_error() {
 #[test]
 fn the_stage_bar_selects_stages() {
     let mut shown = Shown::new([1200.0, 60.0], |context| fixture::at_step(context, 2), bars::stages);
-    assert_eq!(shown.click("point_stereo"), vec![Command::SelectStage(Stage::PointStereo)]);
-    assert_eq!(shown.click("judge"), vec![Command::SelectStage(Stage::Judge)]);
+    assert_eq!(shown.click("point_stereo"), vec![Command::SelectStage(Stage::POINT_STEREO)]);
+    assert_eq!(shown.click("judge"), vec![Command::SelectStage(Stage::JUDGE)]);
 }
 
 #[test]

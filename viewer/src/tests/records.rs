@@ -16,7 +16,7 @@ fn one_declaration_puts_a_number_into_inspector_and_plots() {
     let quantity = StageQuantity::named(NAME).unwrap();
     let mut shown = Shown::pane(Pane::Inspector, |context| {
         let mut state = fixture::at_step(context, 2);
-        state.stage = Stage::MatchTemplate;
+        state.stage = Stage::MATCH_TEMPLATE;
         state
     });
     shown.says("match sigma").says(&format!("= {}", quantity.declared().formula));

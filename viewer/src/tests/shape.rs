@@ -207,16 +207,16 @@ fn the_gates_of_a_registration_have_words_values_and_limits() {
 #[test]
 fn every_stage_of_both_trackers_has_its_record() {
     let trace = shape_run::trace(TrackerKind::Combined, HAND_OFF);
-    for stage in [Stage::Surface, Stage::CoarseRegister, Stage::RefineRegister, Stage::CarriedRay] {
+    for stage in [Stage::SURFACE, Stage::COARSE_REGISTER, Stage::REFINE_REGISTER, Stage::CARRIED_RAY] {
         for tracker in [TrackerKind::Shape, TrackerKind::Combined] {
-            assert!(Stage::of(tracker).contains(&stage), "{}", stage.word());
+            assert!(Stage::of(tracker).any(|of| of == stage), "{}", stage.word());
         }
         assert!(inspector::is_reached(&trace, stage), "{}", stage.word());
         assert!(inspector::record(&trace, stage).is_some(), "{}", stage.word());
     }
     let combined = |context: &egui::Context| shape_run::at_step(context, TrackerKind::Combined, 2);
     let mut shown = Shown::new([1600.0, 60.0], combined, bars::stages);
-    assert_eq!(shown.click("refine_register"), vec![Command::SelectStage(Stage::RefineRegister)]);
+    assert_eq!(shown.click("refine_register"), vec![Command::SelectStage(Stage::REFINE_REGISTER)]);
     shown.says("fit_motion");
 }
 

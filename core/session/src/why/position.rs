@@ -150,7 +150,7 @@ impl Book<'_> {
                         "the rigid motion of the scene applied to the position at the remembered stop",
                         &["inliers", "matches"],
                     ),
-                    Evidence::Shape(_) | Evidence::Combined(_) => draft.roughly(
+                    _ => draft.roughly(
                         "the registration of this stop's surface with the earlier view, or the features where it was not asked",
                         &["shape_correction_m", "inliers", "predicted_position"],
                     ),

@@ -285,6 +285,16 @@ pub fn locate(input: &LocateInput<'_>, memory: &TrackerMemory) -> Located {
     }
 }
 
+/// The steps of a tracker in running order, as names of stages of the record.
+pub const fn steps(tracker: TrackerKind) -> &'static [&'static str] {
+    match tracker {
+        TrackerKind::Template => TemplateTracker::STEPS,
+        TrackerKind::Features => FeatureTracker::STEPS,
+        TrackerKind::Shape => ShapeTracker::STEPS,
+        TrackerKind::Combined => CombinedTracker::STEPS,
+    }
+}
+
 /// The gates of all trackers, by number; a gate that several trackers share is listed once.
 pub fn gate_kinds() -> Vec<GateKind> {
     let all = [TemplateTracker::GATES, FeatureTracker::GATES, ShapeTracker::GATES, CombinedTracker::GATES];

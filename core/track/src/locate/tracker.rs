@@ -32,6 +32,8 @@ pub trait Tracker {
 
     /// The gates of this tracker.
     const GATES: &'static [GateKind];
+    /// Its steps in running order: names of stages of the record.
+    const STEPS: &'static [&'static str];
 
     /// Finds the position of a designated pixel; no memory where there is no position.
     fn designate(&self, input: &DesignateInput<'_>) -> (Sighting<Self::Evidence>, Option<Self::Memory>);

@@ -210,13 +210,13 @@ fn gates_and_inspector_say_what_differs_from_the_other_run() {
     gates.says("Δ vs run B: ±0, limit Δ +0.400; it passes there");
     let inspector = Shown::pane(Pane::Inspector, |context| {
         let mut state = compared(context, 3);
-        state.stage = Stage::MatchTemplate;
+        state.stage = Stage::MATCH_TEMPLATE;
         state
     });
     inspector.says("Δ vs run B: 1 value differs").says("pixel x (px)").says("−8");
     let alike = Shown::pane(Pane::Inspector, |context| {
         let mut state = compared(context, 2);
-        state.stage = Stage::MatchTemplate;
+        state.stage = Stage::MATCH_TEMPLATE;
         state
     });
     alike.says("Δ vs run B: alike (every bit)");

@@ -23,7 +23,7 @@ fn the_first_divergence_goes_to_step_and_stage_and_says_the_sentence() {
     let keys = crate::command::keys::command(Keyboard::D, Modifiers::NONE, &state);
     assert_eq!(keys, Some(Command::Compare(Ask::FirstDivergence)));
     state.perform(keys.unwrap());
-    assert_eq!((state.cursor.step, state.stage()), (3, Stage::MatchTemplate));
+    assert_eq!((state.cursor.step, state.stage()), (3, Stage::MATCH_TEMPLATE));
     let said = &state.messages.newest().unwrap().text;
     assert!(said.contains("run A and run B first differ at step 3 in match_template"), "{said}");
     // Asked before the answer is there, it goes as soon as it comes.

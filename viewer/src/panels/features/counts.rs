@@ -24,26 +24,26 @@ pub(crate) fn lines(evidence: &FeatureEvidence) -> Vec<Line> {
     let mut add = |stage, words: String, count: String| lines.push(Line { stage, words, count });
     if let Some(found) = &evidence.detect {
         let words = "features, left and right".to_owned();
-        add(Stage::Detect, words, format!("{} and {}", found.left, found.right));
+        add(Stage::DETECT, words, format!("{} and {}", found.left, found.right));
         let words = "of them with a partner in the other eye".to_owned();
-        add(Stage::MatchFeatures, words, share(found.stereo_matches, found.left));
+        add(Stage::MATCH_FEATURES, words, share(found.stereo_matches, found.left));
         let range = found.median_range_m.map_or_else(String::new, |m| format!(", median range {m:.2} m"));
-        add(Stage::Triangulate, format!("points{range}"), share(found.points, found.stereo_matches));
+        add(Stage::TRIANGULATE, format!("points{range}"), share(found.points, found.stereo_matches));
     }
     if let Some(matched) = &evidence.match_features {
         let words = format!("matched with the {} points of step {}", matched.then, matched.from_step);
-        add(Stage::MatchFeatures, words, share(matched.matches, matched.now));
+        add(Stage::MATCH_FEATURES, words, share(matched.matches, matched.now));
         if matched.prior_given_up {
             let words = "too few agreed with the pose estimate: looked for everywhere".to_owned();
-            add(Stage::MatchFeatures, words, "prior given up".to_owned());
+            add(Stage::MATCH_FEATURES, words, "prior given up".to_owned());
         }
         if let Some(motion) = &evidence.fit_motion {
             let words = "agree with the motion".to_owned();
-            add(Stage::FitMotion, words, share(motion.inliers, matched.matches));
+            add(Stage::FIT_MOTION, words, share(motion.inliers, matched.matches));
         }
     }
     if let Some(bootstrap) = &evidence.bootstrap {
-        add(Stage::Bootstrap, "sets drawn from those".to_owned(), bootstrap.sets.to_string());
+        add(Stage::BOOTSTRAP, "sets drawn from those".to_owned(), bootstrap.sets.to_string());
     }
     lines
 }

@@ -33,7 +33,7 @@ pub(crate) struct Patch {
 }
 
 /// The stages whose patches are shown.
-const STAGES: [Stage; 3] = [Stage::ScaleRoll, Stage::MatchTemplate, Stage::PointStereo];
+const STAGES: [Stage; 3] = [Stage::SCALE_ROLL, Stage::MATCH_TEMPLATE, Stage::POINT_STEREO];
 
 /// The patches of a step, in the order in which the stages declare them; those that were not reached are left out.
 pub(crate) fn patches(trace: &StepTrace) -> Vec<Patch> {

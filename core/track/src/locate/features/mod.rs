@@ -63,6 +63,8 @@ impl Tracker for FeatureTracker {
     type Evidence = FeatureEvidence;
 
     const GATES: &'static [GateKind] = &[gates::CONFIDENCE];
+    const STEPS: &'static [&'static str] =
+        &["detect", "match_features", "triangulate", "fit_motion", "bootstrap"];
 
     fn designate(&self, input: &DesignateInput<'_>) -> (Sighting<FeatureEvidence>, Option<Anchors>) {
         let (by_template, _) = TemplateTracker.designate(input);

@@ -85,6 +85,7 @@ impl Tracker for ShapeTracker {
     type Evidence = ShapeEvidence;
 
     const GATES: &'static [GateKind] = &gates::GATES;
+    const STEPS: &'static [&'static str] = &["surface", "coarse_register", "refine_register", "carried_ray"];
 
     fn designate(&self, input: &DesignateInput<'_>) -> (Sighting<ShapeEvidence>, Option<Views>) {
         let (by_template, _) = TemplateTracker.designate(input);
@@ -119,6 +120,17 @@ impl Tracker for CombinedTracker {
     type Evidence = ShapeEvidence;
 
     const GATES: &'static [GateKind] = &gates::WITH_CONFIDENCE;
+    const STEPS: &'static [&'static str] = &[
+        "detect",
+        "match_features",
+        "triangulate",
+        "fit_motion",
+        "bootstrap",
+        "surface",
+        "coarse_register",
+        "refine_register",
+        "carried_ray",
+    ];
 
     fn designate(&self, input: &DesignateInput<'_>) -> (Sighting<ShapeEvidence>, Option<CombinedMemory>) {
         let (by_features, anchors) = FeatureTracker.designate(input);

@@ -61,6 +61,7 @@ impl Tracker for TemplateTracker {
     type Evidence = TemplateEvidence;
 
     const GATES: &'static [GateKind] = &gates::GATES;
+    const STEPS: &'static [&'static str] = &["scale_roll", "match_template", "point_stereo", "triangulate"];
 
     fn designate(&self, input: &DesignateInput<'_>) -> (Sighting<TemplateEvidence>, Option<TemplateMemory>) {
         let found = designate(input);
