@@ -96,7 +96,7 @@ fn designated(
     let step = designation.step;
     let (left, right) = stops.cameras(step);
     let pixel = check_pixel(designation, left)?;
-    let capture = capture::capture(stops.capture(step)?, Some(pixel), settings.template.subframe_px);
+    let capture = capture::capture(stops.capture(step)?, Some(pixel), settings.subframe_px());
     let (located, memory) = locate::designate(&DesignateInput {
         step,
         site_from_rover: &stops.site_from_rover(step),
@@ -138,7 +138,7 @@ pub fn run_step_displaced(
             return StepTrace { step, time_s, point_mast: pointing, kind, update, truth: None };
         }
     };
-    let capture = capture::capture(pair, pointing.predicted_left, settings.template.subframe_px);
+    let capture = capture::capture(pair, pointing.predicted_left, settings.subframe_px());
     let input = LocateInput {
         prediction: &prediction,
         pointing: &pointing,

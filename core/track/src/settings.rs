@@ -121,6 +121,11 @@ impl Settings {
         table
     }
 
+    /// Side of the square subframe that `capture` cuts out about the prediction, px.
+    pub const fn subframe_px(&self) -> u32 {
+        self.template.subframe_px
+    }
+
     /// These settings with `changes` applied; an unknown name or a value out of range changes nothing.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-//! The shape tracker's registration: where the target is, by the shape of its surroundings alone (Deans et al. 2005, D§3).
+//! The shape tracker's registration: where the target is, by the shape of its surroundings alone (Deans et al. 2005, D§2).
 //!
 //! ```text
 //! points ─► mesh ─┐ fixed: the target's first view                ┌─ path, residuals before and after

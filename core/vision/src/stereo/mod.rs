@@ -1,4 +1,4 @@
-//! Dense stereo: a depth for every pixel of the left image that has a partner in the right one (R187, D§3).
+//! Dense stereo: a depth for every pixel of the left image that has a partner in the right one (R187, D§2).
 //!
 //! ```text
 //! two images, two cameras ─► align ─► census ─► block_matching │ semi_global ─► checks ─► ranges ─► points
