@@ -28,7 +28,7 @@ trait Read<S> {
     fn is_reached(&self, step: &S) -> bool;
     fn value(&self, step: &S, index: usize) -> Option<Value>;
     fn array<'a>(&self, step: &'a S, index: usize) -> Option<ArrayView<'a>>;
-    fn record(&self, step: &S) -> StageRecord;
+    fn record(&self, step: Option<&S>) -> StageRecord;
 }
 
 /// Evidence that the step contains.
@@ -41,6 +41,12 @@ struct Borrowed<S, E> {
 struct Computed<S, E> {
     make: fn(&S) -> E,
     declaration: Declaration<E>,
+}
+
+/// Evidence of something that the step contains.
+struct Within<T, S> {
+    find: for<'a> fn(&'a T) -> Option<&'a S>,
+    reader: Box<dyn Read<S> + Send + Sync>,
 }
 
 impl<S: 'static> Stage<S> {
@@ -93,6 +99,31 @@ impl<S: 'static> Stage<S> {
         Self { schema, parts: Vec::new(), evidence: None }
     }
 
+    /// The same stage of a type that contains `S`, at one of the paths `at`; an empty path means that it is not nested.
+    #[must_use]
+    pub fn within<T: 'static>(
+        self,
+        find: for<'a> fn(&'a T) -> Option<&'a S>,
+        at: &[&'static str],
+    ) -> Stage<T> {
+        let parts = self.parts.into_iter().map(|Part { first_quantity, first_array, reader }| {
+            let reader = Box::new(Within { find, reader });
+            Part { first_quantity, first_array, reader }
+        });
+        let evidence =
+            self.evidence.map(|evidence| -> Evidence<T> { Box::new(move |step| evidence(find(step)?)) });
+        let paths: Vec<Cow<'static, str>> = at
+            .iter()
+            .flat_map(|at| self.schema.paths().map(move |path| joined(at, path)))
+            .map(Cow::Owned)
+            .collect();
+        let mut stage = Stage { schema: self.schema, parts: parts.collect(), evidence };
+        let mut paths = paths.into_iter();
+        stage.schema.path = paths.next().unwrap_or_default();
+        stage.schema.other_paths = paths.collect();
+        stage
+    }
+
     fn add(&mut self, part: StageSchema, reader: Box<dyn Read<S> + Send + Sync>) {
         let schema = &mut self.schema;
         let (first_quantity, first_array) = (schema.quantities.len(), schema.arrays.len());
@@ -142,7 +173,7 @@ impl<S: 'static> Stage<S> {
     pub fn record(&self, step: &S) -> StageRecord {
         let mut whole = StageRecord { reached: self.is_reached(step), ..StageRecord::default() };
         for part in &self.parts {
-            let record = part.reader.record(step);
+            let record = part.reader.record(Some(step));
             whole.values.extend(record.values);
             whole.arrays.extend(record.arrays);
             whole.marks.extend(record.marks);
@@ -197,8 +228,8 @@ impl<S: 'static, E: 'static> Read<S> for Borrowed<S, E> {
         self.declaration.arrays.get(index)?((self.find)(step)?)
     }
 
-    fn record(&self, step: &S) -> StageRecord {
-        self.declaration.record((self.find)(step))
+    fn record(&self, step: Option<&S>) -> StageRecord {
+        self.declaration.record(step.and_then(self.find))
     }
 }
 
@@ -215,8 +246,35 @@ impl<S: 'static, E: 'static> Read<S> for Computed<S, E> {
         None
     }
 
-    fn record(&self, step: &S) -> StageRecord {
-        self.declaration.record(Some(&(self.make)(step)))
+    fn record(&self, step: Option<&S>) -> StageRecord {
+        self.declaration.record(step.map(self.make).as_ref())
+    }
+}
+
+impl<T: 'static, S: 'static> Read<T> for Within<T, S> {
+    fn is_reached(&self, step: &T) -> bool {
+        (self.find)(step).is_some_and(|found| self.reader.is_reached(found))
+    }
+
+    fn value(&self, step: &T, index: usize) -> Option<Value> {
+        self.reader.value((self.find)(step)?, index)
+    }
+
+    fn array<'a>(&self, step: &'a T, index: usize) -> Option<ArrayView<'a>> {
+        self.reader.array((self.find)(step)?, index)
+    }
+
+    fn record(&self, step: Option<&T>) -> StageRecord {
+        self.reader.record(step.and_then(self.find))
+    }
+}
+
+/// A path below another.
+fn joined(at: &str, path: &str) -> String {
+    match (at, path) {
+        ("", path) => path.to_owned(),
+        (at, "") => at.to_owned(),
+        (at, path) => format!("{at}.{path}"),
     }
 }
 

@@ -33,7 +33,7 @@ use crate::gate::{Gate, GateKind};
 use crate::settings::TrackerKind;
 use sightline_geometry::estimate::drift::Drift;
 use sightline_geometry::frames::{Pixel, Point3};
-use sightline_record::{Declaration, Eye, Record, Role, Shape, ShapeKind, Unit};
+use sightline_record::{Declaration, Record, Stage, Unit};
 use sightline_vision::image::GrayImage;
 
 /// Where the target is now, and how that was found; by default nowhere.
@@ -295,6 +295,18 @@ pub const fn steps(tracker: TrackerKind) -> &'static [&'static str] {
     }
 }
 
+/// The stages of all trackers, in running order and at their paths in the serialised [`Evidence`].
+pub fn stages() -> Vec<Stage<Evidence>> {
+    let template = TemplateEvidence::stages().into_iter();
+    let features = FeatureEvidence::stages().into_iter();
+    let shape = ShapeEvidence::stages().into_iter();
+    template
+        .map(|stage| stage.within(Evidence::template, &["", "designation", "features.designation"]))
+        .chain(features.map(|stage| stage.within(Evidence::features, &["", "features"])))
+        .chain(shape.map(|stage| stage.within(Evidence::shape, &[""])))
+        .collect()
+}
+
 /// The gates of all trackers, by number; a gate that several trackers share is listed once.
 pub fn gate_kinds() -> Vec<GateKind> {
     let all = [TemplateTracker::GATES, FeatureTracker::GATES, ShapeTracker::GATES, CombinedTracker::GATES];
@@ -320,9 +332,6 @@ impl Record for Located {
         r.quantity("surface_by_pixel", Unit::MetrePerPixel, |l| l.surface_by_pixel)
             .describe("Derivative of the surface point by the left pixel.");
         r.quantity("confidence", Unit::One, |l| l.confidence).describe("Confidence of the tracker, 0 to 1.");
-        r.mark("located", (Eye::Left, Role::Measurement, ShapeKind::Ellipse), |l| {
-            Some(Shape::Ellipse { centre: l.left_pixel?, covariance_px2: l.left_error.covariance_px2 })
-        });
         r.reason(|l| l.missing.clone());
     }
 }

@@ -13,7 +13,7 @@ use crate::locate::template::evidence::TemplateEvidence;
 use sightline_geometry::estimate::motion_parameters::MotionParameters;
 use sightline_geometry::estimate::ransac::Refit;
 use sightline_geometry::frames::Pose;
-use sightline_record::{ArrayKind, ArrayView, Declaration, Record, Unit};
+use sightline_record::{ArrayKind, ArrayView, Declaration, Record, Stage, Unit};
 
 /// What the feature locator saw; a step that was not reached is null.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -201,8 +201,30 @@ impl<'a> From<&'a Table> for ArrayView<'a> {
 }
 
 impl FeatureEvidence {
+    /// The stages of this evidence, in running order and at their paths in it.
+    pub(in crate::locate) fn stages() -> Vec<Stage<Self>> {
+        vec![
+            Stage::of("detect", "Which features do the two images have?", |e: &Self| e.detect.as_ref())
+                .with(|e| Some(e), Self::declare_features)
+                .at("detect"),
+            Stage::of(
+                "match_features",
+                "Which features are the same, in the other eye and at an earlier stop?",
+                |e: &Self| e.match_features.as_ref(),
+            )
+            .at("match_features"),
+            Stage::of("fit_motion", "Which rigid motion do most matches agree with?", |e: &Self| {
+                e.fit_motion.as_ref()
+            })
+            .at("fit_motion"),
+            Stage::of("bootstrap", "How certain is that motion?", |e: &Self| e.bootstrap.as_ref())
+                .with(|e| Some(e), Self::declare_cloud)
+                .at("bootstrap"),
+        ]
+    }
+
     /// Declares the arrays of `detect`.
-    pub(crate) fn declare_features(r: &mut Declaration<Self>) {
+    fn declare_features(r: &mut Declaration<Self>) {
         r.array(
             "features",
             ArrayKind::Table,
@@ -212,7 +234,7 @@ impl FeatureEvidence {
     }
 
     /// Declares the arrays of `bootstrap`.
-    pub(crate) fn declare_cloud(r: &mut Declaration<Self>) {
+    fn declare_cloud(r: &mut Declaration<Self>) {
         r.array(
             "cloud",
             ArrayKind::Table,

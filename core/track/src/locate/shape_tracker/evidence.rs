@@ -17,7 +17,7 @@ use crate::gate::Gate;
 use crate::locate::features::evidence::{FeatureEvidence, Table};
 use crate::locate::template::evidence::TemplateEvidence;
 use sightline_geometry::frames::{Point3, Pose};
-use sightline_record::{ArrayKind, Declaration, GateRecord, Record, Unit};
+use sightline_record::{ArrayKind, Declaration, GateRecord, Record, Stage, Unit};
 use sightline_vision::registration::{Failure, Mesh, Method, Registration};
 
 /// What the shape tracker saw; a step that was not reached is null.
@@ -93,6 +93,38 @@ pub struct Registered {
 }
 
 impl ShapeEvidence {
+    /// The stages of this evidence, in running order and at their paths in it.
+    pub(in crate::locate) fn stages() -> Vec<Stage<Self>> {
+        vec![
+            Stage::of("surface", "Which surface does the pair show?", |e: &Self| e.surface.as_ref())
+                .with(|e| Some(&e.arrays), ShapeArrays::declare_surface)
+                .at("surface"),
+            Stage::of_parts("coarse_register", "By which shift does it fit the earlier surface, roughly?")
+                .with(|e: &Self| e.registration.as_ref(), Registered::declare_coarse)
+                .with(|e| Some(&e.arrays), ShapeArrays::declare_coarse)
+                .at("registration"),
+            Stage::of(
+                "refine_register",
+                "By which motion does it fit best, and how certain is that?",
+                |e: &Self| e.registration.as_ref(),
+            )
+            .with(|e| Some(&e.arrays), ShapeArrays::declare_refine)
+            .at("registration"),
+            Stage::of("carried_ray", "Where does the first line of sight meet the surface?", |e: &Self| {
+                e.registration.as_ref()?.ray.as_ref()
+            })
+            .at("registration.ray"),
+            Stage::of("hand_off", "Where do other cameras see the last image of the target?", |e: &Self| {
+                e.registration.as_ref()?.draped.as_ref()
+            })
+            .at("registration.draped"),
+            Stage::of("placement", "Can the arm reach the target, and where does it touch?", |e: &Self| {
+                e.placement.as_ref()
+            })
+            .at("placement"),
+        ]
+    }
+
     /// The checks of the registration; none without one.
     pub(super) fn checks(&self) -> Option<&[Gate]> {
         self.registration.as_ref().map(|found| found.checks.as_slice())
@@ -182,7 +214,7 @@ fn place(point: &Point3) -> [f32; 3] {
 
 impl Registered {
     /// Declares the coarse search.
-    pub(crate) fn declare_coarse(r: &mut Declaration<Self>) {
+    fn declare_coarse(r: &mut Declaration<Self>) {
         r.quantity("to_step", Unit::One, |f| f.to_step).describe("The stop of the earlier view.");
         r.quantity("start_in_rover", Unit::Metre, |f| f.start_in_rover)
             .describe("Start of the search in the present rover frame.");
@@ -235,7 +267,7 @@ impl Record for Registered {
 
 impl ShapeArrays {
     /// Declares the arrays of dense stereo.
-    pub(crate) fn declare_surface(r: &mut Declaration<Self>) {
+    fn declare_surface(r: &mut Declaration<Self>) {
         use ArrayKind::DepthMap;
         r.array("disparities", DepthMap, "Disparities of the aligned left image; bright is near", |a| {
             (&a.disparities).into()
@@ -248,7 +280,7 @@ impl ShapeArrays {
     }
 
     /// Declares the arrays of the coarse search.
-    pub(crate) fn declare_coarse(r: &mut Declaration<Self>) {
+    fn declare_coarse(r: &mut Declaration<Self>) {
         r.array(
             "sensor",
             ArrayKind::DepthMap,
@@ -280,7 +312,7 @@ impl ShapeArrays {
     }
 
     /// Declares the arrays of the refinement.
-    pub(crate) fn declare_refine(r: &mut Declaration<Self>) {
+    fn declare_refine(r: &mut Declaration<Self>) {
         r.array(
             "error_fine",
             ArrayKind::Difference,

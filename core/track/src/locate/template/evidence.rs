@@ -13,6 +13,7 @@ use super::relief::Relief;
 use super::scale_roll::ScaleRoll;
 use super::triangulate::Triangulation;
 use super::warnings::Warning;
+use sightline_record::Stage;
 
 /// What the template locator saw; a step that was not reached is null.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -31,4 +32,34 @@ pub struct TemplateEvidence {
     pub point_stereo: Option<PointStereo>,
     /// The position from both.
     pub triangulate: Option<Triangulation>,
+}
+
+impl TemplateEvidence {
+    /// The stages of this evidence, in running order and at their paths in it.
+    pub(in crate::locate) fn stages() -> Vec<Stage<Self>> {
+        vec![
+            Stage::of("scale_roll", "How should the template look from here?", |e: &Self| {
+                e.scale_roll.as_ref()
+            })
+            .at("scale_roll"),
+            Stage::of("match_template", "Where does the template fit best in the left image?", |e: &Self| {
+                e.match_template.as_ref()
+            })
+            .at("match_template"),
+            Stage::of("drift_correction", "Where does the designated window fit?", |e: &Self| {
+                e.drift_correction.as_ref()
+            })
+            .at("drift_correction"),
+            Stage::of("relief", "Which heights surround the target?", |e: &Self| e.relief.as_ref())
+                .at("relief"),
+            Stage::of("point_stereo", "Which point of the right image is it?", |e: &Self| {
+                e.point_stereo.as_ref()
+            })
+            .at("point_stereo"),
+            Stage::of("triangulate", "Which point in space do both pixels see?", |e: &Self| {
+                e.triangulate.as_ref()
+            })
+            .at("triangulate"),
+        ]
+    }
 }
