@@ -3,11 +3,11 @@
 use std::borrow::Cow;
 
 use super::{
-    ArrayDecl, ArrayKind, ArrayView, Eye, GateDecl, GateRecord, MarkDecl, Measured, Quantity, Role, Shape,
-    ShapeKind, Side, StageSchema, Unit, Value, label,
+    ArrayDecl, ArrayKind, ArrayView, GateDecl, GateRecord, Measured, Quantity, Side, StageSchema, Unit, Value,
+    label,
 };
 
-/// Evidence that declares its quantities, arrays, marks and gates.
+/// Evidence that declares its quantities, arrays and gates.
 pub trait Record: Sized + 'static {
     /// Declares the record. The declaration gives the schema without any instance, and the values of one.
     fn declare(r: &mut Declaration<Self>);
@@ -15,7 +15,6 @@ pub trait Record: Sized + 'static {
 
 type Get<E> = Box<dyn Fn(&E) -> Value + Send + Sync>;
 type GetArray<E> = Box<dyn for<'a> Fn(&'a E) -> Option<ArrayView<'a>> + Send + Sync>;
-type GetShape<E> = Box<dyn Fn(&E) -> Option<Shape> + Send + Sync>;
 type GetGates<E> = Box<dyn Fn(&E) -> Vec<GateRecord> + Send + Sync>;
 type GetReason<E> = Box<dyn Fn(&E) -> Option<String> + Send + Sync>;
 
@@ -24,7 +23,6 @@ pub struct Declaration<E> {
     pub(crate) schema: StageSchema,
     pub(crate) values: Vec<Get<E>>,
     pub(crate) arrays: Vec<GetArray<E>>,
-    pub(crate) shapes: Vec<GetShape<E>>,
     pub(crate) gates: Vec<GetGates<E>>,
     pub(crate) reason: Option<GetReason<E>>,
 }
@@ -35,7 +33,6 @@ impl<E> Default for Declaration<E> {
             schema: StageSchema::default(),
             values: Vec::new(),
             arrays: Vec::new(),
-            shapes: Vec::new(),
             gates: Vec::new(),
             reason: None,
         }
@@ -120,17 +117,6 @@ impl<E: 'static> Declaration<E> {
         });
         let last = self.schema.arrays.len() - 1;
         DescribedArray(&mut self.schema.arrays[last])
-    }
-
-    /// Declares a mark in one of the images.
-    pub fn mark(
-        &mut self,
-        name: &'static str,
-        (eye, role, kind): (Eye, Role, ShapeKind),
-        get: impl Fn(&E) -> Option<Shape> + Send + Sync + 'static,
-    ) {
-        self.shapes.push(Box::new(get));
-        self.schema.marks.push(MarkDecl { name: name.into(), eye, role, kind });
     }
 
     /// Declares a gate that [`Self::gates`] may give.

@@ -1,4 +1,4 @@
-//! Self-describing records: a stage declares its quantities, arrays, marks and gates once, beside its evidence.
+//! Self-describing records: a stage declares its quantities, arrays and gates once, beside its evidence.
 //!
 //! ```text
 //! impl Record for Evidence ──► Stage<Step> ──► StageSchema   names, units, formulas     once per run
@@ -31,7 +31,6 @@ mod array;
 mod column;
 mod declare;
 mod label;
-mod mark;
 mod schema;
 mod stage;
 mod unit;
@@ -41,7 +40,6 @@ pub use array::{ArrayDecl, ArrayKind, ArrayView};
 pub use column::Column;
 pub use declare::{Declaration, Record};
 pub use label::{label, unit_label};
-pub use mark::{Eye, Mark, MarkDecl, Role, Shape, ShapeKind};
 pub use schema::{GateDecl, GateRecord, Quantity, Side, StageRecord, StageSchema};
 pub use stage::Stage;
 pub use unit::Unit;

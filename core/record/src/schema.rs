@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::{ArrayDecl, Kind, Mark, MarkDecl, Unit, Value, unit_label};
+use super::{ArrayDecl, Kind, Unit, Value, unit_label};
 
 /// The declaration of a quantity.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -93,8 +93,6 @@ pub struct StageSchema {
     pub fields: Vec<(Cow<'static, str>, Unit)>,
     /// The arrays.
     pub arrays: Vec<ArrayDecl>,
-    /// The marks.
-    pub marks: Vec<MarkDecl>,
     /// The gates.
     pub gates: Vec<GateDecl>,
 }
@@ -121,8 +119,6 @@ pub struct StageRecord {
     pub values: Vec<Value>,
     /// Width and height of every array; `None` where it does not exist at this step.
     pub arrays: Vec<Option<[u32; 2]>>,
-    /// The marks that exist at this step.
-    pub marks: Vec<Mark>,
     /// The gates that were evaluated.
     pub gates: Vec<GateRecord>,
     /// Why the stage gave no result, as one sentence.

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use serde::Serialize;
 
-use super::{ArrayView, Declaration, Mark, Record, StageRecord, StageSchema, Value};
+use super::{ArrayView, Declaration, Record, StageRecord, StageSchema, Value};
 
 /// A stage of the step type `S`, whatever its evidence types are.
 pub struct Stage<S> {
@@ -130,7 +130,6 @@ impl<S: 'static> Stage<S> {
         schema.quantities.extend(part.quantities);
         schema.fields.extend(part.fields);
         schema.arrays.extend(part.arrays);
-        schema.marks.extend(part.marks);
         schema.gates.extend(part.gates);
         self.parts.push(Part { first_quantity, first_array, reader });
     }
@@ -176,7 +175,6 @@ impl<S: 'static> Stage<S> {
             let record = part.reader.record(Some(step));
             whole.values.extend(record.values);
             whole.arrays.extend(record.arrays);
-            whole.marks.extend(record.marks);
             whole.gates.extend(record.gates);
             whole.reason = whole.reason.or(record.reason);
         }
@@ -200,15 +198,10 @@ impl<E: 'static> Declaration<E> {
                 ..StageRecord::default()
             };
         };
-        let marks = self.shapes.iter().zip(&self.schema.marks).filter_map(|(shape, mark)| {
-            let shape = shape(evidence)?;
-            Some(Mark { name: mark.name.clone(), eye: mark.eye, role: mark.role, shape })
-        });
         StageRecord {
             reached: true,
             values: self.values.iter().map(|value| value(evidence)).collect(),
             arrays: self.arrays.iter().map(|array| array(evidence).map(|view| view.size())).collect(),
-            marks: marks.collect(),
             gates: self.gates.iter().flat_map(|gates| gates(evidence)).collect(),
             reason: self.reason.as_ref().and_then(|reason| reason(evidence)),
         }
@@ -301,9 +294,6 @@ mod tests {
             r.quantity("best", Unit::One, |f| f.scores.iter().copied().reduce(f32::max))
                 .formula("max score", &["scores"]);
             r.array("scores", ArrayKind::ScoreMap, "Scores.", |f| ArrayView::new(2, &f.scores));
-            r.mark("match", (Eye::Left, Role::Measurement, ShapeKind::Dot), |f| {
-                Some(Shape::Dot { at: f.pixel })
-            });
             r.gate("best", Unit::One, Side::AtLeast, "limits.best_min");
             r.gates(|f| {
                 vec![GateRecord {
@@ -334,8 +324,6 @@ mod tests {
         assert_eq!(record.arrays, [Some([2, 2])]);
         assert_eq!(stage.evidence(&step), Some(serde_json::json!({ "pixel": { "x": 1.5, "y": 2.0 } })));
         assert_eq!(stage.array(&step, "scores").unwrap().values()[1], 0.75);
-        assert_eq!(record.marks[0].shape, Shape::Dot { at: Pixel::new(1.5, 2.0) });
-        assert_eq!(record.marks[0].shape.kind(), schema.marks[0].kind);
         assert_eq!((record.gates[0].value, record.gates[0].limit), (Some(0.25), 0.5));
     }
 
@@ -344,7 +332,7 @@ mod tests {
         let record = stage().record(&Step { found: None });
         assert!(!record.reached);
         assert_eq!(record.values, [Value::Missing, Value::Missing]);
-        assert_eq!((record.arrays, record.marks.len(), record.gates.len()), (vec![None], 0, 0));
+        assert_eq!((record.arrays, record.gates.len()), (vec![None], 0));
         assert!(stage().array(&Step { found: None }, "scores").is_none());
         assert_eq!(stage().evidence(&Step { found: None }), None);
     }

@@ -3,9 +3,9 @@
 //! ```text
 //! step ─► predict ─► point_mast ─► capture ─► the steps of locate ─► locate ─► judge ─► update ─► truth
 //! ```
-//! The quantities, arrays, marks and gates are declared beside each evidence type (`impl Record`). Tables, comparisons,
+//! The quantities, arrays and gates are declared beside each evidence type (`impl Record`). Tables, comparisons,
 //! expressions, logs and pages are views of this list, so that a quantity or an array is added in one file, and a
-//! stage in its own file and one entry here.
+//! step of `locate` in its own file and the evidence of its tracker.
 
 mod evidence;
 

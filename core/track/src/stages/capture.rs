@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use sightline_geometry::frames::Pixel;
-use sightline_record::{Declaration, Eye, Record, Role, Shape, ShapeKind, Unit};
+use sightline_record::{Declaration, Record, Unit};
 use sightline_vision::image::{GrayImage, PixelRect};
 
 /// Both images of one stop.
@@ -83,8 +83,5 @@ impl Record for Capture {
             .describe("Mean grey value in the subframe, as a fraction of full scale.");
         r.quantity("subframe_saturated", Unit::One, |c| c.subframe_saturated)
             .describe("Share of the subframe's pixels at full scale.");
-        r.mark("subframe", (Eye::Left, Role::Search, ShapeKind::Rect), |c| {
-            Some(Shape::Rect { rect: c.subframe? })
-        });
     }
 }

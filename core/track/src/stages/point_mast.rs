@@ -13,7 +13,7 @@ use utoipa::ToSchema;
 
 use sightline_geometry::camera::{Camera, Mast, MastAngles};
 use sightline_geometry::frames::{Pixel, Point3};
-use sightline_record::{Declaration, Eye, Record, Role, Shape, ShapeKind, Unit};
+use sightline_record::{Declaration, Record, Unit};
 
 /// Pointing and camera models of this stop.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -98,14 +98,5 @@ impl Record for Pointing {
         r.quantity("predicted_covariance_px2", Unit::SquarePixel, |p| p.predicted_covariance_px2)
             .describe("Covariance of the prediction in the left image.")
             .formula("J Σ Jᵀ", &["predict.covariance_in_rover"]);
-        r.mark("predicted_left", (Eye::Left, Role::Prediction, ShapeKind::Cross), |p| {
-            Some(Shape::Cross { at: p.predicted_left? })
-        });
-        r.mark("predicted_right", (Eye::Right, Role::Prediction, ShapeKind::Cross), |p| {
-            Some(Shape::Cross { at: p.predicted_right? })
-        });
-        r.mark("gate", (Eye::Left, Role::Prediction, ShapeKind::Ellipse), |p| {
-            Some(Shape::Ellipse { centre: p.predicted_left?, covariance_px2: p.predicted_covariance_px2? })
-        });
     }
 }

@@ -19,7 +19,7 @@ use super::settings::TemplateSettings;
 use crate::locate::tracker::LocateInput;
 use sightline_geometry::estimate::drift::Drift;
 use sightline_geometry::frames::Pixel;
-use sightline_record::{Declaration, Eye, Record, Role, Shape, ShapeKind, Unit};
+use sightline_record::{Declaration, Record, Unit};
 use sightline_vision::correlate::{Focus, find_peak, zncc_surface};
 use sightline_vision::image::{PixelRect, patch};
 
@@ -95,8 +95,5 @@ impl Record for DriftCorrection {
             .describe("Distance from the match of the renewed template.")
             .formula("│pixel − match│", &["pixel", "match_template.pixel"]);
         r.quantity("accepted", Unit::One, |d| d.accepted).describe("Whether its position is used.");
-        r.mark("designated", (Eye::Left, Role::Template, ShapeKind::Cross), |d| {
-            Some(Shape::Cross { at: d.pixel })
-        });
     }
 }

@@ -27,7 +27,7 @@ use super::settings::{FirstStage, Measure, Refine, Search, TemplateSettings};
 use crate::array_name::ArrayName;
 use crate::locate::tracker::LocateInput;
 use sightline_geometry::frames::Pixel;
-use sightline_record::{ArrayKind, Declaration, Eye, Record, Role, Shape, ShapeKind, Unit};
+use sightline_record::{ArrayKind, Declaration, Record, Unit};
 use sightline_vision::correlate::coarse_to_fine::{CoarseSearch, coarse_to_fine};
 use sightline_vision::correlate::lucas_kanade::Placed;
 use sightline_vision::correlate::peak::{self, Peak, SecondPeak};
@@ -314,18 +314,7 @@ impl Record for TemplateMatch {
             "The score of every position of the search window; bright is a better match",
             |m| (&m.surface).into(),
         );
-        declare_marks(r);
     }
-}
-
-fn declare_marks(r: &mut Declaration<TemplateMatch>) {
-    r.mark("window", (Eye::Left, Role::Search, ShapeKind::Rect), |m| {
-        Some(Shape::Rect { rect: m.search_window })
-    });
-    r.mark("peak", (Eye::Left, Role::Measurement, ShapeKind::Dot), |m| Some(Shape::Dot { at: m.pixel }));
-    r.mark("second_peak", (Eye::Left, Role::SecondPeak, ShapeKind::Dot), |m| {
-        Some(Shape::Dot { at: m.second_peak.as_ref()?.pixel })
-    });
 }
 
 /// The arrays of this stage that panels draw by themselves.

@@ -38,7 +38,7 @@ use super::stereo_search::{Best, StereoTemplate, Windows};
 use crate::array_name::ArrayName;
 use sightline_geometry::frames::Pixel;
 use sightline_geometry::stereo_geometry::StereoGeometry;
-use sightline_record::{ArrayKind, Declaration, Eye, Record, Role, Shape, ShapeKind, Unit};
+use sightline_record::{ArrayKind, Declaration, Record, Unit};
 use sightline_vision::correlate::Focus;
 use sightline_vision::image::patch::{self, Patch};
 use sightline_vision::image::resample;
@@ -316,12 +316,6 @@ impl Record for PointStereo {
             "The right image at the stereo match, as the left eye would see it",
             |s| (&s.right_window).into(),
         );
-        r.mark("match", (Eye::Right, Role::Measurement, ShapeKind::Dot), |s| {
-            Some(Shape::Dot { at: s.right_pixel })
-        });
-        r.mark("curve", (Eye::Right, Role::Search, ShapeKind::Curve), |s| {
-            Some(Shape::Curve { points: s.curve.iter().map(|point| point.pixel).collect() })
-        });
     }
 }
 
