@@ -274,7 +274,7 @@ fn joined(at: &str, path: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{ArrayKind, Eye, GateRecord, Kind, Role, Shape, ShapeKind, Side, Unit};
+    use crate::{ArrayKind, GateRecord, Kind, Side, Unit};
     use sightline_geometry::frames::Pixel;
 
     #[derive(Serialize)]

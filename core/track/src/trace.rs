@@ -25,7 +25,7 @@ use crate::stages::predict::Prediction;
 use crate::stages::update::Updated;
 use sightline_geometry::estimate::error_budget::{Approach, ErrorBudget, StereoPair};
 use sightline_geometry::frames::{Pixel, Point3};
-use sightline_record::{Declaration, Eye, Record, Role, Shape, ShapeKind, Unit};
+use sightline_record::{Declaration, Record, Unit};
 
 /// One step of a run.
 #[derive(Clone, Debug, PartialEq)]
@@ -309,8 +309,5 @@ impl Record for StepTruth {
             .describe("The error up to which the target counts as tracked.");
         r.quantity("tracked", Unit::One, |t| t.tracked)
             .describe("Whether the target is tracked; missing where the truth is hidden.");
-        r.mark("true_left", (Eye::Left, Role::Truth, ShapeKind::Cross), |t| {
-            Some(Shape::Cross { at: t.left_pixel? })
-        });
     }
 }
