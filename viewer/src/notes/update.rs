@@ -196,7 +196,7 @@ impl State {
             }
             None => self.cursor.step = pin.step,
         }
-        if let Some(stage) = pin.stage.as_deref().and_then(stage_of_word) {
+        if let Some(stage) = pin.stage.as_deref().and_then(Stage::named) {
             self.stage = stage;
         }
         self.notes.at = Some(id);
