@@ -75,7 +75,7 @@ async fn fill_page(browser: &Browser, panel: &str) {
 async fn every_panel_looks_as_it_was_last_seen() {
     let bench = Bench::start(&short_approach()).await;
     let browser = Browser::start().await;
-    browser.resize(1100, 760).await;
+    browser.resize(1100, 621).await;
     bench.pick(&browser).await;
     for step in 1..=STEP {
         browser.press("ArrowRight").await;

@@ -175,10 +175,17 @@ impl Browser {
         (answers.pop().unwrap_or_default(), name)
     }
 
-    /// Makes the window so large, px.
+    /// Gives the page this size, px. The browser's own bars differ from version to version, so that the size of the window
+    /// does not tell the page's.
     pub async fn resize(&self, width: u32, height: u32) {
-        let done = self.client.set_window_size(width, height).await;
-        done.unwrap_or_else(|error| panic!("the window cannot have {width} × {height}: {error}"));
+        let set = async |[width, height]: [u32; 2]| {
+            let done = self.client.set_window_size(width, height).await;
+            done.unwrap_or_else(|error| panic!("the window cannot have {width} × {height}: {error}"));
+        };
+        set([width, height]).await;
+        let bars = self.evaluate("return [outerWidth - innerWidth, outerHeight - innerHeight]").await;
+        let bar = |k: usize| bars[k].as_u64().expect("a number of pixels") as u32;
+        set([width + bar(0), height + bar(1)]).await;
     }
 
     /// The page as it looks now, as a PNG file's bytes.
