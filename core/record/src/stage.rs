@@ -43,6 +43,12 @@ struct Computed<S, E> {
     declaration: Declaration<E>,
 }
 
+/// Evidence of a step that another step type contains.
+struct Within<T, S> {
+    find: for<'a> fn(&'a T) -> &'a S,
+    reader: Box<dyn Read<S> + Send + Sync>,
+}
+
 impl<S: 'static> Stage<S> {
     /// A stage whose evidence is a part of the step.
     pub fn of<E: Record + Serialize>(
@@ -91,6 +97,17 @@ impl<S: 'static> Stage<S> {
     pub fn of_parts(name: &'static str, question: &'static str) -> Self {
         let schema = StageSchema { stage: name.into(), question: question.into(), ..StageSchema::default() };
         Self { schema, parts: Vec::new(), evidence: None }
+    }
+
+    /// The same stage of a step type that contains `S`.
+    pub fn within<T: 'static>(self, find: for<'a> fn(&'a T) -> &'a S) -> Stage<T> {
+        let parts = self.parts.into_iter().map(|Part { first_quantity, first_array, reader }| {
+            let reader = Box::new(Within { find, reader });
+            Part { first_quantity, first_array, reader }
+        });
+        let evidence =
+            self.evidence.map(|evidence| -> Evidence<T> { Box::new(move |step| evidence(find(step))) });
+        Stage { schema: self.schema, parts: parts.collect(), evidence }
     }
 
     fn add(&mut self, part: StageSchema, reader: Box<dyn Read<S> + Send + Sync>) {
@@ -220,6 +237,24 @@ impl<S: 'static, E: 'static> Read<S> for Computed<S, E> {
     }
 }
 
+impl<T: 'static, S: 'static> Read<T> for Within<T, S> {
+    fn is_reached(&self, step: &T) -> bool {
+        self.reader.is_reached((self.find)(step))
+    }
+
+    fn value(&self, step: &T, index: usize) -> Option<Value> {
+        self.reader.value((self.find)(step), index)
+    }
+
+    fn array<'a>(&self, step: &'a T, index: usize) -> Option<ArrayView<'a>> {
+        self.reader.array((self.find)(step), index)
+    }
+
+    fn record(&self, step: &T) -> StageRecord {
+        self.reader.record((self.find)(step))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -306,6 +341,27 @@ mod tests {
         assert_eq!(stage.record(&step).arrays, [Some([2, 2]), Some([4, 1])]);
         assert_eq!(stage.array(&step, "row").unwrap().size(), [4, 1]);
         assert_eq!(stage.value_of(&step, "nothing"), None);
+    }
+
+    #[test]
+    fn a_stage_of_a_contained_step_is_unchanged() {
+        struct Whole {
+            step: Step,
+        }
+        fn more(r: &mut Declaration<Step>) {
+            r.quantity("two", Unit::One, |_| 2_usize);
+        }
+        let own = || stage().with(|step| Some(step), more);
+        let within = own().within(|whole: &Whole| &whole.step);
+        for found in [None, Some(Found { pixel: Pixel::new(1.5, 2.0), scores: vec![0.25; 4] })] {
+            let whole = Whole { step: Step { found } };
+            assert_eq!(within.schema(), own().schema());
+            assert_eq!(within.record(&whole), own().record(&whole.step));
+            assert_eq!(within.evidence(&whole), own().evidence(&whole.step));
+            assert_eq!(within.value_of(&whole, "two"), own().value_of(&whole.step, "two"));
+            let size = within.array(&whole, "scores").map(|array| array.size());
+            assert_eq!(size, own().array(&whole.step, "scores").map(|array| array.size()));
+        }
     }
 
     #[test]
