@@ -10,10 +10,10 @@
 use nalgebra::{Matrix2, SymmetricEigen, Vector2};
 use sightline_geometry::frames::Pixel;
 use sightline_record::Unit;
-use sightline_track::records;
+use sightline_session::records;
+use sightline_session::step::{RunStep, StepRow};
 use sightline_track::settings::Settings;
 use sightline_track::target::TrackingState;
-use sightline_track::trace::{StepRow, StepTrace};
 use sightline_vision::image::GrayImage;
 
 use super::canvas::{Canvas, Line, Rgb, Window};
@@ -57,17 +57,13 @@ pub(crate) fn plain_size() -> [u32; 2] {
 ///
 /// # Errors
 /// What the encoder says.
-pub(crate) fn png(
-    trace: &StepTrace,
-    left: Option<&GrayImage>,
-    settings: &Settings,
-) -> Result<Vec<u8>, String> {
+pub(crate) fn png(trace: &RunStep, left: Option<&GrayImage>, settings: &Settings) -> Result<Vec<u8>, String> {
     draw(trace, left, settings, None).ok_or("a picture without pixels")?.png()
 }
 
 /// The picture of a step; `head` is a line above it. None of the images: their place is a checker.
 pub(super) fn draw(
-    trace: &StepTrace,
+    trace: &RunStep,
     left: Option<&GrayImage>,
     settings: &Settings,
     head: Option<&str>,
@@ -100,7 +96,7 @@ pub(super) fn draw(
     Some(canvas)
 }
 
-fn marks(canvas: &mut Canvas, trace: &StepTrace, window: &Window, settings: &Settings) {
+fn marks(canvas: &mut Canvas, trace: &RunStep, window: &Window, settings: &Settings) {
     let pointing = &trace.point_mast;
     if let Some(pixel) = pointing.predicted_left.filter(|_| trace.prediction().is_some()) {
         canvas.line(&ring(window, pixel, 2.5), true, PREDICTION, Line::Solid);
@@ -129,7 +125,7 @@ fn marks(canvas: &mut Canvas, trace: &StepTrace, window: &Window, settings: &Set
     }
 }
 
-fn foot(canvas: &mut Canvas, trace: &StepTrace, top: f32) {
+fn foot(canvas: &mut Canvas, trace: &RunStep, top: f32) {
     let [width, height] = canvas.size();
     canvas.fill([0.0, top], [width as f32, height as f32 - top], PAPER);
     canvas.fill([0.0, top], [8.0, height as f32 - top], state_colour(trace.update.state));
@@ -140,7 +136,7 @@ fn foot(canvas: &mut Canvas, trace: &StepTrace, top: f32) {
 }
 
 /// The state in capitals, with the count of bad updates.
-pub(crate) fn state_words(trace: &StepTrace) -> String {
+pub(crate) fn state_words(trace: &RunStep) -> String {
     match trace.update.state {
         TrackingState::Lost { count } => format!("LOST {count}"),
         other => other.word().to_uppercase(),

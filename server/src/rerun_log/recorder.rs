@@ -7,7 +7,7 @@ use std::sync::Arc;
 use rerun::{RecordingStream, RecordingStreamBuilder, TextDocument};
 use sightline_geometry::frames::Point3;
 use sightline_rover::pipeline::Stops;
-use sightline_track::trace::StepTrace;
+use sightline_session::step::RunStep;
 use sightline_vision::image::GrayImage;
 
 use super::blueprint::Lane;
@@ -25,7 +25,7 @@ pub struct RunLog<'a> {
     /// What the person calls the target.
     pub label: &'a str,
     /// Its steps so far.
-    pub steps: &'a [Arc<StepTrace>],
+    pub steps: &'a [Arc<RunStep>],
 }
 
 impl RunLog<'_> {
@@ -60,7 +60,7 @@ struct Known {
 }
 
 impl Known {
-    fn new(first: &StepTrace) -> Self {
+    fn new(first: &RunStep) -> Self {
         let subframe = first.capture().and_then(|capture| capture.subframe);
         Self {
             steps: BTreeSet::new(),
@@ -126,7 +126,7 @@ impl Recorder {
     }
 
     /// Logs one step of a run that was made known, unless it is in the recording already.
-    pub(super) fn log_step(&mut self, run: &RunLog<'_>, stops: &dyn Stops, trace: &StepTrace) -> Logged {
+    pub(super) fn log_step(&mut self, run: &RunLog<'_>, stops: &dyn Stops, trace: &RunStep) -> Logged {
         let root = root(run.target, run.run);
         if !self.runs.get_mut(&root).is_some_and(|known| known.steps.insert(trace.step)) {
             return Ok(());
@@ -152,7 +152,7 @@ impl Recorder {
 
 /// The images of a step. Those of a run that was read back from disk are not in the trace and come from the
 /// traverse.
-fn images(trace: &StepTrace, stops: &dyn Stops) -> Option<[Arc<GrayImage>; 2]> {
+fn images(trace: &RunStep, stops: &dyn Stops) -> Option<[Arc<GrayImage>; 2]> {
     let kept = trace.capture()?.pair.clone();
     let pair = if kept.left.width() > 0 { kept } else { stops.capture(trace.step).ok()? };
     Some([pair.left, pair.right])

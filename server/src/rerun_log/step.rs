@@ -6,11 +6,11 @@ use nalgebra::Matrix3;
 use rerun::components::AggregationPolicy;
 use rerun::{AsComponents, Clear, Color, Ellipsoids3D, RecordingStream, SeriesLines};
 use sightline_geometry::frames::{Point3, Pose};
+use sightline_session::step::RunStep;
 use sightline_track::locate::features::FeatureEvidence;
 use sightline_track::locate::template::TemplateEvidence;
 use sightline_track::locate::template::match_template::TemplateMatch;
 use sightline_track::stages::point_mast::Pointing;
-use sightline_track::trace::StepTrace;
 use sightline_vision::image::GrayImage;
 
 use super::Logged;
@@ -26,7 +26,7 @@ pub(super) struct Step<'a> {
     /// What the person calls the run.
     pub(super) label: &'a str,
     /// What the stages saw and decided.
-    pub(super) trace: &'a StepTrace,
+    pub(super) trace: &'a RunStep,
     /// The left and the right image of the stop, where they could be read and are still to be logged.
     pub(super) images: Option<[Arc<GrayImage>; 2]>,
     /// The estimated pose of the stop.

@@ -2,8 +2,8 @@
 
 use sightline_session::breakpoints::{BreakpointChange, BreakpointView, NewBreakpoint};
 
-use crate::breakpoints::{AskRequest, WhenSet};
 use crate::breakpoints::derived::Derived;
+use crate::breakpoints::{AskRequest, WhenSet};
 use crate::state::State;
 use crate::state::deeds::Deed;
 

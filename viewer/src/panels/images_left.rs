@@ -2,9 +2,9 @@
 
 use egui::{Margin, Rect, Ui, pos2, vec2};
 use sightline_geometry::frames::Pixel;
+use sightline_session::step::RunStep;
 use sightline_track::locate::features::rows::moved_covariance_px2;
 use sightline_track::locate::shape_tracker::rows::{basin, registered_covariance_px2};
-use sightline_track::trace::StepTrace;
 use sightline_vision::image::PixelRect;
 
 use crate::cache::{Eye, Slot};
@@ -186,7 +186,7 @@ fn entries(state: &State) -> Vec<Entry> {
 }
 
 /// Paints what one step saw.
-fn paint_marks(overlay: &Overlay<'_>, trace: &StepTrace, state: &State) {
+fn paint_marks(overlay: &Overlay<'_>, trace: &RunStep, state: &State) {
     let run = theme::run(state.cursor.run);
     let evidence = trace.template();
     let matched = evidence.and_then(|e| e.match_template.as_ref());
@@ -235,13 +235,13 @@ fn paint_marks(overlay: &Overlay<'_>, trace: &StepTrace, state: &State) {
 
 /// The rock's half width about the prediction, in the image and in metres: from farther off a registration may settle on
 /// another place (R155).
-fn basin_of(trace: &StepTrace) -> Option<(Vec<Pixel>, f64)> {
+fn basin_of(trace: &RunStep) -> Option<(Vec<Pixel>, f64)> {
     let half_width_m = trace.shape()?.registration.as_ref()?.half_width_m;
     let predicted = &trace.prediction()?.position_in_rover;
     Some((basin(predicted, half_width_m, &trace.point_mast.left), half_width_m))
 }
 
-fn paint_prediction(overlay: &Overlay<'_>, trace: &StepTrace) {
+fn paint_prediction(overlay: &Overlay<'_>, trace: &RunStep) {
     let pointing = &trace.point_mast;
     let Some(pixel) = pointing.predicted_left else { return };
     if let Some(covariance) = &pointing.predicted_covariance_px2 {

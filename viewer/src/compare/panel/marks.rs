@@ -1,8 +1,8 @@
 //! What a compared run saw, in its own colour and shape, on the left image.
 
 use egui::vec2;
+use sightline_session::step::RunStep;
 use sightline_session::view::RunView;
-use sightline_track::trace::StepTrace;
 
 use crate::command::Layer;
 use crate::compare::state::{Look, Other};
@@ -72,7 +72,7 @@ pub(crate) fn paint_right(overlay: &Overlay<'_>, state: &State) {
 }
 
 /// The record of another run at this very stop: pixels of another stop mean nothing on its image.
-fn here<'a>(state: &'a State, other: &Other<'_>) -> Option<&'a StepTrace> {
+fn here<'a>(state: &'a State, other: &Other<'_>) -> Option<&'a RunStep> {
     state.other_trace(other.name).ready().filter(|trace| trace.step == state.cursor.step)
 }
 
@@ -91,7 +91,7 @@ pub(crate) fn elsewhere(state: &State) -> Option<String> {
 }
 
 /// Paints what one step of a run saw: search window, prediction with its gate, template window and match.
-pub(crate) fn paint(overlay: &Overlay<'_>, trace: &StepTrace, run: &RunView, look: Look, state: &State) {
+pub(crate) fn paint(overlay: &Overlay<'_>, trace: &RunStep, run: &RunView, look: Look, state: &State) {
     let matched = trace.template().and_then(|evidence| evidence.match_template.as_ref());
     if let Some(matched) = matched.filter(|_| state.shows(Layer::SearchWindow)) {
         overlay.rectangle(matched.search_window, look.colour, Line::Dashed);
@@ -123,7 +123,7 @@ pub(crate) fn paint(overlay: &Overlay<'_>, trace: &StepTrace, run: &RunView, loo
 }
 
 /// The run's name beside its mark.
-fn name(overlay: &Overlay<'_>, trace: &StepTrace, look: Look, words: &str) {
+fn name(overlay: &Overlay<'_>, trace: &RunStep, look: Look, words: &str) {
     if let Some(pixel) = crate::compare::state::place_of_target(trace) {
         overlay.words(pixel, vec2(12.0, 16.0), words, look.colour);
     }
