@@ -22,12 +22,12 @@ use std::sync::OnceLock;
 use divan::Bencher;
 use sightline_recordings::{Traverse, create_simulated};
 use sightline_rover::pipeline::Stops;
+use sightline_session::step::RunStep;
 use sightline_session::track;
 use sightline_track::locate::shape_tracker::surface::StopSurface;
 use sightline_track::presets::preset;
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
-use sightline_track::trace::StepTrace;
 use sightline_world::{choose_targets, library};
 
 fn main() {
@@ -39,7 +39,7 @@ struct Scene {
     _folder: tempfile::TempDir,
     traverse: Traverse,
     settings: Settings,
-    steps: Vec<StepTrace>,
+    steps: Vec<RunStep>,
 }
 
 fn scene() -> &'static Scene {

@@ -11,12 +11,13 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use sightline_geometry::frames::Pixel;
+use sightline_session::step::RunStep;
+use sightline_session::summary::summarise;
 use sightline_session::track::{self, Drive};
 use sightline_study::point::Visit;
 use sightline_study::staged::Staged;
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
-use sightline_track::trace::{StepTrace, summarise};
 
 /// Far ends of the ranges in which scores are averaged, m; each reaches down to the next, the last to 0.
 pub(crate) const RANGES_M: [f64; 5] = [12.0, 8.0, 6.0, 4.0, 3.0];
@@ -67,7 +68,7 @@ pub(crate) fn difficulty<D: Drive>(
 ) -> Difficulty {
     let drive = Staged::new(drive, Visit::Every(stride));
     let run = |&pixel: &Pixel| track::run(&drive, Designation { step: 0, pixel }, settings).ok();
-    let runs: Vec<Option<Vec<StepTrace>>> = targets.par_iter().map(run).collect();
+    let runs: Vec<Option<Vec<RunStep>>> = targets.par_iter().map(run).collect();
     let mut found = Difficulty {
         stride,
         targets: targets.len(),

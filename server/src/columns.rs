@@ -4,8 +4,8 @@
 
 use sightline_api::table::cell as text_cell;
 use sightline_record::{Column, StageRecord, Value};
-use sightline_track::records;
-use sightline_track::trace::StepRow;
+use sightline_session::records;
+use sightline_session::step::StepRow;
 
 /// A table with a header.
 pub(crate) fn csv(rows: &[StepRow]) -> String {

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use sightline_api::location::AtStep;
 use sightline_geometry::frames::Pixel;
+use sightline_session::step::RunStep;
 use sightline_session::what_if::Base;
 use sightline_track::locate::template::history::{AgainstEarlier, against_earlier};
 use sightline_track::settings::Settings;
-use sightline_track::trace::StepTrace;
 
 use crate::live_session::{CancelFlag, LiveSession};
 use crate::problem::{ApiError, ApiResult};
@@ -19,11 +19,11 @@ pub(crate) struct RecordedStep {
     /// The session.
     pub live: Arc<LiveSession>,
     /// The run's designation.
-    pub first: Arc<StepTrace>,
+    pub first: Arc<RunStep>,
     /// The step before; none at the designation.
-    pub last: Option<Arc<StepTrace>>,
+    pub last: Option<Arc<RunStep>>,
     /// The step.
-    pub recorded: Arc<StepTrace>,
+    pub recorded: Arc<RunStep>,
     /// The numbers of its target and run.
     of: (usize, usize),
     /// The run's configuration.
@@ -95,7 +95,7 @@ impl RecordedStep {
     }
 
     /// The steps before it that took a new template, the designation first.
-    fn renewals(&self) -> ApiResult<Vec<Arc<StepTrace>>> {
+    fn renewals(&self) -> ApiResult<Vec<Arc<RunStep>>> {
         self.live.with(|session| {
             let steps = &session.run(self.of.0, self.of.1)?.steps;
             let earlier = steps.iter().take_while(|step| step.step < self.recorded.step);

@@ -10,10 +10,10 @@ use std::sync::atomic::Ordering;
 
 use sightline_api::wire::Event;
 use sightline_geometry::error::{Error, Result};
+use sightline_session::step::RunStep;
 use sightline_session::{Next, Pending, Session, track};
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
-use sightline_track::trace::StepTrace;
 use tokio::sync::broadcast;
 
 use crate::jobs::Lane;
@@ -153,7 +153,7 @@ impl Runner {
         (target, run): (usize, usize),
         pending: &Pending,
         flag: &CancelFlag,
-    ) -> Result<StepTrace> {
+    ) -> Result<RunStep> {
         let traverse = &live.traverse.traverse;
         let step = pending.last.step + 1;
         if !traverse.is_ready(step) {
@@ -198,7 +198,7 @@ pub(crate) fn designate(
     open: &OpenTraverse,
     designation: Designation,
     settings: &Settings,
-) -> Result<StepTrace> {
+) -> Result<RunStep> {
     let (step, pixel) = (designation.step, designation.pixel);
     if step < open.traverse.stop_count() {
         let left = open.traverse.left_camera(step);
@@ -214,7 +214,7 @@ pub(crate) fn designate(
 ///
 /// # Errors
 /// When that image cannot be read.
-pub(crate) fn with_image(open: &OpenTraverse, step: &Arc<StepTrace>) -> Result<Arc<StepTrace>> {
+pub(crate) fn with_image(open: &OpenTraverse, step: &Arc<RunStep>) -> Result<Arc<RunStep>> {
     let mut step = Arc::clone(step);
     if let Some(stop) = step.update.target.memory.lacks_image_of() {
         let image = open.traverse.capture(stop)?.left;
@@ -224,7 +224,7 @@ pub(crate) fn with_image(open: &OpenTraverse, step: &Arc<StepTrace>) -> Result<A
 }
 
 /// Adds a step to its run; the one before lets go of its image.
-fn record(session: &mut Session, target: usize, run: usize, trace: StepTrace) -> Result<()> {
+fn record(session: &mut Session, target: usize, run: usize, trace: RunStep) -> Result<()> {
     let current = session.run_mut(target, run)?;
     match current.steps.last_mut() {
         None => current.steps.push(Arc::new(trace)),
@@ -241,7 +241,7 @@ fn record(session: &mut Session, target: usize, run: usize, trace: StepTrace) ->
 }
 
 /// The step without the stop's images.
-fn without_pair(mut trace: StepTrace) -> StepTrace {
+fn without_pair(mut trace: RunStep) -> RunStep {
     if let Some(capture) = trace.capture_mut() {
         capture.pair = Default::default();
     }

@@ -8,11 +8,11 @@ use std::time::Duration;
 
 use sightline_geometry::frames::Pixel;
 use sightline_server::rerun_log::{Rows, documented_entities};
+use sightline_session::step::RunStep;
 use sightline_tests::bench::{Bench, picked};
 use sightline_tests::browser::Browser;
 use sightline_tests::rrd;
 use sightline_tests::scenario::short_approach;
-use sightline_track::trace::StepTrace;
 use sightline_world::Scenario;
 
 #[tokio::test(flavor = "multi_thread")]
@@ -61,11 +61,11 @@ fn check_export(bench: &Bench, session: &str) {
     let path = folder.path().join("session.rrd");
     std::fs::write(&path, bench.get(&format!("/api/v1/sessions/{session}/exports/recording.rrd"))).unwrap();
     let recording = rrd::read(&path);
-    let read = |step: usize| -> StepTrace {
+    let read = |step: usize| -> RunStep {
         let path = format!("/api/v1/sessions/{session}/targets/0/runs/0/steps/{step}");
         serde_json::from_slice(&bench.get(&path)).unwrap()
     };
-    let traces: Vec<StepTrace> = (0..bench.stop_count).map(read).collect();
+    let traces: Vec<RunStep> = (0..bench.stop_count).map(read).collect();
     let mut checked = 0;
     for doc in documented_entities(1) {
         let found =

@@ -6,11 +6,12 @@ use std::sync::atomic::AtomicBool;
 use sightline_geometry::estimate::quantile::median;
 use sightline_geometry::frames::Pixel;
 use sightline_recordings::{Traverse, import};
+use sightline_session::step::RunStep;
 use sightline_session::track;
 use sightline_tests::data;
 use sightline_track::settings::Settings;
 use sightline_track::target::{Designation, TrackingState};
-use sightline_track::trace::{StepTrace, TruthKind};
+use sightline_world::target_truth::TruthKind;
 
 /// Pixels of the first frame on a scaffold (66 m), a parked car (37 m), a tree before a house (26 m), a hoarding (17 m)
 /// and a near car (13 m): five depths, all off the sky.
@@ -22,7 +23,7 @@ fn imported(set: &Path, folder: &Path) -> Traverse {
     Traverse::open(folder).unwrap()
 }
 
-fn designate(traverse: &Traverse, x: f64, y: f64) -> sightline_geometry::error::Result<Vec<StepTrace>> {
+fn designate(traverse: &Traverse, x: f64, y: f64) -> sightline_geometry::error::Result<Vec<RunStep>> {
     track::run(traverse, Designation { step: 0, pixel: Pixel::new(x, y) }, &Settings::default())
 }
 
@@ -31,7 +32,7 @@ fn designate(traverse: &Traverse, x: f64, y: f64) -> sightline_geometry::error::
 const TREE: usize = 2;
 
 /// Located minus true pixel, where both are there and the target is tracked.
-fn error_px(step: &StepTrace) -> Option<(f64, f64)> {
+fn error_px(step: &RunStep) -> Option<(f64, f64)> {
     let (truth, located) = (step.truth.as_ref()?.left_pixel?, step.located()?.left_pixel?);
     (step.update.state == TrackingState::Tracking).then_some((located.x - truth.x, located.y - truth.y))
 }

@@ -9,9 +9,9 @@ use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::RowAccessor;
 use serde_json::{Value, json};
 use sightline_record::Unit;
+use sightline_session::records::{self, StageQuantity};
 use sightline_tests::rrd;
 use sightline_tests::server::{TestServer, request, small_drive};
-use sightline_track::records::{self, StageQuantity};
 
 /// The number: declared in the `impl Record` of its stage, and no field of the evidence.
 const NAME: &str = "match_template.match_sigma_px";

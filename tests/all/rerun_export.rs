@@ -15,6 +15,7 @@ use sightline_geometry::frames::Pixel;
 use sightline_server::rerun_log::{
     LiveStream, Rows, RunLog, documented_entities, entities_of, export, root, shared_entities,
 };
+use sightline_session::step::RunStep;
 use sightline_session::{Session, track};
 use sightline_tests::rrd::{self, EntityRows, Recording};
 use sightline_tests::troubled::Troubled;
@@ -25,7 +26,6 @@ use sightline_track::locate::features::evidence::{
 };
 use sightline_track::settings::Settings;
 use sightline_track::target::{Designation, TrackingState};
-use sightline_track::trace::StepTrace;
 
 /// The stop whose image is missing.
 const MISSING: usize = 2;
@@ -35,7 +35,7 @@ const COVERED: usize = 4;
 /// The drive and the runs of two targets, tracked once for all tests.
 struct Fixture {
     drive: Troubled,
-    runs: Vec<Vec<Arc<StepTrace>>>,
+    runs: Vec<Vec<Arc<RunStep>>>,
     _folder: tempfile::TempDir,
 }
 
@@ -77,11 +77,7 @@ fn names(folder: &Path) -> Vec<String> {
 }
 
 /// The steps with and without data that the documentation promises.
-fn promised(
-    rows: Rows,
-    doc: &sightline_server::rerun_log::EntityDoc,
-    steps: &[Arc<StepTrace>],
-) -> EntityRows {
+fn promised(rows: Rows, doc: &sightline_server::rerun_log::EntityDoc, steps: &[Arc<RunStep>]) -> EntityRows {
     let split = |wanted: bool| {
         steps.iter().filter(|t| doc.has_data_at(t) == wanted).map(|t| t.step as i64).collect::<Vec<_>>()
     };
@@ -134,7 +130,7 @@ fn an_export_holds_every_documented_entity_with_the_documented_rows_and_no_other
 }
 
 /// Three features: one alone, an inlier and an outlier; a target moved by half a pixel of residual.
-fn by_features(trace: &StepTrace) -> StepTrace {
+fn by_features(trace: &RunStep) -> RunStep {
     let mut trace = trace.clone();
     let (is_pick, Some(located)) = (trace.prediction().is_none(), trace.located_mut()) else { return trace };
     const NONE: f32 = f32::NAN;
@@ -170,7 +166,7 @@ fn by_features(trace: &StepTrace) -> StepTrace {
 }
 
 /// The recording of a run, whose every entity has data and is cleared at the steps that its documentation promises.
-fn exported_as_promised(steps: &[Arc<StepTrace>]) -> rrd::Recording {
+fn exported_as_promised(steps: &[Arc<RunStep>]) -> rrd::Recording {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.rrd");
     let runs = [RunLog { target: 0, run: 0, label: "rock", steps }];

@@ -1,7 +1,8 @@
 //! The stages and the steps of `locate` that can be selected: names of stages of the record, in the order of each tracker.
 
+use sightline_session::records;
 use sightline_track::locate;
-use sightline_track::records;
+use sightline_track::records::stages_of;
 use sightline_track::settings::TrackerKind;
 
 /// A stage or a step of `locate`, by its name in the record.
@@ -51,7 +52,7 @@ impl Stage {
 impl Stage {
     /// Those of a tracker, in running order.
     pub fn of(tracker: TrackerKind) -> impl Iterator<Item = Self> {
-        records::stages_of(tracker).map(Self)
+        stages_of(tracker).map(Self)
     }
 
     /// The stage of this name, whichever tracker has it.

@@ -15,13 +15,13 @@ use sightline_session::metrics::RunMetrics;
 use sightline_session::notes::{EditNote, NewNote, Note};
 use sightline_session::query::{CompletionQuery, Language, Query, QueryAnswer};
 use sightline_session::reproduce::Reproduction;
+use sightline_session::step::RunStep;
 use sightline_session::view::{RunView, SessionView};
 use sightline_session::what_if::{Ghost, WhatIf};
 use sightline_session::why::Explanation;
 use sightline_study::wire::{NewStudy, StudyInfo, StudyJob, StudyRows};
 use sightline_track::limits::SettingInfo;
 use sightline_track::locate::template::history::AgainstEarlier;
-use sightline_track::trace::StepTrace;
 
 use crate::endpoint::{Done, Endpoint, File, Method, NoBody, NoQuery};
 use crate::location::{
@@ -143,7 +143,7 @@ endpoints! {
     CompareRuns: Post "/sessions/{session}/compare", AtSession, body NewComparison => Comparison;
 
     /// A step.
-    ShowStep: Get "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}", AtStep => StepTrace;
+    ShowStep: Get "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}", AtStep => RunStep;
     /// All arrays of a step as one NumPy archive.
     ShowArrays: Get "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/arrays.npz", AtStep => File;
     /// The view of a step against the earlier templates of its run.

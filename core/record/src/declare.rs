@@ -3,8 +3,8 @@
 use std::borrow::Cow;
 
 use super::{
-    ArrayDecl, ArrayKind, ArrayView, GateDecl, GateRecord, Measured, Quantity, Side, StageSchema, Unit, Value,
-    label,
+    ArrayDecl, ArrayKind, ArrayView, GateDecl, GateRecord, Measured, Quantity, Side, StageSchema, Unit,
+    Value, label,
 };
 
 /// Evidence that declares its quantities, arrays and gates.

@@ -355,6 +355,27 @@ mod tests {
     }
 
     #[test]
+    fn a_stage_of_a_contained_step_is_unchanged() {
+        struct Whole {
+            step: Step,
+        }
+        fn more(r: &mut Declaration<Step>) {
+            r.quantity("two", Unit::One, |_| 2_usize);
+        }
+        let own = || stage().with(|step| Some(step), more);
+        let within = own().within(|whole: &Whole| Some(&whole.step), &[""]);
+        for found in [None, Some(Found { pixel: Pixel::new(1.5, 2.0), scores: vec![0.25; 4] })] {
+            let whole = Whole { step: Step { found } };
+            assert_eq!(within.schema(), own().schema());
+            assert_eq!(within.record(&whole), own().record(&whole.step));
+            assert_eq!(within.evidence(&whole), own().evidence(&whole.step));
+            assert_eq!(within.value_of(&whole, "two"), own().value_of(&whole.step, "two"));
+            let size = within.array(&whole, "scores").map(|array| array.size());
+            assert_eq!(size, own().array(&whole.step, "scores").map(|array| array.size()));
+        }
+    }
+
+    #[test]
     fn a_schema_survives_its_serialised_form() {
         let text = serde_json::to_string(stage().schema()).unwrap();
         assert_eq!(&serde_json::from_str::<StageSchema>(&text).unwrap(), stage().schema());

@@ -83,7 +83,6 @@ pub fn designate(stops: &dyn Stops, designation: Designation, settings: &Setting
         point_mast: pointing,
         kind: StepKind::Designation { capture, locate: located },
         update,
-        truth: None,
     })
 }
 
@@ -135,7 +134,7 @@ pub fn run_step_displaced(
         Err(error) => {
             let kind = StepKind::Damaged { predict: prediction, fault: error.to_string() };
             let update = unseen(carried, last.state);
-            return StepTrace { step, time_s, point_mast: pointing, kind, update, truth: None };
+            return StepTrace { step, time_s, point_mast: pointing, kind, update };
         }
     };
     let capture = capture::capture(pair, pointing.predicted_left, settings.subframe_px());
@@ -155,7 +154,7 @@ pub fn run_step_displaced(
         judge::judge(target, &prediction, &pointing, &locate, &site_from_rover, last.state, &settings.limits);
     let update = update::update(carried, &pointing, &capture, &locate, &judge, &site_from_rover, settings);
     let kind = StepKind::Tracked { predict: prediction, capture, locate, judge };
-    StepTrace { step, time_s, point_mast: pointing, kind, update, truth: None }
+    StepTrace { step, time_s, point_mast: pointing, kind, update }
 }
 
 /// The update of a stop without images: the target is where the prediction puts it, the state stays.

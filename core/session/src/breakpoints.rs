@@ -11,8 +11,8 @@ use utoipa::ToSchema;
 
 use super::Session;
 use super::expression::{Expression, Refused};
+use crate::step::RunStep;
 use sightline_geometry::error::{Error, Result};
-use sightline_track::trace::StepTrace;
 
 /// How many breakpoints a session may have.
 pub const BREAKPOINT_LIMIT: usize = 64;
@@ -141,7 +141,7 @@ impl Breakpoints {
     }
 
     /// Looks at the steps of a target's runs that were not looked at yet.
-    fn look(&mut self, target: usize, runs: &[&[Arc<StepTrace>]]) {
+    fn look(&mut self, target: usize, runs: &[&[Arc<RunStep>]]) {
         for watched in self.set.iter_mut().filter(|watched| watched.breakpoint.on) {
             let Ok(expression) = &watched.expression else { continue };
             let compared = expression.runs_compared();
@@ -186,7 +186,7 @@ impl Breakpoints {
 }
 
 /// How many of a run's steps cannot change their answer any more.
-fn settled(runs: &[&[Arc<StepTrace>]], steps: &[Arc<StepTrace>], compared: &[usize]) -> usize {
+fn settled(runs: &[&[Arc<RunStep>]], steps: &[Arc<RunStep>], compared: &[usize]) -> usize {
     let end = |run: &usize| runs.get(*run).and_then(|steps| steps.last()).map_or(0, |last| last.step + 1);
     match compared.iter().map(end).min() {
         None => steps.len(),
@@ -252,7 +252,7 @@ impl Session {
     /// All breakpoints with everything that they hit so far; only steps that are new since the last time are evaluated.
     pub fn breakpoint_views(&mut self) -> Vec<BreakpointView> {
         for (number, target) in self.targets.iter().enumerate().filter(|(_, target)| !target.removed) {
-            let runs: Vec<&[Arc<StepTrace>]> = target.runs.iter().map(|run| run.steps.as_slice()).collect();
+            let runs: Vec<&[Arc<RunStep>]> = target.runs.iter().map(|run| run.steps.as_slice()).collect();
             self.breakpoints.look(number, &runs);
         }
         let targets = &self.targets;

@@ -13,6 +13,10 @@ pub mod progress;
 mod removal;
 mod run;
 pub mod shell;
+pub mod step;
+pub mod summary;
+pub mod records;
+pub mod marks;
 pub mod track;
 pub mod view;
 pub mod photometry;
@@ -36,11 +40,11 @@ use utoipa::ToSchema;
 pub use self::breakpoints::Breakpoints;
 pub use self::progress::Next;
 pub use self::run::{Fork, Run};
+use crate::step::RunStep;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
 use sightline_track::settings::{Changes, Settings};
 use sightline_track::target::Designation;
-use sightline_track::trace::StepTrace;
 
 /// What every panel is a view of.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -88,9 +92,9 @@ pub struct Session {
 #[derive(Clone, Debug)]
 pub struct Pending {
     /// The designation.
-    pub first: Arc<StepTrace>,
+    pub first: Arc<RunStep>,
     /// The last step so far.
-    pub last: Arc<StepTrace>,
+    pub last: Arc<RunStep>,
     /// The run's configuration.
     pub settings: Arc<Settings>,
     /// Where a person put the prediction of the step in the left image, px.
@@ -105,7 +109,7 @@ impl Session {
     }
 
     /// Adds a target whose designation was computed, and looks at it. Returns its number.
-    pub fn add_target(&mut self, label: Option<String>, settings: Settings, first: Arc<StepTrace>) -> usize {
+    pub fn add_target(&mut self, label: Option<String>, settings: Settings, first: Arc<RunStep>) -> usize {
         let number = self.targets.len();
         let designation = first.update.target.designation;
         let label =
@@ -141,7 +145,7 @@ impl Session {
         run: usize,
         from_step: usize,
         changes: &Changes,
-        redesignated: Option<Arc<StepTrace>>,
+        redesignated: Option<Arc<RunStep>>,
     ) -> Result<usize> {
         let parent = self.run(target, run)?;
         let settings = Arc::new(parent.settings.with(changes)?);
@@ -180,7 +184,7 @@ impl Session {
     ///
     /// # Errors
     /// [`Error::Request`] when there is no such target or run, or the step is not the next one.
-    pub fn record(&mut self, target: usize, run: usize, trace: Arc<StepTrace>) -> Result<()> {
+    pub fn record(&mut self, target: usize, run: usize, trace: Arc<RunStep>) -> Result<()> {
         let run = self.run_mut(target, run)?;
         let expected = run.steps.last().map(|last| last.step + 1);
         if expected != Some(trace.step) {

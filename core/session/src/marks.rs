@@ -79,7 +79,7 @@ pub enum Shape {
     /// A rectangle of whole pixels.
     Rect(PixelRect),
     /// A polyline; each position with its score, where it has one.
-    Curve(Vec<(Pixel, Option<f64>)>),
+    Curve(Vec<(Pixel, Option<f32>)>),
 }
 
 /// A mark over an image of a step.
@@ -104,7 +104,9 @@ pub fn marks(step: &RunStep, template_size_px: u32) -> Vec<Mark> {
     list.add(MarkName::Subframe, step.capture().and_then(|c| c.subframe).map(Shape::Rect));
     list.add(MarkName::SearchWindow, matched.map(|m| Shape::Rect(m.search_window)));
     if let Some(predicted) = pointing.predicted_left.filter(|_| step.prediction().is_some()) {
-        let gate = pointing.predicted_covariance_px2.map(|covariance_px2| ellipse(predicted, covariance_px2, &[3.0]));
+        let gate = pointing
+            .predicted_covariance_px2
+            .map(|covariance_px2| ellipse(predicted, covariance_px2, &[3.0]));
         list.add(MarkName::PredictionGate, gate);
         list.add(MarkName::PredictedLeft, Some(Shape::Point(predicted)));
         list.add(MarkName::PredictedWindow, prepared.map(|p| window(predicted, &p.prepared_from_template())));
@@ -128,8 +130,9 @@ pub fn marks(step: &RunStep, template_size_px: u32) -> Vec<Mark> {
     let truth = step.truth.as_ref().and_then(|truth| truth.left_pixel);
     list.add(MarkName::TrueLeft, truth.map(Shape::Point));
 
-    let curve = |stereo: &[_]| Shape::Curve(stereo.iter().map(|p: &CurvePoint| (p.pixel, p.score)).collect());
-    list.add(MarkName::Curve, stereo.map(|s| curve(&s.curve)));
+    let curve =
+        stereo.map(|s| Shape::Curve(s.curve.iter().map(|point| (point.pixel, point.score)).collect()));
+    list.add(MarkName::Curve, curve);
     let predicted = pointing.predicted_right.filter(|_| step.prediction().is_some());
     list.add(MarkName::PredictedRight, predicted.map(Shape::Point));
     list.add(MarkName::StereoError, stereo.map(|s| ellipse(s.right_pixel, s.covariance_px2, &[3.0])));
@@ -142,7 +145,8 @@ pub fn marks(step: &RunStep, template_size_px: u32) -> Vec<Mark> {
 pub fn basin_of(step: &RunStep) -> Option<(Vec<Pixel>, f64)> {
     let half_width_m = step.shape()?.registration.as_ref()?.half_width_m;
     let predicted = &step.prediction()?.position_in_rover;
-    Some((basin(predicted, half_width_m, &step.point_mast.left), half_width_m)).filter(|(outline, _)| !outline.is_empty())
+    Some((basin(predicted, half_width_m, &step.point_mast.left), half_width_m))
+        .filter(|(outline, _)| !outline.is_empty())
 }
 
 /// The corners of a square window of `side_px` whole pixels about `centre`, carried by `image_from_window`.
@@ -163,5 +167,25 @@ struct List(Vec<Mark>);
 impl List {
     fn add(&mut self, name: MarkName, shape: Option<Shape>) {
         self.0.extend(shape.map(|shape| Mark { name, shape }));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_window_of_one_pixel_covers_exactly_that_pixel() {
+        let corners = square(Pixel::new(10.0, 20.0), 1, &Matrix2::identity());
+        assert_eq!(corners.map(|c| [c.x, c.y]), [[9.5, 19.5], [10.5, 19.5], [10.5, 20.5], [9.5, 20.5]]);
+    }
+
+    #[test]
+    fn a_rolled_window_turns_clockwise_on_the_screen_and_grows_with_the_scale() {
+        let turn = nalgebra::Rotation2::new(10.0_f64.to_radians()).into_inner() * 1.5;
+        let corners = square(Pixel::new(0.0, 0.0), 20, &turn);
+        // The top edge runs right and down when content turns clockwise (y points down).
+        assert!(corners[1].y > corners[0].y);
+        assert!((corners[0].distance(corners[1]) - 30.0).abs() < 1e-9);
     }
 }

@@ -11,7 +11,7 @@ use utoipa::ToSchema;
 use super::Session;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
-use sightline_track::records;
+use sightline_track::records::stages_of;
 use sightline_track::settings::TrackerKind;
 
 /// How many notes a session may have.
@@ -233,10 +233,9 @@ fn checked(text: &str) -> Result<String, String> {
 
 /// The names of the stages to which a note can be pinned, those of all trackers.
 fn stages() -> impl Iterator<Item = &'static str> {
-    let is_of = |name: &&str| {
-        TrackerKind::ALL.iter().any(|tracker| records::stages_of(*tracker).any(|of| of == *name))
-    };
-    records::stages().iter().map(|stage| stage.schema().stage.as_ref()).filter(is_of)
+    let is_of =
+        |name: &&str| TrackerKind::ALL.iter().any(|tracker| stages_of(*tracker).any(|of| of == *name));
+    crate::records::stages().iter().map(|stage| stage.schema().stage.as_ref()).filter(is_of)
 }
 
 fn check_pin(pin: &Pin, session: &Session) -> Result<()> {

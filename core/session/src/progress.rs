@@ -123,10 +123,7 @@ impl Session {
 
 impl Run {
     /// The steps before `from_step`; none when the run has not come so far.
-    pub(crate) fn steps_before(
-        &self,
-        from_step: usize,
-    ) -> Option<Vec<Arc<sightline_track::trace::StepTrace>>> {
+    pub(crate) fn steps_before(&self, from_step: usize) -> Option<Vec<Arc<crate::step::RunStep>>> {
         let kept: Vec<_> = self.steps.iter().filter(|trace| trace.step < from_step).cloned().collect();
         kept.last().is_some_and(|last| last.step + 1 == from_step).then_some(kept)
     }

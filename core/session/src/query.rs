@@ -8,7 +8,7 @@ use utoipa::ToSchema;
 use super::Session;
 use super::expression::catalogue::Name;
 use super::expression::{Answers, Expression, Value};
-use sightline_track::trace::StepTrace;
+use crate::step::RunStep;
 
 /// Asks an expression at every step.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -100,7 +100,7 @@ pub struct TargetSteps {
     /// The target's number.
     pub target: usize,
     /// Its runs.
-    pub runs: Vec<Vec<Arc<StepTrace>>>,
+    pub runs: Vec<Vec<Arc<RunStep>>>,
 }
 
 impl Session {
@@ -130,7 +130,7 @@ pub fn ask(expression: &Expression, targets: &[TargetSteps], with_values: bool) 
     };
     let compared = expression.runs_compared();
     for target in targets {
-        let runs: Vec<&[Arc<StepTrace>]> = target.runs.iter().map(Vec::as_slice).collect();
+        let runs: Vec<&[Arc<RunStep>]> = target.runs.iter().map(Vec::as_slice).collect();
         for (run, steps) in runs.iter().enumerate() {
             if !compared.is_empty() && !compared.contains(&run) {
                 continue;

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::step::RunStep;
 use sightline_geometry::frames::Pixel;
 use sightline_track::settings::Settings;
-use sightline_track::trace::StepTrace;
 
 /// Where a run left another.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -37,7 +37,7 @@ pub struct Run {
     /// Where it left another run.
     pub fork: Option<Fork>,
     /// The steps so far; the first is the designation.
-    pub steps: Vec<Arc<StepTrace>>,
+    pub steps: Vec<Arc<RunStep>>,
     /// The step after which a person stopped it.
     pub stop_after: Option<usize>,
     /// Why it stopped before the last stop: `cancelled`, or what went wrong.
@@ -48,12 +48,12 @@ pub struct Run {
 
 impl Run {
     /// A run that begins with `steps`.
-    pub fn new(settings: Arc<Settings>, fork: Option<Fork>, steps: Vec<Arc<StepTrace>>) -> Self {
+    pub fn new(settings: Arc<Settings>, fork: Option<Fork>, steps: Vec<Arc<RunStep>>) -> Self {
         Self { settings, fork, steps, stop_after: None, stopped: None, removed: false }
     }
 
     /// The record of a stop, where it was computed.
-    pub fn step(&self, step: usize) -> Option<&Arc<StepTrace>> {
+    pub fn step(&self, step: usize) -> Option<&Arc<RunStep>> {
         let first = self.steps.first()?.step;
         self.steps.get(step.checked_sub(first)?)
     }

@@ -2,6 +2,7 @@
 //!
 //! Page, REST and command line all come through these two functions, so that they show the same numbers.
 
+use crate::step::RunStep;
 use sightline_geometry::error::Result;
 use sightline_geometry::frames::Pixel;
 use sightline_rover::pipeline::{self, Stops};
@@ -19,11 +20,10 @@ impl<T: Stops + TruthSource> Drive for T {}
 ///
 /// # Errors
 /// [`sightline_geometry::error::Error::Target`] when there is no such pixel or no 3-D position under it; file errors.
-pub fn designate<D: Drive>(drive: &D, designation: Designation, settings: &Settings) -> Result<StepTrace> {
+pub fn designate<D: Drive>(drive: &D, designation: Designation, settings: &Settings) -> Result<RunStep> {
     let mut trace = pipeline::designate(drive, designation, settings)?;
-    compare(drive, &mut trace, None);
     warn_of_shadow(drive, &mut trace, settings);
-    Ok(trace)
+    Ok(compared(drive, trace, None))
 }
 
 /// Adds the warning of a shadow on the window (R21), which only a source of truth knows.
@@ -39,7 +39,7 @@ fn warn_of_shadow<D: Drive>(drive: &D, trace: &mut StepTrace, settings: &Setting
 }
 
 /// The step after `last`; `first` is the run's designation.
-pub fn advance<D: Drive>(drive: &D, first: &StepTrace, last: &StepTrace, settings: &Settings) -> StepTrace {
+pub fn advance<D: Drive>(drive: &D, first: &StepTrace, last: &StepTrace, settings: &Settings) -> RunStep {
     advance_displaced(drive, first, last, settings, None)
 }
 
@@ -50,17 +50,16 @@ pub fn advance_displaced<D: Drive>(
     last: &StepTrace,
     settings: &Settings,
     prediction_px: Option<Pixel>,
-) -> StepTrace {
-    let mut trace = pipeline::run_step_displaced(drive, &last.update, settings, prediction_px);
-    compare(drive, &mut trace, Some(first));
-    trace
+) -> RunStep {
+    let trace = pipeline::run_step_displaced(drive, &last.update, settings, prediction_px);
+    compared(drive, trace, Some(first))
 }
 
 /// All steps of a run, from the designation to the last stop.
 ///
 /// # Errors
 /// As [`designate`].
-pub fn run<D: Drive>(drive: &D, designation: Designation, settings: &Settings) -> Result<Vec<StepTrace>> {
+pub fn run<D: Drive>(drive: &D, designation: Designation, settings: &Settings) -> Result<Vec<RunStep>> {
     let mut steps = vec![designate(drive, designation, settings)?];
     while let Some(last) = steps.last().filter(|last| last.step + 1 < drive.stop_count()) {
         let next = advance(drive, &steps[0], last, settings);
@@ -69,9 +68,9 @@ pub fn run<D: Drive>(drive: &D, designation: Designation, settings: &Settings) -
     Ok(steps)
 }
 
-fn compare<D: Drive>(drive: &D, trace: &mut StepTrace, first: Option<&StepTrace>) {
-    let first = first.unwrap_or(trace);
-    let target = &first.update.target;
+fn compared<D: Drive>(drive: &D, trace: StepTrace, first: Option<&StepTrace>) -> RunStep {
+    let target = &first.unwrap_or(&trace).update.target;
     let truth = TargetTruth::new(drive, target.designation, Some(&target.position_in_rover));
-    trace.truth = truth.and_then(|truth| truth.compare(trace));
+    let truth = truth.and_then(|truth| truth.compare(&trace));
+    RunStep { trace, truth }
 }

@@ -5,9 +5,10 @@ use utoipa::ToSchema;
 
 use super::breakpoints::Breakpoint;
 use super::{Cursor, Fork, Run, Session, TargetRecord};
+use crate::step::StepRow;
+use crate::summary::{Summary, summarise};
 use sightline_track::settings::{Changes, Settings};
 use sightline_track::target::Designation;
-use sightline_track::trace::{StepRow, Summary, summarise};
 
 /// The version of the saved form that this code reads and writes.
 pub const SAVED_FORMAT: u32 = 1;

@@ -9,14 +9,16 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::removal::NO_PREDICTION;
+use crate::step::{RunStep, StepRow};
 use crate::track::{self, Drive};
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
 use sightline_track::locate::template::match_template::TemplateMatch;
 use sightline_track::settings::{Changes, Settings};
 use sightline_track::stages::judge::Verdict;
-use sightline_track::trace::{ArrayName, ArrayView, StepRow, StepTrace, StepTruth};
+use sightline_track::trace::{ArrayName, ArrayView};
 use sightline_vision::image::PixelRect;
+use sightline_world::target_truth::StepTruth;
 
 /// What is to be tried at a step.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -45,11 +47,11 @@ impl WhatIf {
 #[derive(Clone, Copy, Debug)]
 pub struct Base<'a> {
     /// The run's designation.
-    pub first: &'a StepTrace,
+    pub first: &'a RunStep,
     /// What the previous step left, with the image of its template; none at the designation.
-    pub last: Option<&'a StepTrace>,
+    pub last: Option<&'a RunStep>,
     /// The step as it was recorded.
-    pub recorded: &'a StepTrace,
+    pub recorded: &'a RunStep,
     /// The run's configuration.
     pub settings: &'a Settings,
     /// Where the run has the prediction of this step in the left image, where a person put it, px.
@@ -61,7 +63,7 @@ pub struct Base<'a> {
 /// # Errors
 /// [`Error::Setting`] for a bad change; [`Error::Request`] when a designation is to be displaced or the pixel is no
 /// number; at a designation those of [`track::designate`].
-pub fn try_step<D: Drive>(drive: &D, base: Base<'_>, what_if: &WhatIf) -> Result<StepTrace> {
+pub fn try_step<D: Drive>(drive: &D, base: Base<'_>, what_if: &WhatIf) -> Result<RunStep> {
     let settings = base.settings.with(&what_if.settings)?;
     let is_pixel = what_if.prediction_px.is_none_or(|pixel| pixel.x.is_finite() && pixel.y.is_finite());
     match (base.last, what_if.prediction_px) {
@@ -150,7 +152,7 @@ pub struct GhostArray {
 
 impl Ghost {
     /// What is drawn of `tried` over `recorded`; `settings` are those that `tried` was computed with.
-    pub fn new(what_if: WhatIf, tried: &StepTrace, recorded: &StepTrace, settings: &Settings) -> Self {
+    pub fn new(what_if: WhatIf, tried: &RunStep, recorded: &RunStep, settings: &Settings) -> Self {
         let pointing = tried.prediction().map(|_| &tried.point_mast);
         let evidence = tried.template();
         let matched = evidence.and_then(|e| e.match_template.as_ref());
@@ -186,10 +188,10 @@ impl Ghost {
 }
 
 impl Deltas {
-    fn between(tried: &StepTrace, recorded: &StepTrace) -> Self {
+    fn between(tried: &RunStep, recorded: &RunStep) -> Self {
         let (now, then) = (tried.row(), recorded.row());
         let more = |of: fn(&StepRow) -> Option<f64>| Some(of(&now)? - of(&then)?);
-        let position = |trace: &StepTrace| trace.located().and_then(|l| l.position_in_rover);
+        let position = |trace: &RunStep| trace.located().and_then(|l| l.position_in_rover);
         Self {
             state_recorded: then.state.clone(),
             ncc: more(|row| row.ncc),
@@ -221,12 +223,12 @@ mod tests {
         PlaneWorld::new([0.0, 0.7, 1.4].map(|x| Pose::translation(x, 0.0, 0.0)).to_vec())
     }
 
-    fn steps(world: &PlaneWorld) -> Vec<StepTrace> {
+    fn steps(world: &PlaneWorld) -> Vec<RunStep> {
         let designation = Designation { step: 0, pixel: Pixel::new(118.3, 131.6) };
         track::run(world, designation, &Settings::default()).unwrap()
     }
 
-    fn base<'a>(steps: &'a [StepTrace], step: usize, settings: &'a Settings) -> Base<'a> {
+    fn base<'a>(steps: &'a [RunStep], step: usize, settings: &'a Settings) -> Base<'a> {
         let last = step.checked_sub(1).map(|last| &steps[last]);
         Base { first: &steps[0], last, recorded: &steps[step], settings, prediction_px: None }
     }

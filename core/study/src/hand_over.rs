@@ -14,7 +14,7 @@
 use serde::{Deserialize, Serialize};
 
 use sightline_geometry::frames::Point3;
-use sightline_track::trace::StepTrace;
+use sightline_session::step::RunStep;
 use sightline_world::target_truth::TruthSource;
 
 /// The errors of one run, m; null where a step was not reached.
@@ -54,12 +54,12 @@ impl HandOver {
     pub fn add<T: TruthSource + ?Sized>(
         &mut self,
         source: &T,
-        [first, before, trace]: [&StepTrace; 3],
+        [first, before, trace]: [&RunStep; 3],
     ) -> Option<()> {
         let evidence = trace.shape()?;
         let registration = evidence.registration.as_ref()?;
         let truth = trace.truth.as_ref()?.position_in_rover;
-        let carried = |from: &StepTrace| -> Option<Point3> {
+        let carried = |from: &RunStep| -> Option<Point3> {
             let site = source.true_site_from_rover(from.step)? * from.update.target.position_in_rover;
             Some(source.true_site_from_rover(trace.step)?.inverse() * site)
         };

@@ -7,7 +7,7 @@ use crate::run::Run;
 fn run(group: &str, tracked: Option<bool>, state: &str, err_m: f64) -> Run {
     let mut run: Run = serde_json::from_value(serde_json::json!({
         "target": 0, "group": group, "pixel": {"x": 1.0, "y": 2.0}, "refused": null, "distance_m": null,
-        "summary": sightline_track::trace::Summary::default(), "state": state, "end_pixel": null, "true_end_pixel": null,
+        "summary": sightline_session::summary::Summary::default(), "state": state, "end_pixel": null, "true_end_pixel": null,
         "drift_m": err_m, "err_range_m": null, "sigma_m": null, "nees": 3.0, "end": null,
         "end_is_false_loss": false, "fault_step": null, "at_fault": null, "false_after_fault": 0
     }))

@@ -23,10 +23,11 @@ use super::staged::Staged;
 use super::step_record::StepRecord;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::{Pixel, Point3};
+use sightline_session::step::RunStep;
+use sightline_session::summary::{Summary, summarise};
 use sightline_session::track::{self, Drive};
 use sightline_track::settings::Settings;
 use sightline_track::target::{Designation, TrackingState};
-use sightline_track::trace::{StepTrace, Summary, summarise};
 
 /// A pixel that is to be tracked.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -193,13 +194,7 @@ impl Follower {
         Ok(())
     }
 
-    fn record<D: Drive>(
-        &mut self,
-        drive: &D,
-        before: Option<&StepTrace>,
-        first: &StepTrace,
-        trace: &StepTrace,
-    ) {
+    fn record<D: Drive>(&mut self, drive: &D, before: Option<&RunStep>, first: &RunStep, trace: &RunStep) {
         if let Some(before) = before {
             self.run.hand_over.add(drive, [first, before, trace]);
             self.run.trust.add(drive, trace, drift_m(drive, first, trace));
@@ -216,7 +211,7 @@ impl Follower {
         }
     }
 
-    fn conclude<D: Drive>(&mut self, drive: &D, first: &StepTrace, last: &StepTrace) {
+    fn conclude<D: Drive>(&mut self, drive: &D, first: &RunStep, last: &RunStep) {
         let row = last.row();
         let run = &mut self.run;
         run.state = Some(row.state);
@@ -250,7 +245,7 @@ fn add(sum: &mut Summary, part: &Summary) {
 }
 
 /// What became of the target at a step; none without truth.
-fn fate<D: Drive>(drive: &D, trace: &StepTrace) -> Option<Fate> {
+fn fate<D: Drive>(drive: &D, trace: &RunStep) -> Option<Fate> {
     let truth = trace.truth.as_ref()?;
     if trace.update.state != TrackingState::Tracking {
         return Some(Fate::Lost);
@@ -262,7 +257,7 @@ fn fate<D: Drive>(drive: &D, trace: &StepTrace) -> Option<Fate> {
 }
 
 /// How far the last estimate lies from the first one, carried by the true motion, m.
-fn drift_m<D: Drive>(drive: &D, first: &StepTrace, last: &StepTrace) -> Option<f64> {
+fn drift_m<D: Drive>(drive: &D, first: &RunStep, last: &RunStep) -> Option<f64> {
     let site_from_first = drive.true_site_from_rover(first.step)?;
     let site_from_last = drive.true_site_from_rover(last.step)?;
     let carried: Point3 =

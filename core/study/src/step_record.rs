@@ -12,10 +12,10 @@ use serde::{Deserialize, Serialize};
 
 use sightline_geometry::camera::Camera;
 use sightline_geometry::frames::{Point3, Pose, Vector3};
+use sightline_session::step::RunStep;
 use sightline_session::track::Drive;
 use sightline_track::locate::template::scale_roll::geometry;
 use sightline_track::locate::template::settings::RollReference;
-use sightline_track::trace::StepTrace;
 
 /// What one update looked like and what it should have looked like.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -67,14 +67,14 @@ struct Stand<'a> {
 
 impl StepRecord {
     /// The record of a step and the one before it.
-    pub fn of<D: Drive>(drive: &D, before: Option<&StepTrace>, trace: &StepTrace) -> Self {
+    pub fn of<D: Drive>(drive: &D, before: Option<&RunStep>, trace: &RunStep) -> Self {
         let (row, target) = (trace.row(), &trace.update.target);
-        let estimated = |trace: &StepTrace| Stand {
+        let estimated = |trace: &RunStep| Stand {
             site_from_rover: drive.site_from_rover(trace.step),
             camera: drive.cameras(trace.step).0,
             target_in_rover: trace.update.target.position_in_rover,
         };
-        let truly = |trace: &StepTrace| {
+        let truly = |trace: &RunStep| {
             Some(Stand {
                 site_from_rover: drive.true_site_from_rover(trace.step)?,
                 camera: drive.true_left_camera(trace.step),

@@ -5,13 +5,14 @@ use serde_json::{Value, json};
 
 use sightline_geometry::frames::{Pixel, Pose, Vector3};
 use sightline_rover::pipeline::Stops;
+use sightline_session::step::RunStep;
 use sightline_session::track;
 use sightline_testing::{PlaneWorld, Trouble};
 use sightline_track::locate::store::SharedStore;
 use sightline_track::presets::preset;
 use sightline_track::settings::{Changes, Settings};
 use sightline_track::target::{Designation, TrackingState};
-use sightline_track::trace::{ArrayName, StepTrace};
+use sightline_track::trace::ArrayName;
 
 /// The recommended configuration with changes.
 fn settings(changes: &[(&str, Value)]) -> Settings {
@@ -31,19 +32,19 @@ fn drive() -> PlaneWorld {
     }
 }
 
-fn run(world: &PlaneWorld, settings: &Settings) -> Vec<StepTrace> {
+fn run(world: &PlaneWorld, settings: &Settings) -> Vec<RunStep> {
     let designation = Designation { step: 0, pixel: Pixel::new(140.3, 120.6) };
     track::run(world, designation, settings).unwrap()
 }
 
 /// What tracking added to the error of the designation, m.
-fn drift_m(world: &PlaneWorld, steps: &[StepTrace]) -> f64 {
+fn drift_m(world: &PlaneWorld, steps: &[RunStep]) -> f64 {
     let last = steps.last().unwrap();
     let now_from_first = world.true_poses[last.step].inverse() * world.true_poses[0];
     (last.update.target.position_in_rover - now_from_first * steps[0].update.target.position_in_rover).norm()
 }
 
-fn states(steps: &[StepTrace]) -> Vec<&'static str> {
+fn states(steps: &[RunStep]) -> Vec<&'static str> {
     steps.iter().map(|step| step.update.state.word()).collect()
 }
 
@@ -91,7 +92,7 @@ fn a_covered_stop_is_dead_reckoned_and_the_target_found_again_after_it() {
     assert_eq!(states(&steps), ["tracking", "tracking", "lost", "lost", "tracking", "tracking"]);
     let located = steps[2].located().unwrap();
     assert!(located.missing.as_ref().unwrap().contains("since step 1"), "{:?}", located.missing);
-    let sigma = |step: &StepTrace| step.row().sigma_m.unwrap();
+    let sigma = |step: &RunStep| step.row().sigma_m.unwrap();
     assert!(sigma(&steps[3]) > sigma(&steps[2]) && sigma(&steps[2]) > sigma(&steps[1]));
     // What dead reckoning added while the stops were covered is gone again.
     assert!(sigma(&steps[4]) < sigma(&steps[2]) && drift_m(&world, &steps) < 0.002);
@@ -106,7 +107,7 @@ fn once_lost_it_must_be_surer_to_return() {
     // A confidence of 0.6 at every step: enough to stay, too little to return.
     let middle = count as f64 - (0.6_f64 / 0.4).ln() / 0.1;
     let at = |middle: f64| settings(&[("confidence_matches", json!(middle)), ("feature_memory", json!(1))]);
-    let gate = |steps: &[StepTrace], step: usize| steps[step].verdict().unwrap().gates[0].limit;
+    let gate = |steps: &[RunStep], step: usize| steps[step].verdict().unwrap().gates[0].limit;
     let steps = run(&world, &at(middle));
     assert_eq!((steps[1].update.state, gate(&steps, 1)), (TrackingState::Tracking, 0.5));
     let lost = run(&world, &at(1000.0));
@@ -122,7 +123,7 @@ fn a_wrong_pose_estimate_changes_nothing_and_is_given_up_as_a_prior() {
     }
     let free = run(&world, &settings(&[]));
     assert!(drift_m(&world, &free) < 0.002, "{} m", drift_m(&world, &free));
-    let given_up = |steps: &[StepTrace], step: usize| {
+    let given_up = |steps: &[RunStep], step: usize| {
         steps[step].features().unwrap().match_features.unwrap().prior_given_up
     };
     let bound = run(&world, &settings(&[("prior_radius_px", json!(20.0)), ("feature_memory", json!(1))]));

@@ -5,16 +5,16 @@ use std::collections::BTreeSet;
 use serde_json::Value;
 
 use sightline_geometry::frames::{Pixel, Pose};
+use sightline_session::records;
+use sightline_session::step::RunStep;
 use sightline_session::track;
 use sightline_testing::PlaneWorld;
 use sightline_track::presets::preset;
-use sightline_track::records;
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
-use sightline_track::trace::StepTrace;
 
 /// A short run by each tracker.
-fn runs() -> Vec<(&'static str, Vec<StepTrace>)> {
+fn runs() -> Vec<(&'static str, Vec<RunStep>)> {
     let world = PlaneWorld::new([0.0, 0.5, 1.0].map(|x| Pose::translation(x, 0.0, 0.0)).to_vec());
     let designation = Designation { step: 0, pixel: Pixel::new(140.3, 120.6) };
     let run = |settings: &Settings| track::run(&world, designation, settings).unwrap();

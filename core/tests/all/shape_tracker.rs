@@ -5,6 +5,7 @@ use std::sync::LazyLock;
 use sightline_geometry::frames::{Pixel, Pose};
 use sightline_recordings::{Traverse, create_simulated};
 use sightline_rover::pipeline::Stops;
+use sightline_session::step::RunStep;
 use sightline_session::track;
 use sightline_study::point::Visit;
 use sightline_study::staged::Staged;
@@ -14,7 +15,6 @@ use sightline_track::locate::shape_tracker::evidence::Registered;
 use sightline_track::presets::preset;
 use sightline_track::settings::{Settings, TrackerKind};
 use sightline_track::target::{Designation, TrackingState};
-use sightline_track::trace::StepTrace;
 use sightline_world::{choose_targets, library};
 
 /// A drive from 5 m in three steps, its last stop taken again by the hazcams, and the pixel of its rock.
@@ -35,7 +35,7 @@ static SCENE: LazyLock<Scene> = LazyLock::new(|| {
     Scene { _folder: folder, traverse, pixel }
 });
 
-fn run(settings: &Settings) -> Vec<StepTrace> {
+fn run(settings: &Settings) -> Vec<RunStep> {
     let designation = Designation { step: 0, pixel: SCENE.pixel };
     track::run(&SCENE.traverse, designation, settings).unwrap()
 }
@@ -44,11 +44,11 @@ fn combined() -> Settings {
     preset("combined").unwrap().settings().unwrap()
 }
 
-fn error_m(trace: &StepTrace) -> f64 {
+fn error_m(trace: &RunStep) -> f64 {
     trace.truth.as_ref().unwrap().err_m
 }
 
-fn registration(trace: &StepTrace) -> &Registered {
+fn registration(trace: &RunStep) -> &Registered {
     trace.shape().unwrap().registration.as_ref().unwrap()
 }
 

@@ -2,11 +2,12 @@
 
 use serde_json::json;
 use sightline_geometry::frames::{Pixel, Pose, Vector3, attitude_from_roll_pitch_yaw};
+use sightline_session::step::RunStep;
+use sightline_session::summary::summarise;
 use sightline_session::track;
 use sightline_testing::{PlaneWorld, Trouble};
 use sightline_track::settings::{Changes, Settings};
 use sightline_track::target::{Designation, TrackingState};
-use sightline_track::trace::{StepTrace, summarise};
 
 pub(super) fn pose(x: f64, roll_deg: f64) -> Pose {
     let attitude = attitude_from_roll_pitch_yaw(roll_deg.to_radians(), 0.0, 0.0);
@@ -29,7 +30,7 @@ pub(super) fn designation(x: f64, y: f64) -> Designation {
     Designation { step: 0, pixel: Pixel::new(x, y) }
 }
 
-pub(super) fn run(world: &PlaneWorld, changes: &[(&str, serde_json::Value)]) -> Vec<StepTrace> {
+pub(super) fn run(world: &PlaneWorld, changes: &[(&str, serde_json::Value)]) -> Vec<RunStep> {
     let changes: Changes = changes.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect();
     let settings = Settings::default().with(&changes).unwrap();
     track::run(world, designation(118.3, 131.6), &settings).unwrap()
@@ -59,7 +60,7 @@ fn an_approach_stays_within_a_tenth_of_a_pixel_a_step_and_a_few_millimetres() {
 fn backing_away_shrinks_the_template_and_finds_the_point_again() {
     let world = PlaneWorld::new(approach().into_iter().rev().collect());
     let steps = run(&world, &[("template_update", json!("every_update"))]);
-    let scale = |step: &StepTrace| step.row().scale.unwrap();
+    let scale = |step: &RunStep| step.row().scale.unwrap();
     assert!(steps[1..].iter().all(|step| (0.85..0.95).contains(&scale(step))), "{:?}", scale(&steps[1]));
     assert!(steps.iter().all(|step| step.truth.as_ref().unwrap().tracked == Some(true)));
 }
@@ -101,7 +102,7 @@ fn a_surface_turned_away_is_found_through_its_slope_and_worse_by_scale_and_roll_
     let world = turned_plane();
     let by_slope = run(&world, &[]);
     let alone = run(&world, &[("surface_warp", json!(false))]);
-    let prepared = |steps: &[StepTrace]| {
+    let prepared = |steps: &[RunStep]| {
         steps[1]
             .template()
             .and_then(|e| e.scale_roll.as_ref())
@@ -155,7 +156,7 @@ fn a_match_far_from_the_prediction_must_score_more() {
     // The estimate turns by 3° at the third stop: 31 px, where the prediction is known to some 4 px.
     let jump = pose(0.0, 0.0).rotation * attitude_from_roll_pitch_yaw(0.0, 0.0, 3_f64.to_radians());
     world.estimates[2] = Pose::from_parts(world.estimates[2].translation, jump);
-    let reason = |steps: &[StepTrace]| steps[2].row().reason.unwrap_or_default();
+    let reason = |steps: &[RunStep]| steps[2].row().reason.unwrap_or_default();
     let believed = run(&world, &[]);
     assert_eq!(believed[2].update.state, TrackingState::Tracking, "{}", reason(&believed));
     let doubted = run(&world, &[("far_ncc_min", json!(1.0))]);

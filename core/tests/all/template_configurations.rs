@@ -5,19 +5,19 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 
 use super::template::{approach, designation, pose, run, turned_plane};
+use sightline_session::step::RunStep;
 use sightline_session::track;
 use sightline_testing::{PlaneWorld, Trouble};
 use sightline_track::locate::template::history::against_earlier;
 use sightline_track::locate::template::match_template::TemplateMatch;
 use sightline_track::presets::{PRESETS, preset};
 use sightline_track::target::TrackingState;
-use sightline_track::trace::StepTrace;
 
-fn matched(step: &StepTrace) -> &TemplateMatch {
+fn matched(step: &RunStep) -> &TemplateMatch {
     step.template().and_then(|e| e.match_template.as_ref()).unwrap()
 }
 
-fn err_px(step: &StepTrace) -> f64 {
+fn err_px(step: &RunStep) -> f64 {
     step.truth.as_ref().unwrap().err_px.unwrap()
 }
 
@@ -180,7 +180,7 @@ fn drift_correction_takes_the_chained_error_away_and_leaves_that_of_one_match() 
     let correction = last.drift_correction.as_ref().unwrap();
     assert!(correction.accepted && correction.template_step == 0 && correction.score > 0.9, "{correction:?}");
     assert_eq!(corrected[5].located().unwrap().left_pixel, Some(correction.pixel));
-    let sigma = |steps: &[StepTrace]| steps[5].located().unwrap().left_error.covariance_px2.trace();
+    let sigma = |steps: &[RunStep]| steps[5].located().unwrap().left_error.covariance_px2.trace();
     assert!(sigma(&corrected) < 0.5 * sigma(&chained), "{} {}", sigma(&corrected), sigma(&chained));
     assert!(err_px(&corrected[5]) < err_px(&chained[5]).max(0.75), "{}", err_px(&corrected[5]));
     assert!(corrected[1].template().unwrap().drift_correction.is_none());

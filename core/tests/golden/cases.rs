@@ -1,10 +1,10 @@
 //! The cases of the golden lists: a drive and a configuration each.
 
+use sightline_session::step::RunStep;
 use sightline_session::track;
 use sightline_track::presets::{Preset, preset};
 use sightline_track::settings::{Settings, parse_assignment};
 use sightline_track::target::Designation;
-use sightline_track::trace::StepTrace;
 
 use super::drives::{Drive, DriveName};
 use super::extract;
@@ -111,7 +111,7 @@ impl Case {
             }
         };
         extract::step(&mut sheet, &first, &folder);
-        let mut last: Option<StepTrace> = None;
+        let mut last: Option<RunStep> = None;
         for _ in 1..stops {
             let next = track::advance(&drive.traverse, &first, last.as_ref().unwrap_or(&first), &settings);
             extract::step(&mut sheet, &next, &folder);

@@ -5,6 +5,7 @@
 
 use sightline_geometry::camera::Camera;
 use sightline_geometry::estimate::drift::Drift;
+use sightline_session::step::RunStep;
 use sightline_track::locate::Located;
 use sightline_track::stages::capture::Capture;
 use sightline_track::stages::judge::Verdict;
@@ -12,13 +13,13 @@ use sightline_track::stages::point_mast::Pointing;
 use sightline_track::stages::predict::Prediction;
 use sightline_track::stages::update::Updated;
 use sightline_track::target::{Target, TrackingState};
-use sightline_track::trace::{StepTrace, StepTruth, TruthKind};
+use sightline_world::target_truth::{StepTruth, TruthKind};
 
 use super::sheet::{Sheet, Value};
 use super::{arrays, extract_features, extract_shape, extract_template};
 
 /// Writes everything that one step computed; `folder` is the drive's folder, which sentences may name.
-pub(crate) fn step(sheet: &mut Sheet, trace: &StepTrace, folder: &str) {
+pub(crate) fn step(sheet: &mut Sheet, trace: &RunStep, folder: &str) {
     sheet.within(&format!("stop{}", trace.step), |sheet| {
         let fault = trace.fault().map(|fault| fault.replace(folder, "DRIVE"));
         sheet.put("time_s", trace.time_s);

@@ -1,30 +1,26 @@
 //! The stages of a step in running order, each with its question and the way from the step to its evidence.
 //!
 //! ```text
-//! step ─► predict ─► point_mast ─► capture ─► the steps of locate ─► locate ─► judge ─► update ─► truth
+//! step ─► predict ─► point_mast ─► capture ─► the steps of locate ─► locate ─► judge ─► update
 //! ```
-//! The quantities, arrays and gates are declared beside each evidence type (`impl Record`). Tables, comparisons,
-//! expressions, logs and pages are views of this list, so that a quantity or an array is added in one file, and a
-//! step of `locate` in its own file and the evidence of its tracker.
-
-mod evidence;
-
-pub use evidence::{evidence, is_pixel, rest};
+//! The quantities, arrays and gates are declared beside each evidence type (`impl Record`). `session::records` adds the row
+//! of a step and its comparison with the truth; tables, comparisons, expressions, logs and pages are views of that list. A
+//! quantity or an array is added in one file, a step of `locate` in its own file and the evidence of its tracker.
 
 use std::sync::LazyLock;
 
-use sightline_record::{
-    ArrayDecl, ArrayView, Column, Quantity, Stage, StageRecord, StageSchema, Unit, Value,
-};
+use sightline_record::{ArrayDecl, ArrayView, Stage};
 
 use crate::locate::template::memory::TemplateMemory;
 use crate::locate::{self, Evidence};
 use crate::settings::TrackerKind;
-use crate::trace::{StepRow, StepTrace};
+use crate::trace::StepTrace;
 
-static STAGES: LazyLock<Vec<Stage<StepTrace>>> = LazyLock::new(|| {
+static STAGES: LazyLock<Vec<Stage<StepTrace>>> = LazyLock::new(stages);
+
+/// The stages of all trackers, in running order.
+pub fn stages() -> Vec<Stage<StepTrace>> {
     let mut stages = vec![
-        Stage::computed("step", "What is the result of the step, in one row?", StepTrace::row),
         Stage::of("predict", "Where should the target be now, by dead reckoning?", StepTrace::prediction)
             .at("predict"),
         Stage::of(
@@ -36,53 +32,20 @@ static STAGES: LazyLock<Vec<Stage<StepTrace>>> = LazyLock::new(|| {
         Stage::of("capture", "What was photographed, and how well is it exposed?", StepTrace::capture)
             .at("capture"),
     ];
-    stages.extend(locate::stages().into_iter().map(|stage| stage.within(evidence_of, &["locate.evidence"])));
+    let of_trackers = locate::stages().into_iter();
+    stages.extend(of_trackers.map(|stage| stage.within(evidence, &["locate.evidence"])));
     stages.extend([
         Stage::of("locate", "Where is the target now?", StepTrace::located).at("locate"),
         Stage::of("judge", "Can the match be trusted?", StepTrace::verdict).at("judge"),
         Stage::of("update", "What does this stop leave to the next?", |t: &StepTrace| Some(&t.update))
             .with(|t: &StepTrace| t.update.target.memory.template(), TemplateMemory::declare)
             .at("update"),
-        Stage::of("truth", "How far is the estimate from the truth?", |t: &StepTrace| t.truth.as_ref())
-            .at("truth"),
     ]);
     stages
-});
+}
 
-fn evidence_of(trace: &StepTrace) -> Option<&Evidence> {
+fn evidence(trace: &StepTrace) -> Option<&Evidence> {
     Some(&trace.located()?.evidence)
-}
-
-static ROW: LazyLock<Stage<StepRow>> = LazyLock::new(|| {
-    Stage::of("step", "What is the result of the step, in one row?", |row: &StepRow| Some(row))
-});
-
-static COLUMNS: LazyLock<Vec<Column>> = LazyLock::new(|| Column::all(STAGES.iter().map(Stage::schema)));
-
-/// The columns of a table of steps: those of [`StepRow`] first, then the quantities of every stage.
-pub fn columns() -> &'static [Column] {
-    &COLUMNS
-}
-
-/// The first of [`columns`]: those of a row alone.
-pub fn row_columns() -> &'static [Column] {
-    static COUNT: LazyLock<usize> = LazyLock::new(|| Column::all([ROW.schema()]).len());
-    &COLUMNS[..*COUNT]
-}
-
-/// The record of a row, for the cells of [`row_columns`].
-pub fn row_record(row: &StepRow) -> [StageRecord; 1] {
-    [ROW.record(row)]
-}
-
-/// The stages of all trackers, in running order.
-pub fn stages() -> &'static [Stage<StepTrace>] {
-    &STAGES
-}
-
-/// The stage of a name.
-pub fn stage(name: &str) -> Option<&'static Stage<StepTrace>> {
-    STAGES.iter().find(|stage| stage.schema().stage == name)
 }
 
 /// The stages that a user sees of a tracker, in running order: the six of every tracker, with its own steps after `locate`.
@@ -91,110 +54,8 @@ pub fn stages_of(tracker: TrackerKind) -> impl Iterator<Item = &'static str> {
     before.chain(locate::steps(tracker).iter().copied()).chain(["judge", "update"])
 }
 
-/// The schemas of all stages, in running order.
-pub fn schema() -> Vec<StageSchema> {
-    STAGES.iter().map(|stage| stage.schema().clone()).collect()
-}
-
-/// The records of a step, in the order of [`schema`].
-pub fn records(trace: &StepTrace) -> Vec<StageRecord> {
-    STAGES.iter().map(|stage| stage.record(trace)).collect()
-}
-
-/// The quantity at a path of the serialised step, whichever tracker made it.
-pub fn quantity_at(path: &str) -> Option<&'static Quantity> {
-    within(path).find_map(|(schema, name)| schema.quantity(name))
-}
-
-/// The unit of the field at a path of the serialised step: as its stage declares it, else as its name tells.
-pub fn unit_at(path: &str) -> Option<Unit> {
-    let field = |(schema, name): (&'static StageSchema, &str)| {
-        schema.fields.iter().find(|(field, _)| field == name).map(|(_, unit)| *unit)
-    };
-    let declared = quantity_at(path).map(|quantity| quantity.unit).or_else(|| within(path).find_map(field));
-    declared.or_else(|| Unit::of_name(path.rsplit('.').next()?))
-}
-
-/// The stages whose evidence contains a path, with the rest of it.
-fn within(path: &str) -> impl Iterator<Item = (&'static StageSchema, &str)> {
-    STAGES.iter().map(Stage::schema).flat_map(move |schema| {
-        let rest = move |place: &str| path.strip_prefix(place)?.strip_prefix('.');
-        schema.paths().filter_map(rest).map(move |rest| (schema, rest))
-    })
-}
-
-/// The quantity behind a column of [`StepRow`].
-pub fn row_quantity(column: &str) -> Option<&'static Quantity> {
-    ROW.schema().quantity(column)
-}
-
-/// The number in a column of [`StepRow`].
-pub fn row_value(row: &StepRow, column: &str) -> Option<f64> {
-    ROW.value_of(row, column)?.number()
-}
-
-/// The same in another unit of its dimension.
-pub fn row_value_in(row: &StepRow, column: &str, unit: Unit) -> Option<f64> {
-    let declared = row_quantity(column)?.unit;
-    Some(row_value(row, column)? * (unit.per_base() / declared.per_base()))
-}
-
-/// A quantity of a stage: how views that show any number of a step name and read it.
-#[derive(Clone, Copy)]
-pub struct StageQuantity {
-    stage: &'static Stage<StepTrace>,
-    index: usize,
-}
-
-impl StageQuantity {
-    /// Every quantity of the stages that have evidence of their own, in running order.
-    pub fn all() -> impl Iterator<Item = Self> {
-        let stages = STAGES.iter().filter(|stage| !stage.schema().path.is_empty());
-        stages.flat_map(|stage| (0..stage.schema().quantities.len()).map(move |index| Self { stage, index }))
-    }
-
-    /// The quantity called `stage.quantity`; those of a row are called `step.column`.
-    pub fn named(name: &str) -> Option<Self> {
-        let (word, name) = name.split_once('.')?;
-        let stage = stage(word)?;
-        let index = stage.schema().quantities.iter().position(|quantity| quantity.name == name)?;
-        Some(Self { stage, index })
-    }
-
-    /// The stage.
-    pub fn stage(self) -> &'static Stage<StepTrace> {
-        self.stage
-    }
-
-    /// The declaration.
-    pub fn declared(self) -> &'static Quantity {
-        &self.stage.schema().quantities[self.index]
-    }
-
-    /// The name by which expressions, explanations and tables know it: `stage.quantity`.
-    pub fn name(self) -> String {
-        format!("{}.{}", self.stage.schema().stage, self.declared().name)
-    }
-
-    /// The value at a step; missing where the stage was not reached.
-    pub fn value(self, trace: &StepTrace) -> Value {
-        self.stage.value(trace, self.index)
-    }
-
-    /// The number at a step, where it is one and finite.
-    pub fn number(self, trace: &StepTrace) -> Option<f64> {
-        self.value(trace).number().filter(|value| value.is_finite())
-    }
-}
-
-impl std::fmt::Debug for StageQuantity {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.name())
-    }
-}
-
 /// The declarations of all arrays, in the order of the stages.
-pub fn arrays() -> impl Iterator<Item = &'static ArrayDecl> {
+pub(crate) fn arrays() -> impl Iterator<Item = &'static ArrayDecl> {
     STAGES.iter().flat_map(|stage| &stage.schema().arrays)
 }
 
@@ -205,69 +66,14 @@ pub fn array<'a>(trace: &'a StepTrace, name: &str) -> Option<ArrayView<'a>> {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeSet;
-
     use super::*;
-    use crate::settings::Settings;
 
     #[test]
     fn every_step_of_a_tracker_is_a_stage_of_the_record() {
+        let names: Vec<_> = stages().iter().map(|stage| stage.schema().stage.clone()).collect();
         for tracker in TrackerKind::ALL {
             for name in stages_of(tracker) {
-                assert!(stage(name).is_some(), "{}: {name}", tracker.word());
-            }
-        }
-    }
-
-    #[test]
-    fn names_are_unique_within_a_stage_and_arrays_within_the_record() {
-        let (mut stages, mut arrays) = (BTreeSet::new(), BTreeSet::new());
-        for schema in schema() {
-            assert!(stages.insert(schema.stage.clone()), "{} twice", schema.stage);
-            let names: BTreeSet<_> = schema.quantities.iter().map(|q| &q.name).collect();
-            assert_eq!(names.len(), schema.quantities.len(), "{}", schema.stage);
-            assert!(schema.arrays.iter().all(|array| arrays.insert(array.name.clone())), "{}", schema.stage);
-        }
-    }
-
-    #[test]
-    fn every_quantity_is_described_and_its_inputs_exist() {
-        let (all, table) = (schema(), Settings::table());
-        let keys: Vec<&str> = table.iter().map(|info| info.key.as_ref()).collect();
-        for stage in &all {
-            for quantity in &stage.quantities {
-                let name = format!("{}.{}", stage.stage, quantity.name);
-                assert!(quantity.description.ends_with('.'), "{name}: {}", quantity.description);
-                for input in &quantity.inputs {
-                    let of_other = |other: &StageSchema| {
-                        let rest = input.strip_prefix(other.stage.as_ref()).and_then(|r| r.strip_prefix('.'));
-                        rest.is_some_and(|rest| other.quantity(rest).is_some())
-                    };
-                    let is_setting = input.strip_prefix("setting.").is_some_and(|key| keys.contains(&key));
-                    let is_known = stage.quantity(input).is_some() || is_setting || all.iter().any(of_other);
-                    assert!(is_known, "{name} ← {input}");
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn the_unit_of_a_field_is_declared_or_in_its_name() {
-        assert_eq!(unit_at("locate.evidence.match_template.pixel"), Some(Unit::Pixel));
-        assert_eq!(unit_at("locate.evidence.designation.match_template.pixel"), Some(Unit::Pixel));
-        assert_eq!(unit_at("locate.evidence.features.fit_motion.roll_pitch_yaw_deg"), Some(Unit::Degree));
-        assert_eq!(unit_at("update.target.memory.appearance.camera.C"), Some(Unit::Metre));
-        assert_eq!(unit_at("point_mast.left.size_px"), Some(Unit::Pixel));
-        assert_eq!(unit_at("predict.nothing"), None);
-    }
-
-    #[test]
-    fn a_unit_in_a_name_is_the_declared_unit() {
-        for stage in schema() {
-            for quantity in &stage.quantities {
-                if let Some(unit) = Unit::of_name(&quantity.name) {
-                    assert_eq!(unit, quantity.unit, "{}.{}", stage.stage, quantity.name);
-                }
+                assert!(names.iter().any(|known| known == name), "{}: {name}", tracker.word());
             }
         }
     }

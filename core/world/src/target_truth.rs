@@ -8,10 +8,14 @@
 //! `│ p_estimated,rover − (site_from_rover,true)⁻¹ T_site │`. A target counts as tracked when its pixel error is
 //! at most max(5 px, 0.5 px × magnification so far).
 
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
 use sightline_geometry::camera::Camera;
-use sightline_geometry::frames::{Point3, Pose};
+use sightline_geometry::frames::{Pixel, Point3, Pose};
+use sightline_record::{Declaration, Record, Unit};
 use sightline_track::target::TrackingState;
-use sightline_track::trace::{StepTrace, StepTruth, TruthKind};
+use sightline_track::trace::StepTrace;
 
 /// What is true of a traverse.
 pub trait TruthSource: Send + Sync {
@@ -20,18 +24,47 @@ pub trait TruthSource: Send + Sync {
     /// The true left camera in the rover frame.
     fn true_left_camera(&self, step: usize) -> &Camera;
     /// The surface point under a pixel of the left image, in the site frame; none where no surface is known.
-    fn surface_point_in_site(&self, step: usize, pixel: sightline_geometry::frames::Pixel) -> Option<Point3>;
+    fn surface_point_in_site(&self, step: usize, pixel: Pixel) -> Option<Point3>;
     /// Whether a point of the site frame is unoccluded in the left image of a stop.
     fn is_visible(&self, step: usize, point_in_site: &Point3) -> bool;
     /// The share of a square window of the left image that lies in shadow, 0 to 1; none where no light is known.
-    fn shadow_share(
-        &self,
-        _step: usize,
-        _centre: sightline_geometry::frames::Pixel,
-        _size_px: u32,
-    ) -> Option<f64> {
+    fn shadow_share(&self, _step: usize, _centre: Pixel, _size_px: u32) -> Option<f64> {
         None
     }
+}
+
+/// What the truth of a target is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum TruthKind {
+    /// The surface point under the designated pixel, seen through the true camera.
+    Surface,
+    /// The first estimate carried by the true poses: what remains is what tracking added (its drift).
+    Carried,
+}
+
+/// The comparison of one step with the truth.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct StepTruth {
+    /// What the truth is.
+    pub kind: TruthKind,
+    /// The true position in the true rover frame of this stop, m.
+    #[schema(value_type = [f64; 3])]
+    pub position_in_rover: Point3,
+    /// The truth in the left image, px; null where it is not visible.
+    pub left_pixel: Option<Pixel>,
+    /// Distance between estimated and true position in the present rover frame, m.
+    pub err_m: f64,
+    /// Distance between located and true pixel, px; null where nothing was located or the truth is hidden.
+    pub err_px: Option<f64>,
+    /// Squared Mahalanobis distance of the error, 3 degrees of freedom; null without a covariance.
+    pub nees: Option<f64>,
+    /// Magnification since the designation.
+    pub magnification: f64,
+    /// The error up to which the target counts as tracked, px (R116).
+    pub tolerance_px: f64,
+    /// Whether the target is tracked: state `tracking` and within the tolerance; null where the truth is hidden.
+    pub tracked: Option<bool>,
 }
 
 /// The truth of one target.
@@ -96,5 +129,27 @@ impl<'a> TargetTruth<'a> {
             tolerance_px,
             tracked: visible.then_some(tracking && within),
         })
+    }
+}
+
+impl Record for StepTruth {
+    fn declare(r: &mut Declaration<Self>) {
+        r.quantity("position_in_rover", Unit::Metre, |t| t.position_in_rover)
+            .describe("The true position in the true rover frame of this stop.");
+        r.quantity("left_pixel", Unit::Pixel, |t| t.left_pixel)
+            .describe("The truth in the left image; missing where it is hidden.");
+        r.quantity("err_m", Unit::Metre, |t| t.err_m)
+            .describe("Distance between estimated and true position in the present rover frame.");
+        r.quantity("err_px", Unit::Pixel, |t| t.err_px)
+            .describe("Distance between located and true pixel.")
+            .formula("│located − true│", &["locate.left_pixel", "left_pixel"]);
+        r.quantity("nees", Unit::One, |t| t.nees)
+            .describe("Squared Mahalanobis distance of the error, 3 degrees of freedom.");
+        r.quantity("magnification", Unit::One, |t| t.magnification)
+            .describe("Magnification since the designation.");
+        r.quantity("tolerance_px", Unit::Pixel, |t| t.tolerance_px)
+            .describe("The error up to which the target counts as tracked.");
+        r.quantity("tracked", Unit::One, |t| t.tracked)
+            .describe("Whether the target is tracked; missing where the truth is hidden.");
     }
 }

@@ -18,11 +18,12 @@ use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
 use sightline_recordings::Traverse;
 use sightline_rover::designate::Place;
+use sightline_session::step::RunStep;
+use sightline_session::summary::{Summary, summarise};
 use sightline_session::track;
 use sightline_track::locate::template::compare_searches::compare_searches;
 use sightline_track::presets::{preset, validated};
 use sightline_track::settings::{Changes, Settings, TrackerKind, parse_assignment};
-use sightline_track::trace::{StepTrace, Summary, summarise};
 
 use super::open;
 use super::terminal::{self, Progress};
@@ -128,8 +129,8 @@ impl SearchLine {
     fn new(
         target: Option<usize>,
         traverse: &Traverse,
-        last: &StepTrace,
-        next: &StepTrace,
+        last: &RunStep,
+        next: &RunStep,
         settings: &Settings,
     ) -> Self {
         let pose = traverse.site_from_rover(next.step);
@@ -219,7 +220,7 @@ impl Track {
 }
 
 /// The first step of a run; says how far the surface lies from a point that was given.
-fn designate(traverse: &Traverse, step: usize, place: &Place, settings: &Settings) -> Result<StepTrace> {
+fn designate(traverse: &Traverse, step: usize, place: &Place, settings: &Settings) -> Result<RunStep> {
     let named = place.name(traverse, step)?;
     let first = track::designate(traverse, named.designation, settings)?;
     if let Some(gap_m) = named.gap_m(&first) {
@@ -235,7 +236,7 @@ fn designate(traverse: &Traverse, step: usize, place: &Place, settings: &Setting
 fn follow(
     traverse: &Traverse,
     target: Option<usize>,
-    steps: &mut Vec<Arc<StepTrace>>,
+    steps: &mut Vec<Arc<RunStep>>,
     settings: &Settings,
     compares: bool,
 ) -> Result<()> {
@@ -265,7 +266,7 @@ fn follow(
 }
 
 /// A copy without the stop's images, of which a long drive has more than fit into memory.
-fn without_images(trace: &StepTrace) -> StepTrace {
+fn without_images(trace: &RunStep) -> RunStep {
     let mut lighter = trace.clone();
     lighter.update.target.memory.set_image(Arc::default());
     if let Some(capture) = lighter.capture_mut() {
@@ -278,7 +279,7 @@ fn json(line: &impl Serialize) -> Result<String> {
     serde_json::to_string(line).map_err(|error| Error::Request(error.to_string()))
 }
 
-fn write_csv(path: &Path, runs: &[Vec<Arc<StepTrace>>]) -> Result<()> {
+fn write_csv(path: &Path, runs: &[Vec<Arc<RunStep>>]) -> Result<()> {
     let unwritable = |source| Error::Write { path: path.to_owned(), source };
     let mut file = BufWriter::new(File::create_new(path).map_err(unwritable)?);
     for (number, steps) in runs.iter().enumerate() {
@@ -297,7 +298,7 @@ fn write_csv(path: &Path, runs: &[Vec<Arc<StepTrace>>]) -> Result<()> {
     file.flush().map_err(unwritable)
 }
 
-fn write_rrd(path: &Path, traverse: &Traverse, runs: &[Vec<Arc<StepTrace>>]) -> Result<()> {
+fn write_rrd(path: &Path, traverse: &Traverse, runs: &[Vec<Arc<RunStep>>]) -> Result<()> {
     let labels: Vec<_> = (1..=runs.len()).map(|number| format!("target {number}")).collect();
     let logs: Vec<_> = runs
         .iter()

@@ -3,7 +3,8 @@
 //! Errors are taken over the steps after the designation that are in state `tracking` and whose truth is known; the others
 //! are counted apart. `err_px` is the distance in the left image, `err_m` that in the present rover frame.
 
-use sightline_track::trace::{StepRow, StepTrace, summarise};
+use sightline_session::step::{RunStep, StepRow};
+use sightline_session::summary::summarise;
 
 /// Errors in the image within which steps are counted, px.
 const WITHIN_PX: [f64; 5] = [1.0, 2.0, 4.0, 8.0, 16.0];
@@ -24,7 +25,7 @@ pub(crate) struct Metric {
 }
 
 /// The metrics of a run.
-pub(crate) fn metrics(steps: &[std::sync::Arc<StepTrace>]) -> Vec<Metric> {
+pub(crate) fn metrics(steps: &[std::sync::Arc<RunStep>]) -> Vec<Metric> {
     let rows: Vec<StepRow> = steps.iter().map(|trace| trace.row()).collect();
     let summary = summarise(steps.iter().map(AsRef::as_ref));
     let mut all = vec![
@@ -80,7 +81,7 @@ pub(crate) fn metrics(steps: &[std::sync::Arc<StepTrace>]) -> Vec<Metric> {
 
 /// The worst steps of a run, by their place in it, the worst first: by the error in the image where the truth is known;
 /// otherwise those that are lost, then those with the least score.
-pub(crate) fn worst(steps: &[std::sync::Arc<StepTrace>]) -> Vec<usize> {
+pub(crate) fn worst(steps: &[std::sync::Arc<RunStep>]) -> Vec<usize> {
     let mut places: Vec<(usize, f64)> = steps
         .iter()
         .enumerate()

@@ -10,10 +10,11 @@
 use nalgebra::{Matrix2, SymmetricEigen, Vector2};
 use sightline_geometry::frames::Pixel;
 use sightline_record::Unit;
-use sightline_track::records;
+use sightline_session::marks::{Mark, MarkName, Shape, marks, square};
+use sightline_session::records;
+use sightline_session::step::{RunStep, StepRow};
 use sightline_track::settings::Settings;
 use sightline_track::target::TrackingState;
-use sightline_track::trace::{StepRow, StepTrace};
 use sightline_vision::image::GrayImage;
 
 use super::canvas::{Canvas, Line, Rgb, Window};
@@ -26,8 +27,6 @@ pub(super) const PICTURE_PX: u32 = 320;
 /// Height of the words above and below, px.
 const HEAD_PX: u32 = 22;
 const FOOT_PX: u32 = 42;
-/// Standard deviations of the ellipses.
-const SIGMAS: f64 = 3.0;
 
 pub(super) const PAPER: Rgb = [0xff, 0xff, 0xff];
 pub(super) const INK: Rgb = [0x22, 0x22, 0x22];
@@ -57,17 +56,13 @@ pub(crate) fn plain_size() -> [u32; 2] {
 ///
 /// # Errors
 /// What the encoder says.
-pub(crate) fn png(
-    trace: &StepTrace,
-    left: Option<&GrayImage>,
-    settings: &Settings,
-) -> Result<Vec<u8>, String> {
+pub(crate) fn png(trace: &RunStep, left: Option<&GrayImage>, settings: &Settings) -> Result<Vec<u8>, String> {
     draw(trace, left, settings, None).ok_or("a picture without pixels")?.png()
 }
 
 /// The picture of a step; `head` is a line above it. None of the images: their place is a checker.
 pub(super) fn draw(
-    trace: &StepTrace,
+    trace: &RunStep,
     left: Option<&GrayImage>,
     settings: &Settings,
     head: Option<&str>,
@@ -90,7 +85,7 @@ pub(super) fn draw(
         size: [PICTURE_PX; 2],
     };
     canvas.image(image, &window);
-    marks(&mut canvas, trace, &window, settings);
+    paint_marks(&mut canvas, trace, &window, settings);
     // Marks that reach over the picture's border are cut there.
     if let Some(words) = head {
         canvas.fill([0.0, 0.0], [width as f32, top as f32], PAPER);
@@ -100,36 +95,40 @@ pub(super) fn draw(
     Some(canvas)
 }
 
-fn marks(canvas: &mut Canvas, trace: &StepTrace, window: &Window, settings: &Settings) {
-    let pointing = &trace.point_mast;
-    if let Some(pixel) = pointing.predicted_left.filter(|_| trace.prediction().is_some()) {
-        canvas.line(&ring(window, pixel, 2.5), true, PREDICTION, Line::Solid);
-        let covariance = pointing.predicted_covariance_px2;
-        if let Some(points) = covariance.and_then(|covariance| ellipse(window, pixel, &covariance)) {
-            canvas.line(&points, true, PREDICTION, Line::Dotted);
+fn paint_marks(canvas: &mut Canvas, trace: &RunStep, window: &Window, settings: &Settings) {
+    let side_px = settings.template.template_size_px;
+    for Mark { name, shape } in marks(trace, side_px) {
+        match (name, shape) {
+            (MarkName::PredictedLeft, Shape::Point(pixel)) => {
+                canvas.line(&ring(window, pixel, 2.5), true, PREDICTION, Line::Solid);
+            }
+            (MarkName::PredictionGate, Shape::Ellipse { centre, covariance_px2, sigmas }) => {
+                let contours = sigmas.iter().filter_map(|s| ellipse(window, centre, &covariance_px2, *s));
+                contours.for_each(|points| canvas.line(&points, true, PREDICTION, Line::Dotted));
+            }
+            (MarkName::LocatedLeft, Shape::Point(pixel)) => {
+                let corners = square(pixel, side_px, &Matrix2::identity());
+                let corners = corners.map(|corner| window.place(corner.x, corner.y));
+                canvas.line(&corners, true, MEASUREMENT, Line::Solid);
+                for stroke in cross(window, pixel, 2.0) {
+                    canvas.line(&stroke, false, MEASUREMENT, Line::Solid);
+                }
+            }
+            (MarkName::LocatedError, Shape::Ellipse { centre, covariance_px2, sigmas }) => {
+                let contours = sigmas.iter().filter_map(|s| ellipse(window, centre, &covariance_px2, *s));
+                contours.for_each(|points| canvas.line(&points, true, MEASUREMENT, Line::Solid));
+            }
+            (MarkName::TrueLeft, Shape::Point(pixel)) => {
+                let [x, y] = window.place(pixel.x, pixel.y);
+                canvas.line(&[[x - 8.0, y], [x + 8.0, y]], false, TRUTH, Line::Solid);
+                canvas.line(&[[x, y - 8.0], [x, y + 8.0]], false, TRUTH, Line::Solid);
+            }
+            _ => {}
         }
-    }
-    let located = trace.located().and_then(|located| Some((located.left_pixel?, located)));
-    if let Some((pixel, located)) = located {
-        let half = f64::from(settings.template.template_size_px) / 2.0;
-        let corners = [(-half, -half), (half, -half), (half, half), (-half, half)];
-        let square = corners.map(|(x, y)| window.place(pixel.x + x, pixel.y + y));
-        canvas.line(&square, true, MEASUREMENT, Line::Solid);
-        for stroke in cross(window, pixel, 2.0) {
-            canvas.line(&stroke, false, MEASUREMENT, Line::Solid);
-        }
-        if let Some(points) = ellipse(window, pixel, &located.left_error.covariance_px2) {
-            canvas.line(&points, true, MEASUREMENT, Line::Solid);
-        }
-    }
-    if let Some(pixel) = trace.truth.as_ref().and_then(|truth| truth.left_pixel) {
-        let [x, y] = window.place(pixel.x, pixel.y);
-        canvas.line(&[[x - 8.0, y], [x + 8.0, y]], false, TRUTH, Line::Solid);
-        canvas.line(&[[x, y - 8.0], [x, y + 8.0]], false, TRUTH, Line::Solid);
     }
 }
 
-fn foot(canvas: &mut Canvas, trace: &StepTrace, top: f32) {
+fn foot(canvas: &mut Canvas, trace: &RunStep, top: f32) {
     let [width, height] = canvas.size();
     canvas.fill([0.0, top], [width as f32, height as f32 - top], PAPER);
     canvas.fill([0.0, top], [8.0, height as f32 - top], state_colour(trace.update.state));
@@ -140,7 +139,7 @@ fn foot(canvas: &mut Canvas, trace: &StepTrace, top: f32) {
 }
 
 /// The state in capitals, with the count of bad updates.
-pub(crate) fn state_words(trace: &StepTrace) -> String {
+pub(crate) fn state_words(trace: &RunStep) -> String {
     match trace.update.state {
         TrackingState::Lost { count } => format!("LOST {count}"),
         other => other.word().to_uppercase(),
@@ -181,12 +180,12 @@ fn ring(window: &Window, at: Pixel, radius_px: f64) -> Vec<[f32; 2]> {
     around(|x, y| window.place(at.x + radius_px * x, at.y + radius_px * y))
 }
 
-fn ellipse(window: &Window, at: Pixel, covariance_px2: &Matrix2<f64>) -> Option<Vec<[f32; 2]>> {
+fn ellipse(window: &Window, at: Pixel, covariance_px2: &Matrix2<f64>, sigmas: f64) -> Option<Vec<[f32; 2]>> {
     if !covariance_px2.iter().all(|v| v.is_finite()) || covariance_px2.trace() <= 0.0 {
         return None;
     }
     let eigen = SymmetricEigen::new(*covariance_px2);
-    let lengths = eigen.eigenvalues.map(|v| v.max(0.0).sqrt() * SIGMAS);
+    let lengths = eigen.eigenvalues.map(|v| v.max(0.0).sqrt() * sigmas);
     let axes = eigen.eigenvectors * Matrix2::from_diagonal(&lengths);
     Some(around(|x, y| {
         let offset = axes * Vector2::new(x, y);

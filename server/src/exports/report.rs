@@ -8,8 +8,8 @@ use sightline_record::Unit;
 use sightline_rover::version::tracker_version;
 use sightline_session::format;
 use sightline_session::notes::Note;
-use sightline_track::records::{self, StageQuantity};
-use sightline_track::trace::StepTrace;
+use sightline_session::records::{self, StageQuantity};
+use sightline_session::step::RunStep;
 
 use super::kind::Part;
 use super::metrics::{metrics, worst};
@@ -73,7 +73,7 @@ pub(crate) fn html(source: &Source, part: Part, cancel: &AtomicBool) -> ApiResul
 /// All runs in one table.
 fn overview(source: &Source, runs: &[NamedRun<'_>]) -> String {
     let row = |run: &NamedRun<'_>| {
-        let summary = sightline_track::trace::summarise(run.run.steps.iter().map(AsRef::as_ref));
+        let summary = sightline_session::summary::summarise(run.run.steps.iter().map(AsRef::as_ref));
         let changes = serde_json::to_string(&run.run.settings.changes()).unwrap_or_default();
         let left = run.run.fork.map_or_else(String::new, |fork| {
             format!("run {} at step {}", sheet::run_letter(fork.run), fork.from_step)
@@ -183,7 +183,7 @@ fn chapter(text: &mut String, source: &Source, run: NamedRun<'_>, cancel: &Atomi
     Ok(())
 }
 
-fn figure_of(trace: &StepTrace, png: &[u8]) -> String {
+fn figure_of(trace: &RunStep, png: &[u8]) -> String {
     let row = trace.row();
     let words = format!(
         "Step {}, {}: {}.",
@@ -201,7 +201,7 @@ fn figure_of(trace: &StepTrace, png: &[u8]) -> String {
 }
 
 /// Scores and errors over the steps.
-fn figures(steps: &[std::sync::Arc<StepTrace>], run: &NamedRun<'_>) -> ApiResult<Vec<String>> {
+fn figures(steps: &[std::sync::Arc<RunStep>], run: &NamedRun<'_>) -> ApiResult<Vec<String>> {
     let rows: Vec<_> = steps.iter().map(|trace| trace.row()).collect();
     let points = |get: &dyn Fn(usize) -> Option<f64>| {
         (0..rows.len()).filter_map(|k| Some((rows[k].step as f64, get(k)?))).collect::<Vec<_>>()
@@ -260,7 +260,7 @@ fn drawn(title: &str, unit: &str, lines: Vec<Line>) -> ApiResult<Option<String>>
     Ok(Some(format!("<figure role=\"img\" aria-label=\"{label}\">{svg}</figure>\n")))
 }
 
-fn number_of(name: &str, trace: &StepTrace) -> Option<f64> {
+fn number_of(name: &str, trace: &RunStep) -> Option<f64> {
     StageQuantity::named(name)?.number(trace)
 }
 
@@ -276,8 +276,8 @@ const COLUMNS: [(&str, Unit, usize); 8] = [
     ("range_m", Unit::Metre, 2),
 ];
 
-fn step_table(steps: &[std::sync::Arc<StepTrace>]) -> String {
-    let row = |trace: &std::sync::Arc<StepTrace>| {
+fn step_table(steps: &[std::sync::Arc<RunStep>]) -> String {
+    let row = |trace: &std::sync::Arc<RunStep>| {
         let row = trace.row();
         let mut cells = vec![row.step.to_string(), row.state.clone()];
         cells.extend(
@@ -301,7 +301,7 @@ fn step_table(steps: &[std::sync::Arc<StepTrace>]) -> String {
 }
 
 /// Every number that the stages declare and the run has.
-fn quantity_table(steps: &[std::sync::Arc<StepTrace>]) -> String {
+fn quantity_table(steps: &[std::sync::Arc<RunStep>]) -> String {
     let row = |quantity: StageQuantity| {
         let values: Vec<f64> = steps.iter().filter_map(|trace| quantity.number(trace)).collect();
         let of = |share: f64| Some(format::number(quantile(&values, share)?));

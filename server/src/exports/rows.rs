@@ -15,8 +15,8 @@ use parquet::schema::parser::parse_message_type;
 use serde::{Serialize, Serializer};
 use sightline_record::{Kind, StageRecord, Value};
 use sightline_rover::version::tracker_version;
-use sightline_track::records::{columns, records, row_columns};
-use sightline_track::trace::{StepRow, StepTrace};
+use sightline_session::records::{columns, records, row_columns};
+use sightline_session::step::{RunStep, StepRow};
 
 use super::kind::Part;
 use super::source::Source;
@@ -32,8 +32,8 @@ pub(crate) struct Row {
     records: Vec<StageRecord>,
 }
 
-impl From<&StepTrace> for Row {
-    fn from(trace: &StepTrace) -> Self {
+impl From<&RunStep> for Row {
+    fn from(trace: &RunStep) -> Self {
         Self { row: trace.row(), records: records(trace) }
     }
 }
@@ -67,7 +67,7 @@ fn lines(source: &Source, part: Part) -> Vec<Line<'_>> {
     let mut lines = Vec::new();
     for run in source.runs(part) {
         let label = &run.record.label;
-        let line = |trace: &Arc<StepTrace>| Line {
+        let line = |trace: &Arc<RunStep>| Line {
             target: run.target,
             label,
             run: run.number,

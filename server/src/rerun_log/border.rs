@@ -74,15 +74,6 @@ pub(super) fn outline(corners: impl IntoIterator<Item = Pixel>) -> Vec<[f32; 2]>
     strip
 }
 
-/// The edges of a square window of `size` whole pixels about `centre`, carried by `image_from_window`.
-pub(super) fn square(centre: Pixel, size: u32, image_from_window: &Matrix2<f64>) -> Vec<[f32; 2]> {
-    let half = f64::from(size) / 2.0;
-    outline([(-half, -half), (half, -half), (half, half), (-half, half)].map(|(x, y)| {
-        let offset = image_from_window * Vector2::new(x, y);
-        centre.offset(offset.x, offset.y)
-    }))
-}
-
 /// A plus sign with arms of `arm` px.
 pub(super) fn plus(centre: Pixel, arm: f64) -> [Vec<[f32; 2]>; 2] {
     let stroke = |dx: f64, dy: f64| vec![point(centre.offset(-dx, -dy)), point(centre.offset(dx, dy))];
@@ -187,12 +178,6 @@ mod tests {
     fn the_centre_of_the_first_pixel_is_half_a_pixel_from_the_corner() {
         assert_eq!(point(Pixel::new(0.0, 0.0)), [0.5, 0.5]);
         assert_eq!(point(Pixel::new(-0.5, 479.5)), [0.0, 480.0]);
-    }
-
-    #[test]
-    fn a_window_of_one_pixel_covers_exactly_that_pixel() {
-        let strip = square(Pixel::new(10.0, 20.0), 1, &Matrix2::identity());
-        assert_eq!(strip, [[10.0, 20.0], [11.0, 20.0], [11.0, 21.0], [10.0, 21.0], [10.0, 20.0]]);
     }
 
     #[test]

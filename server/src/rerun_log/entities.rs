@@ -1,8 +1,9 @@
 //! Every entity of a recording, in the order in which a step logs them: the table that the module's header
 //! prints and that a test compares with what is read back from a file.
 
-use sightline_track::records::StageQuantity;
-use sightline_track::trace::{ArrayName, StepTrace};
+use sightline_session::records::StageQuantity;
+use sightline_session::step::RunStep;
+use sightline_track::trace::ArrayName;
 
 use super::scores::{self, SCORES, Score};
 use super::shape;
@@ -21,7 +22,7 @@ pub enum Rows {
         /// When there are data, in words.
         when: &'static str,
         /// Whether this step has data.
-        holds: fn(&StepTrace) -> bool,
+        holds: fn(&RunStep) -> bool,
     },
     /// The same, for a number.
     EachScore {
@@ -43,7 +44,7 @@ enum Reader {
 }
 
 impl Number {
-    fn at(self, trace: &StepTrace) -> Option<f64> {
+    fn at(self, trace: &RunStep) -> Option<f64> {
         match self.0 {
             Reader::Score(score) => score.at(trace),
             Reader::Declared(quantity) => quantity.number(trace),
@@ -66,7 +67,7 @@ pub struct EntityDoc {
 
 impl EntityDoc {
     /// Whether the entity has data at a step.
-    pub fn has_data_at(&self, trace: &StepTrace) -> bool {
+    pub fn has_data_at(&self, trace: &RunStep) -> bool {
         match self.rows {
             Rows::Once => false,
             Rows::EachStop => true,
@@ -123,7 +124,7 @@ pub fn documented_entities(targets: usize) -> Vec<EntityDoc> {
 }
 
 /// Entity, archetype, when there are data, and the test for it.
-type Evidence = (&'static str, &'static str, &'static str, fn(&StepTrace) -> bool);
+type Evidence = (&'static str, &'static str, &'static str, fn(&RunStep) -> bool);
 
 /// What is logged of a run beside its numbers, in the order of the stages.
 #[rustfmt::skip]
@@ -185,49 +186,49 @@ const EVIDENCE: &[Evidence] = &[
     ("/truth/{target}/position", "Points3D", "the truth is known", |t| t.truth.is_some()),
 ];
 
-fn predicted_left(trace: &StepTrace) -> bool {
+fn predicted_left(trace: &RunStep) -> bool {
     trace.prediction().is_some() && trace.point_mast.predicted_left.is_some()
 }
 
-fn predicted_right(trace: &StepTrace) -> bool {
+fn predicted_right(trace: &RunStep) -> bool {
     trace.prediction().is_some() && trace.point_mast.predicted_right.is_some()
 }
 
-fn prepared(trace: &StepTrace) -> bool {
+fn prepared(trace: &RunStep) -> bool {
     trace.template().is_some_and(|e| e.scale_roll.is_some())
 }
 
-fn matched(trace: &StepTrace) -> bool {
+fn matched(trace: &RunStep) -> bool {
     trace.template().is_some_and(|e| e.match_template.is_some())
 }
 
-fn second_peak(trace: &StepTrace) -> bool {
+fn second_peak(trace: &RunStep) -> bool {
     trace.template().and_then(|e| e.match_template.as_ref()).is_some_and(|m| m.second_peak.is_some())
 }
 
-fn stereo_matched(trace: &StepTrace) -> bool {
+fn stereo_matched(trace: &RunStep) -> bool {
     trace.template().is_some_and(|e| e.point_stereo.is_some())
 }
 
-fn detected(trace: &StepTrace) -> bool {
+fn detected(trace: &RunStep) -> bool {
     trace.features().is_some_and(|e| e.detect.is_some())
 }
 
-fn fitted(trace: &StepTrace) -> bool {
+fn fitted(trace: &RunStep) -> bool {
     trace.features().is_some_and(|e| e.fit_motion.is_some())
 }
 
-fn bootstrapped(trace: &StepTrace) -> bool {
+fn bootstrapped(trace: &RunStep) -> bool {
     trace.features().is_some_and(|e| e.bootstrap.is_some())
 }
 
-fn moved(trace: &StepTrace) -> bool {
+fn moved(trace: &RunStep) -> bool {
     let located = trace.located();
     bootstrapped(trace)
         && shape::registered(trace).is_none()
         && located.is_some_and(|l| l.position_in_rover.is_some() && l.covariance_in_rover.is_some())
 }
 
-fn triangulated(trace: &StepTrace) -> bool {
+fn triangulated(trace: &RunStep) -> bool {
     trace.template().is_some_and(|e| e.triangulate.is_some())
 }

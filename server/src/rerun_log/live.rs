@@ -12,7 +12,7 @@ use rerun::{MemoryLimit, ServerOptions};
 use sightline_geometry::error::{Error, Result};
 use sightline_rover::pipeline::Stops;
 use sightline_session::Session;
-use sightline_track::trace::StepTrace;
+use sightline_session::step::RunStep;
 
 use super::page::ViewerPage;
 use super::recorder::{Recorder, RunLog, builder};
@@ -95,7 +95,7 @@ impl LiveStream {
         traverse_name: &str,
         stops: &dyn Stops,
         run: &RunLog<'_>,
-        trace: &StepTrace,
+        trace: &RunStep,
     ) -> Result<()> {
         let mut recorder = self.recorder();
         let logged = recorder

@@ -7,7 +7,8 @@ use std::sync::Arc;
 use rerun::{RecordingStream, RecordingStreamBuilder, TextDocument};
 use sightline_geometry::frames::Point3;
 use sightline_rover::pipeline::Stops;
-use sightline_track::trace::StepTrace;
+use sightline_session::marks::marks;
+use sightline_session::step::RunStep;
 use sightline_vision::image::GrayImage;
 
 use super::blueprint::Lane;
@@ -25,7 +26,7 @@ pub struct RunLog<'a> {
     /// What the person calls the target.
     pub label: &'a str,
     /// Its steps so far.
-    pub steps: &'a [Arc<StepTrace>],
+    pub steps: &'a [Arc<RunStep>],
 }
 
 impl RunLog<'_> {
@@ -60,7 +61,7 @@ struct Known {
 }
 
 impl Known {
-    fn new(first: &StepTrace) -> Self {
+    fn new(first: &RunStep) -> Self {
         let subframe = first.capture().and_then(|capture| capture.subframe);
         Self {
             steps: BTreeSet::new(),
@@ -126,7 +127,7 @@ impl Recorder {
     }
 
     /// Logs one step of a run that was made known, unless it is in the recording already.
-    pub(super) fn log_step(&mut self, run: &RunLog<'_>, stops: &dyn Stops, trace: &StepTrace) -> Logged {
+    pub(super) fn log_step(&mut self, run: &RunLog<'_>, stops: &dyn Stops, trace: &RunStep) -> Logged {
         let root = root(run.target, run.run);
         if !self.runs.get_mut(&root).is_some_and(|known| known.steps.insert(trace.step)) {
             return Ok(());
@@ -138,6 +139,7 @@ impl Recorder {
             root: &root,
             label: &run.title(),
             trace,
+            marks: marks(trace, template_size_px(trace)),
             images: if is_first_here { images(trace, stops) } else { None },
             site_from_rover: stops.site_from_rover(trace.step),
         };
@@ -150,9 +152,15 @@ impl Recorder {
     }
 }
 
+/// The side of the template; 0 where none was prepared.
+fn template_size_px(trace: &RunStep) -> u32 {
+    let prepared = trace.template().and_then(|evidence| evidence.scale_roll.as_ref());
+    prepared.map_or(0, |prepared| prepared.reference.width())
+}
+
 /// The images of a step. Those of a run that was read back from disk are not in the trace and come from the
 /// traverse.
-fn images(trace: &StepTrace, stops: &dyn Stops) -> Option<[Arc<GrayImage>; 2]> {
+fn images(trace: &RunStep, stops: &dyn Stops) -> Option<[Arc<GrayImage>; 2]> {
     let kept = trace.capture()?.pair.clone();
     let pair = if kept.left.width() > 0 { kept } else { stops.capture(trace.step).ok()? };
     Some([pair.left, pair.right])

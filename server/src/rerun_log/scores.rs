@@ -5,8 +5,8 @@
 
 use rerun::{RecordingStream, Scalars};
 use sightline_record::{Kind, Unit};
-use sightline_track::records::{self, StageQuantity};
-use sightline_track::trace::StepTrace;
+use sightline_session::records::{self, StageQuantity};
+use sightline_session::step::RunStep;
 
 use super::Logged;
 use super::palette::{FAILED, LIMIT, LOST, MEASUREMENT, PREDICTION, Rgb, SECOND_PEAK, TRACKING, color};
@@ -74,11 +74,11 @@ pub(super) const SCORES: &[Score] = &[
 
 impl Score {
     /// The number at a step; what is not finite cannot be drawn and counts as missing.
-    pub(super) fn at(&self, trace: &StepTrace) -> Option<f64> {
+    pub(super) fn at(&self, trace: &RunStep) -> Option<f64> {
         self.read(trace).filter(|value| value.is_finite())
     }
 
-    fn read(&self, trace: &StepTrace) -> Option<f64> {
+    fn read(&self, trace: &RunStep) -> Option<f64> {
         if let Some((stage, gate)) = self.source.split_once(".gates.") {
             let (name, part) = gate.rsplit_once('.')?;
             let gates = records::stage(stage)?.record(trace).gates;

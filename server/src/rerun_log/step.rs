@@ -6,11 +6,11 @@ use nalgebra::Matrix3;
 use rerun::components::AggregationPolicy;
 use rerun::{AsComponents, Clear, Color, Ellipsoids3D, RecordingStream, SeriesLines};
 use sightline_geometry::frames::{Point3, Pose};
+use sightline_session::marks::{Mark, MarkName, Shape};
+use sightline_session::step::RunStep;
 use sightline_track::locate::features::FeatureEvidence;
 use sightline_track::locate::template::TemplateEvidence;
 use sightline_track::locate::template::match_template::TemplateMatch;
-use sightline_track::stages::point_mast::Pointing;
-use sightline_track::trace::StepTrace;
 use sightline_vision::image::GrayImage;
 
 use super::Logged;
@@ -26,7 +26,9 @@ pub(super) struct Step<'a> {
     /// What the person calls the run.
     pub(super) label: &'a str,
     /// What the stages saw and decided.
-    pub(super) trace: &'a StepTrace,
+    pub(super) trace: &'a RunStep,
+    /// The marks over its images.
+    pub(super) marks: Vec<Mark>,
     /// The left and the right image of the stop, where they could be read and are still to be logged.
     pub(super) images: Option<[Arc<GrayImage>; 2]>,
     /// The estimated pose of the stop.
@@ -44,11 +46,6 @@ impl Step<'_> {
         }
     }
 
-    /// The pointing of a step that had a prediction: at the designation there is none.
-    pub(super) fn predicted(&self) -> Option<&Pointing> {
-        self.trace.prediction().map(|_| &self.trace.point_mast)
-    }
-
     /// The evidence of the template locator.
     pub(super) fn template(&self) -> Option<&TemplateEvidence> {
         self.trace.template()
@@ -62,6 +59,11 @@ impl Step<'_> {
     /// The match of the template.
     pub(super) fn matched(&self) -> Option<&TemplateMatch> {
         self.template().and_then(|evidence| evidence.match_template.as_ref())
+    }
+
+    /// The shape of a mark over the images, where the step has it.
+    pub(super) fn mark(&self, name: MarkName) -> Option<&Shape> {
+        self.marks.iter().find(|mark| mark.name == name).map(|mark| &mark.shape)
     }
 
     /// A point of the present rover frame in the site frame of the estimated pose.

@@ -12,8 +12,8 @@ use sightline_api::endpoints::ShowPhotometry;
 use sightline_geometry::error::Result;
 use sightline_recordings::Traverse;
 use sightline_session::photometry::photometry;
+use sightline_session::step::RunStep;
 use sightline_track::settings::Settings;
-use sightline_track::trace::StepTrace;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
@@ -54,7 +54,7 @@ fn download(media_type: &'static str, name: &str, text: String) -> Response {
 }
 
 /// The designation with its left image, which a recorded step does not keep; a later step as it is.
-fn with_image(traverse: &Traverse, trace: &Arc<StepTrace>) -> Result<Arc<StepTrace>> {
+fn with_image(traverse: &Traverse, trace: &Arc<RunStep>) -> Result<Arc<RunStep>> {
     let mut trace = Arc::clone(trace);
     let is_designation = trace.verdict().is_none() && trace.update.target.designation.step == trace.step;
     if is_designation && trace.capture().is_some_and(|capture| capture.pair.left.is_empty()) {
@@ -72,7 +72,7 @@ fn with_image(traverse: &Traverse, trace: &Arc<StepTrace>) -> Result<Arc<StepTra
 /// A simulated exposure that cannot be metered, or a cancelled one.
 pub(crate) fn table(
     traverse: &Traverse,
-    steps: &[Arc<StepTrace>],
+    steps: &[Arc<RunStep>],
     settings: &Settings,
     cancel: &AtomicBool,
 ) -> Result<String> {

@@ -6,8 +6,9 @@ use axum::http::header;
 use axum::response::{IntoResponse, Response};
 use sightline_api::endpoint::Endpoint;
 use sightline_api::endpoints::{ShowArrays, ShowEarlierTemplates, ShowStep};
+use sightline_session::step::RunStep;
 use sightline_track::locate::template::history::AgainstEarlier;
-use sightline_track::trace::{ArrayName, ArrayView, StepTrace};
+use sightline_track::trace::{ArrayName, ArrayView};
 use sightline_vision::image::{npy, npz};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
@@ -33,7 +34,7 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
 /// A step
 ///
 /// Arrays are left out; they are fetched together in one file.
-#[utoipa::path(get, operation_id = "show_step", path = ShowStep::PATH, tag = "steps", responses((status = 200, body = StepTrace), ApiError))]
+#[utoipa::path(get, operation_id = "show_step", path = ShowStep::PATH, tag = "steps", responses((status = 200, body = RunStep), ApiError))]
 async fn show(step: RecordedStep) -> ApiResult<Response> {
     blocking(move || Ok(Json(step.recorded.as_ref()).into_response())).await
 }

@@ -3,13 +3,13 @@
 use std::sync::Arc;
 
 use sightline_geometry::frames::{Pixel, Point3};
+use sightline_session::step::RunStep;
 use sightline_track::locate::features::evidence::Table;
 use sightline_track::locate::shape_tracker::ShapeEvidence;
 use sightline_track::locate::shape_tracker::drape::Draped;
 use sightline_track::locate::shape_tracker::evidence::{MESH_COLUMNS, Registered};
 use sightline_track::locate::shape_tracker::surface::SurfaceSeen;
 use sightline_track::locate::{Evidence, gate_kinds};
-use sightline_track::trace::StepTrace;
 use sightline_vision::registration::Method;
 
 use super::{FIXTURE, MISSING, exported_as_promised};
@@ -57,7 +57,7 @@ fn registered() -> Registered {
 }
 
 /// A surface of two by two pixels, registered with a sensor of four by four and found again at a hand-off.
-fn by_shape(trace: &StepTrace) -> StepTrace {
+fn by_shape(trace: &RunStep) -> RunStep {
     let mut trace = trace.clone();
     let (is_pick, Some(located)) = (trace.prediction().is_none(), trace.located_mut()) else { return trace };
     let mut evidence = ShapeEvidence { why: "made up".to_owned(), ..ShapeEvidence::default() };

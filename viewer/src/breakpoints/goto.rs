@@ -56,7 +56,7 @@ impl State {
     fn step_of_event(&self, word: &str) -> Result<usize, String> {
         let run = self.run().ok_or_else(|| self.missing_target())?;
         let step = self.cursor.step;
-        let at = |row: &sightline_track::trace::StepRow| row.step;
+        let at = |row: &sightline_session::step::StepRow| row.step;
         let mut steps: Vec<usize> = match word {
             "pick" => run.rows.first().map(at).into_iter().collect(),
             "fault" => run.rows.iter().filter(|row| row.fault).map(at).collect(),

@@ -11,8 +11,9 @@ use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 use sightline_api::wire::{Problem, StopDetail};
+use sightline_session::step::RunStep;
 use sightline_track::locate::template::history::AgainstEarlier;
-use sightline_track::trace::{ArrayName, StepTrace};
+use sightline_track::trace::ArrayName;
 
 pub(crate) use self::names::{Eye, Key, StepKey};
 use crate::drawing::raster::Raster;
@@ -33,7 +34,7 @@ pub enum Item {
     /// Of [`Key::Stop`].
     Stop(Arc<StopDetail>),
     /// Of [`Key::Trace`].
-    Trace(Arc<StepTrace>),
+    Trace(Arc<RunStep>),
     /// Of [`Key::Image`] and of a [`Key::Array`] that is a picture.
     Raster(Arc<Raster>),
     /// Of a [`Key::Array`] that is a table.
@@ -190,7 +191,7 @@ impl Cache {
     }
 
     /// A step's record.
-    pub fn trace(&self, key: &StepKey) -> Slot<'_, StepTrace> {
+    pub fn trace(&self, key: &StepKey) -> Slot<'_, RunStep> {
         self.slot(&Key::Trace(key.clone())).and(|item| match item {
             Item::Trace(trace) => Some(trace.as_ref()),
             _ => None,

@@ -1,6 +1,6 @@
 //! Everything a person can ask for, by name: what the palette finds, with the keys that do the same.
 
-use sightline_track::trace::StepRow;
+use sightline_session::step::StepRow;
 
 use crate::command::table;
 use crate::command::{Command, Go, Stage};

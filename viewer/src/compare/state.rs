@@ -6,8 +6,9 @@ use egui::Color32;
 use sightline_geometry::frames::Pixel;
 use sightline_session::compare::{Alignment, Comparison, RUNS_MAX, RunName, Tolerance};
 use sightline_session::metrics::{Metric, RunMetrics};
+use sightline_session::step::{RunStep, StepRow};
 use sightline_session::view::{RunView, TargetView};
-use sightline_track::trace::{ArrayName, StepRow, StepTrace};
+use sightline_track::trace::ArrayName;
 
 use crate::cache::{Eye, Key, Slot, StepKey};
 use crate::drawing::overlay::{Mark, run_mark};
@@ -160,7 +161,7 @@ impl State {
     }
 
     /// The record of another run beside the cursor's step.
-    pub fn other_trace(&self, other: RunName) -> Slot<'_, StepTrace> {
+    pub fn other_trace(&self, other: RunName) -> Slot<'_, RunStep> {
         let step = self.beside(other, self.cursor.step);
         let key = step.and_then(|step| self.other_key(other, step));
         key.map_or(Slot::Absent, |key| self.cache.trace(&key))
@@ -206,7 +207,7 @@ impl State {
     }
 
     /// The view of the left image: about the target where that is held still.
-    pub(crate) fn held_view(&self, view: View2d, trace: Option<&StepTrace>) -> View2d {
+    pub(crate) fn held_view(&self, view: View2d, trace: Option<&RunStep>) -> View2d {
         match trace.and_then(place_of_target).filter(|_| self.compare.is_held) {
             Some(centre) => View2d::At { centre, scale: scale_of(view) },
             None => view,
@@ -215,7 +216,7 @@ impl State {
 }
 
 /// Where a run sees the target: the match, or else the prediction.
-pub(crate) fn place_of_target(trace: &StepTrace) -> Option<Pixel> {
+pub(crate) fn place_of_target(trace: &RunStep) -> Option<Pixel> {
     let located = trace.located().filter(|_| !trace.update.state.is_lost()).and_then(|l| l.left_pixel);
     located.or(trace.point_mast.predicted_left)
 }

@@ -233,15 +233,6 @@ pub(crate) fn paint_words(painter: &Painter, at: Pos2, words: &str, colour: Colo
     area
 }
 
-/// The four corners of a square template window with `side` px, turned and magnified by `image_from_template`.
-pub(crate) fn template_quad(centre: Pixel, side: u32, image_from_template: &Matrix2<f64>) -> [Pixel; 4] {
-    let half = f64::from(side) / 2.0;
-    [(-half, -half), (half, -half), (half, half), (-half, half)].map(|(x, y)| {
-        let corner = image_from_template * nalgebra::Vector2::new(x, y);
-        centre.offset(corner.x, corner.y)
-    })
-}
-
 /// A row of the legend at `at`: the mark, then its word. Returns the row's area.
 pub(crate) fn paint_legend_row(
     painter: &Painter,
@@ -264,13 +255,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_quad_of_an_unchanged_template_covers_its_whole_pixels() {
-        let quad = template_quad(Pixel::new(100.0, 50.0), 21, &Matrix2::identity());
-        assert_eq!(quad[0], Pixel::new(89.5, 39.5));
-        assert_eq!(quad[2], Pixel::new(110.5, 60.5));
-    }
-
-    #[test]
     fn of_a_line_only_what_is_in_the_area_is_left() {
         let area = Rect::from_min_max(pos2(0.0, 0.0), pos2(100.0, 50.0));
         let line = |points: &[(f32, f32)]| -> Vec<Pos2> { points.iter().map(|&(x, y)| pos2(x, y)).collect() };
@@ -283,14 +267,5 @@ mod tests {
         assert_eq!(inside(&bent, area), pieces);
         assert!(inside(&line(&[(-5.0, 60.0), (105.0, 60.0)]), area).is_empty());
         assert!(inside(&line(&[(-20.0, 40.0), (10.0, 80.0)]), area).is_empty(), "past a corner");
-    }
-
-    #[test]
-    fn a_rolled_quad_turns_clockwise_on_the_screen_and_grows_with_the_scale() {
-        let turn = nalgebra::Rotation2::new(10.0_f64.to_radians()).into_inner() * 1.5;
-        let quad = template_quad(Pixel::new(0.0, 0.0), 20, &turn);
-        // The top edge runs right and down when content turns clockwise (y points down).
-        assert!(quad[1].y > quad[0].y);
-        assert!((quad[0].distance(quad[1]) - 30.0).abs() < 1e-9);
     }
 }

@@ -2,8 +2,8 @@
 
 use egui::scroll_area::ScrollBarVisibility;
 use egui::{Align, Button, ComboBox, Layout, Response, RichText, ScrollArea, Ui};
+use sightline_session::step::RunStep;
 use sightline_track::target::TrackingState;
-use sightline_track::trace::StepTrace;
 
 use crate::command::table::{
     EXPORT, FIRST_STEP, HELP, LAST_STEP, NEXT_EVENT, NEXT_STEP, OPEN, OPEN_RERUN, PREVIOUS_EVENT,
@@ -229,7 +229,7 @@ fn stage_button(ui: &mut Ui, state: &State, stage: Stage, out: &mut Vec<Command>
 }
 
 /// Whether a stage is where the step went wrong.
-fn has_failed(trace: Option<&StepTrace>, stage: Stage) -> bool {
+fn has_failed(trace: Option<&RunStep>, stage: Stage) -> bool {
     let Some(trace) = trace else { return false };
     match stage {
         Stage::CAPTURE => trace.fault().is_some(),

@@ -4,7 +4,6 @@
 use egui::{Color32, vec2};
 use sightline_session::marks::{MarkName, Shape, marks};
 use sightline_session::step::RunStep;
-use sightline_session::view::RunView;
 
 use crate::cache::Eye;
 use crate::command::Layer;
@@ -30,14 +29,21 @@ enum Pen {
 }
 
 /// Paints the marks of a step over one of its images, as far as their layers are shown.
-pub(crate) fn paint(overlay: &Overlay<'_>, step: &RunStep, run: &RunView, eye: Eye, of: Of, state: &State) {
-    let marks = marks(step, run.settings.template.template_size_px);
+pub(crate) fn paint(
+    overlay: &Overlay<'_>,
+    step: &RunStep,
+    template_size_px: u32,
+    eye: Eye,
+    of: Of,
+    state: &State,
+) {
+    let marks = marks(step, template_size_px);
     for mark in marks.iter().filter(|mark| mark.name.is_left() == (eye == Eye::Left)) {
         let style = match of {
             Of::Shown(colour) => style(mark.name, colour),
             Of::Compared(colour, sign) => compared_style(mark.name, colour, sign),
         };
-        let Some((layer, colour, pen)) = style.filter(|(layer, ..)| state.shows(*layer)) else { continue };
+        let Some((_, colour, pen)) = style.filter(|(layer, ..)| state.shows(*layer)) else { continue };
         paint_shape(overlay, &mark.shape, colour, &pen);
         if mark.name == MarkName::PredictionGate && matches!(of, Of::Shown(_)) {
             paint_gate_words(overlay, &mark.shape, colour);

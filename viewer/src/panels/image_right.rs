@@ -2,7 +2,7 @@
 
 use egui::{Margin, Ui, vec2};
 use sightline_geometry::frames::Pixel;
-use sightline_track::trace::StepTrace;
+use sightline_session::step::RunStep;
 use sightline_vision::image::PixelRect;
 
 use crate::cache::Eye;
@@ -13,6 +13,7 @@ use crate::drawing::raster::Raster;
 use crate::drawing::view2d::Canvas;
 use crate::panels::epipolar::Curve;
 use crate::panels::features::marks;
+use crate::panels::image_marks::{self, Of};
 use crate::panels::images_left::ready_image;
 use crate::panels::legend;
 use crate::panels::legend::Entry;
@@ -95,34 +96,21 @@ fn entries(state: &State) -> Vec<Entry> {
     entries
 }
 
-fn paint_marks(canvas: &Canvas, trace: &StepTrace, state: &State) {
+fn paint_marks(canvas: &Canvas, trace: &RunStep, state: &State) {
     let overlay = Overlay::new(&canvas.painter, &canvas.transform);
-    let pointing = &trace.point_mast;
-    let Some(located) = trace.located() else { return };
     if let Some(curve) = target_curve(state).filter(|_| state.shows(Layer::Curve)) {
         curve.paint(canvas, theme::search(), Line::Dotted);
-        if let Some(stereo) = trace.template().and_then(|e| e.point_stereo.as_ref()) {
-            let searched: Vec<Pixel> = stereo.curve.iter().map(|point| point.pixel).collect();
-            overlay.line(&searched, theme::search(), Line::Solid);
-        }
     }
-    if trace.prediction().is_some()
-        && state.shows(Layer::Prediction)
-        && let Some(pixel) = pointing.predicted_right
-    {
-        overlay.mark(pixel, Mark::Cross, theme::prediction());
-    }
-    if let Some(pixel) = located.right_pixel.filter(|_| state.shows(Layer::Match)) {
-        let run = theme::run(state.cursor.run);
-        if let Some(stereo) = trace.template().and_then(|e| e.point_stereo.as_ref()) {
-            overlay.ellipse(pixel, &stereo.covariance_px2, 3.0, run, Line::Solid);
-            let words = format!("{:.2} m, ncc {:.2}", stereo.range_m, stereo.score);
-            overlay.words(pixel, vec2(12.0, -14.0), &words, run);
-            if stereo.at_end {
-                overlay.words(pixel, vec2(12.0, 4.0), "at the end of the searched ranges", theme::lost());
-            }
+    let run = theme::run(state.cursor.run);
+    image_marks::paint(&overlay, trace, state.template_side_px(), Eye::Right, Of::Shown(run), state);
+    let stereo = trace.template().and_then(|evidence| evidence.point_stereo.as_ref());
+    if let Some(stereo) = stereo.filter(|_| state.shows(Layer::Match)) {
+        let words = format!("{:.2} m, ncc {:.2}", stereo.range_m, stereo.score);
+        overlay.words(stereo.right_pixel, vec2(12.0, -14.0), &words, run);
+        if stereo.at_end {
+            let words = "at the end of the searched ranges";
+            overlay.words(stereo.right_pixel, vec2(12.0, 4.0), words, theme::lost());
         }
-        overlay.mark(pixel, Mark::Ring, run);
     }
 }
 

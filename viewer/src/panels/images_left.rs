@@ -1,16 +1,13 @@
 //! The left image with all that the tracker knew of the target in it.
 
 use egui::{Margin, Rect, Ui, pos2, vec2};
-use sightline_geometry::frames::Pixel;
-use sightline_track::locate::features::rows::moved_covariance_px2;
-use sightline_track::locate::shape_tracker::rows::{basin, registered_covariance_px2};
-use sightline_track::trace::StepTrace;
+use sightline_session::marks::{basin_of, square};
 use sightline_vision::image::PixelRect;
 
 use crate::cache::{Eye, Slot};
 use crate::command::{Command, Layer, Zoomable};
 use crate::compare::panel::{bar, marks as compared, modes};
-use crate::drawing::overlay::{Line, Mark, Overlay, template_quad};
+use crate::drawing::overlay::{Line, Mark, Overlay};
 use crate::drawing::raster::Raster;
 use crate::drawing::view2d::Canvas;
 use crate::layout::left_image::keep_left_image;
@@ -18,6 +15,7 @@ use crate::panels::broken;
 use crate::panels::epipolar::Curve;
 use crate::panels::exposure;
 use crate::panels::features::marks;
+use crate::panels::image_marks::{self, Of};
 use crate::panels::legend;
 use crate::panels::legend::Entry;
 use crate::panels::panel::Panel;
@@ -81,7 +79,9 @@ fn picture(
         paint_others(&canvas, state);
         marks::paint_left(&canvas, state);
         if let Some(trace) = state.trace() {
-            paint_marks(&Overlay::new(&canvas.painter, &canvas.transform), trace, state);
+            let of = Of::Shown(theme::run(state.cursor.run));
+            let overlay = Overlay::new(&canvas.painter, &canvas.transform);
+            image_marks::paint(&overlay, trace, state.template_side_px(), Eye::Left, of, state);
         }
     }
     modes::over(ui, &canvas, state, out);
@@ -161,7 +161,7 @@ fn entries(state: &State) -> Vec<Entry> {
             "predicted, 3σ gate",
         ));
     }
-    if let Some((_, half_width_m)) = basin_of(trace).filter(|(outline, _)| !outline.is_empty()) {
+    if let Some((_, half_width_m)) = basin_of(trace) {
         let word = format!("basin, half width {:.0} cm", half_width_m * 100.0);
         entries.push(Entry::new(Layer::Basin, Mark::Stroke(Line::Dashed), theme::basin(), word));
     }
@@ -183,77 +183,6 @@ fn entries(state: &State) -> Vec<Entry> {
     entries.extend(marks::left_entries(state));
     entries.extend(compared::entries(state));
     entries
-}
-
-/// Paints what one step saw.
-fn paint_marks(overlay: &Overlay<'_>, trace: &StepTrace, state: &State) {
-    let run = theme::run(state.cursor.run);
-    let evidence = trace.template();
-    let matched = evidence.and_then(|e| e.match_template.as_ref());
-    if let Some(subframe) = trace.capture().and_then(|c| c.subframe).filter(|_| state.shows(Layer::Subframe))
-    {
-        overlay.rectangle(subframe, theme::subframe(), Line::Dotted);
-    }
-    if let Some(found) = matched.filter(|_| state.shows(Layer::SearchWindow)) {
-        overlay.rectangle(found.search_window, theme::search(), Line::Dashed);
-    }
-    if state.shows(Layer::Prediction) && trace.prediction().is_some() {
-        paint_prediction(overlay, trace);
-    }
-    if let Some((outline, _)) = basin_of(trace).filter(|_| state.shows(Layer::Basin)) {
-        overlay.outline(&outline, theme::basin(), Line::Dashed);
-    }
-    if let (Some(found), Some(prepared)) = (matched, evidence.and_then(|e| e.scale_roll.as_ref()))
-        && state.shows(Layer::Template)
-    {
-        // What was compared is an upright square; the quad is where the reference's own window went.
-        let (at, side) = (found.pixel, state.template_side_px());
-        overlay.outline(&template_quad(at, side, &nalgebra::Matrix2::identity()), run, Line::Solid);
-        overlay.outline(&template_quad(at, side, &prepared.prepared_from_template()), run, Line::Dotted);
-    }
-    if let Some((located, pixel)) = trace.located().and_then(|l| Some((l, l.left_pixel?)))
-        && state.shows(Layer::Match)
-    {
-        let camera = &trace.point_mast.left;
-        let moved =
-            moved_covariance_px2(located, camera).or_else(|| registered_covariance_px2(located, camera));
-        match moved {
-            Some(moved) => {
-                for sigmas in [1.0, 2.0, 3.0] {
-                    overlay.ellipse(pixel, &moved, sigmas, run, Line::Solid);
-                }
-            }
-            None => overlay.ellipse(pixel, &located.left_error.mean_square_px2(), 3.0, run, Line::Solid),
-        }
-        overlay.mark(pixel, Mark::Ring, run);
-    }
-    if let Some(pixel) = trace.truth.as_ref().and_then(|t| t.left_pixel).filter(|_| state.shows(Layer::Truth))
-    {
-        overlay.mark(pixel, Mark::Plus, theme::truth());
-    }
-}
-
-/// The rock's half width about the prediction, in the image and in metres: from farther off a registration may settle on
-/// another place (R155).
-fn basin_of(trace: &StepTrace) -> Option<(Vec<Pixel>, f64)> {
-    let half_width_m = trace.shape()?.registration.as_ref()?.half_width_m;
-    let predicted = &trace.prediction()?.position_in_rover;
-    Some((basin(predicted, half_width_m, &trace.point_mast.left), half_width_m))
-}
-
-fn paint_prediction(overlay: &Overlay<'_>, trace: &StepTrace) {
-    let pointing = &trace.point_mast;
-    let Some(pixel) = pointing.predicted_left else { return };
-    if let Some(covariance) = &pointing.predicted_covariance_px2 {
-        overlay.ellipse(pixel, covariance, 3.0, theme::prediction(), Line::Dotted);
-        if let Some([long, _]) = crate::drawing::ellipse::axes(covariance) {
-            let end = pixel.offset(3.0 * long.x.abs(), 3.0 * long.x.signum() * long.y);
-            if overlay.length(pixel, end) > 24.0 {
-                overlay.words(end, vec2(6.0, 0.0), "3σ", theme::prediction());
-            }
-        }
-    }
-    overlay.mark(pixel, Mark::Cross, theme::prediction());
 }
 
 /// The other targets, where their latest runs place them.
@@ -310,7 +239,7 @@ fn paint_pointed(canvas: &Canvas, state: &State) -> Option<String> {
             Some(format!("curve of x {:.1}  y {:.1} of the right image", pixel.x, pixel.y))
         }
         Pointed::Score(pixel) => {
-            let quad = template_quad(pixel, state.template_side_px(), &nalgebra::Matrix2::identity());
+            let quad = square(pixel, state.template_side_px(), &nalgebra::Matrix2::identity());
             overlay.outline(&quad, theme::accent(), Line::Dashed);
             overlay.mark(pixel, Mark::Plus, theme::accent());
             Some(format!("template at x {:.0}  y {:.0}", pixel.x, pixel.y))

@@ -3,10 +3,10 @@
 use egui::{CollapsingHeader, RichText, ScrollArea, Ui};
 use serde_json::Value;
 use sightline_record::{Kind, Quantity, Unit, Value as Recorded, label, unit_label};
+use sightline_session::records;
+use sightline_session::step::RunStep;
 use sightline_session::why;
-use sightline_track::records;
 use sightline_track::settings::TrackerKind;
-use sightline_track::trace::StepTrace;
 
 use crate::command::{Command, Stage};
 use crate::compare::panel::readouts;
@@ -58,11 +58,11 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 }
 
 /// A stage of the record.
-type RecordedStage = &'static sightline_record::Stage<StepTrace>;
+type RecordedStage = &'static sightline_record::Stage<RunStep>;
 
 /// The stages of the record that a stage of the bar shows, those that were reached: its own first, then those that have
 /// no place of their own in the bar of the tracker.
-fn recorded(trace: &StepTrace, stage: Stage) -> Vec<RecordedStage> {
+fn recorded(trace: &RunStep, stage: Stage) -> Vec<RecordedStage> {
     let tracker = trace.located().map_or_else(TrackerKind::default, |l| l.evidence.tracker());
     let mut of = Stage::PREDICT;
     let mut shown: Vec<RecordedStage> = Vec::new();
@@ -81,13 +81,13 @@ fn recorded(trace: &StepTrace, stage: Stage) -> Vec<RecordedStage> {
 }
 
 /// Whether a stage of the record belongs to one of the bar: the row repeats others, and the truth is shown with all.
-fn is_in_bar(stage: &sightline_record::Stage<StepTrace>) -> bool {
+fn is_in_bar(stage: &sightline_record::Stage<RunStep>) -> bool {
     let schema = stage.schema();
     !schema.path.is_empty() && schema.stage != "truth"
 }
 
 /// The quantities of a stage, then the rest of its evidence.
-fn section(ui: &mut Ui, trace: &StepTrace, stage: RecordedStage, out: &mut Vec<Command>) {
+fn section(ui: &mut Ui, trace: &RunStep, stage: RecordedStage, out: &mut Vec<Command>) {
     let schema = stage.schema();
     egui::Grid::new(ui.next_auto_id()).num_columns(2).spacing([10.0, 2.0]).show(ui, |ui| {
         for (index, quantity) in schema.quantities.iter().enumerate() {
@@ -180,7 +180,7 @@ fn matrix_of(kind: Kind, value: &Recorded) -> Option<Vec<Vec<f64>>> {
     }
 }
 
-fn not_reached(trace: &StepTrace, state: &State) -> String {
+fn not_reached(trace: &RunStep, state: &State) -> String {
     let word = state.stage().word();
     match (trace.fault(), trace.prediction().is_none()) {
         (Some(fault), _) => format!("{word} was not reached: {fault}"),
@@ -196,7 +196,7 @@ fn not_reached(trace: &StepTrace, state: &State) -> String {
 }
 
 /// Whether a stage was reached.
-pub(crate) fn is_reached(trace: &StepTrace, stage: Stage) -> bool {
+pub(crate) fn is_reached(trace: &RunStep, stage: Stage) -> bool {
     match stage {
         // The evidence of the registration exists before its refinement has an end.
         Stage::REFINE_REGISTER => trace
@@ -210,7 +210,7 @@ pub(crate) fn is_reached(trace: &StepTrace, stage: Stage) -> bool {
 }
 
 /// What a stage returned, as one tree; none where it was not reached.
-pub(crate) fn record(trace: &StepTrace, stage: Stage) -> Option<Value> {
+pub(crate) fn record(trace: &RunStep, stage: Stage) -> Option<Value> {
     let mut stages = recorded(trace, stage).into_iter();
     let mut whole = records::evidence(stages.next()?, trace);
     for other in stages {

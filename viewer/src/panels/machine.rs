@@ -7,9 +7,9 @@
 //! one that detects the loss does not count among them unless `count_detecting_update` says so (R91).
 
 use egui::{Align2, Color32, Pos2, Rect, RichText, ScrollArea, Sense, Stroke, StrokeKind, Ui, pos2, vec2};
+use sightline_session::step::StepRow;
 use sightline_session::view::RunView;
 use sightline_track::target::TrackingState;
-use sightline_track::trace::StepRow;
 
 use crate::command::{Command, Go};
 use crate::panels::gates;

@@ -95,6 +95,7 @@ pub(crate) mod exposure;
 pub(crate) mod features;
 pub(crate) mod gates;
 pub(crate) mod history;
+pub(crate) mod image_marks;
 pub(crate) mod image_right;
 pub(crate) mod images_left;
 pub(crate) mod inspector;

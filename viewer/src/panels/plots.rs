@@ -5,10 +5,10 @@ use std::collections::HashMap;
 use egui::{Color32, RichText, ScrollArea, Ui, vec2};
 use egui_plot::{HLine, HoverPosition, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotUi, Points};
 use sightline_record::{Kind, Quantity, StageSchema, Unit};
+use sightline_session::records;
+use sightline_session::step::StepRow;
 use sightline_session::view::RunView;
-use sightline_track::records;
 use sightline_track::settings::TrackerKind;
-use sightline_track::trace::StepRow;
 
 use crate::breakpoints::Ask;
 use crate::command::{Command, Go};

@@ -3,8 +3,8 @@
 use egui::vec2;
 use nalgebra::Matrix2;
 use sightline_geometry::frames::Pixel;
+use sightline_session::step::RunStep;
 use sightline_track::locate::template::match_template::TemplateMatch;
-use sightline_track::trace::StepTrace;
 use sightline_vision::image::PixelRect;
 
 use crate::drawing::contour::contour;
@@ -35,7 +35,7 @@ pub(crate) fn paint_contour(canvas: &Canvas, raster: &Raster, region: PixelRect,
 }
 
 /// Prediction, peaks and truth on the scores.
-pub(crate) fn paint_marks(canvas: &Canvas, trace: &StepTrace, matched: &TemplateMatch, run: egui::Color32) {
+pub(crate) fn paint_marks(canvas: &Canvas, trace: &RunStep, matched: &TemplateMatch, run: egui::Color32) {
     let pointing = &trace.point_mast;
     let predicted = pointing.predicted_left.map(|pixel| (pixel, pointing.predicted_covariance_px2));
     let truth = trace.truth.as_ref().and_then(|t| t.left_pixel);

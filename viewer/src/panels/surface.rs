@@ -4,7 +4,7 @@ use egui::{Align2, Margin, Rect, Ui, pos2, vec2};
 use sightline_geometry::frames::Pixel;
 use sightline_track::locate::template::match_template::TemplateMatch;
 use sightline_track::locate::template::settings::Measure;
-use sightline_track::trace::{ArrayName, StepTrace};
+use sightline_track::trace::ArrayName;
 use sightline_vision::image::PixelRect;
 
 use crate::cache::Slot;
@@ -63,7 +63,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 
 /// Shows the scores of the run.
 pub(crate) fn recorded(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    let matched = state.trace().and_then(StepTrace::template).and_then(|e| e.match_template.as_ref());
+    let matched = state.trace().and_then(|trace| trace.template()).and_then(|e| e.match_template.as_ref());
     let (Some(trace), Some(matched)) = (state.trace(), matched) else {
         panels::missing(ui, PURPOSE, &state.missing_template());
         return;

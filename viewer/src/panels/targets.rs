@@ -91,7 +91,7 @@ fn show_target(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Co
 fn warnings<'a>(state: &'a State, target: &TargetView) -> Vec<&'a str> {
     let is_selected = state.cursor.target == Some(target.number);
     let pick = state.trace_at(target.designation.step).ready().filter(|_| is_selected);
-    let evidence = pick.and_then(sightline_track::trace::StepTrace::template);
+    let evidence = pick.and_then(|trace| trace.template());
     evidence.map_or_else(Vec::new, |e| e.warnings.iter().map(|warning| warning.sentence.as_str()).collect())
 }
 

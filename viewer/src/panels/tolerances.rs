@@ -5,9 +5,9 @@
 
 use egui::{Align2, Color32, RichText, Ui, vec2};
 use egui_plot::{Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotUi, Points, Text, VLine};
+use sightline_session::step::StepRow;
 use sightline_session::view::RunView;
 use sightline_track::settings::TrackerKind;
-use sightline_track::trace::StepRow;
 
 use crate::command::{Command, Go};
 use crate::drawing::decimate;

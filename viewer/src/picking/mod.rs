@@ -8,11 +8,12 @@ use egui::{Button, CursorIcon, Mesh, Pos2, Rect, Shape, Stroke, Ui, UiBuilder, p
 use sightline_geometry::frames::Pixel;
 use sightline_rover::trackability::map::Cell;
 use sightline_rover::trackability::{TrackabilityLimits, TrackabilityMap, Verdict};
+use sightline_session::marks::square;
 use sightline_vision::image::PixelRect;
 
 use crate::command::{Command, Layer, Mode};
 use crate::drawing::overlay;
-use crate::drawing::overlay::{Line, Mark, Overlay, paint_words, template_quad};
+use crate::drawing::overlay::{Line, Mark, Overlay, paint_words};
 use crate::drawing::raster::Raster;
 use crate::drawing::view2d::{Canvas, Transform};
 use crate::panels::legend;
@@ -165,7 +166,7 @@ pub(crate) fn show(ui: &mut Ui, canvas: &Canvas, raster: &Raster, state: &State,
     if let Some(pixel) = state.trackability.aim {
         let overlay = Overlay::new(&canvas.painter, &canvas.transform);
         overlay.outline(
-            &template_quad(pixel, state.template_side_px(), &nalgebra::Matrix2::identity()),
+            &square(pixel, state.template_side_px(), &nalgebra::Matrix2::identity()),
             theme::accent(),
             Line::Dotted,
         );

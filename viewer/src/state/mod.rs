@@ -35,12 +35,13 @@ use serde_json::Value;
 use sightline_api::wire::{StopView, TraverseEntry, TraverseView};
 use sightline_geometry::camera::Camera;
 use sightline_session::Cursor;
+use sightline_session::step::{RunStep, StepRow};
 use sightline_session::view::{RunView, SessionView, TargetView};
 use sightline_track::limits::SettingInfo;
 use sightline_track::locate::template::history::AgainstEarlier;
 use sightline_track::settings::{Changes, Settings};
 use sightline_track::target::TrackingState;
-use sightline_track::trace::{ArrayName, StepRow, StepTrace};
+use sightline_track::trace::ArrayName;
 
 use self::calculator::Calculator;
 use self::configurations::Configurations;
@@ -260,12 +261,12 @@ impl State {
     }
 
     /// What a step saw and decided.
-    pub fn trace_at(&self, step: usize) -> Slot<'_, StepTrace> {
+    pub fn trace_at(&self, step: usize) -> Slot<'_, RunStep> {
         self.step_key(step).map_or(Slot::Absent, |key| self.cache.trace(&key))
     }
 
     /// What the cursor's step saw and decided, once it is here.
-    pub fn trace(&self) -> Option<&StepTrace> {
+    pub fn trace(&self) -> Option<&RunStep> {
         self.trace_at(self.cursor.step).ready()
     }
 

@@ -1,8 +1,8 @@
 //! Rows of a run and the words for them.
 
+use sightline_session::step::StepRow;
 use sightline_session::view::RunView;
 use sightline_track::target::TrackingState;
-use sightline_track::trace::StepRow;
 
 /// A step of a run as one line.
 pub(crate) fn row_of(run: &RunView, step: usize) -> Option<&StepRow> {

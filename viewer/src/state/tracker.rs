@@ -1,13 +1,14 @@
 //! What the run that is looked at was tracked with, and what only one of the trackers has.
 
 use sightline_geometry::camera::Camera;
+use sightline_session::step::StepRow;
 use sightline_session::view::RunView;
 use sightline_track::locate::features::FeatureEvidence;
 use sightline_track::locate::features::rows::{CloudPoint, Feature};
 use sightline_track::locate::shape_tracker::ShapeEvidence;
 use sightline_track::locate::shape_tracker::rows::{Facet, PathStep};
 use sightline_track::settings::TrackerKind;
-use sightline_track::trace::{ArrayName, StepRow, StepTrace};
+use sightline_track::trace::ArrayName;
 use sightline_vision::stereo::{AlignSettings, Alignment};
 
 use crate::cache::{Key, Slot};
@@ -33,7 +34,7 @@ impl State {
 
     /// What the feature tracker saw at the cursor's step.
     pub fn feature_evidence(&self) -> Option<&FeatureEvidence> {
-        self.trace().and_then(StepTrace::features)
+        self.trace().and_then(|trace| trace.features())
     }
 
     /// The features of the cursor's step.
@@ -70,7 +71,7 @@ impl State {
 
     /// What the shape tracker saw at the cursor's step.
     pub fn shape_evidence(&self) -> Option<&ShapeEvidence> {
-        self.trace().and_then(StepTrace::shape)
+        self.trace().and_then(|trace| trace.shape())
     }
 
     /// The aligned left camera of the cursor's step, in which surfaces are measured.

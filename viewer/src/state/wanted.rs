@@ -1,7 +1,8 @@
 //! What the page wants loaded for what it shows.
 
+use sightline_session::step::StepRow;
 use sightline_session::view::RunView;
-use sightline_track::trace::{ArrayName, StepRow};
+use sightline_track::trace::ArrayName;
 
 use crate::cache::{Eye, Key};
 use crate::state::{State, row_of};

@@ -5,13 +5,15 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Matrix6};
 use sightline_geometry::estimate::ransac::Refit;
 use sightline_geometry::frames::{Pixel, Point3};
+use sightline_session::step::RunStep;
+use sightline_session::summary::summarise;
 use sightline_track::locate::features::FeatureEvidence;
 use sightline_track::locate::features::evidence::{
     AnchorTried, Bootstrapped, CLOUD_COLUMNS, Detected, FeatureColumn, FittedMotion, MatchedFeatures, Table,
 };
 use sightline_track::locate::{Evidence, gate_kinds};
 use sightline_track::settings::{Settings, TrackerKind};
-use sightline_track::trace::{ArrayName, StepKind, StepTrace, summarise};
+use sightline_track::trace::{ArrayName, StepKind};
 use sightline_vision::image::{GrayImage, npy};
 
 use crate::cache::{Item, Key, StepKey};
@@ -35,11 +37,11 @@ const POSITION: [f64; 3] = [6.0, 0.4, 0.2];
 /// A session with one target and its run by features, at `step`, with everything of that step loaded.
 pub(crate) fn at_step(context: &egui::Context, step: usize) -> State {
     let mut state = fixture::at_step(context, step);
-    let traces: Vec<StepTrace> = (0..fixture::STOPS - 1).map(trace).collect();
+    let traces: Vec<RunStep> = (0..fixture::STOPS - 1).map(trace).collect();
     if let Some(session) = &mut state.session {
         let run = &mut session.targets[0].runs[0];
         run.settings = Settings { tracker: TrackerKind::Features, ..Settings::default() };
-        run.rows = traces.iter().map(StepTrace::row).collect();
+        run.rows = traces.iter().map(RunStep::row).collect();
         run.summary = summarise(&traces);
     }
     let Some(trace) = traces.into_iter().nth(step) else { return state };
@@ -56,7 +58,7 @@ pub(crate) fn at_step(context: &egui::Context, step: usize) -> State {
 }
 
 /// The record of a step: the designation by point stereo, then motions from the one or two stops before.
-pub(crate) fn trace(step: usize) -> StepTrace {
+pub(crate) fn trace(step: usize) -> RunStep {
     let mut trace = fixture::trace(step);
     let located = trace.located_mut().unwrap();
     let is_pick = step == 0;

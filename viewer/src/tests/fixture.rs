@@ -9,6 +9,8 @@ use sightline_geometry::estimate::drift::Drift;
 use sightline_geometry::frames::{Pixel, Point3, Pose, PoseRecord};
 use sightline_geometry::stereo_geometry::StereoGeometry;
 use sightline_session::Cursor;
+use sightline_session::step::RunStep;
+use sightline_session::summary::summarise;
 use sightline_session::view::{RunView, SessionView, TargetView};
 use sightline_track::locate::template::TemplateEvidence;
 use sightline_track::locate::template::history::AgainstEarlier;
@@ -26,9 +28,10 @@ use sightline_track::stages::point_mast::Pointing;
 use sightline_track::stages::predict::Prediction;
 use sightline_track::stages::update::Updated;
 use sightline_track::target::{Designation, Target, TrackingState};
-use sightline_track::trace::{ArrayName, StepKind, StepTrace, StepTruth, TruthKind, summarise};
+use sightline_track::trace::{ArrayName, StepKind, StepTrace};
 use sightline_vision::correlate::peak::{Peak, SecondPeak};
 use sightline_vision::image::{GrayImage, PixelRect, npy};
+use sightline_world::target_truth::{StepTruth, TruthKind};
 
 use crate::cache::{Eye, Item, Key, StepKey};
 use crate::drawing::raster::Raster;
@@ -85,13 +88,13 @@ pub(crate) fn without_target() -> State {
 /// A session with one target and its run, at `step`, with everything of that step loaded.
 pub(crate) fn at_step(context: &egui::Context, step: usize) -> State {
     let mut state = without_target();
-    let traces: Vec<StepTrace> = (0..STOPS - 1).map(trace).collect();
+    let traces: Vec<RunStep> = (0..STOPS - 1).map(trace).collect();
     let run = RunView {
         number: 0,
         fork: None,
         changes: Changes::new(),
         settings: Settings::default(),
-        rows: traces.iter().map(StepTrace::row).collect(),
+        rows: traces.iter().map(RunStep::row).collect(),
         complete: false,
         stopped: None,
         summary: summarise(&traces),
@@ -144,7 +147,7 @@ pub(crate) fn with_history(context: &egui::Context, step: usize) -> State {
 }
 
 /// Loads the record of a step of the first run.
-pub(crate) fn load(state: &mut State, trace: StepTrace) {
+pub(crate) fn load(state: &mut State, trace: RunStep) {
     let key = StepKey { session: "s1".to_owned(), target: 0, run: 0, step: trace.step };
     state.cache.arrived(Key::Trace(key), Ok(Item::Trace(Arc::new(trace))), 0.0);
 }
@@ -183,7 +186,7 @@ fn traverse() -> TraverseView {
 }
 
 /// The record of a step: the designation, two good ones, one lost, one failed.
-pub(crate) fn trace(step: usize) -> StepTrace {
+pub(crate) fn trace(step: usize) -> RunStep {
     let state = match step {
         0..3 => TrackingState::Tracking,
         3 => TrackingState::Lost { count: 1 },
@@ -218,7 +221,7 @@ pub(crate) fn trace(step: usize) -> StepTrace {
             StepKind::Tracked { predict: prediction, capture, locate, judge }
         }
     };
-    StepTrace {
+    let trace = StepTrace {
         step,
         time_s: 60.0 * step as f64,
         point_mast: Pointing {
@@ -232,18 +235,19 @@ pub(crate) fn trace(step: usize) -> StepTrace {
         },
         kind,
         update: updated(step, state, is_good, covariance, left),
-        truth: Some(StepTruth {
-            kind: TruthKind::Surface,
-            position_in_rover: Point3::from(POSITION),
-            left_pixel: Some(PIXEL.offset(0.4, 0.3)),
-            err_m: 0.02,
-            err_px: Some(if is_good { 0.5 } else { 40.0 }),
-            nees: Some(2.1),
-            magnification: 1.0 + 0.1 * step as f64,
-            tolerance_px: 5.0,
-            tracked: Some(is_good),
-        }),
-    }
+    };
+    let truth = StepTruth {
+        kind: TruthKind::Surface,
+        position_in_rover: Point3::from(POSITION),
+        left_pixel: Some(PIXEL.offset(0.4, 0.3)),
+        err_m: 0.02,
+        err_px: Some(if is_good { 0.5 } else { 40.0 }),
+        nees: Some(2.1),
+        magnification: 1.0 + 0.1 * step as f64,
+        tolerance_px: 5.0,
+        tracked: Some(is_good),
+    };
+    RunStep { trace, truth: Some(truth) }
 }
 
 fn located(is_designation: bool, is_good: bool, covariance: Matrix3<f64>) -> Located {

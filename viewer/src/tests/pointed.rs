@@ -78,7 +78,7 @@ fn before_there_is_a_target_the_stop_tells_its_cameras() {
     assert!(state.eyes().is_none());
     let key = state.stop_detail_key(0).unwrap();
     assert!(state.wanted().contains(&key), "the page asks for them");
-    let pointing = trace(0).point_mast;
+    let pointing = trace(0).trace.point_mast;
     let stop = state.stop().unwrap().clone();
     let detail = StopDetail { stop, left: pointing.left, right: pointing.right, mast: None };
     state.cache.arrived(key, Ok(Item::Stop(Arc::new(detail))), 0.0);

@@ -1,6 +1,6 @@
 //! A number that a stage declares is in the views of the page, although none of them names it.
 
-use sightline_track::records::{self, StageQuantity};
+use sightline_session::records::{self, StageQuantity};
 
 use super::{Shown, fixture};
 use crate::command::{Command, Stage};

@@ -5,8 +5,8 @@ use sightline_api::location::Anywhere;
 use sightline_api::wire::{Event, Problem, SessionEntry};
 use sightline_geometry::frames::Pixel;
 use sightline_session::Cursor;
+use sightline_session::step::StepRow;
 use sightline_session::view::RunView;
-use sightline_track::trace::StepRow;
 
 use crate::cache::{Eye, Key, Slot};
 use crate::command::{Command, Go, Mode};

@@ -3,6 +3,8 @@
 use std::sync::Arc;
 
 use nalgebra::{Matrix2, Matrix3, Vector3};
+use sightline_session::step::RunStep;
+use sightline_session::summary::summarise;
 use sightline_track::gate::{Gate, GateKind};
 use sightline_track::locate::features::FeatureEvidence;
 use sightline_track::locate::features::evidence::Table;
@@ -13,7 +15,7 @@ use sightline_track::locate::shape_tracker::evidence::{Registered, ShapeArrays};
 use sightline_track::locate::shape_tracker::surface::SurfaceSeen;
 use sightline_track::locate::{Evidence, gate_kinds};
 use sightline_track::settings::{Settings, TrackerKind};
-use sightline_track::trace::{ArrayName, StepKind, StepTrace, summarise};
+use sightline_track::trace::{ArrayName, StepKind};
 use sightline_vision::image::{GrayImage, npy};
 use sightline_vision::registration::{Failure, Method};
 
@@ -37,11 +39,11 @@ pub(crate) const HAND_OFF: usize = 4;
 /// A session with one target and its run by a tracker that asks the shape, at `step`, with everything loaded.
 pub(crate) fn at_step(context: &egui::Context, tracker: TrackerKind, step: usize) -> State {
     let mut state = fixture::at_step(context, step);
-    let traces: Vec<StepTrace> = (0..fixture::STOPS - 1).map(|step| trace(tracker, step)).collect();
+    let traces: Vec<RunStep> = (0..fixture::STOPS - 1).map(|step| trace(tracker, step)).collect();
     if let Some(session) = &mut state.session {
         let run = &mut session.targets[0].runs[0];
         run.settings = Settings { tracker, ..Settings::default() };
-        run.rows = traces.iter().map(StepTrace::row).collect();
+        run.rows = traces.iter().map(RunStep::row).collect();
         run.summary = summarise(&traces);
     }
     if let Some(traverse) = &mut state.traverse {
@@ -67,7 +69,7 @@ pub(crate) fn at_step(context: &egui::Context, tracker: TrackerKind, step: usize
 }
 
 /// The record of a step.
-pub(crate) fn trace(tracker: TrackerKind, step: usize) -> StepTrace {
+pub(crate) fn trace(tracker: TrackerKind, step: usize) -> RunStep {
     let mut trace = match tracker {
         TrackerKind::Combined => feature_run::trace(step),
         _ => fixture::trace(step),

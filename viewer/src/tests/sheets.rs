@@ -203,7 +203,7 @@ fn ten_thousand_steps_are_made_row_by_row() {
             let mut state = fixture::at_step(context, 2);
             let run = &mut state.session.as_mut().unwrap().targets[0].runs[0];
             let row = run.rows[2].clone();
-            run.rows.extend((5..10_000).map(|step| sightline_track::trace::StepRow { step, ..row.clone() }));
+            run.rows.extend((5..10_000).map(|step| sightline_session::step::StepRow { step, ..row.clone() }));
             state.perform(Command::Table(Pane::Plots));
             state
         },

@@ -4,11 +4,11 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::{Compared, Moment};
+use crate::records;
+use crate::step::RunStep;
 use sightline_geometry::error::{Error, Result};
 use sightline_record::{Kind, StageRecord};
-use sightline_track::records;
 use sightline_track::stages::judge::Gate;
-use sightline_track::trace::StepTrace;
 
 /// Numbers of all runs over the moments.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -54,7 +54,7 @@ pub(crate) fn columns(
         return Ok((Vec::new(), Vec::new()));
     }
     let is_asked = |name: &str| asked.is_none_or(|names| names.iter().any(|asked| asked == name));
-    let traces: Vec<Vec<Option<&StepTrace>>> = runs
+    let traces: Vec<Vec<Option<&RunStep>>> = runs
         .iter()
         .enumerate()
         .map(|(i, run)| moments.iter().map(|moment| run.step(moment.steps[i]?).map(AsRef::as_ref)).collect())
@@ -87,7 +87,7 @@ pub(crate) fn columns(
 }
 
 /// The columns of all gates that any step has.
-fn gates(traces: &[Vec<Option<&StepTrace>>], is_asked: impl Fn(&str) -> bool) -> Vec<Column> {
+fn gates(traces: &[Vec<Option<&RunStep>>], is_asked: impl Fn(&str) -> bool) -> Vec<Column> {
     let all = || traces.iter().flatten().flatten().filter_map(|trace| trace.verdict());
     let mut names: Vec<(u8, &str, &str)> = all()
         .flat_map(|verdict| &verdict.gates)
@@ -102,7 +102,7 @@ fn gates(traces: &[Vec<Option<&StepTrace>>], is_asked: impl Fn(&str) -> bool) ->
             if !is_asked(&name) {
                 continue;
             }
-            let of = |trace: &Option<&StepTrace>| {
+            let of = |trace: &Option<&RunStep>| {
                 value((*trace)?.verdict()?.gates.iter().find(|gate| gate.name == gate_name)?)
             };
             let values = traces.iter().map(|run| run.iter().map(of).collect()).collect();
@@ -141,7 +141,7 @@ impl WordColumn {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sightline_track::trace::StepRow;
+    use crate::step::StepRow;
 
     #[test]
     fn every_field_of_a_line_is_a_column() {

@@ -13,9 +13,9 @@ use utoipa::ToSchema;
 use super::differ::{self, Difference, Tolerance};
 use super::stages::{PLACES, Place};
 use super::{Compared, Moment, RunName};
+use crate::step::RunStep;
 use sightline_record::{ArrayDecl, ArrayKind, ArrayView};
 use sightline_track::records;
-use sightline_track::trace::StepTrace;
 
 /// The most values of a stage that are listed.
 const VALUES_MAX: usize = 40;
@@ -78,7 +78,7 @@ pub(crate) fn first(
 }
 
 /// The first stage in which two steps differ.
-pub(crate) fn of_step(a: &StepTrace, b: &StepTrace, tolerance: &Tolerance) -> Option<Divergence> {
+pub(crate) fn of_step(a: &RunStep, b: &RunStep, tolerance: &Tolerance) -> Option<Divergence> {
     PLACES.iter().find_map(|place| {
         let mut values = of_place(place, a, b, tolerance);
         let count = values.len();
@@ -95,7 +95,7 @@ pub(crate) fn of_step(a: &StepTrace, b: &StepTrace, tolerance: &Tolerance) -> Op
 }
 
 /// The values of a stage that differ, the most telling first.
-fn of_place(place: &Place, a: &StepTrace, b: &StepTrace, tolerance: &Tolerance) -> Vec<Difference> {
+fn of_place(place: &Place, a: &RunStep, b: &RunStep, tolerance: &Tolerance) -> Vec<Difference> {
     let mut values = differ::differences(&(place.record)(a), &(place.record)(b), tolerance);
     values.extend(place.arrays().filter_map(|array| of_array(array, a, b, tolerance)));
     let rank = |value: &Difference| {
@@ -109,7 +109,7 @@ fn of_place(place: &Place, a: &StepTrace, b: &StepTrace, tolerance: &Tolerance) 
 }
 
 /// How an array differs: in size, or in the first value that does.
-fn of_array(array: &ArrayDecl, a: &StepTrace, b: &StepTrace, tolerance: &Tolerance) -> Option<Difference> {
+fn of_array(array: &ArrayDecl, a: &RunStep, b: &RunStep, tolerance: &Tolerance) -> Option<Difference> {
     let (name, unit) = (array.name.as_ref(), array.unit.symbol());
     let path = format!("arrays.{name}");
     let different = |a: Value, b: Value, delta: Option<f64>, path: String| {

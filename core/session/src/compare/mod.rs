@@ -31,9 +31,9 @@ pub use self::columns::{Column, WordColumn};
 pub use self::differ::{Difference, Tolerance};
 pub use self::divergence::{Divergence, FirstDivergence};
 use super::{Run, Session};
+use crate::step::RunStep;
 use sightline_geometry::error::{Error, Result};
 use sightline_track::settings::Settings;
-use sightline_track::trace::StepTrace;
 
 /// The most runs that are compared at a time: there are four marks for them.
 pub const RUNS_MAX: usize = 4;
@@ -109,7 +109,7 @@ pub struct Compared {
     /// Its configuration.
     pub settings: Arc<Settings>,
     /// Its steps, the designation first.
-    pub steps: Vec<Arc<StepTrace>>,
+    pub steps: Vec<Arc<RunStep>>,
 }
 
 impl Compared {
@@ -119,7 +119,7 @@ impl Compared {
     }
 
     /// The record of a stop, where it was computed.
-    pub fn step(&self, step: usize) -> Option<&Arc<StepTrace>> {
+    pub fn step(&self, step: usize) -> Option<&Arc<RunStep>> {
         let first = self.steps.first()?.step;
         self.steps.get(step.checked_sub(first)?)
     }

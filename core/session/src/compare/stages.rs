@@ -2,9 +2,9 @@
 
 use serde_json::{Value, json};
 
+use crate::records;
+use crate::step::RunStep;
 use sightline_record::ArrayDecl;
-use sightline_track::records;
-use sightline_track::trace::StepTrace;
 
 /// A stage of a step, or a step of `locate`, and how to get what it returned.
 pub(crate) struct Place {
@@ -15,7 +15,7 @@ pub(crate) struct Place {
     /// Fields that tell most, the most telling first: the beginnings of their paths.
     pub telling: &'static [&'static str],
     /// What it returned; null where it was not reached.
-    pub record: fn(&StepTrace) -> Value,
+    pub record: fn(&RunStep) -> Value,
 }
 
 impl Place {
@@ -81,16 +81,12 @@ pub(crate) const PLACES: [Place; 23] = [
 const fn whole(
     stage: &'static str,
     telling: &'static [&'static str],
-    record: fn(&StepTrace) -> Value,
+    record: fn(&RunStep) -> Value,
 ) -> Place {
     Place { stage, part: None, telling, record }
 }
 
-const fn part(
-    word: &'static str,
-    telling: &'static [&'static str],
-    record: fn(&StepTrace) -> Value,
-) -> Place {
+const fn part(word: &'static str, telling: &'static [&'static str], record: fn(&RunStep) -> Value) -> Place {
     Place { stage: "locate", part: Some(word), telling, record }
 }
 
@@ -99,18 +95,18 @@ fn json(value: &impl serde::Serialize) -> Value {
 }
 
 /// A stop whose files are damaged has no record of `capture`, but a fault.
-fn capture(trace: &StepTrace) -> Value {
+fn capture(trace: &RunStep) -> Value {
     match trace.fault() {
         Some(fault) => json!({ "fault": fault }),
         None => json(&trace.capture()),
     }
 }
 
-fn tracker(trace: &StepTrace) -> Option<&'static str> {
+fn tracker(trace: &RunStep) -> Option<&'static str> {
     trace.located().map(|located| located.evidence.tracker().word())
 }
 
-fn match_features(trace: &StepTrace) -> Value {
+fn match_features(trace: &RunStep) -> Value {
     let Some(evidence) = trace.features() else { return Value::Null };
     let mut record = json(&evidence.match_features);
     if let Some(fields) = record.as_object_mut() {
@@ -119,7 +115,7 @@ fn match_features(trace: &StepTrace) -> Value {
     record
 }
 
-fn coarse(trace: &StepTrace) -> Value {
+fn coarse(trace: &RunStep) -> Value {
     let found = trace.shape().and_then(|evidence| evidence.registration.as_ref());
     found.map_or(Value::Null, |found| {
         json!({
@@ -131,7 +127,7 @@ fn coarse(trace: &StepTrace) -> Value {
 }
 
 /// What `locate` returned as a whole; its steps have records of their own.
-fn located(trace: &StepTrace) -> Value {
+fn located(trace: &RunStep) -> Value {
     let mut record = json(&trace.located());
     if let Some(fields) = record.as_object_mut() {
         fields.remove("evidence");

@@ -41,6 +41,7 @@ use serde_json::Value;
 use utoipa::ToSchema;
 
 use self::trials::Trials;
+use crate::step::{RunStep, StepRow};
 use crate::track::Drive;
 use crate::what_if::{Base, WhatIf};
 use sightline_geometry::error::{Error, Result};
@@ -48,7 +49,6 @@ use sightline_geometry::frames::Pixel;
 use sightline_track::limits::SettingInfo;
 use sightline_track::settings::Changes;
 use sightline_track::target::TrackingState;
-use sightline_track::trace::{StepRow, StepTrace};
 
 /// What a change is to bring about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -272,6 +272,6 @@ fn changes_of(changes: &[SettingChange]) -> Changes {
 }
 
 /// Whether a step is accepted.
-fn is_accepted(trace: &StepTrace) -> bool {
+fn is_accepted(trace: &RunStep) -> bool {
     trace.verdict().is_some_and(|verdict| verdict.accepted)
 }

@@ -3,13 +3,13 @@
 
 use super::trials::{Reach, Trials};
 use super::{Finding, Moved};
+use crate::step::RunStep;
 use crate::track::Drive;
 use sightline_geometry::error::Result;
 use sightline_geometry::frames::Pixel;
 use sightline_track::limits::Domain;
 use sightline_track::locate::Evidence;
 use sightline_track::settings::{Changes, Settings};
-use sightline_track::trace::StepTrace;
 
 /// How narrow the bracket of the way becomes, px.
 const BRACKET_PX: f64 = 0.25;
@@ -55,13 +55,13 @@ fn found_far<D: Drive>(trials: &mut Trials<'_, D>) -> Result<Option<(Pixel, Stri
     };
     let changes = Changes::from([("search_window_px".to_owned(), widest.into())]);
     let wide = trials.run(&changes, None)?;
-    let matched = wide.as_ref().and_then(StepTrace::template).and_then(|e| e.match_template.as_ref());
+    let matched = wide.as_ref().and_then(|trace| trace.template()).and_then(|e| e.match_template.as_ref());
     let because = || format!("a search window of {widest} px finds the best match that way");
     Ok(matched.map(|matched| (matched.pixel, because())))
 }
 
 /// The side of a search window that holds the whole left image, as far as the setting goes, px.
-fn widest_window(settings: &Settings, recorded: &StepTrace) -> Option<u32> {
+fn widest_window(settings: &Settings, recorded: &RunStep) -> Option<u32> {
     let [width, height] = recorded.capture()?.left_size;
     let table = Settings::table();
     let info = table.iter().find(|info| info.key == "search_window_px")?;
@@ -71,7 +71,7 @@ fn widest_window(settings: &Settings, recorded: &StepTrace) -> Option<u32> {
 }
 
 /// How near the end of a way comes, where it ends, and the step from there.
-type Way = (Reach, Pixel, StepTrace);
+type Way = (Reach, Pixel, RunStep);
 
 /// The first place on the way to `to` from which the step turns, with how near it comes; none where not even `to` does.
 fn on_the_way<D: Drive>(trials: &mut Trials<'_, D>, from: Pixel, to: Pixel) -> Result<Option<Way>> {

@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 
 use super::trials::{Reach, Trials};
+use crate::step::RunStep;
 use crate::track::Drive;
 use sightline_geometry::error::Result;
 use sightline_track::limits::{Domain, SettingInfo};
 use sightline_track::settings::Changes;
-use sightline_track::trace::StepTrace;
 
 /// The first change of a real number, as a share of its value.
 const FIRST_SHARE: f64 = 0.01;
@@ -21,7 +21,7 @@ const DOUBLINGS: u32 = 16;
 const BRACKET: f64 = 0.02;
 
 /// A value of a setting with the step that was computed with it.
-pub(super) type Verified = (Value, StepTrace);
+pub(super) type Verified = (Value, RunStep);
 
 /// The values that a numeric setting may take about its present one.
 #[derive(Clone, Copy, Debug)]

@@ -99,7 +99,7 @@ impl TruthSource for Rendered {
 /// A run of which only the last step has the settings under test.
 struct Staged {
     world: Rendered,
-    steps: Vec<StepTrace>,
+    steps: Vec<RunStep>,
     settings: Settings,
 }
 
@@ -128,7 +128,7 @@ impl Staged {
         look(&self.world, self.base(), &AtomicBool::new(false), &mut |_| {}).unwrap()
     }
 
-    fn with(&self, key: &str, value: Value) -> StepTrace {
+    fn with(&self, key: &str, value: Value) -> RunStep {
         let what_if = WhatIf { settings: Changes::from([(key.to_owned(), value)]), ..WhatIf::default() };
         try_step(&self.world, self.base(), &what_if).unwrap()
     }

@@ -3,6 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::{Finding, Goal, Moved, Outcome, SettingChange, is_accepted, wording};
+use crate::step::RunStep;
 use crate::track::Drive;
 use crate::what_if::{Base, WhatIf, try_step};
 use crate::why::gates::{self, Margin};
@@ -11,7 +12,6 @@ use sightline_geometry::frames::Pixel;
 use sightline_track::limits::Limits;
 use sightline_track::settings::Changes;
 use sightline_track::stages::judge;
-use sightline_track::trace::StepTrace;
 
 /// How near a trial came to the goal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -47,11 +47,7 @@ impl<'a, D: Drive> Trials<'a, D> {
     }
 
     /// The step with changes; none where they are no settings.
-    pub(super) fn run(
-        &mut self,
-        changes: &Changes,
-        prediction_px: Option<Pixel>,
-    ) -> Result<Option<StepTrace>> {
+    pub(super) fn run(&mut self, changes: &Changes, prediction_px: Option<Pixel>) -> Result<Option<RunStep>> {
         self.check()?;
         self.runs += 1;
         let what_if = WhatIf { settings: changes.clone(), prediction_px, arrays: Vec::new() };
@@ -62,7 +58,7 @@ impl<'a, D: Drive> Trials<'a, D> {
     }
 
     /// How near a computed step came.
-    pub(super) fn reach(&self, trace: &StepTrace) -> Reach {
+    pub(super) fn reach(&self, trace: &RunStep) -> Reach {
         let tracked = trace.truth.as_ref().and_then(|truth| truth.tracked);
         self.reach_of(is_accepted(trace), tracked)
     }
@@ -105,7 +101,7 @@ impl<'a, D: Drive> Trials<'a, D> {
         changes: Vec<SettingChange>,
         moved: Option<Moved>,
         relative: f64,
-        (trace, runs): (&StepTrace, usize),
+        (trace, runs): (&RunStep, usize),
     ) -> Finding {
         let outcome = match (is_accepted(trace), trace.truth.as_ref().and_then(|truth| truth.tracked)) {
             (false, _) => Outcome::Rejected,

@@ -3,11 +3,11 @@
 use serde_json::Value;
 
 use super::{Finding, Outcome};
+use crate::step::RunStep;
 use crate::why::words::{number, signed};
-use sightline_track::trace::StepTrace;
 
 /// What changes, what came of it, and how sure that is.
-pub(super) fn sentence(finding: &Finding, trace: &StepTrace) -> String {
+pub(super) fn sentence(finding: &Finding, trace: &RunStep) -> String {
     let mut what: Vec<String> = finding
         .changes
         .iter()

@@ -1,7 +1,7 @@
 //! The catalogue of names: what an expression can speak of, with unit, meaning and stage. It drives checking, completion
 //! and documentation.
 //!
-//! A name is looked up among the short names, then the columns of [`StepRow`], then the fields of [`StepTrace`], then the
+//! A name is looked up among the short names, then the columns of [`StepRow`], then the fields of [`RunStep`], then the
 //! quantities that the stages declare.
 
 use std::collections::BTreeMap;
@@ -14,10 +14,10 @@ use super::recorded;
 use super::schema::{Entry, Shape, fields_of};
 use super::tree::{Segment, path_text};
 use super::unit::Unit;
+use crate::records;
+use crate::step::{RunStep, StepRow};
 use sightline_record::GateDecl;
-use sightline_track::records;
 use sightline_track::target::TrackingState;
-use sightline_track::trace::{StepRow, StepTrace};
 
 /// Short names of quantities with their paths in the record, which give unit and meaning.
 pub(super) const SHORT: [(&str, &str); 11] = [
@@ -142,7 +142,7 @@ impl Catalogue {
         if let Some(state) = row.get_mut("state") {
             state.shape = Shape::Word(states.map(|state| state.word().to_owned()).to_vec());
         }
-        let mut record = fields_of::<StepTrace>(recorded::of_field);
+        let mut record = fields_of::<RunStep>(recorded::of_field);
         let stages = recorded::stages();
         for (stage, declared) in &stages {
             if let Some(entry) = record.get_mut(stage) {

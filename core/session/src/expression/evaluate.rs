@@ -11,7 +11,7 @@ use super::catalogue::{Place, Root};
 use super::extract::{Value, extract};
 use super::recorded;
 use super::tree::Operator;
-use sightline_track::trace::{StepRow, StepTrace};
+use crate::step::{RunStep, StepRow};
 
 /// A function of numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,7 +57,7 @@ pub(super) enum Code {
 }
 
 /// The runs of a target, each with its steps so far, the designation first.
-pub type Runs<'a> = [&'a [Arc<StepTrace>]];
+pub type Runs<'a> = [&'a [Arc<RunStep>]];
 
 /// One step of one run.
 pub(super) struct Moment<'a> {
@@ -75,7 +75,7 @@ impl<'a> Moment<'a> {
         Some(Self { runs, run, index, row: OnceCell::new(), before: OnceCell::new() })
     }
 
-    fn trace(&self) -> &'a StepTrace {
+    fn trace(&self) -> &'a RunStep {
         &self.runs[self.run][self.index]
     }
 

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use crate::records::{self, StageQuantity};
+use crate::step::RunStep;
 use sightline_record::{Kind, Quantity, StageSchema, Value as Recorded};
-use sightline_track::records::{self, StageQuantity};
-use sightline_track::trace::StepTrace;
 
 use super::extract::Value;
 use super::schema::{Declared, Entry, Shape};
@@ -77,7 +77,7 @@ fn of_quantity(quantity: &Quantity) -> Entry {
 }
 
 /// The value of a declared quantity: the stage, the name of the quantity, and a component where it has some.
-pub(super) fn read(trace: &StepTrace, path: &[Segment]) -> Value {
+pub(super) fn read(trace: &RunStep, path: &[Segment]) -> Value {
     let names: Option<Vec<&str>> = path.iter().map(field).collect();
     let found = names.and_then(|names| {
         let name = names.join(".");

@@ -4,14 +4,14 @@ use std::sync::{Arc, LazyLock};
 
 use super::complete::complete;
 use super::*;
+use crate::step::RunStep;
 use crate::track;
 use sightline_geometry::frames::{Pixel, Pose};
 use sightline_testing::{PlaneWorld, Trouble};
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
-use sightline_track::trace::StepTrace;
 
-type Steps = Vec<Arc<StepTrace>>;
+type Steps = Vec<Arc<RunStep>>;
 
 /// Six stops towards the plane; at stop 3 both eyes are covered, at stop 5 the files are missing.
 fn run(changes: &[(&str, serde_json::Value)]) -> Steps {
@@ -28,7 +28,7 @@ fn run(changes: &[(&str, serde_json::Value)]) -> Steps {
 pub(super) static RUNS: LazyLock<[Steps; 2]> =
     LazyLock::new(|| [run(&[]), run(&[("template_size_px", serde_json::json!(11))])]);
 
-fn runs() -> [&'static [Arc<StepTrace>]; 2] {
+fn runs() -> [&'static [Arc<RunStep>]; 2] {
     [RUNS[0].as_slice(), RUNS[1].as_slice()]
 }
 
@@ -51,7 +51,7 @@ fn refused(text: &str) -> Refused {
     }
 }
 
-fn numbers(steps: impl Fn(&StepTrace) -> Option<f64>) -> Vec<Value> {
+fn numbers(steps: impl Fn(&RunStep) -> Option<f64>) -> Vec<Value> {
     RUNS[0].iter().map(|trace| steps(trace).map_or(Value::Missing, Value::Number)).collect()
 }
 
@@ -67,26 +67,26 @@ fn a_column_is_the_row_s_value_and_missing_where_the_row_has_none() {
 
 #[test]
 fn a_path_reaches_any_value_of_any_stage() {
-    let evidence = |trace: &StepTrace| Some(trace.template()?.match_template.as_ref()?.peak.score);
+    let evidence = |trace: &RunStep| Some(trace.template()?.match_template.as_ref()?.peak.score);
     assert_eq!(values("locate.evidence.match_template.peak.score"), numbers(evidence));
-    let margin = |trace: &StepTrace| trace.verdict()?.gates.iter().find(|gate| gate.name == "ncc")?.margin;
+    let margin = |trace: &RunStep| trace.verdict()?.gates.iter().find(|gate| gate.name == "ncc")?.margin;
     assert_eq!(values("judge.gates.ncc.margin"), numbers(margin));
-    let covariance = |trace: &StepTrace| Some(trace.update.target.covariance_in_rover[(0, 1)]);
+    let covariance = |trace: &RunStep| Some(trace.update.target.covariance_in_rover[(0, 1)]);
     assert_eq!(values("covariance_in_rover.xy"), numbers(covariance));
-    let taken = |trace: &StepTrace| Some(trace.update.target.memory.template()?.appearance.step as f64);
+    let taken = |trace: &RunStep| Some(trace.update.target.memory.template()?.appearance.step as f64);
     assert_eq!(values("update.target.appearance.step"), numbers(taken));
     assert_eq!(values("judge.gates[0].margin"), numbers(margin));
     let second =
-        |trace: &StepTrace| Some(trace.template()?.match_template.as_ref()?.second_peak.as_ref()?.ratio);
+        |trace: &RunStep| Some(trace.template()?.match_template.as_ref()?.second_peak.as_ref()?.ratio);
     assert_eq!(values("peak_ratio"), numbers(second));
-    let x = |trace: &StepTrace| Some(trace.located()?.left_pixel?.x);
+    let x = |trace: &RunStep| Some(trace.located()?.left_pixel?.x);
     assert_eq!(values("locate.left_pixel.x"), numbers(x));
-    let forward = |trace: &StepTrace| Some(trace.update.target.position_in_rover.x);
+    let forward = |trace: &RunStep| Some(trace.update.target.position_in_rover.x);
     assert_eq!(values("update.target.position_in_rover.x"), numbers(forward));
     assert_eq!(values("position_in_rover[0]"), numbers(forward));
-    let travelled = |trace: &StepTrace| Some(trace.prediction()?.step_length_m);
+    let travelled = |trace: &RunStep| Some(trace.prediction()?.step_length_m);
     assert_eq!(values("predict.step_length_m"), numbers(travelled));
-    let gates = |trace: &StepTrace| Some(trace.verdict()?.gates.len() as f64);
+    let gates = |trace: &RunStep| Some(trace.verdict()?.gates.len() as f64);
     assert_eq!(values("count(judge.gates)"), numbers(gates));
     assert_eq!(values("update.state.state")[1], Value::Word("tracking".to_owned()));
     assert_eq!(values("time_s"), numbers(|trace| Some(trace.time_s)));

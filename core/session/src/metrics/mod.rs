@@ -19,8 +19,9 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use self::uncertainty::Uncertainty;
+use crate::step::RunStep;
 use sightline_track::target::TrackingState;
-use sightline_track::trace::{StepTrace, StepTruth, TruthKind};
+use sightline_world::target_truth::{StepTruth, TruthKind};
 
 /// What the protocol is called.
 pub(crate) const PROTOCOL: &str =
@@ -112,7 +113,7 @@ pub struct Excluded {
 
 /// A step that counts.
 struct Judged<'a> {
-    trace: &'a StepTrace,
+    trace: &'a RunStep,
     truth: Option<&'a StepTruth>,
     is_tracking: bool,
 }
@@ -134,9 +135,9 @@ impl Judged<'_> {
 }
 
 /// The metrics of a run.
-pub fn metrics(steps: &[Arc<StepTrace>]) -> RunMetrics {
+pub fn metrics(steps: &[Arc<RunStep>]) -> RunMetrics {
     let later = steps.iter().skip(1).map(AsRef::as_ref);
-    let (faulty, good): (Vec<&StepTrace>, Vec<&StepTrace>) = later.partition(|trace| trace.fault().is_some());
+    let (faulty, good): (Vec<&RunStep>, Vec<&RunStep>) = later.partition(|trace| trace.fault().is_some());
     let judged: Vec<Judged<'_>> = good
         .into_iter()
         .map(|trace| Judged {
@@ -164,7 +165,7 @@ pub fn metrics(steps: &[Arc<StepTrace>]) -> RunMetrics {
     }
 }
 
-fn excluded(pick: Option<&StepTrace>, faulty: &[&StepTrace], judged: &[Judged<'_>]) -> Vec<Excluded> {
+fn excluded(pick: Option<&RunStep>, faulty: &[&RunStep], judged: &[Judged<'_>]) -> Vec<Excluded> {
     let of =
         |of: &str, why: &str, steps: Vec<usize>| Excluded { of: of.to_owned(), why: why.to_owned(), steps };
     let those =

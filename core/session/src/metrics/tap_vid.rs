@@ -11,7 +11,7 @@
 //! is the first estimate carried along, nobody knows when the point is hidden, and the protocol does not apply.
 
 use super::{Judged, Metric, THRESHOLDS_PX};
-use sightline_track::trace::TruthKind;
+use sightline_world::target_truth::TruthKind;
 
 const NAMES: [&str; 2] = ["average_jaccard", "occlusion_accuracy"];
 

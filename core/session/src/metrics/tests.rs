@@ -23,7 +23,7 @@ fn said(state: TrackingState, err_px: Option<f64>, err_m: f64) -> Said {
 }
 
 /// A tracked run of the plane with these truths written over it.
-fn run(later: &[Said]) -> Vec<Arc<StepTrace>> {
+fn run(later: &[Said]) -> Vec<Arc<RunStep>> {
     let world = PlaneWorld::new(vec![Pose::identity(), Pose::translation(0.3, 0.0, 0.0)]);
     let designation = Designation { step: 0, pixel: Pixel::new(128.0, 120.0) };
     let [first, second] = track::run(&world, designation, &Settings::default()).unwrap().try_into().unwrap();

@@ -20,8 +20,8 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use utoipa::ToSchema;
 
 use super::Metric;
+use crate::step::RunStep;
 use sightline_track::target::TrackingState;
-use sightline_track::trace::StepTrace;
 
 /// Degrees of freedom of a position in space.
 const OF_POSITION: f64 = 3.0;
@@ -86,7 +86,7 @@ pub struct Coverage {
 }
 
 /// The consistency of the steps that count.
-pub(super) fn uncertainty<'a>(steps: impl Iterator<Item = &'a StepTrace>) -> Uncertainty {
+pub(super) fn uncertainty<'a>(steps: impl Iterator<Item = &'a RunStep>) -> Uncertainty {
     let (mut errors, mut innovations) = (Vec::new(), Vec::new());
     for trace in steps {
         let value = |value: f64| StepValue { step: trace.step, value };
@@ -100,7 +100,7 @@ pub(super) fn uncertainty<'a>(steps: impl Iterator<Item = &'a StepTrace>) -> Unc
 }
 
 /// The squared Mahalanobis distance of an accepted match from its prediction.
-pub fn nis(trace: &StepTrace) -> Option<f64> {
+pub fn nis(trace: &RunStep) -> Option<f64> {
     if trace.update.state != TrackingState::Tracking {
         return None;
     }

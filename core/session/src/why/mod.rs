@@ -37,12 +37,12 @@ use utoipa::ToSchema;
 
 pub use self::node::{Node, Origin, OriginKind};
 pub use self::recorded::is_explained;
+use crate::records::StageQuantity;
+use crate::step::RunStep;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::{Pixel, Pose};
-use sightline_track::records::StageQuantity;
 use sightline_track::settings::Settings;
 use sightline_track::stages::judge::Gate;
-use sightline_track::trace::StepTrace;
 
 /// How deep a tree goes; what lies deeper can be asked for by name.
 const DEPTH: usize = 12;
@@ -70,9 +70,9 @@ impl Sources for sightline_recordings::Traverse {
 #[derive(Clone, Copy)]
 pub struct Book<'a> {
     /// The step.
-    pub trace: &'a StepTrace,
+    pub trace: &'a RunStep,
     /// The step before it; none at the designation.
-    pub before: Option<&'a StepTrace>,
+    pub before: Option<&'a RunStep>,
     /// The run's configuration.
     pub settings: &'a Settings,
     /// Where a person put the prediction of this step in the left image, px.

@@ -1,7 +1,7 @@
 //! Quantities that the stages declare: value, unit, formula and inputs as declared, unless another file has words for one.
 
+use crate::records::{self, StageQuantity};
 use sightline_record::{StageSchema, Value};
-use sightline_track::records::{self, StageQuantity};
 
 use super::Book;
 use super::node::{Draft, OriginKind};

@@ -7,12 +7,12 @@
 use super::gates::by_margin;
 use super::template::edge_distance_px;
 use super::words::{number, told_apart};
+use crate::step::RunStep;
 use sightline_geometry::frames::Pixel;
 use sightline_track::locate::Evidence;
 use sightline_track::settings::Settings;
 use sightline_track::stages::judge::{Gate, Verdict};
 use sightline_track::target::TrackingState;
-use sightline_track::trace::StepTrace;
 
 /// A peak so near to the rim may belong to one beyond it, px.
 const AT_RIM_PX: f64 = 3.0;
@@ -21,7 +21,7 @@ const AT_RIM_PX: f64 = 3.0;
 const AMBIGUOUS: f64 = 0.95;
 
 /// The verdict in words; `before` is the step before, where there is one.
-pub fn verdict(trace: &StepTrace, before: Option<&StepTrace>, settings: &Settings) -> String {
+pub fn verdict(trace: &RunStep, before: Option<&RunStep>, settings: &Settings) -> String {
     if let Some(fault) = trace.fault() {
         return format!("Nothing could be judged, since the files of this stop are at fault: {fault}.");
     }
@@ -43,7 +43,7 @@ pub fn verdict(trace: &StepTrace, before: Option<&StepTrace>, settings: &Setting
 }
 
 /// What was decided, with the criteria that decided it.
-fn decision(verdict: &Verdict, trace: &StepTrace) -> String {
+fn decision(verdict: &Verdict, trace: &RunStep) -> String {
     let margins = by_margin(&verdict.gates);
     let failed: Vec<String> = margins
         .iter()
@@ -83,7 +83,7 @@ fn failed_words(gate: &Gate) -> String {
 }
 
 /// What is odd about the peak.
-fn peak_words(trace: &StepTrace, settings: &Settings, accepted: bool) -> Vec<String> {
+fn peak_words(trace: &RunStep, settings: &Settings, accepted: bool) -> Vec<String> {
     let located = trace.located().map(|located| &located.evidence);
     let Some(Evidence::Template(evidence)) = located else { return Vec::new() };
     let Some(matched) = evidence.match_template.as_ref().filter(|_| !accepted) else { return Vec::new() };
@@ -109,7 +109,7 @@ fn peak_words(trace: &StepTrace, settings: &Settings, accepted: bool) -> Vec<Str
 }
 
 /// How far off the prediction was, by the truth where that is known, else by the match.
-fn prediction_words(trace: &StepTrace, settings: &Settings, accepted: bool) -> Option<String> {
+fn prediction_words(trace: &RunStep, settings: &Settings, accepted: bool) -> Option<String> {
     let predicted = trace.point_mast.predicted_left.filter(|_| !accepted && trace.prediction().is_some())?;
     let template = trace.located().and_then(|located| match &located.evidence {
         Evidence::Template(evidence) => evidence.match_template.as_ref(),
@@ -133,7 +133,7 @@ fn prediction_words(trace: &StepTrace, settings: &Settings, accepted: bool) -> O
 }
 
 /// That it was lost before already.
-fn lost_before(verdict: &Verdict, before: Option<&StepTrace>) -> Option<String> {
+fn lost_before(verdict: &Verdict, before: Option<&RunStep>) -> Option<String> {
     match (verdict.state_before, verdict.good) {
         (TrackingState::Lost { count: 1 }, false) => Some("the update before was bad already".to_owned()),
         (TrackingState::Lost { count }, false) => {
@@ -149,7 +149,7 @@ fn lost_before(verdict: &Verdict, before: Option<&StepTrace>) -> Option<String> 
 }
 
 /// What the truth says of the decision.
-fn truth_words(trace: &StepTrace, verdict: &Verdict) -> Option<String> {
+fn truth_words(trace: &RunStep, verdict: &Verdict) -> Option<String> {
     let truth = trace.truth.as_ref()?;
     let (err_px, tolerance_px) = (truth.err_px?, truth.tolerance_px);
     let [err, tolerance] = told_apart(err_px, tolerance_px);

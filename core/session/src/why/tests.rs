@@ -29,7 +29,7 @@ fn world() -> PlaneWorld {
     world
 }
 
-fn run(changes: &[(&str, serde_json::Value)]) -> (PlaneWorld, Vec<StepTrace>, Settings) {
+fn run(changes: &[(&str, serde_json::Value)]) -> (PlaneWorld, Vec<RunStep>, Settings) {
     let changes: Changes = changes.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect();
     let (world, settings) = (world(), Settings::default().with(&changes).unwrap());
     let designation = Designation { step: 0, pixel: Pixel::new(118.3, 131.6) };
@@ -37,7 +37,7 @@ fn run(changes: &[(&str, serde_json::Value)]) -> (PlaneWorld, Vec<StepTrace>, Se
     (world, steps, settings)
 }
 
-fn book<'a>(world: &'a PlaneWorld, steps: &'a [StepTrace], settings: &'a Settings, step: usize) -> Book<'a> {
+fn book<'a>(world: &'a PlaneWorld, steps: &'a [RunStep], settings: &'a Settings, step: usize) -> Book<'a> {
     let before = step.checked_sub(1).map(|before| &steps[before]);
     Book { trace: &steps[step], before, settings, prediction_px: None, sources: world }
 }

@@ -5,8 +5,8 @@ use std::sync::atomic::AtomicBool;
 
 use sightline_geometry::error::Error;
 use sightline_session::Run;
-use sightline_track::records;
-use sightline_track::trace::{StepRow, StepTrace};
+use sightline_session::records;
+use sightline_session::step::{RunStep, StepRow};
 
 use super::{arrays, page, step_path, values};
 use crate::exports::{Part, Source, note_html, picture, run_letter};
@@ -99,7 +99,7 @@ fn events(rows: &[StepRow]) -> Vec<usize> {
 }
 
 /// State and most important numbers in a sentence.
-fn sentence(trace: &StepTrace) -> String {
+fn sentence(trace: &RunStep) -> String {
     let row = trace.row();
     let good = if trace.update.state.is_lost() { "bad" } else { "good" };
     let state = picture::state_words(trace).to_lowercase();
@@ -119,7 +119,7 @@ fn sentence(trace: &StepTrace) -> String {
 }
 
 /// The close-up with its marks, and both images of the stop.
-fn pictures(source: &Source, run: &Run, trace: &StepTrace, cancel: &AtomicBool) -> ApiResult<String> {
+fn pictures(source: &Source, run: &Run, trace: &RunStep, cancel: &AtomicBool) -> ApiResult<String> {
     let left = match source.images(trace.step, cancel) {
         Err(Error::Cancelled) => return Err(Error::Cancelled.into()),
         images => images.ok().map(|[left, _]| left),
@@ -159,7 +159,7 @@ fn pictures(source: &Source, run: &Run, trace: &StepTrace, cancel: &AtomicBool) 
 }
 
 /// Every criterion with value, limit and margin.
-fn verdict(trace: &StepTrace) -> String {
+fn verdict(trace: &RunStep) -> String {
     let mut html = "<h2>Verdict</h2>\n".to_owned();
     let Some(verdict) = trace.verdict() else {
         html.push_str(
@@ -210,7 +210,7 @@ fn verdict(trace: &StepTrace) -> String {
 const LEFT_OUT: [&str; 4] = ["left", "right", "camera", "gates"];
 
 /// The record of every stage; of the steps of `locate` those that were reached.
-fn stages(trace: &StepTrace) -> String {
+fn stages(trace: &RunStep) -> String {
     let mut html = "<h2>Stages</h2>\n".to_owned();
     for stage in records::stages() {
         let schema = stage.schema();
@@ -235,7 +235,7 @@ fn stages(trace: &StepTrace) -> String {
 }
 
 /// The comparison with the truth.
-fn truth(trace: &StepTrace) -> String {
+fn truth(trace: &RunStep) -> String {
     let mut html = "<h2>Error against the truth</h2>\n".to_owned();
     match records::stage("truth").filter(|truth| truth.is_reached(trace)) {
         Some(truth) => {

@@ -3,14 +3,14 @@
 use serde_json::Value;
 use sightline_record::{Stage, Unit};
 use sightline_session::format;
-use sightline_track::records;
-use sightline_track::trace::StepTrace;
+use sightline_session::records;
+use sightline_session::step::RunStep;
 
 /// Lists of more numbers than these are counted, not listed.
 const MOST_LISTED: usize = 9;
 
 /// The quantities of a stage, then the rest of its evidence without the fields called `without`, at any depth.
-pub(super) fn rows(stage: &Stage<StepTrace>, trace: &StepTrace, without: &[&str]) -> Vec<Vec<String>> {
+pub(super) fn rows(stage: &Stage<RunStep>, trace: &RunStep, without: &[&str]) -> Vec<Vec<String>> {
     let schema = stage.schema();
     let row = |(index, quantity): (usize, &sightline_record::Quantity)| {
         let value = serde_json::to_value(stage.value(trace, index)).unwrap_or_default();

@@ -4,8 +4,8 @@ use egui::{CollapsingHeader, Grid, RichText, Ui};
 use serde_json::Value;
 use sightline_session::compare::Difference;
 use sightline_session::compare::differ::{differences, told_apart, words_of};
+use sightline_session::step::{RunStep, StepRow};
 use sightline_track::stages::judge::Gate;
-use sightline_track::trace::{StepRow, StepTrace};
 
 use crate::compare::panel::{chip, mark};
 use crate::compare::state::Other;
@@ -94,7 +94,7 @@ pub(crate) fn gate(ui: &mut Ui, state: &State, gate: &Gate) {
 
 /// In the inspector: the values of the selected stage, as `record` reads them, that differ from those of the first
 /// compared run.
-pub(crate) fn record(ui: &mut Ui, state: &State, record: impl Fn(&StepTrace) -> Option<Value>) {
+pub(crate) fn record(ui: &mut Ui, state: &State, record: impl Fn(&RunStep) -> Option<Value>) {
     let Some(other) = first(state) else { return };
     let label = state.run_label(other.name);
     let (own, there) = (state.trace(), state.other_trace(other.name).ready());

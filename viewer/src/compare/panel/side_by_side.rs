@@ -2,8 +2,8 @@
 
 use egui::{Rect, Ui, UiBuilder, vec2};
 use sightline_session::compare::RunName;
+use sightline_session::step::RunStep;
 use sightline_session::view::RunView;
-use sightline_track::trace::StepTrace;
 use sightline_vision::image::PixelRect;
 
 use crate::command::{Command, Zoomable};
@@ -25,7 +25,7 @@ struct Part<'a> {
     name: RunName,
     run: &'a RunView,
     look: Look,
-    trace: Option<&'a StepTrace>,
+    trace: Option<&'a RunStep>,
     raster: Option<&'a Raster>,
 }
 

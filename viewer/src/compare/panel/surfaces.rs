@@ -2,7 +2,8 @@
 
 use egui::{Rect, Ui, UiBuilder, vec2};
 use sightline_session::compare::RunName;
-use sightline_track::trace::{ArrayName, StepTrace};
+use sightline_session::step::RunStep;
+use sightline_track::trace::ArrayName;
 
 use crate::cache::Slot;
 use crate::command::{Command, Zoomable};
@@ -45,12 +46,12 @@ fn show_part(
     ui: &mut Ui,
     state: &State,
     (name, look): (RunName, Look),
-    trace: Option<&StepTrace>,
+    trace: Option<&RunStep>,
     raster: Slot<'_, Raster>,
     out: &mut Vec<Command>,
 ) {
     let label = state.run_label(name);
-    let matched = trace.and_then(StepTrace::template).and_then(|e| e.match_template.as_ref());
+    let matched = trace.and_then(|trace| trace.template()).and_then(|e| e.match_template.as_ref());
     let (Some(trace), Some(matched)) = (trace, matched) else {
         return panels::missing(ui, "", &format!("{label} matched no template at this step."));
     };

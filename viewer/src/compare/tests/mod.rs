@@ -11,11 +11,13 @@ use sightline_api::wire::Problem;
 use sightline_geometry::frames::Pixel;
 use sightline_session::compare::{Alignment, Compared, RunName, compare};
 use sightline_session::metrics::metrics;
+use sightline_session::step::RunStep;
+use sightline_session::summary::summarise;
 use sightline_session::view::RunView;
 use sightline_track::locate::Evidence;
 use sightline_track::settings::Settings;
 use sightline_track::target::TrackingState;
-use sightline_track::trace::{ArrayName, StepKind, StepTrace, summarise};
+use sightline_track::trace::{ArrayName, StepKind};
 use sightline_vision::image::{GrayImage, npy};
 
 use crate::cache::{Item, Key, StepKey};
@@ -39,12 +41,12 @@ const B: RunName = RunName { target: 0, run: 1 };
 const PIXEL_B: Pixel = Pixel::new(fixture::PIXEL.x + 8.0, fixture::PIXEL.y);
 
 /// The records of run A.
-fn traces_a() -> Vec<StepTrace> {
+fn traces_a() -> Vec<RunStep> {
     (0..STOPS - 1).map(fixture::trace).collect()
 }
 
 /// The records of run B, which asks for less from step 3 on and goes on tracking, a little beside.
-fn traces_b() -> Vec<StepTrace> {
+fn traces_b() -> Vec<RunStep> {
     let mut traces = traces_a();
     for trace in traces.iter_mut().skip(3) {
         trace.update.state = TrackingState::Tracking;
@@ -63,7 +65,7 @@ fn traces_b() -> Vec<StepTrace> {
             }
         }
         if let Some(truth) = &mut trace.truth {
-            (truth.err_px, truth.tracked) = (Some(1.5 + trace.step as f64), Some(false));
+            (truth.err_px, truth.tracked) = (Some(1.5 + trace.trace.step as f64), Some(false));
         }
     }
     traces
@@ -83,7 +85,7 @@ fn two_runs(context: &Context, step: usize) -> State {
         fork: None,
         changes: settings.changes(),
         settings,
-        rows: traces.iter().map(StepTrace::row).collect(),
+        rows: traces.iter().map(RunStep::row).collect(),
         complete: false,
         stopped: None,
         summary: summarise(&traces),
@@ -112,7 +114,7 @@ fn compared(context: &Context, step: usize) -> State {
     state
 }
 
-fn steps(name: RunName) -> Vec<Arc<StepTrace>> {
+fn steps(name: RunName) -> Vec<Arc<RunStep>> {
     let traces = if name == A { traces_a() } else { traces_b() };
     traces.into_iter().map(Arc::new).collect()
 }

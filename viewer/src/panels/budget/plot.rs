@@ -6,8 +6,8 @@
 use egui::{Color32, Ui, vec2};
 use egui_plot::{GridInput, GridMark, HLine, Line, LineStyle, MarkerShape, Plot, PlotUi, Points};
 use sightline_geometry::estimate::error_budget::{Approach, PLACEMENT_NEED_M, StereoPair};
+use sightline_session::step::StepRow;
 use sightline_session::view::RunView;
-use sightline_track::trace::StepRow;
 
 use crate::drawing::decimate;
 use crate::drawing::overlay;

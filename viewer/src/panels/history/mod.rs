@@ -5,10 +5,10 @@
 
 use egui::{Align2, Margin, Rect, ScrollArea, Sense, Ui, UiBuilder, pos2, vec2};
 use egui_plot::{GridMark, Line, MarkerShape, Plot, Points};
+use sightline_session::step::StepRow;
 use sightline_session::view::RunView;
 use sightline_track::locate::template::history::AgainstEarlier;
 use sightline_track::settings::TrackerKind;
-use sightline_track::trace::StepRow;
 
 use crate::cache::Slot;
 use crate::command::{Command, Go};

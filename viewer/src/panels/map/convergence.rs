@@ -9,8 +9,8 @@ use egui_plot::{Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotUi, Points, P
 use nalgebra::Matrix2;
 use sightline_api::wire::StopView;
 use sightline_geometry::frames::Point3;
+use sightline_session::step::StepRow;
 use sightline_session::view::RunView;
-use sightline_track::trace::StepRow;
 
 use crate::compare::state::{Look, Other};
 use crate::drawing::{decimate, ellipse};

@@ -73,10 +73,10 @@ fn settings(ui: &mut Ui, state: &State) {
 fn header(found: &RunMetrics) -> Vec<String> {
     let truth = match found.truth {
         None => "no truth is known: only survival_steps and mean_nis can be given",
-        Some(sightline_track::trace::TruthKind::Surface) => {
+        Some(sightline_world::target_truth::TruthKind::Surface) => {
             "the truth is the surface point that was designated"
         }
-        Some(sightline_track::trace::TruthKind::Carried) => {
+        Some(sightline_world::target_truth::TruthKind::Carried) => {
             "the truth is the first estimate carried along by true poses: errors are drift"
         }
     };

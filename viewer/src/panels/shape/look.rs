@@ -1,8 +1,8 @@
 //! What every part of the panel “Shape” is given, and what it says where it has no data.
 
 use egui::Ui;
+use sightline_session::step::RunStep;
 use sightline_track::locate::shape_tracker::ShapeEvidence;
-use sightline_track::trace::StepTrace;
 
 use crate::cache::Slot;
 use crate::panels;
@@ -12,7 +12,7 @@ use crate::state::State;
 #[derive(Clone, Copy)]
 pub(super) struct Look<'a> {
     pub(super) state: &'a State,
-    pub(super) trace: &'a StepTrace,
+    pub(super) trace: &'a RunStep,
     pub(super) evidence: &'a ShapeEvidence,
 }
 

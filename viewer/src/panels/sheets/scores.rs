@@ -1,7 +1,7 @@
 //! The scores of a match as tables: of the template over the search window, and of point stereo along the curve.
 
 use sightline_geometry::frames::Pixel;
-use sightline_track::trace::{ArrayName, StepTrace};
+use sightline_track::trace::ArrayName;
 
 use crate::panels::score_marks::region_of;
 use crate::panels::sheets::{Cell, Column, Sheet};
@@ -12,7 +12,7 @@ const NEAR_PX: i64 = 4;
 
 /// The marks on the surface, the scores about the peak, and all scores for the copy.
 pub(crate) fn surface(state: &State) -> Result<Vec<Sheet>, String> {
-    let matched = state.trace().and_then(StepTrace::template).and_then(|e| e.match_template.as_ref());
+    let matched = state.trace().and_then(|trace| trace.template()).and_then(|e| e.match_template.as_ref());
     let (Some(trace), Some(matched)) = (state.trace(), matched) else { return Err(state.missing_template()) };
     let measure = matched.measure.word();
     let columns = ["x, px", "y, px"].map(|name| Column::new(name, "")).into_iter();
@@ -84,7 +84,7 @@ fn about_the_peak(
 
 /// The scores along the epipolar curve.
 pub(crate) fn stereo_profile(state: &State) -> Result<Vec<Sheet>, String> {
-    let stereo = state.trace().and_then(StepTrace::template).and_then(|e| e.point_stereo.as_ref());
+    let stereo = state.trace().and_then(|trace| trace.template()).and_then(|e| e.point_stereo.as_ref());
     let Some(stereo) = stereo else { return Err(state.missing_template()) };
     let columns =
         [("range", "m"), ("score", ""), ("x in the right image", "px"), ("y in the right image", "px")];

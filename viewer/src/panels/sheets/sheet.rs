@@ -1,7 +1,7 @@
 //! A table of values, and the same as CSV (RFC 4180): full digits, units in the head, nothing where there is no value.
 
 use sightline_api::table;
-use sightline_track::trace::StepRow;
+use sightline_session::step::StepRow;
 
 use crate::panels::digits;
 

@@ -5,8 +5,9 @@ mod pointed;
 
 use egui::{Align2, Margin, Pos2, Rect, Sense, Ui, pos2, vec2};
 use sightline_record::{ArrayKind, Unit, label};
-use sightline_track::records::{self, StageQuantity};
-use sightline_track::trace::{ArrayName, StepTrace};
+use sightline_session::records::{self, StageQuantity};
+use sightline_session::step::RunStep;
+use sightline_track::trace::ArrayName;
 
 use crate::cache::Slot;
 use crate::command::{Command, Stage};
@@ -36,9 +37,9 @@ pub(crate) struct Patch {
 const STAGES: [Stage; 3] = [Stage::SCALE_ROLL, Stage::MATCH_TEMPLATE, Stage::POINT_STEREO];
 
 /// The patches of a step, in the order in which the stages declare them; those that were not reached are left out.
-pub(crate) fn patches(trace: &StepTrace) -> Vec<Patch> {
+pub(crate) fn patches(trace: &RunStep) -> Vec<Patch> {
     let reached = STAGES.into_iter().filter_map(|stage| Some((stage, records::stage(stage.word())?)));
-    let of_stage = |(stage, recorded): (Stage, &'static sightline_record::Stage<StepTrace>)| {
+    let of_stage = |(stage, recorded): (Stage, &'static sightline_record::Stage<RunStep>)| {
         let arrays = recorded.schema().arrays.iter().filter(|_| recorded.is_reached(trace));
         let patches = arrays.filter(|array| matches!(array.kind, ArrayKind::Patch | ArrayKind::Difference));
         patches.filter_map(move |array| {
@@ -51,7 +52,7 @@ pub(crate) fn patches(trace: &StepTrace) -> Vec<Patch> {
 }
 
 /// The title of a patch, and what happened on the way to it.
-fn caption(trace: &StepTrace, array: ArrayName) -> (String, String) {
+fn caption(trace: &RunStep, array: ArrayName) -> (String, String) {
     let number = |name: &str| StageQuantity::named(name)?.number(trace);
     let applied = |[applied, computed]: [&str; 2], words: fn(f64) -> String| {
         let is_on = number(applied) == number(computed);
@@ -103,7 +104,7 @@ impl Panel for Strip {
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let patches = state.trace().map(patches).unwrap_or_default();
     let area = ui.available_rect_before_wrap();
-    let has_pointer = state.trace().is_some_and(pointed::is_there);
+    let has_pointer = state.trace().is_some_and(|trace| pointed::is_there(trace));
     let count = (patches.len() + usize::from(has_pointer)) as f32;
     let across = (area.width() - BETWEEN * (count - 1.0)) / count;
     let side = across.min(area.height() - WORDS.0 - WORDS.1).max(16.0);

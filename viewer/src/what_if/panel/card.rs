@@ -1,11 +1,12 @@
 //! The ghost of what is tried, dashed over the image, and a small card that says what changed.
 
 use egui::{Align, Button, Frame, Label, Layout, Margin, Pos2, Rect, RichText, Ui, UiBuilder, vec2};
+use sightline_session::marks::square;
 use sightline_session::what_if::Ghost;
 use sightline_session::why::words::signed;
 
 use crate::command::Command;
-use crate::drawing::overlay::{Line, Mark, Overlay, template_quad};
+use crate::drawing::overlay::{Line, Mark, Overlay};
 use crate::drawing::view2d::Canvas;
 use crate::state::State;
 use crate::state::state_of;
@@ -33,7 +34,7 @@ pub(crate) fn ghost(canvas: &Canvas, trial: &Trial) {
     }
     if let Some(pixel) = ghost.left_pixel {
         if let Some(map) = &ghost.prepared_from_template {
-            let quad = template_quad(pixel, ghost.template_size_px, map);
+            let quad = square(pixel, ghost.template_size_px, map);
             overlay.outline(&quad, theme::ghost(), Line::Dashed);
         }
         if let Some(covariance) = &ghost.left_covariance_px2 {

@@ -6,7 +6,6 @@ use sightline_session::what_if::Ghost;
 use sightline_track::locate::template::match_template::TemplateMatch;
 use sightline_track::locate::template::settings::Measure;
 use sightline_track::settings::TrackerKind;
-use sightline_track::trace::StepTrace;
 
 use crate::command::{Command, Zoomable};
 use crate::drawing::overlay::paint_words;
@@ -39,7 +38,7 @@ pub(crate) fn show(
     let chosen = state.why.scores_shown;
     let shown = if chosen == Scores::Both && !has_room { Scores::Tried } else { chosen };
     let tried = state.tried_scores(ui.ctx());
-    let recorded = state.trace().and_then(StepTrace::template).and_then(|e| e.match_template.as_ref());
+    let recorded = state.trace().and_then(|trace| trace.template()).and_then(|e| e.match_template.as_ref());
     ui.horizontal(|ui| {
         ui.label(theme::note("scores"));
         for choice in Scores::ALL {

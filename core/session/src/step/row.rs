@@ -4,9 +4,9 @@ use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::gate::Gate;
 use sightline_geometry::frames::Pixel;
 use sightline_record::{Declaration, Record, Unit};
+use sightline_track::gate::Gate;
 
 /// One line of a run: the columns of plots, tables and `sightline track`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]

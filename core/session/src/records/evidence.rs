@@ -5,14 +5,14 @@ use serde_json::Value;
 use sightline_record::Stage;
 
 use super::stages;
-use crate::trace::StepTrace;
+use crate::step::RunStep;
 
 /// The evidence of a stage without that of the stages inside it; of a stage without evidence of its own its quantities.
-pub fn evidence(stage: &Stage<StepTrace>, trace: &StepTrace) -> Value {
+pub fn evidence(stage: &Stage<RunStep>, step: &RunStep) -> Value {
     let schema = stage.schema();
-    let Some(mut evidence) = stage.evidence(trace) else {
+    let Some(mut evidence) = stage.evidence(step) else {
         let values = schema.quantities.iter().enumerate().filter_map(|(index, quantity)| {
-            Some((quantity.name.to_string(), serde_json::to_value(stage.value(trace, index)).ok()?))
+            Some((quantity.name.to_string(), serde_json::to_value(stage.value(step, index)).ok()?))
         });
         return Value::Object(values.collect());
     };
@@ -25,8 +25,8 @@ pub fn evidence(stage: &Stage<StepTrace>, trace: &StepTrace) -> Value {
 }
 
 /// The evidence that no quantity of the stage shows.
-pub fn rest(stage: &Stage<StepTrace>, trace: &StepTrace) -> Value {
-    let mut rest = evidence(stage, trace);
+pub fn rest(stage: &Stage<RunStep>, step: &RunStep) -> Value {
+    let mut rest = evidence(stage, step);
     for quantity in &stage.schema().quantities {
         // A record of several fields says more than a quantity of its name.
         remove(&mut rest, &quantity.name, |value| !value.is_object() || is_pixel(value));

@@ -7,13 +7,15 @@ use utoipa::openapi::RefOr;
 use utoipa::openapi::schema::Schema;
 use utoipa::{PartialSchema, ToSchema};
 
-use super::{StepKind, StepTrace, StepTruth};
-use crate::locate::Located;
-use crate::stages::capture::Capture;
-use crate::stages::point_mast::Pointing;
-use crate::stages::prediction::Prediction;
-use crate::stages::update::Updated;
-use crate::verdict::Verdict;
+use super::RunStep;
+use sightline_track::locate::Located;
+use sightline_track::stages::capture::Capture;
+use sightline_track::stages::point_mast::Pointing;
+use sightline_track::stages::prediction::Prediction;
+use sightline_track::stages::update::Updated;
+use sightline_track::trace::{StepKind, StepTrace};
+use sightline_track::verdict::Verdict;
+use sightline_world::target_truth::StepTruth;
 
 /// One step of a run. At the designation there is no `predict` and no `judge`; at a stop whose files are
 /// damaged there is a `fault` and nothing after `point_mast`.
@@ -42,8 +44,8 @@ struct SerialisedStep<'a> {
     truth: Option<Cow<'a, StepTruth>>,
 }
 
-impl<'a> From<&'a StepTrace> for SerialisedStep<'a> {
-    fn from(trace: &'a StepTrace) -> Self {
+impl<'a> From<&'a RunStep> for SerialisedStep<'a> {
+    fn from(RunStep { trace, truth }: &'a RunStep) -> Self {
         Self {
             step: trace.step,
             time_s: trace.time_s,
@@ -54,14 +56,14 @@ impl<'a> From<&'a StepTrace> for SerialisedStep<'a> {
             locate: trace.located().map(Cow::Borrowed),
             judge: trace.verdict().map(Cow::Borrowed),
             update: Cow::Borrowed(&trace.update),
-            truth: trace.truth.as_ref().map(Cow::Borrowed),
+            truth: truth.as_ref().map(Cow::Borrowed),
         }
     }
 }
 
 impl SerialisedStep<'_> {
     /// The step; `None` where its stages are those of no kind of step.
-    fn into_trace(self) -> Option<StepTrace> {
+    fn into_step(self) -> Option<RunStep> {
         let fault = self.fault.map(Cow::into_owned);
         let (predict, capture) = (self.predict.map(Cow::into_owned), self.capture.map(Cow::into_owned));
         let (locate, judge) = (self.locate.map(Cow::into_owned), self.judge.map(Cow::into_owned));
@@ -73,38 +75,38 @@ impl SerialisedStep<'_> {
             (Some(predict), None, None, None, Some(fault)) => StepKind::Damaged { predict, fault },
             _ => return None,
         };
-        Some(StepTrace {
+        let trace = StepTrace {
             step: self.step,
             time_s: self.time_s,
             point_mast: self.point_mast?.into_owned(),
             kind,
             update: self.update.into_owned(),
-            truth: self.truth.map(Cow::into_owned),
-        })
+        };
+        Some(RunStep { trace, truth: self.truth.map(Cow::into_owned) })
     }
 }
 
-impl Serialize for StepTrace {
+impl Serialize for RunStep {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         SerialisedStep::from(self).serialize(serializer)
     }
 }
 
-impl<'de> Deserialize<'de> for StepTrace {
+impl<'de> Deserialize<'de> for RunStep {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let step = SerialisedStep::deserialize(deserializer)?;
-        step.into_trace()
+        step.into_step()
             .ok_or_else(|| de::Error::custom("the stages of the step are those of no kind of step"))
     }
 }
 
-impl PartialSchema for StepTrace {
+impl PartialSchema for RunStep {
     fn schema() -> RefOr<Schema> {
         SerialisedStep::schema()
     }
 }
 
-impl ToSchema for StepTrace {
+impl ToSchema for RunStep {
     fn name() -> Cow<'static, str> {
         SerialisedStep::name()
     }
@@ -120,18 +122,18 @@ mod tests {
     use serde_json::Value;
 
     use super::*;
-    use crate::locate::TrackerMemory;
-    use crate::locate::features::anchor::Anchors;
-    use crate::stages::point_mast::{UsedPointing, point_mast};
-    use crate::target::{Designation, Target, TrackingState};
-    use crate::testing;
-    use sightline_geometry::frames::{Pixel, Point3};
+    use sightline_geometry::frames::{Pixel, Point3, Pose};
+    use sightline_testing::PlaneWorld;
+    use sightline_track::locate::TrackerMemory;
+    use sightline_track::locate::features::anchor::Anchors;
+    use sightline_track::stages::point_mast::{UsedPointing, point_mast};
+    use sightline_track::target::{Designation, Target, TrackingState};
 
-    fn step(kind: StepKind) -> StepTrace {
+    fn step(kind: StepKind) -> RunStep {
         let position = Point3::new(5.0, 0.0, 0.0);
         let covariance = Matrix3::identity() * 1e-4;
-        let camera = testing::camera();
-        let used = UsedPointing { mast: None, angles: None, left: &camera, right: &camera };
+        let world = PlaneWorld::new(vec![Pose::identity()]);
+        let used = UsedPointing { mast: None, angles: None, left: &world.left, right: &world.right };
         let target = Target {
             designation: Designation { step: 0, pixel: Pixel::new(1.0, 2.0) },
             step: 3,
@@ -148,7 +150,7 @@ mod tests {
         let update =
             Updated { target, state, template_renewed: false, correction_m: None, correction_px: None };
         let point_mast = point_mast(&position, &covariance, used);
-        StepTrace { step: 3, time_s: 60.0, point_mast, kind, update, truth: None }
+        RunStep { trace: StepTrace { step: 3, time_s: 60.0, point_mast, kind, update }, truth: None }
     }
 
     fn kinds() -> [StepKind; 3] {
@@ -198,7 +200,7 @@ mod tests {
             for stage in ["fault", "predict", "point_mast", "capture", "locate", "judge"] {
                 assert_eq!(value[stage].is_null(), !reached.contains(&stage), "{stage}");
             }
-            assert_eq!(serde_json::from_value::<StepTrace>(value).unwrap(), step);
+            assert_eq!(serde_json::from_value::<RunStep>(value).unwrap(), step);
         }
     }
 
@@ -208,7 +210,7 @@ mod tests {
         for stage in ["predict", "point_mast", "capture", "locate", "judge"] {
             let mut without = tracked.clone();
             without[stage] = Value::Null;
-            let error = serde_json::from_value::<StepTrace>(without).unwrap_err();
+            let error = serde_json::from_value::<RunStep>(without).unwrap_err();
             assert!(error.to_string().contains("no kind of step"), "{stage}: {error}");
         }
     }

@@ -1,0 +1,46 @@
+//! The verdict on a whole run against the truth.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::step::RunStep;
+use sightline_track::target::TrackingState;
+
+/// The verdict on a whole run against the truth.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Summary {
+    /// Steps run, the designation included.
+    pub steps: usize,
+    /// Steps that were tracked; null without truth.
+    pub steps_tracked: Option<usize>,
+    /// Steps in state `lost` or `failed`.
+    pub steps_lost: usize,
+    /// Steps in state `tracking` that were not tracked; null without truth.
+    pub false_tracked: Option<usize>,
+    /// Steps lost or failed whose evidence was right; null without truth.
+    pub false_lost: Option<usize>,
+    /// Whether the last step was tracked; null without truth.
+    pub run_tracked: Option<bool>,
+    /// Error of the last step, px.
+    pub final_err_px: Option<f64>,
+    /// Error of the last step, m.
+    pub final_err_m: Option<f64>,
+}
+
+/// Sums up a run.
+pub fn summarise<'a>(steps: impl IntoIterator<Item = &'a RunStep>) -> Summary {
+    let mut summary = Summary::default();
+    for step in steps {
+        summary.steps += 1;
+        summary.steps_lost += usize::from(step.update.state.is_lost());
+        let Some(truth) = &step.truth else { continue };
+        let tracking = step.update.state == TrackingState::Tracking;
+        *summary.steps_tracked.get_or_insert(0) += usize::from(truth.tracked == Some(true));
+        *summary.false_tracked.get_or_insert(0) += usize::from(tracking && truth.tracked == Some(false));
+        *summary.false_lost.get_or_insert(0) += usize::from(step.is_false_loss());
+        summary.run_tracked = truth.tracked;
+        summary.final_err_px = truth.err_px;
+        summary.final_err_m = Some(truth.err_m);
+    }
+    summary
+}
