@@ -69,7 +69,7 @@ pub fn records(step: &RunStep) -> Vec<StageRecord> {
 }
 
 /// The quantity at a path of the serialised step, whichever tracker made it.
-pub fn quantity_at(path: &str) -> Option<&'static Quantity> {
+pub(crate) fn quantity_at(path: &str) -> Option<&'static Quantity> {
     within(path).find_map(|(schema, name)| schema.quantity(name))
 }
 
