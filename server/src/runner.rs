@@ -10,7 +10,8 @@ use std::sync::atomic::Ordering;
 
 use sightline_api::wire::Event;
 use sightline_geometry::error::{Error, Result};
-use sightline_session::{Next, Pending, Session, track};
+use sightline_session::track::{self, NextStep};
+use sightline_session::{Next, Pending, Session};
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
 use sightline_track::trace::StepTrace;
@@ -164,8 +165,14 @@ impl Runner {
             }
         }
         let last = with_image(&live.traverse, &pending.last)?;
-        let (first, prediction_px) = (&pending.first, pending.prediction_px);
-        Ok(without_pair(track::advance_displaced(traverse, first, &last, &pending.settings, prediction_px)))
+        let next = NextStep {
+            first: &pending.first,
+            last: &last,
+            settings: &pending.settings,
+            prediction_px: pending.prediction_px,
+            cancel: flag.as_ref().into(),
+        };
+        next.compute(traverse).map(without_pair)
     }
 }
 

@@ -10,10 +10,10 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use crate::extract::Body;
-use crate::live_session::CancelFlag;
 use crate::problem::{ApiError, ApiResult};
 use crate::recorded_step::RecordedStep;
 use crate::routes::route::route;
+use crate::routes::traverses::CancelOnDrop;
 use crate::state::AppState;
 
 /// How far outside every image a prediction may be put, px.
@@ -43,11 +43,14 @@ async fn what_if(
         return Err(ApiError::invalid("field", detail));
     }
     let settings = asked.settings.with(&what_if.settings)?;
+    let cancel = CancelOnDrop::default();
+    let flag = cancel.flag();
     state
         .tries()
         .run(move || {
-            asked.prepare(&CancelFlag::default())?;
-            let tried = try_step(&asked.live.traverse.traverse, asked.base(), &what_if)?;
+            asked.prepare(&flag)?;
+            let drive = &asked.live.traverse.traverse;
+            let tried = try_step(drive, asked.base(), &what_if, flag.as_ref().into())?;
             Ok(Json(Ghost::new(what_if, &tried, &asked.recorded, &settings)))
         })
         .await
