@@ -10,9 +10,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 
+use sightline_geometry::cancel::Cancel;
 use tokio::runtime::Handle;
 use tokio::sync::{AcquireError, OwnedSemaphorePermit, Semaphore};
 
+use crate::cancel::{CancelFlag, CancelOnDrop};
 use crate::problem::{ApiError, ApiResult};
 
 /// Locks, also after a panic elsewhere: what these mutexes guard is never left half changed.
@@ -36,17 +38,41 @@ impl Lane {
 
     /// Does `work` when its turn comes; a request that goes away gives its place in the queue back.
     ///
+    /// Once begun, the work counts among those of the lane until it ends, also when the request goes away.
+    ///
     /// # Errors
     /// Those of `work`, a problem when too many are waiting, and one without details when `work` panics.
     pub(crate) async fn run<T: Send + 'static>(
         &self,
         work: impl FnOnce() -> ApiResult<T> + Send + 'static,
     ) -> ApiResult<T> {
-        let _permit = {
+        let permit = {
             let _place = Place::take(&self.waiting, self.limit)?;
-            self.permits.acquire().await.map_err(|closed| ApiError::internal(closed.to_string()))?
+            let turn = Arc::clone(&self.permits).acquire_owned();
+            turn.await.map_err(|closed| ApiError::internal(closed.to_string()))?
         };
-        blocking(work).await
+        blocking(move || {
+            let _permit = permit;
+            work()
+        })
+        .await
+    }
+
+    /// The same for work that looks at a flag, which is set when the request goes away.
+    ///
+    /// # Errors
+    /// As [`Self::run`].
+    pub(crate) async fn run_until_dropped<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&CancelFlag) -> ApiResult<T> + Send + 'static,
+    ) -> ApiResult<T> {
+        let cancel = CancelOnDrop::default();
+        let flag = cancel.flag();
+        self.run(move || {
+            Cancel::from(flag.as_ref()).check()?;
+            work(&flag)
+        })
+        .await
     }
 
     /// Does `job` in the background when its turn comes, also after the request that submits it.
@@ -152,6 +178,29 @@ mod tests {
         drop(sender);
         let done = blocking(move || Ok(receiver.iter().collect::<Vec<_>>())).await.unwrap();
         assert_eq!(done, (0..50).collect::<Vec<_>>());
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn abandoned_work_keeps_its_permit_and_is_told_to_end() {
+        let lane = Lane::new(1, 8);
+        let (begin, mut begun) = tokio::sync::mpsc::unbounded_channel();
+        let (release, released) = mpsc::channel::<()>();
+        let own = lane.clone();
+        let request = tokio::spawn(async move {
+            own.run_until_dropped(move |cancel| {
+                begin.send(Arc::clone(cancel)).unwrap();
+                released.recv().map_err(|closed| ApiError::internal(closed.to_string()))
+            })
+            .await
+        });
+        let flag = begun.recv().await.unwrap();
+        assert!(!flag.load(Ordering::Relaxed));
+        request.abort();
+        assert!(request.await.unwrap_err().is_cancelled());
+        assert!(flag.load(Ordering::Relaxed));
+        assert_eq!(lane.permits.available_permits(), 0, "the work goes on");
+        release.send(()).unwrap();
+        assert_eq!(lane.run(|| Ok(3)).await, Ok(3));
     }
 
     #[tokio::test]

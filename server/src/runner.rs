@@ -9,6 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use sightline_api::wire::Event;
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_session::track::{self, NextStep};
 use sightline_session::{Next, Pending, Session};
@@ -17,8 +18,9 @@ use sightline_track::target::Designation;
 use sightline_track::trace::StepTrace;
 use tokio::sync::broadcast;
 
+use crate::cancel::CancelFlag;
 use crate::jobs::Lane;
-use crate::live_session::{CancelFlag, LiveSession};
+use crate::live_session::LiveSession;
 use crate::problem::ApiResult;
 use crate::rendering::OpenTraverse;
 
@@ -133,7 +135,9 @@ impl Runner {
         }
         let trace = match live.with(|session| session.next(target, run))? {
             Next::Nothing => return Ok(false),
-            Next::Designate { designation, settings } => designate(&live.traverse, designation, &settings)?,
+            Next::Designate { designation, settings } => {
+                designate(&live.traverse, designation, &settings, flag)?
+            }
             Next::Advance(pending) => self.advance(live, (target, run), &pending, flag)?,
         };
         live.with(|session| {
@@ -200,21 +204,24 @@ fn every_run(session: &Session) -> Vec<(usize, usize)> {
 /// Designates a target: renders the stop where that is needed, and computes the first step of a run.
 ///
 /// # Errors
-/// As [`track::designate`].
+/// As [`track::designate`]; [`Error::Cancelled`] soon after `cancel` is set.
 pub(crate) fn designate(
     open: &OpenTraverse,
     designation: Designation,
     settings: &Settings,
+    cancel: &CancelFlag,
 ) -> Result<StepTrace> {
     let (step, pixel) = (designation.step, designation.pixel);
     if step < open.traverse.stop_count() {
         let left = open.traverse.left_camera(step);
         // A pixel outside is refused by the tracker; nothing needs to be rendered for that.
         if pixel.is_inside(left.width(), left.height()) {
-            open.make_ready(step, &CancelFlag::default())?;
+            open.make_ready(step, cancel)?;
         }
     }
-    track::designate(&open.traverse, designation, settings).map(without_pair)
+    let first = track::designate(&open.traverse, designation, settings).map(without_pair)?;
+    Cancel::from(cancel.as_ref()).check()?;
+    Ok(first)
 }
 
 /// A step with the image from which the next template is cut, which a recorded step let go of.

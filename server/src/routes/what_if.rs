@@ -13,7 +13,6 @@ use crate::extract::Body;
 use crate::problem::{ApiError, ApiResult};
 use crate::recorded_step::RecordedStep;
 use crate::routes::route::route;
-use crate::routes::traverses::CancelOnDrop;
 use crate::state::AppState;
 
 /// How far outside every image a prediction may be put, px.
@@ -43,14 +42,12 @@ async fn what_if(
         return Err(ApiError::invalid("field", detail));
     }
     let settings = asked.settings.with(&what_if.settings)?;
-    let cancel = CancelOnDrop::default();
-    let flag = cancel.flag();
     state
         .tries()
-        .run(move || {
-            asked.prepare(&flag)?;
+        .run_until_dropped(move |cancel| {
+            asked.prepare(cancel)?;
             let drive = &asked.live.traverse.traverse;
-            let tried = try_step(drive, asked.base(), &what_if, flag.as_ref().into())?;
+            let tried = try_step(drive, asked.base(), &what_if, cancel.as_ref().into())?;
             Ok(Json(Ghost::new(what_if, &tried, &asked.recorded, &settings)))
         })
         .await
