@@ -1,9 +1,11 @@
-//! Computes runs in the background, one step at a time: lock, ask what is next, unlock, compute, lock, record.
+//! Computes runs in the background, one step at a time: lock, ask what is next, unlock, compute, lock, record. After each
+//! step a run goes to the end of the queue.
 //!
 //! A step is recorded only while its computation was not told to end, so a cancelled run gains nothing more.
 //! Recorded steps let go of their images, which the traverse has anyway: only a run's last step keeps the one
 //! from which the next template is cut.
 
+use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -49,7 +51,8 @@ impl Runner {
     pub(crate) fn start(&self, live: &Arc<LiveSession>, target: usize, run: usize) -> ApiResult<()> {
         let flag = live.begin(target, run);
         let (runner, owned_live, owned_flag) = (self.clone(), Arc::clone(live), Arc::clone(&flag));
-        let submitted = self.lane.submit(move || runner.compute(&owned_live, target, run, &owned_flag));
+        let turn = move || runner.turn(&owned_live, target, run, &owned_flag);
+        let submitted = self.lane.submit_by_turns(turn);
         if submitted.is_err() {
             live.end(target, run, &flag);
         }
@@ -84,15 +87,22 @@ impl Runner {
         which: impl FnOnce(&Session) -> Vec<(usize, usize)> + Send + 'static,
     ) -> ApiResult<()> {
         let (runner, live) = (self.clone(), Arc::clone(live));
-        self.lane.submit(move || {
-            let _until_the_end = restoring;
-            let runs = live.with(|session| which(session));
-            for (target, run) in runs {
-                if !live.is_computing(target, run) {
-                    let flag = live.begin(target, run);
-                    runner.compute(&live, target, run, &flag);
-                }
+        let mut which = Some(which);
+        let (mut runs, mut current) = (Vec::new().into_iter(), None);
+        self.lane.submit_by_turns(move || {
+            let _until_the_end = &restoring;
+            if let Some(which) = which.take() {
+                runs = live.with(|session| which(session)).into_iter();
             }
+            if current.is_none() {
+                let next = runs.find(|(target, run)| !live.is_computing(*target, *run));
+                current = next.map(|(target, run)| (target, run, live.begin(target, run)));
+            }
+            let Some((target, run, flag)) = &current else { return ControlFlow::Break(()) };
+            if runner.turn(&live, *target, *run, flag).is_break() {
+                current = None;
+            }
+            ControlFlow::Continue(())
         })
     }
 
@@ -103,15 +113,13 @@ impl Runner {
         }
     }
 
-    /// Computes what is missing of a run, until it ends or is told to.
-    fn compute(&self, live: &LiveSession, target: usize, run: usize, flag: &CancelFlag) {
-        let outcome = loop {
-            match catch_unwind(AssertUnwindSafe(|| self.one_step(live, target, run, flag))) {
-                Ok(Ok(true)) => {}
-                Ok(Ok(false) | Err(Error::Cancelled)) => break Ok(()),
-                Ok(Err(error)) => break Err(error.to_string()),
-                Err(_) => break Err("the server met a fault of its own; its log says more".to_owned()),
-            }
+    /// Computes the next step of a run; breaks once the run has ended or is told to.
+    fn turn(&self, live: &LiveSession, target: usize, run: usize, flag: &CancelFlag) -> ControlFlow<()> {
+        let outcome = match catch_unwind(AssertUnwindSafe(|| self.one_step(live, target, run, flag))) {
+            Ok(Ok(true)) => return ControlFlow::Continue(()),
+            Ok(Ok(false) | Err(Error::Cancelled)) => Ok(()),
+            Ok(Err(error)) => Err(error.to_string()),
+            Err(_) => Err("the server met a fault of its own; its log says more".to_owned()),
         };
         live.end(target, run, flag);
         if let Err(why) = outcome {
@@ -126,6 +134,7 @@ impl Runner {
             let _ = live.with(|session| session.fail(target, run, why));
         }
         self.tell(progress(live, target, run, "done".to_owned()));
+        ControlFlow::Break(())
     }
 
     /// Computes and records one step; false when there is nothing more to compute.

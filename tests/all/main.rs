@@ -11,6 +11,7 @@ mod copied;
 mod ending;
 mod exports;
 mod expressions;
+mod fairness;
 mod imports;
 mod keeping;
 mod opening;
