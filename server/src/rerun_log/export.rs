@@ -53,7 +53,7 @@ fn write(
     let wrong = |error: &dyn std::fmt::Display| failed(path, &error.to_string());
     let gather =
         ChunkBatcherConfig { flush_tick: Duration::MAX, flush_num_bytes: CHUNK_BYTES, ..Default::default() };
-    let memory = MemoryStream::open(builder(traverse_name).batcher_config(gather));
+    let memory = MemoryStream::open(builder(traverse_name)?.batcher_config(gather));
     let memory = memory.map_err(|error| wrong(&error))?;
     let mut recorder = Recorder::new(memory.stream().clone(), false);
     let mut file = RrdFile::create(path)?;
