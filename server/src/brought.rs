@@ -8,7 +8,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use sightline_geometry::error::{Error, Result};
-use sightline_recordings::create_simulated;
+use sightline_recordings::create_simulated_until;
 use sightline_session::Session;
 use sightline_session::breakpoints::BREAKPOINT_LIMIT;
 use sightline_session::notes::Notes;
@@ -17,6 +17,7 @@ use sightline_session::view::{SavedRun, SavedSession};
 use sightline_track::settings::Settings;
 use sightline_world::Scenario;
 
+use crate::cancel::CancelFlag;
 use crate::drives::{folder_name, scenario_of};
 use crate::live_session::{LABEL_LIMIT, LiveSession, RUN_LIMIT, TARGET_LIMIT};
 use crate::naming::name_of;
@@ -31,8 +32,12 @@ const DRIVE_LIMIT: usize = 64;
 /// Opens the drive of a scenario; says whether it was not open before.
 ///
 /// # Errors
-/// A problem that names what is wrong with the scenario, or when there are too many drives.
-pub(crate) fn open(state: &AppState, text: &str) -> ApiResult<(Arc<OpenTraverse>, bool)> {
+/// A problem that names what is wrong with the scenario, when there are too many drives, or soon after `cancel` is set.
+pub(crate) fn open(
+    state: &AppState,
+    text: &str,
+    cancel: &CancelFlag,
+) -> ApiResult<(Arc<OpenTraverse>, bool)> {
     let scenario = Scenario::from_toml(text, Path::new("scenario")).map_err(|error| {
         ApiError::invalid("field", error.to_string())
             .hint("`sightline scenarios` writes scenarios to begin with.")
@@ -48,7 +53,8 @@ pub(crate) fn open(state: &AppState, text: &str) -> ApiResult<(Arc<OpenTraverse>
         return Err(ApiError::conflict(detail).hint("Begin with another data folder: --data-dir."));
     }
     let name = folder_name(&scenario);
-    let traverse = create_simulated(&scenario, &state.folders().traverses.join(&name))?;
+    let folder = state.folders().traverses.join(&name);
+    let traverse = create_simulated_until(&scenario, &folder, cancel.as_ref().into())?;
     let id = name_of(&traverse)?;
     let open = Arc::new(OpenTraverse::new(id, traverse, state.events().clone()));
     state.store().save_drive(&name, &text)?;
@@ -59,10 +65,10 @@ pub(crate) fn open(state: &AppState, text: &str) -> ApiResult<(Arc<OpenTraverse>
 ///
 /// # Errors
 /// A problem that names what is wrong with it; nothing is begun then.
-pub(crate) fn bring(state: &AppState, new: Reproduction) -> ApiResult<Arc<LiveSession>> {
+pub(crate) fn bring(state: &AppState, new: Reproduction, cancel: &CancelFlag) -> ApiResult<Arc<LiveSession>> {
     let Reproduction { traverse, session, notes } = new;
     check(&session)?;
-    let open = drive(state, &traverse)?;
+    let open = drive(state, &traverse, cancel)?;
     let stops = open.traverse.stop_count();
     let name = open.id.clone();
     let mut kept = Notes::default();
@@ -80,12 +86,16 @@ pub(crate) fn bring(state: &AppState, new: Reproduction) -> ApiResult<Arc<LiveSe
 }
 
 /// The drive of a file: opened by its scenario, or one that is open.
-fn drive(state: &AppState, traverse: &ReproducedTraverse) -> ApiResult<Arc<OpenTraverse>> {
+fn drive(
+    state: &AppState,
+    traverse: &ReproducedTraverse,
+    cancel: &CancelFlag,
+) -> ApiResult<Arc<OpenTraverse>> {
     if let Some(open) = state.traverses().into_iter().find(|open| open.id == traverse.id) {
         return Ok(open);
     }
     match &traverse.scenario_toml {
-        Some(text) => Ok(open(state, text)?.0),
+        Some(text) => Ok(open(state, text, cancel)?.0),
         None => {
             let name: String = crate::printable::printable(&traverse.name).chars().take(100).collect();
             let detail = format!("The file belongs to the recorded drive “{name}”, which is not open here.");

@@ -11,6 +11,7 @@ use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
 use sightline_world::{Scenario, choose_targets, library};
 
+use crate::cancel::CancelFlag;
 use crate::live_session::LiveSession;
 use crate::problem::ApiResult;
 use crate::runner;
@@ -57,7 +58,8 @@ fn designate(state: &AppState, live: &Arc<LiveSession>, scenario: &Scenario) -> 
     let pixel = choose_targets(world, scenario, traverse.index()).first().copied();
     let pixel = pixel.ok_or_else(|| Error::Request("the scenario's rule finds no target".to_owned()))?;
     let settings = Settings::default();
-    let first = runner::designate(&live.traverse, Designation { step: 0, pixel }, &settings)?;
+    let designation = Designation { step: 0, pixel };
+    let first = runner::designate(&live.traverse, designation, &settings, &CancelFlag::default())?;
     let target = live.with(|session| {
         let target = session.add_target(Some(LABEL.to_owned()), settings, Arc::new(first));
         session.move_cursor(Cursor { target: Some(target), run: 0, step: 0 }).map(|()| target)

@@ -1,18 +1,21 @@
 //! Work that takes long, on threads of its own: each lane does so much at a time, first come first served, and lets
-//! so much wait.
+//! so much wait. A job of many turns queues again after each, so that short ones do not wait for long ones.
 //!
 //! The reactor computes nothing. A lane that is full refuses at once, so that nothing piles up unseen.
 
 use std::future::Future;
+use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::pin::Pin;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 
+use sightline_geometry::cancel::Cancel;
 use tokio::runtime::Handle;
 use tokio::sync::{AcquireError, OwnedSemaphorePermit, Semaphore};
 
+use crate::cancel::{CancelFlag, CancelOnDrop};
 use crate::problem::{ApiError, ApiResult};
 
 /// Locks, also after a panic elsewhere: what these mutexes guard is never left half changed.
@@ -36,17 +39,41 @@ impl Lane {
 
     /// Does `work` when its turn comes; a request that goes away gives its place in the queue back.
     ///
+    /// Once begun, the work counts among those of the lane until it ends, also when the request goes away.
+    ///
     /// # Errors
     /// Those of `work`, a problem when too many are waiting, and one without details when `work` panics.
     pub(crate) async fn run<T: Send + 'static>(
         &self,
         work: impl FnOnce() -> ApiResult<T> + Send + 'static,
     ) -> ApiResult<T> {
-        let _permit = {
+        let permit = {
             let _place = Place::take(&self.waiting, self.limit)?;
-            self.permits.acquire().await.map_err(|closed| ApiError::internal(closed.to_string()))?
+            let turn = Arc::clone(&self.permits).acquire_owned();
+            turn.await.map_err(|closed| ApiError::internal(closed.to_string()))?
         };
-        blocking(work).await
+        blocking(move || {
+            let _permit = permit;
+            work()
+        })
+        .await
+    }
+
+    /// The same for work that looks at a flag, which is set when the request goes away.
+    ///
+    /// # Errors
+    /// As [`Self::run`].
+    pub(crate) async fn run_until_dropped<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&CancelFlag) -> ApiResult<T> + Send + 'static,
+    ) -> ApiResult<T> {
+        let cancel = CancelOnDrop::default();
+        let flag = cancel.flag();
+        self.run(move || {
+            Cancel::from(flag.as_ref()).check()?;
+            work(&flag)
+        })
+        .await
     }
 
     /// Does `job` in the background when its turn comes, also after the request that submits it.
@@ -56,18 +83,40 @@ impl Lane {
     /// # Errors
     /// A problem when too many are waiting already.
     pub(crate) fn submit(&self, job: impl FnOnce() + Send + 'static) -> ApiResult<()> {
-        let place = Place::take(&self.waiting, self.limit)?;
+        let mut job = Some(job);
+        self.submit_by_turns(move || {
+            if let Some(job) = job.take() {
+                job();
+            }
+            ControlFlow::Break(())
+        })
+    }
+
+    /// The same for a job of many turns: after each it goes to the end of the queue, until it breaks.
+    ///
+    /// # Errors
+    /// A problem when too many are waiting already; later turns always find a place.
+    pub(crate) fn submit_by_turns(
+        &self,
+        job: impl FnMut() -> ControlFlow<()> + Send + 'static,
+    ) -> ApiResult<()> {
+        self.enqueue(Place::take(&self.waiting, self.limit)?, Box::new(job))
+    }
+
+    /// Starts the next turn of a job when the lane has room.
+    fn enqueue(&self, place: Place, job: Box<Job>) -> ApiResult<()> {
         let mut turn: Pin<Box<Turn>> = Box::pin(Arc::clone(&self.permits).acquire_owned());
-        // The first poll enters the queue of the semaphore, so that jobs start in the order of their submission.
+        // The first poll enters the queue of the semaphore, so that turns start in the order of this call.
         match turn.as_mut().poll(&mut Context::from_waker(Waker::noop())) {
-            Poll::Ready(permit) => start(permit, job),
+            Poll::Ready(permit) => self.start(permit, job),
             Poll::Pending => {
                 let runtime = Handle::try_current();
                 let runtime = runtime.map_err(|missing| ApiError::internal(missing.to_string()))?;
+                let lane = self.clone();
                 runtime.spawn(async move {
                     let permit = turn.await;
                     drop(place);
-                    if let Err(problem) = start(permit, job) {
+                    if let Err(problem) = lane.start(permit, job) {
                         tracing::error!("a job was not started: {}", problem.problem().detail);
                     }
                 });
@@ -75,29 +124,44 @@ impl Lane {
             }
         }
     }
+
+    /// Does a turn of `job` on a thread of its own, and those after it while nobody else waits.
+    fn start(&self, permit: Result<OwnedSemaphorePermit, AcquireError>, mut job: Box<Job>) -> ApiResult<()> {
+        let permit = permit.map_err(|closed| ApiError::internal(closed.to_string()))?;
+        // Jobs submit others when a run is forked or a session is read back.
+        let runtime = Handle::try_current().ok();
+        let lane = self.clone();
+        let work = move || {
+            let permit = permit;
+            let _inside = runtime.as_ref().map(Handle::enter);
+            loop {
+                match catch_unwind(AssertUnwindSafe(&mut job)) {
+                    Ok(ControlFlow::Continue(())) if lane.waiting.load(Ordering::Relaxed) == 0 => {}
+                    Ok(ControlFlow::Continue(())) => break,
+                    Ok(ControlFlow::Break(())) => return,
+                    Err(_) => {
+                        tracing::error!("a job panicked");
+                        return;
+                    }
+                }
+            }
+            let place = Place::retake(&lane.waiting);
+            // The first in the queue gets the permit before this job enters it again.
+            drop(permit);
+            if let Err(problem) = lane.enqueue(place, job) {
+                tracing::error!("a job was not continued: {}", problem.problem().detail);
+            }
+        };
+        let started = std::thread::Builder::new().name("job".to_owned()).spawn(work);
+        started.map(|_| ()).map_err(|error| ApiError::internal(format!("cannot start a thread: {error}")))
+    }
 }
+
+/// A turn of a job; whether there are more.
+type Job = dyn FnMut() -> ControlFlow<()> + Send;
 
 /// Waits for the right to work.
 type Turn = dyn Future<Output = Result<OwnedSemaphorePermit, AcquireError>> + Send;
-
-/// Starts `job` on a thread of its own, which gives the permit back at its end.
-fn start(
-    permit: Result<OwnedSemaphorePermit, AcquireError>,
-    job: impl FnOnce() + Send + 'static,
-) -> ApiResult<()> {
-    let permit = permit.map_err(|closed| ApiError::internal(closed.to_string()))?;
-    // Jobs submit others when a run is forked or a session is read back.
-    let runtime = Handle::try_current().ok();
-    let work = move || {
-        let _permit = permit;
-        let _inside = runtime.as_ref().map(Handle::enter);
-        if catch_unwind(AssertUnwindSafe(job)).is_err() {
-            tracing::error!("a job panicked");
-        }
-    };
-    let started = std::thread::Builder::new().name("job".to_owned()).spawn(work);
-    started.map(|_| ()).map_err(|error| ApiError::internal(format!("cannot start a thread: {error}")))
-}
 
 /// A place in the queue of a lane, also given back when the request goes away.
 struct Place(Arc<AtomicUsize>);
@@ -107,6 +171,12 @@ impl Place {
         let before = waiting.fetch_add(1, Ordering::Relaxed);
         let place = Self(Arc::clone(waiting));
         if before < limit { Ok(place) } else { Err(ApiError::busy()) }
+    }
+
+    /// A place for a job that was in the lane already, whatever the limit.
+    fn retake(waiting: &Arc<AtomicUsize>) -> Self {
+        waiting.fetch_add(1, Ordering::Relaxed);
+        Self(Arc::clone(waiting))
     }
 }
 
@@ -152,6 +222,54 @@ mod tests {
         drop(sender);
         let done = blocking(move || Ok(receiver.iter().collect::<Vec<_>>())).await.unwrap();
         assert_eq!(done, (0..50).collect::<Vec<_>>());
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn abandoned_work_keeps_its_permit_and_is_told_to_end() {
+        let lane = Lane::new(1, 8);
+        let (begin, mut begun) = tokio::sync::mpsc::unbounded_channel();
+        let (release, released) = mpsc::channel::<()>();
+        let own = lane.clone();
+        let request = tokio::spawn(async move {
+            own.run_until_dropped(move |cancel| {
+                begin.send(Arc::clone(cancel)).unwrap();
+                released.recv().map_err(|closed| ApiError::internal(closed.to_string()))
+            })
+            .await
+        });
+        let flag = begun.recv().await.unwrap();
+        assert!(!flag.load(Ordering::Relaxed));
+        request.abort();
+        assert!(request.await.unwrap_err().is_cancelled());
+        assert!(flag.load(Ordering::Relaxed));
+        assert_eq!(lane.permits.available_permits(), 0, "the work goes on");
+        release.send(()).unwrap();
+        assert_eq!(lane.run(|| Ok(3)).await, Ok(3));
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn jobs_of_many_turns_take_turns() {
+        let lane = Lane::new(1, 8);
+        let (sender, receiver) = mpsc::channel();
+        let (release, released) = mpsc::channel::<()>();
+        // Nobody begins before all are in the queue.
+        lane.submit(move || released.recv().unwrap()).unwrap();
+        for name in ["a", "b", "c"] {
+            let (sender, mut turns) = (sender.clone(), 0..3);
+            lane.submit_by_turns(move || match turns.next() {
+                Some(turn) => {
+                    sender.send(format!("{name}{turn}")).unwrap();
+                    ControlFlow::Continue(())
+                }
+                None => ControlFlow::Break(()),
+            })
+            .unwrap();
+        }
+        drop(sender);
+        release.send(()).unwrap();
+        let done = blocking(move || Ok(receiver.iter().collect::<Vec<_>>())).await.unwrap();
+        assert_eq!(done, ["a0", "b0", "c0", "a1", "b1", "c1", "a2", "b2", "c2"]);
+        assert_eq!(lane.waiting.load(Ordering::Relaxed), 0);
     }
 
     #[tokio::test]

@@ -26,6 +26,7 @@ mod brought;
 mod questions;
 mod trackability_maps;
 mod clock;
+mod cancel;
 mod jobs;
 mod store;
 pub mod hosts;

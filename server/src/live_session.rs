@@ -8,6 +8,7 @@ use sightline_geometry::error::Result;
 use sightline_session::Session;
 use sightline_session::notes::Notes;
 
+use crate::cancel::CancelFlag;
 use crate::jobs::lock;
 use crate::rendering::OpenTraverse;
 use crate::store::Store;
@@ -18,9 +19,6 @@ pub(crate) const TARGET_LIMIT: usize = 256;
 pub(crate) const LABEL_LIMIT: usize = 100;
 /// How many runs a target may have.
 pub(crate) const RUN_LIMIT: usize = 256;
-
-/// Tells one computation of one run to end.
-pub(crate) type CancelFlag = Arc<AtomicBool>;
 
 /// A session with its traverse.
 pub struct LiveSession {

@@ -7,8 +7,8 @@ use sightline_api::location::AtStep;
 use sightline_api::wire::Event;
 use sightline_session::counterfactual::wire::{Question, QuestionState};
 
+use crate::cancel::CancelFlag;
 use crate::jobs::lock;
-use crate::live_session::CancelFlag;
 use crate::problem::{ApiError, ApiResult};
 
 /// How many questions are kept; the oldest answered ones are forgotten.

@@ -9,7 +9,8 @@ use sightline_session::what_if::Base;
 use sightline_track::locate::template::history::{AgainstEarlier, against_earlier};
 use sightline_track::settings::Settings;
 
-use crate::live_session::{CancelFlag, LiveSession};
+use crate::cancel::CancelFlag;
+use crate::live_session::LiveSession;
 use crate::problem::{ApiError, ApiResult};
 use crate::runner;
 use crate::state::AppState;

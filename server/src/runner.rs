@@ -1,23 +1,28 @@
-//! Computes runs in the background, one step at a time: lock, ask what is next, unlock, compute, lock, record.
+//! Computes runs in the background, one step at a time: lock, ask what is next, unlock, compute, lock, record. After each
+//! step a run goes to the end of the queue.
 //!
 //! A step is recorded only while its computation was not told to end, so a cancelled run gains nothing more.
 //! Recorded steps let go of their images, which the traverse has anyway: only a run's last step keeps the one
 //! from which the next template is cut.
 
+use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use sightline_api::wire::Event;
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_session::step::RunStep;
-use sightline_session::{Next, Pending, Session, track};
+use sightline_session::track::{self, NextStep};
+use sightline_session::{Next, Pending, Session};
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
 use tokio::sync::broadcast;
 
+use crate::cancel::CancelFlag;
 use crate::jobs::Lane;
-use crate::live_session::{CancelFlag, LiveSession};
+use crate::live_session::LiveSession;
 use crate::problem::ApiResult;
 use crate::rendering::OpenTraverse;
 
@@ -46,7 +51,8 @@ impl Runner {
     pub(crate) fn start(&self, live: &Arc<LiveSession>, target: usize, run: usize) -> ApiResult<()> {
         let flag = live.begin(target, run);
         let (runner, owned_live, owned_flag) = (self.clone(), Arc::clone(live), Arc::clone(&flag));
-        let submitted = self.lane.submit(move || runner.compute(&owned_live, target, run, &owned_flag));
+        let turn = move || runner.turn(&owned_live, target, run, &owned_flag);
+        let submitted = self.lane.submit_by_turns(turn);
         if submitted.is_err() {
             live.end(target, run, &flag);
         }
@@ -81,15 +87,22 @@ impl Runner {
         which: impl FnOnce(&Session) -> Vec<(usize, usize)> + Send + 'static,
     ) -> ApiResult<()> {
         let (runner, live) = (self.clone(), Arc::clone(live));
-        self.lane.submit(move || {
-            let _until_the_end = restoring;
-            let runs = live.with(|session| which(session));
-            for (target, run) in runs {
-                if !live.is_computing(target, run) {
-                    let flag = live.begin(target, run);
-                    runner.compute(&live, target, run, &flag);
-                }
+        let mut which = Some(which);
+        let (mut runs, mut current) = (Vec::new().into_iter(), None);
+        self.lane.submit_by_turns(move || {
+            let _until_the_end = &restoring;
+            if let Some(which) = which.take() {
+                runs = live.with(|session| which(session)).into_iter();
             }
+            if current.is_none() {
+                let next = runs.find(|(target, run)| !live.is_computing(*target, *run));
+                current = next.map(|(target, run)| (target, run, live.begin(target, run)));
+            }
+            let Some((target, run, flag)) = &current else { return ControlFlow::Break(()) };
+            if runner.turn(&live, *target, *run, flag).is_break() {
+                current = None;
+            }
+            ControlFlow::Continue(())
         })
     }
 
@@ -100,15 +113,13 @@ impl Runner {
         }
     }
 
-    /// Computes what is missing of a run, until it ends or is told to.
-    fn compute(&self, live: &LiveSession, target: usize, run: usize, flag: &CancelFlag) {
-        let outcome = loop {
-            match catch_unwind(AssertUnwindSafe(|| self.one_step(live, target, run, flag))) {
-                Ok(Ok(true)) => {}
-                Ok(Ok(false) | Err(Error::Cancelled)) => break Ok(()),
-                Ok(Err(error)) => break Err(error.to_string()),
-                Err(_) => break Err("the server met a fault of its own; its log says more".to_owned()),
-            }
+    /// Computes the next step of a run; breaks once the run has ended or is told to.
+    fn turn(&self, live: &LiveSession, target: usize, run: usize, flag: &CancelFlag) -> ControlFlow<()> {
+        let outcome = match catch_unwind(AssertUnwindSafe(|| self.one_step(live, target, run, flag))) {
+            Ok(Ok(true)) => return ControlFlow::Continue(()),
+            Ok(Ok(false) | Err(Error::Cancelled)) => Ok(()),
+            Ok(Err(error)) => Err(error.to_string()),
+            Err(_) => Err("the server met a fault of its own; its log says more".to_owned()),
         };
         live.end(target, run, flag);
         if let Err(why) = outcome {
@@ -123,6 +134,7 @@ impl Runner {
             let _ = live.with(|session| session.fail(target, run, why));
         }
         self.tell(progress(live, target, run, "done".to_owned()));
+        ControlFlow::Break(())
     }
 
     /// Computes and records one step; false when there is nothing more to compute.
@@ -132,7 +144,9 @@ impl Runner {
         }
         let trace = match live.with(|session| session.next(target, run))? {
             Next::Nothing => return Ok(false),
-            Next::Designate { designation, settings } => designate(&live.traverse, designation, &settings)?,
+            Next::Designate { designation, settings } => {
+                designate(&live.traverse, designation, &settings, flag)?
+            }
             Next::Advance(pending) => self.advance(live, (target, run), &pending, flag)?,
         };
         live.with(|session| {
@@ -164,8 +178,14 @@ impl Runner {
             }
         }
         let last = with_image(&live.traverse, &pending.last)?;
-        let (first, prediction_px) = (&pending.first, pending.prediction_px);
-        Ok(without_pair(track::advance_displaced(traverse, first, &last, &pending.settings, prediction_px)))
+        let next = NextStep {
+            first: &pending.first,
+            last: &last,
+            settings: &pending.settings,
+            prediction_px: pending.prediction_px,
+            cancel: flag.as_ref().into(),
+        };
+        next.compute(traverse).map(without_pair)
     }
 }
 
@@ -193,21 +213,24 @@ fn every_run(session: &Session) -> Vec<(usize, usize)> {
 /// Designates a target: renders the stop where that is needed, and computes the first step of a run.
 ///
 /// # Errors
-/// As [`track::designate`].
+/// As [`track::designate`]; [`Error::Cancelled`] soon after `cancel` is set.
 pub(crate) fn designate(
     open: &OpenTraverse,
     designation: Designation,
     settings: &Settings,
+    cancel: &CancelFlag,
 ) -> Result<RunStep> {
     let (step, pixel) = (designation.step, designation.pixel);
     if step < open.traverse.stop_count() {
         let left = open.traverse.left_camera(step);
         // A pixel outside is refused by the tracker; nothing needs to be rendered for that.
         if pixel.is_inside(left.width(), left.height()) {
-            open.make_ready(step, &CancelFlag::default())?;
+            open.make_ready(step, cancel)?;
         }
     }
-    track::designate(&open.traverse, designation, settings).map(without_pair)
+    let first = track::designate(&open.traverse, designation, settings).map(without_pair)?;
+    Cancel::from(cancel.as_ref()).check()?;
+    Ok(first)
 }
 
 /// A step with the image from which the next template is cut, which a recorded step let go of.

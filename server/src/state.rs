@@ -34,6 +34,8 @@ const EVENT_BACKLOG: usize = 256;
 const RUNS_AT_A_TIME: usize = 2;
 /// Runs that may wait.
 const RUNS_WAITING: usize = 256;
+/// Questions that are answered at a time.
+const ANSWERS_AT_A_TIME: usize = 1;
 /// How many sessions there may be.
 const SESSION_LIMIT: usize = 1000;
 
@@ -60,6 +62,7 @@ struct Inner {
     maps: Maps,
     tries: Lane,
     questions: Questions,
+    answers: Lane,
 }
 
 #[derive(Default)]
@@ -138,6 +141,7 @@ impl AppState {
             maps: Maps::default(),
             tries: Lane::new(2, 16),
             questions: Questions::default(),
+            answers: Lane::new(ANSWERS_AT_A_TIME, RUNS_WAITING),
         })))
     }
 
@@ -348,6 +352,11 @@ impl AppState {
     /// What would have saved steps: the questions that were asked.
     pub(crate) fn questions(&self) -> &Questions {
         &self.0.questions
+    }
+
+    /// Where questions are answered.
+    pub(crate) fn answers(&self) -> &Lane {
+        &self.0.answers
     }
 }
 

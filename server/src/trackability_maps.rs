@@ -8,8 +8,8 @@ use sightline_geometry::error::Result;
 use sightline_rover::trackability::{Ground, MapProgress, TrackabilityLimits};
 use sightline_track::settings::Settings;
 
+use crate::cancel::CancelFlag;
 use crate::jobs::{Lane, lock};
-use crate::live_session::CancelFlag;
 use crate::rendering::OpenTraverse;
 
 /// Maps that are kept: about half a megabyte each.

@@ -74,6 +74,18 @@ fn bad_commands_and_bad_input_have_their_own_exit_codes() {
 }
 
 #[test]
+fn info_writes_no_control_characters_of_a_file() {
+    let drive = small_drive();
+    let index = drive.path().join("traverse.toml");
+    let named = std::fs::read_to_string(&index).unwrap().replacen("small drive", "\\u001b[31mred\\u0007", 1);
+    std::fs::write(&index, named).unwrap();
+    let output = run(&["info", text(drive.path())]);
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(output.status.success() && said.contains("name          [31mred"), "{said:?}");
+    assert!(said.chars().all(|c| c == '\n' || !c.is_control()), "{said:?}");
+}
+
+#[test]
 fn a_taken_port_is_said_with_the_way_out() {
     let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let port = taken.local_addr().unwrap().port().to_string();

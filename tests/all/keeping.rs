@@ -38,6 +38,11 @@ impl Killable {
         Self { child, address: url.trim_end_matches('/').to_owned() }
     }
 
+    /// The process.
+    pub(crate) fn process(&mut self) -> &mut Child {
+        &mut self.child
+    }
+
     /// SIGKILL, as the system does it when there is no memory: nothing can be said or written any more.
     pub(crate) fn kill(self) {
         drop(self);

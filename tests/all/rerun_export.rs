@@ -276,6 +276,31 @@ fn a_cancelled_export_leaves_nothing_and_an_existing_file_is_kept() {
     assert_eq!(std::fs::read_to_string(&path).unwrap(), "mine");
 }
 
+/// Threads of this process that belong to a Rerun stream.
+#[cfg(target_os = "linux")]
+fn stream_threads() -> usize {
+    let tasks = std::fs::read_dir("/proc/self/task").unwrap();
+    let names = tasks.filter_map(|task| std::fs::read_to_string(task.unwrap().path().join("comm")).ok());
+    names.filter(|name| name.starts_with("RecordingStream") || name.starts_with("ChunkBatcher")).count()
+}
+
+/// Each leaked eight threads, and each further target of a live stream six; other tests have a few of their own.
+#[cfg(target_os = "linux")]
+#[test]
+fn exports_and_live_targets_leave_no_threads_behind() {
+    const TIMES: usize = 20;
+    let before = stream_threads();
+    let live = LiveStream::start().unwrap();
+    let mut session = Session::new("s", "short", FIXTURE.drive.traverse.stop_count());
+    for _ in 0..TIMES {
+        FIXTURE.exported();
+        session.add_target(None, Settings::default(), Arc::clone(&FIXTURE.runs[0][0]));
+        live.log_session("short approach", &FIXTURE.drive, &session).unwrap();
+    }
+    let after = stream_threads();
+    assert!(after < before + 2 * TIMES, "{before} threads of streams, then {after}");
+}
+
 #[test]
 fn the_live_page_answers_on_loopback_and_may_talk_to_nobody_else() {
     let stream = LiveStream::start().unwrap();

@@ -8,6 +8,7 @@
 
 pub mod frames;
 pub mod error;
+pub mod cancel;
 pub mod camera;
 pub mod stereo_geometry;
 pub mod odometry_error;

@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use super::files::resolve;
+use super::files::{read_text, resolve};
 use sightline_geometry::camera::{Camera, text};
 use sightline_geometry::frames::PoseRecord;
 use sightline_world::traverse::{CameraSource, FORMAT_VERSION, Stop, StopLight, TraverseIndex, View};
@@ -139,7 +139,7 @@ fn read_camera(folder: &Path, name: &str) -> Result<Camera, String> {
     if std::fs::metadata(&path).map_err(unreadable)?.len() > CAMERA_FILE_LIMIT {
         return Err(format!("{name} is too large for a camera file"));
     }
-    let content = std::fs::read_to_string(&path).map_err(unreadable)?;
+    let content = read_text(&path).map_err(unreadable)?;
     text::read_text(&content, Path::new(name)).map_err(|error| error.to_string())
 }
 

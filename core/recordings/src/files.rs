@@ -3,11 +3,12 @@
 //! An index may come from anyone, so a name in it must stay inside the folder: relative, without `..`,
 //! and without a symbolic link that leads out.
 
-use std::fs::OpenOptions;
-use std::io::{ErrorKind, Write};
+use std::fs::{File, OpenOptions};
+use std::io::{ErrorKind, Read, Write};
 use std::path::{Component, Path, PathBuf};
 
 use sightline_geometry::error::{Error, Result};
+use sightline_vision::image::io::open_regular;
 
 /// How often a free temporary name is sought.
 const TEMPORARY_NAMES: u32 = 10_000;
@@ -38,6 +39,24 @@ pub(super) fn resolve(folder: &Path, name: &str) -> Result<PathBuf, String> {
             "\"{name}\" is a link that leads out of the folder or nowhere; copy the file instead"
         )),
     }
+}
+
+/// Opens a regular file for reading.
+///
+/// # Errors
+/// As [`open_regular`].
+pub(super) fn open(path: &Path) -> Result<File> {
+    open_regular(path).map_err(|source| Error::Read { path: path.to_owned(), source })
+}
+
+/// The text of a regular file.
+///
+/// # Errors
+/// As [`open_regular`], or a file that is not UTF-8.
+pub(super) fn read_text(path: &Path) -> std::io::Result<String> {
+    let mut text = String::new();
+    open_regular(path)?.read_to_string(&mut text)?;
+    Ok(text)
 }
 
 /// Writes `bytes` under a temporary name and renames it, so that nobody ever sees half a file.

@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::files::write_atomically;
+use super::files::{read_text, write_atomically};
 use sightline_geometry::error::{Error, Result};
 use sightline_world::toml_text;
 use sightline_world::traverse::TraverseIndex;
@@ -85,7 +85,7 @@ pub(super) fn read(path: &Path, format: IndexFormat) -> Result<TraverseIndex> {
         let limit = SIZE_LIMIT >> 20;
         return Err(Error::format(path, format!("is larger than {limit} MiB, the most an index may have")));
     }
-    let text = std::fs::read_to_string(path).map_err(unreadable)?;
+    let text = read_text(path).map_err(unreadable)?;
     parse(&text, format).map_err(|problem| Error::format(path, problem))
 }
 

@@ -19,4 +19,4 @@ mod truth_files;
 pub use index_file::{Existing, IndexFormat};
 pub use native::{Traverse, write};
 pub use render_cache::RenderCache;
-pub use simulated_traverse::create_simulated;
+pub use simulated_traverse::{create_simulated, create_simulated_until};

@@ -210,13 +210,26 @@ impl Traverse {
     /// As [`Self::capture`], of this image.
     pub fn capture_one(&self, step: usize, is_left: bool) -> Result<Arc<GrayImage>> {
         let stop = self.stop(step)?;
-        match self.capture(step) {
-            Ok(pair) => Ok(if is_left { pair.left } else { pair.right }),
-            Err(_) if is_left => {
-                self.read_image(step, "left", &stop.left, &self.cameras[step].left).map(Arc::new)
-            }
-            Err(_) => self.read_image(step, "right", &stop.right, &self.cameras[step].right).map(Arc::new),
+        if let Some(pair) = self.cached(|cache| cache.get(step)) {
+            return Ok(if is_left { pair.left } else { pair.right });
         }
+        self.render_step(step, &AtomicBool::new(false))?;
+        let cameras = &self.cameras[step];
+        let read = |is_left: bool| {
+            let (side, view, camera) = match is_left {
+                true => ("left", &stop.left, &cameras.left),
+                false => ("right", &stop.right, &cameras.right),
+            };
+            self.read_image(step, side, view, camera).map(Arc::new)
+        };
+        let wanted = read(is_left)?;
+        // The pair is kept, because its other image is usually wanted next.
+        if let Ok(other) = read(!is_left) {
+            let [left, right] = if is_left { [&wanted, &other] } else { [&other, &wanted] };
+            let pair = StereoPair { left: Arc::clone(left), right: Arc::clone(right) };
+            self.cached(|cache| cache.insert(step, pair));
+        }
+        Ok(wanted)
     }
 
     /// The stops as the renderer sees them.
@@ -242,18 +255,24 @@ impl Traverse {
         let path = resolve(&self.folder, &view.image).map_err(|problem| {
             Error::format(&self.index_path, format!("stops[{step}].{side}.image: {problem}"))
         })?;
-        let image = io::read_png(&path, self.index.full_scale_dn).map_err(|error| match error {
+        let named = |error| match error {
             Error::Read { path, source } => Error::format(path, format!("{which} cannot be read ({source})")),
             Error::Format { path, problem } => Error::format(path, format!("{which}: {problem}")),
             other => other,
-        })?;
-        if image.dimensions() != (camera.width(), camera.height()) {
-            let ((width, height), [wanted_width, wanted_height]) = (image.dimensions(), camera.size);
-            let problem = format!(
-                "{which} has {width} × {height} pixels, but its camera is for {wanted_width} × {wanted_height}"
-            );
-            return Err(Error::format(path, problem));
-        }
+        };
+        let check = |[width, height]: [u32; 2]| {
+            let [wanted_width, wanted_height] = camera.size;
+            let problem = || {
+                format!(
+                    "{which} has {width} × {height} pixels, but its camera is for {wanted_width} × {wanted_height}"
+                )
+            };
+            ([width, height] == camera.size).then_some(()).ok_or_else(|| Error::format(&path, problem()))
+        };
+        // The header first: decoding takes memory for as many pixels as the file states.
+        check(io::png_size(&path).map_err(named)?)?;
+        let image = io::read_png_of_size(&path, self.index.full_scale_dn, camera.size).map_err(named)?;
+        check(image.dimensions().into())?;
         Ok(image)
     }
 }

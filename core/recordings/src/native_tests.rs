@@ -163,6 +163,69 @@ fn a_damaged_or_wrong_sized_image_names_itself_and_its_step() {
 }
 
 #[test]
+fn image_of_another_size_is_refused_by_its_header() {
+    let folder = folder(IndexFormat::Toml);
+    let path = folder.path().join("images/0000_left.png");
+    let mut file = std::fs::read(&path).unwrap();
+    // No such image could be decoded: the checksum of the header is wrong now, and nearly all pixels are missing.
+    file[16..24].copy_from_slice(&[0, 0, 0x1f, 0x40, 0, 0, 0x1e, 0xdc]);
+    std::fs::write(&path, file).unwrap();
+    let traverse = Traverse::open(folder.path()).unwrap();
+    for message in [traverse.capture(0).unwrap_err(), traverse.capture_one(0, true).unwrap_err()] {
+        let message = message.to_string();
+        assert!(
+            message.contains("0000_left.png: the left image of step 0 has 8000 × 7900 pixels"),
+            "{message}"
+        );
+    }
+    assert!(traverse.capture_one(0, false).is_ok());
+}
+
+#[test]
+fn one_image_brings_the_pair_unless_the_other_is_damaged() {
+    let folder = folder(IndexFormat::Toml);
+    let path = |name: &str| folder.path().join(name);
+    std::fs::write(path("images/0001_right.png"), "no image").unwrap();
+    let traverse = Traverse::open(folder.path()).unwrap();
+    let right = traverse.capture_one(0, false).unwrap();
+    let left = traverse.capture_one(1, true).unwrap();
+    for name in ["images/0000_left.png", "images/0000_right.png"] {
+        std::fs::remove_file(path(name)).unwrap();
+    }
+    let pair = traverse.capture(0).unwrap();
+    assert!(Arc::ptr_eq(&pair.right, &right) && pair.left.dimensions() == left.dimensions());
+    assert!(
+        traverse.capture_one(1, false).unwrap_err().to_string().contains("0001_right.png: the right image")
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn named_pipe_in_place_of_an_image_or_a_camera_is_refused() {
+    let folder = folder(IndexFormat::Toml);
+    let pipe = |name: &str| {
+        let made = std::process::Command::new("mkfifo").arg(folder.path().join(name)).status();
+        assert!(made.unwrap().success());
+    };
+    std::fs::remove_file(folder.path().join("images/0001_left.png")).unwrap();
+    pipe("images/0001_left.png");
+    pipe("left.cahvor");
+    let mut with_file = index(3);
+    with_file.stops[2].left.camera = CameraSource::File { file: "left.cahvor".into() };
+    let (sender, receiver) = std::sync::mpsc::channel();
+    let path = folder.path().to_owned();
+    // Nobody ever writes into the pipes: whoever opened one would wait for ever.
+    std::thread::spawn(move || {
+        let image = Traverse::open(&path).unwrap().capture(1).unwrap_err().to_string();
+        write(&with_file, &path, IndexFormat::Toml, Existing::Replace).unwrap();
+        sender.send([image, refusal(&path)]).unwrap();
+    });
+    let [image, camera] = receiver.recv_timeout(std::time::Duration::from_secs(60)).unwrap();
+    assert!(image.contains("the left image of step 1 cannot be read (not a regular file)"), "{image}");
+    assert!(camera.contains("left.cahvor cannot be read (not a regular file)"), "{camera}");
+}
+
+#[test]
 fn an_index_that_is_malformed_names_the_file_the_line_and_the_field() {
     let folder = folder(IndexFormat::Toml);
     let file = folder.path().join("traverse.toml");

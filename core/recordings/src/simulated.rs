@@ -25,7 +25,7 @@ use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError, TryLockError};
 use serde::Serialize;
 
 use super::check::StopCameras;
-use super::files::{resolve, write_atomically};
+use super::files::{read_text, resolve, write_atomically};
 use super::render_cache::{self, RenderCache};
 use sightline_geometry::camera::Camera;
 use sightline_geometry::error::{Error, Result};
@@ -211,7 +211,7 @@ pub(super) fn read_scenario(path: &Path) -> Result<Scenario> {
     if std::fs::metadata(path).map_err(unreadable)?.len() > SCENARIO_LIMIT {
         return Err(Error::format(path, "is too large for a scenario"));
     }
-    let text = std::fs::read_to_string(path).map_err(unreadable)?;
+    let text = read_text(path).map_err(unreadable)?;
     Scenario::from_toml(&text, path)
 }
 

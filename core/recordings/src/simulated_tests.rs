@@ -7,7 +7,7 @@ use crate::render_cache;
 use crate::simulated::{camera_in_site, stop_key};
 use sightline_geometry::frames::{Pixel, Vector3};
 use sightline_vision::image::GrayImage;
-use sightline_world::scenario::{ExposureMode, Quantisation};
+use sightline_world::scenario::{ExposureMode, PlacedRock, Quantisation, RockShape};
 use sightline_world::target_truth::TruthSource;
 use sightline_world::traverse::TraverseIndex;
 use sightline_world::{Eye, NoiseSeed, Region, clean_radiance, develop};
@@ -156,6 +156,20 @@ fn many_who_ask_for_the_same_stop_get_the_same_pair() {
         assert_eq!(Arc::as_ref(&pair.left), Arc::as_ref(&traverse.capture(step).unwrap().left));
     }
     assert_eq!(files(folder.path()), 4);
+}
+
+#[test]
+fn cancelled_traverse_leaves_no_file() {
+    let folder = tempfile::tempdir().unwrap();
+    // Without the flag the rays of the exposure and the wheels would meet thousands of rocks each, for minutes.
+    let mut crowded = scenario();
+    let (diameter_m, height_m, shape) = (0.5, 0.4, RockShape::Block);
+    crowded.rocks.placed =
+        vec![PlacedRock { x_m: 0.0, y_m: 0.0, diameter_m, height_m, yaw_deg: 0.0, shape }; 5000];
+    let cancel = AtomicBool::new(true);
+    let made = create_simulated_until(&crowded, folder.path(), (&cancel).into());
+    assert!(matches!(made, Err(Error::Cancelled)));
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
 #[test]

@@ -8,6 +8,7 @@ use super::index_file::{self, Existing, IndexFormat};
 use super::native::{Traverse, write};
 use super::render_cache::RenderCache;
 use super::simulated::{needs_truth, read_scenario};
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_world::moment::{Moment, sun_at};
 use sightline_world::traverse::StopLight;
@@ -19,6 +20,14 @@ use sightline_world::{SCENARIO_FILE, Scenario, World};
 /// A scenario that no world can be made of, a folder that holds another traverse or images without one, or a
 /// folder that cannot be written.
 pub fn create_simulated(scenario: &Scenario, folder: &Path) -> Result<Traverse> {
+    create_simulated_until(scenario, folder, Cancel::default())
+}
+
+/// The same; soon after `cancel` is requested nothing is made.
+///
+/// # Errors
+/// As [`create_simulated`], and [`Error::Cancelled`].
+pub fn create_simulated_until(scenario: &Scenario, folder: &Path, cancel: Cancel<'_>) -> Result<Traverse> {
     scenario.validate()?;
     let scenario_path = folder.join(SCENARIO_FILE);
     if folder.is_dir() && index_file::find(folder).is_ok() {
@@ -27,8 +36,11 @@ pub fn create_simulated(scenario: &Scenario, folder: &Path) -> Result<Traverse> 
         }
         return Err(Error::format(folder, "holds another traverse already; choose another folder"));
     }
-    let world = World::new(scenario);
-    let index = sightline_world::index(scenario, &world)?;
+    let world = World::new_until(scenario, cancel);
+    cancel.check()?;
+    let index = sightline_world::index_until(scenario, &world, cancel);
+    cancel.check()?;
+    let index = index?;
     for view in index.stops.iter().flat_map(|stop| [&stop.left, &stop.right]) {
         let path = folder.join(&view.image);
         if path.exists() {

@@ -11,6 +11,7 @@
 use std::borrow::Cow;
 
 use sightline_geometry::camera::{Camera, Mast, MastAngles};
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::{Pixel, Pose};
 use sightline_geometry::odometry_error::OdometryError;
@@ -112,15 +113,33 @@ fn designated(
 
 /// One later step of a run: what `last` left behind is found again at the next stop.
 pub fn run_step(stops: &dyn Stops, last: &Updated, settings: &Settings) -> StepTrace {
-    run_step_displaced(stops, last, settings, None)
+    computed_step(stops, last, settings, None, Cancel::default())
 }
 
 /// The same from a prediction that a person put at a pixel of the left image, where they did.
+///
+/// # Errors
+/// [`Error::Cancelled`] soon after `cancel` is requested.
 pub fn run_step_displaced(
     stops: &dyn Stops,
     last: &Updated,
     settings: &Settings,
     prediction_px: Option<Pixel>,
+    cancel: Cancel<'_>,
+) -> Result<StepTrace> {
+    cancel.check()?;
+    let trace = computed_step(stops, last, settings, prediction_px, cancel);
+    cancel.check()?;
+    Ok(trace)
+}
+
+/// The step; anything once `cancel` is requested.
+fn computed_step(
+    stops: &dyn Stops,
+    last: &Updated,
+    settings: &Settings,
+    prediction_px: Option<Pixel>,
+    cancel: Cancel<'_>,
 ) -> StepTrace {
     let target = &*with_own_memory(stops, &last.target, settings);
     let step = target.step + 1;
@@ -148,6 +167,7 @@ pub fn run_step_displaced(
         place: place(stops, step, settings),
         lost_count: lost_count(last.state),
         settings,
+        cancel,
     };
     let locate = locate::locate(&input, &target.memory);
     let judge =

@@ -1,8 +1,9 @@
 //! The tracker over a traverse: one step of a run with its comparison against the truth.
 //!
-//! Page, REST and command line all come through these two functions, so that they show the same numbers.
+//! Page, REST and command line all come through these functions, so that they show the same numbers.
 
 use crate::step::RunStep;
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
 use sightline_geometry::frames::Pixel;
 use sightline_rover::pipeline::{self, Stops};
@@ -40,19 +41,34 @@ fn warn_of_shadow<D: Drive>(drive: &D, trace: &mut StepTrace, settings: &Setting
 
 /// The step after `last`; `first` is the run's designation.
 pub fn advance<D: Drive>(drive: &D, first: &StepTrace, last: &StepTrace, settings: &Settings) -> RunStep {
-    advance_displaced(drive, first, last, settings, None)
+    compared(drive, pipeline::run_step(drive, &last.update, settings), Some(first))
 }
 
-/// The same from a prediction that a person put at a pixel of the left image, where they did.
-pub fn advance_displaced<D: Drive>(
-    drive: &D,
-    first: &StepTrace,
-    last: &StepTrace,
-    settings: &Settings,
-    prediction_px: Option<Pixel>,
-) -> RunStep {
-    let trace = pipeline::run_step_displaced(drive, &last.update, settings, prediction_px);
-    compared(drive, trace, Some(first))
+/// The step after the last one of a run, as a person may have changed it and may cancel it.
+#[derive(Clone, Copy, Debug)]
+pub struct NextStep<'a> {
+    /// The run's designation.
+    pub first: &'a StepTrace,
+    /// The last step.
+    pub last: &'a StepTrace,
+    /// The configuration.
+    pub settings: &'a Settings,
+    /// Pixel of the left image at which a person put the prediction, px.
+    pub prediction_px: Option<Pixel>,
+    /// Read several times during the step.
+    pub cancel: Cancel<'a>,
+}
+
+impl NextStep<'_> {
+    /// Computes the step.
+    ///
+    /// # Errors
+    /// [`sightline_geometry::error::Error::Cancelled`] soon after `cancel` is requested.
+    pub fn compute<D: Drive>(&self, drive: &D) -> Result<RunStep> {
+        let Self { first, last, settings, prediction_px, cancel } = *self;
+        let trace = pipeline::run_step_displaced(drive, &last.update, settings, prediction_px, cancel)?;
+        Ok(compared(drive, trace, Some(first)))
+    }
 }
 
 /// All steps of a run, from the designation to the last stop.

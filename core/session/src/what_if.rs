@@ -10,7 +10,8 @@ use utoipa::ToSchema;
 
 use crate::removal::NO_PREDICTION;
 use crate::step::{RunStep, StepRow};
-use crate::track::{self, Drive};
+use crate::track::{self, Drive, NextStep};
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
 use sightline_track::locate::template::match_template::TemplateMatch;
@@ -62,8 +63,13 @@ pub struct Base<'a> {
 ///
 /// # Errors
 /// [`Error::Setting`] for a bad change; [`Error::Request`] when a designation is to be displaced or the pixel is no
-/// number; at a designation those of [`track::designate`].
-pub fn try_step<D: Drive>(drive: &D, base: Base<'_>, what_if: &WhatIf) -> Result<RunStep> {
+/// number; at a designation those of [`track::designate`]; [`Error::Cancelled`] soon after `cancel` is requested.
+pub fn try_step<D: Drive>(
+    drive: &D,
+    base: Base<'_>,
+    what_if: &WhatIf,
+    cancel: Cancel<'_>,
+) -> Result<RunStep> {
     let settings = base.settings.with(&what_if.settings)?;
     let is_pixel = what_if.prediction_px.is_none_or(|pixel| pixel.x.is_finite() && pixel.y.is_finite());
     match (base.last, what_if.prediction_px) {
@@ -74,7 +80,7 @@ pub fn try_step<D: Drive>(drive: &D, base: Base<'_>, what_if: &WhatIf) -> Result
         (None, None) => track::designate(drive, base.first.update.target.designation, &settings),
         (Some(last), prediction_px) => {
             let prediction_px = prediction_px.or(base.prediction_px);
-            Ok(track::advance_displaced(drive, base.first, last, &settings, prediction_px))
+            NextStep { first: base.first, last, settings: &settings, prediction_px, cancel }.compute(drive)
         }
     }
 }
@@ -238,7 +244,9 @@ mod tests {
         let (world, settings) = (world(), Settings::default());
         let steps = steps(&world);
         for step in 0..3 {
-            let tried = try_step(&world, base(&steps, step, &settings), &WhatIf::default()).unwrap();
+            let tried =
+                try_step(&world, base(&steps, step, &settings), &WhatIf::default(), Cancel::default())
+                    .unwrap();
             assert_eq!(tried, steps[step]);
         }
     }
@@ -251,7 +259,7 @@ mod tests {
         let put = predicted.offset(20.0, -9.0);
         let what_if =
             WhatIf { prediction_px: Some(put), arrays: vec![ArrayName::SURFACE], ..WhatIf::default() };
-        let tried = try_step(&world, base(&steps, 1, &settings), &what_if).unwrap();
+        let tried = try_step(&world, base(&steps, 1, &settings), &what_if, Cancel::default()).unwrap();
         let ghost = Ghost::new(what_if, &tried, &steps[1], &settings);
         assert!(ghost.predicted_left.unwrap().distance(put) < 1e-9);
         assert_eq!(ghost.search_window, Some(PixelRect::centred(put, 143)));
@@ -263,7 +271,7 @@ mod tests {
         assert_eq!((ghost.arrays[0].size, ghost.arrays[0].values.len()), ([123, 123], 123 * 123));
         // Far enough away the target is not in the window, and the step is lost.
         let away = WhatIf { prediction_px: Some(predicted.offset(-75.0, 60.0)), ..WhatIf::default() };
-        let tried = try_step(&world, base(&steps, 1, &settings), &away).unwrap();
+        let tried = try_step(&world, base(&steps, 1, &settings), &away, Cancel::default()).unwrap();
         assert_ne!(tried.update.state, TrackingState::Tracking);
     }
 
@@ -272,7 +280,9 @@ mod tests {
         let (world, settings) = (world(), Settings::default());
         let steps = steps(&world);
         let refuse = |step: usize, what_if: &WhatIf| {
-            try_step(&world, base(&steps, step, &settings), what_if).unwrap_err().to_string()
+            try_step(&world, base(&steps, step, &settings), what_if, Cancel::default())
+                .unwrap_err()
+                .to_string()
         };
         let put = |x: f64| WhatIf { prediction_px: Some(Pixel::new(x, 10.0)), ..WhatIf::default() };
         assert!(refuse(0, &put(10.0)).starts_with("prediction_px: the target is designated"));

@@ -11,7 +11,7 @@
 //! or *false* (says tracked, is not). There the truth is projected even where something hides it: a window of which a
 //! corner is hidden may be tracked rightly.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -21,11 +21,11 @@ use super::hand_over::HandOver;
 use super::point::{Fault, Point};
 use super::staged::Staged;
 use super::step_record::StepRecord;
-use sightline_geometry::error::{Error, Result};
+use sightline_geometry::error::Result;
 use sightline_geometry::frames::{Pixel, Point3};
 use sightline_session::step::RunStep;
 use sightline_session::summary::{Summary, summarise};
-use sightline_session::track::{self, Drive};
+use sightline_session::track::{self, Drive, NextStep};
 use sightline_track::settings::Settings;
 use sightline_track::target::{Designation, TrackingState};
 
@@ -113,7 +113,7 @@ pub struct Watch<'a> {
 /// Tracks every target of a point through a drive.
 ///
 /// # Errors
-/// [`Error::Cancelled`] soon after the watch is told to end.
+/// [`Error::Cancelled`](sightline_geometry::error::Error::Cancelled) soon after the watch is told to end.
 pub fn measure<D: Drive>(
     drive: &D,
     point: &Point,
@@ -183,10 +183,9 @@ impl Follower {
         let mut last = first.clone();
         self.record(drive, None, &first, &last);
         while last.step + 1 < drive.stop_count() {
-            if cancel.load(Ordering::Relaxed) {
-                return Err(Error::Cancelled);
-            }
-            let next = track::advance(drive, &first, &last, settings);
+            let next =
+                NextStep { first: &first, last: &last, settings, prediction_px: None, cancel: cancel.into() };
+            let next = next.compute(drive)?;
             self.record(drive, Some(&last), &first, &next);
             last = next;
         }

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::point::Visit;
+use sightline_geometry::error::Error;
 use sightline_geometry::frames::Pose;
 use sightline_testing::{PlaneWorld, Trouble};
 use sightline_track::settings::Changes;

@@ -1,10 +1,13 @@
 //! The template tracker over a world whose truth is a formula.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use serde_json::json;
+use sightline_geometry::error::Error;
 use sightline_geometry::frames::{Pixel, Pose, Vector3, attitude_from_roll_pitch_yaw};
 use sightline_session::step::RunStep;
 use sightline_session::summary::summarise;
-use sightline_session::track;
+use sightline_session::track::{self, NextStep};
 use sightline_testing::{PlaneWorld, Trouble};
 use sightline_track::settings::{Changes, Settings};
 use sightline_track::target::{Designation, TrackingState};
@@ -54,6 +57,37 @@ fn an_approach_stays_within_a_tenth_of_a_pixel_a_step_and_a_few_millimetres() {
     }
     let summary = summarise(&steps);
     assert_eq!((summary.steps_tracked, summary.false_tracked), (Some(6), Some(0)));
+}
+
+#[test]
+fn wild_pose_is_lost_with_the_distances_as_its_reason() {
+    let mut world = PlaneWorld::new(approach());
+    // The blur before shrinking by 150,000 would have a kernel of 450,000 px.
+    world.estimates[2].translation.vector.x -= 1e6;
+    let steps = run(&world, &[]);
+    assert_eq!(steps[2].update.state, TrackingState::Lost { count: 1 });
+    let reason = steps[2].located().unwrap().missing.as_ref().unwrap();
+    assert!(reason.contains("1000006.9 m away and was"), "{reason}");
+    assert!(reason.contains("scaled by 1/20 to 20; check the poses"), "{reason}");
+    assert_eq!(steps[3].update.state, TrackingState::Tracking, "{:?}", steps[3].located());
+}
+
+#[test]
+fn cancelled_step_returns_no_trace() {
+    let world = PlaneWorld::new(approach());
+    let settings = Settings::default();
+    let first = track::designate(&world, designation(118.3, 131.6), &settings).unwrap();
+    let flag = AtomicBool::new(false);
+    let next = NextStep {
+        first: &first,
+        last: &first,
+        settings: &settings,
+        prediction_px: None,
+        cancel: (&flag).into(),
+    };
+    assert_eq!(next.compute(&world).unwrap(), track::advance(&world, &first, &first, &settings));
+    flag.store(true, Ordering::Relaxed);
+    assert!(matches!(next.compute(&world), Err(Error::Cancelled)));
 }
 
 #[test]

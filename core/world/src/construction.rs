@@ -15,12 +15,18 @@ use crate::moment::fiducials;
 use crate::rover::plan;
 use crate::scenario::Scenario;
 use crate::world::{Scenery, World};
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::{Point3, Ray, Vector3};
 
 impl World {
     /// Builds the world of a scenario at the start of the drive, without the rover and what is in its way; the
     /// scenario is taken as valid ([`Scenario::validate`]).
     pub fn new(scenario: &Scenario) -> Self {
+        Self::new_until(scenario, Cancel::default())
+    }
+
+    /// The same; once `cancel` is requested, returns a world without its exposure soon, which is to be discarded.
+    pub fn new_until(scenario: &Scenario, cancel: Cancel<'_>) -> Self {
         let approach = Approach {
             goal_m: plan::goal_m(&scenario.drive),
             wheels_reach_m: plan::wheels_reach_m(&scenario.drive),
@@ -54,7 +60,7 @@ impl World {
         let centre = world.cast(&down).map_or(Point3::new(x_m_goal, y_m_goal, 0.0), |hit| hit.point);
         Arc::make_mut(&mut world.scenery).targets_centre = centre;
         world.solids = fiducials(&scenario.fiducials, &centre);
-        world.exposure = render::exposure(&world, scenario);
+        world.exposure = render::exposure(&world, scenario, cancel);
         world
     }
 }

@@ -13,6 +13,7 @@
 
 use crate::traverse::{CameraSource, FORMAT_VERSION, Stop, StopTruth, TraverseIndex, View};
 use sightline_geometry::camera::{Camera, MastAngles};
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
 use sightline_geometry::frames::PoseRecord;
 use sightline_geometry::stereo_geometry::StereoGeometry;
@@ -31,8 +32,13 @@ const PAUSE_S: f64 = 60.0;
 
 /// Builds the index of a scenario's traverse; fails where the drive is impossible on this ground.
 pub fn index(scenario: &Scenario, world: &World) -> Result<TraverseIndex> {
+    index_until(scenario, world, Cancel::default())
+}
+
+/// The same, failing soon after `cancel` is requested.
+pub fn index_until(scenario: &Scenario, world: &World, cancel: Cancel<'_>) -> Result<TraverseIndex> {
     let rig = Rig::new(&scenario.camera);
-    let drive = drive::true_drive(world, scenario)?;
+    let drive = drive::true_drive(world, scenario, cancel)?;
     let estimates = odometry::believed(&drive, scenario);
     let told: Vec<MastAngles> = drive.stops.iter().filter_map(|stop| stop.angles).collect();
     let true_angles = mast_error::true_angles(&told, scenario);

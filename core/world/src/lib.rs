@@ -67,7 +67,7 @@ mod tests;
 pub use camera::picture::{Eye, NoiseSeed, Region};
 pub use camera::render::{clean_radiance, develop, render};
 pub use camera::rig::Rig;
-pub use index::{SCENARIO_FILE, index, true_camera_in_site};
+pub use index::{SCENARIO_FILE, index, index_until, true_camera_in_site};
 pub use scenario::Scenario;
 pub use targets::{Special, choose_special, choose_targets, is_on_boundary, surface_point};
 pub use world::{Hit, SurfaceId, World};

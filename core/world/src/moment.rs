@@ -26,6 +26,7 @@ use crate::scenario::{EventSettings, Fiducial, Occluder, Scenario, SunSettings};
 use crate::solids::{Look, Shape, Solid, SolidKind};
 use crate::traverse::Stop;
 use crate::world::World;
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::{Point3, Pose, Vector3};
 
 /// Albedo of what stands in the way.
@@ -108,7 +109,7 @@ impl World {
         }
         let laid = self.scenery.laid.get_or_init(|| {
             // A drive that is impossible has no stops at which this could be asked.
-            let drive = true_drive(self, scenario).ok()?;
+            let drive = true_drive(self, scenario, Cancel::default()).ok()?;
             Some(Arc::new(Laid::new(&Tracks::new(&drive, &scenario.rover))))
         });
         Imprint::at_stop(laid.as_ref()?, stop as usize)

@@ -10,6 +10,7 @@ use sightline_geometry::stereo_geometry::StereoGeometry;
 use sightline_recordings::Traverse;
 
 use super::{open, terminal};
+use crate::printable::printable;
 
 /// Say what a traverse holds.
 #[derive(Debug, Args)]
@@ -25,7 +26,8 @@ impl Info {
     /// A traverse that cannot be opened.
     pub(super) fn run(self) -> Result<()> {
         let traverse = open::open(&self.traverse, None)?;
-        summary(&traverse).iter().try_for_each(|line| terminal::line(line))
+        // Names come from the file, and a terminal obeys control characters.
+        summary(&traverse).iter().try_for_each(|line| terminal::line(&printable(line)))
     }
 }
 

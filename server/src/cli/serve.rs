@@ -3,6 +3,7 @@
 use std::fs::{File, TryLockError};
 use std::net::{IpAddr, SocketAddr, TcpListener};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use clap::Args;
 use sightline_geometry::error::{Error, Result};
@@ -13,6 +14,9 @@ use crate::first_session;
 use crate::folders::Folders;
 use crate::hosts::Hosts;
 use crate::state::AppState;
+
+/// How long the end of the program waits for work that does not look at a cancel flag.
+const SHUTDOWN: Duration = Duration::from_secs(1);
 
 /// Open traverses in the browser.
 #[derive(Debug, Args)]
@@ -52,7 +56,7 @@ impl Serve {
         let [sessions, studies, made] = ["sessions", "studies", open::TRAVERSES].map(|name| data.join(name));
         let folders = Folders { sessions, studies, traverses: made };
         let runtime = super::runtime()?;
-        let _inside = runtime.enter();
+        let inside = runtime.enter();
         let state =
             AppState::with_folders(traverses, &folders, Hosts::new(address.port(), &self.allow_host))?;
         if !self.listen.is_loopback() {
@@ -62,7 +66,11 @@ impl Serve {
             let begun = first_session::begin(&state, &first_session::scenario()?);
             begun.map_err(|problem| Error::Request(problem.problem().detail.clone()))?;
         }
-        runtime.block_on(serve(listener, address, state))
+        let ended = runtime.block_on(serve(listener, address, state));
+        drop(inside);
+        // Work that is under way is lost in any case: nothing of it is on disk before it ends.
+        runtime.shutdown_timeout(SHUTDOWN);
+        ended
     }
 
     fn open_traverses(&self, data: &Path) -> Result<Vec<Traverse>> {

@@ -10,10 +10,10 @@ use std::time::Duration;
 use rerun::external::re_build_info::CrateVersion;
 use rerun::external::re_log_encoding::{Encoder, EncodingOptions};
 use rerun::log::ChunkBatcherConfig;
-use rerun::sink::MemorySinkStorage;
 use sightline_geometry::error::{Error, Result};
 use sightline_rover::pipeline::Stops;
 
+use super::memory::MemoryStream;
 use super::recorder::{Recorder, RunLog, builder};
 
 /// How many steps are gathered before they are written: rows of one entity then share a chunk.
@@ -53,9 +53,9 @@ fn write(
     let wrong = |error: &dyn std::fmt::Display| failed(path, &error.to_string());
     let gather =
         ChunkBatcherConfig { flush_tick: Duration::MAX, flush_num_bytes: CHUNK_BYTES, ..Default::default() };
-    let (stream, gathered) =
-        builder(traverse_name).batcher_config(gather).memory().map_err(|error| wrong(&error))?;
-    let mut recorder = Recorder::new(stream, false);
+    let memory = MemoryStream::open(builder(traverse_name)?.batcher_config(gather));
+    let memory = memory.map_err(|error| wrong(&error))?;
+    let mut recorder = Recorder::new(memory.stream().clone(), false);
     let mut file = RrdFile::create(path)?;
     recorder
         .log_runs(runs, stops)
@@ -72,10 +72,10 @@ fn write(
             }
         }
         if done % STEPS_AT_ONCE == STEPS_AT_ONCE - 1 {
-            file.append(&gathered)?;
+            file.append(&memory)?;
         }
     }
-    file.append(&gathered)?;
+    file.append(&memory)?;
     file.finish()?;
     // Everything is on disk: a break now would come too late, so its answer does not matter.
     let _ = progress(all.len(), all.len());
@@ -96,8 +96,8 @@ impl<'a> RrdFile<'a> {
         Ok(Self { path, encoder: encoder.map_err(|error| failed(path, &error.to_string()))? })
     }
 
-    fn append(&mut self, gathered: &MemorySinkStorage) -> Result<()> {
-        for message in gathered.take() {
+    fn append(&mut self, memory: &MemoryStream) -> Result<()> {
+        for message in memory.take() {
             self.encoder.append(&message).map_err(|error| failed(self.path, &error.to_string()))?;
         }
         Ok(())

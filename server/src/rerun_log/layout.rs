@@ -9,6 +9,7 @@ use rerun::log::LogMsg;
 use rerun::{AsComponents, RecordingStream, RecordingStreamBuilder, StoreKind};
 
 use super::Logged;
+use super::memory::MemoryStream;
 
 /// The timeline of layouts, at whose zero rerun's builder puts its rows.
 const TIMELINE: &str = "blueprint";
@@ -37,11 +38,11 @@ impl Layout {
     /// Sends the layout whose views these are, and makes it the one that is shown.
     pub(super) fn send(self, blueprint: &Blueprint, stream: &RecordingStream) -> Logged {
         let Some(info) = stream.store_info() else { return Ok(()) };
-        let (aside, gathered) =
-            RecordingStreamBuilder::new(info.application_id().clone()).enabled(true).memory()?;
-        blueprint.send(&aside, BlueprintActivation::default())?;
+        let aside =
+            MemoryStream::open(RecordingStreamBuilder::new(info.application_id().clone()).enabled(true))?;
+        blueprint.send(aside.stream(), BlueprintActivation::default())?;
         let messages =
-            gathered.take().into_iter().filter(|message| message.store_id().kind() == StoreKind::Blueprint);
+            aside.take().into_iter().filter(|message| message.store_id().kind() == StoreKind::Blueprint);
         let (last, rows): (Vec<_>, Vec<_>) =
             messages.partition(|message| matches!(message, LogMsg::BlueprintActivationCommand(_)));
         let own = rows.first().map(|row| self.rows(row)).transpose()?.unwrap_or_default();
@@ -54,12 +55,13 @@ impl Layout {
     fn rows(&self, sibling: &LogMsg) -> rerun::RecordingStreamResult<Vec<LogMsg>> {
         let store =
             RecordingStreamBuilder::from_store_id(sibling.store_id()).send_properties(false).enabled(true);
-        let (stream, gathered) = store.memory()?;
+        let memory = MemoryStream::open(store)?;
+        let stream = memory.stream();
         stream.set_log_time_enabled(false);
         stream.set_time_sequence(TIMELINE, 0);
         for (path, property) in &self.properties {
             stream.log(path.as_str(), property.as_ref())?;
         }
-        Ok(gathered.take().into_iter().filter(|message| matches!(message, LogMsg::ArrowMsg(..))).collect())
+        Ok(memory.take().into_iter().filter(|message| matches!(message, LogMsg::ArrowMsg(..))).collect())
     }
 }

@@ -42,7 +42,7 @@ impl LiveStream {
             memory_limit: MemoryLimit::from_bytes(HISTORY_BYTES),
             ..ServerOptions::default()
         };
-        let stream = builder("live").serve_grpc_opts(Ipv4Addr::LOCALHOST.to_string(), port, options);
+        let stream = builder("live")?.serve_grpc_opts(Ipv4Addr::LOCALHOST.to_string(), port, options);
         let recorder = Recorder::new(stream.map_err(|error| refused(&error))?, true);
         wait_for(port)?;
         let page = ViewerPage::start(port).map_err(|error| refused(&error))?;

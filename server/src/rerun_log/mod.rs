@@ -130,6 +130,7 @@ mod images;
 mod layout;
 mod live;
 mod map;
+mod memory;
 mod page;
 mod palette;
 mod properties;

@@ -3,8 +3,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
+use std::time::SystemTime;
 
 use rerun::{RecordingStream, RecordingStreamBuilder, TextDocument};
+use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Point3;
 use sightline_rover::pipeline::Stops;
 use sightline_session::marks::marks;
@@ -73,8 +75,23 @@ impl Known {
 }
 
 /// What every recording of ours begins with. The environment cannot switch it off: a person asked for it.
-pub(super) fn builder(name: &str) -> RecordingStreamBuilder {
-    RecordingStreamBuilder::new("sightline").recording_name(name).enabled(true)
+///
+/// # Errors
+/// As [`check_clock`].
+pub(super) fn builder(name: &str) -> Result<RecordingStreamBuilder> {
+    check_clock(SystemTime::now())?;
+    Ok(RecordingStreamBuilder::new("sightline").recording_name(name).enabled(true))
+}
+
+/// Refuses a clock before 1970, at which rerun panics: a recording holds the time at which it was made.
+///
+/// # Errors
+/// [`Error::Request`].
+fn check_clock(now: SystemTime) -> Result<()> {
+    let is_held = now.duration_since(SystemTime::UNIX_EPOCH).is_ok();
+    let problem =
+        "the clock of this computer is before 1970, which a rerun recording cannot hold: set the clock";
+    is_held.then_some(()).ok_or_else(|| Error::Request(problem.to_owned()))
 }
 
 impl Recorder {
@@ -164,4 +181,18 @@ fn images(trace: &RunStep, stops: &dyn Stops) -> Option<[Arc<GrayImage>; 2]> {
     let kept = trace.capture()?.pair.clone();
     let pair = if kept.left.width() > 0 { kept } else { stops.capture(trace.step).ok()? };
     Some([pair.left, pair.right])
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn clock_before_1970_is_refused() {
+        assert!(check_clock(SystemTime::now()).is_ok());
+        let before = SystemTime::UNIX_EPOCH - Duration::from_secs(1);
+        assert!(check_clock(before).unwrap_err().to_string().contains("set the clock"));
+    }
 }

@@ -1,7 +1,7 @@
 //! `…/steps/{step}/counterfactual`: what would have saved a step, as a job with its findings as they come.
 //!
-//! One question for each step; recorded steps never change, so that an answer stays good. A question is answered among the
-//! runs; between two trials it looks whether it was cancelled.
+//! One question for each step; recorded steps never change, so that an answer stays good. Questions have a
+//! lane of their own, so that runs do not wait for them; between two trials it looks whether it was cancelled.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -96,7 +96,7 @@ fn begin(state: &AppState, path: AtStep, asked: RecordedStep) -> ApiResult<Quest
     let (work, is_new) = state.questions().begin(path.clone())?;
     if is_new {
         let (own_state, own_work) = (state.clone(), Arc::clone(&work));
-        let submitted = state.jobs().submit(move || answer(&own_state, &own_work, asked));
+        let submitted = state.answers().submit(move || answer(&own_state, &own_work, asked));
         submitted.inspect_err(|_| state.questions().forget(&path))?;
     }
     Ok(work.view())

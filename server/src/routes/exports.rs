@@ -15,12 +15,13 @@ use tokio_util::io::ReaderStream;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
+use crate::cancel::CancelOnDrop;
 use crate::exports::{Kind, Made, Part, Source, catalogue, make};
 use crate::extract::{Params, Path, SessionPath};
 use crate::jobs::blocking;
 use crate::problem::{ApiError, ApiResult};
 use crate::routes::route::route;
-use crate::routes::traverses::{CancelOnDrop, FileBytes};
+use crate::routes::traverses::FileBytes;
 use crate::state::AppState;
 
 /// The routes of this resource.

@@ -17,10 +17,10 @@ use sightline_track::settings::Settings;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
+use crate::cancel::CancelOnDrop;
 use crate::extract::RunPath;
 use crate::problem::{ApiError, ApiResult};
 use crate::routes::route::route;
-use crate::routes::traverses::CancelOnDrop;
 use crate::state::AppState;
 
 /// The header of the table.

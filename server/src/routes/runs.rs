@@ -16,6 +16,7 @@ use sightline_session::view::RunView;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
+use crate::cancel::CancelFlag;
 use crate::extract::{Body, Params, RunPath, TargetPath};
 use crate::jobs::blocking;
 use crate::live_session::{LiveSession, RUN_LIMIT};
@@ -48,7 +49,7 @@ async fn fork(
     live.with(|session| session.target(target).map(|_| ()))
         .map_err(|error| ApiError::from(error).about_path())?;
     let work_state = state.clone();
-    state.designations().run(move || add(&work_state, &live, target, &new)).await
+    state.designations().run_until_dropped(move |cancel| add(&work_state, &live, target, &new, cancel)).await
 }
 
 /// A run so far
@@ -101,7 +102,14 @@ async fn resume(
     .await
 }
 
-fn add(state: &AppState, live: &Arc<LiveSession>, target: usize, new: &NewRun) -> ApiResult<Response> {
+/// Adds the run, unless the request went away while its target was designated anew.
+fn add(
+    state: &AppState,
+    live: &Arc<LiveSession>,
+    target: usize,
+    new: &NewRun,
+    cancel: &CancelFlag,
+) -> ApiResult<Response> {
     let (designation, settings) = live.with(|session| {
         let (record, parent) = (session.target(target)?, session.run(target, new.run)?);
         Ok::<_, ApiError>((record.designation, parent.settings.with(&new.settings)?))
@@ -120,7 +128,7 @@ fn add(state: &AppState, live: &Arc<LiveSession>, target: usize, new: &NewRun) -
         return Err(ApiError::invalid("field", detail).hint("Leave it out, or run from a later step."));
     }
     let redesignated = if new.from_step == designation.step {
-        Some(Arc::new(runner::designate(&live.traverse, designation, &settings)?))
+        Some(Arc::new(runner::designate(&live.traverse, designation, &settings, cancel)?))
     } else {
         None
     };

@@ -17,6 +17,7 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use crate::brought;
+use crate::cancel::CancelFlag;
 use crate::extract::{Body, SessionPath};
 use crate::jobs::blocking;
 use crate::live_session::LiveSession;
@@ -89,12 +90,12 @@ async fn begin(State(state): State<AppState>, Body(new): Body<BeginSession>) -> 
     (status = 201, body = SessionView), ApiError))]
 async fn bring(State(state): State<AppState>, Body(new): Body<BringSession>) -> ApiResult<Response> {
     let work_state = state.clone();
-    let work = move || {
-        let live = brought::bring(&work_state, new)?;
+    let work = move |cancel: &CancelFlag| {
+        let live = brought::bring(&work_state, new, cancel)?;
         let location = location::<ShowSession>(&AtSession { session: live.id.clone() });
         Ok((StatusCode::CREATED, location, Json(live.with(|session| session.view()))).into_response())
     };
-    state.designations().run(work).await
+    state.designations().run_until_dropped(work).await
 }
 
 /// A session with its targets and runs

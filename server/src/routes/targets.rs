@@ -15,6 +15,7 @@ use sightline_track::settings::Settings;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
+use crate::cancel::CancelFlag;
 use crate::extract::{Body, SessionPath, TargetPath};
 use crate::jobs::blocking;
 use crate::live_session::{LABEL_LIMIT, LiveSession, TARGET_LIMIT};
@@ -45,7 +46,7 @@ async fn designate(
     }
     let settings = Settings::default().with(&new.settings)?;
     let work_state = state.clone();
-    state.designations().run(move || add(&work_state, &live, new, settings)).await
+    state.designations().run_until_dropped(move |cancel| add(&work_state, &live, new, settings, cancel)).await
 }
 
 /// Removes a target; its number is not used again
@@ -64,7 +65,14 @@ async fn remove(
     .await
 }
 
-fn add(state: &AppState, live: &Arc<LiveSession>, new: NewTarget, settings: Settings) -> ApiResult<Response> {
+/// Computes the designation and adds its target, unless the request went away meanwhile.
+fn add(
+    state: &AppState,
+    live: &Arc<LiveSession>,
+    new: NewTarget,
+    settings: Settings,
+    cancel: &CancelFlag,
+) -> ApiResult<Response> {
     let has_room = |count: usize| {
         let full = || ApiError::conflict(format!("A session may have at most {TARGET_LIMIT} targets."));
         (count < TARGET_LIMIT).then_some(()).ok_or_else(full)
@@ -72,7 +80,7 @@ fn add(state: &AppState, live: &Arc<LiveSession>, new: NewTarget, settings: Sett
     has_room(live.with(|session| session.targets.len()))?;
     let named = new.place().name(&live.traverse.traverse, new.step)?;
     let designation = named.designation;
-    let first = runner::designate(&live.traverse, designation, &settings)
+    let first = runner::designate(&live.traverse, designation, &settings, cancel)
         .map_err(|error| trackability::refusal(state, &live.traverse, designation, &settings, error))?;
     let first = Arc::new(first);
     let gap_m = named.gap_m(&first);

@@ -24,9 +24,9 @@ use sightline_track::target::Designation;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
+use crate::cancel::CancelFlag;
 use crate::extract::{Params, Path};
 use crate::jobs::{blocking, lock};
-use crate::live_session::CancelFlag;
 use crate::problem::{ApiError, ApiResult};
 use crate::rendering::OpenTraverse;
 use crate::routes::route::route;
@@ -97,13 +97,9 @@ async fn at_pixel(
     let work_state = state.clone();
     state
         .designations()
-        .run(move || {
-            let ground = work_state.maps().ground(
-                &open,
-                step,
-                (&Settings::default(), &limits),
-                &CancelFlag::default(),
-            )?;
+        .run_until_dropped(move |cancel| {
+            let wanted = (&Settings::default(), &limits);
+            let ground = work_state.maps().ground(&open, step, wanted, cancel)?;
             Ok(Json(PixelVerdict::of(&open.traverse, &ground, place)))
         })
         .await

@@ -1,7 +1,6 @@
 //! `traverses`: what was recorded or is simulated, and its images.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use axum::Json;
 use axum::extract::State;
@@ -20,6 +19,7 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use crate::brought;
+use crate::cancel::{CancelFlag, CancelOnDrop};
 use crate::drives;
 use crate::extract::{Body, Params, Path};
 use crate::jobs::blocking;
@@ -75,13 +75,13 @@ fn entry(open: &OpenTraverse) -> TraverseEntry {
     (status = 201, body = TraverseEntry), ApiError))]
 async fn add(State(state): State<AppState>, Body(new): Body<AddTraverse>) -> ApiResult<Response> {
     let work_state = state.clone();
-    let work = move || {
-        let (open, is_new) = brought::open(&work_state, &new.scenario)?;
+    let work = move |cancel: &CancelFlag| {
+        let (open, is_new) = brought::open(&work_state, &new.scenario, cancel)?;
         let status = if is_new { StatusCode::CREATED } else { StatusCode::OK };
         let location = location::<ShowTraverse>(&AtTraverse { id: open.id.clone() });
         Ok((status, location, Json(entry(&open))).into_response())
     };
-    state.designations().run(work).await
+    state.designations().run_until_dropped(work).await
 }
 
 /// A traverse with its stops
@@ -219,21 +219,4 @@ fn picture(png: Vec<u8>, headers: &HeaderMap) -> Response {
         return (StatusCode::NOT_MODIFIED, caching).into_response();
     }
     ([(header::CONTENT_TYPE, "image/png")], caching, png).into_response()
-}
-
-/// Cancels the work for a request that goes away.
-#[derive(Default)]
-pub(crate) struct CancelOnDrop(Arc<AtomicBool>);
-
-impl CancelOnDrop {
-    /// What is set when the request goes away.
-    pub(crate) fn flag(&self) -> Arc<AtomicBool> {
-        Arc::clone(&self.0)
-    }
-}
-
-impl Drop for CancelOnDrop {
-    fn drop(&mut self) {
-        self.0.store(true, Ordering::Relaxed);
-    }
 }

@@ -10,7 +10,6 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use crate::extract::Body;
-use crate::live_session::CancelFlag;
 use crate::problem::{ApiError, ApiResult};
 use crate::recorded_step::RecordedStep;
 use crate::routes::route::route;
@@ -45,9 +44,10 @@ async fn what_if(
     let settings = asked.settings.with(&what_if.settings)?;
     state
         .tries()
-        .run(move || {
-            asked.prepare(&CancelFlag::default())?;
-            let tried = try_step(&asked.live.traverse.traverse, asked.base(), &what_if)?;
+        .run_until_dropped(move |cancel| {
+            asked.prepare(cancel)?;
+            let drive = &asked.live.traverse.traverse;
+            let tried = try_step(drive, asked.base(), &what_if, cancel.as_ref().into())?;
             Ok(Json(Ghost::new(what_if, &tried, &asked.recorded, &settings)))
         })
         .await

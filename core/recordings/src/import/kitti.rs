@@ -29,6 +29,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
 
 use super::{ImportFormat, ImportOptions, Output};
+use crate::files;
 use sightline_geometry::camera::{Cahv, Camera, CameraModel};
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::{Point3, Pose, PoseRecord, Vector3};
@@ -127,7 +128,7 @@ fn rover_from_camera() -> Rotation3<f64> {
 }
 
 fn read_text(path: &Path) -> Result<String> {
-    std::fs::read_to_string(path).map_err(|source| Error::Read { path: path.to_owned(), source })
+    files::read_text(path).map_err(|source| Error::Read { path: path.to_owned(), source })
 }
 
 /// The finite numbers of a line; `None` where one of its words is none.
@@ -235,6 +236,10 @@ fn choose_frames(path: &Path, poses: &[Pose], options: &ImportOptions) -> Result
 }
 
 fn image_size(path: &Path) -> Result<[u32; 2]> {
-    let image = io::read_png(path, None)?;
-    Ok([image.width(), image.height()])
+    let size = io::png_size(path)?;
+    let pixels = u64::from(size[0]) * u64::from(size[1]);
+    if pixels > io::MAX_PIXELS {
+        return Err(Error::format(path, format!("{} × {} pixels are too many", size[0], size[1])));
+    }
+    Ok(size)
 }

@@ -12,14 +12,18 @@ pub mod kitti;
 pub(crate) mod odl;
 pub mod pds3;
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::files::write_atomically;
+use super::files::{self, write_atomically};
 use super::index_file::{self, Existing, IndexFormat};
 use super::native;
 use sightline_geometry::error::{Error, Result};
 use sightline_world::traverse::TraverseIndex;
+
+/// The largest file that is copied, bytes.
+const FILE_LIMIT: u64 = 256 << 20;
 
 /// What a person may choose; each format uses what concerns it.
 #[derive(Clone, Debug, PartialEq)]
@@ -150,7 +154,12 @@ impl Output<'_> {
     pub fn copy(&mut self, source: &Path, name: &str) -> Result<()> {
         self.check_cancelled()?;
         let unreadable = |error| Error::Read { path: source.to_owned(), source: error };
-        let bytes = std::fs::read(source).map_err(unreadable)?;
+        let mut bytes = Vec::new();
+        let length = files::open(source)?.take(FILE_LIMIT + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+        if length as u64 > FILE_LIMIT {
+            let limit = FILE_LIMIT >> 20;
+            return Err(Error::format(source, format!("the file has more than the {limit} MiB allowed")));
+        }
         self.write(name, &bytes)
     }
 

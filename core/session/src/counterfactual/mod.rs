@@ -10,7 +10,7 @@
 //! | lost or failed | it is accepted |
 //! | accepted, yet false against the truth | it is rejected, or accepted and right |
 //!
-//! Every finding was verified by computing the step with it (`track::advance_displaced`), and says whether the result is
+//! Every finding was verified by computing the step with it (`track::NextStep`), and says whether the result is
 //! right where the truth is known: an acceptance that is false tracking is said plainly and comes last. Of a setting with
 //! which a small change accepts a wrong match and a larger one the right match, the larger one is the finding.
 //!
@@ -187,7 +187,7 @@ pub fn goal(base: &Base<'_>) -> Result<Goal> {
 /// Looks for the changes with which the step turns; `on` hears of every one as it is found.
 ///
 /// # Errors
-/// Those of [`goal`]; [`Error::Cancelled`] soon after `cancel` is set, between two computations of the step.
+/// Those of [`goal`]; [`Error::Cancelled`] soon after `cancel` is set.
 pub fn look<D: Drive>(
     drive: &D,
     base: Base<'_>,

@@ -9,6 +9,7 @@ use super::*;
 use crate::track;
 use crate::what_if::try_step;
 use sightline_geometry::camera::{Camera, Mast, MastAngles};
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::{Point3, Pose, Vector3};
 use sightline_geometry::odometry_error::OdometryError;
 use sightline_geometry::stereo_geometry::StereoGeometry;
@@ -130,7 +131,7 @@ impl Staged {
 
     fn with(&self, key: &str, value: Value) -> RunStep {
         let what_if = WhatIf { settings: Changes::from([(key.to_owned(), value)]), ..WhatIf::default() };
-        try_step(&self.world, self.base(), &what_if).unwrap()
+        try_step(&self.world, self.base(), &what_if, Cancel::default()).unwrap()
     }
 }
 
@@ -165,7 +166,7 @@ fn a_window_too_small_for_a_displaced_prediction_is_answered_by_the_least_window
             .starts_with(&format!("search_window_px {least} instead of 61 px: accepted and right"))
     );
     // What was verified is what the step really does.
-    let again = try_step(&staged.world, staged.base(), &finding.what_if()).unwrap();
+    let again = try_step(&staged.world, staged.base(), &finding.what_if(), Cancel::default()).unwrap();
     assert_eq!(again.row(), finding.row);
 }
 
@@ -183,14 +184,14 @@ fn the_prediction_need_only_move_until_the_match_is_in_the_window() {
     let left_px = (truth.x - moved.to.x).abs().max((truth.y - moved.to.y).abs());
     assert!((19.0..20.5 + tolerance_px).contains(&left_px), "{left_px} px are left, {tolerance_px} allowed");
     assert_eq!(finding.outcome, Outcome::Right);
-    let again = try_step(&staged.world, staged.base(), &finding.what_if()).unwrap();
+    let again = try_step(&staged.world, staged.base(), &finding.what_if(), Cancel::default()).unwrap();
     assert_eq!(again.row(), finding.row);
     let nearer = Pixel::new(
         moved.from.x + (moved.to.x - moved.from.x) * 0.8,
         moved.from.y + (moved.to.y - moved.from.y) * 0.8,
     );
     let short = WhatIf { prediction_px: Some(nearer), ..WhatIf::default() };
-    assert!(!is_accepted(&try_step(&staged.world, staged.base(), &short).unwrap()));
+    assert!(!is_accepted(&try_step(&staged.world, staged.base(), &short, Cancel::default()).unwrap()));
 }
 
 #[test]

@@ -1,12 +1,13 @@
 //! Trials of a step: each computes it with a change and says what came of it.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use super::{Finding, Goal, Moved, Outcome, SettingChange, is_accepted, wording};
 use crate::step::RunStep;
 use crate::track::Drive;
 use crate::what_if::{Base, WhatIf, try_step};
 use crate::why::gates::{self, Margin};
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
 use sightline_track::limits::Limits;
@@ -33,17 +34,17 @@ pub(super) struct Trials<'a, D: Drive> {
     pub goal: Goal,
     /// How many times so far.
     pub runs: usize,
-    cancel: &'a AtomicBool,
+    cancel: Cancel<'a>,
 }
 
 impl<'a, D: Drive> Trials<'a, D> {
     pub(super) fn new(drive: &'a D, base: Base<'a>, goal: Goal, cancel: &'a AtomicBool) -> Self {
-        Self { drive, base, goal, runs: 0, cancel }
+        Self { drive, base, goal, runs: 0, cancel: cancel.into() }
     }
 
     /// Ends the search once it was cancelled.
     pub(super) fn check(&self) -> Result<()> {
-        if self.cancel.load(Ordering::Relaxed) { Err(Error::Cancelled) } else { Ok(()) }
+        self.cancel.check()
     }
 
     /// The step with changes; none where they are no settings.
@@ -51,7 +52,7 @@ impl<'a, D: Drive> Trials<'a, D> {
         self.check()?;
         self.runs += 1;
         let what_if = WhatIf { settings: changes.clone(), prediction_px, arrays: Vec::new() };
-        match try_step(self.drive, self.base, &what_if) {
+        match try_step(self.drive, self.base, &what_if, self.cancel) {
             Err(Error::Setting { .. }) => Ok(None),
             tried => tried.map(Some),
         }

@@ -4,7 +4,8 @@ use nalgebra::{Matrix2, Matrix3, Quaternion, Translation3, UnitQuaternion, Vecto
 use serde_json::json;
 
 use super::*;
-use crate::track;
+use crate::track::{self, NextStep};
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::{Point3, Vector3};
 use sightline_testing::{PlaneWorld, Trouble};
 use sightline_track::settings::Changes;
@@ -348,7 +349,10 @@ fn the_sentence_of_a_lost_step_names_value_limit_rim_and_how_far_the_prediction_
 fn a_displaced_prediction_is_told_as_what_a_person_did() {
     let (world, steps, settings) = run(&[]);
     let pixel = Pixel::new(110.0, 140.0);
-    let tried = track::advance_displaced(&world, &steps[0], &steps[1], &settings, Some(pixel));
+    let (first, last) = (&steps[0], &steps[1]);
+    let prediction_px = Some(pixel);
+    let next = NextStep { first, last, settings: &settings, prediction_px, cancel: Cancel::default() };
+    let tried = next.compute(&world).unwrap();
     let book = Book { trace: &tried, prediction_px: Some(pixel), ..book(&world, &steps, &settings, 2) };
     let node = book.ask("predicted_position").unwrap();
     assert!(!node.is_closed_form);

@@ -18,6 +18,7 @@ use crate::stages::capture::Capture;
 use crate::stages::point_mast::Pointing;
 use crate::stages::prediction::Prediction;
 use sightline_geometry::camera::Camera;
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::estimate::drift::Drift;
 use sightline_geometry::frames::{Pixel, Point3, Pose};
 use sightline_geometry::stereo_geometry::StereoGeometry;
@@ -187,6 +188,8 @@ pub struct LocateInput<'a> {
     pub lost_count: u32,
     /// The configuration.
     pub settings: &'a Settings,
+    /// Once requested, the tracker returns anything soon: the sighting is discarded.
+    pub cancel: Cancel<'a>,
 }
 
 /// A stop among those of its drive.

@@ -5,10 +5,11 @@
 //! luma = 0.2126 R + 0.7152 G + 0.0722 B (ITU-R BT.709); transparency is ignored.
 //!
 //! A file says how much memory it wants before it shows a pixel, so the size is checked first: nothing above
-//! [`MAX_PIXELS`] is decoded, and the decoder may not allocate more than [`MAX_ALLOCATION_BYTES`].
+//! [`MAX_PIXELS`] is decoded, and the decoder may not allocate more than [`MAX_ALLOCATION_BYTES`]. Where the size is known
+//! before, the header is compared with it and the limit is what that size takes.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Cursor, Seek};
+use std::io::{BufRead, BufReader, Cursor, ErrorKind, Read, Seek};
 use std::path::Path;
 
 use image::codecs::png::PngDecoder;
@@ -23,14 +24,66 @@ pub const MAX_PIXELS: u64 = 64_000_000;
 /// Most memory the decoder may allocate at a time, bytes: four 16-bit channels of the largest image.
 pub const MAX_ALLOCATION_BYTES: u64 = MAX_PIXELS * 8;
 
+/// Memory for the parts of a file that are not pixels, such as a colour profile, bytes.
+const METADATA_BYTES: u64 = 4 << 20;
+
+/// First bytes of every PNG file: signature, length and name of the header chunk.
+const PNG_START: [u8; 16] = *b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR";
+
 /// Reads an 8- or 16-bit PNG file; `full_scale_dn` is the detector number that becomes 1.
 ///
 /// # Errors
 /// [`Error::Read`] when the file cannot be opened; [`Error::Format`] when it is no PNG, is damaged or too large.
 pub fn read_png(path: impl AsRef<Path>, full_scale_dn: Option<f64>) -> Result<GrayImage> {
     let path = path.as_ref();
-    let file = File::open(path).map_err(|source| Error::Read { path: path.into(), source })?;
-    decode(BufReader::new(file), path, full_scale_dn)
+    decode(open(path)?, path, full_scale_dn, MAX_ALLOCATION_BYTES)
+}
+
+/// The same for a file that should have `size`, width and height in px: the decoder may allocate no more than that
+/// takes. The caller compares the sizes, with [`png_size`] before and with the image after.
+///
+/// # Errors
+/// As [`read_png`].
+pub fn read_png_of_size(path: &Path, full_scale_dn: Option<f64>, size: [u32; 2]) -> Result<GrayImage> {
+    let pixels = u64::from(size[0]) * u64::from(size[1]);
+    let most = pixels.saturating_mul(8).saturating_add(METADATA_BYTES).min(MAX_ALLOCATION_BYTES);
+    decode(open(path)?, path, full_scale_dn, most)
+}
+
+/// Width and height that the header of a PNG file states, px; no pixel is decoded.
+///
+/// # Errors
+/// As [`read_png`].
+pub fn png_size(path: &Path) -> Result<[u32; 2]> {
+    let mut start = [0; PNG_START.len() + 8];
+    let read = open(path)?.read_exact(&mut start);
+    let [a, b, c, d, e, f, g, h] = start[PNG_START.len()..] else { return Ok([0; 2]) };
+    match read {
+        Ok(()) if start.starts_with(&PNG_START) => {
+            Ok([u32::from_be_bytes([a, b, c, d]), u32::from_be_bytes([e, f, g, h])])
+        }
+        Err(source) if source.kind() != ErrorKind::UnexpectedEof => {
+            Err(Error::Read { path: path.into(), source })
+        }
+        _ => Err(Error::format(path, "not a PNG image that can be read (no header)")),
+    }
+}
+
+/// Opens a file for reading, unless it is something else, such as a named pipe, which might never answer.
+///
+/// # Errors
+/// A missing file, a folder, a pipe, a device or a socket.
+pub fn open_regular(path: &Path) -> std::io::Result<File> {
+    // A pipe would block already when it is opened.
+    if std::fs::metadata(path)?.is_file() {
+        File::open(path)
+    } else {
+        Err(std::io::Error::new(ErrorKind::InvalidInput, "not a regular file"))
+    }
+}
+
+fn open(path: &Path) -> Result<BufReader<File>> {
+    open_regular(path).map(BufReader::new).map_err(|source| Error::Read { path: path.into(), source })
 }
 
 /// Decodes the bytes of a PNG file; `name` is what messages call it.
@@ -38,7 +91,7 @@ pub fn read_png(path: impl AsRef<Path>, full_scale_dn: Option<f64>) -> Result<Gr
 /// # Errors
 /// [`Error::Format`] when the bytes are no PNG, are damaged or hold too large an image.
 pub fn decode_png(bytes: &[u8], name: impl AsRef<Path>, full_scale_dn: Option<f64>) -> Result<GrayImage> {
-    decode(Cursor::new(bytes), name.as_ref(), full_scale_dn)
+    decode(Cursor::new(bytes), name.as_ref(), full_scale_dn, MAX_ALLOCATION_BYTES)
 }
 
 /// Writes 8 bits: 1 becomes 255; values are cut to 0…1, invalid pixels become 0.
@@ -73,12 +126,17 @@ pub fn encode_png_u16(image: &GrayImage, full_scale_dn: Option<f64>) -> Result<V
     encode(&to_u16(image, full_scale_dn), Path::new("image"))
 }
 
-fn decode(reader: impl BufRead + Seek, path: &Path, full_scale_dn: Option<f64>) -> Result<GrayImage> {
+fn decode(
+    reader: impl BufRead + Seek,
+    path: &Path,
+    full_scale_dn: Option<f64>,
+    most_bytes: u64,
+) -> Result<GrayImage> {
     if let Some(dn) = full_scale_dn.filter(|dn| !(*dn > 0.0 && dn.is_finite())) {
         return Err(Error::format(path, format!("full scale must be a positive number, not {dn}")));
     }
     let mut limits = Limits::default();
-    limits.max_alloc = Some(MAX_ALLOCATION_BYTES);
+    limits.max_alloc = Some(most_bytes);
     let damaged =
         |error: ImageError| Error::format(path, format!("not a PNG image that can be read ({error})"));
     let decoder = PngDecoder::with_limits(reader, limits).map_err(damaged)?;

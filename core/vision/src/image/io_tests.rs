@@ -65,5 +65,25 @@ fn damaged_and_foreign_files_are_named() {
         assert!(error.starts_with("some/file.png: not a PNG image that can be read"), "{error}");
     }
     assert!(matches!(read_png("no/such/file.png", None), Err(Error::Read { .. })));
+    assert!(matches!(read_png(".", None), Err(Error::Read { .. })));
     assert!(decode_png(&whole, "zero", Some(0.0)).unwrap_err().to_string().contains("full scale"));
+}
+
+#[test]
+fn header_states_the_size_and_bounds_the_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("image.png");
+    write_png_u16(&path, &GrayImage::new(3000, 1000), None).unwrap();
+    assert_eq!(png_size(&path).unwrap(), [3000, 1000]);
+    assert_eq!(read_png_of_size(&path, None, [3000, 1000]).unwrap().dimensions(), (3000, 1000));
+    let small = read_png_of_size(&path, None, [3, 3]).unwrap_err().to_string();
+    assert!(small.contains("image.png: not a PNG image that can be read"), "{small}");
+    let whole = std::fs::read(&path).unwrap();
+    std::fs::write(&path, &whole[..24]).unwrap();
+    assert_eq!(png_size(&path).unwrap(), [3000, 1000]);
+    for damaged in [&whole[..23], &b"GIF89a, which is followed by enough bytes"[..]] {
+        std::fs::write(&path, damaged).unwrap();
+        let message = png_size(&path).unwrap_err().to_string();
+        assert!(message.contains("image.png: not a PNG image that can be read"), "{message}");
+    }
 }

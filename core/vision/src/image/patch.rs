@@ -38,6 +38,9 @@ const NATURAL_BLUR_PX: f64 = 0.5;
 /// part in 65535 makes 3.7e-7.
 pub const FLAT_STD: f64 = 1e-7;
 
+/// How far from a window its source is read at most, px: farther than any image reaches, and small enough for `i32`.
+const REACH_MAX_PX: f64 = 1e6;
+
 /// A window of an image, or one resampled from it; NaN = invalid. It reads like the image it wraps.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Patch(GrayImage);
@@ -182,7 +185,7 @@ fn smoothed(
     scale: f64,
 ) -> Option<(GrayImage, Vector2<f64>)> {
     let sigma_px = NATURAL_BLUR_PX * (1.0 / (scale * scale) - 1.0).sqrt();
-    let reach = farthest + 3.0 + (3.0 * sigma_px).ceil();
+    let reach = (farthest + 3.0 + (3.0 * sigma_px).ceil()).min(REACH_MAX_PX);
     let needed = PixelRect::centred(centre, 2 * reach.ceil() as u32 + 1);
     let part = needed.intersect(&PixelRect::whole(source.width(), source.height()))?;
     let corner = Vector2::new(f64::from(part.x), f64::from(part.y));
@@ -244,38 +247,66 @@ pub fn crop(image: &GrayImage, part: &PixelRect) -> GrayImage {
 }
 
 /// Gaussian smoothing, normalised over the valid pixels inside the image; invalid pixels stay invalid.
+///
+/// The kernel ends at 3σ, or at the image's longest side where that is shorter: taps beyond it read no pixel.
 pub fn blurred(image: &GrayImage, sigma_px: f64) -> GrayImage {
-    let radius = (3.0 * sigma_px).ceil() as i64;
+    let (width, height) = (image.width() as usize, image.height() as usize);
+    let radius = (3.0 * sigma_px).ceil().min(width.max(height) as f64) as usize;
     let weights: Vec<f64> =
-        (-radius..=radius).map(|i| (-0.5 * (i as f64 / sigma_px.max(1e-9)).powi(2)).exp()).collect();
-    let (width, height) = (i64::from(image.width()), i64::from(image.height()));
-    // Each pixel carries its weighted value and its weight, so that both passes stay separable.
-    let start: Vec<(f64, f64)> = image
-        .as_raw()
-        .iter()
-        .map(|v| if v.is_finite() { (f64::from(*v), 1.0) } else { (0.0, 0.0) })
-        .collect();
-    let pass = |from: &[(f64, f64)], dx: i64, dy: i64| -> Vec<(f64, f64)> {
-        let mut out = Vec::with_capacity(from.len());
-        for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
-            let mut sum = (0.0, 0.0);
-            for (i, w) in (-radius..=radius).zip(&weights) {
-                let (u, v) = (x + i * dx, y + i * dy);
-                if u >= 0 && v >= 0 && u < width && v < height {
-                    let (value, weight) = from[(v * width + u) as usize];
-                    sum = (sum.0 + w * value, sum.1 + w * weight);
-                }
-            }
-            out.push(sum);
-        }
-        out
-    };
-    let sums = pass(&pass(&start, 1, 0), 0, 1);
+        (0..=radius).map(|i| (-0.5 * (i as f64 / sigma_px.max(1e-9)).powi(2)).exp()).collect();
+    // The weighted values and the weights are summed separately, so that both passes stay separable.
+    let mut values: Vec<f64> =
+        image.as_raw().iter().map(|v| if v.is_finite() { f64::from(*v) } else { 0.0 }).collect();
+    let mut sums: Vec<f64> = image.as_raw().iter().map(|v| f64::from(u8::from(v.is_finite()))).collect();
+    for plane in [&mut values, &mut sums] {
+        *plane = along_columns(&along_rows(plane, width, &weights), width, &weights);
+    }
     let mut out = image.clone();
-    for (pixel, (value, weight)) in out.iter_mut().zip(sums).filter(|(pixel, _)| pixel.is_finite()) {
-        *pixel = (value / weight) as f32;
+    let blurred = values.iter().zip(&sums).map(|(value, sum)| (value / sum) as f32);
+    out.iter_mut().zip(blurred).filter(|(pixel, _)| pixel.is_finite()).for_each(|(pixel, v)| *pixel = v);
+    out
+}
+
+/// Each row convolved with the symmetric kernel whose weights from its middle on are `weights`.
+fn along_rows(plane: &[f64], width: usize, weights: &[f64]) -> Vec<f64> {
+    let mut out = vec![0.0; plane.len()];
+    for (to, from) in out.chunks_exact_mut(width.max(1)).zip(plane.chunks_exact(width.max(1))) {
+        for (shift, weight) in taps(weights).filter(|(shift, _)| shift.unsigned_abs() < width) {
+            let by = shift.unsigned_abs();
+            if shift < 0 {
+                add(&mut to[by..], weight, &from[..width - by]);
+            } else {
+                add(&mut to[..width - by], weight, &from[by..]);
+            }
+        }
     }
     out
+}
+
+/// Each column convolved with the symmetric kernel whose weights from its middle on are `weights`.
+fn along_columns(plane: &[f64], width: usize, weights: &[f64]) -> Vec<f64> {
+    let rows: Vec<&[f64]> = plane.chunks_exact(width.max(1)).collect();
+    let mut out = vec![0.0; plane.len()];
+    for (y, to) in out.chunks_exact_mut(width.max(1)).enumerate() {
+        for (shift, weight) in taps(weights) {
+            if let Some(from) = y.checked_add_signed(shift).and_then(|y| rows.get(y)) {
+                add(to, weight, from);
+            }
+        }
+    }
+    out
+}
+
+/// Offset and weight of every tap, from the first to the last.
+fn taps(weights: &[f64]) -> impl Iterator<Item = (isize, f64)> {
+    let before = (1..weights.len()).rev().map(|i| (-(i as isize), weights[i]));
+    before.chain(weights.iter().enumerate().map(|(i, weight)| (i as isize, *weight)))
+}
+
+fn add(to: &mut [f64], weight: f64, from: &[f64]) {
+    for (sum, value) in to.iter_mut().zip(from) {
+        *sum += weight * value;
+    }
 }
 
 /// A patch without a valid pixel.

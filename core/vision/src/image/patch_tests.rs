@@ -141,3 +141,51 @@ fn normalised_patches_have_zero_mean_and_unit_deviation() {
     assert!(normalise(&flat).is_none());
     assert_eq!(normalised_difference(&patch, &flat), unit);
 }
+
+/// The blur by its definition: for each pixel, the weighted mean of the valid pixels within 3σ along rows, then columns.
+fn blurred_by_definition(image: &GrayImage, sigma_px: f64) -> GrayImage {
+    let radius = (3.0 * sigma_px).ceil() as i64;
+    let (width, height) = (i64::from(image.width()), i64::from(image.height()));
+    let start = image.iter().map(|v| if v.is_finite() { (f64::from(*v), 1.0) } else { (0.0, 0.0) });
+    let pass = |from: Vec<(f64, f64)>, dx: i64, dy: i64| -> Vec<(f64, f64)> {
+        let sum = |x: i64, y: i64| {
+            let inside = (-radius..=radius).map(|i| (i, x + i * dx, y + i * dy));
+            let inside = inside.filter(|(_, u, v)| (0..width).contains(u) && (0..height).contains(v));
+            inside.fold((0.0, 0.0), |sum, (i, u, v)| {
+                let weight = (-0.5 * (i as f64 / sigma_px).powi(2)).exp();
+                let (value, valid) = from[(v * width + u) as usize];
+                (sum.0 + weight * value, sum.1 + weight * valid)
+            })
+        };
+        (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| sum(x, y)).collect()
+    };
+    let mut out = image.clone();
+    let sums = pass(pass(start.collect(), 1, 0), 0, 1);
+    for (pixel, (value, weight)) in out.iter_mut().zip(sums).filter(|(pixel, _)| pixel.is_finite()) {
+        *pixel = (value / weight) as f32;
+    }
+    out
+}
+
+#[test]
+fn blur_has_the_bits_of_its_definition() {
+    let mut image = GrayImage::from_fn(37, 23, |x, y| Luma([texture(f64::from(x), f64::from(y)) as f32]));
+    image.put_pixel(5, 11, Luma([f32::NAN]));
+    let bits = |image: &GrayImage| image.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+    for sigma_px in [0.3, 1.7, 6.0, 40.0] {
+        let found = blurred(&image, sigma_px);
+        assert_eq!(bits(&found), bits(&blurred_by_definition(&image, sigma_px)), "{sigma_px}");
+    }
+}
+
+#[test]
+fn blur_kernel_is_no_longer_than_the_image() {
+    // A kernel of 3σ would not fit into memory.
+    let image = image_of(16, texture);
+    let mean = Patch::from(image.clone()).mean().unwrap();
+    for sigma_px in [1e12, 1e300, f64::INFINITY] {
+        assert!(blurred(&image, sigma_px).iter().all(|v| (f64::from(*v) - mean).abs() < 1e-6), "{sigma_px}");
+    }
+    let shrunk = scale_roll(&image, Pixel::new(8.0, 8.0), 1e-12, 0.1, 21, Kernel::Bicubic);
+    assert!(shrunk.valid_share() < 0.01);
+}

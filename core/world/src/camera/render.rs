@@ -27,6 +27,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use rayon::prelude::*;
 
 use sightline_geometry::camera::Camera;
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
 use sightline_vision::image::GrayImage;
@@ -102,10 +103,12 @@ pub fn clean_radiance(
 }
 
 /// Fraction of full scale per unit of radiance that gives the first left picture its mean level.
-pub(crate) fn exposure(world: &World, scenario: &Scenario) -> f64 {
+///
+/// Returns 1 soon after `cancel` is requested.
+pub(crate) fn exposure(world: &World, scenario: &Scenario, cancel: Cancel<'_>) -> f64 {
     /// Rays along each side of the picture.
     const SIDE: u32 = 64;
-    let Ok(stop) = drive::first_stop(world, scenario) else { return 1.0 };
+    let Ok(stop) = drive::first_stop(world, scenario, cancel) else { return 1.0 };
     let rig = Rig::new(&scenario.camera);
     let camera = rig.cameras_in_rover(stop.angles).0.moved(&stop.site_from_rover);
     let sampler = Sampler::new(world, &camera, 1);
@@ -114,6 +117,9 @@ pub(crate) fn exposure(world: &World, scenario: &Scenario) -> f64 {
     let mut sum = 0.0;
     for row in 0..SIDE {
         for column in 0..SIDE {
+            if cancel.is_requested() {
+                return 1.0;
+            }
             let (x, y) = (middle(column, camera.width()), middle(row, camera.height()));
             let radiance = sampler.tile(i64::from(x), i64::from(y), 1, 1);
             sum += flat.at(x, y) * radiance.iter().copied().map(f64::from).sum::<f64>();

@@ -154,6 +154,7 @@ impl<'a> Driver<'a> {
 
     /// Ends a piece at a place, the wheels having advanced along its chord and turned it by `turn_rad`.
     fn advance(&mut self, place: Place, wheels_m: [f64; 2], turn_rad: f64) -> Result<()> {
+        self.scene.cancel.check()?;
         let stand = self.scene.settle(place).ok_or_else(|| {
             self.wrong(format!("the wheels find no stand at x {:.2} m, y {:.2} m", place.x_m, place.y_m))
         })?;

@@ -5,6 +5,7 @@
 //!
 //! Frames: site and rover. Source: domain.md 5.4.
 
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
 
 use crate::camera::rig::Rig;
@@ -14,7 +15,12 @@ use crate::scenario::Scenario;
 use crate::world::World;
 
 /// Does something with the scene of a scenario's world.
-fn in_scene<T>(world: &World, scenario: &Scenario, act: impl FnOnce(&Scene<'_>) -> T) -> T {
+fn in_scene<T>(
+    world: &World,
+    scenario: &Scenario,
+    cancel: Cancel<'_>,
+    act: impl FnOnce(&Scene<'_>) -> T,
+) -> T {
     act(&Scene {
         ground_z_m: &|x_m, y_m| world.footing_z_at(x_m, y_m),
         blocked_by_m: &|x_m, y_m| world.blocked_by_m(x_m, y_m),
@@ -22,15 +28,16 @@ fn in_scene<T>(world: &World, scenario: &Scenario, act: impl FnOnce(&Scene<'_>) 
         rig: &Rig::new(&scenario.camera),
         drive: &scenario.drive,
         rover: &scenario.rover,
+        cancel,
     })
 }
 
 /// The drive as it truly goes in the scenario's world.
-pub(crate) fn true_drive(world: &World, scenario: &Scenario) -> Result<TrueDrive> {
-    in_scene(world, scenario, course::drive)
+pub(crate) fn true_drive(world: &World, scenario: &Scenario, cancel: Cancel<'_>) -> Result<TrueDrive> {
+    in_scene(world, scenario, cancel, course::drive)
 }
 
 /// The first stop of the scenario.
-pub(crate) fn first_stop(world: &World, scenario: &Scenario) -> Result<TrueStop> {
-    in_scene(world, scenario, course::first_stop)
+pub(crate) fn first_stop(world: &World, scenario: &Scenario, cancel: Cancel<'_>) -> Result<TrueStop> {
+    in_scene(world, scenario, cancel, course::first_stop)
 }

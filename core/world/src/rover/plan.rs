@@ -6,6 +6,7 @@
 //! Frames: site and rover, m. Source: domain.md 5.4.
 
 use sightline_geometry::camera::Mast;
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
 use sightline_geometry::frames::Point3;
 
@@ -41,6 +42,7 @@ pub(crate) fn planned(drive: &DriveSettings) -> Result<TrueDrive> {
         rig: &Rig::Mast(Mast::spirit()),
         drive,
         rover: &RoverSettings::default(),
+        cancel: Cancel::default(),
     })
 }
 

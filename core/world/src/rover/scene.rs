@@ -13,6 +13,7 @@
 //! Frames: site and rover. Source: papers.md R25, R104.
 
 use sightline_geometry::camera::MastAngles;
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::{Point3, Pose, Vector3};
 
 use crate::camera::rig::Rig;
@@ -42,6 +43,8 @@ pub(crate) struct Scene<'a> {
     pub drive: &'a DriveSettings,
     /// How its wheels slip.
     pub rover: &'a RoverSettings,
+    /// Once requested, the drive fails soon.
+    pub cancel: Cancel<'a>,
 }
 
 /// Where the rover truly stands and where its mast is told to look.
@@ -175,7 +178,7 @@ impl Scene<'_> {
         }
         for _ in 0..100 {
             let level_m = (near_m * far_excess_m - far_m * near_excess_m) / (far_excess_m - near_excess_m);
-            let found_m = excess_m(level_m)?;
+            let found_m = excess_m(level_m).filter(|_| !self.cancel.is_requested())?;
             if found_m.abs() <= EXACT_M || (far_m - near_m < 1e-12 && found_m.abs() <= ACCEPTED_M) {
                 return Some(place(level_m));
             }

@@ -9,6 +9,7 @@ use crate::scenario::{
 };
 use crate::world::World;
 use sightline_geometry::camera::Mast;
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::{Point3, Pose, Ray, Vector3};
 
 /// A drive of moves.
@@ -328,7 +329,7 @@ fn wheels_climb_a_rock_of_15_cm_and_a_drive_over_one_of_30_cm_is_refused() {
             format!("x_m = -5.0\ny_m = 0.53\ndiameter_m = 0.4\nheight_m = {height_m}\nshape = \"slab\"");
         scenario.rocks.placed.push(toml::from_str(&text).unwrap());
         let world = World::new(&scenario);
-        (crate::rover::drive::true_drive(&world, &scenario), world)
+        (crate::rover::drive::true_drive(&world, &scenario, Cancel::default()), world)
     };
     let (drive, world) = rock_m(0.15);
     let stands: Vec<_> = drive.unwrap().legs.into_iter().flat_map(|leg| leg.stands).collect();

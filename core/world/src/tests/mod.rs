@@ -17,6 +17,7 @@ use super::*;
 use crate::rover::drive::true_drive;
 use crate::rover::scene::TrueStop;
 use crate::traverse::TraverseIndex;
+use sightline_geometry::cancel::Cancel;
 
 /// The demonstration's scenario with its world and index.
 struct Demo {
@@ -37,7 +38,7 @@ fn demo() -> &'static Demo {
 
 /// The true stops of a scenario that can be driven, in the order of the drive.
 fn true_stops(world: &World, scenario: &Scenario) -> Vec<TrueStop> {
-    true_drive(world, scenario).unwrap().stops
+    true_drive(world, scenario, Cancel::default()).unwrap().stops
 }
 
 /// A number in [0, 1) from two others.

@@ -17,6 +17,7 @@ use crate::library;
 use crate::rover::drive::true_drive;
 use crate::scenario::{OdometryModel, Soil};
 use sightline_geometry::camera::Camera;
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::{Point3, Ray, Vector3};
 
 /// A scenario of the library with what its paper's numbers are compared with.
@@ -35,7 +36,7 @@ impl Staged {
         let scenario = library::scenario(name).unwrap();
         let world = World::new(&scenario);
         let index = index(&scenario, &world).unwrap();
-        let drive = true_drive(&world, &scenario).unwrap();
+        let drive = true_drive(&world, &scenario, Cancel::default()).unwrap();
         let cameras = index.stops[..drive.stops.len()].iter();
         let cameras = cameras.map(|stop| true_camera_in_site(stop, Eye::Left).unwrap()).collect();
         let yaw_deg = |stop: &crate::rover::scene::TrueStop| {

@@ -8,6 +8,7 @@ use crate::rover::plan::planned;
 use crate::rover::scene::{Scene, TrueDrive};
 use crate::scenario::{DriveSettings, ForcedSlip, Move, RoverSettings, Soil};
 use sightline_geometry::camera::Mast;
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::Point3;
 use sightline_geometry::odometry_error::OdometryError;
 
@@ -29,6 +30,7 @@ fn on_plane(
         rig: &Rig::Mast(Mast::spirit()),
         drive,
         rover,
+        cancel: Cancel::default(),
     })
 }
 

@@ -22,13 +22,13 @@ use sightline_api::location::{AtSession, AtStep};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
+use crate::cancel::CancelOnDrop;
 use crate::exports::Source;
 use crate::extract::Path;
 use crate::html::escape;
 use crate::jobs::blocking;
 use crate::problem::{ApiError, ApiResult};
 use crate::routes::route::route;
-use crate::routes::traverses::CancelOnDrop;
 use crate::state::AppState;
 
 /// The only style that these pages may have.

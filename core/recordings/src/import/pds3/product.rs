@@ -5,7 +5,6 @@
 //! appears twice is taken from its last group. O is made unit on reading (domain.md 2.4); the other vectors
 //! stay as printed. Poses are those of the label: rover in site, scalar first.
 
-use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -13,6 +12,7 @@ use crate::import::odl::Group;
 use sightline_geometry::camera::{Cahv, Cahvor, Cahvore, Camera, CameraModel, Imaging};
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::{Point3, PoseRecord, Vector3};
+use sightline_vision::image::io::{MAX_PIXELS, open_regular};
 use sightline_world::traverse::StopLight;
 
 /// The largest file that is read, bytes.
@@ -34,7 +34,7 @@ pub struct Product {
 /// Whether the file begins like a PDS3 product.
 pub fn is_product(path: &Path) -> bool {
     let mut head = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(512).read_to_end(&mut head));
+    let read = open_regular(path).and_then(|file| file.take(512).read_to_end(&mut head));
     let begins = |mark: &[u8]| head.windows(mark.len()).any(|window| window == mark);
     read.is_ok() && (begins(b"PDS_VERSION_ID") || begins(b"ODL_VERSION_ID"))
 }
@@ -46,7 +46,7 @@ impl Product {
     /// A file that cannot be read, is larger than `FILE_LIMIT`, or whose label is damaged.
     pub fn read(path: &Path) -> Result<Self> {
         let unreadable = |source| Error::Read { path: path.to_owned(), source };
-        let file = File::open(path).map_err(unreadable)?;
+        let file = open_regular(path).map_err(unreadable)?;
         let length = file.metadata().map_err(unreadable)?.len();
         if length > FILE_LIMIT {
             let (mib, limit) = (length >> 20, FILE_LIMIT >> 20);
@@ -101,7 +101,13 @@ impl Product {
             let in_range = value >= 1.0 && value <= f64::from(SIZE_LIMIT) && value.fract() == 0.0;
             in_range.then_some(value as u32).ok_or_else(problem)
         };
-        Ok([read("LINE_SAMPLES")?, read("LINES")?])
+        let [width, height] = [read("LINE_SAMPLES")?, read("LINES")?];
+        if u64::from(width) * u64::from(height) > MAX_PIXELS {
+            let limit = MAX_PIXELS / 1_000_000;
+            let problem = format!("{width} × {height} pixels; at most {limit} million can be read");
+            return Err(self.problem(problem));
+        }
+        Ok([width, height])
     }
 
     /// The `IMAGE` object, at the top or inside a `FILE` object.

@@ -9,13 +9,13 @@
 //! leave out the mask's radix, so a mask that is written with as many binary digits as a sample has bits is
 //! read as binary.
 
-use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::PathBuf;
 
 use super::product::{FILE_LIMIT, Product};
 use crate::import::odl::{Group, Value};
 use sightline_geometry::error::{Error, Result};
+use sightline_vision::image::io::open_regular;
 
 /// The samples of a picture, as the detector's numbers.
 #[derive(Clone, Debug, PartialEq)]
@@ -148,7 +148,7 @@ impl Product {
     fn read_block(&self, length: usize) -> Result<Vec<u8>> {
         let (path, offset) = self.locate_pixels()?;
         let unreadable = |source| Error::Read { path: path.clone(), source };
-        let mut file = File::open(&path).map_err(unreadable)?;
+        let mut file = open_regular(&path).map_err(unreadable)?;
         let present = file.metadata().map_err(unreadable)?.len();
         let needed = offset.saturating_add(length as u64);
         if needed > present || present > FILE_LIMIT {

@@ -105,8 +105,9 @@ impl Tracker for FeatureTracker {
                 detect::detect(&input.capture.pair, cameras, settings)
             })
         });
+        let wanted = memory.newest().take_while(|_| !input.cancel.is_requested());
         let candidates: Vec<Candidate<'_>> =
-            memory.newest().map(|anchor| Candidate::new(anchor, &now, input)).collect();
+            wanted.map(|anchor| Candidate::new(anchor, &now, input)).collect();
         let chosen = choose(&candidates, input.settings.limits.confidence_min);
         evidence.stop = input.shared.map(|shared| shared.stop);
         evidence.anchors = candidates.iter().enumerate().map(|(i, c)| c.tried(Some(i) == chosen)).collect();

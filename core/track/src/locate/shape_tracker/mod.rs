@@ -252,6 +252,7 @@ fn locate(
         None => (Sighting::default(), None),
     };
     evidence.features = features;
+    let asked = asked.filter(|_| !input.cancel.is_requested());
     let by_shape = asked.and_then(|_| by_shape(input, views, &base, &mut evidence));
     let is_sure = base.position_in_rover.is_some() && base.confidence >= least_confidence(input);
     evidence.is_judged_by_shape = by_shape.is_some() || evidence.registration.is_some() && !is_sure;

@@ -68,6 +68,9 @@ pub(super) fn choose<'a>(
     let left = &input.pointing.left;
     for (appearance, drift, now_from_then) in &appearances {
         for pair in &pairs {
+            if input.cancel.is_requested() {
+                return Err(Unmatched { scale_roll: None, missing: TemplateFailure::NoTemplate });
+            }
             let prepared = match scale_roll(appearance, now_from_then, left, settings, *pair) {
                 Ok(prepared) => prepared,
                 Err(missing) => {

@@ -19,6 +19,19 @@ pub enum TemplateFailure {
     /// The helper points of scale and roll are not seen.
     #[error("the predicted target lies behind the left camera or outside its model")]
     PredictionUnseen,
+    /// The pose estimates make the template too small or too large to be compared.
+    #[error(
+        "the predicted target is {now_m:.1} m away and was {then_m:.1} m away when its template was taken: a template \
+         is scaled by 1/{limit} to {limit}; check the poses of both stops"
+    )]
+    ScaleOutside {
+        /// Distance from the left camera when the template was taken, m.
+        then_m: f64,
+        /// Predicted distance from the left camera, m.
+        now_m: f64,
+        /// Largest scale; its inverse is the smallest.
+        limit: f64,
+    },
     /// The prediction has no pixel.
     #[error("the predicted target lies behind the left camera")]
     PredictionBehind,

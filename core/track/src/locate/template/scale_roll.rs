@@ -47,6 +47,12 @@ const HELPER_LENGTH_M: f64 = 0.05;
 /// A slope that stretches the template by more than this beside scale and roll is not believed, px per px.
 const STRETCH_LIMIT: f64 = 0.5;
 
+/// A template is scaled by at most this, and by at least its inverse.
+///
+/// Magnified more, the default window shows a single pixel of its source; shrunk more, its source is larger than most
+/// images. Distances that differ so much come from wrong poses.
+const SCALE_MAX: f64 = 20.0;
+
 /// The template, scaled and rolled, or warped by the target's surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ScaleRoll {
@@ -158,6 +164,10 @@ pub fn scale_roll<'a>(
     )?;
     let by_geometry = (if settings.scale { scale } else { 1.0 }, if settings.roll { roll_rad } else { 0.0 });
     let (applied_scale, applied_roll_rad) = tried.unwrap_or(by_geometry);
+    if !(1.0 / SCALE_MAX..=SCALE_MAX).contains(&applied_scale) {
+        let (then_m, now_m) = (old_distance_m, new_distance_m);
+        return Err(TemplateFailure::ScaleOutside { then_m, now_m, limit: SCALE_MAX });
+    }
     let (image, pixel) = (appearance.image.as_ref(), appearance.pixel);
     let (size, kernel) = (settings.template_size_px, settings.kernel);
     let similarity = Rotation2::new(roll_rad).into_inner() * scale;

@@ -1,0 +1,68 @@
+//! The end of the program: SIGTERM ends it, whatever it computes.
+
+use std::io::Write;
+use std::net::TcpStream;
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+use serde_json::json;
+use sightline_tests::server::{small_drive, small_scenario};
+
+use crate::keeping::Killable;
+
+/// How long the program may take to end: a fraction of the time that the world takes.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// Processor time of a process, hundredths of a second.
+fn ticks(id: u32) -> u64 {
+    let stat = std::fs::read_to_string(format!("/proc/{id}/stat")).unwrap();
+    let fields: Vec<&str> = stat.rsplit_once(") ").unwrap().1.split(' ').collect();
+    fields[11].parse::<u64>().unwrap() + fields[12].parse::<u64>().unwrap()
+}
+
+/// A scenario whose rocks all stand at one place, so that every ray meets all of them: a world of minutes.
+fn crowded() -> String {
+    let mut scenario = small_scenario();
+    scenario.rocks.placed.clear();
+    let rock = "{x_m=0.0,y_m=0.0,diameter_m=1.0,height_m=0.8},";
+    let rocks = format!("placed = [{}]", rock.repeat(18_000).trim_end_matches(','));
+    let text = scenario.to_toml();
+    assert!(text.contains("placed = []"), "{text}");
+    text.replacen("placed = []", &rocks, 1)
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn sigterm_ends_a_server_that_builds_a_world() {
+    let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
+    let mut server = Killable::start_at("0", drive.path(), data.path());
+    let id = server.process().id();
+    let before = ticks(id);
+    let body = json!({ "scenario": crowded() }).to_string();
+    let mut request = TcpStream::connect(&server.address).unwrap();
+    write!(
+        request,
+        "POST /api/v1/traverses HTTP/1.1\r\nHost: {}\r\nContent-Type: application/json\r\nContent-Length: {}\r\n\r\n{body}",
+        server.address,
+        body.len()
+    )
+    .unwrap();
+    let begun = Instant::now();
+    // Reading the scenario takes less.
+    while ticks(id) < before + 300 {
+        assert!(begun.elapsed() < Duration::from_secs(120), "the world is not begun");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert!(server.process().try_wait().unwrap().is_none());
+    assert!(Command::new("kill").args(["-TERM", &id.to_string()]).status().unwrap().success());
+    let told = Instant::now();
+    let status = loop {
+        if let Some(status) = server.process().try_wait().unwrap() {
+            break status;
+        }
+        assert!(told.elapsed() < PATIENCE, "the program does not end");
+        std::thread::sleep(Duration::from_millis(20));
+    };
+    assert!(status.success(), "{status}");
+    drop(request);
+}

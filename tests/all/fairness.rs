@@ -1,0 +1,32 @@
+//! Runs take turns: a short one does not wait for long ones that began before it.
+
+use serde_json::json;
+use sightline_tests::server::{PIXEL, TestServer, long_recording};
+
+/// Stops of the drive; every eighth shows the first image.
+const STOPS: usize = 2405;
+
+#[tokio::test(flavor = "multi_thread")]
+async fn short_run_ends_before_two_long_ones() {
+    let (drive, sessions) = (long_recording(STOPS), tempfile::tempdir().unwrap());
+    let server = TestServer::open(drive.path(), sessions.path());
+    let [x, y] = PIXEL;
+    let mut begun = Vec::new();
+    for step in [0, 0, STOPS - 5] {
+        let session = server.begin().await;
+        let new = json!({ "step": step, "pixel": { "x": x, "y": y } });
+        server.post(&format!("sessions/{session}/targets"), &new).await.expect(201);
+        begun.push(session);
+    }
+    assert_eq!(server.ended(&begun[2], 0, 0).await["rows"].as_array().unwrap().len(), 5);
+    for session in &begun[..2] {
+        let path = format!("sessions/{session}/targets/0/runs/0");
+        let run = server.get(&path).await.expect(200);
+        assert_eq!(
+            (&run["complete"], &run["stopped"]),
+            (&json!(false), &json!(null)),
+            "{session} ended first"
+        );
+        server.post(&format!("{path}/cancel"), &json!({})).await;
+    }
+}
