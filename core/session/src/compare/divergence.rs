@@ -101,8 +101,8 @@ fn of_place(place: &Place, a: &RunStep, b: &RunStep, tolerance: &Tolerance) -> V
     let rank = |value: &Difference| {
         // A limit that was changed tells more than what was decided by it.
         let is_limit = value.path.ends_with(".limit");
-        let telling = place.telling.iter().position(|beginning| value.path.starts_with(beginning));
-        (!is_limit, telling.unwrap_or(place.telling.len()))
+        let telling = place.telling().iter().position(|beginning| value.path.starts_with(beginning));
+        (!is_limit, telling.unwrap_or(place.telling().len()))
     };
     values.sort_by_key(rank);
     values

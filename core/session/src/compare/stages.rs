@@ -1,10 +1,15 @@
 //! What each stage of a step returned, in running order: the steps of `locate` have records of their own.
 
+use std::sync::LazyLock;
+
 use serde_json::{Value, json};
 
 use crate::records;
 use crate::step::RunStep;
-use sightline_record::ArrayDecl;
+use sightline_record::{ArrayDecl, Stage};
+
+/// Reads from a step what a stage returned.
+type Record = Box<dyn Fn(&RunStep) -> Value + Send + Sync>;
 
 /// A stage of a step, or a step of `locate`, and how to get what it returned.
 pub(crate) struct Place {
@@ -12,10 +17,8 @@ pub(crate) struct Place {
     pub stage: &'static str,
     /// The word of the step of `locate`; none for a whole stage.
     pub part: Option<&'static str>,
-    /// Fields that tell most, the most telling first: the beginnings of their paths.
-    pub telling: &'static [&'static str],
     /// What it returned; null where it was not reached.
-    pub record: fn(&RunStep) -> Value,
+    pub record: Record,
 }
 
 impl Place {
@@ -30,64 +33,63 @@ impl Place {
     pub(crate) fn word(&self) -> &'static str {
         self.part.unwrap_or(self.stage)
     }
+
+    /// Fields that tell most, the most telling first: the beginnings of their paths.
+    pub(crate) fn telling(&self) -> &'static [&'static str] {
+        let own = TELLING.iter().find(|(word, _)| *word == self.word());
+        own.map_or(&[], |(_, fields)| fields)
+    }
 }
 
-/// Every place of every tracker, in running order.
-pub(crate) const PLACES: [Place; 23] = [
-    whole("predict", &["position_in_rover"], |trace| json(&trace.prediction())),
-    whole("point_mast", &["used", "predicted_left"], |trace| json(&trace.point_mast)),
-    whole("capture", &["fault"], capture),
+/// Every place of every tracker, in running order: the stages of the record; before the steps of `locate` the tracker.
+pub(crate) static PLACES: LazyLock<Vec<Place>> = LazyLock::new(|| {
+    // The row repeats the stages, and the truth is no stage.
+    let is_place =
+        |stage: &&'static Stage<RunStep>| !["step", "truth"].contains(&stage.schema().stage.as_ref());
+    let mut places: Vec<Place> = records::stages().iter().filter(is_place).map(place).collect();
+    let first_step = places.iter().position(|place| place.part.is_some()).unwrap_or(0);
     // Two trackers that differ do so here.
-    whole("locate", &["tracker"], |trace| json!({ "tracker": tracker(trace) })),
-    part(
+    let tracker: fn(&RunStep) -> Value = |trace| json!({ "tracker": tracker(trace) });
+    places.insert(first_step, Place { stage: "locate", part: None, record: Box::new(tracker) });
+    places
+});
+
+/// The most telling fields of the stages that have some.
+const TELLING: [(&str, &[&str]); 15] = [
+    ("predict", &["position_in_rover"]),
+    ("point_mast", &["used", "predicted_left"]),
+    ("capture", &["fault"]),
+    (
         "scale_roll",
         &["template_step", "warped", "applied_scale", "applied_roll_rad", "scale", "arrays.reference"],
-        |trace| json(&trace.template().and_then(|e| e.scale_roll.as_ref())),
     ),
-    part("match_template", &["measure", "search_window", "positions", "score", "pixel"], |trace| {
-        json(&trace.template().and_then(|e| e.match_template.as_ref()))
-    }),
-    part("drift_correction", &[], |trace| json(&trace.template().and_then(|e| e.drift_correction.as_ref()))),
-    part("relief", &[], |trace| json(&trace.template().and_then(|e| e.relief.as_ref()))),
-    part("point_stereo", &["right_pixel", "range_m", "score"], |trace| {
-        json(&trace.template().and_then(|e| e.point_stereo.as_ref()))
-    }),
-    part("detect", &["left", "right"], |trace| json(&trace.features().and_then(|e| e.detect.as_ref()))),
-    part("match_features", &["from_step", "matches"], match_features),
-    part("triangulate", &["position_in_rover", "range_m"], |trace| {
-        json(&trace.template().and_then(|e| e.triangulate.as_ref()))
-    }),
-    part("fit_motion", &["inliers", "translation_m"], |trace| {
-        json(&trace.features().and_then(|e| e.fit_motion.as_ref()))
-    }),
-    part("bootstrap", &[], |trace| json(&trace.features().and_then(|e| e.bootstrap.as_ref()))),
-    part("surface", &[], |trace| json(&trace.shape().and_then(|e| e.surface.as_ref()))),
-    part("coarse_register", &["to_step", "coarse_shift_m"], coarse),
-    part("refine_register", &["correction_m", "mean_m"], |trace| {
-        json(&trace.shape().and_then(|e| e.registration.as_ref()))
-    }),
-    part("carried_ray", &[], |trace| {
-        json(&trace.shape().and_then(|e| e.registration.as_ref()?.ray.as_ref()))
-    }),
-    part("hand_off", &[], |trace| {
-        json(&trace.shape().and_then(|e| e.registration.as_ref()?.draped.as_ref()))
-    }),
-    part("placement", &[], |trace| json(&trace.shape().and_then(|e| e.placement.as_ref()))),
-    whole("locate", &["left_pixel", "position_in_rover", "missing"], located),
-    whole("judge", &["state.", "accepted"], |trace| json(&trace.verdict())),
-    whole("update", &["template_renewed", "target.position_in_rover"], |trace| json(&trace.update)),
+    ("match_template", &["measure", "search_window", "positions", "score", "pixel"]),
+    ("point_stereo", &["right_pixel", "range_m", "score"]),
+    ("triangulate", &["position_in_rover", "range_m"]),
+    ("detect", &["left", "right"]),
+    ("match_features", &["from_step", "matches"]),
+    ("fit_motion", &["inliers", "translation_m"]),
+    ("coarse_register", &["to_step", "coarse_shift_m"]),
+    ("refine_register", &["correction_m", "mean_m"]),
+    ("locate", &["tracker", "left_pixel", "position_in_rover", "missing"]),
+    ("judge", &["state.", "accepted"]),
+    ("update", &["template_renewed", "target.position_in_rover"]),
 ];
 
-const fn whole(
-    stage: &'static str,
-    telling: &'static [&'static str],
-    record: fn(&RunStep) -> Value,
-) -> Place {
-    Place { stage, part: None, telling, record }
-}
-
-const fn part(word: &'static str, telling: &'static [&'static str], record: fn(&RunStep) -> Value) -> Place {
-    Place { stage: "locate", part: Some(word), telling, record }
+fn place(stage: &'static Stage<RunStep>) -> Place {
+    let schema = stage.schema();
+    let record: Record = match schema.stage.as_ref() {
+        "capture" => Box::new(capture),
+        "match_features" => Box::new(match_features),
+        "coarse_register" => Box::new(coarse),
+        "locate" => Box::new(located),
+        _ => Box::new(|trace| stage.evidence(trace).unwrap_or_default()),
+    };
+    if schema.path.starts_with("locate.") {
+        Place { stage: "locate", part: Some(&schema.stage), record }
+    } else {
+        Place { stage: &schema.stage, part: None, record }
+    }
 }
 
 fn json(value: &impl serde::Serialize) -> Value {
@@ -143,15 +145,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_stage_and_every_array_of_the_record_has_a_place_in_running_order() {
-        let recorded = records::stages().iter().map(sightline_record::Stage::schema);
-        // The row repeats the stages, and the truth is no stage.
-        let recorded = recorded.filter(|schema| !["step", "truth"].contains(&schema.stage.as_ref()));
-        let recorded: Vec<&str> = recorded.map(|schema| schema.stage.as_ref()).collect();
-        let mut places: Vec<&str> = PLACES.iter().map(Place::word).collect();
-        // The tracker is compared before its steps.
-        let tracker = places.iter().position(|word| *word == "locate").unwrap();
-        places.remove(tracker);
-        assert_eq!(places, recorded);
+    fn telling_fields_belong_to_places_and_the_tracker_stands_before_its_steps() {
+        let words: Vec<&str> = PLACES.iter().map(Place::word).collect();
+        assert!(TELLING.iter().all(|(word, _)| words.contains(word)));
+        let at = |word: &str| words.iter().position(|known| *known == word).unwrap();
+        assert!(at("capture") < at("locate") && at("locate") < at("scale_roll"));
+        assert_eq!(words.iter().filter(|word| **word == "locate").count(), 2);
+        assert!(words.ends_with(&["locate", "judge", "update"]), "{words:?}");
     }
 }
