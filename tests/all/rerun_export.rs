@@ -252,7 +252,14 @@ fn the_layout_is_in_the_file_and_shall_be_shown() {
     let recording = FIXTURE.exported();
     assert_eq!(recording.application, "sightline");
     assert!(recording.blueprint_activated);
-    assert!(recording.blueprint.iter().any(|path| path.starts_with("/view/")), "{:?}", recording.blueprint);
+    let has = |part: &str| recording.blueprint.iter().any(|path| path.contains(part));
+    for part in ["/container/", "/view/", "/viewport", "/blueprint_panel", "/selection_panel", "/time_panel"]
+    {
+        assert!(has(part), "{part}: {:?}", recording.blueprint);
+    }
+    for property in ["/ViewContents", "/PlotLegend", "/EyeControls3D", "/VisualBounds2D", "/Background"] {
+        assert!(has(property), "{property}: {:?}", recording.blueprint);
+    }
 }
 
 #[test]

@@ -67,7 +67,7 @@ fn wild_pose_is_lost_with_the_distances_as_its_reason() {
     let steps = run(&world, &[]);
     assert_eq!(steps[2].update.state, TrackingState::Lost { count: 1 });
     let reason = steps[2].located().unwrap().missing.as_ref().unwrap();
-    assert!(reason.contains("1000006.9 m away and was"), "{reason}");
+    assert!(reason.contains("1000006.2 m away and was 7.7 m"), "{reason}");
     assert!(reason.contains("scaled by 1/20 to 20; check the poses"), "{reason}");
     assert_eq!(steps[3].update.state, TrackingState::Tracking, "{:?}", steps[3].located());
 }

@@ -12,21 +12,19 @@
 //! image, from the frame of the subframe, which goes with the target. A run that asks for the shape has two tabs, “Match”
 //! and “Shape”; the second has what the shape tracker saw, the meshes and how well they fit.
 
+use rerun::AsComponents;
+use rerun::blueprint::components::ContainerKind::{Grid, Horizontal, Tabs, Vertical};
 use rerun::blueprint::components::{
-    BackgroundKind, Corner2D, PanelState, PlayState, VisualBounds2D as Bounds,
+    BackgroundKind, Corner2D, Fps, PanelState, PlayState, TimelineName, VisualBounds2D as Bounds,
 };
-use rerun::blueprint::{
-    Blueprint, BlueprintPanel, ContainerLike, Grid, Horizontal, SelectionPanel, Spatial2DView, Spatial3DView,
-    StateTimelineView, Tabs, TextDocumentView, TextLogView, TimePanel, TimeSeriesView, Vertical,
-};
-use rerun::datatypes::Range2D;
+use rerun::datatypes::{Float64, Range2D};
 use rerun::external::re_sdk_types::blueprint::archetypes::{
-    Background, EyeControls3D, PlotLegend, VisualBounds2D,
+    Background, EyeControls3D, PanelBlueprint, PlotLegend, TimePanelBlueprint, VisualBounds2D,
 };
 
 use super::Logged;
 use super::border::point_3d;
-use super::layout::Layout;
+use super::layout::{self, Container, Part, View};
 use super::map::Outlook;
 use super::palette::{MAP_BACKGROUND, color};
 use super::step::path;
@@ -159,113 +157,115 @@ pub(super) fn send(
     live: bool,
 ) -> Logged {
     let roots: Vec<_> = lanes.iter().map(|lane| lane.root).collect();
-    let mut layout = Layout::default();
-    let pictures = Horizontal::new([
-        picture("left image", "/capture/left", &LEFT, &roots),
-        picture("right image", "/capture/right", &RIGHT, &roots),
-        map(&mut layout, outlook, &roots),
-    ]);
-    let runs = Tabs::new(lanes.iter().map(|lane| run(&mut layout, lane)).collect::<Vec<_>>());
-    let states = StateTimelineView::new("states").with_contents(of_all(&["/{target}/judge/state"], &roots));
-    let words = Horizontal::new([states.into(), words(&roots)]);
-    let rows = Vertical::new([pictures.into(), runs.into(), words.into()]).with_row_shares([4.0, 4.0, 2.0]);
-    let play = if live { PlayState::Following } else { PlayState::Paused };
-    let time = TimePanel::new().with_state(PanelState::Collapsed).with_timeline("step").with_fps(2.0);
-    let blueprint = Blueprint::new(rows)
-        .with_auto_views(false)
-        .with_auto_layout(false)
-        .with_blueprint_panel(BlueprintPanel::from_state(PanelState::Collapsed))
-        .with_selection_panel(SelectionPanel::from_state(PanelState::Collapsed))
-        .with_time_panel(time.with_play_state(play));
-    layout.send(&blueprint, stream)
+    let pictures = Container::new(
+        Horizontal,
+        [
+            picture("left image", "/capture/left", &LEFT, &roots),
+            picture("right image", "/capture/right", &RIGHT, &roots),
+            map(outlook, &roots),
+        ],
+    );
+    let runs = Container::new(Tabs, lanes.iter().map(run));
+    let states = View::new("StateTimeline", "states", of_all(&["/{target}/judge/state"], &roots));
+    let words = Container::new(Horizontal, [states.into(), words(&roots)]);
+    let rows = Container::new(Vertical, [pictures.into(), runs.into(), words.into()]);
+    let collapsed = PanelBlueprint::new().with_state(PanelState::Collapsed);
+    let time = TimePanelBlueprint::new()
+        .with_state(PanelState::Collapsed)
+        .with_timeline(TimelineName("step".into()))
+        .with_fps(Fps(Float64(2.0)))
+        .with_play_state(if live { PlayState::Following } else { PlayState::Paused });
+    let panels: [(&str, &dyn AsComponents); 3] =
+        [("blueprint_panel", &collapsed), ("selection_panel", &collapsed), ("time_panel", &time)];
+    layout::send(rows.with_shares([4.0, 4.0, 2.0]), &panels, stream)
 }
 
-fn picture(name: &str, origin: &str, overlays: &[&str], roots: &[&str]) -> ContainerLike {
+fn picture(name: &str, origin: &str, overlays: &[&str], roots: &[&str]) -> Part {
     let contents = std::iter::once("$origin".to_owned()).chain(of_all(overlays, roots));
-    Spatial2DView::new(name).with_origin(origin).with_contents(contents).into()
+    View::new("2D", name, contents).with_origin(origin).into()
 }
 
-fn map(layout: &mut Layout, outlook: &Outlook, roots: &[&str]) -> ContainerLike {
+fn map(outlook: &Outlook, roots: &[&str]) -> Part {
     let contents = std::iter::once("/rover/**".to_owned()).chain(of_all(&MAP, roots));
-    let view = Spatial3DView::new("map").with_origin("/").with_contents(contents);
     let eye = EyeControls3D::new()
         .with_position(point_3d(&outlook.eye))
         .with_look_target(point_3d(&outlook.target))
         .with_eye_up([0.0, 0.0, -1.0]);
-    let view = layout.view(view, "EyeControls3D", eye);
-    // The truth is white, so the sky must be dark in any theme.
-    let background = Background::new(BackgroundKind::SolidColor).with_color(color(MAP_BACKGROUND));
-    layout.view(view, "Background", background)
+    View::new("3D", "map", contents)
+        .with_property("EyeControls3D", eye)
+        .with_property("Background", background())
+        .into()
+}
+
+/// The truth is white, so that the sky must be dark in any theme.
+fn background() -> Background {
+    Background::new(BackgroundKind::SolidColor).with_color(color(MAP_BACKGROUND))
 }
 
 /// What one run shows below the images.
-fn run(layout: &mut Layout, lane: &Lane<'_>) -> ContainerLike {
-    let patch = |(name, entity): (&str, &str)| -> ContainerLike {
-        Spatial2DView::new(name).with_origin(path(entity, lane.root)).with_contents(["$origin"]).into()
+fn run(lane: &Lane<'_>) -> Part {
+    let patch = |(name, entity): (&str, &str)| -> Part {
+        View::new("2D", name, ["$origin"]).with_origin(path(entity, lane.root)).into()
     };
-    let surface = Spatial2DView::new("surface of scores")
-        .with_origin(path("/{target}/locate/match_template/surface", lane.root))
-        .with_contents(["$origin/**"]);
-    let matched = Horizontal::new([
-        close_up(layout, lane),
-        Grid::new(PATCHES.map(patch)).with_grid_columns(3).into(),
-        surface.into(),
-        time_series(layout, &DECISIONS, lane.root),
-        time_series(layout, &ERRORS, lane.root),
-    ])
-    .with_column_shares([5.0, 7.0, 5.0, 5.0, 5.0]);
+    let surface = View::new("2D", "surface of scores", ["$origin/**"])
+        .with_origin(path("/{target}/locate/match_template/surface", lane.root));
+    let matched = Container::new(
+        Horizontal,
+        [
+            close_up(lane),
+            Container::new(Grid, PATCHES.map(patch)).with_columns(3).into(),
+            surface.into(),
+            time_series(&DECISIONS, lane.root),
+            time_series(&ERRORS, lane.root),
+        ],
+    )
+    .with_shares([5.0, 7.0, 5.0, 5.0, 5.0]);
     if !lane.has_shape {
         return matched.with_name(lane.root).into();
     }
-    let shape = shape(layout, lane);
-    Tabs::new([matched.with_name("Match").into(), shape]).with_name(lane.root).into()
+    Container::new(Tabs, [matched.with_name("Match").into(), shape(lane)]).with_name(lane.root).into()
 }
 
 /// What the shape tracker of a run shows.
-fn shape(layout: &mut Layout, lane: &Lane<'_>) -> ContainerLike {
-    let picture = |(name, entity): (&str, &str)| -> ContainerLike {
-        let view = Spatial2DView::new(name).with_origin(path(entity, lane.root));
-        view.with_contents(["$origin/**"]).into()
+fn shape(lane: &Lane<'_>) -> Part {
+    let picture = |(name, entity): (&str, &str)| -> Part {
+        View::new("2D", name, ["$origin/**"]).with_origin(path(entity, lane.root)).into()
     };
-    let meshes = Spatial3DView::new("meshes").with_origin("/").with_contents(of_all(&MESHES, &[lane.root]));
-    let background = Background::new(BackgroundKind::SolidColor).with_color(color(MAP_BACKGROUND));
-    let meshes = layout.view(meshes, "Background", background);
-    Horizontal::new([
-        Grid::new(SHAPE.map(picture)).with_grid_columns(5).into(),
-        meshes,
-        time_series(layout, &FIT, lane.root),
-    ])
-    .with_name("Shape")
-    .with_column_shares([14.0, 7.0, 6.0])
-    .into()
+    let meshes = View::new("3D", "meshes", of_all(&MESHES, &[lane.root]));
+    let parts = [
+        Container::new(Grid, SHAPE.map(picture)).with_columns(5).into(),
+        meshes.with_property("Background", background()).into(),
+        time_series(&FIT, lane.root),
+    ];
+    Container::new(Horizontal, parts).with_name("Shape").with_shares([14.0, 7.0, 6.0]).into()
 }
 
-fn close_up(layout: &mut Layout, lane: &Lane<'_>) -> ContainerLike {
+fn close_up(lane: &Lane<'_>) -> Part {
     let contents = std::iter::once("/capture/left".to_owned()).chain(of_all(&LEFT, &[lane.root]));
-    let view = Spatial2DView::new("close-up")
-        .with_origin(path("/{target}/capture/frame", lane.root))
-        .with_contents(contents);
     let [x_range, y_range] = lane.close_up_px.map(|length| [0.0, f64::from(length)].into());
-    layout.view(view, "VisualBounds2D", VisualBounds2D::new(Bounds(Range2D { x_range, y_range })))
+    View::new("2D", "close-up", contents)
+        .with_origin(path("/{target}/capture/frame", lane.root))
+        .with_property("VisualBounds2D", VisualBounds2D::new(Bounds(Range2D { x_range, y_range })))
+        .into()
 }
 
-fn time_series(layout: &mut Layout, series: &[Series], root: &str) -> ContainerLike {
-    let views = series.iter().map(|(name, corner, entities)| {
+fn time_series(series: &[Series], root: &str) -> Part {
+    let view = |(name, corner, entities): &Series| -> Part {
         let contents = entities.iter().map(|entity| path(entity, root));
-        let view = TimeSeriesView::new(*name).with_contents(contents);
-        layout.view(view, "PlotLegend", PlotLegend::new().with_corner(*corner))
-    });
-    Tabs::new(views.collect::<Vec<_>>()).into()
+        let legend = PlotLegend::new().with_corner(*corner);
+        View::new("TimeSeries", *name, contents).with_property("PlotLegend", legend).into()
+    };
+    Container::new(Tabs, series.iter().map(view)).into()
 }
 
-fn words(roots: &[&str]) -> ContainerLike {
-    let log: ContainerLike =
-        TextLogView::new("log").with_contents(of_all(&["/{target}/judge/verdict"], roots)).into();
-    let about = TextDocumentView::new("traverse").with_origin("/traverse").with_contents(["$origin"]).into();
-    let labels = roots.iter().map(|root| {
-        TextDocumentView::new(*root).with_origin(path("/{target}", root)).with_contents(["$origin"]).into()
-    });
-    Tabs::new([log, about].into_iter().chain(labels)).into()
+fn words(roots: &[&str]) -> Part {
+    let log = View::new("TextLog", "log", of_all(&["/{target}/judge/verdict"], roots));
+    let document = |name: &str, origin: String| -> Part {
+        View::new("TextDocument", name, ["$origin"]).with_origin(origin).into()
+    };
+    let labels = roots.iter().map(|root| document(root, path("/{target}", root)));
+    let about = document("traverse", "/traverse".to_owned());
+    Container::new(Tabs, [log.into(), about].into_iter().chain(labels)).into()
 }
 
 fn of_all(entities: &[&str], roots: &[&str]) -> Vec<String> {

@@ -20,25 +20,37 @@ use super::grid::Grid;
 use super::surface::Surface;
 use crate::image::patch::Patch;
 use crate::image::{GrayImage, PixelRect};
+use sightline_geometry::cancel::Cancel;
 
 /// Mean absolute difference, negated, at every position of `region` that holds the template.
 ///
 /// `None` as for [`super::zncc_surface`].
-pub fn sad_surface(template: &Patch, image: &GrayImage, region: PixelRect) -> Option<Surface> {
-    surface(template, image, region, f32::abs)
+pub(super) fn sad_surface(
+    template: &Patch,
+    image: &GrayImage,
+    region: PixelRect,
+    cancel: Cancel<'_>,
+) -> Option<Surface> {
+    surface(template, image, region, cancel, f32::abs)
 }
 
 /// Mean squared difference, negated, at every position of `region` that holds the template.
 ///
 /// `None` as for [`super::zncc_surface`].
-pub fn ssd_surface(template: &Patch, image: &GrayImage, region: PixelRect) -> Option<Surface> {
-    surface(template, image, region, |d| d * d)
+pub(super) fn ssd_surface(
+    template: &Patch,
+    image: &GrayImage,
+    region: PixelRect,
+    cancel: Cancel<'_>,
+) -> Option<Surface> {
+    surface(template, image, region, cancel, |d| d * d)
 }
 
 fn surface(
     template: &Patch,
     image: &GrayImage,
     region: PixelRect,
+    cancel: Cancel<'_>,
     cost: impl Fn(f32) -> f32 + Sync,
 ) -> Option<Surface> {
     if !template.is_complete() {
@@ -49,6 +61,9 @@ fn surface(
     let count = (size * size) as f64;
     let mut scores = vec![0.0; grid.len()];
     scores.par_chunks_mut(grid.width as usize).enumerate().for_each(|(iy, out)| {
+        if cancel.is_requested() {
+            return;
+        }
         let mut total = vec![0.0_f64; out.len()];
         let mut row_sum = vec![0.0_f32; out.len()];
         for (v, weights) in template.as_raw().chunks_exact(size).enumerate() {

@@ -24,6 +24,7 @@ use super::grid::Grid;
 use super::surface::Surface;
 use crate::image::patch::{self, Patch};
 use crate::image::{GrayImage, PixelRect};
+use sightline_geometry::cancel::Cancel;
 
 /// The two Gaussians.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -43,7 +44,14 @@ impl Sdog {
     /// Scores at every position of `region` that holds the template: the middle `size` × `size` px of `wide`.
     ///
     /// `None` as for [`super::zncc_surface`].
-    pub fn surface(&self, wide: &Patch, size: u32, image: &GrayImage, region: PixelRect) -> Option<Surface> {
+    pub(super) fn surface(
+        &self,
+        wide: &Patch,
+        size: u32,
+        image: &GrayImage,
+        region: PixelRect,
+        cancel: Cancel<'_>,
+    ) -> Option<Surface> {
         let grid = Grid::new((size, size), image, region)?;
         let inset = wide.width().checked_sub(size)? / 2;
         let all = PixelRect::new(inset as i32, inset as i32, size, size);
@@ -56,6 +64,9 @@ impl Sdog {
         let count = f64::from(size).powi(2);
         let mut scores = vec![0.0; grid.len()];
         scores.par_chunks_mut(grid.width as usize).enumerate().for_each(|(iy, out)| {
+            if cancel.is_requested() {
+                return;
+            }
             for (ix, out) in out.iter_mut().enumerate() {
                 let is_valid = is_complete || searched.is_valid(ix, iy, size as usize);
                 let agreement = f64::from(template.agreement(&searched, ix, iy)) / count;

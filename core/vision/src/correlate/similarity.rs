@@ -15,6 +15,7 @@ use super::surface::Surface;
 use super::zncc::zncc_surface;
 use crate::image::patch::{self, Patch};
 use crate::image::{GrayImage, PixelRect};
+use sightline_geometry::cancel::Cancel;
 
 /// A measure of likeness.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -44,12 +45,24 @@ impl Similarity {
     /// `None` when `size` is even or larger than `wide`, when the template has an invalid pixel, or when no
     /// position holds it.
     pub fn surface(&self, wide: &Patch, size: u32, image: &GrayImage, region: PixelRect) -> Option<Surface> {
+        self.surface_until(wide, size, image, region, Cancel::default())
+    }
+
+    /// The same; soon after `cancel` is requested, returns a surface whose scores mean nothing.
+    pub fn surface_until(
+        &self,
+        wide: &Patch,
+        size: u32,
+        image: &GrayImage,
+        region: PixelRect,
+        cancel: Cancel<'_>,
+    ) -> Option<Surface> {
         let template = patch::middle(wide, size)?;
         match self {
             Self::Ncc => zncc_surface(&template, image, region),
-            Self::Sad => sad_surface(&template, image, region),
-            Self::Ssd => ssd_surface(&template, image, region),
-            Self::Sdog(sdog) if template.is_complete() => sdog.surface(wide, size, image, region),
+            Self::Sad => sad_surface(&template, image, region, cancel),
+            Self::Ssd => ssd_surface(&template, image, region, cancel),
+            Self::Sdog(sdog) if template.is_complete() => sdog.surface(wide, size, image, region, cancel),
             Self::Sdog(_) => None,
         }
     }

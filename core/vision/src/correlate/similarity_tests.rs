@@ -80,3 +80,17 @@ fn every_measure_leaves_out_windows_with_an_invalid_pixel() {
         assert_eq!(excluded, 21 * 21, "{similarity:?}");
     }
 }
+
+#[test]
+fn cancelled_search_visits_no_position() {
+    let image = reference_image(|x, y| (x, y), 1.0, 0.0);
+    let wide = extract(&image, Pixel::new(40.0, 33.0), 20, Kernel::Bicubic);
+    let all = PixelRect::whole(image.width(), image.height());
+    let flag = std::sync::atomic::AtomicBool::new(true);
+    for measure in [Similarity::Sad, Similarity::Ssd, SDOG] {
+        let surface = measure.surface_until(&wide, 21, &image, all, (&flag).into()).unwrap();
+        assert!(surface.scores.iter().all(|score| *score == 0.0), "{measure:?}");
+        let whole = measure.surface(&wide, 21, &image, all).unwrap();
+        assert!(whole.scores.iter().any(|score| *score != 0.0), "{measure:?}");
+    }
+}

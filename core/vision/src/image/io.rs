@@ -5,8 +5,8 @@
 //! luma = 0.2126 R + 0.7152 G + 0.0722 B (ITU-R BT.709); transparency is ignored.
 //!
 //! A file says how much memory it wants before it shows a pixel, so the size is checked first: nothing above
-//! [`MAX_PIXELS`] is decoded, and the decoder may not allocate more than [`MAX_ALLOCATION_BYTES`]. Where the size is known
-//! before, the header is compared with it and the limit is what that size takes.
+//! [`MAX_PIXELS`] is decoded, or above the size that is expected, and what else is in the file may take as much memory as
+//! those pixels and 4 MiB.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor, ErrorKind, Read, Seek};
@@ -21,8 +21,8 @@ use sightline_geometry::error::{Error, Result};
 /// Largest image that is read, pixels.
 pub const MAX_PIXELS: u64 = 64_000_000;
 
-/// Most memory the decoder may allocate at a time, bytes: four 16-bit channels of the largest image.
-pub const MAX_ALLOCATION_BYTES: u64 = MAX_PIXELS * 8;
+/// Memory of a decoded pixel, bytes: four 16-bit channels.
+const PIXEL_BYTES: u64 = 8;
 
 /// Memory for the parts of a file that are not pixels, such as a colour profile, bytes.
 const METADATA_BYTES: u64 = 4 << 20;
@@ -36,18 +36,17 @@ const PNG_START: [u8; 16] = *b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR";
 /// [`Error::Read`] when the file cannot be opened; [`Error::Format`] when it is no PNG, is damaged or too large.
 pub fn read_png(path: impl AsRef<Path>, full_scale_dn: Option<f64>) -> Result<GrayImage> {
     let path = path.as_ref();
-    decode(open(path)?, path, full_scale_dn, MAX_ALLOCATION_BYTES)
+    decode(open(path)?, path, full_scale_dn, MAX_PIXELS)
 }
 
-/// The same for a file that should have `size`, width and height in px: the decoder may allocate no more than that
-/// takes. The caller compares the sizes, with [`png_size`] before and with the image after.
+/// The same for a file that should have `size`, width and height in px: one of more pixels is not decoded. The caller
+/// compares the sizes, with [`png_size`] before and with the image after.
 ///
 /// # Errors
 /// As [`read_png`].
 pub fn read_png_of_size(path: &Path, full_scale_dn: Option<f64>, size: [u32; 2]) -> Result<GrayImage> {
     let pixels = u64::from(size[0]) * u64::from(size[1]);
-    let most = pixels.saturating_mul(8).saturating_add(METADATA_BYTES).min(MAX_ALLOCATION_BYTES);
-    decode(open(path)?, path, full_scale_dn, most)
+    decode(open(path)?, path, full_scale_dn, pixels.min(MAX_PIXELS))
 }
 
 /// Width and height that the header of a PNG file states, px; no pixel is decoded.
@@ -91,7 +90,7 @@ fn open(path: &Path) -> Result<BufReader<File>> {
 /// # Errors
 /// [`Error::Format`] when the bytes are no PNG, are damaged or hold too large an image.
 pub fn decode_png(bytes: &[u8], name: impl AsRef<Path>, full_scale_dn: Option<f64>) -> Result<GrayImage> {
-    decode(Cursor::new(bytes), name.as_ref(), full_scale_dn, MAX_ALLOCATION_BYTES)
+    decode(Cursor::new(bytes), name.as_ref(), full_scale_dn, MAX_PIXELS)
 }
 
 /// Writes 8 bits: 1 becomes 255; values are cut to 0…1, invalid pixels become 0.
@@ -130,20 +129,23 @@ fn decode(
     reader: impl BufRead + Seek,
     path: &Path,
     full_scale_dn: Option<f64>,
-    most_bytes: u64,
+    most_pixels: u64,
 ) -> Result<GrayImage> {
     if let Some(dn) = full_scale_dn.filter(|dn| !(*dn > 0.0 && dn.is_finite())) {
         return Err(Error::format(path, format!("full scale must be a positive number, not {dn}")));
     }
     let mut limits = Limits::default();
-    limits.max_alloc = Some(most_bytes);
+    limits.max_alloc = Some(most_pixels * PIXEL_BYTES + METADATA_BYTES);
     let damaged =
         |error: ImageError| Error::format(path, format!("not a PNG image that can be read ({error})"));
     let decoder = PngDecoder::with_limits(reader, limits).map_err(damaged)?;
     let (width, height) = decoder.dimensions();
-    if u64::from(width) * u64::from(height) > MAX_PIXELS {
-        let limit = MAX_PIXELS / 1_000_000;
-        let problem = format!("the image has {width} × {height} pixels; at most {limit} million can be read");
+    if u64::from(width) * u64::from(height) > most_pixels {
+        let most = match most_pixels {
+            MAX_PIXELS => format!("{} million", MAX_PIXELS / 1_000_000),
+            fewer => fewer.to_string(),
+        };
+        let problem = format!("the image has {width} × {height} pixels; at most {most} can be read");
         return Err(Error::format(path, problem));
     }
     let decoded = DynamicImage::from_decoder(decoder).map_err(damaged)?;

@@ -77,7 +77,7 @@ fn header_states_the_size_and_bounds_the_memory() {
     assert_eq!(png_size(&path).unwrap(), [3000, 1000]);
     assert_eq!(read_png_of_size(&path, None, [3000, 1000]).unwrap().dimensions(), (3000, 1000));
     let small = read_png_of_size(&path, None, [3, 3]).unwrap_err().to_string();
-    assert!(small.contains("image.png: not a PNG image that can be read"), "{small}");
+    assert!(small.ends_with("image.png: the image has 3000 × 1000 pixels; at most 9 can be read"), "{small}");
     let whole = std::fs::read(&path).unwrap();
     std::fs::write(&path, &whole[..24]).unwrap();
     assert_eq!(png_size(&path).unwrap(), [3000, 1000]);

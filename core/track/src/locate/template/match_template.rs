@@ -26,6 +26,7 @@ use super::scale_roll::Prepared;
 use super::settings::{FirstStage, Measure, Refine, Search, TemplateSettings};
 use crate::array_name::ArrayName;
 use crate::locate::tracker::LocateInput;
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::Pixel;
 use sightline_record::{ArrayKind, Declaration, Record, Unit};
 use sightline_vision::correlate::coarse_to_fine::{CoarseSearch, coarse_to_fine};
@@ -134,8 +135,8 @@ pub fn first_match(
     if settings.first_stage != FirstStage::Correlation {
         return klt::first_match(prepared, image, search_window, predicted, settings);
     }
-    let (surface, coarse) =
-        correlate(prepared, image, search_window, settings).ok_or(TemplateFailure::WindowTooSmall)?;
+    let (surface, coarse) = correlate(prepared, image, search_window, settings, input.cancel)
+        .ok_or(TemplateFailure::WindowTooSmall)?;
     let peak = peak::find_peak(&surface, settings.sub_pixel).ok_or(TemplateFailure::NoScore)?;
     let positions =
         coarse.as_ref().map_or(u64::from(surface.width) * u64::from(surface.height), |c| c.comparisons);
@@ -148,12 +149,13 @@ fn correlate(
     image: &GrayImage,
     search_window: PixelRect,
     settings: &TemplateSettings,
+    cancel: Cancel<'_>,
 ) -> Option<(Surface, Option<CoarseSearch>)> {
     let (similarity, size) = (settings.similarity(), settings.template_size_px);
     match settings.search {
         Search::Exhaustive => {
             let wide = prepared.window(size + 2 * similarity.margin_px());
-            Some((similarity.surface(&wide, size, image, search_window)?, None))
+            Some((similarity.surface_until(&wide, size, image, search_window, cancel)?, None))
         }
         Search::CoarseToFine => {
             let descent = settings.descent();
