@@ -1,4 +1,4 @@
-//! The builder with which an evidence type declares what it records.
+//! The builder of a declaration: an evidence type lists its quantities, arrays and gates.
 
 use std::borrow::Cow;
 

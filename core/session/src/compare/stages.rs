@@ -1,4 +1,4 @@
-//! What each stage of a step returned, in running order: the steps of `locate` have records of their own.
+//! The results of the stages of a step, in running order. Each step of `locate` has a result of its own.
 
 use std::sync::LazyLock;
 
@@ -8,16 +8,16 @@ use crate::records;
 use crate::step::RunStep;
 use sightline_record::{ArrayDecl, Stage};
 
-/// Reads from a step what a stage returned.
+/// Reads the result of a stage from a step.
 type Record = Box<dyn Fn(&RunStep) -> Value + Send + Sync>;
 
-/// A stage of a step, or a step of `locate`, and how to get what it returned.
+/// A stage, or a step of `locate`, with the function that reads its result.
 pub(crate) struct Place {
     /// The stage's word.
     pub stage: &'static str,
     /// The word of the step of `locate`; none for a whole stage.
     pub part: Option<&'static str>,
-    /// What it returned; null where it was not reached.
+    /// The result; null where the stage was not reached.
     pub record: Record,
 }
 
