@@ -76,6 +76,9 @@ impl Ray {
     }
 }
 
+/// The largest coordinate of a pose that is read, m: beyond any planet, and small enough to print.
+pub const POSITION_LIMIT_M: f64 = 1e9;
+
 /// A pose as files and the interface write it: origin of the moving frame and its attitude, scalar first.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct PoseRecord {
@@ -96,10 +99,10 @@ impl PoseRecord {
         Pose::from_parts(Translation3::from(Vector3::from(self.position_m)), rotation)
     }
 
-    /// Whether all numbers are finite and the quaternion is close to unit length (within 1 %).
+    /// Whether the position is within [`POSITION_LIMIT_M`] and the quaternion is close to unit length (within 1 %).
     pub fn is_plausible(&self) -> bool {
         let norm = self.quaternion_sxyz.iter().map(|q| q * q).sum::<f64>().sqrt();
-        self.position_m.iter().all(|v| v.is_finite()) && (norm - 1.0).abs() < 0.01
+        self.position_m.iter().all(|v| v.abs() <= POSITION_LIMIT_M) && (norm - 1.0).abs() < 0.01
     }
 }
 

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use super::files::{read_text, resolve};
 use sightline_geometry::camera::{Camera, text};
-use sightline_geometry::frames::PoseRecord;
+use sightline_geometry::frames::{POSITION_LIMIT_M, PoseRecord};
 use sightline_world::traverse::{CameraSource, FORMAT_VERSION, Stop, StopLight, TraverseIndex, View};
 
 /// The largest width or height of an image, px.
@@ -120,8 +120,12 @@ pub(super) fn check_stop(stop: &Stop, folder: &Path) -> Result<StopCameras, Stri
 }
 
 fn check_pose(field: &str, pose: &PoseRecord) -> Result<(), String> {
-    let expected = "must have a finite position_m and a quaternion_sxyz of unit length";
-    if pose.is_plausible() { Ok(()) } else { Err(format!("{field}: {expected}")) }
+    if pose.is_plausible() {
+        return Ok(());
+    }
+    Err(format!(
+        "{field}: must have a position_m within {POSITION_LIMIT_M:.0e} m and a quaternion_sxyz of unit length"
+    ))
 }
 
 fn check_view(side: &str, view: &View, folder: &Path) -> Result<Camera, String> {

@@ -1,15 +1,41 @@
 //! Reading TOML so that what is wrong is one sentence with line and field: the reader's own words draw several lines.
 
+use serde::Serialize;
 use serde::de::DeserializeOwned;
+use toml::{Table, Value};
 
 /// Reads a value.
 ///
+/// The reader of TOML ignores what an array has beyond the numbers that a field takes; here such an array is an error.
+///
 /// # Errors
 /// A sentence with the line and, where there is one, the path of the field, such as `line 2: sun.reflectance: …`.
-pub fn read<T: DeserializeOwned>(text: &str) -> Result<T, String> {
+pub fn read<T: DeserializeOwned + Serialize>(text: &str) -> Result<T, String> {
     let toml = toml::Deserializer::parse(text).map_err(|error| sentence(text, &error, ""))?;
-    serde_path_to_error::deserialize(toml)
-        .map_err(|error| sentence(text, error.inner(), &error.path().to_string()))
+    let read: T = serde_path_to_error::deserialize(toml)
+        .map_err(|error| sentence(text, error.inner(), &error.path().to_string()))?;
+    let given = text.parse::<Table>().map_err(|error| sentence(text, &error, ""))?;
+    let taken = Table::try_from(&read).map_err(|error| error.to_string())?;
+    longer_array(&Value::Table(given), &Value::Table(taken), "").map_or(Ok(read), Err)
+}
+
+/// The first array of `given` that is longer than the same array of `taken`, as a sentence with its path.
+fn longer_array(given: &Value, taken: &Value, path: &str) -> Option<String> {
+    match (given, taken) {
+        (Value::Table(given), Value::Table(taken)) => given.iter().find_map(|(key, value)| {
+            let separator = if path.is_empty() { "" } else { "." };
+            longer_array(value, taken.get(key)?, &format!("{path}{separator}{key}"))
+        }),
+        (Value::Array(given), Value::Array(taken)) if given.len() > taken.len() => {
+            Some(format!("{path}: has {} values, but takes {}", given.len(), taken.len()))
+        }
+        (Value::Array(given), Value::Array(taken)) => given
+            .iter()
+            .zip(taken)
+            .enumerate()
+            .find_map(|(index, (given, taken))| longer_array(given, taken, &format!("{path}[{index}]"))),
+        _ => None,
+    }
 }
 
 fn sentence(text: &str, error: &toml::de::Error, path: &str) -> String {

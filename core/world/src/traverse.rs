@@ -162,5 +162,16 @@ fn camera_from_table(table: serde_json::Map<String, serde_json::Value>) -> Resul
     if let Some(unknown) = table.keys().find(|key| !known(key)) {
         return Err(format!("unknown field `{unknown}`, expected model, size, {}", fields.join(", ")));
     }
+    // TOML can state numbers that are not finite, which become null in the table.
+    let is_number = |value: &serde_json::Value| value.is_number();
+    for field in fields {
+        match (*field, table.get(*field)) {
+            (_, None) => {}
+            ("T" | "P", Some(value)) if is_number(value) => {}
+            ("T" | "P", Some(_)) => return Err(format!("{field}: must be a finite number")),
+            (_, Some(serde_json::Value::Array(v))) if v.len() == 3 && v.iter().all(is_number) => {}
+            (_, Some(_)) => return Err(format!("{field}: must be three finite numbers")),
+        }
+    }
     serde_json::from_value(serde_json::Value::Object(table)).map_err(|error| error.to_string())
 }

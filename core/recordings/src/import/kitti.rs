@@ -44,6 +44,9 @@ const FRAME_TIME_S: f64 = 0.1;
 /// How far a pose's rotation matrix may be from a rotation (files carry seven digits).
 const ROTATION_TOLERANCE: f64 = 1e-3;
 
+/// The smallest distance between the two cameras, m.
+const SMALLEST_BASELINE_M: f64 = 1e-3;
+
 /// The importer.
 pub struct Kitti;
 
@@ -152,7 +155,14 @@ pub fn read_cameras(path: &Path, size: [u32; 2]) -> Result<[Camera; 2]> {
         model.validate().map_err(|problem| Error::format(path, format!("{key}: {problem}")))?;
         Ok(Camera { model, size })
     };
-    Ok([read("P0")?, read("P1")?])
+    let cameras = [read("P0")?, read("P1")?];
+    let baseline_m = (cameras[1].model.centre() - cameras[0].model.centre()).norm();
+    if baseline_m < SMALLEST_BASELINE_M {
+        let problem =
+            "P0 and P1 have the same centre, so no range can be measured; give the matrices of both cameras";
+        return Err(Error::format(path, problem));
+    }
+    Ok(cameras)
 }
 
 /// The CAHV model of a projection matrix (header), in the rover frame.

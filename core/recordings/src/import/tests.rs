@@ -165,6 +165,11 @@ fn a_damaged_kitti_sequence_names_the_file_and_line() {
     for (file, content, expected) in [
         ("calib.txt", "P0: 1 2 3\n", "calib.txt: needs a line \"P0: …\""),
         ("calib.txt", "P0: 0 0 0 0 0 0 0 0 0 0 0 0\n", "calib.txt: P0 has no inverse"),
+        (
+            "calib.txt",
+            "P0: 40 0 5 0 0 40 3 0 0 0 1 0\nP1: 40 0 5 0 0 40 3 0 0 0 1 0\n",
+            "calib.txt: P0 and P1 have the same centre",
+        ),
         ("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0\n", "poses.txt: line 2: a pose must have 12"),
         (
             "poses.txt",
@@ -248,6 +253,15 @@ fn a_damaged_product_names_itself_and_what_is_wrong() {
         ("LINES = 4", "LINES = 9", "but the file has"),
         ("^IMAGE = 4", "^IMAGE = 99", "but the file has"),
         ("^IMAGE = 4", "^IMAGE = -", "^IMAGE names -"),
+        ("RECORD_BYTES = 512", "RECORD_BYTES = 0", "RECORD_BYTES is 0, but it must be a whole number"),
+        ("RECORD_BYTES = 512", "RECORD_BYTES = 512.5", "RECORD_BYTES is 512.5, but it must be"),
+        ("RECORD_BYTES = 512", "RECORD_BYTES = -512", "RECORD_BYTES is -512, but it must be"),
+        ("RECORD_BYTES = 512\r\n", "", "RECORD_BYTES is missing"),
+        (
+            "RECORD_BYTES = 512",
+            "RECORD_BYTES = 256\r\nFILE_RECORDS = 4",
+            "4 FILE_RECORDS of 256 RECORD_BYTES are 1024 bytes, but the file has ",
+        ),
         ("^IMAGE = 4", "^IMAGE = (\"../A.IMG\",4)", "^IMAGE names ../A.IMG, which is not in the same folder"),
         ("MODEL_TYPE = \"CAHV\"", "MODEL_TYPE = PSPH", "MODEL_TYPE PSPH is not one of"),
         ("(C,A,H,V)", "(C,A,H)", "MODEL_COMPONENT_ID lists no V"),

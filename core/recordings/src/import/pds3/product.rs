@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use crate::import::odl::Group;
 use sightline_geometry::camera::{Cahv, Cahvor, Cahvore, Camera, CameraModel, Imaging};
 use sightline_geometry::error::{Error, Result};
-use sightline_geometry::frames::{Point3, PoseRecord, Vector3};
+use sightline_geometry::frames::{POSITION_LIMIT_M, Point3, PoseRecord, Vector3};
 use sightline_vision::image::io::{MAX_PIXELS, open_regular};
 use sightline_world::traverse::StopLight;
 
@@ -216,7 +216,12 @@ fn rover_pose(label: &Group) -> Result<PoseRecord, String> {
         quaternion_sxyz: vector(group, "ORIGIN_ROTATION_QUATERNION")?,
     };
     let plausible = record.is_plausible().then_some(record);
-    plausible.ok_or_else(|| format!("{GROUP}: ORIGIN_ROTATION_QUATERNION is not of unit length"))
+    plausible.ok_or_else(|| {
+        format!(
+            "{GROUP}: ORIGIN_ROTATION_QUATERNION is not of unit length, or ORIGIN_OFFSET_VECTOR beyond \
+             {POSITION_LIMIT_M:.0e} m"
+        )
+    })
 }
 
 fn vector<const N: usize>(group: &Group, key: &str) -> Result<[f64; N], String> {

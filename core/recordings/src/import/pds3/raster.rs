@@ -10,7 +10,7 @@
 //! read as binary.
 
 use std::io::{Read, Seek, SeekFrom};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::product::{FILE_LIMIT, Product};
 use crate::import::odl::{Group, Value};
@@ -181,10 +181,35 @@ impl Product {
         if place.has_unit("BYTES") {
             return Ok((path, number - 1));
         }
-        let record = self.label.number("RECORD_BYTES").filter(|&n| n >= 1.0 && n <= FILE_LIMIT as f64);
-        let record =
-            record.ok_or_else(|| self.problem("^IMAGE counts records, but RECORD_BYTES is missing"))?;
-        Ok((path, (number - 1).saturating_mul(record as u64)))
+        let record_bytes = self.record_bytes(&path)?;
+        Ok((path, (number - 1).saturating_mul(record_bytes)))
+    }
+
+    /// Length of a record of the file at `path`, bytes; checked against the number of records, if the label has one.
+    fn record_bytes(&self, path: &Path) -> Result<u64> {
+        let missing = || self.problem("^IMAGE counts records, but RECORD_BYTES is missing");
+        let stated = self.label.number("RECORD_BYTES").ok_or_else(missing)?;
+        if !(stated >= 1.0 && stated <= FILE_LIMIT as f64 && stated.fract() == 0.0) {
+            let problem =
+                format!("RECORD_BYTES is {stated}, but it must be a whole number from 1 to {FILE_LIMIT}");
+            return Err(self.problem(problem));
+        }
+        let bytes = stated as u64;
+        if let Some(records) =
+            self.label.number("FILE_RECORDS").filter(|&n| n >= 1.0 && n <= FILE_LIMIT as f64)
+        {
+            let unreadable = |source| Error::Read { path: path.to_owned(), source };
+            let present = open_regular(path).and_then(|file| file.metadata()).map_err(unreadable)?.len();
+            let expected = (records as u64).saturating_mul(bytes);
+            // Some archives pad a file, by less than a record.
+            if !(expected..expected.saturating_add(bytes)).contains(&present) {
+                return Err(self.problem(format!(
+                    "{records} FILE_RECORDS of {bytes} RECORD_BYTES are {expected} bytes, but the file has {present}; \
+                     mend the label or fetch the file again"
+                )));
+            }
+        }
+        Ok(bytes)
     }
 
     /// The file of that name in the label's folder, whichever the case of its letters.
