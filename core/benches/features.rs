@@ -21,6 +21,7 @@ use std::sync::{Arc, OnceLock};
 
 use divan::Bencher;
 use sightline_geometry::camera::{Camera, Mast, MastAngles};
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
 use sightline_geometry::frames::{Pixel, Pose};
 use sightline_geometry::odometry_error::OdometryError;
@@ -84,7 +85,8 @@ impl Scene {
     }
 
     fn detected(&self, step: usize) -> StopFeatures {
-        detect(&self.pairs[step], self.cameras(step), &settings().features)
+        detect(&self.pairs[step], self.cameras(step), &settings().features, Cancel::default())
+            .expect("nobody cancels it")
     }
 }
 

@@ -20,6 +20,7 @@
 use std::sync::OnceLock;
 
 use divan::Bencher;
+use sightline_geometry::cancel::Cancel;
 use sightline_recordings::{Traverse, create_simulated};
 use sightline_rover::pipeline::Stops;
 use sightline_session::step::RunStep;
@@ -64,7 +65,7 @@ fn surface(bencher: Bencher<'_, '_>, step: usize) {
     let (pair, (left, right)) = (scene.traverse.capture(step).expect("images"), scene.traverse.cameras(step));
     let target = &scene.steps[step].update.target.position_in_rover;
     let stereo = scene.settings.shape.stereo((target - left.model.centre()).norm());
-    bencher.bench_local(|| StopSurface::measure(&pair, [left, right], &stereo));
+    bencher.bench_local(|| StopSurface::measure(&pair, [left, right], &stereo, Cancel::default()));
 }
 
 /// Dense stereo at the designation.

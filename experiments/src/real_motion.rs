@@ -33,6 +33,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use sightline_geometry::camera::Camera;
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
 use sightline_geometry::estimate::quantile::{median, quantile};
 use sightline_geometry::frames::{Pixel, Point3, Pose, PoseRecord};
@@ -255,7 +256,9 @@ impl Recording {
 
     /// The features of a frame that belong to what moves as a whole.
     fn features(&self, frame: &Frame, settings: &FeatureSettings) -> StopFeatures {
-        let mut features = detect(&frame.pair, [&self.cameras[0], &self.cameras[1]], settings);
+        let cameras = [&self.cameras[0], &self.cameras[1]];
+        let mut features =
+            detect(&frame.pair, cameras, settings, Cancel::default()).expect("nobody cancels it");
         if let Some(outline) = &frame.outline {
             let StopFeatures { left, points, .. } = &mut features;
             let pixel = |index: u32| StopFeatures::pixel(&left.keypoints[index as usize]);

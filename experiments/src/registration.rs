@@ -35,6 +35,7 @@ use serde::{Deserialize, Serialize};
 
 pub use rocks::rock_cases;
 use rocks::rover;
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::{Point3, Pose, Vector3};
 use sightline_track::locate::shape_tracker::ShapeTrackerSettings;
 use sightline_vision::registration::{
@@ -259,6 +260,7 @@ impl Case {
             half_width_m: self.half_width_m,
             prior,
             sensor: None,
+            cancel: Cancel::default(),
         };
         register(&input, settings)
     }

@@ -228,9 +228,8 @@ pub(crate) fn designate(
             open.make_ready(step, cancel)?;
         }
     }
-    let first = track::designate(&open.traverse, designation, settings).map(without_pair)?;
-    Cancel::from(cancel.as_ref()).check()?;
-    Ok(first)
+    let cancel = Cancel::from(cancel.as_ref());
+    track::designate_until(&open.traverse, designation, settings, cancel).map(without_pair)
 }
 
 /// A step with the image from which the next template is cut, which a recorded step let go of.

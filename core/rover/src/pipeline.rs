@@ -61,6 +61,19 @@ pub trait Stops {
 /// # Errors
 /// [`Error::Target`] when the pixel or step does not exist or no 3-D position is found; file errors of the stop.
 pub fn designate(stops: &dyn Stops, designation: Designation, settings: &Settings) -> Result<StepTrace> {
+    designate_until(stops, designation, settings, Cancel::default())
+}
+
+/// [`designate`], which ends soon after `cancel` is requested.
+///
+/// # Errors
+/// As [`designate`], and [`Error::Cancelled`].
+pub fn designate_until(
+    stops: &dyn Stops,
+    designation: Designation,
+    settings: &Settings,
+    cancel: Cancel<'_>,
+) -> Result<StepTrace> {
     let step = designation.step;
     if step >= stops.stop_count() {
         return Err(Error::Target(format!(
@@ -68,7 +81,9 @@ pub fn designate(stops: &dyn Stops, designation: Designation, settings: &Setting
             stops.stop_count()
         )));
     }
-    let (capture, located, memory) = designated(stops, designation, settings)?;
+    cancel.check()?;
+    let (capture, located, memory) = designated(stops, designation, settings, cancel)?;
+    cancel.check()?;
     let target = first_target(stops, designation, &located, memory)?;
     let pointing = pointing(stops, step, &target);
     let update = Updated {
@@ -92,6 +107,7 @@ fn designated(
     stops: &dyn Stops,
     designation: Designation,
     settings: &Settings,
+    cancel: Cancel<'_>,
 ) -> Result<(Capture, Located, Option<TrackerMemory>)> {
     let step = designation.step;
     let (left, right) = stops.cameras(step);
@@ -107,6 +123,7 @@ fn designated(
         stereo: stops.stereo(),
         shared: stops.shared(step),
         settings,
+        cancel,
     });
     Ok((capture, located, memory))
 }
@@ -141,7 +158,7 @@ fn computed_step(
     prediction_px: Option<Pixel>,
     cancel: Cancel<'_>,
 ) -> StepTrace {
-    let target = &*with_own_memory(stops, &last.target, settings);
+    let target = &*with_own_memory(stops, &last.target, settings, cancel);
     let step = target.step + 1;
     let site_from_rover = stops.site_from_rover(step);
     let prediction = prediction(stops, target, prediction_px);
@@ -197,11 +214,16 @@ fn prediction(stops: &dyn Stops, target: &Target, prediction_px: Option<Pixel>) 
 /// A run may change its tracker on the way. The new one cannot read the other's memory; it begins with its own of the
 /// designation, and keeps the position that the other one left. Where it finds no position there, the memory stays, and
 /// with it the tracker.
-fn with_own_memory<'a>(stops: &dyn Stops, target: &'a Target, settings: &Settings) -> Cow<'a, Target> {
+fn with_own_memory<'a>(
+    stops: &dyn Stops,
+    target: &'a Target,
+    settings: &Settings,
+    cancel: Cancel<'_>,
+) -> Cow<'a, Target> {
     if target.memory.tracker() == settings.tracker {
         return Cow::Borrowed(target);
     }
-    match designated(stops, target.designation, settings) {
+    match designated(stops, target.designation, settings, cancel) {
         Ok((_, _, Some(memory))) => Cow::Owned(Target { memory, ..target.clone() }),
         _ => Cow::Borrowed(target),
     }

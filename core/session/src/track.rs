@@ -22,7 +22,20 @@ impl<T: Stops + TruthSource> Drive for T {}
 /// # Errors
 /// [`sightline_geometry::error::Error::Target`] when there is no such pixel or no 3-D position under it; file errors.
 pub fn designate<D: Drive>(drive: &D, designation: Designation, settings: &Settings) -> Result<RunStep> {
-    let mut trace = pipeline::designate(drive, designation, settings)?;
+    designate_until(drive, designation, settings, Cancel::default())
+}
+
+/// [`designate`], which ends soon after `cancel` is requested.
+///
+/// # Errors
+/// As [`designate`], and [`sightline_geometry::error::Error::Cancelled`].
+pub fn designate_until<D: Drive>(
+    drive: &D,
+    designation: Designation,
+    settings: &Settings,
+    cancel: Cancel<'_>,
+) -> Result<RunStep> {
+    let mut trace = pipeline::designate_until(drive, designation, settings, cancel)?;
     warn_of_shadow(drive, &mut trace, settings);
     Ok(compared(drive, trace, None))
 }

@@ -77,7 +77,9 @@ pub fn try_step<D: Drive>(
             Err(Error::Request("prediction_px: x and y must be numbers, px".to_owned()))
         }
         (None, Some(_)) => Err(Error::Request(NO_PREDICTION.to_owned())),
-        (None, None) => track::designate(drive, base.first.update.target.designation, &settings),
+        (None, None) => {
+            track::designate_until(drive, base.first.update.target.designation, &settings, cancel)
+        }
         (Some(last), prediction_px) => {
             let prediction_px = prediction_px.or(base.prediction_px);
             NextStep { first: base.first, last, settings: &settings, prediction_px, cancel }.compute(drive)

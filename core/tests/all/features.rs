@@ -3,6 +3,7 @@
 use nalgebra::UnitQuaternion;
 use serde_json::{Value, json};
 
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::{Pixel, Pose, Vector3};
 use sightline_rover::pipeline::Stops;
 use sightline_session::step::RunStep;
@@ -154,8 +155,13 @@ impl OneEyed {
         let mut pair = self.0.capture(1).unwrap();
         std::sync::Arc::make_mut(&mut pair.right).pixels_mut().for_each(|pixel| pixel[0] = 0.4);
         let (left, right) = self.0.cameras(1);
-        let seen =
-            sightline_track::locate::features::detect::detect(&pair, [left, right], &settings.features);
+        let seen = sightline_track::locate::features::detect::detect(
+            &pair,
+            [left, right],
+            &settings.features,
+            Cancel::default(),
+        )
+        .unwrap();
         assert!(seen.left.keypoints.len() > 50 && seen.points.is_empty());
         let anchor = first.update.target.memory.features().unwrap().newest().next().unwrap();
         let input = sightline_track::locate::features::motion::MotionInput {
@@ -201,14 +207,10 @@ fn the_tables_hold_every_feature_and_tell_those_that_agree() {
 fn what_was_found_for_one_target_serves_the_next() {
     let store = SharedStore::default();
     let settings = settings(&[]).features;
-    let shared = Some(sightline_track::locate::store::Shared { store: &store, stop: 3 });
-    let empty = || sightline_track::locate::features::detect::StopFeatures::default();
-    let first = sightline_track::locate::store::shared(shared, &settings, 64, empty);
-    let again = sightline_track::locate::store::shared(shared, &settings, 64, || unreachable!("it is kept"));
+    let empty = sightline_track::locate::features::detect::StopFeatures::default;
+    let first = store.get(3, &settings, 64, empty);
+    let again = store.get(3, &settings, 64, || unreachable!("it is kept"));
     assert!(std::sync::Arc::ptr_eq(&first, &again));
     let other = sightline_track::locate::features::FeatureSettings { sift_sigma: 1.7, ..settings };
-    assert!(!std::sync::Arc::ptr_eq(
-        &first,
-        &sightline_track::locate::store::shared(shared, &other, 64, empty)
-    ));
+    assert!(!std::sync::Arc::ptr_eq(&first, &store.get(3, &other, 64, empty)));
 }

@@ -6,6 +6,7 @@ use rand_pcg::Pcg64;
 
 use sightline_experiments::registration::views::Stereo;
 use sightline_experiments::registration::{Case, Staging};
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::{Point3, Pose, Ray, Vector3};
 use sightline_vision::registration::*;
 use sightline_world::ground::rocks::{Rock, RockSeed};
@@ -162,11 +163,38 @@ fn a_pinhole_sensor_finds_the_same_motion() {
             half_width_m: case.half_width_m,
             prior: None,
             sensor: Some(sensor),
+            cancel: Cancel::default(),
         },
         &settings,
     );
     let row = case.row(&found, 0.4, Method::PointToPlane);
     assert!(row.is_success() && row.error_m < 2e-3, "{row:?}");
+}
+
+#[test]
+fn cancelled_registration_compares_no_shift_and_takes_no_step() {
+    let case = rock_case(&rock(3, RockShape::Angular), &exact(), 1);
+    let start = case.start(0.4, &Staging::default(), 5);
+    let cancelled = std::sync::atomic::AtomicBool::new(true);
+    for method in BOTH {
+        let settings = with(method);
+        let [fixed, moving] = case.meshes(&start, &settings);
+        let input = RegistrationInput {
+            fixed: &fixed,
+            moving: &moving,
+            start_fixed_from_moving: &start,
+            target_in_fixed: &case.target_in_fixed,
+            half_width_m: case.half_width_m,
+            prior: None,
+            sensor: None,
+            cancel: Cancel::from(&cancelled),
+        };
+        let found = register(&input, &settings);
+        assert!(found.failure.is_some() && found.path.is_empty(), "{method:?}");
+        assert!(found.coarse.mean_m.iter().all(|mean_m| mean_m.is_infinite()), "{method:?}");
+        let free = register(&RegistrationInput { cancel: Cancel::default(), ..input }, &settings);
+        assert!(free.failure.is_none(), "{method:?}: {:?}", free.failure);
+    }
 }
 
 #[test]

@@ -14,6 +14,7 @@ use sightline_track::locate::shape_tracker::drape::{DrapeInput, drape};
 use sightline_track::locate::shape_tracker::surface::StopSurface;
 
 use sightline_geometry::camera::Camera;
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::estimate::quantile::median;
 use sightline_geometry::frames::{Pixel, Point3, Pose};
 use sightline_recordings::import::pds3::Product;
@@ -92,7 +93,7 @@ fn a_mast_that_turned_moved_along_its_line_of_sight_so_that_rows_cannot_be_align
     // The epipole is in the picture: no turn of the cameras makes the rows agree, and nothing is invented.
     let pair = StereoPair { left: left_image, right: right_image };
     let settings = StereoSettings { range_min_m: 2.0, ..StereoSettings::default() };
-    let found = StopSurface::measure(&pair, [&left, &right], &settings)
+    let found = StopSurface::measure(&pair, [&left, &right], &settings, Cancel::default())
         .map_or(0, |surface| surface.points_m.iter().filter(|point| point[0].is_finite()).count());
     assert!(found < 1000, "{found} points");
 }

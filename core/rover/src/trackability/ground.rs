@@ -19,6 +19,7 @@ use super::depth::{Ranges, WindowRanges, edge_distances};
 use super::{Aspect, Criterion, TrackabilityLimits, Verdict, texture};
 use crate::pipeline::Stops;
 use sightline_geometry::camera::Camera;
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::estimate::quantile::upper_median;
 use sightline_geometry::frames::Pixel;
@@ -153,7 +154,8 @@ impl Ground {
         let pair = stops.capture(step)?;
         let (left, right) = stops.cameras(step);
         let stereo = StereoSettings::default();
-        let surface = StopSurface::shared(stops.shared(step), &pair, [left, right], &stereo)?;
+        let surface =
+            StopSurface::shared(stops.shared(step), &pair, [left, right], &stereo, Cancel::default())?;
         let (image, edges_px) = (pair.left, edge_distances(&surface.disparities, limits));
         let ranges = Ranges { surface: &surface, left };
         Ok(Self {

@@ -74,27 +74,10 @@ impl std::fmt::Debug for Shared<'_> {
 }
 
 /// A result of one stop, kept where there is a store.
-pub fn shared<S, V>(
-    shared: Option<Shared<'_>>,
-    settings: &S,
-    limit: usize,
-    find: impl FnOnce() -> V,
-) -> Arc<V>
-where
-    S: PartialEq + Clone + Send + 'static,
-    V: Send + Sync + 'static,
-{
-    match shared {
-        Some(Shared { store, stop }) => store.get(stop, settings, limit, find),
-        None => Arc::new(find()),
-    }
-}
-
-/// The same for a computation that may fail.
 ///
 /// # Errors
 /// Those of `find`; a failure is not kept.
-pub(crate) fn try_shared<S, V, E>(
+pub(crate) fn shared<S, V, E>(
     shared: Option<Shared<'_>>,
     settings: &S,
     limit: usize,

@@ -165,6 +165,8 @@ pub struct DesignateInput<'a> {
     pub shared: Option<Shared<'a>>,
     /// The configuration.
     pub settings: &'a Settings,
+    /// Once requested, the tracker returns anything soon: the sighting is discarded.
+    pub cancel: Cancel<'a>,
 }
 
 /// What a tracker is given at every later stop.

@@ -28,6 +28,7 @@ use serde::{Deserialize, Serialize};
 use super::objective::{Agreement, Offset, agreement, motion};
 use super::range_sensor::{Projection, RangeSensor};
 use super::rasterise::{Depths, Facets, Picture, rasterise};
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::Point3;
 
 /// Every so many pixels of a row, and rows, are compared.
@@ -85,6 +86,15 @@ pub(super) struct CoarseInput<'a> {
     /// How far minima must be apart to be two, m.
     pub(super) apart_m: f64,
     pub(super) overlap_min: f64,
+    /// Once requested, no further shift is compared.
+    pub(super) cancel: Cancel<'a>,
+}
+
+impl CoarseInput<'_> {
+    /// A row of shifts that were not compared, once the result is not wanted any more.
+    fn cancelled_row(&self, side: usize) -> Option<Vec<(Agreement, f32)>> {
+        self.cancel.is_requested().then(|| vec![(agreement(0.0, 0, 1, self.overlap_min), 0.0); side])
+    }
 }
 
 /// J over all shifts, and its minima.
@@ -132,6 +142,9 @@ fn by_reading(input: &CoarseInput<'_>, steps: usize) -> Vec<(Agreement, f32)> {
         .collect();
     let side = 2 * steps + 1;
     let row = |j: usize| {
+        if let Some(cells) = input.cancelled_row(side) {
+            return cells;
+        }
         let mut differences = Vec::with_capacity(pixels.len());
         let mut cells = Vec::with_capacity(side);
         for i in 0..side {
@@ -151,6 +164,9 @@ fn by_drawing(input: &CoarseInput<'_>, steps: usize, step_m: f64) -> Vec<(Agreem
     let pixels = compared(input.sensor, input.fixed_m);
     let side = 2 * steps + 1;
     let row = |j: usize| {
+        if let Some(cells) = input.cancelled_row(side) {
+            return cells;
+        }
         let mut moving_m = vec![f32::INFINITY; input.fixed_m.len()];
         let mut picture = Picture::default();
         let mut differences = Vec::with_capacity(pixels.len());

@@ -10,6 +10,7 @@ use serde::Deserialize;
 use sightline_testdata::recorded;
 
 use super::*;
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::Vector3;
 
 /// What the other program reached.
@@ -79,6 +80,7 @@ fn a_street_is_registered_about_as_well_as_by_another_program() {
             half_width_m: 5.0,
             prior: None,
             sensor: Some(RangeSensor::pinhole(&Point3::origin(), &direction, 0.9, [160, 64])),
+            cancel: Cancel::default(),
         };
         for method in [Method::SimplexL1, Method::PointToPlane] {
             let mut settings =

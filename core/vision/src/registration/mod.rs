@@ -47,6 +47,7 @@ mod checks;
 use nalgebra::{Matrix3, Matrix6};
 use serde::{Deserialize, Serialize};
 
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::{Point3, Pose, PoseRecord};
 
 pub use coarse_register::{CoarseSurface, Minimum};
@@ -64,7 +65,7 @@ use covariance::{arm, covariance_of_point, precision};
 use held::Held;
 use objective::{Objective, motion};
 use pairs::{Moving, Template};
-use refine_register::refine_register;
+use refine_register::{Refinement, refine_register};
 
 /// What is registered.
 #[derive(Clone, Copy, Debug)]
@@ -83,6 +84,8 @@ pub struct RegistrationInput<'a> {
     pub prior: Option<Prior>,
     /// The virtual sensor; none: one that looks at the target ([`sensor_for`]).
     pub sensor: Option<RangeSensor>,
+    /// Once requested, the registration ends soon and its result is discarded.
+    pub cancel: Cancel<'a>,
 }
 
 /// How well the start of a registration is known, before the surfaces are compared.
@@ -225,6 +228,7 @@ pub fn register(input: &RegistrationInput<'_>, settings: &ShapeSettings) -> Regi
         half_range_m: settings.search_half_range_m.unwrap_or(input.half_width_m),
         apart_m: settings.checks.apart * input.half_width_m,
         overlap_min: settings.overlap_min,
+        cancel: input.cancel,
     });
     let best = coarse.best;
     let overlap_best = coarse.overlap_best;
@@ -234,7 +238,7 @@ pub fn register(input: &RegistrationInput<'_>, settings: &ShapeSettings) -> Regi
     };
     let (near, start) = (refine_register::near(&template, &moving, &best.offset()), best.offset());
     let held = Held::new(input, &sensor);
-    let (end, path) = refine(&template, &near, &start, &held, settings);
+    let (end, path) = refine(&template, &near, &start, &held, (settings, input.cancel));
     result.path = path;
     let ways = [(Offset::zeros(), &moving), (start, &near), (end, &near)];
     finish(result, &template, ways, (input, &held), settings)
@@ -246,17 +250,17 @@ fn refine(
     near: &Moving,
     start: &Offset,
     held: &Held,
-    settings: &ShapeSettings,
+    (settings, cancel): (&ShapeSettings, Cancel<'_>),
 ) -> (Offset, Vec<PathStep>) {
-    let how = (settings.method, &settings.simplex, &settings.plane);
-    let (end, mut path) = refine_register(template, near, start, settings.overlap_min, how, held);
+    let how = Refinement { settings, cancel };
+    let (end, mut path) = refine_register(template, near, start, &how, held);
     if held.is_free() || settings.method == Method::SimplexL1 {
         return (end, path);
     }
     let (image, pairs) = template.pairs(near, &end);
     let alike_px = precision(template, &image, &pairs, settings.method, held).alike_px;
     let held = Held { alike_px, ..*held };
-    let (end, again) = refine_register(template, near, &end, settings.overlap_min, how, &held);
+    let (end, again) = refine_register(template, near, &end, &how, &held);
     let before = path.last().map_or(0, |last| last.evaluations);
     path.extend(again.into_iter().map(|step| PathStep {
         evaluations: step.evaluations + before,

@@ -27,10 +27,11 @@
 use nalgebra::{Matrix6, Vector6};
 
 use super::held::Held;
-use super::nelder_mead::{PathStep, SimplexSettings, minimise};
+use super::nelder_mead::{PathStep, minimise};
 use super::objective::{Objective, Offset, motion, offset};
 use super::pairs::{Moving, Pair, Template, robust_scale};
-use super::settings::{Method, PlaneSettings};
+use super::settings::{Method, ShapeSettings};
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::estimate::weighted_motion::Loss;
 
 /// How far beside the picture facets may begin that are still drawn, m.
@@ -44,6 +45,13 @@ const DAMPING: f64 = 1e-4;
 /// The scale does not fall below this share of the noise that the surfaces claim.
 const SCALE_MIN: f64 = 0.1;
 
+/// How a motion is refined.
+pub(super) struct Refinement<'a> {
+    pub(super) settings: &'a ShapeSettings,
+    /// Once requested, the refinement ends soon and its result is discarded.
+    pub(super) cancel: Cancel<'a>,
+}
+
 /// The part of the moving surface that the refinement from a start can see.
 pub(super) fn near(template: &Template, moving: &Moving, start: &Offset) -> Moving {
     let reach_px = (REACH_M / template.sensor.pixel_m(template.pivot.z)).ceil() as usize;
@@ -55,21 +63,21 @@ pub(super) fn refine_register(
     template: &Template,
     moving: &Moving,
     start: &Offset,
-    overlap_min: f64,
-    how: (Method, &SimplexSettings, &PlaneSettings),
+    how: &Refinement<'_>,
     held: &Held,
 ) -> (Offset, Vec<PathStep>) {
-    let (method, simplex, plane) = how;
-    match method {
+    let &Refinement { settings, cancel } = how;
+    match settings.method {
         Method::SimplexL1 => {
             let fixed_m = &template.image.depth_m;
             let facets = &moving.facets;
             let mut objective =
-                Objective::new(&template.sensor, fixed_m, facets, template.pivot, overlap_min);
-            let (end, _, path) = minimise(|p| objective.at(p).mean_m, start, simplex);
+                Objective::new(&template.sensor, fixed_m, facets, template.pivot, settings.overlap_min);
+            let value_m = |p: &Offset| if cancel.is_requested() { 0.0 } else { objective.at(p).mean_m };
+            let (end, _, path) = minimise(value_m, start, &settings.simplex);
             (end, path)
         }
-        Method::PointToPlane => point_to_plane(template, moving, start, plane, held),
+        Method::PointToPlane => point_to_plane(template, moving, start, how, held),
     }
 }
 
@@ -78,12 +86,16 @@ fn point_to_plane(
     template: &Template,
     moving: &Moving,
     start: &Offset,
-    settings: &PlaneSettings,
+    how: &Refinement<'_>,
     held: &Held,
 ) -> (Offset, Vec<PathStep>) {
+    let settings = &how.settings.plane;
     let mut at = *start;
     let mut path = Vec::new();
     for step in 0..settings.steps_max {
+        if how.cancel.is_requested() {
+            break;
+        }
         let (_, pairs) = template.pairs(moving, &at);
         path.push(PathStep {
             evaluations: step + 1,

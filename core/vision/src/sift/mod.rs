@@ -60,6 +60,8 @@ use crate::image::GrayImage;
 use extrema::Extremum;
 use scale_space::{Octave, ScaleSpace};
 use scan::Candidate;
+use sightline_geometry::cancel::Cancel;
+use sightline_geometry::error::Result;
 use validity::Validity;
 
 pub use descriptor::Descriptor;
@@ -135,13 +137,23 @@ pub struct Features {
 /// change. An image too small for a single octave, or flat, has no features; nor has any with settings that
 /// describe no scale space (a σ or a number of scales that is not positive).
 pub fn detect(image: &GrayImage, settings: &SiftSettings) -> Features {
-    let Some(validity) = Validity::of(image) else { return Features::default() };
+    // Nobody can cancel it.
+    detect_until(image, settings, Cancel::default()).unwrap_or_default()
+}
+
+/// [`detect`], which ends within some rows of an octave once `cancel` is requested.
+///
+/// # Errors
+/// [`Error::Cancelled`](sightline_geometry::error::Error::Cancelled).
+pub fn detect_until(image: &GrayImage, settings: &SiftSettings, cancel: Cancel<'_>) -> Result<Features> {
+    let Some(validity) = Validity::of(image) else { return Ok(Features::default()) };
     let mended = validity.mended(image);
-    let Some(mut space) = ScaleSpace::new(&mended, settings) else { return Features::default() };
+    let Some(mut space) = ScaleSpace::new(&mended, settings) else { return Ok(Features::default()) };
     let mut strongest = Strongest::new(settings.features_max);
     while space.next_octave() {
         let mut seen = BTreeSet::new();
         while let Some((octave, rows)) = space.slide() {
+            cancel.check()?;
             let mut extrema = extrema::find(octave, rows, settings);
             extrema.retain(|extremum| seen.insert(extremum.pixel) && strongest.may_keep(extremum.contrast));
             let orient_one = |extremum: &Extremum| orient(octave, extremum, settings);
@@ -151,7 +163,7 @@ pub fn detect(image: &GrayImage, settings: &SiftSettings) -> Features {
             strongest.add(found.into_iter().zip(described));
         }
     }
-    strongest.features()
+    Ok(strongest.features())
 }
 
 /// Where a feature stands among all: octave, layer, row and column.

@@ -182,3 +182,13 @@ fn settings_that_describe_no_scale_space_give_nothing() {
         assert_eq!(detect(&image, &settings), Features::default());
     }
 }
+
+#[test]
+fn cancelled_detection_returns_no_features() {
+    let cancelled = std::sync::atomic::AtomicBool::new(true);
+    let found = detect_until(&texture(64), &SiftSettings::default(), Cancel::from(&cancelled));
+    assert!(matches!(found, Err(sightline_geometry::error::Error::Cancelled)), "{found:?}");
+    let free = detect_until(&texture(64), &SiftSettings::default(), Cancel::default()).unwrap();
+    assert_eq!(free, detect(&texture(64), &SiftSettings::default()));
+    assert!(!free.keypoints.is_empty());
+}

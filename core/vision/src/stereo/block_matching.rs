@@ -78,6 +78,9 @@ pub(super) fn match_rows<const N: usize>(
     let first = rows.start.saturating_sub(half);
     band.columns.values_mut().fill(0);
     for next in first..rows.end + half {
+        if scene.cancel.is_requested() {
+            return;
+        }
         let comes = next < scene.size[1];
         if comes {
             band.left.take(&scene.left, next);

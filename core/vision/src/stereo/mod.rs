@@ -51,6 +51,7 @@ use utoipa::ToSchema;
 
 use crate::image::GrayImage;
 use sightline_geometry::camera::Camera;
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Point3;
 
@@ -140,6 +141,19 @@ pub fn dense_stereo(
     cameras: [&Camera; 2],
     settings: &StereoSettings,
 ) -> Result<DenseStereo> {
+    dense_stereo_until([left, right], cameras, settings, Cancel::default())
+}
+
+/// [`dense_stereo`], which ends within a row or an alignment once `cancel` is requested.
+///
+/// # Errors
+/// As [`dense_stereo`], and [`Error::Cancelled`].
+pub fn dense_stereo_until(
+    [left, right]: [&GrayImage; 2],
+    cameras: [&Camera; 2],
+    settings: &StereoSettings,
+    cancel: Cancel<'_>,
+) -> Result<DenseStereo> {
     for (image, camera) in [left, right].into_iter().zip(cameras) {
         if <[u32; 2]>::from(image.dimensions()) != camera.size {
             return Err(Error::Request("an image of the pair is not as large as its camera says".to_owned()));
@@ -152,7 +166,8 @@ pub fn dense_stereo(
         settings.disparity_count = (nearest.ceil() as u32 + 1).clamp(8, 512);
     }
     let images = alignment.images(left, right);
-    let mut disparities = disparities([&images[0], &images[1]], &settings)?;
+    cancel.check()?;
+    let mut disparities = disparities_until([&images[0], &images[1]], &settings, cancel)?;
     let points_m = ranges::points(&mut disparities, &alignment, cameras, settings.range_max_m);
     Ok(DenseStereo { alignment, images, disparities, points_m })
 }
@@ -161,7 +176,15 @@ pub fn dense_stereo(
 ///
 /// # Errors
 /// [`Error::Setting`] for a setting that cannot be used; [`Error::Request`] for images without pixels or of unequal height.
-pub fn disparities([left, right]: [&GrayImage; 2], settings: &StereoSettings) -> Result<DisparityMap> {
+pub fn disparities(images: [&GrayImage; 2], settings: &StereoSettings) -> Result<DisparityMap> {
+    disparities_until(images, settings, Cancel::default())
+}
+
+fn disparities_until(
+    [left, right]: [&GrayImage; 2],
+    settings: &StereoSettings,
+    cancel: Cancel<'_>,
+) -> Result<DisparityMap> {
     settings.check()?;
     if left.height() != right.height() || left.is_empty() || right.is_empty() {
         return Err(Error::Request(
@@ -169,7 +192,7 @@ pub fn disparities([left, right]: [&GrayImage; 2], settings: &StereoSettings) ->
         ));
     }
     let (scene, texture) = rayon::join(
-        || Scene::new(left, right, settings),
+        || Scene::new(left, right, settings, cancel),
         || if settings.texture_min > 0.0 { texture::texture(left) } else { Vec::new() },
     );
     let pixels = left.as_raw().len();
@@ -185,6 +208,7 @@ pub fn disparities([left, right]: [&GrayImage; 2], settings: &StereoSettings) ->
         256 => match_all::<4>(&scene, &texture, &mut map),
         _ => match_all::<8>(&scene, &texture, &mut map),
     }
+    cancel.check()?;
     checks::remove_speckles(&mut map, settings.speckle_px as usize, settings.speckle_step_px as f32);
     Ok(map)
 }

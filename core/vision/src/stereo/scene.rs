@@ -5,6 +5,7 @@ use super::lanes::{LANES, Row};
 use super::settings::StereoSettings;
 use super::winner::rival_share;
 use crate::image::GrayImage;
+use sightline_geometry::cancel::Cancel;
 
 /// An aligned pair, ready to be matched.
 pub(super) struct Scene<'a> {
@@ -29,10 +30,17 @@ pub(super) struct Scene<'a> {
     /// By which share another sum must exceed the least one, in 65536ths.
     pub(super) rival_share: u64,
     pub(super) settings: &'a StereoSettings,
+    /// Once requested, the remaining rows are left as they are: the result is discarded.
+    pub(super) cancel: Cancel<'a>,
 }
 
 impl<'a> Scene<'a> {
-    pub(super) fn new(left: &'a GrayImage, right: &GrayImage, settings: &'a StereoSettings) -> Self {
+    pub(super) fn new(
+        left: &'a GrayImage,
+        right: &GrayImage,
+        settings: &'a StereoSettings,
+        cancel: Cancel<'a>,
+    ) -> Self {
         let count = settings.disparity_count as usize;
         let cells = count.next_power_of_two().max(LANES);
         let first_px = settings.disparity_first_px as isize;
@@ -58,6 +66,7 @@ impl<'a> Scene<'a> {
             beyond_costs,
             rival_share: rival_share(settings.uniqueness_min),
             settings,
+            cancel,
         }
     }
 

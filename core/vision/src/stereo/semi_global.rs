@@ -257,6 +257,9 @@ pub(super) fn match_rows<const N: usize>(scene: &Scene<'_>, mut take: impl FnMut
     let mut below: Vec<u16> = vec![0; if eight { width * height * scene.cells } else { 0 }];
     if eight {
         for (y, keep) in (0..height).rev().zip(below.rchunks_exact_mut(width * scene.cells)) {
+            if scene.cancel.is_requested() {
+                return;
+            }
             pass.begin(scene, y, Some(y + 1).filter(|y| *y < height));
             Arch::new().dispatch(FromLeft::<N> { scene, pass: &mut pass, side_counts: false });
             keep.copy_from_slice(pass.sums.values());
@@ -264,6 +267,9 @@ pub(super) fn match_rows<const N: usize>(scene: &Scene<'_>, mut take: impl FnMut
         pass = Pass::new(scene);
     }
     for y in 0..height {
+        if scene.cancel.is_requested() {
+            return;
+        }
         pass.begin(scene, y, y.checked_sub(1));
         Arch::new().dispatch(FromLeft::<N> { scene, pass: &mut pass, side_counts: true });
         if eight {

@@ -145,7 +145,7 @@ fn expected(images: [&GrayImage; 2], settings: &StereoSettings) -> Vec<usize> {
 }
 
 fn found(images: [&GrayImage; 2], settings: &StereoSettings) -> Vec<usize> {
-    let scene = Scene::new(images[0], images[1], settings);
+    let scene = Scene::new(images[0], images[1], settings, Cancel::default());
     let mut found = Vec::new();
     let take = |_: usize, row: &RowResult| found.extend(row.pixels.iter().map(|pixel| pixel.index()));
     let (rows, mut band) = (0..scene.size[1], block_matching::Band::new(&scene));
@@ -340,5 +340,26 @@ fn settings_and_images_that_cannot_be_used_are_refused() {
     for method in [StereoMethod::SemiGlobal, StereoMethod::BlockMatching] {
         let map = disparities([&small, &small], &plain(method, 0, 8)).unwrap();
         assert_eq!(map.disparity_px.len(), 6);
+    }
+}
+
+#[test]
+fn cancelled_matching_returns_no_disparities() {
+    let [left, right] = pair([75, 33], |_, _| 6.0);
+    let cancelled = std::sync::atomic::AtomicBool::new(true);
+    for method in [StereoMethod::SemiGlobal, StereoMethod::BlockMatching] {
+        let settings = plain(method, 0, 20);
+        let found = disparities_until([&left, &right], &settings, Cancel::from(&cancelled));
+        assert!(matches!(found, Err(Error::Cancelled)), "{method:?}");
+        let mut rows = 0;
+        let scene = Scene::new(&left, &right, &settings, Cancel::from(&cancelled));
+        match method {
+            StereoMethod::SemiGlobal => semi_global::match_rows::<1>(&scene, |_, _| rows += 1),
+            StereoMethod::BlockMatching => {
+                let mut band = block_matching::Band::new(&scene);
+                block_matching::match_rows::<1>(&scene, &mut band, 0..33, |_, _| rows += 1);
+            }
+        }
+        assert_eq!(rows, 0, "{method:?}");
     }
 }

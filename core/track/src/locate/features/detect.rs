@@ -19,6 +19,8 @@ use super::match_stereo::{StereoMatch, match_stereo, pixel_of};
 use super::settings::FeatureSettings;
 use crate::stages::capture::StereoPair;
 use sightline_geometry::camera::Camera;
+use sightline_geometry::cancel::Cancel;
+use sightline_geometry::error::Result;
 use sightline_geometry::estimate::triangulate::midpoint;
 use sightline_geometry::frames::{Pixel, Point3, Vector3};
 use sightline_vision::sift::{self, Features, Keypoint};
@@ -64,9 +66,18 @@ impl StopFeatures {
 }
 
 /// Finds the features of a stereo pair and their points in the rover frame.
-pub fn detect(pair: &StereoPair, cameras: [&Camera; 2], settings: &FeatureSettings) -> StopFeatures {
+///
+/// # Errors
+/// [`Error::Cancelled`](sightline_geometry::error::Error::Cancelled).
+pub fn detect(
+    pair: &StereoPair,
+    cameras: [&Camera; 2],
+    settings: &FeatureSettings,
+    cancel: Cancel<'_>,
+) -> Result<StopFeatures> {
     let sift = settings.sift();
-    let (left, right) = (sift::detect(&pair.left, &sift), sift::detect(&pair.right, &sift));
+    let left = sift::detect_until(&pair.left, &sift, cancel)?;
+    let right = sift::detect_until(&pair.right, &sift, cancel)?;
     let matched = match_stereo(&left, &right, cameras, settings);
     let found = matched.len();
     let points: Vec<Point> = matched
@@ -79,7 +90,7 @@ pub fn detect(pair: &StereoPair, cameras: [&Camera; 2], settings: &FeatureSettin
         })
         .collect();
     let out_of_range = found - points.len();
-    StopFeatures { left, right, points, out_of_range }
+    Ok(StopFeatures { left, right, points, out_of_range })
 }
 
 /// The point of a match; none beyond the ranges or behind a camera.

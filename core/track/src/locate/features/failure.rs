@@ -6,6 +6,9 @@ pub enum FeatureFailure {
     /// Settings contradict each other.
     #[error("{0}")]
     Settings(String),
+    /// The result is not wanted any more; it is discarded.
+    #[error("the step was cancelled")]
+    Cancelled,
     /// The memory is empty.
     #[error("no earlier stop with features is remembered")]
     NoAnchor,

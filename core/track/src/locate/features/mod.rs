@@ -79,12 +79,14 @@ impl Tracker for FeatureTracker {
             found = Sighting::nothing(missing, FeatureEvidence::default());
         } else if let Some((position, covariance)) = found.position_in_rover.zip(found.covariance_in_rover) {
             evidence.carried = Some(Carried::designated(position, covariance));
-            see(&mut evidence, || {
-                let cameras = [input.left, input.right];
-                store::shared(input.shared, settings, STOPS_KEPT, || {
-                    detect::detect(&input.capture.pair, cameras, settings)
-                })
+            let cameras = [input.left, input.right];
+            let seen = store::shared(input.shared, settings, STOPS_KEPT, || {
+                detect::detect(&input.capture.pair, cameras, settings, input.cancel)
             });
+            match seen {
+                Ok(seen) => note(&mut evidence, &seen),
+                Err(_) => found = Sighting::nothing(FeatureFailure::Cancelled, FeatureEvidence::default()),
+            }
         }
         let memory = found.position_in_rover.map(|_| {
             let anchor = anchor(&evidence, input.step, input.site_from_rover);
@@ -100,11 +102,11 @@ impl Tracker for FeatureTracker {
             return Sighting::nothing(missing, evidence);
         }
         let cameras = [&input.pointing.left, &input.pointing.right];
-        let now = see(&mut evidence, || {
-            store::shared(input.shared, settings, STOPS_KEPT, || {
-                detect::detect(&input.capture.pair, cameras, settings)
-            })
+        let seen = store::shared(input.shared, settings, STOPS_KEPT, || {
+            detect::detect(&input.capture.pair, cameras, settings, input.cancel)
         });
+        let Ok(now) = seen else { return Sighting::nothing(FeatureFailure::Cancelled, evidence) };
+        note(&mut evidence, &now);
         let wanted = memory.newest().take_while(|_| !input.cancel.is_requested());
         let candidates: Vec<Candidate<'_>> =
             wanted.map(|anchor| Candidate::new(anchor, &now, input)).collect();
@@ -157,9 +159,8 @@ fn kept_motion(
     }
 }
 
-/// Finds the features of a stop and notes them.
-fn see(evidence: &mut FeatureEvidence, find: impl FnOnce() -> Arc<StopFeatures>) -> Arc<StopFeatures> {
-    let features = find();
+/// Notes the features of a stop in its evidence.
+fn note(evidence: &mut FeatureEvidence, features: &Arc<StopFeatures>) {
     let mut ranges: Vec<f64> = features.points.iter().map(|point| point.range_m).collect();
     ranges.sort_by(f64::total_cmp);
     evidence.detect = Some(Detected {
@@ -169,9 +170,8 @@ fn see(evidence: &mut FeatureEvidence, find: impl FnOnce() -> Arc<StopFeatures>)
         points: features.points.len(),
         median_range_m: ranges.get(ranges.len() / 2).copied(),
     });
-    evidence.table = tables::features(&features);
-    evidence.features = Some(Arc::clone(&features));
-    features
+    evidence.table = tables::features(features);
+    evidence.features = Some(Arc::clone(features));
 }
 
 /// The motion from one remembered stop, and where it puts the target.

@@ -10,6 +10,7 @@ use crate::locate::tracker::LocateInput;
 use crate::settings::Settings;
 use crate::stages::capture::Capture;
 use sightline_geometry::camera::Camera;
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::Point3;
 use sightline_vision::registration::{Mesh, Region, ShapeSettings, region_radius_m};
 
@@ -20,6 +21,7 @@ pub(super) struct Look<'a> {
     pub(super) cameras: [&'a Camera; 2],
     pub(super) shared: Option<Shared<'a>>,
     pub(super) settings: &'a Settings,
+    pub(super) cancel: Cancel<'a>,
 }
 
 impl Look<'_> {
@@ -27,7 +29,7 @@ impl Look<'_> {
     pub(super) fn surface(&self, target: &Point3) -> Result<Arc<StopSurface>, ShapeFailure> {
         let distance_m = (target - self.cameras[0].model.centre()).norm();
         let stereo = self.settings.shape.stereo(distance_m);
-        StopSurface::shared(self.shared, &self.capture.pair, self.cameras, &stereo)
+        StopSurface::shared(self.shared, &self.capture.pair, self.cameras, &stereo, self.cancel)
             .map_err(|error| ShapeFailure::NoSurface(error.to_string()))
     }
 }

@@ -197,7 +197,13 @@ fn first_view(input: &DesignateInput<'_>, located: &Sighting<ShapeEvidence>, evi
         return;
     };
     let cameras = [input.left, input.right];
-    let look = Look { capture: input.capture, cameras, shared: input.shared, settings: input.settings };
+    let look = Look {
+        capture: input.capture,
+        cameras,
+        shared: input.shared,
+        settings: input.settings,
+        cancel: input.cancel,
+    };
     let settings = &input.settings.shape;
     let surface = match look.surface(&position) {
         Ok(surface) => surface,

@@ -116,7 +116,13 @@ impl Tried {
         let search_m = own.search_m(sigma_m, view.half_width_m);
         let settings = ShapeSettings { search_half_range_m: Some(search_m), ..own.registration() };
         let cameras = [&input.pointing.left, &input.pointing.right];
-        let look = Look { capture: input.capture, cameras, shared: input.shared, settings: input.settings };
+        let look = Look {
+            capture: input.capture,
+            cameras,
+            shared: input.shared,
+            settings: input.settings,
+            cancel: input.cancel,
+        };
         let surface = look.surface(&expected)?;
         let mesh = surface.mesh(&region(expected, view.half_width_m, &settings), own);
         note(evidence, &surface, &mesh);
@@ -128,6 +134,7 @@ impl Tried {
             half_width_m: view.half_width_m,
             prior: Some(begin.prior).filter(|_| own.shape_prior),
             sensor: None,
+            cancel: input.cancel,
         };
         let found = register(&registration, &settings);
         Ok(Self { found, mesh, expected, settings })

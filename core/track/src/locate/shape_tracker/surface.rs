@@ -24,11 +24,12 @@ use crate::locate::features::evidence::Table;
 use crate::locate::store::{self, Shared};
 use crate::stages::capture::StereoPair;
 use sightline_geometry::camera::Camera;
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
 use sightline_geometry::frames::Point3;
 use sightline_record::{Declaration, Record, Unit};
 use sightline_vision::registration::{Mesh, MeshSettings, PointGrid, Region};
-use sightline_vision::stereo::{Alignment, DisparityMap, Outcome, StereoSettings, dense_stereo};
+use sightline_vision::stereo::{Alignment, DisparityMap, Outcome, StereoSettings, dense_stereo_until};
 
 /// Longest side of the disparities and ranges that are shown.
 const SHOWN_PX: usize = 512;
@@ -79,16 +80,22 @@ impl StopSurface {
         pair: &StereoPair,
         cameras: [&Camera; 2],
         settings: &StereoSettings,
+        cancel: Cancel<'_>,
     ) -> Result<Arc<Self>> {
-        store::try_shared(shared, settings, SURFACES_KEPT, || Self::measure(pair, cameras, settings))
+        store::shared(shared, settings, SURFACES_KEPT, || Self::measure(pair, cameras, settings, cancel))
     }
 
     /// The surface that a pair shows.
     ///
     /// # Errors
-    /// As [`dense_stereo`].
-    pub fn measure(pair: &StereoPair, cameras: [&Camera; 2], settings: &StereoSettings) -> Result<Self> {
-        let seen = dense_stereo([&pair.left, &pair.right], cameras, settings)?;
+    /// As [`dense_stereo_until`].
+    pub fn measure(
+        pair: &StereoPair,
+        cameras: [&Camera; 2],
+        settings: &StereoSettings,
+        cancel: Cancel<'_>,
+    ) -> Result<Self> {
+        let seen = dense_stereo_until([&pair.left, &pair.right], cameras, settings, cancel)?;
         Ok(Self {
             alignment: seen.alignment,
             disparities: seen.disparities,
