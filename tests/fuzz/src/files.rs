@@ -1,0 +1,91 @@
+//! Parsers that read files: products, sequences, indexes and images.
+
+use std::path::Path;
+
+use sightline_recordings::Traverse;
+use sightline_recordings::import::kitti;
+use sightline_recordings::import::pds3::{Product, is_product};
+use sightline_vision::image::{io, npz};
+
+use crate::recording;
+
+/// The most pixels of a picture that is decoded here: the parsers allow more than the fuzzer's memory.
+const PIXELS_MAX: u64 = 1 << 20;
+
+/// A product with its label, camera, pose and pixels.
+pub(crate) fn pds3(bytes: &[u8]) {
+    with_file("product.img", bytes, |path| {
+        is_product(path);
+        let Ok(product) = Product::read(path) else { return };
+        // Each part may be refused by itself.
+        let _ = (product.id(), product.instrument().to_owned(), product.light());
+        let _ = (product.camera(), product.site_from_rover());
+        let is_small =
+            product.size().is_ok_and(|[width, height]| u64::from(width) * u64::from(height) <= PIXELS_MAX);
+        if is_small && let Ok(raster) = product.read_raster() {
+            let _ = raster.statistics();
+        }
+    });
+}
+
+/// The projection matrices of a sequence.
+pub(crate) fn kitti_calibration(bytes: &[u8]) {
+    with_file("calib.txt", bytes, |path| {
+        let _ = kitti::read_cameras(path, [64, 48]);
+    });
+}
+
+/// The poses of a sequence.
+pub(crate) fn kitti_poses(bytes: &[u8]) {
+    with_file("poses.txt", bytes, |path| {
+        let _ = kitti::read_poses(path);
+    });
+}
+
+/// An index as a person writes it.
+pub(crate) fn index_toml(bytes: &[u8]) {
+    index("traverse.toml", bytes);
+}
+
+/// An index as a program writes it.
+pub(crate) fn index_json(bytes: &[u8]) {
+    index("traverse.json", bytes);
+}
+
+fn index(name: &str, bytes: &[u8]) {
+    with_file(name, bytes, |path| {
+        if let Ok(traverse) = Traverse::open(path) {
+            let _ = traverse.warnings();
+            for step in 0..traverse.stop_count().min(4) {
+                // The images are not there.
+                assert!(traverse.capture(step).is_err());
+            }
+        }
+    });
+}
+
+/// An image.
+pub(crate) fn png(bytes: &[u8]) {
+    with_file("image.png", bytes, |path| {
+        let Ok([width, height]) = io::png_size(path) else { return };
+        if u64::from(width) * u64::from(height) <= PIXELS_MAX {
+            let _ = io::read_png_of_size(path, Some(4095.0), [width, height]);
+        }
+        // One of more pixels than wanted is refused by its header.
+        let is_larger = u64::from(width) * u64::from(height) > 1;
+        assert!(!is_larger || io::read_png_of_size(path, None, [1, 1]).is_err());
+    });
+}
+
+/// An archive of arrays.
+pub(crate) fn npz(bytes: &[u8]) {
+    let _ = npz::decode(bytes, "arrays.npz");
+}
+
+/// Gives a parser a file with these bytes.
+fn with_file(name: &str, bytes: &[u8], read: impl FnOnce(&Path)) {
+    let path = recording::scratch().join(name);
+    std::fs::write(&path, bytes).expect("the scratch folder can be written");
+    read(&path);
+    std::fs::remove_file(&path).expect("the scratch folder can be written");
+}

@@ -1,0 +1,97 @@
+//! Replays the inputs under `corpus/`, each as it is and with seeded changes.
+
+use std::path::{Path, PathBuf};
+
+use super::{TARGETS, Target};
+
+/// Inputs that are replayed for each parser.
+const INPUTS: usize = 1500;
+/// Inputs of the parser of requests, each of which is answered by a whole server.
+const REQUESTS: usize = 400;
+
+/// A small generator with a seed (xorshift64*).
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, end: usize) -> usize {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        (self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 33) as usize % end.max(1)
+    }
+}
+
+/// The inputs of a parser, by name.
+fn corpus(target: &Target) -> Vec<Vec<u8>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(target.name);
+    let entries = std::fs::read_dir(&folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
+    let mut files: Vec<PathBuf> = entries.map(|entry| entry.expect("an entry").path()).collect();
+    files.sort();
+    files.iter().map(|file| std::fs::read(file).expect("an input")).collect()
+}
+
+/// One to four changes: a byte replaced, a piece removed, repeated, or taken from another input.
+fn changed(input: &[u8], other: &[u8], random: &mut Random) -> Vec<u8> {
+    const TOKENS: [&[u8]; 10] =
+        [b"-1", b"0", b"1e308", b"nan", b"99999999999999999999", b"\"", b"{", b"]", b"\xff\xfe", b"\0"];
+    let mut bytes = input.to_vec();
+    for _ in 0..=random.below(4) {
+        let at = random.below(bytes.len() + 1);
+        let end = (at + 1 + random.below(16)).min(bytes.len());
+        match random.below(5) {
+            0 if at < bytes.len() => bytes[at] ^= 1 << random.below(8),
+            1 if at < end => drop(bytes.drain(at..end)),
+            2 if at < end => {
+                let piece = bytes[at..end].to_vec();
+                bytes.splice(at..at, piece);
+            }
+            3 => {
+                let from = random.below(other.len() + 1);
+                let piece = other[from..(from + 32).min(other.len())].to_vec();
+                bytes.splice(at..at, piece);
+            }
+            _ => drop(bytes.splice(at..end.max(at), TOKENS[random.below(TOKENS.len())].iter().copied())),
+        }
+    }
+    bytes
+}
+
+fn replay(target: &Target, count: usize) {
+    let name = target.name;
+    let inputs = corpus(target);
+    assert!(!inputs.is_empty(), "{name} has no inputs");
+    for input in &inputs {
+        (target.parse)(input);
+    }
+    (target.parse)(b"");
+    let mut random = Random(0x5EED_0000 + name.len() as u64);
+    for _ in inputs.len()..count {
+        let [input, other] = [(); 2].map(|()| &inputs[random.below(inputs.len())]);
+        let input = changed(input, other, &mut random);
+        let outcome = std::panic::catch_unwind(|| (target.parse)(&input));
+        assert!(outcome.is_ok(), "{name} failed at {:?}", String::from_utf8_lossy(&input));
+    }
+}
+
+#[test]
+fn each_parser_has_a_folder_of_inputs_of_its_name() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus");
+    let entries = std::fs::read_dir(folder).expect("the inputs");
+    let mut folders: Vec<_> = entries.map(|entry| entry.expect("an entry").file_name()).collect();
+    let mut names: Vec<_> = TARGETS.iter().map(|target| std::ffi::OsString::from(target.name)).collect();
+    folders.sort();
+    names.sort();
+    assert_eq!(folders, names);
+}
+
+#[test]
+fn parsers_return_for_every_input() {
+    for target in TARGETS.iter().filter(|target| target.name != "requests") {
+        replay(target, INPUTS);
+    }
+}
+
+#[test]
+fn server_answers_every_request_without_an_internal_error() {
+    replay(super::target("requests").expect("a parser"), REQUESTS);
+}
