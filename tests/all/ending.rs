@@ -21,7 +21,7 @@ fn ticks(id: u32) -> u64 {
 }
 
 /// A scenario with thousands of rocks under the wheels at the first stop: a world of minutes.
-fn crowded() -> String {
+pub(crate) fn crowded() -> String {
     let mut scenario = small_scenario();
     scenario.rocks.placed.clear();
     let rock = "{x_m=-5.0,y_m=0.5,diameter_m=2.0,height_m=0.1},";

@@ -1,5 +1,6 @@
 //! What survives a server that is killed, and what people write and keep: sessions, notes, documents.
 
+use std::ffi::OsStr;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
@@ -23,15 +24,27 @@ pub(crate) struct Killable {
 }
 
 impl Killable {
-    fn start(drive: &Path, data: &Path) -> Self {
+    /// Serves at any free port.
+    pub(crate) fn start(drive: &Path, data: &Path) -> Self {
         Self::start_at("0", drive, data)
     }
 
     /// Serves at a port; 0 is any free one.
     pub(crate) fn start_at(port: &str, drive: &Path, data: &Path) -> Self {
+        Self::run(port, &[], drive, data)
+    }
+
+    /// Serves with variables in its environment.
+    pub(crate) fn start_with(environment: &[(&str, &OsStr)], drive: &Path, data: &Path) -> Self {
+        Self::run("0", environment, drive, data)
+    }
+
+    fn run(port: &str, environment: &[(&str, &OsStr)], drive: &Path, data: &Path) -> Self {
         let arguments =
             ["serve", drive.to_str().unwrap(), "--port", port, "--data-dir", data.to_str().unwrap()];
-        let mut child = Command::new(program()).args(arguments).stdout(Stdio::piped()).spawn().unwrap();
+        let mut program = Command::new(program());
+        program.args(arguments).envs(environment.iter().copied());
+        let mut child = program.stdout(Stdio::piped()).spawn().unwrap();
         let mut line = String::new();
         BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
         let url = line.trim().strip_prefix("Sightline is ready: http://").unwrap_or_else(|| panic!("{line}"));
@@ -43,12 +56,18 @@ impl Killable {
         &mut self.child
     }
 
+    /// The number of the process.
+    pub(crate) fn id(&self) -> u32 {
+        self.child.id()
+    }
+
     /// SIGKILL, as the system does it when there is no memory: nothing can be said or written any more.
     pub(crate) fn kill(self) {
         drop(self);
     }
 
-    fn raw(&self, method: &str, path: &str, headers: &str, body: &str) -> String {
+    /// Sends a request and does not wait for its answer.
+    pub(crate) fn open(&self, method: &str, path: &str, headers: &str, body: &str) -> TcpStream {
         let mut stream = TcpStream::connect(&self.address).unwrap();
         let length = body.len();
         let json =
@@ -59,21 +78,48 @@ impl Killable {
             self.address
         )
         .unwrap();
-        let mut answer = Vec::new();
-        stream.read_to_end(&mut answer).unwrap();
-        let answer = String::from_utf8_lossy(&answer).into_owned();
-        let (head, body) = answer.split_once("\r\n\r\n").unwrap();
-        let status: u16 = head.split(' ').nth(1).unwrap().parse().unwrap();
-        assert!((200..300).contains(&status), "{method} {path}: {head}\n{body}");
-        body.to_owned()
+        stream
     }
 
-    fn json(&self, method: &str, path: &str, body: &Value) -> Value {
+    /// Status, head and body of the answer.
+    fn whole(&self, method: &str, path: &str, headers: &str, body: &str) -> (u16, String, Vec<u8>) {
+        let mut answer = Vec::new();
+        self.open(method, path, headers, body).read_to_end(&mut answer).unwrap();
+        let end = answer.windows(4).position(|bytes| bytes == b"\r\n\r\n").expect("a head");
+        let body = answer.split_off(end + 4);
+        let head = String::from_utf8_lossy(&answer).into_owned();
+        (head.split(' ').nth(1).unwrap().parse().unwrap(), head, body)
+    }
+
+    /// Status and body of the answer.
+    pub(crate) fn answer(&self, method: &str, path: &str, headers: &str, body: &str) -> (u16, String) {
+        let (status, _, body) = self.whole(method, path, headers, body);
+        (status, String::from_utf8_lossy(&body).into_owned())
+    }
+
+    /// The body of an answer that grants the request.
+    pub(crate) fn raw(&self, method: &str, path: &str, headers: &str, body: &str) -> String {
+        let (status, head, body) = self.whole(method, path, headers, body);
+        let body = String::from_utf8_lossy(&body).into_owned();
+        assert!((200..300).contains(&status), "{method} {path}: {head}\n{body}");
+        body
+    }
+
+    /// A file.
+    pub(crate) fn bytes(&self, path: &str) -> Vec<u8> {
+        let (status, head, body) = self.whole("GET", path, "", "");
+        assert_eq!(status, 200, "{path}: {head}");
+        body
+    }
+
+    /// The JSON of an answer that grants the request; null for none.
+    pub(crate) fn json(&self, method: &str, path: &str, body: &Value) -> Value {
         let body = if body.is_null() { String::new() } else { body.to_string() };
         serde_json::from_str(&self.raw(method, path, "", &body)).unwrap_or(Value::Null)
     }
 
-    fn get(&self, path: &str) -> Value {
+    /// The JSON at a path.
+    pub(crate) fn get(&self, path: &str) -> Value {
         self.json("GET", path, &Value::Null)
     }
 

@@ -8,6 +8,7 @@ mod api_security;
 mod cli;
 mod compare;
 mod copied;
+mod drill;
 mod ending;
 mod exports;
 mod expressions;

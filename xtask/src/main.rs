@@ -1,4 +1,4 @@
-//! The project's commands: `cargo xtask serve | test | golden | check | web | bench | dist | screenshot`.
+//! The project's commands: `cargo xtask serve | test | golden | fuzz | drill | check | web | bench | dist | screenshot`.
 //!
 //! Each command installs or builds what it needs and says in one sentence what to do when it cannot. `serve` builds
 //! the server alone, the other commands the whole workspace; `sightline-features` gives both the same features, so
@@ -14,6 +14,8 @@ mod chromium;
 mod serve;
 mod test;
 mod golden;
+mod fuzz;
+mod drill;
 mod check;
 mod house_rules;
 mod imports;
@@ -55,6 +57,16 @@ enum Task {
         #[arg(long)]
         update: bool,
     },
+    /// Search for inputs that break a parser of foreign bytes.
+    Fuzz {
+        /// Search in this parser only; by default in each of them.
+        target: Option<String>,
+        /// How long to search in each, minutes.
+        #[arg(long, default_value_t = 1.0)]
+        minutes: f64,
+    },
+    /// Run the program under load and in trouble, for about 20 minutes, and print what it held and lost as a table.
+    Drill,
     /// Check format, lints (native and WASM), documentation and the rules of the house.
     Check,
     /// Build what the browser loads into `target/web`.
@@ -77,10 +89,15 @@ enum Task {
 }
 
 fn main() -> ExitCode {
+    if let Some(code) = fuzz::as_compiler() {
+        return code;
+    }
     let done = match Arguments::parse().command {
         Task::Serve { arguments } => serve::serve(&arguments),
         Task::Test { filter } => test::test(filter.as_deref()),
         Task::Golden { update } => golden::golden(update),
+        Task::Fuzz { target, minutes } => fuzz::fuzz(target.as_deref(), minutes),
+        Task::Drill => drill::drill(),
         Task::Check => check::check(),
         Task::Web => web::web(),
         Task::Bench { peers: true, json, .. } => peers::peers(json),

@@ -108,7 +108,7 @@ fn name_programs(command: &mut Command, browser: &chromium::Browser) {
 
 /// How many tests ended in which way.
 #[derive(Default, Debug, PartialEq)]
-struct Count {
+pub(crate) struct Count {
     passed: u64,
     ignored: u64,
 }
@@ -133,7 +133,7 @@ impl Count {
 /// Runs `cargo test`, showing its output as it comes, and counts what ran.
 ///
 /// A filter that matches nothing ends well for Cargo; counting is what keeps a misspelt one from passing.
-fn run_and_count(command: &mut Command) -> Result<Count> {
+pub(crate) fn run_and_count(command: &mut Command) -> Result<Count> {
     let mend = "mend the tests reported above";
     let mut child =
         command.stdout(Stdio::piped()).spawn().with_context(|| format!("cargo cannot start; {mend}"))?;

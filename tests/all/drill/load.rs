@@ -1,0 +1,197 @@
+//! Many sessions, slow connections, exports, abandoned questions; reading beside long work.
+
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::sync::PoisonError;
+use std::time::{Duration, Instant};
+
+use serde_json::json;
+use sightline_tests::server::{long_recording, small_drive};
+
+use super::{ONE, Watched, begin, has_ended, p95_ms, scale, tell, until};
+use crate::keeping::Killable;
+
+/// Reads a step as the page does: the record, one image, and the cursor moves there. How long it took.
+fn step(server: &Killable, session: &str, traverse: &str, step: usize) -> Duration {
+    let begun = Instant::now();
+    let cursor = json!({ "target": 0, "run": 0, "step": step });
+    server.json("PUT", &format!("sessions/{session}/cursor"), &cursor);
+    server.get(&format!("sessions/{session}/targets/0/runs/0/steps/{step}"));
+    server.bytes(&format!("traverses/{traverse}/steps/{step}/images/left.png"));
+    begun.elapsed()
+}
+
+fn traverse(server: &Killable) -> String {
+    server.get("traverses")[0]["id"].as_str().unwrap().to_owned()
+}
+
+#[test]
+fn drill_many_sessions_step_at_the_same_time() {
+    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let (count, lasting) = (scale(64, 6), Duration::from_secs(scale(90, 1)));
+    let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
+    let server = Killable::start(drive.path(), data.path());
+    let traverse = traverse(&server);
+    let watched = Watched::of(&server, Duration::from_secs(scale(15, 1)), || {
+        let sessions: Vec<String> = (0..count).map(|_| begin(&server, 0)).collect();
+        for session in &sessions {
+            until(&server, &format!("sessions/{session}/targets/0/runs/0"), has_ended);
+        }
+        let begun = Instant::now();
+        let stepping = |session: &String| {
+            let mut times = Vec::new();
+            while begun.elapsed() < lasting {
+                times.push(step(&server, session, &traverse, times.len() % 5));
+            }
+            times
+        };
+        let mut times: Vec<Duration> = std::thread::scope(|scope| {
+            let all: Vec<_> = sessions.iter().map(|session| scope.spawn(move || stepping(session))).collect();
+            all.into_iter().flat_map(|one| one.join().unwrap()).collect()
+        });
+        assert!(times.len() >= count, "every session has stepped");
+        for session in &sessions {
+            server.json("DELETE", &format!("sessions/{session}"), &json!(null));
+        }
+        (times.len(), p95_ms(&mut times))
+    });
+    let (steps, p95) = watched.value;
+    watched.tell(
+        &format!("{count} sessions step for {} s", lasting.as_secs()),
+        &format!("{steps} steps, p95 {p95:.0} ms"),
+    );
+    watched.assert_given_back();
+    assert_eq!(server.get("health")["notices"], json!([]));
+}
+
+#[test]
+fn drill_slow_connections_leave_room_for_others() {
+    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let (count, lasting) = (scale(900, 40), Duration::from_secs(scale(75, 2)));
+    let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
+    let server = Killable::start(drive.path(), data.path());
+    let watched = Watched::of(&server, Duration::from_secs(scale(5, 1)), || {
+        let connect = |_| TcpStream::connect(&server.address);
+        let mut open: Vec<TcpStream> = (0..count).filter_map(|number| connect(number).ok()).collect();
+        let begun = Instant::now();
+        let (mut dribble, mut answered) = (b"GET /api/v1/version HTTP/1.1\r\nX-Slow: ".iter().cycle(), 0);
+        while begun.elapsed() < lasting {
+            let letter = *dribble.next().unwrap();
+            open.retain_mut(|stream| stream.write_all(&[letter]).is_ok());
+            server.get("version");
+            answered += 1;
+            std::thread::sleep(Duration::from_millis(500));
+        }
+        // Those that the server has closed answer with an end.
+        let is_open = |stream: &mut TcpStream| {
+            stream.set_nonblocking(true).unwrap();
+            stream.read(&mut [0_u8; 512]).is_err_and(|error| error.kind() == std::io::ErrorKind::WouldBlock)
+        };
+        open.retain_mut(is_open);
+        (answered, open.len())
+    });
+    let (answered, open) = watched.value;
+    watched.tell(
+        &format!("{count} slow connections for {} s", lasting.as_secs()),
+        &format!("{answered} others answered, {open} still open at the end"),
+    );
+    watched.assert_given_back();
+}
+
+#[test]
+fn drill_exports_give_everything_back() {
+    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let count: usize = scale(1000, 12);
+    let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
+    let server = Killable::start(drive.path(), data.path());
+    let session = begin(&server, 0);
+    until(&server, &format!("sessions/{session}/targets/0/runs/0"), has_ended);
+    let files = ["recording.rrd", "rows.csv", "rows.parquet", "report.html"];
+    let export = |number: usize| {
+        let file = files[number % files.len()];
+        server.bytes(&format!("sessions/{session}/exports/{file}")).len()
+    };
+    // What is made once and kept: fonts, the sources of the page, caches.
+    (0..files.len()).for_each(|number| assert!(export(number) > 0));
+    let watched =
+        Watched::of(&server, Duration::from_secs(scale(15, 1)), || (0..count).map(export).sum::<usize>());
+    watched.tell(&format!("{count} exports"), &format!("{} MB written", watched.value / 1_000_000));
+    watched.assert_given_back();
+}
+
+#[test]
+fn drill_abandoned_questions_end() {
+    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let count = scale(100, 8);
+    let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
+    let server = Killable::start(drive.path(), data.path());
+    let session = begin(&server, 0);
+    until(&server, &format!("sessions/{session}/targets/0/runs/0"), has_ended);
+    let path = format!("sessions/{session}/targets/0/runs/0/steps/2/what_if");
+    let body = json!({ "settings": { "tracker": "features" } });
+    let ask = || {
+        let begun = Instant::now();
+        server.json("POST", &path, &body);
+        begun.elapsed().as_secs_f64()
+    };
+    let alone = ask();
+    let watched = Watched::of(&server, Duration::from_secs(scale(15, 1)), || {
+        for _ in 0..count {
+            let mut stream = server.open("POST", &path, "", &body.to_string());
+            stream.flush().unwrap();
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        ask()
+    });
+    watched.tell(
+        &format!("{count} abandoned questions (what_if)"),
+        &format!("the next one takes {:.2} s, {alone:.2} s alone", watched.value),
+    );
+    watched.assert_given_back();
+}
+
+#[test]
+fn drill_steps_are_read_beside_long_work() {
+    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let (stops, reads) = (scale(4805, 2405), scale(300, 10));
+    let (drive, data) = (long_recording(stops), tempfile::tempdir().unwrap());
+    let server = Killable::start(drive.path(), data.path());
+    let traverse = traverse(&server);
+    let session = begin(&server, stops - 5);
+    until(&server, &format!("sessions/{session}/targets/0/runs/0"), has_ended);
+    let read = || -> Vec<Duration> {
+        (0..reads).map(|number| step(&server, &session, &traverse, stops - 5 + number % 5)).collect()
+    };
+    let idle = p95_ms(&mut read());
+    let study = server.json("POST", "studies/jobs", &json!({ "study": "straight", "seeds": [1, 2, 3] }));
+    let long = [begin(&server, 0), begin(&server, 0)];
+    let watched = Watched::of(&server, Duration::ZERO, || {
+        let beside = p95_ms(&mut read());
+        let begun = Instant::now();
+        let short = begin(&server, stops - 5);
+        let path = format!("sessions/{short}/targets/0/runs/0");
+        until(&server, &path, |run| run["rows"].as_array().is_some_and(|rows| !rows.is_empty()));
+        let started = begun.elapsed();
+        until(&server, &path, has_ended);
+        (beside, started, begun.elapsed())
+    });
+    let (beside, started, ended) = watched.value;
+    for session in &long {
+        let path = format!("sessions/{session}/targets/0/runs/0");
+        assert!(!has_ended(&server.get(&path)), "the long runs went on meanwhile");
+    }
+    let job = server.get(&format!("studies/jobs/{}", study["id"].as_str().unwrap_or("1")));
+    watched.tell(
+        "steps beside two long runs and a study",
+        &format!("p95 {idle:.1} ms alone, {beside:.1} ms beside them"),
+    );
+    tell(
+        "a short run beside them",
+        &format!(
+            "first step after {:.2} s, five after {:.2} s; the study is {}",
+            started.as_secs_f64(),
+            ended.as_secs_f64(),
+            job["state"]
+        ),
+    );
+}

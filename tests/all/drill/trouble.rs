@@ -1,0 +1,122 @@
+//! A full disk and images that are gone.
+
+use std::path::Path;
+use std::process::Command;
+use std::sync::PoisonError;
+
+use serde_json::json;
+use sightline_tests::server::{small_drive, small_recording};
+
+use super::{ONE, begin, has_ended, tell, until};
+use crate::keeping::Killable;
+
+/// A small file system in memory, which only an administrator may make.
+struct SmallDisk(tempfile::TempDir);
+
+impl SmallDisk {
+    fn make() -> Option<Self> {
+        let folder = tempfile::tempdir().unwrap();
+        let mut mount = Command::new("mount");
+        mount.args(["-t", "tmpfs", "-o", "size=8m", "tmpfs"]).arg(folder.path());
+        mount.output().is_ok_and(|made| made.status.success()).then(|| Self(folder))
+    }
+
+    fn path(&self) -> &Path {
+        self.0.path()
+    }
+}
+
+impl Drop for SmallDisk {
+    fn drop(&mut self) {
+        Command::new("umount").arg(self.0.path()).status().unwrap();
+    }
+}
+
+#[test]
+fn drill_a_full_disk_is_reported_and_later_writes_succeed() {
+    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let Some(disk) = SmallDisk::make() else {
+        tell("full disk", "left out: only an administrator may mount a small file system");
+        return;
+    };
+    let drive = small_drive();
+    let server = Killable::start(drive.path(), disk.path());
+    let session = begin(&server, 0);
+    until(&server, &format!("sessions/{session}/targets/0/runs/0"), has_ended);
+    let filler = disk.path().join("filler");
+    // Fails when the disk is full, which is its purpose.
+    assert!(std::fs::write(&filler, vec![1_u8; 16 << 20]).is_err(), "the disk is too large");
+    let note = |number: usize| json!({ "step": 0, "text": format!("{number} {}", "x".repeat(3000)) });
+    let notes = format!("sessions/{session}/notes");
+    let mut acknowledged = 0;
+    let refused = (0..500).find_map(|number| {
+        let (status, body) = server.answer("POST", &notes, "", &note(number).to_string());
+        acknowledged += usize::from(status == 201);
+        (status != 201).then_some((status, body))
+    });
+    let (status, body) = refused.expect("the disk is full");
+    assert_eq!(status, 507, "{body}");
+    let health = server.get("health");
+    assert_ne!(health["notices"], json!([]), "{health}");
+    std::fs::remove_file(&filler).unwrap();
+    for number in 0..20 {
+        server.json("POST", &notes, &note(number));
+    }
+    assert_eq!(server.get("health")["notices"], json!([]));
+    let count = |server: &Killable| server.get(&notes).as_array().unwrap().len();
+    assert_eq!(count(&server), acknowledged + 20);
+    server.kill();
+    let server = Killable::start(drive.path(), disk.path());
+    assert_eq!(count(&server), acknowledged + 20);
+    tell(
+        "full disk, and space again",
+        &format!(
+            "{acknowledged} + 20 changes acknowledged and kept; refused with {status}; health reports it"
+        ),
+    );
+}
+
+#[test]
+fn drill_deleted_images_end_a_run_with_a_reason_and_it_goes_on_when_they_are_back() {
+    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let (drive, data) = (small_recording(), tempfile::tempdir().unwrap());
+    let index = std::fs::read_to_string(drive.path().join("traverse.toml")).unwrap();
+    let images: Vec<_> = index
+        .lines()
+        .filter_map(|line| line.trim().strip_prefix("image = \"")?.strip_suffix('"'))
+        .map(|name| drive.path().join(name))
+        .collect();
+    assert!(images.len() >= 10, "{images:?}");
+    let hidden = tempfile::tempdir().unwrap();
+    let server = Killable::start(drive.path(), data.path());
+    let whole = begin(&server, 0);
+    let whole_path = format!("sessions/{whole}/targets/0/runs/0");
+    until(&server, &whole_path, has_ended);
+    let rows = server.raw("GET", &format!("sessions/{whole}/exports/rows.jsonl"), "", "");
+    let place = |number: usize| hidden.path().join(number.to_string());
+    for (number, image) in images.iter().enumerate().skip(4) {
+        std::fs::copy(image, place(number)).unwrap();
+        std::fs::remove_file(image).unwrap();
+    }
+    server.kill();
+
+    let server = Killable::start(drive.path(), data.path());
+    let path = format!("sessions/{whole}/targets/0/runs/0");
+    let stopped = until(&server, &path, has_ended);
+    let traverse = server.get("traverses")[0]["id"].as_str().unwrap().to_owned();
+    let (status, body) =
+        server.answer("GET", &format!("traverses/{traverse}/steps/3/images/left.png"), "", "");
+    assert!((400..500).contains(&status), "{status}: {body}");
+    for (number, image) in images.iter().enumerate().skip(4) {
+        std::fs::copy(place(number), image).unwrap();
+    }
+    let again = begin(&server, 0);
+    until(&server, &format!("sessions/{again}/targets/0/runs/0"), has_ended);
+    let rows_again = server.raw("GET", &format!("sessions/{again}/exports/rows.jsonl"), "", "");
+    assert_eq!(rows_again, rows);
+    let reason = stopped["stopped"].to_string();
+    tell(
+        "images deleted and brought back",
+        &format!("image {status}, run: {reason}; afterwards the same bits"),
+    );
+}
