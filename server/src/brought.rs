@@ -7,8 +7,9 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use sightline_api::wire::Event;
 use sightline_geometry::error::{Error, Result};
-use sightline_recordings::create_simulated_until;
+use sightline_recordings::{IndexFormat, create_simulated_until};
 use sightline_session::Session;
 use sightline_session::breakpoints::BREAKPOINT_LIMIT;
 use sightline_session::notes::Notes;
@@ -19,8 +20,8 @@ use sightline_world::Scenario;
 
 use crate::cancel::CancelFlag;
 use crate::drives::{folder_name, scenario_of};
-use crate::live_session::{LABEL_LIMIT, LiveSession, RUN_LIMIT, TARGET_LIMIT};
-use crate::naming::name_of;
+use crate::identity::{Identity, Relation};
+use crate::live_session::{LABEL_LIMIT, LiveSession, RUN_LIMIT, TARGET_LIMIT, TARGET_NUMBERS};
 use crate::problem::{ApiError, ApiResult};
 use crate::rendering::OpenTraverse;
 use crate::routes::what_if;
@@ -50,15 +51,45 @@ pub(crate) fn open(
     }
     if state.store().drives()?.len() >= DRIVE_LIMIT {
         let detail = format!("There are {DRIVE_LIMIT} drives already that were opened from pages.");
-        return Err(ApiError::conflict(detail).hint("Begin with another data folder: --data-dir."));
+        return Err(ApiError::conflict(detail).hint("Remove one that is not needed: DELETE traverses/{id}."));
     }
+    let _making = state.making_drives();
     let name = folder_name(&scenario);
     let folder = state.folders().traverses.join(&name);
+    if folder.is_dir() && !folder.join(IndexFormat::default().file_name()).is_file() {
+        // What a removal left that was interrupted: images without their index.
+        remove_folder(&folder)?;
+    }
     let traverse = create_simulated_until(&scenario, &folder, cancel.as_ref().into())?;
-    let id = name_of(&traverse)?;
-    let open = Arc::new(OpenTraverse::new(id, traverse, state.events().clone()));
+    let identity = Identity::of(&traverse, None)?;
+    let open = Arc::new(OpenTraverse::new(identity, traverse, state.events().clone()));
     state.store().save_drive(&name, &text)?;
     Ok((state.add_traverse(open)?, true))
+}
+
+/// Removes a drive that was opened by its scenario, with its folder.
+///
+/// # Errors
+/// A problem when it has sessions, or its folder cannot be removed.
+pub(crate) fn remove(state: &AppState, open: &OpenTraverse) -> ApiResult<()> {
+    let _making = state.making_drives();
+    state.close_traverse(open)?;
+    if let Some(scenario) = scenario_of(&open.traverse) {
+        let name = folder_name(&scenario);
+        state.store().remove_drive(&name)?;
+        remove_folder(&state.folders().traverses.join(&name))?;
+    }
+    state.tell(Event::TraverseRemoved { traverse: open.id.clone() });
+    Ok(())
+}
+
+fn remove_folder(folder: &Path) -> Result<()> {
+    match std::fs::remove_dir_all(folder) {
+        Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
+            Err(Error::Write { path: folder.to_owned(), source })
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Begins the session of a file that was exported elsewhere.
@@ -91,13 +122,22 @@ fn drive(
     traverse: &ReproducedTraverse,
     cancel: &CancelFlag,
 ) -> ApiResult<Arc<OpenTraverse>> {
-    if let Some(open) = state.traverses().into_iter().find(|open| open.id == traverse.id) {
-        return Ok(open);
+    let known = state.traverses();
+    let find = |wanted: Relation| known.iter().find(|open| open.identity.relation(&traverse.id) == wanted);
+    if let Some(open) = find(Relation::Same).or_else(|| find(Relation::SameIndex)) {
+        return Ok(Arc::clone(open));
     }
     match &traverse.scenario_toml {
         Some(text) => Ok(open(state, text, cancel)?.0),
         None => {
             let name: String = crate::printable::printable(&traverse.name).chars().take(100).collect();
+            if find(Relation::OtherFiles).is_some() {
+                let detail =
+                    format!("The drive “{name}” that is open here has other images than that of the file.");
+                return Err(ApiError::invalid("traverse", detail).hint(
+                    "Start the server with the folder of the very recording that the file was made of.",
+                ));
+            }
             let detail = format!("The file belongs to the recorded drive “{name}”, which is not open here.");
             Err(ApiError::invalid("traverse", detail)
                 .hint("Start the server with that drive's folder, `sightline serve FOLDER`, and open the file again."))
@@ -108,8 +148,11 @@ fn drive(
 /// Refuses what the other routes would refuse.
 fn check(session: &SavedSession) -> ApiResult<()> {
     let wrong = |what: String| Err(ApiError::invalid("field", what));
-    if session.targets.len() > TARGET_LIMIT {
-        return wrong(format!("session.targets: may be at most {TARGET_LIMIT}"));
+    let live = session.targets.iter().filter(|target| !target.removed).count();
+    if live > TARGET_LIMIT || session.targets.len() > TARGET_NUMBERS {
+        return wrong(format!(
+            "session.targets: may be at most {TARGET_LIMIT}, and {TARGET_NUMBERS} with the removed ones"
+        ));
     }
     if session.breakpoints.len() > BREAKPOINT_LIMIT {
         return wrong(format!("session.breakpoints: may be at most {BREAKPOINT_LIMIT}"));

@@ -10,7 +10,8 @@ use sightline_world::{Scenario, library};
 use tokio::sync::broadcast;
 
 use crate::folders::Folders;
-use crate::naming::{hash, name_of, slug};
+use crate::identity::Identity;
+use crate::naming::{hash, slug};
 use crate::rendering::OpenTraverse;
 use crate::store::Store;
 
@@ -40,6 +41,32 @@ pub(crate) fn argument(traverse: &Traverse) -> String {
     named.map_or_else(|| folder().display().to_string(), str::to_owned)
 }
 
+/// The drives that the server was given, each once, and a notice for each that is the same as another.
+///
+/// # Errors
+/// An index that cannot be named.
+pub(crate) fn open_given(
+    traverses: Vec<Traverse>,
+    folders: &Folders,
+    events: &broadcast::Sender<Event>,
+) -> Result<(Vec<Arc<OpenTraverse>>, Vec<String>)> {
+    let (mut open, mut notices) = (Vec::<Arc<OpenTraverse>>::new(), Vec::new());
+    for traverse in traverses {
+        let identity = Identity::of(&traverse, Some(&folders.digests))?;
+        let id = identity.id();
+        match open.iter().find(|other| other.id == id) {
+            Some(other) => {
+                let [this, other] = [traverse.folder(), other.traverse.folder()].map(Path::display);
+                notices.push(format!(
+                    "{this} and {other} are the same drive, {id}: index and images are equal; it is listed once"
+                ));
+            }
+            None => open.push(Arc::new(OpenTraverse::new(identity, traverse, events.clone()))),
+        }
+    }
+    Ok((open, notices))
+}
+
 /// Opens the drives that were opened from pages before; what cannot be opened is said in one sentence each.
 ///
 /// # Errors
@@ -57,9 +84,11 @@ pub(crate) fn open_again(
         });
         match made {
             Ok(traverse) => {
-                let id = name_of(&traverse)?;
+                let identity = Identity::of(&traverse, None)?;
+                let id = identity.id();
+                // A drive that was given as well is no surprise.
                 if open.iter().all(|other| other.id != id) {
-                    open.push(Arc::new(OpenTraverse::new(id, traverse, events.clone())));
+                    open.push(Arc::new(OpenTraverse::new(identity, traverse, events.clone())));
                 }
             }
             Err(error) => lost.push(format!("the drive {name} cannot be opened again: {error}")),

@@ -138,24 +138,27 @@ impl<E: Endpoint, S: Send + Sync> FromRequest<S> for Body<E> {
         if request.headers().get(header::CONTENT_TYPE).is_none() {
             return Err(not_json());
         }
-        let reading = tokio::time::timeout(BODY_PATIENCE, Bytes::from_request(request, state)).await;
-        let slow = |_| {
-            ApiError::new(
-                StatusCode::REQUEST_TIMEOUT,
-                "slow",
-                "The body of the request did not arrive in time.",
-            )
-        };
-        let bytes = reading.map_err(slow)?.map_err(|wrong| match wrong.status() {
-            StatusCode::PAYLOAD_TOO_LARGE => {
-                let limit = BODY_LIMIT >> 20;
-                let detail = format!("The body of a request may have at most {limit} MiB.");
-                ApiError::new(StatusCode::PAYLOAD_TOO_LARGE, "too_large", detail)
-            }
-            status => ApiError::new(status, "body", "The body of the request did not arrive whole."),
-        })?;
-        parse(&bytes).map(Self)
+        parse(&whole_body(request, state).await?).map(Self)
     }
+}
+
+/// The bytes of a body.
+///
+/// # Errors
+/// A problem when it is too large, or does not arrive in time.
+pub(crate) async fn whole_body<S: Send + Sync>(request: Request, state: &S) -> ApiResult<Bytes> {
+    let reading = tokio::time::timeout(BODY_PATIENCE, Bytes::from_request(request, state)).await;
+    let slow = |_| {
+        ApiError::new(StatusCode::REQUEST_TIMEOUT, "slow", "The body of the request did not arrive in time.")
+    };
+    reading.map_err(slow)?.map_err(|wrong| match wrong.status() {
+        StatusCode::PAYLOAD_TOO_LARGE => {
+            let limit = BODY_LIMIT >> 20;
+            let detail = format!("The body of a request may have at most {limit} MiB.");
+            ApiError::new(StatusCode::PAYLOAD_TOO_LARGE, "too_large", detail)
+        }
+        status => ApiError::new(status, "body", "The body of the request did not arrive whole."),
+    })
 }
 
 /// Reads JSON: what is no JSON is a bad request; what does not fit is refused by the name of the field.

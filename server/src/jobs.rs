@@ -3,11 +3,11 @@
 //!
 //! The reactor computes nothing. A lane that is full refuses at once, so that nothing piles up unseen.
 
+use std::collections::BTreeSet;
 use std::future::Future;
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::pin::Pin;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 
@@ -27,14 +27,16 @@ pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 #[derive(Clone)]
 pub(crate) struct Lane {
     permits: Arc<Semaphore>,
-    waiting: Arc<AtomicUsize>,
+    queue: Arc<Queue>,
+    at_a_time: usize,
     limit: usize,
 }
 
 impl Lane {
     /// A lane for `at_a_time` pieces of work, with at most `limit` more waiting.
     pub(crate) fn new(at_a_time: usize, limit: usize) -> Self {
-        Self { permits: Arc::new(Semaphore::new(at_a_time)), waiting: Arc::default(), limit }
+        let permits = Arc::new(Semaphore::new(at_a_time));
+        Self { permits, queue: Arc::default(), at_a_time, limit }
     }
 
     /// Does `work` when its turn comes; a request that goes away gives its place in the queue back.
@@ -48,7 +50,7 @@ impl Lane {
         work: impl FnOnce() -> ApiResult<T> + Send + 'static,
     ) -> ApiResult<T> {
         let permit = {
-            let _place = Place::take(&self.waiting, self.limit)?;
+            let _place = Place::take(&self.queue, self.limit, &Position::default())?;
             let turn = Arc::clone(&self.permits).acquire_owned();
             turn.await.map_err(|closed| ApiError::internal(closed.to_string()))?
         };
@@ -84,23 +86,32 @@ impl Lane {
     /// A problem when too many are waiting already.
     pub(crate) fn submit(&self, job: impl FnOnce() + Send + 'static) -> ApiResult<()> {
         let mut job = Some(job);
-        self.submit_by_turns(move || {
+        let once = move || {
             if let Some(job) = job.take() {
                 job();
             }
             ControlFlow::Break(())
-        })
+        };
+        self.submit_by_turns(&Position::default(), once)
     }
 
-    /// The same for a job of many turns: after each it goes to the end of the queue, until it breaks.
+    /// The same for a job of many turns: after each it goes to the end of the queue, until it breaks; `position` follows where
+    /// it is in the queue.
     ///
     /// # Errors
     /// A problem when too many are waiting already; later turns always find a place.
     pub(crate) fn submit_by_turns(
         &self,
+        position: &Position,
         job: impl FnMut() -> ControlFlow<()> + Send + 'static,
     ) -> ApiResult<()> {
-        self.enqueue(Place::take(&self.waiting, self.limit)?, Box::new(job))
+        self.enqueue(Place::take(&self.queue, self.limit, position)?, Box::new(job))
+    }
+
+    /// How many jobs are before the one at `position`, those that are being done included; `None` unless it waits.
+    pub(crate) fn before(&self, position: &Position) -> Option<usize> {
+        let place = (*lock(&position.0))?;
+        Some(self.at_a_time + lock(&self.queue.places).waiting.range(..place).count())
     }
 
     /// Starts the next turn of a job when the lane has room.
@@ -108,15 +119,20 @@ impl Lane {
         let mut turn: Pin<Box<Turn>> = Box::pin(Arc::clone(&self.permits).acquire_owned());
         // The first poll enters the queue of the semaphore, so that turns start in the order of this call.
         match turn.as_mut().poll(&mut Context::from_waker(Waker::noop())) {
-            Poll::Ready(permit) => self.start(permit, job),
+            Poll::Ready(permit) => {
+                let position = place.position.clone();
+                drop(place);
+                self.start(permit, position, job)
+            }
             Poll::Pending => {
                 let runtime = Handle::try_current();
                 let runtime = runtime.map_err(|missing| ApiError::internal(missing.to_string()))?;
                 let lane = self.clone();
                 runtime.spawn(async move {
                     let permit = turn.await;
+                    let position = place.position.clone();
                     drop(place);
-                    if let Err(problem) = lane.start(permit, job) {
+                    if let Err(problem) = lane.start(permit, position, job) {
                         tracing::error!("a job was not started: {}", problem.problem().detail);
                     }
                 });
@@ -126,7 +142,12 @@ impl Lane {
     }
 
     /// Does a turn of `job` on a thread of its own, and those after it while nobody else waits.
-    fn start(&self, permit: Result<OwnedSemaphorePermit, AcquireError>, mut job: Box<Job>) -> ApiResult<()> {
+    fn start(
+        &self,
+        permit: Result<OwnedSemaphorePermit, AcquireError>,
+        position: Position,
+        mut job: Box<Job>,
+    ) -> ApiResult<()> {
         let permit = permit.map_err(|closed| ApiError::internal(closed.to_string()))?;
         // Jobs submit others when a run is forked or a session is read back.
         let runtime = Handle::try_current().ok();
@@ -136,7 +157,7 @@ impl Lane {
             let _inside = runtime.as_ref().map(Handle::enter);
             loop {
                 match catch_unwind(AssertUnwindSafe(&mut job)) {
-                    Ok(ControlFlow::Continue(())) if lane.waiting.load(Ordering::Relaxed) == 0 => {}
+                    Ok(ControlFlow::Continue(())) if lane.queue.is_empty() => {}
                     Ok(ControlFlow::Continue(())) => break,
                     Ok(ControlFlow::Break(())) => return,
                     Err(_) => {
@@ -145,7 +166,8 @@ impl Lane {
                     }
                 }
             }
-            let place = Place::retake(&lane.waiting);
+            // A job that was in the lane already always finds a place.
+            let Some(place) = Place::enter(&lane.queue, usize::MAX, &position) else { return };
             // The first in the queue gets the permit before this job enters it again.
             drop(permit);
             if let Err(problem) = lane.enqueue(place, job) {
@@ -163,26 +185,61 @@ type Job = dyn FnMut() -> ControlFlow<()> + Send;
 /// Waits for the right to work.
 type Turn = dyn Future<Output = Result<OwnedSemaphorePermit, AcquireError>> + Send;
 
+/// What waits in a lane.
+#[derive(Default)]
+struct Queue {
+    places: Mutex<Places>,
+}
+
+#[derive(Default)]
+struct Places {
+    waiting: BTreeSet<u64>,
+    next: u64,
+}
+
+impl Queue {
+    fn is_empty(&self) -> bool {
+        lock(&self.places).waiting.is_empty()
+    }
+}
+
+/// Where a job is in the queue of its lane: the number of its place, `None` unless it waits.
+#[derive(Clone, Default)]
+pub(crate) struct Position(Arc<Mutex<Option<u64>>>);
+
 /// A place in the queue of a lane, also given back when the request goes away.
-struct Place(Arc<AtomicUsize>);
+struct Place {
+    queue: Arc<Queue>,
+    number: u64,
+    position: Position,
+}
 
 impl Place {
-    fn take(waiting: &Arc<AtomicUsize>, limit: usize) -> ApiResult<Self> {
-        let before = waiting.fetch_add(1, Ordering::Relaxed);
-        let place = Self(Arc::clone(waiting));
-        if before < limit { Ok(place) } else { Err(ApiError::busy()) }
+    fn take(queue: &Arc<Queue>, limit: usize, position: &Position) -> ApiResult<Self> {
+        Self::enter(queue, limit, position).ok_or_else(ApiError::busy)
     }
 
-    /// A place for a job that was in the lane already, whatever the limit.
-    fn retake(waiting: &Arc<AtomicUsize>) -> Self {
-        waiting.fetch_add(1, Ordering::Relaxed);
-        Self(Arc::clone(waiting))
+    /// A place behind the others; `None` where `limit` of them wait already.
+    fn enter(queue: &Arc<Queue>, limit: usize, position: &Position) -> Option<Self> {
+        let number = {
+            let mut places = lock(&queue.places);
+            if places.waiting.len() >= limit {
+                return None;
+            }
+            let number = places.next;
+            places.next += 1;
+            places.waiting.insert(number);
+            number
+        };
+        *lock(&position.0) = Some(number);
+        Some(Self { queue: Arc::clone(queue), number, position: position.clone() })
     }
 }
 
 impl Drop for Place {
     fn drop(&mut self) {
-        self.0.fetch_sub(1, Ordering::Relaxed);
+        lock(&self.queue.places).waiting.remove(&self.number);
+        *lock(&self.position.0) = None;
     }
 }
 
@@ -200,6 +257,7 @@ pub(crate) async fn blocking<T: Send + 'static>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::atomic::Ordering;
     use std::sync::mpsc;
 
     #[tokio::test]
@@ -256,7 +314,7 @@ mod tests {
         lane.submit(move || released.recv().unwrap()).unwrap();
         for name in ["a", "b", "c"] {
             let (sender, mut turns) = (sender.clone(), 0..3);
-            lane.submit_by_turns(move || match turns.next() {
+            lane.submit_by_turns(&Position::default(), move || match turns.next() {
                 Some(turn) => {
                     sender.send(format!("{name}{turn}")).unwrap();
                     ControlFlow::Continue(())
@@ -269,7 +327,29 @@ mod tests {
         release.send(()).unwrap();
         let done = blocking(move || Ok(receiver.iter().collect::<Vec<_>>())).await.unwrap();
         assert_eq!(done, ["a0", "b0", "c0", "a1", "b1", "c1", "a2", "b2", "c2"]);
-        assert_eq!(lane.waiting.load(Ordering::Relaxed), 0);
+        assert!(lane.queue.is_empty());
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn a_job_that_waits_knows_how_many_are_before_it() {
+        let lane = Lane::new(1, 8);
+        let (release, released) = mpsc::channel::<()>();
+        lane.submit(move || released.recv().unwrap()).unwrap();
+        let positions = [Position::default(), Position::default()];
+        let (sender, receiver) = mpsc::channel();
+        for position in &positions {
+            let sender = sender.clone();
+            lane.submit_by_turns(position, move || {
+                sender.send(()).unwrap();
+                ControlFlow::Break(())
+            })
+            .unwrap();
+        }
+        assert_eq!(positions.each_ref().map(|position| lane.before(position)), [Some(1), Some(2)]);
+        drop(sender);
+        release.send(()).unwrap();
+        blocking(move || Ok(receiver.iter().count())).await.unwrap();
+        assert_eq!(positions.each_ref().map(|position| lane.before(position)), [None, None]);
     }
 
     #[tokio::test]

@@ -15,11 +15,13 @@
 
 pub mod state;
 mod live_session;
+mod sessions;
 pub mod first_session;
 mod recorded_step;
 mod runner;
 mod rendering;
 pub mod naming;
+mod identity;
 mod folders;
 mod drives;
 mod brought;
@@ -32,6 +34,7 @@ mod store;
 pub mod hosts;
 mod guard;
 mod request_id;
+mod idempotency;
 mod extract;
 mod printable;
 mod problem;
@@ -44,6 +47,8 @@ mod html;
 pub mod rerun_log;
 pub mod study;
 pub mod cli;
+
+use std::sync::Arc;
 
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
@@ -59,6 +64,7 @@ use crate::state::AppState;
 pub fn app(state: AppState) -> Router {
     let (api, _) = openapi::router().split_for_parts();
     let api = api.fallback(no_route).method_not_allowed_fallback(page::wrong_method);
+    let api = api.layer(middleware::from_fn_with_state(Arc::default(), idempotency::once));
     let hosts = state.hosts().clone();
     Router::new()
         .nest("/api/v1", api)

@@ -9,12 +9,14 @@ use sightline_session::Session;
 use sightline_session::notes::Notes;
 
 use crate::cancel::CancelFlag;
-use crate::jobs::lock;
+use crate::jobs::{Position, lock};
 use crate::rendering::OpenTraverse;
 use crate::store::Store;
 
-/// How many targets a session may have, the removed ones included.
+/// How many targets a session may have at a time.
 pub(crate) const TARGET_LIMIT: usize = 256;
+/// How many targets a session may ever have, the removed ones included.
+pub(crate) const TARGET_NUMBERS: usize = 4096;
 /// How many characters the label of a target may have.
 pub(crate) const LABEL_LIMIT: usize = 100;
 /// How many runs a target may have.
@@ -29,11 +31,18 @@ pub struct LiveSession {
     session: Mutex<Session>,
     notes: Mutex<Notes>,
     /// The runs, by target and number, that are computed now or wait for it.
-    computing: Mutex<HashMap<(usize, usize), CancelFlag>>,
-    saving: Mutex<()>,
+    computing: Mutex<HashMap<(usize, usize), Computing>>,
+    /// Whether it was removed, so that nothing of it is written any more; locked while it is written.
+    removed: Mutex<bool>,
     is_awake: AtomicBool,
     is_restoring: AtomicBool,
     used: Mutex<Option<jiff::Timestamp>>,
+}
+
+/// A run that is computed or waits for it.
+struct Computing {
+    flag: CancelFlag,
+    position: Position,
 }
 
 impl LiveSession {
@@ -45,7 +54,7 @@ impl LiveSession {
             session: Mutex::new(session),
             notes: Mutex::default(),
             computing: Mutex::default(),
-            saving: Mutex::default(),
+            removed: Mutex::default(),
             is_awake: AtomicBool::new(is_awake),
             is_restoring: AtomicBool::new(false),
             used: Mutex::default(),
@@ -72,9 +81,34 @@ impl LiveSession {
     /// # Errors
     /// When the database cannot be written.
     pub fn save(&self, store: &Store) -> Result<()> {
-        let _saving = lock(&self.saving);
+        let removed = lock(&self.removed);
+        if *removed {
+            return Ok(());
+        }
         let saved = self.with(|session| session.saved());
         store.save(&saved)
+    }
+
+    /// Takes the session out of the database for good; says whether it was there.
+    ///
+    /// # Errors
+    /// When the database cannot be written; the session is then as it was.
+    pub(crate) fn remove(&self, store: &Store) -> Result<bool> {
+        let mut removed = lock(&self.removed);
+        if *removed {
+            return Ok(false);
+        }
+        store.remove(&self.id)?;
+        *removed = true;
+        for one in lock(&self.computing).values() {
+            one.flag.store(true, Ordering::Relaxed);
+        }
+        Ok(true)
+    }
+
+    /// Whether it was removed.
+    pub(crate) fn is_removed(&self) -> bool {
+        *lock(&self.removed)
     }
 
     /// Looks at or changes the notes; keep it short. Where both are needed, the session comes first.
@@ -87,7 +121,10 @@ impl LiveSession {
     /// # Errors
     /// When the database cannot be written.
     pub(crate) fn save_notes(&self, store: &Store) -> Result<()> {
-        let _saving = lock(&self.saving);
+        let removed = lock(&self.removed);
+        if *removed {
+            return Ok(());
+        }
         let notes = self.with_notes(|notes| notes.clone());
         store.save_notes(&self.id, &notes)
     }
@@ -115,16 +152,22 @@ impl LiveSession {
     /// Marks a run as being computed, in place of what may still be ending.
     pub fn begin(&self, target: usize, run: usize) -> CancelFlag {
         let flag = CancelFlag::default();
-        if let Some(earlier) = lock(&self.computing).insert((target, run), Arc::clone(&flag)) {
-            earlier.store(true, Ordering::Relaxed);
+        let one = Computing { flag: Arc::clone(&flag), position: Position::default() };
+        if let Some(earlier) = lock(&self.computing).insert((target, run), one) {
+            earlier.flag.store(true, Ordering::Relaxed);
         }
         flag
+    }
+
+    /// Where a run is in the queue; nowhere unless it is being computed.
+    pub(crate) fn position(&self, target: usize, run: usize) -> Position {
+        lock(&self.computing).get(&(target, run)).map_or_else(Position::default, |one| one.position.clone())
     }
 
     /// Marks a run as not being computed any more, unless it was begun anew.
     pub fn end(&self, target: usize, run: usize, flag: &CancelFlag) {
         let mut computing = lock(&self.computing);
-        if computing.get(&(target, run)).is_some_and(|present| Arc::ptr_eq(present, flag)) {
+        if computing.get(&(target, run)).is_some_and(|present| Arc::ptr_eq(&present.flag, flag)) {
             computing.remove(&(target, run));
         }
     }
@@ -138,8 +181,8 @@ impl LiveSession {
     pub(crate) fn tell_to_end(&self, target: usize, run: Option<usize>) {
         let computing = lock(&self.computing);
         let meant = computing.iter().filter(|((t, r), _)| *t == target && run.is_none_or(|run| run == *r));
-        for (_, flag) in meant {
-            flag.store(true, Ordering::Relaxed);
+        for (_, one) in meant {
+            one.flag.store(true, Ordering::Relaxed);
         }
     }
 }

@@ -4,7 +4,7 @@ use sha2::{Digest, Sha256};
 use sightline_geometry::error::{Error, Result};
 use sightline_recordings::Traverse;
 
-/// The name of a traverse in paths: readable, and another one when its index is another.
+/// The part of a traverse's name that follows from its index: readable, and another one when the index is another.
 ///
 /// # Errors
 /// An index that cannot be written as JSON.
@@ -23,5 +23,10 @@ pub(crate) fn slug(name: &str) -> String {
 
 /// The SHA-256 of `bytes`, as hexadecimal digits.
 pub fn hash(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+    digits(&Sha256::digest(bytes))
+}
+
+/// Bytes as hexadecimal digits.
+pub(crate) fn digits(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }

@@ -8,7 +8,9 @@ use axum::response::{IntoResponse, Response};
 use sightline_api::wire::{ExpressionProblem, Problem, ProblemPlace, TextRange};
 use sightline_geometry::error::Error;
 use sightline_geometry::frames::Pixel;
-use utoipa::openapi::{ContentBuilder, RefOr, ResponseBuilder};
+use utoipa::IntoResponses;
+use utoipa::openapi::schema::AnyOfBuilder;
+use utoipa::openapi::{ContentBuilder, Ref, RefOr, ResponseBuilder, Schema};
 
 /// The media type of problems.
 pub(crate) const PROBLEM_JSON: &str = "application/problem+json";
@@ -144,13 +146,28 @@ impl IntoResponse for ApiError {
 }
 
 /// The answer of every route when it cannot do what was asked, for the OpenAPI document.
-impl utoipa::IntoResponses for ApiError {
-    fn responses() -> std::collections::BTreeMap<String, RefOr<utoipa::openapi::Response>> {
-        let content = ContentBuilder::new().schema(Some(utoipa::openapi::Ref::from_schema_name("Problem")));
-        let response = ResponseBuilder::new()
-            .description("What is wrong and how to mend it")
-            .content(PROBLEM_JSON, content.build())
-            .build();
-        [("default".to_owned(), RefOr::T(response))].into()
+impl IntoResponses for ApiError {
+    fn responses() -> Responses {
+        documented("default", "What is wrong and how to mend it", Ref::from_schema_name("Problem"))
     }
+}
+
+/// The answer to an expression that cannot be used, for the OpenAPI document: with its place where that is at fault.
+pub(crate) struct ExpressionRefusal;
+
+impl IntoResponses for ExpressionRefusal {
+    fn responses() -> Responses {
+        let forms = ["ExpressionProblem", "Problem"].map(Ref::from_schema_name);
+        let schema = forms.into_iter().fold(AnyOfBuilder::new(), AnyOfBuilder::item).build();
+        documented("422", "What is wrong with the expression, and where", Schema::AnyOf(schema))
+    }
+}
+
+/// Answers of a status, as problems.
+type Responses = std::collections::BTreeMap<String, RefOr<utoipa::openapi::Response>>;
+
+fn documented(status: &str, description: &str, schema: impl Into<RefOr<Schema>>) -> Responses {
+    let content = ContentBuilder::new().schema(Some(schema)).build();
+    let response = ResponseBuilder::new().description(description).content(PROBLEM_JSON, content).build();
+    [(status.to_owned(), RefOr::T(response))].into()
 }

@@ -1,6 +1,7 @@
 //! The questions that were asked: what would have saved a step. One for each step, kept with its answer.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
 use sightline_api::location::AtStep;
@@ -61,6 +62,17 @@ impl Questions {
         let work = Arc::new(Work { number, question: Mutex::new(question), cancel });
         kept.by_step.insert(path, Arc::clone(&work));
         Ok((work, true))
+    }
+
+    /// Forgets the questions of a session; those that are being answered end.
+    pub(crate) fn forget_session(&self, session: &str) {
+        lock(&self.0).by_step.retain(|path, work| {
+            let is_kept = path.session != session;
+            if !is_kept {
+                work.cancel.store(true, Ordering::Relaxed);
+            }
+            is_kept
+        });
     }
 
     pub(crate) fn forget(&self, path: &AtStep) {

@@ -14,6 +14,7 @@ use sightline_geometry::error::{Error, Result};
 use sightline_recordings::Traverse;
 use tokio::sync::broadcast;
 
+use crate::identity::Identity;
 use crate::jobs::lock;
 
 /// How soon a cancelled wait is noticed.
@@ -25,6 +26,9 @@ pub struct OpenTraverse {
     pub id: String,
     /// The traverse.
     pub traverse: Traverse,
+    /// From which its name follows.
+    pub(crate) identity: Identity,
+    is_closed: AtomicBool,
     turn: Mutex<Turn>,
     turned: Condvar,
     events: broadcast::Sender<Event>,
@@ -41,9 +45,21 @@ struct Turn {
 }
 
 impl OpenTraverse {
-    /// A traverse under the name `id`; its progress is told to `events`.
-    pub fn new(id: String, traverse: Traverse, events: broadcast::Sender<Event>) -> Self {
-        Self { id, traverse, turn: Mutex::default(), turned: Condvar::new(), events }
+    /// A traverse under the name of its identity; its progress is told to `events`.
+    pub(crate) fn new(identity: Identity, traverse: Traverse, events: broadcast::Sender<Event>) -> Self {
+        let id = identity.id();
+        let (is_closed, turn, turned) = (AtomicBool::new(false), Mutex::default(), Condvar::new());
+        Self { id, traverse, identity, is_closed, turn, turned, events }
+    }
+
+    /// Renders nothing any more, because the traverse is removed.
+    pub(crate) fn close(&self) {
+        self.is_closed.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether the traverse is removed.
+    pub(crate) fn is_closed(&self) -> bool {
+        self.is_closed.load(Ordering::Relaxed)
     }
 
     /// Makes sure that the images of a stop are there; a recorded stop is always ready.
@@ -79,7 +95,7 @@ impl OpenTraverse {
         let mut turn = lock(&self.turn);
         turn.urgent += usize::from(yields.is_none());
         let taken = loop {
-            if cancel.load(Ordering::Relaxed) {
+            if cancel.load(Ordering::Relaxed) || self.is_closed() {
                 break Err(Error::Cancelled);
             }
             if turn.step.is_none() && (yields.is_none() || turn.urgent == 0) {

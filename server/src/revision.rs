@@ -3,7 +3,9 @@
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, StatusCode, header};
+use axum::response::{IntoResponse, Response};
 
+use crate::naming::hash;
 use crate::problem::{ApiError, ApiResult};
 
 /// The revision that was read: `If-Match: "3"`; `If-Match: *` is none, whichever it is; `If-None-Match: *` is 0, a thing
@@ -44,6 +46,17 @@ fn read(headers: &HeaderMap) -> ApiResult<Read> {
 /// The header that tells a revision.
 pub(crate) fn tag(revision: u64) -> [(header::HeaderName, String); 1] {
     [(header::ETAG, format!("\"{revision}\""))]
+}
+
+/// An answer with an ETag of its contents, or 304 where the reader has it already.
+pub(crate) fn unless_known(headers: &HeaderMap, media_type: &'static str, body: Vec<u8>) -> Response {
+    let tag = format!("\"{}\"", &hash(&body)[..32]);
+    let known = headers.get(header::IF_NONE_MATCH).and_then(|value| value.to_str().ok());
+    let caching = [(header::ETAG, tag.clone()), (header::CACHE_CONTROL, "private, no-cache".to_owned())];
+    if known.is_some_and(|known| known.split(',').any(|one| one.trim().trim_start_matches("W/") == tag)) {
+        return (StatusCode::NOT_MODIFIED, caching).into_response();
+    }
+    ([(header::CONTENT_TYPE, media_type)], caching, body).into_response()
 }
 
 /// Somebody changed it meanwhile.

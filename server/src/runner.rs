@@ -15,13 +15,14 @@ use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_session::step::RunStep;
 use sightline_session::track::{self, NextStep};
+use sightline_session::view::waiting_for;
 use sightline_session::{Next, Pending, Session};
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
 use tokio::sync::broadcast;
 
 use crate::cancel::CancelFlag;
-use crate::jobs::Lane;
+use crate::jobs::{Lane, Position};
 use crate::live_session::LiveSession;
 use crate::problem::ApiResult;
 use crate::rendering::OpenTraverse;
@@ -52,11 +53,22 @@ impl Runner {
         let flag = live.begin(target, run);
         let (runner, owned_live, owned_flag) = (self.clone(), Arc::clone(live), Arc::clone(&flag));
         let turn = move || runner.turn(&owned_live, target, run, &owned_flag);
-        let submitted = self.lane.submit_by_turns(turn);
-        if submitted.is_err() {
-            live.end(target, run, &flag);
+        let position = live.position(target, run);
+        let submitted = self.lane.submit_by_turns(&position, turn);
+        match &submitted {
+            Err(_) => live.end(target, run, &flag),
+            Ok(()) => {
+                if let Some(before) = self.lane.before(&position) {
+                    self.tell(progress(live, target, run, waiting_for(before)));
+                }
+            }
         }
         submitted
+    }
+
+    /// How many runs a run waits for; `None` unless it waits.
+    pub(crate) fn waits_for(&self, live: &LiveSession, target: usize, run: usize) -> Option<usize> {
+        self.lane.before(&live.position(target, run))
     }
 
     /// Computes all runs of a session that was read back, in the background; parents come before their forks.
@@ -89,7 +101,7 @@ impl Runner {
         let (runner, live) = (self.clone(), Arc::clone(live));
         let mut which = Some(which);
         let (mut runs, mut current) = (Vec::new().into_iter(), None);
-        self.lane.submit_by_turns(move || {
+        self.lane.submit_by_turns(&Position::default(), move || {
             let _until_the_end = &restoring;
             if let Some(which) = which.take() {
                 runs = live.with(|session| which(session)).into_iter();
@@ -139,7 +151,7 @@ impl Runner {
 
     /// Computes and records one step; false when there is nothing more to compute.
     fn one_step(&self, live: &LiveSession, target: usize, run: usize, flag: &CancelFlag) -> Result<bool> {
-        if flag.load(Ordering::Relaxed) {
+        if flag.load(Ordering::Relaxed) || live.is_removed() {
             return Err(Error::Cancelled);
         }
         let trace = match live.with(|session| session.next(target, run))? {

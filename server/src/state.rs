@@ -1,12 +1,13 @@
 //! What the handlers share: the open traverses, the sessions, and the ways to compute, to save and to tell.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
 use sightline_api::wire::Event;
 use sightline_geometry::error::{Error, Result};
 use sightline_recordings::Traverse;
+use sightline_session::view::SessionView;
 use sightline_session::{Cursor, Session};
 use tokio::sync::broadcast;
 
@@ -16,17 +17,19 @@ use crate::folders::Folders;
 use crate::hosts::Hosts;
 use crate::jobs::{Lane, lock};
 use crate::live_session::LiveSession;
-use crate::naming::name_of;
 use crate::problem::{ApiError, ApiResult};
 use crate::questions::Questions;
 use crate::rendering::{Ahead, OpenTraverse};
 use crate::rerun_log::LiveStream;
 use crate::runner::Runner;
+use crate::sessions::Sessions;
 use crate::store::{self, Store};
 use crate::study::jobs::Shelf;
 use crate::study::order::order;
 use crate::study::saved::Keeper;
 use crate::trackability_maps::Maps;
+
+mod removal;
 
 /// Events that a slow page may be behind before it is told to read everything again.
 const EVENT_BACKLOG: usize = 256;
@@ -36,8 +39,6 @@ const RUNS_AT_A_TIME: usize = 2;
 const RUNS_WAITING: usize = 256;
 /// Questions that are answered at a time.
 const ANSWERS_AT_A_TIME: usize = 1;
-/// How many sessions there may be.
-const SESSION_LIMIT: usize = 1000;
 
 /// What the handlers share.
 #[derive(Clone)]
@@ -46,6 +47,10 @@ pub struct AppState(Arc<Inner>);
 struct Inner {
     hosts: Hosts,
     traverses: Mutex<Vec<Arc<OpenTraverse>>>,
+    /// The names of the traverses that the server was given, which cannot be removed.
+    given: BTreeSet<String>,
+    /// Held while a drive is made or removed, because both change its folder.
+    making_drives: Mutex<()>,
     folders: Folders,
     sessions: Mutex<Sessions>,
     events: broadcast::Sender<Event>,
@@ -65,12 +70,6 @@ struct Inner {
     answers: Lane,
 }
 
-#[derive(Default)]
-struct Sessions {
-    by_number: BTreeMap<u64, Arc<LiveSession>>,
-    last_number: u64,
-}
-
 impl Drop for Inner {
     fn drop(&mut self) {
         self.ahead.close();
@@ -84,12 +83,7 @@ impl AppState {
     /// # Errors
     /// As `Self::with_folders`.
     pub fn new(traverses: Vec<Traverse>, folder: &Path, hosts: Hosts) -> Result<Self> {
-        let folders = Folders {
-            sessions: folder.to_owned(),
-            studies: folder.join("studies"),
-            traverses: folder.join("traverses"),
-        };
-        Self::with_folders(traverses, &folders, hosts)
+        Self::with_folders(traverses, &Folders::in_one(folder), hosts)
     }
 
     /// Opens the state on its folders.
@@ -99,17 +93,12 @@ impl AppState {
     pub(crate) fn with_folders(traverses: Vec<Traverse>, folders: &Folders, hosts: Hosts) -> Result<Self> {
         let no_threads = |error: std::io::Error| Error::Request(format!("cannot start a thread: {error}"));
         let events = broadcast::Sender::new(EVENT_BACKLOG);
-        let mut open: Vec<Arc<OpenTraverse>> = Vec::new();
-        for traverse in traverses {
-            let id = name_of(&traverse)?;
-            // The same traverse given twice is one.
-            if open.iter().all(|other| other.id != id) {
-                open.push(Arc::new(OpenTraverse::new(id, traverse, events.clone())));
-            }
-        }
+        let (mut open, of_drives) = drives::open_given(traverses, folders, &events)?;
+        let given = open.iter().map(|open| open.id.clone()).collect();
         let store = Store::open(&folders.sessions)?;
         let drives_lost = drives::open_again(&store, folders, &mut open, &events)?;
-        let (sessions, mut notices) = read_back(&store, &open)?;
+        let (sessions, mut notices) = Sessions::read_back(&store, &open)?;
+        notices.extend(of_drives);
         notices.extend(drives_lost);
         for notice in &notices {
             tracing::warn!("{}", crate::printable::printable(notice));
@@ -125,6 +114,8 @@ impl AppState {
         Ok(Self(Arc::new(Inner {
             hosts,
             traverses: Mutex::new(open),
+            given,
+            making_drives: Mutex::default(),
             folders: folders.clone(),
             sessions: Mutex::new(sessions),
             runner: Runner::new(Lane::new(RUNS_AT_A_TIME, RUNS_WAITING), events.clone()),
@@ -174,7 +165,7 @@ impl AppState {
         if let Some(known) = traverses.iter().find(|known| known.id == open.id) {
             return Ok(Arc::clone(known));
         }
-        let (found, notices) = read_back(&self.0.store, std::slice::from_ref(&open))?;
+        let (found, notices) = Sessions::read_back(&self.0.store, std::slice::from_ref(&open))?;
         for notice in &notices {
             tracing::warn!("{}", crate::printable::printable(notice));
         }
@@ -235,9 +226,9 @@ impl AppState {
         make: impl FnOnce(String) -> ApiResult<Session>,
     ) -> ApiResult<Arc<LiveSession>> {
         let mut sessions = lock(&self.0.sessions);
-        if sessions.by_number.len() >= SESSION_LIMIT {
-            let detail = format!("There are {SESSION_LIMIT} sessions already.");
-            return Err(ApiError::conflict(detail).hint("Begin with another data folder: --data-dir."));
+        sessions.has_room()?;
+        if traverse.is_closed() {
+            return Err(ApiError::not_found("The drive was removed meanwhile."));
         }
         let number = sessions.last_number + 1;
         let live = Arc::new(LiveSession::new(make(store::id_of(number))?, traverse, is_awake));
@@ -252,6 +243,9 @@ impl AppState {
     /// # Errors
     /// A problem when it cannot be written.
     pub fn changed(&self, live: &LiveSession) -> ApiResult<()> {
+        if live.is_removed() {
+            return Err(ApiError::not_found("The session was removed meanwhile."));
+        }
         self.tell(Event::SessionChanged { session: live.id.clone() });
         self.touched(live);
         Ok(live.save(&self.0.store)?)
@@ -265,6 +259,9 @@ impl AppState {
 
     /// Remembers a cursor that moved, which is on disk a moment later, and tells every page.
     pub(crate) fn cursor_moved(&self, live: &LiveSession, cursor: Cursor) {
+        if live.is_removed() {
+            return;
+        }
         self.0.store.move_cursor(&live.id, cursor);
         self.touched(live);
         self.tell(Event::CursorMoved { session: live.id.clone(), cursor });
@@ -297,6 +294,17 @@ impl AppState {
             self.sessions().into_iter().map(|live| Event::SessionChanged { session: live.id.clone() });
         let traverses = self.traverses().into_iter().filter(|open| open.traverse.index().scenario.is_some());
         sessions.chain(traverses.map(|open| open.progress(None))).collect()
+    }
+
+    /// The session as pages and scripts see it, with what its runs wait for.
+    pub(crate) fn view(&self, live: &LiveSession) -> SessionView {
+        let mut view = live.with(|session| session.view());
+        for target in &mut view.targets {
+            for run in &mut target.runs {
+                run.waits_for = self.0.runner.waits_for(live, target.number, run.number);
+            }
+        }
+        view
     }
 
     /// What computes runs.
@@ -358,25 +366,4 @@ impl AppState {
     pub(crate) fn answers(&self) -> &Lane {
         &self.0.answers
     }
-}
-
-/// The sessions on disk whose traverses are open; the others stay where they are.
-fn read_back(store: &Store, traverses: &[Arc<OpenTraverse>]) -> Result<(Sessions, Vec<String>)> {
-    let mut found = store.load()?;
-    let mut sessions = Sessions { last_number: found.last_number, ..Sessions::default() };
-    let mut notices = std::mem::take(&mut found.messages);
-    for saved in std::mem::take(&mut found.sessions) {
-        let traverse = traverses.iter().find(|open| open.id == saved.traverse);
-        let (Some(traverse), Some(number)) = (traverse, store::number_of(&saved.id)) else { continue };
-        match Session::restored(&saved, traverse.traverse.stop_count()) {
-            Ok(session) => {
-                let live = LiveSession::new(session, Arc::clone(traverse), false);
-                live.with_notes(|notes| *notes = found.notes.remove(&number).unwrap_or_default());
-                live.set_used(found.used.remove(&number).and_then(|time| time.parse().ok()));
-                sessions.by_number.insert(number, Arc::new(live));
-            }
-            Err(error) => notices.push(store.set_aside(&saved.id, &error.to_string())),
-        }
-    }
-    Ok((sessions, notices))
 }

@@ -1,6 +1,7 @@
 //! The trackability maps that were made or are being made, and the surfaces behind the newest.
 
 use std::collections::VecDeque;
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
 use sightline_api::wire::Event;
@@ -76,6 +77,18 @@ impl Maps {
         let place =
             making.iter().position(|one| one.is_of(traverse, step, limits) && !lock(&one.progress).ended)?;
         making.remove(place)
+    }
+
+    /// Forgets everything about a traverse; what is being made ends.
+    pub(crate) fn forget(&self, traverse: &str) {
+        lock(&self.making).retain(|one| {
+            let is_kept = one.traverse != traverse;
+            if !is_kept {
+                one.cancel.store(true, Ordering::Relaxed);
+            }
+            is_kept
+        });
+        lock(&self.grounds).retain(|(id, _)| id != traverse);
     }
 
     /// What lies under the pixels of a stop, kept for the newest.

@@ -7,7 +7,7 @@ use axum::http::header;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::RowAccessor;
 use serde_json::{Value, json};
-use sightline_tests::server::{Answer, PIXEL, TestServer, rows_of_run, small_drive};
+use sightline_tests::server::{Answer, PIXEL, TestServer, rows_of_run, small_drive, small_recording};
 
 use crate::cli::program;
 
@@ -346,4 +346,34 @@ async fn a_recording_of_all_branches_names_its_makers_and_its_layout() {
     std::fs::write(&path, one).unwrap();
     let recording = sightline_tests::rrd::read(&path);
     assert!(!recording.entities.contains_key("/target_1/update/position"), "the other run is left out");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn no_file_contains_the_folder_of_the_recording() {
+    let mut tables = Vec::new();
+    for _ in 0..2 {
+        let (drive, folder) = (small_recording(), tempfile::tempdir().unwrap());
+        std::fs::remove_file(drive.path().join("images/left_0002.png")).unwrap();
+        let server = TestServer::open(drive.path(), folder.path());
+        server.begin().await;
+        server.pick("s1").await;
+        server.ended("s1", 0, 0).await;
+        let place = drive.path().file_name().unwrap().to_str().unwrap();
+        for name in
+            ["rows.csv", "rows.jsonl", "rows.parquet", "report.html", "recording.rrd", "reproduce.json"]
+        {
+            let bytes = file(&server, name, "").await.bytes;
+            let contains = |text: &str| bytes.windows(text.len()).any(|window| window == text.as_bytes());
+            assert!(!contains(place), "{name}");
+            assert!(name == "reproduce.json" || contains("images/left_0002.png"), "{name}");
+        }
+        let [csv, jsonl, parquet] = [
+            file(&server, "rows.csv", "").await,
+            file(&server, "rows.jsonl", "").await,
+            file(&server, "rows.parquet", "").await,
+        ];
+        let reproduced = file(&server, "reproduce.json", "").await.json()["runs"][0]["rows_sha256"].clone();
+        tables.push((csv.bytes, jsonl.bytes, parquet.bytes, reproduced));
+    }
+    assert!(tables[0] == tables[1], "equal recordings in two folders give the same bytes");
 }

@@ -1,6 +1,8 @@
 //! Runs take turns: a short one does not wait for long ones that began before it.
 
+use axum::http::Method;
 use serde_json::json;
+use sightline_api::wire::Event;
 use sightline_tests::server::{PIXEL, TestServer, long_recording};
 
 /// Stops of the drive; every eighth shows the first image.
@@ -29,4 +31,22 @@ async fn short_run_ends_before_two_long_ones() {
         );
         server.post(&format!("{path}/cancel"), &json!({})).await;
     }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_run_that_waits_says_for_how_many() {
+    let (drive, folder) = (long_recording(600), tempfile::tempdir().unwrap());
+    let server = TestServer::open(drive.path(), folder.path());
+    let session = server.begin().await;
+    server.pick(&session).await;
+    server.pick(&session).await;
+    let mut events = server.state.events().subscribe();
+    let third = server.pick(&session).await;
+    let told = std::iter::from_fn(|| events.try_recv().ok()).find_map(|event| match event {
+        Event::RunProgress { target, doing, .. } if target as u64 == third => Some(doing),
+        _ => None,
+    });
+    assert_eq!(told.as_deref(), Some("waiting for 2 runs before it"));
+    let removed = server.json(Method::DELETE, &format!("sessions/{session}"), &json!({})).await;
+    assert_eq!(removed.status.as_u16(), 204, "the long runs end");
 }

@@ -99,6 +99,22 @@ async fn an_exported_session_begins_again_elsewhere_with_the_same_rows_notes_and
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn an_exported_file_can_be_sent_as_it_is() {
+    let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
+    let server = TestServer::open(drive.path(), folder.path());
+    let session = server.begin().await;
+    server.pick(&session).await;
+    let rows = server.ended(&session, 0, 0).await["rows"].clone();
+    let file = server.get(&format!("sessions/{session}/exports/reproduce.json")).await.expect(200);
+    let parts = json!({ "traverse": file["traverse"], "session": file["session"], "notes": file["notes"] });
+    for body in [&file, &parts] {
+        let view = server.post("sessions/reproduced", body).await.expect(201);
+        let id = view["id"].as_str().unwrap();
+        assert_eq!(server.ended(id, 0, 0).await["rows"], rows);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_session_that_names_what_cannot_be_is_refused_and_none_is_begun() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), folder.path());

@@ -20,7 +20,7 @@ async fn files(browser: &Browser, event: &str, files: &[(&str, &[u8])]) {
     browser.evaluate(&script).await;
 }
 
-async fn drop_one(browser: &Browser, name: &str, bytes: &[u8]) {
+pub(crate) async fn drop_one(browser: &Browser, name: &str, bytes: &[u8]) {
     files(browser, "drop", &[(name, bytes)]).await;
 }
 

@@ -61,6 +61,19 @@ macro_rules! endpoints {
     (@or $default:ty, $given:ty) => { $given };
 }
 
+/// The paths of the endpoints that create something: a request with the header `Idempotency-Key` can be sent again without
+/// creating it twice.
+pub const CREATING: &[&str] = &[
+    AddTraverse::PATH,
+    BeginSession::PATH,
+    BringSession::PATH,
+    DesignateTarget::PATH,
+    ForkRun::PATH,
+    AddNote::PATH,
+    AddBreakpoint::PATH,
+    StartStudy::PATH,
+];
+
 endpoints! {
     /// What this program is.
     ShowVersion: Get "/version", Anywhere => Version;
@@ -79,6 +92,8 @@ endpoints! {
     AddTraverse: Post "/traverses", Anywhere, body NewTraverse => TraverseEntry;
     /// A traverse with its stops.
     ShowTraverse: Get "/traverses/{id}", AtTraverse => TraverseView;
+    /// Removes a drive that was opened by its scenario, with its images.
+    RemoveTraverse: Delete "/traverses/{id}", AtTraverse => Done;
     /// A stop with its cameras.
     ShowStop: Get "/traverses/{id}/steps/{step}", AtStop => StopDetail;
     /// An image of a stop as PNG.
@@ -101,6 +116,10 @@ endpoints! {
     BringSession: Post "/sessions/reproduced", Anywhere, body Reproduction => SessionView;
     /// A session with its targets and runs.
     ShowSession: Get "/sessions/{session}", AtSession => SessionView;
+    /// Removes a session.
+    RemoveSession: Delete "/sessions/{session}", AtSession => Done;
+    /// Takes the removal of a session back.
+    RestoreSession: Post "/sessions/{session}/restore", AtSession => SessionView;
     /// The cursor of a session.
     ShowCursor: Get "/sessions/{session}/cursor", AtSession => Cursor;
     /// Moves the cursor.

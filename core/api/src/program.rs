@@ -20,6 +20,7 @@ pub struct Version {
 
 /// The limits in force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[schema(as = ProgramLimits)]
 pub struct Limits {
     /// The largest body of a request, bytes.
     pub body_bytes: usize,

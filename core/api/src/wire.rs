@@ -27,6 +27,8 @@ pub struct TraverseEntry {
     pub simulated: bool,
     /// How many stops it has.
     pub stop_count: usize,
+    /// Whether it can be removed: it was opened by its scenario, not given when the server was started.
+    pub removable: bool,
 }
 
 /// A session in the server's list.
@@ -216,6 +218,16 @@ pub enum Event {
     SessionChanged {
         /// The session.
         session: String,
+    },
+    /// A session was removed.
+    SessionRemoved {
+        /// The session.
+        session: String,
+    },
+    /// A drive was removed.
+    TraverseRemoved {
+        /// The traverse.
+        traverse: String,
     },
     /// The cursor of a session was moved; nothing else of it changed.
     CursorMoved {

@@ -5,6 +5,8 @@
 
 use std::path::Path;
 
+use nalgebra::Vector3;
+
 use super::files::{read_text, resolve};
 use sightline_geometry::camera::{Camera, text};
 use sightline_geometry::frames::{POSITION_LIMIT_M, PoseRecord};
@@ -14,6 +16,17 @@ use sightline_world::traverse::{CameraSource, FORMAT_VERSION, Stop, StopLight, T
 const IMAGE_SIDE_LIMIT: u32 = 16_384;
 /// The largest camera file that is read, bytes.
 const CAMERA_FILE_LIMIT: u64 = 1 << 20;
+
+/// A motion between two stops is a jump beyond this length, m, if it is also [`FEW_TIMES`] as long as the median.
+const JUMP_M: f64 = 20.0;
+/// See [`JUMP_M`]: recordings of cars have long steps everywhere.
+const FEW_TIMES: f64 = 3.0;
+/// A motion between two stops is a jump beyond this multiple of the median, unless it is shorter than [`SHORT_M`].
+const MANY_TIMES: f64 = 20.0;
+/// The shortest jump, m: a rover that turns in place has a median near zero.
+const SHORT_M: f64 = 1.0;
+/// How many jumps are named one by one.
+const JUMPS_NAMED: usize = 5;
 
 /// The cameras of one stop, in the rover frame, with O made unit.
 #[derive(Clone, Debug)]
@@ -160,6 +173,36 @@ fn check_camera(camera: &Camera) -> Result<(), String> {
     camera.model.validate()
 }
 
+/// One warning for each of the first [`JUMPS_NAMED`] motions between stops that are much longer than the others.
+fn jumps(index: &TraverseIndex) -> Vec<String> {
+    let between_m = |pair: &[Stop]| {
+        let [from, to] = [&pair[0], &pair[1]].map(|stop| Vector3::from(stop.site_from_rover.position_m));
+        (to - from).norm()
+    };
+    let motions_m: Vec<f64> = index.stops.windows(2).map(between_m).collect();
+    let mut sorted_m = motions_m.clone();
+    sorted_m.sort_by(f64::total_cmp);
+    let others_m = sorted_m.get(sorted_m.len().saturating_sub(1) / 2).copied().filter(|_| sorted_m.len() > 1);
+    let is_jump = |motion_m: f64| {
+        let ratio = others_m.map_or(f64::INFINITY, |others_m| motion_m / others_m);
+        (motion_m > JUMP_M && ratio > FEW_TIMES) || (motion_m > SHORT_M && ratio > MANY_TIMES)
+    };
+    let found: Vec<_> = motions_m.iter().enumerate().filter(|(_, motion_m)| is_jump(**motion_m)).collect();
+    let typical =
+        others_m.map_or_else(String::new, |others_m| format!("; a typical step is {others_m:.2} m"));
+    let named = found.iter().take(JUMPS_NAMED).map(|(step, motion_m)| {
+        let stop = step + 1;
+        // Scientific notation where the digits of an absurd number would fill the line.
+        let motion = if **motion_m < 1e7 { format!("{motion_m:.1}") } else { format!("{motion_m:.1e}") };
+        format!("stops[{stop}].site_from_rover: is {motion} m from the stop before{typical}: check the poses")
+    });
+    let mut sentences: Vec<String> = named.collect();
+    if found.len() > JUMPS_NAMED {
+        sentences.push(format!("{} more stops are as far from the stop before", found.len() - JUMPS_NAMED));
+    }
+    sentences
+}
+
 /// What a person should know about an index that can be used nevertheless.
 pub(super) fn warnings(index: &TraverseIndex, folder: &Path) -> Vec<String> {
     let mut warnings = Vec::new();
@@ -168,6 +211,7 @@ pub(super) fn warnings(index: &TraverseIndex, folder: &Path) -> Vec<String> {
             warnings.push(format!("stops[{}].time_s: is earlier than the stop before", step + 1));
         }
     }
+    warnings.extend(jumps(index));
     if index.scenario.is_none() {
         let missing = |view: &View| !folder.join(&view.image).is_file();
         let views = |stop: &Stop| usize::from(missing(&stop.left)) + usize::from(missing(&stop.right));
@@ -179,3 +223,7 @@ pub(super) fn warnings(index: &TraverseIndex, folder: &Path) -> Vec<String> {
     }
     warnings
 }
+
+#[cfg(test)]
+#[path = "check_tests.rs"]
+mod tests;

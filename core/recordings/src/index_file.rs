@@ -89,7 +89,7 @@ pub(super) fn read(path: &Path, format: IndexFormat) -> Result<TraverseIndex> {
     parse(&text, format).map_err(|problem| Error::format(path, problem))
 }
 
-fn parse(text: &str, format: IndexFormat) -> Result<TraverseIndex, String> {
+pub(super) fn parse(text: &str, format: IndexFormat) -> Result<TraverseIndex, String> {
     match format {
         IndexFormat::Toml => toml_text::read(text),
         IndexFormat::Json => {

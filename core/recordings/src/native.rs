@@ -188,18 +188,22 @@ impl Traverse {
     /// The stereo pair of a stop, in fractions of full scale; a simulated one is rendered where it is missing.
     ///
     /// # Errors
-    /// No such stop, or an image that is missing, damaged or not of its camera's size; the sentence names it.
+    /// No such stop, or an image that is missing, damaged or not of its camera's size; the sentence names it relative to the
+    /// folder, because it becomes part of the step's record, which must not depend on where the folder is.
     pub fn capture(&self, step: usize) -> Result<StereoPair> {
         let stop = self.stop(step)?;
         if let Some(pair) = self.cached(|cache| cache.get(step)) {
             return Ok(pair);
         }
-        self.render_step(step, &AtomicBool::new(false))?;
         let cameras = &self.cameras[step];
-        let pair = StereoPair {
-            left: Arc::new(self.read_image(step, "left", &stop.left, &cameras.left)?),
-            right: Arc::new(self.read_image(step, "right", &stop.right, &cameras.right)?),
+        let read = || {
+            self.render_step(step, &AtomicBool::new(false))?;
+            Ok(StereoPair {
+                left: Arc::new(self.read_image(step, "left", &stop.left, &cameras.left)?),
+                right: Arc::new(self.read_image(step, "right", &stop.right, &cameras.right)?),
+            })
         };
+        let pair = read().map_err(|error| self.without_folder(error))?;
         self.cached(|cache| cache.insert(step, pair.clone()));
         Ok(pair)
     }
@@ -213,7 +217,8 @@ impl Traverse {
         if let Some(pair) = self.cached(|cache| cache.get(step)) {
             return Ok(if is_left { pair.left } else { pair.right });
         }
-        self.render_step(step, &AtomicBool::new(false))?;
+        let named = |error| self.without_folder(error);
+        self.render_step(step, &AtomicBool::new(false)).map_err(named)?;
         let cameras = &self.cameras[step];
         let read = |is_left: bool| {
             let (side, view, camera) = match is_left {
@@ -222,7 +227,7 @@ impl Traverse {
             };
             self.read_image(step, side, view, camera).map(Arc::new)
         };
-        let wanted = read(is_left)?;
+        let wanted = read(is_left).map_err(named)?;
         // The pair is kept, because its other image is usually wanted next.
         if let Ok(other) = read(!is_left) {
             let [left, right] = if is_left { [&wanted, &other] } else { [&other, &wanted] };
@@ -235,6 +240,21 @@ impl Traverse {
     /// The stops as the renderer sees them.
     pub(super) fn stops(&self) -> Stops<'_> {
         Stops { folder: &self.folder, index: &self.index, cameras: &self.cameras }
+    }
+
+    /// The error with the path of its file relative to the folder.
+    fn without_folder(&self, error: Error) -> Error {
+        let relative = |path: PathBuf| match path.strip_prefix(&self.folder) {
+            Ok(inside) if inside != Path::new("") => inside.to_owned(),
+            Ok(_) => PathBuf::from("."),
+            Err(_) => path,
+        };
+        match error {
+            Error::Read { path, source } => Error::Read { path: relative(path), source },
+            Error::Write { path, source } => Error::Write { path: relative(path), source },
+            Error::Format { path, problem } => Error::Format { path: relative(path), problem },
+            other => other,
+        }
     }
 
     fn stop(&self, step: usize) -> Result<&Stop> {

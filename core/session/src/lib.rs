@@ -10,7 +10,7 @@ pub mod documents;
 pub mod exports;
 pub mod notes;
 pub mod progress;
-mod removal;
+pub mod removal;
 mod run;
 pub mod shell;
 pub mod step;
@@ -32,6 +32,7 @@ pub mod reproduce;
 #[cfg(test)]
 mod breakpoint_tests;
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
@@ -86,6 +87,8 @@ pub struct Session {
     pub cursor: Cursor,
     /// The conditions that are looked for.
     pub breakpoints: Breakpoints,
+    /// The removed targets that can be restored, the one removed last at the end.
+    removals: VecDeque<usize>,
 }
 
 /// What a run needs for its next step.
@@ -105,7 +108,8 @@ impl Session {
     /// A session without targets.
     pub fn new(id: impl Into<String>, traverse: impl Into<String>, stop_count: usize) -> Self {
         let (targets, cursor, breakpoints) = (Vec::new(), Cursor::default(), Breakpoints::default());
-        Self { id: id.into(), traverse: traverse.into(), stop_count, targets, cursor, breakpoints }
+        let (id, traverse, removals) = (id.into(), traverse.into(), VecDeque::new());
+        Self { id, traverse, stop_count, targets, cursor, breakpoints, removals }
     }
 
     /// Adds a target whose designation was computed, and looks at it. Returns its number.
@@ -118,19 +122,6 @@ impl Session {
         self.targets.push(TargetRecord { label, designation, runs: vec![run], removed: false });
         self.cursor = Cursor { target: Some(number), run: 0, step: designation.step };
         number
-    }
-
-    /// Removes a target; its number is not used again.
-    ///
-    /// # Errors
-    /// [`Error::Request`] when there is no such target.
-    pub fn remove_target(&mut self, target: usize) -> Result<()> {
-        self.target_mut(target)?.removed = true;
-        if self.cursor.target == Some(target) {
-            let other = self.targets.iter().rposition(|record| !record.removed);
-            self.cursor = Cursor { target: other, run: 0, step: self.cursor.step };
-        }
-        Ok(())
     }
 
     /// Forks `run`: the steps before `from_step` are shared, the later ones are computed with changed settings.

@@ -47,6 +47,12 @@ impl Session {
         let breakpoints = Breakpoints::restored(&saved.breakpoints);
         let new = Self::new(&saved.id, &saved.traverse, stop_count);
         let mut session = Self { targets, breakpoints, ..new };
+        // Those removed before an earlier end of the program count as removed in the order of their numbers.
+        for (number, record) in saved.targets.iter().enumerate() {
+            if record.removed && !record.runs.is_empty() {
+                session.note_removal(number);
+            }
+        }
         // A cursor that points nowhere is no reason to lose the targets.
         let _ = session.move_cursor(saved.cursor);
         Ok(session)
@@ -141,7 +147,8 @@ fn restored_target(number: usize, saved: &SavedTarget, stop_count: usize) -> Res
         let step = saved.designation.step;
         return Err(wrong(format!("step {step} does not exist: the traverse has {stop_count} stops")));
     }
-    if saved.runs.is_empty() {
+    // A target that was removed long ago has none.
+    if saved.runs.is_empty() && !saved.removed {
         return Err(wrong("it has no run".to_owned()));
     }
     let runs = saved.runs.iter().enumerate().map(|(run, saved)| match saved.fork {

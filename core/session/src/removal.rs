@@ -2,23 +2,66 @@
 //!
 //! Runs are a tree: a run shares the steps before its fork with the one it left. A removed run is hidden, its number is
 //! not used again, and it is still computed after a restart where a run that left it needs its steps.
+//!
+//! The last [`RESTORABLE_TARGETS`] removed targets can be restored. Older ones keep their number and label only, so that
+//! picking and removing for hours takes no more memory than a short session.
 
 use crate::{Cursor, Run, Session};
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
 
+/// How many removed targets of a session can be restored.
+pub const RESTORABLE_TARGETS: usize = 16;
+
 impl Session {
+    /// The number of targets that were not removed.
+    pub fn target_count(&self) -> usize {
+        self.targets.iter().filter(|record| !record.removed).count()
+    }
+
+    /// Removes a target; its number is not used again. The target that was removed longest ago gives its runs up once more
+    /// than [`RESTORABLE_TARGETS`] are removed.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when there is no such target.
+    pub fn remove_target(&mut self, target: usize) -> Result<()> {
+        self.target_mut(target)?.removed = true;
+        if self.cursor.target == Some(target) {
+            let other = self.targets.iter().rposition(|record| !record.removed);
+            self.cursor = Cursor { target: other, run: 0, step: self.cursor.step };
+        }
+        self.note_removal(target);
+        Ok(())
+    }
+
+    /// Remembers that a target was removed last.
+    pub(super) fn note_removal(&mut self, target: usize) {
+        self.removals.push_back(target);
+        while self.removals.len() > RESTORABLE_TARGETS {
+            let oldest = self.removals.pop_front().and_then(|oldest| self.targets.get_mut(oldest));
+            if let Some(record) = oldest {
+                record.runs = Vec::new();
+            }
+        }
+    }
+
     /// Takes the removal of a target back, and looks at it.
     ///
     /// # Errors
-    /// [`Error::Request`] when there is no such target, or it was not removed.
+    /// [`Error::Request`] when there is no such target, it was not removed, or too long ago.
     pub fn restore_target(&mut self, target: usize) -> Result<()> {
         let id = self.id.clone();
         let found = self.targets.get_mut(target).filter(|record| record.removed);
         let record =
             found.ok_or_else(|| Error::Request(format!("session {id} has no removed target {target}")))?;
+        if record.runs.is_empty() {
+            return Err(Error::Request(format!(
+                "target {target} was removed too long ago: the last {RESTORABLE_TARGETS} removed targets can be restored"
+            )));
+        }
         record.removed = false;
         let run = record.runs.iter().rposition(|run| !run.removed).unwrap_or(0);
+        self.removals.retain(|removed| *removed != target);
         self.cursor = Cursor { target: Some(target), run, step: self.cursor.step };
         Ok(())
     }
@@ -101,5 +144,47 @@ impl Run {
     /// Where a person put the prediction of a step in the left image, px.
     pub fn displaced_at(&self, step: usize) -> Option<Pixel> {
         self.fork.filter(|fork| fork.from_step == step).and_then(|fork| fork.prediction_px)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::TargetRecord;
+    use sightline_track::settings::Settings;
+    use sightline_track::target::Designation;
+
+    /// A session of so many targets without steps.
+    fn session(targets: usize) -> Session {
+        let designation = Designation { step: 0, pixel: Pixel::new(1.0, 2.0) };
+        let target = |number| TargetRecord {
+            label: format!("target {number}"),
+            designation,
+            runs: vec![Run::new(Arc::new(Settings::default()), None, Vec::new())],
+            removed: false,
+        };
+        Session { targets: (0..targets).map(target).collect(), ..Session::new("s1", "t", 3) }
+    }
+
+    #[test]
+    fn old_removed_targets_give_their_runs_up() {
+        let count = RESTORABLE_TARGETS + 3;
+        let mut session = session(count);
+        for target in 0..count - 1 {
+            session.remove_target(target).unwrap();
+        }
+        assert_eq!(session.target_count(), 1);
+        let kept = session.targets.iter().filter(|record| !record.runs.is_empty()).count();
+        assert_eq!(kept, RESTORABLE_TARGETS + 1);
+        assert!(session.restore_target(0).unwrap_err().to_string().contains("too long ago"));
+        session.restore_target(5).unwrap();
+        assert_eq!((session.target_count(), session.cursor.target), (2, Some(5)));
+
+        let saved = session.saved();
+        let restored = Session::restored(&saved, 3).unwrap();
+        assert_eq!(restored.saved(), saved);
+        assert!(restored.clone().restore_target(0).is_err() && restored.clone().restore_target(6).is_ok());
     }
 }

@@ -18,9 +18,9 @@ pub const FORMAT: &str = "sightline-reproduce";
 /// The version of the file that this code reads and writes.
 pub const FORMAT_VERSION: u32 = 1;
 
-/// Begins a session as it was elsewhere.
+/// Begins a session as it was elsewhere. What else the exported file has (hashes, commands, versions) is ignored, so that it
+/// can be sent as it is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
 pub struct Reproduction {
     /// The drive.
     pub traverse: ReproducedTraverse,
@@ -32,9 +32,8 @@ pub struct Reproduction {
     pub notes: Vec<Note>,
 }
 
-/// The drive of a session from elsewhere.
+/// The drive of a session from elsewhere; what else the file says of it is ignored.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
 pub struct ReproducedTraverse {
     /// Its name in paths, which another index would not have.
     pub id: String,

@@ -62,8 +62,16 @@ pub struct RunView {
     pub complete: bool,
     /// Why it stopped before.
     pub stopped: Option<String>,
+    /// How many runs are before it in the queue of the server, those that are being computed included; null unless it waits.
+    #[serde(default)]
+    pub waits_for: Option<usize>,
     /// The verdict so far.
     pub summary: Summary,
+}
+
+/// What a waiting run waits for, in words.
+pub fn waiting_for(before: usize) -> String {
+    format!("waiting for {before} {} before it", if before == 1 { "run" } else { "runs" })
 }
 
 /// What a person did, from which the session comes again.
@@ -150,6 +158,7 @@ impl Session {
             rows: run.steps.iter().skip(from_row).map(|trace| trace.row()).collect(),
             complete: run.steps.last().is_some_and(|last| last.step + 1 == self.stop_count),
             stopped: run.why_stopped(),
+            waits_for: None,
             summary: summarise(run.steps.iter().map(AsRef::as_ref)),
         }
     }

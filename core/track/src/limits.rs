@@ -6,6 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
+use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, OneOfBuilder, Schema, Type};
 
 /// Which values a setting may take.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -47,13 +48,25 @@ impl Domain {
     }
 }
 
+/// The schema of a setting's value: a number, a switch or a word.
+fn value_schema() -> Schema {
+    let one = |kind: Type| ObjectBuilder::new().schema_type(kind);
+    let kinds = [Type::Number, Type::Boolean, Type::String].map(one);
+    Schema::OneOf(kinds.into_iter().fold(OneOfBuilder::new(), OneOfBuilder::item).build())
+}
+
+/// The schema of several values.
+fn value_list_schema() -> Schema {
+    Schema::Array(ArrayBuilder::new().items(value_schema()).build())
+}
+
 /// Values of another setting under which a setting has an effect.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Condition {
     /// The other setting.
     pub key: String,
     /// Its values.
-    #[schema(value_type = Vec<Object>)]
+    #[schema(schema_with = value_list_schema)]
     pub values: Vec<serde_json::Value>,
     /// Whether it must have none of these values, instead of one of them.
     pub excluded: bool,
@@ -89,7 +102,7 @@ pub struct SettingInfo {
     /// The unit, empty for pure numbers.
     pub unit: String,
     /// The default.
-    #[schema(value_type = Object)]
+    #[schema(schema_with = value_schema)]
     pub default: serde_json::Value,
     /// The values it may take.
     pub domain: Domain,
@@ -103,6 +116,15 @@ pub struct SettingInfo {
 }
 
 impl SettingInfo {
+    /// `value` as the setting has it: a whole number may be written as 100.0.
+    pub(crate) fn normalised(&self, value: &serde_json::Value) -> serde_json::Value {
+        let whole = value.as_f64().filter(|v| v.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(v));
+        match whole {
+            Some(whole) if self.default.is_u64() => (whole as u64).into(),
+            _ => value.clone(),
+        }
+    }
+
     /// Why `value` cannot be this setting's, as a clause that can follow its name.
     pub fn problem_with(&self, value: &serde_json::Value) -> Option<String> {
         let is_broken = self.default.is_u64() && !value.is_u64();

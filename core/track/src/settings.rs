@@ -135,7 +135,7 @@ impl Settings {
         let mut document = serde_json::to_value(self).map_err(|e| Error::setting("", e.to_string()))?;
         for (info, value) in checked(changes, &table)? {
             let place = if info.group == TRACKER { &mut document } else { &mut document[&info.group] };
-            place[&info.key] = value.clone();
+            place[&info.key] = value;
         }
         serde_json::from_value(document).map_err(|e| Error::setting(join_keys(changes), e.to_string()))
     }
@@ -200,17 +200,15 @@ fn join_keys(changes: &Changes) -> String {
     changes.keys().cloned().collect::<Vec<_>>().join(", ")
 }
 
-/// Every change with what the table says of its setting.
+/// Every change, as its setting has it, with what the table says of the setting.
 ///
 /// # Errors
 /// [`Error::Setting`] naming the first that the table does not know or whose value does not fit.
-pub fn checked<'a>(
-    changes: &'a Changes,
-    table: &'a [SettingInfo],
-) -> Result<Vec<(&'a SettingInfo, &'a Value)>> {
+pub fn checked<'a>(changes: &'a Changes, table: &'a [SettingInfo]) -> Result<Vec<(&'a SettingInfo, Value)>> {
     let check = |(key, value): (&'a String, &'a Value)| {
         let info = table.iter().find(|info| info.key == *key).ok_or_else(|| unknown(key, table))?;
-        match info.problem_with(value) {
+        let value = info.normalised(value);
+        match info.problem_with(&value) {
             Some(problem) => Err(Error::setting(key, problem)),
             None => Ok((info, value)),
         }
@@ -239,6 +237,16 @@ mod tests {
         let settings = change("ncc_min", json!(0.55)).unwrap();
         assert_eq!(settings.limits.ncc_min, 0.55);
         assert_eq!(settings.changes(), Changes::from([("ncc_min".to_owned(), json!(0.55))]));
+    }
+
+    #[test]
+    fn a_whole_number_may_be_written_with_a_point() {
+        assert_eq!(change("n_retry", json!(3.0)).unwrap().limits.n_retry, 3);
+        assert_eq!(change("template_size_px", json!(21.0)).unwrap().template.template_size_px, 21);
+        for wrong in [json!(2.5), json!(-1.0), json!(1e300)] {
+            assert!(change("n_retry", wrong.clone()).is_err(), "{wrong}");
+        }
+        assert!(change("template_size_px", json!(22.0)).is_err());
     }
 
     #[test]

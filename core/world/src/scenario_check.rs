@@ -8,6 +8,9 @@ use crate::scenario::{Course, Scenario};
 use crate::toml_text;
 use sightline_geometry::error::{Error, Result};
 
+/// The most characters that the name of a scenario may have.
+const NAME_LIMIT: usize = 200;
+
 impl Scenario {
     /// Reads and checks a scenario; `path` only names the culprit in the message, beside key and allowed range.
     pub fn from_toml(text: &str, path: &Path) -> Result<Self> {
@@ -19,6 +22,7 @@ impl Scenario {
     /// Refuses settings that no world can be made of, naming the first bad one. The ranges keep sizes finite and
     /// geometry possible; they say nothing of what is plausible on Mars.
     pub fn validate(&self) -> Result<()> {
+        self.validate_name()?;
         if self.seed > MAX_SEED {
             return Err(Error::setting("seed", format!("{} is above 2^53", self.seed)));
         }
@@ -41,6 +45,18 @@ impl Scenario {
         within("odometry_error.attitude_deg", error.attitude_deg, 0.0, 10.0)?;
         self.targets.validate()
     }
+
+    fn validate_name(&self) -> Result<()> {
+        let length = self.name.chars().count();
+        let problem = match () {
+            () if self.name.trim().is_empty() => "is empty".to_owned(),
+            () if length > NAME_LIMIT => format!("has {length} characters"),
+            () if self.name.chars().any(char::is_control) => "has a control character".to_owned(),
+            () => return Ok(()),
+        };
+        let wanted = format!("must have 1 to {NAME_LIMIT} characters, none of them a control character");
+        Err(Error::setting("name", format!("{problem}, but it {wanted}")))
+    }
 }
 
 #[cfg(test)]
@@ -54,6 +70,26 @@ mod tests {
         scenario.sun.azimuth_deg = -33.25;
         let read = Scenario::from_toml(&scenario.to_toml(), Path::new("scenario.toml"));
         assert_eq!(read.unwrap(), scenario);
+    }
+
+    #[test]
+    fn names_are_short_and_printable() {
+        let named = |name: &str| Scenario { name: name.to_owned(), ..Scenario::demo() }.validate();
+        for wrong in ["", "  ", "a\0b", "two\nlines", &"x".repeat(201)] {
+            assert!(named(wrong).unwrap_err().to_string().starts_with("setting name: "), "{wrong:?}");
+        }
+        assert!(named(&"ö".repeat(200)).is_ok());
+    }
+
+    #[test]
+    fn the_number_of_stops_and_of_placed_rocks_is_bounded() {
+        let one = "[[drive.moves]]\nkind = \"forward\"\ndistance_m = 0.1\nstops = 200\n";
+        let drive = |moves: usize| format!("[drive]\ncourse = \"moves\"\n{}", one.repeat(moves));
+        let refused = |text: &str| Scenario::from_toml(text, Path::new("s.toml")).unwrap_err().to_string();
+        let many = refused(&drive(11));
+        assert!(many.contains("drive.moves") && many.contains("2200 stops"), "{many}");
+        let rock = "[[rocks.placed]]\nx_m = 1.0\ny_m = 1.0\ndiameter_m = 0.1\nheight_m = 0.1\n";
+        assert!(refused(&rock.repeat(1001)).contains("rocks.placed"));
     }
 
     #[test]

@@ -25,7 +25,9 @@ use super::terminal::Progress;
 use super::track::pixel;
 use super::{open, terminal};
 use crate::exports::{Kind, Made, Part, Source, make};
+use crate::folders::Folders;
 use crate::hosts::Hosts;
+use crate::identity::{Identity, Relation};
 use crate::live_session::LiveSession;
 use crate::naming::name_of;
 use crate::problem::ApiError;
@@ -115,10 +117,21 @@ impl Export {
             Some(path) => open::open(path, Some(&data))?,
             None => find_traverse(&data, &saved.traverse)?,
         };
-        let own = name_of(&traverse)?;
-        if own != saved.traverse {
-            let theirs = &saved.traverse;
-            return Err(Error::Request(format!("session {id} is on the traverse {theirs}, not on {own}")));
+        let digests = Folders::in_one(&data).digests;
+        let own = Identity::of(&traverse, Some(&digests))?;
+        let theirs = &saved.traverse;
+        match own.relation(theirs) {
+            Relation::Same | Relation::SameIndex => {}
+            Relation::OtherFiles => {
+                let message = "was made on other images than the drive has now; put those back to export it";
+                return Err(Error::Request(format!("session {id} {message} ({theirs}, not {})", own.id())));
+            }
+            Relation::Other => {
+                let own = own.id();
+                return Err(Error::Request(format!(
+                    "session {id} is on the traverse {theirs}, not on {own}"
+                )));
+            }
         }
         let notes =
             store::number_of(id).and_then(|number| found.notes.get(&number)).cloned().unwrap_or_default();
@@ -140,7 +153,8 @@ impl Export {
         let settings = own.with(&changes)?;
         terminal::settings_without_effect(&settings, &changes);
         let traverse = open::open(path, self.data_dir.as_deref())?;
-        let mut session = Session::new("s1", name_of(&traverse)?, traverse.stop_count());
+        let id = Identity::of(&traverse, None)?.id();
+        let mut session = Session::new("s1", id, traverse.stop_count());
         for pixel in &self.target {
             let designation = Designation { step: self.from_step, pixel: *pixel };
             if self.from_step < traverse.stop_count() {

@@ -53,8 +53,7 @@ impl Serve {
         let address = listener.local_addr().map_err(|error| Error::Request(error.to_string()))?;
         let _lock = lock(&data)?;
         let traverses = self.open_traverses(&data)?;
-        let [sessions, studies, made] = ["sessions", "studies", open::TRAVERSES].map(|name| data.join(name));
-        let folders = Folders { sessions, studies, traverses: made };
+        let folders = Folders { sessions: data.join("sessions"), ..Folders::in_one(&data) };
         let runtime = super::runtime()?;
         let inside = runtime.enter();
         let state =

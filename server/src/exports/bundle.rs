@@ -34,6 +34,7 @@ pub(crate) fn json(source: &Source, part: Part) -> String {
             "description": index.description,
             "stops": index.stops.len(),
             "index_sha256": hash(&serde_json::to_vec(index).unwrap_or_default()),
+            "files_sha256": source.open.identity.files_sha256,
             "seed": scenario.as_ref().map(|scenario| scenario.seed),
             "scenario_sha256": scenario.as_ref().map(|scenario| hash(scenario.to_toml().as_bytes())),
             "scenario_toml": scenario.as_ref().map(Scenario::to_toml),

@@ -7,7 +7,6 @@ use axum::response::{IntoResponse, Response};
 use sightline_api::endpoint::Endpoint;
 use sightline_api::endpoints::{AddBreakpoint, ChangeBreakpoint, ListBreakpoints, RemoveBreakpoint};
 use sightline_api::location::AtBreakpoint;
-use sightline_api::wire::ExpressionProblem;
 use sightline_session::Session;
 use sightline_session::breakpoints::{BreakpointChange, BreakpointView, NewBreakpoint};
 use sightline_session::expression::Refused;
@@ -17,7 +16,7 @@ use utoipa_axum::routes;
 use crate::extract::{Body, Path, SessionPath};
 use crate::jobs::blocking;
 use crate::live_session::LiveSession;
-use crate::problem::{ApiError, ApiResult};
+use crate::problem::{ApiError, ApiResult, ExpressionRefusal};
 use crate::routes::route::{location, route};
 use crate::state::AppState;
 
@@ -42,7 +41,7 @@ async fn list(SessionPath(live): SessionPath) -> ApiResult<Json<Vec<BreakpointVi
 /// It is a condition, or the stop to break at. One with the same condition is switched on instead.
 #[utoipa::path(post, operation_id = "add_breakpoint", path = AddBreakpoint::PATH, tag = "breakpoints",
     request_body = NewBreakpoint, responses((status = 201, body = BreakpointView),
-    (status = 422, description = "What is wrong with the condition, and where", body = ExpressionProblem), ApiError))]
+    ExpressionRefusal, ApiError))]
 async fn add(
     State(state): State<AppState>,
     SessionPath(live): SessionPath,
@@ -73,7 +72,7 @@ async fn add(
 /// Changes a breakpoint's condition, or switches it on or off
 #[utoipa::path(patch, operation_id = "change_breakpoint", path = ChangeBreakpoint::PATH,
     tag = "breakpoints", request_body = BreakpointChange, responses((status = 200, body = BreakpointView),
-    (status = 422, description = "What is wrong with the condition, and where", body = ExpressionProblem), ApiError))]
+    ExpressionRefusal, ApiError))]
 async fn change(
     State(state): State<AppState>,
     Path(AtBreakpoint { session, breakpoint: number }): Path<ChangeBreakpoint>,

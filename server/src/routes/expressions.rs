@@ -4,7 +4,6 @@ use axum::Json;
 use axum::extract::State;
 use sightline_api::endpoint::Endpoint;
 use sightline_api::endpoints::{CompleteExpression, QuerySession, ShowExpressions};
-use sightline_api::wire::ExpressionProblem;
 use sightline_session::expression::Expression;
 use sightline_session::expression::complete::{Completion, complete};
 use sightline_session::query::{self, CompletionQuery, Language, Query, QueryAnswer};
@@ -13,7 +12,7 @@ use utoipa_axum::routes;
 
 use crate::extract::{Body, SessionPath};
 use crate::jobs::blocking;
-use crate::problem::{ApiError, ApiResult};
+use crate::problem::{ApiError, ApiResult, ExpressionRefusal};
 use crate::routes::breakpoints::refused;
 use crate::routes::route::route;
 use crate::state::AppState;
@@ -43,7 +42,7 @@ async fn completion(Body(asked): Body<CompleteExpression>) -> Json<Completion> {
 /// Asks an expression at every step of every run: where it is true, and what its values are
 #[utoipa::path(post, operation_id = "query_session", path = QuerySession::PATH, tag = "expressions",
     request_body = Query, responses((status = 200, body = QueryAnswer),
-    (status = 422, description = "What is wrong with the expression, and where", body = ExpressionProblem), ApiError))]
+    ExpressionRefusal, ApiError))]
 async fn ask(
     State(state): State<AppState>,
     SessionPath(live): SessionPath,

@@ -6,7 +6,7 @@ use axum::http::header;
 use axum::response::IntoResponse;
 use sightline_api::endpoint::Endpoint;
 use sightline_api::endpoints::ShowOpenApi;
-use sightline_api::wire::{Event, Problem};
+use sightline_api::wire::{Event, ExpressionProblem, Problem};
 use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
@@ -25,7 +25,7 @@ use crate::state::AppState;
         Units are in the names of fields (`_px`, `_m`, `_deg`, `_s`); `a_from_b` takes points of frame b into \
         frame a; pixel (0, 0) is the centre of the first pixel; what is not known is null."),
     servers((url = "/api/v1")),
-    components(schemas(Problem, Event))
+    components(schemas(Problem, ExpressionProblem, Event))
 )]
 struct Document;
 
@@ -70,12 +70,13 @@ async fn document() -> impl IntoResponse {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeSet;
+    use std::collections::{BTreeMap, BTreeSet};
 
     use serde_json::Value;
     use sightline_api::endpoints::ALL;
 
     use super::*;
+    use crate::routes::route;
 
     #[test]
     fn the_router_has_exactly_the_declared_endpoints() {
@@ -86,6 +87,43 @@ mod tests {
         });
         let declared = ALL.iter().map(|(method, path)| (method.to_string(), (*path).to_owned()));
         assert_eq!(described.collect::<BTreeSet<_>>(), declared.collect::<BTreeSet<_>>());
+    }
+
+    #[test]
+    fn every_schema_is_of_one_type() {
+        let own = Document::openapi().components.unwrap().schemas;
+        drop(router());
+        let mut by_name = BTreeMap::<String, Value>::new();
+        let mut clashes = BTreeSet::new();
+        for (name, schema) in own.into_iter().chain(route::schemas_of_all_routes()) {
+            let schema = serde_json::to_value(schema).unwrap();
+            if *by_name.entry(name.clone()).or_insert_with(|| schema.clone()) != schema {
+                clashes.insert(name);
+            }
+        }
+        assert!(by_name.len() > 100, "the schemas are collected");
+        assert!(clashes.is_empty(), "two types have the same name, say `#[schema(as = …)]`: {clashes:?}");
+    }
+
+    #[test]
+    fn every_reference_names_a_schema_and_every_problem_its_media_type() {
+        let document: Value = serde_json::from_str(&JSON).unwrap();
+        for named in JSON.split("\"#/components/schemas/").skip(1) {
+            let name = named.split('"').next().unwrap();
+            assert!(document["components"]["schemas"][name].is_object(), "{name}");
+        }
+        for (method, path) in ALL {
+            let responses = &document["paths"][*path][&method.to_string().to_lowercase()]["responses"];
+            let responses = responses.as_object().unwrap();
+            assert!(responses.contains_key("default"), "{method} {path} has no answer for problems");
+            let problems = responses.iter().filter(|(status, _)| status.starts_with('4'));
+            for (status, response) in problems {
+                let types: Vec<_> = response["content"].as_object().unwrap().keys().collect();
+                let is_page = path.ends_with("/page");
+                let expected = if is_page { "text/html" } else { "application/problem+json" };
+                assert_eq!(types, [expected], "{method} {path} {status}");
+            }
+        }
     }
 
     #[test]

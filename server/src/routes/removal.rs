@@ -1,22 +1,28 @@
-//! Removing runs, and taking the removal of targets and runs back: nothing that was recorded is lost.
+//! Removing sessions, runs and drives, and taking the removal of sessions, targets and runs back.
 
 use std::sync::Arc;
 
 use axum::Json;
 use axum::extract::State;
+use axum::http::StatusCode;
 use sightline_api::endpoint::Endpoint;
-use sightline_api::endpoints::{RemoveRun, RestoreRun, RestoreTarget};
+use sightline_api::endpoints::{
+    RemoveRun, RemoveSession, RemoveTraverse, RestoreRun, RestoreSession, RestoreTarget,
+};
+use sightline_api::location::{AtSession, AtTraverse};
 use sightline_geometry::error::Result;
 use sightline_session::Session;
 use sightline_session::view::SessionView;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
-use crate::extract::{RunPath, TargetPath};
+use crate::brought;
+use crate::extract::{Path, RunPath, TargetPath};
 use crate::jobs::blocking;
 use crate::live_session::LiveSession;
 use crate::problem::{ApiError, ApiResult};
 use crate::routes::route::route;
+use crate::routes::targets;
 use crate::state::AppState;
 
 /// The routes of this resource.
@@ -25,6 +31,50 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
         .routes(route::<RemoveRun>(routes!(remove_run)))
         .routes(route::<RestoreRun>(routes!(restore_run)))
         .routes(route::<RestoreTarget>(routes!(restore_target)))
+        .routes(route::<RemoveSession>(routes!(remove_session)))
+        .routes(route::<RestoreSession>(routes!(restore_session)))
+        .routes(route::<RemoveTraverse>(routes!(remove_traverse)))
+}
+
+/// Removes a session
+///
+/// Its runs end. The last 16 removed sessions can be restored until the server ends.
+#[utoipa::path(delete, operation_id = "remove_session", path = RemoveSession::PATH, tag = "sessions", responses((status = 204), ApiError))]
+async fn remove_session(
+    State(state): State<AppState>,
+    Path(AtSession { session }): Path<RemoveSession>,
+) -> ApiResult<StatusCode> {
+    blocking(move || state.remove_session(&session).map(|()| StatusCode::NO_CONTENT)).await
+}
+
+/// Takes the removal of a session back; its runs are computed again
+#[utoipa::path(post, operation_id = "restore_session", path = RestoreSession::PATH, tag = "sessions", responses((status = 200, body = SessionView), ApiError))]
+async fn restore_session(
+    State(state): State<AppState>,
+    Path(AtSession { session }): Path<RestoreSession>,
+) -> ApiResult<Json<SessionView>> {
+    blocking(move || {
+        let live = state.restore_session(&session)?;
+        Ok(Json(state.view(&live)))
+    })
+    .await
+}
+
+/// Removes a drive that was opened by its scenario
+///
+/// Its folder with the rendered images is deleted. A drive with sessions, or one that was given when the server was started,
+/// is refused (409). The same scenario opens it again.
+#[utoipa::path(delete, operation_id = "remove_traverse", path = RemoveTraverse::PATH, tag = "traverses", responses((status = 204), ApiError))]
+async fn remove_traverse(
+    State(state): State<AppState>,
+    Path(AtTraverse { id }): Path<RemoveTraverse>,
+) -> ApiResult<StatusCode> {
+    let open = state.traverse(&id)?;
+    if !state.is_removable(&open) {
+        return Err(ApiError::conflict(format!("The drive {id} was given when the server was started."))
+            .hint("Start the server without it."));
+    }
+    blocking(move || brought::remove(&state, &open).map(|()| StatusCode::NO_CONTENT)).await
 }
 
 /// Removes a run; its number is not used again, and what left it keeps the steps that both share
@@ -69,6 +119,7 @@ async fn restore_target(
     TargetPath { live, target }: TargetPath,
 ) -> ApiResult<Json<SessionView>> {
     blocking(move || {
+        live.with(|session| targets::has_room(session))?;
         restored(&live, |session| session.restore_target(target))?;
         state.runner().go_on_with(&live, target)?;
         saved(&state, &live)
@@ -82,5 +133,5 @@ fn restored(live: &LiveSession, restore: impl FnOnce(&mut Session) -> Result<()>
 
 fn saved(state: &AppState, live: &Arc<LiveSession>) -> ApiResult<Json<SessionView>> {
     state.changed(live)?;
-    Ok(Json(live.with(|session| session.view())))
+    Ok(Json(state.view(live)))
 }

@@ -76,10 +76,13 @@ async fn follow(live: Arc<LiveSession>, stream: Arc<LiveStream>, mut events: Rec
         }
         loop {
             match events.recv().await {
+                Ok(Event::SessionRemoved { session }) if session == live.id => return,
                 Ok(Event::SessionChanged { session } | Event::RunProgress { session, .. })
                     if session != live.id => {}
                 Ok(
-                    Event::CursorMoved { .. }
+                    Event::SessionRemoved { .. }
+                    | Event::TraverseRemoved { .. }
+                    | Event::CursorMoved { .. }
                     | Event::RenderProgress { .. }
                     | Event::StudyProgress { .. }
                     | Event::TrackabilityProgress { .. }

@@ -2,11 +2,14 @@
 
 use axum::http::header::{self, HeaderName};
 use sightline_api::endpoint::{self, Endpoint, Method};
-use utoipa::IntoParams;
+use sightline_api::endpoints::CREATING;
 use utoipa::openapi::RefOr;
 use utoipa::openapi::path::{Operation, ParameterIn, PathItem};
+use utoipa::{IntoParams, IntoResponses};
 use utoipa_axum::router::UtoipaMethodRouter;
 
+use crate::idempotency;
+use crate::problem::ApiError;
 use crate::state::AppState;
 
 /// The handler that `routes!` describes, as the route of `E`; its description gains the names in the path.
@@ -17,6 +20,8 @@ pub(crate) fn route<E: Endpoint<At: IntoParams>>(
     described: UtoipaMethodRouter<AppState>,
 ) -> UtoipaMethodRouter<AppState> {
     let (schemas, mut paths, handler) = described;
+    #[cfg(test)]
+    SCHEMAS.with_borrow_mut(|all| all.extend(schemas.iter().cloned()));
     let operation = paths.paths.get_mut(E::PATH).and_then(|item| operation(item, E::METHOD));
     assert!(operation.is_some(), "the handler of {} {} declares another route", E::METHOD, E::PATH);
     if let Some(operation) = operation {
@@ -30,9 +35,32 @@ pub(crate) fn route<E: Endpoint<At: IntoParams>>(
         all.iter_mut().for_each(|parameter| parameter.description = None);
         let mut all: Vec<_> = all.into_iter().map(RefOr::T).collect();
         all.extend(declared);
+        if E::METHOD == Method::Post && CREATING.contains(&E::PATH) {
+            all.push(RefOr::T(idempotency::parameter()));
+        }
         operation.parameters = (!all.is_empty()).then_some(all);
+        // The guard before every handler refuses with a problem.
+        for (status, response) in ApiError::responses() {
+            operation.responses.responses.entry(status).or_insert(response);
+        }
     }
     (schemas, paths, handler)
+}
+
+/// A schema with its name.
+#[cfg(test)]
+type NamedSchema = (String, RefOr<utoipa::openapi::Schema>);
+
+#[cfg(test)]
+thread_local! {
+    /// The schemas of the routes that this thread registered, also those that others of their name replaced.
+    static SCHEMAS: std::cell::RefCell<Vec<NamedSchema>> = const { std::cell::RefCell::new(Vec::new()) };
+}
+
+/// The schemas of all routes that this thread registered.
+#[cfg(test)]
+pub(super) fn schemas_of_all_routes() -> Vec<NamedSchema> {
+    SCHEMAS.take()
 }
 
 fn operation(item: &mut PathItem, method: Method) -> Option<&mut Operation> {

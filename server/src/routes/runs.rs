@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use axum::Json;
 use axum::extract::State;
-use axum::http::StatusCode;
+use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
 use sightline_api::endpoint::Endpoint;
 use sightline_api::endpoints::{CancelRun, ForkRun, ResumeRun, ShowRun};
@@ -21,6 +21,7 @@ use crate::extract::{Body, Params, RunPath, TargetPath};
 use crate::jobs::blocking;
 use crate::live_session::{LiveSession, RUN_LIMIT};
 use crate::problem::{ApiError, ApiResult};
+use crate::revision;
 use crate::routes::route::{location, route};
 use crate::routes::targets::start_or_say;
 use crate::routes::what_if;
@@ -53,13 +54,24 @@ async fn fork(
 }
 
 /// A run so far
-#[utoipa::path(get, operation_id = "show_run", path = ShowRun::PATH, tag = "runs", params(FirstRow),
-    responses((status = 200, body = RunView), ApiError))]
+///
+/// The answer has an ETag; `If-None-Match` with it is answered by 304 while the run is the same.
+#[utoipa::path(get, operation_id = "show_run", path = ShowRun::PATH, tag = "runs", params(FirstRow,
+    ("If-None-Match" = Option<String>, Header, description = "The ETag of the answer that you have")),
+    responses((status = 200, body = RunView, headers(("etag" = String, description = "Changes with the answer"))),
+    (status = 304, description = "It is the one that you have (If-None-Match)"), ApiError))]
 async fn show(
+    State(state): State<AppState>,
     RunPath { live, target, run }: RunPath,
     Params(rows): Params<ShowRun>,
-) -> ApiResult<Json<RunView>> {
-    Ok(Json(view_from(&live, target, run, rows.from_row)?))
+    headers: HeaderMap,
+) -> ApiResult<Response> {
+    blocking(move || {
+        let view = view_from(&state, &live, target, run, rows.from_row)?;
+        let json = serde_json::to_vec(&view).map_err(|error| ApiError::internal(error.to_string()))?;
+        Ok(revision::unless_known(&headers, "application/json", json))
+    })
+    .await
 }
 
 /// Stops a run after its last step so far
@@ -69,7 +81,7 @@ async fn cancel(
     RunPath { live, target, run }: RunPath,
 ) -> ApiResult<Json<RunView>> {
     blocking(move || {
-        let before = view(&live, target, run)?;
+        let before = view(&state, &live, target, run)?;
         if before.complete || before.stopped.is_some() {
             return Err(ApiError::conflict("The run has ended already."));
         }
@@ -79,7 +91,7 @@ async fn cancel(
             session.cancel(target, run)
         })?;
         state.changed(&live)?;
-        Ok(Json(view(&live, target, run)?))
+        Ok(Json(view(&state, &live, target, run)?))
     })
     .await
 }
@@ -91,13 +103,13 @@ async fn resume(
     RunPath { live, target, run }: RunPath,
 ) -> ApiResult<(StatusCode, Json<RunView>)> {
     blocking(move || {
-        if view(&live, target, run)?.stopped.is_none() {
+        if view(&state, &live, target, run)?.stopped.is_none() {
             return Err(ApiError::conflict("The run was not stopped."));
         }
         live.with(|session| session.resume(target, run))?;
         start_or_say(&state, &live, target, run);
         state.changed(&live)?;
-        Ok((StatusCode::ACCEPTED, Json(view(&live, target, run)?)))
+        Ok((StatusCode::ACCEPTED, Json(view(&state, &live, target, run)?)))
     })
     .await
 }
@@ -145,7 +157,7 @@ fn add(
     start_or_say(state, live, target, run);
     state.changed(live)?;
     let location = location::<ShowRun>(&AtRun { session: live.id.clone(), target, run });
-    Ok((StatusCode::ACCEPTED, location, Json(view(live, target, run)?)).into_response())
+    Ok((StatusCode::ACCEPTED, location, Json(view(state, live, target, run)?)).into_response())
 }
 
 fn has_room(session: &Session, target: usize) -> ApiResult<()> {
@@ -158,13 +170,20 @@ fn has_room(session: &Session, target: usize) -> ApiResult<()> {
 }
 
 /// The run that the path names.
-fn view(live: &LiveSession, target: usize, run: usize) -> ApiResult<RunView> {
-    view_from(live, target, run, 0)
+fn view(state: &AppState, live: &LiveSession, target: usize, run: usize) -> ApiResult<RunView> {
+    view_from(state, live, target, run, 0)
 }
 
 /// That run with its rows from one on.
-fn view_from(live: &LiveSession, target: usize, run: usize, from_row: usize) -> ApiResult<RunView> {
+fn view_from(
+    state: &AppState,
+    live: &LiveSession,
+    target: usize,
+    run: usize,
+    from_row: usize,
+) -> ApiResult<RunView> {
     let found = live
         .with(|session| session.run(target, run).map(|found| session.run_view_from(run, found, from_row)));
-    found.map_err(|error| ApiError::from(error).about_path())
+    let view = found.map_err(|error| ApiError::from(error).about_path())?;
+    Ok(RunView { waits_for: state.runner().waits_for(live, target, run), ..view })
 }

@@ -77,7 +77,7 @@ async fn begin(State(state): State<AppState>, Body(new): Body<BeginSession>) -> 
         state.look_at(&live.traverse, 0);
         state.changed(&live)?;
         let location = location::<ShowSession>(&AtSession { session: live.id.clone() });
-        Ok((StatusCode::CREATED, location, Json(live.with(|session| session.view()))).into_response())
+        Ok((StatusCode::CREATED, location, Json(state.view(&live))).into_response())
     })
     .await
 }
@@ -93,7 +93,7 @@ async fn bring(State(state): State<AppState>, Body(new): Body<BringSession>) -> 
     let work = move |cancel: &CancelFlag| {
         let live = brought::bring(&work_state, new, cancel)?;
         let location = location::<ShowSession>(&AtSession { session: live.id.clone() });
-        Ok((StatusCode::CREATED, location, Json(live.with(|session| session.view()))).into_response())
+        Ok((StatusCode::CREATED, location, Json(work_state.view(&live))).into_response())
     };
     state.designations().run_until_dropped(work).await
 }
@@ -101,8 +101,8 @@ async fn bring(State(state): State<AppState>, Body(new): Body<BringSession>) -> 
 /// A session with its targets and runs
 #[utoipa::path(get, operation_id = "show_session", path = ShowSession::PATH, tag = "sessions", responses(
     (status = 200, body = SessionView), ApiError))]
-async fn show(SessionPath(live): SessionPath) -> ApiResult<Json<SessionView>> {
-    Ok(Json(live.with(|session| session.view())))
+async fn show(State(state): State<AppState>, SessionPath(live): SessionPath) -> ApiResult<Json<SessionView>> {
+    Ok(Json(state.view(&live)))
 }
 
 /// What is looked at

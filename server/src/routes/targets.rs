@@ -10,6 +10,7 @@ use sightline_api::endpoint::Endpoint;
 use sightline_api::endpoints::{DesignateTarget, RemoveTarget};
 use sightline_api::location::AtTarget;
 use sightline_api::wire::{Designated, NewTarget};
+use sightline_session::Session;
 use sightline_session::view::SessionView;
 use sightline_track::settings::Settings;
 use utoipa_axum::router::OpenApiRouter;
@@ -18,7 +19,7 @@ use utoipa_axum::routes;
 use crate::cancel::CancelFlag;
 use crate::extract::{Body, SessionPath, TargetPath};
 use crate::jobs::blocking;
-use crate::live_session::{LABEL_LIMIT, LiveSession, TARGET_LIMIT};
+use crate::live_session::{LABEL_LIMIT, LiveSession, TARGET_LIMIT, TARGET_NUMBERS};
 use crate::problem::{ApiError, ApiResult};
 use crate::routes::route::{location, route};
 use crate::routes::trackability;
@@ -60,7 +61,7 @@ async fn remove(
         removed.map_err(|error| ApiError::from(error).about_path())?;
         live.tell_to_end(target, None);
         state.changed(&live)?;
-        Ok(Json(live.with(|session| session.view())))
+        Ok(Json(state.view(&live)))
     })
     .await
 }
@@ -73,21 +74,17 @@ fn add(
     settings: Settings,
     cancel: &CancelFlag,
 ) -> ApiResult<Response> {
-    let has_room = |count: usize| {
-        let full = || ApiError::conflict(format!("A session may have at most {TARGET_LIMIT} targets."));
-        (count < TARGET_LIMIT).then_some(()).ok_or_else(full)
-    };
-    has_room(live.with(|session| session.targets.len()))?;
+    live.with(|session| has_number(session))?;
     let named = new.place().name(&live.traverse.traverse, new.step)?;
     let designation = named.designation;
     let first = runner::designate(&live.traverse, designation, &settings, cancel)
         .map_err(|error| trackability::refusal(state, &live.traverse, designation, &settings, error))?;
     let first = Arc::new(first);
     let gap_m = named.gap_m(&first);
-    let (target, view) = live.with(|session| {
-        has_room(session.targets.len())?;
+    let target = live.with(|session| {
+        has_number(session)?;
         let target = session.add_target(new.label, settings, first);
-        Ok::<_, ApiError>((target, session.view()))
+        Ok::<_, ApiError>(target)
     })?;
     state.look_at(&live.traverse, designation.step);
     state.changed(live)?;
@@ -96,9 +93,31 @@ fn add(
     Ok((
         StatusCode::CREATED,
         location::<RemoveTarget>(&at),
-        Json(Designated { target, gap_m, session: view }),
+        Json(Designated { target, gap_m, session: state.view(live) }),
     )
         .into_response())
+}
+
+/// Whether a session may have another target.
+///
+/// # Errors
+/// A problem when it has too many.
+pub(crate) fn has_room(session: &Session) -> ApiResult<()> {
+    if session.target_count() < TARGET_LIMIT {
+        return Ok(());
+    }
+    let detail = format!("A session may have at most {TARGET_LIMIT} targets.");
+    Err(ApiError::conflict(detail).hint("Remove one that is not needed."))
+}
+
+/// Whether a session may have another target with a number of its own.
+fn has_number(session: &Session) -> ApiResult<()> {
+    has_room(session)?;
+    if session.targets.len() < TARGET_NUMBERS {
+        return Ok(());
+    }
+    let detail = format!("A session may have at most {TARGET_NUMBERS} targets, the removed ones included.");
+    Err(ApiError::conflict(detail).hint("Begin another session."))
 }
 
 /// Continues a run; when too much is waiting, the run says so and can be resumed.

@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use axum::Json;
 use axum::extract::State;
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
 use sightline_api::endpoint::Endpoint;
 use sightline_api::endpoints::{AddTraverse, ListTraverses, Prefetch, ShowImage, ShowStop, ShowTraverse};
@@ -23,9 +23,9 @@ use crate::cancel::{CancelFlag, CancelOnDrop};
 use crate::drives;
 use crate::extract::{Body, Params, Path};
 use crate::jobs::blocking;
-use crate::naming::hash;
 use crate::problem::{ApiError, ApiResult};
 use crate::rendering::OpenTraverse;
+use crate::revision;
 use crate::routes::route::{location, route};
 use crate::state::AppState;
 
@@ -53,10 +53,10 @@ pub(crate) struct FileBytes(#[allow(dead_code)] Vec<u8>);
 #[utoipa::path(get, operation_id = "list_traverses", path = ListTraverses::PATH, tag = "traverses", responses(
     (status = 200, body = Vec<TraverseEntry>), ApiError))]
 async fn list(State(state): State<AppState>) -> Json<Vec<TraverseEntry>> {
-    Json(state.traverses().iter().map(|open| entry(open)).collect())
+    Json(state.traverses().iter().map(|open| entry(&state, open)).collect())
 }
 
-fn entry(open: &OpenTraverse) -> TraverseEntry {
+fn entry(state: &AppState, open: &OpenTraverse) -> TraverseEntry {
     let index = open.traverse.index();
     TraverseEntry {
         id: open.id.clone(),
@@ -64,6 +64,7 @@ fn entry(open: &OpenTraverse) -> TraverseEntry {
         description: index.description.clone(),
         simulated: index.scenario.is_some(),
         stop_count: index.stops.len(),
+        removable: state.is_removable(open),
     }
 }
 
@@ -79,7 +80,7 @@ async fn add(State(state): State<AppState>, Body(new): Body<AddTraverse>) -> Api
         let (open, is_new) = brought::open(&work_state, &new.scenario, cancel)?;
         let status = if is_new { StatusCode::CREATED } else { StatusCode::OK };
         let location = location::<ShowTraverse>(&AtTraverse { id: open.id.clone() });
-        Ok((status, location, Json(entry(&open))).into_response())
+        Ok((status, location, Json(entry(&work_state, &open))).into_response())
     };
     state.designations().run_until_dropped(work).await
 }
@@ -155,7 +156,8 @@ async fn image(
             })
         })
         .await?;
-    Ok(picture(png, &headers))
+    // The browser keeps it, and asks before it uses it again: files may be exchanged between two starts of the server.
+    Ok(revision::unless_known(&headers, "image/png", png))
 }
 
 /// Renders the stops from this one on before all others
@@ -207,16 +209,4 @@ fn encode(
     open.make_ready(step, cancel)?;
     let image = open.traverse.capture_one(step, is_left)?;
     if is_deep { io::encode_png_u16(&image, None) } else { io::encode_png_u8(&image) }
-}
-
-/// An answer that the browser keeps, and asks about before it uses it again: files may be exchanged between
-/// two starts of the server.
-fn picture(png: Vec<u8>, headers: &HeaderMap) -> Response {
-    let tag = format!("\"{}\"", &hash(&png)[..32]);
-    let known = headers.get(header::IF_NONE_MATCH).and_then(|value| value.to_str().ok());
-    let caching = [(header::ETAG, tag.clone()), (header::CACHE_CONTROL, "private, no-cache".to_owned())];
-    if known.is_some_and(|known| known.split(',').any(|one| one.trim().trim_start_matches("W/") == tag)) {
-        return (StatusCode::NOT_MODIFIED, caching).into_response();
-    }
-    ([(header::CONTENT_TYPE, "image/png")], caching, png).into_response()
 }

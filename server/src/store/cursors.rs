@@ -61,6 +61,13 @@ impl Cursors {
         lock(&self.waiting.inside).moved.remove(&number);
     }
 
+    /// Forgets everything about a session that is removed.
+    pub(super) fn forget_session(&self, number: u64) {
+        let mut inside = lock(&self.waiting.inside);
+        inside.moved.remove(&number);
+        inside.used.remove(&number);
+    }
+
     /// Writes what is remembered.
     pub(super) fn flush(&self, disk: &Disk) -> Result<()> {
         self.waiting.write(disk)

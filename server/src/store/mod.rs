@@ -143,6 +143,16 @@ impl Store {
         self.disk.write(|transaction| put(transaction, NOTES, number, notes))
     }
 
+    /// Takes a session with all that belongs to it out of the database.
+    ///
+    /// # Errors
+    /// [`Error::Write`]; the database is then as it was.
+    pub(crate) fn remove(&self, session: &str) -> Result<()> {
+        let Some(number) = number_of(session) else { return Ok(()) };
+        self.cursors.forget_session(number);
+        self.disk.write(|transaction| forget(transaction, number))
+    }
+
     /// Reads everything; sessions that cannot be read are moved aside.
     ///
     /// # Errors

@@ -120,6 +120,14 @@ impl Store {
         self.disk.write(|transaction| put(transaction, DRIVES, folder, &scenario))
     }
 
+    /// Forgets a drive that was opened from a page.
+    ///
+    /// # Errors
+    /// [`sightline_geometry::error::Error::Write`]; the database is then as it was.
+    pub(crate) fn remove_drive(&self, folder: &str) -> Result<()> {
+        self.disk.write(|transaction| Ok(transaction.open_table(DRIVES)?.remove(folder)?.is_some()))
+    }
+
     /// The studies that were started, by number; what cannot be read is left out.
     ///
     /// # Errors

@@ -6,6 +6,7 @@ pub(crate) mod documents;
 pub(crate) mod inbox;
 pub(crate) mod window;
 pub(crate) mod download;
+mod removal;
 mod update;
 
 use sightline_api::wire::SessionEntry;
@@ -27,6 +28,14 @@ pub enum Ask {
     Resume(String),
     /// Begins a new session on a traverse.
     Begin(String),
+    /// Removes a session.
+    RemoveSession(Box<SessionEntry>),
+    /// Takes the removal of a session back.
+    RestoreSession(String),
+    /// Asks whether to remove a drive; none when not to.
+    ConfirmDrive(Option<String>),
+    /// Removes a drive with its images.
+    RemoveDrive(String),
     /// Asks again for what of the cursor's stop could not be shown.
     TryAgain,
 }
@@ -46,4 +55,8 @@ pub struct Files {
     pub opening: Option<String>,
     /// The path that is being typed.
     pub path: String,
+    /// The sessions that were removed here and can be restored, the last one at the end.
+    pub removed: Vec<SessionEntry>,
+    /// The drive about whose removal the user is asked.
+    pub confirming: Option<String>,
 }

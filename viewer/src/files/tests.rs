@@ -1,9 +1,9 @@
 //! Opening: what a file is, what is said of one that is none, and what comes of it.
 
 use serde_json::{Value, json};
-use sightline_api::endpoints::{AddTraverse, BringSession, ListSessions};
-use sightline_api::location::Anywhere;
-use sightline_api::wire::{NewTraverse, Problem, SessionEntry};
+use sightline_api::endpoints::{AddTraverse, BringSession, ListSessions, RemoveSession};
+use sightline_api::location::{Anywhere, AtSession};
+use sightline_api::wire::{Event, NewTraverse, Problem, SessionEntry, TraverseEntry};
 use sightline_rover::version::tracker_version;
 use sightline_session::reproduce::{FORMAT, FORMAT_VERSION};
 use sightline_track::settings::Settings;
@@ -246,6 +246,55 @@ fn recent_sessions_are_listed_by_their_use_and_one_click_opens_one() {
     state.perform(Command::Files(Ask::Open));
     state.perform(Command::Files(Ask::Resume("s1".to_owned())));
     assert_eq!(newest(&state).1, "That session is open already.");
+}
+
+#[test]
+fn a_listed_session_is_removed_and_restored_with_one_click_each() {
+    let window = |context: &egui::Context| {
+        let mut state = fixture::at_step(context, 2);
+        (state.files.is_open, state.files.recent) = (true, Some(vec![entry("s1", None), entry("s3", None)]));
+        state.files.removed = vec![entry("s2", None)];
+        state
+    };
+    let mut shown = Shown::new([1000.0, 800.0], window, window::show);
+    let removed = Command::Files(Ask::RemoveSession(Box::new(entry("s3", None))));
+    assert_eq!(shown.click("remove session s3"), vec![removed.clone()]);
+    assert_eq!(shown.click("restore session s2"), vec![Command::Files(Ask::RestoreSession("s2".to_owned()))]);
+
+    let mut state = window(&egui::Context::default());
+    state.take_requests();
+    state.perform(removed);
+    let request = state.take_requests().remove(0);
+    assert!(request.calls::<RemoveSession>(&AtSession { session: "s3".to_owned() }), "{request:?}");
+    state.arrived(Arrived { request, outcome: Ok(fixture::reply(&())) }, 0.0);
+    assert_eq!(state.files.removed.last().unwrap().id, "s3");
+    state.told(Event::SessionRemoved { session: "s1".to_owned() });
+    assert!(newest(&state).1.contains("s1 was removed"), "the open one, by another page");
+}
+
+#[test]
+fn a_drive_is_removed_after_a_question() {
+    let window = |context: &egui::Context| {
+        let mut state = fixture::at_step(context, 2);
+        let hill = TraverseEntry { id: "hill-1".to_owned(), name: "hill".to_owned(), ..fixture::entry() };
+        state.files.is_open = true;
+        state.traverses = Some(vec![fixture::entry(), TraverseEntry { removable: true, ..hill }]);
+        state
+    };
+    let asked = Command::Files(Ask::ConfirmDrive(Some("hill-1".to_owned())));
+    let mut shown = Shown::new([1000.0, 800.0], window, window::show);
+    assert_eq!(shown.click("remove the drive hill"), vec![asked.clone()]);
+    let confirming = move |context: &egui::Context| {
+        let mut state = window(context);
+        state.perform(asked.clone());
+        state
+    };
+    let mut shown = Shown::new([1000.0, 800.0], confirming, window::show);
+    let really = Command::Files(Ask::RemoveDrive("hill-1".to_owned()));
+    assert_eq!(shown.click("really remove the drive hill"), vec![really]);
+    let mut state = window(&egui::Context::default());
+    state.told(Event::TraverseRemoved { traverse: "hill-1".to_owned() });
+    assert_eq!(state.traverses.unwrap().len(), 1);
 }
 
 #[test]

@@ -42,6 +42,10 @@ impl State {
                 let here = self.cursor.step;
                 self.cache.retry(|key| matches!(key, Key::Image { step, .. } if *step == here));
             }
+            Ask::RemoveSession(entry) => self.remove_session(*entry),
+            Ask::RestoreSession(id) => self.restore_session(id),
+            Ask::ConfirmDrive(id) => self.files.confirming = id,
+            Ask::RemoveDrive(id) => self.remove_drive(id),
             Ask::Begin(traverse) => {
                 self.files.is_open = false;
                 self.begin_session(traverse);
@@ -135,7 +139,7 @@ impl State {
     }
 
     /// Asks for the sessions, for the list of recent ones.
-    fn read_recent(&mut self) {
+    pub(super) fn read_recent(&mut self) {
         let call = Call::to::<ListSessions>(&Anywhere {});
         self.call_with_problem::<ListSessions>(call, |state, outcome| match outcome {
             Ok(mut list) => {

@@ -3,7 +3,7 @@
 use egui::{
     Align2, Area, Button, Id, Label, Modal, Order, RichText, ScrollArea, Sense, Ui, WidgetInfo, vec2,
 };
-use sightline_api::wire::SessionEntry;
+use sightline_api::wire::{SessionEntry, TraverseEntry};
 
 use crate::command::Command;
 use crate::files::Ask;
@@ -13,6 +13,9 @@ use crate::theme;
 
 /// How many recent sessions are listed.
 const LISTED: usize = 30;
+
+/// The room for the small button beside a line.
+const BESIDE_WIDTH: f32 = 84.0;
 
 /// Shows the window, while it is open.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
@@ -102,9 +105,22 @@ fn recent(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(Ask)) {
     for entry in list.iter().take(LISTED) {
         let is_open = state.session.as_ref().is_some_and(|open| open.id == entry.id);
         let words = format!("{}: {}", entry.id, about(entry, is_open));
-        if row(ui, &entry.traverse_name, &words, is_open, &session_name(entry)) {
-            ask(Ask::Resume(entry.id.clone()));
+        let name = format!("remove session {}", entry.id);
+        let remove = (!is_open).then_some(("Remove", name.as_str()));
+        match row(ui, [&entry.traverse_name, &words], is_open, &session_name(entry), remove) {
+            Some(Pressed::Row) => ask(Ask::Resume(entry.id.clone())),
+            Some(Pressed::Beside) => ask(Ask::RemoveSession(Box::new(entry.clone()))),
+            None => {}
         }
+    }
+    for entry in state.files.removed.iter().rev() {
+        ui.horizontal(|ui| {
+            ui.label(theme::note(format!("{} on {} was removed.", entry.id, entry.traverse_name)));
+            let undo = Button::new("Undo").min_size(vec2(24.0, 24.0));
+            if ui.add(undo).accessible_name(format!("restore session {}", entry.id)).clicked() {
+                ask(Ask::RestoreSession(entry.id.clone()));
+            }
+        });
     }
     if list.len() > LISTED {
         ui.label(theme::note(format!("and {} older ones", list.len() - LISTED)));
@@ -122,14 +138,50 @@ fn drives(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(Ask)) {
     for entry in list {
         let kind = if entry.simulated { "simulated" } else { "recorded" };
         let words = format!("{kind}, {} stops", entry.stop_count);
-        if row(ui, &entry.name, &words, false, &format!("new session on {}", entry.name)) {
-            ask(Ask::Begin(entry.id.clone()));
+        let name = format!("remove the drive {}", entry.name);
+        let remove = entry.removable.then_some(("Remove …", name.as_str()));
+        match row(ui, [&entry.name, &words], false, &format!("new session on {}", entry.name), remove) {
+            Some(Pressed::Row) => ask(Ask::Begin(entry.id.clone())),
+            Some(Pressed::Beside) => ask(Ask::ConfirmDrive(Some(entry.id.clone()))),
+            None => {}
+        }
+        if state.files.confirming.as_ref() == Some(&entry.id) {
+            confirm(ui, entry, ask);
         }
     }
 }
 
-/// A line that is one button: what it is, and more about it.
-fn row(ui: &mut Ui, title: &str, words: &str, is_on: bool, name: &str) -> bool {
+/// Asks whether to remove a drive, because its images are rendered anew when it is opened again.
+fn confirm(ui: &mut Ui, entry: &TraverseEntry, ask: &mut dyn FnMut(Ask)) {
+    ui.horizontal(|ui| {
+        let words = format!("Remove {} and its rendered images? Its scenario opens it again.", entry.name);
+        ui.label(RichText::new(words).color(theme::text()));
+        let remove = Button::new("Remove").min_size(vec2(24.0, 24.0));
+        if ui.add(remove).accessible_name(format!("really remove the drive {}", entry.name)).clicked() {
+            ask(Ask::RemoveDrive(entry.id.clone()));
+        }
+        if ui.add(Button::new("Keep").min_size(vec2(24.0, 24.0))).clicked() {
+            ask(Ask::ConfirmDrive(None));
+        }
+    });
+}
+
+/// The button of a line that was pressed.
+enum Pressed {
+    /// The line itself.
+    Row,
+    /// The small button beside it.
+    Beside,
+}
+
+/// A line that is one button (title, and more about it), perhaps with a small one beside it (label and accessible name).
+fn row(
+    ui: &mut Ui,
+    [title, words]: [&str; 2],
+    is_on: bool,
+    name: &str,
+    beside: Option<(&str, &str)>,
+) -> Option<Pressed> {
     let mut job = egui::text::LayoutJob::default();
     let style = ui.style().clone();
     let normal = egui::FontSelection::Default;
@@ -140,8 +192,22 @@ fn row(ui: &mut Ui, title: &str, words: &str, is_on: bool, name: &str) -> bool {
         egui::Align::Center,
     );
     theme::note(words).append_to(&mut job, &style, normal, egui::Align::Center);
-    let button = Button::selectable(is_on, job).truncate().min_size(vec2(ui.available_width(), 26.0));
-    ui.add(button).accessible_name(name).clicked()
+    ui.horizontal(|ui| {
+        let width = ui.available_width() - if beside.is_some() { BESIDE_WIDTH } else { 0.0 };
+        let size = vec2(width, 26.0);
+        let button = Button::selectable(is_on, job).truncate().min_size(size);
+        let is_pressed = ui.add_sized(size, button).accessible_name(name).clicked();
+        let is_beside = beside.is_some_and(|(label, name)| {
+            let button = Button::new(label).min_size(vec2(24.0, 24.0));
+            ui.add(button).accessible_name(name).clicked()
+        });
+        match (is_beside, is_pressed) {
+            (true, _) => Some(Pressed::Beside),
+            (false, true) => Some(Pressed::Row),
+            (false, false) => None,
+        }
+    })
+    .inner
 }
 
 /// The accessible name of a recent session: what the line says.

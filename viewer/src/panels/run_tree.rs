@@ -52,6 +52,7 @@ mod tests {
             rows: Vec::new(),
             complete: false,
             stopped: None,
+            waits_for: None,
             summary: Default::default(),
         }
     }

@@ -65,6 +65,8 @@ impl State {
                 self.question_went_on(StepKey { session, target, run, step });
             }
             Event::NotesChanged { session } => self.notes_changed(session),
+            Event::SessionRemoved { session } => self.session_removed(&session),
+            Event::TraverseRemoved { traverse } => self.drive_removed(&traverse),
         }
     }
 
@@ -330,6 +332,7 @@ impl State {
             self.traverse = None;
             self.read_traverse(view.traverse.clone());
         }
+        self.note_waiting_runs(&view);
         let is_kept = std::mem::take(&mut self.sync.keeps_cursor) && !is_other;
         if is_kept {
             // A server that was ended may have lost the last move: it is told again where the page is.

@@ -4,8 +4,10 @@ use std::collections::BTreeSet;
 
 use sightline_geometry::frames::Pixel;
 use sightline_session::Cursor;
+use sightline_session::view::{SessionView, waiting_for};
 
 use crate::page::link::Fragment;
+use crate::state::State;
 
 /// How far a run is.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,6 +18,21 @@ pub struct Progress {
     pub n: usize,
     /// What is being done.
     pub doing: String,
+}
+
+impl State {
+    /// Shows what runs wait for that waited before this page listened.
+    pub(crate) fn note_waiting_runs(&mut self, view: &SessionView) {
+        for target in &view.targets {
+            let n = view.stop_count - target.designation.step;
+            for run in &target.runs {
+                if let Some(before) = run.waits_for {
+                    let progress = Progress { k: run.rows.len(), n, doing: waiting_for(before) };
+                    self.progress.entry((target.number, run.number)).or_insert(progress);
+                }
+            }
+        }
+    }
 }
 
 /// A place in the left image of a stop.

@@ -64,6 +64,7 @@ pub(crate) fn entry() -> TraverseEntry {
         description: "A fixed drive.".to_owned(),
         simulated: true,
         stop_count: STOPS,
+        removable: false,
     }
 }
 
@@ -97,6 +98,7 @@ pub(crate) fn at_step(context: &egui::Context, step: usize) -> State {
         rows: traces.iter().map(RunStep::row).collect(),
         complete: false,
         stopped: None,
+        waits_for: None,
         summary: summarise(&traces),
     };
     let designation = Designation { step: 0, pixel: PIXEL };

@@ -32,6 +32,15 @@ pub(super) fn problem(status: u16) -> Problem {
 }
 
 #[test]
+fn a_page_that_is_opened_late_shows_what_a_run_waits_for() {
+    let mut state = loaded(0);
+    let mut view = state.session.clone().unwrap();
+    view.targets[0].runs[0].waits_for = Some(2);
+    state.adopt(view, false);
+    assert_eq!(state.progress[&(0, 0)].doing, "waiting for 2 runs before it");
+}
+
+#[test]
 fn the_cursor_stays_on_the_drive_and_jumps_between_events() {
     let mut state = loaded(0);
     let mut go = |go: Go| {

@@ -41,6 +41,7 @@ const DRAWN_ACROSS_M: f64 = 1e-4;
 /// By what a match counts as agreeing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
+#[schema(as = InlierGate)]
 pub enum Gate {
     /// Its residual is shorter than `inlier_m`, as in the paper.
     #[default]

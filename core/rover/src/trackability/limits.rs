@@ -63,7 +63,7 @@ impl TrackabilityLimits {
         let table = Self::table();
         let mut document = serde_json::to_value(self).map_err(|e| Error::setting("", e.to_string()))?;
         for (info, value) in checked(changes, &table)? {
-            document[&info.key] = value.clone();
+            document[&info.key] = value;
         }
         for [risky, bad] in PAIRS {
             let (from, to) = (&document[risky], &document[bad]);

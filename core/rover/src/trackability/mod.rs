@@ -52,6 +52,7 @@ pub use pixel::PixelVerdict;
     Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, ToSchema,
 )]
 #[serde(rename_all = "snake_case")]
+#[schema(as = Trackability)]
 pub enum Verdict {
     /// Nothing speaks against it.
     #[default]

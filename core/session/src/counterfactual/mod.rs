@@ -63,6 +63,7 @@ pub enum Goal {
 /// What came of a change, best first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
+#[schema(as = CounterfactualOutcome)]
 pub enum Outcome {
     /// Accepted, and right against the truth.
     Right,

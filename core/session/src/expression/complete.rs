@@ -14,6 +14,7 @@ pub const CANDIDATES: usize = 12;
 
 /// Something that could be written.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[schema(as = CompletionCandidate)]
 pub struct Candidate {
     /// What would be written.
     pub text: String,

@@ -42,6 +42,7 @@ pub struct Descent {
 
 /// A local maximum of the coarsest level and what became of it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = CoarseCandidate)]
 pub struct Candidate {
     /// Where it lay at the coarsest level, px of the image.
     pub coarse_pixel: Pixel,

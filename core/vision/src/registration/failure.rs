@@ -21,6 +21,7 @@ use utoipa::ToSchema;
 /// Which of the two surfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
+#[schema(as = RegisteredView)]
 pub enum Side {
     /// The target's first view.
     Fixed,

@@ -65,6 +65,7 @@ use scene::Scene;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 #[repr(u8)]
+#[schema(as = StereoOutcome)]
 pub enum Outcome {
     /// It has a disparity.
     #[default]

@@ -7,6 +7,12 @@ use super::range::within;
 use crate::rover::approach::distances_m;
 use sightline_geometry::error::{Error, Result};
 
+/// The most stops that a list of moves may have: the index of a drive is read at every start of a server.
+const STOP_LIMIT: usize = 2000;
+
+/// The farthest that a drive may begin from the targets' centre, m.
+const FARTHEST_M: f64 = 50.0;
+
 /// What the drive is made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
@@ -155,11 +161,31 @@ impl DriveSettings {
             let problem = format!("course moves needs 1 to 200 of them, not {}", self.moves.len());
             return Err(Error::setting("drive.moves", problem));
         }
-        self.moves.iter().enumerate().try_for_each(|(index, one)| one.validate(index))
+        self.moves.iter().enumerate().try_for_each(|(index, one)| one.validate(index))?;
+        let stops: usize = self.moves.iter().map(|one| one.most_stops()).sum();
+        if stops > STOP_LIMIT {
+            let problem = format!("may have {stops} stops, but a drive may have at most {STOP_LIMIT}");
+            return Err(Error::setting("drive.moves", problem));
+        }
+        Ok(())
     }
 }
 
 impl Move {
+    /// The most stops with which it can end, wherever the rover begins it.
+    fn most_stops(&self) -> usize {
+        match *self {
+            Self::Forward { stops, .. }
+            | Self::Arc { stops, .. }
+            | Self::Turn { stops, .. }
+            | Self::Crab { stops, .. } => stops as usize,
+            Self::FaceTarget => 1,
+            Self::Approach { to_distance_m, step_fraction } => {
+                distances_m(FARTHEST_M, to_distance_m, step_fraction).len()
+            }
+        }
+    }
+
     /// Refuses a move that is impossible wherever the rover stands; `index` is its place in the list.
     fn validate(&self, index: usize) -> Result<()> {
         let check = |field: &str, value: f64, low: f64, high: f64| {

@@ -4,7 +4,10 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::range::within;
-use sightline_geometry::error::Result;
+use sightline_geometry::error::{Error, Result};
+
+/// The most rocks that may be placed one by one.
+const PLACED_LIMIT: usize = 1000;
 
 /// The relief of the ground: a fractal height field on a regular grid, a plane beyond it, and level ground far away.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -226,6 +229,10 @@ impl RockSettings {
         within("rocks.cluster_radius_m", self.cluster_radius_m, 0.1, 10.0)?;
         within("rocks.cluster_smallest_m", self.cluster_smallest_m, 0.02, self.cluster_largest_m / 1.01)?;
         within("rocks.cluster_largest_m", self.cluster_largest_m, 0.03, 2.0)?;
+        if self.placed.len() > PLACED_LIMIT {
+            let problem = format!("has {} rocks, but may have at most {PLACED_LIMIT}", self.placed.len());
+            return Err(Error::setting("rocks.placed", problem));
+        }
         self.placed.iter().try_for_each(PlacedRock::validate)
     }
 }

@@ -19,6 +19,7 @@ use sha2::{Digest, Sha256};
 use sightline_api::endpoint::Endpoint;
 use sightline_api::endpoints::{ShowSessionPage, ShowSessionsPage, ShowStepPage};
 use sightline_api::location::{AtSession, AtStep};
+use utoipa::IntoResponses;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
@@ -53,14 +54,14 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
 
 /// A plain page with all sessions
 #[utoipa::path(get, operation_id = "plain_sessions", path = ShowSessionsPage::PATH, tag = "plain pages", responses(
-    (status = 200, content_type = "text/html", body = String)))]
+    (status = 200, content_type = "text/html", body = String), NoPage))]
 async fn all(State(state): State<AppState>) -> Response {
     answer(blocking(move || Ok(overview::all(&state))).await, None)
 }
 
 /// A plain page with the targets, runs and notes of a session
 #[utoipa::path(get, operation_id = "plain_session", path = ShowSessionPage::PATH, tag = "plain pages",
-    responses((status = 200, content_type = "text/html", body = String)))]
+    responses((status = 200, content_type = "text/html", body = String), NoPage))]
 async fn session(
     State(state): State<AppState>,
     Path(AtSession { session }): Path<ShowSessionPage>,
@@ -74,7 +75,7 @@ async fn session(
 
 /// A plain page with everything that a step saw and decided
 #[utoipa::path(get, operation_id = "plain_step", path = ShowStepPage::PATH,
-    tag = "plain pages", responses((status = 200, content_type = "text/html", body = String)))]
+    tag = "plain pages", responses((status = 200, content_type = "text/html", body = String), NoPage))]
 async fn step(
     State(state): State<AppState>,
     Path(AtStep { session, target, run, step }): Path<ShowStepPage>,
@@ -91,6 +92,19 @@ async fn step(
         Err(problem) => Err(problem),
     };
     answer(made, Some(&id))
+}
+
+/// The answer where there is no page, for the OpenAPI document.
+#[derive(IntoResponses)]
+enum NoPage {
+    /// A page that says why there is none
+    #[response(status = 404, content_type = "text/html")]
+    #[allow(dead_code)]
+    NotThere(String),
+    /// A page that says what is wrong
+    #[response(status = "default", content_type = "text/html")]
+    #[allow(dead_code)]
+    Refused(String),
 }
 
 /// The page, or a page that says why there is none.

@@ -88,6 +88,7 @@ fn two_runs(context: &Context, step: usize) -> State {
         rows: traces.iter().map(RunStep::row).collect(),
         complete: false,
         stopped: None,
+        waits_for: None,
         summary: summarise(&traces),
     };
     state.session.as_mut().unwrap().targets[0].runs.push(run);
