@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use rayon::prelude::*;
 use sightline_api::wire::Event;
 use sightline_geometry::error::Result;
 use sightline_recordings::{Traverse, create_simulated};
@@ -77,11 +78,16 @@ pub(crate) fn open_again(
     open: &mut Vec<Arc<OpenTraverse>>,
     events: &broadcast::Sender<Event>,
 ) -> Result<Vec<String>> {
-    let mut lost = Vec::new();
-    for (name, text) in store.drives()? {
+    let make = |(name, text): (String, String)| {
         let made = Scenario::from_toml(&text, Path::new("scenario")).and_then(|scenario| {
             create_simulated(&scenario, &folders.traverses.join(folder_name(&scenario)))
         });
+        (name, made)
+    };
+    // Reading a long index takes most of a second; all processors read.
+    let all: Vec<_> = store.drives()?.into_par_iter().map(make).collect();
+    let mut lost = Vec::new();
+    for (name, made) in all {
         match made {
             Ok(traverse) => {
                 let identity = Identity::of(&traverse, None)?;

@@ -195,7 +195,7 @@ impl AppState {
     ///
     /// # Errors
     /// A problem when there is none.
-    pub(crate) fn session(&self, id: &str) -> ApiResult<Arc<LiveSession>> {
+    pub fn session(&self, id: &str) -> ApiResult<Arc<LiveSession>> {
         let number = store::number_of(id);
         let found = number.and_then(|number| lock(&self.0.sessions).by_number.get(&number).cloned());
         let live = found.ok_or_else(|| ApiError::not_found("There is no such session."))?;

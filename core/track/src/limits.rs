@@ -6,6 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
+use utoipa::openapi::RefOr;
 use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, OneOfBuilder, Schema, Type};
 
 /// Which values a setting may take.
@@ -57,7 +58,7 @@ fn value_schema() -> Schema {
 
 /// The schema of several values.
 fn value_list_schema() -> Schema {
-    Schema::Array(ArrayBuilder::new().items(value_schema()).build())
+    Schema::Array(ArrayBuilder::new().items(RefOr::T(value_schema())).build())
 }
 
 /// Values of another setting under which a setting has an effect.

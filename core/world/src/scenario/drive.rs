@@ -162,7 +162,7 @@ impl DriveSettings {
             return Err(Error::setting("drive.moves", problem));
         }
         self.moves.iter().enumerate().try_for_each(|(index, one)| one.validate(index))?;
-        let stops: usize = self.moves.iter().map(|one| one.most_stops()).sum();
+        let stops: usize = self.moves.iter().map(Move::most_stops).sum();
         if stops > STOP_LIMIT {
             let problem = format!("may have {stops} stops, but a drive may have at most {STOP_LIMIT}");
             return Err(Error::setting("drive.moves", problem));
