@@ -15,6 +15,71 @@ const plain = document.getElementById("message-plain");
 /** A failure with a sentence for the person before the screen; `cause` is shown small below it. */
 class Failure extends Error {}
 
+/** Exchanges an access token for a cookie; says whether the server took it. */
+async function logIn(token) {
+  const headers = { "Content-Type": "application/json" };
+  const response = await ask("api/v1/login", { method: "POST", headers, body: JSON.stringify({ token }) });
+  return response.ok;
+}
+
+/** Asks the server; a server that does not answer is a failure with a sentence. */
+async function ask(path, request) {
+  try {
+    return await fetch(path, request);
+  } catch (cause) {
+    throw new Failure(SERVER_GONE, { cause });
+  }
+}
+
+/** Takes the access token out of the address, where it must not stay: addresses are copied, sent and kept. */
+function tokenOfAddress() {
+  const parts = location.hash.replace(/^#/, "").split("&");
+  const mine = parts.find((part) => part.startsWith("token="));
+  if (mine === undefined) {
+    return undefined;
+  }
+  const others = parts.filter((part) => part !== mine && part !== "").join("&");
+  history.replaceState(history.state, "", location.pathname + location.search + (others ? `#${others}` : ""));
+  return mine.slice("token=".length);
+}
+
+/** Asks the person for the access token until the server takes it. */
+function askForToken() {
+  const form = document.getElementById("login");
+  const field = document.getElementById("login-token");
+  tell("This server asks for its access token. Open the address that it printed when it was started, or enter the token.");
+  form.hidden = false;
+  field.focus();
+  return new Promise((resolve, reject) => {
+    form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      // A whole address is taken as well.
+      const token = field.value.trim().replace(/^.*[#&]token=/, "");
+      logIn(token).then((taken) => {
+        if (taken) {
+          form.hidden = true;
+          resolve();
+        } else {
+          tell("That is not the access token of this server. It is the part after `#token=` of the address that the server printed.");
+          field.select();
+        }
+      }, reject);
+    });
+  });
+}
+
+/** Makes sure that the server lets this page in. */
+async function enter() {
+  const token = tokenOfAddress();
+  if (token !== undefined && (await logIn(token))) {
+    return;
+  }
+  const response = await ask("api/v1/version");
+  if (response.status === 401) {
+    await askForToken();
+  }
+}
+
 /** Shows what is being done, and how much of it is. */
 function tell(sentence, fraction) {
   text.textContent = sentence;
@@ -108,6 +173,7 @@ async function importBindings() {
 
 async function boot() {
   requireBrowser();
+  await enter();
   tell("Loading the viewer");
   const [bindings, module] = await Promise.all([importBindings(), fetchModule()]);
   try {
@@ -123,6 +189,14 @@ async function boot() {
     document.getElementById(CANVAS).focus();
   }
 }
+
+// The printed address may be opened in a tab that shows this page already, perhaps of an earlier start of the server.
+window.addEventListener("hashchange", () => {
+  const token = tokenOfAddress();
+  if (token !== undefined) {
+    logIn(token).finally(() => location.reload());
+  }
+});
 
 // A panic inside the viewer calls this with its message; afterwards nothing on the canvas answers any more.
 window.addEventListener("sightline-panic", (event) => {

@@ -4,6 +4,9 @@
 //! ours, exactly (a rebinding page controls both Host and Origin, so comparing them with each other would
 //! prove nothing); a foreign Origin may change nothing and open no WebSocket; bodies must be JSON, which a
 //! form cannot send. Scripts without a browser send no Origin and are not hindered.
+//!
+//! Other users of this machine, and other machines, need the access token: for everything but the files of the page, which are
+//! the same for everybody, and the route that exchanges the token for a cookie.
 
 use axum::extract::{Request, State};
 use axum::http::header::{self, HeaderName};
@@ -11,15 +14,18 @@ use axum::http::{HeaderMap, HeaderValue, Method, Uri};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
+use crate::access::Access;
 use crate::extract::check_content_type;
-use crate::hosts::Hosts;
 use crate::problem::{ApiError, ApiResult};
 use crate::request_id;
 use tracing::Instrument;
 
+/// The only route below `/api` that needs no token, because it asks for it.
+const LOGIN: &str = "/api/v1/login";
+
 /// Checks a request before it is routed, and puts the headers on its answer.
-pub(crate) async fn guard(State(hosts): State<Hosts>, request: Request, next: Next) -> Response {
-    let checked = check(&hosts, request.method(), request.uri(), request.headers());
+pub(crate) async fn guard(State(access): State<Access>, request: Request, next: Next) -> Response {
+    let checked = check(&access, request.method(), request.uri(), request.headers());
     let (host, is_api) = match &checked {
         Ok(host) => (Some(host.clone()), request.uri().path().starts_with("/api/")),
         Err(_) => (None, false),
@@ -41,7 +47,8 @@ pub(crate) async fn guard(State(hosts): State<Hosts>, request: Request, next: Ne
 }
 
 /// The host by which we are addressed, where the request may come in.
-fn check(hosts: &Hosts, method: &Method, uri: &Uri, headers: &HeaderMap) -> ApiResult<String> {
+fn check(access: &Access, method: &Method, uri: &Uri, headers: &HeaderMap) -> ApiResult<String> {
+    let hosts = access.hosts();
     let mut named = headers.get_all(header::HOST).iter();
     let host = match (named.next().map(HeaderValue::to_str), named.next()) {
         (Some(Ok(host)), None) if hosts.has(host) => host,
@@ -67,6 +74,9 @@ fn check(hosts: &Hosts, method: &Method, uri: &Uri, headers: &HeaderMap) -> ApiR
         return Err(ApiError::forbidden("origin", "A page of another site may not read this."));
     }
     check_content_type(method, headers)?;
+    if uri.path().starts_with("/api") && uri.path() != LOGIN {
+        access.check(headers)?;
+    }
     Ok(host.to_owned())
 }
 
@@ -98,6 +108,7 @@ fn put_headers(headers: &mut HeaderMap, host: Option<&str>, is_api: bool) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::hosts::Hosts;
 
     fn verdict(method: Method, headers: &[(&'static str, &str)]) -> Result<String, u16> {
         let pairs = headers
@@ -105,7 +116,8 @@ mod tests {
             .map(|(name, value)| (HeaderName::from_static(name), HeaderValue::from_str(value).unwrap()));
         let headers: HeaderMap = pairs.collect();
         let hosts = Hosts::new(7700, &["rover.example".to_owned()]);
-        check(&hosts, &method, &Uri::from_static("/"), &headers).map_err(|error| error.problem().status)
+        check(&Access::without_token(hosts), &method, &Uri::from_static("/"), &headers)
+            .map_err(|error| error.problem().status)
     }
 
     #[test]

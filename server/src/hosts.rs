@@ -5,7 +5,10 @@ use std::sync::Arc;
 
 /// The hosts under which the server may be addressed.
 #[derive(Clone, Debug)]
-pub struct Hosts(Arc<BTreeSet<String>>);
+pub struct Hosts {
+    names: Arc<BTreeSet<String>>,
+    port: u16,
+}
 
 impl Hosts {
     /// This machine's own names with `port`, and `others`, each with or without a port of its own.
@@ -19,10 +22,15 @@ impl Hosts {
             hosts.extend(own.map(str::to_owned));
         }
         hosts.extend(others);
-        Self(Arc::new(hosts))
+        Self { names: Arc::new(hosts), port }
     }
 
     pub(crate) fn has(&self, host: &str) -> bool {
-        self.0.contains(&host.to_ascii_lowercase())
+        self.names.contains(&host.to_ascii_lowercase())
+    }
+
+    /// The port at which the server listens.
+    pub(crate) const fn port(&self) -> u16 {
+        self.port
     }
 }

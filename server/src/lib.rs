@@ -32,6 +32,7 @@ mod cancel;
 mod jobs;
 mod store;
 pub mod hosts;
+pub mod access;
 mod guard;
 mod request_id;
 mod idempotency;
@@ -65,14 +66,14 @@ pub fn app(state: AppState) -> Router {
     let (api, _) = openapi::router().split_for_parts();
     let api = api.fallback(no_route).method_not_allowed_fallback(page::wrong_method);
     let api = api.layer(middleware::from_fn_with_state(Arc::default(), idempotency::once));
-    let hosts = state.hosts().clone();
+    let access = state.access().clone();
     Router::new()
         .nest("/api/v1", api)
         .fallback(page::serve)
         .with_state(state)
         .layer(DefaultBodyLimit::max(extract::BODY_LIMIT))
         .layer(CatchPanicLayer::custom(panicked))
-        .layer(middleware::from_fn_with_state(hosts, guard::guard))
+        .layer(middleware::from_fn_with_state(access, guard::guard))
 }
 
 async fn no_route() -> ApiError {

@@ -11,10 +11,10 @@ use sightline_session::view::SessionView;
 use sightline_session::{Cursor, Session};
 use tokio::sync::broadcast;
 
+use crate::access::Access;
 use crate::clock;
 use crate::drives;
 use crate::folders::Folders;
-use crate::hosts::Hosts;
 use crate::jobs::{Lane, lock};
 use crate::live_session::LiveSession;
 use crate::problem::{ApiError, ApiResult};
@@ -45,7 +45,7 @@ const ANSWERS_AT_A_TIME: usize = 1;
 pub struct AppState(Arc<Inner>);
 
 struct Inner {
-    hosts: Hosts,
+    access: Access,
     traverses: Mutex<Vec<Arc<OpenTraverse>>>,
     /// The names of the traverses that the server was given, which cannot be removed.
     given: BTreeSet<String>,
@@ -82,15 +82,15 @@ impl AppState {
     ///
     /// # Errors
     /// As `Self::with_folders`.
-    pub fn new(traverses: Vec<Traverse>, folder: &Path, hosts: Hosts) -> Result<Self> {
-        Self::with_folders(traverses, &Folders::in_one(folder), hosts)
+    pub fn new(traverses: Vec<Traverse>, folder: &Path, access: Access) -> Result<Self> {
+        Self::with_folders(traverses, &Folders::in_one(folder), access)
     }
 
     /// Opens the state on its folders.
     ///
     /// # Errors
     /// A folder that cannot be read or made, or a system without threads.
-    pub(crate) fn with_folders(traverses: Vec<Traverse>, folders: &Folders, hosts: Hosts) -> Result<Self> {
+    pub(crate) fn with_folders(traverses: Vec<Traverse>, folders: &Folders, access: Access) -> Result<Self> {
         let no_threads = |error: std::io::Error| Error::Request(format!("cannot start a thread: {error}"));
         let events = broadcast::Sender::new(EVENT_BACKLOG);
         let (mut open, of_drives) = drives::open_given(traverses, folders, &events)?;
@@ -112,7 +112,7 @@ impl AppState {
         let studies = Shelf::new(folders.studies.clone(), events.clone(), keeper);
         studies.read_back(|new| order(&folders.studies, new))?;
         Ok(Self(Arc::new(Inner {
-            hosts,
+            access,
             traverses: Mutex::new(open),
             given,
             making_drives: Mutex::default(),
@@ -136,9 +136,9 @@ impl AppState {
         })))
     }
 
-    /// The hosts under which the server may be addressed.
-    pub(crate) fn hosts(&self) -> &Hosts {
-        &self.0.hosts
+    /// Who may use the server, and under which names.
+    pub(crate) fn access(&self) -> &Access {
+        &self.0.access
     }
 
     /// What a person should know about this start of the server, one sentence each.

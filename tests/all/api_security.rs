@@ -6,7 +6,7 @@ use axum::body::Body;
 use axum::http::{HeaderValue, Method, StatusCode, header};
 use futures_util::{SinkExt, StreamExt};
 use serde_json::{Value, json};
-use sightline_tests::server::{PIXEL, PORT, TestServer, request, small_drive};
+use sightline_tests::server::{PIXEL, PORT, TOKEN, TestServer, access, request, small_drive};
 use tokio_tungstenite::tungstenite::{self, Message};
 
 /// A server with a session, and what keeps its folders.
@@ -176,8 +176,8 @@ async fn bound() -> (SocketAddr, TestServer, [tempfile::TempDir; 2]) {
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = listener.local_addr().unwrap();
     let traverse = sightline_recordings::Traverse::open(folders[0].path()).unwrap();
-    let hosts = sightline_server::hosts::Hosts::new(address.port(), &[]);
-    let state = sightline_server::state::AppState::new(vec![traverse], folders[1].path(), hosts).unwrap();
+    let access = access(address.port());
+    let state = sightline_server::state::AppState::new(vec![traverse], folders[1].path(), access).unwrap();
     let app = sightline_server::app(state.clone());
     tokio::spawn(async move { axum::serve(listener, app).await });
     let traverse = state.traverses()[0].id.clone();
@@ -187,6 +187,8 @@ async fn bound() -> (SocketAddr, TestServer, [tempfile::TempDir; 2]) {
 
 async fn connect(address: SocketAddr, origin: Option<&str>) -> Result<u16, tungstenite::Error> {
     let mut request = tungstenite::client::IntoClientRequest::into_client_request(events_url(address))?;
+    let token = HeaderValue::from_str(&format!("Bearer {TOKEN}")).unwrap();
+    request.headers_mut().insert(header::AUTHORIZATION, token);
     if let Some(origin) = origin {
         request.headers_mut().insert(header::ORIGIN, HeaderValue::from_str(origin).unwrap());
     }

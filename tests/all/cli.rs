@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
 use serde_json::{Value, json};
-use sightline_tests::server::{PIXEL, TestServer, rows_of_run, small_drive, small_scenario};
+use sightline_tests::server::{PIXEL, TOKEN, TestServer, rows_of_run, small_drive, small_scenario};
 
 /// The program: the one named by `SIGHTLINE_BIN`, else the one beside this test.
 pub(crate) fn program() -> PathBuf {
@@ -162,6 +162,7 @@ fn serve_says_one_line_and_survives_being_killed() {
     let start = || {
         let mut server = Command::new(program())
             .args(["serve", text(drive.path()), "--port", "0", "--data-dir", text(home.path())])
+            .env("SIGHTLINE_TOKEN", TOKEN)
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();
@@ -173,7 +174,7 @@ fn serve_says_one_line_and_survives_being_killed() {
         (server, url)
     };
     let (mut server, url) = start();
-    let address = url.trim_start_matches("http://").trim_end_matches('/').to_owned();
+    let address = url.trim_start_matches("http://").split_once('/').unwrap().0.to_owned();
     let traverses = http(&address, "GET", "traverses", "");
     let id = traverses.split('"').nth(3).unwrap().to_owned();
     let begun = http(&address, "POST", "sessions", &json!({ "traverse": id }).to_string());
@@ -182,7 +183,7 @@ fn serve_says_one_line_and_survives_being_killed() {
     server.kill().unwrap();
     server.wait().unwrap();
     let (mut server, url) = start();
-    let address = url.trim_start_matches("http://").trim_end_matches('/').to_owned();
+    let address = url.trim_start_matches("http://").split_once('/').unwrap().0.to_owned();
     assert!(http(&address, "GET", "sessions", "").contains("\"s1\""));
     server.kill().unwrap();
     server.wait().unwrap();
@@ -193,7 +194,9 @@ fn http(address: &str, method: &str, path: &str, body: &str) -> String {
     use std::io::{Read, Write};
     let mut stream = std::net::TcpStream::connect(address).unwrap();
     let length = body.len();
-    let head = format!("{method} /api/v1/{path} HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n");
+    let token = format!("Authorization: Bearer {TOKEN}");
+    let head =
+        format!("{method} /api/v1/{path} HTTP/1.1\r\nHost: {address}\r\n{token}\r\nConnection: close\r\n");
     let json = format!("Content-Type: application/json\r\nContent-Length: {length}\r\n\r\n{body}");
     stream.write_all((head + &json).as_bytes()).unwrap();
     let mut answer = String::new();

@@ -5,7 +5,7 @@ use std::process::Command;
 use serde_json::{Value, json};
 use sightline_session::shell;
 use sightline_session::view::SessionView;
-use sightline_tests::server::{PIXEL, TestServer, rows_of_run, small_drive};
+use sightline_tests::server::{PIXEL, TOKEN, TestServer, access, rows_of_run, small_drive};
 
 use crate::cli::program;
 
@@ -16,8 +16,8 @@ async fn what_is_copied_as_curl_does_what_it_says() {
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
     let origin = format!("http://{}", listener.local_addr().unwrap());
     let traverse = sightline_recordings::Traverse::open(drive.path()).unwrap();
-    let hosts = sightline_server::hosts::Hosts::new(listener.local_addr().unwrap().port(), &[]);
-    let state = sightline_server::state::AppState::new(vec![traverse], folder.path(), hosts).unwrap();
+    let access = access(listener.local_addr().unwrap().port());
+    let state = sightline_server::state::AppState::new(vec![traverse], folder.path(), access).unwrap();
     let id = state.traverses()[0].id.clone();
     let app = sightline_server::app(state);
     tokio::spawn(async move { axum::serve(listener, app).await });
@@ -29,7 +29,9 @@ async fn what_is_copied_as_curl_does_what_it_says() {
         let (url, body) = (format!("{origin}/api/v1/{path}"), body.map(|body| body.to_string()));
         let curl = Curl { method, url: &url, body: body.as_deref(), revision, file: file.as_deref() };
         let text = curl.text();
-        tokio::task::spawn_blocking(move || Command::new("sh").args(["-c", &text]).output().unwrap())
+        tokio::task::spawn_blocking(move || {
+            Command::new("sh").args(["-c", &text]).env("SIGHTLINE_TOKEN", TOKEN).output().unwrap()
+        })
     };
     let said = |output: std::process::Output| {
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

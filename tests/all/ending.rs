@@ -6,7 +6,7 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 use serde_json::json;
-use sightline_tests::server::{small_drive, small_scenario};
+use sightline_tests::server::{TOKEN, small_drive, small_scenario};
 
 use crate::keeping::Killable;
 
@@ -42,7 +42,7 @@ fn sigterm_ends_a_server_that_builds_a_world() {
     let mut request = TcpStream::connect(&server.address).unwrap();
     write!(
         request,
-        "POST /api/v1/traverses HTTP/1.1\r\nHost: {}\r\nContent-Type: application/json\r\nContent-Length: {}\r\n\r\n{body}",
+        "POST /api/v1/traverses HTTP/1.1\r\nHost: {}\r\nAuthorization: Bearer {TOKEN}\r\nContent-Type: application/json\r\nContent-Length: {}\r\n\r\n{body}",
         server.address,
         body.len()
     )

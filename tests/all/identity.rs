@@ -4,14 +4,13 @@ use std::path::Path;
 
 use serde_json::json;
 use sightline_recordings::Traverse;
-use sightline_server::hosts::Hosts;
 use sightline_server::state::AppState;
-use sightline_tests::server::{PORT, TestServer, small_drive, small_recording};
+use sightline_tests::server::{PORT, TestServer, access, small_drive, small_recording};
 
 /// The server of some drives with its sessions in `folder`.
 fn state(drives: &[&Path], folder: &Path) -> AppState {
     let drives = drives.iter().map(|drive| Traverse::open(drive).unwrap()).collect();
-    AppState::new(drives, folder, Hosts::new(PORT, &[])).unwrap()
+    AppState::new(drives, folder, access(PORT)).unwrap()
 }
 
 /// Exchanges the left images of two stops.

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use axum::http::{Method, header};
 use serde_json::{Value, json};
-use sightline_tests::server::{PIXEL, TestServer, request, small_drive};
+use sightline_tests::server::{PIXEL, TOKEN, TestServer, request, small_drive};
 
 use crate::cli::program;
 
@@ -43,12 +43,14 @@ impl Killable {
         let arguments =
             ["serve", drive.to_str().unwrap(), "--port", port, "--data-dir", data.to_str().unwrap()];
         let mut program = Command::new(program());
-        program.args(arguments).envs(environment.iter().copied());
+        program.args(arguments).env("SIGHTLINE_TOKEN", TOKEN).envs(environment.iter().copied());
         let mut child = program.stdout(Stdio::piped()).spawn().unwrap();
         let mut line = String::new();
         BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
         let url = line.trim().strip_prefix("Sightline is ready: http://").unwrap_or_else(|| panic!("{line}"));
-        Self { child, address: url.trim_end_matches('/').to_owned() }
+        let (address, token) = url.split_once("/#token=").unwrap_or_else(|| panic!("{line}"));
+        assert_eq!(token, TOKEN);
+        Self { child, address: address.to_owned() }
     }
 
     /// The process.
@@ -74,7 +76,7 @@ impl Killable {
             if body.is_empty() { String::new() } else { "Content-Type: application/json\r\n".to_owned() };
         write!(
             stream,
-            "{method} /api/v1/{path} HTTP/1.0\r\nHost: {}\r\n{json}{headers}Content-Length: {length}\r\n\r\n{body}",
+            "{method} /api/v1/{path} HTTP/1.0\r\nHost: {}\r\nAuthorization: Bearer {TOKEN}\r\n{json}{headers}Content-Length: {length}\r\n\r\n{body}",
             self.address
         )
         .unwrap();
@@ -233,7 +235,7 @@ fn write_until_it_fails(address: &str, kept: u64) -> u64 {
         let body = json!({ "text": (confirmed + 1).to_string() }).to_string();
         let Ok(mut stream) = TcpStream::connect(address) else { return confirmed };
         let head = format!(
-            "PATCH /api/v1/sessions/s1/notes/1 HTTP/1.0\r\nHost: {address}\r\nIf-Match: *\r\n\
+            "PATCH /api/v1/sessions/s1/notes/1 HTTP/1.0\r\nHost: {address}\r\nIf-Match: *\r\nAuthorization: Bearer {TOKEN}\r\n\
              Content-Type: application/json\r\nContent-Length: {}\r\n\r\n{body}",
             body.len()
         );

@@ -3,9 +3,9 @@
 
 use sightline_recordings::create_simulated;
 use sightline_server::first_session;
-use sightline_server::hosts::Hosts;
 use sightline_server::state::AppState;
 use sightline_tests::browser::Browser;
+use sightline_tests::server::{TOKEN, access};
 use sightline_world::Scenario;
 
 /// Actions from the first page to the cause, at most.
@@ -37,7 +37,7 @@ async fn serve(scenario: &Scenario, folder: &std::path::Path) -> u16 {
     let traverse = create_simulated(scenario, &folder.join("first")).unwrap();
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
     let port = listener.local_addr().unwrap().port();
-    let state = AppState::new(vec![traverse], &folder.join("sessions"), Hosts::new(port, &[])).unwrap();
+    let state = AppState::new(vec![traverse], &folder.join("sessions"), access(port)).unwrap();
     first_session::begin(&state, scenario).unwrap();
     tokio::spawn(async move { axum::serve(listener, sightline_server::app(state)).await });
     port
@@ -49,7 +49,7 @@ async fn a_new_user_finds_why_the_first_target_was_lost_and_what_saves_it() {
     let scenario = first_session::scenario().unwrap();
     let port = serve(&scenario, folder.path()).await;
     let browser = Browser::start().await;
-    browser.goto(&format!("http://127.0.0.1:{port}/")).await;
+    browser.goto(&format!("http://127.0.0.1:{port}/#token={TOKEN}")).await;
     browser.wait_for_viewer().await;
     browser.wait_status("the first target", "s.target === 0 && s.shown").await;
     browser.says("1 of 6").await;
@@ -86,7 +86,7 @@ async fn a_new_user_finds_why_the_first_target_was_lost_and_what_saves_it() {
     // Whoever gets the link sees the branch at that step.
     let link = browser.fragment().await;
     let other = Browser::start().await;
-    other.goto(&format!("http://127.0.0.1:{port}/#{link}")).await;
+    other.goto(&format!("http://127.0.0.1:{port}/#{link}&token={TOKEN}")).await;
     other.wait_for_viewer().await;
     other.wait_status("the same place", "s.run === 1 && s.shown && s.state === 'tracking'").await;
     assert_eq!(browser.console_errors().await, Vec::<String>::new());

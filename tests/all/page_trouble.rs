@@ -6,7 +6,7 @@ use sightline_geometry::frames::Pixel;
 use sightline_recordings::Traverse;
 use sightline_tests::bench::{Bench, place};
 use sightline_tests::browser::Browser;
-use sightline_tests::server::{PIXEL, small_drive, small_recording};
+use sightline_tests::server::{PIXEL, TOKEN, small_drive, small_recording};
 
 use crate::keeping::Killable;
 
@@ -59,7 +59,7 @@ async fn while_the_server_is_gone_loaded_steps_stay_and_then_all_goes_on() {
     let address = server.address.clone();
     let port = address.rsplit(':').next().unwrap().to_owned();
     let browser = Browser::start().await;
-    browser.goto(&format!("http://{address}/")).await;
+    browser.goto(&format!("http://{address}/#token={TOKEN}")).await;
     browser.wait_for_viewer().await;
     browser
         .wait_status("the first image", "s.phase === 'ready' && s.shown && s.image_to_screen !== null")

@@ -9,14 +9,13 @@ use std::time::Duration;
 use serde_json::Value;
 use sightline_geometry::frames::Pixel;
 use sightline_recordings::{Traverse, create_simulated};
-use sightline_server::hosts::Hosts;
 use sightline_server::state::AppState;
 use sightline_world::Scenario;
 
 use tempfile::TempDir;
 
 use crate::browser::Browser;
-use crate::server::copy_folder;
+use crate::server::{TOKEN, access, copy_folder};
 
 /// A server with one traverse, and a rock's pixel in its first left image.
 pub struct Bench {
@@ -47,8 +46,7 @@ impl Bench {
         let stop_count = traverse.stop_count();
         let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
         let port = listener.local_addr().unwrap().port();
-        let hosts = Hosts::new(port, &[]);
-        let state = AppState::new(vec![traverse], &folder.path().join("sessions"), hosts).unwrap();
+        let state = AppState::new(vec![traverse], &folder.path().join("sessions"), access(port)).unwrap();
         tokio::spawn(async move { axum::serve(listener, sightline_server::app(state)).await });
         Self { port, rock, stop_count, _folder: folder }
     }
@@ -62,7 +60,9 @@ impl Bench {
     pub fn get(&self, path: &str) -> Vec<u8> {
         let mut stream = TcpStream::connect(("127.0.0.1", self.port)).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(300))).unwrap();
-        write!(stream, "GET {path} HTTP/1.0\r\nHost: 127.0.0.1:{}\r\n\r\n", self.port).unwrap();
+        let port = self.port;
+        let token = format!("Authorization: Bearer {TOKEN}");
+        write!(stream, "GET {path} HTTP/1.0\r\nHost: 127.0.0.1:{port}\r\n{token}\r\n\r\n").unwrap();
         let mut answer = Vec::new();
         stream.read_to_end(&mut answer).unwrap();
         let end = answer.windows(4).position(|w| w == b"\r\n\r\n").unwrap();
@@ -78,7 +78,9 @@ impl Bench {
 
     /// Opens the page and waits for the first image.
     pub async fn open(&self, browser: &Browser) {
-        browser.goto(&self.url()).await;
+        // Another fragment alone would not load the page again.
+        browser.goto("about:blank").await;
+        browser.goto(&format!("{}#token={TOKEN}", self.url())).await;
         browser.wait_for_viewer().await;
         let shown = "s.phase === 'ready' && s.shown && s.image_to_screen !== null";
         browser.wait_status("the first image", shown).await;

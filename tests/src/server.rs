@@ -10,6 +10,7 @@ use axum::body::Body;
 use axum::http::{HeaderMap, Method, Request, StatusCode, header};
 use serde_json::{Value, json};
 use sightline_recordings::{Traverse, create_simulated};
+use sightline_server::access::{Access, Token};
 use sightline_server::app;
 use sightline_server::hosts::Hosts;
 use sightline_server::state::AppState;
@@ -18,6 +19,9 @@ use sightline_world::scenario::{PlacedRock, RockShape};
 use sightline_world::traverse::Stop;
 use tempfile::TempDir;
 use tower::ServiceExt;
+
+/// The access token of every server of the tests.
+pub const TOKEN: &str = "token-of-the-tests";
 
 /// The port by which the server in this process believes to be addressed.
 pub const PORT: u16 = 7700;
@@ -79,7 +83,7 @@ impl TestServer {
     /// A server with the traverse of `drive` that keeps its sessions in `sessions`.
     pub fn open(drive: &Path, sessions: &Path) -> Self {
         let traverse = Traverse::open(drive).expect("a traverse");
-        let state = AppState::new(vec![traverse], sessions, Hosts::new(PORT, &[])).expect("a server");
+        let state = AppState::new(vec![traverse], sessions, access(PORT)).expect("a server");
         let traverse = state.traverses()[0].id.clone();
         Self { app: app(state.clone()), state, traverse }
     }
@@ -137,10 +141,17 @@ impl TestServer {
     }
 }
 
-/// A request to a path below `/api/v1/` as our own page sends it.
+/// Who may use a server of the tests at that port: whoever has [`TOKEN`].
+pub fn access(port: u16) -> Access {
+    Access::with_token(Hosts::new(port, &[]), Token::chosen(TOKEN).expect("a token"))
+}
+
+/// A request to a path below `/api/v1/` as a script with the token sends it.
 pub fn request(method: Method, path: &str) -> axum::http::request::Builder {
     let uri = format!("/api/v1/{path}");
-    Request::builder().method(method).uri(uri).header(header::HOST, format!("127.0.0.1:{PORT}"))
+    let request =
+        Request::builder().method(method).uri(uri).header(header::HOST, format!("127.0.0.1:{PORT}"));
+    request.header(header::AUTHORIZATION, format!("Bearer {TOKEN}"))
 }
 
 /// The scenario of the small drive: five stops of 256 × 256 pixels.

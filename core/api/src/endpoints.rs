@@ -31,8 +31,8 @@ use crate::location::{
 use crate::program::{Health, Version};
 use crate::query::{FirstRow, FirstStop, ImageDepth, MapLimits, MapPixel, SessionPart, ValueName};
 use crate::wire::{
-    Designated, Event, NewRun, NewSession, NewTarget, NewTraverse, RerunStream, SessionEntry, StopDetail,
-    TraverseEntry, TraverseView,
+    Designated, Event, Login, NewRun, NewSession, NewTarget, NewTraverse, RerunStream, SessionEntry,
+    StopDetail, TraverseEntry, TraverseView,
 };
 
 /// Declares a type for each endpoint, and the list of all of them.
@@ -81,6 +81,8 @@ endpoints! {
     ShowHealth: Get "/health", Anywhere => Health;
     /// The OpenAPI document.
     ShowOpenApi: Get "/openapi.json", Anywhere => Value;
+    /// Exchanges the access token for a cookie.
+    LogIn: Post "/login", Anywhere, body Login => Done;
     /// The WebSocket of events; not called as a request.
     ListenToEvents: Get "/events", Anywhere => Event;
     /// The table of settings.

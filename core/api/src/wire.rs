@@ -113,6 +113,14 @@ pub struct StopDetail {
     pub mast: Option<MastAngles>,
 }
 
+/// Exchanges the access token for a cookie. No `Debug`: the token is a secret.
+#[derive(Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Login {
+    /// The access token.
+    pub token: String,
+}
+
 /// Begins a session.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]

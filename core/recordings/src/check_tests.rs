@@ -1,3 +1,5 @@
+//! Tests of the checks of an index of stops: jumps of the pose and the rover that stands still.
+
 use super::*;
 use crate::IndexFormat;
 

@@ -48,7 +48,7 @@ pub struct Curl<'a> {
 }
 
 impl Curl<'_> {
-    /// The command: silent but for problems, which make it fail.
+    /// The command: silent but for problems, which make it fail. The access token is read from `SIGHTLINE_TOKEN`.
     pub fn text(&self) -> String {
         let mut text = "curl -fsS".to_owned();
         if self.method != "GET" {
@@ -58,6 +58,8 @@ impl Curl<'_> {
             text.push_str(&format!(" -o {}", quoted(file)));
         }
         text.push_str(&format!(" {}", quoted(self.url)));
+        // In double quotes, so that the shell reads the variable; the page does not know the token.
+        text.push_str(" -H \"Authorization: Bearer $SIGHTLINE_TOKEN\"");
         if let Some(revision) = self.revision {
             text.push_str(&format!(" -H {}", quoted(&format!("If-Match: \"{revision}\""))));
         }

@@ -24,6 +24,7 @@ use sightline_track::target::Designation;
 use super::terminal::Progress;
 use super::track::pixel;
 use super::{open, terminal};
+use crate::access::Access;
 use crate::exports::{Kind, Made, Part, Source, make};
 use crate::folders::Folders;
 use crate::hosts::Hosts;
@@ -176,7 +177,7 @@ impl Export {
 fn computed(traverse: Traverse, folder: &Path, id: &str) -> Result<Arc<LiveSession>> {
     let runtime = super::runtime()?;
     let _inside = runtime.enter();
-    let state = AppState::new(vec![traverse], folder, Hosts::new(0, &[]))?;
+    let state = AppState::new(vec![traverse], folder, Access::without_token(Hosts::new(0, &[])))?;
     let live = state.session(id).map_err(refused)?;
     let count = |session: &Session| {
         let live = session.targets.iter().filter(|target| !target.removed);

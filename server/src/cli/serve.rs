@@ -10,6 +10,7 @@ use sightline_geometry::error::{Error, Result};
 use sightline_recordings::Traverse;
 
 use super::{open, terminal};
+use crate::access::{Access, Token};
 use crate::first_session;
 use crate::folders::Folders;
 use crate::hosts::Hosts;
@@ -17,6 +18,9 @@ use crate::state::AppState;
 
 /// How long the end of the program waits for work that does not look at a cancel flag.
 const SHUTDOWN: Duration = Duration::from_secs(1);
+
+/// The variable with the access token, which other users of the machine cannot see as they see arguments.
+const TOKEN_VARIABLE: &str = "SIGHTLINE_TOKEN";
 
 /// Open traverses in the browser.
 #[derive(Debug, Args)]
@@ -32,6 +36,12 @@ pub(super) struct Serve {
     /// A further name under which the server may be addressed; can be given more than once.
     #[arg(long, value_name = "NAME")]
     allow_host: Vec<String>,
+    /// The access token, 16 letters or more, instead of a random one; also the variable SIGHTLINE_TOKEN.
+    #[arg(long, value_name = "TOKEN")]
+    token: Option<String>,
+    /// Let in everybody who reaches the server: every user of this machine.
+    #[arg(long, conflicts_with = "token")]
+    no_token: bool,
     /// Where sessions and simulated traverses are kept.
     #[arg(long, value_name = "FOLDER")]
     data_dir: Option<PathBuf>,
@@ -45,9 +55,14 @@ impl Serve {
     pub(super) fn run(self) -> Result<()> {
         if !self.listen.is_loopback() && self.allow_host.is_empty() {
             let message = "listening beyond this machine needs --allow-host with the name by which pages will \
-                           address the server; anyone who reaches it can use it";
+                           address the server";
             return Err(Error::Request(message.to_owned()));
         }
+        if !self.listen.is_loopback() && self.no_token {
+            let message = "listening beyond this machine needs an access token; leave --no-token out";
+            return Err(Error::Request(message.to_owned()));
+        }
+        let token = self.token()?;
         let data = open::data_folder(self.data_dir.as_deref())?;
         let listener = bind(SocketAddr::new(self.listen, self.port))?;
         let address = listener.local_addr().map_err(|error| Error::Request(error.to_string()))?;
@@ -56,20 +71,34 @@ impl Serve {
         let folders = Folders { sessions: data.join("sessions"), ..Folders::in_one(&data) };
         let runtime = super::runtime()?;
         let inside = runtime.enter();
-        let state =
-            AppState::with_folders(traverses, &folders, Hosts::new(address.port(), &self.allow_host))?;
-        if !self.listen.is_loopback() {
-            terminal::error("warning: anyone who reaches this address can use the server");
+        let hosts = Hosts::new(address.port(), &self.allow_host);
+        let access = match token.clone() {
+            Some(token) => Access::with_token(hosts, token),
+            None => Access::without_token(hosts),
+        };
+        let state = AppState::with_folders(traverses, &folders, access)?;
+        if token.is_none() {
+            terminal::error("warning: without an access token every user of this machine can use the server");
         }
         if self.traverses.is_empty() {
             let begun = first_session::begin(&state, &first_session::scenario()?);
             begun.map_err(|problem| Error::Request(problem.problem().detail.clone()))?;
         }
-        let ended = runtime.block_on(serve(listener, address, state));
+        let ended = runtime.block_on(serve(listener, &url(address, token.as_ref()), state));
         drop(inside);
         // Work that is under way is lost in any case: nothing of it is on disk before it ends.
         runtime.shutdown_timeout(SHUTDOWN);
         ended
+    }
+
+    /// The access token; none with `--no-token`.
+    fn token(&self) -> Result<Option<Token>> {
+        if self.no_token {
+            return Ok(None);
+        }
+        let chosen =
+            self.token.clone().or_else(|| std::env::var(TOKEN_VARIABLE).ok().filter(|text| !text.is_empty()));
+        chosen.map_or_else(Token::random, |text| Token::chosen(&text)).map(Some)
     }
 
     fn open_traverses(&self, data: &Path) -> Result<Vec<Traverse>> {
@@ -80,11 +109,11 @@ impl Serve {
     }
 }
 
-async fn serve(listener: TcpListener, address: SocketAddr, state: AppState) -> Result<()> {
+async fn serve(listener: TcpListener, url: &str, state: AppState) -> Result<()> {
     let failed = |error: std::io::Error| Error::Request(format!("the server stopped: {error}"));
     let listener = tokio::net::TcpListener::from_std(listener).map_err(failed)?;
     let app = crate::app(state.clone());
-    terminal::line(&format!("Sightline is ready: {}", url(address)))?;
+    terminal::line(&format!("Sightline is ready: {url}"))?;
     let ended = tokio::select! {
         ended = async { axum::serve(listener, app).await } => ended.map_err(failed),
         () = told_to_end() => Ok(()),
@@ -126,12 +155,13 @@ fn bind(address: SocketAddr) -> Result<TcpListener> {
     Ok(listener)
 }
 
-/// The address as a browser takes it.
-fn url(address: SocketAddr) -> String {
+/// The address as a browser takes it; the token is in its fragment, which a browser sends to nobody.
+fn url(address: SocketAddr, token: Option<&Token>) -> String {
+    let fragment = token.map(|token| format!("#token={}", token.secret())).unwrap_or_default();
     if address.ip().is_unspecified() {
-        format!("http://127.0.0.1:{}/", address.port())
+        format!("http://127.0.0.1:{}/{fragment}", address.port())
     } else {
-        format!("http://{address}/")
+        format!("http://{address}/{fragment}")
     }
 }
 

@@ -2,6 +2,7 @@
 
 pub(crate) mod route;
 pub(crate) mod about;
+pub(crate) mod login;
 pub(crate) mod settings;
 pub(crate) mod traverses;
 pub(crate) mod sessions;

@@ -7,27 +7,46 @@ use axum::response::IntoResponse;
 use sightline_api::endpoint::Endpoint;
 use sightline_api::endpoints::ShowOpenApi;
 use sightline_api::wire::{Event, ExpressionProblem, Problem};
-use utoipa::OpenApi;
+use utoipa::openapi::OpenApi;
+use utoipa::openapi::security::{ApiKey, ApiKeyValue, HttpAuthScheme, HttpBuilder, SecurityScheme};
+use utoipa::{Modify, OpenApi as _};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use super::{
-    about, breakpoints, compare, counterfactual, documents, events, exports, expressions, notes, photometry,
-    plain, removal, rerun, runs, sessions, settings, steps, studies, targets, trackability, traverses,
-    what_if, why,
+    about, breakpoints, compare, counterfactual, documents, events, exports, expressions, login, notes,
+    photometry, plain, removal, rerun, runs, sessions, settings, steps, studies, targets, trackability,
+    traverses, what_if, why,
 };
 use crate::routes::route::route;
 use crate::state::AppState;
 
-#[derive(OpenApi)]
+#[derive(utoipa::OpenApi)]
 #[openapi(
     info(title = "Sightline", description = "Sessions of the visual debugger for rover target tracking. \
         Units are in the names of fields (`_px`, `_m`, `_deg`, `_s`); `a_from_b` takes points of frame b into \
         frame a; pixel (0, 0) is the centre of the first pixel; what is not known is null."),
     servers((url = "/api/v1")),
-    components(schemas(Problem, ExpressionProblem, Event))
+    components(schemas(Problem, ExpressionProblem, Event)),
+    security(("token" = []), ("cookie" = [])),
+    modifiers(&SecuritySchemes)
 )]
 struct Document;
+
+/// The two ways to send the access token.
+struct SecuritySchemes;
+
+impl Modify for SecuritySchemes {
+    fn modify(&self, document: &mut OpenApi) {
+        let about = "The access token that `sightline serve` prints";
+        let bearer = HttpBuilder::new().scheme(HttpAuthScheme::Bearer).description(Some(about)).build();
+        let about = "The cookie that `POST login` sets for a page; PORT is the server's port";
+        let cookie = ApiKey::Cookie(ApiKeyValue::with_description("sightline-PORT", about));
+        let components = document.components.get_or_insert_default();
+        components.add_security_scheme("token", SecurityScheme::Http(bearer));
+        components.add_security_scheme("cookie", SecurityScheme::ApiKey(cookie));
+    }
+}
 
 static JSON: LazyLock<String> =
     LazyLock::new(|| router().into_openapi().to_json().unwrap_or_else(|error| error.to_string()));
@@ -36,6 +55,7 @@ static JSON: LazyLock<String> =
 pub(crate) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::with_openapi(Document::openapi())
         .merge(about::router())
+        .merge(login::router())
         .routes(route::<ShowOpenApi>(routes!(document)))
         .merge(settings::router())
         .merge(traverses::router())

@@ -15,6 +15,9 @@ use crate::keeping::Killable;
 /// How long the program may take to end: far less than its work takes.
 const PATIENCE: Duration = Duration::from_secs(20);
 
+/// A load, with its name.
+type Load = (&'static str, fn(&Killable));
+
 /// Ends a server as the system does, and waits for it; how long it took.
 fn terminate(mut server: Killable) -> Duration {
     let id = server.id().to_string();
@@ -35,7 +38,7 @@ fn drill_the_program_ends_under_any_load() {
     let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
     let stops = scale(4805, 1205);
     let drive = long_recording(stops);
-    let loads: [(&str, fn(&Killable)); 5] = [
+    let loads: [Load; 5] = [
         ("nothing", |_| {}),
         ("two long runs and a study", |server| {
             begin(server, 0);

@@ -87,36 +87,40 @@ fn drill_deleted_images_end_a_run_with_a_reason_and_it_goes_on_when_they_are_bac
         .map(|name| drive.path().join(name))
         .collect();
     assert!(images.len() >= 10, "{images:?}");
-    let hidden = tempfile::tempdir().unwrap();
     let server = Killable::start(drive.path(), data.path());
-    let whole = begin(&server, 0);
-    let whole_path = format!("sessions/{whole}/targets/0/runs/0");
-    until(&server, &whole_path, has_ended);
-    let rows = server.raw("GET", &format!("sessions/{whole}/exports/rows.jsonl"), "", "");
+    let session = begin(&server, 0);
+    until(&server, &format!("sessions/{session}/targets/0/runs/0"), has_ended);
+    let rows = server.raw("GET", &format!("sessions/{session}/exports/rows.jsonl"), "", "");
+    server.kill();
+
+    let (hidden, data) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let server = Killable::start(drive.path(), data.path());
     let place = |number: usize| hidden.path().join(number.to_string());
     for (number, image) in images.iter().enumerate().skip(4) {
         std::fs::copy(image, place(number)).unwrap();
         std::fs::remove_file(image).unwrap();
     }
-    server.kill();
-
-    let server = Killable::start(drive.path(), data.path());
-    let path = format!("sessions/{whole}/targets/0/runs/0");
-    let stopped = until(&server, &path, has_ended);
+    assert_eq!(begin(&server, 0), session);
+    let path = format!("sessions/{session}/targets/0/runs/0");
+    let damaged = until(&server, &path, has_ended);
     let traverse = server.get("traverses")[0]["id"].as_str().unwrap().to_owned();
-    let (status, body) =
-        server.answer("GET", &format!("traverses/{traverse}/steps/3/images/left.png"), "", "");
+    let image = format!("traverses/{traverse}/steps/3/images/left.png");
+    let (status, body) = server.answer("GET", &image, "", "");
     assert!((400..500).contains(&status), "{status}: {body}");
     for (number, image) in images.iter().enumerate().skip(4) {
         std::fs::copy(place(number), image).unwrap();
     }
-    let again = begin(&server, 0);
-    until(&server, &format!("sessions/{again}/targets/0/runs/0"), has_ended);
-    let rows_again = server.raw("GET", &format!("sessions/{again}/exports/rows.jsonl"), "", "");
-    assert_eq!(rows_again, rows);
-    let reason = stopped["stopped"].to_string();
+    // The steps with damaged files are kept as they were; a fork computes them anew.
+    let fork = json!({ "run": 0, "from_step": 2 });
+    server.json("POST", &format!("sessions/{session}/targets/0/runs"), &fork);
+    until(&server, &format!("sessions/{session}/targets/0/runs/1"), has_ended);
+    let again = server.raw("GET", &format!("sessions/{session}/exports/rows.jsonl?target=0&run=1"), "", "");
+    let numbers = |rows: &str| rows.replace("\"run\":1", "\"run\":0");
+    assert_eq!(numbers(&again), numbers(&rows));
+    let reason = damaged["rows"][2]["reason"].as_str().unwrap_or_default().to_owned();
+    assert!(!reason.is_empty(), "{damaged}");
     tell(
         "images deleted and brought back",
-        &format!("image {status}, run: {reason}; afterwards the same bits"),
+        &format!("the image is refused with {status}, the step says why, a fork from it has the former bits"),
     );
 }

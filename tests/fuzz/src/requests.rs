@@ -5,6 +5,7 @@ use std::cell::RefCell;
 use axum::Router;
 use axum::body::Body;
 use axum::http::{Request, header};
+use sightline_server::access::Access;
 use sightline_server::hosts::Hosts;
 use sightline_server::state::AppState;
 use tempfile::TempDir;
@@ -66,7 +67,11 @@ impl Server {
         let runtime = runtime.expect("a runtime");
         let folder = recording::folder();
         let inside = runtime.enter();
-        let state = AppState::new(vec![recording::recording()], folder.path(), Hosts::new(PORT, &[]));
+        let state = AppState::new(
+            vec![recording::recording()],
+            folder.path(),
+            Access::without_token(Hosts::new(PORT, &[])),
+        );
         let state = state.expect("a server");
         drop(inside);
         let traverse = state.traverses()[0].id.clone();
