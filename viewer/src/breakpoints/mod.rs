@@ -9,10 +9,10 @@ pub(crate) mod goto;
 pub(crate) mod play;
 mod playing;
 mod removal;
+mod server;
 mod update;
 
-use sightline_session::breakpoints::{BreakpointChange, BreakpointView, NewBreakpoint};
-use sightline_session::query::{Query, QueryAnswer};
+use sightline_session::breakpoints::BreakpointView;
 
 use self::derived::Derived;
 use self::play::{Play, Shuttle};
@@ -55,63 +55,6 @@ pub enum Ask {
     Shuttle(Shuttle),
     /// Shows or hides the state bands of the other targets.
     ShowOthers(bool),
-}
-
-/// What is asked of the server.
-#[derive(Clone, Debug, PartialEq)]
-pub enum AskRequest {
-    /// The breakpoints with their hits.
-    Breakpoints(String),
-    /// To set a breakpoint.
-    Add {
-        /// The session.
-        session: String,
-        /// The breakpoint.
-        new: NewBreakpoint,
-    },
-    /// To change a breakpoint.
-    Change {
-        /// The session.
-        session: String,
-        /// The breakpoint's number.
-        number: usize,
-        /// What changes.
-        change: BreakpointChange,
-    },
-    /// To remove a breakpoint.
-    Remove {
-        /// The session.
-        session: String,
-        /// The breakpoint's number.
-        number: usize,
-    },
-    /// An expression at every step.
-    Query {
-        /// The session.
-        session: String,
-        /// The expression.
-        query: Query,
-    },
-}
-
-impl AskRequest {
-    /// Whether this changes the list of breakpoints.
-    pub(super) const fn is_change(&self) -> bool {
-        matches!(self, Self::Add { .. } | Self::Change { .. } | Self::Remove { .. })
-    }
-}
-
-/// What the server answered.
-#[derive(Clone, Debug, PartialEq)]
-pub enum AskReply {
-    /// The breakpoints with their hits.
-    Breakpoints(Vec<BreakpointView>),
-    /// A breakpoint that was set or changed.
-    Breakpoint(BreakpointView),
-    /// An expression at every step.
-    Answer(QueryAnswer),
-    /// It is done.
-    Done,
 }
 
 /// Breakpoints, derived columns, and time travel.

@@ -3,7 +3,7 @@
 use sightline_session::breakpoints::{BreakpointChange, BreakpointView, NewBreakpoint};
 
 use crate::breakpoints::derived::Derived;
-use crate::breakpoints::{AskRequest, WhenSet};
+use crate::breakpoints::WhenSet;
 use crate::state::State;
 use crate::state::deeds::Deed;
 
@@ -11,7 +11,7 @@ impl State {
     /// Takes a breakpoint out of the list and tells the server; none where there is no such one, or no session.
     pub(crate) fn take_breakpoint_out(&mut self, number: usize) -> Option<BreakpointView> {
         let at = self.ask.breakpoints.iter().position(|breakpoint| breakpoint.number == number)?;
-        if !self.ask_server(|session| AskRequest::Remove { session, number }) {
+        if !self.drop_breakpoint(number) {
             return None;
         }
         if self.ask.edited == Some(number) {
@@ -40,8 +40,7 @@ impl State {
         if !is_on {
             self.ask.when_set.push((expression.to_owned(), WhenSet::SwitchOff));
         }
-        let new = NewBreakpoint { expression: Some(expression.to_owned()), step: None };
-        self.ask_server(|session| AskRequest::Add { session, new });
+        self.add_breakpoint(NewBreakpoint { expression: Some(expression.to_owned()), step: None });
     }
 
     /// Takes out what was to be done to a breakpoint as soon as it is set: it is set, or refused.
@@ -58,10 +57,9 @@ impl State {
         let is_removed = waiting.contains(&WhenSet::Remove);
         if is_removed {
             self.ask.breakpoints.retain(|known| known.number != number);
-            self.ask_server(|session| AskRequest::Remove { session, number });
+            self.drop_breakpoint(number);
         } else if waiting.contains(&WhenSet::SwitchOff) {
-            let change = BreakpointChange { on: Some(false), expression: None };
-            self.ask_server(|session| AskRequest::Change { session, number, change });
+            self.change_breakpoint(number, &BreakpointChange { on: Some(false), expression: None });
         }
         is_removed
     }

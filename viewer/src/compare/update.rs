@@ -1,5 +1,8 @@
 //! What is asked of the server about compared runs, what it answers, and what the person asks for.
 
+use sightline_api::endpoint::Call;
+use sightline_api::endpoints::{CompareRuns, ShowMetrics};
+use sightline_api::location::{AtRun, AtSession};
 use sightline_api::wire::Problem;
 use sightline_session::Cursor;
 use sightline_session::compare::{Comparison, NewComparison, RUNS_MAX, RunName};
@@ -8,7 +11,6 @@ use sightline_session::metrics::RunMetrics;
 use crate::cache::{Eye, Key};
 use crate::command::{Command, Go, Stage};
 use crate::compare::{Ask, Asked, Compare};
-use crate::net::request::Request;
 use crate::state::{State, row_of};
 
 /// Requests for metrics that are under way at a time.
@@ -33,9 +35,11 @@ impl State {
         if is_known || self.compare.under_way.is_some() {
             return;
         }
-        self.outbox
-            .push(Request::Compare { session: asked.session.clone(), new: Box::new(asked.new.clone()) });
-        self.compare.under_way = Some(asked);
+        let call = Call::with_body::<CompareRuns>(&AtSession { session: session.to_owned() }, &asked.new);
+        self.compare.under_way = Some(asked.clone());
+        self.call_with_problem::<CompareRuns>(call, move |state, outcome| {
+            state.took_comparison(&asked, outcome);
+        });
     }
 
     fn ask_for_metrics(&mut self, session: &str) {
@@ -53,24 +57,26 @@ impl State {
             .collect();
         for (run, rows) in missing {
             self.compare.metrics_asked.insert(run, rows);
-            self.outbox.push(Request::Metrics { session: session.to_owned(), run });
+            let at = AtRun { session: session.to_owned(), target: run.target, run: run.run };
+            self.call_with_problem::<ShowMetrics>(Call::to::<ShowMetrics>(&at), move |state, outcome| {
+                state.took_metrics(run, outcome);
+            });
         }
     }
 
     /// Takes in a comparison, or why there is none.
-    pub(crate) fn took_comparison(&mut self, request: &Request, outcome: Result<Comparison, &Problem>) {
-        let is_meant = |asked: &mut Asked| matches!(request, Request::Compare { session, new } if *session == asked.session && **new == asked.new);
-        let Some(asked) = self.compare.under_way.take_if(is_meant) else { return };
-        self.compare.answer = Some((asked, outcome.map_err(|problem| problem.detail.clone())));
+    fn took_comparison(&mut self, asked: &Asked, outcome: Result<Comparison, Problem>) {
+        let Some(asked) = self.compare.under_way.take_if(|known| known == asked) else { return };
+        self.compare.answer = Some((asked, outcome.map_err(|problem| problem.detail)));
         if std::mem::take(&mut self.compare.jumps) {
             self.go_to_first_divergence();
         }
     }
 
     /// Takes in the metrics of a run, or why there are none.
-    pub(crate) fn took_metrics(&mut self, run: RunName, outcome: Result<RunMetrics, &Problem>) {
+    fn took_metrics(&mut self, run: RunName, outcome: Result<RunMetrics, Problem>) {
         if let Some(rows) = self.compare.metrics_asked.remove(&run) {
-            self.compare.metrics.insert(run, (rows, outcome.map_err(|problem| problem.detail.clone())));
+            self.compare.metrics.insert(run, (rows, outcome.map_err(|problem| problem.detail)));
         }
     }
 

@@ -28,10 +28,15 @@ impl InOrder {
 
 #[cfg(test)]
 mod tests {
+    use sightline_api::endpoint::Call;
+    use sightline_api::endpoints::RestoreNote;
+    use sightline_api::location::AtNote;
+
     use super::*;
 
-    fn note(id: u64) -> Request {
-        Request::RestoreNote { session: "s1".to_owned(), id }
+    fn note(ticket: u64) -> Request {
+        let call = Call::to::<RestoreNote>(&AtNote { session: "s1".to_owned(), note: ticket });
+        Request::Call { ticket, call }
     }
 
     #[test]

@@ -2,13 +2,11 @@
 
 pub(crate) mod events;
 pub(crate) mod calls;
-mod exchange;
 mod http;
 mod in_order;
-mod items;
+pub(crate) mod items;
 mod reply;
 pub(crate) mod request;
-pub(crate) mod why;
 
 use std::collections::HashSet;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -75,10 +73,10 @@ impl Net {
     fn send_now(&self, request: Request) {
         let (sender, context) = (self.sender.clone(), self.context.clone());
         http::send(&self.origin, request, &self.context, move |arrived| {
-            let shows_nothing = matches!(arrived.request, Request::PutCursor { .. });
+            let is_invisible = arrived.request.is_invisible();
             // Without a receiver the page is closing, and nobody waits for the answer.
             match sender.send(arrived) {
-                Ok(()) if shows_nothing => context.request_repaint_after(UNHURRIED),
+                Ok(()) if is_invisible => context.request_repaint_after(UNHURRIED),
                 Ok(()) => context.request_repaint(),
                 Err(_) => {}
             }

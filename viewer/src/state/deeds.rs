@@ -7,7 +7,6 @@ use sightline_session::what_if::WhatIf;
 use sightline_track::settings::Changes;
 
 use crate::cache::StepKey;
-use crate::net::request::Request;
 use crate::state::rows::run_letter;
 
 /// What a person did.
@@ -81,8 +80,6 @@ pub enum Deed {
 pub struct Undo {
     pub(super) done: Vec<Deed>,
     pub(super) undone: Vec<Deed>,
-    /// Requests that take a deed back or do it again, and are no deeds themselves.
-    pub(super) silent: Vec<Request>,
     /// Raised by every deed, and by taking one back.
     pub(super) changes: u64,
 }

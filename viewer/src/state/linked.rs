@@ -4,7 +4,6 @@ use sightline_session::compare::RunName;
 
 use crate::compare;
 use crate::drawing::view2d::View2d;
-use crate::net::request::Request;
 use crate::page::link::Fragment;
 use crate::state::State;
 use crate::state::run_letter;
@@ -43,7 +42,7 @@ impl State {
         match link.session.clone() {
             Some(id) if !is_open => {
                 self.sync.linked = Some(id.clone());
-                self.outbox.push(Request::Session(id));
+                self.read_session(id);
             }
             _ => {}
         }

@@ -1,13 +1,17 @@
 //! What keeps the page and the server's session together: the session is read as a whole when it changed, but a cursor that
 //! moved, and the rows of a run that goes on, by themselves. A session of a long drive is megabytes.
 
+use sightline_api::endpoint::Call;
+use sightline_api::endpoints::{MoveCursor, ShowCursor, ShowRun, ShowSession};
+use sightline_api::location::{AtRun, AtSession};
+use sightline_api::query::FirstRow;
 use sightline_session::Cursor;
 use sightline_session::compare::RunName;
 use sightline_session::view::RunView;
 
 use crate::net::events::Connection;
-use crate::net::request::Request;
 use crate::state::State;
+use crate::state::calls::Notice;
 
 impl State {
     /// Asks for what keeps page and session together.
@@ -20,7 +24,7 @@ impl State {
             self.sync.cursor_stale = false;
             self.sync.runs_ahead.clear();
             self.sync.session_asked = Some(self.sync.cursor_messages);
-            self.outbox.push(Request::Session(id.clone()));
+            self.read_session(id.clone());
         }
         self.sync_rows(&id);
         if self.cursor != self.sync.server_cursor
@@ -29,13 +33,58 @@ impl State {
         {
             self.sync.cursor_sent = Some(self.cursor);
             self.sync.cursor_messages += 1;
-            self.outbox.push(Request::PutCursor { session: id, cursor: self.cursor });
+            self.move_cursor(id, self.cursor);
         } else if self.sync.cursor_stale && self.sync.cursor_sent.is_none() && self.sync.cursor_read.is_none()
         {
             self.sync.cursor_stale = false;
             self.sync.cursor_read = Some(self.sync.cursor_messages);
-            self.outbox.push(Request::Cursor(id));
+            self.read_cursor(id);
         }
+    }
+
+    /// Reads a session as a whole.
+    pub(crate) fn read_session(&mut self, id: String) {
+        let call = Call::to::<ShowSession>(&AtSession { session: id });
+        let take = |state: &mut Self, view| {
+            let asked = state.sync.session_asked.take();
+            state.adopt(view, asked.is_some_and(|count| count != state.sync.cursor_messages));
+        };
+        self.call_or::<ShowSession>(call, take, |state, problem| {
+            state.sync.session_asked = None;
+            if state.session.is_none() && problem.status != 0 {
+                // The link names a session that was removed: open another one.
+                state.sync.linked = None;
+                state.open_first();
+            }
+            Notice::Card
+        });
+    }
+
+    /// Sends the cursor to the server. If it is refused, the page keeps its cursor and sends the next one.
+    fn move_cursor(&mut self, session: String, cursor: Cursor) {
+        let call = Call::with_body::<MoveCursor>(&AtSession { session }, &cursor);
+        self.call_with_problem::<MoveCursor>(call, move |state, _| state.put_cursor(cursor));
+    }
+
+    /// Reads the cursor of a session.
+    fn read_cursor(&mut self, session: String) {
+        let call = Call::to::<ShowCursor>(&AtSession { session: session.clone() });
+        let take = move |state: &mut Self, cursor| state.took_cursor(&session, cursor);
+        self.call_or::<ShowCursor>(call, take, |state, _| {
+            state.sync.cursor_read = None;
+            Notice::Card
+        });
+    }
+
+    /// Reads the rows of a run from one on, counted from 0.
+    pub(crate) fn read_rows(&mut self, session: String, RunName { target, run }: RunName, from_row: usize) {
+        let at = AtRun { session: session.clone(), target, run };
+        let call = Call::with_query::<ShowRun>(&at, &FirstRow { from_row });
+        self.call_with_problem::<ShowRun>(call, move |state, outcome| match outcome {
+            Ok(tail) => state.took_rows(&session, target, from_row, tail),
+            // The run may have been removed: read the whole session.
+            Err(_) => (state.sync.rows_asked, state.sync.session_stale) = (false, true),
+        });
     }
 
     /// Asks for the rows that a run has and the page has not; while the session is read, which may have them, for none.
@@ -47,7 +96,7 @@ impl State {
         match self.run_named(RunName { target, run }).map(|(_, known)| known.rows.len()) {
             Some(from_row) => {
                 self.sync.rows_asked = true;
-                self.outbox.push(Request::Rows { session: session.to_owned(), target, run, from_row });
+                self.read_rows(session.to_owned(), RunName { target, run }, from_row);
             }
             // A run that another page began.
             None => self.sync.session_stale = true,

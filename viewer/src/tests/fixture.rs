@@ -36,7 +36,6 @@ use sightline_world::target_truth::{StepTruth, TruthKind};
 use crate::cache::{Eye, Item, Key, StepKey};
 use crate::drawing::raster::Raster;
 use crate::net::events::Connection;
-use crate::net::request::Reply;
 use crate::state::State;
 use crate::tables::Table;
 
@@ -49,11 +48,6 @@ const POSITION: [f64; 3] = [6.0, 0.4, 0.2];
 /// A server that said nothing yet.
 pub(crate) fn nothing() -> State {
     State::new("http://localhost".to_owned(), None)
-}
-
-/// The body of a reply.
-pub(crate) fn reply(body: &impl serde::Serialize) -> Reply {
-    Reply::Body(serde_json::to_vec(body).unwrap())
 }
 
 /// The drive in the server's list.

@@ -1,17 +1,20 @@
 //! Asks for the trackability of the stop that is looked at, and moves the place that is being chosen in it.
 
+use sightline_api::endpoint::{Call, Endpoint, NoBody};
+use sightline_api::endpoints::{CancelTrackability, ShowTrackability};
+use sightline_api::location::AtStop;
+use sightline_api::query::MapLimits;
 use sightline_api::wire::Problem;
 use sightline_geometry::frames::Pixel;
 use sightline_rover::trackability::map::Cell;
-use sightline_rover::trackability::{MapProgress, TrackabilityMap, Verdict};
+use sightline_rover::trackability::{MapProgress, TrackabilityLimits, TrackabilityMap, Verdict};
 use sightline_track::settings::Changes;
 
 use crate::command::{Command, Mode};
 use crate::drawing::view2d::View2d;
-use crate::net::request::Request;
 use crate::picking::aim::Aim;
 use crate::state::{Place, Refusal, State};
-use crate::trackability::Trackability;
+use crate::trackability::{MapPlace, Trackability};
 use crate::trackability::limits::{Ask, Form};
 
 impl State {
@@ -87,19 +90,25 @@ impl State {
         let known = &mut self.trackability;
         if known.place != wanted {
             let is_made = known.progress.as_ref().is_none_or(|progress| progress.ended);
-            if let Some((traverse, step, limits)) = known.place.take().filter(|_| !is_made) {
-                self.outbox.push(Request::CancelTrackability { traverse, step, limits });
-            }
+            let unfinished = known.place.take().filter(|_| !is_made);
             let (limits, form) = (std::mem::take(&mut known.limits), known.form.take());
             let aim = known.aim.filter(|_| wanted.is_some());
             *known = Trackability { aim, limits, form, ..Trackability::default() };
             (known.is_stale, known.place) = (wanted.is_some(), wanted);
+            if let Some(place) = unfinished {
+                let call = map_call::<CancelTrackability>(&place);
+                // A refusal means that the map was finished meanwhile.
+                self.call_with_problem::<CancelTrackability>(call, |_, _| {});
+            }
         }
-        if let Some((traverse, step, limits)) =
-            known.place.clone().filter(|_| known.is_stale && !known.is_asked)
-        {
+        let known = &mut self.trackability;
+        let wanted = known.place.clone().filter(|_| known.is_stale && !known.is_asked);
+        if let Some(place) = wanted {
             (known.is_asked, known.is_stale) = (true, false);
-            self.outbox.push(Request::Trackability { traverse, step, limits });
+            let call = map_call::<ShowTrackability>(&place);
+            self.call_with_problem::<ShowTrackability>(call, move |state, answer| {
+                state.took_trackability(&place, answer);
+            });
         }
     }
 
@@ -118,13 +127,9 @@ impl State {
     }
 
     /// Takes an answer in; picking works all the same without one.
-    pub(crate) fn took_trackability(
-        &mut self,
-        place: (String, usize, Changes),
-        answer: Result<MapProgress, Problem>,
-    ) {
+    fn took_trackability(&mut self, place: &MapPlace, answer: Result<MapProgress, Problem>) {
         let known = &mut self.trackability;
-        if known.place.as_ref() != Some(&place) {
+        if known.place.as_ref() != Some(place) {
             return;
         }
         known.is_asked = false;
@@ -138,6 +143,15 @@ impl State {
             }
         }
     }
+}
+
+/// Calls `E` about the map of a stop.
+pub(crate) fn map_call<E>((traverse, step, limits): &MapPlace) -> Call
+where
+    E: Endpoint<At = AtStop, Query = MapLimits, Body = NoBody>,
+{
+    let limits = (!limits.is_empty()).then(|| TrackabilityLimits::text(limits));
+    Call::with_query::<E>(&AtStop { id: traverse.clone(), step: *step }, &MapLimits { limits })
 }
 
 impl State {

@@ -2,6 +2,9 @@
 
 use std::sync::Arc;
 
+use sightline_api::endpoint::Call;
+use sightline_api::endpoints::TryStep;
+use sightline_api::wire::Problem;
 use sightline_session::what_if::{Ghost, WhatIf};
 use sightline_track::settings::TrackerKind;
 use sightline_track::trace::ArrayName;
@@ -9,8 +12,6 @@ use sightline_vision::image::GrayImage;
 
 use crate::cache::StepKey;
 use crate::drawing::raster::Raster;
-use crate::net::request::Request;
-use crate::net::why::WhyRequest;
 use crate::state::State;
 use crate::state::deeds::Deed;
 use crate::what_if::{Scores, Trial};
@@ -54,7 +55,29 @@ impl State {
             what_if.arrays.push(ArrayName::SURFACE);
         }
         self.why.trying = Some((of.clone(), what_if.clone()));
-        self.outbox.push(Request::Why(WhyRequest::WhatIf { of, what_if }));
+        let call = Call::with_body::<TryStep>(&of, &what_if);
+        self.call_with_problem::<TryStep>(call, move |state, outcome| state.took_ghost(&of, what_if, outcome));
+    }
+
+    /// Takes the result of a trial, or why it was refused; then sends the newest change.
+    fn took_ghost(&mut self, of: &StepKey, mut what_if: WhatIf, outcome: Result<Ghost, Problem>) {
+        self.why.trying = None;
+        let has_scores = !what_if.arrays.is_empty();
+        // The requested arrays are no part of the change.
+        what_if.arrays.clear();
+        if let Some(trial) = self.why.trial.as_mut().filter(|trial| trial.of == *of) {
+            let is_newest = trial.what_if == what_if;
+            match outcome {
+                Ok(mut ghost) => {
+                    ghost.what_if.arrays.clear();
+                    (trial.ghost, trial.has_scores) = (Some(ghost), has_scores);
+                    trial.refused = trial.refused.take().filter(|_| !is_newest);
+                }
+                Err(problem) if is_newest => trial.refused = Some(problem.detail),
+                Err(_) => {}
+            }
+        }
+        self.send_trial();
     }
 
     /// Says whether the scores of what is tried are looked at; what is tried is asked for again where they are missing.

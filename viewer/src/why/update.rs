@@ -1,15 +1,16 @@
 //! Carries out what a person asks about a step, and takes in what the server answers.
 
 use serde_json::Value;
-use sightline_api::wire::{NewRun, Problem};
+use sightline_api::endpoint::{Call, Endpoint, NoBody};
+use sightline_api::endpoints::{AskCounterfactual, CancelCounterfactual, ShowCounterfactual, ShowWhy};
+use sightline_api::query::ValueName;
+use sightline_api::wire::NewRun;
 use sightline_session::counterfactual::wire::{Question, QuestionState};
 use sightline_session::view::RunView;
 use sightline_session::what_if::WhatIf;
 use sightline_session::why::{Explanation, gates};
 
 use crate::cache::StepKey;
-use crate::net::request::Request;
-use crate::net::why::{WhyReply, WhyRequest};
 use crate::panels::pane::Pane;
 use crate::state::effect::Effect;
 use crate::state::{State, run_letter};
@@ -69,8 +70,9 @@ impl State {
             Ask::Selected => self.ask_selected(),
             Ask::Saved => self.ask_what_saves(),
             Ask::CancelSaved => {
-                let key = self.step_key(self.cursor.step);
-                self.outbox.extend(key.map(|key| Request::Why(WhyRequest::CancelQuestion(key))));
+                if let Some(key) = self.step_key(self.cursor.step) {
+                    self.call_question::<CancelCounterfactual>(key, false);
+                }
             }
             Ask::Try(what_if) => self.try_out(what_if),
             Ask::Change { key, value } => {
@@ -93,9 +95,7 @@ impl State {
                 }
             }
             Ask::BranchWith(what_if) => self.branch(&what_if),
-            Ask::RemoveRun { target, run } => {
-                self.ask(|session| Request::Why(WhyRequest::RemoveRun { session, target, run }));
-            }
+            Ask::RemoveRun { target, run } => self.remove_run(target, run),
             Ask::Undo => self.undo_last(),
             Ask::Redo => self.redo_last(),
         }
@@ -123,9 +123,12 @@ impl State {
         if self.why.trees.len() >= KEPT {
             self.why.trees.pop_first();
         }
-        let (of, value) = place.clone();
-        self.why.trees.insert(place, Told::Waiting);
-        self.outbox.push(Request::Why(WhyRequest::Explain { of, value }));
+        self.why.trees.insert(place.clone(), Told::Waiting);
+        let call = Call::with_query::<ShowWhy>(key, &ValueName { value: Some(value.to_owned()) });
+        self.call_with_problem::<ShowWhy>(call, move |state, outcome| {
+            let told = outcome.map_or_else(|problem| Told::Refused(problem.detail), Told::Here);
+            state.why.trees.insert(place, told);
+        });
     }
 
     /// The last value asked for, at this step; before the first the worst criterion, else the state.
@@ -162,7 +165,7 @@ impl State {
         };
         if !goes_on {
             self.why.questions.insert(key.clone(), Told::Waiting);
-            self.outbox.push(Request::Why(WhyRequest::AskQuestion(key)));
+            self.call_question::<AskCounterfactual>(key, true);
         }
     }
 
@@ -174,83 +177,37 @@ impl State {
         let from_step = self.cursor.step;
         let (settings, prediction_px) = (what_if.settings.clone(), what_if.prediction_px);
         let new = NewRun { run, from_step, settings, prediction_px };
-        if self.ask(|session| Request::NewRun { session, target, new }) {
+        if self.fork(target, &new) {
             self.messages.note(format!("Running {} from step {from_step} as a branch …", run_letter(run)));
         }
     }
 
-    /// Takes in an answer.
-    pub(crate) fn told_why(&mut self, request: WhyRequest, reply: WhyReply) {
-        match (request, reply) {
-            (WhyRequest::Explain { of, value }, WhyReply::Explanation(explanation)) => {
-                self.why.trees.insert((of, value), Told::Here(*explanation));
+    /// Calls `E` about a question: to read, begin or cancel it.
+    fn call_question<E>(&mut self, key: StepKey, is_refusal_shown: bool)
+    where
+        E: Endpoint<At = StepKey, Body = NoBody, Reply = Question>,
+    {
+        self.call_with_problem::<E>(Call::to::<E>(&key), move |state, outcome| match outcome {
+            Ok(question) if question.state != QuestionState::Unasked => {
+                state.why.questions.insert(key, Told::Here(question));
             }
-            (WhyRequest::WhatIf { of, mut what_if }, WhyReply::Ghost(mut ghost)) => {
-                self.why.trying = None;
-                let has_scores = !what_if.arrays.is_empty();
-                // What is sent along is no part of the change.
-                what_if.arrays.clear();
-                ghost.what_if.arrays.clear();
-                let ours = self.why.trial.as_mut().filter(|trial| trial.of == of);
-                if let Some(trial) = ours {
-                    (trial.ghost, trial.has_scores) = (Some(*ghost), has_scores);
-                    if trial.what_if == what_if {
-                        trial.refused = None;
-                    }
-                }
-                self.send_trial();
-            }
-            (
-                WhyRequest::Question(key) | WhyRequest::AskQuestion(key) | WhyRequest::CancelQuestion(key),
-                WhyReply::Question(question),
-            ) if question.state != QuestionState::Unasked => {
-                self.why.questions.insert(key, Told::Here(*question));
-            }
-            (request, WhyReply::Session(view)) => {
-                self.removed(&request);
-                self.adopt(*view, true);
-                self.sync.session_stale = true;
-            }
-            _ => {}
-        }
-    }
-
-    /// Takes in a refusal; true where it is to be said among the messages as well.
-    pub(crate) fn refused_why(&mut self, request: WhyRequest, problem: &Problem) -> bool {
-        match request {
-            WhyRequest::Explain { of, value } => {
-                self.why.trees.insert((of, value), Told::Refused(problem.detail.clone()));
-                false
-            }
-            WhyRequest::WhatIf { of, mut what_if } => {
-                self.why.trying = None;
-                what_if.arrays.clear();
-                let ours = self.why.trial.as_mut().filter(|trial| trial.of == of && trial.what_if == what_if);
-                if let Some(trial) = ours {
-                    trial.refused = Some(problem.detail.clone());
-                }
-                self.send_trial();
-                false
-            }
-            WhyRequest::AskQuestion(key) => {
-                self.why.questions.insert(key, Told::Refused(problem.detail.clone()));
-                false
+            Err(problem) if is_refusal_shown => {
+                state.why.questions.insert(key, Told::Refused(problem.detail));
             }
             // Nobody has asked, or it ended meanwhile.
-            WhyRequest::Question(_) | WhyRequest::CancelQuestion(_) => false,
-            WhyRequest::RemoveRun { .. }
-            | WhyRequest::RestoreRun { .. }
-            | WhyRequest::RestoreTarget { .. } => {
-                self.forget_silent(&request);
-                true
-            }
-        }
+            _ => {}
+        });
+    }
+
+    /// Reads how far a question is answered.
+    fn read_question(&mut self, key: StepKey) {
+        self.call_question::<ShowCounterfactual>(key, false);
     }
 
     /// Takes in that a question went on.
     pub(crate) fn question_went_on(&mut self, key: StepKey) {
         if self.session.as_ref().is_some_and(|session| session.id == key.session) {
-            self.outbox.push(Request::Why(WhyRequest::Question(key)));
+            self.read_question(key);
         }
     }
 
@@ -258,8 +215,10 @@ impl State {
     pub(crate) fn follow_questions(&mut self) {
         let is_open =
             |told: &Told<Question>| matches!(told, Told::Here(question) if !question.state.is_over());
-        let open = self.why.questions.iter().filter(|(_, told)| is_open(told));
-        self.outbox.extend(open.map(|(key, _)| Request::Why(WhyRequest::Question(key.clone()))));
+        let open = self.why.questions.iter().filter(|(_, told)| is_open(told)).map(|(key, _)| key.clone());
+        for key in open.collect::<Vec<_>>() {
+            self.read_question(key);
+        }
     }
 
     /// Asks once whether somebody has asked what saves the cursor's step: a page that was loaded again finds its answer.
@@ -267,7 +226,7 @@ impl State {
         let is_lost = self.row().is_some_and(|row| row.state != "tracking" || row.tracked == Some(false));
         let Some(key) = self.step_key(self.cursor.step).filter(|_| is_lost) else { return };
         if self.why.looked_for.insert(key.clone()) {
-            self.outbox.push(Request::Why(WhyRequest::Question(key)));
+            self.read_question(key);
         }
     }
 }
