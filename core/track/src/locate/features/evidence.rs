@@ -13,7 +13,7 @@ use crate::locate::template::evidence::TemplateEvidence;
 use sightline_geometry::estimate::motion_parameters::MotionParameters;
 use sightline_geometry::estimate::ransac::Refit;
 use sightline_geometry::frames::Pose;
-use sightline_record::{ArrayKind, ArrayView, Declaration, Record, Stage, Unit};
+use sightline_record::{ArrayKind, ArrayView, Declaration, Record, Stage, Unit, Unsent};
 
 /// What the feature locator saw; a step that was not reached is null.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -45,11 +45,11 @@ pub struct FeatureEvidence {
     /// A row for every feature of the left image.
     #[serde(skip)]
     #[schema(ignore)]
-    pub table: Table,
+    pub table: Unsent<Table>,
     /// A row for every set of the bootstrap: where it puts the target.
     #[serde(skip)]
     #[schema(ignore)]
-    pub cloud: Table,
+    pub cloud: Unsent<Table>,
 }
 
 /// Counts of step `detect` and of the matches between the eyes.
@@ -229,7 +229,7 @@ impl FeatureEvidence {
             "features",
             ArrayKind::Table,
             "The features of the left image, a row each: position, scale, orientation, partners and residual",
-            |e| (&e.table).into(),
+            |e| e.table.view(),
         );
     }
 
@@ -239,7 +239,7 @@ impl FeatureEvidence {
             "cloud",
             ArrayKind::Table,
             "Target positions of the bootstrap sets, a row each: position in the rover frame and pixel",
-            |e| (&e.cloud).into(),
+            |e| e.cloud.view(),
         );
     }
 }

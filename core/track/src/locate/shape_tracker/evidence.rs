@@ -17,7 +17,7 @@ use crate::gate::Gate;
 use crate::locate::features::evidence::{FeatureEvidence, Table};
 use crate::locate::template::evidence::TemplateEvidence;
 use sightline_geometry::frames::{Point3, Pose};
-use sightline_record::{ArrayKind, Declaration, GateRecord, Record, Stage, Unit};
+use sightline_record::{ArrayKind, Declaration, GateRecord, Record, Stage, Unit, Unsent};
 use sightline_vision::registration::{Failure, Mesh, Method, Registration};
 
 /// What the shape tracker saw; a step that was not reached is null.
@@ -46,7 +46,7 @@ pub struct ShapeEvidence {
     /// The arrays.
     #[serde(skip)]
     #[schema(ignore)]
-    pub arrays: ShapeArrays,
+    pub arrays: Unsent<ShapeArrays>,
 }
 
 /// A registration with an earlier view, in numbers.
@@ -97,18 +97,18 @@ impl ShapeEvidence {
     pub(in crate::locate) fn stages() -> Vec<Stage<Self>> {
         vec![
             Stage::of("surface", "Which surface does the pair show?", |e: &Self| e.surface.as_ref())
-                .with(|e| Some(&e.arrays), ShapeArrays::declare_surface)
+                .with(|e| e.arrays.get(), ShapeArrays::declare_surface)
                 .at("surface"),
             Stage::of_parts("coarse_register", "By which shift does it fit the earlier surface, roughly?")
                 .with(|e: &Self| e.registration.as_ref(), Registered::declare_coarse)
-                .with(|e| Some(&e.arrays), ShapeArrays::declare_coarse)
+                .with(|e| e.arrays.get(), ShapeArrays::declare_coarse)
                 .at("registration"),
             Stage::of(
                 "refine_register",
                 "By which motion does it fit best, and how certain is that?",
                 |e: &Self| e.registration.as_ref(),
             )
-            .with(|e| Some(&e.arrays), ShapeArrays::declare_refine)
+            .with(|e| e.arrays.get(), ShapeArrays::declare_refine)
             .at("registration"),
             Stage::of("carried_ray", "Where does the first line of sight meet the surface?", |e: &Self| {
                 e.registration.as_ref()?.ray.as_ref()
