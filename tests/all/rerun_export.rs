@@ -140,7 +140,8 @@ fn by_features(trace: &RunStep) -> RunStep {
     let columns = FeatureColumn::COUNT as u32;
     let table = Table { columns, values: [alone, inlier, outlier].concat() };
     let detect = Detected { left: 3, right: 3, stereo_matches: 2, points: 2, median_range_m: Some(4.5) };
-    let mut evidence = FeatureEvidence { detect: Some(detect), table: table.into(), ..FeatureEvidence::default() };
+    let mut evidence =
+        FeatureEvidence { detect: Some(detect), table: table.into(), ..FeatureEvidence::default() };
     if !is_pick {
         evidence.fit_motion = Some(FittedMotion {
             translation_m: [-0.3, 0.0, 0.0],

@@ -54,7 +54,8 @@ pub(super) fn log_right_window(step: &Step<'_>) -> Logged {
 
 fn shared_limits(step: &Step<'_>) -> [f64; 2] {
     let prepared = step.template().and_then(|e| e.scale_roll.as_ref());
-    let prepared = prepared.into_iter().flat_map(|s| [&s.reference, &s.scaled, &s.rolled]).filter_map(Unsent::get);
+    let prepared =
+        prepared.into_iter().flat_map(|s| [&s.reference, &s.scaled, &s.rolled]).filter_map(Unsent::get);
     limits(prepared.chain(step.matched().and_then(|m| m.matched.get())))
 }
 

@@ -2,8 +2,8 @@
 
 use sightline_session::breakpoints::{BreakpointChange, BreakpointView, NewBreakpoint};
 
-use crate::breakpoints::derived::Derived;
 use crate::breakpoints::WhenSet;
+use crate::breakpoints::derived::Derived;
 use crate::state::State;
 use crate::state::deeds::Deed;
 

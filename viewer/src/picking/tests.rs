@@ -295,9 +295,7 @@ fn a_place_that_the_map_calls_bad_is_refused_before_it_is_asked_for_unless_one_i
     let bad = map.cells().find(|cell| cell.verdict == Verdict::Bad).unwrap();
     let nearest = map.nearest_good(bad.pixel);
     assert!(nearest.is_some());
-    let is_asked = |state: &mut State| {
-        !calls_of::<DesignateTarget>(state).is_empty()
-    };
+    let is_asked = |state: &mut State| !calls_of::<DesignateTarget>(state).is_empty();
     state.perform(Command::Pick(bad.pixel));
     assert!(!is_asked(&mut state), "nothing is designated");
     let refusal = state.refusal.clone().unwrap();

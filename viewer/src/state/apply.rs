@@ -187,8 +187,7 @@ impl State {
         let Some(session) = self.session_id() else { return };
         let target = NewTarget::at_pixel(place.step, place.pixel);
         let call = Call::with_body::<DesignateTarget>(&AtSession { session }, &target);
-        let take =
-            |state: &mut Self, Designated { target, session, .. }| state.designated(target, session);
+        let take = |state: &mut Self, Designated { target, session, .. }| state.designated(target, session);
         self.call_or::<DesignateTarget>(call, take, |state, problem| {
             if let Some(place) = state.designating.take() {
                 let (sentence, nearest) = (problem.detail.clone(), problem.nearest_pixel.as_deref().copied());

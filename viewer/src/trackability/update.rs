@@ -14,8 +14,8 @@ use crate::command::{Command, Mode};
 use crate::drawing::view2d::View2d;
 use crate::picking::aim::Aim;
 use crate::state::{Place, Refusal, State};
-use crate::trackability::{MapPlace, Trackability};
 use crate::trackability::limits::{Ask, Form};
+use crate::trackability::{MapPlace, Trackability};
 
 impl State {
     /// The map of the stop that is looked at, as far as it was made.

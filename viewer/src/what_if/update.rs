@@ -56,7 +56,9 @@ impl State {
         }
         self.why.trying = Some((of.clone(), what_if.clone()));
         let call = Call::with_body::<TryStep>(&of, &what_if);
-        self.call_with_problem::<TryStep>(call, move |state, outcome| state.took_ghost(&of, what_if, outcome));
+        self.call_with_problem::<TryStep>(call, move |state, outcome| {
+            state.took_ghost(&of, what_if, outcome)
+        });
     }
 
     /// Takes the result of a trial, or why it was refused; then sends the newest change.

@@ -11,8 +11,8 @@ use sightline_session::why::Explanation;
 use crate::cache::StepKey;
 use crate::command::{Command, Go};
 use crate::state::State;
-use crate::tests::fixture;
 use crate::tests::calls::{answer, calls, calls_of, refuse};
+use crate::tests::fixture;
 use crate::why::{Ask, Told};
 
 /// The step that is lost.

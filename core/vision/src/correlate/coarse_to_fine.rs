@@ -103,7 +103,10 @@ pub fn coarse_to_fine(
         // The quartic of the sub-pixel fit passes through 5 × 5 scores.
         comparisons += levels.visit(0, [best.x as i32, best.y as i32], 2, &mut visited);
     }
-    Some((visited, CoarseSearch { factor: 1 << descent.levels, candidates, comparisons, coarse: Some(coarse) }))
+    Some((
+        visited,
+        CoarseSearch { factor: 1 << descent.levels, candidates, comparisons, coarse: Some(coarse) },
+    ))
 }
 
 impl Descent {
