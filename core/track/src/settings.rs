@@ -317,6 +317,12 @@ mod tests {
         assert_eq!(idle[0].1, "first_stage = klt_translation or klt_affine, or refine = affine");
         assert!(without_effect(&[("height_scale_m", json!(0.1)), ("height_weight", json!(0.2))]).is_empty());
         assert_eq!(without_effect(&[("height_scale_m", json!(0.1))])[0].1, "height_weight ≠ 0.0");
+        // A group of another tracker has none.
+        let idle = without_effect(&[("bootstrap_sets", json!(50))]);
+        assert_eq!(idle[0].1, "tracker = features or combined");
+        assert!(without_effect(&[("bootstrap_sets", json!(50)), ("tracker", json!("combined"))]).is_empty());
+        let idle = without_effect(&[("motion_inlier_sigma", json!(2.0)), ("tracker", json!("features"))]);
+        assert_eq!(idle[0].1, "tracker = features or combined, and motion_gate = mahalanobis");
     }
 
     #[test]

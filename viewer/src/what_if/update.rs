@@ -57,7 +57,7 @@ impl State {
         self.why.trying = Some((of.clone(), what_if.clone()));
         let call = Call::with_body::<TryStep>(&of, &what_if);
         self.call_with_problem::<TryStep>(call, move |state, outcome| {
-            state.took_ghost(&of, what_if, outcome)
+            state.took_ghost(&of, what_if, outcome);
         });
     }
 
