@@ -149,6 +149,9 @@ impl Settings {
 
     /// The settings among `changes` that have no effect beside the others, each with the condition under which it has.
     pub fn without_effect(&self, changes: &Changes) -> Vec<(String, String)> {
+        if changes.is_empty() {
+            return Vec::new();
+        }
         let (table, document) = (Self::table(), serde_json::to_value(self).unwrap_or_default());
         let value = |info: &SettingInfo| info.value_in(&document).cloned().unwrap_or_default();
         let idle =

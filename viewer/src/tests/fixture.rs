@@ -74,6 +74,7 @@ pub(crate) fn at_step(context: &egui::Context, step: usize) -> State {
         fork: None,
         changes: Changes::new(),
         settings: Settings::default(),
+        without_effect: Default::default(),
         rows: traces.iter().map(RunStep::row).collect(),
         complete: false,
         stopped: None,

@@ -86,6 +86,7 @@ fn two_runs(context: &Context, step: usize) -> State {
         fork: None,
         changes: settings.changes(),
         settings,
+        without_effect: Default::default(),
         rows: traces.iter().map(RunStep::row).collect(),
         complete: false,
         stopped: None,
