@@ -247,13 +247,18 @@ fn limits_are_typed_refused_in_a_sentence_and_used_for_a_map_of_their_own() {
     let limits = state.trackability.limits.clone();
     let text = sightline_rover::trackability::TrackabilityLimits::text(&limits);
     assert_eq!(text, "cell_px=16,edge_bad_px=4.5");
-    let call = map_call::<ShowTrackability>(&("drive".to_owned(), 0, limits));
+    let call = map_call::<ShowTrackability>(&("drive".to_owned(), 0, limits.clone()));
     let curl = crate::exports::as_text::http("http://localhost", call);
     assert!(
         curl.contains("/traverses/drive/steps/0/trackability?limits=cell_px%3D16%2Cedge_bad_px%3D4.5"),
         "{curl}"
     );
     // An answer for the limits before is no answer.
+    let mut state = fixture::at_step(&egui::Context::default(), 0);
+    state.perform(Command::SetMode(Mode::Pick));
+    assert!(asked(&mut state));
+    state.trackability.limits = limits;
+    assert!(asked(&mut state));
     answer(&mut state, &progress(8));
     assert!(state.trackability_map().is_none());
     answer(&mut state, &progress(8));

@@ -1,7 +1,7 @@
 //! Why follows the cursor: to another step, into a branch, and never faster than the server answers.
 
 use sightline_api::endpoint::Call;
-use sightline_api::endpoints::ShowWhy;
+use sightline_api::endpoints::{AskCounterfactual, ShowWhy};
 use sightline_api::query::ValueName;
 use sightline_api::wire::Problem;
 use sightline_session::Fork;
@@ -11,7 +11,7 @@ use sightline_session::why::Explanation;
 use crate::cache::StepKey;
 use crate::command::{Command, Go};
 use crate::state::State;
-use crate::tests::calls::{answer, calls, calls_of, refuse};
+use crate::tests::calls::{answer, calls_of, refuse};
 use crate::tests::fixture;
 use crate::why::{Ask, Told};
 
@@ -86,6 +86,6 @@ fn what_would_have_saved_the_pick_is_answered_without_asking_the_server() {
     let mut state = fixture::at_step(&egui::Context::default(), 0);
     state.take_requests();
     state.perform(Command::Why(Ask::Saved));
-    assert!(calls(&mut state).is_empty());
+    assert!(calls_of::<AskCounterfactual>(&mut state).is_empty());
     assert!(state.messages.newest().unwrap().text.contains("picked at this step"));
 }

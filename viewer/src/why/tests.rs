@@ -171,8 +171,8 @@ fn a_change_that_is_refused_says_so_in_the_card_and_loses_nothing() {
         ("setting".to_owned(), String::new(), "search_window_px must be odd".to_owned());
     let problem =
         Problem { code, title, status: 422, detail, hint: None, nearest_pixel: None, received: None };
-    refuse::<TryStep>(&mut state, problem);
     state.take_requests();
+    refuse::<TryStep>(&mut state, problem);
     assert_eq!(state.trial().unwrap().refused.as_deref(), Some("search_window_px must be odd"));
     assert!(calls_of::<TryStep>(&mut state).is_empty(), "it is not asked for again and again");
 }
