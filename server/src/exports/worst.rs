@@ -20,7 +20,7 @@ pub(super) fn worst(steps: &[Arc<RunStep>]) -> Vec<usize> {
     places.into_iter().take(WORST).map(|(place, _)| place).collect()
 }
 
-/// How bad a step is. Lost steps without a position come first; scores only tell steps apart that have no truth.
+/// The badness of a step. Lost steps without a position are worst; scores order the steps without truth.
 fn badness(row: &StepRow) -> f64 {
     let lost = if is_lost(row) { 1e6 } else { 0.0 };
     match row.err_px.or(row.err_m.map(|error| 100.0 * error)) {

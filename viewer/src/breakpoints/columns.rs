@@ -1,4 +1,4 @@
-//! Plots expressions over the steps, and asks the server for their values.
+//! Plots expressions over the steps and reads their values from the server.
 
 use sightline_session::expression::Expression;
 use sightline_session::query::{Query, QueryAnswer};
@@ -9,7 +9,7 @@ use crate::state::State;
 /// How many derived columns there may be: each is a plot of its own.
 const LIMIT: usize = 8;
 
-/// A run that goes on is asked again when it has grown by this share, so that asking does not grow with its square.
+/// The values of a growing run are read again when it has grown by 1/50: reading every new step would be quadratic.
 const GROWTH: usize = 50;
 
 impl State {

@@ -11,7 +11,7 @@ use crate::state::deeds::Deed;
 use crate::state::effect::Effect;
 
 impl State {
-    /// Carries out what the person asked for.
+    /// Applies a command about breakpoints.
     pub(crate) fn apply_ask(&mut self, ask: Ask) {
         match ask {
             Ask::Type(text) => (self.ask.text, self.ask.wants_focus) = (text, false),
@@ -57,7 +57,7 @@ impl State {
 
     fn set_breakpoint(&mut self) {
         let text = self.ask.text.trim().to_owned();
-        // What is wrong with the text stands under the box already.
+        // The box shows the error already.
         if Expression::condition(&text).is_err() {
             return;
         }
@@ -93,7 +93,7 @@ impl State {
         }
     }
 
-    /// The next hit after a step, or the last one before it, in the run that is looked at.
+    /// The next hit after a step, or the last one before it, in the run at the cursor.
     pub fn hit_from(&self, step: usize, is_forward: bool) -> Option<usize> {
         let (target, run) = (self.cursor.target?, self.cursor.run);
         let hits = self.ask.watched().map(|(_, breakpoint)| Asking::hits(breakpoint, target, run));
@@ -105,7 +105,7 @@ impl State {
         }
     }
 
-    /// The conditions of the breakpoints that a step hits in the run that is looked at.
+    /// The conditions of the breakpoints that a step hits in the run at the cursor.
     pub(crate) fn hit_at(&self, step: usize) -> Vec<&str> {
         let Some(target) = self.cursor.target else { return Vec::new() };
         let is_hit = |breakpoint: &BreakpointView| {

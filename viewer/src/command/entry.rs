@@ -79,7 +79,7 @@ pub(crate) struct UserCommand {
     pub tip: &'static str,
     /// Keys, the one that is shown first.
     pub shortcuts: &'static [Shortcut],
-    /// What it asks for in this state.
+    /// The command in this state.
     pub command: fn(&State) -> Command,
 }
 

@@ -21,7 +21,7 @@ pub(super) fn send(
     };
     let mut http = ehttp::Request::get(format!("{origin}/api/v1/{}", call.path));
     http.method = method(call.method);
-    // Rendering an image or designating a target takes as long as it takes.
+    // Rendering an image or designating a target has no time limit.
     http.timeout = None;
     if let Some(body) = call.body {
         http.headers = Headers::new(&[("Accept", "application/json"), ("Content-Type", "application/json")]);
@@ -56,7 +56,7 @@ const fn method(method: Method) -> ehttp::Method {
     }
 }
 
-/// What the server said instead of an answer.
+/// The problem in a response that is no success.
 fn problem(response: &ehttp::Response) -> Problem {
     serde_json::from_slice(&response.bytes).unwrap_or_else(|_| {
         let detail = format!("The server answered {} {}.", response.status, response.status_text);

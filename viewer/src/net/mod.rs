@@ -18,10 +18,10 @@ use self::in_order::InOrder;
 use self::request::{Arrived, Request};
 use crate::cache::Key;
 
-/// How many images, arrays and records are asked for at a time.
+/// Maximum number of images, arrays and records under way.
 const AT_A_TIME: usize = 6;
 
-/// How many of them may be images that must be rendered first: a browser has few connections to one server.
+/// Maximum number of images among them that must be rendered first: a browser has few connections to one server.
 const SLOW_AT_A_TIME: usize = 2;
 
 /// The network side of the page.
@@ -45,7 +45,7 @@ impl Net {
         Self { origin, context, sender, receiver, under_way, slow, in_order, events }
     }
 
-    /// Takes a place for something that is asked for next, where there is one.
+    /// Reserves a place for an item that is requested next; false if all are taken.
     pub(crate) fn take_place(&mut self, key: &Key, is_slow: bool) -> bool {
         let is_place = self.under_way.len() < AT_A_TIME && (!is_slow || self.slow.len() < SLOW_AT_A_TIME);
         if is_place {
@@ -83,7 +83,7 @@ impl Net {
         });
     }
 
-    /// What arrived since the last time.
+    /// The answers since the last call.
     pub(crate) fn poll(&mut self) -> Vec<Arrived> {
         let arrived: Vec<Arrived> = self.receiver.try_iter().collect();
         for answer in &arrived {

@@ -1,4 +1,4 @@
-//! Carries out what a person asks of notes, and takes in what the server answers.
+//! The user's commands about notes, their calls, and what the replies change.
 
 use sightline_api::endpoint::Call;
 use sightline_api::endpoints::{AddNote, ChangeNote, ListNotes, RemoveNote, RestoreNote};
@@ -13,7 +13,7 @@ use crate::state::calls::Notice;
 use crate::state::deeds::Deed;
 
 impl State {
-    /// Carries out what was asked of notes.
+    /// Applies a command about notes.
     pub(crate) fn ask_of_notes(&mut self, ask: Ask) {
         match ask {
             Ask::Pin => self.pin(),
@@ -86,7 +86,7 @@ impl State {
         self.notes.list.iter().flatten().find(|note| note.id == id)
     }
 
-    /// The notes that are pinned to a stop: to the run that is looked at, or to the stop alone.
+    /// The notes that are pinned to a stop: to the run at the cursor, or to the stop alone.
     pub fn notes_at(&self, step: usize) -> Vec<&Note> {
         let cursor = self.cursor;
         let is_here = |note: &&Note| {
@@ -96,7 +96,7 @@ impl State {
         self.notes.list.iter().flatten().filter(is_here).collect()
     }
 
-    /// Asks for the notes of a session that is being opened.
+    /// Reads the notes of a session that is being opened.
     pub(crate) fn open_notes(&mut self, session: &str) {
         self.notes = Notes { asked: Some(session.to_owned()), ..Notes::default() };
         self.read_notes(session.to_owned());
@@ -108,14 +108,14 @@ impl State {
         self.call::<ListNotes>(call, move |state, list| state.took_notes(&session, list));
     }
 
-    /// Takes in that notes changed.
+    /// Reads the notes again after an event that they changed.
     pub(crate) fn notes_changed(&mut self, session: String) {
         if self.notes.asked.as_ref() == Some(&session) {
             self.read_notes(session);
         }
     }
 
-    /// Takes in the notes of a session.
+    /// Replaces the list of notes, unless another session was opened meanwhile.
     fn took_notes(&mut self, session: &str, list: Vec<Note>) {
         if self.notes.asked.as_deref() == Some(session) {
             self.notes.list = Some(list);
@@ -220,7 +220,7 @@ impl State {
         self.notes.at = Some(id);
     }
 
-    /// The note after the one that was gone to last, or before it; the tour begins at its first.
+    /// The note `by` places after the last visited one; the tour begins at the first note.
     fn next_of_tour(&self, by: isize) -> Option<u64> {
         let list = self.notes.list.as_ref().filter(|list| !list.is_empty())?;
         let at = self.notes.at.and_then(|id| list.iter().position(|note| note.id == id));

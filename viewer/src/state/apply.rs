@@ -1,4 +1,4 @@
-//! Carrying out what the person asked for.
+//! Applies the user's commands to the state.
 
 use sightline_api::endpoint::{Call, Endpoint, NoBody};
 use sightline_api::endpoints::{CancelRun, DesignateTarget, ForkRun, ResumeRun, StreamRecording};
@@ -17,7 +17,7 @@ use crate::state::effect::Effect;
 use crate::state::{Place, Refusal, State, Views, events, run_letter};
 
 impl State {
-    /// Applies one command and returns what the page has to do for it, in order.
+    /// Applies one command and returns its effects, in order.
     #[must_use = "the page carries the effects out"]
     pub fn apply(&mut self, command: Command) -> Vec<Effect> {
         self.perform(command);
@@ -115,7 +115,7 @@ impl State {
 
     fn go(&mut self, go: Go) {
         let Some(last) = self.stop_count().checked_sub(1) else { return };
-        // Who steps by hand wants to stay there.
+        // Stepping by hand ends playing.
         self.shuttle(Shuttle::Stop);
         let events = self.run().map(events).unwrap_or_default();
         let step = self.cursor.step;
@@ -178,7 +178,7 @@ impl State {
         }
     }
 
-    /// Has the server designate a place.
+    /// Designates a target at a place.
     pub(crate) fn designate(&mut self, place: Place) {
         if self.designating.is_some() {
             self.messages.note("The last designation is still being computed.");
@@ -205,7 +205,7 @@ impl State {
         self.call::<E>(call, |state, _| state.sync.session_stale = true);
     }
 
-    /// Forks the run that is looked at; before the step after the designation everything is computed anew.
+    /// Forks the run at the cursor; at the designation the whole run is computed again.
     fn run_from_here(&mut self, changes: Changes) {
         let Some((target, run)) = self.target().map(|t| t.number).zip(self.run().map(|r| r.number)) else {
             self.messages.problem("There is no run to leave: pick a target first.", None);

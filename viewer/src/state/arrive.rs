@@ -1,4 +1,4 @@
-//! Taking in what the server answers and tells.
+//! Applies answers and events of the server to the state.
 
 use std::collections::BTreeSet;
 
@@ -18,7 +18,7 @@ use crate::state::effect::Effect;
 use crate::state::{Progress, State, run_letter};
 
 impl State {
-    /// Asks for what a page needs first.
+    /// Requests the lists and the session that a new page needs.
     pub fn begin(&mut self) {
         self.read_settings();
         self.read_traverses();
@@ -27,7 +27,7 @@ impl State {
         }
     }
 
-    /// Takes in an answer.
+    /// Applies an answer.
     pub fn arrived(&mut self, arrived: Arrived, now: f64) {
         match (arrived.request, arrived.outcome) {
             (Request::Item(key), Ok(Reply::Item(item))) => self.cache.arrived(key, Ok(item), now),
@@ -37,7 +37,7 @@ impl State {
         }
     }
 
-    /// Takes in what the server tells every page.
+    /// Applies an event, which the server sends to every page.
     pub fn told(&mut self, event: Event) {
         let is_ours = |session: &str| self.session.as_ref().is_some_and(|open| open.id == session);
         match event {
@@ -68,7 +68,7 @@ impl State {
         }
     }
 
-    /// Takes in that the events come in, or do not.
+    /// Applies a change of the event connection.
     pub fn connected(&mut self, connection: Connection) {
         let was = std::mem::replace(&mut self.connection, connection);
         if was == connection {
@@ -82,7 +82,7 @@ impl State {
                 self.messages.note("The server answers again.");
                 self.catch_up();
             }
-            // Nothing can be missed before the first connection, except what the first answers lacked.
+            // Before the first connection an event can only have been missed since the first answers.
             (_, Connection::Live) => self.sync.session_stale = true,
             (Connection::Live | Connection::Connecting, Connection::Gone { .. }) => {
                 let hint = "Start it with `sightline serve`; the steps that are loaded stay browsable.";
@@ -92,7 +92,7 @@ impl State {
         }
     }
 
-    /// Asks again for what may have been missed while the server was gone.
+    /// Requests everything that may have changed while the server was unreachable.
     fn catch_up(&mut self) {
         self.cache.retry(|_| true);
         self.ask_why_again();
@@ -133,12 +133,12 @@ impl State {
         self.outbox.add(Effect::OpenUrl(stream.viewer_url));
     }
 
-    /// Says what the server refused, unless it is shown elsewhere.
+    /// Shows a refusal; `is_shown_in_place`: in the list of messages alone.
     pub(crate) fn show_refusal(&mut self, call: &Call, problem: &Problem, is_shown_in_place: bool) {
         if problem.status != 0 {
             self.messages.refused(problem, format!("{} {}", call.method, call.path), !is_shown_in_place);
         } else if call.method != Method::Get {
-            // That the server is gone is said by the banner, but not that something came to nothing.
+            // The banner shows that the server is unreachable, but not that a change was lost.
             let hint = "Do it again when the banner has gone.".to_owned();
             self.messages.problem("The server does not answer, so that nothing was changed.", Some(hint));
         }
@@ -188,7 +188,7 @@ impl State {
         self.call::<ListSettings>(settings, |state, table| state.settings = table);
     }
 
-    /// Reads which traverses the server has.
+    /// Reads the list of traverses.
     pub(crate) fn read_traverses(&mut self) {
         let traverses = Call::to::<ListTraverses>(&Anywhere {});
         self.call::<ListTraverses>(traverses, Self::took_traverses);
@@ -199,7 +199,7 @@ impl State {
         self.call::<ShowTraverse>(traverse, |state, view| state.traverse = Some(view));
     }
 
-    /// Takes a session over; the cursor stays where the person put it unless somebody else moved it.
+    /// Replaces the open session. The cursor stays unless another page moved it.
     pub(crate) fn adopt(&mut self, view: SessionView, moved_meanwhile: bool) {
         let is_other = self.session.as_ref().is_none_or(|open| open.id != view.id);
         self.ask.make_stale();
@@ -221,7 +221,7 @@ impl State {
         self.note_waiting_runs(&view);
         let is_kept = std::mem::take(&mut self.sync.keeps_cursor) && !is_other;
         if is_kept {
-            // A server that was ended may have lost the last move: it is told again where the page is.
+            // A server that was restarted may have lost the last move of the cursor: send it again.
             self.sync.server_cursor = view.cursor;
         }
         if is_other || (!moved_meanwhile && self.is_moved_elsewhere(view.cursor)) {

@@ -1,4 +1,4 @@
-//! Undo and redo: takes deeds back, and does them again.
+//! Undo and redo of the user's changes.
 
 use sightline_api::endpoint::{Call, Endpoint, NoBody};
 use sightline_api::endpoints::{RemoveRun, RemoveTarget, RestoreRun, RestoreTarget};
@@ -13,7 +13,7 @@ use crate::state::{State, run_letter};
 const REMEMBERED: usize = 100;
 
 impl State {
-    /// Remembers a deed; what was taken back before cannot be done again after it.
+    /// Remembers a deed and clears the deeds that could be redone.
     pub(crate) fn did(&mut self, deed: Deed) {
         self.undo.undone.clear();
         self.undo.changes += 1;
@@ -29,7 +29,7 @@ impl State {
         }
     }
 
-    /// Remembers a removal, and says so with a way to take it back.
+    /// Remembers a removal and shows a message that offers to undo it.
     pub(crate) fn did_remove(&mut self, what: &str, deed: Deed) {
         self.did(deed);
         self.messages.deed(format!("Removed {what}."), self.undo.changes);
@@ -120,7 +120,7 @@ impl State {
         }
     }
 
-    /// Does a deed again, or takes it back.
+    /// Redoes a deed, or undoes it.
     fn carry_over(&mut self, deed: &Deed, again: bool) {
         match deed {
             Deed::Picked { target } => self.show_target(*target, again, None),

@@ -1,6 +1,6 @@
-//! The trackability of the stop that is looked at, and the place that is being chosen in it.
+//! The trackability of the cursor's stop, and the aim in its left image.
 //!
-//! The map is asked for while a target is picked, again whenever the server tells of new rows, and given up with the pick.
+//! The map is read while a target is picked, and again after each event about new rows; ending the pick cancels it.
 
 pub(crate) mod limits;
 pub(crate) mod limits_window;
@@ -15,7 +15,7 @@ use crate::trackability::limits::Form;
 /// A map of trackability: the traverse, the stop, and the limits that are not the defaults.
 pub(crate) type MapPlace = (String, usize, Changes);
 
-/// What is known of a stop's trackability.
+/// The trackability of a stop.
 #[derive(Clone, Debug, Default)]
 pub struct Trackability {
     /// The map that is shown or being made.

@@ -1,4 +1,4 @@
-//! Asks for the trackability of the stop that is looked at, and moves the place that is being chosen in it.
+//! Reads the trackability of the cursor's stop, and moves the aim in its left image.
 
 use sightline_api::endpoint::{Call, Endpoint, NoBody};
 use sightline_api::endpoints::{CancelTrackability, ShowTrackability};
@@ -18,7 +18,7 @@ use crate::trackability::limits::{Ask, Form};
 use crate::trackability::{MapPlace, Trackability};
 
 impl State {
-    /// The map of the stop that is looked at, as far as it was made.
+    /// The map of the cursor's stop, as far as it is computed.
     pub fn trackability_map(&self) -> Option<&TrackabilityMap> {
         let (traverse, step, _) = self.trackability.place.as_ref()?;
         let is_here =
@@ -26,12 +26,12 @@ impl State {
         self.trackability.progress.as_ref().filter(|_| is_here)?.map.as_ref()
     }
 
-    /// What the map says of a pixel of the left image.
+    /// The cell of the map at a pixel of the left image.
     pub(crate) fn trackability_at(&self, pixel: Pixel) -> Option<Cell> {
         self.trackability_map()?.at(pixel)
     }
 
-    /// Carries out what was asked of the place that is being chosen.
+    /// Applies a command about the aim.
     pub(crate) fn aim(&mut self, aim: Aim) {
         let nearest = self.refusal.as_ref().and_then(|refusal| refusal.nearest);
         match aim {
@@ -61,7 +61,7 @@ impl State {
         }
     }
 
-    /// What speaks against a place that the map calls bad. Where there is no map yet, nothing does.
+    /// The advice against a place that the map calls bad; `None` without a map.
     pub(crate) fn advised_against(&self, place: Place) -> Option<Refusal> {
         let cell = self.trackability_at(place.pixel).filter(|cell| cell.verdict == Verdict::Bad)?;
         let sentence = cell.sentence().unwrap_or_else(|| "a bad place".to_owned());
@@ -69,7 +69,7 @@ impl State {
         Some(Refusal { place, sentence, nearest, is_advice: true })
     }
 
-    /// Where the keys begin: at the refused pixel, else in the middle of what is shown.
+    /// The first aim of the keys: the refused pixel, else the middle of the view.
     fn first_aim(&self) -> Pixel {
         let [width, height] = self.stop().map_or([1, 1], |stop| stop.left_size);
         let middle = match self.views.left {
@@ -79,7 +79,7 @@ impl State {
         self.refusal.as_ref().map_or(middle, |refusal| refusal.place.pixel)
     }
 
-    /// Asks for the map while a target is picked, and gives it up with the pick.
+    /// Reads the map while a target is picked; cancels it when the pick ends.
     pub(crate) fn sync_trackability(&mut self) {
         let limits = &self.trackability.limits;
         let here = self.traverse.as_ref().map(|open| (open.id.clone(), self.cursor.step, limits.clone()));
@@ -112,7 +112,7 @@ impl State {
         }
     }
 
-    /// The server told of new rows.
+    /// Notes an event about new rows of a map.
     pub(crate) fn trackability_went_on(&mut self, traverse: &str, step: usize) {
         let known = &mut self.trackability;
         let is_ours = known.place.as_ref().is_some_and(|(own, at, _)| own == traverse && *at == step);
@@ -120,13 +120,13 @@ impl State {
         known.is_stale |= is_ours && !is_made;
     }
 
-    /// What may have been missed is asked for again.
+    /// Marks an unfinished map as stale: events about it may have been missed.
     pub(crate) fn trackability_stale(&mut self) {
         let is_made = self.trackability.progress.as_ref().is_some_and(|progress| progress.ended);
         self.trackability.is_stale |= self.trackability.place.is_some() && !is_made;
     }
 
-    /// Takes an answer in; picking works all the same without one.
+    /// Takes an answer; picking works without a map too.
     fn took_trackability(&mut self, place: &MapPlace, answer: Result<MapProgress, Problem>) {
         let known = &mut self.trackability;
         if known.place.as_ref() != Some(place) {
@@ -135,7 +135,7 @@ impl State {
         known.is_asked = false;
         match answer {
             Ok(progress) => known.progress = Some(progress),
-            // The server is gone: asked again when it is back.
+            // The server is unreachable: read it again when it is back.
             Err(problem) if problem.status == 0 => {}
             Err(problem) => {
                 known.progress =
@@ -155,7 +155,7 @@ where
 }
 
 impl State {
-    /// Carries out what was asked of the limits.
+    /// Applies a command about the limits.
     pub(crate) fn ask_limits(&mut self, ask: Ask) {
         let known = &mut self.trackability;
         match ask {

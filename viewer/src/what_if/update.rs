@@ -1,4 +1,4 @@
-//! Changes what is tried at a step, and asks the server for what comes of it.
+//! Changes the trial at a step and computes its result on the server.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use crate::state::deeds::Deed;
 use crate::what_if::{Scores, Trial};
 
 impl State {
-    /// Changes what is tried at the cursor's step.
+    /// Changes the trial at the cursor's step.
     pub(crate) fn try_out(&mut self, what_if: WhatIf) {
         let Some(key) = self.step_key(self.cursor.step).filter(|_| self.row().is_some()) else { return };
         let before = self.trial().map(|trial| trial.what_if.clone()).unwrap_or_default();
@@ -33,7 +33,7 @@ impl State {
             self.why.trial = None;
             return;
         }
-        // The last ghost stands until the new one is here, so that a drag does not flicker.
+        // The last ghost stays until the new one arrives, so that a drag does not flicker.
         let last = self.why.trial.take().filter(|trial| trial.of == of);
         let has_scores = last.as_ref().is_some_and(|trial| trial.has_scores);
         let ghost = last.and_then(|trial| trial.ghost);
@@ -41,7 +41,7 @@ impl State {
         self.send_trial();
     }
 
-    /// Asks for the newest change, unless an older one is under way.
+    /// Sends the newest change, unless an older one is under way.
     pub(crate) fn send_trial(&mut self) {
         let Some(trial) = &self.why.trial else { return };
         let is_whole = trial.has_scores || !self.why.wants_scores;
@@ -82,7 +82,7 @@ impl State {
         self.send_trial();
     }
 
-    /// Says whether the scores of what is tried are looked at; what is tried is asked for again where they are missing.
+    /// Sets whether the scores of the trial are shown; requests the trial again if they are missing.
     pub fn want_tried_scores(&mut self, is_seen: bool) {
         let is_wanted =
             is_seen && self.why.scores_shown != Scores::Recorded && self.tracker() == TrackerKind::Template;
@@ -92,7 +92,7 @@ impl State {
         }
     }
 
-    /// What was tried at the cursor's step, with its scores; none where it has none, or they are on their way.
+    /// The result of the trial at the cursor's step with its scores; `None` until both have arrived.
     pub(crate) fn tried_scores(&self, context: &egui::Context) -> Option<(&Ghost, Arc<Raster>)> {
         let trial = self.trial()?;
         let ghost = trial.ghost.as_ref()?;

@@ -1,4 +1,4 @@
-//! Carries out what a person asks about a step, and takes in what the server answers.
+//! The user's questions about a step, their calls, and what the replies change.
 
 use serde_json::Value;
 use sightline_api::endpoint::{Call, Endpoint, NoBody};
@@ -17,13 +17,13 @@ use crate::state::{State, run_letter};
 use crate::what_if::Trial;
 use crate::why::{Ask, Told};
 
-/// How many values are remembered for the way back.
+/// Maximum number of values in the history of the panel.
 const REMEMBERED: usize = 50;
-/// How many trees are kept.
+/// Maximum number of stored trees.
 const KEPT: usize = 400;
 
 impl State {
-    /// What is tried at the cursor's step.
+    /// The trial at the cursor's step.
     pub fn trial(&self) -> Option<&Trial> {
         let key = self.step_key(self.cursor.step)?;
         self.why.trial.as_ref().filter(|trial| trial.of == key)
@@ -41,7 +41,7 @@ impl State {
         Some((key, value, tree))
     }
 
-    /// The branch that left the run at the cursor with this very change, where there is one.
+    /// The branch that left the run at the cursor's step with exactly this change.
     pub fn branch_of(&self, what_if: &WhatIf) -> Option<&RunView> {
         let (step, parent) = (self.cursor.step, self.run()?);
         let is_it = |run: &&RunView| {
@@ -60,7 +60,7 @@ impl State {
         tried.or_else(|| self.setting(group, key))
     }
 
-    /// Carries out what was asked.
+    /// Applies a command about a step.
     pub(crate) fn ask_why(&mut self, ask: Ask) {
         match ask {
             Ask::Value { step, value } => self.ask_value(step, value),
@@ -131,7 +131,7 @@ impl State {
         });
     }
 
-    /// The last value asked for, at this step; before the first the worst criterion, else the state.
+    /// Explains the last explained value at this step; without one the gate with the smallest margin, else the state.
     fn ask_selected(&mut self) {
         let last = self.why.asked.last().map(|(_, value)| value.clone());
         let worst = || {
@@ -194,7 +194,7 @@ impl State {
             Err(problem) if is_refusal_shown => {
                 state.why.questions.insert(key, Told::Refused(problem.detail));
             }
-            // Nobody has asked, or it ended meanwhile.
+            // Not asked yet, or ended meanwhile.
             _ => {}
         });
     }
@@ -204,14 +204,14 @@ impl State {
         self.call_question::<ShowCounterfactual>(key, false);
     }
 
-    /// Takes in that a question went on.
+    /// Reads a question again after an event about it.
     pub(crate) fn question_went_on(&mut self, key: StepKey) {
         if self.session.as_ref().is_some_and(|session| session.id == key.session) {
             self.read_question(key);
         }
     }
 
-    /// Asks again for what is still being answered: a page that missed events is told that the session changed.
+    /// Reads the unanswered questions again: the page may have missed events about them.
     pub(crate) fn follow_questions(&mut self) {
         let is_open =
             |told: &Told<Question>| matches!(told, Told::Here(question) if !question.state.is_over());
@@ -221,7 +221,7 @@ impl State {
         }
     }
 
-    /// Asks once whether somebody has asked what saves the cursor's step: a page that was loaded again finds its answer.
+    /// Reads once whether the question about the cursor's step was asked before: a reloaded page finds its answer.
     pub fn want_question(&mut self) {
         let is_lost = self.row().is_some_and(|row| row.state != "tracking" || row.tracked == Some(false));
         let Some(key) = self.step_key(self.cursor.step).filter(|_| is_lost) else { return };

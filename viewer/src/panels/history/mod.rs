@@ -1,7 +1,7 @@
 //! The template's history: the window that every step matched, and how the current view correlates with each earlier
 //! template of the run (R72), which the server computes.
 //!
-//! Both are fetched while this panel is looked at.
+//! Both are fetched while this panel is shown.
 
 use egui::{Align2, Margin, Rect, ScrollArea, Sense, Ui, UiBuilder, pos2, vec2};
 use egui_plot::{GridMark, Line, MarkerShape, Plot, Points};

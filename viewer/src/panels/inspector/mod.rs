@@ -72,7 +72,7 @@ fn recorded(trace: &RunStep, stage: Stage) -> Vec<RecordedStage> {
         let word = recorded.schema().stage.as_ref();
         let own = Stage::of(tracker).find(|stage| stage.word() == word);
         of = own.unwrap_or(if of.is_step_of_locate() { of } else { Stage::LOCATE });
-        // The detection counts what its next two steps made of the features.
+        // `detect` counts the results of its next two steps.
         let counts = matches!(stage, Stage::MATCH_FEATURES | Stage::TRIANGULATE) && of == Stage::DETECT;
         if (of == stage || counts) && recorded.is_reached(trace) {
             shown.push(recorded);
@@ -118,13 +118,13 @@ pub(crate) fn is_reached(trace: &RunStep, stage: Stage) -> bool {
             .shape()
             .and_then(|evidence| evidence.registration.as_ref())
             .is_some_and(|found| found.mean_m[2].is_some()),
-        // The feature tracker triangulates what it detects.
+        // The feature tracker triangulates in `detect`.
         Stage::TRIANGULATE if trace.features().is_some() => is_reached(trace, Stage::DETECT),
         _ => records::stage(stage.word()).is_some_and(|recorded| recorded.is_reached(trace)),
     }
 }
 
-/// What a stage returned, as one tree; none where it was not reached.
+/// The evidence of a stage as one tree; `None` if the stage was not reached.
 pub(crate) fn record(trace: &RunStep, stage: Stage) -> Option<Value> {
     let mut stages = recorded(trace, stage).into_iter();
     let mut whole = records::evidence(stages.next()?, trace);

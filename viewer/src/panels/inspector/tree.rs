@@ -28,12 +28,12 @@ impl Place {
         Self { path: format!("{}{dot}{key}", self.path), ..*self }
     }
 
-    /// The name under which it can be asked about.
+    /// The name by which Why explains it.
     fn asked(&self) -> String {
         format!("{}.{}", self.stage.schema().stage, self.path)
     }
 
-    /// The unit as the stage declares it, else as the field's name or the kind of its value tells.
+    /// The unit that the stage declares, else that of the field's name or of the kind of its value.
     fn unit(&self, value: &Value) -> Unit {
         let found = records::unit_at(&format!("{}.{}", self.stage.schema().path, self.path));
         found.unwrap_or(if records::is_pixel(value) { Unit::Pixel } else { Unit::One })
