@@ -7,6 +7,7 @@ use axum::http::header;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::RowAccessor;
 use serde_json::{Value, json};
+use sightline_session::metrics;
 use sightline_tests::server::{Answer, PIXEL, TestServer, rows_of_run, small_drive, small_recording};
 
 use crate::cli::program;
@@ -135,6 +136,8 @@ async fn the_report_is_one_well_formed_page_without_scripts_remote_things_or_pat
     );
     let html = report.text();
     safe(&html, "report");
+    let missing: Vec<_> = metrics::NAMES.into_iter().filter(|name| !html.contains(*name)).collect();
+    assert!(missing.is_empty(), "the report has the metrics of the page: {missing:?}");
     for part in [
         "Worst steps",
         "<strong>why</strong>",

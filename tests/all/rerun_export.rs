@@ -140,7 +140,8 @@ fn by_features(trace: &RunStep) -> RunStep {
     let columns = FeatureColumn::COUNT as u32;
     let table = Table { columns, values: [alone, inlier, outlier].concat() };
     let detect = Detected { left: 3, right: 3, stereo_matches: 2, points: 2, median_range_m: Some(4.5) };
-    let mut evidence = FeatureEvidence { detect: Some(detect), table, ..FeatureEvidence::default() };
+    let mut evidence =
+        FeatureEvidence { detect: Some(detect), table: table.into(), ..FeatureEvidence::default() };
     if !is_pick {
         evidence.fit_motion = Some(FittedMotion {
             translation_m: [-0.3, 0.0, 0.0],
@@ -159,7 +160,7 @@ fn by_features(trace: &RunStep) -> RunStep {
             sigma_rotation_deg: [0.0; 3],
         });
         let values = vec![4.0, 0.1, 0.2, 200.0, 210.0, 4.1, 0.1, 0.2, NONE, NONE];
-        evidence.cloud = Table { columns: CLOUD_COLUMNS as u32, values };
+        evidence.cloud = Table { columns: CLOUD_COLUMNS as u32, values }.into();
     }
     located.evidence = Evidence::Features(Box::new(evidence));
     trace

@@ -107,6 +107,8 @@ pub struct NoBody {}
 pub struct Call {
     /// Its method.
     pub method: Method,
+    /// The path template of its endpoint.
+    pub endpoint: &'static str,
     /// Its path below `/api/v1/`, with the query.
     pub path: String,
     /// Its JSON body.
@@ -125,13 +127,19 @@ impl Call {
     pub fn with_query<E: Endpoint<Body = NoBody>>(at: &E::At, query: &E::Query) -> Self {
         let starts_work = matches!(E::METHOD, Method::Post | Method::Put | Method::Patch);
         let body = starts_work.then(|| b"{}".to_vec());
-        Self { method: E::METHOD, path: path::<E>(at, query), body, revision: None }
+        Self { method: E::METHOD, endpoint: E::PATH, path: path::<E>(at, query), body, revision: None }
     }
 
     /// Calls `E` at this location with a body.
     pub fn with_body<E: Endpoint>(at: &E::At, body: &E::Body) -> Self {
         let path = path::<E>(at, &E::Query::default());
-        Self { method: E::METHOD, path, body: serde_json::to_vec(body).ok(), revision: None }
+        let body = serde_json::to_vec(body).ok();
+        Self { method: E::METHOD, endpoint: E::PATH, path, body, revision: None }
+    }
+
+    /// Whether this calls `E`, at any location.
+    pub fn is_to<E: Endpoint>(&self) -> bool {
+        self.method == E::METHOD && self.endpoint == E::PATH
     }
 
     /// The same call of a revision.
@@ -210,6 +218,12 @@ mod tests {
         let call = Call::with_body::<ForkRun>(&AtTarget { session: "s1".to_owned(), target: 2 }, &new);
         assert_eq!((call.method, call.path.as_str()), (Method::Post, "sessions/s1/targets/2/runs"));
         assert_eq!(NewRun::read(&call.body.unwrap()).unwrap(), new);
+    }
+
+    #[test]
+    fn a_call_names_its_endpoint() {
+        let call = Call::to::<ShowWhy>(&step());
+        assert!(call.is_to::<ShowWhy>() && !call.is_to::<CancelCounterfactual>());
     }
 
     #[test]

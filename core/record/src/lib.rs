@@ -34,6 +34,7 @@ mod label;
 mod schema;
 mod stage;
 mod unit;
+mod unsent;
 mod value;
 
 pub use array::{ArrayDecl, ArrayKind, ArrayView};
@@ -43,4 +44,5 @@ pub use label::{label, unit_label};
 pub use schema::{GateDecl, GateRecord, Quantity, Side, StageRecord, StageSchema};
 pub use stage::Stage;
 pub use unit::Unit;
+pub use unsent::Unsent;
 pub use value::{Kind, Measured, Value};

@@ -87,7 +87,7 @@ pub fn photometry(
 /// The image at the target, as large as the template.
 fn window(trace: &StepTrace, settings: &TemplateSettings) -> Option<Patch> {
     if let Some(matched) = trace.template().and_then(|evidence| evidence.match_template.as_ref()) {
-        return Some(matched.matched.clone());
+        return matched.matched.get().cloned();
     }
     let (designation, capture) = (trace.update.target.designation, trace.capture()?);
     let half = settings.template_size_px / 2;

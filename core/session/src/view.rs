@@ -1,5 +1,7 @@
 //! What of a session travels: the view that pages and scripts read, and the saved form that survives a restart.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -56,6 +58,9 @@ pub struct RunView {
     pub changes: Changes,
     /// The configuration.
     pub settings: Settings,
+    /// The changed settings that have no effect beside the others, each with the condition under which it has one.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub without_effect: BTreeMap<String, String>,
     /// One line a step, so far.
     pub rows: Vec<StepRow>,
     /// Whether the last stop was reached.
@@ -150,10 +155,12 @@ impl Session {
 
     /// A run with its rows from the one at `from_row` on, counted from 0: what is new for somebody who has that many.
     pub fn run_view_from(&self, number: usize, run: &Run, from_row: usize) -> RunView {
+        let changes = run.settings.changes();
         RunView {
             number,
             fork: run.fork,
-            changes: run.settings.changes(),
+            without_effect: run.settings.without_effect(&changes).into_iter().collect(),
+            changes,
             settings: run.settings.as_ref().clone(),
             rows: run.steps.iter().skip(from_row).map(|trace| trace.row()).collect(),
             complete: run.steps.last().is_some_and(|last| last.step + 1 == self.stop_count),
@@ -199,5 +206,33 @@ impl Session {
             designation: record.designation,
             runs: runs.collect(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn a_run_names_the_changed_settings_without_effect() {
+        let changes = Changes::from([
+            ("ncc_min".to_owned(), json!(0.6)),
+            ("sdog_ratio".to_owned(), json!(2.0)),
+            ("bootstrap_sets".to_owned(), json!(50)),
+        ]);
+        let settings = Settings::default().with(&changes).unwrap();
+        let view = |settings: Settings| {
+            Session::new("s1", "drive", 5).run_view(0, &Run::new(Arc::new(settings), None, Vec::new()))
+        };
+        let found = serde_json::to_value(view(settings)).unwrap();
+        let expected =
+            json!({ "bootstrap_sets": "tracker = features or combined", "sdog_ratio": "measure = sdog" });
+        assert_eq!(found["without_effect"], expected);
+        let default = serde_json::to_value(view(Settings::default())).unwrap();
+        assert_eq!(default.get("without_effect"), None);
     }
 }

@@ -105,7 +105,7 @@ fn coarse(sheet: &mut Sheet, coarse: &CoarseSearch) {
         sheet.put("px", candidate.pixel);
         sheet.put("score", candidate.score);
     });
-    let surface = &coarse.coarse;
+    let surface = coarse.coarse.as_ref().expect("a computed step has its scores");
     sheet.array("scores", &[surface.width as usize, surface.height as usize], &surface.scores);
 }
 

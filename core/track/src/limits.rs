@@ -140,13 +140,31 @@ impl SettingInfo {
             let other = table.iter().find(|other| other.key == condition.key);
             other.is_some_and(|other| condition.is_met_by(&value(other)) && other.has_effect(table, value))
         };
-        self.only_if.is_empty() || self.only_if.iter().any(is_met)
+        let is_of_the_tracker = self.trackers().is_none_or(|condition| is_met(&condition));
+        is_of_the_tracker && (self.only_if.is_empty() || self.only_if.iter().any(is_met))
     }
 
-    /// When the setting has an effect, in words: `measure = sdog`; none where it always has.
+    /// When the setting has an effect, in words: `measure = sdog`; `None` if it always has one.
     pub fn condition(&self) -> Option<String> {
         let words: Vec<_> = self.only_if.iter().map(Condition::to_string).collect();
-        (!words.is_empty()).then(|| words.join(", or "))
+        let own = (!words.is_empty()).then(|| words.join(", or "));
+        let trackers = self.trackers().filter(|of| self.only_if.iter().all(|own| own.key != of.key));
+        match (trackers, own) {
+            (Some(trackers), Some(own)) => Some(format!("{trackers}, and {own}")),
+            (Some(trackers), None) => Some(trackers.to_string()),
+            (None, own) => own,
+        }
+    }
+
+    /// The trackers that use the group of this setting; `None`: all of them, since all designate by point stereo.
+    fn trackers(&self) -> Option<Condition> {
+        let words = match self.group.as_str() {
+            "features" => ["features", "combined"],
+            "shape" => ["shape", "combined"],
+            _ => return None,
+        };
+        let values = words.map(serde_json::Value::from).to_vec();
+        Some(Condition { key: "tracker".to_owned(), values, excluded: false })
     }
 }
 

@@ -149,6 +149,9 @@ impl Settings {
 
     /// The settings among `changes` that have no effect beside the others, each with the condition under which it has.
     pub fn without_effect(&self, changes: &Changes) -> Vec<(String, String)> {
+        if changes.is_empty() {
+            return Vec::new();
+        }
         let (table, document) = (Self::table(), serde_json::to_value(self).unwrap_or_default());
         let value = |info: &SettingInfo| info.value_in(&document).cloned().unwrap_or_default();
         let idle =
@@ -317,6 +320,12 @@ mod tests {
         assert_eq!(idle[0].1, "first_stage = klt_translation or klt_affine, or refine = affine");
         assert!(without_effect(&[("height_scale_m", json!(0.1)), ("height_weight", json!(0.2))]).is_empty());
         assert_eq!(without_effect(&[("height_scale_m", json!(0.1))])[0].1, "height_weight ≠ 0.0");
+        // A group of another tracker has none.
+        let idle = without_effect(&[("bootstrap_sets", json!(50))]);
+        assert_eq!(idle[0].1, "tracker = features or combined");
+        assert!(without_effect(&[("bootstrap_sets", json!(50)), ("tracker", json!("combined"))]).is_empty());
+        let idle = without_effect(&[("motion_inlier_sigma", json!(2.0)), ("tracker", json!("features"))]);
+        assert_eq!(idle[0].1, "tracker = features or combined, and motion_gate = mahalanobis");
     }
 
     #[test]

@@ -9,10 +9,10 @@ pub(crate) mod source;
 pub(crate) mod rows;
 pub(crate) mod picture;
 pub(crate) mod sheet;
-pub(crate) mod metrics;
 pub(crate) mod report;
 pub(crate) mod bundle;
 mod canvas;
+mod worst;
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -7,13 +7,14 @@ use sightline_geometry::estimate::quantile::quantile;
 use sightline_record::Unit;
 use sightline_rover::version::tracker_version;
 use sightline_session::format;
+use sightline_session::metrics::{Metric, metrics};
 use sightline_session::notes::Note;
 use sightline_session::records::{self, StageQuantity};
 use sightline_session::step::RunStep;
 
 use super::kind::Part;
-use super::metrics::{metrics, worst};
 use super::source::{NamedRun, Source};
+use super::worst::worst;
 use super::{bundle, picture, sheet};
 use crate::html::{escape, markdown, number, png_address, table};
 use crate::naming::hash;
@@ -150,6 +151,25 @@ pub(crate) fn note_html(number: usize, note: &Note, session: &sightline_session:
     )
 }
 
+/// The metrics of a run, as the page and REST give them.
+fn metrics_table(steps: &[std::sync::Arc<RunStep>]) -> String {
+    let found = metrics(steps);
+    let row = |metric: &Metric| {
+        let value = metric.value.map(|value| metric.words(value));
+        let note = metric.note.as_deref().filter(|_| value.is_none());
+        let worst = metric.worst_step.map_or_else(String::new, |step| format!("step {step}"));
+        vec![
+            metric.name.clone(),
+            value.or_else(|| note.map(str::to_owned)).unwrap_or_default(),
+            metric.used.to_string(),
+            worst,
+        ]
+    };
+    let rows: Vec<Vec<String>> = found.metrics.iter().map(row).collect();
+    let caption = format!("Metrics by the protocol “{}”, version {}.", found.protocol, found.version);
+    table(&caption, &["metric", "value", "steps used", "worst at"], &rows)
+}
+
 /// What there is to say of one run.
 fn chapter(text: &mut String, source: &Source, run: NamedRun<'_>, cancel: &AtomicBool) -> ApiResult<()> {
     let steps = &run.run.steps;
@@ -157,16 +177,7 @@ fn chapter(text: &mut String, source: &Source, run: NamedRun<'_>, cancel: &Atomi
     if let Some(why) = run.run.why_stopped() {
         let _ = writeln!(text, "<p>The run stopped before the last stop: {}.</p>", escape(&why));
     }
-    let rows: Vec<Vec<String>> = metrics(steps)
-        .into_iter()
-        .map(|metric| {
-            let worst = metric.worst_step.map_or_else(String::new, |step| format!("step {step}"));
-            vec![metric.name, metric.value, worst]
-        })
-        .collect();
-    let caption =
-        "Metrics. Errors are those of steps in state tracking after the designation whose truth is known.";
-    text.push_str(&table(caption, &["metric", "value", "worst at"], &rows));
+    text.push_str(&metrics_table(steps));
     for figure in figures(steps, &run)? {
         text.push_str(&figure);
     }

@@ -97,12 +97,12 @@ pub(super) fn log_cloud_left(step: &Step<'_>) -> Logged {
 
 fn features(step: &Step<'_>) -> Option<Vec<Feature>> {
     let evidence = step.features().filter(|evidence| evidence.detect.is_some())?;
-    Some(rows::features(&evidence.table.values).collect())
+    Some(rows::features(&evidence.table.get()?.values).collect())
 }
 
 fn cloud(step: &Step<'_>) -> Option<Vec<CloudPoint>> {
     let evidence = step.features().filter(|evidence| evidence.bootstrap.is_some())?;
-    Some(rows::cloud(&evidence.cloud.values).collect())
+    Some(rows::cloud(&evidence.cloud.get()?.values).collect())
 }
 
 /// The matches that agree with the motion, or those that do not.

@@ -172,7 +172,7 @@ impl Recorder {
 /// The side of the template; 0 where none was prepared.
 fn template_size_px(trace: &RunStep) -> u32 {
     let prepared = trace.template().and_then(|evidence| evidence.scale_roll.as_ref());
-    prepared.map_or(0, |prepared| prepared.reference.width())
+    prepared.and_then(|prepared| prepared.reference.get()).map_or(0, |reference| reference.width())
 }
 
 /// The images of a step. Those of a run that was read back from disk are not in the trace and come from the

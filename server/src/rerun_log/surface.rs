@@ -16,15 +16,18 @@ use super::step::Step;
 /// The scores of all positions.
 pub(super) fn log_surface(step: &Step<'_>) -> Logged {
     let image = step.matched().and_then(|m| {
-        let (size, limits) = ([m.surface.width, m.surface.height], m.measure.shown_limits().map(f64::from));
-        mapped(size, &m.surface.scores, limits, Colormap::Viridis)
+        let surface = m.surface.get()?;
+        let limits = m.measure.shown_limits().map(f64::from);
+        mapped([surface.width, surface.height], &surface.scores, limits, Colormap::Viridis)
     });
     step.log("/{target}/locate/match_template/surface", image)
 }
 
 /// The best match on the surface.
 pub(super) fn log_surface_peak(step: &Step<'_>) -> Logged {
-    let peak = step.matched().map(|m| dot(on_surface(&m.surface, m.peak.pixel), MEASUREMENT, "peak"));
+    let peak = step
+        .matched()
+        .and_then(|m| Some(dot(on_surface(m.surface.get()?, m.peak.pixel), MEASUREMENT, "peak")));
     step.log("/{target}/locate/match_template/surface/peak", peak)
 }
 
@@ -32,7 +35,7 @@ pub(super) fn log_surface_peak(step: &Step<'_>) -> Logged {
 pub(super) fn log_surface_second_peak(step: &Step<'_>) -> Logged {
     let second = step.matched().and_then(|m| {
         let second = m.second_peak.as_ref()?;
-        Some(dot(on_surface(&m.surface, second.pixel), SECOND_PEAK, "second peak"))
+        Some(dot(on_surface(m.surface.get()?, second.pixel), SECOND_PEAK, "second peak"))
     });
     step.log("/{target}/locate/match_template/surface/second_peak", second)
 }

@@ -5,6 +5,7 @@
 
 use rerun::components::Colormap;
 use rerun::{ColorModel, DepthImage, Image};
+use sightline_record::Unsent;
 use sightline_vision::image::Patch;
 
 use super::Logged;
@@ -17,44 +18,45 @@ const DIFFERENCE_LIMIT: f32 = 3.0;
 
 /// The template as it was taken.
 pub(super) fn log_reference(step: &Step<'_>) -> Logged {
-    let patch = step.template().and_then(|e| e.scale_roll.as_ref()).map(|s| &s.reference);
+    let patch = step.template().and_then(|e| e.scale_roll.as_ref()?.reference.get());
     step.log("/{target}/locate/scale_roll/reference", patch.and_then(|p| grey(p, shared_limits(step))))
 }
 
 /// The template, scaled.
 pub(super) fn log_scaled(step: &Step<'_>) -> Logged {
-    let patch = step.template().and_then(|e| e.scale_roll.as_ref()).map(|s| &s.scaled);
+    let patch = step.template().and_then(|e| e.scale_roll.as_ref()?.scaled.get());
     step.log("/{target}/locate/scale_roll/scaled", patch.and_then(|p| grey(p, shared_limits(step))))
 }
 
 /// The template, scaled and rolled: what was matched.
 pub(super) fn log_rolled(step: &Step<'_>) -> Logged {
-    let patch = step.template().and_then(|e| e.scale_roll.as_ref()).map(|s| &s.rolled);
+    let patch = step.template().and_then(|e| e.scale_roll.as_ref()?.rolled.get());
     step.log("/{target}/locate/scale_roll/rolled", patch.and_then(|p| grey(p, shared_limits(step))))
 }
 
 /// The left image at the match.
 pub(super) fn log_matched(step: &Step<'_>) -> Logged {
-    let patch = step.matched().map(|m| &m.matched);
+    let patch = step.matched().and_then(|m| m.matched.get());
     step.log("/{target}/locate/match_template/matched", patch.and_then(|p| grey(p, shared_limits(step))))
 }
 
 /// Matched minus rolled, both normalised.
 pub(super) fn log_difference(step: &Step<'_>) -> Logged {
-    let patch = step.matched().map(|m| &m.difference);
+    let patch = step.matched().and_then(|m| m.difference.get());
     step.log("/{target}/locate/match_template/difference", patch.map(signed))
 }
 
 /// The right image at the stereo match, as the left sees it.
 pub(super) fn log_right_window(step: &Step<'_>) -> Logged {
-    let patch = step.template().and_then(|e| e.point_stereo.as_ref()).map(|s| &s.right_window);
+    let patch = step.template().and_then(|e| e.point_stereo.as_ref()?.right_window.get());
     step.log("/{target}/locate/point_stereo/right_window", patch.and_then(|p| grey(p, limits([p]))))
 }
 
 fn shared_limits(step: &Step<'_>) -> [f64; 2] {
     let prepared = step.template().and_then(|e| e.scale_roll.as_ref());
-    let prepared = prepared.into_iter().flat_map(|s| [&s.reference, &s.scaled, &s.rolled]);
-    limits(prepared.chain(step.matched().map(|m| &m.matched)))
+    let prepared =
+        prepared.into_iter().flat_map(|s| [&s.reference, &s.scaled, &s.rolled]).filter_map(Unsent::get);
+    limits(prepared.chain(step.matched().and_then(|m| m.matched.get())))
 }
 
 /// The least and the greatest valid value; never equal, so that a flat patch still has a colour.

@@ -46,8 +46,8 @@ fn registered() -> Registered {
             correction_px: 1.0,
             covariance_px2: Default::default(),
             on_mesh: 1.0,
-            picture: picture(3, 0.0),
-            matched: picture(3, 0.0),
+            picture: picture(3, 0.0).into(),
+            matched: picture(3, 0.0).into(),
         }),
         draped_missing: None,
         checks: vec![check("shape_overlap", 0.5, 0.25), check("shape_misfit", 1.25, 1.8)],
@@ -70,10 +70,10 @@ fn by_shape(trace: &RunStep) -> RunStep {
         detail_rms_m: 0.0,
         shown_every: 1,
     });
-    (evidence.arrays.disparities, evidence.arrays.ranges) = (picture(2, 10.0), picture(2, 3.0));
+    let arrays = evidence.arrays.get_or_default();
+    (arrays.disparities, arrays.ranges) = (picture(2, 10.0), picture(2, 3.0));
     if !is_pick {
         evidence.registration = Some(registered());
-        let arrays = &mut evidence.arrays;
         (arrays.sensor, arrays.coarse) = (picture(4, 2.0), picture(3, 0.01));
         arrays.error_before = picture(4, -8.0);
         (arrays.error_coarse, arrays.error_fine) = (picture(4, -4.0), picture(4, -2.0));

@@ -1,17 +1,15 @@
-//! Plots expressions over the steps, and asks the server for their values.
+//! Plots expressions over the steps and reads their values from the server.
 
 use sightline_session::expression::Expression;
 use sightline_session::query::{Query, QueryAnswer};
 
-use crate::breakpoints::AskRequest;
 use crate::breakpoints::derived::Derived;
-use crate::net::request::Request;
 use crate::state::State;
 
 /// How many derived columns there may be: each is a plot of its own.
 const LIMIT: usize = 8;
 
-/// A run that goes on is asked again when it has grown by this share, so that asking does not grow with its square.
+/// The values of a growing run are read again when it has grown by 1/50: reading every new step would be quadratic.
 const GROWTH: usize = 50;
 
 impl State {
@@ -36,6 +34,7 @@ impl State {
         let Some(target) = self.target() else { return };
         let (number, steps) = (target.number, target.runs.iter().map(|run| run.rows.len()).sum::<usize>());
         let grows = self.progress.keys().any(|(target, _)| *target == number);
+        let mut queries = Vec::new();
         for derived in self.ask.derived.iter_mut().filter(|derived| !derived.is_asked) {
             let enough = match derived.asked_for {
                 Some((target, before)) if target == number => {
@@ -48,13 +47,16 @@ impl State {
                     (Some((number, steps)), true, false);
                 let query =
                     Query { expression: derived.expression.clone(), target: Some(number), values: true };
-                self.outbox.push(Request::Ask(AskRequest::Query { session: session.to_owned(), query }));
+                queries.push(query);
             }
+        }
+        for query in queries {
+            self.read_column(session, query);
         }
     }
 
-    pub(crate) fn took_column(&mut self, query: &Query, outcome: Result<QueryAnswer, String>) {
-        let asked = self.ask.derived.iter_mut().find(|derived| derived.expression == query.expression);
+    pub(super) fn took_column(&mut self, expression: &str, outcome: Result<QueryAnswer, String>) {
+        let asked = self.ask.derived.iter_mut().find(|derived| derived.expression == expression);
         let Some(derived) = asked else { return };
         derived.is_asked = false;
         match outcome {

@@ -1,4 +1,4 @@
-//! What the person asks of the steps: breakpoints, derived columns, and how time is travelled.
+//! Breakpoints, derived columns, and playing along the steps.
 
 pub(crate) mod panel;
 pub(crate) mod derived_plot;
@@ -9,22 +9,22 @@ pub(crate) mod goto;
 pub(crate) mod play;
 mod playing;
 mod removal;
+mod server;
 mod update;
 
-use sightline_session::breakpoints::{BreakpointChange, BreakpointView, NewBreakpoint};
-use sightline_session::query::{Query, QueryAnswer};
+use sightline_session::breakpoints::BreakpointView;
 
 use self::derived::Derived;
 use self::play::{Play, Shuttle};
 
-/// What a person can ask for.
+/// A command of the user.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Ask {
     /// Changes the text of the expression box.
     Type(String),
     /// Shows the expression box and puts the cursor there.
     Focus,
-    /// Puts a text into the expression box, to be looked at before it is set.
+    /// Puts a text into the expression box, to be checked by the user before it is set.
     Propose(String),
     /// Takes a breakpoint into the box, to change its condition.
     Edit(usize),
@@ -38,7 +38,7 @@ pub enum Ask {
     Switch {
         /// The breakpoint's number.
         number: usize,
-        /// Whether it is looked for.
+        /// Whether it is on.
         on: bool,
     },
     /// Removes a breakpoint.
@@ -55,63 +55,6 @@ pub enum Ask {
     Shuttle(Shuttle),
     /// Shows or hides the state bands of the other targets.
     ShowOthers(bool),
-}
-
-/// What is asked of the server.
-#[derive(Clone, Debug, PartialEq)]
-pub enum AskRequest {
-    /// The breakpoints with their hits.
-    Breakpoints(String),
-    /// To set a breakpoint.
-    Add {
-        /// The session.
-        session: String,
-        /// The breakpoint.
-        new: NewBreakpoint,
-    },
-    /// To change a breakpoint.
-    Change {
-        /// The session.
-        session: String,
-        /// The breakpoint's number.
-        number: usize,
-        /// What changes.
-        change: BreakpointChange,
-    },
-    /// To remove a breakpoint.
-    Remove {
-        /// The session.
-        session: String,
-        /// The breakpoint's number.
-        number: usize,
-    },
-    /// An expression at every step.
-    Query {
-        /// The session.
-        session: String,
-        /// The expression.
-        query: Query,
-    },
-}
-
-impl AskRequest {
-    /// Whether this changes the list of breakpoints.
-    pub(super) const fn is_change(&self) -> bool {
-        matches!(self, Self::Add { .. } | Self::Change { .. } | Self::Remove { .. })
-    }
-}
-
-/// What the server answered.
-#[derive(Clone, Debug, PartialEq)]
-pub enum AskReply {
-    /// The breakpoints with their hits.
-    Breakpoints(Vec<BreakpointView>),
-    /// A breakpoint that was set or changed.
-    Breakpoint(BreakpointView),
-    /// An expression at every step.
-    Answer(QueryAnswer),
-    /// It is done.
-    Done,
 }
 
 /// Breakpoints, derived columns, and time travel.
@@ -132,17 +75,17 @@ pub struct Asking {
     /// Whether the state bands of the other targets are shown.
     pub shows_others: bool,
     stale: bool,
-    /// The list is being read, asked for after this many changes.
+    /// The list is being read; the number of changes when it was requested.
     asked: Option<u64>,
-    /// Changes of the list that were asked for.
+    /// Number of requested changes of the list.
     changes: u64,
     /// How many breakpoints are being set.
     adding: usize,
-    /// Conditions of breakpoints that are being set, with what is to be done to them then.
+    /// Conditions of breakpoints that are being set, with the changes that follow.
     pub(super) when_set: Vec<(String, WhenSet)>,
 }
 
-/// What is to be done to a breakpoint as soon as the server says that it is set, and with which number.
+/// A change that follows as soon as the server has set a breakpoint and its number is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum WhenSet {
     /// It is switched off: so it was before it was removed, or so it is in the file that lists it.
@@ -152,13 +95,13 @@ pub(super) enum WhenSet {
 }
 
 impl Asking {
-    /// Everything is to be asked again.
+    /// Marks breakpoints and columns as stale.
     pub(crate) fn make_stale(&mut self) {
         self.stale = true;
         self.derived.iter_mut().for_each(Derived::make_stale);
     }
 
-    /// Nothing of another session stays, but the texts that the person wrote.
+    /// Forgets everything of another session except the user's texts.
     pub(crate) fn forget(&mut self) {
         self.breakpoints.clear();
         (self.edited, self.asked, self.adding) = (None, None, 0);

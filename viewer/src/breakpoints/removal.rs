@@ -2,16 +2,16 @@
 
 use sightline_session::breakpoints::{BreakpointChange, BreakpointView, NewBreakpoint};
 
+use crate::breakpoints::WhenSet;
 use crate::breakpoints::derived::Derived;
-use crate::breakpoints::{AskRequest, WhenSet};
 use crate::state::State;
 use crate::state::deeds::Deed;
 
 impl State {
-    /// Takes a breakpoint out of the list and tells the server; none where there is no such one, or no session.
+    /// Removes a breakpoint from the list and from the server; `None` without such a breakpoint or without a session.
     pub(crate) fn take_breakpoint_out(&mut self, number: usize) -> Option<BreakpointView> {
         let at = self.ask.breakpoints.iter().position(|breakpoint| breakpoint.number == number)?;
-        if !self.ask_server(|session| AskRequest::Remove { session, number }) {
+        if !self.drop_breakpoint(number) {
             return None;
         }
         if self.ask.edited == Some(number) {
@@ -40,28 +40,26 @@ impl State {
         if !is_on {
             self.ask.when_set.push((expression.to_owned(), WhenSet::SwitchOff));
         }
-        let new = NewBreakpoint { expression: Some(expression.to_owned()), step: None };
-        self.ask_server(|session| AskRequest::Add { session, new });
+        self.add_breakpoint(NewBreakpoint { expression: Some(expression.to_owned()), step: None });
     }
 
-    /// Takes out what was to be done to a breakpoint as soon as it is set: it is set, or refused.
+    /// Takes out the changes that wait until a breakpoint is set: it is set now, or was refused.
     pub(super) fn take_when_set(&mut self, expression: Option<&str>) -> Vec<WhenSet> {
         self.ask.adding = self.ask.adding.saturating_sub(1);
         let is_meant = |waiting: &mut (String, WhenSet)| Some(waiting.0.as_str()) == expression;
         self.ask.when_set.extract_if(.., is_meant).map(|(_, what)| what).collect()
     }
 
-    /// Does what was to be done to a breakpoint as soon as it is set; whether it is removed.
+    /// Applies the changes that waited until a breakpoint is set; returns whether it is removed.
     pub(super) fn change_when_set(&mut self, view: &BreakpointView) -> bool {
         let number = view.number;
         let waiting = self.take_when_set(Some(&view.expression));
         let is_removed = waiting.contains(&WhenSet::Remove);
         if is_removed {
             self.ask.breakpoints.retain(|known| known.number != number);
-            self.ask_server(|session| AskRequest::Remove { session, number });
+            self.drop_breakpoint(number);
         } else if waiting.contains(&WhenSet::SwitchOff) {
-            let change = BreakpointChange { on: Some(false), expression: None };
-            self.ask_server(|session| AskRequest::Change { session, number, change });
+            self.change_breakpoint(number, &BreakpointChange { on: Some(false), expression: None });
         }
         is_removed
     }
@@ -79,7 +77,7 @@ impl State {
         self.ask.derived.retain(|derived| derived.expression != expression);
     }
 
-    /// Plots an expression again at its place; its values are asked for anew.
+    /// Plots an expression again at its place and reads its values again.
     pub(crate) fn plot_again(&mut self, expression: &str, place: usize) {
         if self.ask.derived.iter().all(|derived| derived.expression != expression) {
             let place = place.min(self.ask.derived.len());

@@ -1,18 +1,23 @@
 //! Breakpoints, the expression box, derived plots and going to a step: what is shown, said and asked.
 
 use egui_kittest::kittest::Queryable;
+use sightline_api::endpoint::Call;
+use sightline_api::endpoints::{
+    AddBreakpoint, ChangeBreakpoint, ListBreakpoints, QuerySession, RemoveBreakpoint, ShowSession,
+};
+use sightline_api::location::AtBreakpoint;
 use sightline_api::wire::Event;
-use sightline_session::breakpoints::{Breakpoint, BreakpointChange, BreakpointView, NewBreakpoint, RunHits};
+use sightline_session::breakpoints::{Breakpoint, BreakpointView, NewBreakpoint, RunHits};
 use sightline_session::expression::Answers;
-use sightline_session::query::{QueryAnswer, RunAnswer};
+use sightline_session::query::{Query, QueryAnswer, RunAnswer};
 
-use crate::breakpoints::{Ask, AskReply, AskRequest};
+use crate::breakpoints::Ask;
 use crate::command::help;
 use crate::command::{Command, Go};
-use crate::net::request::{Arrived, Reply, Request};
 use crate::panels::pane::Pane;
 use crate::panels::plots;
 use crate::state::State;
+use crate::tests::calls::{answer, at_session, calls, calls_of};
 use crate::tests::{Shown, fixture};
 
 /// A breakpoint with its hits in the first run.
@@ -41,17 +46,21 @@ fn loaded(step: usize) -> State {
     state
 }
 
-fn ask(state: &mut State, ask: Ask) -> Vec<AskRequest> {
+/// The calls about breakpoints and columns that follow a command.
+fn ask(state: &mut State, ask: Ask) -> Vec<Call> {
     state.perform(Command::Ask(ask));
-    let asked = |request| match request {
-        Request::Ask(asked) => Some(asked),
-        _ => None,
-    };
-    state.take_requests().into_iter().filter_map(asked).collect()
+    let is_ours = |call: &Call| call.endpoint.contains("breakpoint") || call.is_to::<QuerySession>();
+    calls(state).into_iter().filter(is_ours).collect()
 }
 
-fn answer(state: &mut State, request: AskRequest, reply: AskReply) {
-    state.arrived(Arrived { request: Request::Ask(request), outcome: Ok(Reply::Ask(reply)) }, 0.0);
+/// Sets a breakpoint.
+fn add(expression: Option<String>, step: Option<usize>) -> Call {
+    Call::with_body::<AddBreakpoint>(&at_session(), &NewBreakpoint { expression, step })
+}
+
+/// Whether the list of breakpoints is read; takes all requests out.
+fn is_list_read(state: &mut State) -> bool {
+    !calls_of::<ListBreakpoints>(state).is_empty()
 }
 
 #[test]
@@ -133,9 +142,7 @@ fn completion_is_taken_by_arrow_keys_tab_and_enter_and_a_whole_condition_is_set_
     harness.state_mut().take_requests();
     harness.key_press(egui::Key::Enter);
     harness.run_steps(3);
-    let new = NewBreakpoint { expression: Some("sigma_m > 5 cm".to_owned()), step: None };
-    let expected = Request::Ask(AskRequest::Add { session: "s1".to_owned(), new });
-    assert!(harness.state_mut().take_requests().contains(&expected));
+    assert!(calls(harness.state_mut()).contains(&add(Some("sigma_m > 5 cm".to_owned()), None)));
     assert_eq!(harness.state().ask.text, "", "the box is free for the next one");
 }
 
@@ -156,9 +163,8 @@ fn letters_and_the_enter_behind_them_may_come_in_one_frame() {
         let enter = egui::Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers };
         harness.input_mut().events.extend([egui::Event::Text(last.to_owned()), enter]);
         harness.run_steps(3);
-        let new = NewBreakpoint { expression: Some(format!("{before}{last}")), step: None };
-        let expected = Request::Ask(AskRequest::Add { session: "s1".to_owned(), new });
-        assert!(harness.state_mut().take_requests().contains(&expected), "{before}{last}");
+        let expected = add(Some(format!("{before}{last}")), None);
+        assert!(calls(harness.state_mut()).contains(&expected), "{before}{last}");
         assert!(!harness.ctx.text_edit_focused(), "keys mean steps again");
     }
 }
@@ -166,12 +172,9 @@ fn letters_and_the_enter_behind_them_may_come_in_one_frame() {
 #[test]
 fn breaking_at_a_step_twice_takes_the_breakpoint_back() {
     let mut state = loaded(4);
-    let new = NewBreakpoint { expression: None, step: Some(4) };
-    assert_eq!(ask(&mut state, Ask::BreakAt(4)), [AskRequest::Add { session: "s1".to_owned(), new }]);
-    assert_eq!(
-        ask(&mut state, Ask::BreakAt(2)),
-        [AskRequest::Remove { session: "s1".to_owned(), number: 3 }]
-    );
+    assert_eq!(ask(&mut state, Ask::BreakAt(4)), [add(None, Some(4))]);
+    let at = AtBreakpoint { session: "s1".to_owned(), breakpoint: 3 };
+    assert_eq!(ask(&mut state, Ask::BreakAt(2)), [Call::to::<RemoveBreakpoint>(&at)]);
     assert_eq!(state.ask.breakpoints.len(), 1, "it is gone at once");
 }
 
@@ -199,21 +202,14 @@ fn hits_are_asked_again_when_the_session_changes_and_once_at_a_time() {
     let heard = |state: &mut State, view: &sightline_session::view::SessionView| {
         state.told(Event::SessionChanged { session: "s1".to_owned() });
         state.take_requests();
-        let request = Request::Session("s1".to_owned());
-        let reply = Ok(Reply::Session(Box::new(view.clone())));
-        state.arrived(Arrived { request, outcome: reply }, 0.0);
-        state.take_requests()
+        answer::<ShowSession>(state, view);
+        is_list_read(state)
     };
-    let wanted = Request::Ask(AskRequest::Breakpoints("s1".to_owned()));
-    assert!(heard(&mut state, &view).contains(&wanted));
-    assert!(!heard(&mut state, &view).contains(&wanted), "one is under way");
-    answer(
-        &mut state,
-        AskRequest::Breakpoints("s1".to_owned()),
-        AskReply::Breakpoints(vec![breakpoint(0, "ncc < 0.6", &[1, 3])]),
-    );
+    assert!(heard(&mut state, &view));
+    assert!(!heard(&mut state, &view), "one is under way");
+    answer::<ListBreakpoints>(&mut state, &[breakpoint(0, "ncc < 0.6", &[1, 3])]);
     assert_eq!(state.hit_from(1, true), Some(3));
-    assert!(state.take_requests().contains(&wanted), "what changed meanwhile is asked for");
+    assert!(is_list_read(&mut state), "what changed meanwhile is asked for");
 }
 
 #[test]
@@ -225,23 +221,21 @@ fn a_list_that_was_read_before_a_removal_does_not_bring_the_breakpoint_back() {
     state.ask.breakpoints = vec![breakpoint(0, "ncc < 0.6", &[1])];
     state.ask.make_stale();
     state.sync_ask();
-    let list = AskRequest::Breakpoints("s1".to_owned());
-    assert!(state.take_requests().contains(&Request::Ask(list.clone())));
+    assert!(is_list_read(&mut state));
+    ask(&mut state, Ask::Switch { number: 0, on: false });
     ask(&mut state, Ask::Remove(0));
-    answer(&mut state, list.clone(), AskReply::Breakpoints(vec![breakpoint(0, "ncc < 0.6", &[1])]));
+    answer::<ListBreakpoints>(&mut state, &[breakpoint(0, "ncc < 0.6", &[1])]);
     assert!(state.ask.breakpoints.is_empty());
     state.sync_ask();
-    assert!(state.take_requests().contains(&Request::Ask(list.clone())), "it is read again");
-    answer(&mut state, list, AskReply::Breakpoints(vec![]));
-    // The answer to a change that was asked for before the removal does not bring it back either.
-    let change = BreakpointChange { on: Some(false), expression: None };
-    let change = AskRequest::Change { session: "s1".to_owned(), number: 0, change };
-    answer(&mut state, change, AskReply::Breakpoint(breakpoint(0, "ncc < 0.6", &[1])));
+    assert!(is_list_read(&mut state), "it is read again");
+    answer::<ListBreakpoints>(&mut state, &[(); 0]);
+    // The answer to a change that was sent before the removal does not bring it back either.
+    answer::<ChangeBreakpoint>(&mut state, &breakpoint(0, "ncc < 0.6", &[1]));
     assert!(state.ask.breakpoints.is_empty());
 }
 
 /// A column over the first run whose values are the steps.
-fn column(expression: &str, unit: &str) -> AskReply {
+fn column(expression: &str, unit: &str) -> QueryAnswer {
     let of_run = RunAnswer {
         target: 0,
         run: 0,
@@ -250,32 +244,31 @@ fn column(expression: &str, unit: &str) -> AskReply {
         hits: vec![],
         values: vec![None, Some(1.0), Some(2.5), Some(3.0), Some(4.0)],
     };
-    AskReply::Answer(QueryAnswer {
+    QueryAnswer {
         expression: expression.to_owned(),
         answers: Answers::Number,
         unit: unit.to_owned(),
         count: 0,
         runs: vec![of_run],
-    })
+    }
 }
 
 #[test]
 fn any_expression_becomes_a_plot_that_can_be_taken_away() {
     let mut state = loaded(2);
-    let asked = ask(&mut state, Ask::Plot("sigma_m * 2".to_owned()));
-    let [AskRequest::Query { query, .. }] = asked.as_slice() else { panic!("{asked:?}") };
-    assert_eq!((query.target, query.values), (Some(0), true));
+    let query = Query { expression: "sigma_m * 2".to_owned(), target: Some(0), values: true };
+    let expected = Call::with_body::<QuerySession>(&at_session(), &query);
+    assert_eq!(ask(&mut state, Ask::Plot("sigma_m * 2".to_owned())), [expected]);
     assert_eq!(ask(&mut state, Ask::Plot("sigma_m * 2".to_owned())), [], "it is plotted already");
     assert_eq!(ask(&mut state, Ask::Plot("state".to_owned())), []);
     assert!(state.messages.newest().unwrap().text.contains("cannot be plotted"));
-    let request = asked[0].clone();
     let mut shown = Shown::new(
         [520.0, 520.0],
         move |context| {
             let mut state = watched(context, 2);
             state.perform(Command::Ask(Ask::Plot("sigma_m * 2".to_owned())));
             state.take_requests();
-            answer(&mut state, request, column("sigma_m * 2", "m"));
+            answer::<QuerySession>(&mut state, &column("sigma_m * 2", "m"));
             state
         },
         plots::show,
@@ -287,9 +280,9 @@ fn any_expression_becomes_a_plot_that_can_be_taken_away() {
 #[test]
 fn a_derived_plot_is_asked_again_when_its_runs_grow() {
     let mut state = loaded(2);
-    let asked = ask(&mut state, Ask::Plot("ncc".to_owned()));
+    ask(&mut state, Ask::Plot("ncc".to_owned()));
     assert_eq!(state.take_requests(), [], "it is under way");
-    answer(&mut state, asked[0].clone(), column("ncc", ""));
+    answer::<QuerySession>(&mut state, &column("ncc", ""));
     assert_eq!(state.take_requests(), []);
     let mut view = state.session.clone().unwrap();
     let rows = &mut view.targets[0].runs[0].rows;
@@ -298,11 +291,8 @@ fn a_derived_plot_is_asked_again_when_its_runs_grow() {
     rows.push(next);
     state.told(Event::SessionChanged { session: "s1".to_owned() });
     state.take_requests();
-    let request = Request::Session("s1".to_owned());
-    state.arrived(Arrived { request, outcome: Ok(Reply::Session(Box::new(view))) }, 0.0);
-    assert!(
-        state.take_requests().iter().any(|request| matches!(request, Request::Ask(AskRequest::Query { .. })))
-    );
+    answer::<ShowSession>(&mut state, &view);
+    assert!(!calls_of::<QuerySession>(&mut state).is_empty());
 }
 
 #[test]

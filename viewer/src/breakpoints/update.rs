@@ -1,20 +1,17 @@
-//! Carries out what a person asks of breakpoints, and takes in what the server answers.
+//! Carries out the user's commands about breakpoints.
 
-use sightline_api::wire::Problem;
 use sightline_session::breakpoints::{BreakpointChange, BreakpointView, NewBreakpoint};
 use sightline_session::expression::Expression;
 
-use crate::breakpoints::{Ask, AskReply, AskRequest, Asking};
+use crate::breakpoints::{Ask, Asking};
 use crate::command::{Command, Go};
-use crate::net::events::Connection;
-use crate::net::request::Request;
 use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::state::deeds::Deed;
 use crate::state::effect::Effect;
 
 impl State {
-    /// Carries out what the person asked for.
+    /// Applies a command about breakpoints.
     pub(crate) fn apply_ask(&mut self, ask: Ask) {
         match ask {
             Ask::Type(text) => (self.ask.text, self.ask.wants_focus) = (text, false),
@@ -35,7 +32,7 @@ impl State {
             Ask::BreakAt(step) => self.break_at(step),
             Ask::Switch { number, on } => {
                 let change = BreakpointChange { on: Some(on), expression: None };
-                self.ask_server(|session| AskRequest::Change { session, number, change });
+                self.change_breakpoint(number, &change);
                 if let Some(known) = self.ask.breakpoints.iter_mut().find(|known| known.number == number) {
                     known.on = on;
                 }
@@ -60,21 +57,17 @@ impl State {
 
     fn set_breakpoint(&mut self) {
         let text = self.ask.text.trim().to_owned();
-        // What is wrong with the text stands under the box already.
+        // The box shows the error already.
         if Expression::condition(&text).is_err() {
             return;
         }
         let edited = self.ask.edited;
-        let asked = self.ask_server(|session| match edited {
+        let asked = match edited {
             Some(number) => {
-                let change = BreakpointChange { expression: Some(text), on: None };
-                AskRequest::Change { session, number, change }
+                self.change_breakpoint(number, &BreakpointChange { expression: Some(text), on: None })
             }
-            None => {
-                let new = NewBreakpoint { expression: Some(text), step: None };
-                AskRequest::Add { session, new }
-            }
-        });
+            None => self.add_breakpoint(NewBreakpoint { expression: Some(text), step: None }),
+        };
         if asked {
             (self.ask.text, self.ask.edited) = (String::new(), None);
         }
@@ -87,8 +80,7 @@ impl State {
         match self.ask.breakpoints.iter().find(is_here).map(|breakpoint| breakpoint.number) {
             Some(number) => self.remove_breakpoint(number),
             None => {
-                let new = NewBreakpoint { expression: None, step: Some(step) };
-                self.ask_server(|session| AskRequest::Add { session, new });
+                self.add_breakpoint(NewBreakpoint { expression: None, step: Some(step) });
             }
         }
     }
@@ -101,7 +93,7 @@ impl State {
         }
     }
 
-    /// The next hit after a step, or the last one before it, in the run that is looked at.
+    /// The next hit after a step, or the last one before it, in the run at the cursor.
     pub fn hit_from(&self, step: usize, is_forward: bool) -> Option<usize> {
         let (target, run) = (self.cursor.target?, self.cursor.run);
         let hits = self.ask.watched().map(|(_, breakpoint)| Asking::hits(breakpoint, target, run));
@@ -113,7 +105,7 @@ impl State {
         }
     }
 
-    /// The conditions of the breakpoints that a step hits in the run that is looked at.
+    /// The conditions of the breakpoints that a step hits in the run at the cursor.
     pub(crate) fn hit_at(&self, step: usize) -> Vec<&str> {
         let Some(target) = self.cursor.target else { return Vec::new() };
         let is_hit = |breakpoint: &BreakpointView| {
@@ -134,91 +126,6 @@ impl State {
                 let side = if is_forward { "after" } else { "before" };
                 self.messages.note(format!("No breakpoint is hit {side} this step in this run."));
             }
-        }
-    }
-
-    /// Asks the server about the open session; says so when there is none.
-    pub(super) fn ask_server(&mut self, request: impl FnOnce(String) -> AskRequest) -> bool {
-        match self.session.as_ref().map(|session| session.id.clone()) {
-            Some(session) => {
-                let request = request(session);
-                self.ask.changes += u64::from(request.is_change());
-                self.ask.adding += usize::from(matches!(request, AskRequest::Add { .. }));
-                self.outbox.push(Request::Ask(request));
-                true
-            }
-            None => {
-                self.messages.problem("No session is open yet.", None);
-                false
-            }
-        }
-    }
-
-    /// Asks for what is not known any more.
-    pub(crate) fn sync_ask(&mut self) {
-        let Some(session) = &self.session else { return };
-        if self.connection != Connection::Live {
-            return;
-        }
-        let id = session.id.clone();
-        if self.ask.stale && self.ask.asked.is_none() {
-            self.ask.stale = false;
-            // Without any there is nothing to hear. A session that was read before a change of this page does not know.
-            if session.breakpoints.is_empty() && self.ask.changes == 0 {
-                self.ask.breakpoints.clear();
-            } else {
-                self.ask.asked = Some(self.ask.changes);
-                self.outbox.push(Request::Ask(AskRequest::Breakpoints(id.clone())));
-            }
-        }
-        self.sync_derived(&id);
-    }
-
-    /// Takes in an answer.
-    pub(crate) fn answered_ask(&mut self, request: &AskRequest, reply: AskReply) {
-        match (request, reply) {
-            (AskRequest::Breakpoints(_), AskReply::Breakpoints(list)) => {
-                // A list that was read before a later change would bring back what is removed.
-                if self.ask.asked.take().is_none_or(|changes| changes == self.ask.changes) {
-                    self.ask.breakpoints = list;
-                } else {
-                    self.ask.stale = true;
-                }
-            }
-            (_, AskReply::Breakpoint(view)) => {
-                let is_new = matches!(request, AskRequest::Add { .. });
-                if is_new && self.change_when_set(&view) {
-                    return;
-                }
-                match self.ask.breakpoints.iter_mut().find(|known| known.number == view.number) {
-                    Some(known) => *known = view,
-                    None if is_new => self.ask.breakpoints.push(view),
-                    // It was removed after this change was asked for.
-                    None => {}
-                }
-            }
-            (AskRequest::Query { query, .. }, AskReply::Answer(answer)) => {
-                self.took_column(query, Ok(answer));
-            }
-            _ => {}
-        }
-    }
-
-    /// Takes in a refusal.
-    pub(crate) fn refused_ask(&mut self, request: &AskRequest, problem: &Problem) {
-        match request {
-            AskRequest::Breakpoints(_) => self.ask.asked = None,
-            AskRequest::Query { query, .. } => self.took_column(query, Err(problem.detail.clone())),
-            // What the page believed of the list may be wrong now.
-            AskRequest::Remove { .. } => {
-                self.undo.forget_last(|deed| matches!(deed, Deed::RemovedBreakpoint { .. }));
-                self.ask.stale = true;
-            }
-            AskRequest::Add { new, .. } => {
-                self.take_when_set(new.expression.as_deref());
-                self.ask.stale = true;
-            }
-            AskRequest::Change { .. } => self.ask.stale = true,
         }
     }
 }

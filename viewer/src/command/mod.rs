@@ -1,5 +1,6 @@
 //! What a person can ask for. Panels and keys make commands; `state` carries them out.
 
+mod entry;
 pub(crate) mod table;
 pub(crate) mod keys;
 pub(crate) mod actions;

@@ -5,6 +5,8 @@
 
 use egui::{Key, Modifiers};
 
+pub(crate) use super::entry::{Line, Shortcut, UserCommand};
+
 use crate::breakpoints::play::Shuttle;
 use crate::command::{Command, Go, Mode, Search};
 use crate::compare;
@@ -16,134 +18,6 @@ use crate::tour::Turn;
 use crate::trackability::limits;
 use crate::{breakpoints, exports, files, notes, why};
 
-/// A key with its modifiers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Shortcut {
-    /// The key.
-    pub key: Key,
-    /// Whether Ctrl (or Command) is held.
-    pub ctrl: bool,
-    /// Whether Shift is held; `None`: either way.
-    pub shift: Option<bool>,
-}
-
-impl Shortcut {
-    const fn plain(key: Key) -> Self {
-        Self { key, ctrl: false, shift: None }
-    }
-
-    const fn no_shift(key: Key) -> Self {
-        Self { key, ctrl: false, shift: Some(false) }
-    }
-
-    const fn shift(key: Key) -> Self {
-        Self { key, ctrl: false, shift: Some(true) }
-    }
-
-    const fn ctrl(key: Key) -> Self {
-        Self { key, ctrl: true, shift: Some(false) }
-    }
-
-    const fn ctrl_shift(key: Key) -> Self {
-        Self { key, ctrl: true, shift: Some(true) }
-    }
-
-    /// Whether `key` with `modifiers` is this shortcut.
-    pub(crate) fn matches(self, key: Key, modifiers: Modifiers) -> bool {
-        let has_ctrl = modifiers.ctrl || modifiers.command;
-        self.key == key
-            && self.ctrl == has_ctrl
-            && !modifiers.alt
-            && self.shift.is_none_or(|shift| shift == modifiers.shift)
-    }
-
-    /// The words on the help sheet and in tooltips, such as `Ctrl+S`.
-    pub(crate) fn words(self) -> String {
-        let key = match self.key {
-            Key::ArrowRight => "Right",
-            Key::ArrowLeft => "Left",
-            Key::ArrowUp => "Up",
-            Key::ArrowDown => "Down",
-            Key::PageUp => "PgUp",
-            Key::PageDown => "PgDn",
-            Key::Escape => "Esc",
-            Key::OpenBracket => "[",
-            Key::CloseBracket => "]",
-            Key::Backtick => "`",
-            Key::Questionmark => "?",
-            key => key.name(),
-        };
-        let ctrl = if self.ctrl { "Ctrl+" } else { "" };
-        let shift = if self.shift == Some(true) { "Shift+" } else { "" };
-        format!("{ctrl}{shift}{key}")
-    }
-}
-
-/// A command that the user can give by key or by name.
-#[derive(Clone, Copy)]
-pub(crate) struct UserCommand {
-    /// Name in the palette and in menus; empty: only a key gives the command.
-    pub name: &'static str,
-    /// Text of the button in the bars that gives the command; empty without such a button.
-    pub icon: &'static str,
-    /// Tooltip of that button, without the keys.
-    pub tip: &'static str,
-    /// Keys, the one that is shown first.
-    pub shortcuts: &'static [Shortcut],
-    /// What it asks for in this state.
-    pub command: fn(&State) -> Command,
-}
-
-impl UserCommand {
-    /// The shortcut that is shown; empty without one.
-    pub(crate) fn keys(&self) -> String {
-        self.shortcuts.first().map(|shortcut| shortcut.words()).unwrap_or_default()
-    }
-
-    /// The tooltip of its button: what it does, and the keys in brackets.
-    pub(crate) fn tooltip(&self) -> String {
-        self.with_keys(self.tip)
-    }
-
-    /// A text with the keys in brackets after it.
-    pub(crate) fn with_keys(&self, text: &str) -> String {
-        let keys = self.keys();
-        if keys.is_empty() { text.to_owned() } else { format!("{text} ({keys})") }
-    }
-}
-
-/// A line of the help sheet with the commands that it explains.
-#[derive(Clone, Copy)]
-pub(crate) struct Line {
-    /// The explanation on the help sheet; empty: the commands have no line there.
-    pub help: &'static str,
-    /// Keys or gestures that are no shortcut of a command; empty: the shortcuts of the commands are shown.
-    pub gesture: &'static str,
-    /// The commands.
-    pub commands: &'static [UserCommand],
-}
-
-impl Line {
-    /// Keys or gestures as the help sheet shows them.
-    pub(crate) fn keys(&self) -> String {
-        if self.gesture.is_empty() {
-            self.commands.iter().map(UserCommand::keys).collect::<Vec<_>>().join("  ")
-        } else {
-            self.gesture.to_owned()
-        }
-    }
-}
-
-impl UserCommand {
-    const fn new(name: &'static str, shortcuts: &'static [Shortcut], command: fn(&State) -> Command) -> Self {
-        Self { name, icon: "", tip: "", shortcuts, command }
-    }
-
-    const fn button(self, icon: &'static str, tip: &'static str) -> Self {
-        Self { icon, tip, ..self }
-    }
-}
-
 const fn line(help: &'static str, commands: &'static [UserCommand]) -> Line {
     Line { help, gesture: "", commands }
 }
@@ -152,8 +26,7 @@ const fn gesture(gesture: &'static str, help: &'static str) -> Line {
     Line { help, gesture, commands: &[] }
 }
 
-use Shortcut as On;
-use UserCommand as Do;
+use {Shortcut as On, UserCommand as Do};
 
 /// One step forward.
 pub(crate) const NEXT_STEP: Do =

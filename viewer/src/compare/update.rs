@@ -1,5 +1,8 @@
-//! What is asked of the server about compared runs, what it answers, and what the person asks for.
+//! The user's commands about compared runs, their calls, and what the replies change.
 
+use sightline_api::endpoint::Call;
+use sightline_api::endpoints::{CompareRuns, ShowMetrics};
+use sightline_api::location::{AtRun, AtSession};
 use sightline_api::wire::Problem;
 use sightline_session::Cursor;
 use sightline_session::compare::{Comparison, NewComparison, RUNS_MAX, RunName};
@@ -8,14 +11,13 @@ use sightline_session::metrics::RunMetrics;
 use crate::cache::{Eye, Key};
 use crate::command::{Command, Go, Stage};
 use crate::compare::{Ask, Asked, Compare};
-use crate::net::request::Request;
 use crate::state::{State, row_of};
 
 /// Requests for metrics that are under way at a time.
 const METRICS_AT_A_TIME: usize = 2;
 
 impl State {
-    /// Asks for what comparing needs and is not known.
+    /// Reads the comparison and the metrics that are missing.
     pub(crate) fn sync_compare(&mut self, session: &str) {
         self.ask_for_comparison(session);
         self.ask_for_metrics(session);
@@ -26,16 +28,18 @@ impl State {
         let rows =
             runs.iter().map(|&name| self.run_named(name).map_or(0, |(_, run)| run.rows.len())).collect();
         let (align, tolerance) = (self.compare.align, self.tolerances());
-        // Values come from the records; asked for are only the alignment, the first divergence and the settings.
+        // Values are in the records: request only the alignment, the first divergence and the settings.
         let new = NewComparison { runs, align, tolerance, columns: Some(Vec::new()) };
         let asked = Asked { session: session.to_owned(), new, rows };
         let is_known = self.compare.answer.as_ref().is_some_and(|(known, _)| *known == asked);
         if is_known || self.compare.under_way.is_some() {
             return;
         }
-        self.outbox
-            .push(Request::Compare { session: asked.session.clone(), new: Box::new(asked.new.clone()) });
-        self.compare.under_way = Some(asked);
+        let call = Call::with_body::<CompareRuns>(&AtSession { session: session.to_owned() }, &asked.new);
+        self.compare.under_way = Some(asked.clone());
+        self.call_with_problem::<CompareRuns>(call, move |state, outcome| {
+            state.took_comparison(&asked, outcome);
+        });
     }
 
     fn ask_for_metrics(&mut self, session: &str) {
@@ -53,28 +57,30 @@ impl State {
             .collect();
         for (run, rows) in missing {
             self.compare.metrics_asked.insert(run, rows);
-            self.outbox.push(Request::Metrics { session: session.to_owned(), run });
+            let at = AtRun { session: session.to_owned(), target: run.target, run: run.run };
+            self.call_with_problem::<ShowMetrics>(Call::to::<ShowMetrics>(&at), move |state, outcome| {
+                state.took_metrics(run, outcome);
+            });
         }
     }
 
-    /// Takes in a comparison, or why there is none.
-    pub(crate) fn took_comparison(&mut self, request: &Request, outcome: Result<Comparison, &Problem>) {
-        let is_meant = |asked: &mut Asked| matches!(request, Request::Compare { session, new } if *session == asked.session && **new == asked.new);
-        let Some(asked) = self.compare.under_way.take_if(is_meant) else { return };
-        self.compare.answer = Some((asked, outcome.map_err(|problem| problem.detail.clone())));
+    /// Takes a comparison, or its problem.
+    fn took_comparison(&mut self, asked: &Asked, outcome: Result<Comparison, Problem>) {
+        let Some(asked) = self.compare.under_way.take_if(|known| known == asked) else { return };
+        self.compare.answer = Some((asked, outcome.map_err(|problem| problem.detail)));
         if std::mem::take(&mut self.compare.jumps) {
             self.go_to_first_divergence();
         }
     }
 
-    /// Takes in the metrics of a run, or why there are none.
-    pub(crate) fn took_metrics(&mut self, run: RunName, outcome: Result<RunMetrics, &Problem>) {
+    /// Takes the metrics of a run, or their problem.
+    fn took_metrics(&mut self, run: RunName, outcome: Result<RunMetrics, Problem>) {
         if let Some(rows) = self.compare.metrics_asked.remove(&run) {
-            self.compare.metrics.insert(run, (rows, outcome.map_err(|problem| problem.detail.clone())));
+            self.compare.metrics.insert(run, (rows, outcome.map_err(|problem| problem.detail)));
         }
     }
 
-    /// Forgets what belongs to another session, or may have been missed while the server was gone.
+    /// Forgets the comparisons of another session, or those that may have changed while the server was unreachable.
     pub(crate) fn forget_comparisons(&mut self, is_other_session: bool) {
         if is_other_session {
             let (wants_metrics, view) = (self.compare.wants_metrics, self.compare.view);
@@ -85,7 +91,7 @@ impl State {
         }
     }
 
-    /// Keeps the comparison when another run is looked at: the one looked at before takes its place.
+    /// Keeps the comparison when the cursor moves to a compared run: the run before takes its place.
     pub(crate) fn looked_elsewhere(&mut self, before: Option<RunName>, now: Cursor) {
         let now = now.target.map(|target| RunName { target, run: now.run });
         let place = self.compare.others.iter().position(|&name| Some(name) == now);
@@ -96,7 +102,7 @@ impl State {
         }
     }
 
-    /// Carries out what was asked for.
+    /// Applies a command about compared runs.
     pub(crate) fn ask_compare(&mut self, ask: Ask) {
         match ask {
             Ask::With { place, run } => self.compare_with(place, run),
@@ -189,11 +195,11 @@ impl State {
         self.stage = Stage::of(self.tracker()).find(|stage| stage.word() == word).unwrap_or(Stage::LOCATE);
     }
 
-    /// What the compared runs need at a step: their records, and the arrays that are shown beside each other.
+    /// Adds the items that the compared runs need at a step: their records and arrays.
     pub(crate) fn want_compared(&self, keys: &mut Vec<Key>) {
         let step = self.cursor.step;
         for other in self.others() {
-            // The neighbours' records are small; arrays are fetched for the step that is looked at alone.
+            // The records of the neighbours are small; arrays are fetched for the cursor's step alone.
             for near in [Some(step), step.checked_add(1), step.checked_sub(1)].into_iter().flatten() {
                 let there = self.beside(other.name, near).filter(|&step| row_of(other.run, step).is_some());
                 let Some(there) = there else { continue };

@@ -1,7 +1,10 @@
 //! Opening: what a file is, what is said of one that is none, and what comes of it.
 
 use serde_json::{Value, json};
-use sightline_api::endpoints::{AddTraverse, BringSession, ListSessions, RemoveSession};
+use sightline_api::endpoint::Call;
+use sightline_api::endpoints::{
+    AddBreakpoint, AddTraverse, BringSession, ListSessions, RemoveSession, ShowSession,
+};
 use sightline_api::location::{Anywhere, AtSession};
 use sightline_api::wire::{Event, NewTraverse, Problem, SessionEntry, TraverseEntry};
 use sightline_rover::version::tracker_version;
@@ -9,18 +12,17 @@ use sightline_session::reproduce::{FORMAT, FORMAT_VERSION};
 use sightline_track::settings::Settings;
 use sightline_world::Scenario;
 
-use crate::breakpoints::AskRequest;
 use crate::command::Command;
 use crate::command::keys;
 use crate::files::Ask;
 use crate::files::documents::{Document, TEXT_LIMIT, before_reading, only_one, read, shown};
 use crate::files::inbox::Arrival;
 use crate::files::window;
-use crate::net::request::{Arrived, Request};
 use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::state::effect::Effect;
 use crate::state::messages::Weight;
+use crate::tests::calls::{answer, bodies, calls, calls_of, refuse};
 use crate::tests::{Shown, fixture};
 
 fn reproduce() -> Value {
@@ -138,22 +140,19 @@ fn a_scenario_is_sent_and_its_drive_is_opened_and_a_refusal_leaves_everything_as
     state.take_requests();
     let send = |state: &mut State| {
         drop_file(state, "hill.toml", b"seed = 4");
-        let [request] = state.take_requests().try_into().unwrap();
-        request
+        bodies::<AddTraverse>(state)
     };
-    let request: Request = send(&mut state);
-    let new = NewTraverse { scenario: "seed = 4".to_owned() };
-    assert_eq!(request.body_of::<AddTraverse>(&Anywhere {}), Some(new));
+    assert_eq!(send(&mut state), [NewTraverse { scenario: "seed = 4".to_owned() }]);
     assert_eq!(state.files.opening.as_deref(), Some("“hill.toml”"));
     let problem = Problem::new(409, "conflict", "", "There are 64 drives already.");
-    state.arrived(Arrived { request, outcome: Err(problem) }, 0.0);
+    refuse::<AddTraverse>(&mut state, problem);
     assert_eq!(newest(&state).1, "“hill.toml” cannot be opened: There are 64 drives already.");
     assert_eq!((state.files.opening.as_deref(), state.cursor.step), (None, 2));
     let entry = sightline_api::wire::TraverseEntry { id: "hill-1".to_owned(), ..fixture::entry() };
-    let request = send(&mut state);
-    state.arrived(Arrived { request, outcome: Ok(fixture::reply(&entry)) }, 0.0);
-    let [sessions] = state.take_requests().try_into().unwrap();
-    assert!(sessions.calls::<ListSessions>(&Anywhere {}), "its latest session, or a new one");
+    send(&mut state);
+    answer::<AddTraverse>(&mut state, &entry);
+    let sessions = Call::to::<ListSessions>(&Anywhere {});
+    assert_eq!(calls(&mut state), [sessions], "its latest session, or a new one");
     assert_eq!(state.traverses.as_ref().unwrap().len(), 2);
 }
 
@@ -162,11 +161,9 @@ fn a_reproduced_session_is_opened_at_its_cursor() {
     let mut state = fixture::at_step(&egui::Context::default(), 2);
     state.take_requests();
     drop_file(&mut state, "reproduce.json", reproduce().to_string().as_bytes());
-    let request = state.take_requests().remove(0);
-    assert!(request.calls::<BringSession>(&Anywhere {}), "{request:?}");
     let mut view = state.session.clone().unwrap();
     (view.id, view.cursor.step) = ("s9".to_owned(), 4);
-    state.arrived(Arrived { request, outcome: Ok(fixture::reply(&view)) }, 0.0);
+    answer::<BringSession>(&mut state, &view);
     assert_eq!((state.session.as_ref().unwrap().id.as_str(), state.cursor.step), ("s9", 4));
     let mut other = reproduce();
     other["program"]["tracker"] = json!("0.0.1");
@@ -195,10 +192,7 @@ fn breakpoints_of_a_file_are_set_and_those_that_are_off_are_switched_off() {
     state.take_requests();
     let list = json!([{ "expression": "ncc < 0.5", "on": false }, "step == 4"]);
     drop_file(&mut state, "b.json", list.to_string().as_bytes());
-    let added = state.take_requests().into_iter().filter_map(|request| match request {
-        Request::Ask(AskRequest::Add { new, .. }) => new.expression,
-        _ => None,
-    });
+    let added = bodies::<AddBreakpoint>(&mut state).into_iter().filter_map(|new| new.expression);
     assert_eq!(added.collect::<Vec<_>>(), ["ncc < 0.5", "step == 4"]);
     assert_eq!(newest(&state).1, "2 breakpoints of “b.json” set.");
 }
@@ -224,11 +218,10 @@ fn recent_sessions_are_listed_by_their_use_and_one_click_opens_one() {
         let ctrl = egui::Modifiers::CTRL;
         let open = keys::command(egui::Key::O, ctrl, &state).unwrap();
         state.perform(open);
-        let recent = |request: &Request| request.calls::<ListSessions>(&Anywhere {});
-        let request = state.take_requests().into_iter().find(recent).unwrap();
         let list =
             [entry("s1", Some(10.0)), entry("s2", None), entry("s3", Some(7200.0)), entry("s4", Some(90.0))];
-        state.arrived(Arrived { request, outcome: Ok(fixture::reply(&list)) }, 0.0);
+        answer::<ListSessions>(&mut state, &list);
+        state.take_requests();
         state
     };
     let ids = window(&egui::Context::default()).files.recent.unwrap();
@@ -239,10 +232,8 @@ fn recent_sessions_are_listed_by_their_use_and_one_click_opens_one() {
     assert_eq!(shown.click(name), vec![Command::Files(Ask::Resume("s3".to_owned()))]);
     let mut state = window(&egui::Context::default());
     state.perform(Command::Files(Ask::Resume("s3".to_owned())));
-    assert_eq!(
-        (state.take_requests(), state.files.is_open),
-        (vec![Request::Session("s3".to_owned())], false)
-    );
+    let read = Call::to::<ShowSession>(&AtSession { session: "s3".to_owned() });
+    assert_eq!((calls(&mut state), state.files.is_open), (vec![read], false));
     state.perform(Command::Files(Ask::Open));
     state.perform(Command::Files(Ask::Resume("s1".to_owned())));
     assert_eq!(newest(&state).1, "That session is open already.");
@@ -264,9 +255,9 @@ fn a_listed_session_is_removed_and_restored_with_one_click_each() {
     let mut state = window(&egui::Context::default());
     state.take_requests();
     state.perform(removed);
-    let request = state.take_requests().remove(0);
-    assert!(request.calls::<RemoveSession>(&AtSession { session: "s3".to_owned() }), "{request:?}");
-    state.arrived(Arrived { request, outcome: Ok(fixture::reply(&())) }, 0.0);
+    let expected = Call::to::<RemoveSession>(&AtSession { session: "s3".to_owned() });
+    assert_eq!(calls_of::<RemoveSession>(&mut state), [expected]);
+    answer::<RemoveSession>(&mut state, &());
     assert_eq!(state.files.removed.last().unwrap().id, "s3");
     state.told(Event::SessionRemoved { session: "s1".to_owned() });
     assert!(newest(&state).1.contains("s1 was removed"), "the open one, by another page");

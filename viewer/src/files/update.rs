@@ -11,7 +11,6 @@ use crate::cache::Key;
 use crate::files::documents::Document;
 use crate::files::inbox::Arrival;
 use crate::files::{Ask, documents};
-use crate::net::request::Request;
 use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::state::effect::Effect;
@@ -35,7 +34,7 @@ impl State {
                     self.messages.note("That session is open already.");
                 } else {
                     self.sync.linked = Some(id.clone());
-                    self.outbox.push(Request::Session(id));
+                    self.read_session(id);
                 }
             }
             Ask::TryAgain => {

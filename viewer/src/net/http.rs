@@ -4,7 +4,6 @@ use ehttp::Headers;
 use sightline_api::endpoint::Method;
 use sightline_api::wire::Problem;
 
-use crate::net::exchange::{Exchange, Reader};
 use crate::net::items;
 use crate::net::request::{Arrived, Reply, Request};
 
@@ -15,10 +14,14 @@ pub(super) fn send(
     context: &egui::Context,
     done: impl FnOnce(Arrived) + Send + 'static,
 ) {
-    let Some(Exchange { call, reader }) = request.exchange() else { return };
+    let call = match &request {
+        Request::Call { call, .. } => call.clone(),
+        Request::Item(key) => items::call(key),
+        Request::Reconnect => return,
+    };
     let mut http = ehttp::Request::get(format!("{origin}/api/v1/{}", call.path));
     http.method = method(call.method);
-    // Rendering an image or designating a target takes as long as it takes.
+    // Rendering an image or designating a target has no time limit.
     http.timeout = None;
     if let Some(body) = call.body {
         http.headers = Headers::new(&[("Accept", "application/json"), ("Content-Type", "application/json")]);
@@ -30,11 +33,11 @@ pub(super) fn send(
     let context = context.clone();
     ehttp::fetch(http, move |answer| {
         let outcome = match answer {
-            Ok(response) if response.ok => match reader {
-                // An item that is being made is not there yet.
-                Reader::Item(_) if response.status == 202 => Err(problem(&response)),
-                Reader::Item(key) => items::read(&key, &response.bytes, &context).map(Reply::Item),
-                Reader::Json(read) => read(&response.bytes),
+            Ok(response) if response.ok => match &request {
+                // The server is still making the item.
+                Request::Item(_) if response.status == 202 => Err(problem(&response)),
+                Request::Item(key) => items::read(key, &response.bytes, &context).map(Reply::Item),
+                Request::Call { .. } | Request::Reconnect => Ok(Reply::Body(response.bytes)),
             },
             Ok(response) => Err(problem(&response)),
             Err(why) => Err(unreachable(&why.to_string())),
@@ -53,7 +56,7 @@ const fn method(method: Method) -> ehttp::Method {
     }
 }
 
-/// What the server said instead of an answer.
+/// The problem in a response that is no success.
 fn problem(response: &ehttp::Response) -> Problem {
     serde_json::from_slice(&response.bytes).unwrap_or_else(|_| {
         let detail = format!("The server answered {} {}.", response.status, response.status_text);

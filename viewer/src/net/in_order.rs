@@ -5,18 +5,18 @@ use std::collections::VecDeque;
 
 use crate::net::request::Request;
 
-/// The requests that were not answered yet; the first one is under way.
+/// The unanswered requests; the first one is under way.
 #[derive(Default)]
 pub(super) struct InOrder(VecDeque<Request>);
 
 impl InOrder {
-    /// Takes a request in; it is returned where it can be sent at once.
+    /// Adds a request; returns it if it can be sent at once.
     pub(super) fn add(&mut self, request: Request) -> Option<Request> {
         self.0.push_back(request);
         if self.0.len() == 1 { self.0.front().cloned() } else { None }
     }
 
-    /// Takes in that a request was answered; returns the one that can be sent next.
+    /// Removes an answered request; returns the one that can be sent next.
     pub(super) fn answered(&mut self, request: &Request) -> Option<Request> {
         if self.0.front() != Some(request) {
             return None;
@@ -28,10 +28,15 @@ impl InOrder {
 
 #[cfg(test)]
 mod tests {
+    use sightline_api::endpoint::Call;
+    use sightline_api::endpoints::RestoreNote;
+    use sightline_api::location::AtNote;
+
     use super::*;
 
-    fn note(id: u64) -> Request {
-        Request::RestoreNote { session: "s1".to_owned(), id }
+    fn note(ticket: u64) -> Request {
+        let call = Call::to::<RestoreNote>(&AtNote { session: "s1".to_owned(), note: ticket });
+        Request::Call { ticket, call }
     }
 
     #[test]

@@ -14,8 +14,8 @@ use crate::drawing::raster::Raster;
 use crate::net::reply::{misread, parse};
 use crate::tables::Table;
 
-/// The request for an item. A single array comes with all arrays of its step.
-pub(super) fn call(key: &Key) -> Call {
+/// The call that reads an item. A single array comes with all arrays of its step.
+pub(crate) fn call(key: &Key) -> Call {
     match key {
         Key::Image { traverse, step, eye } => {
             let (id, file) = (traverse.clone(), format!("{}.png", eye.word()));

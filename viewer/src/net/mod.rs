@@ -2,13 +2,11 @@
 
 pub(crate) mod events;
 pub(crate) mod calls;
-mod exchange;
 mod http;
 mod in_order;
-mod items;
+pub(crate) mod items;
 mod reply;
 pub(crate) mod request;
-pub(crate) mod why;
 
 use std::collections::HashSet;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -20,10 +18,10 @@ use self::in_order::InOrder;
 use self::request::{Arrived, Request};
 use crate::cache::Key;
 
-/// How many images, arrays and records are asked for at a time.
+/// Maximum number of images, arrays and records under way.
 const AT_A_TIME: usize = 6;
 
-/// How many of them may be images that must be rendered first: a browser has few connections to one server.
+/// Maximum number of images among them that must be rendered first: a browser has few connections to one server.
 const SLOW_AT_A_TIME: usize = 2;
 
 /// The network side of the page.
@@ -47,7 +45,7 @@ impl Net {
         Self { origin, context, sender, receiver, under_way, slow, in_order, events }
     }
 
-    /// Takes a place for something that is asked for next, where there is one.
+    /// Reserves a place for an item that is requested next; false if all are taken.
     pub(crate) fn take_place(&mut self, key: &Key, is_slow: bool) -> bool {
         let is_place = self.under_way.len() < AT_A_TIME && (!is_slow || self.slow.len() < SLOW_AT_A_TIME);
         if is_place {
@@ -75,17 +73,17 @@ impl Net {
     fn send_now(&self, request: Request) {
         let (sender, context) = (self.sender.clone(), self.context.clone());
         http::send(&self.origin, request, &self.context, move |arrived| {
-            let shows_nothing = matches!(arrived.request, Request::PutCursor { .. });
+            let is_invisible = arrived.request.is_invisible();
             // Without a receiver the page is closing, and nobody waits for the answer.
             match sender.send(arrived) {
-                Ok(()) if shows_nothing => context.request_repaint_after(UNHURRIED),
+                Ok(()) if is_invisible => context.request_repaint_after(UNHURRIED),
                 Ok(()) => context.request_repaint(),
                 Err(_) => {}
             }
         });
     }
 
-    /// What arrived since the last time.
+    /// The answers since the last call.
     pub(crate) fn poll(&mut self) -> Vec<Arrived> {
         let arrived: Vec<Arrived> = self.receiver.try_iter().collect();
         for answer in &arrived {

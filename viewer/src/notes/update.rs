@@ -1,16 +1,19 @@
-//! Carries out what a person asks of notes, and takes in what the server answers.
+//! The user's commands about notes, their calls, and what the replies change.
 
+use sightline_api::endpoint::Call;
+use sightline_api::endpoints::{AddNote, ChangeNote, ListNotes, RemoveNote, RestoreNote};
+use sightline_api::location::{AtNote, AtSession};
 use sightline_session::Cursor;
 use sightline_session::notes::{EditNote, NewNote, Note, Pin};
 
-use crate::net::request::Request;
 use crate::notes::{Ask, Draft, Notes};
 use crate::stage::Stage;
 use crate::state::State;
+use crate::state::calls::Notice;
 use crate::state::deeds::Deed;
 
 impl State {
-    /// Carries out what was asked of notes.
+    /// Applies a command about notes.
     pub(crate) fn ask_of_notes(&mut self, ask: Ask) {
         match ask {
             Ask::Pin => self.pin(),
@@ -32,15 +35,16 @@ impl State {
                 let draft = self.notes.draft.take().filter(|draft| draft.of.is_none());
                 self.notes.kept = draft.map(|draft| draft.text).unwrap_or_default();
             }
-            Ask::Remove(id) => {
-                let request = self.removal_of_note(id);
-                self.outbox.extend(request);
-            }
-            Ask::Restore(id) => self.restore_note(id),
+            Ask::Remove(id) => self.remove_note(id, true),
+            // If the removal was the last deed, restoring the note takes that deed back.
+            Ask::Restore(id) => match self.undo.ends().0 {
+                Some(Deed::RemovedNote { id: last, .. }) if *last == id => self.undo_last(),
+                _ => self.restore_note(id),
+            },
             Ask::Move { id, place } => {
                 let Some(revision) = self.note(id).map(|note| note.revision) else { return };
                 let edit = EditNote { text: None, place: Some(place) };
-                self.ask(|session| Request::EditNote { session, id, revision, edit });
+                self.change_note(id, revision, edit);
             }
             Ask::GoTo(id) => self.go_to_note(id),
             Ask::Tour(by) => {
@@ -51,34 +55,30 @@ impl State {
         }
     }
 
-    /// What removes a note; none where there is no such one. It can be brought back in the panel, too.
-    pub(crate) fn removal_of_note(&mut self, id: u64) -> Option<Request> {
-        let session = self.session.as_ref()?.id.clone();
-        let note = self.note(id)?.clone();
-        let revision = note.revision;
+    /// Removes a note. `is_deed`: the removal can be taken back, and is not itself the redoing of one.
+    pub(crate) fn remove_note(&mut self, id: u64, is_deed: bool) {
+        let Some(session) = self.session.as_ref().map(|session| session.id.clone()) else { return };
+        let Some(note) = self.note(id).cloned() else { return };
+        let step = note.pin.step;
+        let call = Call::to::<RemoveNote>(&AtNote { session: session.clone(), note: id });
+        let take = move |state: &mut Self, _| {
+            if is_deed {
+                state.did_remove(&format!("the note at step {step}"), Deed::RemovedNote { id, step });
+            }
+        };
+        self.call_or::<RemoveNote>(call.at_revision(note.revision), take, move |state, _| {
+            state.notes.removed = None;
+            state.read_notes(session);
+            Notice::Card
+        });
         self.notes.removed = Some(note);
-        Some(Request::RemoveNote { session, id, revision })
     }
 
-    /// Brings a removed note back; where its removal was the last deed, that is taking it back.
-    fn restore_note(&mut self, id: u64) {
-        if matches!(self.undo.ends().0, Some(Deed::RemovedNote { id: last, .. }) if *last == id) {
-            self.undo_last();
-            return;
-        }
+    /// Restores a removed note.
+    pub(crate) fn restore_note(&mut self, id: u64) {
+        let Some(session) = self.session_id() else { return };
         self.notes.removed = None;
-        self.ask(|session| Request::RestoreNote { session, id });
-    }
-
-    /// Takes in that a note was removed: a deed, unless it does one again.
-    pub(crate) fn removed_note(&mut self, request: &Request) {
-        let Request::RemoveNote { id, .. } = *request else { return };
-        if self.take_silent(request) {
-            return;
-        }
-        let removed = self.notes.removed.as_ref().filter(|note| note.id == id);
-        let step = removed.map_or(self.cursor.step, |note| note.pin.step);
-        self.did_remove(&format!("the note at step {step}"), Deed::RemovedNote { id, step });
+        self.call::<RestoreNote>(Call::to::<RestoreNote>(&AtNote { session, note: id }), |_, _| {});
     }
 
     /// The note of that number.
@@ -86,7 +86,7 @@ impl State {
         self.notes.list.iter().flatten().find(|note| note.id == id)
     }
 
-    /// The notes that are pinned to a stop: to the run that is looked at, or to the stop alone.
+    /// The notes that are pinned to a stop: to the run at the cursor, or to the stop alone.
     pub fn notes_at(&self, step: usize) -> Vec<&Note> {
         let cursor = self.cursor;
         let is_here = |note: &&Note| {
@@ -96,47 +96,68 @@ impl State {
         self.notes.list.iter().flatten().filter(is_here).collect()
     }
 
-    /// Asks for the notes of a session that is being opened.
+    /// Reads the notes of a session that is being opened.
     pub(crate) fn open_notes(&mut self, session: &str) {
         self.notes = Notes { asked: Some(session.to_owned()), ..Notes::default() };
-        self.outbox.push(Request::Notes(session.to_owned()));
+        self.read_notes(session.to_owned());
     }
 
-    /// Takes in that notes changed.
+    /// Reads the notes of a session.
+    pub(crate) fn read_notes(&mut self, session: String) {
+        let call = Call::to::<ListNotes>(&AtSession { session: session.clone() });
+        self.call::<ListNotes>(call, move |state, list| state.took_notes(&session, list));
+    }
+
+    /// Reads the notes again after an event that they changed.
     pub(crate) fn notes_changed(&mut self, session: String) {
         if self.notes.asked.as_ref() == Some(&session) {
-            self.outbox.push(Request::Notes(session));
+            self.read_notes(session);
         }
     }
 
-    /// Takes in the notes of a session.
-    pub(crate) fn took_notes(&mut self, session: &str, list: Vec<Note>) {
+    /// Replaces the list of notes, unless another session was opened meanwhile.
+    fn took_notes(&mut self, session: &str, list: Vec<Note>) {
         if self.notes.asked.as_deref() == Some(session) {
             self.notes.list = Some(list);
         }
     }
 
-    /// A note could not be kept: its words come back.
-    pub(crate) fn note_refused(&mut self, request: &Request) {
-        let draft = match request {
-            Request::NewNote { new, .. } => Draft { of: None, pin: new.pin.clone(), text: new.text.clone() },
-            Request::EditNote { session, id, revision, edit: EditNote { text: Some(text), .. } } => {
-                self.outbox.push(Request::Notes(session.clone()));
-                // The next attempt is one against what the server has by then.
-                let revision = self.note(*id).map_or(*revision, |note| note.revision);
-                Draft { of: Some((*id, revision)), pin: Pin::default(), text: text.clone() }
-            }
-            Request::EditNote { session, .. } | Request::RemoveNote { session, .. } => {
-                self.notes.removed = None;
-                self.forget_refused(request);
-                self.outbox.push(Request::Notes(session.clone()));
-                return;
-            }
-            _ => return,
+    /// Changes a note of the revision that was read; if the server refuses that, the text is in the editor again.
+    fn change_note(&mut self, id: u64, revision: u64, edit: EditNote) {
+        let Some(session) = self.session_id() else { return };
+        let at = AtNote { session: session.clone(), note: id };
+        let call = Call::with_body::<ChangeNote>(&at, &edit).at_revision(revision);
+        self.call_or::<ChangeNote>(
+            call,
+            |_, _| {},
+            move |state, _| {
+                state.read_notes(session);
+                if let Some(text) = edit.text {
+                    // The next attempt changes the revision that is known then.
+                    let revision = state.note(id).map_or(revision, |note| note.revision);
+                    state.edit_again(Draft { of: Some((id, revision)), pin: Pin::default(), text });
+                }
+                Notice::Card
+            },
+        );
+    }
+
+    /// Pins a note; if the server refuses it, the text is in the editor again.
+    fn add_note(&mut self, new: NewNote) {
+        let Some(session) = self.session_id() else { return };
+        let call = Call::with_body::<AddNote>(&AtSession { session }, &new);
+        let take = |state: &mut Self, _| {
+            state.messages.note("The note is pinned; the panel Notes lists them.");
         };
-        if self.notes.draft.is_none() {
-            self.notes.draft = Some(draft);
-        }
+        self.call_or::<AddNote>(call, take, move |state, _| {
+            state.edit_again(Draft { of: None, pin: new.pin, text: new.text });
+            Notice::Card
+        });
+    }
+
+    /// Puts a draft into the editor unless another one is being written.
+    fn edit_again(&mut self, draft: Draft) {
+        self.notes.draft.get_or_insert(draft);
     }
 
     fn pin(&mut self) {
@@ -168,12 +189,9 @@ impl State {
         match of {
             Some((id, revision)) => {
                 let edit = EditNote { text: Some(text), place: None };
-                self.ask(|session| Request::EditNote { session, id, revision, edit });
+                self.change_note(id, revision, edit);
             }
-            None => {
-                let new = NewNote { pin, text };
-                self.ask(|session| Request::NewNote { session, new });
-            }
+            None => self.add_note(NewNote { pin, text }),
         }
     }
 
@@ -202,7 +220,7 @@ impl State {
         self.notes.at = Some(id);
     }
 
-    /// The note after the one that was gone to last, or before it; the tour begins at its first.
+    /// The note `by` places after the last visited one; the tour begins at the first note.
     fn next_of_tour(&self, by: isize) -> Option<u64> {
         let list = self.notes.list.as_ref().filter(|list| !list.is_empty())?;
         let at = self.notes.at.and_then(|id| list.iter().position(|note| note.id == id));

@@ -2,6 +2,8 @@
 
 use egui::scroll_area::ScrollBarVisibility;
 use egui::{Align, Button, ComboBox, Layout, Response, RichText, ScrollArea, Ui};
+use sightline_record::Unit;
+use sightline_session::records;
 use sightline_session::step::RunStep;
 use sightline_track::target::TrackingState;
 
@@ -20,6 +22,15 @@ use crate::{panels, theme};
 
 /// How wide the buttons on the right are taken to be before they were laid out once, points.
 const BUTTONS: f32 = 320.0;
+
+/// The columns of a row that the status line shows, each with its unit there and its number of decimals.
+const STATUS: [(&str, Unit, usize); 5] = [
+    ("ncc", Unit::One, 2),
+    ("inliers", Unit::One, 0),
+    ("confidence", Unit::One, 2),
+    ("err_px", Unit::Pixel, 1),
+    ("sigma_m", Unit::Centimetre, 1),
+];
 
 /// The top bar: what is open, where the cursor is, and what can be done with the whole.
 pub(crate) fn top(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
@@ -105,19 +116,16 @@ pub(crate) fn status(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         other => other.word().to_uppercase(),
     };
     ui.label(RichText::new(word).strong().color(theme::state(tracking)));
-    let confidence = state.run().and_then(|run| confidence_of(run, row));
-    for (name, value, unit, asked) in [
-        ("ncc", row.ncc.map(|v| format!("{v:.2}")), "", "ncc"),
-        ("inliers", row.inliers.map(|n| n.to_string()), "", "inliers"),
-        ("confidence", confidence.map(|v| format!("{v:.2}")), "", "confidence"),
-        ("err", row.err_px.map(|v| format!("{v:.1}")), "px", "err_px"),
-        ("σ", row.sigma_m.map(|v| format!("{:.1}", v * 100.0)), "cm", "sigma_m"),
-    ] {
-        if let Some(value) = value {
-            ui.label(theme::label(name));
-            numbers::show(ui, theme::number(value).size(13.0), state.cursor.step, asked, out);
-            ui.label(theme::note(unit));
-            readouts::after(ui, state, name);
+    let has_confidence = state.run().and_then(|run| confidence_of(run, row)).is_some();
+    for (column, unit, decimals) in STATUS {
+        let value = records::row_value_in(row, column, unit);
+        let is_shown = column != "confidence" || has_confidence;
+        if let (Some(value), Some(declared), true) = (value, records::row_quantity(column), is_shown) {
+            ui.label(theme::label(declared.label.as_ref()));
+            let words = theme::number(format!("{value:.decimals$}")).size(13.0);
+            numbers::show(ui, words, state.cursor.step, column, out);
+            ui.label(theme::note(unit.symbol()));
+            readouts::after(ui, state, column, unit);
         }
     }
     readouts::states(ui, state);

@@ -49,6 +49,7 @@ mod tests {
             fork,
             settings: Settings::default().with(&changes).unwrap(),
             changes,
+            without_effect: Default::default(),
             rows: Vec::new(),
             complete: false,
             stopped: None,

@@ -2,19 +2,21 @@
 
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable;
+use sightline_api::endpoints::{CancelTrackability, DesignateTarget, ShowTrackability};
 use sightline_api::wire::{Event, Problem};
 use sightline_geometry::frames::Pixel;
 use sightline_rover::trackability::{Aspect, MapProgress, TrackabilityMap, Verdict};
 
 use crate::command::keys;
 use crate::command::{Command, Layer, Mode};
-use crate::net::request::{Arrived, Reply, Request};
 use crate::panels::pane::Pane;
 use crate::picking;
 use crate::picking::aim::Aim;
 use crate::state::{Place, Refusal, State};
+use crate::tests::calls::{self, bodies, calls_of};
 use crate::tests::{Shown, fixture};
 use crate::trackability::limits;
+use crate::trackability::update::map_call;
 
 const PLACE: Pixel = Pixel::new(20.0, 30.0);
 const GOOD: Pixel = Pixel::new(44.0, 36.0);
@@ -50,26 +52,19 @@ fn progress(k: usize) -> MapProgress {
     MapProgress { k, n: 8, ended: k == 8, failed: None, map: Some(map(k)) }
 }
 
-fn requests(state: &mut State) -> Vec<Request> {
-    state.take_requests()
-}
-
 fn asked(state: &mut State) -> bool {
-    requests(state).iter().any(|request| matches!(request, Request::Trackability { .. }))
+    !calls_of::<ShowTrackability>(state).is_empty()
 }
 
-fn answer(state: &mut State, outcome: Result<MapProgress, Problem>) {
-    let limits = state.trackability.limits.clone();
-    let request = Request::Trackability { traverse: "drive".to_owned(), step: state.cursor.step, limits };
-    let outcome = outcome.map(|progress| Reply::Trackability(Box::new(progress)));
-    state.arrived(Arrived { request, outcome }, 0.0);
+fn answer(state: &mut State, progress: &MapProgress) {
+    calls::answer::<ShowTrackability>(state, progress);
 }
 
 fn picking(context: &egui::Context) -> State {
     let mut state = fixture::at_step(context, 0);
     state.perform(Command::SetMode(Mode::Pick));
     state.take_requests();
-    answer(&mut state, Ok(progress(8)));
+    answer(&mut state, &progress(8));
     state
 }
 
@@ -92,7 +87,7 @@ fn the_map_is_asked_for_while_picking_again_with_new_rows_and_given_up_with_the_
     state.perform(Command::SetMode(Mode::Pick));
     assert!(asked(&mut state));
     assert!(!asked(&mut state), "once");
-    answer(&mut state, Ok(progress(3)));
+    answer(&mut state, &progress(3));
     assert_eq!(state.trackability_map().unwrap().rows_done(), 3);
     let rows =
         |step| Event::TrackabilityProgress { traverse: "drive".to_owned(), step, k: 5, n: 8, ended: false };
@@ -100,18 +95,17 @@ fn the_map_is_asked_for_while_picking_again_with_new_rows_and_given_up_with_the_
     assert!(!asked(&mut state), "another stop");
     state.told(rows(0));
     assert!(asked(&mut state));
-    answer(&mut state, Ok(progress(5)));
+    answer(&mut state, &progress(5));
     state.perform(Command::SetMode(Mode::Look));
-    let cancel =
-        Request::CancelTrackability { traverse: "drive".to_owned(), step: 0, limits: Default::default() };
-    assert!(requests(&mut state).contains(&cancel), "nobody wants the rest");
+    let cancelled = |state: &mut State| calls_of::<CancelTrackability>(state).len();
+    assert_eq!(cancelled(&mut state), 1, "nobody wants the rest");
     assert!(state.trackability_map().is_none());
     // A map that is complete needs no cancelling.
     let mut state = picking(&egui::Context::default());
     state.told(rows(0));
     assert!(!asked(&mut state));
     state.perform(Command::SetMode(Mode::Look));
-    assert!(!requests(&mut state).contains(&cancel));
+    assert_eq!(cancelled(&mut state), 0);
 }
 
 #[test]
@@ -129,7 +123,7 @@ fn without_a_map_picking_works_and_the_panel_says_why_there_is_none() {
             nearest_pixel: None,
             received: None,
         };
-        answer(&mut state, Err(problem));
+        calls::refuse::<ShowTrackability>(&mut state, problem);
         assert!(state.messages.newest().is_none(), "it is no problem of the person's");
         state
     };
@@ -137,7 +131,7 @@ fn without_a_map_picking_works_and_the_panel_says_why_there_is_none() {
     let mut state = state(&egui::Context::default());
     assert!(state.trackability.progress.as_ref().unwrap().failed.is_some());
     state.perform(Command::Pick(GOOD));
-    assert!(requests(&mut state).iter().any(|request| matches!(request, Request::NewTarget { .. })));
+    assert!(!calls_of::<DesignateTarget>(&mut state).is_empty());
 }
 
 #[test]
@@ -167,11 +161,8 @@ fn a_refused_pick_offers_the_nearest_good_pixel_by_button_and_by_enter() {
     for aim in [Aim::TakeNearest, Aim::Accept] {
         let mut state = refused(&egui::Context::default());
         state.perform(Command::Aim(aim));
-        let picked = requests(&mut state).into_iter().find_map(|request| match request {
-            Request::NewTarget { target, .. } => target.pixel,
-            _ => None,
-        });
-        assert_eq!(picked, Some(GOOD));
+        let picked: Vec<_> = bodies::<DesignateTarget>(&mut state).iter().map(|new| new.pixel).collect();
+        assert_eq!(picked, [Some(GOOD)]);
     }
     let mut state = fixture::without_target();
     state.perform(Command::SetMode(Mode::Pick));
@@ -184,7 +175,6 @@ fn the_servers_refusal_brings_the_nearest_good_pixel_along() {
     let mut state = fixture::without_target();
     state.perform(Command::SetMode(Mode::Pick));
     state.perform(Command::Pick(PLACE));
-    let request = requests(&mut state).into_iter().find(|r| matches!(r, Request::NewTarget { .. })).unwrap();
     let problem = Problem {
         code: "target".to_owned(),
         title: String::new(),
@@ -194,7 +184,7 @@ fn the_servers_refusal_brings_the_nearest_good_pixel_along() {
         nearest_pixel: Some(Box::new(GOOD)),
         received: None,
     };
-    state.arrived(Arrived { request, outcome: Err(problem) }, 0.0);
+    calls::refuse::<DesignateTarget>(&mut state, problem);
     assert_eq!(state.refusal.as_ref().unwrap().nearest, Some(GOOD));
 }
 
@@ -257,17 +247,21 @@ fn limits_are_typed_refused_in_a_sentence_and_used_for_a_map_of_their_own() {
     let limits = state.trackability.limits.clone();
     let text = sightline_rover::trackability::TrackabilityLimits::text(&limits);
     assert_eq!(text, "cell_px=16,edge_bad_px=4.5");
-    let request = Request::Trackability { traverse: "drive".to_owned(), step: 0, limits };
-    let curl = crate::exports::as_text::http("http://localhost", request.call().unwrap());
+    let call = map_call::<ShowTrackability>(&("drive".to_owned(), 0, limits.clone()));
+    let curl = crate::exports::as_text::http("http://localhost", call);
     assert!(
         curl.contains("/traverses/drive/steps/0/trackability?limits=cell_px%3D16%2Cedge_bad_px%3D4.5"),
         "{curl}"
     );
     // An answer for the limits before is no answer.
-    let before = Request::Trackability { traverse: "drive".to_owned(), step: 0, limits: Default::default() };
-    state.arrived(Arrived { request: before, outcome: Ok(Reply::Trackability(Box::new(progress(8)))) }, 0.0);
+    let mut state = fixture::at_step(&egui::Context::default(), 0);
+    state.perform(Command::SetMode(Mode::Pick));
+    assert!(asked(&mut state));
+    state.trackability.limits = limits;
+    assert!(asked(&mut state));
+    answer(&mut state, &progress(8));
     assert!(state.trackability_map().is_none());
-    answer(&mut state, Ok(progress(8)));
+    answer(&mut state, &progress(8));
     assert!(state.trackability_map().is_some());
 }
 
@@ -279,7 +273,7 @@ fn the_map_says_by_which_limits_it_was_made() {
         let mut state = picking(context);
         let mut progress = progress(8);
         progress.map.as_mut().unwrap().limits.insert("edge_bad_px".to_owned(), serde_json::json!(4.5));
-        answer(&mut state, Ok(progress));
+        state.trackability.progress = Some(progress);
         state
     });
     changed.says("Map made with edge_bad_px 4.5 px");
@@ -306,10 +300,7 @@ fn a_place_that_the_map_calls_bad_is_refused_before_it_is_asked_for_unless_one_i
     let bad = map.cells().find(|cell| cell.verdict == Verdict::Bad).unwrap();
     let nearest = map.nearest_good(bad.pixel);
     assert!(nearest.is_some());
-    let is_asked = |state: &mut State| {
-        let asked = requests(state);
-        asked.iter().any(|request| matches!(request, Request::NewTarget { .. }))
-    };
+    let is_asked = |state: &mut State| !calls_of::<DesignateTarget>(state).is_empty();
     state.perform(Command::Pick(bad.pixel));
     assert!(!is_asked(&mut state), "nothing is designated");
     let refusal = state.refusal.clone().unwrap();

@@ -1,7 +1,9 @@
-//! Carrying out what the person asked for.
+//! Applies the user's commands to the state.
 
-use sightline_api::endpoints::StreamRecording;
-use sightline_api::wire::{NewRun, NewTarget};
+use sightline_api::endpoint::{Call, Endpoint, NoBody};
+use sightline_api::endpoints::{CancelRun, DesignateTarget, ForkRun, ResumeRun, StreamRecording};
+use sightline_api::location::{AtRun, AtSession, AtTarget};
+use sightline_api::wire::{Designated, NewRun, NewTarget};
 use sightline_geometry::frames::Pixel;
 use sightline_session::Cursor;
 use sightline_track::settings::Changes;
@@ -10,11 +12,12 @@ use crate::breakpoints::play::Shuttle;
 use crate::command::{Command, Go, Mode, Zoomable};
 use crate::exports::update::stream_to_rerun;
 use crate::net::request::Request;
+use crate::state::calls::Notice;
 use crate::state::effect::Effect;
-use crate::state::{Place, State, Views, events, run_letter};
+use crate::state::{Place, Refusal, State, Views, events, run_letter};
 
 impl State {
-    /// Applies one command and returns what the page has to do for it, in order.
+    /// Applies one command and returns its effects, in order.
     #[must_use = "the page carries the effects out"]
     pub fn apply(&mut self, command: Command) -> Vec<Effect> {
         self.perform(command);
@@ -40,9 +43,7 @@ impl State {
             Command::StageBy(by) => self.stage = self.stage().neighbour(self.tracker(), by),
             Command::SetMode(mode) => self.set_mode(mode),
             Command::Pick(pixel) => self.pick(pixel),
-            Command::RemoveTarget(target) => {
-                self.ask(|session| Request::RemoveTarget { session, target });
-            }
+            Command::RemoveTarget(target) => self.remove_target(target),
             Command::Draft { key, value } => {
                 match value {
                     Some(value) => self.draft.insert(key, value),
@@ -53,10 +54,10 @@ impl State {
             Command::ClearDraft => self.draft.clear(),
             Command::RunFromHere(changes) => self.run_from_here(changes),
             Command::CancelRun { target, run } => {
-                self.ask(|session| Request::CancelRun { session, target, run });
+                self.switch_run::<CancelRun>(target, run);
             }
             Command::ResumeRun { target, run } => {
-                self.ask(|session| Request::ResumeRun { session, target, run });
+                self.switch_run::<ResumeRun>(target, run);
             }
             Command::View(panel, view) => match panel {
                 Zoomable::Left => self.views.left = view,
@@ -114,7 +115,7 @@ impl State {
 
     fn go(&mut self, go: Go) {
         let Some(last) = self.stop_count().checked_sub(1) else { return };
-        // Who steps by hand wants to stay there.
+        // Stepping by hand ends playing.
         self.shuttle(Shuttle::Stop);
         let events = self.run().map(events).unwrap_or_default();
         let step = self.cursor.step;
@@ -177,19 +178,34 @@ impl State {
         }
     }
 
-    /// Has the server designate a place.
+    /// Designates a target at a place.
     pub(crate) fn designate(&mut self, place: Place) {
         if self.designating.is_some() {
             self.messages.note("The last designation is still being computed.");
             return;
         }
+        let Some(session) = self.session_id() else { return };
         let target = NewTarget::at_pixel(place.step, place.pixel);
-        if self.ask(|session| Request::NewTarget { session, target }) {
-            (self.designating, self.refusal) = (Some(place), None);
-        }
+        let call = Call::with_body::<DesignateTarget>(&AtSession { session }, &target);
+        let take = |state: &mut Self, Designated { target, session, .. }| state.designated(target, session);
+        self.call_or::<DesignateTarget>(call, take, |state, problem| {
+            if let Some(place) = state.designating.take() {
+                let (sentence, nearest) = (problem.detail.clone(), problem.nearest_pixel.as_deref().copied());
+                state.refusal = Some(Refusal { place, sentence, nearest, is_advice: false });
+            }
+            Notice::List
+        });
+        (self.designating, self.refusal) = (Some(place), None);
     }
 
-    /// Forks the run that is looked at; before the step after the designation everything is computed anew.
+    /// Stops a run, or lets a stopped one go on.
+    fn switch_run<E: Endpoint<At = AtRun, Body = NoBody>>(&mut self, target: usize, run: usize) {
+        let Some(session) = self.session_id() else { return };
+        let call = Call::to::<E>(&AtRun { session, target, run });
+        self.call::<E>(call, |state, _| state.sync.session_stale = true);
+    }
+
+    /// Forks the run at the cursor; at the designation the whole run is computed again.
     fn run_from_here(&mut self, changes: Changes) {
         let Some((target, run)) = self.target().map(|t| t.number).zip(self.run().map(|r| r.number)) else {
             self.messages.problem("There is no run to leave: pick a target first.", None);
@@ -199,7 +215,7 @@ impl State {
         let computed = self.run().and_then(|run| run.rows.last()).map_or(first, |row| row.step);
         let from_step = self.cursor.step.clamp(first, computed + 1);
         let new = NewRun { run, from_step, settings: changes, prediction_px: None };
-        if self.ask(|session| Request::NewRun { session, target, new }) {
+        if self.fork(target, &new) {
             self.messages.note(format!("Running {} again from step {from_step} …", run_letter(run)));
         }
     }
@@ -209,11 +225,11 @@ impl State {
         self.outbox.add(Effect::OpenUrl(format!("{}/api/v1/{path}", self.origin)));
     }
 
-    /// Puts a request about the open session into the outbox; says so when there is none.
-    pub(crate) fn ask(&mut self, request: impl FnOnce(String) -> Request) -> bool {
-        let session = self.session_id();
-        let is_open = session.is_some();
-        self.outbox.extend(session.map(request));
-        is_open
+    /// Forks a run of a target; false if no session is open.
+    pub(crate) fn fork(&mut self, target: usize, new: &NewRun) -> bool {
+        let Some(session) = self.session_id() else { return false };
+        let call = Call::with_body::<ForkRun>(&AtTarget { session, target }, new);
+        self.call::<ForkRun>(call, move |state, run| state.took_run(target, run));
+        true
     }
 }

@@ -1,4 +1,4 @@
-//! Taking in what the server answers and tells.
+//! Applies answers and events of the server to the state.
 
 use std::collections::BTreeSet;
 
@@ -9,37 +9,35 @@ use sightline_api::wire::{Event, NewSession, Problem, RerunStream, SessionEntry,
 use sightline_session::Cursor;
 use sightline_session::view::{RunView, SessionView};
 
-use crate::breakpoints::AskRequest;
 use crate::cache::{Key, StepKey};
 use crate::command::Mode;
 use crate::net::events::Connection;
 use crate::net::request::{Arrived, Reply, Request};
 use crate::state::deeds::Deed;
 use crate::state::effect::Effect;
-use crate::state::{Progress, Refusal, State, run_letter};
+use crate::state::{Progress, State, run_letter};
 
 impl State {
-    /// Asks for what a page needs first.
+    /// Requests the lists and the session that a new page needs.
     pub fn begin(&mut self) {
         self.read_settings();
         self.read_traverses();
         if let Some(session) = self.sync.linked.clone() {
-            self.outbox.push(Request::Session(session));
+            self.read_session(session);
         }
     }
 
-    /// Takes in an answer.
+    /// Applies an answer.
     pub fn arrived(&mut self, arrived: Arrived, now: f64) {
         match (arrived.request, arrived.outcome) {
             (Request::Item(key), Ok(Reply::Item(item))) => self.cache.arrived(key, Ok(item), now),
             (Request::Item(key), Err(problem)) => self.cache.arrived(key, Err(problem), now),
             (Request::Call { ticket, .. }, outcome) => self.answered_call(ticket, outcome),
-            (request, Ok(reply)) => self.answered(request, reply),
-            (request, Err(problem)) => self.refused(request, problem),
+            (Request::Item(_) | Request::Reconnect, _) => {}
         }
     }
 
-    /// Takes in what the server tells every page.
+    /// Applies an event, which the server sends to every page.
     pub fn told(&mut self, event: Event) {
         let is_ours = |session: &str| self.session.as_ref().is_some_and(|open| open.id == session);
         match event {
@@ -70,7 +68,7 @@ impl State {
         }
     }
 
-    /// Takes in that the events come in, or do not.
+    /// Applies a change of the event connection.
     pub fn connected(&mut self, connection: Connection) {
         let was = std::mem::replace(&mut self.connection, connection);
         if was == connection {
@@ -78,11 +76,13 @@ impl State {
         }
         match (was, connection) {
             (Connection::Gone { .. }, Connection::Live) => {
-                self.outbox.extend(self.session.as_ref().map(|session| Request::Notes(session.id.clone())));
+                if let Some(session) = self.session.as_ref().map(|session| session.id.clone()) {
+                    self.read_notes(session);
+                }
                 self.messages.note("The server answers again.");
                 self.catch_up();
             }
-            // Nothing can be missed before the first connection, except what the first answers lacked.
+            // Before the first connection an event can only have been missed since the first answers.
             (_, Connection::Live) => self.sync.session_stale = true,
             (Connection::Live | Connection::Connecting, Connection::Gone { .. }) => {
                 let hint = "Start it with `sightline serve`; the steps that are loaded stay browsable.";
@@ -92,7 +92,7 @@ impl State {
         }
     }
 
-    /// Asks again for what may have been missed while the server was gone.
+    /// Requests everything that may have changed while the server was unreachable.
     fn catch_up(&mut self) {
         self.cache.retry(|_| true);
         self.ask_why_again();
@@ -109,7 +109,7 @@ impl State {
         }
         match (&self.session, &self.traverse, &self.sync.linked) {
             (Some(session), None, _) => self.read_traverse(session.traverse.clone()),
-            (None, _, Some(linked)) => self.outbox.push(Request::Session(linked.clone())),
+            (None, _, Some(linked)) => self.read_session(linked.clone()),
             _ => {}
         }
     }
@@ -123,68 +123,6 @@ impl State {
         self.cache.retry(|key| matches!(key, Key::Image { step, .. } if Some(*step) == ready));
     }
 
-    fn answered(&mut self, request: Request, reply: Reply) {
-        match reply {
-            Reply::Session(view) => {
-                let asked = self.sync.session_asked.take();
-                let was_read = matches!(request, Request::Session(_));
-                self.adopt(*view, was_read && asked.is_some_and(|count| count != self.sync.cursor_messages));
-            }
-            Reply::Designated { target, session } => self.designated(target, *session),
-            Reply::Run(run) => match request {
-                Request::Rows { session, target, from_row, .. } => {
-                    self.took_rows(&session, target, from_row, *run);
-                }
-                request => self.took_run(request, *run),
-            },
-            Reply::Cursor(cursor) => {
-                if let Request::Cursor(session) = request {
-                    self.took_cursor(&session, cursor);
-                }
-            }
-            Reply::Done => match request {
-                // The server tells every page that notes changed.
-                Request::NewNote { .. } => {
-                    self.messages.note("The note is pinned; the panel Notes lists them.");
-                }
-                Request::EditNote { .. } | Request::RestoreNote { .. } => {}
-                request @ Request::RemoveNote { .. } => self.removed_note(&request),
-                Request::PutCursor { cursor, .. } => self.put_cursor(cursor),
-                request => {
-                    self.removed_target(&request);
-                    self.sync.session_stale = true;
-                }
-            },
-            Reply::Trackability(progress) => {
-                if let Request::Trackability { traverse, step, limits } = request {
-                    self.took_trackability((traverse, step, limits), Ok(*progress));
-                }
-            }
-            Reply::Why(reply) => {
-                if let Request::Why(request) = request {
-                    self.told_why(request, reply);
-                }
-            }
-            Reply::Notes(list) => {
-                if let Request::Notes(session) = request {
-                    self.took_notes(&session, list);
-                }
-            }
-            Reply::Item(_) | Reply::Body(_) => {}
-            Reply::Compared(found) => self.took_comparison(&request, Ok(*found)),
-            Reply::Metrics(found) => {
-                if let Request::Metrics { run, .. } = request {
-                    self.took_metrics(run, Ok(*found));
-                }
-            }
-            Reply::Ask(reply) => {
-                if let Request::Ask(asked) = &request {
-                    self.answered_ask(asked, reply);
-                }
-            }
-        }
-    }
-
     pub(crate) fn rerun_opened(&mut self, stream: RerunStream) {
         let words = format!(
             "Rerun shows this session. A viewer of your own takes `rerun {}`. Whoever uses this machine can read the \
@@ -195,64 +133,12 @@ impl State {
         self.outbox.add(Effect::OpenUrl(stream.viewer_url));
     }
 
-    fn refused(&mut self, request: Request, problem: Problem) {
-        match request.clone() {
-            Request::PutCursor { cursor, .. } => {
-                // The page keeps its cursor and tells the server of the next one.
-                self.put_cursor(cursor);
-                return;
-            }
-            Request::NewTarget { .. } => {
-                if let Some(place) = self.designating.take() {
-                    let nearest = problem.nearest_pixel.as_deref().copied();
-                    self.refusal =
-                        Some(Refusal { place, sentence: problem.detail.clone(), nearest, is_advice: false });
-                }
-            }
-            Request::Compare { .. } => return self.took_comparison(&request, Err(&problem)),
-            Request::Metrics { run, .. } => return self.took_metrics(run, Err(&problem)),
-            Request::Trackability { traverse, step, limits } => {
-                self.took_trackability((traverse, step, limits), Err(problem));
-                return;
-            }
-            // A map that was complete before it was given up is no problem.
-            Request::CancelTrackability { .. } => return,
-            Request::Why(asked) if !self.refused_why(asked.clone(), &problem) => return,
-            Request::RemoveTarget { .. } => self.forget_refused(&request),
-            request @ (Request::NewNote { .. } | Request::EditNote { .. } | Request::RemoveNote { .. }) => {
-                self.note_refused(&request);
-            }
-            Request::Ask(asked) => self.refused_ask(&asked, &problem),
-            Request::Cursor(_) => self.sync.cursor_read = None,
-            Request::Rows { .. } => {
-                // The run may be gone: what there is, is read as a whole.
-                (self.sync.rows_asked, self.sync.session_stale) = (false, true);
-                return;
-            }
-            Request::Session(_) => {
-                self.sync.session_asked = None;
-                if self.session.is_none() && problem.status != 0 {
-                    // The link names a session that is no more: open what there is.
-                    self.sync.linked = None;
-                    self.open_first();
-                }
-            }
-            _ => {}
-        }
-        let Some(call) = request.call() else { return };
-        let is_shown_in_place = matches!(
-            request,
-            Request::NewTarget { .. } | Request::Ask(AskRequest::Query { .. } | AskRequest::Breakpoints(_))
-        );
-        self.show_refusal(&call, &problem, is_shown_in_place);
-    }
-
-    /// Says what the server refused, unless it is shown elsewhere.
+    /// Shows a refusal; `is_shown_in_place`: in the list of messages alone.
     pub(crate) fn show_refusal(&mut self, call: &Call, problem: &Problem, is_shown_in_place: bool) {
         if problem.status != 0 {
             self.messages.refused(problem, format!("{} {}", call.method, call.path), !is_shown_in_place);
         } else if call.method != Method::Get {
-            // That the server is gone is said by the banner, but not that something came to nothing.
+            // The banner shows that the server is unreachable, but not that a change was lost.
             let hint = "Do it again when the banner has gone.".to_owned();
             self.messages.problem("The server does not answer, so that nothing was changed.", Some(hint));
         }
@@ -265,7 +151,7 @@ impl State {
         }
     }
 
-    fn open_first(&mut self) {
+    pub(super) fn open_first(&mut self) {
         let first = self.traverses.as_ref().and_then(|list| list.first());
         if let Some(id) = first.map(|entry| entry.id.clone()) {
             self.open(id);
@@ -283,7 +169,7 @@ impl State {
         let Some(traverse) = self.sync.opening.take() else { return };
         let latest = list.iter().rev().find(|entry| entry.traverse == traverse);
         match latest {
-            Some(entry) => self.outbox.push(Request::Session(entry.id.clone())),
+            Some(entry) => self.read_session(entry.id.clone()),
             None => self.begin_session(traverse),
         }
     }
@@ -302,7 +188,7 @@ impl State {
         self.call::<ListSettings>(settings, |state, table| state.settings = table);
     }
 
-    /// Reads which traverses the server has.
+    /// Reads the list of traverses.
     pub(crate) fn read_traverses(&mut self) {
         let traverses = Call::to::<ListTraverses>(&Anywhere {});
         self.call::<ListTraverses>(traverses, Self::took_traverses);
@@ -313,7 +199,7 @@ impl State {
         self.call::<ShowTraverse>(traverse, |state, view| state.traverse = Some(view));
     }
 
-    /// Takes a session over; the cursor stays where the person put it unless somebody else moved it.
+    /// Replaces the open session. The cursor stays unless another page moved it.
     pub(crate) fn adopt(&mut self, view: SessionView, moved_meanwhile: bool) {
         let is_other = self.session.as_ref().is_none_or(|open| open.id != view.id);
         self.ask.make_stale();
@@ -335,7 +221,7 @@ impl State {
         self.note_waiting_runs(&view);
         let is_kept = std::mem::take(&mut self.sync.keeps_cursor) && !is_other;
         if is_kept {
-            // A server that was ended may have lost the last move: it is told again where the page is.
+            // A server that was restarted may have lost the last move of the cursor: send it again.
             self.sync.server_cursor = view.cursor;
         }
         if is_other || (!moved_meanwhile && self.is_moved_elsewhere(view.cursor)) {
@@ -361,7 +247,7 @@ impl State {
         self.cursor.step = self.cursor.step.min(session.stop_count.saturating_sub(1));
     }
 
-    fn designated(&mut self, target: usize, session: SessionView) {
+    pub(super) fn designated(&mut self, target: usize, session: SessionView) {
         (self.designating, self.refusal, self.mode) = (None, None, Mode::Look);
         self.adopt(session, true);
         self.cursor.target = Some(target);
@@ -378,9 +264,8 @@ impl State {
         }
     }
 
-    fn took_run(&mut self, request: Request, run: RunView) {
+    pub(super) fn took_run(&mut self, target: usize, run: RunView) {
         self.sync.session_stale = true;
-        let Request::NewRun { target, .. } = request else { return };
         let number = run.number;
         let of_target = self.session.as_mut().and_then(|s| s.targets.iter_mut().find(|t| t.number == target));
         let Some(record) = of_target else { return };

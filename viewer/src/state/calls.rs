@@ -6,39 +6,67 @@ use sightline_api::wire::Problem;
 use crate::net::request::Reply;
 use crate::state::State;
 
+/// How the page shows that a call was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Notice {
+    /// As a card, and in the list of messages.
+    Card,
+    /// In the list of messages alone: the panel that made the call shows it too.
+    List,
+}
+
 impl State {
-    /// Calls `E`; `take` gets the reply, and a problem is shown as a message.
+    /// Calls `E`; `take` gets the reply, and a refusal is shown as a card.
     pub(crate) fn call<E: Endpoint>(&mut self, call: Call, take: impl FnOnce(&mut Self, E::Reply) + 'static) {
-        let shown = call.clone();
-        self.call_with_problem::<E>(call, move |state, outcome| match outcome {
-            Ok(reply) => take(state, reply),
-            Err(problem) => state.show_refusal(&shown, &problem, false),
-        });
+        self.call_or::<E>(call, take, |_, _| Notice::Card);
     }
 
-    /// Calls `E`; `take` gets the reply or the problem.
+    /// Calls `E`; `take` gets the reply, `refused` the problem.
+    pub(crate) fn call_or<E: Endpoint>(
+        &mut self,
+        call: Call,
+        take: impl FnOnce(&mut Self, E::Reply) + 'static,
+        refused: impl FnOnce(&mut Self, &Problem) -> Notice + 'static,
+    ) {
+        let request = self.calls.begin::<E>(call, move |state: &mut Self, call, outcome| match outcome {
+            Ok(reply) => take(state, reply),
+            Err(problem) => match refused(state, &problem) {
+                Notice::Card => state.show_refusal(call, &problem, false),
+                Notice::List => state.show_refusal(call, &problem, true),
+            },
+        });
+        self.outbox.push(request);
+    }
+
+    /// Calls `E`; `take` gets the reply or the problem, of which nothing is shown.
     pub(crate) fn call_with_problem<E: Endpoint>(
         &mut self,
         call: Call,
         take: impl FnOnce(&mut Self, Result<E::Reply, Problem>) + 'static,
     ) {
-        let request = self.calls.begin::<E>(call, take);
+        let request = self.calls.begin::<E>(call, |state, _, outcome| take(state, outcome));
         self.outbox.push(request);
     }
 
-    /// Takes in the answer to a call.
+    /// Passes the answer to a call on to its reader.
     pub(crate) fn answered_call(&mut self, ticket: u64, outcome: Result<Reply, Problem>) {
         let outcome = match outcome {
             Ok(Reply::Body(bytes)) => Ok(bytes),
-            Ok(_) => return,
+            Ok(Reply::Item(_)) => return,
             Err(problem) => Err(problem),
         };
-        if let Some(take) = self.calls.end(ticket) {
-            take(self, outcome);
+        if let Some(waiting) = self.calls.take(ticket) {
+            waiting.end(self, outcome);
         }
     }
 
-    /// The id of the open session; says so if there is none.
+    /// The calls that wait for their answers, with their tickets, oldest first.
+    #[cfg(test)]
+    pub(crate) fn waiting_calls(&self) -> impl Iterator<Item = (u64, &Call)> {
+        self.calls.iter()
+    }
+
+    /// The id of the open session; shows a message if none is open.
     pub(crate) fn session_id(&mut self) -> Option<String> {
         let id = self.session.as_ref().map(|session| session.id.clone());
         if id.is_none() {

@@ -1,4 +1,4 @@
-//! A short memory of deeds, each with what takes it back.
+//! The user's last changes (deeds), each with the data to undo it.
 //!
 //! It covers picks, removed targets, runs, breakpoints, derived plots and notes, branches, the draft of settings and what is
 //! tried. Nothing that was computed is lost by taking a deed back: targets and runs are hidden, and shown again.
@@ -7,10 +7,9 @@ use sightline_session::what_if::WhatIf;
 use sightline_track::settings::Changes;
 
 use crate::cache::StepKey;
-use crate::net::request::Request;
 use crate::state::rows::run_letter;
 
-/// What a person did.
+/// A change by the user.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Deed {
     /// Designated a target.
@@ -65,13 +64,13 @@ pub enum Deed {
         /// The draft after.
         after: Changes,
     },
-    /// Changed what is tried at a step.
+    /// Changed the trial at a step.
     Tried {
         /// The step.
         of: StepKey,
-        /// What was tried before.
+        /// The trial before.
         before: WhatIf,
-        /// What is tried.
+        /// The trial after.
         after: WhatIf,
     },
 }
@@ -81,8 +80,6 @@ pub enum Deed {
 pub struct Undo {
     pub(super) done: Vec<Deed>,
     pub(super) undone: Vec<Deed>,
-    /// Requests that take a deed back or do it again, and are no deeds themselves.
-    pub(super) silent: Vec<Request>,
     /// Raised by every deed, and by taking one back.
     pub(super) changes: u64,
 }

@@ -44,11 +44,6 @@ impl Outbox {
         self.0.push(Effect::Send(request));
     }
 
-    /// Adds requests.
-    pub(crate) fn extend(&mut self, requests: impl IntoIterator<Item = Request>) {
-        self.0.extend(requests.into_iter().map(Effect::Send));
-    }
-
     /// Adds any effect.
     pub(crate) fn add(&mut self, effect: Effect) {
         self.0.push(effect);

@@ -1,16 +1,15 @@
-//! What the page's address says, and how an address becomes what is looked at.
+//! Converts the state to the address of the page, and an address to the state.
 
 use sightline_session::compare::RunName;
 
 use crate::compare;
 use crate::drawing::view2d::View2d;
-use crate::net::request::Request;
 use crate::page::link::Fragment;
 use crate::state::State;
 use crate::state::run_letter;
 
 impl State {
-    /// What a link to this place says, but for the arrangement of the panels.
+    /// The link to this view without the arrangement of the panels.
     pub fn fragment(&self) -> Fragment {
         let at = |view: View2d| Some(view).filter(|view| *view != View2d::Fit);
         let Some(session) = &self.session else { return Fragment::default() };
@@ -43,7 +42,7 @@ impl State {
         match link.session.clone() {
             Some(id) if !is_open => {
                 self.sync.linked = Some(id.clone());
-                self.outbox.push(Request::Session(id));
+                self.read_session(id);
             }
             _ => {}
         }

@@ -7,7 +7,7 @@ mod apply;
 mod arrive;
 pub(crate) mod effect;
 pub(crate) mod calculator;
-mod calls;
+pub(crate) mod calls;
 mod configurations;
 pub(crate) mod deeds;
 mod draft;

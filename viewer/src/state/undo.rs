@@ -1,9 +1,11 @@
-//! Undo and redo: takes deeds back, and does them again.
+//! Undo and redo of the user's changes.
 
+use sightline_api::endpoint::{Call, Endpoint, NoBody};
+use sightline_api::endpoints::{RemoveRun, RemoveTarget, RestoreRun, RestoreTarget};
+use sightline_api::location::{AtRun, AtTarget};
+use sightline_session::view::SessionView;
 use sightline_track::settings::Changes;
 
-use crate::net::request::Request;
-use crate::net::why::WhyRequest;
 use crate::state::deeds::{Deed, Undo};
 use crate::state::{State, run_letter};
 
@@ -11,7 +13,7 @@ use crate::state::{State, run_letter};
 const REMEMBERED: usize = 100;
 
 impl State {
-    /// Remembers a deed; what was taken back before cannot be done again after it.
+    /// Remembers a deed and clears the deeds that could be redone.
     pub(crate) fn did(&mut self, deed: Deed) {
         self.undo.undone.clear();
         self.undo.changes += 1;
@@ -27,7 +29,7 @@ impl State {
         }
     }
 
-    /// Remembers a removal, and says so with a way to take it back.
+    /// Remembers a removal and shows a message that offers to undo it.
     pub(crate) fn did_remove(&mut self, what: &str, deed: Deed) {
         self.did(deed);
         self.messages.deed(format!("Removed {what}."), self.undo.changes);
@@ -46,37 +48,52 @@ impl State {
         self.undo = Undo::default();
     }
 
-    /// Remembers a removal that was carried out, unless it takes something back.
-    pub(crate) fn removed(&mut self, request: &WhyRequest) {
-        if self.forget_silent(request) {
-            return;
+    /// Removes a target: a deed that can be taken back.
+    pub(crate) fn remove_target(&mut self, target: usize) {
+        self.show_target(target, false, Some(Deed::RemovedTarget { target }));
+    }
+
+    /// Removes a run: a deed that can be taken back.
+    pub(crate) fn remove_run(&mut self, target: usize, run: usize) {
+        self.show_run(target, run, false, Some(Deed::RemovedRun { target, run }));
+    }
+
+    /// Removes a target or restores it; `deed` is remembered once the server has done it.
+    fn show_target(&mut self, target: usize, shown: bool, deed: Option<Deed>) {
+        let Some(session) = self.session_id() else { return };
+        let (at, what) = (AtTarget { session, target }, format!("target {}", target + 1));
+        if shown {
+            self.change_parts::<RestoreTarget>(&at, what, deed);
+        } else {
+            self.change_parts::<RemoveTarget>(&at, what, deed);
         }
-        if let WhyRequest::RemoveRun { target, run, .. } = *request {
-            self.did_remove(&format!("run {}", run_letter(run)), Deed::RemovedRun { target, run });
+    }
+
+    /// The same for a run.
+    fn show_run(&mut self, target: usize, run: usize, shown: bool, deed: Option<Deed>) {
+        let Some(session) = self.session_id() else { return };
+        let (at, what) = (AtRun { session, target, run }, format!("run {}", run_letter(run)));
+        if shown {
+            self.change_parts::<RestoreRun>(&at, what, deed);
+        } else {
+            self.change_parts::<RemoveRun>(&at, what, deed);
         }
     }
 
-    /// The same for a target.
-    pub(crate) fn removed_target(&mut self, request: &Request) {
-        if let Request::RemoveTarget { target, .. } = *request
-            && !self.take_silent(request)
-        {
-            self.did_remove(&format!("target {}", target + 1), Deed::RemovedTarget { target });
-        }
-    }
-
-    pub(crate) fn forget_silent(&mut self, request: &WhyRequest) -> bool {
-        self.take_silent(&Request::Why(request.clone()))
-    }
-
-    /// Forgets that a request was to take something back: it was refused.
-    pub(crate) fn forget_refused(&mut self, request: &Request) {
-        self.take_silent(request);
-    }
-
-    pub(crate) fn take_silent(&mut self, request: &Request) -> bool {
-        let place = self.undo.silent.iter().position(|silent| silent == request);
-        place.map(|place| self.undo.silent.remove(place)).is_some()
+    /// Calls `E`, which changes the parts of the open session, and takes over the session that it replies.
+    fn change_parts<E: Endpoint<Body = NoBody, Reply = SessionView>>(
+        &mut self,
+        at: &E::At,
+        what: String,
+        deed: Option<Deed>,
+    ) {
+        self.call::<E>(Call::to::<E>(at), move |state, view| {
+            if let Some(deed) = deed {
+                state.did_remove(&what, deed);
+            }
+            state.adopt(view, true);
+            state.sync.session_stale = true;
+        });
     }
 
     pub(crate) fn undo_last(&mut self) {
@@ -103,65 +120,24 @@ impl State {
         }
     }
 
-    /// Does a deed again, or takes it back.
+    /// Redoes a deed, or undoes it.
     fn carry_over(&mut self, deed: &Deed, again: bool) {
-        let Some(session) = self.session.as_ref().map(|session| session.id.clone()) else { return };
-        let target_request = |target: usize, shown: bool, session: String| {
-            if shown {
-                Request::Why(WhyRequest::RestoreTarget { session, target })
-            } else {
-                Request::RemoveTarget { session, target }
-            }
-        };
-        let run_request = |target: usize, run: usize, shown: bool, session: String| {
-            Request::Why(if shown {
-                WhyRequest::RestoreRun { session, target, run }
-            } else {
-                WhyRequest::RemoveRun { session, target, run }
-            })
-        };
-        let request = match deed {
-            Deed::Picked { target } => target_request(*target, again, session),
-            Deed::RemovedTarget { target } => target_request(*target, !again, session),
-            Deed::Branched { target, run } => run_request(*target, *run, again, session),
-            Deed::RemovedRun { target, run } => run_request(*target, *run, !again, session),
-            Deed::RemovedBreakpoint { expression, is_on } => {
-                if again {
-                    self.unset(expression);
-                } else {
-                    self.set_again(expression, *is_on);
-                }
-                return;
-            }
-            Deed::RemovedPlot { expression, place } => {
-                if again {
-                    self.take_plot_out(expression);
-                } else {
-                    self.plot_again(expression, *place);
-                }
-                return;
-            }
-            Deed::RemovedNote { id, .. } if again => match self.removal_of_note(*id) {
-                Some(request) => request,
-                None => return,
-            },
-            Deed::RemovedNote { id, .. } => {
-                // What brings a note back is no removal, so that nothing has to be kept silent.
-                self.notes.removed = None;
-                self.outbox.push(Request::RestoreNote { session, id: *id });
-                return;
-            }
-            Deed::Drafted { before, after } => {
-                self.draft = if again { after } else { before }.clone();
-                return;
-            }
+        match deed {
+            Deed::Picked { target } => self.show_target(*target, again, None),
+            Deed::RemovedTarget { target } => self.show_target(*target, !again, None),
+            Deed::Branched { target, run } => self.show_run(*target, *run, again, None),
+            Deed::RemovedRun { target, run } => self.show_run(*target, *run, !again, None),
+            Deed::RemovedBreakpoint { expression, .. } if again => self.unset(expression),
+            Deed::RemovedBreakpoint { expression, is_on } => self.set_again(expression, *is_on),
+            Deed::RemovedPlot { expression, .. } if again => self.take_plot_out(expression),
+            Deed::RemovedPlot { expression, place } => self.plot_again(expression, *place),
+            Deed::RemovedNote { id, .. } if again => self.remove_note(*id, false),
+            Deed::RemovedNote { id, .. } => self.restore_note(*id),
+            Deed::Drafted { before, after } => self.draft = if again { after } else { before }.clone(),
             Deed::Tried { of, before, after } => {
                 let what_if = if again { after } else { before }.clone();
                 self.set_trial(of.clone(), what_if);
-                return;
             }
-        };
-        self.undo.silent.push(request.clone());
-        self.outbox.push(request);
+        }
     }
 }

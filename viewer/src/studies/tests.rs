@@ -1,16 +1,17 @@
 //! The panel of the validation experiments.
 
+use sightline_api::endpoint::Call;
 use sightline_api::endpoints::{ListStudies, ShowStudyRows, StartStudy};
-use sightline_api::location::{Anywhere, AtStudyJob};
+use sightline_api::location::AtStudyJob;
 use sightline_api::wire::Event;
 use sightline_study::row::Row;
 use sightline_study::wire::{StudyInfo, StudyJob, StudyRows, StudyState};
 
 use crate::command::Command;
-use crate::net::request::{Arrived, Request};
 use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::studies::Order;
+use crate::tests::calls::{answer, bodies, calls, calls_of};
 use crate::tests::{Shown, fixture};
 
 fn job(state: StudyState, k: usize) -> StudyJob {
@@ -48,8 +49,7 @@ fn studies_are_asked_for_once() {
     page.take_requests();
     page.want_studies();
     page.want_studies();
-    let asked = page.take_requests();
-    assert_eq!(asked.iter().filter(|request| request.calls::<ListStudies>(&Anywhere {})).count(), 1);
+    assert_eq!(calls_of::<ListStudies>(&mut page).len(), 1);
     Shown::pane(Pane::Studies, |_| fixture::without_target()).says("Asking the server for its studies");
 }
 
@@ -62,12 +62,8 @@ fn a_study_is_started_with_what_was_typed() {
     page.take_requests();
     page.perform(Command::OrderStudy(Order { seeds: "7,8".to_owned(), ..Order::default() }));
     page.perform(Command::StartStudy);
-    let requests = page.take_requests();
-    let new = requests.iter().find_map(|request| request.body_of::<StartStudy>(&Anywhere {}));
-    assert_eq!(
-        new.as_ref().map(|new| (new.study.as_str(), new.seeds.as_slice())),
-        Some(("straight", &[7, 8][..]))
-    );
+    let [new] = bodies::<StartStudy>(&mut page).try_into().unwrap();
+    assert_eq!((new.study.as_str(), new.seeds.as_slice()), ("straight", &[7, 8][..]));
     let wrong = Shown::pane(Pane::Studies, |_| {
         let mut page = with_job(StudyState::Running);
         page.perform(Command::OrderStudy(Order { seeds: "seven".to_owned(), ..Order::default() }));
@@ -105,13 +101,13 @@ fn the_table_has_a_row_for_each_unit_and_grows_with_the_job() {
     };
     let mut page = with_job(StudyState::Running);
     page.perform(Command::LookAtStudy("j1".to_owned()));
-    let of_job = AtStudyJob { job: "j1".to_owned() };
-    let reads_rows = |request: &Request| request.calls::<ShowStudyRows>(&of_job);
-    assert!(page.take_requests().iter().any(reads_rows));
+    let of_job = Call::to::<ShowStudyRows>(&AtStudyJob { job: "j1".to_owned() });
+    assert!(calls(&mut page).contains(&of_job));
     page.told(Event::StudyProgress { job: job(StudyState::Running, 4) });
-    let again = page.take_requests().into_iter().find(reads_rows).expect("one more unit is done");
-    let table = fixture::reply(&StudyRows { rows: vec![row] });
-    page.arrived(Arrived { request: again, outcome: Ok(table) }, 0.0);
+    assert!(calls(&mut page).contains(&of_job), "one more unit is done");
+    for rows in [Vec::new(), vec![row]] {
+        answer::<ShowStudyRows>(&mut page, &StudyRows { rows });
+    }
     let shown = Shown::new(
         [900.0, 600.0],
         |_| page,

@@ -67,7 +67,7 @@ pub(crate) fn trace(step: usize) -> RunStep {
         _ => None,
     };
     let mut evidence = FeatureEvidence { designation, detect: Some(detected()), ..Default::default() };
-    evidence.table = table(step);
+    evidence.table = table(step).into();
     if !is_pick {
         located.confidence = 0.354;
         evidence.anchors =
@@ -86,7 +86,7 @@ pub(crate) fn trace(step: usize) -> RunStep {
             sigma_translation_m: [0.001, 0.002, 0.003],
             sigma_rotation_deg: [0.05, 0.06, 0.07],
         });
-        evidence.cloud = cloud();
+        evidence.cloud = cloud().into();
         located.covariance_in_rover = Some(Matrix3::from_diagonal(&nalgebra::Vector3::new(4e-4, 1e-4, 1e-4)));
     }
     located.evidence = Evidence::Features(Box::new(evidence));

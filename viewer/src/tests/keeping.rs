@@ -1,10 +1,11 @@
 //! Notes and exports: what they show, what they ask of the server, and that no words are lost.
 
-use sightline_api::endpoints::ListExports;
-use sightline_api::location::AtSession;
+use sightline_api::endpoint::{Call, Endpoint};
+use sightline_api::endpoints::{AddNote, ChangeNote, ListExports, ListNotes, RemoveNote, RestoreNote};
+use sightline_api::location::AtNote;
 use sightline_api::wire::{Event, Problem};
 use sightline_session::exports::{ExportEntry, Size};
-use sightline_session::notes::{Note, Pin};
+use sightline_session::notes::{EditNote, Note, Pin};
 
 use egui_kittest::kittest::Queryable;
 
@@ -12,12 +13,12 @@ use crate::command::{Command, Stage};
 use crate::exports;
 use crate::exports::window;
 use crate::figure::wish::{Kind, Wish};
-use crate::net::request::{Arrived, Reply, Request};
 use crate::notes::Ask;
 use crate::notes::panel;
 use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::state::effect::Effect;
+use crate::tests::calls::{self, answer, bodies, calls_of};
 use crate::tests::{Shown, fixture};
 
 fn note(id: u64, step: usize, target: Option<usize>, text: &str) -> Note {
@@ -42,12 +43,16 @@ fn do_(state: &mut State, ask: Ask) {
     state.perform(Command::Notes(ask));
 }
 
-fn refuse(state: &mut State, request: Request) {
+fn refuse<E: Endpoint>(state: &mut State) {
     let detail = "Note 5 was changed meanwhile.".to_owned();
     let (code, title) = ("changed".to_owned(), String::new());
     let problem =
         Problem { code, title, status: 412, detail, hint: None, nearest_pixel: None, received: None };
-    state.arrived(Arrived { request, outcome: Err(problem) }, 0.0);
+    calls::refuse::<E>(state, problem);
+}
+
+fn at_note() -> AtNote {
+    AtNote { session: "s1".to_owned(), note: 5 }
 }
 
 #[test]
@@ -108,12 +113,11 @@ fn a_note_is_pinned_to_what_is_looked_at_and_its_words_are_never_lost() {
     do_(&mut state, Ask::Pin);
     assert_eq!(state.notes.draft.as_ref().unwrap().text, "half a thought", "closing keeps the words");
     do_(&mut state, Ask::Save);
-    let [request @ Request::NewNote { .. }] = &state.take_requests()[..] else { panic!("the note is sent") };
-    let Request::NewNote { new, .. } = request else { unreachable!() };
+    let [new] = bodies::<AddNote>(&mut state).try_into().unwrap();
     let stage = Some("match_template".to_owned());
     assert_eq!((new.pin.target, new.pin.run, new.pin.step, &new.pin.stage), (Some(0), 0, 2, &stage));
     assert_eq!((new.text.as_str(), new.pin.pixel), ("half a thought", Some(fixture::PIXEL)));
-    refuse(&mut state, request.clone());
+    refuse::<AddNote>(&mut state);
     assert_eq!(state.notes.draft.as_ref().unwrap().text, "half a thought", "a refusal keeps them, too");
     do_(&mut state, Ask::Write("  ".to_owned()));
     do_(&mut state, Ask::Save);
@@ -127,10 +131,11 @@ fn an_edit_that_came_too_late_shows_its_words_again_and_reads_the_notes() {
     do_(&mut state, Ask::Edit(5));
     do_(&mut state, Ask::Write("not so fine".to_owned()));
     do_(&mut state, Ask::Save);
-    let [request] = &state.take_requests()[..] else { panic!("one request") };
-    assert!(matches!(request, Request::EditNote { id: 5, revision: 3, .. }), "{request:?}");
-    refuse(&mut state, request.clone());
-    assert!(state.take_requests().contains(&Request::Notes("s1".to_owned())));
+    let edit = EditNote { text: Some("not so fine".to_owned()), place: None };
+    let expected = Call::with_body::<ChangeNote>(&at_note(), &edit).at_revision(3);
+    assert_eq!(calls::calls(&mut state), [expected]);
+    refuse::<ChangeNote>(&mut state);
+    assert_eq!(calls_of::<ListNotes>(&mut state).len(), 1);
     assert_eq!(state.notes.draft.as_ref().unwrap().text, "not so fine");
     assert!(state.messages.newest().unwrap().text.contains("changed meanwhile"));
 }
@@ -140,8 +145,7 @@ fn a_removed_note_can_be_brought_back() {
     let mut state = noted(&egui::Context::default());
     state.take_requests();
     do_(&mut state, Ask::Remove(5));
-    let expected = Request::RemoveNote { session: "s1".to_owned(), id: 5, revision: 3 };
-    assert_eq!(state.take_requests(), vec![expected]);
+    assert_eq!(calls::calls(&mut state), [Call::to::<RemoveNote>(&at_note()).at_revision(3)]);
     let removed = |context: &egui::Context| {
         let mut state = noted(context);
         do_(&mut state, Ask::Remove(5));
@@ -151,24 +155,22 @@ fn a_removed_note_can_be_brought_back() {
     shown.says("A note at step 2 was removed");
     assert_eq!(shown.click("bring the removed note back"), vec![Command::Notes(Ask::Restore(5))]);
     do_(&mut state, Ask::Restore(5));
-    assert_eq!(state.take_requests(), vec![Request::RestoreNote { session: "s1".to_owned(), id: 5 }]);
+    assert_eq!(calls::calls(&mut state), [Call::to::<RestoreNote>(&at_note())]);
 }
 
 #[test]
 fn notes_that_changed_elsewhere_are_read_again() {
     let mut state = fixture::nothing();
     let view = noted(&egui::Context::default()).session.unwrap();
-    let request = Request::Session("s1".to_owned());
-    state.arrived(Arrived { request, outcome: Ok(Reply::Session(Box::new(view))) }, 0.0);
-    let asked = Request::Notes("s1".to_owned());
-    assert!(state.take_requests().contains(&asked), "an opened session has its notes read");
-    let list = vec![note(1, 0, None, "x")];
-    state.arrived(Arrived { request: asked.clone(), outcome: Ok(Reply::Notes(list)) }, 0.0);
+    state.adopt(view, false);
+    let asked = |state: &mut State| calls_of::<ListNotes>(state).len();
+    assert_eq!(asked(&mut state), 1, "the notes of an opened session are read");
+    answer::<ListNotes>(&mut state, &[note(1, 0, None, "x")]);
     assert_eq!(state.notes_at(0).len(), 1);
     state.told(Event::NotesChanged { session: "other".to_owned() });
-    assert!(!state.take_requests().contains(&asked));
+    assert_eq!(asked(&mut state), 0);
     state.told(Event::NotesChanged { session: "s1".to_owned() });
-    assert!(state.take_requests().contains(&asked));
+    assert_eq!(asked(&mut state), 1);
 }
 
 #[test]
@@ -194,8 +196,7 @@ fn the_export_window_lists_files_with_sizes_and_ways_to_copy_them() {
         |context| {
             let mut state = noted(context);
             state.perform(Command::Exports(exports::Ask::Open));
-            let at = AtSession { session: "s1".to_owned() };
-            assert!(state.take_requests().iter().any(|request| request.calls::<ListExports>(&at)));
+            assert!(!calls_of::<ListExports>(&mut state).is_empty());
             state.exports.panes = vec![Pane::Map];
             state.exports.entries = Some(vec![ExportEntry {
                 name: "rows.csv".to_owned(),

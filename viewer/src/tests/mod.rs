@@ -27,7 +27,7 @@ mod tracking;
 mod palette;
 #[path = "../picking/tests.rs"]
 mod picking;
-mod questions;
+pub(crate) mod calls;
 #[path = "../tour/tests.rs"]
 mod tour;
 #[path = "../why/tests.rs"]

@@ -1,15 +1,18 @@
 //! What a person sees of a problem: the card, the list of messages, and a server that is gone.
 
+use sightline_api::endpoint::Call;
+use sightline_api::endpoints::{ForkRun, MoveCursor, RemoveTarget, ShowSession};
 use sightline_api::wire::{Problem, Received};
+use sightline_session::Cursor;
 
 use crate::cache::Eye;
 use crate::command::{Command, Go, Mode};
 use crate::files::Ask;
 use crate::net::events::Connection;
-use crate::net::request::{Arrived, Reply, Request};
 use crate::panels::card;
 use crate::panels::pane::Pane;
 use crate::state::State;
+use crate::tests::calls::{answer, at_session, bodies, calls, refuse};
 use crate::tests::{Shown, fixture};
 
 fn problem() -> Problem {
@@ -24,8 +27,7 @@ fn refused(context: &egui::Context) -> State {
     let mut state = fixture::at_step(context, 2);
     state.take_requests();
     state.perform(Command::RunFromHere(state.draft.clone()));
-    let request = state.take_requests().into_iter().find(|r| matches!(r, Request::NewRun { .. })).unwrap();
-    state.arrived(Arrived { request, outcome: Err(problem()) }, 0.0);
+    refuse::<ForkRun>(&mut state, problem());
     state
 }
 
@@ -73,15 +75,16 @@ fn a_file_that_cannot_be_opened_has_a_card_of_its_own() {
 fn a_deed_that_no_server_heard_of_is_said_to_have_come_to_nothing() {
     let mut state = fixture::at_step(&egui::Context::default(), 2);
     state.connected(Connection::Gone { attempts: 3 });
-    let lost = |state: &mut State, request: Request| {
-        let before = state.messages.all().len();
-        let gone = Problem::new(0, "unreachable", "", "The server does not answer.");
-        state.arrived(Arrived { request, outcome: Err(gone) }, 0.0);
-        state.messages.all().len() - before
-    };
-    assert_eq!(lost(&mut state, Request::RemoveTarget { session: "s1".to_owned(), target: 0 }), 1);
+    let gone = || Problem::new(0, "unreachable", "", "The server does not answer.");
+    let count = |state: &State| state.messages.all().len();
+    let before = count(&state);
+    state.perform(Command::RemoveTarget(0));
+    refuse::<RemoveTarget>(&mut state, gone());
+    assert_eq!(count(&state), before + 1);
     assert!(state.messages.newest().unwrap().text.contains("nothing was changed"));
-    assert_eq!(lost(&mut state, Request::Session("s1".to_owned())), 0, "the banner says that");
+    state.read_session("s1".to_owned());
+    refuse::<ShowSession>(&mut state, gone());
+    assert_eq!(count(&state), before + 1, "the banner says that");
 }
 
 #[test]
@@ -91,30 +94,20 @@ fn the_cursor_is_kept_when_a_server_comes_back_that_forgot_its_last_move() {
     state.take_requests();
     state.perform(Command::Go(Go::By(2)));
     state.connected(Connection::Live);
-    let requests = state.take_requests();
-    let request = Request::Session("s1".to_owned());
-    assert!(requests.contains(&request));
+    assert!(calls(&mut state).contains(&Call::to::<ShowSession>(&at_session())));
     // The server tells of a place where the page was never: it was ended before it had written the last move.
-    let put = requests.into_iter().find(|r| matches!(r, Request::PutCursor { .. })).unwrap();
-    state.arrived(Arrived { request: put, outcome: Ok(Reply::Done) }, 0.0);
+    answer::<MoveCursor>(&mut state, &Cursor::default());
     let mut view = state.session.clone().unwrap();
     view.cursor.step = 1;
-    let reply = Reply::Session(Box::new(view.clone()));
-    state.arrived(Arrived { request: request.clone(), outcome: Ok(reply) }, 0.0);
+    answer::<ShowSession>(&mut state, &view);
     assert_eq!(state.cursor.step, 4);
-    let again = state.take_requests();
-    assert!(
-        again.iter().any(|r| matches!(r, Request::PutCursor { cursor, .. } if cursor.step == 4)),
-        "{again:?}"
-    );
+    let again: Vec<usize> = bodies::<MoveCursor>(&mut state).iter().map(|cursor| cursor.step).collect();
+    assert_eq!(again, [4]);
     // Later moves by others count again.
-    for put in again {
-        if matches!(put, Request::PutCursor { .. }) {
-            state.arrived(Arrived { request: put, outcome: Ok(Reply::Done) }, 0.0);
-        }
-    }
+    answer::<MoveCursor>(&mut state, &Cursor::default());
     view.cursor.step = 3;
-    state.arrived(Arrived { request, outcome: Ok(Reply::Session(Box::new(view))) }, 0.0);
+    state.read_session("s1".to_owned());
+    answer::<ShowSession>(&mut state, &view);
     assert_eq!(state.cursor.step, 3);
 }
 

@@ -1,22 +1,46 @@
 //! What commands and answers do to the state: cursor, targets, refusals and what is asked of the server.
 
-use sightline_api::endpoints::{ListSessions, ListSettings, ListTraverses};
-use sightline_api::location::Anywhere;
+use sightline_api::endpoint::Call;
+use sightline_api::endpoints::{
+    DesignateTarget, ListSessions, ListSettings, ListTraverses, MoveCursor, ShowCursor, ShowRun, ShowSession,
+};
+use sightline_api::location::{Anywhere, AtRun, AtSession};
+use sightline_api::query::FirstRow;
 use sightline_api::wire::{Event, Problem, SessionEntry};
 use sightline_geometry::frames::Pixel;
 use sightline_session::Cursor;
+use sightline_session::compare::RunName;
 use sightline_session::step::StepRow;
 use sightline_session::view::RunView;
 
 use crate::cache::{Eye, Key, Slot};
 use crate::command::{Command, Go, Mode};
 use crate::net::events::Connection;
-use crate::net::request::{Arrived, Reply, Request};
+use crate::net::request::{Arrived, Request};
 use crate::state::{State, events};
-use crate::tests::fixture::{STOPS, at_step, nothing, reply, without_target};
+use crate::tests::calls::{answer, at_session, bodies, calls, calls_of, refuse};
+use crate::tests::fixture::{STOPS, at_step, nothing, without_target};
 
 fn loaded(step: usize) -> State {
     at_step(&egui::Context::default(), step)
+}
+
+/// As [`loaded`], with the cursor known to the server.
+fn settled(step: usize) -> State {
+    let mut state = loaded(step);
+    assert_eq!(moves(&mut state), [step]);
+    take_cursor(&mut state);
+    state
+}
+
+/// Takes all requests out; returns the steps to which the server's cursor is moved.
+fn moves(state: &mut State) -> Vec<usize> {
+    bodies::<MoveCursor>(state).into_iter().map(|cursor| cursor.step).collect()
+}
+
+/// The server takes the cursor that is under way.
+fn take_cursor(state: &mut State) {
+    answer::<MoveCursor>(state, &Cursor::default());
 }
 
 pub(super) fn problem(status: u16) -> Problem {
@@ -64,12 +88,11 @@ fn the_cursor_stays_on_the_drive_and_jumps_between_events() {
 fn a_page_without_a_link_opens_the_latest_session_of_the_first_traverse() {
     let mut state = nothing();
     state.begin();
-    let [settings, traverses] = state.take_requests().try_into().unwrap();
-    assert!(settings.calls::<ListSettings>(&Anywhere {}) && traverses.calls::<ListTraverses>(&Anywhere {}));
-    let list = reply(&[super::fixture::entry()]);
-    state.arrived(Arrived { request: traverses, outcome: Ok(list) }, 0.0);
-    let [sessions] = state.take_requests().try_into().unwrap();
-    assert!(sessions.calls::<ListSessions>(&Anywhere {}));
+    let anywhere = Anywhere {};
+    let expected = [Call::to::<ListSettings>(&anywhere), Call::to::<ListTraverses>(&anywhere)];
+    assert_eq!(calls(&mut state), expected);
+    answer::<ListTraverses>(&mut state, &[super::fixture::entry()]);
+    assert_eq!(calls(&mut state), [Call::to::<ListSessions>(&anywhere)]);
     let entry = |id: &str, traverse: &str| SessionEntry {
         id: id.to_owned(),
         traverse: traverse.to_owned(),
@@ -81,9 +104,9 @@ fn a_page_without_a_link_opens_the_latest_session_of_the_first_traverse() {
         used: None,
         idle_s: None,
     };
-    let list = reply(&[entry("a", "drive"), entry("b", "drive"), entry("c", "other")]);
-    state.arrived(Arrived { request: sessions, outcome: Ok(list) }, 0.0);
-    assert_eq!(state.take_requests(), vec![Request::Session("b".to_owned())]);
+    let list = [entry("a", "drive"), entry("b", "drive"), entry("c", "other")];
+    answer::<ListSessions>(&mut state, &list);
+    assert_eq!(calls(&mut state), [Call::to::<ShowSession>(&AtSession { session: "b".to_owned() })]);
 }
 
 #[test]
@@ -92,8 +115,7 @@ fn a_refused_designation_is_shown_at_its_place_with_the_servers_sentence() {
     state.perform(Command::SetMode(Mode::Pick));
     state.perform(Command::Pick(Pixel::new(10.0, 20.0)));
     assert!(state.designating.is_some());
-    let request = state.take_requests().into_iter().find(|r| matches!(r, Request::NewTarget { .. })).unwrap();
-    state.arrived(Arrived { request, outcome: Err(problem(422)) }, 0.0);
+    refuse::<DesignateTarget>(&mut state, problem(422));
     let refusal = state.refusal.as_ref().unwrap();
     assert_eq!((refusal.place.pixel, refusal.sentence.as_str()), (Pixel::new(10.0, 20.0), "no 3-D position"));
     assert_eq!(state.messages.newest().unwrap().text, "no 3-D position");
@@ -105,44 +127,36 @@ fn a_refused_designation_is_shown_at_its_place_with_the_servers_sentence() {
 
 #[test]
 fn the_cursor_is_sent_once_at_a_time_and_an_older_answer_does_not_move_it_back() {
-    let mut state = loaded(0);
-    let [put] = state.take_requests().try_into().unwrap();
-    state.arrived(Arrived { request: put, outcome: Ok(Reply::Done) }, 0.0);
+    let mut state = settled(0);
     state.perform(Command::Go(Go::By(1)));
-    let first = state.take_requests();
+    assert_eq!(moves(&mut state), [1]);
     assert!(state.take_requests().is_empty(), "nothing is sent while one is under way");
     state.perform(Command::Go(Go::By(1)));
     let mut view = state.session.clone().unwrap();
     view.cursor = Cursor::default();
-    let request = Request::Session("s1".to_owned());
-    state.arrived(Arrived { request, outcome: Ok(Reply::Session(Box::new(view))) }, 0.0);
+    state.read_session("s1".to_owned());
+    answer::<ShowSession>(&mut state, &view);
     assert_eq!(state.cursor.step, 2);
-    let [put] = first.try_into().unwrap();
-    state.arrived(Arrived { request: put, outcome: Ok(Reply::Done) }, 0.0);
-    let [Request::PutCursor { cursor, .. }] = &state.take_requests()[..] else {
-        panic!("the newest cursor is sent")
-    };
-    assert_eq!(cursor.step, 2);
+    take_cursor(&mut state);
+    assert_eq!(moves(&mut state), [2], "the newest cursor is sent");
 }
 
 #[test]
 fn an_answer_from_before_the_cursor_was_taken_does_not_move_it_back() {
-    let mut state = loaded(0);
-    let [put] = state.take_requests().try_into().unwrap();
-    state.arrived(Arrived { request: put, outcome: Ok(Reply::Done) }, 0.0);
+    let mut state = settled(0);
     state.perform(Command::Go(Go::By(1)));
-    let [put] = state.take_requests().try_into().unwrap();
+    assert_eq!(moves(&mut state), [1]);
     state.told(Event::SessionChanged { session: "s1".to_owned() });
-    let [get] = state.take_requests().try_into().unwrap();
+    assert_eq!(calls(&mut state), [Call::to::<ShowSession>(&at_session())]);
     let mut view = state.session.clone().unwrap();
     view.cursor = Cursor { target: Some(0), run: 0, step: 0 };
-    state.arrived(Arrived { request: put, outcome: Ok(Reply::Done) }, 0.0);
-    state.arrived(Arrived { request: get, outcome: Ok(Reply::Session(Box::new(view.clone()))) }, 0.0);
+    take_cursor(&mut state);
+    answer::<ShowSession>(&mut state, &view);
     assert_eq!(state.cursor.step, 1, "the session was read before the server took the cursor");
     state.told(Event::SessionChanged { session: "s1".to_owned() });
-    let [get] = state.take_requests().try_into().unwrap();
+    assert_eq!(calls(&mut state), [Call::to::<ShowSession>(&at_session())]);
     view.cursor.step = 4;
-    state.arrived(Arrived { request: get, outcome: Ok(Reply::Session(Box::new(view))) }, 0.0);
+    answer::<ShowSession>(&mut state, &view);
     assert_eq!(state.cursor.step, 4, "another page moved it");
 }
 
@@ -163,77 +177,70 @@ fn progress_of_a_run_reads_the_session_again_and_ends() {
     let (had, whole) = (rows(&state), state.run().unwrap().clone());
     state.told(progress(false));
     assert_eq!(state.run_progress().unwrap().k, 5);
-    let asked = state.take_requests();
-    let [request @ Request::Rows { target: 0, run: 0, from_row, .. }] = &asked[..] else {
-        panic!("only the rows that are new are read, not {asked:?}")
+    let rows_from = |from_row: usize| {
+        let at = AtRun { session: "s1".to_owned(), target: 0, run: 0 };
+        Call::with_query::<ShowRun>(&at, &FirstRow { from_row })
     };
-    assert_eq!(*from_row, had);
+    assert_eq!(calls(&mut state), [rows_from(had)], "only the new rows are read");
     state.told(progress(true));
     assert!(state.run_progress().is_none());
     assert!(state.take_requests().is_empty(), "one question at a time");
     let new = StepRow { step: had, ..whole.rows[had - 1].clone() };
     let tail = RunView { rows: vec![new.clone()], complete: true, ..whole.clone() };
-    state.arrived(Arrived { request: request.clone(), outcome: Ok(Reply::Run(Box::new(tail))) }, 0.0);
+    answer::<ShowRun>(&mut state, &tail);
     assert_eq!(rows(&state), had + 1);
     assert_eq!(state.run().unwrap().rows.last(), Some(&new));
     assert!(state.run().unwrap().complete);
-    // The end was told while the rows were read: what came until then is read, too, but not added twice.
-    let [again] = rows_asked(&mut state).try_into().unwrap();
-    state
-        .arrived(Arrived { request: request.clone(), outcome: Ok(Reply::Run(Box::new(whole.clone()))) }, 0.0);
-    assert_eq!(rows(&state), had + 1, "an answer that begins elsewhere is not taken");
-    // An answer about another session is not taken either.
-    let elsewhere = Request::Rows { session: "s2".to_owned(), target: 0, run: 0, from_row: had + 1 };
+    // The run ended while the rows were read: the rows until then are read too, but not added twice.
+    assert_eq!(calls_of::<ShowRun>(&mut state), [rows_from(had + 1)]);
+    refuse::<ShowRun>(&mut state, problem(404));
+    assert!(calls(&mut state).contains(&Call::to::<ShowSession>(&at_session())), "the run may be removed");
+    let name = RunName { target: 0, run: 0 };
+    state.read_rows("s1".to_owned(), name, had);
+    answer::<ShowRun>(&mut state, &whole);
+    assert_eq!(rows(&state), had + 1, "an answer that begins at another row is not taken");
     let tail = RunView { rows: vec![new], ..whole };
-    state.arrived(Arrived { request: elsewhere, outcome: Ok(Reply::Run(Box::new(tail))) }, 0.0);
-    assert_eq!(rows(&state), had + 1);
-    state.arrived(Arrived { request: again, outcome: Err(problem(404)) }, 0.0);
-    assert!(state.take_requests().contains(&Request::Session("s1".to_owned())), "the run may be gone");
-}
-
-fn rows_asked(state: &mut State) -> Vec<Request> {
-    let is_rows = |request: &Request| matches!(request, Request::Rows { .. });
-    state.take_requests().into_iter().filter(is_rows).collect()
+    state.read_rows("s2".to_owned(), name, had + 1);
+    answer::<ShowRun>(&mut state, &tail);
+    assert_eq!(rows(&state), had + 1, "an answer about another session is not taken either");
 }
 
 #[test]
 fn a_cursor_that_another_page_moved_is_followed_and_the_own_one_is_not_read_back() {
-    let mut state = loaded(0);
-    let [put] = state.take_requests().try_into().unwrap();
-    state.arrived(Arrived { request: put, outcome: Ok(Reply::Done) }, 0.0);
+    let mut state = settled(0);
     let told = |step: usize| Event::CursorMoved {
         session: "s1".to_owned(),
         cursor: Cursor { target: Some(0), run: 0, step },
     };
-    let read = |state: &mut State, request: Request, step: usize| {
-        let cursor = Cursor { target: Some(0), run: 0, step };
-        state.arrived(Arrived { request, outcome: Ok(Reply::Cursor(cursor)) }, 0.0);
+    let read = |state: &mut State, step: usize| {
+        answer::<ShowCursor>(state, &Cursor { target: Some(0), run: 0, step });
     };
+    let reading = [Call::to::<ShowCursor>(&at_session())];
     state.perform(Command::Go(Go::By(1)));
-    let [put] = state.take_requests().try_into().unwrap();
+    assert_eq!(moves(&mut state), [1]);
     state.told(told(1));
-    state.arrived(Arrived { request: put, outcome: Ok(Reply::Done) }, 0.0);
+    take_cursor(&mut state);
     state.told(told(1));
     assert!(state.take_requests().is_empty(), "that is this page's own cursor");
     // Another page goes to step 4; what is told late does not count, what is read does.
     state.told(told(3));
-    let [get] = state.take_requests().try_into().unwrap();
-    assert_eq!(get, Request::Cursor("s1".to_owned()));
-    read(&mut state, get, 4);
+    assert_eq!(calls(&mut state), reading);
+    read(&mut state, 4);
     assert_eq!(state.cursor.step, 4);
     assert!(state.take_requests().is_empty(), "and is not sent back");
     // An answer that crossed a cursor of this page may be older than that.
     state.told(told(2));
-    let [get] = state.take_requests().try_into().unwrap();
+    assert_eq!(calls(&mut state), reading);
     state.perform(Command::Go(Go::By(1)));
-    let [put] = state.take_requests().try_into().unwrap();
-    state.arrived(Arrived { request: put, outcome: Ok(Reply::Done) }, 0.0);
-    read(&mut state, get, 2);
+    assert_eq!(moves(&mut state), [5]);
+    take_cursor(&mut state);
+    read(&mut state, 2);
     assert_eq!(state.cursor.step, 5);
     // Nor does a cursor of another session count.
     state.told(told(3));
-    assert_eq!(state.take_requests(), vec![Request::Cursor("s1".to_owned())]);
-    read(&mut state, Request::Cursor("s2".to_owned()), 3);
+    assert_eq!(calls(&mut state), reading);
+    state.session.as_mut().unwrap().id = "s2".to_owned();
+    read(&mut state, 3);
     assert_eq!(state.cursor.step, 5);
 }
 
@@ -262,9 +269,10 @@ fn loaded_steps_stay_when_the_server_goes_and_all_is_asked_again_when_it_comes_b
     assert_eq!(state.cursor.step, 3);
     assert!(state.take_requests().is_empty());
     state.connected(Connection::Live);
-    let requests = state.take_requests();
-    assert!(requests.contains(&Request::Session("s1".to_owned())));
-    assert!(requests.iter().any(|r| matches!(r, Request::PutCursor { cursor, .. } if cursor.step == 3)));
+    let calls = calls(&mut state);
+    assert!(calls.contains(&Call::to::<ShowSession>(&at_session())));
+    assert!(calls.contains(&Call::with_body::<MoveCursor>(&at_session(), &state.cursor)));
+    assert_eq!(state.cursor.step, 3);
 }
 
 #[test]

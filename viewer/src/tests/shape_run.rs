@@ -84,14 +84,15 @@ pub(crate) fn trace(tracker: TrackerKind, step: usize) -> RunStep {
     }
     if step != 1 {
         evidence.surface = Some(surface());
-        evidence.arrays.disparities = picture(40, 30, |x, y| if y < 4.0 { f32::NAN } else { 4.0 + x + y });
-        evidence.arrays.ranges = picture(40, 30, |x, y| if y < 4.0 { f32::NAN } else { 9.0 - 0.1 * (x + y) });
+        let arrays = evidence.arrays.get_or_default();
+        arrays.disparities = picture(40, 30, |x, y| if y < 4.0 { f32::NAN } else { 4.0 + x + y });
+        arrays.ranges = picture(40, 30, |x, y| if y < 4.0 { f32::NAN } else { 9.0 - 0.1 * (x + y) });
     }
     if step >= 2 {
         located.covariance_in_rover = Some(Matrix3::from_diagonal(&Vector3::new(1.6e-5, 4e-6, 1e-6)));
         evidence.registration = Some(registered(step));
         evidence.is_judged_by_shape = true;
-        registration_arrays(&mut evidence.arrays);
+        registration_arrays(evidence.arrays.get_or_default());
     }
     if step == REFUSED {
         (located.position_in_rover, located.left_pixel, located.covariance_in_rover) = (None, None, None);
@@ -174,8 +175,8 @@ fn draped() -> Draped {
         correction_px: 2.4,
         covariance_px2: Matrix2::new(0.04, 0.0, 0.0, 0.01),
         on_mesh: 0.82,
-        picture: picture(31, 31, |x, y| 0.5 + 0.01 * (x - y)),
-        matched: picture(31, 31, |x, y| 0.4 + 0.01 * (x - y)),
+        picture: picture(31, 31, |x, y| 0.5 + 0.01 * (x - y)).into(),
+        matched: picture(31, 31, |x, y| 0.4 + 0.01 * (x - y)).into(),
     }
 }
 

@@ -2,22 +2,25 @@
 
 use egui_kittest::kittest::Queryable;
 use serde_json::json;
+use sightline_api::endpoint::Call;
+use sightline_api::endpoints::{
+    AddBreakpoint, ChangeBreakpoint, RemoveBreakpoint, RemoveNote, RemoveRun, RemoveTarget, RestoreNote,
+    RestoreRun, RestoreTarget,
+};
+use sightline_api::location::{AtBreakpoint, AtNote, AtRun, AtTarget};
 use sightline_api::wire::Problem;
 use sightline_session::Fork;
-use sightline_session::breakpoints::BreakpointView;
+use sightline_session::breakpoints::{BreakpointChange, BreakpointView, NewBreakpoint};
 use sightline_session::notes::{Note, Pin};
 use sightline_session::view::RunView;
 use sightline_track::settings::Changes;
 
-use crate::breakpoints::{AskReply, AskRequest};
 use crate::command::Command;
 use crate::command::keys;
-use crate::net::request::{Arrived, Reply, Request};
-use crate::net::why::{WhyReply, WhyRequest};
 use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::state::deeds::Deed;
-use crate::tests::questions::{answer, asked};
+use crate::tests::calls::{answer, at_session, calls, calls_of, refuse};
 use crate::tests::{Shown, fixture};
 use crate::why::Ask;
 use crate::{breakpoints, notes};
@@ -29,13 +32,22 @@ fn lost() -> State {
     fixture::at_step(&egui::Context::default(), LOST)
 }
 
-/// What is asked about breakpoints.
-fn asked_of_breakpoints(state: &mut State) -> Vec<AskRequest> {
-    let of = |request| match request {
-        Request::Ask(request) if !matches!(request, AskRequest::Breakpoints(_)) => Some(request),
-        _ => None,
+/// The calls that change breakpoints.
+fn asked_of_breakpoints(state: &mut State) -> Vec<Call> {
+    let is_change = |call: &Call| {
+        call.is_to::<AddBreakpoint>() || call.is_to::<ChangeBreakpoint>() || call.is_to::<RemoveBreakpoint>()
     };
-    state.take_requests().into_iter().filter_map(of).collect()
+    calls(state).into_iter().filter(is_change).collect()
+}
+
+fn at(breakpoint: usize) -> AtBreakpoint {
+    AtBreakpoint { session: "s1".to_owned(), breakpoint }
+}
+
+/// Sets the removed breakpoint again.
+fn add() -> Call {
+    let new = NewBreakpoint { expression: Some("ncc < 0.5".to_owned()), step: None };
+    Call::with_body::<AddBreakpoint>(&at_session(), &new)
 }
 
 fn undo(state: &mut State) {
@@ -59,15 +71,13 @@ fn deeds_are_taken_back_and_done_again() {
     assert_eq!(keys::command(egui::Key::Y, ctrl, &state), Some(Command::Why(Ask::Redo)));
     // A removed target comes back, and its undoing is no deed of its own.
     state.perform(Command::RemoveTarget(0));
-    let request =
-        state.take_requests().into_iter().find(|r| matches!(r, Request::RemoveTarget { .. })).unwrap();
-    state.arrived(Arrived { request, outcome: Ok(Reply::Done) }, 0.0);
+    let view = state.session.clone().unwrap();
+    answer::<RemoveTarget>(&mut state, &view);
     assert_eq!(state.undo.ends().0, Some(&Deed::RemovedTarget { target: 0 }));
     state.perform(Command::Why(Ask::Undo));
-    let restore = WhyRequest::RestoreTarget { session: "s1".to_owned(), target: 0 };
-    assert_eq!(asked(&mut state), vec![restore.clone()]);
-    let view = Box::new(state.session.clone().unwrap());
-    answer(&mut state, restore, WhyReply::Session(view));
+    let restore = Call::to::<RestoreTarget>(&AtTarget { session: "s1".to_owned(), target: 0 });
+    assert_eq!(calls_of::<RestoreTarget>(&mut state), [restore]);
+    answer::<RestoreTarget>(&mut state, &view);
     assert_eq!(state.undo.ends(), (None, Some(&Deed::RemovedTarget { target: 0 })));
     // The draft goes back value by value, a drag as one.
     for value in [0.6, 0.5, 0.4] {
@@ -96,16 +106,13 @@ fn a_removed_run_leaves_the_list_and_can_be_taken_back() {
     assert_eq!(shown.click("remove run B"), vec![Command::Why(remove.clone())]);
     let mut state = two_runs(&egui::Context::default());
     state.perform(Command::Why(remove));
-    let request = asked(&mut state).remove(0);
     let mut view = state.session.clone().unwrap();
     view.targets[0].runs.truncate(1);
-    answer(&mut state, request, WhyReply::Session(Box::new(view)));
+    answer::<RemoveRun>(&mut state, &view);
     assert_eq!(state.target().unwrap().runs.len(), 1);
     state.perform(Command::Why(Ask::Undo));
-    assert_eq!(
-        asked(&mut state),
-        vec![WhyRequest::RestoreRun { session: "s1".to_owned(), target: 0, run: 1 }]
-    );
+    let restore = Call::to::<RestoreRun>(&AtRun { session: "s1".to_owned(), target: 0, run: 1 });
+    assert_eq!(calls_of::<RestoreRun>(&mut state), [restore]);
 }
 
 #[test]
@@ -115,27 +122,18 @@ fn a_removed_breakpoint_comes_back_as_it_was_also_where_it_was_off() {
     state.take_requests();
     state.perform(Command::Ask(breakpoints::Ask::Remove(4)));
     let removal = asked_of_breakpoints(&mut state);
-    assert_eq!(removal, vec![AskRequest::Remove { session: "s1".to_owned(), number: 4 }]);
+    assert_eq!(removal, [Call::to::<RemoveBreakpoint>(&at(4))]);
     let message = state.messages.newest().unwrap();
     assert_eq!(message.text, "Removed the breakpoint `ncc < 0.5`.");
     assert!(state.undo.is_last(message.deed.unwrap()), "the message offers to take it back");
     undo(&mut state);
-    let add = asked_of_breakpoints(&mut state).remove(0);
-    assert!(matches!(&add, AskRequest::Add { new, .. } if new.expression.as_deref() == Some("ncc < 0.5")));
-    let reply = Reply::Ask(AskReply::Breakpoint(breakpoint(5, "ncc < 0.5", true)));
-    state.arrived(Arrived { request: Request::Ask(add), outcome: Ok(reply) }, 0.0);
-    let change = asked_of_breakpoints(&mut state);
-    assert!(
-        matches!(&change[..], [AskRequest::Change { number: 5, change, .. }] if change.on == Some(false)),
-        "{change:?}"
-    );
+    assert_eq!(asked_of_breakpoints(&mut state), [add()]);
+    answer::<AddBreakpoint>(&mut state, &breakpoint(5, "ncc < 0.5", true));
+    let change = BreakpointChange { on: Some(false), expression: None };
+    assert_eq!(asked_of_breakpoints(&mut state), [Call::with_body::<ChangeBreakpoint>(&at(5), &change)]);
     redo(&mut state);
     let again = asked_of_breakpoints(&mut state);
-    assert_eq!(
-        again,
-        vec![AskRequest::Remove { session: "s1".to_owned(), number: 5 }],
-        "under its new number"
-    );
+    assert_eq!(again, [Call::to::<RemoveBreakpoint>(&at(5))], "under its new number");
 }
 
 #[test]
@@ -144,13 +142,11 @@ fn a_removal_is_done_again_also_before_the_server_has_set_the_breakpoint() {
     state.ask.breakpoints = vec![breakpoint(4, "ncc < 0.5", true)];
     state.perform(Command::Ask(breakpoints::Ask::Remove(4)));
     undo(&mut state);
-    let add = asked_of_breakpoints(&mut state).pop().unwrap();
+    assert_eq!(asked_of_breakpoints(&mut state).pop(), Some(add()));
     redo(&mut state);
     assert!(asked_of_breakpoints(&mut state).is_empty(), "its number is not known yet");
-    let reply = Reply::Ask(AskReply::Breakpoint(breakpoint(5, "ncc < 0.5", true)));
-    state.arrived(Arrived { request: Request::Ask(add), outcome: Ok(reply) }, 0.0);
-    let removal = AskRequest::Remove { session: "s1".to_owned(), number: 5 };
-    assert_eq!(asked_of_breakpoints(&mut state), vec![removal]);
+    answer::<AddBreakpoint>(&mut state, &breakpoint(5, "ncc < 0.5", true));
+    assert_eq!(asked_of_breakpoints(&mut state), [Call::to::<RemoveBreakpoint>(&at(5))]);
     assert!(state.ask.breakpoints.is_empty());
 }
 
@@ -159,8 +155,7 @@ fn a_removal_of_a_breakpoint_that_is_refused_is_no_deed() {
     let mut state = lost();
     state.ask.breakpoints = vec![breakpoint(4, "ncc < 0.5", true)];
     state.perform(Command::Ask(breakpoints::Ask::Remove(4)));
-    let request = Request::Ask(asked_of_breakpoints(&mut state).remove(0));
-    state.arrived(Arrived { request, outcome: Err(Problem::new(500, "internal", "", "a fault")) }, 0.0);
+    refuse::<RemoveBreakpoint>(&mut state, Problem::new(500, "internal", "", "a fault"));
     assert_eq!(state.undo.ends().0, None);
 }
 
@@ -197,12 +192,12 @@ fn a_removed_note_comes_back_by_undo_or_by_its_button_but_not_twice() {
     state.take_requests();
     let remove = |state: &mut State| {
         state.perform(Command::Notes(notes::Ask::Remove(5)));
-        let request = state.take_requests().into_iter().find(|r| matches!(r, Request::RemoveNote { .. }));
-        state.arrived(Arrived { request: request.unwrap(), outcome: Ok(Reply::Done) }, 0.0);
+        answer::<RemoveNote>(state, &());
     };
+    let at = AtNote { session: "s1".to_owned(), note: 5 };
     let restored = |state: &mut State| {
-        let requests = state.take_requests();
-        requests.iter().filter(|request| matches!(request, Request::RestoreNote { id: 5, .. })).count()
+        let restoring = calls_of::<RestoreNote>(state);
+        restoring.iter().filter(|call| **call == Call::to::<RestoreNote>(&at)).count()
     };
     remove(&mut state);
     assert_eq!(state.undo.ends().0, Some(&Deed::RemovedNote { id: 5, step: 2 }));
@@ -213,10 +208,8 @@ fn a_removed_note_comes_back_by_undo_or_by_its_button_but_not_twice() {
     assert_eq!(restored(&mut state), 0, "the button took the deed back already");
     // Done again it is the same deed, not another one.
     redo(&mut state);
-    let request =
-        state.take_requests().into_iter().find(|r| matches!(r, Request::RemoveNote { .. })).unwrap();
-    assert!(matches!(request, Request::RemoveNote { revision: 3, .. }));
-    state.arrived(Arrived { request, outcome: Ok(Reply::Done) }, 0.0);
+    assert_eq!(calls_of::<RemoveNote>(&mut state), [Call::to::<RemoveNote>(&at).at_revision(3)]);
+    answer::<RemoveNote>(&mut state, &());
     assert_eq!(state.undo.ends(), (Some(&Deed::RemovedNote { id: 5, step: 2 }), None));
 }
 

@@ -1,10 +1,10 @@
-//! The trackability of the stop that is looked at, and the place that is being chosen in it.
+//! The trackability of the cursor's stop, and the aim in its left image.
 //!
-//! The map is asked for while a target is picked, again whenever the server tells of new rows, and given up with the pick.
+//! The map is read while a target is picked, and again after each event about new rows; ending the pick cancels it.
 
 pub(crate) mod limits;
 pub(crate) mod limits_window;
-mod update;
+pub(crate) mod update;
 
 use sightline_geometry::frames::Pixel;
 use sightline_rover::trackability::MapProgress;
@@ -12,11 +12,14 @@ use sightline_track::settings::Changes;
 
 use crate::trackability::limits::Form;
 
-/// What is known of a stop's trackability.
+/// A map of trackability: the traverse, the stop, and the limits that are not the defaults.
+pub(crate) type MapPlace = (String, usize, Changes);
+
+/// The trackability of a stop.
 #[derive(Clone, Debug, Default)]
 pub struct Trackability {
-    /// The traverse and the stop that it is of, and the limits by which it is made, where they are not the defaults.
-    pub place: Option<(String, usize, Changes)>,
+    /// The map that is shown or being made.
+    pub place: Option<MapPlace>,
     /// The limits that are not the defaults.
     pub limits: Changes,
     /// The limits as they are typed, while their window is open.

@@ -1,21 +1,24 @@
-//! Asks for the trackability of the stop that is looked at, and moves the place that is being chosen in it.
+//! Reads the trackability of the cursor's stop, and moves the aim in its left image.
 
+use sightline_api::endpoint::{Call, Endpoint, NoBody};
+use sightline_api::endpoints::{CancelTrackability, ShowTrackability};
+use sightline_api::location::AtStop;
+use sightline_api::query::MapLimits;
 use sightline_api::wire::Problem;
 use sightline_geometry::frames::Pixel;
 use sightline_rover::trackability::map::Cell;
-use sightline_rover::trackability::{MapProgress, TrackabilityMap, Verdict};
+use sightline_rover::trackability::{MapProgress, TrackabilityLimits, TrackabilityMap, Verdict};
 use sightline_track::settings::Changes;
 
 use crate::command::{Command, Mode};
 use crate::drawing::view2d::View2d;
-use crate::net::request::Request;
 use crate::picking::aim::Aim;
 use crate::state::{Place, Refusal, State};
-use crate::trackability::Trackability;
 use crate::trackability::limits::{Ask, Form};
+use crate::trackability::{MapPlace, Trackability};
 
 impl State {
-    /// The map of the stop that is looked at, as far as it was made.
+    /// The map of the cursor's stop, as far as it is computed.
     pub fn trackability_map(&self) -> Option<&TrackabilityMap> {
         let (traverse, step, _) = self.trackability.place.as_ref()?;
         let is_here =
@@ -23,12 +26,12 @@ impl State {
         self.trackability.progress.as_ref().filter(|_| is_here)?.map.as_ref()
     }
 
-    /// What the map says of a pixel of the left image.
+    /// The cell of the map at a pixel of the left image.
     pub(crate) fn trackability_at(&self, pixel: Pixel) -> Option<Cell> {
         self.trackability_map()?.at(pixel)
     }
 
-    /// Carries out what was asked of the place that is being chosen.
+    /// Applies a command about the aim.
     pub(crate) fn aim(&mut self, aim: Aim) {
         let nearest = self.refusal.as_ref().and_then(|refusal| refusal.nearest);
         match aim {
@@ -58,7 +61,7 @@ impl State {
         }
     }
 
-    /// What speaks against a place that the map calls bad. Where there is no map yet, nothing does.
+    /// The advice against a place that the map calls bad; `None` without a map.
     pub(crate) fn advised_against(&self, place: Place) -> Option<Refusal> {
         let cell = self.trackability_at(place.pixel).filter(|cell| cell.verdict == Verdict::Bad)?;
         let sentence = cell.sentence().unwrap_or_else(|| "a bad place".to_owned());
@@ -66,7 +69,7 @@ impl State {
         Some(Refusal { place, sentence, nearest, is_advice: true })
     }
 
-    /// Where the keys begin: at the refused pixel, else in the middle of what is shown.
+    /// The first aim of the keys: the refused pixel, else the middle of the view.
     fn first_aim(&self) -> Pixel {
         let [width, height] = self.stop().map_or([1, 1], |stop| stop.left_size);
         let middle = match self.views.left {
@@ -76,7 +79,7 @@ impl State {
         self.refusal.as_ref().map_or(middle, |refusal| refusal.place.pixel)
     }
 
-    /// Asks for the map while a target is picked, and gives it up with the pick.
+    /// Reads the map while a target is picked; cancels it when the pick ends.
     pub(crate) fn sync_trackability(&mut self) {
         let limits = &self.trackability.limits;
         let here = self.traverse.as_ref().map(|open| (open.id.clone(), self.cursor.step, limits.clone()));
@@ -87,23 +90,29 @@ impl State {
         let known = &mut self.trackability;
         if known.place != wanted {
             let is_made = known.progress.as_ref().is_none_or(|progress| progress.ended);
-            if let Some((traverse, step, limits)) = known.place.take().filter(|_| !is_made) {
-                self.outbox.push(Request::CancelTrackability { traverse, step, limits });
-            }
+            let unfinished = known.place.take().filter(|_| !is_made);
             let (limits, form) = (std::mem::take(&mut known.limits), known.form.take());
             let aim = known.aim.filter(|_| wanted.is_some());
             *known = Trackability { aim, limits, form, ..Trackability::default() };
             (known.is_stale, known.place) = (wanted.is_some(), wanted);
+            if let Some(place) = unfinished {
+                let call = map_call::<CancelTrackability>(&place);
+                // A refusal means that the map was finished meanwhile.
+                self.call_with_problem::<CancelTrackability>(call, |_, _| {});
+            }
         }
-        if let Some((traverse, step, limits)) =
-            known.place.clone().filter(|_| known.is_stale && !known.is_asked)
-        {
+        let known = &mut self.trackability;
+        let wanted = known.place.clone().filter(|_| known.is_stale && !known.is_asked);
+        if let Some(place) = wanted {
             (known.is_asked, known.is_stale) = (true, false);
-            self.outbox.push(Request::Trackability { traverse, step, limits });
+            let call = map_call::<ShowTrackability>(&place);
+            self.call_with_problem::<ShowTrackability>(call, move |state, answer| {
+                state.took_trackability(&place, answer);
+            });
         }
     }
 
-    /// The server told of new rows.
+    /// Notes an event about new rows of a map.
     pub(crate) fn trackability_went_on(&mut self, traverse: &str, step: usize) {
         let known = &mut self.trackability;
         let is_ours = known.place.as_ref().is_some_and(|(own, at, _)| own == traverse && *at == step);
@@ -111,26 +120,22 @@ impl State {
         known.is_stale |= is_ours && !is_made;
     }
 
-    /// What may have been missed is asked for again.
+    /// Marks an unfinished map as stale: events about it may have been missed.
     pub(crate) fn trackability_stale(&mut self) {
         let is_made = self.trackability.progress.as_ref().is_some_and(|progress| progress.ended);
         self.trackability.is_stale |= self.trackability.place.is_some() && !is_made;
     }
 
-    /// Takes an answer in; picking works all the same without one.
-    pub(crate) fn took_trackability(
-        &mut self,
-        place: (String, usize, Changes),
-        answer: Result<MapProgress, Problem>,
-    ) {
+    /// Takes an answer; picking works without a map too.
+    fn took_trackability(&mut self, place: &MapPlace, answer: Result<MapProgress, Problem>) {
         let known = &mut self.trackability;
-        if known.place.as_ref() != Some(&place) {
+        if known.place.as_ref() != Some(place) {
             return;
         }
         known.is_asked = false;
         match answer {
             Ok(progress) => known.progress = Some(progress),
-            // The server is gone: asked again when it is back.
+            // The server is unreachable: read it again when it is back.
             Err(problem) if problem.status == 0 => {}
             Err(problem) => {
                 known.progress =
@@ -140,8 +145,17 @@ impl State {
     }
 }
 
+/// Calls `E` about the map of a stop.
+pub(crate) fn map_call<E>((traverse, step, limits): &MapPlace) -> Call
+where
+    E: Endpoint<At = AtStop, Query = MapLimits, Body = NoBody>,
+{
+    let limits = (!limits.is_empty()).then(|| TrackabilityLimits::text(limits));
+    Call::with_query::<E>(&AtStop { id: traverse.clone(), step: *step }, &MapLimits { limits })
+}
+
 impl State {
-    /// Carries out what was asked of the limits.
+    /// Applies a command about the limits.
     pub(crate) fn ask_limits(&mut self, ask: Ask) {
         let known = &mut self.trackability;
         match ask {

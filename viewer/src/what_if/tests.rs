@@ -4,17 +4,16 @@
 use egui::accesskit::Role;
 use egui_kittest::kittest::{NodeT, Queryable};
 use serde_json::json;
+use sightline_api::endpoints::TryStep;
 use sightline_session::what_if::{Ghost, GhostArray, WhatIf};
 use sightline_track::settings::Changes;
 use sightline_track::trace::ArrayName;
 
-use crate::cache::StepKey;
 use crate::command::{Command, Zoomable};
 use crate::drawing::view2d::View2d;
-use crate::net::request::{Arrived, Reply, Request};
-use crate::net::why::{WhyReply, WhyRequest};
 use crate::panels::pane::Pane;
 use crate::state::State;
+use crate::tests::calls::{self, bodies};
 use crate::tests::{Shown, fixture};
 use crate::what_if::Scores;
 use crate::why::Ask;
@@ -22,32 +21,22 @@ use crate::why::Ask;
 const STEP: usize = 3;
 const SIDE: u32 = 31;
 
-fn key() -> StepKey {
-    StepKey { session: "s1".to_owned(), target: 0, run: 0, step: STEP }
-}
-
 fn what_if(arrays: Vec<ArrayName>) -> WhatIf {
     WhatIf { settings: Changes::from([("ncc_min".to_owned(), json!(0.4))]), arrays, ..WhatIf::default() }
 }
 
 fn asked(state: &mut State) -> Vec<WhatIf> {
-    let tried = |request| match request {
-        Request::Why(WhyRequest::WhatIf { what_if, .. }) => Some(what_if),
-        _ => None,
-    };
-    state.take_requests().into_iter().filter_map(tried).collect()
+    bodies::<TryStep>(state)
 }
 
 fn answer(state: &mut State, arrays: Vec<ArrayName>) {
     let what_if = what_if(arrays.clone());
     let settings = Default::default();
-    let mut ghost = Ghost::new(what_if.clone(), &fixture::trace(2), &fixture::trace(STEP), &settings);
+    let mut ghost = Ghost::new(what_if, &fixture::trace(2), &fixture::trace(STEP), &settings);
     let values = (0..SIDE * SIDE).map(|k| Some(k as f32 / (SIDE * SIDE) as f32).filter(|_| k > 0)).collect();
     let array = |name| GhostArray { name, size: [SIDE, SIDE], values: Vec::clone(&values) };
     ghost.arrays = arrays.into_iter().map(array).collect();
-    let request = Request::Why(WhyRequest::WhatIf { of: key(), what_if });
-    let reply = Reply::Why(WhyReply::Ghost(Box::new(ghost)));
-    state.arrived(Arrived { request, outcome: Ok(reply) }, 0.0);
+    calls::answer::<TryStep>(state, &ghost);
 }
 
 fn trying(context: &egui::Context) -> State {

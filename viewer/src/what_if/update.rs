@@ -1,7 +1,10 @@
-//! Changes what is tried at a step, and asks the server for what comes of it.
+//! Changes the trial at a step and computes its result on the server.
 
 use std::sync::Arc;
 
+use sightline_api::endpoint::Call;
+use sightline_api::endpoints::TryStep;
+use sightline_api::wire::Problem;
 use sightline_session::what_if::{Ghost, WhatIf};
 use sightline_track::settings::TrackerKind;
 use sightline_track::trace::ArrayName;
@@ -9,14 +12,12 @@ use sightline_vision::image::GrayImage;
 
 use crate::cache::StepKey;
 use crate::drawing::raster::Raster;
-use crate::net::request::Request;
-use crate::net::why::WhyRequest;
 use crate::state::State;
 use crate::state::deeds::Deed;
 use crate::what_if::{Scores, Trial};
 
 impl State {
-    /// Changes what is tried at the cursor's step.
+    /// Changes the trial at the cursor's step.
     pub(crate) fn try_out(&mut self, what_if: WhatIf) {
         let Some(key) = self.step_key(self.cursor.step).filter(|_| self.row().is_some()) else { return };
         let before = self.trial().map(|trial| trial.what_if.clone()).unwrap_or_default();
@@ -32,7 +33,7 @@ impl State {
             self.why.trial = None;
             return;
         }
-        // The last ghost stands until the new one is here, so that a drag does not flicker.
+        // The last ghost stays until the new one arrives, so that a drag does not flicker.
         let last = self.why.trial.take().filter(|trial| trial.of == of);
         let has_scores = last.as_ref().is_some_and(|trial| trial.has_scores);
         let ghost = last.and_then(|trial| trial.ghost);
@@ -40,7 +41,7 @@ impl State {
         self.send_trial();
     }
 
-    /// Asks for the newest change, unless an older one is under way.
+    /// Sends the newest change, unless an older one is under way.
     pub(crate) fn send_trial(&mut self) {
         let Some(trial) = &self.why.trial else { return };
         let is_whole = trial.has_scores || !self.why.wants_scores;
@@ -54,10 +55,34 @@ impl State {
             what_if.arrays.push(ArrayName::SURFACE);
         }
         self.why.trying = Some((of.clone(), what_if.clone()));
-        self.outbox.push(Request::Why(WhyRequest::WhatIf { of, what_if }));
+        let call = Call::with_body::<TryStep>(&of, &what_if);
+        self.call_with_problem::<TryStep>(call, move |state, outcome| {
+            state.took_ghost(&of, what_if, outcome);
+        });
     }
 
-    /// Says whether the scores of what is tried are looked at; what is tried is asked for again where they are missing.
+    /// Takes the result of a trial, or why it was refused; then sends the newest change.
+    fn took_ghost(&mut self, of: &StepKey, mut what_if: WhatIf, outcome: Result<Ghost, Problem>) {
+        self.why.trying = None;
+        let has_scores = !what_if.arrays.is_empty();
+        // The requested arrays are no part of the change.
+        what_if.arrays.clear();
+        if let Some(trial) = self.why.trial.as_mut().filter(|trial| trial.of == *of) {
+            let is_newest = trial.what_if == what_if;
+            match outcome {
+                Ok(mut ghost) => {
+                    ghost.what_if.arrays.clear();
+                    (trial.ghost, trial.has_scores) = (Some(ghost), has_scores);
+                    trial.refused = trial.refused.take().filter(|_| !is_newest);
+                }
+                Err(problem) if is_newest => trial.refused = Some(problem.detail),
+                Err(_) => {}
+            }
+        }
+        self.send_trial();
+    }
+
+    /// Sets whether the scores of the trial are shown; requests the trial again if they are missing.
     pub fn want_tried_scores(&mut self, is_seen: bool) {
         let is_wanted =
             is_seen && self.why.scores_shown != Scores::Recorded && self.tracker() == TrackerKind::Template;
@@ -67,7 +92,7 @@ impl State {
         }
     }
 
-    /// What was tried at the cursor's step, with its scores; none where it has none, or they are on their way.
+    /// The result of the trial at the cursor's step with its scores; `None` until both have arrived.
     pub(crate) fn tried_scores(&self, context: &egui::Context) -> Option<(&Ghost, Arc<Raster>)> {
         let trial = self.trial()?;
         let ghost = trial.ghost.as_ref()?;

@@ -1,5 +1,8 @@
 //! Why follows the cursor: to another step, into a branch, and never faster than the server answers.
 
+use sightline_api::endpoint::Call;
+use sightline_api::endpoints::{AskCounterfactual, ShowWhy};
+use sightline_api::query::ValueName;
 use sightline_api::wire::Problem;
 use sightline_session::Fork;
 use sightline_session::view::RunView;
@@ -7,11 +10,9 @@ use sightline_session::why::Explanation;
 
 use crate::cache::StepKey;
 use crate::command::{Command, Go};
-use crate::net::request::{Arrived, Request};
-use crate::net::why::{WhyReply, WhyRequest};
 use crate::state::State;
+use crate::tests::calls::{answer, calls_of, refuse};
 use crate::tests::fixture;
-use crate::tests::questions::{answer, asked};
 use crate::why::{Ask, Told};
 
 /// The step that is lost.
@@ -19,6 +20,10 @@ const LOST: usize = 3;
 
 fn key() -> StepKey {
     StepKey { session: "s1".to_owned(), target: 0, run: 0, step: LOST }
+}
+
+fn explain(at: &StepKey) -> Call {
+    Call::with_query::<ShowWhy>(at, &ValueName { value: Some("ncc".to_owned()) })
 }
 
 fn lost() -> State {
@@ -29,16 +34,15 @@ fn lost() -> State {
 fn the_tree_follows_the_cursor_and_nothing_of_another_step_stands_there_unlabelled() {
     let mut state = fixture::with_history(&egui::Context::default(), LOST);
     let at = |step: usize| StepKey { step, ..key() };
-    let explain = |step: usize| WhyRequest::Explain { of: at(step), value: "ncc".to_owned() };
     state.perform(Command::Why(Ask::Value { step: LOST, value: "ncc".to_owned() }));
     state.follow_why();
-    assert_eq!(asked(&mut state), vec![explain(LOST)]);
+    assert_eq!(calls_of::<ShowWhy>(&mut state), [explain(&at(LOST))]);
     // While the answer is under way the cursor runs ahead, and only where it rests is asked.
     state.perform(Command::Go(Go::By(-1)));
     state.follow_why();
     state.perform(Command::Go(Go::By(-1)));
     state.follow_why();
-    assert!(asked(&mut state).is_empty());
+    assert!(calls_of::<ShowWhy>(&mut state).is_empty());
     let empty = Explanation {
         step: LOST,
         sentence: String::new(),
@@ -46,12 +50,12 @@ fn the_tree_follows_the_cursor_and_nothing_of_another_step_stands_there_unlabell
         values: Vec::new(),
         tree: None,
     };
-    answer(&mut state, explain(LOST), WhyReply::Explanation(Box::new(empty.clone())));
+    answer::<ShowWhy>(&mut state, &empty);
     state.follow_why();
-    assert_eq!(asked(&mut state), vec![explain(1)]);
+    assert_eq!(calls_of::<ShowWhy>(&mut state), [explain(&at(1))]);
     let (shown, value, told) = state.explained().unwrap();
     assert_eq!((shown, value, told), (&at(1), "ncc", &Told::Waiting), "the old tree is gone at once");
-    answer(&mut state, explain(1), WhyReply::Explanation(Box::new(empty)));
+    answer::<ShowWhy>(&mut state, &empty);
     // A value of an earlier step can be looked into from here.
     state.perform(Command::Why(Ask::Value { step: 0, value: "position".to_owned() }));
     state.follow_why();
@@ -68,13 +72,12 @@ fn a_branch_that_is_looked_at_gets_its_own_tree() {
     state.session.as_mut().unwrap().targets[0].runs.push(run);
     state.perform(Command::Why(Ask::Value { step: LOST, value: "ncc".to_owned() }));
     state.follow_why();
-    let request = asked(&mut state).remove(0);
-    let refused = Problem::new(422, "request", "", "no such value");
-    state.arrived(Arrived { request: Request::Why(request), outcome: Err(refused) }, 0.0);
+    refuse::<ShowWhy>(&mut state, Problem::new(422, "request", "", "no such value"));
+    state.take_requests();
     state.perform(Command::Look { target: 0, run: 1 });
     state.follow_why();
     let branch = StepKey { run: 1, ..key() };
-    assert_eq!(asked(&mut state), vec![WhyRequest::Explain { of: branch.clone(), value: "ncc".to_owned() }]);
+    assert_eq!(calls_of::<ShowWhy>(&mut state), [explain(&branch)]);
     assert_eq!((state.explained().unwrap().0, state.why.asked.len()), (&branch, 1));
 }
 
@@ -83,6 +86,6 @@ fn what_would_have_saved_the_pick_is_answered_without_asking_the_server() {
     let mut state = fixture::at_step(&egui::Context::default(), 0);
     state.take_requests();
     state.perform(Command::Why(Ask::Saved));
-    assert!(asked(&mut state).is_empty());
+    assert!(calls_of::<AskCounterfactual>(&mut state).is_empty());
     assert!(state.messages.newest().unwrap().text.contains("picked at this step"));
 }

@@ -2,6 +2,9 @@
 
 use egui_kittest::kittest::{NodeT, Queryable};
 use serde_json::json;
+use sightline_api::endpoint::Call;
+use sightline_api::endpoints::{AskCounterfactual, ForkRun, ShowCounterfactual, ShowWhy, TryStep};
+use sightline_api::query::ValueName;
 use sightline_api::wire::{Event, Problem};
 use sightline_geometry::frames::Pixel;
 use sightline_session::Fork;
@@ -16,12 +19,10 @@ use crate::cache::StepKey;
 use crate::command::keys;
 use crate::command::{Command, Go, Zoomable};
 use crate::drawing::view2d::View2d;
-use crate::net::request::{Arrived, Request};
-use crate::net::why::{WhyReply, WhyRequest};
 use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::state::effect::Effect;
-use crate::tests::questions::{answer, asked};
+use crate::tests::calls::{answer, bodies, calls_of, refuse};
 use crate::tests::{Shown, fixture};
 use crate::why::{Ask, Told};
 
@@ -30,6 +31,11 @@ const LOST: usize = 3;
 
 fn key() -> StepKey {
     StepKey { session: "s1".to_owned(), target: 0, run: 0, step: LOST }
+}
+
+/// Explains a value of that step.
+fn explain(value: &str) -> Call {
+    Call::with_query::<ShowWhy>(&key(), &ValueName { value: Some(value.to_owned()) })
 }
 
 fn lost() -> State {
@@ -140,14 +146,13 @@ fn while_a_change_is_tried_only_the_newest_is_asked_for_next() {
             value: Some(json!(value)),
         }));
     }
-    let first = asked(&mut state);
-    assert_eq!(first, vec![WhyRequest::WhatIf { of: key(), what_if: side(61) }], "one at a time");
-    answer(&mut state, first[0].clone(), WhyReply::Ghost(Box::new(ghost(side(61)))));
+    let trial = |value: u64| Call::with_body::<TryStep>(&key(), &side(value));
+    assert_eq!(calls_of::<TryStep>(&mut state), [trial(61)], "one at a time");
+    answer::<TryStep>(&mut state, &ghost(side(61)));
     assert_eq!(state.trial().unwrap().ghost.as_ref().unwrap().what_if, side(61), "the last answer stands");
-    let next = asked(&mut state);
-    assert_eq!(next, vec![WhyRequest::WhatIf { of: key(), what_if: side(101) }], "the newest, not the next");
-    answer(&mut state, next[0].clone(), WhyReply::Ghost(Box::new(ghost(side(101)))));
-    assert!(asked(&mut state).is_empty());
+    assert_eq!(calls_of::<TryStep>(&mut state), [trial(101)], "the newest, not the next");
+    answer::<TryStep>(&mut state, &ghost(side(101)));
+    assert!(calls_of::<TryStep>(&mut state).is_empty());
     // Dragging is one deed.
     state.perform(Command::Why(Ask::Undo));
     assert!(state.trial().is_none());
@@ -162,14 +167,14 @@ fn while_a_change_is_tried_only_the_newest_is_asked_for_next() {
 fn a_change_that_is_refused_says_so_in_the_card_and_loses_nothing() {
     let mut state = lost();
     state.perform(Command::Why(Ask::Try(changing("search_window_px", json!(61)))));
-    let request = Request::Why(asked(&mut state).remove(0));
     let (code, title, detail) =
         ("setting".to_owned(), String::new(), "search_window_px must be odd".to_owned());
     let problem =
         Problem { code, title, status: 422, detail, hint: None, nearest_pixel: None, received: None };
-    state.arrived(Arrived { request, outcome: Err(problem) }, 0.0);
+    state.take_requests();
+    refuse::<TryStep>(&mut state, problem);
     assert_eq!(state.trial().unwrap().refused.as_deref(), Some("search_window_px must be odd"));
-    assert!(asked(&mut state).is_empty(), "it is not asked for again and again");
+    assert!(calls_of::<TryStep>(&mut state).is_empty(), "it is not asked for again and again");
 }
 
 #[test]
@@ -178,8 +183,7 @@ fn the_ghost_has_a_card_with_what_changed_and_what_can_be_done() {
         let mut state = fixture::at_step(context, LOST);
         let what_if = changing("search_window_px", json!(81));
         state.perform(Command::Why(Ask::Try(what_if.clone())));
-        let request = WhyRequest::WhatIf { of: key(), what_if: what_if.clone() };
-        answer(&mut state, request, WhyReply::Ghost(Box::new(ghost(what_if))));
+        answer::<TryStep>(&mut state, &ghost(what_if));
         state
     });
     shown.says("search_window_px = 81 instead of 143").says("TRACKING").says("was lost").says("Δ +0.420");
@@ -217,11 +221,7 @@ fn a_branch_takes_settings_and_prediction_along() {
         Some(Command::Why(Ask::Discard))
     );
     state.perform(Command::Why(Ask::Branch));
-    let new = state.take_requests().into_iter().find_map(|request| match request {
-        Request::NewRun { new, .. } => Some(new),
-        _ => None,
-    });
-    let new = new.unwrap();
+    let [new] = bodies::<ForkRun>(&mut state).try_into().unwrap();
     assert_eq!((new.run, new.from_step, new.prediction_px), (0, LOST, Some(pixel)));
     assert_eq!(new.settings, Changes::from([("ncc_min".to_owned(), json!(0.4))]));
 }
@@ -241,7 +241,8 @@ fn the_findings_can_be_tried_and_run_from_here() {
         move |context| {
             let mut state = fixture::at_step(context, LOST);
             let question = question(QuestionState::Done, vec![right, false_one]);
-            answer(&mut state, WhyRequest::AskQuestion(key()), WhyReply::Question(Box::new(question)));
+            state.perform(Command::Why(Ask::Saved));
+            answer::<AskCounterfactual>(&mut state, &question);
             state
         },
         |ui, state, out| {
@@ -277,7 +278,8 @@ fn a_question_that_goes_on_shows_how_far_and_can_be_cancelled() {
     let mut shown = Shown::pane(Pane::Why, |context| {
         let mut state = fixture::at_step(context, LOST);
         let question = question(QuestionState::Running, vec![finding("ncc_min", 0.4, Outcome::Unknown)]);
-        answer(&mut state, WhyRequest::Question(key()), WhyReply::Question(Box::new(question)));
+        state.want_question();
+        answer::<ShowCounterfactual>(&mut state, &question);
         state
     });
     shown.says("4 of 31: kernel").says("ncc_min 0.4 instead of 0.7");
@@ -289,23 +291,26 @@ fn a_question_is_asked_once_followed_by_events_and_found_again_by_a_new_page() {
     let mut state = lost();
     state.want_question();
     state.want_question();
-    assert_eq!(asked(&mut state), vec![WhyRequest::Question(key())], "looked for once");
+    let reads = |state: &mut State| calls_of::<ShowCounterfactual>(state).len();
+    let unasked = question(QuestionState::Unasked, Vec::new());
+    assert_eq!(reads(&mut state), 1, "looked for once");
+    answer::<ShowCounterfactual>(&mut state, &unasked);
     state.perform(Command::Why(Ask::Saved));
     state.perform(Command::Why(Ask::Saved));
-    assert_eq!(asked(&mut state), vec![WhyRequest::AskQuestion(key())]);
+    assert_eq!(calls_of::<AskCounterfactual>(&mut state), [Call::to::<AskCounterfactual>(&key())]);
     let StepKey { session, target, run, step } = key();
     state.told(Event::QuestionProgress { session, target, run, step, k: 1, n: 9, ended: false });
-    assert_eq!(asked(&mut state), vec![WhyRequest::Question(key())]);
+    assert_eq!(reads(&mut state), 1);
     assert_eq!(state.question(), Some(&Told::Waiting));
     // A page that missed events reads the session again, and what is still being answered with it.
     let running = question(QuestionState::Running, Vec::new());
-    answer(&mut state, WhyRequest::Question(key()), WhyReply::Question(Box::new(running)));
+    answer::<ShowCounterfactual>(&mut state, &running);
     state.told(Event::SessionChanged { session: "s1".to_owned() });
-    assert_eq!(asked(&mut state), vec![WhyRequest::Question(key())]);
+    assert_eq!(reads(&mut state), 1);
     let done = question(QuestionState::Done, Vec::new());
-    answer(&mut state, WhyRequest::Question(key()), WhyReply::Question(Box::new(done)));
+    answer::<ShowCounterfactual>(&mut state, &done);
     state.told(Event::SessionChanged { session: "s1".to_owned() });
-    assert!(asked(&mut state).is_empty());
+    assert_eq!(reads(&mut state), 0);
 }
 
 #[test]
@@ -347,10 +352,9 @@ fn a_value_shows_its_tree_and_each_line_of_it_can_be_asked_about() {
     let mut shown = Shown::pane(Pane::Why, move |context| {
         let mut state = fixture::at_step(context, LOST);
         state.perform(Command::Why(Ask::Value { step: LOST, value: "ncc".to_owned() }));
-        let request = asked(&mut state).remove(0);
+        assert_eq!(calls_of::<ShowWhy>(&mut state), [explain("ncc")]);
         assert!(state.take_effects().contains(&Effect::reveal(Pane::Why)), "the panel comes to the front");
-        assert_eq!(request, WhyRequest::Explain { of: key(), value: "ncc".to_owned() });
-        answer(&mut state, request, WhyReply::Explanation(Box::new(explanation)));
+        answer::<ShowWhy>(&mut state, &explanation);
         state
     });
     shown.says("= the score of the peak").says("from file: images/left_0003.png").says("· match_template");
@@ -364,7 +368,7 @@ fn w_asks_for_the_worst_criterion_first_and_numbers_elsewhere_lead_to_why() {
     assert_eq!(keys::command(egui::Key::W, egui::Modifiers::NONE, &state), Some(Command::Why(Ask::Selected)));
     assert_eq!(keys::command(egui::Key::C, egui::Modifiers::NONE, &state), Some(Command::Why(Ask::Saved)));
     state.perform(Command::Why(Ask::Selected));
-    assert_eq!(asked(&mut state), vec![WhyRequest::Explain { of: key(), value: "gate.ncc".to_owned() }]);
+    assert_eq!(calls_of::<ShowWhy>(&mut state), [explain("gate.ncc")]);
     let value = |name: &str| vec![Command::Why(Ask::Value { step: LOST, value: name.to_owned() })];
     let mut gates = Shown::pane(Pane::Gates, |context| fixture::at_step(context, LOST));
     assert_eq!(gates.click("match score"), value("gate.ncc"));

@@ -1,28 +1,29 @@
-//! Carries out what a person asks about a step, and takes in what the server answers.
+//! The user's questions about a step, their calls, and what the replies change.
 
 use serde_json::Value;
-use sightline_api::wire::{NewRun, Problem};
+use sightline_api::endpoint::{Call, Endpoint, NoBody};
+use sightline_api::endpoints::{AskCounterfactual, CancelCounterfactual, ShowCounterfactual, ShowWhy};
+use sightline_api::query::ValueName;
+use sightline_api::wire::NewRun;
 use sightline_session::counterfactual::wire::{Question, QuestionState};
 use sightline_session::view::RunView;
 use sightline_session::what_if::WhatIf;
 use sightline_session::why::{Explanation, gates};
 
 use crate::cache::StepKey;
-use crate::net::request::Request;
-use crate::net::why::{WhyReply, WhyRequest};
 use crate::panels::pane::Pane;
 use crate::state::effect::Effect;
 use crate::state::{State, run_letter};
 use crate::what_if::Trial;
 use crate::why::{Ask, Told};
 
-/// How many values are remembered for the way back.
+/// Maximum number of values in the history of the panel.
 const REMEMBERED: usize = 50;
-/// How many trees are kept.
+/// Maximum number of stored trees.
 const KEPT: usize = 400;
 
 impl State {
-    /// What is tried at the cursor's step.
+    /// The trial at the cursor's step.
     pub fn trial(&self) -> Option<&Trial> {
         let key = self.step_key(self.cursor.step)?;
         self.why.trial.as_ref().filter(|trial| trial.of == key)
@@ -40,7 +41,7 @@ impl State {
         Some((key, value, tree))
     }
 
-    /// The branch that left the run at the cursor with this very change, where there is one.
+    /// The branch that left the run at the cursor's step with exactly this change.
     pub fn branch_of(&self, what_if: &WhatIf) -> Option<&RunView> {
         let (step, parent) = (self.cursor.step, self.run()?);
         let is_it = |run: &&RunView| {
@@ -59,7 +60,7 @@ impl State {
         tried.or_else(|| self.setting(group, key))
     }
 
-    /// Carries out what was asked.
+    /// Applies a command about a step.
     pub(crate) fn ask_why(&mut self, ask: Ask) {
         match ask {
             Ask::Value { step, value } => self.ask_value(step, value),
@@ -69,8 +70,9 @@ impl State {
             Ask::Selected => self.ask_selected(),
             Ask::Saved => self.ask_what_saves(),
             Ask::CancelSaved => {
-                let key = self.step_key(self.cursor.step);
-                self.outbox.extend(key.map(|key| Request::Why(WhyRequest::CancelQuestion(key))));
+                if let Some(key) = self.step_key(self.cursor.step) {
+                    self.call_question::<CancelCounterfactual>(key, false);
+                }
             }
             Ask::Try(what_if) => self.try_out(what_if),
             Ask::Change { key, value } => {
@@ -93,9 +95,7 @@ impl State {
                 }
             }
             Ask::BranchWith(what_if) => self.branch(&what_if),
-            Ask::RemoveRun { target, run } => {
-                self.ask(|session| Request::Why(WhyRequest::RemoveRun { session, target, run }));
-            }
+            Ask::RemoveRun { target, run } => self.remove_run(target, run),
             Ask::Undo => self.undo_last(),
             Ask::Redo => self.redo_last(),
         }
@@ -123,12 +123,15 @@ impl State {
         if self.why.trees.len() >= KEPT {
             self.why.trees.pop_first();
         }
-        let (of, value) = place.clone();
-        self.why.trees.insert(place, Told::Waiting);
-        self.outbox.push(Request::Why(WhyRequest::Explain { of, value }));
+        self.why.trees.insert(place.clone(), Told::Waiting);
+        let call = Call::with_query::<ShowWhy>(key, &ValueName { value: Some(value.to_owned()) });
+        self.call_with_problem::<ShowWhy>(call, move |state, outcome| {
+            let told = outcome.map_or_else(|problem| Told::Refused(problem.detail), Told::Here);
+            state.why.trees.insert(place, told);
+        });
     }
 
-    /// The last value asked for, at this step; before the first the worst criterion, else the state.
+    /// Explains the last explained value at this step; without one the gate with the smallest margin, else the state.
     fn ask_selected(&mut self) {
         let last = self.why.asked.last().map(|(_, value)| value.clone());
         let worst = || {
@@ -162,7 +165,7 @@ impl State {
         };
         if !goes_on {
             self.why.questions.insert(key.clone(), Told::Waiting);
-            self.outbox.push(Request::Why(WhyRequest::AskQuestion(key)));
+            self.call_question::<AskCounterfactual>(key, true);
         }
     }
 
@@ -174,100 +177,56 @@ impl State {
         let from_step = self.cursor.step;
         let (settings, prediction_px) = (what_if.settings.clone(), what_if.prediction_px);
         let new = NewRun { run, from_step, settings, prediction_px };
-        if self.ask(|session| Request::NewRun { session, target, new }) {
+        if self.fork(target, &new) {
             self.messages.note(format!("Running {} from step {from_step} as a branch …", run_letter(run)));
         }
     }
 
-    /// Takes in an answer.
-    pub(crate) fn told_why(&mut self, request: WhyRequest, reply: WhyReply) {
-        match (request, reply) {
-            (WhyRequest::Explain { of, value }, WhyReply::Explanation(explanation)) => {
-                self.why.trees.insert((of, value), Told::Here(*explanation));
+    /// Calls `E` about a question: to read, begin or cancel it.
+    fn call_question<E>(&mut self, key: StepKey, is_refusal_shown: bool)
+    where
+        E: Endpoint<At = StepKey, Body = NoBody, Reply = Question>,
+    {
+        self.call_with_problem::<E>(Call::to::<E>(&key), move |state, outcome| match outcome {
+            Ok(question) if question.state != QuestionState::Unasked => {
+                state.why.questions.insert(key, Told::Here(question));
             }
-            (WhyRequest::WhatIf { of, mut what_if }, WhyReply::Ghost(mut ghost)) => {
-                self.why.trying = None;
-                let has_scores = !what_if.arrays.is_empty();
-                // What is sent along is no part of the change.
-                what_if.arrays.clear();
-                ghost.what_if.arrays.clear();
-                let ours = self.why.trial.as_mut().filter(|trial| trial.of == of);
-                if let Some(trial) = ours {
-                    (trial.ghost, trial.has_scores) = (Some(*ghost), has_scores);
-                    if trial.what_if == what_if {
-                        trial.refused = None;
-                    }
-                }
-                self.send_trial();
+            Err(problem) if is_refusal_shown => {
+                state.why.questions.insert(key, Told::Refused(problem.detail));
             }
-            (
-                WhyRequest::Question(key) | WhyRequest::AskQuestion(key) | WhyRequest::CancelQuestion(key),
-                WhyReply::Question(question),
-            ) if question.state != QuestionState::Unasked => {
-                self.why.questions.insert(key, Told::Here(*question));
-            }
-            (request, WhyReply::Session(view)) => {
-                self.removed(&request);
-                self.adopt(*view, true);
-                self.sync.session_stale = true;
-            }
+            // Not asked yet, or ended meanwhile.
             _ => {}
-        }
+        });
     }
 
-    /// Takes in a refusal; true where it is to be said among the messages as well.
-    pub(crate) fn refused_why(&mut self, request: WhyRequest, problem: &Problem) -> bool {
-        match request {
-            WhyRequest::Explain { of, value } => {
-                self.why.trees.insert((of, value), Told::Refused(problem.detail.clone()));
-                false
-            }
-            WhyRequest::WhatIf { of, mut what_if } => {
-                self.why.trying = None;
-                what_if.arrays.clear();
-                let ours = self.why.trial.as_mut().filter(|trial| trial.of == of && trial.what_if == what_if);
-                if let Some(trial) = ours {
-                    trial.refused = Some(problem.detail.clone());
-                }
-                self.send_trial();
-                false
-            }
-            WhyRequest::AskQuestion(key) => {
-                self.why.questions.insert(key, Told::Refused(problem.detail.clone()));
-                false
-            }
-            // Nobody has asked, or it ended meanwhile.
-            WhyRequest::Question(_) | WhyRequest::CancelQuestion(_) => false,
-            WhyRequest::RemoveRun { .. }
-            | WhyRequest::RestoreRun { .. }
-            | WhyRequest::RestoreTarget { .. } => {
-                self.forget_silent(&request);
-                true
-            }
-        }
+    /// Reads how far a question is answered.
+    fn read_question(&mut self, key: StepKey) {
+        self.call_question::<ShowCounterfactual>(key, false);
     }
 
-    /// Takes in that a question went on.
+    /// Reads a question again after an event about it.
     pub(crate) fn question_went_on(&mut self, key: StepKey) {
         if self.session.as_ref().is_some_and(|session| session.id == key.session) {
-            self.outbox.push(Request::Why(WhyRequest::Question(key)));
+            self.read_question(key);
         }
     }
 
-    /// Asks again for what is still being answered: a page that missed events is told that the session changed.
+    /// Reads the unanswered questions again: the page may have missed events about them.
     pub(crate) fn follow_questions(&mut self) {
         let is_open =
             |told: &Told<Question>| matches!(told, Told::Here(question) if !question.state.is_over());
-        let open = self.why.questions.iter().filter(|(_, told)| is_open(told));
-        self.outbox.extend(open.map(|(key, _)| Request::Why(WhyRequest::Question(key.clone()))));
+        let open = self.why.questions.iter().filter(|(_, told)| is_open(told)).map(|(key, _)| key.clone());
+        for key in open.collect::<Vec<_>>() {
+            self.read_question(key);
+        }
     }
 
-    /// Asks once whether somebody has asked what saves the cursor's step: a page that was loaded again finds its answer.
+    /// Reads once whether the question about the cursor's step was asked before: a reloaded page finds its answer.
     pub fn want_question(&mut self) {
         let is_lost = self.row().is_some_and(|row| row.state != "tracking" || row.tracked == Some(false));
         let Some(key) = self.step_key(self.cursor.step).filter(|_| is_lost) else { return };
         if self.why.looked_for.insert(key.clone()) {
-            self.outbox.push(Request::Why(WhyRequest::Question(key)));
+            self.read_question(key);
         }
     }
 }

@@ -8,7 +8,6 @@ use super::Goal;
 use crate::what_if::Base;
 use sightline_track::limits::SettingInfo;
 use sightline_track::locate::Evidence;
-use sightline_track::locate::features::settings::{MotionGate, MotionWeighting};
 use sightline_track::settings::Settings;
 use sightline_track::target::TrackingState;
 
@@ -80,7 +79,7 @@ fn is_used(info: &SettingInfo, base: &Base<'_>, goal: Goal) -> bool {
         "limits" if by_template => limit_is_used(key, base, goal),
         "limits" => !by_shape && confidence_is_used(key, base),
         "template" => by_template && template_is_used(key, base),
-        "features" => base.recorded.features().is_some() && features_are_used(key, base.settings),
+        "features" => base.recorded.features().is_some(),
         "shape" => base.recorded.shape().is_some() && shape_is_used(key, base),
         _ => false,
     }
@@ -120,16 +119,6 @@ fn template_is_used(key: &str, base: &Base<'_>) -> bool {
 fn is_matched(base: &Base<'_>) -> bool {
     let gates = base.recorded.verdict().into_iter().flat_map(|verdict| &verdict.gates);
     gates.into_iter().any(|gate| gate.name == "ncc" && gate.passed)
-}
-
-fn features_are_used(key: &str, settings: &Settings) -> bool {
-    let own = &settings.features;
-    match key {
-        "feature_sigma_px" | "feature_sigma_per_scale" => {
-            own.motion_gate == MotionGate::Mahalanobis || own.motion_weighting == MotionWeighting::Range
-        }
-        _ => true,
-    }
 }
 
 fn shape_is_used(key: &str, base: &Base<'_>) -> bool {

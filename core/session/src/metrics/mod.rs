@@ -19,6 +19,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use self::uncertainty::Uncertainty;
+use crate::format;
 use crate::step::RunStep;
 use sightline_track::target::TrackingState;
 use sightline_world::target_truth::{StepTruth, TruthKind};
@@ -194,6 +195,13 @@ fn excluded(pick: Option<&RunStep>, faulty: &[&RunStep], judged: &[Judged<'_>]) 
 }
 
 impl Metric {
+    /// A value of this metric as text without its unit; shares are in per cent.
+    pub fn words(&self, value: f64) -> String {
+        let is_share = self.name.starts_with("pck_")
+            || matches!(self.name.as_str(), "average_jaccard" | "occlusion_accuracy" | "inside_3_sigma");
+        if is_share { format!("{:.0} %", value * 100.0) } else { format::number(value) }
+    }
+
     fn new(
         name: impl Into<String>,
         unit: &str,

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `template` (Kim et al. 2009) | `scale_roll` → `match_template` → `point_stereo` → `triangulate` |
 //! | `features` (Deans et al. 2005) | `detect` → `match_features` → `triangulate` → `fit_motion` → `bootstrap` |
-//! | `shape` (Deans et al. 2005) | `surface` → `mesh` → `coarse_register` → `refine_register` → `carried_ray` |
+//! | `shape` (Deans et al. 2005) | `surface` → `coarse_register` → `refine_register` → `carried_ray` |
 //! | `combined` (D§4) | those of `features` on the way, those of `shape` at the end |
 //!
 //! This file is the only one that lists the trackers. A trait with associated types cannot be a trait object, so that

@@ -63,10 +63,11 @@ pub struct CoarseSearch {
     pub candidates: Vec<Candidate>,
     /// How many positions were compared, all levels together.
     pub comparisons: u64,
-    /// Scores of all positions of the coarsest level; its pixels are `factor` px of the image.
+    /// Scores of all positions of the coarsest level; its pixels are `factor` px of the image. Not serialised: `None` in
+    /// a record that was read from JSON.
     #[serde(skip)]
     #[schema(ignore)]
-    pub coarse: Surface,
+    pub coarse: Option<Surface>,
 }
 
 /// Finds the middle `size` × `size` px of `wide` in `region`: the visited scores at whole pixels, and the record.
@@ -102,7 +103,10 @@ pub fn coarse_to_fine(
         // The quartic of the sub-pixel fit passes through 5 × 5 scores.
         comparisons += levels.visit(0, [best.x as i32, best.y as i32], 2, &mut visited);
     }
-    Some((visited, CoarseSearch { factor: 1 << descent.levels, candidates, comparisons, coarse }))
+    Some((
+        visited,
+        CoarseSearch { factor: 1 << descent.levels, candidates, comparisons, coarse: Some(coarse) },
+    ))
 }
 
 impl Descent {

@@ -72,5 +72,6 @@ fn positions_that_were_not_visited_have_no_score() {
     let visited = surface.valid_positions();
     assert!((25..=6 * 25).contains(&visited), "{visited}");
     assert!((surface.maximum().unwrap().2 - 1.0).abs() < 1e-5);
-    assert_eq!((search.coarse.width, search.coarse.template_size), (36, 5));
+    let coarse = search.coarse.as_ref().unwrap();
+    assert_eq!((coarse.width, coarse.template_size), (36, 5));
 }

@@ -2,8 +2,10 @@
 
 use egui::{CollapsingHeader, Grid, RichText, Ui};
 use serde_json::Value;
+use sightline_record::Unit;
 use sightline_session::compare::Difference;
 use sightline_session::compare::differ::{differences, told_apart, words_of};
+use sightline_session::records;
 use sightline_session::step::{RunStep, StepRow};
 use sightline_track::stages::judge::Gate;
 
@@ -30,30 +32,16 @@ fn first(state: &State) -> Option<Other<'_>> {
     state.others().into_iter().next()
 }
 
-/// Behind a value of the status line: its difference, in `unit`s.
-pub(crate) fn after(ui: &mut Ui, state: &State, name: &str) {
+/// Behind a value of the status line: its difference in a unit.
+pub(crate) fn after(ui: &mut Ui, state: &State, column: &str, unit: Unit) {
     let Some(other) = first(state) else { return };
-    let Some(delta) =
-        state.row().zip(state.other_row(&other)).and_then(|(own, other)| delta(name, own, other))
-    else {
-        return;
-    };
+    let value = |row: &StepRow| records::row_value_in(row, column, unit);
+    let values = state.row().and_then(value).zip(state.other_row(&other).and_then(value));
+    let (Some((own, there)), Some(declared)) = (values, records::row_quantity(column)) else { return };
+    let (delta, name) = (own - there, &declared.label);
     let words = RichText::new(format!("Δ{}", signed(delta))).monospace().size(11.0).color(other.look.colour);
     let help = format!("{name}: this run less {}", state.run_label(other.name));
     ui.label(words).on_hover_text(help);
-}
-
-/// The difference of a value of the status line.
-fn delta(name: &str, own: &StepRow, other: &StepRow) -> Option<f64> {
-    let value = |row: &StepRow| match name {
-        "ncc" => row.ncc,
-        "inliers" => row.inliers.map(|count| count as f64),
-        "confidence" => row.confidence,
-        "err" => row.err_px,
-        "σ" => row.sigma_m.map(|sigma_m| sigma_m * 100.0),
-        _ => None,
-    };
-    Some(value(own)? - value(other)?)
 }
 
 /// At the end of the status line: the states of the compared runs.

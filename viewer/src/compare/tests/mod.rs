@@ -7,9 +7,10 @@ use std::sync::Arc;
 
 use egui::{Context, Key as Keyboard, Modifiers};
 use egui_kittest::kittest::Queryable;
+use sightline_api::endpoints::{CompareRuns, ShowMetrics};
 use sightline_api::wire::Problem;
 use sightline_geometry::frames::Pixel;
-use sightline_session::compare::{Alignment, Compared, RunName, compare};
+use sightline_session::compare::{Alignment, Compared, NewComparison, RunName, compare};
 use sightline_session::metrics::metrics;
 use sightline_session::step::RunStep;
 use sightline_session::summary::summarise;
@@ -26,11 +27,11 @@ use crate::compare::{Ask, Sort, View};
 use crate::drawing::raster::Raster;
 use crate::drawing::view2d::View2d;
 use crate::layout::show_pane;
-use crate::net::request::{Arrived, Reply, Request};
 use crate::panels::pane::Pane;
 use crate::panels::{bars, images_left, runs};
 use crate::state::State;
 use crate::tests::Shown;
+use crate::tests::calls::{self, bodies, calls, calls_of};
 use crate::tests::fixture;
 use crate::tests::fixture::STOPS;
 
@@ -85,6 +86,7 @@ fn two_runs(context: &Context, step: usize) -> State {
         fork: None,
         changes: settings.changes(),
         settings,
+        without_effect: Default::default(),
         rows: traces.iter().map(RunStep::row).collect(),
         complete: false,
         stopped: None,
@@ -124,21 +126,20 @@ fn steps(name: RunName) -> Vec<Arc<RunStep>> {
 fn answer(state: &mut State) -> usize {
     let mut comparisons = 0;
     for _ in 0..6 {
-        for request in state.take_requests() {
-            let reply = match &request {
-                Request::Compare { new, .. } => {
-                    comparisons += 1;
-                    let run = |&name: &RunName| {
-                        let settings = if name == A { Settings::default() } else { settings_b() };
-                        Compared { name, settings: Arc::new(settings), steps: steps(name) }
-                    };
-                    let runs: Vec<Compared> = new.runs.iter().map(run).collect();
-                    Reply::Compared(Box::new(compare(&runs, new).unwrap()))
-                }
-                Request::Metrics { run, .. } => Reply::Metrics(Box::new(metrics(&steps(*run)))),
-                _ => continue,
-            };
-            state.arrived(Arrived { request, outcome: Ok(reply) }, 0.0);
+        for call in calls(state) {
+            if call.is_to::<CompareRuns>() {
+                comparisons += 1;
+                let new: NewComparison = serde_json::from_slice(&call.body.unwrap()).unwrap();
+                let run = |&name: &RunName| {
+                    let settings = if name == A { Settings::default() } else { settings_b() };
+                    Compared { name, settings: Arc::new(settings), steps: steps(name) }
+                };
+                let runs: Vec<Compared> = new.runs.iter().map(run).collect();
+                calls::answer::<CompareRuns>(state, &compare(&runs, &new).unwrap());
+            } else if call.is_to::<ShowMetrics>() {
+                let name = if call.path.contains("/runs/0/") { A } else { B };
+                calls::answer::<ShowMetrics>(state, &metrics(&steps(name)));
+            }
         }
     }
     comparisons
@@ -173,14 +174,12 @@ fn paints(shown: &Shown<'_>, words: &str) -> bool {
 
 /// Answers a comparison as if run B had driven twice as far between its stops.
 fn twice_as_far(state: &mut State) {
-    let request = state.take_requests().into_iter().find(|r| matches!(r, Request::Compare { .. })).unwrap();
-    let Request::Compare { new, .. } = &request else { panic!("a comparison was asked for") };
+    let [new] = bodies::<CompareRuns>(state).try_into().unwrap();
     let mut faster = traces_b();
     faster.iter_mut().for_each(|trace| trace.update.target.travelled_m *= 2.0);
     let runs = [
         Compared { name: A, settings: Arc::default(), steps: steps(A) },
         Compared { name: B, settings: Arc::default(), steps: faster.into_iter().map(Arc::new).collect() },
     ];
-    let found = compare(&runs, new).unwrap();
-    state.arrived(Arrived { request, outcome: Ok(Reply::Compared(Box::new(found))) }, 0.0);
+    calls::answer::<CompareRuns>(state, &compare(&runs, &new).unwrap());
 }

@@ -303,11 +303,8 @@ fn the_uncertainty_has_a_sentence_for_each_run_and_words_for_each_plot() {
         let mut traces = traces_a();
         traces.iter_mut().for_each(|trace| trace.truth = None);
         let steps: Vec<_> = traces.into_iter().map(Arc::new).collect();
-        for request in state.take_requests() {
-            if let Request::Metrics { .. } = &request {
-                let reply = Reply::Metrics(Box::new(metrics(&steps)));
-                state.arrived(Arrived { request, outcome: Ok(reply) }, 0.0);
-            }
+        for _ in calls_of::<ShowMetrics>(&mut state) {
+            calls::answer::<ShowMetrics>(&mut state, &metrics(&steps));
         }
         state
     });

@@ -39,7 +39,6 @@ fn the_first_divergence_goes_to_step_and_stage_and_says_the_sentence() {
 fn a_refused_comparison_says_why() {
     let mut state = two_runs(&Context::default(), 1);
     state.perform(Command::Compare(Ask::With { place: 0, run: Some(B) }));
-    let request = state.take_requests().into_iter().find(|r| matches!(r, Request::Compare { .. })).unwrap();
     let problem = Problem {
         code: "request".to_owned(),
         title: String::new(),
@@ -49,7 +48,8 @@ fn a_refused_comparison_says_why() {
         nearest_pixel: None,
         received: None,
     };
-    state.arrived(Arrived { request, outcome: Err(problem) }, 0.0);
+    state.take_requests();
+    calls::refuse::<CompareRuns>(&mut state, problem);
     assert_eq!(state.comparison_problem(), Some("target 0 has no run 1"));
     state.perform(Command::Compare(Ask::FirstDivergence));
     assert_eq!(state.messages.newest().unwrap().text, "target 0 has no run 1");
@@ -113,10 +113,7 @@ fn a_visit_goes_to_the_run_and_the_step() {
 #[test]
 fn metrics_are_asked_for_only_while_they_are_looked_at() {
     let mut state = two_runs(&Context::default(), 2);
-    let asked = |state: &mut State| {
-        let requests = state.take_requests();
-        requests.into_iter().filter(|request| matches!(request, Request::Metrics { .. })).count()
-    };
+    let asked = |state: &mut State| calls_of::<ShowMetrics>(state).len();
     assert_eq!(asked(&mut state), 0);
     state.compare.wants_metrics = true;
     assert_eq!(asked(&mut state), 2);

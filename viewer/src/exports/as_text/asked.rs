@@ -1,30 +1,32 @@
-//! What the page asks of the server for what it shows, as requests that anybody can repeat: where a number came from, what is
-//! tried, what would have saved a step, the comparison, metrics, breakpoints, columns, trackability, studies, the stream.
+//! The calls behind what the page shows, for anybody to repeat: explanation of a number, trial, counterfactual, comparison,
+//! metrics, breakpoints, columns, trackability, studies, live stream.
 
 use sightline_api::endpoint::Call;
+use sightline_api::endpoints::{
+    AddBreakpoint, AskCounterfactual, CompareRuns, QuerySession, ShowMetrics, ShowTrackability, ShowWhy,
+    TryStep,
+};
+use sightline_api::location::{AtRun, AtSession};
+use sightline_api::query::ValueName;
 use sightline_session::breakpoints::NewBreakpoint;
 use sightline_session::compare::NewComparison;
 use sightline_session::query::Query;
 
-use crate::breakpoints::AskRequest;
 use crate::exports::update::stream_to_rerun;
-use crate::net::request::Request;
-use crate::net::why::WhyRequest;
 use crate::state::State;
 use crate::studies::update::start_study;
+use crate::trackability::update::map_call;
 
-/// What is asked where the cursor is, each with its words.
+/// The calls about what is shown at the cursor, each with its words.
 pub(crate) fn calls(state: &State, session: &str) -> Vec<(String, Call)> {
-    let mut requests = of_step(state);
-    requests.extend(of_runs(state, session));
-    requests.extend(of_expressions(state, session));
+    let mut calls = of_step(state);
+    calls.extend(of_runs(state, session));
+    calls.extend(of_expressions(state, session));
     if let Some(traverse) = &state.traverse {
         let (step, limits) = (state.cursor.step, state.trackability.limits.clone());
-        let request = Request::Trackability { traverse: traverse.id.clone(), step, limits };
-        requests.push((format!("map of trackability at step {step}"), request));
+        let call = map_call::<ShowTrackability>(&(traverse.id.clone(), step, limits));
+        calls.push((format!("map of trackability at step {step}"), call));
     }
-    let called = |(words, request): (String, Request)| Some((words, request.call()?));
-    let mut calls: Vec<(String, Call)> = requests.into_iter().filter_map(called).collect();
     if let Some(new) = state.studies.chosen().and_then(|info| state.studies.order.request(&info.name).ok()) {
         calls.push((format!("start the study {}", new.study), start_study(&new)));
     }
@@ -34,57 +36,57 @@ pub(crate) fn calls(state: &State, session: &str) -> Vec<(String, Call)> {
     calls
 }
 
-/// About the step that is looked at.
-fn of_step(state: &State) -> Vec<(String, Request)> {
-    let Some(of) = state.step_key(state.cursor.step).filter(|_| state.row().is_some()) else {
+/// About the step at the cursor.
+fn of_step(state: &State) -> Vec<(String, Call)> {
+    let Some(at) = state.step_key(state.cursor.step).filter(|_| state.row().is_some()) else {
         return Vec::new();
     };
-    let step = of.step;
-    let mut asked = Vec::new();
+    let step = at.step;
+    let mut calls = Vec::new();
     if let Some((of, value, _)) = state.explained() {
-        let request = WhyRequest::Explain { of: of.clone(), value: value.to_owned() };
-        asked.push((format!("why {value} at step {}", of.step), request));
+        let call = Call::with_query::<ShowWhy>(of, &ValueName { value: Some(value.to_owned()) });
+        calls.push((format!("why {value} at step {}", of.step), call));
     }
     if let Some(trial) = state.trial() {
-        let what_if = trial.what_if.clone();
-        asked.push((format!("what if, at step {step}"), WhyRequest::WhatIf { of: of.clone(), what_if }));
+        calls.push((format!("what if, at step {step}"), Call::with_body::<TryStep>(&at, &trial.what_if)));
     }
     if state.row().is_some_and(|row| row.state != "tracking" || row.tracked == Some(false)) {
-        asked.push((format!("what would have saved step {step}"), WhyRequest::AskQuestion(of)));
+        calls.push((format!("what would have saved step {step}"), Call::to::<AskCounterfactual>(&at)));
     }
-    asked.into_iter().map(|(words, request)| (words, Request::Why(request))).collect()
+    calls
 }
 
-/// About the run that is looked at and those beside it.
-fn of_runs(state: &State, session: &str) -> Vec<(String, Request)> {
-    let mut requests = Vec::new();
-    if let Some(run) = state.own_name() {
-        let words = format!("metrics of {}", state.run_label(run));
-        requests.push((words, Request::Metrics { session: session.to_owned(), run }));
+/// About the run at the cursor and those compared with it.
+fn of_runs(state: &State, session: &str) -> Vec<(String, Call)> {
+    let session = session.to_owned();
+    let mut calls = Vec::new();
+    if let Some(name) = state.own_name() {
+        let at = AtRun { session: session.clone(), target: name.target, run: name.run };
+        calls.push((format!("metrics of {}", state.run_label(name)), Call::to::<ShowMetrics>(&at)));
     }
     if let Some(runs) = state.compared_names() {
         let labels: Vec<String> = runs.iter().map(|&run| state.run_label(run)).collect();
         let (align, tolerance) = (state.compare.align, state.tolerances());
-        let new = Box::new(NewComparison { runs, align, tolerance, columns: None });
-        let words = format!("compare {}", labels.join(", "));
-        requests.push((words, Request::Compare { session: session.to_owned(), new }));
+        let new = NewComparison { runs, align, tolerance, columns: None };
+        let call = Call::with_body::<CompareRuns>(&AtSession { session }, &new);
+        calls.push((format!("compare {}", labels.join(", ")), call));
     }
-    requests
+    calls
 }
 
 /// Breakpoints and plotted expressions.
-fn of_expressions(state: &State, session: &str) -> Vec<(String, Request)> {
-    let session = || session.to_owned();
+fn of_expressions(state: &State, session: &str) -> Vec<(String, Call)> {
+    let at = AtSession { session: session.to_owned() };
     let breakpoints = state.ask.breakpoints.iter().map(|known| {
         let new = NewBreakpoint { expression: Some(known.expression.clone()), step: None };
-        (format!("break when {}", known.expression), AskRequest::Add { session: session(), new })
+        (format!("break when {}", known.expression), Call::with_body::<AddBreakpoint>(&at, &new))
     });
     let columns = state.ask.derived.iter().map(|derived| {
         let query =
             Query { expression: derived.expression.clone(), target: state.cursor.target, values: true };
-        (format!("column {}", derived.expression), AskRequest::Query { session: session(), query })
+        (format!("column {}", derived.expression), Call::with_body::<QuerySession>(&at, &query))
     });
-    breakpoints.chain(columns).map(|(words, request)| (words, Request::Ask(request))).collect()
+    breakpoints.chain(columns).collect()
 }
 
 #[cfg(test)]

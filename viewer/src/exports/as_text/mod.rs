@@ -3,6 +3,8 @@
 mod asked;
 
 use sightline_api::endpoint::Call;
+use sightline_api::endpoints::{CancelRun, DesignateTarget, ForkRun, MoveCursor, ShowStep};
+use sightline_api::location::{AtRun, AtSession, AtTarget};
 use sightline_api::wire::{NewRun, NewTarget};
 use sightline_session::exports::ExportEntry;
 use sightline_session::shell::{self, Curl};
@@ -10,7 +12,6 @@ use sightline_session::view::{RunView, TargetView};
 use sightline_track::settings::Changes;
 use sightline_track::target::Designation;
 
-use crate::net::request::Request;
 use crate::state::{State, run_letter};
 
 /// An action that a person may want to repeat elsewhere.
@@ -22,6 +23,13 @@ pub(crate) struct Action {
     pub command: Option<String>,
     /// As `curl`.
     pub http: String,
+}
+
+impl Action {
+    /// A call that the command line does not have.
+    fn of(state: &State, words: String, call: Call) -> Self {
+        Self { words, command: None, http: http(&state.origin, call) }
+    }
 }
 
 /// A call as `curl`.
@@ -38,23 +46,22 @@ pub(crate) fn download(origin: &str, entry: &ExportEntry) -> String {
     Curl { method: "GET", url: &url, body: None, revision: None, file: Some(&entry.file) }.text()
 }
 
-/// A request as a command of the program; none where it has no such command.
-pub(crate) fn command(state: &State, request: &Request) -> Option<String> {
-    let drive = &state.traverse.as_ref()?.source;
-    match request {
-        Request::NewTarget { target, .. } => track(drive, target),
-        Request::NewRun { target, new, .. } => {
-            let of = state.session.as_ref()?.targets.iter().find(|known| known.number == *target)?;
-            // A run that leaves another on its way has steps of both, which the command line does not do.
-            if new.from_step > of.designation.step {
-                return None;
-            }
-            let mut changes = of.runs.iter().find(|run| run.number == new.run)?.changes.clone();
-            changes.extend(new.settings.clone());
-            track(drive, &target_of(of, changes))
-        }
-        _ => None,
-    }
+/// A designation as an action.
+fn designate(state: &State, words: String, session: &str, target: &NewTarget) -> Action {
+    let call = Call::with_body::<DesignateTarget>(&AtSession { session: session.to_owned() }, target);
+    Action { command: track(state, target), ..Action::of(state, words, call) }
+}
+
+/// A fork of a run as an action; the command line has no fork on the way, whose steps belong to two runs.
+fn fork(state: &State, words: String, session: &str, target: &TargetView, new: &NewRun) -> Action {
+    let at = AtTarget { session: session.to_owned(), target: target.number };
+    let parent = target.runs.iter().find(|run| run.number == new.run);
+    let command = parent.filter(|_| new.from_step <= target.designation.step).and_then(|parent| {
+        let mut changes = parent.changes.clone();
+        changes.extend(new.settings.clone());
+        track(state, &target_of(target, changes))
+    });
+    Action { command, ..Action::of(state, words, Call::with_body::<ForkRun>(&at, new)) }
 }
 
 /// The pick of a target, as it would be asked for.
@@ -63,52 +70,42 @@ fn target_of(target: &TargetView, settings: Changes) -> NewTarget {
     NewTarget { settings, ..NewTarget::at_pixel(designation.step, designation.pixel) }
 }
 
-fn track(drive: &str, target: &NewTarget) -> Option<String> {
+fn track(state: &State, target: &NewTarget) -> Option<String> {
+    let drive = &state.traverse.as_ref()?.source;
     let designation = Designation { step: target.step, pixel: target.pixel? };
     Some(shell::track(drive, designation, &target.settings))
 }
 
-/// What can be done where the cursor is, and what was done to come there.
+/// The actions at the cursor, and those that led there.
 pub(crate) fn actions(state: &State) -> Vec<Action> {
     let Some(session) = state.session.as_ref().map(|session| session.id.clone()) else { return Vec::new() };
-    let mut requests = vec![(
-        format!("go to step {}", state.cursor.step),
-        Request::PutCursor { session: session.clone(), cursor: state.cursor },
-    )];
+    let call = Call::with_body::<MoveCursor>(&AtSession { session: session.clone() }, &state.cursor);
+    let mut actions = vec![Action::of(state, format!("go to step {}", state.cursor.step), call)];
     if let (Some(target), Some(run)) = (state.target(), state.run()) {
-        requests.extend(of_run(state, &session, target, run));
+        actions.extend(of_run(state, &session, target, run));
     }
     if let Some(key) = state.step_key(state.cursor.step).filter(|_| state.row().is_some()) {
-        requests.push((format!("read step {}", key.step), Request::Item(crate::cache::Key::Trace(key))));
+        actions.push(Action::of(state, format!("read step {}", key.step), Call::to::<ShowStep>(&key)));
     }
-    let action = |(words, request): (String, Request)| {
-        let http = http(&state.origin, request.call()?);
-        Some(Action { words, command: command(state, &request), http })
-    };
     let asked = asked::calls(state, &session).into_iter();
-    let asked = asked.map(|(words, call)| Action { words, command: None, http: http(&state.origin, call) });
-    requests.into_iter().filter_map(action).chain(asked).collect()
+    actions.extend(asked.map(|(words, call)| Action::of(state, words, call)));
+    actions
 }
 
-fn of_run(state: &State, session: &str, target: &TargetView, run: &RunView) -> Vec<(String, Request)> {
-    let (session, number, letter) = (session.to_owned(), target.number, run_letter(run.number));
+fn of_run(state: &State, session: &str, target: &TargetView, run: &RunView) -> Vec<Action> {
+    let (number, letter) = (target.number, run_letter(run.number));
     let first = target.runs.first().map(|first| first.changes.clone()).unwrap_or_default();
     let mut pick = target_of(target, first);
     pick.label = Some(target.label.clone());
-    let mut requests = vec![(
-        format!("pick {}", target.label),
-        Request::NewTarget { session: session.clone(), target: pick },
-    )];
-    if let Some(fork) = run.fork {
-        let parent = target.runs.iter().find(|other| other.number == fork.run);
+    let mut actions = vec![designate(state, format!("pick {}", target.label), session, &pick)];
+    if let Some(made) = run.fork {
+        let parent = target.runs.iter().find(|other| other.number == made.run);
         let settings =
             parent.map_or_else(|| run.changes.clone(), |parent| run.settings.changes_from(&parent.settings));
-        let prediction_px = fork.prediction_px;
-        let new = NewRun { run: fork.run, from_step: fork.from_step, settings, prediction_px };
-        requests.push((
-            format!("make run {letter} of run {}", run_letter(fork.run)),
-            Request::NewRun { session: session.clone(), target: number, new },
-        ));
+        let prediction_px = made.prediction_px;
+        let new = NewRun { run: made.run, from_step: made.from_step, settings, prediction_px };
+        let words = format!("make run {letter} of run {}", run_letter(made.run));
+        actions.push(fork(state, words, session, target, &new));
     }
     let last = run.rows.last().map_or(target.designation.step, |row| row.step + 1);
     let new = NewRun {
@@ -117,19 +114,19 @@ fn of_run(state: &State, session: &str, target: &TargetView, run: &RunView) -> V
         settings: state.draft.clone(),
         prediction_px: None,
     };
-    requests.push((
-        format!("run {letter} from step {} with the changed settings", new.from_step),
-        Request::NewRun { session: session.clone(), target: number, new },
-    ));
-    let run = run.number;
-    requests.push((format!("cancel run {letter}"), Request::CancelRun { session, target: number, run }));
-    requests
+    let words = format!("run {letter} from step {} with the changed settings", new.from_step);
+    actions.push(fork(state, words, session, target, &new));
+    let at = AtRun { session: session.to_owned(), target: number, run: run.number };
+    actions.push(Action::of(state, format!("cancel run {letter}"), Call::to::<CancelRun>(&at)));
+    actions
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::tests::fixture;
+    use sightline_api::endpoints::{ChangeNote, ShowSession};
+    use sightline_api::location::AtNote;
     use sightline_session::Cursor;
     use sightline_session::notes::EditNote;
 
@@ -137,22 +134,21 @@ mod tests {
 
     #[test]
     fn requests_become_curl() {
-        let session = || "s1".to_owned();
+        let at = AtSession { session: "s1".to_owned() };
         let cursor = Cursor { target: Some(0), run: 1, step: 4 };
-        let text = http(ORIGIN, Request::PutCursor { session: session(), cursor }.call().unwrap());
+        let text = http(ORIGIN, Call::with_body::<MoveCursor>(&at, &cursor));
         assert_eq!(
             text,
             "curl -fsS -X PUT http://127.0.0.1:7700/api/v1/sessions/s1/cursor -H 'Content-Type: application/json' \
              --data-raw '{\"target\":0,\"run\":1,\"step\":4}'"
         );
-        let read = http(ORIGIN, Request::Session(session()).call().unwrap());
+        let read = http(ORIGIN, Call::to::<ShowSession>(&at));
         assert_eq!(read, "curl -fsS http://127.0.0.1:7700/api/v1/sessions/s1");
         let edit = EditNote { text: Some("it's".to_owned()), place: None };
-        let edited =
-            http(ORIGIN, Request::EditNote { session: session(), id: 2, revision: 5, edit }.call().unwrap());
+        let at = AtNote { session: "s1".to_owned(), note: 2 };
+        let edited = http(ORIGIN, Call::with_body::<ChangeNote>(&at, &edit).at_revision(5));
         assert!(edited.contains("-X PATCH") && edited.contains("-H 'If-Match: \"5\"'"), "{edited}");
         assert!(edited.contains("it'\\''s"), "{edited}");
-        assert_eq!(Request::Reconnect.call(), None);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The template's history: the window that every step matched, and how the current view correlates with each earlier
 //! template of the run (R72), which the server computes.
 //!
-//! Both are fetched while this panel is looked at.
+//! Both are fetched while this panel is shown.
 
 use egui::{Align2, Margin, Rect, ScrollArea, Sense, Ui, UiBuilder, pos2, vec2};
 use egui_plot::{GridMark, Line, MarkerShape, Plot, Points};
@@ -155,10 +155,10 @@ fn comparisons(ui: &mut Ui, state: &State, run: &RunView) {
         found.iter().map(|one| Some([one.template_step as f64, of(one)])).collect()
     };
     ui.horizontal_top(|ui| {
-        chart(ui, "score, by step of the template", size, [0.0, 1.0], &points(&|one| one.score), colour);
+        chart(ui, "score by template step", size, [0.0, 1.0], &points(&|one| one.score), colour);
         chart(
             ui,
-            "shift, px, by step of the template",
+            "shift, px, by template step",
             size,
             [0.0, 1.0],
             &points(&AgainstEarlier::shift_px),
@@ -195,7 +195,7 @@ fn chart(
 ) {
     ui.vertical(|ui| {
         ui.set_width(size.x);
-        ui.label(theme::note(title));
+        ui.add(egui::Label::new(theme::note(title)).truncate());
         let plot = Plot::new(title)
             .width(size.x)
             .height((ui.available_height() - 2.0).max(30.0))

@@ -3,7 +3,6 @@
 use egui::{Button, Grid, Link, RichText, Sense, Ui, vec2};
 use serde_json::Value;
 use sightline_session::compare::RunName;
-use sightline_session::metrics::Metric;
 use sightline_session::view::{RunView, TargetView};
 use sightline_track::settings::Changes;
 
@@ -233,7 +232,7 @@ pub(crate) fn cell(
     };
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        let words = words(found, value);
+        let words = found.words(value);
         match found.worst_step {
             Some(step) => {
                 let help = format!("{metric}: worst at step {step}; a click goes there");
@@ -254,13 +253,6 @@ pub(crate) fn cell(
             ui.label(theme::note(format!("Δ{sign}{}", digits((value - there).abs()))));
         }
     });
-}
-
-/// A value as it is written: shares in per cent.
-pub(crate) fn words(metric: &Metric, value: f64) -> String {
-    let is_share = metric.name.starts_with("pck_")
-        || matches!(metric.name.as_str(), "average_jaccard" | "occlusion_accuracy" | "inside_3_sigma");
-    if is_share { format!("{:.0} %", value * 100.0) } else { digits(value) }
 }
 
 /// The settings that differ from the baseline's, or from the defaults.

@@ -1,4 +1,4 @@
-//! What the feature locator saw, step by step, and the tables that the views draw from it (R170).
+//! The evidence of the feature tracker, step by step, and the tables that the views draw (R170).
 
 use std::sync::Arc;
 
@@ -13,9 +13,9 @@ use crate::locate::template::evidence::TemplateEvidence;
 use sightline_geometry::estimate::motion_parameters::MotionParameters;
 use sightline_geometry::estimate::ransac::Refit;
 use sightline_geometry::frames::Pose;
-use sightline_record::{ArrayKind, ArrayView, Declaration, Record, Stage, Unit};
+use sightline_record::{ArrayKind, ArrayView, Declaration, Record, Stage, Unit, Unsent};
 
-/// What the feature locator saw; a step that was not reached is null.
+/// The evidence of the feature tracker; a step that was not reached is null.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct FeatureEvidence {
     /// Point stereo of the designated pixel; at the designation only.
@@ -28,28 +28,28 @@ pub struct FeatureEvidence {
     pub match_features: Option<MatchedFeatures>,
     /// The motion from it.
     pub fit_motion: Option<FittedMotion>,
-    /// How certain that is.
+    /// The covariance of that motion by the bootstrap.
     pub bootstrap: Option<Bootstrapped>,
-    /// Which stop of the recording this is, where the traverse has a store.
+    /// The stop of the recording; `None` if the traverse has no store.
     #[serde(skip)]
     #[schema(ignore)]
     pub stop: Option<usize>,
-    /// The target as the motions carried it here.
+    /// The target, carried here by the motions.
     #[serde(skip)]
     #[schema(ignore)]
     pub carried: Option<Carried>,
-    /// The features themselves.
+    /// The features of this stop.
     #[serde(skip)]
     #[schema(ignore)]
     pub features: Option<Arc<StopFeatures>>,
-    /// A row for every feature of the left image.
+    /// One row per feature of the left image, with the columns of [`FeatureColumn`].
     #[serde(skip)]
     #[schema(ignore)]
-    pub table: Table,
-    /// A row for every set of the bootstrap: where it puts the target.
+    pub table: Unsent<Table>,
+    /// One row per bootstrap set: the target's position.
     #[serde(skip)]
     #[schema(ignore)]
-    pub cloud: Table,
+    pub cloud: Unsent<Table>,
 }
 
 /// Counts of step `detect` and of the matches between the eyes.
@@ -67,22 +67,22 @@ pub struct Detected {
     pub median_range_m: Option<f64>,
 }
 
-/// A remembered stop, tried.
+/// The motion from one remembered stop.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct AnchorTried {
     /// The stop.
     pub step: usize,
     /// Matched points.
     pub matches: usize,
-    /// Those that agree with the motion.
+    /// Number of inliers of the motion.
     pub inliers: usize,
-    /// The confidence that follows.
+    /// The confidence of that number of inliers.
     pub confidence: f64,
     /// Largest 1σ axis of the target's position by this motion, m; null without one.
     pub sigma_m: Option<f64>,
     /// Why there is no motion, as one sentence.
     pub missing: Option<String>,
-    /// Whether the target was taken from here.
+    /// Whether the target is located from this stop.
     pub chosen: bool,
 }
 
@@ -97,7 +97,7 @@ pub struct MatchedFeatures {
     pub now: usize,
     /// Matches of the two.
     pub matches: usize,
-    /// Whether too little agreed with the pose estimates, so that the features were looked for everywhere.
+    /// Whether the prior was dropped because too few matches were consistent with the pose estimates.
     #[serde(default)]
     pub prior_given_up: bool,
 }
@@ -109,22 +109,22 @@ pub struct FittedMotion {
     pub translation_m: [f64; 3],
     /// Roll, pitch and yaw, deg.
     pub roll_pitch_yaw_deg: [f64; 3],
-    /// Matches that agree with it.
+    /// Number of inliers.
     pub inliers: usize,
-    /// Root mean square of their residuals, m.
+    /// RMS residual of the inliers, m.
     pub rms_m: f64,
-    /// Median of the residuals of those that agree, m.
+    /// Median residual of the inliers, m.
     pub median_m: f64,
-    /// Matches that agreed with each random draw.
+    /// Number of inliers of each hypothesis.
     pub consensus_by_draw: Vec<u32>,
-    /// How the motion and the set that agrees with it settled.
+    /// The refits of the motion until the set of inliers no longer changed.
     pub refits: Vec<Refit>,
-    /// What it moves the target away from the prediction by, m.
+    /// Distance between the target moved by the motion and the prediction, m.
     pub correction_m: f64,
 }
 
 impl FittedMotion {
-    /// The motion: takes points of the earlier rover frame into the present one.
+    /// The rigid transform from the earlier rover frame to the current one.
     pub fn now_from_then(&self) -> Pose {
         let [roll_rad, pitch_rad, yaw_rad] = self.roll_pitch_yaw_deg.map(f64::to_radians);
         MotionParameters { translation_m: self.translation_m, roll_rad, pitch_rad, yaw_rad }.to_pose()
@@ -134,7 +134,7 @@ impl FittedMotion {
 /// The covariance of the motion.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Bootstrapped {
-    /// Sets that were drawn.
+    /// Number of bootstrap sets.
     pub sets: usize,
     /// Of translation (m) and roll, pitch, yaw (rad).
     #[schema(value_type = Vec<f64>)]
@@ -145,10 +145,10 @@ pub struct Bootstrapped {
     pub sigma_rotation_deg: [f64; 3],
 }
 
-/// Numbers row by row.
+/// A table of numbers, row-major.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
-    /// Numbers of a row.
+    /// Number of columns.
     pub columns: u32,
     /// All rows; NaN where a number does not exist.
     pub values: Vec<f32>,
@@ -229,7 +229,7 @@ impl FeatureEvidence {
             "features",
             ArrayKind::Table,
             "The features of the left image, a row each: position, scale, orientation, partners and residual",
-            |e| (&e.table).into(),
+            |e| e.table.view(),
         );
     }
 
@@ -239,7 +239,7 @@ impl FeatureEvidence {
             "cloud",
             ArrayKind::Table,
             "Target positions of the bootstrap sets, a row each: position in the rover frame and pixel",
-            |e| (&e.cloud).into(),
+            |e| e.cloud.view(),
         );
     }
 }

@@ -170,7 +170,7 @@ fn note(evidence: &mut FeatureEvidence, features: &Arc<StopFeatures>) {
         points: features.points.len(),
         median_range_m: ranges.get(ranges.len() / 2).copied(),
     });
-    evidence.table = tables::features(features);
+    evidence.table = tables::features(features).into();
     evidence.features = Some(Arc::clone(features));
 }
 
@@ -232,7 +232,7 @@ impl<'a> Candidate<'a> {
             matches: motion.matches.len(),
             prior_given_up: motion.prior_given_up,
         });
-        tables::add_motion(&mut evidence.table, motion, &anchor.features, now, left);
+        tables::add_motion(evidence.table.get_or_default(), motion, &anchor.features, now, left);
         let Some(carried) = self.target else { return Sighting::default() };
         let position = carried.position_in_rover;
         evidence.carried = Some(carried);
@@ -243,7 +243,7 @@ impl<'a> Candidate<'a> {
                 .samples
                 .iter()
                 .map(|theta| MotionParameters::from_vector(&(*theta).into()).to_pose());
-            evidence.cloud = tables::cloud(poses, &anchor.carried.position_in_rover, left);
+            evidence.cloud = tables::cloud(poses, &anchor.carried.position_in_rover, left).into();
         }
         Sighting {
             left_pixel: left.project(&position),

@@ -69,9 +69,9 @@ settings_group! {
         /// too few agree then.
         prior_radius_px: f64 = 0.0, "px", Domain::Between(0.0, 2000.0), "ours; off";
         /// Noise of each coordinate of a feature, from which the covariances of the points follow.
-        feature_sigma_px: f64 = 0.5, "px", Domain::Between(0.01, 10.0), "D§2, R172";
+        feature_sigma_px: f64 = 0.5, "px", Domain::Between(0.01, 10.0), "D§2, R172", if motion_gate = "mahalanobis", if motion_weighting = "range";
         /// What that grows by for every pixel of a feature's scale: large features lie on no surface point in particular.
-        feature_sigma_per_scale: f64 = 0.0, "", Domain::Between(0.0, 10.0), "ours; off";
+        feature_sigma_per_scale: f64 = 0.0, "", Domain::Between(0.0, 10.0), "ours; off", if motion_gate = "mahalanobis", if motion_weighting = "range";
         /// Error that the pixels of all features of a stop share, and their disparities, after a way as long as their range:
         /// relief and shadows that are seen from elsewhere shift many features alike.
         feature_common_px: f64 = 0.0, "px", Domain::Between(0.0, 5.0), "ours; off";

@@ -31,7 +31,7 @@ use crate::locate::features::evidence::Table;
 use crate::locate::template::match_noise::match_noise;
 use sightline_geometry::camera::Camera;
 use sightline_geometry::frames::{Pixel, Point3, Pose, Ray, Vector3};
-use sightline_record::{ArrayKind, Declaration, Record, Unit};
+use sightline_record::{ArrayKind, Declaration, Record, Unit, Unsent};
 use sightline_vision::correlate::zncc::zncc_surface;
 use sightline_vision::correlate::{Focus, peak};
 use sightline_vision::image::patch::{self, Patch};
@@ -67,11 +67,11 @@ pub struct Draped {
     /// The draped picture.
     #[serde(skip)]
     #[schema(ignore)]
-    pub picture: Table,
+    pub picture: Unsent<Table>,
     /// The present image at the match.
     #[serde(skip)]
     #[schema(ignore)]
-    pub matched: Table,
+    pub matched: Unsent<Table>,
 }
 
 /// What is draped over what, and where it is looked for.
@@ -159,8 +159,8 @@ fn drape_window(input: &DrapeInput<'_>) -> Result<Placed, DrapeFailure> {
         correction_px: pixel.distance(start),
         covariance_px2: noise.covariance_px2,
         on_mesh,
-        picture: table(&picture),
-        matched: table(&matched),
+        picture: table(&picture).into(),
+        matched: table(&matched).into(),
     };
     Ok((position, covariance, draped))
 }
@@ -292,10 +292,10 @@ impl Record for Draped {
         r.quantity("on_mesh", Unit::One, |d| d.on_mesh)
             .describe("Share of the window on the earlier mesh; the rest is the plane.");
         r.array("draped", ArrayKind::Patch, "The earlier image as the present camera would see it", |d| {
-            (&d.picture).into()
+            d.picture.view()
         });
         r.array("draped_match", ArrayKind::Patch, "The present image where that was found", |d| {
-            (&d.matched).into()
+            d.matched.view()
         });
     }
 }

@@ -1,4 +1,4 @@
-//! What the shape tracker saw, and the arrays that the views draw from it (R200–R203).
+//! The evidence of the shape tracker, and the arrays that the views draw (R200–R203).
 
 use std::sync::Arc;
 
@@ -17,78 +17,78 @@ use crate::gate::Gate;
 use crate::locate::features::evidence::{FeatureEvidence, Table};
 use crate::locate::template::evidence::TemplateEvidence;
 use sightline_geometry::frames::{Point3, Pose};
-use sightline_record::{ArrayKind, Declaration, GateRecord, Record, Stage, Unit};
+use sightline_record::{ArrayKind, Declaration, GateRecord, Record, Stage, Unit, Unsent};
 use sightline_vision::registration::{Failure, Mesh, Method, Registration};
 
-/// What the shape tracker saw; a step that was not reached is null.
+/// The evidence of the shape tracker; a step that was not reached is null.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ShapeEvidence {
     /// Point stereo of the designated pixel; at the designation of the shape tracker only.
     pub designation: Option<Box<TemplateEvidence>>,
-    /// What the features said, where they are followed on the way.
+    /// The evidence of the features; `combined` only.
     pub features: Option<Box<FeatureEvidence>>,
-    /// Why the shape was asked here, or was not, as one sentence.
+    /// Why the shape was registered here, or was not, as one sentence.
     pub why: String,
     /// Dense stereo of this stop.
     pub surface: Option<SurfaceSeen>,
     /// The registration with an earlier view.
     pub registration: Option<Registered>,
-    /// What the arm is told, where other cameras took over and the target was found.
+    /// Instrument-placement target after a hand-off; `None` until the target is re-acquired.
     pub placement: Option<Placement>,
-    /// Whether the update is judged by it, rather than by the features.
+    /// Whether the update is judged by the gates of the shape, not by those of the features.
     pub is_judged_by_shape: bool,
-    /// Why there is no registration although it was asked for, as one sentence.
+    /// Why the registration failed to start, as one sentence.
     pub missing: Option<String>,
-    /// This stop, to be registered to by later ones.
+    /// The view of this stop, to which later stops are registered.
     #[serde(skip)]
     #[schema(ignore)]
     pub view: Option<Arc<View>>,
-    /// The arrays.
+    /// The arrays of this stop.
     #[serde(skip)]
     #[schema(ignore)]
-    pub arrays: ShapeArrays,
+    pub arrays: Unsent<ShapeArrays>,
 }
 
 /// A registration with an earlier view, in numbers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Registered {
-    /// The stop whose view it was registered to.
+    /// The stop of the earlier view.
     pub to_step: usize,
-    /// Whether that view was seen by other cameras: the hand-off.
+    /// Whether the earlier view is of other cameras: a hand-off.
     pub is_hand_off: bool,
-    /// How the motion was refined.
+    /// The method of refinement.
     pub method: Method,
-    /// Half the width of the recognised surface, m.
+    /// Half the width of the registered surface, m.
     pub half_width_m: f64,
-    /// Side of what the virtual sensor spans, m.
+    /// Side of the virtual sensor's field of view, m.
     pub sensor_side_m: Option<f64>,
-    /// Where the target was looked for, m, present rover frame.
+    /// The start of the registration: the target's expected position, m, current rover frame.
     pub start_in_rover: [f64; 3],
-    /// How far from there it was found, m.
+    /// Distance of the registered target from the start, m.
     pub correction_m: Option<f64>,
-    /// What the coarse search found: Δx, Δy, Δz along the axes of the sensor, m.
+    /// Result of the coarse search: Δx, Δy, Δz along the axes of the sensor, m.
     pub coarse_shift_m: Option<[f64; 3]>,
-    /// How far the coarse search went to each side, m.
+    /// Half range of the coarse search, m.
     pub search_m: f64,
     /// Mean distance of the surfaces before, after the coarse search and at the end, m.
     pub mean_m: [Option<f64>; 3],
-    /// Values of the objective that were computed in the refinement.
+    /// Number of evaluations of the objective in the refinement.
     pub evaluations: u32,
-    /// How far the refinement turned, deg.
+    /// Rotation of the refinement, deg.
     pub turn_deg: f64,
     /// 1σ of the target by the registration alone along the axes of its ellipsoid, m, largest first.
     pub sigmas_m: Option<[f64; 3]>,
-    /// Where the designation's line of sight met the surface; null where it was not carried along or met nothing.
+    /// Intersection of the designation's line of sight with the surface; null without one.
     pub ray: Option<RayMeeting>,
-    /// The earlier image draped over the surface and found in the present one; at a hand-off.
+    /// The match of the earlier image, draped over the surface, with the current one; at a hand-off.
     pub draped: Option<Draped>,
-    /// Why it was not found, as one sentence.
+    /// Why that match failed, as one sentence.
     pub draped_missing: Option<String>,
-    /// Its gates.
+    /// The gates of the registration.
     pub checks: Vec<Gate>,
-    /// Why it is not used; null where it is.
+    /// Why the registration is not used; null if it is used.
     pub failure: Option<Failure>,
-    /// The same as one sentence.
+    /// That failure as one sentence.
     pub reason: Option<String>,
 }
 
@@ -97,18 +97,18 @@ impl ShapeEvidence {
     pub(in crate::locate) fn stages() -> Vec<Stage<Self>> {
         vec![
             Stage::of("surface", "Which surface does the pair show?", |e: &Self| e.surface.as_ref())
-                .with(|e| Some(&e.arrays), ShapeArrays::declare_surface)
+                .with(|e| e.arrays.get(), ShapeArrays::declare_surface)
                 .at("surface"),
             Stage::of_parts("coarse_register", "By which shift does it fit the earlier surface, roughly?")
                 .with(|e: &Self| e.registration.as_ref(), Registered::declare_coarse)
-                .with(|e| Some(&e.arrays), ShapeArrays::declare_coarse)
+                .with(|e| e.arrays.get(), ShapeArrays::declare_coarse)
                 .at("registration"),
             Stage::of(
                 "refine_register",
                 "By which motion does it fit best, and how certain is that?",
                 |e: &Self| e.registration.as_ref(),
             )
-            .with(|e| Some(&e.arrays), ShapeArrays::declare_refine)
+            .with(|e| e.arrays.get(), ShapeArrays::declare_refine)
             .at("registration"),
             Stage::of("carried_ray", "Where does the first line of sight meet the surface?", |e: &Self| {
                 e.registration.as_ref()?.ray.as_ref()
@@ -132,8 +132,7 @@ impl ShapeEvidence {
 }
 
 impl Registered {
-    /// Adds a picture that was found: it holds the target where the surfaces alone let it slide, so that the registration
-    /// has not failed.
+    /// Adds the match of the draped image. It constrains sliding along the surface, so that the registration has not failed.
     pub(super) fn add_picture(&mut self, draped: Draped) {
         self.draped = Some(draped);
         (self.failure, self.reason) = (None, None);
@@ -149,7 +148,7 @@ pub struct ShapeArrays {
     pub ranges: Table,
     /// The earlier surface as the virtual sensor sees it: depth, m.
     pub sensor: Table,
-    /// Present less earlier depth there at the start, m.
+    /// Current minus earlier depth at the start, m.
     pub error_before: Table,
     /// The same after the coarse search.
     pub error_coarse: Table,
@@ -157,11 +156,11 @@ pub struct ShapeArrays {
     pub error_fine: Table,
     /// Mean distance for every shift of the coarse search, m, the first row at the least Δy.
     pub coarse: Table,
-    /// The way of the refinement: a row a step, with the columns of [`PATH_COLUMNS`].
+    /// The steps of the refinement, one row each, with the columns of [`PATH_COLUMNS`].
     pub path: Table,
-    /// The earlier mesh in the present rover frame: a row a facet, x, y, z of its corners, m.
+    /// The earlier mesh in the current rover frame: one row per facet, x, y, z of its corners, m.
     pub mesh_fixed: Table,
-    /// The present mesh in the present rover frame, in the columns of `mesh_fixed`, m.
+    /// Triangles of the current mesh; columns and frame as in `mesh_fixed`.
     pub mesh_moving: Table,
 }
 

@@ -42,8 +42,8 @@ pub(super) fn region(centre: Point3, half_width_m: f64, settings: &ShapeSettings
 /// Notes the surface of a stop in its evidence.
 pub(super) fn note(evidence: &mut ShapeEvidence, surface: &StopSurface, mesh: &Mesh) {
     evidence.surface = Some(surface.seen(mesh));
-    evidence.arrays.disparities = surface.shown_disparities();
-    evidence.arrays.ranges = surface.shown_ranges();
+    let arrays = evidence.arrays.get_or_default();
+    (arrays.disparities, arrays.ranges) = (surface.shown_disparities(), surface.shown_ranges());
 }
 
 /// The confidence that the features need: more once the target is lost (R185).

@@ -1,4 +1,4 @@
-//! The shape tracker, and the combined one: `surface` → `mesh` → `coarse_register` → `refine_register` → `carried_ray`
+//! The shape tracker, and the combined one: `surface` → `coarse_register` → `refine_register` → `carried_ray`
 //! (Deans et al. 2005, D§2 and D§4).
 //!
 //! | tracker | on the way | at the last stop of a camera pair | where another pair takes over |

@@ -64,7 +64,8 @@ pub(super) fn by_shape(
         evidence.placement = is_hand_off.then(|| placement(&view.mesh, &there));
     }
     evidence.registration = Some(registered);
-    evidence.arrays.add(found, [&view.mesh, &tried.mesh], &found.fixed_from_moving.inverse());
+    let arrays = evidence.arrays.get_or_default();
+    arrays.add(found, [&view.mesh, &tried.mesh], &found.fixed_from_moving.inverse());
     let (overlap, left, right) = (found.agreement[2], &input.pointing.left, &input.pointing.right);
     // Kept with the position that this stop ends with.
     evidence.view = Some(Arc::new(View {

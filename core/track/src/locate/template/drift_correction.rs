@@ -53,7 +53,7 @@ pub(super) fn correct(
     let now_from_first = now_from_kept(input, memory, first);
     let image = input.capture.pair.left.as_ref();
     let prepared =
-        scale_roll(&first.appearance, &now_from_first, &input.pointing.left, settings, None).ok()?.record;
+        scale_roll(&first.appearance, &now_from_first, &input.pointing.left, settings, None).ok()?;
     let size = settings.template_size_px;
     // One position more than the reach, so that a peak at its end has neighbours.
     let side = size + 2 * (settings.drift_reach_px.ceil() as u32 + 1);
@@ -63,20 +63,20 @@ pub(super) fn correct(
     let focused = refine(&focus, &prepared.rolled, image, &peak, settings);
     let pixel = focused.map_or(peak.pixel, |(pixel, _)| pixel);
     let window = patch::extract(image, pixel, size / 2, settings.kernel);
-    let noise = match_noise(&prepared.rolled, &window, &prepared.misfit(), &focus);
+    let noise = match_noise(&prepared.rolled, &window, &prepared.record.misfit(), &focus);
     let shift_px = pixel.distance(matched);
     let is_near = shift_px <= settings.drift_reach_px && !peak.at_edge;
-    let is_alike = prepared.scale.max(1.0 / prepared.scale) <= settings.drift_scale_max;
+    let is_alike = prepared.record.scale.max(1.0 / prepared.record.scale) <= settings.drift_scale_max;
     let record = DriftCorrection {
         template_step: first.appearance.step,
-        scale: prepared.scale,
+        scale: prepared.record.scale,
         pixel,
         score: peak.score,
         shift_px,
         accepted: is_near && is_alike && peak.score >= settings.drift_ncc_min,
     };
     let error = first.drift.after_match(
-        &prepared.image_from_template,
+        &prepared.record.image_from_template,
         &noise.covariance_px2,
         noise.bias_px,
         settings.match_correlation,

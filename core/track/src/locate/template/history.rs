@@ -57,13 +57,13 @@ pub fn against_earlier<'a>(
     let compare = |appearance: &Appearance| -> Option<AgainstEarlier> {
         let now_from_then = site_from_rover.inverse() * appearance.site_from_rover;
         let prepared =
-            scale_roll(appearance, &now_from_then, &recorded.point_mast.left, settings, None).ok()?.record;
+            scale_roll(appearance, &now_from_then, &recorded.point_mast.left, settings, None).ok()?;
         let surface = zncc_surface(&prepared.rolled, image, region)?;
         let peak = find_peak(&surface, true)?;
         Some(AgainstEarlier {
             template_step: appearance.step,
-            scale: prepared.applied_scale,
-            roll_rad: prepared.applied_roll_rad,
+            scale: prepared.record.applied_scale,
+            roll_rad: prepared.record.applied_roll_rad,
             score: peak.score,
             offset_px: [peak.pixel.x - here.x, peak.pixel.y - here.y],
         })

@@ -47,7 +47,7 @@ pub(super) fn first_match(
     }
     let score = |centre: Pixel| {
         let window = Placed { centre, ..placed }.window(image, size, settings.kernel);
-        zncc(&prepared.record.rolled, &window).map_or(0.0, f64::from)
+        zncc(&prepared.rolled, &window).map_or(0.0, f64::from)
     };
     let integer = [placed.centre.x.round() as i32, placed.centre.y.round() as i32];
     let peak = Peak {

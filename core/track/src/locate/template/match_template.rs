@@ -28,7 +28,7 @@ use crate::array_name::ArrayName;
 use crate::locate::tracker::LocateInput;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::Pixel;
-use sightline_record::{ArrayKind, Declaration, Record, Unit};
+use sightline_record::{ArrayKind, Declaration, Record, Unit, Unsent};
 use sightline_vision::correlate::coarse_to_fine::{CoarseSearch, coarse_to_fine};
 use sightline_vision::correlate::lucas_kanade::Placed;
 use sightline_vision::correlate::peak::{self, Peak, SecondPeak};
@@ -95,15 +95,15 @@ pub struct TemplateMatch {
     /// Scores of the positions; NaN where none was compared, empty after a descent.
     #[serde(skip)]
     #[schema(ignore)]
-    pub surface: Surface,
+    pub surface: Unsent<Surface>,
     /// The image at the match.
     #[serde(skip)]
     #[schema(ignore)]
-    pub matched: Patch,
+    pub matched: Unsent<Patch>,
     /// Matched patch minus template, both normalised to zero mean and unit deviation.
     #[serde(skip)]
     #[schema(ignore)]
-    pub difference: Patch,
+    pub difference: Unsent<Patch>,
 }
 
 /// Distance from a whole pixel to the rim of the positions compared, px; `None` outside them.
@@ -129,7 +129,7 @@ pub fn first_match(
     let search_window = PixelRect::centred(predicted, side)
         .intersect(&PixelRect::whole(image.width(), image.height()))
         .ok_or(TemplateFailure::WindowOutside)?;
-    if !prepared.record.rolled.is_complete() {
+    if !prepared.rolled.is_complete() {
         return Err(TemplateFailure::TemplateIncomplete);
     }
     if settings.first_stage != FirstStage::Correlation {
@@ -175,7 +175,7 @@ pub fn finish(
     image: &GrayImage,
     settings: &TemplateSettings,
 ) -> TemplateMatch {
-    let (size, template) = (settings.template_size_px, &prepared.record.rolled);
+    let (size, template) = (settings.template_size_px, &prepared.rolled);
     let mut peak = first.peak;
     let second_peak = peak::second_peak(&first.surface, &peak, f64::from(size) / 2.0);
     let is_correlated = first.descent.is_none() && settings.measure == Measure::Ncc;
@@ -222,9 +222,9 @@ pub fn finish(
         covariance_px2,
         bias_px: noise.bias_px,
         edge_distance_px,
-        surface: first.surface,
-        difference: patch::normalised_difference(&matched, template),
-        matched,
+        surface: first.surface.into(),
+        difference: patch::normalised_difference(&matched, template).into(),
+        matched: matched.into(),
     }
 }
 
@@ -303,18 +303,18 @@ impl Record for TemplateMatch {
             .formula("second_peak.score / peak.score", &["second_peak.score", "peak.score"]);
         r.quantity("second_peak.distance_px", Unit::Pixel, |m| Some(m.second_peak.as_ref()?.distance_px))
             .describe("Distance of the second peak from the first.");
-        r.array("matched", ArrayKind::Patch, "The left image at the match", |m| (&m.matched).into());
+        r.array("matched", ArrayKind::Patch, "The left image at the match", |m| m.matched.view());
         r.array(
             "difference",
             ArrayKind::Difference,
             "Match less template, both normalised; grey is no difference",
-            |m| (&m.difference).into(),
+            |m| m.difference.view(),
         );
         r.array(
             "surface",
             ArrayKind::ScoreMap,
             "The score of every position of the search window; bright is a better match",
-            |m| (&m.surface).into(),
+            |m| m.surface.view(),
         );
     }
 }

@@ -38,7 +38,7 @@ use super::stereo_search::{Best, StereoTemplate, Windows};
 use crate::array_name::ArrayName;
 use sightline_geometry::frames::Pixel;
 use sightline_geometry::stereo_geometry::StereoGeometry;
-use sightline_record::{ArrayKind, Declaration, Record, Unit};
+use sightline_record::{ArrayKind, Declaration, Record, Unit, Unsent};
 use sightline_vision::correlate::Focus;
 use sightline_vision::image::patch::{self, Patch};
 use sightline_vision::image::resample;
@@ -82,7 +82,7 @@ pub struct PointStereo {
     /// The right image at the match, resampled as the left sees it.
     #[serde(skip)]
     #[schema(ignore)]
-    pub right_window: Patch,
+    pub right_window: Unsent<Patch>,
 }
 
 /// A slope that stretches the window by more than this is not believed, px per px.
@@ -138,7 +138,7 @@ pub fn point_stereo(
         at_end: best.at_end,
         covariance_px2: prepared * seen * prepared.transpose(),
         right_from_left,
-        right_window,
+        right_window: right_window.into(),
     })
 }
 
@@ -314,7 +314,7 @@ impl Record for PointStereo {
             "right_window",
             ArrayKind::Patch,
             "The right image at the stereo match, as the left eye would see it",
-            |s| (&s.right_window).into(),
+            |s| s.right_window.view(),
         );
     }
 }

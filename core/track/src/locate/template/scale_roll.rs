@@ -38,7 +38,7 @@ use super::window_map::{PlaneMap, WindowMap, WindowSource};
 use crate::array_name::ArrayName;
 use sightline_geometry::camera::Camera;
 use sightline_geometry::frames::{Pixel, Point3, Pose};
-use sightline_record::{ArrayKind, Declaration, Record, Unit};
+use sightline_record::{ArrayKind, Declaration, Record, Unit, Unsent};
 use sightline_vision::image::patch::{self, Patch};
 
 /// Length of the helper vector, m (K-Eq 10).
@@ -78,15 +78,15 @@ pub struct ScaleRoll {
     /// The window as it was in the image from which it was taken.
     #[serde(skip)]
     #[schema(ignore)]
-    pub reference: Patch,
+    pub reference: Unsent<Patch>,
     /// The window after scaling.
     #[serde(skip)]
     #[schema(ignore)]
-    pub scaled: Patch,
+    pub scaled: Unsent<Patch>,
     /// The window after scaling and rolling, or after warping: what is matched.
     #[serde(skip)]
     #[schema(ignore)]
-    pub rolled: Patch,
+    pub rolled: Unsent<Patch>,
 }
 
 impl ScaleRoll {
@@ -187,6 +187,7 @@ pub fn scale_roll<'a>(
         (None, None) => WindowMap::Linear(Rotation2::new(applied_roll_rad).into_inner() * applied_scale),
     };
     let source = WindowSource { appearance, map, kernel };
+    let rolled = source.window(size);
     Ok(Prepared {
         record: ScaleRoll {
             image_from_template: surface.unwrap_or(similarity),
@@ -198,10 +199,11 @@ pub fn scale_roll<'a>(
             old_distance_m,
             new_distance_m,
             template_step: appearance.step,
-            reference: patch::extract(image, pixel, size / 2, kernel),
-            scaled: patch::scale_roll(image, pixel, applied_scale, 0.0, size, kernel),
-            rolled: source.window(size),
+            reference: patch::extract(image, pixel, size / 2, kernel).into(),
+            scaled: patch::scale_roll(image, pixel, applied_scale, 0.0, size, kernel).into(),
+            rolled: rolled.clone().into(),
         },
+        rolled,
         source,
     })
 }
@@ -209,8 +211,10 @@ pub fn scale_roll<'a>(
 /// The prepared template with where it comes from, so that its surroundings can be prepared as it was.
 #[derive(Clone, Debug)]
 pub struct Prepared<'a> {
-    /// What the trace keeps.
+    /// The record of the step.
     pub record: ScaleRoll,
+    /// The prepared window: the template to be matched.
+    pub rolled: Patch,
     source: WindowSource<'a>,
 }
 
@@ -222,7 +226,7 @@ impl Prepared<'_> {
 
     /// The template with its surroundings: a window of `size` × `size` px with the same middle.
     pub fn window(&self, size: u32) -> Patch {
-        if size == self.record.rolled.width() { self.record.rolled.clone() } else { self.source.window(size) }
+        if size == self.rolled.width() { self.rolled.clone() } else { self.source.window(size) }
     }
 }
 
@@ -248,12 +252,12 @@ impl Record for ScaleRoll {
             .describe("Predicted distance from the left camera now.");
         r.quantity("template_step", Unit::One, |s| s.template_step)
             .describe("The stop at which the template was taken.");
-        r.array("reference", ArrayKind::Patch, "The template as it was taken", |s| (&s.reference).into());
+        r.array("reference", ArrayKind::Patch, "The template as it was taken", |s| s.reference.view());
         r.array("scaled", ArrayKind::Patch, "The template, scaled to the present distance", |s| {
-            (&s.scaled).into()
+            s.scaled.view()
         });
         r.array("rolled", ArrayKind::Patch, "The template, scaled and rolled: what was matched", |s| {
-            (&s.rolled).into()
+            s.rolled.view()
         });
     }
 }

@@ -123,7 +123,7 @@ settings_group! {
         /// Where the pixel noise of the covariance comes from.
         noise_model: NoiseModel = NoiseModel::Measured, "", Domain::choice(&["measured", "half_pixel"]), "ours; papers: R170";
         /// How alike the errors of two matches in a row are, where they are measured.
-        match_correlation: f64 = 0.4, "", Domain::Between(0.0, 0.99), "ours; ARCHITECTURE.md";
+        match_correlation: f64 = 0.4, "", Domain::Between(0.0, 0.99), "ours; ARCHITECTURE.md", if noise_model = "measured";
     }
 }
 

@@ -1,0 +1,135 @@
+//! The inspector: the quantities that the selected stage declares, then the rest of its evidence as a tree.
+
+mod quantities;
+mod tree;
+
+use egui::{RichText, ScrollArea, Ui};
+use serde_json::Value;
+use sightline_record::{Unit, label};
+use sightline_session::records;
+use sightline_session::step::RunStep;
+use sightline_track::settings::TrackerKind;
+
+use self::tree::Place;
+use crate::command::{Command, Stage};
+use crate::compare::panel::readouts;
+use crate::panels::panel::Panel;
+use crate::state::State;
+use crate::{panels, theme};
+
+/// The panel “Inspector”.
+pub(crate) struct Inspector;
+
+impl Panel for Inspector {
+    fn show(&self, ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+        show(ui, state, out);
+    }
+}
+
+/// Shows the record.
+pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    ui.horizontal_wrapped(|ui| {
+        ui.label(RichText::new(state.stage().word()).strong().color(theme::strong()));
+        ui.label(theme::note(state.stage().question()));
+    });
+    let Some(trace) = state.trace() else {
+        panels::missing(ui, "", &state.missing_step());
+        return;
+    };
+    let stages = recorded(trace, state.stage());
+    if stages.is_empty() {
+        panels::missing(ui, "", &not_reached(trace, state));
+        return;
+    }
+    ScrollArea::vertical().auto_shrink(false).id_salt(state.stage()).show(ui, |ui| {
+        readouts::record(ui, state, |trace| self::record(trace, state.stage()));
+        for (index, stage) in stages.into_iter().enumerate() {
+            if index > 0 {
+                ui.add_space(4.0);
+                ui.label(theme::title(&label(&stage.schema().stage, Unit::One)));
+                ui.label(theme::note(stage.schema().question.as_ref()));
+            }
+            section(ui, trace, stage, out);
+        }
+        if let Some(truth) = records::stage("truth").filter(|truth| truth.is_reached(trace)) {
+            ui.add_space(4.0);
+            ui.label(theme::title("against the truth"));
+            section(ui, trace, truth, out);
+        }
+    });
+}
+
+/// A stage of the record.
+type RecordedStage = &'static sightline_record::Stage<RunStep>;
+
+/// The stages of the record that a stage of the bar shows, those that were reached: its own first, then those that have
+/// no place of their own in the bar of the tracker.
+fn recorded(trace: &RunStep, stage: Stage) -> Vec<RecordedStage> {
+    let tracker = trace.located().map_or_else(TrackerKind::default, |l| l.evidence.tracker());
+    let mut of = Stage::PREDICT;
+    let mut shown: Vec<RecordedStage> = Vec::new();
+    for recorded in records::stages().iter().filter(|recorded| is_in_bar(recorded)) {
+        let word = recorded.schema().stage.as_ref();
+        let own = Stage::of(tracker).find(|stage| stage.word() == word);
+        of = own.unwrap_or(if of.is_step_of_locate() { of } else { Stage::LOCATE });
+        // `detect` counts the results of its next two steps.
+        let counts = matches!(stage, Stage::MATCH_FEATURES | Stage::TRIANGULATE) && of == Stage::DETECT;
+        if (of == stage || counts) && recorded.is_reached(trace) {
+            shown.push(recorded);
+        }
+    }
+    shown.sort_by_key(|recorded| recorded.schema().stage != stage.word());
+    shown
+}
+
+/// Whether a stage of the record belongs to one of the bar: the row repeats others, and the truth is shown with all.
+fn is_in_bar(stage: &sightline_record::Stage<RunStep>) -> bool {
+    let schema = stage.schema();
+    !schema.path.is_empty() && schema.stage != "truth"
+}
+
+/// The quantities of a stage, then the rest of its evidence.
+fn section(ui: &mut Ui, trace: &RunStep, stage: RecordedStage, out: &mut Vec<Command>) {
+    quantities::show(ui, trace, stage, out);
+    let place = Place { stage, path: String::new(), step: trace.step };
+    tree::entries(ui, &place, &records::rest(stage, trace), out);
+}
+
+fn not_reached(trace: &RunStep, state: &State) -> String {
+    let word = state.stage().word();
+    match (trace.fault(), trace.prediction().is_none()) {
+        (Some(fault), _) => format!("{word} was not reached: {fault}"),
+        (None, true) => {
+            let mut steps = Stage::of(state.tracker()).filter(|stage| stage.is_step_of_locate());
+            let other = steps.find(|stage| is_reached(trace, *stage)).unwrap_or(Stage::LOCATE).word();
+            format!(
+                "{word} is not part of the designation. Go one step on (Right) to see it, or select `{other}`."
+            )
+        }
+        (None, false) => format!("{word} was not reached: {}", state.missing_step()),
+    }
+}
+
+/// Whether a stage was reached.
+pub(crate) fn is_reached(trace: &RunStep, stage: Stage) -> bool {
+    match stage {
+        // The evidence of the registration exists before its refinement has an end.
+        Stage::REFINE_REGISTER => trace
+            .shape()
+            .and_then(|evidence| evidence.registration.as_ref())
+            .is_some_and(|found| found.mean_m[2].is_some()),
+        // The feature tracker triangulates in `detect`.
+        Stage::TRIANGULATE if trace.features().is_some() => is_reached(trace, Stage::DETECT),
+        _ => records::stage(stage.word()).is_some_and(|recorded| recorded.is_reached(trace)),
+    }
+}
+
+/// The evidence of a stage as one tree; `None` if the stage was not reached.
+pub(crate) fn record(trace: &RunStep, stage: Stage) -> Option<Value> {
+    let mut stages = recorded(trace, stage).into_iter();
+    let mut whole = records::evidence(stages.next()?, trace);
+    for other in stages {
+        whole[other.schema().stage.as_ref()] = records::evidence(other, trace);
+    }
+    Some(whole)
+}
