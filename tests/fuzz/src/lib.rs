@@ -5,8 +5,10 @@
 //! seeds of the search and the inputs that once failed; the tests replay them, with seeded changes.
 
 mod files;
+mod connections;
 mod recording;
 mod requests;
+mod server;
 mod texts;
 #[cfg(test)]
 mod replay;
@@ -35,6 +37,8 @@ pub const TARGETS: &[Target] = &[
     Target { name: "reproduction", parse: texts::reproduction },
     Target { name: "settings", parse: texts::settings },
     Target { name: "requests", parse: requests::requests },
+    Target { name: "http", parse: connections::http },
+    Target { name: "websocket", parse: connections::websocket },
 ];
 
 /// The parser of this name.
