@@ -10,6 +10,7 @@ mod build;
 mod costs;
 mod features;
 mod wasm_target;
+mod apt;
 mod chromium;
 mod serve;
 mod test;
