@@ -9,6 +9,7 @@ mod connections;
 mod recording;
 mod requests;
 mod server;
+mod store;
 mod texts;
 #[cfg(test)]
 mod replay;
@@ -35,6 +36,7 @@ pub const TARGETS: &[Target] = &[
     Target { name: "npz", parse: files::npz },
     Target { name: "stored_session", parse: texts::stored_session },
     Target { name: "reproduction", parse: texts::reproduction },
+    Target { name: "store", parse: store::store },
     Target { name: "settings", parse: texts::settings },
     Target { name: "requests", parse: requests::requests },
     Target { name: "http", parse: connections::http },

@@ -7,7 +7,7 @@ use super::{TARGETS, Target};
 /// Inputs that are replayed for each parser.
 const INPUTS: usize = 1500;
 /// Parsers behind a whole server.
-const SERVED: [&str; 3] = ["requests", "http", "websocket"];
+const SERVED: [&str; 4] = ["requests", "http", "websocket", "store"];
 /// Inputs that are replayed for each of these.
 const SERVED_INPUTS: usize = 400;
 

@@ -33,7 +33,7 @@ pub(crate) struct Server {
     /// The name of the recording.
     pub(crate) traverse: String,
     connections: Sender<DuplexStream>,
-    _folder: TempDir,
+    folder: TempDir,
 }
 
 impl Server {
@@ -56,7 +56,7 @@ impl Server {
         let served = axum::serve(Pipes(accepted), app.clone());
         tokio::spawn(async { served.await });
         drop(inside);
-        let server = Self { app, runtime, traverse, connections, _folder: folder };
+        let server = Self { app, runtime, traverse, connections, folder };
         let session = format!(r#"{{"traverse":"{}"}}"#, server.traverse);
         assert_eq!(server.send("POST", "/sessions", session.as_bytes()), Some(201));
         let target = br#"{"step":0,"pixel":{"x":48,"y":32}}"#;
@@ -80,6 +80,12 @@ impl Server {
             axum::body::to_bytes(response.into_body(), 1 << 28).await.expect("a whole body");
             status
         }))
+    }
+
+    /// Ends the server; its folder.
+    pub(crate) fn end(self) -> TempDir {
+        let Self { folder, .. } = self;
+        folder
     }
 
     /// A new connection to the server.
