@@ -34,7 +34,7 @@ fn described(package: &Path) -> Option<String> {
             println!("cargo:rerun-if-changed={}", path.display());
         }
     }
-    git(package, &["describe", "--always", "--dirty", "--tags"])
+    git(package, &["describe", "--always", "--dirty", "--tags", "--abbrev=12"])
 }
 
 /// The output of a Git command, if there is a Git and a repository.

@@ -2,19 +2,23 @@
 
 use anyhow::{Context, Result, bail};
 
-use crate::{cmd, features, house_rules, public_functions, wasm_target, web};
+use crate::{cmd, deny, features, house_rules, public_functions, wasm_target, web};
 
 /// Runs every check, the quick ones first.
 pub(crate) fn check() -> Result<()> {
     keep_rules()?;
     features::check()?;
+    deny::check()?;
     cmd::run(&mut cmd::cargo(&["fmt", "--all", "--check"]), "run `cargo fmt --all`")?;
     // The server's build embeds or names this folder, which a fresh clone does not have.
     std::fs::create_dir_all(web::output_dir()).context("the folder target/web cannot be made")?;
     let mend = "mend what Clippy reports above";
     wasm_target::ensure()?;
     let lints = ["--", "-D", "warnings"];
-    cmd::run(web::viewer_cargo("clippy").args(["--package", "sightline-viewer", "--lib"]).args(lints), mend)?;
+    cmd::run(
+        web::viewer_cargo("clippy")?.args(["--package", "sightline-viewer", "--lib"]).args(lints),
+        mend,
+    )?;
     for crates in [&["--package", "xtask"][..], &["--workspace", "--exclude", "xtask"]] {
         cmd::run(cmd::cargo(&["clippy", "--all-targets"]).args(crates).args(lints), mend)?;
         cmd::run(

@@ -12,7 +12,7 @@ use std::sync::Mutex;
 
 use anyhow::{Context, Result, bail};
 
-use crate::cmd;
+use crate::{apt, cmd};
 
 /// Says to this program that it is run in place of the compiler.
 const AS_COMPILER: &str = "SIGHTLINE_FUZZ_COMPILER";
@@ -106,13 +106,24 @@ fn corpus() -> PathBuf {
     cmd::root().join("tests/fuzz/corpus")
 }
 
+/// Finds a C++ compiler for the engine; on Debian, installs it.
+fn ensure_cxx() -> Result<()> {
+    let is_there =
+        || std::env::var_os("CXX").is_some() || cmd::find_in_path(&["c++", "g++", "clang++"]).is_some();
+    if is_there() || apt::install("The engine of the search is written in C++", &["g++"])? && is_there() {
+        return Ok(());
+    }
+    bail!("the engine of the search needs a C++ compiler: install g++ or clang, or set CXX")
+}
+
 /// Builds the search; returns the program.
 fn build() -> Result<PathBuf> {
+    ensure_cxx()?;
     let mut cargo = cmd::cargo(&["build", "--package", "sightline-fuzz", "--features", "libfuzzer"]);
     cargo.env("RUSTC_WORKSPACE_WRAPPER", std::env::current_exe()?).env(AS_COMPILER, "1");
     // Incremental builds cannot tell that the options changed.
     cargo.env("CARGO_INCREMENTAL", "0");
-    cmd::run(&mut cargo, "mend what the compiler reports; the engine needs a C++ compiler")?;
+    cmd::run(&mut cargo, "mend what the compiler reports above")?;
     let program =
         cmd::target_dir().join("debug").join(format!("sightline-fuzz{}", std::env::consts::EXE_SUFFIX));
     Ok(program)

@@ -10,6 +10,7 @@ mod build;
 mod costs;
 mod features;
 mod wasm_target;
+mod apt;
 mod chromium;
 mod serve;
 mod test;
@@ -20,8 +21,14 @@ mod check;
 mod house_rules;
 mod imports;
 mod public_functions;
+mod packages;
+mod deny;
 mod bench;
 mod peers;
+mod remap;
+mod parts;
+mod bill;
+mod licences;
 mod dist;
 
 use std::io::Write;
@@ -67,7 +74,7 @@ enum Task {
     },
     /// Run the program under load and in trouble, for about 20 minutes, and print what it held and lost as a table.
     Drill,
-    /// Check format, lints (native and WASM), documentation and the rules of the house.
+    /// Check format, lints (native and WASM), documentation, and the rules of the house and for dependencies.
     Check,
     /// Build what the browser loads into `target/web`.
     Web,
@@ -82,7 +89,7 @@ enum Task {
         #[arg(long, requires = "peers")]
         json: bool,
     },
-    /// Build the program to hand out, with the viewer inside, as `target/dist/sightline`.
+    /// Build the program to hand out, with the viewer inside, its bill of materials and its licences, in `target/dist`.
     Dist,
     /// Take the picture in the README again.
     Screenshot,

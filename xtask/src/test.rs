@@ -119,6 +119,11 @@ impl Count {
         self.ignored += other.ignored;
     }
 
+    /// The numbers in words.
+    pub(crate) fn shown(&self) -> String {
+        format!("{} tests passed, {} ignored.", self.passed, self.ignored)
+    }
+
     /// Reads a summary line such as `test result: ok. 3 passed; 0 failed; 1 ignored; …`.
     fn from_summary(line: &str) -> Option<Self> {
         let rest = line.strip_prefix("test result: ")?;
@@ -134,6 +139,11 @@ impl Count {
 ///
 /// A filter that matches nothing ends well for Cargo; counting is what keeps a misspelt one from passing.
 pub(crate) fn run_and_count(command: &mut Command) -> Result<Count> {
+    run_and_read(command, |_| ())
+}
+
+/// The same, with a reader of each line.
+pub(crate) fn run_and_read(command: &mut Command, mut read: impl FnMut(&str)) -> Result<Count> {
     let mend = "mend the tests reported above";
     let mut child =
         command.stdout(Stdio::piped()).spawn().with_context(|| format!("cargo cannot start; {mend}"))?;
@@ -143,6 +153,7 @@ pub(crate) fn run_and_count(command: &mut Command) -> Result<Count> {
         let line = line.context("cargo's output cannot be read; run the command again")?;
         let line = String::from_utf8_lossy(&line);
         cmd::say(&line);
+        read(&line);
         if let Some(summary) = Count::from_summary(&line) {
             count.add(summary);
         }

@@ -12,7 +12,7 @@ use flate2::write::GzEncoder;
 use wasm_bindgen_cli_support::Bindgen;
 
 use crate::build::{self, Build};
-use crate::{cmd, wasm_target};
+use crate::{cmd, remap, wasm_target};
 
 /// The folder from which the server serves, or embeds, the page.
 pub(crate) fn output_dir() -> PathBuf {
@@ -27,7 +27,7 @@ pub(crate) fn web() -> Result<()> {
 /// The build of the viewer's WASM and, after it, of the page.
 pub(crate) fn build() -> Result<Build> {
     wasm_target::ensure()?;
-    let mut command = viewer_cargo("build");
+    let mut command = viewer_cargo("build")?;
     command.args(["--package", "sightline-viewer", "--lib"]);
     let tree =
         vec!["--package", "sightline-viewer", "--target", wasm_target::TARGET, "--edges", "normal,build"];
@@ -83,10 +83,13 @@ fn unpack(packed: &Path) -> std::io::Result<Vec<u8>> {
 /// A Cargo command for the viewer in the browser, with a directory and a profile of its own.
 ///
 /// The native crates are compiled with other features and flags; apart, neither ever makes the other compile again.
-pub(crate) fn viewer_cargo(task: &str) -> Command {
+/// The folders of this machine are left out at each build, so that the page to hand out is compiled only once.
+pub(crate) fn viewer_cargo(task: &str) -> Result<Command> {
+    let target_dir = cmd::root().join("target/viewer");
     let mut cargo = cmd::cargo(&[task, "--target", wasm_target::TARGET, "--target-dir", "target/viewer"]);
     cargo.args(["--profile", "viewer"]);
-    cargo
+    remap::apply(&mut cargo, &target_dir)?;
+    Ok(cargo)
 }
 
 /// Writes the JavaScript bindings and the WASM that goes with them, unless they are those of this build already.

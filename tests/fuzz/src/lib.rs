@@ -5,8 +5,11 @@
 //! seeds of the search and the inputs that once failed; the tests replay them, with seeded changes.
 
 mod files;
+mod connections;
 mod recording;
 mod requests;
+mod server;
+mod store;
 mod texts;
 #[cfg(test)]
 mod replay;
@@ -33,8 +36,11 @@ pub const TARGETS: &[Target] = &[
     Target { name: "npz", parse: files::npz },
     Target { name: "stored_session", parse: texts::stored_session },
     Target { name: "reproduction", parse: texts::reproduction },
+    Target { name: "store", parse: store::store },
     Target { name: "settings", parse: texts::settings },
     Target { name: "requests", parse: requests::requests },
+    Target { name: "http", parse: connections::http },
+    Target { name: "websocket", parse: connections::websocket },
 ];
 
 /// The parser of this name.

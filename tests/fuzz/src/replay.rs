@@ -6,8 +6,10 @@ use super::{TARGETS, Target};
 
 /// Inputs that are replayed for each parser.
 const INPUTS: usize = 1500;
-/// Inputs of the parser of requests, each of which is answered by a whole server.
-const REQUESTS: usize = 400;
+/// Parsers behind a whole server.
+const SERVED: [&str; 4] = ["requests", "http", "websocket", "store"];
+/// Inputs that are replayed for each of these.
+const SERVED_INPUTS: usize = 400;
 
 /// A small generator with a seed (xorshift64*).
 struct Random(u64);
@@ -86,12 +88,14 @@ fn each_parser_has_a_folder_of_inputs_of_its_name() {
 
 #[test]
 fn parsers_return_for_every_input() {
-    for target in TARGETS.iter().filter(|target| target.name != "requests") {
+    for target in TARGETS.iter().filter(|target| !SERVED.contains(&target.name)) {
         replay(target, INPUTS);
     }
 }
 
 #[test]
 fn server_answers_every_request_without_an_internal_error() {
-    replay(super::target("requests").expect("a parser"), REQUESTS);
+    for name in SERVED {
+        replay(super::target(name).expect("a parser"), SERVED_INPUTS);
+    }
 }

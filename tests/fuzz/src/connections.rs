@@ -1,0 +1,123 @@
+//! The connection itself: any bytes in place of requests, and any frames on a WebSocket.
+
+use std::cell::RefCell;
+use std::time::Duration;
+
+use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
+
+use crate::server::{LEFT_OUT, PORT, Server, TOKEN};
+
+/// Connections to one server, so that what it keeps stays small.
+const CONNECTIONS_EACH: usize = 500;
+/// The longest wait for the end of a connection whose client has ended its side. The search has a limit of its own.
+const PATIENCE: Duration = Duration::from_secs(60);
+/// The most bytes of an answer that are read.
+const ANSWER_BYTES: u64 = 16 << 20;
+/// The most bytes of a structured frame, which a length byte gives.
+const PAYLOAD_BYTES: usize = 255;
+/// The mask of frames, any four bytes.
+const MASK: [u8; 4] = [0x37, 0xfa, 0x21, 0x3d];
+
+/// Bytes on a fresh connection to a server that asks for an access token.
+///
+/// Without the token in the bytes, no answer contains the name of the recording.
+pub(crate) fn http(bytes: &[u8]) {
+    let has = |text: &str| bytes.windows(text.len()).any(|window| window == text.as_bytes());
+    if has(TOKEN) && LEFT_OUT.iter().any(|end| has(end)) {
+        return;
+    }
+    with_server(true, |server| {
+        let traverse = server.traverse.clone();
+        let answer = server.runtime.block_on(async {
+            let stream = server.connect().await;
+            exchange(stream, bytes).await
+        });
+        let answer = String::from_utf8_lossy(&answer);
+        assert!(!answer.contains("HTTP/1.1 500"), "an internal error: {answer}");
+        assert!(
+            has(TOKEN) || has(&traverse) || !answer.contains(&traverse),
+            "let in without a token: {answer}"
+        );
+    });
+}
+
+/// Frames on the WebSocket of events, after a proper handshake.
+///
+/// A first byte of 0: the other bytes are sent as they are. Else frames follow, each a first byte of its own, a length and so
+/// many bytes, which are sent masked, as a client must.
+pub(crate) fn websocket(bytes: &[u8]) {
+    let sent = match bytes.split_first() {
+        None => return,
+        Some((0, raw)) => raw.to_vec(),
+        Some((_, frames)) => framed(frames),
+    };
+    with_server(false, |server| {
+        let request = format!(
+            "GET /api/v1/events HTTP/1.1\r\nHost: 127.0.0.1:{PORT}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
+             Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+        );
+        let answer = server.runtime.block_on(async {
+            let mut stream = server.connect().await;
+            stream.write_all(request.as_bytes()).await.expect("the server reads");
+            exchange(stream, &sent).await
+        });
+        let answer = String::from_utf8_lossy(&answer);
+        assert!(answer.starts_with("HTTP/1.1 101 "), "no WebSocket: {answer}");
+        assert_eq!(server.send("GET", "/sessions", b""), Some(200));
+    });
+}
+
+/// Encodes frames of at most [`PAYLOAD_BYTES`] (RFC 6455, 5.2).
+fn framed(mut frames: &[u8]) -> Vec<u8> {
+    let mut sent = Vec::new();
+    while let [first, length, rest @ ..] = frames {
+        let (payload, next) = rest.split_at(usize::from(*length).min(PAYLOAD_BYTES).min(rest.len()));
+        sent.push(*first);
+        match u8::try_from(payload.len()) {
+            Ok(short) if short < 126 => sent.push(0x80 | short),
+            _ => {
+                sent.push(0x80 | 126);
+                sent.extend((payload.len() as u16).to_be_bytes());
+            }
+        }
+        sent.extend(MASK);
+        sent.extend(payload.iter().zip(MASK.iter().cycle()).map(|(byte, mask)| byte ^ mask));
+        frames = next;
+    }
+    sent
+}
+
+/// Sends the bytes, ends the client's side and reads until the server ends its own.
+async fn exchange(stream: DuplexStream, bytes: &[u8]) -> Vec<u8> {
+    let (reader, mut writer) = tokio::io::split(stream);
+    let mut answer = Vec::new();
+    let write = async {
+        // The server may close the connection before it has read everything.
+        let _ = writer.write_all(bytes).await;
+        let _ = writer.shutdown().await;
+    };
+    let mut reader = reader.take(ANSWER_BYTES);
+    let both = async { tokio::join!(write, reader.read_to_end(&mut answer)) };
+    assert!(
+        tokio::time::timeout(PATIENCE, both).await.is_ok(),
+        "the server keeps a connection that its client has ended"
+    );
+    answer
+}
+
+/// Gives a server of this thread to `use_it`; a fresh one after some connections.
+fn with_server(is_locked: bool, use_it: impl FnOnce(&Server)) {
+    thread_local! {
+        static SERVERS: RefCell<[Option<(Server, usize)>; 2]> = const { RefCell::new([None, None]) };
+    }
+    SERVERS.with_borrow_mut(|servers| {
+        let server = &mut servers[usize::from(is_locked)];
+        if server.as_ref().is_none_or(|(_, used)| *used >= CONNECTIONS_EACH) {
+            *server = Some((Server::start(is_locked), 0));
+        }
+        if let Some((server, used)) = server {
+            *used += 1;
+            use_it(server);
+        }
+    });
+}
