@@ -132,6 +132,7 @@ mod tests {
     use crate::tests::fixture;
     use sightline_session::Cursor;
     use sightline_session::notes::EditNote;
+    use sightline_session::shell::WITH_TOKEN;
 
     const ORIGIN: &str = "http://127.0.0.1:7700";
 
@@ -142,11 +143,13 @@ mod tests {
         let text = http(ORIGIN, Request::PutCursor { session: session(), cursor }.call().unwrap());
         assert_eq!(
             text,
-            "curl -fsS -X PUT http://127.0.0.1:7700/api/v1/sessions/s1/cursor -H 'Content-Type: application/json' \
-             --data-raw '{\"target\":0,\"run\":1,\"step\":4}'"
+            format!(
+                "{WITH_TOKEN} | curl -fsS -H @- -X PUT http://127.0.0.1:7700/api/v1/sessions/s1/cursor -H \
+                 'Content-Type: application/json' --data-raw '{{\"target\":0,\"run\":1,\"step\":4}}'"
+            )
         );
         let read = http(ORIGIN, Request::Session(session()).call().unwrap());
-        assert_eq!(read, "curl -fsS http://127.0.0.1:7700/api/v1/sessions/s1");
+        assert_eq!(read, format!("{WITH_TOKEN} | curl -fsS -H @- http://127.0.0.1:7700/api/v1/sessions/s1"));
         let edit = EditNote { text: Some("it's".to_owned()), place: None };
         let edited =
             http(ORIGIN, Request::EditNote { session: session(), id: 2, revision: 5, edit }.call().unwrap());
