@@ -205,6 +205,8 @@ pub enum Command {
     ToggleMarks,
     /// Opens the session in Rerun.
     OpenRerun,
+    /// Closes the live Rerun stream of the session.
+    CloseRerun,
     /// Takes a message away.
     Dismiss(u64),
     /// Connects again at once.

@@ -1,6 +1,6 @@
 //! Carrying out what the person asked for.
 
-use sightline_api::endpoints::StreamRecording;
+use sightline_api::endpoints::{CloseRecording, StreamRecording};
 use sightline_api::wire::{NewRun, NewTarget};
 use sightline_geometry::frames::Pixel;
 use sightline_session::Cursor;
@@ -8,7 +8,7 @@ use sightline_track::settings::Changes;
 
 use crate::breakpoints::play::Shuttle;
 use crate::command::{Command, Go, Mode, Zoomable};
-use crate::exports::update::stream_to_rerun;
+use crate::exports::update::{close_rerun, stream_to_rerun};
 use crate::net::request::Request;
 use crate::state::effect::Effect;
 use crate::state::{Place, State, Views, events, run_letter};
@@ -87,6 +87,13 @@ impl State {
                     self.call::<StreamRecording>(stream_to_rerun(session), Self::rerun_opened);
                 }
                 self.messages.note("Opening the session in Rerun …");
+            }
+            Command::CloseRerun => {
+                if let Some(session) = self.session_id() {
+                    self.call::<CloseRecording>(close_rerun(session), |state, _| {
+                        state.messages.note("The Rerun stream of this session is closed.");
+                    });
+                }
             }
             Command::Dismiss(id) => self.messages.dismiss(id),
             Command::Reconnect => self.outbox.push(Request::Reconnect),

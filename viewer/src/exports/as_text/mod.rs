@@ -38,6 +38,13 @@ pub(crate) fn download(origin: &str, entry: &ExportEntry) -> String {
     Curl { method: "GET", url: &url, body: None, revision: None, file: Some(&entry.file) }.text()
 }
 
+/// An answer that never ends as `curl`, which hands every part of it on at once.
+pub(crate) fn stream(origin: &str, path: &str) -> String {
+    let url = format!("{origin}/api/v1/{path}");
+    let text = Curl { method: "GET", url: &url, body: None, revision: None, file: None }.text();
+    text.replacen("curl ", "curl -N ", 1)
+}
+
 /// A request as a command of the program; none where it has no such command.
 pub(crate) fn command(state: &State, request: &Request) -> Option<String> {
     let drive = &state.traverse.as_ref()?.source;
