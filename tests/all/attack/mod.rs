@@ -6,6 +6,7 @@
 mod access;
 mod proxied;
 mod rerun_stream;
+mod single;
 mod table;
 
 use std::collections::BTreeMap;
@@ -20,7 +21,8 @@ use tempfile::TempDir;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 
-use table::{CREDENTIALS, Entry, FOREIGN_HOSTS, FOREIGN_ORIGINS, KINDS, OURS, SINGLE};
+use single::SINGLE;
+use table::{CREDENTIALS, Entry, FOREIGN_HOSTS, FOREIGN_ORIGINS, KINDS, OURS};
 
 /// How long an answer may take; less than the server waits for a body.
 const PATIENCE: Duration = Duration::from_secs(25);
