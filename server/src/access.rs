@@ -13,6 +13,7 @@ use sightline_geometry::error::{Error, Result};
 
 use crate::hosts::Hosts;
 use crate::problem::{ApiError, ApiResult};
+use crate::public_url::PublicUrl;
 
 /// Random bytes of a token: 128 bits.
 const RANDOM_BYTES: usize = 16;
@@ -74,17 +75,29 @@ impl fmt::Debug for Token {
 pub struct Access {
     hosts: Hosts,
     token: Option<Token>,
+    public: Option<PublicUrl>,
 }
 
 impl Access {
     /// Only with the token.
     pub const fn with_token(hosts: Hosts, token: Token) -> Self {
-        Self { hosts, token: Some(token) }
+        Self { hosts, token: Some(token), public: None }
     }
 
     /// For everybody who reaches the server under these names.
     pub const fn without_token(hosts: Hosts) -> Self {
-        Self { hosts, token: None }
+        Self { hosts, token: None, public: None }
+    }
+
+    /// The same behind a reverse proxy that publishes the server at this address.
+    #[must_use]
+    pub fn behind_proxy(self, public: PublicUrl) -> Self {
+        Self { hosts: self.hosts.and(public.authority()), public: Some(public), ..self }
+    }
+
+    /// The address under which a reverse proxy publishes the server.
+    pub(crate) const fn public(&self) -> Option<&PublicUrl> {
+        self.public.as_ref()
     }
 
     /// The names under which the server may be addressed.
@@ -114,8 +127,10 @@ impl Access {
         match &self.token {
             None => Ok(None),
             Some(token) if token.is(given) => {
-                let attributes = "HttpOnly; SameSite=Strict; Path=/";
-                Ok(Some(format!("{}={}; {attributes}", self.cookie_name(), token.secret())))
+                let (name, secret) = (self.cookie_name(), token.secret());
+                let folder = self.public().map_or("/", PublicUrl::folder);
+                let secure = if self.public().is_some_and(PublicUrl::is_https) { "; Secure" } else { "" };
+                Ok(Some(format!("{name}={secret}; HttpOnly; SameSite=Strict; Path={folder}{secure}")))
             }
             Some(_) => Err(locked()),
         }
@@ -177,6 +192,17 @@ mod tests {
         }
         assert!(access().check(&HeaderMap::new()).is_err());
         assert!(Access::without_token(Hosts::new(7700, &[])).check(&HeaderMap::new()).is_ok());
+    }
+
+    #[test]
+    fn the_cookie_is_for_the_folder_of_the_proxy() {
+        let cookie = |access: Access| access.log_in(SECRET).unwrap().unwrap();
+        let strict = "HttpOnly; SameSite=Strict; Path=";
+        assert_eq!(cookie(access()), format!("sightline-7700={SECRET}; {strict}/"));
+        let public = PublicUrl::parse("https://rover.example/sightline/").unwrap();
+        let published = access().behind_proxy(public);
+        assert!(published.hosts().has("rover.example"));
+        assert_eq!(cookie(published), format!("sightline-7700={SECRET}; {strict}/sightline/; Secure"));
     }
 
     #[test]

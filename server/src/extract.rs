@@ -11,15 +11,13 @@ use axum::http::{HeaderMap, Method, StatusCode, header};
 use serde::de::DeserializeOwned;
 use sightline_api::endpoint::Endpoint;
 use sightline_api::location::{AtRun, AtSession, AtTarget};
+use sightline_api::program::BODY_BYTES;
 use sightline_session::{Run, Session};
 
 use crate::live_session::LiveSession;
 use crate::problem::{ApiError, ApiResult};
 use crate::recorded_step::RecordedStep;
 use crate::state::AppState;
-
-/// The largest body of a request, bytes.
-pub(crate) const BODY_LIMIT: usize = 1 << 20;
 
 /// How long a body may take to arrive.
 const BODY_PATIENCE: Duration = Duration::from_secs(30);
@@ -152,13 +150,20 @@ pub(crate) async fn whole_body<S: Send + Sync>(request: Request, state: &S) -> A
         ApiError::new(StatusCode::REQUEST_TIMEOUT, "slow", "The body of the request did not arrive in time.")
     };
     reading.map_err(slow)?.map_err(|wrong| match wrong.status() {
-        StatusCode::PAYLOAD_TOO_LARGE => {
-            let limit = BODY_LIMIT >> 20;
-            let detail = format!("The body of a request may have at most {limit} MiB.");
-            ApiError::new(StatusCode::PAYLOAD_TOO_LARGE, "too_large", detail)
-        }
+        StatusCode::PAYLOAD_TOO_LARGE => too_large(),
         status => ApiError::new(status, "body", "The body of the request did not arrive whole."),
     })
+}
+
+/// Refuses a body that is announced as too large, before it is waited for.
+pub(crate) fn check_announced_length(headers: &HeaderMap) -> ApiResult<()> {
+    let length = headers.get(header::CONTENT_LENGTH).and_then(|length| length.to_str().ok()?.parse().ok());
+    if length.is_some_and(|length: u64| length > BODY_BYTES as u64) { Err(too_large()) } else { Ok(()) }
+}
+
+fn too_large() -> ApiError {
+    let detail = format!("The body of a request may have at most {} MiB.", BODY_BYTES >> 20);
+    ApiError::new(StatusCode::PAYLOAD_TOO_LARGE, "too_large", detail)
 }
 
 /// Reads JSON: what is no JSON is a bad request; what does not fit is refused by the name of the field.

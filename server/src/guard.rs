@@ -5,8 +5,8 @@
 //! prove nothing); a foreign Origin may change nothing and open no WebSocket; bodies must be JSON, which a
 //! form cannot send. Scripts without a browser send no Origin and are not hindered.
 //!
-//! Other users of this machine, and other machines, need the access token: for everything but the files of the page, which are
-//! the same for everybody, and the route that exchanges the token for a cookie.
+//! Other users of this machine, and other machines, need the access token: for everything but the files of the page, which
+//! are the same for everybody, and the route that exchanges the token for a cookie.
 
 use axum::extract::{Request, State};
 use axum::http::header::{self, HeaderName};
@@ -15,8 +15,9 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
 use crate::access::Access;
-use crate::extract::check_content_type;
+use crate::extract::{check_announced_length, check_content_type};
 use crate::problem::{ApiError, ApiResult};
+use crate::public_url::PublicUrl;
 use crate::request_id;
 use tracing::Instrument;
 
@@ -42,7 +43,8 @@ pub(crate) async fn guard(State(access): State<Access>, request: Request, next: 
     };
     let mut response = answer.instrument(tracing::info_span!("request", id)).await;
     response = request_id::told(response, &id).await;
-    put_headers(response.headers_mut(), host.as_deref(), is_api);
+    let published = access.public().map(PublicUrl::authority);
+    put_headers(response.headers_mut(), &[host.as_deref(), published], is_api);
     response
 }
 
@@ -70,13 +72,16 @@ fn check(access: &Access, method: &Method, uri: &Uri, headers: &HeaderMap) -> Ap
     }
     let said = |name: &'static str| headers.get(HeaderName::from_static(name)).map(HeaderValue::as_bytes);
     let is_navigation = *method == Method::GET && said("sec-fetch-mode") == Some(b"navigate") && !is_upgrade;
-    if said("sec-fetch-site") == Some(b"cross-site") && !is_navigation {
+    // Another port of this machine is the same site, so that its requests have our cookie.
+    let is_foreign = matches!(said("sec-fetch-site"), Some(b"cross-site" | b"same-site"));
+    if is_foreign && !is_navigation {
         return Err(ApiError::forbidden("origin", "A page of another site may not read this."));
     }
     check_content_type(method, headers)?;
     if uri.path().starts_with("/api") && uri.path() != LOGIN {
         access.check(headers)?;
     }
+    check_announced_length(headers)?;
     Ok(host.to_owned())
 }
 
@@ -85,9 +90,9 @@ fn foreign_host() -> ApiError {
         .hint("Use http://127.0.0.1 with the server's port, or start it with `--allow-host NAME`.")
 }
 
-fn put_headers(headers: &mut HeaderMap, host: Option<&str>, is_api: bool) {
-    // The host was checked, so it can end no directive. Older browsers do not count WebSockets as 'self'.
-    let sockets = host.map(|host| format!(" ws://{host} wss://{host}")).unwrap_or_default();
+fn put_headers(headers: &mut HeaderMap, hosts: &[Option<&str>], is_api: bool) {
+    // The hosts were checked, so they can end no directive. Older browsers do not count WebSockets as 'self'.
+    let sockets: String = hosts.iter().flatten().map(|host| format!(" ws://{host} wss://{host}")).collect();
     let policy = format!(
         "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'self'{sockets}; \
          img-src 'self' data: blob:; object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -107,6 +112,8 @@ fn put_headers(headers: &mut HeaderMap, host: Option<&str>, is_api: bool) {
 
 #[cfg(test)]
 mod tests {
+    use sightline_api::program::BODY_BYTES;
+
     use super::*;
     use crate::hosts::Hosts;
 
@@ -144,9 +151,20 @@ mod tests {
             assert_eq!(verdict(Method::POST, &[ours, ("origin", origin)]), Err(403), "{origin}");
             assert_eq!(verdict(Method::GET, &[ours, ("origin", origin), ("upgrade", "websocket")]), Err(403));
         }
-        let cross = ("sec-fetch-site", "cross-site");
-        assert_eq!(verdict(Method::GET, &[ours, cross]), Err(403));
-        assert!(verdict(Method::GET, &[ours, cross, ("sec-fetch-mode", "navigate")]).is_ok());
+        for foreign in [("sec-fetch-site", "cross-site"), ("sec-fetch-site", "same-site")] {
+            assert_eq!(verdict(Method::GET, &[ours, foreign]), Err(403));
+            assert!(verdict(Method::GET, &[ours, foreign, ("sec-fetch-mode", "navigate")]).is_ok());
+        }
+        assert!(verdict(Method::GET, &[ours, ("sec-fetch-site", "same-origin")]).is_ok());
+    }
+
+    #[test]
+    fn a_body_that_is_announced_as_too_large_is_refused_before_it_comes() {
+        let [ours, json] = [("host", "localhost:7700"), ("content-type", "application/json")];
+        let with =
+            |length: usize| verdict(Method::POST, &[ours, json, ("content-length", &length.to_string())]);
+        assert!(with(BODY_BYTES).is_ok());
+        assert_eq!(with(BODY_BYTES + 1), Err(413));
     }
 
     #[test]

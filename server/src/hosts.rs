@@ -25,6 +25,13 @@ impl Hosts {
         Self { names: Arc::new(hosts), port }
     }
 
+    /// The same names and one more, with its port.
+    pub(crate) fn and(&self, host: &str) -> Self {
+        let mut names = BTreeSet::clone(&self.names);
+        names.insert(host.to_ascii_lowercase());
+        Self { names: Arc::new(names), port: self.port }
+    }
+
     pub(crate) fn has(&self, host: &str) -> bool {
         self.names.contains(&host.to_ascii_lowercase())
     }

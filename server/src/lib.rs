@@ -31,9 +31,11 @@ mod clock;
 mod cancel;
 mod jobs;
 mod store;
+mod streams;
 pub mod hosts;
 pub mod access;
 mod guard;
+pub mod public_url;
 mod request_id;
 mod idempotency;
 mod extract;
@@ -55,6 +57,7 @@ use axum::Router;
 use axum::extract::DefaultBodyLimit;
 use axum::middleware;
 use axum::response::{IntoResponse, Response};
+use sightline_api::program::BODY_BYTES;
 use tower_http::catch_panic::CatchPanicLayer;
 
 use crate::problem::ApiError;
@@ -67,13 +70,21 @@ pub fn app(state: AppState) -> Router {
     let api = api.fallback(no_route).method_not_allowed_fallback(page::wrong_method);
     let api = api.layer(middleware::from_fn_with_state(Arc::default(), idempotency::once));
     let access = state.access().clone();
-    Router::new()
+    let public = access.public().cloned();
+    let whole = Router::new()
         .nest("/api/v1", api)
         .fallback(page::serve)
         .with_state(state)
-        .layer(DefaultBodyLimit::max(extract::BODY_LIMIT))
+        .layer(DefaultBodyLimit::max(BODY_BYTES))
         .layer(CatchPanicLayer::custom(panicked))
-        .layer(middleware::from_fn_with_state(access, guard::guard))
+        .layer(middleware::from_fn_with_state(access, guard::guard));
+    match public {
+        // Layers come after the routing of their router, so that another one around it changes the path.
+        Some(public) => Router::new()
+            .fallback_service(whole)
+            .layer(middleware::from_fn_with_state(public, public_url::mount)),
+        None => whole,
+    }
 }
 
 async fn no_route() -> ApiError {

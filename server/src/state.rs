@@ -1,6 +1,6 @@
 //! What the handlers share: the open traverses, the sessions, and the ways to compute, to save and to tell.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
@@ -20,10 +20,10 @@ use crate::live_session::LiveSession;
 use crate::problem::{ApiError, ApiResult};
 use crate::questions::Questions;
 use crate::rendering::{Ahead, OpenTraverse};
-use crate::rerun_log::LiveStream;
 use crate::runner::Runner;
 use crate::sessions::Sessions;
 use crate::store::{self, Store};
+use crate::streams::Streams;
 use crate::study::jobs::Shelf;
 use crate::study::order::order;
 use crate::study::saved::Keeper;
@@ -63,7 +63,7 @@ struct Inner {
     queries: Lane,
     exports: Lane,
     studies: Shelf,
-    streams: Mutex<BTreeMap<String, Arc<LiveStream>>>,
+    streams: Streams,
     maps: Maps,
     tries: Lane,
     questions: Questions,
@@ -128,7 +128,7 @@ impl AppState {
             queries: Lane::new(2, 64),
             exports: Lane::new(1, 8),
             studies,
-            streams: Mutex::default(),
+            streams: Streams::default(),
             maps: Maps::default(),
             tries: Lane::new(2, 16),
             questions: Questions::default(),
@@ -348,7 +348,7 @@ impl AppState {
     }
 
     /// The live Rerun streams, by session.
-    pub(crate) fn streams(&self) -> &Mutex<BTreeMap<String, Arc<LiveStream>>> {
+    pub(crate) fn streams(&self) -> &Streams {
         &self.0.streams
     }
 

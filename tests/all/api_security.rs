@@ -6,6 +6,7 @@ use axum::body::Body;
 use axum::http::{HeaderValue, Method, StatusCode, header};
 use futures_util::{SinkExt, StreamExt};
 use serde_json::{Value, json};
+use sightline_api::program::BODY_BYTES;
 use sightline_tests::server::{PIXEL, PORT, TOKEN, TestServer, access, request, small_drive};
 use tokio_tungstenite::tungstenite::{self, Message};
 
@@ -59,7 +60,7 @@ async fn what_cannot_be_read_is_refused() {
     with("application/x-www-form-urlencoded", "step=0").await.problem(415, "not_json");
     with("text/plain", "{}").await.problem(415, "not_json");
     let large = request(Method::POST, &path).header(header::CONTENT_TYPE, "application/json");
-    let large = server.send(large.body(Body::from(vec![b' '; (1 << 20) + 1])).unwrap()).await;
+    let large = server.send(large.body(Body::from(vec![b' '; BODY_BYTES + 1])).unwrap()).await;
     large.problem(413, "too_large");
     server.json(Method::PATCH, "sessions", &json!({})).await.problem(405, "method");
     server.post("sessions", &json!({ "traverse": "../secret" })).await.problem(422, "field");
@@ -186,17 +187,19 @@ async fn bound() -> (SocketAddr, TestServer, [tempfile::TempDir; 2]) {
 }
 
 async fn connect(address: SocketAddr, origin: Option<&str>) -> Result<u16, tungstenite::Error> {
-    let mut request = tungstenite::client::IntoClientRequest::into_client_request(events_url(address))?;
-    let token = HeaderValue::from_str(&format!("Bearer {TOKEN}")).unwrap();
-    request.headers_mut().insert(header::AUTHORIZATION, token);
+    let mut request = events_request(address);
     if let Some(origin) = origin {
         request.headers_mut().insert(header::ORIGIN, HeaderValue::from_str(origin).unwrap());
     }
     tokio_tungstenite::connect_async(request).await.map(|(_, response)| response.status().as_u16())
 }
 
-fn events_url(address: SocketAddr) -> String {
-    format!("ws://{address}/api/v1/events")
+fn events_request(address: SocketAddr) -> tungstenite::handshake::client::Request {
+    let url = format!("ws://{address}/api/v1/events");
+    let mut request = tungstenite::client::IntoClientRequest::into_client_request(url).unwrap();
+    let token = HeaderValue::from_str(&format!("Bearer {TOKEN}")).unwrap();
+    request.headers_mut().insert(header::AUTHORIZATION, token);
+    request
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -216,8 +219,8 @@ async fn a_foreign_page_opens_no_websocket() {
 #[tokio::test(flavor = "multi_thread")]
 async fn every_page_hears_what_changes_and_a_flood_hurts_nobody() {
     let (address, server, _folders) = bound().await;
-    let (mut socket, _) = tokio_tungstenite::connect_async(events_url(address)).await.unwrap();
-    let (mut flooding, _) = tokio_tungstenite::connect_async(events_url(address)).await.unwrap();
+    let (mut socket, _) = tokio_tungstenite::connect_async(events_request(address)).await.unwrap();
+    let (mut flooding, _) = tokio_tungstenite::connect_async(events_request(address)).await.unwrap();
     // A message above the limit ends that connection only.
     let _ = flooding.send(Message::text("x".repeat(200_000))).await;
     socket.send(Message::text("{\"anything\": 1}")).await.unwrap();
@@ -274,5 +277,8 @@ async fn the_table_of_settings_is_what_the_tracker_takes() {
     let keys: Vec<_> = table.as_array().unwrap().iter().map(|info| info["key"].as_str().unwrap()).collect();
     assert!(keys.contains(&"ncc_min") && keys.contains(&"search_window_px"));
     let version = server.get("version").await.expect(200);
-    assert_eq!((&version["name"], &version["limits"]["body_bytes"]), (&json!("sightline"), &json!(1 << 20)));
+    assert_eq!(
+        (&version["name"], &version["limits"]["body_bytes"]),
+        (&json!("sightline"), &json!(BODY_BYTES))
+    );
 }

@@ -71,6 +71,11 @@ fn bad_commands_and_bad_input_have_their_own_exit_codes() {
     refused(&["import", folder, "--out", "x"], 3, "native traverse");
     refused(&["serve", "/nowhere/at/all", "--port", "0"], 3, "/nowhere/at/all");
     refused(&["serve", folder, "--port", "0", "--listen", "0.0.0.0"], 3, "--allow-host");
+    let beyond = ["serve", folder, "--port", "0", "--listen", "0.0.0.0", "--allow-host", "rover.example"];
+    refused(&[&beyond[..], &["--no-token"]].concat(), 3, "access token");
+    refused(&[&beyond[..], &["--token", "short"]].concat(), 2, "16 to 256");
+    refused(&["serve", folder, "--token", "0123456789abcdef", "--no-token"], 2, "--no-token");
+    refused(&["serve", folder, "--behind-proxy", "rover.example"], 2, "https://rover.example/sightline/");
 }
 
 #[test]

@@ -5,6 +5,7 @@
 
 mod api;
 mod api_security;
+mod attack;
 mod cli;
 mod compare;
 mod copied;

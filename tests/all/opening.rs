@@ -115,6 +115,30 @@ async fn an_exported_file_can_be_sent_as_it_is() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_session_with_500_long_notes_can_be_brought_back() {
+    let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
+    let server = TestServer::open(drive.path(), folder.path());
+    let session = server.begin().await;
+    server.post(&format!("sessions/{session}/notes"), &json!({ "step": 1, "text": "x" })).await.expect(201);
+    let mut file = server.get(&format!("sessions/{session}/exports/reproduce.json")).await.expect(200);
+    let note = file["notes"][0].clone();
+    // Signs of four bytes each.
+    let text = "𝛼".repeat(4000);
+    let notes = (1..=500).map(|id| {
+        let mut note = note.clone();
+        (note["id"], note["text"]) = (json!(id), json!(text));
+        note
+    });
+    file["notes"] = notes.collect();
+    let size = file.to_string().len();
+    assert!(size > 7 << 20 && size < sightline_api::program::BODY_BYTES, "{size} bytes");
+    let view = server.post("sessions/reproduced", &file).await.expect(201);
+    let brought = format!("sessions/{}/notes", view["id"].as_str().unwrap());
+    let notes = server.get(&brought).await.expect(200);
+    assert_eq!((notes.as_array().unwrap().len(), &notes[499]["text"]), (500, &json!(text)));
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_session_that_names_what_cannot_be_is_refused_and_none_is_begun() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), folder.path());

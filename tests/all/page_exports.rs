@@ -105,17 +105,17 @@ async fn check_actions(browser: &Browser, bench: &Bench, folder: &std::path::Pat
 
 #[tokio::test(flavor = "multi_thread")]
 async fn the_live_stream_is_shown_by_reruns_own_viewer() {
-    let (_bench, browser) = picked(&short_approach()).await;
+    let (bench, browser) = picked(&short_approach()).await;
     browser.evaluate(CATCH).await;
     let url = caught(&browser, "opened", "Open in Rerun").await;
-    assert!(url.starts_with("http://127.0.0.1:"), "{url}");
-    // The page says where, for a viewer of one's own, and that the stream asks for no token.
+    assert!(url.starts_with(&format!("{}api/v1/rerun/index.html?session=s1", bench.url())), "{url}");
+    // The page says how another viewer reads it.
     browser.show_panel("Messages").await;
-    browser.says("rerun+http://127.0.0.1:").await;
+    browser.says("| rerun -").await;
     browser.shot("rerun-message").await;
-    browser.end().await;
 
-    let viewer = Browser::start().await;
+    // In the same browser, which has the cookie.
+    let viewer = browser;
     viewer.goto(&url).await;
     let painted = "const c = document.querySelector('canvas'); return c !== null && c.width > 300";
     viewer.wait_for("rerun's canvas", painted).await;

@@ -3,8 +3,6 @@
 
 mod shape;
 
-use std::io::{Read, Write};
-use std::net::TcpStream;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
@@ -13,7 +11,7 @@ use sightline_geometry::error::Error;
 use sightline_geometry::estimate::ransac::Refit;
 use sightline_geometry::frames::Pixel;
 use sightline_server::rerun_log::{
-    LiveStream, Rows, RunLog, documented_entities, entities_of, export, root, shared_entities,
+    LiveRecording, Rows, RunLog, documented_entities, entities_of, export, root, shared_entities,
 };
 use sightline_session::step::RunStep;
 use sightline_session::{Session, track};
@@ -298,51 +296,56 @@ fn stream_threads() -> usize {
 fn exports_and_live_targets_leave_no_threads_behind() {
     const TIMES: usize = 20;
     let before = stream_threads();
-    let live = LiveStream::start().unwrap();
+    let mut live = LiveRecording::start().unwrap();
     let mut session = Session::new("s", "short", FIXTURE.drive.traverse.stop_count());
     for _ in 0..TIMES {
         FIXTURE.exported();
         session.add_target(None, Settings::default(), Arc::clone(&FIXTURE.runs[0][0]));
-        live.log_session("short approach", &FIXTURE.drive, &session).unwrap();
+        while !live.advance("short approach", &FIXTURE.drive, &session).unwrap().is_empty() {}
     }
     let after = stream_threads();
     assert!(after < before + 2 * TIMES, "{before} threads of streams, then {after}");
 }
 
 #[test]
-fn the_live_page_answers_on_loopback_and_may_talk_to_nobody_else() {
-    let stream = LiveStream::start().unwrap();
+fn a_live_recording_grows_step_by_step_to_the_exported_one() {
+    let mut live = LiveRecording::start().unwrap();
     let mut session = Session::new("s", "short", FIXTURE.drive.traverse.stop_count());
-    session.add_target(Some("rock".to_owned()), Settings::default(), Arc::clone(&FIXTURE.runs[0][0]));
-    stream.log_session("short", &FIXTURE.drive, &session).unwrap();
-    for trace in &FIXTURE.runs[0][1..] {
-        session.record(0, 0, Arc::clone(trace)).unwrap();
-        stream.log_session("short", &FIXTURE.drive, &session).unwrap();
+    for (label, run) in LABELS.iter().zip(&FIXTURE.runs) {
+        session.add_target(Some((*label).to_owned()), Settings::default(), Arc::clone(&run[0]));
     }
-    let url = stream.viewer_url();
-    let port = url.strip_prefix("http://127.0.0.1:").and_then(|rest| rest.split('/').next()).unwrap();
-    let head = get(port.parse().unwrap(), "/");
-    assert!(head.starts_with("HTTP/1.1 200 OK"), "{head}");
-    let policy = head.lines().find(|line| line.starts_with("content-security-policy:")).unwrap();
-    let data = stream.stream_url().replace("rerun+http", "http").replace("/proxy", "");
-    assert!(
-        policy.contains("default-src 'none'") && policy.contains(&format!("connect-src 'self' {data};")),
-        "{policy}"
-    );
-    assert!(get(port.parse().unwrap(), "/re_viewer_bg.wasm").starts_with("HTTP/1.1 200 OK"));
-    assert!(get(port.parse().unwrap(), "/signed-in").starts_with("HTTP/1.1 404"));
-    drop(stream);
-    assert!(
-        TcpStream::connect(("127.0.0.1", port.parse().unwrap())).is_err(),
-        "the page outlives the stream"
-    );
-}
-
-/// The head of an answer over plain HTTP.
-fn get(port: u16, path: &str) -> String {
-    let mut socket = TcpStream::connect(("127.0.0.1", port)).unwrap();
-    write!(socket, "GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nConnection: close\r\n\r\n").unwrap();
-    let mut head = vec![0; 4096];
-    let count = socket.read(&mut head).unwrap();
-    String::from_utf8_lossy(&head[..count]).into_owned()
+    let mut bytes = Vec::new();
+    let mut read_all = |session: &Session, bytes: &mut Vec<u8>| {
+        let mut batches = 0;
+        loop {
+            let batch = live.advance("short approach", &FIXTURE.drive, session).unwrap();
+            if batch.is_empty() {
+                return batches;
+            }
+            bytes.extend(batch);
+            batches += 1;
+        }
+    };
+    assert_eq!(read_all(&session, &mut bytes), 1);
+    assert_eq!(&bytes[..4], b"RRF2");
+    assert_eq!(read_all(&session, &mut bytes), 0, "nothing new");
+    for (target, run) in FIXTURE.runs.iter().enumerate() {
+        for trace in &run[1..] {
+            session.record(target, 0, Arc::clone(trace)).unwrap();
+        }
+    }
+    assert!(read_all(&session, &mut bytes) > 1, "many steps come in batches");
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("live.rrd");
+    std::fs::write(&path, &bytes).unwrap();
+    let (live, exported) = (rrd::read(&path), FIXTURE.exported());
+    let rows = |recording: &Recording| {
+        let own = recording.entities.iter().filter(|(path, _)| !path.starts_with("/__properties"));
+        own.map(|(path, rows)| {
+            (path.clone(), sorted(rows.data.clone()), sorted(rows.cleared.clone()), rows.numbers.clone())
+        })
+        .collect::<Vec<_>>()
+    };
+    assert_eq!(rows(&live), rows(&exported));
+    assert!(live.blueprint_activated);
 }

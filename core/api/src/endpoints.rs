@@ -26,7 +26,7 @@ use sightline_track::locate::template::history::AgainstEarlier;
 use crate::endpoint::{Done, Endpoint, File, Method, NoBody, NoQuery};
 use crate::location::{
     Anywhere, AtBreakpoint, AtDocument, AtExport, AtImage, AtNote, AtRun, AtSession, AtStep, AtStop,
-    AtStudyJob, AtTarget, AtTraverse,
+    AtStudyJob, AtTarget, AtTraverse, AtViewerFile,
 };
 use crate::program::{Health, Version};
 use crate::query::{FirstRow, FirstStop, ImageDepth, MapLimits, MapPixel, SessionPart, ValueName};
@@ -126,8 +126,14 @@ endpoints! {
     ShowCursor: Get "/sessions/{session}/cursor", AtSession => Cursor;
     /// Moves the cursor.
     MoveCursor: Put "/sessions/{session}/cursor", AtSession, body Cursor => Cursor;
-    /// Opens a live Rerun stream.
+    /// Opens the live Rerun stream of a session.
     StreamRecording: Post "/sessions/{session}/rerun", AtSession => RerunStream;
+    /// Closes the live Rerun stream of a session.
+    CloseRecording: Delete "/sessions/{session}/rerun", AtSession => Done;
+    /// The live Rerun stream: an endless recording that grows with the session.
+    ReadRecording: Get "/sessions/{session}/rerun/live.rrd", AtSession => File;
+    /// A file of Rerun's web viewer.
+    ShowRerunViewer: Get "/rerun/{file}", AtViewerFile => File;
     /// What a session can be exported as.
     ListExports: Get "/sessions/{session}/exports", AtSession, query SessionPart => Vec<ExportEntry>;
     /// A session, or a part of it, as a file.

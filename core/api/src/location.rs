@@ -127,3 +127,11 @@ pub struct AtStudyJob {
     /// The study job's id.
     pub job: String,
 }
+
+/// A file of Rerun's web viewer.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, IntoParams)]
+#[into_params(parameter_in = Path)]
+pub struct AtViewerFile {
+    /// index.html, re_viewer.js, re_viewer_bg.wasm, favicon.ico or apple-touch-icon.png
+    pub file: String,
+}

@@ -3,6 +3,9 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+/// The largest body of a request, bytes: a session with 500 notes of 4,000 characters each, with its runs, fits.
+pub const BODY_BYTES: usize = 8 << 20;
+
 /// What this program is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Version {

@@ -209,13 +209,13 @@ pub struct NewRun {
     pub prediction_px: Option<Pixel>,
 }
 
-/// A live Rerun stream that was opened for a session.
+/// The live Rerun stream of a session.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct RerunStream {
-    /// The page that shows it.
-    pub viewer_url: String,
-    /// Where the data come from.
-    pub stream_url: String,
+    /// Path below `/api/v1/` of the page that shows it.
+    pub viewer_path: String,
+    /// Path below `/api/v1/` of the recording, for another viewer: `curl -N … | rerun -`.
+    pub stream_path: String,
 }
 
 /// What the server tells every open page over the WebSocket.

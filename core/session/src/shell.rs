@@ -32,6 +32,9 @@ pub fn track(drive: &str, designation: Designation, changes: &Changes) -> String
     format!("sightline track {} --target {},{}{from}{settings}", quoted(drive), pixel.x, pixel.y)
 }
 
+/// Writes the header with the access token; `printf` is part of the shell and no program of its own.
+pub const WITH_TOKEN: &str = "printf 'Authorization: Bearer %s' \"$SIGHTLINE_TOKEN\"";
+
 /// A request over HTTP, to be written as `curl`.
 #[derive(Clone, Copy, Debug)]
 pub struct Curl<'a> {
@@ -48,9 +51,10 @@ pub struct Curl<'a> {
 }
 
 impl Curl<'_> {
-    /// The command: silent but for problems, which make it fail. The access token is read from `SIGHTLINE_TOKEN`.
+    /// The command: silent but for problems, which make it fail. The page does not have the access token: the shell reads
+    /// it from `SIGHTLINE_TOKEN`, and hands it over by the standard input, because all users see the arguments of a program.
     pub fn text(&self) -> String {
-        let mut text = "curl -fsS".to_owned();
+        let mut text = format!("{WITH_TOKEN} | curl -fsS -H @-");
         if self.method != "GET" {
             text.push_str(&format!(" -X {}", self.method));
         }
@@ -58,8 +62,6 @@ impl Curl<'_> {
             text.push_str(&format!(" -o {}", quoted(file)));
         }
         text.push_str(&format!(" {}", quoted(self.url)));
-        // In double quotes, so that the shell reads the variable; the page does not know the token.
-        text.push_str(" -H \"Authorization: Bearer $SIGHTLINE_TOKEN\"");
         if let Some(revision) = self.revision {
             text.push_str(&format!(" -H {}", quoted(&format!("If-Match: \"{revision}\""))));
         }

@@ -14,6 +14,7 @@ use crate::access::{Access, Token};
 use crate::first_session;
 use crate::folders::Folders;
 use crate::hosts::Hosts;
+use crate::public_url::PublicUrl;
 use crate::state::AppState;
 
 /// How long the end of the program waits for work that does not look at a cancel flag.
@@ -36,9 +37,12 @@ pub(super) struct Serve {
     /// A further name under which the server may be addressed; can be given more than once.
     #[arg(long, value_name = "NAME")]
     allow_host: Vec<String>,
+    /// The address under which a reverse proxy publishes the server, such as https://rover.example/sightline/.
+    #[arg(long, value_name = "URL", value_parser = PublicUrl::parse)]
+    behind_proxy: Option<PublicUrl>,
     /// The access token, 16 letters or more, instead of a random one; also the variable SIGHTLINE_TOKEN.
-    #[arg(long, value_name = "TOKEN")]
-    token: Option<String>,
+    #[arg(long, value_name = "TOKEN", value_parser = Token::chosen)]
+    token: Option<Token>,
     /// Let in everybody who reaches the server: every user of this machine.
     #[arg(long, conflicts_with = "token")]
     no_token: bool,
@@ -53,9 +57,9 @@ impl Serve {
     /// # Errors
     /// A traverse that cannot be opened, a data folder in use, or a port that is taken.
     pub(super) fn run(self) -> Result<()> {
-        if !self.listen.is_loopback() && self.allow_host.is_empty() {
+        if !self.listen.is_loopback() && self.allow_host.is_empty() && self.behind_proxy.is_none() {
             let message = "listening beyond this machine needs --allow-host with the name by which pages will \
-                           address the server";
+                           address the server, or --behind-proxy";
             return Err(Error::Request(message.to_owned()));
         }
         if !self.listen.is_loopback() && self.no_token {
@@ -76,6 +80,10 @@ impl Serve {
             Some(token) => Access::with_token(hosts, token),
             None => Access::without_token(hosts),
         };
+        let access = match self.behind_proxy.clone() {
+            Some(public) => access.behind_proxy(public),
+            None => access,
+        };
         let state = AppState::with_folders(traverses, &folders, access)?;
         if token.is_none() {
             terminal::error("warning: without an access token every user of this machine can use the server");
@@ -84,7 +92,8 @@ impl Serve {
             let begun = first_session::begin(&state, &first_session::scenario()?);
             begun.map_err(|problem| Error::Request(problem.problem().detail.clone()))?;
         }
-        let ended = runtime.block_on(serve(listener, &url(address, token.as_ref()), state));
+        let page = self.behind_proxy.as_ref().map_or_else(|| page(address), PublicUrl::to_string);
+        let ended = runtime.block_on(serve(listener, &with_token(&page, token.as_ref()), state));
         drop(inside);
         // Work that is under way is lost in any case: nothing of it is on disk before it ends.
         runtime.shutdown_timeout(SHUTDOWN);
@@ -96,8 +105,10 @@ impl Serve {
         if self.no_token {
             return Ok(None);
         }
-        let chosen =
-            self.token.clone().or_else(|| std::env::var(TOKEN_VARIABLE).ok().filter(|text| !text.is_empty()));
+        if let Some(token) = &self.token {
+            return Ok(Some(token.clone()));
+        }
+        let chosen = std::env::var(TOKEN_VARIABLE).ok().filter(|text| !text.is_empty());
         chosen.map_or_else(Token::random, |text| Token::chosen(&text)).map(Some)
     }
 
@@ -155,14 +166,19 @@ fn bind(address: SocketAddr) -> Result<TcpListener> {
     Ok(listener)
 }
 
-/// The address as a browser takes it; the token is in its fragment, which a browser sends to nobody.
-fn url(address: SocketAddr, token: Option<&Token>) -> String {
-    let fragment = token.map(|token| format!("#token={}", token.secret())).unwrap_or_default();
+/// The address of the page as a browser takes it.
+fn page(address: SocketAddr) -> String {
     if address.ip().is_unspecified() {
-        format!("http://127.0.0.1:{}/{fragment}", address.port())
+        format!("http://127.0.0.1:{}/", address.port())
     } else {
-        format!("http://{address}/{fragment}")
+        format!("http://{address}/")
     }
+}
+
+/// The address with the token in its fragment, which a browser sends to nobody.
+fn with_token(page: &str, token: Option<&Token>) -> String {
+    let fragment = token.map(|token| format!("#token={}", token.secret())).unwrap_or_default();
+    format!("{page}{fragment}")
 }
 
 /// Two servers must not write the same sessions; the system lets go of the lock when the program ends.

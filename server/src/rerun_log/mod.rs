@@ -1,4 +1,4 @@
-//! The Rerun side of the debugger: runs as an `.rrd` file ([`export`]) or as a live stream ([`LiveStream`]).
+//! The Rerun side of the debugger: runs as an `.rrd` file ([`export`]) or as a live recording ([`LiveRecording`]).
 //!
 //! Every entity has one `log_*` function, called in the order of the stages from `log_step`; the numbers are
 //! one table in `scores`. `{target}` is the run's name: `target_1` for the first run of the first target,
@@ -131,7 +131,7 @@ mod layout;
 mod live;
 mod map;
 mod memory;
-mod page;
+pub(crate) mod page;
 mod palette;
 mod properties;
 mod recorder;
@@ -147,7 +147,7 @@ use sightline_rover::pipeline::Stops;
 
 pub use entities::{EntityDoc, Rows, documented_entities, entities_of, shared_entities};
 pub use export::export;
-pub use live::LiveStream;
+pub use live::LiveRecording;
 pub use recorder::RunLog;
 
 use scores::SCORES;

@@ -1,98 +1,93 @@
-//! The page with rerun's own viewer, from this machine and talking to this machine only.
+//! The files of rerun's own viewer, served by us.
 //!
-//! Rerun can serve the page itself, but the viewer it bundles reports its use to rerun.io and fetches fonts
-//! and examples from the network, with no switch to turn that off. We serve the same files under a content
-//! security policy that lets the page talk to its own origin and to the data stream, and to nothing else.
+//! The viewer that rerun bundles reports its use to rerun.io and fetches fonts and examples from the network, with no
+//! switch to turn that off. Our content security policy lets the page load and call its own origin only, and run only the
+//! scripts that it arrives with, by their digests. It opens the live recording of the session named in its address, and
+//! no other address.
 
-use std::io;
-use std::net::{Ipv4Addr, SocketAddr};
-use std::sync::Arc;
-use std::thread::JoinHandle;
+use std::sync::LazyLock;
 
-use axum::Router;
-use axum::extract::State;
-use axum::http::header::{CONTENT_SECURITY_POLICY, CONTENT_TYPE, REFERRER_POLICY, X_CONTENT_TYPE_OPTIONS};
-use axum::http::{StatusCode, Uri};
+use axum::http::header::{CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE};
 use axum::response::{IntoResponse, Response};
-use re_web_viewer_server::WebViewerData;
-use tokio::sync::oneshot;
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use re_web_viewer_server::{WebViewerData, WebViewerDataError};
+use sha2::{Digest, Sha256};
 
-/// The page, served until it is dropped.
-pub(super) struct ViewerPage {
-    address: SocketAddr,
-    stop: Option<oneshot::Sender<()>>,
-    thread: Option<JoinHandle<()>>,
-}
+/// The page, a name of [`file`].
+pub(crate) const PAGE: &str = "index.html";
 
-/// The viewer's files and the policy they are served under.
+/// Which recording rerun's page opens: as many as its address names, from any host.
+const ANY_RECORDING: &str = r#"url: query.getAll("url"),"#;
+
+/// Which recording ours opens.
+const OUR_RECORDING: &str = r#"url: [new URL(`../sessions/${encodeURIComponent(query.get("session"))}/rerun/live.rrd`, location.href).href],"#;
+
+/// The viewer's files and the policy of its page.
 struct Files {
     data: WebViewerData,
     page: String,
     policy: String,
 }
 
-impl ViewerPage {
-    /// Serves the page for a stream on `stream_port`, on a free port of the loopback address.
-    pub(super) fn start(stream_port: u16) -> io::Result<Self> {
-        let data = WebViewerData::load(None).map_err(io::Error::other)?;
-        let page = without_foreign_links(&String::from_utf8_lossy(data.index_html()));
-        let files = Arc::new(Files { data, page, policy: policy(stream_port) });
-        let listener = std::net::TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
-        listener.set_nonblocking(true)?;
-        let address = listener.local_addr()?;
-        // A runtime of its own, so that the page can be started from inside and outside of one.
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-        let (stop, stopped) = oneshot::channel::<()>();
-        let serve = async move {
-            let listener = tokio::net::TcpListener::from_std(listener)?;
-            let serving = axum::serve(listener, router(files));
-            tokio::select! {
-                ended = serving.into_future() => ended,
-                _ = stopped => Ok(()),
-            }
-        };
-        let thread = std::thread::Builder::new().name("rerun_page".to_owned()).spawn(move || {
-            if let Err(error) = runtime.block_on(serve) {
-                tracing::warn!(%error, "the page of the rerun viewer ended");
-            }
-        })?;
-        Ok(Self { address, stop: Some(stop), thread: Some(thread) })
-    }
+static FILES: LazyLock<Result<Files, WebViewerDataError>> = LazyLock::new(|| {
+    let data = WebViewerData::load(None)?;
+    let page = without_foreign_links(&String::from_utf8_lossy(data.index_html()));
+    let page = page.replace(ANY_RECORDING, OUR_RECORDING);
+    let policy = policy(&page);
+    Ok(Files { data, page, policy })
+});
 
-    /// Where the page is.
-    pub(super) fn url(&self) -> String {
-        format!("http://{}", self.address)
-    }
+/// A file of the viewer; `None` for another name.
+///
+/// # Errors
+/// A viewer that is not part of the program.
+pub(crate) fn file(name: &str) -> Result<Option<Response>, &'static WebViewerDataError> {
+    let files = FILES.as_ref()?;
+    let data = &files.data;
+    let (kind, bytes) = match name {
+        PAGE => {
+            let headers =
+                [(CONTENT_TYPE, "text/html; charset=utf-8"), (CONTENT_SECURITY_POLICY, &files.policy)];
+            return Ok(Some((headers, files.page.as_str()).into_response()));
+        }
+        "favicon.ico" => ("image/x-icon", data.favicon()),
+        "apple-touch-icon.png" => ("image/png", data.apple_touch_icon()),
+        "re_viewer.js" => ("text/javascript", data.viewer_js()),
+        "re_viewer_bg.wasm" => ("application/wasm", data.viewer_wasm()),
+        _ => return Ok(None),
+    };
+    // The files change with the program only; the largest has 40 MB.
+    let headers = [(CONTENT_TYPE, kind), (CACHE_CONTROL, "private, max-age=3600")];
+    Ok(Some((headers, bytes.to_vec()).into_response()))
 }
 
-impl Drop for ViewerPage {
-    fn drop(&mut self) {
-        if let Some(stop) = self.stop.take() {
-            // The thread may have ended by itself, and then nobody listens.
-            let _ = stop.send(());
-        }
-        if let Some(thread) = self.thread.take() {
-            // It was told to end; that it panicked before is of no use to anyone here.
-            let _ = thread.join();
-        }
-    }
-}
-
-/// What the page may load and whom it may talk to.
-fn policy(stream_port: u16) -> String {
-    let stream = format!("http://127.0.0.1:{stream_port}");
+/// What the page may load and whom it may call.
+fn policy(page: &str) -> String {
+    let scripts: Vec<_> =
+        inline_scripts(page).map(|script| format!(" 'sha256-{}'", digest(script))).collect();
     [
         "default-src 'none'",
-        "script-src 'self' 'unsafe-inline' 'wasm-unsafe-eval'",
+        &format!("script-src 'self' 'wasm-unsafe-eval'{}", scripts.concat()),
         "style-src 'self' 'unsafe-inline'",
         "img-src 'self' data: blob:",
         "font-src 'self' data:",
-        &format!("connect-src 'self' {stream}"),
+        "connect-src 'self'",
         "worker-src 'self' blob:",
         "base-uri 'none'",
         "form-action 'none'",
+        "frame-ancestors 'none'",
     ]
     .join("; ")
+}
+
+/// The contents of the scripts that are part of the page.
+fn inline_scripts(page: &str) -> impl Iterator<Item = &str> {
+    page.split("<script>").skip(1).filter_map(|rest| rest.split("</script>").next())
+}
+
+fn digest(script: &str) -> String {
+    STANDARD.encode(Sha256::digest(script.as_bytes()))
 }
 
 /// The page without its links to other hosts, which the policy would refuse and the console would report.
@@ -108,29 +103,6 @@ fn without_foreign_links(html: &str) -> String {
     page
 }
 
-fn router(files: Arc<Files>) -> Router {
-    Router::new().fallback(file).with_state(files)
-}
-
-async fn file(State(files): State<Arc<Files>>, uri: Uri) -> Response {
-    let data = &files.data;
-    let (kind, bytes) = match uri.path() {
-        "/" | "/index.html" => ("text/html; charset=utf-8", files.page.as_bytes()),
-        "/favicon.ico" => ("image/x-icon", data.favicon()),
-        "/apple-touch-icon.png" => ("image/png", data.apple_touch_icon()),
-        "/re_viewer.js" => ("text/javascript", data.viewer_js()),
-        "/re_viewer_bg.wasm" => ("application/wasm", data.viewer_wasm()),
-        _ => return StatusCode::NOT_FOUND.into_response(),
-    };
-    let headers = [
-        (CONTENT_TYPE, kind),
-        (CONTENT_SECURITY_POLICY, files.policy.as_str()),
-        (X_CONTENT_TYPE_OPTIONS, "nosniff"),
-        (REFERRER_POLICY, "no-referrer"),
-    ];
-    (headers.map(|(name, value)| (name, value.to_owned())), bytes.to_vec()).into_response()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -140,8 +112,23 @@ mod tests {
         let html =
             r#"<head><link rel="icon" href="favicon.ico" /><link href="https://a.example/f.css" /><p>x</p>"#;
         assert_eq!(without_foreign_links(html), r#"<head><link rel="icon" href="favicon.ico" /><p>x</p>"#);
-        let data = WebViewerData::load(None).unwrap();
-        let page = without_foreign_links(&String::from_utf8_lossy(data.index_html()));
+        let page = &FILES.as_ref().unwrap().page;
         assert!(page.contains("favicon.ico") && !page.contains("fonts.g"));
+    }
+
+    #[test]
+    fn page_opens_our_recording_and_no_other() {
+        let files = FILES.as_ref().unwrap();
+        let original = String::from_utf8_lossy(files.data.index_html());
+        assert_eq!(original.matches(ANY_RECORDING).count(), 1, "rerun's page has changed");
+        assert!(files.page.contains("/rerun/live.rrd") && !files.page.contains("getAll(\"url\")"));
+    }
+
+    #[test]
+    fn policy_names_both_inline_scripts_and_allows_no_others() {
+        let files = FILES.as_ref().unwrap();
+        assert_eq!(inline_scripts(&files.page).count(), 2, "rerun's page has changed");
+        let script = files.policy.split("; ").find(|part| part.starts_with("script-src")).unwrap();
+        assert!(script.matches("'sha256-").count() == 2 && !script.contains("unsafe-inline"), "{script}");
     }
 }

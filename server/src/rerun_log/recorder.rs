@@ -163,6 +163,11 @@ impl Recorder {
         log_step(&step, is_first_here)
     }
 
+    /// Whether a step of a run is in the recording.
+    pub(super) fn has(&self, run: &RunLog<'_>, trace: &RunStep) -> bool {
+        self.runs.get(&root(run.target, run.run)).is_some_and(|known| known.steps.contains(&trace.step))
+    }
+
     fn set_time(&self, step: usize, stops: &dyn Stops) {
         self.stream.set_time_sequence("step", step as i64);
         self.stream.set_duration_secs("time", stops.time_s(step));

@@ -4,13 +4,12 @@ use axum::Json;
 use axum::extract::State;
 use sightline_api::endpoint::Endpoint;
 use sightline_api::endpoints::{ShowHealth, ShowVersion};
-use sightline_api::program::{Health, Limits, Version};
+use sightline_api::program::{BODY_BYTES, Health, Limits, Version};
 use sightline_session::progress::SAVED_FORMAT;
 use sightline_world::traverse::FORMAT_VERSION;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
-use crate::extract::BODY_LIMIT;
 use crate::live_session::{RUN_LIMIT, TARGET_LIMIT};
 use crate::routes::route::route;
 use crate::state::AppState;
@@ -30,7 +29,7 @@ async fn version() -> Json<Version> {
         version: crate::version::VERSION.to_owned(),
         traverse_format: FORMAT_VERSION,
         session_format: SAVED_FORMAT,
-        limits: Limits { body_bytes: BODY_LIMIT, targets: TARGET_LIMIT, runs: RUN_LIMIT },
+        limits: Limits { body_bytes: BODY_BYTES, targets: TARGET_LIMIT, runs: RUN_LIMIT },
     })
 }
 

@@ -25,7 +25,7 @@ impl AppState {
         }
         lock(&self.0.sessions).take(number);
         self.0.questions.forget_session(id);
-        lock(&self.0.streams).remove(id);
+        self.0.streams.close(id);
         self.tell(Event::SessionRemoved { session: id.to_owned() });
         Ok(())
     }

@@ -206,6 +206,8 @@ pub enum Command {
     ToggleMarks,
     /// Opens the session in Rerun.
     OpenRerun,
+    /// Closes the live Rerun stream of the session.
+    CloseRerun,
     /// Takes a message away.
     Dismiss(u64),
     /// Connects again at once.

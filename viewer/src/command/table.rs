@@ -87,6 +87,8 @@ pub(crate) const COPY_LINK: Do =
 /// Opens the session in Rerun.
 pub(crate) const OPEN_RERUN: Do = Do::new("Open the session in Rerun", &[], |_| Command::OpenRerun)
     .button("Open in Rerun", "Streams this session to a Rerun viewer in a new tab");
+/// Closes the live Rerun stream of the session.
+pub(crate) const CLOSE_RERUN: Do = Do::new("Close the Rerun stream", &[], |_| Command::CloseRerun);
 /// Lets the current panel fill the page, or restores the others.
 pub(crate) const MAXIMISE: Do =
     Do::new("Fill the page with the current panel", &[On::plain(Key::Backtick)], |_| {
@@ -262,6 +264,7 @@ pub(crate) static TABLE: &[Line] = &[
             Do::new("Take the changed settings back", &[], |_| Command::ClearDraft),
             Do::new("Open the plain page of this step", &[], |_| Command::Exports(exports::Ask::PlainPage)),
             OPEN_RERUN,
+            CLOSE_RERUN,
             Do::new("Tour: six bubbles from a lost target to a saved one", &[], |_| {
                 Command::Tour(Turn::Begin)
             }),

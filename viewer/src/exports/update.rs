@@ -2,7 +2,7 @@
 
 use sightline_api::endpoint::Call;
 use sightline_api::endpoints::{
-    ListExports, ShowSessionPage, ShowSessionsPage, ShowStepPage, StreamRecording,
+    CloseRecording, ListExports, ShowSessionPage, ShowSessionsPage, ShowStepPage, StreamRecording,
 };
 use sightline_api::location::{Anywhere, AtSession};
 use sightline_api::query::SessionPart;
@@ -10,6 +10,11 @@ use sightline_api::query::SessionPart;
 use crate::exports::{Ask, Part};
 use crate::state::State;
 use crate::state::effect::Effect;
+
+/// Closes the live Rerun stream of a session.
+pub(crate) fn close_rerun(session: String) -> Call {
+    Call::to::<CloseRecording>(&AtSession { session })
+}
 
 /// Opens a live Rerun stream of a session.
 pub(crate) fn stream_to_rerun(session: String) -> Call {

@@ -41,10 +41,13 @@ pub async fn start(canvas_id: String) -> Result<(), JsValue> {
         .await
 }
 
-/// The server that sent the page, and what its fragment says.
+/// The server that sent the page, and what its fragment says. Behind a reverse proxy the page may be in a folder, which
+/// is part of the server's address.
 fn link() -> Link {
     let location = web_sys::window().map(|window| window.location());
     let origin = location.as_ref().and_then(|location| location.origin().ok()).unwrap_or_default();
+    let path = location.as_ref().and_then(|location| location.pathname().ok()).unwrap_or_default();
+    let origin = format!("{origin}{}", path.rsplit_once('/').map_or("", |(folder, _)| folder));
     Link { origin, fragment: Fragment::parse(&web::hash()) }
 }
 

@@ -1,7 +1,7 @@
 //! Applies the user's commands to the state.
 
 use sightline_api::endpoint::{Call, Endpoint, NoBody};
-use sightline_api::endpoints::{CancelRun, DesignateTarget, ForkRun, ResumeRun, StreamRecording};
+use sightline_api::endpoints::{CancelRun, CloseRecording, DesignateTarget, ForkRun, ResumeRun, StreamRecording};
 use sightline_api::location::{AtRun, AtSession, AtTarget};
 use sightline_api::wire::{Designated, NewRun, NewTarget};
 use sightline_geometry::frames::Pixel;
@@ -10,7 +10,7 @@ use sightline_track::settings::Changes;
 
 use crate::breakpoints::play::Shuttle;
 use crate::command::{Command, Go, Mode, Zoomable};
-use crate::exports::update::stream_to_rerun;
+use crate::exports::update::{close_rerun, stream_to_rerun};
 use crate::net::request::Request;
 use crate::state::calls::Notice;
 use crate::state::effect::Effect;
@@ -88,6 +88,13 @@ impl State {
                     self.call::<StreamRecording>(stream_to_rerun(session), Self::rerun_opened);
                 }
                 self.messages.note("Opening the session in Rerun …");
+            }
+            Command::CloseRerun => {
+                if let Some(session) = self.session_id() {
+                    self.call::<CloseRecording>(close_rerun(session), |state, _| {
+                        state.messages.note("The Rerun stream of this session is closed.");
+                    });
+                }
             }
             Command::Dismiss(id) => self.messages.dismiss(id),
             Command::Reconnect => self.outbox.push(Request::Reconnect),

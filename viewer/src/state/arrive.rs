@@ -11,6 +11,7 @@ use sightline_session::view::{RunView, SessionView};
 
 use crate::cache::{Key, StepKey};
 use crate::command::Mode;
+use crate::exports::as_text;
 use crate::net::events::Connection;
 use crate::net::request::{Arrived, Reply, Request};
 use crate::state::deeds::Deed;
@@ -124,13 +125,13 @@ impl State {
     }
 
     pub(crate) fn rerun_opened(&mut self, stream: RerunStream) {
+        let read = as_text::stream(&self.origin, &stream.stream_path);
         let words = format!(
-            "Rerun shows this session. A viewer of your own takes `rerun {}`. Whoever uses this machine can read the \
-             stream: it asks for no token.",
-            stream.stream_url
+            "Rerun shows this session. A viewer of your own takes `{read} | rerun -`. \u{201c}Close the Rerun stream\u{201d} ends it."
         );
-        self.messages.note_with_link(words, stream.viewer_url.clone());
-        self.outbox.add(Effect::OpenUrl(stream.viewer_url));
+        let url = format!("{}/api/v1/{}", self.origin, stream.viewer_path);
+        self.messages.note_with_link(words, url.clone());
+        self.outbox.add(Effect::OpenUrl(url));
     }
 
     /// Shows a refusal; `is_shown_in_place`: in the list of messages alone.

@@ -6,6 +6,7 @@ use sightline_api::location::AtNote;
 use sightline_api::wire::{Event, Problem};
 use sightline_session::exports::{ExportEntry, Size};
 use sightline_session::notes::{EditNote, Note, Pin};
+use sightline_session::shell::WITH_TOKEN;
 
 use egui_kittest::kittest::Queryable;
 
@@ -229,7 +230,10 @@ fn the_export_window_lists_files_with_sizes_and_ways_to_copy_them() {
     let curl = copied(&mut shown, "copy as HTTP: Rows, CSV");
     assert_eq!(
         curl,
-        "curl -fsS -o sightline-s1-rows.csv http://localhost/api/v1/sessions/s1/exports/rows.csv"
+        format!(
+            "{WITH_TOKEN} | curl -fsS -H @- -o sightline-s1-rows.csv \
+             http://localhost/api/v1/sessions/s1/exports/rows.csv"
+        )
     );
     let figure = shown.click("figure of Map, site frame");
     let wish = Wish { pane: Pane::Map, kind: Kind::Png(2) };

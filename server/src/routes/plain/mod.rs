@@ -56,7 +56,7 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
 #[utoipa::path(get, operation_id = "plain_sessions", path = ShowSessionsPage::PATH, tag = "plain pages", responses(
     (status = 200, content_type = "text/html", body = String), NoPage))]
 async fn all(State(state): State<AppState>) -> Response {
-    answer(blocking(move || Ok(overview::all(&state))).await, None)
+    answer::<ShowSessionsPage>(blocking(move || Ok(overview::all(&state))).await, None)
 }
 
 /// A plain page with the targets, runs and notes of a session
@@ -70,7 +70,7 @@ async fn session(
         let live = state.session(&session)?;
         Ok(overview::session(&Source::of(&live)))
     };
-    answer(blocking(work).await, None)
+    answer::<ShowSessionPage>(blocking(work).await, None)
 }
 
 /// A plain page with everything that a step saw and decided
@@ -91,7 +91,7 @@ async fn step(
         }
         Err(problem) => Err(problem),
     };
-    answer(made, Some(&id))
+    answer::<ShowStepPage>(made, Some(&id))
 }
 
 /// The answer where there is no page, for the OpenAPI document.
@@ -108,19 +108,28 @@ enum NoPage {
 }
 
 /// The page, or a page that says why there is none.
-fn answer(made: ApiResult<String>, session: Option<&str>) -> Response {
+fn answer<E: Endpoint>(made: ApiResult<String>, session: Option<&str>) -> Response {
     let headers = [
         (header::CONTENT_TYPE, "text/html; charset=utf-8"),
         (header::CONTENT_SECURITY_POLICY, POLICY.as_str()),
     ];
     match made {
-        Ok(html) => (headers, html).into_response(),
+        Ok(html) => (headers, relative(&html, E::PATH)).into_response(),
         Err(problem) => {
             let status = StatusCode::from_u16(problem.problem().status);
-            (status.unwrap_or(StatusCode::INTERNAL_SERVER_ERROR), headers, refused(&problem, session))
-                .into_response()
+            let html = relative(&refused(&problem, session), E::PATH);
+            (status.unwrap_or(StatusCode::INTERNAL_SERVER_ERROR), headers, html).into_response()
         }
     }
+}
+
+/// The page with its links written from where it is, so that it also works below a path of a reverse proxy. Texts are
+/// escaped, so that only our own attributes have this form.
+fn relative(html: &str, path: &str) -> String {
+    let root = "../".repeat(path.matches('/').count() + 1);
+    ["href", "src"]
+        .into_iter()
+        .fold(html.to_owned(), |html, name| html.replace(&format!("{name}=\"/"), &format!("{name}=\"{root}")))
 }
 
 fn refused(problem: &ApiError, session: Option<&str>) -> String {
@@ -151,4 +160,17 @@ fn page(title: &str, contents: &str) -> String {
 /// The path of a step's page.
 fn step_path(session: &str, target: usize, run: usize, step: usize) -> String {
     format!("/api/v1/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/page")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn links_climb_to_the_root_of_the_server() {
+        let html =
+            relative("<a href=\"/api/v1/page\">=&quot;/x</a><img src=\"/icon.svg\">", ShowSessionPage::PATH);
+        let root = "../../../../";
+        assert_eq!(html, format!("<a href=\"{root}api/v1/page\">=&quot;/x</a><img src=\"{root}icon.svg\">"));
+    }
 }

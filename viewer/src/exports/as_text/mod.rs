@@ -46,6 +46,13 @@ pub(crate) fn download(origin: &str, entry: &ExportEntry) -> String {
     Curl { method: "GET", url: &url, body: None, revision: None, file: Some(&entry.file) }.text()
 }
 
+/// An answer that never ends as `curl`, which hands every part of it on at once.
+pub(crate) fn stream(origin: &str, path: &str) -> String {
+    let url = format!("{origin}/api/v1/{path}");
+    let text = Curl { method: "GET", url: &url, body: None, revision: None, file: None }.text();
+    text.replacen("curl ", "curl -N ", 1)
+}
+
 /// A designation as an action.
 fn designate(state: &State, words: String, session: &str, target: &NewTarget) -> Action {
     let call = Call::with_body::<DesignateTarget>(&AtSession { session: session.to_owned() }, target);
@@ -129,6 +136,7 @@ mod tests {
     use sightline_api::location::AtNote;
     use sightline_session::Cursor;
     use sightline_session::notes::EditNote;
+    use sightline_session::shell::WITH_TOKEN;
 
     const ORIGIN: &str = "http://127.0.0.1:7700";
 
@@ -139,11 +147,13 @@ mod tests {
         let text = http(ORIGIN, Call::with_body::<MoveCursor>(&at, &cursor));
         assert_eq!(
             text,
-            "curl -fsS -X PUT http://127.0.0.1:7700/api/v1/sessions/s1/cursor -H 'Content-Type: application/json' \
-             --data-raw '{\"target\":0,\"run\":1,\"step\":4}'"
+            format!(
+                "{WITH_TOKEN} | curl -fsS -H @- -X PUT http://127.0.0.1:7700/api/v1/sessions/s1/cursor -H \
+                 'Content-Type: application/json' --data-raw '{{\"target\":0,\"run\":1,\"step\":4}}'"
+            )
         );
         let read = http(ORIGIN, Call::to::<ShowSession>(&at));
-        assert_eq!(read, "curl -fsS http://127.0.0.1:7700/api/v1/sessions/s1");
+        assert_eq!(read, format!("{WITH_TOKEN} | curl -fsS -H @- http://127.0.0.1:7700/api/v1/sessions/s1"));
         let edit = EditNote { text: Some("it's".to_owned()), place: None };
         let at = AtNote { session: "s1".to_owned(), note: 2 };
         let edited = http(ORIGIN, Call::with_body::<ChangeNote>(&at, &edit).at_revision(5));
