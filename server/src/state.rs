@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex};
 use sightline_api::wire::Event;
 use sightline_geometry::error::{Error, Result};
 use sightline_recordings::Traverse;
+use sightline_session::notes::Notes;
 use sightline_session::view::SessionView;
 use sightline_session::{Cursor, Session};
 use tokio::sync::broadcast;
@@ -21,6 +22,7 @@ use crate::problem::{ApiError, ApiResult};
 use crate::questions::Questions;
 use crate::rendering::{Ahead, OpenTraverse};
 use crate::rerun_log::LiveStream;
+use crate::routes::counterfactual;
 use crate::runner::Runner;
 use crate::sessions::Sessions;
 use crate::store::{self, Store};
@@ -91,6 +93,9 @@ impl AppState {
     /// # Errors
     /// A folder that cannot be read or made, or a system without threads.
     pub(crate) fn with_folders(traverses: Vec<Traverse>, folders: &Folders, access: Access) -> Result<Self> {
+        folders
+            .make_private()
+            .map_err(|source| Error::Write { path: folders.sessions.clone(), source })?;
         let no_threads = |error: std::io::Error| Error::Request(format!("cannot start a thread: {error}"));
         let events = broadcast::Sender::new(EVENT_BACKLOG);
         let (mut open, of_drives) = drives::open_given(traverses, folders, &events)?;
@@ -107,6 +112,7 @@ impl AppState {
         if let Some(first) = open.first() {
             ahead.look_at(first, 0);
         }
+        let questions = Questions::read_back(&store)?;
         let store = Arc::new(store);
         let keeper = Keeper::new(&store);
         let studies = Shelf::new(folders.studies.clone(), events.clone(), keeper);
@@ -131,7 +137,7 @@ impl AppState {
             streams: Mutex::default(),
             maps: Maps::default(),
             tries: Lane::new(2, 16),
-            questions: Questions::default(),
+            questions,
             answers: Lane::new(ANSWERS_AT_A_TIME, RUNS_WAITING),
         })))
     }
@@ -141,9 +147,9 @@ impl AppState {
         &self.0.access
     }
 
-    /// What a person should know about this start of the server, one sentence each.
-    pub(crate) fn notices(&self) -> &[String] {
-        &self.0.notices
+    /// What a person should know about this start of the server, and about what fails now, one sentence each.
+    pub(crate) fn notices(&self) -> Vec<String> {
+        self.0.store.trouble().into_iter().chain(self.0.notices.iter().cloned()).collect()
     }
 
     /// The open traverses, those that were opened from a page last.
@@ -200,7 +206,9 @@ impl AppState {
         let found = number.and_then(|number| lock(&self.0.sessions).by_number.get(&number).cloned());
         let live = found.ok_or_else(|| ApiError::not_found("There is no such session."))?;
         if live.wake() {
-            self.0.runner.restore(&live).inspect_err(|_| live.sleep())?;
+            let (state, restored) = (self.clone(), Arc::clone(&live));
+            let go_on = move || counterfactual::go_on(&state, &restored);
+            self.0.runner.restore(&live, go_on).inspect_err(|_| live.sleep())?;
         }
         Ok(live)
     }
@@ -212,43 +220,73 @@ impl AppState {
     pub fn begin_session(&self, traverse: Arc<OpenTraverse>) -> ApiResult<Arc<LiveSession>> {
         let count = traverse.traverse.stop_count();
         let name = traverse.id.clone();
-        self.enter_session(traverse, true, |id| Ok(Session::new(id, &name, count)))
+        self.enter_session(traverse, true, |id| Ok((Session::new(id, &name, count), Notes::default())))
     }
 
-    /// Enters the session that `make` makes of its name; one that is not awake has its runs computed when it is asked for.
+    /// Enters the session that `make` makes of its name, once it is on disk, and tells every page; one that is not awake has
+    /// its runs computed when it is asked for.
     ///
     /// # Errors
-    /// A problem when there are too many already, or that of `make`.
+    /// A problem when there are too many already, that of `make`, or when it cannot be written: nothing is begun then.
     pub(crate) fn enter_session(
         &self,
         traverse: Arc<OpenTraverse>,
         is_awake: bool,
-        make: impl FnOnce(String) -> ApiResult<Session>,
+        make: impl FnOnce(String) -> ApiResult<(Session, Notes)>,
     ) -> ApiResult<Arc<LiveSession>> {
-        let mut sessions = lock(&self.0.sessions);
-        sessions.has_room()?;
-        if traverse.is_closed() {
+        let number = lock(&self.0.sessions).reserve()?;
+        let made = make(store::id_of(number)).and_then(|(session, notes)| {
+            self.0.store.save_with(&session.saved(), Some(&notes))?;
+            let live = LiveSession::new(session, traverse, is_awake);
+            live.with_notes(|own| *own = notes);
+            Ok(Arc::new(live))
+        });
+        let is_closed = {
+            let mut sessions = lock(&self.0.sessions);
+            let is_closed = made.as_ref().is_ok_and(|live| live.traverse.is_closed());
+            sessions.enter(number, made.as_ref().ok().filter(|_| !is_closed));
+            is_closed
+        };
+        let live = made?;
+        if is_closed {
+            self.0.store.remove(&live.id)?;
             return Err(ApiError::not_found("The drive was removed meanwhile."));
         }
-        let number = sessions.last_number + 1;
-        let live = Arc::new(LiveSession::new(make(store::id_of(number))?, traverse, is_awake));
-        live.set_used(Some(jiff::Timestamp::now()));
-        sessions.last_number = number;
-        sessions.by_number.insert(number, Arc::clone(&live));
+        self.announce(&live);
         Ok(live)
     }
 
-    /// Saves a session that was changed, and tells every page.
+    /// Changes a session, saves it, and tells every page: all or nothing.
     ///
     /// # Errors
-    /// A problem when it cannot be written.
-    pub fn changed(&self, live: &LiveSession) -> ApiResult<()> {
-        if live.is_removed() {
-            return Err(ApiError::not_found("The session was removed meanwhile."));
-        }
+    /// That of `work`, or when the session was removed or cannot be written.
+    pub(crate) fn change<T>(
+        &self,
+        live: &LiveSession,
+        work: impl FnOnce(&mut Session) -> ApiResult<T>,
+    ) -> ApiResult<T> {
+        self.change_and(live, work, |_| ())
+    }
+
+    /// As [`Self::change`], with something to be done before the session is used again, once it is on disk.
+    ///
+    /// # Errors
+    /// As [`Self::change`].
+    pub(crate) fn change_and<T>(
+        &self,
+        live: &LiveSession,
+        work: impl FnOnce(&mut Session) -> ApiResult<T>,
+        then: impl FnOnce(&T),
+    ) -> ApiResult<T> {
+        let value = live.change_and(&self.0.store, work, then)?;
+        self.announce(live);
+        Ok(value)
+    }
+
+    /// Tells every page that a session was changed.
+    fn announce(&self, live: &LiveSession) {
         self.tell(Event::SessionChanged { session: live.id.clone() });
         self.touched(live);
-        Ok(live.save(&self.0.store)?)
     }
 
     /// Remembers that a session is used now.

@@ -131,7 +131,7 @@ fn a_session_that_cannot_be_understood_is_moved_into_a_file_and_the_others_stay(
     let store = Store::open(folder.path()).unwrap();
     store.save(&saved("s1")).unwrap();
     store.save(&saved("s2")).unwrap();
-    store.disk.write(|transaction| put(transaction, RUNS, (2, 0, 1), &"nonsense")).unwrap();
+    store.disk.write(|write| write.put(Place::Run((2, 0, 1)), &"nonsense").map(|_| ())).unwrap();
     let found = store.load().unwrap();
     assert_eq!(found.sessions, vec![saved("s1")]);
     assert!(found.messages[0].contains("session s2") && found.messages[0].contains("run 1 of target 0"));
@@ -146,9 +146,8 @@ fn a_database_of_a_newer_version_is_left_alone() {
     let folder = tempfile::tempdir().unwrap();
     {
         let store = Store::open(folder.path()).unwrap();
-        let newer = |transaction: &WriteTransaction| {
-            transaction.open_table(META)?.insert("version", STORE_VERSION + 1)?;
-            Ok(true)
+        let newer = |write: &Write| {
+            write.put_meta("version", STORE_VERSION + 1)
         };
         store.disk.write(newer).unwrap();
     }
