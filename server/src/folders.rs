@@ -3,6 +3,8 @@
 use std::io::Result;
 use std::path::{Path, PathBuf};
 
+use sightline_recordings::files::remove_left_overs;
+
 /// Where the server keeps what it makes.
 #[derive(Clone, Debug)]
 pub(crate) struct Folders {
@@ -23,12 +25,31 @@ impl Folders {
         Self { sessions: folder.to_owned(), studies, traverses, digests }
     }
 
-    /// Makes the folders beside that of the sessions, for the owner alone.
+    /// Makes the folders beside that of the sessions, for the owner alone, and begins to remove what a killed server left in
+    /// them. They may hold a hundred thousand images, so that nobody waits for it.
     ///
     /// # Errors
     /// Those of the system.
-    pub(crate) fn make_private(&self) -> Result<()> {
-        [&self.studies, &self.traverses, &self.digests].into_iter().try_for_each(|folder| make_private(folder))
+    pub(crate) fn prepare(&self) -> Result<()> {
+        let folders = [&self.studies, &self.traverses, &self.digests].map(PathBuf::clone);
+        folders.iter().try_for_each(|folder| make_private(folder))?;
+        let tidy = move || folders.iter().for_each(|folder| tidy(folder, DEPTH));
+        std::thread::Builder::new().name("tidy".to_owned()).spawn(tidy).map(|_| ())
+    }
+}
+
+/// Folders below the server's own that hold files of it: a drive, and its images.
+const DEPTH: usize = 2;
+
+/// Removes what killed programs left in a folder and those below it.
+fn tidy(folder: &Path, depth: usize) {
+    remove_left_overs(folder, None);
+    if depth == 0 {
+        return;
+    }
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    for entry in entries.filter(|entry| entry.file_type().is_ok_and(|kind| kind.is_dir())) {
+        tidy(&entry.path(), depth - 1);
     }
 }
 

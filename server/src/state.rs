@@ -93,9 +93,7 @@ impl AppState {
     /// # Errors
     /// A folder that cannot be read or made, or a system without threads.
     pub(crate) fn with_folders(traverses: Vec<Traverse>, folders: &Folders, access: Access) -> Result<Self> {
-        folders
-            .make_private()
-            .map_err(|source| Error::Write { path: folders.sessions.clone(), source })?;
+        folders.prepare().map_err(|source| Error::Write { path: folders.sessions.clone(), source })?;
         let no_threads = |error: std::io::Error| Error::Request(format!("cannot start a thread: {error}"));
         let events = broadcast::Sender::new(EVENT_BACKLOG);
         let (mut open, of_drives) = drives::open_given(traverses, folders, &events)?;

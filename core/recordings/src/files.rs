@@ -118,10 +118,7 @@ impl PartialFile {
         self.complete(|file, path| file.persist_noclobber(path).map(|_| ()).map_err(|failed| failed.error))
     }
 
-    fn complete(
-        self,
-        persist: impl FnOnce(NamedTempFile, &Path) -> std::io::Result<()>,
-    ) -> Result<()> {
+    fn complete(self, persist: impl FnOnce(NamedTempFile, &Path) -> std::io::Result<()>) -> Result<()> {
         let Self { file, path } = self;
         let on_disk = file.as_file().sync_all().and_then(|()| persist(file, &path));
         on_disk.and_then(|()| sync_folder(folder_of(&path))).map_err(|source| Error::Write { path, source })
@@ -175,6 +172,12 @@ pub fn remove_left_overs(folder: &Path, name: Option<&str>) {
             let _ = std::fs::remove_file(entry.path());
         }
     }
+}
+
+/// Removes the temporary files that killed programs left of the file `path`.
+pub fn remove_left_overs_of(path: &Path) {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    remove_left_overs(folder_of(path), Some(&name));
 }
 
 /// The name of the file that this one, without the dot in front, is the temporary form of: `NAME.X.partial`, in earlier

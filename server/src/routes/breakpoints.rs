@@ -60,9 +60,8 @@ async fn add(
         _ => return Err(ApiError::invalid("field", "give either `expression` or `step`")),
     };
     blocking(move || {
-        let number = state.change(&live, |session| {
-            session.add_breakpoint(&expression).map_err(|wrong| refused(&wrong))
-        })?;
+        let number = state
+            .change(&live, |session| session.add_breakpoint(&expression).map_err(|wrong| refused(&wrong)))?;
         let at = AtBreakpoint { session: live.id.clone(), breakpoint: number };
         Ok((StatusCode::CREATED, location::<ChangeBreakpoint>(&at), view(&live, number)?).into_response())
     })

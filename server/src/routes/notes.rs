@@ -98,9 +98,7 @@ async fn remove(
 ) -> ApiResult<StatusCode> {
     let live = state.session(&session)?;
     blocking(move || {
-        change(&state, &live, |_, notes| {
-            notes.remove(note, read).map_err(|refused| problem(note, refused))
-        })?;
+        change(&state, &live, |_, notes| notes.remove(note, read).map_err(|refused| problem(note, refused)))?;
         Ok(StatusCode::NO_CONTENT)
     })
     .await
@@ -114,9 +112,8 @@ async fn restore(
 ) -> ApiResult<Response> {
     let live = state.session(&session)?;
     blocking(move || {
-        let back = change(&state, &live, |_, notes| {
-            notes.restore(note).map_err(|refused| problem(note, refused))
-        })?;
+        let back =
+            change(&state, &live, |_, notes| notes.restore(note).map_err(|refused| problem(note, refused)))?;
         Ok(tagged(back))
     })
     .await

@@ -105,10 +105,7 @@ async fn restore_run(
     State(state): State<AppState>,
     RunPath { live, target, run }: RunPath,
 ) -> ApiResult<Json<SessionView>> {
-    blocking(move || {
-        restored(&state, &live, target, |session| Ok(session.restore_run(target, run)?))
-    })
-    .await
+    blocking(move || restored(&state, &live, target, |session| Ok(session.restore_run(target, run)?))).await
 }
 
 /// Takes the removal of a target back

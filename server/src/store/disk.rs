@@ -136,11 +136,7 @@ impl Disk {
     }
 
     /// One transaction; whether it changed something.
-    fn attempt(
-        &self,
-        writing: &mut Writing,
-        work: impl FnOnce(&Write) -> Outcome<()>,
-    ) -> Outcome<bool> {
+    fn attempt(&self, writing: &mut Writing, work: impl FnOnce(&Write) -> Outcome<()>) -> Outcome<bool> {
         self.ready(writing)?;
         let sequence = writing.next;
         writing.next += 1;
@@ -163,7 +159,8 @@ impl Disk {
         if self.shared().is_none() {
             // The library panics at some damage.
             let opened = catch_unwind(AssertUnwindSafe(&self.opener));
-            let opened = opened.map_err(|_| redb::Error::Corrupted("it cannot be opened again".to_owned()))?;
+            let opened =
+                opened.map_err(|_| redb::Error::Corrupted("it cannot be opened again".to_owned()))?;
             *self.database.write().unwrap_or_else(PoisonError::into_inner) = Some(opened?);
         }
         let Some((sequence, earlier)) = &writing.in_doubt else { return Ok(()) };

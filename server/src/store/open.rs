@@ -176,7 +176,9 @@ fn add_lines(transaction: &WriteTransaction) -> Outcome<()> {
     for table in NUMBERED {
         for entry in transaction.open_table(table)?.iter()? {
             let (key, value) = entry?;
-            all.extend(Place::numbered(table.name(), key.value()).map(|place| (place, value.value().to_vec())));
+            all.extend(
+                Place::numbered(table.name(), key.value()).map(|place| (place, value.value().to_vec())),
+            );
         }
     }
     for table in NAMED {

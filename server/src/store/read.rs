@@ -5,7 +5,9 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use redb::backends::InMemoryBackend;
-use redb::{ConcurrencyMode, DatabaseError, ReadTransaction, ReadableDatabase, ReadableTable, StorageBackend as _};
+use redb::{
+    ConcurrencyMode, DatabaseError, ReadTransaction, ReadableDatabase, ReadableTable, StorageBackend as _,
+};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 use sightline_geometry::error::{Error, Result};

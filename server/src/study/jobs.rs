@@ -134,7 +134,8 @@ impl Shelf {
             work
         };
         if let Err(problem) = self.submit(&work) {
-            work.change(|inside| end(inside, StudyState::Failed, "too many studies were waiting"));
+            lock(&self.works).retain(|other| other.number != work.number);
+            self.keeper.forget(work.number);
             return Err(problem);
         }
         Ok(work.view())
