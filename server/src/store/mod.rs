@@ -25,6 +25,8 @@ mod cursors;
 mod disk;
 mod open;
 #[cfg(test)]
+mod power_storage;
+#[cfg(test)]
 mod power_tests;
 mod read;
 mod record;

@@ -5,18 +5,14 @@
 //! any sectors. `SIGHTLINE_POWER_LOSS_POINTS` is the number of cuts.
 
 use std::collections::BTreeMap;
-use std::io::{Error as IoError, ErrorKind, Result as IoResult};
-use std::ops::Bound;
+use std::io::ErrorKind;
 use std::path::Path;
-use std::sync::{Arc, Mutex};
 
-use redb::{BackendError, StorageBackend};
 use serde_json::{Value, json};
 use sightline_session::counterfactual::wire::Question;
 use sightline_session::notes::{NewNote, Pin};
 
-use super::disk::Opener;
-use super::open::{builder, prepare};
+use super::power_storage::{Op, Storage};
 use super::tests::saved;
 use super::*;
 use crate::jobs::lock;
@@ -25,149 +21,9 @@ use crate::jobs::lock;
 const POINTS: usize = 60;
 /// Requests of the recorded sessions.
 const REQUESTS: u64 = 120;
-/// What a disk writes whole or not at all, bytes.
-const SECTOR: usize = 512;
-
 /// The number of cuts.
 fn points() -> usize {
     std::env::var("SIGHTLINE_POWER_LOSS_POINTS").map_or(POINTS, |text| text.parse().expect("a number"))
-}
-
-/// Something that was asked of a storage.
-#[derive(Clone)]
-enum Op {
-    Write(u64, Vec<u8>),
-    Length(u64),
-    Sync,
-    /// The program acknowledged a request.
-    Acknowledged,
-}
-
-/// A storage in memory that records everything, and may fail.
-#[derive(Clone, Default)]
-struct Storage(Arc<Mutex<Content>>);
-
-#[derive(Default)]
-struct Content {
-    bytes: Vec<u8>,
-    ops: Vec<Op>,
-    /// Operations until one fails, how many fail then, and how.
-    failure: Option<(usize, usize, ErrorKind)>,
-    failed: usize,
-}
-
-impl std::fmt::Debug for Storage {
-    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        out.write_str("Storage")
-    }
-}
-
-impl Storage {
-    fn of(bytes: Vec<u8>) -> Self {
-        Self(Arc::new(Mutex::new(Content { bytes, ..Content::default() })))
-    }
-
-    fn opener(&self) -> Opener {
-        let storage = self.clone();
-        Box::new(move || builder().create_with_backend(storage.clone()))
-    }
-
-    /// The store on this storage.
-    fn store(&self, folder: &Path) -> std::result::Result<Store, String> {
-        let opener = self.opener();
-        let database = opener().map_err(|error| error.to_string())?;
-        prepare(&database).map_err(|error| error.to_string())?;
-        let disk = Disk::new(folder.join(FILE_NAME), database, opener).map_err(|error| error.to_string())?;
-        Store::on(disk, Vec::new()).map_err(|error| error.to_string())
-    }
-
-    fn change(&self, op: Op) -> IoResult<()> {
-        let mut content = lock(&self.0);
-        if let Some((before, fail, kind)) = &mut content.failure {
-            match (before, fail) {
-                (0, 0) => {}
-                (0, fail) => {
-                    *fail -= 1;
-                    let kind = *kind;
-                    content.failed += 1;
-                    return Err(IoError::new(kind, "refused by the test"));
-                }
-                (before, _) => *before -= 1,
-            }
-        }
-        op.apply(&mut content.bytes, |_| true);
-        content.ops.push(op);
-        Ok(())
-    }
-}
-
-impl Op {
-    /// Carries it out on bytes, for a write the sectors that are to be written.
-    fn apply(&self, bytes: &mut Vec<u8>, is_written: impl Fn(usize) -> bool) {
-        match self {
-            Self::Write(at, data) => {
-                let end = *at as usize + data.len();
-                bytes.resize(bytes.len().max(end), 0);
-                for (number, part) in
-                    data.chunks(SECTOR).enumerate().filter(|(number, _)| is_written(*number))
-                {
-                    let from = *at as usize + number * SECTOR;
-                    bytes[from..from + part.len()].copy_from_slice(part);
-                }
-            }
-            Self::Length(length) => bytes.resize(*length as usize, 0),
-            Self::Sync | Self::Acknowledged => {}
-        }
-    }
-}
-
-impl StorageBackend for Storage {
-    fn len(&self) -> IoResult<u64> {
-        Ok(lock(&self.0).bytes.len() as u64)
-    }
-
-    fn read(&self, offset: u64, out: &mut [u8]) -> IoResult<()> {
-        let content = lock(&self.0);
-        let part = content.bytes.get(offset as usize..offset as usize + out.len());
-        out.copy_from_slice(part.ok_or(ErrorKind::UnexpectedEof)?);
-        Ok(())
-    }
-
-    fn set_len(&self, length: u64) -> IoResult<()> {
-        self.change(Op::Length(length))
-    }
-
-    fn sync_data(&self) -> IoResult<()> {
-        self.change(Op::Sync)
-    }
-
-    fn write(&self, offset: u64, data: &[u8]) -> IoResult<()> {
-        self.change(Op::Write(offset, data.to_vec()))
-    }
-
-    fn try_lock_range(&self, _: Bound<u64>, _: Bound<u64>) -> std::result::Result<bool, BackendError> {
-        Ok(true)
-    }
-
-    fn try_lock_shared_range(&self, _: Bound<u64>, _: Bound<u64>) -> std::result::Result<bool, BackendError> {
-        Ok(true)
-    }
-
-    fn lock_range(&self, _: Bound<u64>, _: Bound<u64>) -> std::result::Result<(), BackendError> {
-        Ok(())
-    }
-
-    fn lock_shared_range(&self, _: Bound<u64>, _: Bound<u64>) -> std::result::Result<(), BackendError> {
-        Ok(())
-    }
-
-    fn unlock_range(&self, _: Bound<u64>, _: Bound<u64>) -> std::result::Result<(), BackendError> {
-        Ok(())
-    }
-
-    fn query_lock_range(&self, _: Bound<u64>, _: Bound<u64>) -> std::result::Result<bool, BackendError> {
-        Ok(false)
-    }
 }
 
 /// Everything that a person put in and the server computed.
@@ -246,7 +102,7 @@ impl Kept {
                 store.save_drive(&name, &text)?;
                 after.drives.insert(name, text);
             }
-            8 if number % 3 == 0 => {
+            8 if number.is_multiple_of(3) => {
                 let name = format!("drive-{}", number - 1);
                 store.remove_drive(&name)?;
                 after.drives.remove(&name);
@@ -318,7 +174,7 @@ fn after_a_cut(begin: &[u8], ops: &[Op], variant: usize, chance: &mut Chance) ->
         match variant {
             0 => op.apply(&mut bytes, |_| true),
             1 => {}
-            2 if chance.next() % 2 == 0 => {}
+            2 if chance.next().is_multiple_of(2) => {}
             2 => op.apply(&mut bytes, |_| true),
             _ => {
                 let sectors = chance.next();
