@@ -56,9 +56,9 @@ pub(super) fn open(folder: &Path) -> Result<(Disk, Vec<String>)> {
     }
     let database = match attempt(&path)? {
         Ok(database) => database,
-        Err(why) => {
+        Err(Damaged(why)) => {
             messages.push(salvage(&path, &why)?);
-            attempt(&path)?.map_err(|why| failed(&path, &why))?
+            attempt(&path)?.map_err(|Damaged(why)| failed(&path, &why))?
         }
     };
     make_file_private(&path).map_err(unwritable)?;
@@ -106,8 +106,11 @@ fn open_file(path: &Path) -> std::result::Result<Database, DatabaseError> {
     builder().create_with_backend(FileBackend::new(file)?)
 }
 
+/// What is damaged.
+struct Damaged(String);
+
 /// Opens the database; the inner error says what is damaged.
-fn attempt(path: &Path) -> Result<std::result::Result<Database, String>> {
+fn attempt(path: &Path) -> Result<std::result::Result<Database, Damaged>> {
     let begun = Instant::now();
     loop {
         // Some damage is met by the library with a panic.
@@ -116,7 +119,7 @@ fn attempt(path: &Path) -> Result<std::result::Result<Database, String>> {
             prepare(&database).map(|version| (database, version))
         }));
         return match opened {
-            Err(_) => Ok(Err("it cannot be checked".to_owned())),
+            Err(_) => Ok(Err(Damaged("it cannot be checked".to_owned()))),
             Ok(Ok((_, version))) if version > STORE_VERSION => Err(Error::Request(format!(
                 "{} was written by a newer version of this program (form {version}; this one reads {STORE_VERSION}); \
                  use that one, or another folder with --data-dir",
@@ -135,7 +138,7 @@ fn attempt(path: &Path) -> Result<std::result::Result<Database, String>> {
             {
                 Err(Error::Write { path: path.to_owned(), source })
             }
-            Ok(Err(error)) => Ok(Err(crate::printable::printable(&error.to_string()))),
+            Ok(Err(error)) => Ok(Err(Damaged(crate::printable::printable(&error.to_string())))),
         };
     }
 }
@@ -233,7 +236,9 @@ impl Store {
                     }
                     move_aside(&path, &id_of(number), "imported", "was read into the database")
                 }
-                Err(why) => move_aside(&path, &id_of(number), "damaged", &format!("cannot be read ({why})")),
+                Err(Damaged(why)) => {
+                    move_aside(&path, &id_of(number), "damaged", &format!("cannot be read ({why})"))
+                }
             };
             self.messages.push(message);
         }
@@ -249,13 +254,13 @@ impl Store {
     }
 }
 
-fn read(path: &Path, id: &str) -> std::result::Result<SavedSession, String> {
-    let bytes = std::fs::read(path).map_err(|error| error.to_string())?;
-    let saved: SavedSession = serde_json::from_slice(&bytes).map_err(|error| error.to_string())?;
+fn read(path: &Path, id: &str) -> std::result::Result<SavedSession, Damaged> {
+    let bytes = std::fs::read(path).map_err(|error| Damaged(error.to_string()))?;
+    let saved: SavedSession = serde_json::from_slice(&bytes).map_err(|error| Damaged(error.to_string()))?;
     if saved.id == id {
         Ok(saved)
     } else {
-        Err(format!("it holds session {}", crate::printable::printable(&saved.id)))
+        Err(Damaged(format!("it holds session {}", crate::printable::printable(&saved.id))))
     }
 }
 

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex};
 
 use redb::{BackendError, StorageBackend};
 
-use super::disk::{Disk, Opener};
+use super::disk::{Disk, Opener, Outcome};
 use super::open::{builder, prepare};
 use super::{FILE_NAME, Store};
 use crate::jobs::lock;
@@ -55,12 +55,12 @@ impl Storage {
     }
 
     /// The store on this storage.
-    pub(super) fn store(&self, folder: &Path) -> std::result::Result<Store, String> {
+    pub(super) fn store(&self, folder: &Path) -> Outcome<Store> {
         let opener = self.opener();
-        let database = opener().map_err(|error| error.to_string())?;
-        prepare(&database).map_err(|error| error.to_string())?;
-        let disk = Disk::new(folder.join(FILE_NAME), database, opener).map_err(|error| error.to_string())?;
-        Store::on(disk, Vec::new()).map_err(|error| error.to_string())
+        let database = opener()?;
+        prepare(&database)?;
+        let store = Store::on(Disk::new(folder.join(FILE_NAME), database, opener)?, Vec::new());
+        Ok(store.expect("a thread"))
     }
 
     fn change(&self, op: Op) -> IoResult<()> {

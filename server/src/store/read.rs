@@ -99,7 +99,7 @@ pub(super) fn read(database: &impl ReadableDatabase) -> Outcome<Found> {
         found.last_number = found.last_number.max(number);
         match session(&transaction, number, value.value())? {
             Ok(saved) => found.sessions.push(saved),
-            Err(why) => found.damaged.push((id_of(number), why)),
+            Err(why) => found.damaged.push((id_of(number), why.to_string())),
         }
     }
     for entry in transaction.open_table(NOTES)?.iter()? {
@@ -123,18 +123,28 @@ pub(super) fn read(database: &impl ReadableDatabase) -> Outcome<Found> {
     Ok(found)
 }
 
+/// Why a record cannot be read.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Unreadable(String);
+
+impl std::fmt::Display for Unreadable {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        out.write_str(&self.0)
+    }
+}
+
 /// A session put together from its parts.
 fn session(
     transaction: &ReadTransaction,
     number: u64,
     head: &[u8],
-) -> Outcome<std::result::Result<SavedSession, String>> {
+) -> Outcome<std::result::Result<SavedSession, Unreadable>> {
     let (mut saved, runs) = match head_of(&Place::Session(number), head) {
         Ok(head) => head,
         Err(why) => return Ok(Err(why)),
     };
     if saved.id != id_of(number) {
-        return Ok(Err(format!("it holds session {}", crate::printable::printable(&saved.id))));
+        return Ok(Err(Unreadable(format!("it holds session {}", crate::printable::printable(&saved.id)))));
     }
     if let Some(cursor) = transaction.open_table(CURSORS)?.get(number)? {
         // A cursor that cannot be read is no reason to lose the session.
@@ -147,13 +157,13 @@ fn session(
         let place = saved.targets.get_mut(target as usize).filter(|record| record.runs.len() as u64 == run);
         match (place, parsed(&Place::Run(key.value()), value.value())) {
             (Some(record), Ok(read)) => record.runs.push(read),
-            (None, _) => return Ok(Err(format!("run {run} of target {target} has no place"))),
-            (_, Err(why)) => return Ok(Err(format!("run {run} of target {target}: {why}"))),
+            (None, _) => return Ok(Err(Unreadable(format!("run {run} of target {target} has no place")))),
+            (_, Err(why)) => return Ok(Err(Unreadable(format!("run {run} of target {target}: {why}")))),
         }
     }
     let has: Vec<usize> = saved.targets.iter().map(|target| target.runs.len()).collect();
     if runs.is_some_and(|runs| runs != has) {
-        return Ok(Err("a run is missing".to_owned()));
+        return Ok(Err(Unreadable("a run is missing".to_owned())));
     }
     Ok(Ok(saved))
 }
@@ -162,7 +172,7 @@ fn session(
 pub(super) fn head_of(
     place: &Place,
     bytes: &[u8],
-) -> std::result::Result<(SavedSession, Option<Vec<usize>>), String> {
+) -> std::result::Result<(SavedSession, Option<Vec<usize>>), Unreadable> {
     if bytes.starts_with(b"[") {
         parsed::<(SavedSession, Vec<usize>)>(place, bytes).map(|(saved, runs)| (saved, Some(runs)))
     } else {
@@ -197,7 +207,7 @@ pub(super) fn raw(database: &impl ReadableDatabase, number: u64) -> Outcome<Stri
     Ok(format!("{:#}", Value::Object(whole)))
 }
 
-fn parsed<T: DeserializeOwned>(place: &Place, bytes: &[u8]) -> std::result::Result<T, String> {
-    let json = decode(place, bytes).map_err(|altered| altered.to_string())?;
-    serde_json::from_slice(json).map_err(|error| error.to_string())
+fn parsed<T: DeserializeOwned>(place: &Place, bytes: &[u8]) -> std::result::Result<T, Unreadable> {
+    let json = decode(place, bytes).map_err(|altered| Unreadable(altered.to_string()))?;
+    serde_json::from_slice(json).map_err(|error| Unreadable(error.to_string()))
 }
