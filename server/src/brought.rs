@@ -102,16 +102,12 @@ pub(crate) fn bring(state: &AppState, new: Reproduction, cancel: &CancelFlag) ->
     let open = drive(state, &traverse, cancel)?;
     let stops = open.traverse.stop_count();
     let name = open.id.clone();
-    let mut kept = Notes::default();
     let live = state.enter_session(open, false, |id| {
         let session = SavedSession { id, traverse: name, ..session };
         let session = Session::restored(&session, stops)?;
-        kept = Notes::brought(notes, &session)?;
-        Ok(session)
+        let notes = Notes::brought(notes, &session)?;
+        Ok((session, notes))
     })?;
-    live.with_notes(|own| *own = kept);
-    live.save_notes(state.store())?;
-    state.changed(&live)?;
     // Asking for it begins its runs.
     state.session(&live.id)
 }

@@ -38,7 +38,6 @@ pub fn begin(state: &AppState, scenario: &Scenario) -> ApiResult<()> {
         return Ok(());
     }
     let live = state.begin_session(open)?;
-    state.changed(&live)?;
     let (own, scenario) = (state.clone(), scenario.clone());
     state.jobs().submit(move || {
         if let Err(error) = designate(&own, &live, &scenario) {
@@ -60,11 +59,12 @@ fn designate(state: &AppState, live: &Arc<LiveSession>, scenario: &Scenario) -> 
     let settings = Settings::default();
     let designation = Designation { step: 0, pixel };
     let first = runner::designate(&live.traverse, designation, &settings, &CancelFlag::default())?;
-    let target = live.with(|session| {
-        let target = session.add_target(Some(LABEL.to_owned()), settings, Arc::new(first));
-        session.move_cursor(Cursor { target: Some(target), run: 0, step: 0 }).map(|()| target)
-    })?;
     let problem = |error: crate::problem::ApiError| Error::Request(error.problem().detail.clone());
-    state.changed(live).map_err(problem)?;
+    let added = state.change(live, |session| {
+        let target = session.add_target(Some(LABEL.to_owned()), settings, Arc::new(first));
+        session.move_cursor(Cursor { target: Some(target), run: 0, step: 0 })?;
+        Ok(target)
+    });
+    let target = added.map_err(problem)?;
     state.runner().start(live, target, 0).map_err(problem)
 }

@@ -1,6 +1,9 @@
 //! The folders of the server.
 
+use std::io::Result;
 use std::path::{Path, PathBuf};
+
+use sightline_recordings::files::remove_left_overs;
 
 /// Where the server keeps what it makes.
 #[derive(Clone, Debug)]
@@ -20,5 +23,104 @@ impl Folders {
     pub(crate) fn in_one(folder: &Path) -> Self {
         let [studies, traverses, digests] = ["studies", "traverses", "digests"].map(|name| folder.join(name));
         Self { sessions: folder.to_owned(), studies, traverses, digests }
+    }
+
+    /// Makes the folders beside that of the sessions, for the owner alone, and begins to remove what a killed server left in
+    /// them. They may hold a hundred thousand images, so that nobody waits for it.
+    ///
+    /// # Errors
+    /// Those of the system.
+    pub(crate) fn prepare(&self) -> Result<()> {
+        let folders = [&self.studies, &self.traverses, &self.digests].map(PathBuf::clone);
+        folders.iter().try_for_each(|folder| make_private(folder))?;
+        let tidy = move || folders.iter().for_each(|folder| tidy(folder, DEPTH));
+        std::thread::Builder::new().name("tidy".to_owned()).spawn(tidy).map(|_| ())
+    }
+}
+
+/// Folders below the server's own that hold files of it: a drive, and its images.
+const DEPTH: usize = 2;
+
+/// Removes what killed programs left in a folder and those below it.
+fn tidy(folder: &Path, depth: usize) {
+    remove_left_overs(folder, None);
+    if depth == 0 {
+        return;
+    }
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    for entry in entries.filter(|entry| entry.file_type().is_ok_and(|kind| kind.is_dir())) {
+        tidy(&entry.path(), depth - 1);
+    }
+}
+
+/// Makes a folder for its owner alone, or takes the rights of others away from one that exists.
+///
+/// # Errors
+/// Those of the system.
+pub(crate) fn make_private(folder: &Path) -> Result<()> {
+    make(folder)?;
+    restrict(folder, 0o700)
+}
+
+/// Makes a folder for its owner alone; one that exists keeps its rights.
+///
+/// # Errors
+/// Those of the system.
+pub(crate) fn make(folder: &Path) -> Result<()> {
+    let mut builder = std::fs::DirBuilder::new();
+    builder.recursive(true);
+    #[cfg(unix)]
+    std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
+    builder.create(folder)
+}
+
+/// Takes the rights of others away from a file.
+///
+/// # Errors
+/// Those of the system.
+pub(crate) fn make_file_private(file: &Path) -> Result<()> {
+    restrict(file, 0o600)
+}
+
+/// Takes all rights away that are not in `mode`.
+#[cfg(unix)]
+fn restrict(path: &Path, mode: u32) -> Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    let now = std::fs::metadata(path)?.permissions().mode() & 0o7777;
+    if now & !mode == 0 {
+        return Ok(());
+    }
+    std::fs::set_permissions(path, PermissionsExt::from_mode(now & mode))
+}
+
+#[cfg(not(unix))]
+fn restrict(_path: &Path, _mode: u32) -> Result<()> {
+    // There, the folder of a user is the user's alone already.
+    Ok(())
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::PermissionsExt;
+
+    #[test]
+    fn folders_and_files_are_for_their_owner_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let mode = |path: &Path| std::fs::metadata(path).unwrap().permissions().mode() & 0o777;
+        let (new, old) = (folder.path().join("new/below"), folder.path().join("old"));
+        std::fs::create_dir(&old).unwrap();
+        let file = old.join("file");
+        std::fs::write(&file, "x").unwrap();
+        for (path, wide) in [(&old, 0o755), (&file, 0o644)] {
+            std::fs::set_permissions(path, PermissionsExt::from_mode(wide)).unwrap();
+        }
+        make(&old).unwrap();
+        assert_eq!(mode(&old), 0o755, "a folder that is not the server's keeps its rights");
+        make_private(&new).unwrap();
+        make_private(&old).unwrap();
+        make_file_private(&file).unwrap();
+        let modes = [new.parent().unwrap(), &new, &old, &file].map(mode);
+        assert_eq!(modes, [0o700, 0o700, 0o700, 0o600]);
     }
 }

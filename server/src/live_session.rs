@@ -10,6 +10,7 @@ use sightline_session::notes::Notes;
 
 use crate::cancel::CancelFlag;
 use crate::jobs::{Position, lock};
+use crate::problem::{ApiError, ApiResult};
 use crate::rendering::OpenTraverse;
 use crate::store::Store;
 
@@ -76,17 +77,34 @@ impl LiveSession {
         *lock(&self.used) = used;
     }
 
-    /// Writes what the person did. The last write holds the last state, whoever comes first.
+    /// Changes the session, writes it, and does what follows before anybody uses it again: all or nothing.
+    ///
+    /// The session is locked until it is on disk: a step that is recorded meanwhile would be taken back with the change.
     ///
     /// # Errors
-    /// When the database cannot be written.
-    pub fn save(&self, store: &Store) -> Result<()> {
+    /// That of `work`, or when the session was removed or the database cannot be written; it is then as it was.
+    pub(crate) fn change_and<T>(
+        &self,
+        store: &Store,
+        work: impl FnOnce(&mut Session) -> ApiResult<T>,
+        then: impl FnOnce(&T),
+    ) -> ApiResult<T> {
         let removed = lock(&self.removed);
         if *removed {
-            return Ok(());
+            return Err(is_gone());
         }
-        let saved = self.with(|session| session.saved());
-        store.save(&saved)
+        self.with(|session| {
+            let before = session.clone();
+            let changed = work(session).and_then(|value| {
+                store.save(&session.saved())?;
+                Ok(value)
+            });
+            match &changed {
+                Ok(value) => then(value),
+                Err(_) => *session = before,
+            }
+            changed
+        })
     }
 
     /// Takes the session out of the database for good; says whether it was there.
@@ -116,17 +134,32 @@ impl LiveSession {
         work(&mut lock(&self.notes))
     }
 
-    /// Writes the notes. The last write holds the last state, whoever comes first.
+    /// Changes the notes and writes them: both or nothing.
     ///
     /// # Errors
-    /// When the database cannot be written.
-    pub(crate) fn save_notes(&self, store: &Store) -> Result<()> {
+    /// That of `work`, or when the session was removed or the database cannot be written; they are then as they were.
+    pub(crate) fn change_notes<T>(
+        &self,
+        store: &Store,
+        work: impl FnOnce(&Session, &mut Notes) -> ApiResult<T>,
+    ) -> ApiResult<T> {
         let removed = lock(&self.removed);
         if *removed {
-            return Ok(());
+            return Err(is_gone());
         }
-        let notes = self.with_notes(|notes| notes.clone());
-        store.save_notes(&self.id, &notes)
+        self.with(|session| {
+            self.with_notes(|notes| {
+                let before = notes.clone();
+                let changed = work(session, notes).and_then(|value| {
+                    store.save_notes(&self.id, notes)?;
+                    Ok(value)
+                });
+                if changed.is_err() {
+                    *notes = before;
+                }
+                changed
+            })
+        })
     }
 
     /// Whether this is the first time that somebody asks for it.
@@ -185,4 +218,8 @@ impl LiveSession {
             one.flag.store(true, Ordering::Relaxed);
         }
     }
+}
+
+fn is_gone() -> ApiError {
+    ApiError::not_found("The session was removed meanwhile.")
 }

@@ -115,11 +115,26 @@ impl From<Error> for ApiError {
             Error::Request(_) => Self::invalid("request", detail),
             Error::Read { .. } | Error::Format { .. } => Self::invalid("file", detail),
             Error::Cancelled => Self::conflict(detail),
-            Error::Write { .. } => {
+            Error::Write { source, .. } => {
                 let status = StatusCode::INSUFFICIENT_STORAGE;
-                Self { log: Some(detail.clone()), ..Self::new(status, "write", detail) }
+                let problem = Self::new(status, "write", detail.clone()).hint(hint_for(&source));
+                Self { log: Some(detail), ..problem }
             }
         }
+    }
+}
+
+/// How to mend a write that failed.
+fn hint_for(source: &std::io::Error) -> &'static str {
+    use std::io::ErrorKind;
+    match source.kind() {
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {
+            "Make room on the disk and try again; nothing of this change was kept."
+        }
+        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
+            "Make the server's folder writable and try again; nothing of this change was kept."
+        }
+        _ => "Check the disk of the server's folder and try again; nothing of this change was kept.",
     }
 }
 

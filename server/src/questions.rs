@@ -1,4 +1,5 @@
-//! The questions that were asked: what would have saved a step. One for each step, kept with its answer.
+//! The questions that were asked: what would have saved a step. One for each step, kept with its answer, also on disk: one
+//! that was not answered when the server ended goes on when its session is asked for and its runs are computed again.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
@@ -6,11 +7,13 @@ use std::sync::{Arc, Mutex};
 
 use sightline_api::location::AtStep;
 use sightline_api::wire::Event;
+use sightline_geometry::error::Result;
 use sightline_session::counterfactual::wire::{Question, QuestionState};
 
 use crate::cancel::CancelFlag;
 use crate::jobs::lock;
 use crate::problem::{ApiError, ApiResult};
+use crate::store::Store;
 
 /// How many questions are kept; the oldest answered ones are forgotten.
 const QUESTION_LIMIT: usize = 256;
@@ -33,6 +36,33 @@ pub(crate) struct Work {
 }
 
 impl Questions {
+    /// The questions on disk; those without an answer wait for [`Self::waiting_of`].
+    ///
+    /// # Errors
+    /// When the database cannot be read.
+    pub(crate) fn read_back(store: &Store) -> Result<Self> {
+        let mut kept = Kept::default();
+        for mut question in store.questions()? {
+            let Question { session, target, run, step, .. } = question.clone();
+            if question.state == QuestionState::Running {
+                question.state = QuestionState::Waiting;
+            }
+            kept.last_number += 1;
+            let (number, cancel) = (kept.last_number, CancelFlag::default());
+            let work = Arc::new(Work { number, question: Mutex::new(question), cancel });
+            kept.by_step.insert(AtStep { session, target, run, step }, work);
+        }
+        Ok(Self(Mutex::new(kept)))
+    }
+
+    /// The questions of a session that wait.
+    pub(crate) fn waiting_of(&self, session: &str) -> Vec<(AtStep, Arc<Work>)> {
+        let waits = |work: &Work| lock(&work.question).state == QuestionState::Waiting;
+        let kept = lock(&self.0);
+        let of_session = kept.by_step.iter().filter(|(path, work)| path.session == session && waits(work));
+        of_session.map(|(path, work)| (path.clone(), Arc::clone(work))).collect()
+    }
+
     pub(crate) fn find(&self, path: &AtStep) -> ApiResult<Arc<Work>> {
         let found = lock(&self.0).by_step.get(path).cloned();
         found.ok_or_else(|| {
@@ -42,7 +72,7 @@ impl Questions {
     }
 
     /// The work on a question; none where it goes on or is answered already.
-    pub(crate) fn begin(&self, path: AtStep) -> ApiResult<(Arc<Work>, bool)> {
+    pub(crate) fn begin(&self, path: AtStep, store: &Store) -> ApiResult<(Arc<Work>, bool)> {
         let mut kept = lock(&self.0);
         let state_of = |work: &Work| lock(&work.question).state;
         if let Some(work) = kept.by_step.get(&path) {
@@ -52,13 +82,16 @@ impl Questions {
         } else if kept.by_step.len() >= QUESTION_LIMIT {
             let over = kept.by_step.iter().filter(|(_, work)| state_of(work).is_over());
             let oldest = over.min_by_key(|(_, work)| work.number).map(|(path, _)| path.clone());
-            kept.by_step.remove(&oldest.ok_or_else(ApiError::busy)?);
+            if let Some(work) = kept.by_step.remove(&oldest.ok_or_else(ApiError::busy)?) {
+                store.forget_question(&work.view());
+            }
         }
         kept.last_number += 1;
         let AtStep { session, target, run, step } = path.clone();
         let state = QuestionState::Waiting;
         let question = Question { session, target, run, step, state, answer: None, problem: None };
         let (number, cancel) = (kept.last_number, CancelFlag::default());
+        store.save_question(&question)?;
         let work = Arc::new(Work { number, question: Mutex::new(question), cancel });
         kept.by_step.insert(path, Arc::clone(&work));
         Ok((work, true))
@@ -75,8 +108,11 @@ impl Questions {
         });
     }
 
-    pub(crate) fn forget(&self, path: &AtStep) {
-        lock(&self.0).by_step.remove(path);
+    /// Forgets a question that nobody can answer now.
+    pub(crate) fn forget(&self, path: &AtStep, store: &Store) {
+        if let Some(work) = lock(&self.0).by_step.remove(path) {
+            store.forget_question(&work.view());
+        }
     }
 }
 

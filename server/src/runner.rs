@@ -71,13 +71,18 @@ impl Runner {
         self.lane.before(&live.position(target, run))
     }
 
-    /// Computes all runs of a session that was read back, in the background; parents come before their forks.
+    /// Computes all runs of a session that was read back, in the background; parents come before their forks. `then` follows
+    /// once all have ended.
     ///
     /// # Errors
     /// A problem when too much is waiting already.
-    pub(crate) fn restore(&self, live: &Arc<LiveSession>) -> ApiResult<()> {
+    pub(crate) fn restore(
+        &self,
+        live: &Arc<LiveSession>,
+        then: impl FnOnce() + Send + 'static,
+    ) -> ApiResult<()> {
         live.set_restoring(true);
-        let restoring = Restoring(Arc::clone(live));
+        let restoring = Restoring { live: Arc::clone(live), then: Some(Box::new(then)) };
         self.go_on(live, Some(restoring), every_run)
     }
 
@@ -95,14 +100,13 @@ impl Runner {
     fn go_on(
         &self,
         live: &Arc<LiveSession>,
-        restoring: Option<Restoring>,
+        mut restoring: Option<Restoring>,
         which: impl FnOnce(&Session) -> Vec<(usize, usize)> + Send + 'static,
     ) -> ApiResult<()> {
         let (runner, live) = (self.clone(), Arc::clone(live));
         let mut which = Some(which);
         let (mut runs, mut current) = (Vec::new().into_iter(), None);
         self.lane.submit_by_turns(&Position::default(), move || {
-            let _until_the_end = &restoring;
             if let Some(which) = which.take() {
                 runs = live.with(|session| which(session)).into_iter();
             }
@@ -110,7 +114,10 @@ impl Runner {
                 let next = runs.find(|(target, run)| !live.is_computing(*target, *run));
                 current = next.map(|(target, run)| (target, run, live.begin(target, run)));
             }
-            let Some((target, run, flag)) = &current else { return ControlFlow::Break(()) };
+            let Some((target, run, flag)) = &current else {
+                restoring.take().into_iter().for_each(Restoring::end);
+                return ControlFlow::Break(());
+            };
             if runner.turn(&live, *target, *run, flag).is_break() {
                 current = None;
             }
@@ -202,11 +209,24 @@ impl Runner {
 }
 
 /// A session whose runs are being computed again, until this goes away, also by a panic or a queue that is full.
-struct Restoring(Arc<LiveSession>);
+struct Restoring {
+    live: Arc<LiveSession>,
+    then: Option<Box<dyn FnOnce() + Send>>,
+}
+
+impl Restoring {
+    /// All runs have ended.
+    fn end(mut self) {
+        self.live.set_restoring(false);
+        if let Some(then) = self.then.take() {
+            then();
+        }
+    }
+}
 
 impl Drop for Restoring {
     fn drop(&mut self) {
-        self.0.set_restoring(false);
+        self.live.set_restoring(false);
     }
 }
 

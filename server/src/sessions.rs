@@ -41,6 +41,8 @@ pub(crate) struct Sessions {
     pub(crate) by_number: BTreeMap<u64, Arc<LiveSession>>,
     /// The largest number that a session ever had.
     pub(crate) last_number: u64,
+    /// Sessions that are being begun: they have a number, and are not on disk yet.
+    beginning: usize,
     /// Those that were removed, the last one at the end.
     removed: VecDeque<Removed>,
 }
@@ -61,7 +63,10 @@ impl Sessions {
             let (traverse, saved) = match place(traverses, saved) {
                 Place::On(traverse, saved) => (traverse, saved),
                 Place::Renamed(traverse, saved) => {
-                    store.save(&saved)?;
+                    // Otherwise it is renamed at the next start again.
+                    if let Err(error) = store.save(&saved) {
+                        notices.push(format!("session {}: {error}", saved.id));
+                    }
                     (traverse, saved)
                 }
                 Place::OtherImages(saved) => {
@@ -89,11 +94,34 @@ impl Sessions {
     /// # Errors
     /// A problem when there are too many.
     pub(crate) fn has_room(&self) -> ApiResult<()> {
-        if self.by_number.len() < SESSION_LIMIT {
+        if self.by_number.len() + self.beginning < SESSION_LIMIT {
             return Ok(());
         }
         let detail = format!("There are {SESSION_LIMIT} sessions already.");
         Err(ApiError::conflict(detail).hint("Remove one that is not needed: DELETE sessions/{session}."))
+    }
+
+    /// A number for a session that is begun.
+    ///
+    /// # Errors
+    /// A problem when there are too many.
+    pub(crate) fn reserve(&mut self) -> ApiResult<u64> {
+        self.has_room()?;
+        self.beginning += 1;
+        self.last_number += 1;
+        Ok(self.last_number)
+    }
+
+    /// Enters the session for which a number was reserved, or gives the number back.
+    pub(crate) fn enter(&mut self, number: u64, live: Option<&Arc<LiveSession>>) {
+        self.beginning -= 1;
+        match live {
+            Some(live) => {
+                self.by_number.insert(number, Arc::clone(live));
+            }
+            None if self.last_number == number => self.last_number -= 1,
+            None => {}
+        }
     }
 
     /// The number of sessions on a traverse.
@@ -134,8 +162,7 @@ pub(crate) fn restore(sessions: &Mutex<Sessions>, store: &Store, number: u64) ->
     let live = LiveSession::new(session, Arc::clone(&removed.traverse), false);
     live.with_notes(|notes| *notes = removed.notes.clone());
     live.set_used(removed.used);
-    live.save(store)?;
-    live.save_notes(store)?;
+    store.save_with(&removed.saved, Some(&removed.notes))?;
     sessions.removed.remove(place);
     sessions.by_number.insert(number, Arc::new(live));
     Ok(())

@@ -8,11 +8,9 @@ use sightline_api::wire::Event;
 use sightline_geometry::error::{Error, Result};
 use sightline_recordings::Traverse;
 use sightline_session::view::SessionView;
-use sightline_session::{Cursor, Session};
 use tokio::sync::broadcast;
 
 use crate::access::Access;
-use crate::clock;
 use crate::drives;
 use crate::folders::Folders;
 use crate::jobs::{Lane, lock};
@@ -20,6 +18,7 @@ use crate::live_session::LiveSession;
 use crate::problem::{ApiError, ApiResult};
 use crate::questions::Questions;
 use crate::rendering::{Ahead, OpenTraverse};
+use crate::routes::counterfactual;
 use crate::runner::Runner;
 use crate::sessions::Sessions;
 use crate::store::{self, Store};
@@ -29,6 +28,7 @@ use crate::study::order::order;
 use crate::study::saved::Keeper;
 use crate::trackability_maps::Maps;
 
+mod changes;
 mod removal;
 
 /// Events that a slow page may be behind before it is told to read everything again.
@@ -91,6 +91,7 @@ impl AppState {
     /// # Errors
     /// A folder that cannot be read or made, or a system without threads.
     pub(crate) fn with_folders(traverses: Vec<Traverse>, folders: &Folders, access: Access) -> Result<Self> {
+        folders.prepare().map_err(|source| Error::Write { path: folders.sessions.clone(), source })?;
         let no_threads = |error: std::io::Error| Error::Request(format!("cannot start a thread: {error}"));
         let events = broadcast::Sender::new(EVENT_BACKLOG);
         let (mut open, of_drives) = drives::open_given(traverses, folders, &events)?;
@@ -107,6 +108,7 @@ impl AppState {
         if let Some(first) = open.first() {
             ahead.look_at(first, 0);
         }
+        let questions = Questions::read_back(&store)?;
         let store = Arc::new(store);
         let keeper = Keeper::new(&store);
         let studies = Shelf::new(folders.studies.clone(), events.clone(), keeper);
@@ -131,7 +133,7 @@ impl AppState {
             streams: Streams::default(),
             maps: Maps::default(),
             tries: Lane::new(2, 16),
-            questions: Questions::default(),
+            questions,
             answers: Lane::new(ANSWERS_AT_A_TIME, RUNS_WAITING),
         })))
     }
@@ -141,9 +143,9 @@ impl AppState {
         &self.0.access
     }
 
-    /// What a person should know about this start of the server, one sentence each.
-    pub(crate) fn notices(&self) -> &[String] {
-        &self.0.notices
+    /// What a person should know about this start of the server, and about what fails now, one sentence each.
+    pub(crate) fn notices(&self) -> Vec<String> {
+        self.0.store.trouble().into_iter().chain(self.0.notices.iter().cloned()).collect()
     }
 
     /// The open traverses, those that were opened from a page last.
@@ -200,71 +202,11 @@ impl AppState {
         let found = number.and_then(|number| lock(&self.0.sessions).by_number.get(&number).cloned());
         let live = found.ok_or_else(|| ApiError::not_found("There is no such session."))?;
         if live.wake() {
-            self.0.runner.restore(&live).inspect_err(|_| live.sleep())?;
+            let (state, restored) = (self.clone(), Arc::clone(&live));
+            let go_on = move || counterfactual::go_on(&state, &restored);
+            self.0.runner.restore(&live, go_on).inspect_err(|_| live.sleep())?;
         }
         Ok(live)
-    }
-
-    /// Begins a session on a traverse.
-    ///
-    /// # Errors
-    /// A problem when there are too many already.
-    pub fn begin_session(&self, traverse: Arc<OpenTraverse>) -> ApiResult<Arc<LiveSession>> {
-        let count = traverse.traverse.stop_count();
-        let name = traverse.id.clone();
-        self.enter_session(traverse, true, |id| Ok(Session::new(id, &name, count)))
-    }
-
-    /// Enters the session that `make` makes of its name; one that is not awake has its runs computed when it is asked for.
-    ///
-    /// # Errors
-    /// A problem when there are too many already, or that of `make`.
-    pub(crate) fn enter_session(
-        &self,
-        traverse: Arc<OpenTraverse>,
-        is_awake: bool,
-        make: impl FnOnce(String) -> ApiResult<Session>,
-    ) -> ApiResult<Arc<LiveSession>> {
-        let mut sessions = lock(&self.0.sessions);
-        sessions.has_room()?;
-        if traverse.is_closed() {
-            return Err(ApiError::not_found("The drive was removed meanwhile."));
-        }
-        let number = sessions.last_number + 1;
-        let live = Arc::new(LiveSession::new(make(store::id_of(number))?, traverse, is_awake));
-        live.set_used(Some(jiff::Timestamp::now()));
-        sessions.last_number = number;
-        sessions.by_number.insert(number, Arc::clone(&live));
-        Ok(live)
-    }
-
-    /// Saves a session that was changed, and tells every page.
-    ///
-    /// # Errors
-    /// A problem when it cannot be written.
-    pub fn changed(&self, live: &LiveSession) -> ApiResult<()> {
-        if live.is_removed() {
-            return Err(ApiError::not_found("The session was removed meanwhile."));
-        }
-        self.tell(Event::SessionChanged { session: live.id.clone() });
-        self.touched(live);
-        Ok(live.save(&self.0.store)?)
-    }
-
-    /// Remembers that a session is used now.
-    fn touched(&self, live: &LiveSession) {
-        live.set_used(Some(jiff::Timestamp::now()));
-        self.0.store.touch(&live.id, clock::now());
-    }
-
-    /// Remembers a cursor that moved, which is on disk a moment later, and tells every page.
-    pub(crate) fn cursor_moved(&self, live: &LiveSession, cursor: Cursor) {
-        if live.is_removed() {
-            return;
-        }
-        self.0.store.move_cursor(&live.id, cursor);
-        self.touched(live);
-        self.tell(Event::CursorMoved { session: live.id.clone(), cursor });
     }
 
     /// What survives the server.

@@ -14,7 +14,7 @@ use sightline_tests::server::{PIXEL, TOKEN, TestServer, request, small_drive};
 use crate::cli::program;
 
 /// How long a test waits for a run.
-const PATIENCE: Duration = Duration::from_secs(180);
+pub(crate) const PATIENCE: Duration = Duration::from_secs(180);
 
 /// The program itself, serving a drive.
 pub(crate) struct Killable {
@@ -126,7 +126,7 @@ impl Killable {
     }
 
     /// Waits until a run has ended; its rows as text.
-    fn rows(&self, run: u64) -> String {
+    pub(crate) fn rows(&self, run: u64) -> String {
         let begun = Instant::now();
         loop {
             let view = self.get(&format!("sessions/s1/targets/0/runs/{run}"));
@@ -251,17 +251,21 @@ fn write_until_it_fails(address: &str, kept: u64) -> u64 {
 #[cfg(unix)]
 #[test]
 fn an_orderly_end_keeps_the_cursor_that_has_just_moved() {
-    let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
-    let mut server = Killable::start(drive.path(), data.path());
-    let traverse = server.get("traverses")[0]["id"].clone();
-    server.json("POST", "sessions", &json!({ "traverse": traverse }));
-    server.json("PUT", "sessions/s1/cursor", &json!({ "target": null, "run": 0, "step": 3 }));
-    let pid = server.child.id().to_string();
-    assert!(Command::new("kill").args(["-TERM", &pid]).status().unwrap().success());
-    assert!(server.child.wait().unwrap().success());
-    let server = Killable::start(drive.path(), data.path());
-    assert_eq!(server.get("sessions/s1")["cursor"]["step"], json!(3));
-    server.kill();
+    let drive = small_drive();
+    // The system's end, a closed terminal, and Ctrl-C.
+    for signal in ["-TERM", "-HUP", "-INT"] {
+        let data = tempfile::tempdir().unwrap();
+        let mut server = Killable::start(drive.path(), data.path());
+        let traverse = server.get("traverses")[0]["id"].clone();
+        server.json("POST", "sessions", &json!({ "traverse": traverse }));
+        server.json("PUT", "sessions/s1/cursor", &json!({ "target": null, "run": 0, "step": 3 }));
+        let pid = server.child.id().to_string();
+        assert!(Command::new("kill").args([signal, &pid]).status().unwrap().success());
+        assert!(server.child.wait().unwrap().success(), "{signal}");
+        let server = Killable::start(drive.path(), data.path());
+        assert_eq!(server.get("sessions/s1")["cursor"]["step"], json!(3), "{signal}");
+        server.kill();
+    }
 }
 
 #[test]

@@ -44,6 +44,7 @@ mod removal;
 mod repeated;
 mod rerun_export;
 mod studies;
+mod surviving;
 mod trackability;
 mod why;
 mod zncc_reference;

@@ -3,15 +3,16 @@
 //! An index may come from anyone, so a name in it must stay inside the folder: relative, without `..`,
 //! and without a symbolic link that leads out.
 
-use std::fs::{File, OpenOptions};
+use std::fs::File;
 use std::io::{ErrorKind, Read, Write};
 use std::path::{Component, Path, PathBuf};
 
 use sightline_geometry::error::{Error, Result};
 use sightline_vision::image::io::open_regular;
+use tempfile::NamedTempFile;
 
-/// How often a free temporary name is sought.
-const TEMPORARY_NAMES: u32 = 10_000;
+/// How the names of temporary files end.
+pub const PARTIAL: &str = ".partial";
 
 /// The path of `name` inside `folder`; the file need not exist.
 ///
@@ -64,30 +65,134 @@ pub(super) fn read_text(path: &Path) -> std::io::Result<String> {
 /// # Errors
 /// [`Error::Write`] naming `path`; nothing is left behind.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
-    let unwritable = |source| Error::Write { path: path.to_owned(), source };
     let folder = path.parent().unwrap_or(Path::new(""));
-    std::fs::create_dir_all(folder).map_err(unwritable)?;
-    let (written, temporary) = {
-        let (mut file, temporary) = create_temporary(path).map_err(unwritable)?;
-        (file.write_all(bytes).and_then(|()| file.sync_all()), temporary)
-    };
-    written.and_then(|()| std::fs::rename(&temporary, path)).map_err(|source| {
-        // The first error is the one to tell; a temporary file that cannot be removed does no harm.
-        let _ = std::fs::remove_file(&temporary);
-        unwritable(source)
-    })
+    std::fs::create_dir_all(folder).map_err(|source| Error::Write { path: path.to_owned(), source })?;
+    let mut file = PartialFile::create(path)?;
+    file.write_all(bytes).map_err(|source| Error::Write { path: path.to_owned(), source })?;
+    file.replace()
 }
 
-fn create_temporary(path: &Path) -> std::io::Result<(std::fs::File, PathBuf)> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    for attempt in 0..TEMPORARY_NAMES {
-        let temporary = path.with_file_name(format!(".{name}.{attempt}.part"));
-        match OpenOptions::new().write(true).create_new(true).open(&temporary) {
-            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
-            opened => return Ok((opened?, temporary)),
+/// A file in work, beside its place under a temporary name: it gets its own name when it is complete and on disk. Dropped
+/// before, it is removed; what a killed program leaves is locked by nobody, and [`remove_left_overs`] removes it.
+#[derive(Debug)]
+pub struct PartialFile {
+    file: NamedTempFile,
+    path: PathBuf,
+}
+
+impl PartialFile {
+    /// Begins the file `path`, whose folder exists.
+    ///
+    /// # Errors
+    /// [`Error::Write`] naming `path`.
+    pub fn create(path: &Path) -> Result<Self> {
+        let prefix = format!(".{}.", path.file_name().unwrap_or_default().to_string_lossy());
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(&prefix).suffix(PARTIAL);
+        // As any new file: the umask decides who may read it.
+        #[cfg(unix)]
+        let mode = std::os::unix::fs::PermissionsExt::from_mode(0o666);
+        #[cfg(unix)]
+        builder.permissions(mode);
+        let file = builder
+            .tempfile_in(folder_of(path))
+            .map_err(|source| Error::Write { path: path.to_owned(), source })?;
+        // Where a file system has no locks, what a killed program leaves stays.
+        let _ = file.as_file().try_lock();
+        Ok(Self { file, path: path.to_owned() })
+    }
+
+    /// Completes the file, in place of one that has its name.
+    ///
+    /// # Errors
+    /// [`Error::Write`]; nothing is left behind.
+    pub fn replace(self) -> Result<()> {
+        self.complete(|file, path| file.persist(path).map(|_| ()).map_err(|failed| failed.error))
+    }
+
+    /// Completes the file, never over another one.
+    ///
+    /// # Errors
+    /// [`Error::Write`] also when a file of its name exists; nothing of this one is left behind.
+    pub fn complete_new(self) -> Result<()> {
+        self.complete(|file, path| file.persist_noclobber(path).map(|_| ()).map_err(|failed| failed.error))
+    }
+
+    fn complete(self, persist: impl FnOnce(NamedTempFile, &Path) -> std::io::Result<()>) -> Result<()> {
+        let Self { file, path } = self;
+        let on_disk = file.as_file().sync_all().and_then(|()| persist(file, &path));
+        on_disk.and_then(|()| sync_folder(folder_of(&path))).map_err(|source| Error::Write { path, source })
+    }
+}
+
+impl Write for PartialFile {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.file.flush()
+    }
+}
+
+/// Puts the names in a folder on disk, which the file itself does not: without it a new file may be gone after a power loss.
+///
+/// # Errors
+/// Those of the system.
+pub fn sync_folder(folder: &Path) -> std::io::Result<()> {
+    #[cfg(unix)]
+    match File::open(folder).and_then(|opened| opened.sync_all()) {
+        // Some file systems cannot do it, and a folder that may be written need not be readable.
+        Err(error)
+            if !matches!(
+                error.kind(),
+                ErrorKind::InvalidInput | ErrorKind::Unsupported | ErrorKind::PermissionDenied
+            ) =>
+        {
+            return Err(error);
+        }
+        _ => {}
+    }
+    #[cfg(not(unix))]
+    let _ = folder;
+    Ok(())
+}
+
+/// Removes the temporary files that killed programs left in a folder, those of the file `name` alone if there is one; a
+/// file that is being written is locked and stays.
+pub fn remove_left_overs(folder: &Path, name: Option<&str>) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let own = entry.file_name().to_string_lossy().into_owned();
+        let Some(stem) = own.strip_prefix('.').and_then(temporary_of) else { continue };
+        if name.is_some_and(|name| name != stem) || !entry.file_type().is_ok_and(|kind| kind.is_file()) {
+            continue;
+        }
+        if File::open(entry.path()).is_ok_and(|file| file.try_lock().is_ok()) {
+            // One that cannot be removed does no harm.
+            let _ = std::fs::remove_file(entry.path());
         }
     }
-    Err(std::io::Error::new(ErrorKind::AlreadyExists, "too many temporary files of this name"))
+}
+
+/// Removes the temporary files that killed programs left of the file `path`.
+pub fn remove_left_overs_of(path: &Path) {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    remove_left_overs(folder_of(path), Some(&name));
+}
+
+/// The name of the file that this one, without the dot in front, is the temporary form of: `NAME.X.partial`, in earlier
+/// versions also `NAME.NUMBER.part`.
+fn temporary_of(name: &str) -> Option<&str> {
+    if let Some(rest) = name.strip_suffix(PARTIAL) {
+        return rest.rsplit_once('.').map(|(stem, _)| stem);
+    }
+    let (stem, number) = name.strip_suffix(".part")?.rsplit_once('.')?;
+    number.bytes().all(|byte| byte.is_ascii_digit()).then_some(stem)
+}
+
+/// The folder of a file.
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 #[cfg(test)]
@@ -131,5 +236,40 @@ mod tests {
         assert_eq!(std::fs::read_dir(path.parent().unwrap()).unwrap().count(), 1);
         let blocked = path.join("below/a/file");
         assert!(write_atomically(&blocked, b"x").unwrap_err().to_string().contains("below"));
+    }
+
+    #[test]
+    fn a_partial_file_has_no_name_before_it_is_complete() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("rows.csv");
+        let mut dropped = PartialFile::create(&path).unwrap();
+        dropped.write_all(b"half").unwrap();
+        assert!(!path.exists());
+        drop(dropped);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+        let mut whole = PartialFile::create(&path).unwrap();
+        whole.write_all(b"whole").unwrap();
+        whole.complete_new().unwrap();
+        assert!(PartialFile::create(&path).unwrap().complete_new().is_err());
+        assert_eq!(std::fs::read(&path).unwrap(), b"whole");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn left_overs_are_removed_and_files_in_work_stay() {
+        let folder = tempfile::tempdir().unwrap();
+        let place = |name: &str| folder.path().join(name);
+        let left = [".rows.csv.4711.partial", ".rows.csv.Xy12.partial", ".rows.csv.0.part", ".a.b.3.partial"];
+        let others = ["rows.csv", ".rows.csv", ".movie.mkv.part", "x.1.partial", ".partial", "y.part"];
+        for name in left.iter().chain(&others) {
+            std::fs::write(place(name), "x").unwrap();
+        }
+        let in_work = PartialFile::create(&place("rows.csv")).unwrap();
+        remove_left_overs(folder.path(), Some("rows.csv"));
+        assert!(place(left[3]).exists() && left[..3].iter().all(|name| !place(name).exists()));
+        remove_left_overs(folder.path(), None);
+        assert!(!place(left[3]).exists() && others.iter().all(|name| place(name).exists()));
+        in_work.replace().unwrap();
+        assert_eq!(std::fs::read(place("rows.csv")).unwrap(), b"");
     }
 }

@@ -3,7 +3,6 @@
 //! Either of a session in the data folder, also while a server works in it, or of targets on a traverse. Runs are computed
 //! again from what the session says of them: the same input gives the same bits.
 
-use std::fs::File;
 use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -227,15 +226,15 @@ fn find_traverse(data: &Path, id: &str) -> Result<Traverse> {
     })
 }
 
+/// Writes the file complete or not at all.
 fn write(path: &Path, made: Made) -> Result<()> {
-    let unwritable = |source| Error::Write { path: path.to_owned(), source };
-    let mut file = File::create_new(path).map_err(unwritable)?;
+    let mut file = terminal::new_file(path)?;
     match made {
         Made::Bytes(bytes) => file.write_all(&bytes),
         Made::File(mut source, _folder) => std::io::copy(&mut source, &mut file).map(|_| ()),
     }
-    .and_then(|()| file.sync_all())
-    .map_err(unwritable)
+    .map_err(|source| Error::Write { path: path.to_owned(), source })?;
+    file.complete_new()
 }
 
 /// A problem as the command line says it.

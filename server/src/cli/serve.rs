@@ -139,10 +139,13 @@ async fn told_to_end() {
     #[cfg(unix)]
     {
         use tokio::signal::unix::{SignalKind, signal};
-        if let Ok(mut terminate) = signal(SignalKind::terminate()) {
+        // SIGHUP: the terminal was closed.
+        let signals = (signal(SignalKind::terminate()), signal(SignalKind::hangup()));
+        if let (Ok(mut terminate), Ok(mut hang_up)) = signals {
             tokio::select! {
                 _ = tokio::signal::ctrl_c() => {}
                 _ = terminate.recv() => {}
+                _ = hang_up.recv() => {}
             }
             return;
         }
@@ -185,7 +188,7 @@ fn with_token(page: &str, token: Option<&Token>) -> String {
 fn lock(data: &Path) -> Result<File> {
     let path = data.join("lock");
     let unwritable = |source| Error::Write { path: path.clone(), source };
-    std::fs::create_dir_all(data).map_err(unwritable)?;
+    crate::folders::make(data).map_err(unwritable)?;
     let file = File::create(&path).map_err(unwritable)?;
     match file.try_lock() {
         Ok(()) => Ok(file),

@@ -3,12 +3,14 @@
 //! At most eight stops, evenly spaced, the first and the last among them. Levels are drawn as their square root,
 //! near what a screen shows for linear light, with one scale for the whole sheet.
 
+use std::io::Cursor;
 use std::path::Path;
 
 use image::imageops::{self, FilterType};
-use image::{GrayImage, Luma};
+use image::{GrayImage, ImageFormat, Luma};
 use sightline_geometry::error::{Error, Result};
 use sightline_recordings::Traverse;
+use sightline_recordings::files::{remove_left_overs_of, write_atomically};
 
 /// Images in a row.
 const COLUMNS: u32 = 4;
@@ -49,7 +51,12 @@ pub(super) fn write(traverse: &Traverse, path: &Path) -> Result<()> {
         let at = |k: u32, size: u32| i64::from(GAP_PX + k * (size + GAP_PX));
         imageops::replace(&mut sheet, &drawn, at(column, WIDTH_PX), at(row, height));
     }
-    sheet.save(path).map_err(|problem| Error::format(path, format!("cannot be written: {problem}")))
+    let wrong = |problem| Error::format(path, format!("cannot be written: {problem}"));
+    let format = ImageFormat::from_path(path).map_err(wrong)?;
+    let mut bytes = Cursor::new(Vec::new());
+    sheet.write_to(&mut bytes, format).map_err(wrong)?;
+    remove_left_overs_of(path);
+    write_atomically(path, bytes.get_ref())
 }
 
 /// The stops on the sheet.

@@ -1,9 +1,11 @@
 //! What the commands say: results on the standard output, progress on the standard error.
 
 use std::io::{IsTerminal, Write};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use sightline_geometry::error::{Error, Result};
+use sightline_recordings::files::{PartialFile, remove_left_overs_of};
 use sightline_track::settings::{Changes, Settings};
 
 /// What messages call the standard output.
@@ -27,6 +29,18 @@ pub(super) fn settings_without_effect(settings: &Settings, given: &Changes) {
     for (key, condition) in settings.without_effect(given) {
         error(&format!("{key} has no effect: it has one only if {condition}"));
     }
+}
+
+/// A new file, which gets its name when it is complete; what a killed command left of it is removed.
+///
+/// # Errors
+/// A file of that name, or a folder that cannot be written.
+pub(super) fn new_file(path: &Path) -> Result<PartialFile> {
+    if path.exists() {
+        return Err(Error::format(path, "exists already; choose another name"));
+    }
+    remove_left_overs_of(path);
+    PartialFile::create(path)
 }
 
 /// How often progress is told where it cannot overwrite itself.

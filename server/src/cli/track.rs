@@ -3,7 +3,6 @@
 //! Each step is one line of JSON on the standard output as soon as it is computed, and each run ends with a
 //! line `{"summary": …}`. With several targets every line begins with the target's number.
 
-use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -17,6 +16,7 @@ use sightline_geometry::camera::MastAngles;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
 use sightline_recordings::Traverse;
+use sightline_recordings::files::{remove_left_overs_of, write_atomically};
 use sightline_rover::designate::Place;
 use sightline_session::step::RunStep;
 use sightline_session::summary::{Summary, summarise};
@@ -186,7 +186,8 @@ impl Track {
         }
         if let Some(path) = &self.photometry {
             let table = photometry::table(&traverse, &runs[0], &settings, &AtomicBool::new(false))?;
-            std::fs::write(path, table).map_err(|source| Error::Write { path: path.clone(), source })?;
+            remove_left_overs_of(path);
+            write_atomically(path, table.as_bytes())?;
         }
         if let Some(path) = &self.rrd {
             write_rrd(path, &traverse, &runs)?;
@@ -281,7 +282,7 @@ fn json(line: &impl Serialize) -> Result<String> {
 
 fn write_csv(path: &Path, runs: &[Vec<Arc<RunStep>>]) -> Result<()> {
     let unwritable = |source| Error::Write { path: path.to_owned(), source };
-    let mut file = BufWriter::new(File::create_new(path).map_err(unwritable)?);
+    let mut file = BufWriter::new(terminal::new_file(path)?);
     for (number, steps) in runs.iter().enumerate() {
         let rows: Vec<_> = steps.iter().map(|trace| trace.row()).collect();
         let table = columns::csv(&rows);
@@ -295,7 +296,7 @@ fn write_csv(path: &Path, runs: &[Vec<Arc<RunStep>>]) -> Result<()> {
             writeln!(file, "{named}{text}").map_err(unwritable)?;
         }
     }
-    file.flush().map_err(unwritable)
+    file.into_inner().map_err(|error| unwritable(error.into_error()))?.complete_new()
 }
 
 fn write_rrd(path: &Path, traverse: &Traverse, runs: &[Vec<Arc<RunStep>>]) -> Result<()> {

@@ -1,16 +1,16 @@
 //! A recording as an `.rrd` file: written beside its place, then moved there whole.
 
 use std::collections::BTreeSet;
-use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::BufWriter;
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Duration;
 
 use rerun::external::re_build_info::CrateVersion;
 use rerun::external::re_log_encoding::{Encoder, EncodingOptions};
 use rerun::log::ChunkBatcherConfig;
 use sightline_geometry::error::{Error, Result};
+use sightline_recordings::files::{PartialFile, remove_left_overs_of};
 use sightline_rover::pipeline::Stops;
 
 use super::memory::MemoryStream;
@@ -38,25 +38,25 @@ pub fn export(
     if path.exists() {
         return Err(failed(path, "the file exists already; choose another name"));
     }
-    let partial = Partial::beside(path);
-    write(&partial.path, traverse_name, stops, runs, progress)?;
-    std::fs::rename(&partial.path, path).map_err(|source| Error::Write { path: path.to_owned(), source })
+    remove_left_overs_of(path);
+    write(PartialFile::create(path)?, path, traverse_name, stops, runs, progress)?.complete_new()
 }
 
 fn write(
+    file: PartialFile,
     path: &Path,
     traverse_name: &str,
     stops: &dyn Stops,
     runs: &[RunLog<'_>],
     progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
-) -> Result<()> {
+) -> Result<PartialFile> {
     let wrong = |error: &dyn std::fmt::Display| failed(path, &error.to_string());
     let gather =
         ChunkBatcherConfig { flush_tick: Duration::MAX, flush_num_bytes: CHUNK_BYTES, ..Default::default() };
     let memory = MemoryStream::open(builder(traverse_name)?.batcher_config(gather));
     let memory = memory.map_err(|error| wrong(&error))?;
     let mut recorder = Recorder::new(memory.stream().clone(), false);
-    let mut file = RrdFile::create(path)?;
+    let mut file = RrdFile::begin(file, path)?;
     recorder
         .log_runs(runs, stops)
         .and_then(|()| recorder.log_traverse(traverse_name, stops))
@@ -76,21 +76,20 @@ fn write(
         }
     }
     file.append(&memory)?;
-    file.finish()?;
-    // Everything is on disk: a break now would come too late, so its answer does not matter.
+    let file = file.finish()?;
+    // Everything is written: a break now would come too late, so its answer does not matter.
     let _ = progress(all.len(), all.len());
-    Ok(())
+    Ok(file)
 }
 
 /// An `.rrd` file in work. Rerun's own file sink reports a full disk only to its log, so we write ourselves.
 struct RrdFile<'a> {
     path: &'a Path,
-    encoder: Encoder<BufWriter<File>>,
+    encoder: Encoder<BufWriter<PartialFile>>,
 }
 
 impl<'a> RrdFile<'a> {
-    fn create(path: &'a Path) -> Result<Self> {
-        let file = File::create_new(path).map_err(|source| Error::Write { path: path.to_owned(), source })?;
+    fn begin(file: PartialFile, path: &'a Path) -> Result<Self> {
         let options = EncodingOptions::PROTOBUF_COMPRESSED;
         let encoder = Encoder::new_eager(CrateVersion::LOCAL, options, BufWriter::new(file));
         Ok(Self { path, encoder: encoder.map_err(|error| failed(path, &error.to_string()))? })
@@ -103,31 +102,11 @@ impl<'a> RrdFile<'a> {
         Ok(())
     }
 
-    fn finish(mut self) -> Result<()> {
+    fn finish(mut self) -> Result<PartialFile> {
         self.encoder.finish().map_err(|error| failed(self.path, &error.to_string()))?;
-        let mut file = self.encoder.into_inner().map_err(|error| failed(self.path, &error.to_string()))?;
-        file.flush()
-            .and_then(|()| file.get_ref().sync_all())
-            .map_err(|source| Error::Write { path: self.path.to_owned(), source })
-    }
-}
-
-/// The file in work, which is removed unless it was moved away.
-struct Partial {
-    path: PathBuf,
-}
-
-impl Partial {
-    fn beside(path: &Path) -> Self {
-        let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        Self { path: path.with_file_name(format!(".{name}.{}.partial", std::process::id())) }
-    }
-}
-
-impl Drop for Partial {
-    fn drop(&mut self) {
-        // After the move there is nothing to remove, and otherwise there is nobody left to tell.
-        let _ = std::fs::remove_file(&self.path);
+        let file = self.encoder.into_inner().map_err(|error| failed(self.path, &error.to_string()))?;
+        file.into_inner()
+            .map_err(|error| Error::Write { path: self.path.to_owned(), source: error.into_error() })
     }
 }
 

@@ -36,5 +36,5 @@ async fn version() -> Json<Version> {
 /// Whether the server is well
 #[utoipa::path(get, operation_id = "show_health", path = ShowHealth::PATH, tag = "about", responses((status = 200, body = Health)))]
 async fn health(State(state): State<AppState>) -> Json<Health> {
-    Json(Health { status: "ok".to_owned(), notices: state.notices().to_vec() })
+    Json(Health { status: "ok".to_owned(), notices: state.notices() })
 }

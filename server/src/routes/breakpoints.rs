@@ -60,9 +60,8 @@ async fn add(
         _ => return Err(ApiError::invalid("field", "give either `expression` or `step`")),
     };
     blocking(move || {
-        let number =
-            live.with(|session| session.add_breakpoint(&expression)).map_err(|wrong| refused(&wrong))?;
-        state.changed(&live)?;
+        let number = state
+            .change(&live, |session| session.add_breakpoint(&expression).map_err(|wrong| refused(&wrong)))?;
         let at = AtBreakpoint { session: live.id.clone(), breakpoint: number };
         Ok((StatusCode::CREATED, location::<ChangeBreakpoint>(&at), view(&live, number)?).into_response())
     })
@@ -80,7 +79,7 @@ async fn change(
 ) -> ApiResult<Json<BreakpointView>> {
     let live = state.session(&session)?;
     blocking(move || {
-        live.with(|session| {
+        state.change(&live, |session| {
             session.breakpoint(number).map_err(|error| ApiError::from(error).about_path())?;
             if let Some(expression) = &change.expression {
                 session.change_breakpoint(number, expression).map_err(|wrong| refused(&wrong))?;
@@ -88,9 +87,8 @@ async fn change(
             if let Some(on) = change.on {
                 session.switch_breakpoint(number, on)?;
             }
-            Ok::<_, ApiError>(())
+            Ok(())
         })?;
-        state.changed(&live)?;
         view(&live, number)
     })
     .await
@@ -105,9 +103,9 @@ async fn remove(
 ) -> ApiResult<StatusCode> {
     let live = state.session(&session)?;
     blocking(move || {
-        let removed = live.with(|session| session.remove_breakpoint(number));
-        removed.map_err(|error| ApiError::from(error).about_path())?;
-        state.changed(&live)?;
+        state.change(&live, |session| {
+            session.remove_breakpoint(number).map_err(|error| ApiError::from(error).about_path())
+        })?;
         Ok(StatusCode::NO_CONTENT)
     })
     .await

@@ -22,6 +22,7 @@ use utoipa_axum::routes;
 
 use crate::extract::Path;
 use crate::jobs::{blocking, lock};
+use crate::live_session::LiveSession;
 use crate::problem::{ApiError, ApiResult};
 use crate::questions::Work;
 use crate::recorded_step::RecordedStep;
@@ -60,6 +61,8 @@ async fn show(
     Path(at): Path<ShowCounterfactual>,
 ) -> ApiResult<Json<Question>> {
     if let Ok(work) = state.questions().find(&at) {
+        // A question that the end of the server interrupted goes on with its session, which is woken.
+        state.session(&at.session)?;
         return Ok(Json(work.view()));
     }
     // That nobody has asked is an answer, too; that there is no such step is none.
@@ -87,19 +90,40 @@ async fn cancel(
         question.state = QuestionState::Cancelled;
     }
     state.tell(work.progress());
+    let (own, kept) = (state.clone(), work.view());
+    blocking(move || {
+        own.store().keep_question(&kept);
+        Ok(())
+    })
+    .await?;
     Ok(Json(work.view()))
 }
 
 /// Begins to answer, unless that goes on already.
 fn begin(state: &AppState, path: AtStep, asked: RecordedStep) -> ApiResult<Question> {
     counterfactual::goal(&asked.base())?;
-    let (work, is_new) = state.questions().begin(path.clone())?;
+    let (work, is_new) = state.questions().begin(path.clone(), state.store())?;
     if is_new {
         let (own_state, own_work) = (state.clone(), Arc::clone(&work));
         let submitted = state.answers().submit(move || answer(&own_state, &own_work, asked));
-        submitted.inspect_err(|_| state.questions().forget(&path))?;
+        submitted.inspect_err(|_| state.questions().forget(&path, state.store()))?;
     }
     Ok(work.view())
+}
+
+/// Goes on with the questions of a session that was read back, once its runs are computed again.
+pub(crate) fn go_on(state: &AppState, live: &LiveSession) {
+    for (path, work) in state.questions().waiting_of(&live.id) {
+        let (own_state, own_work) = (state.clone(), Arc::clone(&work));
+        let submitted = RecordedStep::find(state, &path)
+            .and_then(|asked| state.answers().submit(move || answer(&own_state, &own_work, asked)));
+        if let Err(problem) = submitted {
+            let why = problem.problem().detail.clone();
+            work.change(|question| (question.state, question.problem) = (QuestionState::Failed, Some(why)));
+            state.store().keep_question(&work.view());
+            state.tell(work.progress());
+        }
+    }
 }
 
 /// Answers a question; a fault of our own ends only this one.
@@ -108,6 +132,7 @@ fn answer(state: &AppState, work: &Work, mut asked: RecordedStep) {
         return;
     }
     state.tell(work.progress());
+    let live = Arc::clone(&asked.live);
     let outcome = catch_unwind(AssertUnwindSafe(|| {
         asked.prepare(&work.cancel).map_err(|problem| problem.problem().detail.clone())?;
         let mut told = 0;
@@ -132,5 +157,9 @@ fn answer(state: &AppState, work: &Work, mut asked: RecordedStep) {
         Ok(None) => question.state = QuestionState::Cancelled,
         Err(why) => (question.state, question.problem) = (QuestionState::Failed, Some(why)),
     });
+    // On disk before anybody sees it, unless the session is gone with its questions.
+    if !live.is_removed() {
+        state.store().keep_question(&work.view());
+    }
     state.tell(work.progress());
 }

@@ -1,7 +1,5 @@
 //! `sessions/{session}/notes`: what a person wrote about places of the drive.
 
-use std::sync::Arc;
-
 use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
@@ -10,6 +8,7 @@ use sightline_api::endpoint::Endpoint;
 use sightline_api::endpoints::{AddNote, ChangeNote, ListNotes, RemoveNote, RestoreNote, ShowNote};
 use sightline_api::location::AtNote;
 use sightline_api::wire::Event;
+use sightline_session::Session;
 use sightline_session::notes::{EditNote, NewNote, Note, Notes, Refused};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
@@ -48,8 +47,7 @@ async fn add(
     Body(new): Body<AddNote>,
 ) -> ApiResult<Response> {
     blocking(move || {
-        let note = live.with(|session| live.with_notes(|notes| notes.add(new, session, &now())))?;
-        keep(&state, &live)?;
+        let note = change(&state, &live, |session, notes| Ok(notes.add(new, session, &now())?))?;
         let at = AtNote { session: live.id.clone(), note: note.id };
         let headers = (revision::tag(note.revision), location::<ShowNote>(&at));
         Ok((StatusCode::CREATED, headers.0, headers.1, Json(note)).into_response())
@@ -76,13 +74,13 @@ async fn edit(
     State(state): State<AppState>,
     Path(AtNote { session, note }): Path<ChangeNote>,
     Read(read): Read,
-    Body(change): Body<ChangeNote>,
+    Body(edit): Body<ChangeNote>,
 ) -> ApiResult<Response> {
     let live = state.session(&session)?;
     blocking(move || {
-        let edited = live.with_notes(|notes| notes.edit(note, read, change, &now()));
-        let edited = edited.map_err(|refused| problem(note, refused))?;
-        keep(&state, &live)?;
+        let edited = change(&state, &live, |_, notes| {
+            notes.edit(note, read, edit, &now()).map_err(|refused| problem(note, refused))
+        })?;
         Ok(tagged(edited))
     })
     .await
@@ -100,8 +98,7 @@ async fn remove(
 ) -> ApiResult<StatusCode> {
     let live = state.session(&session)?;
     blocking(move || {
-        live.with_notes(|notes| notes.remove(note, read)).map_err(|refused| problem(note, refused))?;
-        keep(&state, &live)?;
+        change(&state, &live, |_, notes| notes.remove(note, read).map_err(|refused| problem(note, refused)))?;
         Ok(StatusCode::NO_CONTENT)
     })
     .await
@@ -115,8 +112,8 @@ async fn restore(
 ) -> ApiResult<Response> {
     let live = state.session(&session)?;
     blocking(move || {
-        let back = live.with_notes(|notes| notes.restore(note)).map_err(|refused| problem(note, refused))?;
-        keep(&state, &live)?;
+        let back =
+            change(&state, &live, |_, notes| notes.restore(note).map_err(|refused| problem(note, refused)))?;
         Ok(tagged(back))
     })
     .await
@@ -138,11 +135,15 @@ fn problem(note: u64, refused: Refused) -> ApiError {
     }
 }
 
-/// Writes the notes and tells every page.
-fn keep(state: &AppState, live: &Arc<LiveSession>) -> ApiResult<()> {
-    live.save_notes(state.store())?;
+/// Changes the notes, writes them and tells every page.
+fn change<T>(
+    state: &AppState,
+    live: &LiveSession,
+    work: impl FnOnce(&Session, &mut Notes) -> ApiResult<T>,
+) -> ApiResult<T> {
+    let value = live.change_notes(state.store(), work)?;
     state.tell(Event::NotesChanged { session: live.id.clone() });
-    Ok(())
+    Ok(value)
 }
 
 /// The notes that are pinned to a step of a run, or to the stop alone.

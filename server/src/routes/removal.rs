@@ -10,7 +10,6 @@ use sightline_api::endpoints::{
     RemoveRun, RemoveSession, RemoveTraverse, RestoreRun, RestoreSession, RestoreTarget,
 };
 use sightline_api::location::{AtSession, AtTraverse};
-use sightline_geometry::error::Result;
 use sightline_session::Session;
 use sightline_session::view::SessionView;
 use utoipa_axum::router::OpenApiRouter;
@@ -86,14 +85,16 @@ async fn remove_run(
     let found = live.with(|session| session.run(target, run).map(|_| ()));
     found.map_err(|error| ApiError::from(error).about_path())?;
     blocking(move || {
-        live.with(|session| {
+        let remove = |session: &mut Session| {
             session.remove_run(target, run)?;
-            if !session.is_needed(target, run) {
+            Ok(session.is_needed(target, run))
+        };
+        state.change_and(&live, remove, |is_needed| {
+            if !is_needed {
                 live.tell_to_end(target, Some(run));
             }
-            Ok::<_, ApiError>(())
         })?;
-        saved(&state, &live)
+        Ok(Json(state.view(&live)))
     })
     .await
 }
@@ -104,12 +105,7 @@ async fn restore_run(
     State(state): State<AppState>,
     RunPath { live, target, run }: RunPath,
 ) -> ApiResult<Json<SessionView>> {
-    blocking(move || {
-        restored(&live, |session| session.restore_run(target, run))?;
-        state.runner().go_on_with(&live, target)?;
-        saved(&state, &live)
-    })
-    .await
+    blocking(move || restored(&state, &live, target, |session| Ok(session.restore_run(target, run)?))).await
 }
 
 /// Takes the removal of a target back
@@ -119,19 +115,22 @@ async fn restore_target(
     TargetPath { live, target }: TargetPath,
 ) -> ApiResult<Json<SessionView>> {
     blocking(move || {
-        live.with(|session| targets::has_room(session))?;
-        restored(&live, |session| session.restore_target(target))?;
-        state.runner().go_on_with(&live, target)?;
-        saved(&state, &live)
+        restored(&state, &live, target, |session| {
+            targets::has_room(session)?;
+            Ok(session.restore_target(target)?)
+        })
     })
     .await
 }
 
-fn restored(live: &LiveSession, restore: impl FnOnce(&mut Session) -> Result<()>) -> ApiResult<()> {
-    live.with(restore).map_err(|error| ApiError::from(error).about_path())
-}
-
-fn saved(state: &AppState, live: &Arc<LiveSession>) -> ApiResult<Json<SessionView>> {
-    state.changed(live)?;
+/// Takes a removal back and lets the runs of its target go on.
+fn restored(
+    state: &AppState,
+    live: &Arc<LiveSession>,
+    target: usize,
+    restore: impl FnOnce(&mut Session) -> ApiResult<()>,
+) -> ApiResult<Json<SessionView>> {
+    state.change(live, |session| restore(session).map_err(ApiError::about_path))?;
+    state.runner().go_on_with(live, target)?;
     Ok(Json(state.view(live)))
 }

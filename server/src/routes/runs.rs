@@ -85,12 +85,9 @@ async fn cancel(
         if before.complete || before.stopped.is_some() {
             return Err(ApiError::conflict("The run has ended already."));
         }
-        live.with(|session| {
-            // Told under the session's lock, so that no step is recorded after this.
-            live.tell_to_end(target, Some(run));
-            session.cancel(target, run)
-        })?;
-        state.changed(&live)?;
+        // Told under the session's lock, so that no step is recorded after this.
+        let tell = |(): &()| live.tell_to_end(target, Some(run));
+        state.change_and(&live, |session| Ok(session.cancel(target, run)?), tell)?;
         Ok(Json(view(&state, &live, target, run)?))
     })
     .await
@@ -106,9 +103,8 @@ async fn resume(
         if view(&state, &live, target, run)?.stopped.is_none() {
             return Err(ApiError::conflict("The run was not stopped."));
         }
-        live.with(|session| session.resume(target, run))?;
+        state.change(&live, |session| Ok(session.resume(target, run)?))?;
         start_or_say(&state, &live, target, run);
-        state.changed(&live)?;
         Ok((StatusCode::ACCEPTED, Json(view(&state, &live, target, run)?)))
     })
     .await
@@ -144,7 +140,7 @@ fn add(
     } else {
         None
     };
-    let run = live.with(|session| {
+    let run = state.change(live, |session| {
         has_room(session, target)?;
         // A run again from the very step at which its parent was displaced is displaced alike, unless it says where.
         let inherited = session.run(target, new.run)?.displaced_at(new.from_step);
@@ -152,10 +148,9 @@ fn add(
         if let Some(pixel) = new.prediction_px.or(inherited) {
             session.displace(target, run, pixel)?;
         }
-        Ok::<_, ApiError>(run)
+        Ok(run)
     })?;
     start_or_say(state, live, target, run);
-    state.changed(live)?;
     let location = location::<ShowRun>(&AtRun { session: live.id.clone(), target, run });
     Ok((StatusCode::ACCEPTED, location, Json(view(state, live, target, run)?)).into_response())
 }

@@ -75,7 +75,6 @@ async fn begin(State(state): State<AppState>, Body(new): Body<BeginSession>) -> 
     blocking(move || {
         let live = state.begin_session(traverse)?;
         state.look_at(&live.traverse, 0);
-        state.changed(&live)?;
         let location = location::<ShowSession>(&AtSession { session: live.id.clone() });
         Ok((StatusCode::CREATED, location, Json(state.view(&live))).into_response())
     })

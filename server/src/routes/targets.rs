@@ -57,10 +57,10 @@ async fn remove(
     TargetPath { live, target }: TargetPath,
 ) -> ApiResult<Json<SessionView>> {
     blocking(move || {
-        let removed = live.with(|session| session.remove_target(target));
-        removed.map_err(|error| ApiError::from(error).about_path())?;
-        live.tell_to_end(target, None);
-        state.changed(&live)?;
+        let remove = |session: &mut Session| {
+            session.remove_target(target).map_err(|error| ApiError::from(error).about_path())
+        };
+        state.change_and(&live, remove, |()| live.tell_to_end(target, None))?;
         Ok(Json(state.view(&live)))
     })
     .await
@@ -81,13 +81,11 @@ fn add(
         .map_err(|error| trackability::refusal(state, &live.traverse, designation, &settings, error))?;
     let first = Arc::new(first);
     let gap_m = named.gap_m(&first);
-    let target = live.with(|session| {
+    let target = state.change(live, |session| {
         has_number(session)?;
-        let target = session.add_target(new.label, settings, first);
-        Ok::<_, ApiError>(target)
+        Ok(session.add_target(new.label, settings, first))
     })?;
     state.look_at(&live.traverse, designation.step);
-    state.changed(live)?;
     start_or_say(state, live, target, 0);
     let at = AtTarget { session: live.id.clone(), target };
     Ok((

@@ -1,19 +1,26 @@
 //! Opening the database: a damaged file is moved aside, one of a newer version is left alone, and the JSON files of an
 //! earlier version are read in once and kept.
 
+use std::fs::OpenOptions;
 use std::io::ErrorKind;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use redb::{Builder, ConcurrencyMode, Database, DatabaseError, ReadableTable, StorageError};
+use redb::backends::FileBackend;
+use redb::{
+    Builder, ConcurrencyMode, Database, DatabaseError, ReadableTable, StorageError, TableHandle as _,
+    WriteTransaction,
+};
 use sightline_geometry::error::{Error, Result};
+use sightline_recordings::files::{PARTIAL, remove_left_overs, sync_folder};
 use sightline_session::view::SavedSession;
 
-use super::{
-    CURSORS, DOCUMENTS, DRIVES, Disk, FILE_NAME, LAST_SESSION, META, NOTES, RUNS, SESSIONS, STORE_VERSION,
-    STUDIES, Store, USED, id_of, number_of,
-};
+use super::disk::{Disk, Outcome, io_error};
+use super::record::{NAMED, NUMBERED, Place, RUNS, RunKey, SESSIONS, encode, has_line, run_keys};
+use super::salvage::Salvaged;
+use super::{FILE_NAME, META, STORE_VERSION, Store, id_of, number_of, raise_last_session};
+use crate::folders::{make_file_private, make_private};
 
 /// How long a database is waited for that a server in this very process is about to let go of.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -31,38 +38,94 @@ pub(super) fn builder() -> Builder {
 /// The database in `folder`, and what happened on the way, one sentence each.
 pub(super) fn open(folder: &Path) -> Result<(Disk, Vec<String>)> {
     let path = folder.join(FILE_NAME);
-    let unwritable = |source| Error::Write { path: folder.to_owned(), source };
-    std::fs::create_dir_all(folder).map_err(unwritable)?;
-    match attempt(&path)? {
-        Ok(disk) => Ok((disk, Vec::new())),
-        Err(why) => {
-            let to = free_name(folder, FILE_NAME, "damaged");
-            std::fs::rename(&path, &to).map_err(|source| Error::Write { path: path.clone(), source })?;
-            let (from, to) = (path.display(), to.display());
-            let message = format!("{from} is damaged ({why}); it was moved to {to}, and sessions begin anew");
-            let disk = attempt(&path)?.map_err(|why| failed(&path, &why))?;
-            Ok((disk, vec![message]))
+    let unwritable = |source| Error::Write { path: path.clone(), source };
+    make_private(folder).map_err(unwritable)?;
+    remove_left_overs(folder, None);
+    let mut messages = Vec::new();
+    match std::fs::metadata(&path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => create(&path, &Salvaged::default())?,
+        Ok(about) if about.len() == 0 => {
+            messages.push(format!(
+                "{} was empty, without any session; sessions begin anew. If there were sessions, bring the file back from a \
+                 copy",
+                path.display()
+            ));
+            create(&path, &Salvaged::default())?;
         }
+        _ => {}
     }
+    let database = match attempt(&path)? {
+        Ok(database) => database,
+        Err(Damaged(why)) => {
+            messages.push(salvage(&path, &why)?);
+            attempt(&path)?.map_err(|Damaged(why)| failed(&path, &why))?
+        }
+    };
+    make_file_private(&path).map_err(unwritable)?;
+    let again = path.clone();
+    let disk = Disk::new(path.clone(), database, Box::new(move || open_file(&again)));
+    disk.map(|disk| (disk, messages)).map_err(|error| failed(&path, &error.to_string()))
 }
 
-/// Opens or makes the database; the inner error says what is damaged.
-fn attempt(path: &Path) -> Result<std::result::Result<Disk, String>> {
+/// Puts a damaged file aside, and what can be verified of it in its place; says what happened. At no moment is there no file.
+fn salvage(path: &Path, why: &str) -> Result<String> {
+    let unwritable = |source| Error::Write { path: path.to_owned(), source };
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let bytes = std::fs::read(path).map_err(|source| Error::Read { path: path.to_owned(), source })?;
+    let salvaged = Salvaged::of(&bytes);
+    let to = free_name(folder, FILE_NAME, "damaged");
+    std::fs::hard_link(path, &to).or_else(|_| std::fs::copy(path, &to).map(|_| ())).map_err(unwritable)?;
+    make_file_private(&to).map_err(unwritable)?;
+    create(path, &salvaged)?;
+    let (from, to, summary) = (path.display(), to.display(), salvaged.summary());
+    Ok(format!("{from} is damaged ({why}); it was moved to {to}; {summary}"))
+}
+
+/// Makes the database with these records, in place of one that is there, complete or not at all.
+fn create(path: &Path, records: &Salvaged) -> Result<()> {
+    let unwritable = |source: std::io::Error| Error::Write { path: path.to_owned(), source };
+    let folder = path.parent().unwrap_or(Path::new("."));
+    // A temporary file is for its owner alone.
+    let prefix = format!(".{FILE_NAME}.");
+    let file = tempfile::Builder::new().prefix(&prefix).suffix(PARTIAL).tempfile_in(folder);
+    let file = file.map_err(unwritable)?;
+    let make = || {
+        let database = builder().create_with_backend(FileBackend::new(file.reopen()?)?)?;
+        prepare(&database)?;
+        records.fill(&database)?;
+        Ok::<_, redb::Error>(database.close()?)
+    };
+    make().map_err(|error| unwritable(io_error(error)))?;
+    file.as_file().sync_all().map_err(unwritable)?;
+    file.persist(path).map_err(|error| unwritable(error.error))?;
+    sync_folder(folder).map_err(unwritable)
+}
+
+fn open_file(path: &Path) -> std::result::Result<Database, DatabaseError> {
+    let file = OpenOptions::new().read(true).write(true).open(path)?;
+    builder().create_with_backend(FileBackend::new(file)?)
+}
+
+/// What is damaged.
+struct Damaged(String);
+
+/// Opens the database; the inner error says what is damaged.
+fn attempt(path: &Path) -> Result<std::result::Result<Database, Damaged>> {
     let begun = Instant::now();
     loop {
         // Some damage is met by the library with a panic.
         let opened = catch_unwind(AssertUnwindSafe(|| {
-            let database = builder().create(path)?;
+            let database = open_file(path)?;
             prepare(&database).map(|version| (database, version))
         }));
         return match opened {
-            Err(_) => Ok(Err("it cannot be checked".to_owned())),
+            Err(_) => Ok(Err(Damaged("it cannot be checked".to_owned()))),
             Ok(Ok((_, version))) if version > STORE_VERSION => Err(Error::Request(format!(
                 "{} was written by a newer version of this program (form {version}; this one reads {STORE_VERSION}); \
                  use that one, or another folder with --data-dir",
                 path.display()
             ))),
-            Ok(Ok((database, _))) => Ok(Ok(Disk { database, path: path.to_owned() })),
+            Ok(Ok((database, _))) => Ok(Ok(database)),
             Ok(Err(redb::Error::DatabaseAlreadyOpen)) if begun.elapsed() < PATIENCE => {
                 std::thread::sleep(Duration::from_millis(20));
                 continue;
@@ -75,18 +138,19 @@ fn attempt(path: &Path) -> Result<std::result::Result<Disk, String>> {
             {
                 Err(Error::Write { path: path.to_owned(), source })
             }
-            Ok(Err(error)) => Ok(Err(crate::printable::printable(&error.to_string()))),
+            Ok(Err(error)) => Ok(Err(Damaged(crate::printable::printable(&error.to_string())))),
         };
     }
 }
 
-/// Makes the tables that are missing; returns the version.
-fn prepare(database: &Database) -> std::result::Result<u64, redb::Error> {
+/// Makes the tables that are missing, and gives the records of an earlier version their lines; returns the version, which
+/// may be a newer one: then nothing is changed.
+pub(super) fn prepare(database: &Database) -> Outcome<u64> {
     let transaction = database.begin_write()?;
     let version = {
         let mut meta = transaction.open_table(META)?;
         let known = meta.get("version")?.map(|value| value.value());
-        if known.is_none() {
+        if known.is_none_or(|known| known < STORE_VERSION) {
             meta.insert("version", STORE_VERSION)?;
         }
         known.unwrap_or(STORE_VERSION)
@@ -95,16 +159,59 @@ fn prepare(database: &Database) -> std::result::Result<u64, redb::Error> {
         transaction.abort()?;
         return Ok(version);
     }
-    transaction.open_table(SESSIONS)?;
+    for table in NUMBERED {
+        transaction.open_table(table)?;
+    }
+    for table in NAMED {
+        transaction.open_table(table)?;
+    }
     transaction.open_table(RUNS)?;
-    transaction.open_table(CURSORS)?;
-    transaction.open_table(NOTES)?;
-    transaction.open_table(STUDIES)?;
-    transaction.open_table(DOCUMENTS)?;
-    transaction.open_table(USED)?;
-    transaction.open_table(DRIVES)?;
+    if version < STORE_VERSION {
+        add_lines(&transaction)?;
+    }
     transaction.commit()?;
     Ok(version)
+}
+
+/// Gives every record its line, and every session the numbers of its runs.
+fn add_lines(transaction: &WriteTransaction) -> Outcome<()> {
+    let mut all = Vec::new();
+    for table in NUMBERED {
+        for entry in transaction.open_table(table)?.iter()? {
+            let (key, value) = entry?;
+            all.extend(
+                Place::numbered(table.name(), key.value()).map(|place| (place, value.value().to_vec())),
+            );
+        }
+    }
+    for table in NAMED {
+        for entry in transaction.open_table(table)?.iter()? {
+            let (key, value) = entry?;
+            all.extend(Place::named(table.name(), key.value()).map(|place| (place, value.value().to_vec())));
+        }
+    }
+    for entry in transaction.open_table(RUNS)?.iter()? {
+        let (key, value) = entry?;
+        all.push((Place::Run(key.value()), value.value().to_vec()));
+    }
+    for (place, mut bytes) in all {
+        if has_line(&bytes) {
+            continue;
+        }
+        if let Place::Session(number) = place {
+            bytes = with_runs(&bytes, &run_keys(transaction, number)?);
+        }
+        place.set(transaction, Some(&encode(&place, 1, &bytes)))?;
+    }
+    Ok(())
+}
+
+/// A session with the numbers of its runs; one that is no session stays as it is.
+fn with_runs(session: &[u8], runs: &[RunKey]) -> Vec<u8> {
+    let Ok(saved) = serde_json::from_slice::<SavedSession>(session) else { return session.to_vec() };
+    let count = |target: usize| runs.iter().filter(|(_, of, _)| *of == target as u64).count();
+    let counts: Vec<usize> = (0..saved.targets.len()).map(count).collect();
+    serde_json::to_vec(&(saved, counts)).unwrap_or_else(|_| session.to_vec())
 }
 
 impl Store {
@@ -129,37 +236,31 @@ impl Store {
                     }
                     move_aside(&path, &id_of(number), "imported", "was read into the database")
                 }
-                Err(why) => move_aside(&path, &id_of(number), "damaged", &format!("cannot be read ({why})")),
+                Err(Damaged(why)) => {
+                    move_aside(&path, &id_of(number), "damaged", &format!("cannot be read ({why})"))
+                }
             };
             self.messages.push(message);
         }
-        self.disk.write(|transaction| {
-            let mut meta = transaction.open_table(META)?;
-            let known = meta.get(LAST_SESSION)?.map_or(0, |value| value.value());
-            if known < last {
-                meta.insert(LAST_SESSION, last)?;
-            }
-            Ok(known < last)
-        })
+        self.write(|write| raise_last_session(write, last))
     }
 
     fn has(&self, number: u64) -> Result<bool> {
-        let find = || {
-            use redb::ReadableDatabase as _;
-            let table = self.disk.database.begin_read()?.open_table(SESSIONS)?;
-            Ok::<_, redb::Error>(table.get(number)?.is_some())
-        };
-        find().map_err(|error| failed(&self.disk.path, &error.to_string()))
+        use redb::ReadableDatabase as _;
+        self.disk.read(|database| {
+            let table = database.begin_read()?.open_table(SESSIONS)?;
+            Ok(table.get(number)?.is_some())
+        })
     }
 }
 
-fn read(path: &Path, id: &str) -> std::result::Result<SavedSession, String> {
-    let bytes = std::fs::read(path).map_err(|error| error.to_string())?;
-    let saved: SavedSession = serde_json::from_slice(&bytes).map_err(|error| error.to_string())?;
+fn read(path: &Path, id: &str) -> std::result::Result<SavedSession, Damaged> {
+    let bytes = std::fs::read(path).map_err(|error| Damaged(error.to_string()))?;
+    let saved: SavedSession = serde_json::from_slice(&bytes).map_err(|error| Damaged(error.to_string()))?;
     if saved.id == id {
         Ok(saved)
     } else {
-        Err(format!("it holds session {}", crate::printable::printable(&saved.id)))
+        Err(Damaged(format!("it holds session {}", crate::printable::printable(&saved.id))))
     }
 }
 

@@ -1,18 +1,28 @@
 //! Reading what is in the database: all of it when a server starts, and for commands that only look.
 
 use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-use redb::{ReadTransaction, ReadableDatabase, ReadableTable};
+use redb::backends::InMemoryBackend;
+use redb::{
+    ConcurrencyMode, DatabaseError, ReadTransaction, ReadableDatabase, ReadableTable, StorageBackend as _,
+};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
-use sightline_geometry::error::Result;
+use sightline_geometry::error::{Error, Result};
 use sightline_session::Cursor;
 use sightline_session::notes::Notes;
 use sightline_session::view::SavedSession;
 
+use super::disk::Outcome;
 use super::open::{builder, failed, refused};
-use super::{CURSORS, FILE_NAME, LAST_SESSION, META, NOTES, RUNS, SESSIONS, USED, id_of};
+use super::record::{CURSORS, NOTES, Place, RUNS, SESSIONS, USED, all_numbered, decode};
+use super::salvage::Salvaged;
+use super::{FILE_NAME, LAST_SESSION, META, id_of};
+
+/// How often a file is copied that a starting server may be changing.
+const COPIES: u32 = 3;
 
 /// What was found.
 #[derive(Debug, Default)]
@@ -31,7 +41,7 @@ pub struct Found {
     pub(super) damaged: Vec<(String, String)>,
 }
 
-/// What a folder holds, without changing it, also while a server works in it.
+/// What a folder holds, without changing it, also while a server works in it and after one that was killed.
 ///
 /// # Errors
 /// No database there, or one that cannot be read.
@@ -40,50 +50,87 @@ pub(crate) fn read_only(folder: &Path) -> Result<Found> {
     let mut builder = builder();
     // The check would write.
     builder.set_check_integrity_on_open(false);
-    let database = builder.open_read_only(&path).map_err(|error| refused(&path, &error))?;
-    read(&database, &path)
+    for _ in 0..COPIES {
+        match builder.open_read_only(&path) {
+            Ok(database) => {
+                return read(&database).map_err(|error| failed(&path, &error.to_string()));
+            }
+            // No server is there, and the last one did not end in order: the file is repaired in memory.
+            Err(DatabaseError::RepairAborted) => {}
+            Err(error) => return Err(refused(&path, &error)),
+        }
+        let bytes = std::fs::read(&path).map_err(|source| Error::Read { path: path.clone(), source })?;
+        if let Some(found) = repaired(&bytes) {
+            return Ok(found);
+        }
+        // A server may have started while the file was copied.
+    }
+    let bytes = std::fs::read(&path).map_err(|source| Error::Read { path: path.clone(), source })?;
+    let salvaged = Salvaged::of(&bytes);
+    let whole = salvaged.in_memory().and_then(|database| read(&database));
+    let mut found = whole.map_err(|error| failed(&path, &error.to_string()))?;
+    found.messages.push(format!("{} is damaged: {}", path.display(), salvaged.summary()));
+    Ok(found)
+}
+
+/// What the bytes of a database hold after a repair; none where it is damaged beyond it.
+fn repaired(bytes: &[u8]) -> Option<Found> {
+    let open = || {
+        let storage = InMemoryBackend::new();
+        storage.set_len(bytes.len() as u64)?;
+        storage.write(0, bytes)?;
+        let mut builder = builder();
+        // Nobody shares the memory.
+        builder.set_concurrency_mode(ConcurrencyMode::ExclusiveWriter);
+        read(&builder.create_with_backend(storage)?)
+    };
+    // The library panics at some damage.
+    catch_unwind(AssertUnwindSafe(open)).ok()?.ok()
 }
 
 /// Reads everything.
-pub(super) fn read(database: &impl ReadableDatabase, path: &Path) -> Result<Found> {
-    let attempt = || {
-        let transaction = database.begin_read()?;
-        let last_number = transaction.open_table(META)?.get(LAST_SESSION)?.map_or(0, |value| value.value());
-        let mut found = Found { last_number, ..Found::default() };
-        let sessions = transaction.open_table(SESSIONS)?;
-        for entry in sessions.iter()? {
-            let (key, value) = entry?;
-            let number = key.value();
-            found.last_number = found.last_number.max(number);
-            match session(&transaction, number, value.value())? {
-                Ok(saved) => found.sessions.push(saved),
-                Err(why) => found.damaged.push((id_of(number), why)),
-            }
+pub(super) fn read(database: &impl ReadableDatabase) -> Outcome<Found> {
+    let transaction = database.begin_read()?;
+    let last_number = transaction.open_table(META)?.get(LAST_SESSION)?.map_or(0, |value| value.value());
+    let mut found = Found { last_number, ..Found::default() };
+    for entry in transaction.open_table(SESSIONS)?.iter()? {
+        let (key, value) = entry?;
+        let number = key.value();
+        found.last_number = found.last_number.max(number);
+        match session(&transaction, number, value.value())? {
+            Ok(saved) => found.sessions.push(saved),
+            Err(why) => found.damaged.push((id_of(number), why.to_string())),
         }
-        for entry in transaction.open_table(NOTES)?.iter()? {
-            let (key, value) = entry?;
-            match parsed(value.value()) {
-                Ok(notes) => {
-                    found.notes.insert(key.value(), notes);
-                }
-                Err(why) => found.damaged.push((id_of(key.value()), format!("its notes: {why}"))),
+    }
+    for entry in transaction.open_table(NOTES)?.iter()? {
+        let (key, value) = entry?;
+        match parsed(&Place::Notes(key.value()), value.value()) {
+            Ok(notes) => {
+                found.notes.insert(key.value(), notes);
             }
+            Err(why) => found.damaged.push((id_of(key.value()), format!("its notes: {why}"))),
         }
-        // Another program may have the database open for writing in an earlier form, which has no such table.
-        if let Ok(table) = transaction.open_table(USED) {
-            for entry in table.iter()? {
-                let (key, value) = entry?;
-                // A time that cannot be read is no reason to lose anything.
-                found.used.extend(parsed(value.value()).map(|time: String| (key.value(), time)));
-            }
-        }
-        // A session of which one thing cannot be read is moved aside once, with everything.
-        found.damaged.dedup_by(|later, earlier| later.0 == earlier.0);
-        let is_damaged = |id: &str| found.damaged.iter().any(|(damaged, _)| damaged == id);
-        found.sessions.retain(|saved| !is_damaged(&saved.id));
-        Ok::<_, redb::Error>(found)
-    };
-    attempt().map_err(|error| failed(path, &error.to_string()))
+    }
+    // A time that cannot be read is no reason to lose anything.
+    for (number, json) in all_numbered(&transaction, USED)? {
+        found.used.extend(serde_json::from_slice(&json).map(|time: String| (number, time)));
+    }
+    // A session of which one thing cannot be read is moved aside once, with everything.
+    found.damaged.sort();
+    found.damaged.dedup_by(|later, earlier| later.0 == earlier.0);
+    let is_damaged = |id: &str| found.damaged.iter().any(|(damaged, _)| damaged == id);
+    found.sessions.retain(|saved| !is_damaged(&saved.id));
+    Ok(found)
+}
+
+/// Why a record cannot be read.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Unreadable(String);
+
+impl std::fmt::Display for Unreadable {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        out.write_str(&self.0)
+    }
 }
 
 /// A session put together from its parts.
@@ -91,43 +138,61 @@ fn session(
     transaction: &ReadTransaction,
     number: u64,
     head: &[u8],
-) -> std::result::Result<std::result::Result<SavedSession, String>, redb::Error> {
-    let mut saved: SavedSession = match parsed(head) {
-        Ok(saved) => saved,
+) -> Outcome<std::result::Result<SavedSession, Unreadable>> {
+    let (mut saved, runs) = match head_of(&Place::Session(number), head) {
+        Ok(head) => head,
         Err(why) => return Ok(Err(why)),
     };
     if saved.id != id_of(number) {
-        return Ok(Err(format!("it holds session {}", crate::printable::printable(&saved.id))));
+        return Ok(Err(Unreadable(format!("it holds session {}", crate::printable::printable(&saved.id)))));
     }
     if let Some(cursor) = transaction.open_table(CURSORS)?.get(number)? {
         // A cursor that cannot be read is no reason to lose the session.
-        saved.cursor = parsed::<Cursor>(cursor.value()).unwrap_or_default();
+        saved.cursor = parsed::<Cursor>(&Place::Cursor(number), cursor.value()).unwrap_or_default();
     }
     let range = (number, 0, 0)..=(number, u64::MAX, u64::MAX);
     for entry in transaction.open_table(RUNS)?.range(range)? {
         let (key, value) = entry?;
         let (_, target, run) = key.value();
         let place = saved.targets.get_mut(target as usize).filter(|record| record.runs.len() as u64 == run);
-        match (place, parsed(value.value())) {
+        match (place, parsed(&Place::Run(key.value()), value.value())) {
             (Some(record), Ok(read)) => record.runs.push(read),
-            (None, _) => return Ok(Err(format!("run {run} of target {target} has no place"))),
-            (_, Err(why)) => return Ok(Err(format!("run {run} of target {target}: {why}"))),
+            (None, _) => return Ok(Err(Unreadable(format!("run {run} of target {target} has no place")))),
+            (_, Err(why)) => return Ok(Err(Unreadable(format!("run {run} of target {target}: {why}")))),
         }
+    }
+    let has: Vec<usize> = saved.targets.iter().map(|target| target.runs.len()).collect();
+    if runs.is_some_and(|runs| runs != has) {
+        return Ok(Err(Unreadable("a run is missing".to_owned())));
     }
     Ok(Ok(saved))
 }
 
+/// A session as it is stored, with the number of runs of each target; an earlier version did not store these.
+pub(super) fn head_of(
+    place: &Place,
+    bytes: &[u8],
+) -> std::result::Result<(SavedSession, Option<Vec<usize>>), Unreadable> {
+    if bytes.starts_with(b"[") {
+        parsed::<(SavedSession, Vec<usize>)>(place, bytes).map(|(saved, runs)| (saved, Some(runs)))
+    } else {
+        parsed(place, bytes).map(|saved| (saved, None))
+    }
+}
+
 /// Everything of a session as one JSON text, whether or not it can be understood.
-pub(super) fn raw(database: &impl ReadableDatabase, number: u64) -> std::result::Result<String, redb::Error> {
+pub(super) fn raw(database: &impl ReadableDatabase, number: u64) -> Outcome<String> {
     let transaction = database.begin_read()?;
-    let text = |bytes: &[u8]| {
+    let text = |place: Place, bytes: &[u8]| {
         let lossy = || Value::String(String::from_utf8_lossy(bytes).into_owned());
-        serde_json::from_slice(bytes).unwrap_or_else(|_| lossy())
+        let json = decode(&place, bytes).unwrap_or(bytes);
+        serde_json::from_slice(json).unwrap_or_else(|_| lossy())
     };
     let mut whole = serde_json::Map::new();
     for (name, table) in [("session", SESSIONS), ("cursor", CURSORS), ("notes", NOTES)] {
         if let Some(value) = transaction.open_table(table)?.get(number)? {
-            whole.insert(name.to_owned(), text(value.value()));
+            let place = Place::numbered(redb::TableHandle::name(&table), number);
+            whole.extend(place.map(|place| (name.to_owned(), text(place, value.value()))));
         }
     }
     let mut runs = Vec::new();
@@ -135,12 +200,14 @@ pub(super) fn raw(database: &impl ReadableDatabase, number: u64) -> std::result:
     for entry in transaction.open_table(RUNS)?.range(range)? {
         let (key, value) = entry?;
         let (_, target, run) = key.value();
-        runs.push(serde_json::json!({ "target": target, "run": run, "saved": text(value.value()) }));
+        let saved = text(Place::Run(key.value()), value.value());
+        runs.push(serde_json::json!({ "target": target, "run": run, "saved": saved }));
     }
     whole.insert("runs".to_owned(), runs.into());
     Ok(format!("{:#}", Value::Object(whole)))
 }
 
-fn parsed<T: DeserializeOwned>(bytes: &[u8]) -> std::result::Result<T, String> {
-    serde_json::from_slice(bytes).map_err(|error| error.to_string())
+fn parsed<T: DeserializeOwned>(place: &Place, bytes: &[u8]) -> std::result::Result<T, Unreadable> {
+    let json = decode(place, bytes).map_err(|altered| Unreadable(altered.to_string()))?;
+    serde_json::from_slice(json).map_err(|error| Unreadable(error.to_string()))
 }

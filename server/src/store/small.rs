@@ -1,14 +1,16 @@
-//! Documents, studies and opened drives: small values by name or number, each replaced as a whole.
+//! Documents, studies, questions and opened drives: small values by name or number, each replaced as a whole.
 
 use redb::{ReadableDatabase, ReadableTable, ReadableTableMetadata};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 use sightline_geometry::error::Result;
+use sightline_session::counterfactual::wire::Question;
 use sightline_session::documents::{DOCUMENT_LIMIT, Document};
 
-use super::open::failed;
-use super::{DOCUMENTS, DRIVES, STUDIES, Store, put};
+use super::Store;
+use super::disk::{Outcome, Write};
+use super::record::{DOCUMENTS, DRIVES, Named, Place, QUESTIONS, STUDIES, all_named, all_numbered};
 
 /// Why a document could not be replaced.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,16 +27,14 @@ impl Store {
     /// # Errors
     /// [`sightline_geometry::error::Error::Read`] when the database cannot be read.
     pub fn documents(&self) -> Result<Vec<Document>> {
-        let read = || {
-            let table = self.disk.database.begin_read()?.open_table(DOCUMENTS)?;
-            let mut all = Vec::new();
-            for entry in table.iter()? {
-                let (_, value) = entry?;
-                all.extend(serde_json::from_slice::<Document>(value.value()));
-            }
-            Ok::<_, redb::Error>(all)
-        };
-        read().map_err(|error| failed(&self.disk.path, &error.to_string()))
+        self.named(DOCUMENTS).map(|all| all.into_iter().map(|(_, document)| document).collect())
+    }
+
+    /// The values of a table with names; what cannot be read is left out.
+    fn named<T: DeserializeOwned>(&self, table: Named) -> Result<Vec<(String, T)>> {
+        let all = self.disk.read(|database| all_named(&database.begin_read()?, table))?;
+        let read = |(name, json): (String, Vec<u8>)| Some((name, serde_json::from_slice(&json).ok()?));
+        Ok(all.into_iter().filter_map(read).collect())
     }
 
     /// Replaces or adds a document; `revision` is the one that was read, 0 for a new one.
@@ -48,23 +48,21 @@ impl Store {
         revision: Option<u64>,
     ) -> Result<std::result::Result<Document, Clash>> {
         let mut outcome = Err(Clash::Full);
-        self.disk.write(|transaction| {
-            let (known, count) = {
-                let table = transaction.open_table(DOCUMENTS)?;
-                let known = table.get(name)?.and_then(|v| serde_json::from_slice::<Document>(v.value()).ok());
-                (known.map(|document| document.revision), table.len()?)
-            };
+        let place = Place::Document(name.to_owned());
+        self.write(|write| {
+            let known = document(write, &place)?.map(|document| document.revision);
+            let count = write.transaction.open_table(DOCUMENTS)?.len()?;
             if revision.is_some_and(|read| read != known.unwrap_or(0)) {
                 outcome = Err(Clash::Changed(known));
-                return Ok(false);
+                return Ok(());
             }
             if known.is_none() && count >= DOCUMENT_LIMIT as u64 {
-                return Ok(false);
+                return Ok(());
             }
             let document = Document { name: name.to_owned(), revision: known.unwrap_or(0) + 1, value };
-            put(transaction, DOCUMENTS, name, &document)?;
+            write.put(place, &document)?;
             outcome = Ok(document);
-            Ok(true)
+            Ok(())
         })?;
         Ok(outcome)
     }
@@ -79,17 +77,15 @@ impl Store {
         revision: Option<u64>,
     ) -> Result<std::result::Result<bool, Clash>> {
         let mut outcome = Ok(false);
-        self.disk.write(|transaction| {
-            let mut table = transaction.open_table(DOCUMENTS)?;
-            let known = table.get(name)?.and_then(|v| serde_json::from_slice::<Document>(v.value()).ok());
-            let known = known.map(|document| document.revision);
+        let place = Place::Document(name.to_owned());
+        self.write(|write| {
+            let known = document(write, &place)?.map(|document| document.revision);
             if known.is_some() && revision.is_some_and(|read| Some(read) != known) {
                 outcome = Err(Clash::Changed(known));
-                return Ok(false);
+                return Ok(());
             }
-            let was_there = table.remove(name)?.is_some();
-            outcome = Ok(was_there);
-            Ok(was_there)
+            outcome = Ok(write.remove_for_good(&place)?);
+            Ok(())
         })?;
         Ok(outcome)
     }
@@ -99,17 +95,7 @@ impl Store {
     /// # Errors
     /// [`sightline_geometry::error::Error::Read`] when the database cannot be read.
     pub fn drives(&self) -> Result<Vec<(String, String)>> {
-        let read = || {
-            let table = self.disk.database.begin_read()?.open_table(DRIVES)?;
-            let mut all = Vec::new();
-            for entry in table.iter()? {
-                let (key, value) = entry?;
-                let scenario = serde_json::from_slice::<String>(value.value());
-                all.extend(scenario.map(|scenario| (key.value().to_owned(), scenario)));
-            }
-            Ok::<_, redb::Error>(all)
-        };
-        read().map_err(|error| failed(&self.disk.path, &error.to_string()))
+        self.named(DRIVES)
     }
 
     /// Remembers a drive that was opened from a page.
@@ -117,7 +103,7 @@ impl Store {
     /// # Errors
     /// [`sightline_geometry::error::Error::Write`]; the database is then as it was.
     pub(crate) fn save_drive(&self, folder: &str, scenario: &str) -> Result<()> {
-        self.disk.write(|transaction| put(transaction, DRIVES, folder, &scenario))
+        self.write(|write| write.put(Place::Drive(folder.to_owned()), &scenario).map(|_| ()))
     }
 
     /// Forgets a drive that was opened from a page.
@@ -125,7 +111,7 @@ impl Store {
     /// # Errors
     /// [`sightline_geometry::error::Error::Write`]; the database is then as it was.
     pub(crate) fn remove_drive(&self, folder: &str) -> Result<()> {
-        self.disk.write(|transaction| Ok(transaction.open_table(DRIVES)?.remove(folder)?.is_some()))
+        self.write(|write| write.remove_for_good(&Place::Drive(folder.to_owned())).map(|_| ()))
     }
 
     /// The studies that were started, by number; what cannot be read is left out.
@@ -133,16 +119,9 @@ impl Store {
     /// # Errors
     /// [`sightline_geometry::error::Error::Read`] when the database cannot be read.
     pub fn studies<T: DeserializeOwned>(&self) -> Result<Vec<(u64, T)>> {
-        let read = || {
-            let table = self.disk.database.begin_read()?.open_table(STUDIES)?;
-            let mut all = Vec::new();
-            for entry in table.iter()? {
-                let (key, value) = entry?;
-                all.extend(serde_json::from_slice(value.value()).map(|study| (key.value(), study)));
-            }
-            Ok::<_, redb::Error>(all)
-        };
-        read().map_err(|error| failed(&self.disk.path, &error.to_string()))
+        let all = self.disk.read(|database| all_numbered(&database.begin_read()?, STUDIES))?;
+        let read = |(number, json): (u64, Vec<u8>)| Some((number, serde_json::from_slice(&json).ok()?));
+        Ok(all.into_iter().filter_map(read).collect())
     }
 
     /// Takes a study out of the list.
@@ -150,7 +129,8 @@ impl Store {
     /// # Errors
     /// [`sightline_geometry::error::Error::Write`]; the database is then as it was.
     pub(crate) fn remove_study(&self, number: u64) -> Result<()> {
-        self.disk.write(|transaction| Ok(transaction.open_table(STUDIES)?.remove(number)?.is_some()))
+        self.waiting.forget(&Place::Study(number));
+        self.write(|write| write.remove_for_good(&Place::Study(number)).map(|_| ()))
     }
 
     /// Writes how a study stands.
@@ -158,6 +138,69 @@ impl Store {
     /// # Errors
     /// [`sightline_geometry::error::Error::Write`]; the database is then as it was.
     pub(crate) fn save_study(&self, number: u64, study: &impl Serialize) -> Result<()> {
-        self.disk.write(|transaction| put(transaction, STUDIES, number, study))
+        self.write(|write| write.put(Place::Study(number), study).map(|_| ()))?;
+        self.waiting.forget(&Place::Study(number));
+        Ok(())
     }
+
+    /// Writes how a study stands, which nobody waits for: where that fails, it is written later.
+    pub(crate) fn keep_study(&self, number: u64, study: &impl Serialize) {
+        if self.save_study(number, study).is_err() {
+            self.waiting.set(Place::Study(number), study);
+        }
+    }
+
+    /// The questions that were asked; what cannot be read is left out.
+    ///
+    /// # Errors
+    /// [`sightline_geometry::error::Error::Read`] when the database cannot be read.
+    pub(crate) fn questions(&self) -> Result<Vec<Question>> {
+        self.named(QUESTIONS).map(|all| all.into_iter().map(|(_, question)| question).collect())
+    }
+
+    /// Writes a question.
+    ///
+    /// # Errors
+    /// [`sightline_geometry::error::Error::Write`]; the database is then as it was.
+    pub(crate) fn save_question(&self, question: &Question) -> Result<()> {
+        let place = question_place(question);
+        self.write(|write| write.put(place.clone(), question).map(|_| ()))?;
+        self.waiting.forget(&place);
+        Ok(())
+    }
+
+    /// Writes the answer of a question, which nobody waits for: where that fails, it is written later.
+    pub(crate) fn keep_question(&self, question: &Question) {
+        if self.save_question(question).is_err() {
+            self.waiting.set(question_place(question), question);
+        }
+    }
+
+    /// Forgets a question.
+    pub(crate) fn forget_question(&self, question: &Question) {
+        let place = question_place(question);
+        self.waiting.forget(&place);
+        // One that stays is only answered again.
+        let _ = self.write(|write| write.remove_for_good(&place).map(|_| ()));
+    }
+}
+
+fn question_place(question: &Question) -> Place {
+    let Question { session, target, run, step, .. } = question;
+    Place::Question(format!("{session}/{target}/{run}/{step}"))
+}
+
+fn document(write: &Write, place: &Place) -> Outcome<Option<Document>> {
+    Ok(write.get(place)?.and_then(|json| serde_json::from_slice(&json).ok()))
+}
+
+/// Removes the questions whose names begin so.
+pub(super) fn forget_questions(write: &Write, prefix: &str) -> Outcome<()> {
+    let names: Vec<String> = {
+        let table = write.transaction.open_table(QUESTIONS)?;
+        let names: std::result::Result<Vec<String>, redb::StorageError> =
+            table.range(prefix..)?.map(|entry| entry.map(|(key, _)| key.value().to_owned())).collect();
+        names?.into_iter().take_while(|name| name.starts_with(prefix)).collect()
+    };
+    names.into_iter().try_for_each(|name| write.remove(&Place::Question(name)).map(|_| ()))
 }

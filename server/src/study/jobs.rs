@@ -103,13 +103,15 @@ impl Shelf {
     pub(crate) fn add(&self, new: NewStudy, order: Order) -> ApiResult<StudyJob> {
         let work = {
             let mut works = lock(&self.works);
-            if works.len() >= STUDY_LIMIT {
-                let ended = works.iter().position(|work| work.has_ended()).ok_or_else(|| {
+            let surplus = if works.len() >= STUDY_LIMIT {
+                let ended = works.iter().position(|work| work.has_ended());
+                Some(ended.ok_or_else(|| {
                     ApiError::conflict(format!("{STUDY_LIMIT} studies are under way already."))
                         .hint("Wait until some of them are done, or cancel one.")
-                })?;
-                self.keeper.forget(works.remove(ended).number);
-            }
+                })?)
+            } else {
+                None
+            };
             let number = works.iter().map(|work| work.number).max().unwrap_or(0) + 1;
             let view = StudyJob {
                 id: format!("study-{number}"),
@@ -124,12 +126,16 @@ impl Shelf {
             let inside = Inside { view, rows: Vec::new(), report: None, cancel: Arc::default() };
             let (events, keeper) = (self.events.clone(), self.keeper.clone());
             let work = Arc::new(Work { number, new, order, keeper, events, inside: Mutex::new(inside) });
+            self.keeper.keep_new(number, &work.kept(&lock(&work.inside)))?;
+            if let Some(surplus) = surplus {
+                self.keeper.forget(works.remove(surplus).number);
+            }
             works.push(Arc::clone(&work));
             work
         };
-        work.keep(&lock(&work.inside));
         if let Err(problem) = self.submit(&work) {
-            work.change(|inside| end(inside, StudyState::Failed, "too many studies were waiting"));
+            lock(&self.works).retain(|other| other.number != work.number);
+            self.keeper.forget(work.number);
             return Err(problem);
         }
         Ok(work.view())
@@ -205,10 +211,15 @@ impl Work {
 
     /// Writes how it stands.
     fn keep(&self, inside: &Inside) {
+        self.keeper.keep(self.number, &self.kept(inside));
+    }
+
+    /// As it is kept.
+    fn kept(&self, inside: &Inside) -> KeptStudy {
         let (job, report) = (inside.view.clone(), inside.report.clone());
         // Rows before the end are found again in the study's folder.
         let rows = if report.is_some() { KeptStudy::kept_rows(&inside.rows) } else { Vec::new() };
-        self.keeper.keep(self.number, &KeptStudy { new: self.new.clone(), job, rows, report });
+        KeptStudy { new: self.new.clone(), job, rows, report }
     }
 
     /// Changes it and tells every page.

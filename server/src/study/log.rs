@@ -1,4 +1,4 @@
-//! The file of results: one line of JSON for each unit, added and flushed as soon as the unit is done.
+//! The file of results: one line of JSON for each unit, added and synced as soon as the unit is done.
 //!
 //! A program that was killed leaves at most its last line half written. A line that cannot be read is dropped, with a
 //! sentence, and the file is written anew without it; its unit is then done again.
@@ -70,7 +70,7 @@ impl ResultLog {
         let mut line = serde_json::to_vec(unit).map_err(|error| Error::Request(error.to_string()))?;
         line.push(b'\n');
         let mut file = lock(&self.file);
-        let written = file.write_all(&line).and_then(|()| file.flush());
+        let written = file.write_all(&line).and_then(|()| file.sync_data());
         written.map_err(|source| Error::Write { path: self.path.clone(), source })
     }
 }

@@ -64,15 +64,19 @@ impl Keeper {
         self.0.upgrade().map_or_else(|| Ok(Vec::new()), |store| store.studies())
     }
 
-    /// Keeps a study; a failure goes to the log, because the study itself goes on.
+    /// Keeps a study that is being carried out; where that fails, it is written later, because the study itself goes on.
     pub(crate) fn keep(&self, number: u64, study: &KeptStudy) {
-        let Some(store) = self.0.upgrade() else { return };
-        if let Err(error) = store.save_study(number, study) {
-            tracing::error!(
-                "study {number} is not saved: {}",
-                crate::printable::printable(&error.to_string())
-            );
+        if let Some(store) = self.0.upgrade() {
+            store.keep_study(number, study);
         }
+    }
+
+    /// Keeps a study that is started.
+    ///
+    /// # Errors
+    /// When the database cannot be written.
+    pub(crate) fn keep_new(&self, number: u64, study: &KeptStudy) -> Result<()> {
+        self.0.upgrade().map_or(Ok(()), |store| store.save_study(number, study))
     }
 
     /// Forgets a study, for which the list has no room any more; what it found stays in its folder.

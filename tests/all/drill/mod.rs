@@ -6,6 +6,7 @@
 mod clock;
 mod load;
 mod ending;
+mod kills;
 mod trouble;
 
 use std::sync::Mutex;

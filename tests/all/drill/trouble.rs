@@ -4,10 +4,11 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::PoisonError;
 
-use serde_json::json;
+use serde_json::{Value, json};
 use sightline_tests::server::{small_drive, small_recording};
 
 use super::{ONE, begin, has_ended, tell, until};
+use crate::cli::program;
 use crate::keeping::Killable;
 
 /// A small file system in memory, which only an administrator may make.
@@ -56,9 +57,14 @@ fn drill_a_full_disk_is_reported_and_later_writes_succeed() {
     });
     let (status, body) = refused.expect("the disk is full");
     assert_eq!(status, 507, "{body}");
+    assert!(body.contains("Make room on the disk"), "{body}");
     let health = server.get("health");
-    assert_ne!(health["notices"], json!([]), "{health}");
+    assert!(health["notices"].to_string().contains("changes cannot be saved"), "{health}");
+    let in_vain = refused_changes(&server, &session);
+    exports_are_whole_or_absent(disk.path(), &drive.path().join("traverse.toml"));
     std::fs::remove_file(&filler).unwrap();
+    // Without anybody's change it is found out that there is room again.
+    until(&server, "health", |health| health["notices"] == json!([]));
     for number in 0..20 {
         server.json("POST", &notes, &note(number));
     }
@@ -71,9 +77,68 @@ fn drill_a_full_disk_is_reported_and_later_writes_succeed() {
     tell(
         "full disk, and space again",
         &format!(
-            "{acknowledged} + 20 changes acknowledged and kept; refused with {status}; health reports it"
+            "{acknowledged} + 20 changes acknowledged and kept; {in_vain} more refused with {status} and taken back; health \
+             reports it until there is room"
         ),
     );
+}
+
+/// What a session shows.
+fn shown(server: &Killable, session: &str) -> Vec<Value> {
+    let paths = ["", "/notes", "/breakpoints"].map(|part| format!("sessions/{session}{part}"));
+    let all = paths.iter().map(String::as_str).chain(["sessions", "documents", "studies/jobs"]);
+    all.map(|path| server.get(path)).collect()
+}
+
+/// Tries changes of every kind on a full disk until one of each is refused; nothing of it may be seen. How many were refused.
+fn refused_changes(server: &Killable, session: &str) -> usize {
+    let traverse = server.get("traverses")[0]["id"].clone();
+    let [x, y] = sightline_tests::server::PIXEL;
+    let at = |part: &str| format!("sessions/{session}/{part}");
+    let changes = [
+        ("POST", "sessions".to_owned(), json!({ "traverse": traverse })),
+        ("POST", at("targets"), json!({ "step": 0, "pixel": { "x": x, "y": y } })),
+        ("POST", at("targets/0/runs"), json!({ "run": 0, "from_step": 2 })),
+        ("POST", at("breakpoints"), json!({ "expression": "ncc < 0.5" })),
+        ("PUT", "documents/large".to_owned(), json!("z".repeat(200 << 10))),
+        ("POST", "studies/jobs".to_owned(), json!({ "study": "straight", "seeds": [1] })),
+        ("DELETE", at("targets/0"), Value::Null),
+    ];
+    let mut refused = 0;
+    for (method, path, body) in changes {
+        let before = shown(server, session);
+        let text = if body.is_null() { String::new() } else { body.to_string() };
+        let (status, answer) = server.answer(method, &path, "If-Match: *\r\n", &text);
+        // What is small may find room in the file.
+        if status < 300 {
+            continue;
+        }
+        assert_eq!(status, 507, "{method} {path}: {answer}");
+        assert!(answer.contains("Make room on the disk"), "{answer}");
+        assert_eq!(shown(server, session), before, "{method} {path}");
+        refused += 1;
+    }
+    assert!(refused > 0, "there is room for everything");
+    refused
+}
+
+/// Exports on a full disk fail with a sentence and leave nothing.
+fn exports_are_whole_or_absent(disk: &Path, index: &Path) {
+    for (kind, name) in [("report.html", "report.html"), ("recording.rrd", "run.rrd")] {
+        let out = disk.join(name);
+        let [x, y] = sightline_tests::server::PIXEL;
+        let mut command = Command::new(program());
+        command.args(["export", kind]).arg(index).args(["--target", &format!("{x},{y}"), "--out"]).arg(&out);
+        let made = command.output().unwrap();
+        let said = String::from_utf8_lossy(&made.stderr);
+        assert_eq!(made.status.code(), Some(3), "{said}");
+        assert!(said.contains("No space left"), "{said}");
+        assert!(!out.exists(), "half of {kind}");
+    }
+    let left = std::fs::read_dir(disk).unwrap().flatten();
+    let left: Vec<_> =
+        left.filter(|entry| entry.path().extension().is_some_and(|e| e == "partial")).collect();
+    assert!(left.is_empty(), "{left:?}");
 }
 
 #[test]

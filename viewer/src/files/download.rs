@@ -27,8 +27,14 @@ fn keep_in(folder: &std::path::Path, name: &str, bytes: &[u8]) -> Result<(), Str
     let refused = |e: std::io::Error| format!("{name} cannot be written: {e}");
     for number in 0..1000 {
         let free = if number == 0 { name.to_owned() } else { format!("{stem}-{number}.{ending}") };
-        match std::fs::File::create_new(folder.join(free)) {
-            Ok(mut file) => return file.write_all(bytes).map_err(refused),
+        match std::fs::File::create_new(folder.join(&free)) {
+            Ok(mut file) => {
+                return file.write_all(bytes).map_err(|e| {
+                    // Half a file is worse than none.
+                    let _ = std::fs::remove_file(folder.join(&free));
+                    refused(e)
+                });
+            }
             Err(e) if e.kind() == ErrorKind::AlreadyExists => {}
             Err(e) => return Err(refused(e)),
         }

@@ -1,0 +1,276 @@
+//! Power losses and failing disks: all writes of real sessions to a storage are recorded; then the power is cut at any of
+//! them, or the storage refuses one.
+//!
+//! Until a storage is synced, it may have written all, some or nothing of what it was given, in any order, and of a write
+//! any sectors. `SIGHTLINE_POWER_LOSS_POINTS` is the number of cuts.
+
+use std::collections::BTreeMap;
+use std::io::ErrorKind;
+use std::path::Path;
+
+use serde_json::{Value, json};
+use sightline_session::counterfactual::wire::Question;
+use sightline_session::notes::{NewNote, Pin};
+
+use super::power_storage::{Op, Storage};
+use super::tests::saved;
+use super::*;
+use crate::jobs::lock;
+
+/// Cuts in the ordinary tests.
+const POINTS: usize = 60;
+/// Requests of the recorded sessions.
+const REQUESTS: u64 = 120;
+/// The number of cuts.
+fn points() -> usize {
+    std::env::var("SIGHTLINE_POWER_LOSS_POINTS").map_or(POINTS, |text| text.parse().expect("a number"))
+}
+
+/// Everything that a person put in and the server computed.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Kept {
+    sessions: BTreeMap<u64, SavedSession>,
+    notes: BTreeMap<u64, Notes>,
+    documents: BTreeMap<String, Value>,
+    studies: BTreeMap<u64, Value>,
+    questions: Vec<Question>,
+    drives: BTreeMap<String, String>,
+}
+
+impl Kept {
+    fn in_store(store: &Store) -> Self {
+        let found = store.load().unwrap();
+        assert!(found.messages.is_empty(), "{:?}", found.messages);
+        let number = |saved: &SavedSession| number_of(&saved.id).unwrap();
+        Self {
+            sessions: found.sessions.into_iter().map(|saved| (number(&saved), saved)).collect(),
+            notes: found.notes,
+            documents: store.documents().unwrap().into_iter().map(|one| (one.name, one.value)).collect(),
+            studies: store.studies().unwrap().into_iter().collect(),
+            questions: store.questions().unwrap(),
+            drives: store.drives().unwrap().into_iter().collect(),
+        }
+    }
+
+    /// Carries out one of the requests, each of another kind than the one before; what is kept is changed only when it is
+    /// acknowledged.
+    fn request(&mut self, number: u64, store: &Store) -> Result<()> {
+        let mut after = self.clone();
+        let session = 1 + number / 30;
+        let id = id_of(session);
+        match number % 10 {
+            0 | 5 => {
+                let kept = after.sessions.entry(session).or_insert_with(|| saved(&id));
+                let another = kept.targets[0].clone();
+                kept.targets.push(another);
+                store.save(kept)?;
+            }
+            1 => {
+                let mut notes = after.notes.get(&session).cloned().unwrap_or_default();
+                let text = format!("note {number} {}", "x".repeat((number as usize * 97) % 6000));
+                let new = NewNote { pin: Pin::default(), text };
+                notes.add(new, &sightline_session::Session::new(&id, "t", 9), "2026-11-24T12:00:00Z")?;
+                store.save_notes(&id, &notes)?;
+                after.notes.insert(session, notes);
+            }
+            2 => {
+                let kept = after.sessions.get_mut(&session).expect("a session");
+                kept.cursor = Cursor { target: Some(0), run: 0, step: number as usize };
+                store.move_cursor(&id, kept.cursor);
+                store.flush()?;
+            }
+            3 => {
+                let (name, value) = (format!("layout-{}", number % 3), json!([number, 0.1]));
+                store.put_document(&name, value.clone(), None)?.expect("room");
+                after.documents.insert(name, value);
+            }
+            4 => {
+                let value = json!({ "state": number, "rows": vec![1.0 / 3.0; number as usize] });
+                store.save_study(number / 20, &value)?;
+                after.studies.insert(number / 20, value);
+            }
+            6 => {
+                let question = json!({ "session": id, "target": 0, "run": 0, "step": 3, "state": "waiting",
+                    "answer": null, "problem": number.to_string() });
+                let question: Question = serde_json::from_value(question).expect("a question");
+                store.save_question(&question)?;
+                after.questions.retain(|other| other.session != question.session);
+                after.questions.push(question);
+            }
+            7 => {
+                let (name, text) = (format!("drive-{number}"), format!("name = \"{number}\""));
+                store.save_drive(&name, &text)?;
+                after.drives.insert(name, text);
+            }
+            8 if number.is_multiple_of(3) => {
+                let name = format!("drive-{}", number - 1);
+                store.remove_drive(&name)?;
+                after.drives.remove(&name);
+            }
+            8 => {
+                let name = format!("layout-{}", number % 3);
+                store.remove_document(&name, None)?.expect("any revision");
+                after.documents.remove(&name);
+            }
+            _ => {
+                // The session before the present one; its questions and notes go with it.
+                let gone = session.saturating_sub(1 + number % 2);
+                store.remove(&id_of(gone))?;
+                after.sessions.remove(&gone);
+                after.notes.remove(&gone);
+                after.questions.retain(|question| question.session != id_of(gone));
+            }
+        }
+        *self = after;
+        Ok(())
+    }
+}
+
+/// A new database, as it is put in its place: complete.
+fn new_database(folder: &Path) -> Vec<u8> {
+    let storage = Storage::default();
+    drop(storage.store(folder).unwrap());
+    let content = lock(&storage.0);
+    content.bytes.clone()
+}
+
+/// The recorded sessions: the bytes at their beginning, every operation, and what was kept after each request. The server
+/// is started anew a few times.
+fn recorded(folder: &Path) -> (Vec<u8>, Vec<Op>, Vec<Kept>) {
+    let begin = new_database(folder);
+    let storage = Storage::of(begin.clone());
+    let mut states = vec![Kept::default()];
+    for part in 0..4 {
+        let store = storage.store(folder).unwrap();
+        for number in part * REQUESTS / 4..(part + 1) * REQUESTS / 4 {
+            let mut kept = states[states.len() - 1].clone();
+            kept.request(number, &store).unwrap();
+            assert_eq!(Kept::in_store(&store), kept, "request {number}");
+            states.push(kept);
+            lock(&storage.0).ops.push(Op::Acknowledged);
+        }
+    }
+    let ops = std::mem::take(&mut lock(&storage.0).ops);
+    (begin, ops, states)
+}
+
+/// Numbers that look random, the same in each run.
+struct Chance(u64);
+
+impl Chance {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 >> 33
+    }
+}
+
+/// What the storage holds when the power is cut after so many operations. Variant 0 has everything, 1 nothing since the
+/// last sync, 2 some of the operations, and others some of the sectors.
+fn after_a_cut(begin: &[u8], ops: &[Op], variant: usize, chance: &mut Chance) -> Vec<u8> {
+    let mut bytes = begin.to_vec();
+    let synced = ops.iter().rposition(|op| matches!(op, Op::Sync)).map_or(0, |last| last + 1);
+    ops[..synced].iter().for_each(|op| op.apply(&mut bytes, |_| true));
+    for op in &ops[synced..] {
+        match variant {
+            0 => op.apply(&mut bytes, |_| true),
+            1 => {}
+            2 if chance.next().is_multiple_of(2) => {}
+            2 => op.apply(&mut bytes, |_| true),
+            _ => {
+                let sectors = chance.next();
+                op.apply(&mut bytes, |sector| sectors >> (sector % 31) & 1 == 1);
+            }
+        }
+    }
+    bytes
+}
+
+#[test]
+fn power_losses_at_any_write_lose_nothing_that_was_acknowledged() {
+    let folder = tempfile::tempdir().unwrap();
+    let (begin, ops, states) = recorded(folder.path());
+    let (points, mut chance) = (points(), Chance(7));
+    let mut in_flight = 0;
+    for point in 0..points {
+        let cut = 1 + point * (ops.len() - 1) / points;
+        let acknowledged = ops[..cut].iter().filter(|op| matches!(op, Op::Acknowledged)).count();
+        let bytes = after_a_cut(&begin, &ops[..cut], point % 4, &mut chance);
+        let store = Storage::of(bytes).store(folder.path());
+        let store = store.unwrap_or_else(|why| panic!("cut {cut}, variant {}: {why}", point % 4));
+        let kept = Kept::in_store(&store);
+        let is_next = states.get(acknowledged + 1) == Some(&kept);
+        in_flight += usize::from(is_next);
+        assert!(is_next || kept == states[acknowledged], "cut {cut}, variant {}: {kept:#?}", point % 4);
+        // What was cut off does no harm to what follows.
+        let mut kept = kept;
+        kept.request(REQUESTS, &store).unwrap();
+        assert_eq!(Kept::in_store(&store), kept, "cut {cut}");
+    }
+    let writes = ops.iter().filter(|op| !matches!(op, Op::Acknowledged)).count();
+    println!(
+        "drill | {:<44} | {points} cuts in {writes} operations of {REQUESTS} requests: 0 of {} acknowledged lost, 0 invented, \
+         {in_flight} in flight kept whole",
+        "power loss",
+        states.len() - 1
+    );
+}
+
+/// Runs the sessions on a storage that fails, and returns how many requests were refused.
+fn with_failure(begin: &[u8], folder: &Path, failure: (usize, usize, ErrorKind)) -> usize {
+    let storage = Storage::of(begin.to_vec());
+    let store = storage.store(folder).unwrap();
+    lock(&storage.0).failure = Some(failure);
+    let (mut kept, mut refused) = (Kept::default(), 0);
+    for number in 0..REQUESTS {
+        // A session that was refused is made first.
+        let begins = number / 30 * 30;
+        if number % 10 != 0 && !kept.sessions.contains_key(&(1 + number / 30)) {
+            refused += usize::from(kept.request(begins, &store).is_err());
+            if !kept.sessions.contains_key(&(1 + number / 30)) {
+                continue;
+            }
+        }
+        let failed_before = lock(&storage.0).failed;
+        let outcome = kept.request(number, &store);
+        let has_failed = lock(&storage.0).failed > failed_before;
+        assert!(outcome.is_ok() || has_failed, "request {number} of {failure:?}: {outcome:?}");
+        assert_eq!(outcome.is_err(), store.trouble().is_some(), "request {number} of {failure:?}");
+        refused += usize::from(outcome.is_err());
+        // A cursor that could not be written is written later.
+        if outcome.is_ok() {
+            store.flush().unwrap();
+        }
+    }
+    lock(&storage.0).failure = None;
+    store.flush().unwrap();
+    let in_memory = Kept::in_store(&store);
+    drop(store);
+    let again = Kept::in_store(&storage.store(folder).unwrap());
+    assert_eq!(again, in_memory, "{failure:?}");
+    let without_cursors = |mut kept: Kept| {
+        kept.sessions.values_mut().for_each(|saved| saved.cursor = Cursor::default());
+        kept
+    };
+    assert_eq!(without_cursors(again), without_cursors(kept), "{failure:?}");
+    refused
+}
+
+#[test]
+fn power_full_and_failing_disks_refuse_and_later_writes_succeed() {
+    let folder = tempfile::tempdir().unwrap();
+    let (begin, ops, _) = recorded(folder.path());
+    let writes = ops.iter().filter(|op| !matches!(op, Op::Acknowledged)).count();
+    let points = points();
+    let mut refused = 0;
+    for point in 0..points {
+        let at = point * writes / points;
+        let kind = [ErrorKind::StorageFull, ErrorKind::Other][point % 2];
+        // Once, or for a while as on a full disk.
+        refused += with_failure(&begin, folder.path(), (at, [1, 1, 25][point % 3], kind));
+    }
+    assert!(refused > points / 2, "{refused}");
+    println!(
+        "drill | {:<44} | {points} failures at {writes} operations: {refused} requests refused and taken back, all others kept",
+        "ENOSPC and EIO"
+    );
+}
