@@ -29,11 +29,15 @@ mod questions;
 mod trackability_maps;
 mod clock;
 mod cancel;
+pub mod limits;
+mod step_memory;
+mod memory;
 mod jobs;
 mod store;
 pub mod hosts;
 pub mod access;
 mod guard;
+mod connections;
 mod request_id;
 mod idempotency;
 mod extract;
@@ -52,7 +56,6 @@ pub mod cli;
 use std::sync::Arc;
 
 use axum::Router;
-use axum::extract::DefaultBodyLimit;
 use axum::middleware;
 use axum::response::{IntoResponse, Response};
 use tower_http::catch_panic::CatchPanicLayer;
@@ -65,13 +68,13 @@ use crate::state::AppState;
 pub fn app(state: AppState) -> Router {
     let (api, _) = openapi::router().split_for_parts();
     let api = api.fallback(no_route).method_not_allowed_fallback(page::wrong_method);
-    let api = api.layer(middleware::from_fn_with_state(Arc::default(), idempotency::once));
-    let access = state.access().clone();
+    let api = api.layer(middleware::from_fn_with_state(Arc::clone(state.repeated()), idempotency::once));
+    let (access, limits) = (state.access().clone(), Arc::clone(state.limits()));
     Router::new()
         .nest("/api/v1", api)
         .fallback(page::serve)
         .with_state(state)
-        .layer(DefaultBodyLimit::max(extract::BODY_LIMIT))
+        .layer(axum::Extension(limits))
         .layer(CatchPanicLayer::custom(panicked))
         .layer(middleware::from_fn_with_state(access, guard::guard))
 }

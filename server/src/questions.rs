@@ -10,14 +10,14 @@ use sightline_session::counterfactual::wire::{Question, QuestionState};
 
 use crate::cancel::CancelFlag;
 use crate::jobs::lock;
+use crate::limits::SharedLimits;
 use crate::problem::{ApiError, ApiResult};
 
-/// How many questions are kept; the oldest answered ones are forgotten.
-const QUESTION_LIMIT: usize = 256;
-
-/// The questions that were asked.
-#[derive(Default)]
-pub(crate) struct Questions(Mutex<Kept>);
+/// The questions that were asked; the oldest answered ones are forgotten beyond the limit.
+pub(crate) struct Questions {
+    kept: Mutex<Kept>,
+    limits: SharedLimits,
+}
 
 #[derive(Default)]
 struct Kept {
@@ -33,8 +33,12 @@ pub(crate) struct Work {
 }
 
 impl Questions {
+    pub(crate) fn new(limits: &SharedLimits) -> Self {
+        Self { kept: Mutex::default(), limits: Arc::clone(limits) }
+    }
+
     pub(crate) fn find(&self, path: &AtStep) -> ApiResult<Arc<Work>> {
-        let found = lock(&self.0).by_step.get(path).cloned();
+        let found = lock(&self.kept).by_step.get(path).cloned();
         found.ok_or_else(|| {
             ApiError::not_found("Nobody has asked what would have saved this step.")
                 .hint("POST to the same path asks it.")
@@ -43,16 +47,16 @@ impl Questions {
 
     /// The work on a question; none where it goes on or is answered already.
     pub(crate) fn begin(&self, path: AtStep) -> ApiResult<(Arc<Work>, bool)> {
-        let mut kept = lock(&self.0);
+        let mut kept = lock(&self.kept);
         let state_of = |work: &Work| lock(&work.question).state;
         if let Some(work) = kept.by_step.get(&path) {
             if !matches!(state_of(work), QuestionState::Cancelled | QuestionState::Failed) {
                 return Ok((Arc::clone(work), false));
             }
-        } else if kept.by_step.len() >= QUESTION_LIMIT {
+        } else if kept.by_step.len() >= self.limits.questions.count() {
             let over = kept.by_step.iter().filter(|(_, work)| state_of(work).is_over());
             let oldest = over.min_by_key(|(_, work)| work.number).map(|(path, _)| path.clone());
-            kept.by_step.remove(&oldest.ok_or_else(ApiError::busy)?);
+            kept.by_step.remove(&oldest.ok_or_else(|| ApiError::full(&self.limits.questions))?);
         }
         kept.last_number += 1;
         let AtStep { session, target, run, step } = path.clone();
@@ -66,7 +70,7 @@ impl Questions {
 
     /// Forgets the questions of a session; those that are being answered end.
     pub(crate) fn forget_session(&self, session: &str) {
-        lock(&self.0).by_step.retain(|path, work| {
+        lock(&self.kept).by_step.retain(|path, work| {
             let is_kept = path.session != session;
             if !is_kept {
                 work.cancel.store(true, Ordering::Relaxed);
@@ -76,7 +80,7 @@ impl Questions {
     }
 
     pub(crate) fn forget(&self, path: &AtStep) {
-        lock(&self.0).by_step.remove(path);
+        lock(&self.kept).by_step.remove(path);
     }
 }
 

@@ -119,7 +119,7 @@ async fn restore_target(
     TargetPath { live, target }: TargetPath,
 ) -> ApiResult<Json<SessionView>> {
     blocking(move || {
-        live.with(|session| targets::has_room(session))?;
+        live.with(|session| targets::has_room(session, state.limits()))?;
         restored(&live, |session| session.restore_target(target))?;
         state.runner().go_on_with(&live, target)?;
         saved(&state, &live)

@@ -18,8 +18,8 @@ use sightline_world::toml_text;
 pub(crate) const JSON_LIMIT: u64 = 8 << 20;
 /// The largest other file that is read, bytes: scenarios and configurations have a few thousand.
 pub(crate) const TEXT_LIMIT: u64 = 512 << 10;
-/// The largest request that the server takes, bytes.
-const REQUEST_LIMIT: usize = 1 << 20;
+/// The largest session that the server takes unless it was started otherwise, bytes (limit `file_bytes`).
+const REQUEST_LIMIT: usize = 8 << 20;
 /// How many characters of a file's name are shown.
 const NAME_SHOWN: usize = 60;
 
