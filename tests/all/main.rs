@@ -5,6 +5,7 @@
 
 mod api;
 mod api_security;
+mod bounds;
 mod cli;
 mod compare;
 mod copied;
