@@ -7,6 +7,7 @@
 //! | `realism` | the difficulty of simulated worlds for plain correlation |
 //! | `real_motion` | motions between recorded frames against their poses |
 //! | [`registration`] | registration of rocks by their shape, where the motion is known |
+//! | [`cancel`] | how soon each long computation ends once it is cancelled |
 //! | [`trackability`] | targets drawn where the map says good, risky or bad, tracked against the truth |
 
 #[cfg(feature = "command-line")]
@@ -19,6 +20,7 @@ mod exposure;
 mod realism;
 #[cfg(feature = "command-line")]
 mod real_motion;
+pub mod cancel;
 pub mod registration;
 pub mod trackability;
 #[cfg(feature = "command-line")]

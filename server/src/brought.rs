@@ -21,14 +21,12 @@ use sightline_world::Scenario;
 use crate::cancel::CancelFlag;
 use crate::drives::{folder_name, scenario_of};
 use crate::identity::{Identity, Relation};
-use crate::live_session::{LABEL_LIMIT, LiveSession, RUN_LIMIT, TARGET_LIMIT, TARGET_NUMBERS};
+use crate::limits::{Limit, Limits};
+use crate::live_session::{LABEL_LIMIT, LiveSession};
 use crate::problem::{ApiError, ApiResult};
 use crate::rendering::OpenTraverse;
 use crate::routes::what_if;
 use crate::state::AppState;
-
-/// How many drives may be opened from pages.
-const DRIVE_LIMIT: usize = 64;
 
 /// Opens the drive of a scenario; says whether it was not open before.
 ///
@@ -49,9 +47,11 @@ pub(crate) fn open(
     if let Some(open) = known.iter().find(same) {
         return Ok((Arc::clone(open), false));
     }
-    if state.store().drives()?.len() >= DRIVE_LIMIT {
-        let detail = format!("There are {DRIVE_LIMIT} drives already that were opened from pages.");
-        return Err(ApiError::conflict(detail).hint("Remove one that is not needed: DELETE traverses/{id}."));
+    let (count, limits) = (state.store().drives()?.len(), state.limits());
+    if count >= limits.drives.count() {
+        let detail = format!("There are {count} drives already that were opened from pages.");
+        let way_out = "Remove one that is not needed: DELETE traverses/{id}.";
+        return Err(ApiError::conflict(detail).hint(limits.drives.hint(way_out)));
     }
     let _making = state.making_drives();
     let name = folder_name(&scenario);
@@ -61,7 +61,12 @@ pub(crate) fn open(
         remove_folder(&folder)?;
     }
     let traverse = create_simulated_until(&scenario, &folder, cancel.as_ref().into())?;
+    if let Err(problem) = limits.check_drive(&traverse) {
+        remove_folder(&folder)?;
+        return Err(problem.into());
+    }
     let identity = Identity::of(&traverse, None)?;
+    let traverse = traverse.with_cache(state.cache());
     let open = Arc::new(OpenTraverse::new(identity, traverse, state.events().clone()));
     state.store().save_drive(&name, &text)?;
     Ok((state.add_traverse(open)?, true))
@@ -98,7 +103,7 @@ fn remove_folder(folder: &Path) -> Result<()> {
 /// A problem that names what is wrong with it; nothing is begun then.
 pub(crate) fn bring(state: &AppState, new: Reproduction, cancel: &CancelFlag) -> ApiResult<Arc<LiveSession>> {
     let Reproduction { traverse, session, notes } = new;
-    check(&session)?;
+    check(&session, state.limits())?;
     let open = drive(state, &traverse, cancel)?;
     let stops = open.traverse.stop_count();
     let name = open.id.clone();
@@ -142,13 +147,18 @@ fn drive(
 }
 
 /// Refuses what the other routes would refuse.
-fn check(session: &SavedSession) -> ApiResult<()> {
+fn check(session: &SavedSession, limits: &Limits) -> ApiResult<()> {
     let wrong = |what: String| Err(ApiError::invalid("field", what));
     let live = session.targets.iter().filter(|target| !target.removed).count();
-    if live > TARGET_LIMIT || session.targets.len() > TARGET_NUMBERS {
-        return wrong(format!(
-            "session.targets: may be at most {TARGET_LIMIT}, and {TARGET_NUMBERS} with the removed ones"
-        ));
+    let too_many = |what: String, limit: &Limit| {
+        let detail = format!("{what}: may be at most {}", limit.count());
+        Err(ApiError::invalid("field", detail).hint(limit.raise()))
+    };
+    if live > limits.targets.count() {
+        return too_many("session.targets".to_owned(), &limits.targets);
+    }
+    if session.targets.len() > limits.target_numbers.count() {
+        return too_many("session.targets with the removed ones".to_owned(), &limits.target_numbers);
     }
     if session.breakpoints.len() > BREAKPOINT_LIMIT {
         return wrong(format!("session.breakpoints: may be at most {BREAKPOINT_LIMIT}"));
@@ -158,8 +168,8 @@ fn check(session: &SavedSession) -> ApiResult<()> {
         if target.label.chars().count() > LABEL_LIMIT {
             return wrong(format!("{place}.label: may have at most {LABEL_LIMIT} characters"));
         }
-        if target.runs.len() > RUN_LIMIT {
-            return wrong(format!("{place}.runs: may be at most {RUN_LIMIT}"));
+        if target.runs.len() > limits.runs.count() {
+            return too_many(format!("{place}.runs"), &limits.runs);
         }
         for (run, saved) in target.runs.iter().enumerate() {
             check_run(saved)

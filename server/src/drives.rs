@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use sightline_api::wire::Event;
 use sightline_geometry::error::Result;
 use sightline_recordings::{Traverse, create_simulated};
+use sightline_track::locate::store::Cache;
 use sightline_world::{Scenario, library};
 use tokio::sync::broadcast;
 
@@ -75,6 +76,7 @@ pub(crate) fn open_given(
 pub(crate) fn open_again(
     store: &Store,
     folders: &Folders,
+    cache: &Arc<Cache>,
     open: &mut Vec<Arc<OpenTraverse>>,
     events: &broadcast::Sender<Event>,
 ) -> Result<Vec<String>> {
@@ -94,6 +96,7 @@ pub(crate) fn open_again(
                 let id = identity.id();
                 // A drive that was given as well is no surprise.
                 if open.iter().all(|other| other.id != id) {
+                    let traverse = traverse.with_cache(cache);
                     open.push(Arc::new(OpenTraverse::new(identity, traverse, events.clone())));
                 }
             }

@@ -5,22 +5,20 @@ use std::time::Duration;
 
 use axum::body::Bytes;
 use axum::extract::rejection::PathRejection;
-use axum::extract::{FromRequest, FromRequestParts, Query, Request};
+use axum::extract::{DefaultBodyLimit, FromRequest, FromRequestParts, Query, Request};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, Method, StatusCode, header};
 use serde::de::DeserializeOwned;
 use sightline_api::endpoint::Endpoint;
+use sightline_api::endpoints::BringSession;
 use sightline_api::location::{AtRun, AtSession, AtTarget};
-use sightline_api::program::BODY_BYTES;
 use sightline_session::{Run, Session};
 
+use crate::limits::SharedLimits;
 use crate::live_session::LiveSession;
 use crate::problem::{ApiError, ApiResult};
 use crate::recorded_step::RecordedStep;
 use crate::state::AppState;
-
-/// How long a body may take to arrive.
-const BODY_PATIENCE: Duration = Duration::from_secs(30);
 
 /// The names in the path of an endpoint; what is not even of their form does not exist.
 pub(crate) struct Path<E: Endpoint>(pub E::At);
@@ -144,26 +142,30 @@ impl<E: Endpoint, S: Send + Sync> FromRequest<S> for Body<E> {
 ///
 /// # Errors
 /// A problem when it is too large, or does not arrive in time.
-pub(crate) async fn whole_body<S: Send + Sync>(request: Request, state: &S) -> ApiResult<Bytes> {
-    let reading = tokio::time::timeout(BODY_PATIENCE, Bytes::from_request(request, state)).await;
+pub(crate) async fn whole_body<S: Send + Sync>(mut request: Request, state: &S) -> ApiResult<Bytes> {
+    let limits = request.extensions().get::<SharedLimits>().cloned().unwrap_or_default();
+    let is_file = request.uri().path().ends_with(BringSession::PATH);
+    let limit = if is_file { &limits.file_bytes } else { &limits.body_bytes };
+    let too_large = || {
+        let detail = format!("The body of this request may have at most {} bytes.", limit.count());
+        ApiError::new(StatusCode::PAYLOAD_TOO_LARGE, "too_large", detail).hint(limit.raise())
+    };
+    // Nobody waits for bytes that are announced and not wanted.
+    let announced = request.headers().get(header::CONTENT_LENGTH).and_then(|length| length.to_str().ok());
+    if announced.and_then(|length| length.parse::<u64>().ok()).is_some_and(|n| n > limit.count() as u64) {
+        return Err(too_large());
+    }
+    DefaultBodyLimit::max(limit.count()).apply(&mut request);
+    let patience = limits.body_s.time().unwrap_or(Duration::MAX);
+    let reading = tokio::time::timeout(patience, Bytes::from_request(request, state)).await;
     let slow = |_| {
-        ApiError::new(StatusCode::REQUEST_TIMEOUT, "slow", "The body of the request did not arrive in time.")
+        let detail = "The body of the request did not arrive in time.";
+        ApiError::new(StatusCode::REQUEST_TIMEOUT, "slow", detail).hint(limits.body_s.raise())
     };
     reading.map_err(slow)?.map_err(|wrong| match wrong.status() {
         StatusCode::PAYLOAD_TOO_LARGE => too_large(),
         status => ApiError::new(status, "body", "The body of the request did not arrive whole."),
     })
-}
-
-/// Refuses a body that is announced as too large, before it is waited for.
-pub(crate) fn check_announced_length(headers: &HeaderMap) -> ApiResult<()> {
-    let length = headers.get(header::CONTENT_LENGTH).and_then(|length| length.to_str().ok()?.parse().ok());
-    if length.is_some_and(|length: u64| length > BODY_BYTES as u64) { Err(too_large()) } else { Ok(()) }
-}
-
-fn too_large() -> ApiError {
-    let detail = format!("The body of a request may have at most {} MiB.", BODY_BYTES >> 20);
-    ApiError::new(StatusCode::PAYLOAD_TOO_LARGE, "too_large", detail)
 }
 
 /// Reads JSON: what is no JSON is a bad request; what does not fit is refused by the name of the field.

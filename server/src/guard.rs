@@ -15,7 +15,7 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
 use crate::access::Access;
-use crate::extract::{check_announced_length, check_content_type};
+use crate::extract::check_content_type;
 use crate::problem::{ApiError, ApiResult};
 use crate::public_url::PublicUrl;
 use crate::request_id;
@@ -81,7 +81,6 @@ fn check(access: &Access, method: &Method, uri: &Uri, headers: &HeaderMap) -> Ap
     if uri.path().starts_with("/api") && uri.path() != LOGIN {
         access.check(headers)?;
     }
-    check_announced_length(headers)?;
     Ok(host.to_owned())
 }
 
@@ -112,8 +111,6 @@ fn put_headers(headers: &mut HeaderMap, hosts: &[Option<&str>], is_api: bool) {
 
 #[cfg(test)]
 mod tests {
-    use sightline_api::program::BODY_BYTES;
-
     use super::*;
     use crate::hosts::Hosts;
 
@@ -156,15 +153,6 @@ mod tests {
             assert!(verdict(Method::GET, &[ours, foreign, ("sec-fetch-mode", "navigate")]).is_ok());
         }
         assert!(verdict(Method::GET, &[ours, ("sec-fetch-site", "same-origin")]).is_ok());
-    }
-
-    #[test]
-    fn a_body_that_is_announced_as_too_large_is_refused_before_it_comes() {
-        let [ours, json] = [("host", "localhost:7700"), ("content-type", "application/json")];
-        let with =
-            |length: usize| verdict(Method::POST, &[ours, json, ("content-length", &length.to_string())]);
-        assert!(with(BODY_BYTES).is_ok());
-        assert_eq!(with(BODY_BYTES + 1), Err(413));
     }
 
     #[test]

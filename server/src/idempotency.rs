@@ -1,7 +1,7 @@
 //! `Idempotency-Key`: a request that creates something can be sent again, after a broken connection, without creating it twice.
 //!
-//! The same key with the same request gives the same answer as long as the server runs and the answer is among the last
-//! [`KEYS`]; with another request it is refused. A request with a key is carried out also when its sender goes away, because
+//! The same key with the same request gives the same answer as long as the server runs and the answer is among the last ones
+//! (limits `answers` and `answer_bytes`); with another request it is refused. A request with a key is carried out also when its sender goes away, because
 //! the sender will ask again. Only what succeeded is kept: a refused request has created nothing.
 
 use std::collections::{HashMap, VecDeque};
@@ -20,20 +20,19 @@ use utoipa::openapi::schema::{ObjectBuilder, Type};
 
 use crate::extract::whole_body;
 use crate::jobs::lock;
+use crate::limits::SharedLimits;
 use crate::problem::{ApiError, ApiResult};
 
 /// The header with the key.
 const HEADER: &str = "idempotency-key";
-/// How many keys are remembered.
-const KEYS: usize = 1000;
-/// How much memory their answers may take, bytes.
-const MEMORY: usize = 64 << 20;
 /// The most characters that a key may have.
 const KEY_LIMIT: usize = 255;
 
 /// The answers to requests with keys.
-#[derive(Default)]
-pub(crate) struct Answers(Mutex<Kept>);
+pub(crate) struct Answers {
+    kept: Mutex<Kept>,
+    limits: SharedLimits,
+}
 
 #[derive(Default)]
 struct Kept {
@@ -160,12 +159,22 @@ fn key(headers: &HeaderMap) -> ApiResult<String> {
 }
 
 impl Answers {
+    /// No answers yet.
+    pub(crate) fn new(limits: &SharedLimits) -> Self {
+        Self { kept: Mutex::default(), limits: Arc::clone(limits) }
+    }
+
+    /// The memory of the answers, bytes.
+    pub(crate) fn bytes(&self) -> usize {
+        lock(&self.kept).bytes
+    }
+
     /// The request with that key, or the right to carry it out.
     ///
     /// # Errors
     /// A problem when the key was used for another request.
     fn find_or_begin(self: &Arc<Self>, key: &str, request: [u8; 32]) -> ApiResult<Result<Known, Begun>> {
-        let mut kept = lock(&self.0);
+        let mut kept = lock(&self.kept);
         if let Some(known) = kept.by_key.get(key) {
             if known.request == request {
                 return Ok(Ok(known.clone()));
@@ -180,10 +189,11 @@ impl Answers {
 
     /// Keeps an answer; the oldest go.
     fn keep(&self, key: &str, bytes: usize) {
-        let mut kept = lock(&self.0);
+        let mut kept = lock(&self.kept);
         kept.order.push_back(key.to_owned());
         kept.bytes += bytes;
-        while kept.order.len() > KEYS || (kept.bytes > MEMORY && kept.order.len() > 1) {
+        let (most, most_bytes) = (self.limits.answers.count(), self.limits.answer_bytes.count());
+        while kept.order.len() > most || (kept.bytes > most_bytes && kept.order.len() > 1) {
             let Some(oldest) = kept.order.pop_front() else { break };
             let gone = kept.by_key.remove(&oldest);
             if let Some(Progress::Done(answer)) = gone.map(|known| known.state.borrow().clone()) {
@@ -226,7 +236,7 @@ impl Begun {
 impl Drop for Begun {
     fn drop(&mut self) {
         if !self.is_done {
-            lock(&self.answers.0).by_key.remove(&self.key);
+            lock(&self.answers.kept).by_key.remove(&self.key);
             self.sender.send_replace(Progress::Refused);
         }
     }
@@ -248,7 +258,9 @@ mod tests {
 
     #[test]
     fn memory_is_bounded() {
-        let answers = Arc::new(Answers::default());
+        let limits = SharedLimits::default();
+        let (most, most_bytes) = (limits.answers.count(), limits.answer_bytes.count());
+        let answers = Arc::new(Answers::new(&limits));
         let keep = |key: String, bytes: usize| {
             let Ok(Err(mut begun)) = answers.find_or_begin(&key, [0; 32]) else { panic!("a new key") };
             let body = Bytes::from(vec![0; bytes]);
@@ -257,10 +269,11 @@ mod tests {
             begun.sender.send_replace(Progress::Done(Arc::new(answer)));
             answers.keep(&key, bytes);
         };
-        (0..KEYS + 5).for_each(|number| keep(number.to_string(), 1));
-        let count = || (lock(&answers.0).by_key.len(), lock(&answers.0).order.len(), lock(&answers.0).bytes);
-        assert_eq!(count(), (KEYS, KEYS, KEYS));
-        keep("large".to_owned(), MEMORY);
-        assert_eq!(count(), (1, 1, MEMORY));
+        (0..most + 5).for_each(|number| keep(number.to_string(), 1));
+        let count =
+            || (lock(&answers.kept).by_key.len(), lock(&answers.kept).order.len(), lock(&answers.kept).bytes);
+        assert_eq!(count(), (most, most, most));
+        keep("large".to_owned(), most_bytes);
+        assert_eq!(count(), (1, 1, most_bytes));
     }
 }

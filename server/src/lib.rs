@@ -29,6 +29,9 @@ mod questions;
 mod trackability_maps;
 mod clock;
 mod cancel;
+pub mod limits;
+mod step_memory;
+mod memory;
 mod jobs;
 mod store;
 mod streams;
@@ -36,6 +39,7 @@ pub mod hosts;
 pub mod access;
 mod guard;
 pub mod public_url;
+mod connections;
 mod request_id;
 mod idempotency;
 mod extract;
@@ -54,10 +58,8 @@ pub mod cli;
 use std::sync::Arc;
 
 use axum::Router;
-use axum::extract::DefaultBodyLimit;
 use axum::middleware;
 use axum::response::{IntoResponse, Response};
-use sightline_api::program::BODY_BYTES;
 use tower_http::catch_panic::CatchPanicLayer;
 
 use crate::problem::ApiError;
@@ -68,14 +70,14 @@ use crate::state::AppState;
 pub fn app(state: AppState) -> Router {
     let (api, _) = openapi::router().split_for_parts();
     let api = api.fallback(no_route).method_not_allowed_fallback(page::wrong_method);
-    let api = api.layer(middleware::from_fn_with_state(Arc::default(), idempotency::once));
-    let access = state.access().clone();
+    let api = api.layer(middleware::from_fn_with_state(Arc::clone(state.repeated()), idempotency::once));
+    let (access, limits) = (state.access().clone(), Arc::clone(state.limits()));
     let public = access.public().cloned();
     let whole = Router::new()
         .nest("/api/v1", api)
         .fallback(page::serve)
         .with_state(state)
-        .layer(DefaultBodyLimit::max(BODY_BYTES))
+        .layer(axum::Extension(limits))
         .layer(CatchPanicLayer::custom(panicked))
         .layer(middleware::from_fn_with_state(access, guard::guard));
     match public {

@@ -12,16 +12,11 @@ use crate::cancel::CancelFlag;
 use crate::jobs::{Position, lock};
 use crate::problem::{ApiError, ApiResult};
 use crate::rendering::OpenTraverse;
+use crate::step_memory::StepMemory;
 use crate::store::Store;
 
-/// How many targets a session may have at a time.
-pub(crate) const TARGET_LIMIT: usize = 256;
-/// How many targets a session may ever have, the removed ones included.
-pub(crate) const TARGET_NUMBERS: usize = 4096;
 /// How many characters the label of a target may have.
 pub(crate) const LABEL_LIMIT: usize = 100;
-/// How many runs a target may have.
-pub(crate) const RUN_LIMIT: usize = 256;
 
 /// A session with its traverse.
 pub struct LiveSession {
@@ -38,6 +33,8 @@ pub struct LiveSession {
     is_awake: AtomicBool,
     is_restoring: AtomicBool,
     used: Mutex<Option<jiff::Timestamp>>,
+    /// What its steps take.
+    pub(crate) memory: StepMemory,
 }
 
 /// A run that is computed or waits for it.
@@ -59,6 +56,7 @@ impl LiveSession {
             is_awake: AtomicBool::new(is_awake),
             is_restoring: AtomicBool::new(false),
             used: Mutex::default(),
+            memory: StepMemory::default(),
         }
     }
 
@@ -208,6 +206,11 @@ impl LiveSession {
     /// Whether a run is being computed or waits for it.
     pub(crate) fn is_computing(&self, target: usize, run: usize) -> bool {
         lock(&self.computing).contains_key(&(target, run))
+    }
+
+    /// Whether any run is being computed or waits for it.
+    pub(crate) fn is_computing_any(&self) -> bool {
+        !lock(&self.computing).is_empty()
     }
 
     /// Tells the computation of a run, or of all runs of a target, to end.

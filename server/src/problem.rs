@@ -3,6 +3,7 @@
 //! What the person may see and what the log gets are different strings: a fault of the program says only
 //! that it happened, and its cause goes to the log.
 
+use crate::limits::Limit;
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use sightline_api::wire::{ExpressionProblem, Problem, ProblemPlace, TextRange};
@@ -81,6 +82,17 @@ impl ApiError {
     pub(crate) fn busy() -> Self {
         Self::new(StatusCode::SERVICE_UNAVAILABLE, "busy", "The server has too much to do already.")
             .hint("Wait until some of it is done, or cancel a run.")
+    }
+
+    /// As many things as the limit allows are busy already.
+    pub(crate) fn full(limit: &Limit) -> Self {
+        Self::busy().hint(limit.hint("Wait until some of it is done, or cancel some."))
+    }
+
+    /// A computation took longer than the limit allows.
+    pub(crate) fn too_long(limit: &Limit) -> Self {
+        let detail = format!("The step took longer than {} s.", limit.count());
+        Self::invalid("too_long", detail).hint(limit.raise())
     }
 
     /// A fault of the program; `cause` goes to the log only.

@@ -12,15 +12,15 @@ use sightline_session::counterfactual::wire::{Question, QuestionState};
 
 use crate::cancel::CancelFlag;
 use crate::jobs::lock;
+use crate::limits::SharedLimits;
 use crate::problem::{ApiError, ApiResult};
 use crate::store::Store;
 
-/// How many questions are kept; the oldest answered ones are forgotten.
-const QUESTION_LIMIT: usize = 256;
-
-/// The questions that were asked.
-#[derive(Default)]
-pub(crate) struct Questions(Mutex<Kept>);
+/// The questions that were asked; the oldest answered ones are forgotten beyond the limit.
+pub(crate) struct Questions {
+    kept: Mutex<Kept>,
+    limits: SharedLimits,
+}
 
 #[derive(Default)]
 struct Kept {
@@ -40,7 +40,7 @@ impl Questions {
     ///
     /// # Errors
     /// When the database cannot be read.
-    pub(crate) fn read_back(store: &Store) -> Result<Self> {
+    pub(crate) fn read_back(store: &Store, limits: &SharedLimits) -> Result<Self> {
         let mut kept = Kept::default();
         for mut question in store.questions()? {
             let Question { session, target, run, step, .. } = question.clone();
@@ -52,19 +52,19 @@ impl Questions {
             let work = Arc::new(Work { number, question: Mutex::new(question), cancel });
             kept.by_step.insert(AtStep { session, target, run, step }, work);
         }
-        Ok(Self(Mutex::new(kept)))
+        Ok(Self { kept: Mutex::new(kept), limits: Arc::clone(limits) })
     }
 
     /// The questions of a session that wait.
     pub(crate) fn waiting_of(&self, session: &str) -> Vec<(AtStep, Arc<Work>)> {
         let waits = |work: &Work| lock(&work.question).state == QuestionState::Waiting;
-        let kept = lock(&self.0);
+        let kept = lock(&self.kept);
         let of_session = kept.by_step.iter().filter(|(path, work)| path.session == session && waits(work));
         of_session.map(|(path, work)| (path.clone(), Arc::clone(work))).collect()
     }
 
     pub(crate) fn find(&self, path: &AtStep) -> ApiResult<Arc<Work>> {
-        let found = lock(&self.0).by_step.get(path).cloned();
+        let found = lock(&self.kept).by_step.get(path).cloned();
         found.ok_or_else(|| {
             ApiError::not_found("Nobody has asked what would have saved this step.")
                 .hint("POST to the same path asks it.")
@@ -73,16 +73,17 @@ impl Questions {
 
     /// The work on a question; none where it goes on or is answered already.
     pub(crate) fn begin(&self, path: AtStep, store: &Store) -> ApiResult<(Arc<Work>, bool)> {
-        let mut kept = lock(&self.0);
+        let mut kept = lock(&self.kept);
         let state_of = |work: &Work| lock(&work.question).state;
         if let Some(work) = kept.by_step.get(&path) {
             if !matches!(state_of(work), QuestionState::Cancelled | QuestionState::Failed) {
                 return Ok((Arc::clone(work), false));
             }
-        } else if kept.by_step.len() >= QUESTION_LIMIT {
+        } else if kept.by_step.len() >= self.limits.questions.count() {
             let over = kept.by_step.iter().filter(|(_, work)| state_of(work).is_over());
             let oldest = over.min_by_key(|(_, work)| work.number).map(|(path, _)| path.clone());
-            if let Some(work) = kept.by_step.remove(&oldest.ok_or_else(ApiError::busy)?) {
+            let oldest = oldest.ok_or_else(|| ApiError::full(&self.limits.questions))?;
+            if let Some(work) = kept.by_step.remove(&oldest) {
                 store.forget_question(&work.view());
             }
         }
@@ -99,7 +100,7 @@ impl Questions {
 
     /// Forgets the questions of a session; those that are being answered end.
     pub(crate) fn forget_session(&self, session: &str) {
-        lock(&self.0).by_step.retain(|path, work| {
+        lock(&self.kept).by_step.retain(|path, work| {
             let is_kept = path.session != session;
             if !is_kept {
                 work.cancel.store(true, Ordering::Relaxed);
@@ -110,7 +111,7 @@ impl Questions {
 
     /// Forgets a question that nobody can answer now.
     pub(crate) fn forget(&self, path: &AtStep, store: &Store) {
-        if let Some(work) = lock(&self.0).by_step.remove(path) {
+        if let Some(work) = lock(&self.kept).by_step.remove(path) {
             store.forget_question(&work.view());
         }
     }

@@ -7,8 +7,8 @@
 
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex};
 
 use sightline_api::wire::Event;
 use sightline_geometry::cancel::Cancel;
@@ -21,23 +21,34 @@ use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
 use tokio::sync::broadcast;
 
-use crate::cancel::CancelFlag;
+use crate::cancel::{CancelFlag, Deadline};
 use crate::jobs::{Lane, Position};
+use crate::limits::SharedLimits;
 use crate::live_session::LiveSession;
-use crate::problem::ApiResult;
+use crate::memory;
+use crate::problem::{ApiError, ApiResult};
 use crate::rendering::OpenTraverse;
+use crate::sessions::Sessions;
 
 /// What computes runs: the lane in which they wait, and where their progress is told.
 #[derive(Clone)]
 pub(crate) struct Runner {
     lane: Lane,
     events: broadcast::Sender<Event>,
+    /// All sessions, whose steps share the memory for them.
+    sessions: Arc<Mutex<Sessions>>,
+    limits: SharedLimits,
 }
 
 impl Runner {
     /// A runner whose runs are computed in `lane`.
-    pub(crate) fn new(lane: Lane, events: broadcast::Sender<Event>) -> Self {
-        Self { lane, events }
+    pub(crate) fn new(
+        lane: Lane,
+        events: broadcast::Sender<Event>,
+        sessions: &Arc<Mutex<Sessions>>,
+        limits: &SharedLimits,
+    ) -> Self {
+        Self { lane, events, sessions: Arc::clone(sessions), limits: Arc::clone(limits) }
     }
 
     /// The lane in which runs are computed.
@@ -134,8 +145,13 @@ impl Runner {
 
     /// Computes the next step of a run; breaks once the run has ended or is told to.
     fn turn(&self, live: &LiveSession, target: usize, run: usize, flag: &CancelFlag) -> ControlFlow<()> {
+        let deadline = Deadline::begin(self.limits.step_s.time(), flag);
         let outcome = match catch_unwind(AssertUnwindSafe(|| self.one_step(live, target, run, flag))) {
             Ok(Ok(true)) => return ControlFlow::Continue(()),
+            Ok(Err(Error::Cancelled)) if deadline.has_passed() => {
+                let limit = &self.limits.step_s;
+                Err(limit.hint(&ApiError::too_long(limit).problem().detail))
+            }
             Ok(Ok(false) | Err(Error::Cancelled)) => Ok(()),
             Ok(Err(error)) => Err(error.to_string()),
             Err(_) => Err("the server met a fault of its own; its log says more".to_owned()),
@@ -163,6 +179,11 @@ impl Runner {
         }
         let trace = match live.with(|session| session.next(target, run))? {
             Next::Nothing => return Ok(false),
+            _ if !memory::has_room(&self.sessions, &self.limits, live) => {
+                let limit = &self.limits.step_bytes;
+                let way_out = "The steps of all sessions take too much memory: remove targets or sessions that are not needed.";
+                return Err(Error::Request(limit.hint(way_out)));
+            }
             Next::Designate { designation, settings } => {
                 designate(&live.traverse, designation, &settings, flag)?
             }
@@ -175,6 +196,7 @@ impl Runner {
                 record(session, target, run, trace)
             }
         })?;
+        live.measure();
         self.tell(progress(live, target, run, "tracking".to_owned()));
         Ok(true)
     }

@@ -14,6 +14,7 @@ use sightline_session::view::SavedSession;
 
 use crate::identity::Relation;
 use crate::jobs::lock;
+use crate::limits::Limit;
 use crate::live_session::LiveSession;
 use crate::problem::{ApiError, ApiResult};
 use crate::rendering::OpenTraverse;
@@ -21,9 +22,6 @@ use crate::store::{self, Store};
 
 /// How many removed sessions can be restored.
 const RESTORABLE: usize = 16;
-
-/// How many sessions there may be.
-const SESSION_LIMIT: usize = 1000;
 
 /// A removed session: what the person did, from which its runs are computed again.
 pub(crate) struct Removed {
@@ -93,20 +91,21 @@ impl Sessions {
     ///
     /// # Errors
     /// A problem when there are too many.
-    pub(crate) fn has_room(&self) -> ApiResult<()> {
-        if self.by_number.len() + self.beginning < SESSION_LIMIT {
+    pub(crate) fn has_room(&self, limit: &Limit) -> ApiResult<()> {
+        if self.by_number.len() + self.beginning < limit.count() {
             return Ok(());
         }
-        let detail = format!("There are {SESSION_LIMIT} sessions already.");
-        Err(ApiError::conflict(detail).hint("Remove one that is not needed: DELETE sessions/{session}."))
+        let detail = format!("There are {} sessions already.", self.by_number.len());
+        let way_out = "Remove one that is not needed: DELETE sessions/{session}.";
+        Err(ApiError::conflict(detail).hint(limit.hint(way_out)))
     }
 
     /// A number for a session that is begun.
     ///
     /// # Errors
     /// A problem when there are too many.
-    pub(crate) fn reserve(&mut self) -> ApiResult<u64> {
-        self.has_room()?;
+    pub(crate) fn reserve(&mut self, limit: &Limit) -> ApiResult<u64> {
+        self.has_room(limit)?;
         self.beginning += 1;
         self.last_number += 1;
         Ok(self.last_number)
@@ -150,13 +149,18 @@ impl Sessions {
 /// # Errors
 /// A problem when it was not removed, too long ago, there are too many sessions, or it cannot be written: it is then
 /// restorable still.
-pub(crate) fn restore(sessions: &Mutex<Sessions>, store: &Store, number: u64) -> ApiResult<()> {
+pub(crate) fn restore(
+    sessions: &Mutex<Sessions>,
+    store: &Store,
+    limit: &Limit,
+    number: u64,
+) -> ApiResult<()> {
     let mut sessions = lock(sessions);
     let place = sessions.removed.iter().position(|removed| removed.number == number).ok_or_else(|| {
         ApiError::not_found("There is no such removed session.")
             .hint(format!("The last {RESTORABLE} removed sessions can be restored until the server ends."))
     })?;
-    sessions.has_room()?;
+    sessions.has_room(limit)?;
     let removed = &sessions.removed[place];
     let session = Session::restored(&removed.saved, removed.traverse.traverse.stop_count())?;
     let live = LiveSession::new(session, Arc::clone(&removed.traverse), false);

@@ -8,12 +8,16 @@ use sightline_api::wire::Event;
 use sightline_geometry::error::{Error, Result};
 use sightline_recordings::Traverse;
 use sightline_session::view::SessionView;
+use sightline_track::locate::store::Cache;
 use tokio::sync::broadcast;
 
 use crate::access::Access;
+use crate::connections::Connections;
 use crate::drives;
 use crate::folders::Folders;
+use crate::idempotency;
 use crate::jobs::{Lane, lock};
+use crate::limits::{Limits, SharedLimits};
 use crate::live_session::LiveSession;
 use crate::problem::{ApiError, ApiResult};
 use crate::questions::Questions;
@@ -28,17 +32,15 @@ use crate::study::order::order;
 use crate::study::saved::Keeper;
 use crate::trackability_maps::Maps;
 
+mod bounds;
 mod changes;
+mod lanes;
 mod removal;
+
+use self::lanes::Lanes;
 
 /// Events that a slow page may be behind before it is told to read everything again.
 const EVENT_BACKLOG: usize = 256;
-/// Runs that are computed at a time; each uses all processors where it can.
-const RUNS_AT_A_TIME: usize = 2;
-/// Runs that may wait.
-const RUNS_WAITING: usize = 256;
-/// Questions that are answered at a time.
-const ANSWERS_AT_A_TIME: usize = 1;
 
 /// What the handlers share.
 #[derive(Clone)]
@@ -52,22 +54,22 @@ struct Inner {
     /// Held while a drive is made or removed, because both change its folder.
     making_drives: Mutex<()>,
     folders: Folders,
-    sessions: Mutex<Sessions>,
+    sessions: Arc<Mutex<Sessions>>,
+    limits: SharedLimits,
+    /// Images and other results of all drives.
+    cache: Arc<Cache>,
+    connections: Arc<Connections>,
+    repeated: Arc<idempotency::Answers>,
     events: broadcast::Sender<Event>,
     runner: Runner,
     ahead: Arc<Ahead>,
     store: Arc<Store>,
     notices: Vec<String>,
-    designations: Lane,
-    pictures: Lane,
-    queries: Lane,
-    exports: Lane,
+    lanes: Lanes,
     studies: Shelf,
     streams: Streams,
     maps: Maps,
-    tries: Lane,
     questions: Questions,
-    answers: Lane,
 }
 
 impl Drop for Inner {
@@ -83,21 +85,42 @@ impl AppState {
     /// # Errors
     /// As `Self::with_folders`.
     pub fn new(traverses: Vec<Traverse>, folder: &Path, access: Access) -> Result<Self> {
-        Self::with_folders(traverses, &Folders::in_one(folder), access)
+        Self::with_limits(traverses, folder, access, Limits::default())
+    }
+
+    /// The same with other limits.
+    ///
+    /// # Errors
+    /// As `Self::with_folders`.
+    pub fn with_limits(
+        traverses: Vec<Traverse>,
+        folder: &Path,
+        access: Access,
+        limits: Limits,
+    ) -> Result<Self> {
+        Self::with_folders(traverses, &Folders::in_one(folder), access, limits)
     }
 
     /// Opens the state on its folders.
     ///
     /// # Errors
-    /// A folder that cannot be read or made, or a system without threads.
-    pub(crate) fn with_folders(traverses: Vec<Traverse>, folders: &Folders, access: Access) -> Result<Self> {
+    /// A folder that cannot be read or made, a drive beyond the limits, or a system without threads.
+    pub(crate) fn with_folders(
+        traverses: Vec<Traverse>,
+        folders: &Folders,
+        access: Access,
+        limits: Limits,
+    ) -> Result<Self> {
         folders.prepare().map_err(|source| Error::Write { path: folders.sessions.clone(), source })?;
         let no_threads = |error: std::io::Error| Error::Request(format!("cannot start a thread: {error}"));
         let events = broadcast::Sender::new(EVENT_BACKLOG);
+        traverses.iter().try_for_each(|traverse| limits.check_drive(traverse))?;
+        let (cache, limits) = (Arc::new(Cache::new(limits.cache_bytes.count())), Arc::new(limits));
+        let traverses = traverses.into_iter().map(|traverse| traverse.with_cache(&cache)).collect();
         let (mut open, of_drives) = drives::open_given(traverses, folders, &events)?;
         let given = open.iter().map(|open| open.id.clone()).collect();
         let store = Store::open(&folders.sessions)?;
-        let drives_lost = drives::open_again(&store, folders, &mut open, &events)?;
+        let drives_lost = drives::open_again(&store, folders, &cache, &mut open, &events)?;
         let (sessions, mut notices) = Sessions::read_back(&store, &open)?;
         notices.extend(of_drives);
         notices.extend(drives_lost);
@@ -108,10 +131,12 @@ impl AppState {
         if let Some(first) = open.first() {
             ahead.look_at(first, 0);
         }
-        let questions = Questions::read_back(&store)?;
+        let questions = Questions::read_back(&store, &limits)?;
         let store = Arc::new(store);
         let keeper = Keeper::new(&store);
-        let studies = Shelf::new(folders.studies.clone(), events.clone(), keeper);
+        let studies = Shelf::new(folders.studies.clone(), events.clone(), keeper, &limits);
+        let sessions = Arc::new(Mutex::new(sessions));
+        let runs = lanes::lane(&limits.runs_at_a_time, &limits.runs_waiting);
         studies.read_back(|new| order(&folders.studies, new))?;
         Ok(Self(Arc::new(Inner {
             access,
@@ -119,22 +144,21 @@ impl AppState {
             given,
             making_drives: Mutex::default(),
             folders: folders.clone(),
-            sessions: Mutex::new(sessions),
-            runner: Runner::new(Lane::new(RUNS_AT_A_TIME, RUNS_WAITING), events.clone()),
+            runner: Runner::new(runs, events.clone(), &sessions, &limits),
+            sessions,
+            cache,
+            connections: Arc::default(),
+            repeated: Arc::new(idempotency::Answers::new(&limits)),
             events,
             ahead,
             store,
             notices,
-            designations: Lane::new(2, 16),
-            pictures: Lane::new(8, 256),
-            queries: Lane::new(2, 64),
-            exports: Lane::new(1, 8),
+            lanes: Lanes::new(&limits),
             studies,
             streams: Streams::default(),
-            maps: Maps::default(),
-            tries: Lane::new(2, 16),
+            maps: Maps::new(&limits),
             questions,
-            answers: Lane::new(ANSWERS_AT_A_TIME, RUNS_WAITING),
+            limits,
         })))
     }
 
@@ -201,6 +225,7 @@ impl AppState {
         let number = store::number_of(id);
         let found = number.and_then(|number| lock(&self.0.sessions).by_number.get(&number).cloned());
         let live = found.ok_or_else(|| ApiError::not_found("There is no such session."))?;
+        live.memory.is_asked_for();
         if live.wake() {
             let (state, restored) = (self.clone(), Arc::clone(&live));
             let go_on = move || counterfactual::go_on(&state, &restored);
@@ -259,26 +284,6 @@ impl AppState {
         self.0.runner.lane()
     }
 
-    /// Where designations are computed.
-    pub(crate) fn designations(&self) -> &Lane {
-        &self.0.designations
-    }
-
-    /// Where images are read.
-    pub(crate) fn pictures(&self) -> &Lane {
-        &self.0.pictures
-    }
-
-    /// Where expressions are asked over all steps.
-    pub(crate) fn queries(&self) -> &Lane {
-        &self.0.queries
-    }
-
-    /// Where recordings are written.
-    pub(crate) fn exports(&self) -> &Lane {
-        &self.0.exports
-    }
-
     /// The studies that were started.
     pub(crate) fn studies(&self) -> &Shelf {
         &self.0.studies
@@ -294,18 +299,8 @@ impl AppState {
         &self.0.streams
     }
 
-    /// Where single steps are tried.
-    pub(crate) fn tries(&self) -> &Lane {
-        &self.0.tries
-    }
-
     /// What would have saved steps: the questions that were asked.
     pub(crate) fn questions(&self) -> &Questions {
         &self.0.questions
-    }
-
-    /// Where questions are answered.
-    pub(crate) fn answers(&self) -> &Lane {
-        &self.0.answers
     }
 }

@@ -11,20 +11,15 @@ use sightline_track::settings::Settings;
 
 use crate::cancel::CancelFlag;
 use crate::jobs::{Lane, lock};
+use crate::limits::SharedLimits;
 use crate::rendering::OpenTraverse;
-
-/// Maps that are kept: about half a megabyte each.
-const MAPS: usize = 64;
-/// Surfaces that are kept for judging single pixels: about twenty megabytes each.
-const GROUNDS: usize = 2;
-/// Maps that may wait for their turn.
-const WAITING: usize = 8;
 
 /// The maps that were made or are being made, and the surfaces behind the newest.
 pub(crate) struct Maps {
     making: Mutex<VecDeque<Arc<Making>>>,
     grounds: Mutex<VecDeque<(String, Arc<Ground>)>>,
     pub(crate) turn: Lane,
+    limits: SharedLimits,
 }
 
 /// A map that is made, or was.
@@ -36,13 +31,13 @@ pub(crate) struct Making {
     pub(crate) cancel: CancelFlag,
 }
 
-impl Default for Maps {
-    fn default() -> Self {
-        Self { making: Mutex::default(), grounds: Mutex::default(), turn: Lane::new(1, WAITING) }
-    }
-}
-
 impl Maps {
+    /// No maps yet.
+    pub(crate) fn new(limits: &SharedLimits) -> Self {
+        let turn = Lane::new(1, limits.maps_waiting.count());
+        Self { making: Mutex::default(), grounds: Mutex::default(), turn, limits: Arc::clone(limits) }
+    }
+
     pub(crate) fn find_or_begin(
         &self,
         traverse: &str,
@@ -58,7 +53,7 @@ impl Maps {
         let new = Arc::new(Making { traverse, step, limits, progress: Mutex::new(progress), cancel });
         making.push_back(Arc::clone(&new));
         // The oldest that is complete goes; those under way are few.
-        if making.len() > MAPS
+        if making.len() > self.limits.maps.count()
             && let Some(place) = making.iter().position(|one| lock(&one.progress).ended)
         {
             making.remove(place);
@@ -107,10 +102,11 @@ impl Maps {
             return Ok(Arc::clone(known));
         }
         open.make_ready(step, cancel)?;
-        let made = Arc::new(Ground::new(&open.traverse, step, settings, limits)?);
+        let made =
+            Arc::new(Ground::new_until(&open.traverse, step, settings, limits, cancel.as_ref().into())?);
         let mut grounds = lock(grounds);
         grounds.push_back((open.id.clone(), Arc::clone(&made)));
-        let surplus = grounds.len().saturating_sub(GROUNDS);
+        let surplus = grounds.len().saturating_sub(self.limits.grounds.count());
         grounds.drain(..surplus);
         Ok(made)
     }

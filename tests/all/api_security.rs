@@ -6,7 +6,6 @@ use axum::body::Body;
 use axum::http::{HeaderValue, Method, StatusCode, header};
 use futures_util::{SinkExt, StreamExt};
 use serde_json::{Value, json};
-use sightline_api::program::BODY_BYTES;
 use sightline_tests::server::{PIXEL, PORT, TOKEN, TestServer, access, request, small_drive};
 use tokio_tungstenite::tungstenite::{self, Message};
 
@@ -60,7 +59,7 @@ async fn what_cannot_be_read_is_refused() {
     with("application/x-www-form-urlencoded", "step=0").await.problem(415, "not_json");
     with("text/plain", "{}").await.problem(415, "not_json");
     let large = request(Method::POST, &path).header(header::CONTENT_TYPE, "application/json");
-    let large = server.send(large.body(Body::from(vec![b' '; BODY_BYTES + 1])).unwrap()).await;
+    let large = server.send(large.body(Body::from(vec![b' '; (1 << 20) + 1])).unwrap()).await;
     large.problem(413, "too_large");
     server.json(Method::PATCH, "sessions", &json!({})).await.problem(405, "method");
     server.post("sessions", &json!({ "traverse": "../secret" })).await.problem(422, "field");
@@ -276,8 +275,5 @@ async fn the_table_of_settings_is_what_the_tracker_takes() {
     let keys: Vec<_> = table.as_array().unwrap().iter().map(|info| info["key"].as_str().unwrap()).collect();
     assert!(keys.contains(&"ncc_min") && keys.contains(&"search_window_px"));
     let version = server.get("version").await.expect(200);
-    assert_eq!(
-        (&version["name"], &version["limits"]["body_bytes"]),
-        (&json!("sightline"), &json!(BODY_BYTES))
-    );
+    assert_eq!((&version["name"], &version["limits"]["body_bytes"]), (&json!("sightline"), &json!(1 << 20)));
 }

@@ -39,11 +39,25 @@ impl Killable {
         Self::run("0", environment, drive, data)
     }
 
+    /// Serves with few descriptors and moved limits (`NAME=VALUE`).
+    #[cfg(unix)]
+    pub(crate) fn start_bounded(descriptors: u32, limits: &[&str], drive: &Path, data: &Path) -> Self {
+        let mut shell = Command::new("sh");
+        shell.arg("-c").arg(format!("ulimit -n {descriptors} && exec \"$0\" \"$@\"")).arg(program());
+        shell.arg("serve").args(limits.iter().flat_map(|limit| ["--limit", limit]));
+        Self::serve(shell, "0", drive, data)
+    }
+
     fn run(port: &str, environment: &[(&str, &OsStr)], drive: &Path, data: &Path) -> Self {
-        let arguments =
-            ["serve", drive.to_str().unwrap(), "--port", port, "--data-dir", data.to_str().unwrap()];
         let mut program = Command::new(program());
-        program.args(arguments).env("SIGHTLINE_TOKEN", TOKEN).envs(environment.iter().copied());
+        program.arg("serve").envs(environment.iter().copied());
+        Self::serve(program, port, drive, data)
+    }
+
+    /// Starts the program that `program` ends with, and waits until it serves.
+    fn serve(mut program: Command, port: &str, drive: &Path, data: &Path) -> Self {
+        program.args([drive.to_str().unwrap(), "--port", port, "--data-dir", data.to_str().unwrap()]);
+        program.env("SIGHTLINE_TOKEN", TOKEN);
         let mut child = program.stdout(Stdio::piped()).spawn().unwrap();
         let mut line = String::new();
         BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();

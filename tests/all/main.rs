@@ -6,6 +6,7 @@
 mod api;
 mod api_security;
 mod attack;
+mod bounds;
 mod cli;
 mod compare;
 mod copied;

@@ -131,7 +131,7 @@ async fn a_session_with_500_long_notes_can_be_brought_back() {
     });
     file["notes"] = notes.collect();
     let size = file.to_string().len();
-    assert!(size > 7 << 20 && size < sightline_api::program::BODY_BYTES, "{size} bytes");
+    assert!(size > 7 << 20 && size < sightline_api::program::FILE_BYTES, "{size} bytes");
     let view = server.post("sessions/reproduced", &file).await.expect(201);
     let brought = format!("sessions/{}/notes", view["id"].as_str().unwrap());
     let notes = server.get(&brought).await.expect(200);

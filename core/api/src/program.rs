@@ -3,8 +3,9 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// The largest body of a request, bytes: a session with 500 notes of 4,000 characters each, with its runs, fits.
-pub const BODY_BYTES: usize = 8 << 20;
+/// The default of the server's limit `file_bytes`, bytes: the largest exported session that it takes. One with 500 notes of
+/// 4,000 characters each fits.
+pub const FILE_BYTES: usize = 8 << 20;
 
 /// What this program is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -40,4 +41,23 @@ pub struct Health {
     pub status: String,
     /// What a person should know about this start of the server, one sentence each.
     pub notices: Vec<String>,
+    /// What the server takes of the machine.
+    pub usage: Usage,
+}
+
+/// What a server takes of its machine.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct Usage {
+    /// Open connections.
+    pub connections: usize,
+    /// Images, features, surfaces and motions in memory, bytes (limit `cache_bytes`).
+    pub cache_bytes: usize,
+    /// Steps of runs in memory, bytes, an upper bound (limit `step_bytes`).
+    pub step_bytes: usize,
+    /// Answers to requests with an Idempotency-Key in memory, bytes (limit `answer_bytes`).
+    pub answer_bytes: usize,
+    /// Threads of the process; null where the system does not tell.
+    pub threads: Option<u64>,
+    /// Resident memory of the process, bytes; null where the system does not tell.
+    pub resident_bytes: Option<u64>,
 }

@@ -6,7 +6,6 @@
 
 mod check;
 pub mod files;
-mod image_cache;
 pub mod import;
 mod index_file;
 mod native;

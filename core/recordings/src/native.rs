@@ -48,29 +48,25 @@
 //! `truth/`, the truth of every pixel (`truth_files.rs` documents it).
 //!
 //! Opening reads the index and the cameras, never an image: a traverse with missing images opens, and the
-//! stops that have theirs can be used. Images are decoded when asked for; the pairs used last are kept, up to
-//! [`CACHE_LIMIT_BYTES`].
+//! stops that have theirs can be used. Images are decoded when asked for; the pairs used last are kept in the store that
+//! the targets share ([`SharedStore`]), which has a limit in bytes.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, Mutex, PoisonError};
 
 use super::check::{self, StopCameras};
 use super::files::resolve;
-use super::image_cache::ImageCache;
 use super::index_file::{self, Existing, IndexFormat};
 use super::simulated::{Simulated, Stops};
 use sightline_geometry::camera::Camera;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pose;
-use sightline_track::locate::store::SharedStore;
+use sightline_track::locate::store::{Cache, SharedStore};
 use sightline_track::stages::capture::StereoPair;
 use sightline_vision::image::{GrayImage, io};
 use sightline_world::World;
 use sightline_world::traverse::{Stop, TraverseIndex, View};
-
-/// The most memory that decoded pairs may take, bytes (32 pairs of 1024 × 1024).
-pub(crate) const CACHE_LIMIT_BYTES: usize = 256 << 20;
 
 /// An opened traverse.
 pub struct Traverse {
@@ -79,8 +75,8 @@ pub struct Traverse {
     index: TraverseIndex,
     cameras: Vec<StopCameras>,
     warnings: Vec<String>,
-    cache: Mutex<ImageCache>,
-    pub(super) features: SharedStore,
+    /// Images, features, surfaces and motions that were found before.
+    pub(super) store: SharedStore,
     pub(super) simulated: Option<Simulated>,
 }
 
@@ -107,9 +103,15 @@ impl Traverse {
         let read_scenario = |name: &String| Simulated::open(&index, name, &folder);
         let simulated = index.scenario.as_ref().map(read_scenario).transpose().map_err(problem)?;
         let warnings = check::warnings(&index, &folder);
-        let cache = Mutex::new(ImageCache::new(CACHE_LIMIT_BYTES));
-        let features = SharedStore::default();
-        Ok(Self { folder, index_path, index, cameras, warnings, cache, features, simulated })
+        let store = SharedStore::default();
+        Ok(Self { folder, index_path, index, cameras, warnings, store, simulated })
+    }
+
+    /// The same traverse, which shares a cache with others.
+    #[must_use]
+    pub fn with_cache(mut self, cache: &Arc<Cache>) -> Self {
+        self.store = SharedStore::within(cache);
+        self
     }
 
     /// The index as it was read.
@@ -192,8 +194,8 @@ impl Traverse {
     /// folder, because it becomes part of the step's record, which must not depend on where the folder is.
     pub fn capture(&self, step: usize) -> Result<StereoPair> {
         let stop = self.stop(step)?;
-        if let Some(pair) = self.cached(|cache| cache.get(step)) {
-            return Ok(pair);
+        if let Some(pair) = self.kept_pair(step) {
+            return Ok(StereoPair::clone(&pair));
         }
         let cameras = &self.cameras[step];
         let read = || {
@@ -204,7 +206,7 @@ impl Traverse {
             })
         };
         let pair = read().map_err(|error| self.without_folder(error))?;
-        self.cached(|cache| cache.insert(step, pair.clone()));
+        self.keep_pair(step, &pair);
         Ok(pair)
     }
 
@@ -214,8 +216,8 @@ impl Traverse {
     /// As [`Self::capture`], of this image.
     pub fn capture_one(&self, step: usize, is_left: bool) -> Result<Arc<GrayImage>> {
         let stop = self.stop(step)?;
-        if let Some(pair) = self.cached(|cache| cache.get(step)) {
-            return Ok(if is_left { pair.left } else { pair.right });
+        if let Some(pair) = self.kept_pair(step) {
+            return Ok(Arc::clone(if is_left { &pair.left } else { &pair.right }));
         }
         let named = |error| self.without_folder(error);
         self.render_step(step, &AtomicBool::new(false)).map_err(named)?;
@@ -232,7 +234,7 @@ impl Traverse {
         if let Ok(other) = read(!is_left) {
             let [left, right] = if is_left { [&wanted, &other] } else { [&other, &wanted] };
             let pair = StereoPair { left: Arc::clone(left), right: Arc::clone(right) };
-            self.cached(|cache| cache.insert(step, pair));
+            self.keep_pair(step, &pair);
         }
         Ok(wanted)
     }
@@ -264,9 +266,13 @@ impl Traverse {
         self.index.stops.get(step).ok_or_else(missing)
     }
 
-    fn cached<T>(&self, work: impl FnOnce(&mut ImageCache) -> T) -> T {
-        // A panic elsewhere cannot leave the cache half changed.
-        work(&mut self.cache.lock().unwrap_or_else(PoisonError::into_inner))
+    fn kept_pair(&self, step: usize) -> Option<Arc<StereoPair>> {
+        self.store.kept(&step, &())
+    }
+
+    fn keep_pair(&self, step: usize, pair: &StereoPair) {
+        // The bytes of the cache are the limit.
+        self.store.keep(step, &(), usize::MAX, Arc::new(pair.clone()));
     }
 
     fn read_image(&self, step: usize, side: &str, view: &View, camera: &Camera) -> Result<GrayImage> {

@@ -46,7 +46,7 @@ impl Stops for Traverse {
         self.index().stereo
     }
     fn shared(&self, step: usize) -> Option<Shared<'_>> {
-        Some(Shared { store: &self.features, stop: step })
+        Some(Shared { store: &self.store, stop: step })
     }
     fn capture(&self, step: usize) -> Result<StereoPair> {
         self.capture(step)

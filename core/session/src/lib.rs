@@ -11,6 +11,7 @@ pub mod exports;
 pub mod notes;
 pub mod progress;
 pub mod removal;
+mod memory;
 mod run;
 pub mod shell;
 pub mod step;

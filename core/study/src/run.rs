@@ -21,7 +21,7 @@ use super::hand_over::HandOver;
 use super::point::{Fault, Point};
 use super::staged::Staged;
 use super::step_record::StepRecord;
-use sightline_geometry::error::Result;
+use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::{Pixel, Point3};
 use sightline_session::step::RunStep;
 use sightline_session::summary::{Summary, summarise};
@@ -173,8 +173,9 @@ impl Follower {
 
     fn follow<D: Drive>(&mut self, drive: &D, settings: &Settings, cancel: &AtomicBool) -> Result<()> {
         let designation = Designation { step: 0, pixel: self.run.pixel };
-        let first = match track::designate(drive, designation, settings) {
+        let first = match track::designate_until(drive, designation, settings, cancel.into()) {
             Ok(first) => first,
+            Err(Error::Cancelled) => return Err(Error::Cancelled),
             Err(error) => {
                 self.run.refused = Some(error.to_string());
                 return Ok(());

@@ -4,6 +4,7 @@
 //! one by one under the names of [`ArrayName`]. `session::step` adds the comparison with the truth and the serialised form.
 
 mod arrays;
+mod memory;
 
 pub use crate::array_name::ArrayName;
 pub use sightline_record::ArrayView;

@@ -1,5 +1,6 @@
 //! The command line of the experiments: one file for each.
 
+mod cancel;
 mod realism;
 mod scenery;
 mod scenery_figure;
@@ -18,6 +19,8 @@ use sightline_server::cli::{exit_code, start_log};
 #[derive(Debug, Parser)]
 #[command(name = "sightline-experiments", arg_required_else_help = true)]
 enum Experiment {
+    /// How soon each long computation ends once it is cancelled.
+    Cancel(cancel::Cancelled),
     /// How hard the simulated worlds are: plain correlation, without scale and roll, at steps of 5 % and 23 %.
     Realism(realism::Worlds),
     /// The simulated scenery in numbers: rocks, ground, noise and texture against their laws and real frames.
@@ -35,6 +38,7 @@ pub fn run() -> ExitCode {
     let experiment = Experiment::parse();
     start_log();
     exit_code(match experiment {
+        Experiment::Cancel(arguments) => arguments.run(),
         Experiment::Realism(arguments) => arguments.run(),
         Experiment::Scenery(arguments) => arguments.run(),
         Experiment::RealMotion(arguments) => arguments.run(),

@@ -3,6 +3,7 @@
 use std::fs::{File, TryLockError};
 use std::net::{IpAddr, SocketAddr, TcpListener};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Duration;
 
 use clap::Args;
@@ -11,9 +12,11 @@ use sightline_recordings::Traverse;
 
 use super::{open, terminal};
 use crate::access::{Access, Token};
+use crate::connections;
 use crate::first_session;
 use crate::folders::Folders;
 use crate::hosts::Hosts;
+use crate::limits::Limits;
 use crate::public_url::PublicUrl;
 use crate::state::AppState;
 
@@ -49,6 +52,9 @@ pub(super) struct Serve {
     /// Where sessions and simulated traverses are kept.
     #[arg(long, value_name = "FOLDER")]
     data_dir: Option<PathBuf>,
+    /// Moves a limit of the server; can be given more than once. `--limit help` lists all of them.
+    #[arg(long, value_name = "NAME=VALUE")]
+    limit: Vec<String>,
 }
 
 impl Serve {
@@ -57,6 +63,11 @@ impl Serve {
     /// # Errors
     /// A traverse that cannot be opened, a data folder in use, or a port that is taken.
     pub(super) fn run(self) -> Result<()> {
+        let mut limits = Limits::default();
+        if self.limit.iter().any(|text| text == "help") {
+            return terminal::line(limits.table().trim_end());
+        }
+        self.limit.iter().try_for_each(|text| limits.set(text))?;
         if !self.listen.is_loopback() && self.allow_host.is_empty() && self.behind_proxy.is_none() {
             let message = "listening beyond this machine needs --allow-host with the name by which pages will \
                            address the server, or --behind-proxy";
@@ -84,7 +95,7 @@ impl Serve {
             Some(public) => access.behind_proxy(public),
             None => access,
         };
-        let state = AppState::with_folders(traverses, &folders, access)?;
+        let state = AppState::with_folders(traverses, &folders, access, limits)?;
         if token.is_none() {
             terminal::error("warning: without an access token every user of this machine can use the server");
         }
@@ -123,10 +134,10 @@ impl Serve {
 async fn serve(listener: TcpListener, url: &str, state: AppState) -> Result<()> {
     let failed = |error: std::io::Error| Error::Request(format!("the server stopped: {error}"));
     let listener = tokio::net::TcpListener::from_std(listener).map_err(failed)?;
-    let app = crate::app(state.clone());
+    let (app, connections) = (crate::app(state.clone()), Arc::clone(state.connections()));
     terminal::line(&format!("Sightline is ready: {url}"))?;
     let ended = tokio::select! {
-        ended = async { axum::serve(listener, app).await } => ended.map_err(failed),
+        never = connections::serve(listener, app, state.limits(), connections) => match never {},
         () = told_to_end() => Ok(()),
     };
     // Everything but a cursor that has just moved is on disk already.

@@ -1,6 +1,8 @@
 //! What anybody needs to get the same rows again, bit for bit: settings, seed, versions, hashes and commands, as JSON.
 
 use serde_json::{Value, json};
+use sightline_geometry::cancel::Cancel;
+use sightline_geometry::error::Result;
 use sightline_rover::version::tracker_version;
 use sightline_session::reproduce::{FORMAT, FORMAT_VERSION};
 use sightline_session::shell;
@@ -14,11 +16,15 @@ use crate::naming::hash;
 use crate::version::VERSION;
 
 /// The bundle as JSON text.
-pub(crate) fn json(source: &Source, part: Part) -> String {
+///
+/// # Errors
+/// [`Error::Cancelled`](sightline_geometry::error::Error::Cancelled).
+pub(crate) fn json(source: &Source, part: Part, cancel: Cancel<'_>) -> Result<String> {
     let traverse = &source.open.traverse;
     let index = traverse.index();
     let scenario = scenario(source);
-    let runs: Vec<Value> = source.runs(part).into_iter().map(|run| of_run(source, run)).collect();
+    let runs = source.runs(part).into_iter().map(|run| of_run(source, run, cancel));
+    let runs = runs.collect::<Result<Vec<Value>>>()?;
     let bundle = json!({
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
@@ -43,13 +49,13 @@ pub(crate) fn json(source: &Source, part: Part) -> String {
         "notes": source.notes.list,
         "runs": runs,
     });
-    format!("{bundle:#}\n")
+    Ok(format!("{bundle:#}\n"))
 }
 
-fn of_run(source: &Source, run: NamedRun<'_>) -> Value {
+fn of_run(source: &Source, run: NamedRun<'_>, cancel: Cancel<'_>) -> Result<Value> {
     let only = Part { target: Some(run.target), run: Some(run.number) };
     let settings = serde_json::to_vec(run.run.settings.as_ref()).unwrap_or_default();
-    json!({
+    Ok(json!({
         "target": run.target,
         "label": run.record.label,
         "run": run.number,
@@ -58,9 +64,9 @@ fn of_run(source: &Source, run: NamedRun<'_>) -> Value {
         "settings_changed": run.run.settings.changes(),
         "settings_sha256": hash(&settings),
         "steps": run.run.steps.len(),
-        "rows_sha256": hash(rows::jsonl(source, only).as_bytes()),
+        "rows_sha256": hash(rows::jsonl(source, only, cancel)?.as_bytes()),
         "command": command(source, run),
-    })
+    }))
 }
 
 /// The command line that computes a run again; none for one that left another run on the way.

@@ -5,26 +5,32 @@ use sightline_api::endpoints::ExportFile;
 use sightline_api::location::AtExport;
 use sightline_session::exports::{ExportEntry, Size};
 
+use sightline_geometry::cancel::Cancel;
+use sightline_geometry::error::Result;
+
 use super::kind::{Kind, Part};
 use super::source::Source;
 use super::{bundle, rows, sheet};
 
 /// How large the file will be, known or estimated.
-fn size(kind: Kind, source: &Source, part: Part) -> Size {
+///
+/// # Errors
+/// [`Error::Cancelled`](sightline_geometry::error::Error::Cancelled).
+fn size(kind: Kind, source: &Source, part: Part, cancel: Cancel<'_>) -> Result<Size> {
     let exact = |bytes: usize| Size { bytes: bytes as u64, is_exact: true };
     let about = |bytes: u64| Size { bytes, is_exact: false };
     let steps: usize = source.runs(part).iter().map(|run| run.run.steps.len()).sum();
-    match kind {
-        Kind::Jsonl => exact(rows::jsonl(source, part).len()),
-        Kind::Csv => exact(rows::csv(source, part).len()),
-        Kind::Bundle => exact(bundle::json(source, part).len()),
+    Ok(match kind {
+        Kind::Jsonl => exact(rows::jsonl(source, part, cancel)?.len()),
+        Kind::Csv => exact(rows::csv(source, part, cancel)?.len()),
+        Kind::Bundle => exact(bundle::json(source, part, cancel)?.len()),
         // A page a column with its own head, then eight bytes a number.
         Kind::Parquet => about(rows::column_count() * (310 + 7 * steps as u64)),
         Kind::Animation => about(sheet::bytes_of_animation(source, part)),
         Kind::Sheet => about(sheet::bytes_of_sheet(source, part)),
         Kind::Report => about(25_000 + source.runs(part).len() as u64 * 530_000 + 330 * steps as u64),
         Kind::Recording => about(recording_bytes(source, part)),
-    }
+    })
 }
 
 /// The images of every stop as PNG, and what the steps saw.
@@ -46,20 +52,23 @@ fn recording_bytes(source: &Source, part: Part) -> u64 {
 }
 
 /// Everything that can be exported of a part of a session.
-pub(crate) fn catalogue(source: &Source, part: Part) -> Vec<ExportEntry> {
+///
+/// # Errors
+/// [`Error::Cancelled`](sightline_geometry::error::Error::Cancelled).
+pub(crate) fn catalogue(source: &Source, part: Part, cancel: Cancel<'_>) -> Result<Vec<ExportEntry>> {
     let entry = |kind: Kind| {
         let part = source.narrowed(kind, part);
         let session = &source.session.id;
         let at = AtExport { session: session.clone(), file: kind.name().to_owned() };
-        ExportEntry {
+        Ok(ExportEntry {
             name: kind.name().to_owned(),
             title: kind.title().to_owned(),
             sentence: kind.sentence().to_owned(),
             file: source.file_name(kind, part),
-            size: size(kind, source, part),
+            size: size(kind, source, part, cancel)?,
             path: endpoint::path::<ExportFile>(&at, &part),
             command: format!("sightline export {} --session {session}{}", kind.name(), arguments(part)),
-        }
+        })
     };
     Kind::ALL.into_iter().map(entry).collect()
 }

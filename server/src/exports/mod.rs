@@ -48,15 +48,13 @@ pub(crate) fn make(
 ) -> ApiResult<Made> {
     let part = source.narrowed(kind, part);
     Ok(match kind {
-        Kind::Jsonl => Made::Bytes(rows::jsonl(source, part).into_bytes()),
-        Kind::Csv => Made::Bytes(rows::csv(source, part).into_bytes()),
-        Kind::Parquet => Made::Bytes(
-            rows::parquet(source, part).map_err(|error| ApiError::internal(format!("Parquet: {error}")))?,
-        ),
+        Kind::Jsonl => Made::Bytes(rows::jsonl(source, part, cancel.into())?.into_bytes()),
+        Kind::Csv => Made::Bytes(rows::csv(source, part, cancel.into())?.into_bytes()),
+        Kind::Parquet => Made::Bytes(rows::parquet(source, part, cancel.into())?),
         Kind::Animation => Made::Bytes(sheet::animation(source, part, cancel)?),
         Kind::Sheet => Made::Bytes(sheet::sheet(source, part, cancel)?),
         Kind::Report => Made::Bytes(report::html(source, part, cancel)?.into_bytes()),
-        Kind::Bundle => Made::Bytes(bundle::json(source, part).into_bytes()),
+        Kind::Bundle => Made::Bytes(bundle::json(source, part, cancel.into())?.into_bytes()),
         Kind::Recording => recording(source, part, cancel, progress)?,
     })
 }

@@ -13,6 +13,8 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::schema::parser::parse_message_type;
 use serde::{Serialize, Serializer};
+use sightline_geometry::cancel::Cancel;
+use sightline_geometry::error::Result;
 use sightline_record::{Kind, StageRecord, Value};
 use sightline_rover::version::tracker_version;
 use sightline_session::records::{columns, records, row_columns};
@@ -21,6 +23,7 @@ use sightline_session::step::{RunStep, StepRow};
 use super::kind::Part;
 use super::source::Source;
 use crate::columns as csv;
+use crate::problem::{ApiError, ApiResult};
 use crate::version::VERSION;
 
 /// One step as a JSON object: the columns of [`StepRow`], then the quantities of every stage as `stage.quantity`.
@@ -58,41 +61,54 @@ const PLACES: [Place; 3] = [
 ];
 
 /// The quantities that the row does not have, as fields.
-fn quantities<S: Serializer>(records: &[StageRecord], serializer: S) -> Result<S::Ok, S::Error> {
+fn quantities<S: Serializer>(records: &[StageRecord], serializer: S) -> std::result::Result<S::Ok, S::Error> {
     let own = &columns()[row_columns().len()..];
     serializer.collect_map(own.iter().map(|column| (column.name.as_str(), column.cell(records))))
 }
 
-fn lines(source: &Source, part: Part) -> Vec<Line<'_>> {
+/// The rows of a part of a session.
+///
+/// # Errors
+/// [`Error::Cancelled`](sightline_geometry::error::Error::Cancelled).
+fn lines<'a>(source: &'a Source, part: Part, cancel: Cancel<'_>) -> Result<Vec<Line<'a>>> {
     let mut lines = Vec::new();
     for run in source.runs(part) {
-        let label = &run.record.label;
-        let line = |trace: &Arc<RunStep>| Line {
-            target: run.target,
-            label,
-            run: run.number,
-            row: trace.as_ref().into(),
-        };
-        lines.extend(run.run.steps.iter().map(line));
+        for trace in &run.run.steps {
+            cancel.check()?;
+            let (label, row) = (&run.record.label, trace.as_ref().into());
+            lines.push(Line { target: run.target, label, run: run.number, row });
+        }
     }
-    lines
+    Ok(lines)
 }
 
 /// One JSON object a line.
-pub(crate) fn jsonl(source: &Source, part: Part) -> String {
-    let line = |line| serde_json::to_string(&line).map(|text| text + "\n").unwrap_or_default();
-    lines(source, part).into_iter().map(line).collect()
+///
+/// # Errors
+/// As [`lines`].
+pub(crate) fn jsonl(source: &Source, part: Part, cancel: Cancel<'_>) -> Result<String> {
+    let mut text = String::new();
+    for line in lines(source, part, cancel)? {
+        cancel.check()?;
+        text.push_str(&serde_json::to_string(&line).unwrap_or_default());
+        text.push('\n');
+    }
+    Ok(text)
 }
 
 /// A table with a header.
-pub(crate) fn csv(source: &Source, part: Part) -> String {
+///
+/// # Errors
+/// As [`lines`].
+pub(crate) fn csv(source: &Source, part: Part, cancel: Cancel<'_>) -> Result<String> {
     let mut table = header().join(",") + "\n";
-    for line in lines(source, part) {
+    for line in lines(source, part, cancel)? {
+        cancel.check()?;
         let label = sightline_api::table::cell(line.label);
         let cells = csv::csv_cells(columns(), &line.row.records);
         table.push_str(&format!("{},{label},{},{cells}\n", line.target, line.run));
     }
-    table
+    Ok(table)
 }
 
 /// The number of columns.
@@ -109,9 +125,20 @@ fn header() -> Vec<&'static str> {
 /// A Parquet file.
 ///
 /// # Errors
-/// What the library says.
-pub(crate) fn parquet(source: &Source, part: Part) -> Result<Vec<u8>, ParquetError> {
-    let lines = lines(source, part);
+/// A problem when it is cancelled, or with what the library says.
+pub(crate) fn parquet(source: &Source, part: Part, cancel: Cancel<'_>) -> ApiResult<Vec<u8>> {
+    let lines = lines(source, part, cancel)?;
+    written(source, &lines, cancel).map_err(|error| {
+        let said = || ApiError::internal(format!("Parquet: {error}"));
+        cancel.check().map_or_else(ApiError::from, |()| said())
+    })
+}
+
+fn written(
+    source: &Source,
+    lines: &[Line<'_>],
+    cancel: Cancel<'_>,
+) -> std::result::Result<Vec<u8>, ParquetError> {
     let kinds = [Kind::Count, Kind::Word, Kind::Count].into_iter();
     let kinds: Vec<Kind> = kinds.chain(columns().iter().map(|column| column.kind)).collect();
     let mut schema = "message rows {".to_owned();
@@ -141,6 +168,7 @@ pub(crate) fn parquet(source: &Source, part: Part) -> Result<Vec<u8>, ParquetErr
     let mut writer = SerializedFileWriter::new(Vec::new(), schema, Arc::new(properties))?;
     let mut group = writer.next_row_group()?;
     for (index, kind) in kinds.into_iter().enumerate() {
+        cancel.check().map_err(|error| ParquetError::External(Box::new(error)))?;
         if let Some(column) = group.next_column()? {
             let cell = |line: &Line<'_>| match PLACES.get(index) {
                 Some((_, place)) => place(line),
@@ -157,7 +185,7 @@ fn write_column(
     mut column: SerializedColumnWriter<'_>,
     kind: Kind,
     cells: impl Iterator<Item = Value>,
-) -> Result<(), ParquetError> {
+) -> std::result::Result<(), ParquetError> {
     match kind {
         Kind::Count => {
             let (known, levels) = split(cells.map(|cell| match cell {

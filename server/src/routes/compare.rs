@@ -1,6 +1,7 @@
 //! `…/compare` and `…/runs/{run}/metrics`: runs side by side, and what one is worth.
 
 use axum::Json;
+use axum::extract::State;
 use sightline_api::endpoint::Endpoint;
 use sightline_api::endpoints::{CompareRuns, ShowMetrics};
 use sightline_session::compare::{self, Compared, Comparison, NewComparison, RunName};
@@ -9,7 +10,6 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use crate::extract::{Body, RunPath, SessionPath};
-use crate::jobs::blocking;
 use crate::problem::{ApiError, ApiResult};
 use crate::routes::route::route;
 use crate::state::AppState;
@@ -27,19 +27,20 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
 /// first, and the settings that are not alike. Nothing is changed by it.
 #[utoipa::path(post, operation_id = "compare_runs", path = CompareRuns::PATH, tag = "runs", request_body = NewComparison, responses((status = 200, body = Comparison), ApiError))]
 async fn compare_runs(
+    State(state): State<AppState>,
     SessionPath(live): SessionPath,
     Body(new): Body<CompareRuns>,
 ) -> ApiResult<Json<Comparison>> {
     // The steps are shared values: the session is not locked while they are compared.
     let runs = live.with(|session| session.compared(&new.runs))?;
-    blocking(move || Ok(Json(compare::compare(&runs, &new)?))).await
+    state.queries().run(move || Ok(Json(compare::compare(&runs, &new)?))).await
 }
 
 /// The metrics of a run so far, each with its worst step
 #[utoipa::path(get, operation_id = "run_metrics", path = ShowMetrics::PATH, tag = "runs",
     responses((status = 200, body = RunMetrics), ApiError))]
-async fn run_metrics(path: RunPath) -> ApiResult<Json<RunMetrics>> {
+async fn run_metrics(State(state): State<AppState>, path: RunPath) -> ApiResult<Json<RunMetrics>> {
     let name = RunName { target: path.target, run: path.run };
     let found = path.with_run(|_, run| Compared::new(name, run))?;
-    blocking(move || Ok(Json(metrics::metrics(&found.steps)))).await
+    state.queries().run(move || Ok(Json(metrics::metrics(&found.steps)))).await
 }

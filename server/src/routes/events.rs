@@ -24,8 +24,6 @@ use crate::state::AppState;
 
 /// The largest message that a page may send, bytes.
 const MESSAGE_LIMIT: usize = 64 << 10;
-/// How many pages may listen at a time.
-const LISTENER_LIMIT: usize = 64;
 /// How often a page is asked whether it is still there.
 const PING_PERIOD: Duration = Duration::from_secs(15);
 /// How long a page may be silent, or take for one message.
@@ -46,8 +44,9 @@ async fn listen(
     let upgrade = upgrade.map_err(|_| {
         ApiError::new(StatusCode::UPGRADE_REQUIRED, "websocket", "Events are told over a WebSocket only.")
     })?;
-    if state.events().receiver_count() >= LISTENER_LIMIT {
-        return Err(ApiError::busy().hint("Close some pages."));
+    let limit = &state.limits().listeners;
+    if state.events().receiver_count() >= limit.count() {
+        return Err(ApiError::busy().hint(limit.hint("Close some pages.")));
     }
     let events = state.events().subscribe();
     let upgrade = upgrade.max_message_size(MESSAGE_LIMIT).max_frame_size(MESSAGE_LIMIT);

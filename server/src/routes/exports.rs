@@ -15,10 +15,9 @@ use tokio_util::io::ReaderStream;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
-use crate::cancel::CancelOnDrop;
+use crate::cancel::{CancelFlag, CancelOnDrop};
 use crate::exports::{Kind, Made, Part, Source, catalogue, make};
 use crate::extract::{Params, Path, SessionPath};
-use crate::jobs::blocking;
 use crate::problem::{ApiError, ApiResult};
 use crate::routes::route::route;
 use crate::routes::traverses::FileBytes;
@@ -34,15 +33,16 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
 /// What a session can be exported as, with sizes and commands
 #[utoipa::path(get, operation_id = "list_exports", path = ListExports::PATH, tag = "exports", params(Part), responses((status = 200, body = Vec<ExportEntry>), ApiError))]
 async fn list(
+    State(state): State<AppState>,
     SessionPath(live): SessionPath,
     Params(part): Params<ListExports>,
 ) -> ApiResult<Json<Vec<ExportEntry>>> {
-    blocking(move || {
+    let work = move |cancel: &CancelFlag| {
         let source = Source::of(&live);
         source.check(Kind::Csv, part)?;
-        Ok(Json(catalogue::catalogue(&source, part)))
-    })
-    .await
+        Ok(Json(catalogue::catalogue(&source, part, cancel.as_ref().into())?))
+    };
+    state.queries().run_until_dropped(work).await
 }
 
 /// A session, or a part of it, as a file

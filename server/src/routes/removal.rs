@@ -116,7 +116,7 @@ async fn restore_target(
 ) -> ApiResult<Json<SessionView>> {
     blocking(move || {
         restored(&state, &live, target, |session| {
-            targets::has_room(session)?;
+            targets::has_room(session, state.limits())?;
             Ok(session.restore_target(target)?)
         })
     })

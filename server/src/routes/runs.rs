@@ -19,7 +19,8 @@ use utoipa_axum::routes;
 use crate::cancel::CancelFlag;
 use crate::extract::{Body, Params, RunPath, TargetPath};
 use crate::jobs::blocking;
-use crate::live_session::{LiveSession, RUN_LIMIT};
+use crate::limits::Limit;
+use crate::live_session::LiveSession;
 use crate::problem::{ApiError, ApiResult};
 use crate::revision;
 use crate::routes::route::{location, route};
@@ -141,7 +142,7 @@ fn add(
         None
     };
     let run = state.change(live, |session| {
-        has_room(session, target)?;
+        has_room(session, target, &state.limits().runs)?;
         // A run again from the very step at which its parent was displaced is displaced alike, unless it says where.
         let inherited = session.run(target, new.run)?.displaced_at(new.from_step);
         let run = session.fork(target, new.run, new.from_step, &new.settings, redesignated)?;
@@ -155,13 +156,12 @@ fn add(
     Ok((StatusCode::ACCEPTED, location, Json(view(state, live, target, run)?)).into_response())
 }
 
-fn has_room(session: &Session, target: usize) -> ApiResult<()> {
-    let full = session.target(target)?.runs.len() >= RUN_LIMIT;
-    if full {
-        Err(ApiError::conflict(format!("A target may have at most {RUN_LIMIT} runs.")))
-    } else {
-        Ok(())
+fn has_room(session: &Session, target: usize, limit: &Limit) -> ApiResult<()> {
+    let most = limit.count();
+    if session.target(target)?.runs.len() < most {
+        return Ok(());
     }
+    Err(ApiError::conflict(format!("A target may have at most {most} runs.")).hint(limit.raise()))
 }
 
 /// The run that the path names.

@@ -19,7 +19,8 @@ use utoipa_axum::routes;
 use crate::cancel::CancelFlag;
 use crate::extract::{Body, SessionPath, TargetPath};
 use crate::jobs::blocking;
-use crate::live_session::{LABEL_LIMIT, LiveSession, TARGET_LIMIT, TARGET_NUMBERS};
+use crate::limits::Limits;
+use crate::live_session::{LABEL_LIMIT, LiveSession};
 use crate::problem::{ApiError, ApiResult};
 use crate::routes::route::{location, route};
 use crate::routes::trackability;
@@ -74,7 +75,8 @@ fn add(
     settings: Settings,
     cancel: &CancelFlag,
 ) -> ApiResult<Response> {
-    live.with(|session| has_number(session))?;
+    let limits = state.limits();
+    live.with(|session| has_number(session, limits))?;
     let named = new.place().name(&live.traverse.traverse, new.step)?;
     let designation = named.designation;
     let first = runner::designate(&live.traverse, designation, &settings, cancel)
@@ -82,7 +84,7 @@ fn add(
     let first = Arc::new(first);
     let gap_m = named.gap_m(&first);
     let target = state.change(live, |session| {
-        has_number(session)?;
+        has_number(session, limits)?;
         Ok(session.add_target(new.label, settings, first))
     })?;
     state.look_at(&live.traverse, designation.step);
@@ -100,22 +102,24 @@ fn add(
 ///
 /// # Errors
 /// A problem when it has too many.
-pub(crate) fn has_room(session: &Session) -> ApiResult<()> {
-    if session.target_count() < TARGET_LIMIT {
+pub(crate) fn has_room(session: &Session, limits: &Limits) -> ApiResult<()> {
+    let most = limits.targets.count();
+    if session.target_count() < most {
         return Ok(());
     }
-    let detail = format!("A session may have at most {TARGET_LIMIT} targets.");
-    Err(ApiError::conflict(detail).hint("Remove one that is not needed."))
+    let detail = format!("A session may have at most {most} targets.");
+    Err(ApiError::conflict(detail).hint(limits.targets.hint("Remove one that is not needed.")))
 }
 
 /// Whether a session may have another target with a number of its own.
-fn has_number(session: &Session) -> ApiResult<()> {
-    has_room(session)?;
-    if session.targets.len() < TARGET_NUMBERS {
+fn has_number(session: &Session, limits: &Limits) -> ApiResult<()> {
+    has_room(session, limits)?;
+    let most = limits.target_numbers.count();
+    if session.targets.len() < most {
         return Ok(());
     }
-    let detail = format!("A session may have at most {TARGET_NUMBERS} targets, the removed ones included.");
-    Err(ApiError::conflict(detail).hint("Begin another session."))
+    let detail = format!("A session may have at most {most} targets, the removed ones included.");
+    Err(ApiError::conflict(detail).hint(limits.target_numbers.hint("Begin another session.")))
 }
 
 /// Continues a run; when too much is waiting, the run says so and can be resumed.

@@ -36,7 +36,7 @@ impl AppState {
         is_awake: bool,
         make: impl FnOnce(String) -> ApiResult<(Session, Notes)>,
     ) -> ApiResult<Arc<LiveSession>> {
-        let number = lock(&self.0.sessions).reserve()?;
+        let number = lock(&self.0.sessions).reserve(&self.limits().sessions)?;
         let made = make(store::id_of(number)).and_then(|(session, notes)| {
             self.0.store.save_with(&session.saved(), Some(&notes))?;
             let live = LiveSession::new(session, traverse, is_awake);
@@ -87,6 +87,7 @@ impl AppState {
 
     /// Tells every page that a session was changed.
     fn announce(&self, live: &LiveSession) {
+        live.measure();
         self.tell(Event::SessionChanged { session: live.id.clone() });
         self.touched(live);
     }

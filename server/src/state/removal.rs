@@ -37,7 +37,7 @@ impl AppState {
     pub(crate) fn restore_session(&self, id: &str) -> ApiResult<Arc<LiveSession>> {
         let number = store::number_of(id);
         let number = number.ok_or_else(|| ApiError::not_found("There is no such removed session."))?;
-        sessions::restore(&self.0.sessions, &self.0.store, number)?;
+        sessions::restore(&self.0.sessions, &self.0.store, &self.limits().sessions, number)?;
         self.tell(Event::SessionChanged { session: id.to_owned() });
         self.session(id)
     }

@@ -17,12 +17,8 @@ use super::execute::{Progress, carry_out};
 use super::order::Order;
 use super::saved::{Keeper, KeptStudy};
 use crate::jobs::{Lane, lock};
+use crate::limits::SharedLimits;
 use crate::problem::{ApiError, ApiResult};
-
-/// How many studies the list holds.
-const STUDY_LIMIT: usize = 64;
-/// How many may wait.
-const WAITING_LIMIT: usize = 16;
 
 /// The studies of a server.
 pub(crate) struct Shelf {
@@ -31,6 +27,7 @@ pub(crate) struct Shelf {
     jobs: Lane,
     keeper: Keeper,
     works: Mutex<Vec<Arc<Work>>>,
+    limits: SharedLimits,
 }
 
 /// A study that was started.
@@ -52,8 +49,14 @@ struct Inside {
 
 impl Shelf {
     /// A shelf whose studies work in `folder`; its list is read back by [`Shelf::read_back`].
-    pub(crate) fn new(folder: PathBuf, events: broadcast::Sender<Event>, keeper: Keeper) -> Self {
-        Self { folder, events, jobs: Lane::new(1, WAITING_LIMIT), keeper, works: Mutex::default() }
+    pub(crate) fn new(
+        folder: PathBuf,
+        events: broadcast::Sender<Event>,
+        keeper: Keeper,
+        limits: &SharedLimits,
+    ) -> Self {
+        let jobs = Lane::new(1, limits.studies_waiting.count());
+        Self { folder, events, jobs, keeper, works: Mutex::default(), limits: Arc::clone(limits) }
     }
 
     /// Puts the studies on the shelf that were kept; `order` says what is to be done for one, and where it cannot, because
@@ -103,11 +106,12 @@ impl Shelf {
     pub(crate) fn add(&self, new: NewStudy, order: Order) -> ApiResult<StudyJob> {
         let work = {
             let mut works = lock(&self.works);
-            let surplus = if works.len() >= STUDY_LIMIT {
+            let limit = &self.limits.studies;
+            let surplus = if works.len() >= limit.count() {
                 let ended = works.iter().position(|work| work.has_ended());
                 Some(ended.ok_or_else(|| {
-                    ApiError::conflict(format!("{STUDY_LIMIT} studies are under way already."))
-                        .hint("Wait until some of them are done, or cancel one.")
+                    ApiError::conflict(format!("{} studies are under way already.", works.len()))
+                        .hint(limit.hint("Wait until some of them are done, or cancel one."))
                 })?)
             } else {
                 None

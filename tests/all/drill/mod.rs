@@ -24,9 +24,14 @@ const MARK: &str = "drill |";
 /// Drills measure the same machine: one at a time.
 static ONE: Mutex<()> = Mutex::new(());
 
+/// Whether this is the drill itself, and not the slice of it that the tests contain: only the drill judges times and memory.
+pub(crate) fn is_whole() -> bool {
+    std::env::var_os("SIGHTLINE_DRILL").is_some()
+}
+
 /// The number for the whole scale, or the one for the tests.
 pub(crate) fn scale<T>(whole: T, small: T) -> T {
-    if std::env::var_os("SIGHTLINE_DRILL").is_some() { whole } else { small }
+    if is_whole() { whole } else { small }
 }
 
 /// Prints a line of the table.
@@ -111,6 +116,9 @@ impl<T> Watched<T> {
         assert!(self.after.threads <= most(self.before.threads), "threads: {} after", self.after.threads);
         let [before, after] = [self.before.descriptors, self.after.descriptors];
         assert!(after <= most(before), "descriptors: {before} before, {after} after");
+        // On a small scale, what is made once and kept is most of the memory.
+        let [before, after] = [self.before.resident_mib, self.after.resident_mib];
+        assert!(!is_whole() || after <= before + before / 5, "MiB: {before} before, {after} after");
     }
 }
 

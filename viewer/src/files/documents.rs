@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use serde_json::{Map, Value};
-use sightline_api::program::BODY_BYTES;
+use sightline_api::program::FILE_BYTES;
 use sightline_session::breakpoints::BREAKPOINT_LIMIT;
 use sightline_session::expression::Expression;
 use sightline_session::reproduce::Opened;
@@ -15,8 +15,8 @@ use sightline_track::settings::{Changes, Settings};
 use sightline_world::Scenario;
 use sightline_world::toml_text;
 
-/// The largest JSON file that is read, bytes: what the server takes.
-pub(crate) const JSON_LIMIT: u64 = BODY_BYTES as u64;
+/// The largest JSON file that is read, bytes: the largest session that the server takes by default.
+pub(crate) const JSON_LIMIT: u64 = FILE_BYTES as u64;
 /// The largest other file that is read, bytes: scenarios and configurations have a few thousand.
 pub(crate) const TEXT_LIMIT: u64 = 512 << 10;
 /// How many characters of a file's name are shown.
@@ -174,7 +174,7 @@ fn of_json(text: &str) -> Result<Document, String> {
         let opened =
             Opened::read(&value).map_err(|why| format!("is no reproduce.json that can be opened: {why}."))?;
         let size = serde_json::to_vec(&opened.reproduction).map_or(usize::MAX, |bytes| bytes.len());
-        if size > BODY_BYTES {
+        if size > FILE_BYTES {
             return Err("has more runs and notes than one request may have: remove runs that are not needed, and export it again.".to_owned());
         }
         return Ok(Document::Session(Box::new(opened)));

@@ -1,7 +1,9 @@
 //! Applies the user's commands to the state.
 
 use sightline_api::endpoint::{Call, Endpoint, NoBody};
-use sightline_api::endpoints::{CancelRun, CloseRecording, DesignateTarget, ForkRun, ResumeRun, StreamRecording};
+use sightline_api::endpoints::{
+    CancelRun, CloseRecording, DesignateTarget, ForkRun, ResumeRun, StreamRecording,
+};
 use sightline_api::location::{AtRun, AtSession, AtTarget};
 use sightline_api::wire::{Designated, NewRun, NewTarget};
 use sightline_geometry::frames::Pixel;

@@ -144,6 +144,20 @@ impl Ground {
         settings: &Settings,
         limits: &TrackabilityLimits,
     ) -> Result<Self> {
+        Self::new_until(stops, step, settings, limits, Cancel::default())
+    }
+
+    /// [`Ground::new`], which ends soon after `cancel` is requested.
+    ///
+    /// # Errors
+    /// As [`Ground::new`], and [`Error::Cancelled`].
+    pub fn new_until(
+        stops: &dyn Stops,
+        step: usize,
+        settings: &Settings,
+        limits: &TrackabilityLimits,
+        cancel: Cancel<'_>,
+    ) -> Result<Self> {
         let count = stops.stop_count();
         if step >= count {
             return Err(Error::Target(format!("step {step} does not exist: the traverse has {count} stops")));
@@ -154,8 +168,8 @@ impl Ground {
         let pair = stops.capture(step)?;
         let (left, right) = stops.cameras(step);
         let stereo = StereoSettings::default();
-        let surface =
-            StopSurface::shared(stops.shared(step), &pair, [left, right], &stereo, Cancel::default())?;
+        let surface = StopSurface::shared(stops.shared(step), &pair, [left, right], &stereo, cancel)?;
+        cancel.check()?;
         let (image, edges_px) = (pair.left, edge_distances(&surface.disparities, limits));
         let ranges = Ranges { surface: &surface, left };
         Ok(Self {

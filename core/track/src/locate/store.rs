@@ -1,26 +1,141 @@
 //! A store that the targets of a traverse share: results that depend on a stop and on settings alone (R207).
 //!
-//! Features, surfaces and motions are functions of the images, the cameras and the settings, so that keeping them changes
-//! nothing but the time: five targets, a second run or a step back find them ready. The least recently used is forgotten
-//! first. The store does not know its contents: each type of value has a cache of its own.
+//! Images, features, surfaces and motions are functions of the files, the cameras and the settings, so that keeping them
+//! changes nothing but the time: five targets, a second run or a step back find them ready. All traverses of a program
+//! may share one [`Cache`] with a limit in bytes: the least recently used value is forgotten first, of whichever traverse
+//! and type. A traverse that goes away takes its values along.
 
-use std::any::{Any, TypeId};
-use std::collections::{HashMap, VecDeque};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::any::Any;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Results that were found before, by type.
-#[derive(Default)]
-pub struct SharedStore(Mutex<HashMap<TypeId, Arc<dyn Any + Send + Sync>>>);
+/// The memory that a cache may take unless its program says otherwise, bytes: 64 pairs of 1024 × 1024.
+pub const CACHE_BYTES: usize = 512 << 20;
+
+/// A value that can say how much memory it takes.
+pub trait HeapBytes {
+    /// Memory outside of the value itself, bytes; small parts may be left out.
+    fn heap_bytes(&self) -> usize;
+}
+
+/// Values of any traverse and type within a fixed amount of memory.
+#[derive(Debug)]
+pub struct Cache(Mutex<Entries>);
+
+#[derive(Debug)]
+struct Entries {
+    all: Vec<Entry>,
+    bytes: usize,
+    limit_bytes: usize,
+    /// Counts uses: a larger number is a later one.
+    clock: u64,
+    last_owner: u64,
+}
+
+/// A value with what it was found for.
+#[derive(Debug)]
+struct Entry {
+    owner: u64,
+    used: u64,
+    bytes: usize,
+    /// An [`Item`] of its types.
+    item: Box<dyn Any + Send>,
+}
+
+/// Key, settings and value.
+type Item<K, S, V> = (K, S, Arc<V>);
+
+impl Cache {
+    /// A cache of at most so many bytes.
+    pub fn new(limit_bytes: usize) -> Self {
+        Self(Mutex::new(Entries { all: Vec::new(), bytes: 0, limit_bytes, clock: 0, last_owner: 0 }))
+    }
+
+    /// The memory that the values take, bytes.
+    pub fn bytes(&self) -> usize {
+        self.lock().bytes
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Entries> {
+        // A panic elsewhere cannot leave the entries half changed.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Default for Cache {
+    fn default() -> Self {
+        Self::new(CACHE_BYTES)
+    }
+}
+
+impl Entries {
+    /// The place of the value that an owner has for a key.
+    fn find<K, S, V>(&self, owner: u64, key: &K, settings: &S) -> Option<usize>
+    where
+        K: PartialEq + 'static,
+        S: PartialEq + 'static,
+        V: 'static,
+    {
+        self.all.iter().position(|entry| {
+            let item = (entry.owner == owner).then(|| entry.item.downcast_ref::<Item<K, S, V>>());
+            item.flatten().is_some_and(|(own, of, _)| own == key && of == settings)
+        })
+    }
+
+    fn remove(&mut self, place: usize) {
+        self.bytes -= self.all.swap_remove(place).bytes;
+    }
+
+    /// Removes the least recently used of the entries that are meant.
+    fn remove_oldest(&mut self, is_meant: impl Fn(&Entry) -> bool) {
+        let meant = self.all.iter().enumerate().filter(|(_, entry)| is_meant(entry));
+        if let Some((place, _)) = meant.min_by_key(|(_, entry)| entry.used) {
+            self.remove(place);
+        }
+    }
+}
+
+/// The part of a cache that belongs to one traverse.
+#[derive(Debug)]
+pub struct SharedStore {
+    cache: Arc<Cache>,
+    owner: u64,
+}
+
+impl Default for SharedStore {
+    /// A store with a cache of its own.
+    fn default() -> Self {
+        Self::within(&Arc::default())
+    }
+}
+
+impl Drop for SharedStore {
+    fn drop(&mut self) {
+        let mut entries = self.cache.lock();
+        while let Some(place) = entries.all.iter().position(|entry| entry.owner == self.owner) {
+            entries.remove(place);
+        }
+    }
+}
 
 impl SharedStore {
+    /// A store within a cache that others use, too.
+    pub fn within(cache: &Arc<Cache>) -> Self {
+        let owner = {
+            let mut entries = cache.lock();
+            entries.last_owner += 1;
+            entries.last_owner
+        };
+        Self { cache: Arc::clone(cache), owner }
+    }
+
     /// The kept value of `key` and `settings`, or the one that `find` returns; at most `limit` of its type are kept.
     pub fn get<K, S, V>(&self, key: K, settings: &S, limit: usize, find: impl FnOnce() -> V) -> Arc<V>
     where
         K: PartialEq + Send + 'static,
         S: PartialEq + Clone + Send + 'static,
-        V: Send + Sync + 'static,
+        V: HeapBytes + Send + Sync + 'static,
     {
-        self.cache().get(key, settings, limit, find)
+        self.kept(&key, settings).unwrap_or_else(|| self.keep(key, settings, limit, Arc::new(find())))
     }
 
     /// The same for a computation that may fail; a failure is not kept.
@@ -37,24 +152,54 @@ impl SharedStore {
     where
         K: PartialEq + Send + 'static,
         S: PartialEq + Clone + Send + 'static,
+        V: HeapBytes + Send + Sync + 'static,
+    {
+        match self.kept(&key, settings) {
+            Some(found) => Ok(found),
+            None => Ok(self.keep(key, settings, limit, Arc::new(find()?))),
+        }
+    }
+
+    /// The kept value. Nobody waits while one is being found: what two find at once is the same.
+    pub fn kept<K, S, V>(&self, key: &K, settings: &S) -> Option<Arc<V>>
+    where
+        K: PartialEq + Send + 'static,
+        S: PartialEq + Clone + Send + 'static,
         V: Send + Sync + 'static,
     {
-        self.cache().try_get(key, settings, limit, find)
+        let mut entries = self.cache.lock();
+        let place = entries.find::<K, S, V>(self.owner, key, settings)?;
+        entries.clock += 1;
+        entries.all[place].used = entries.clock;
+        entries.all[place].item.downcast_ref::<Item<K, S, V>>().map(|(_, _, value)| Arc::clone(value))
     }
 
-    /// The cache of one type of value.
-    fn cache<K: Send + 'static, S: Send + 'static, V: Send + Sync + 'static>(&self) -> Arc<Kept<K, S, V>> {
-        let mut caches = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let new = || -> Arc<dyn Any + Send + Sync> { Arc::new(Kept::<K, S, V>::default()) };
-        let cache = Arc::clone(caches.entry(TypeId::of::<Kept<K, S, V>>()).or_insert_with(new));
-        // The type is that of the key.
-        cache.downcast().unwrap_or_default()
-    }
-}
-
-impl std::fmt::Debug for SharedStore {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("SharedStore")
+    /// Keeps a value, and forgets the least recently used ones beyond the limits: `limit` values of its type, and the bytes
+    /// of the cache.
+    pub fn keep<K, S, V>(&self, key: K, settings: &S, limit: usize, value: Arc<V>) -> Arc<V>
+    where
+        K: PartialEq + Send + 'static,
+        S: PartialEq + Clone + Send + 'static,
+        V: HeapBytes + Send + Sync + 'static,
+    {
+        let mut entries = self.cache.lock();
+        if let Some(place) = entries.find::<K, S, V>(self.owner, &key, settings) {
+            entries.remove(place);
+        }
+        let bytes = value.heap_bytes() + size_of::<V>() + size_of::<Item<K, S, V>>();
+        let item: Box<dyn Any + Send> = Box::new((key, settings.clone(), Arc::clone(&value)));
+        entries.clock += 1;
+        let entry = Entry { owner: self.owner, used: entries.clock, bytes, item };
+        entries.all.push(entry);
+        entries.bytes += bytes;
+        let is_alike = |entry: &Entry| entry.owner == self.owner && entry.item.is::<Item<K, S, V>>();
+        if entries.all.iter().filter(|entry| is_alike(entry)).count() > limit {
+            entries.remove_oldest(is_alike);
+        }
+        while entries.bytes > entries.limit_bytes {
+            entries.remove_oldest(|_| true);
+        }
+        value
     }
 }
 
@@ -85,7 +230,7 @@ pub(crate) fn shared<S, V, E>(
 ) -> Result<Arc<V>, E>
 where
     S: PartialEq + Clone + Send + 'static,
-    V: Send + Sync + 'static,
+    V: HeapBytes + Send + Sync + 'static,
 {
     match shared {
         Some(Shared { store, stop }) => store.try_get(stop, settings, limit, find),
@@ -93,60 +238,64 @@ where
     }
 }
 
-/// A value with what it was found for.
-type Entry<K, S, V> = (K, S, Arc<V>);
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// Values by key and settings, the most recently used at the back.
-struct Kept<K, S, V>(Mutex<VecDeque<Entry<K, S, V>>>);
+    /// A value of so many bytes.
+    struct Block(usize);
 
-impl<K, S, V> Default for Kept<K, S, V> {
-    fn default() -> Self {
-        Self(Mutex::default())
-    }
-}
-
-impl<K: PartialEq, S: PartialEq + Clone, V> Kept<K, S, V> {
-    /// The kept value, or the one that `find` makes.
-    fn get(&self, key: K, settings: &S, limit: usize, find: impl FnOnce() -> V) -> Arc<V> {
-        self.kept(&key, settings).unwrap_or_else(|| self.keep(key, settings, limit, find()))
-    }
-
-    /// The same where it may fail.
-    fn try_get<E>(
-        &self,
-        key: K,
-        settings: &S,
-        limit: usize,
-        find: impl FnOnce() -> Result<V, E>,
-    ) -> Result<Arc<V>, E> {
-        match self.kept(&key, settings) {
-            Some(found) => Ok(found),
-            None => Ok(self.keep(key, settings, limit, find()?)),
+    impl HeapBytes for Block {
+        fn heap_bytes(&self) -> usize {
+            self.0
         }
     }
 
-    /// The kept value. Nobody waits while one is being found: what two find at once is the same.
-    fn kept(&self, key: &K, settings: &S) -> Option<Arc<V>> {
-        self.with(|entries| {
-            let place = entries.iter().position(|(own, of, _)| own == key && of == settings)?;
-            let entry = entries.remove(place)?;
-            let value = Arc::clone(&entry.2);
-            entries.push_back(entry);
-            Some(value)
-        })
+    fn kept(store: &SharedStore, key: usize) -> bool {
+        store.kept::<usize, (), Block>(&key, &()).is_some()
     }
 
-    fn keep(&self, key: K, settings: &S, limit: usize, value: V) -> Arc<V> {
-        let value = Arc::new(value);
-        self.with(|entries| {
-            entries.push_back((key, settings.clone(), Arc::clone(&value)));
-            entries.drain(..entries.len().saturating_sub(limit));
-        });
-        value
+    fn keep(store: &SharedStore, key: usize, bytes: usize) {
+        store.keep(key, &(), usize::MAX, Arc::new(Block(bytes)));
     }
 
-    fn with<T>(&self, work: impl FnOnce(&mut VecDeque<Entry<K, S, V>>) -> T) -> T {
-        // A panic elsewhere cannot leave the entries half changed.
-        work(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    #[test]
+    fn the_value_unused_for_longest_goes_first_of_any_traverse() {
+        let cache = Arc::new(Cache::new(3 << 20));
+        let (one, other) = (SharedStore::within(&cache), SharedStore::within(&cache));
+        keep(&one, 0, 1 << 20);
+        keep(&other, 0, 1 << 20);
+        assert!(kept(&one, 0));
+        keep(&one, 1, 1 << 20);
+        assert!(!kept(&other, 0) && kept(&one, 0) && kept(&one, 1));
+        assert!((2 << 20..3 << 20).contains(&cache.bytes()), "{}", cache.bytes());
+        // One that is larger than the cache is not kept, and takes all others with it.
+        keep(&other, 7, 4 << 20);
+        assert!(!kept(&other, 7) && cache.bytes() == 0);
+    }
+
+    #[test]
+    fn a_store_that_goes_away_gives_its_memory_back() {
+        let cache = Arc::new(Cache::default());
+        let (one, other) = (SharedStore::within(&cache), SharedStore::within(&cache));
+        (0..5).for_each(|key| keep(&one, key, 1000));
+        keep(&other, 0, 10);
+        keep(&other, 0, 10);
+        drop(one);
+        assert!((10..1000).contains(&cache.bytes()), "{}", cache.bytes());
+        assert!(kept(&other, 0));
+    }
+
+    #[test]
+    fn each_type_has_a_number_of_its_own() {
+        let store = SharedStore::default();
+        let block = |key: usize| store.get(key, &(), 2, || Block(1));
+        (0..4).for_each(|key| drop(block(key)));
+        assert_eq!((0..4).filter(|&key| kept(&store, key)).count(), 2);
+        let other = store.get("text", &1, 2, || Block(5));
+        assert!(Arc::ptr_eq(&other, &store.get("text", &1, 2, || unreachable!("it is kept"))));
+        assert!(kept(&store, 3), "values of another key do not count");
+        let failed: Result<Arc<Block>, &str> = store.try_get(9, &(), 2, || Err("no"));
+        assert!(failed.is_err() && !kept(&store, 9));
     }
 }

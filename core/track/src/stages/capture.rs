@@ -8,6 +8,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::locate::store::HeapBytes;
 use sightline_geometry::frames::Pixel;
 use sightline_record::{Declaration, Record, Unit};
 use sightline_vision::image::{GrayImage, PixelRect};
@@ -19,6 +20,12 @@ pub struct StereoPair {
     pub left: Arc<GrayImage>,
     /// The right (or second) image.
     pub right: Arc<GrayImage>,
+}
+
+impl HeapBytes for StereoPair {
+    fn heap_bytes(&self) -> usize {
+        size_of_val(self.left.as_raw().as_slice()) + size_of_val(self.right.as_raw().as_slice())
+    }
 }
 
 /// The stereo pair with what is known of its exposure.

@@ -17,6 +17,7 @@ use nalgebra::{Matrix3, SMatrix};
 
 use super::match_stereo::{StereoMatch, match_stereo, pixel_of};
 use super::settings::FeatureSettings;
+use crate::locate::store::HeapBytes;
 use crate::stages::capture::StereoPair;
 use sightline_geometry::camera::Camera;
 use sightline_geometry::cancel::Cancel;
@@ -51,6 +52,13 @@ pub struct StopFeatures {
     pub points: Vec<Point>,
     /// Left features whose partner lies beyond the ranges or not in front of the cameras.
     pub out_of_range: usize,
+}
+
+impl HeapBytes for StopFeatures {
+    fn heap_bytes(&self) -> usize {
+        let of_eye = |eye: &Features| size_of_val(&*eye.keypoints) + size_of_val(&*eye.descriptors);
+        of_eye(&self.left) + of_eye(&self.right) + size_of_val(&*self.points)
+    }
 }
 
 impl StopFeatures {

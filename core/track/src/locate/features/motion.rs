@@ -19,6 +19,7 @@ use sightline_vision::sift::matching::{self, Match};
 
 use super::detect::StopFeatures;
 use super::settings::FeatureSettings;
+use crate::locate::store::HeapBytes;
 
 /// Shift of the pixels by which their common error is propagated, px: small against what bends the motion.
 const SHIFT_PX: f64 = 0.05;
@@ -39,6 +40,12 @@ pub struct Motion {
     pub by_shared_error: Option<[Vector6<f64>; 3]>,
     /// Whether there was a prior and too little agreed with it, so that the features were looked for everywhere.
     pub prior_given_up: bool,
+}
+
+impl HeapBytes for Motion {
+    fn heap_bytes(&self) -> usize {
+        size_of_val(&*self.matches) + size_of_val(&*self.fit.inliers)
+    }
 }
 
 /// What a motion is measured from.

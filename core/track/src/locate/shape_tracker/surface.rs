@@ -21,7 +21,7 @@ use utoipa::ToSchema;
 
 use super::settings::ShapeTrackerSettings;
 use crate::locate::features::evidence::Table;
-use crate::locate::store::{self, Shared};
+use crate::locate::store::{self, HeapBytes, Shared};
 use crate::stages::capture::StereoPair;
 use sightline_geometry::camera::Camera;
 use sightline_geometry::cancel::Cancel;
@@ -68,6 +68,13 @@ pub struct SurfaceSeen {
     pub detail_rms_m: f64,
     /// Every so many pixels and rows of the disparities are shown.
     pub shown_every: usize,
+}
+
+impl HeapBytes for StopSurface {
+    fn heap_bytes(&self) -> usize {
+        let DisparityMap { disparity_px, outcome, .. } = &self.disparities;
+        size_of_val(&**disparity_px) + size_of_val(&**outcome) + size_of_val(&*self.points_m)
+    }
 }
 
 impl StopSurface {

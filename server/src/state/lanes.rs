@@ -1,0 +1,70 @@
+//! The lanes in which requests are answered: how much is done at a time, and how much may wait.
+
+use super::AppState;
+use crate::jobs::Lane;
+use crate::limits::{Limit, SharedLimits};
+
+/// Questions that are answered at a time: each tries many steps, and each step uses all processors.
+const ANSWERS_AT_A_TIME: usize = 1;
+
+/// The lanes of requests; runs, studies and trackability maps have their own.
+pub(super) struct Lanes {
+    designations: Lane,
+    pictures: Lane,
+    queries: Lane,
+    exports: Lane,
+    tries: Lane,
+    answers: Lane,
+}
+
+/// A lane by its limits.
+pub(super) fn lane(at_a_time: &Limit, waiting: &Limit) -> Lane {
+    Lane::new(at_a_time.count(), waiting.count())
+}
+
+impl Lanes {
+    pub(super) fn new(limits: &SharedLimits) -> Self {
+        let interactive =
+            || lane(&limits.designations_at_a_time, &limits.designations_waiting).within(limits);
+        Self {
+            designations: interactive(),
+            pictures: lane(&limits.images_at_a_time, &limits.images_waiting),
+            queries: lane(&limits.queries_at_a_time, &limits.queries_waiting),
+            exports: lane(&limits.exports_at_a_time, &limits.exports_waiting),
+            tries: interactive(),
+            answers: Lane::new(ANSWERS_AT_A_TIME, limits.runs_waiting.count()),
+        }
+    }
+}
+
+impl AppState {
+    /// Where designations are computed.
+    pub(crate) fn designations(&self) -> &Lane {
+        &self.0.lanes.designations
+    }
+
+    /// Where images are read.
+    pub(crate) fn pictures(&self) -> &Lane {
+        &self.0.lanes.pictures
+    }
+
+    /// Where expressions are asked over all steps.
+    pub(crate) fn queries(&self) -> &Lane {
+        &self.0.lanes.queries
+    }
+
+    /// Where recordings are written.
+    pub(crate) fn exports(&self) -> &Lane {
+        &self.0.lanes.exports
+    }
+
+    /// Where single steps are tried.
+    pub(crate) fn tries(&self) -> &Lane {
+        &self.0.lanes.tries
+    }
+
+    /// Where questions are answered.
+    pub(crate) fn answers(&self) -> &Lane {
+        &self.0.lanes.answers
+    }
+}
