@@ -88,6 +88,10 @@ impl State {
         deed: Option<Deed>,
     ) {
         self.call::<E>(Call::to::<E>(at), move |state, view| {
+            if state.session.as_ref().is_none_or(|open| open.id != view.id) {
+                // Another session was opened meanwhile.
+                return;
+            }
             if let Some(deed) = deed {
                 state.did_remove(&what, deed);
             }

@@ -12,7 +12,7 @@ use sightline_api::wire::Problem;
 use sightline_session::Fork;
 use sightline_session::breakpoints::{BreakpointChange, BreakpointView, NewBreakpoint};
 use sightline_session::notes::{Note, Pin};
-use sightline_session::view::RunView;
+use sightline_session::view::{RunView, SessionView};
 use sightline_track::settings::Changes;
 
 use crate::command::Command;
@@ -79,6 +79,11 @@ fn deeds_are_taken_back_and_done_again() {
     assert_eq!(calls_of::<RestoreTarget>(&mut state), [restore]);
     answer::<RestoreTarget>(&mut state, &view);
     assert_eq!(state.undo.ends(), (None, Some(&Deed::RemovedTarget { target: 0 })));
+    // An answer about another session changes nothing.
+    state.perform(Command::RemoveTarget(0));
+    answer::<RemoveTarget>(&mut state, &SessionView { id: "s2".to_owned(), ..view });
+    assert_eq!(state.session.as_ref().unwrap().id, "s1");
+    assert_eq!(state.undo.ends().0, None);
     // The draft goes back value by value, a drag as one.
     for value in [0.6, 0.5, 0.4] {
         state.perform(Command::Draft { key: "ncc_min".to_owned(), value: Some(json!(value)) });
