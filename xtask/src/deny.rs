@@ -119,10 +119,8 @@ impl fmt::Display for Finding {
 
 /// Fails if a dependency breaks a rule.
 pub(crate) fn check() -> Result<()> {
-    let text = std::fs::read_to_string(cmd::root().join(FILE)).context("deny.toml cannot be read")?;
-    let rules = read(&text)?;
-    let features: &[&str] = if rules.graph.all_features { &["--all-features"] } else { &[] };
-    let packages = Packages::for_targets(&rules.graph.targets, features)?.all;
+    let rules = read(&text()?)?;
+    let packages = rules.graph.packages()?;
     let findings = rules.findings(&packages);
     for finding in &findings {
         cmd::say(finding);
@@ -137,8 +135,19 @@ pub(crate) fn check() -> Result<()> {
     Ok(())
 }
 
+fn text() -> Result<String> {
+    std::fs::read_to_string(cmd::root().join(FILE)).with_context(|| format!("{FILE} cannot be read"))
+}
+
 fn read(text: &str) -> Result<Rules> {
     toml::from_str(text).with_context(|| format!("{FILE} has a rule that is not applied here"))
+}
+
+impl Graph {
+    fn packages(&self) -> Result<Vec<Package>> {
+        let features: &[&str] = if self.all_features { &["--all-features"] } else { &[] };
+        Ok(Packages::for_targets(&self.targets, features)?.all)
+    }
 }
 
 impl Rules {
@@ -313,6 +322,26 @@ mod tests {
             expect_one(from(source), "which is not allowed");
         }
         assert_eq!(findings(Package { source: None, ..package("c", "MIT") }), Vec::<String>::new());
+    }
+
+    #[test]
+    fn each_rule_of_the_repository_has_an_effect() {
+        let text = text().expect("rules");
+        let rules = read(&text).expect("rules");
+        let packages = rules.graph.packages().expect("packages");
+        assert_eq!(rules.findings(&packages), []);
+        for (rule, other) in [
+            ("\"Unicode-3.0\",", ""),
+            ("\"Zlib\",", "\"Zlib\", \"EUPL-1.2\","),
+            ("crate = \"webdriver\"", "crate = \"axum\""),
+            ("crate = \"cmake\"", "crate = \"serde\""),
+            ("rust-lang/crates.io-index", "other/index"),
+            ("allow-wildcard-paths = true", "allow-wildcard-paths = false"),
+        ] {
+            assert!(text.contains(rule), "no rule {rule}");
+            let changed = read(&text.replace(rule, other)).expect("rules");
+            assert_ne!(changed.findings(&packages), [], "{other} in place of {rule}");
+        }
     }
 
     #[test]

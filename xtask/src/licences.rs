@@ -197,6 +197,26 @@ mod tests {
     }
 
     #[test]
+    fn every_part_of_the_program_has_a_text() {
+        let host = crate::packages::host().expect("a compiler");
+        let packages = crate::parts::packages(&host).expect("packages");
+        let parts = crate::parts::parts(&packages, &host).expect("parts");
+        let list = listing(&parts, "sightline 0", "1.0.0").expect("texts");
+        for part in &parts {
+            let line = format!("\n{} {} | ", part.package.name, part.package.version);
+            assert_eq!(list.contains(&line), part.package.source.is_some(), "{line}");
+        }
+        for words in [
+            "SIL OPEN FONT LICENSE Version 1.1",
+            "UBUNTU FONT LICENCE Version 1.0",
+            "Bitstream Vera",
+            "BoringSSL",
+        ] {
+            assert!(list.contains(words), "no text of {words}");
+        }
+    }
+
+    #[test]
     fn a_package_without_a_text_gets_a_standard_one() {
         let list = listed("Apache-2.0 OR MIT", &["A. Author"], &[("src/license.rs", "no")]).expect("a list");
         assert!(list.contains("\none 1.0.0 | program | Apache-2.0 OR MIT | [2]\n"), "{list}");
