@@ -271,6 +271,19 @@ async fn the_document_describes_every_route_and_names_each_once() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_plain_page_that_is_not_there_is_a_page() {
+    let (server, session, _folders) = server().await;
+    for path in [
+        format!("sessions/{session}/targets/0/runs/2/steps/-1/page"),
+        format!("sessions/{session}/targets/0/runs/0/steps/0/page"),
+        "sessions/s99/page".to_owned(),
+    ] {
+        let answer = server.get(&path).await;
+        assert_eq!((answer.status, answer.headers[header::CONTENT_TYPE].to_str().unwrap()), (StatusCode::NOT_FOUND, "text/html; charset=utf-8"), "{path}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn the_table_of_settings_is_what_the_tracker_takes() {
     let (server, _, _folders) = server().await;
     let table = server.get("settings").await.expect(200);
