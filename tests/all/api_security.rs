@@ -114,6 +114,7 @@ async fn names_that_do_not_exist_are_not_found_however_they_are_written() {
         ["/../Cargo.toml", "/%2e%2e/Cargo.toml", "/..%2fCargo.toml", "//etc/passwd", "/api/v2/version"]
     {
         let request = axum::http::Request::get(path).header(header::HOST, format!("localhost:{PORT}"));
+        let request = request.header(header::AUTHORIZATION, format!("Bearer {TOKEN}"));
         server.send(request.body(Body::empty()).unwrap()).await.problem(404, "not_found");
     }
     server.get(&format!("sessions/{session}")).await.expect(200);
