@@ -7,6 +7,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use axum::http::StatusCode;
 use sightline_api::wire::Event;
 use sightline_geometry::error::{Error, Result};
 use sightline_recordings::{IndexFormat, create_simulated_until};
@@ -27,6 +28,9 @@ use crate::rendering::OpenTraverse;
 use crate::routes::what_if;
 use crate::state::AppState;
 
+/// The largest scenario, bytes; one with 1,000 placed rocks has a tenth of it.
+const SCENARIO_BYTES: usize = 1 << 20;
+
 /// How many drives may be opened from pages.
 const DRIVE_LIMIT: usize = 64;
 
@@ -39,6 +43,10 @@ pub(crate) fn open(
     text: &str,
     cancel: &CancelFlag,
 ) -> ApiResult<(Arc<OpenTraverse>, bool)> {
+    if text.len() > SCENARIO_BYTES {
+        let detail = format!("A scenario may have at most {} MiB.", SCENARIO_BYTES >> 20);
+        return Err(ApiError::new(StatusCode::PAYLOAD_TOO_LARGE, "too_large", detail));
+    }
     let scenario = Scenario::from_toml(text, Path::new("scenario")).map_err(|error| {
         ApiError::invalid("field", error.to_string())
             .hint("`sightline scenarios` writes scenarios to begin with.")

@@ -280,7 +280,11 @@ async fn a_plain_page_that_is_not_there_is_a_page() {
         "sessions/s99/page".to_owned(),
     ] {
         let answer = server.get(&path).await;
-        assert_eq!((answer.status, answer.headers[header::CONTENT_TYPE].to_str().unwrap()), (StatusCode::NOT_FOUND, "text/html; charset=utf-8"), "{path}");
+        assert_eq!(
+            (answer.status, answer.headers[header::CONTENT_TYPE].to_str().unwrap()),
+            (StatusCode::NOT_FOUND, "text/html; charset=utf-8"),
+            "{path}"
+        );
     }
 }
 

@@ -65,10 +65,7 @@ async fn all(State(state): State<AppState>) -> Response {
 /// A plain page with the targets, runs and notes of a session
 #[utoipa::path(get, operation_id = "plain_session", path = ShowSessionPage::PATH, tag = "plain pages",
     responses((status = 200, content_type = "text/html", body = String), NoPage))]
-async fn session(
-    State(state): State<AppState>,
-    path: ApiResult<Path<ShowSessionPage>>,
-) -> Response {
+async fn session(State(state): State<AppState>, path: ApiResult<Path<ShowSessionPage>>) -> Response {
     let work = move || {
         let Path(AtSession { session }) = path?;
         let live = state.session(&session)?;
@@ -80,10 +77,7 @@ async fn session(
 /// A plain page with everything that a step saw and decided
 #[utoipa::path(get, operation_id = "plain_step", path = ShowStepPage::PATH,
     tag = "plain pages", responses((status = 200, content_type = "text/html", body = String), NoPage))]
-async fn step(
-    State(state): State<AppState>,
-    path: ApiResult<Path<ShowStepPage>>,
-) -> Response {
+async fn step(State(state): State<AppState>, path: ApiResult<Path<ShowStepPage>>) -> Response {
     let Path(AtStep { session, target, run, step }) = match path {
         Ok(path) => path,
         Err(problem) => return answer::<ShowStepPage>(Err(problem), None),
@@ -108,7 +102,8 @@ struct NoPage;
 
 impl IntoResponses for NoPage {
     fn responses() -> BTreeMap<String, RefOr<utoipa::openapi::Response>> {
-        let page = || ContentBuilder::new().schema(Some(ObjectBuilder::new().schema_type(Type::String))).build();
+        let page =
+            || ContentBuilder::new().schema(Some(ObjectBuilder::new().schema_type(Type::String))).build();
         let problem = ContentBuilder::new().schema(Some(Ref::from_schema_name("Problem"))).build();
         let missing = ResponseBuilder::new().description("A page that says why there is none");
         let refused = ResponseBuilder::new().description("What is wrong and how to mend it");
