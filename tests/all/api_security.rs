@@ -113,6 +113,7 @@ async fn names_that_do_not_exist_are_not_found_however_they_are_written() {
         ["/../Cargo.toml", "/%2e%2e/Cargo.toml", "/..%2fCargo.toml", "//etc/passwd", "/api/v2/version"]
     {
         let request = axum::http::Request::get(path).header(header::HOST, format!("localhost:{PORT}"));
+        let request = request.header(header::AUTHORIZATION, format!("Bearer {TOKEN}"));
         server.send(request.body(Body::empty()).unwrap()).await.problem(404, "not_found");
     }
     server.get(&format!("sessions/{session}")).await.expect(200);
@@ -265,6 +266,23 @@ async fn the_document_describes_every_route_and_names_each_once() {
     for reference in text.split("#/components/schemas/").skip(1) {
         let name = reference.split('"').next().unwrap();
         assert!(document["components"]["schemas"].get(name).is_some(), "{name} is not described");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_plain_page_that_is_not_there_is_a_page() {
+    let (server, session, _folders) = server().await;
+    for path in [
+        format!("sessions/{session}/targets/0/runs/2/steps/-1/page"),
+        format!("sessions/{session}/targets/0/runs/0/steps/0/page"),
+        "sessions/s99/page".to_owned(),
+    ] {
+        let answer = server.get(&path).await;
+        assert_eq!(
+            (answer.status, answer.headers[header::CONTENT_TYPE].to_str().unwrap()),
+            (StatusCode::NOT_FOUND, "text/html; charset=utf-8"),
+            "{path}"
+        );
     }
 }
 

@@ -119,6 +119,8 @@ async fn a_session_with_500_long_notes_can_be_brought_back() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), folder.path());
     let session = server.begin().await;
+    server.pick(&session).await;
+    server.ended(&session, 0, 0).await;
     server.post(&format!("sessions/{session}/notes"), &json!({ "step": 1, "text": "x" })).await.expect(201);
     let mut file = server.get(&format!("sessions/{session}/exports/reproduce.json")).await.expect(200);
     let note = file["notes"][0].clone();

@@ -184,8 +184,9 @@ fn jumps(index: &TraverseIndex) -> Vec<String> {
     sorted_m.sort_by(f64::total_cmp);
     let others_m = sorted_m.get(sorted_m.len().saturating_sub(1) / 2).copied().filter(|_| sorted_m.len() > 1);
     let is_jump = |motion_m: f64| {
-        let ratio = others_m.map_or(f64::INFINITY, |others_m| motion_m / others_m);
-        (motion_m > JUMP_M && ratio > FEW_TIMES) || (motion_m > SHORT_M && ratio > MANY_TIMES)
+        let exceeds = |times: f64, others_m: f64| motion_m > times * others_m;
+        (motion_m > JUMP_M && others_m.is_none_or(|others_m| exceeds(FEW_TIMES, others_m)))
+            || (motion_m > SHORT_M && others_m.is_some_and(|others_m| exceeds(MANY_TIMES, others_m)))
     };
     let found: Vec<_> = motions_m.iter().enumerate().filter(|(_, motion_m)| is_jump(**motion_m)).collect();
     let typical =

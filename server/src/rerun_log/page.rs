@@ -23,6 +23,12 @@ const ANY_RECORDING: &str = r#"url: query.getAll("url"),"#;
 /// Which recording ours opens.
 const OUR_RECORDING: &str = r#"url: [new URL(`../sessions/${encodeURIComponent(query.get("session"))}/rerun/live.rrd`, location.href).href],"#;
 
+/// Rerun's viewer sends no cookies with what it fetches, so that the server would refuse it.
+const WITH_COOKIE: &str = r#"<script>
+const fetchWithoutCookie = window.fetch;
+window.fetch = (request, options) => fetchWithoutCookie(request, { ...options, credentials: "same-origin" });
+</script>"#;
+
 /// The viewer's files and the policy of its page.
 struct Files {
     data: WebViewerData,
@@ -34,6 +40,7 @@ static FILES: LazyLock<Result<Files, WebViewerDataError>> = LazyLock::new(|| {
     let data = WebViewerData::load(None)?;
     let page = without_foreign_links(&String::from_utf8_lossy(data.index_html()));
     let page = page.replace(ANY_RECORDING, OUR_RECORDING);
+    let page = page.replacen("<body>", &format!("<body>{WITH_COOKIE}"), 1);
     let policy = policy(&page);
     Ok(Files { data, page, policy })
 });
@@ -121,14 +128,15 @@ mod tests {
         let files = FILES.as_ref().unwrap();
         let original = String::from_utf8_lossy(files.data.index_html());
         assert_eq!(original.matches(ANY_RECORDING).count(), 1, "rerun's page has changed");
+        assert_eq!(files.page.matches(WITH_COOKIE).count(), 1);
         assert!(files.page.contains("/rerun/live.rrd") && !files.page.contains("getAll(\"url\")"));
     }
 
     #[test]
-    fn policy_names_both_inline_scripts_and_allows_no_others() {
+    fn policy_names_the_inline_scripts_and_allows_no_others() {
         let files = FILES.as_ref().unwrap();
-        assert_eq!(inline_scripts(&files.page).count(), 2, "rerun's page has changed");
+        assert_eq!(inline_scripts(&files.page).count(), 3, "rerun's page has changed");
         let script = files.policy.split("; ").find(|part| part.starts_with("script-src")).unwrap();
-        assert!(script.matches("'sha256-").count() == 2 && !script.contains("unsafe-inline"), "{script}");
+        assert!(script.matches("'sha256-").count() == 3 && !script.contains("unsafe-inline"), "{script}");
     }
 }

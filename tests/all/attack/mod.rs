@@ -58,10 +58,15 @@ impl Listening {
     /// Sends a request that is written down with `$HOST`, `$PORT`, `$TOKEN` and `$DRIVE`, and reads the head of the answer and
     /// the beginning of its body.
     pub(crate) async fn send(&self, line: &str, headers: &[&str], body: &str) -> Answer {
-        let mut text = line.to_owned();
+        let address = self.address.to_string();
+        let filled = |text: &str| {
+            let text = text.replace("$HOST", &address).replace("$PORT", &self.address.port().to_string());
+            text.replace("$TOKEN", TOKEN).replace("$DRIVE", &self.traverse)
+        };
+        let (mut text, body) = (filled(line), filled(body));
         for header in headers {
             text.push_str("\r\n");
-            text.push_str(header);
+            text.push_str(&filled(header));
         }
         let has_length = headers.iter().any(|header| {
             let name = header.split(':').next().unwrap_or_default();
@@ -71,10 +76,7 @@ impl Listening {
             text.push_str(&format!("\r\nContent-Length: {}", body.len()));
         }
         text.push_str("\r\n\r\n");
-        text.push_str(body);
-        let address = self.address.to_string();
-        let text = text.replace("$HOST", &address).replace("$PORT", &self.address.port().to_string());
-        let text = text.replace("$TOKEN", TOKEN).replace("$DRIVE", &self.traverse);
+        text.push_str(&body);
         exchange(self.address, &text).await
     }
 

@@ -8,6 +8,7 @@ mod overview;
 mod step;
 mod values;
 
+use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
 use axum::extract::State;
@@ -20,6 +21,8 @@ use sightline_api::endpoint::Endpoint;
 use sightline_api::endpoints::{ShowSessionPage, ShowSessionsPage, ShowStepPage};
 use sightline_api::location::{AtSession, AtStep};
 use utoipa::IntoResponses;
+use utoipa::openapi::schema::{ObjectBuilder, Type};
+use utoipa::openapi::{ContentBuilder, Ref, RefOr, ResponseBuilder};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
@@ -28,7 +31,7 @@ use crate::exports::Source;
 use crate::extract::Path;
 use crate::html::escape;
 use crate::jobs::blocking;
-use crate::problem::{ApiError, ApiResult};
+use crate::problem::{ApiError, ApiResult, PROBLEM_JSON};
 use crate::routes::route::route;
 use crate::state::AppState;
 
@@ -62,11 +65,9 @@ async fn all(State(state): State<AppState>) -> Response {
 /// A plain page with the targets, runs and notes of a session
 #[utoipa::path(get, operation_id = "plain_session", path = ShowSessionPage::PATH, tag = "plain pages",
     responses((status = 200, content_type = "text/html", body = String), NoPage))]
-async fn session(
-    State(state): State<AppState>,
-    Path(AtSession { session }): Path<ShowSessionPage>,
-) -> Response {
+async fn session(State(state): State<AppState>, path: ApiResult<Path<ShowSessionPage>>) -> Response {
     let work = move || {
+        let Path(AtSession { session }) = path?;
         let live = state.session(&session)?;
         Ok(overview::session(&Source::of(&live)))
     };
@@ -76,10 +77,11 @@ async fn session(
 /// A plain page with everything that a step saw and decided
 #[utoipa::path(get, operation_id = "plain_step", path = ShowStepPage::PATH,
     tag = "plain pages", responses((status = 200, content_type = "text/html", body = String), NoPage))]
-async fn step(
-    State(state): State<AppState>,
-    Path(AtStep { session, target, run, step }): Path<ShowStepPage>,
-) -> Response {
+async fn step(State(state): State<AppState>, path: ApiResult<Path<ShowStepPage>>) -> Response {
+    let Path(AtStep { session, target, run, step }) = match path {
+        Ok(path) => path,
+        Err(problem) => return answer::<ShowStepPage>(Err(problem), None),
+    };
     let cancel = CancelOnDrop::default();
     let flag = cancel.flag();
     let id = session.clone();
@@ -94,17 +96,24 @@ async fn step(
     answer::<ShowStepPage>(made, Some(&id))
 }
 
-/// The answer where there is no page, for the OpenAPI document.
-#[derive(IntoResponses)]
-enum NoPage {
-    /// A page that says why there is none
-    #[response(status = 404, content_type = "text/html")]
-    #[allow(dead_code)]
-    NotThere(String),
-    /// A page that says what is wrong
-    #[response(status = "default", content_type = "text/html")]
-    #[allow(dead_code)]
-    Refused(String),
+/// The answers where there is no page, for the OpenAPI document: a page that says why, or a problem where the request was
+/// refused before any route.
+struct NoPage;
+
+impl IntoResponses for NoPage {
+    fn responses() -> BTreeMap<String, RefOr<utoipa::openapi::Response>> {
+        let page =
+            || ContentBuilder::new().schema(Some(ObjectBuilder::new().schema_type(Type::String))).build();
+        let problem = ContentBuilder::new().schema(Some(Ref::from_schema_name("Problem"))).build();
+        let missing = ResponseBuilder::new().description("A page that says why there is none");
+        let refused = ResponseBuilder::new().description("What is wrong and how to mend it");
+        let refused = refused.content("text/html", page()).content(PROBLEM_JSON, problem).build();
+        [
+            ("404".to_owned(), RefOr::T(missing.content("text/html", page()).build())),
+            ("default".to_owned(), RefOr::T(refused)),
+        ]
+        .into()
+    }
 }
 
 /// The page, or a page that says why there is none.
