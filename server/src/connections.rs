@@ -35,9 +35,15 @@ use crate::jobs::lock;
 use crate::limits::Limits;
 
 /// Descriptors that are left for files when the system allows few: databases, images, exports, Rerun.
+#[cfg(unix)]
 const DESCRIPTORS_LEFT: u64 = 96;
 /// The least number of connections, however few descriptors there are.
+#[cfg(unix)]
 const LEAST: usize = 16;
+/// Connections that may wait to be accepted: with the 128 of the standard library a newcomer waits for a second behind some
+/// hundred others, because the system drops its first packet.
+#[cfg(unix)]
+const BACKLOG: i32 = 1024;
 /// How long accepting rests when the system refuses, for example because all descriptors are in use.
 const REST: Duration = Duration::from_millis(50);
 
@@ -164,6 +170,10 @@ pub(crate) async fn serve(
     connections: Arc<Connections>,
 ) -> Infallible {
     let limit = most(limits);
+    #[cfg(unix)]
+    if let Err(error) = rustix::net::listen(&listener, BACKLOG) {
+        tracing::warn!("few connections can wait to be accepted: {error}");
+    }
     loop {
         let stream = match listener.accept().await {
             Ok((stream, _)) => stream,

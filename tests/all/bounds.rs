@@ -92,7 +92,7 @@ fn a_drive_beyond_the_limits_is_not_served() {
 fn slow_to_render() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let mut scenario = small_scenario();
-    scenario.camera.samples_per_axis = 24;
+    scenario.camera.samples_per_axis = 8;
     let slow = create_simulated(&scenario, folder.path()).unwrap();
     let stop = &slow.index().stops[0];
     let rendered = small_drive();

@@ -62,7 +62,7 @@ fn drill_the_program_ends_under_any_load() {
                 drop(server.open("GET", &format!("sessions/{session}/exports/{file}"), "", ""));
             }
         }),
-        ("a world of 4,000 rocks", |server| {
+        ("a world of 1,000 rocks", |server| {
             let body = json!({ "scenario": crowded() }).to_string();
             let mut stream = server.open("POST", "traverses", "", &body);
             stream.flush().unwrap();
