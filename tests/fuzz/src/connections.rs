@@ -116,12 +116,11 @@ fn with_server(is_locked: bool, use_it: impl FnOnce(&Server)) {
     }
     SERVERS.with_borrow_mut(|servers| {
         let server = &mut servers[usize::from(is_locked)];
-        if server.as_ref().is_none_or(|(_, used)| *used >= CONNECTIONS_EACH) {
-            *server = Some((Server::start(is_locked), 0));
+        if let Some((used, _)) = server.take_if(|(_, used)| *used >= CONNECTIONS_EACH) {
+            used.leave();
         }
-        if let Some((server, used)) = server {
-            *used += 1;
-            use_it(server);
-        }
+        let (server, used) = server.get_or_insert_with(|| (Server::start(is_locked), 0));
+        *used += 1;
+        use_it(server);
     });
 }

@@ -26,14 +26,13 @@ pub(crate) fn requests(bytes: &[u8]) {
         return;
     }
     SERVER.with_borrow_mut(|server| {
-        if server.as_ref().is_none_or(|(_, answered)| *answered >= REQUESTS_EACH) {
-            *server = Some((Server::start(false), 0));
+        if let Some((used, _)) = server.take_if(|(_, answered)| *answered >= REQUESTS_EACH) {
+            used.leave();
         }
-        if let Some((server, answered)) = server {
-            *answered += 1;
-            let path = path.replace("{traverse}", &server.traverse);
-            let status = server.send(method, &path, body).unwrap_or_default();
-            assert!(status < 500 || status == 503, "{status} for {method} {path}");
-        }
+        let (server, answered) = server.get_or_insert_with(|| (Server::start(false), 0));
+        *answered += 1;
+        let path = path.replace("{traverse}", &server.traverse);
+        let status = server.send(method, &path, body).unwrap_or_default();
+        assert!(status < 500 || status == 503, "{status} for {method} {path}");
     });
 }

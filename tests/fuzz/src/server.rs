@@ -82,10 +82,15 @@ impl Server {
         }))
     }
 
-    /// Ends the server; its folder.
+    /// Ends the server when its work is done; its folder.
     pub(crate) fn end(self) -> TempDir {
         let Self { folder, .. } = self;
         folder
+    }
+
+    /// Leaves the server without waiting for its work on blocking threads, which nobody cancels here.
+    pub(crate) fn leave(self) {
+        self.runtime.shutdown_background();
     }
 
     /// A new connection to the server.
