@@ -270,8 +270,10 @@ mod tests {
             answers.keep(&key, bytes);
         };
         (0..most + 5).for_each(|number| keep(number.to_string(), 1));
-        let count =
-            || (lock(&answers.kept).by_key.len(), lock(&answers.kept).order.len(), lock(&answers.kept).bytes);
+        let count = || {
+            let kept = lock(&answers.kept);
+            (kept.by_key.len(), kept.order.len(), kept.bytes)
+        };
         assert_eq!(count(), (most, most, most));
         keep("large".to_owned(), most_bytes);
         assert_eq!(count(), (1, 1, most_bytes));

@@ -77,7 +77,7 @@ impl Kept {
             }
             1 => {
                 let notes = self.notes.entry(session).or_default();
-                let text = format!("note {number} {}", "x".repeat((number as usize * 97) % 6000));
+                let text = format!("note {number} {}", "x".repeat((number as usize * 97) % 3900));
                 let new = NewNote { pin: Pin::default(), text };
                 notes.add(new, &sightline_session::Session::new(&id, "t", 9), "2026-11-24T12:00:00Z")?;
                 store.save_notes(&id, notes)

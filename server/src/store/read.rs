@@ -7,6 +7,7 @@ use std::path::Path;
 use redb::backends::InMemoryBackend;
 use redb::{
     ConcurrencyMode, DatabaseError, ReadTransaction, ReadableDatabase, ReadableTable, StorageBackend as _,
+    StorageError,
 };
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -57,6 +58,8 @@ pub(crate) fn read_only(folder: &Path) -> Result<Found> {
             }
             // No server is there, and the last one did not end in order: the file is repaired in memory.
             Err(DatabaseError::RepairAborted) => {}
+            // What can be verified in a damaged file is found below.
+            Err(DatabaseError::Storage(StorageError::Corrupted(_))) => {}
             Err(error) => return Err(refused(&path, &error)),
         }
         let bytes = std::fs::read(&path).map_err(|source| Error::Read { path: path.clone(), source })?;

@@ -187,7 +187,7 @@ fn an_image_that_is_a_link_out_of_its_folder_is_not_followed() {
     let outside = elsewhere.path().join("private.png");
     std::fs::rename(&image, &outside).unwrap();
     std::os::unix::fs::symlink(&outside, &image).unwrap();
-    let refused = sightline_recordings::Traverse::open(drive.path()).unwrap_err().to_string();
+    let refused = sightline_recordings::Traverse::open(drive.path()).err().unwrap().to_string();
     assert!(
         refused.contains("images/left_0000.png") && refused.contains("leads out of the folder"),
         "{refused}"

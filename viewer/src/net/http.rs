@@ -23,6 +23,11 @@ pub(super) fn send(
     http.method = method(call.method);
     // Rendering an image or designating a target has no time limit.
     http.timeout = None;
+    // The cookie with the access token, which is left out by default.
+    #[cfg(target_arch = "wasm32")]
+    {
+        http.credentials = ehttp::Credentials::SameOrigin;
+    }
     if let Some(body) = call.body {
         http.headers = Headers::new(&[("Accept", "application/json"), ("Content-Type", "application/json")]);
         http.body = body;
