@@ -8,6 +8,7 @@ use serde_json::Value;
 use sightline_tests::bench::{Bench, picked};
 use sightline_tests::browser::Browser;
 use sightline_tests::scenario::short_approach;
+use sightline_tests::server::TOKEN;
 
 /// Keeps what the page opens and copies, in place of doing it.
 const CATCH: &str = "window.opened = []; window.open = url => { window.opened.push(url); return null; }; \
@@ -42,7 +43,9 @@ fn is_what_it_says(name: &str, bytes: &[u8]) -> bool {
 
 /// Runs a copied command in a shell.
 fn run(folder: &std::path::Path, text: &str) -> std::process::Output {
-    Command::new("sh").args(["-c", text]).current_dir(folder).output().unwrap()
+    let shell =
+        Command::new("sh").args(["-c", text]).current_dir(folder).env("SIGHTLINE_TOKEN", TOKEN).output();
+    shell.unwrap()
 }
 
 #[tokio::test(flavor = "multi_thread")]
