@@ -4,7 +4,7 @@
 //! and without a symbolic link that leads out.
 
 use std::fs::File;
-use std::io::{ErrorKind, Read, Write};
+use std::io::{Read, Write};
 use std::path::{Component, Path, PathBuf};
 
 use sightline_geometry::error::{Error, Result};
@@ -146,7 +146,9 @@ pub fn sync_folder(folder: &Path) -> std::io::Result<()> {
         Err(error)
             if !matches!(
                 error.kind(),
-                ErrorKind::InvalidInput | ErrorKind::Unsupported | ErrorKind::PermissionDenied
+                std::io::ErrorKind::InvalidInput
+                    | std::io::ErrorKind::Unsupported
+                    | std::io::ErrorKind::PermissionDenied
             ) =>
         {
             return Err(error);

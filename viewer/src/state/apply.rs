@@ -85,19 +85,8 @@ impl State {
                 }
             }
             Command::ToggleMarks => self.marks = !self.marks,
-            Command::OpenRerun => {
-                if let Some(session) = self.session_id() {
-                    self.call::<StreamRecording>(stream_to_rerun(session), Self::rerun_opened);
-                }
-                self.messages.note("Opening the session in Rerun …");
-            }
-            Command::CloseRerun => {
-                if let Some(session) = self.session_id() {
-                    self.call::<CloseRecording>(close_rerun(session), |state, _| {
-                        state.messages.note("The Rerun stream of this session is closed.");
-                    });
-                }
-            }
+            Command::OpenRerun => self.open_rerun(),
+            Command::CloseRerun => self.close_rerun(),
             Command::Dismiss(id) => self.messages.dismiss(id),
             Command::Reconnect => self.outbox.push(Request::Reconnect),
             Command::SetLooks(looks) => {
@@ -119,6 +108,21 @@ impl State {
             Command::Limits(ask) => self.ask_limits(ask),
             Command::Table(pane) => self.turn_table(pane),
             Command::Point(at) => self.pointed = Some(at),
+        }
+    }
+
+    fn open_rerun(&mut self) {
+        if let Some(session) = self.session_id() {
+            self.call::<StreamRecording>(stream_to_rerun(session), Self::rerun_opened);
+        }
+        self.messages.note("Opening the session in Rerun …");
+    }
+
+    fn close_rerun(&mut self) {
+        if let Some(session) = self.session_id() {
+            self.call::<CloseRecording>(close_rerun(session), |state, _| {
+                state.messages.note("The Rerun stream of this session is closed.");
+            });
         }
     }
 
