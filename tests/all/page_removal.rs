@@ -23,6 +23,9 @@ async fn sessions_and_drives_are_removed_where_they_are_listed() {
     browser.gone("button", &format!("session {first} on ")).await;
     browser.shot("removed").await;
     browser.click_on("button", &format!("restore session {first}")).await;
+    // The list is read again, and its rows move.
+    browser.gone("button", &format!("restore session {first}")).await;
+    browser.control("button", &format!("remove session {first}")).await;
     browser.click_on("button", &format!("session {first} on ")).await;
     let shown = format!("s.session === '{first}' && s.targets === 1 && s.shown");
     browser.wait_status("the first session", &shown).await;
