@@ -113,7 +113,7 @@ pub struct Watch<'a> {
 /// Tracks every target of a point through a drive.
 ///
 /// # Errors
-/// [`Error::Cancelled`](sightline_geometry::error::Error::Cancelled) soon after the watch is told to end.
+/// [`Error::Cancelled`] soon after the watch is told to end.
 pub fn measure<D: Drive>(
     drive: &D,
     point: &Point,
