@@ -59,7 +59,7 @@ fn drill_many_sessions_step_at_the_same_time() {
     let traverse = traverse(&server);
     // What is made once and kept: images, threads of the tracker.
     step_through(&server, &traverse, scale(4, 1), Duration::from_secs(scale(2, 0)));
-    let mut watched = Watched::of(&server, Duration::from_secs(scale(15, 1)), || {
+    let mut watched = Watched::of(&server, Duration::from_secs(scale(15, 12)), || {
         step_through(&server, &traverse, count, lasting)
     });
     let (steps, p95) = (watched.value.len(), p95_ms(&mut watched.value));
