@@ -207,8 +207,7 @@ fn answer(
     place: &Arc<Place>,
 ) -> impl Future<Output = ()> + Send + 'static {
     let mut http = http1::Builder::new();
-    // The header `Date` would fail while the clock is before 1970.
-    http.timer(TokioTimer::new()).auto_date_header(false).header_read_timeout(limits.header_s.time());
+    http.timer(TokioTimer::new()).header_read_timeout(limits.header_s.time());
     let patience = limits.send_s.time();
     let stream = TokioIo::new(Patient { stream, patience, stalled: None, _place: Arc::clone(place) });
     let (app, place) = (TowerToHyperService::new(app), Arc::clone(place));

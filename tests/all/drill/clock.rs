@@ -47,8 +47,8 @@ fn drill_the_clock_jumps() {
         return;
     };
     let shift = data.path().join("shift");
-    // 100 years back is before 1970; then a day on, an hour back, and 300 years on.
-    let shifts: [i64; 4] = [-3_155_760_000, 86_400, -3_600, 9_467_280_000];
+    // 50 years back: before 1970 the HTTP library cannot write its date; then a day on, an hour back, and 300 years on.
+    let shifts: [i64; 4] = [-1_577_880_000, 86_400, -3_600, 9_467_280_000];
     std::fs::write(&shift, shifts[0].to_string()).unwrap();
     let environment = [("LD_PRELOAD", library.as_os_str()), ("SIGHTLINE_CLOCK", shift.as_os_str())];
     let server = Killable::start_with(&environment, drive.path(), &data.path().join("state"));
