@@ -131,7 +131,7 @@ limits! {
     maps = 64, 1, "maps", "trackability maps in memory, half a megabyte each";
     grounds = 2, 1, "stops", "surfaces behind trackability maps in memory, 24 bytes for each pixel";
     cache_bytes = 512 << 20, 0, "bytes", "images, features, surfaces and motions in memory, of all drives; the idle ones go first";
-    step_bytes = 2 << 30, 1, "bytes", "steps of runs in memory, of all sessions; sessions that nobody asks for go first and are computed again";
+    step_bytes = 4 << 30, 1, "bytes", "steps of runs in memory, of all sessions; sessions that nobody asks for go first and are computed again";
     rest_s = 60, 0, "s", "time for which nobody must have asked for a session before its steps go";
     answers = 1000, 1, "answers", "answers to requests with an Idempotency-Key";
     answer_bytes = 64 << 20, 1, "bytes", "those answers in memory";

@@ -3,6 +3,7 @@
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use axum::http::Method;
@@ -88,18 +89,21 @@ fn a_drive_beyond_the_limits_is_not_served() {
     assert!(refused("stops=4").contains("--limit stops=8"));
 }
 
-/// A drive whose first stop is there, and whose other stops take many seconds to render.
+/// A drive whose first stop is there, and whose other stops take many seconds to render: 134 million samples each.
 fn slow_to_render() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let mut scenario = small_scenario();
+    (scenario.camera.image_size, scenario.camera.samples_per_axis) = (4 * 256, 1);
+    let quick = tempfile::tempdir().unwrap();
+    let rendered = create_simulated(&scenario, quick.path()).unwrap();
+    rendered.render_step(0, &AtomicBool::new(false)).unwrap();
     scenario.camera.samples_per_axis = 8;
     let slow = create_simulated(&scenario, folder.path()).unwrap();
     let stop = &slow.index().stops[0];
-    let rendered = small_drive();
     for view in [&stop.left, &stop.right] {
         let to = folder.path().join(&view.image);
         std::fs::create_dir_all(to.parent().unwrap()).unwrap();
-        std::fs::copy(rendered.path().join(&view.image), to).unwrap();
+        std::fs::copy(quick.path().join(&view.image), to).unwrap();
     }
     folder
 }
@@ -111,7 +115,9 @@ async fn a_step_that_takes_too_long_ends_its_run_with_a_reason() {
     assert!(slow.is_ready(0) && !slow.is_ready(1));
     let server = serve(drive.path(), folder.path(), &["step_s=2"]);
     let session = server.begin().await;
-    server.pick(&session).await;
+    let [x, y] = PIXEL.map(|part| 4.0 * part);
+    let new = json!({ "step": 0, "pixel": { "x": x, "y": y } });
+    server.post(&format!("sessions/{session}/targets"), &new).await.expect(201);
     let run = server.ended(&session, 0, 0).await;
     let stopped = run["stopped"].as_str().unwrap();
     assert!(stopped.contains("longer than 2 s") && stopped.contains("--limit step_s=4"), "{run}");
