@@ -16,6 +16,10 @@ const PATIENCE: Duration = Duration::from_secs(60);
 /// How long what is rendered or tracked on a busy machine may take to come.
 const LONG_PATIENCE: Duration = Duration::from_secs(300);
 
+/// Waits until the page has painted what is pending, and what that led to.
+const FRAMES: &str = "return new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => \
+    requestAnimationFrame(() => done(null)))))";
+
 /// Lists the elements of the mirror.
 const LIST: &str = "return [...document.querySelectorAll('#sightline-mirror [data-node]')].map(e => { \
     const [x, y, w, h] = ['left', 'top', 'width', 'height'].map(k => parseFloat(e.style[k])); \
@@ -107,7 +111,7 @@ impl Browser {
     }
 
     /// Clicks a control with the pointer, in its middle, once it can be clicked and has come to rest: windows find their size
-    /// within a few frames.
+    /// within a few frames, which a busy machine paints late.
     ///
     /// # Panics
     /// When it stays disabled.
@@ -116,6 +120,7 @@ impl Browser {
         let mut before = self.control(role, name).await;
         loop {
             tokio::time::sleep(Duration::from_millis(80)).await;
+            self.evaluate(FRAMES).await;
             let control = self.control(role, name).await;
             if !control.disabled && control.rect == before.rect {
                 let (x, y) = control.middle();
