@@ -8,7 +8,7 @@ use axum::extract::rejection::PathRejection;
 use axum::extract::{DefaultBodyLimit, FromRequest, FromRequestParts, Query, Request};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, Method, StatusCode, header};
-use serde::de::DeserializeOwned;
+use serde::de::{DeserializeOwned, IgnoredAny};
 use sightline_api::endpoint::Endpoint;
 use sightline_api::endpoints::BringSession;
 use sightline_api::location::{AtRun, AtSession, AtTarget};
@@ -175,10 +175,17 @@ fn parse<T: DeserializeOwned>(bytes: &[u8]) -> ApiResult<T> {
         ApiError::new(StatusCode::BAD_REQUEST, "malformed_json", format!("The body is no JSON: {wrong}."))
     };
     let value = serde_path_to_error::deserialize(&mut json).map_err(|wrong| {
-        if !wrong.inner().is_data() {
+        let is_json = wrong.inner().is_data() || serde_json::from_slice::<IgnoredAny>(bytes).is_ok();
+        if !is_json {
             return malformed(wrong.inner());
         }
-        let (field, message) = (wrong.path().to_string(), wrong.inner().to_string());
+        // An array that is too long is the only JSON that serde_json takes for a mistake of syntax.
+        let message = if wrong.inner().is_data() {
+            wrong.inner().to_string()
+        } else {
+            "has too many elements".to_owned()
+        };
+        let field = wrong.path().to_string();
         // serde_json puts the place behind the message, which says less than the field.
         let message = message.split(" at line ").next().unwrap_or_default();
         let place = if matches!(field.as_str(), "." | "?") { String::new() } else { format!("{field}: ") };

@@ -20,6 +20,7 @@ pub struct FirstRow {
 pub struct ImageDepth {
     /// Bits of a pixel: 8 (the default) or 16.
     #[serde(default)]
+    #[param(minimum = 8, maximum = 16, multiple_of = 8)]
     pub bits: Option<u8>,
 }
 

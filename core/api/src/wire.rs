@@ -143,9 +143,11 @@ pub struct NewTarget {
     pub mast: Option<MastAngles>,
     /// Its position in the rover frame of the stop, m.
     #[serde(default)]
+    #[schema(min_items = 3, max_items = 3)]
     pub point_in_rover: Option<[f64; 3]>,
     /// Its position in the site frame, m.
     #[serde(default)]
+    #[schema(min_items = 3, max_items = 3)]
     pub point_in_site: Option<[f64; 3]>,
     /// What to call it.
     #[serde(default)]

@@ -51,8 +51,8 @@ async fn show(
 /// Replaces a document, or adds one
 ///
 /// The header `If-Match` names the revision that was read; `If-None-Match: *` says that there is none yet.
-#[utoipa::path(put, operation_id = "put_document", path = PutDocument::PATH, tag = "documents", params(("If-Match" = Option<String>, Header, description = "The revision in quotes, or *"),
-    ("If-None-Match" = Option<String>, Header, description = "* for a new one")),
+#[utoipa::path(put, operation_id = "put_document", path = PutDocument::PATH, tag = "documents", params(("If-Match" = Option<String>, Header, pattern = r#"^("[0-9]{1,18}"|\*)$"#, description = "The revision in quotes, or *"),
+    ("If-None-Match" = Option<String>, Header, pattern = r"^\*$", description = "* for a new one")),
     request_body = serde_json::Value, responses((status = 200, body = Document), ApiError))]
 async fn put(
     State(state): State<AppState>,
@@ -80,7 +80,7 @@ async fn put(
 /// Removes a document
 ///
 /// The header `If-Match` names the revision that was read.
-#[utoipa::path(delete, operation_id = "remove_document", path = RemoveDocument::PATH, tag = "documents", params(("If-Match" = String, Header, description = "The revision in quotes, or *")), responses((status = 204), ApiError))]
+#[utoipa::path(delete, operation_id = "remove_document", path = RemoveDocument::PATH, tag = "documents", params(("If-Match" = String, Header, pattern = r#"^("[0-9]{1,18}"|\*)$"#, description = "The revision in quotes, or *")), responses((status = 204), ApiError))]
 async fn remove(
     State(state): State<AppState>,
     Path(AtDocument { name }): Path<RemoveDocument>,

@@ -68,7 +68,7 @@ async fn show(
 /// Changes a note's words or its place in the list
 ///
 /// The header `If-Match` names the revision that was read.
-#[utoipa::path(patch, operation_id = "edit_note", path = ChangeNote::PATH, tag = "notes", params(("If-Match" = String, Header, description = "The revision in quotes, or *")),
+#[utoipa::path(patch, operation_id = "edit_note", path = ChangeNote::PATH, tag = "notes", params(("If-Match" = String, Header, pattern = r#"^("[0-9]{1,18}"|\*)$"#, description = "The revision in quotes, or *")),
     request_body = EditNote, responses((status = 200, body = Note), ApiError))]
 async fn edit(
     State(state): State<AppState>,
@@ -89,7 +89,7 @@ async fn edit(
 /// Removes a note, which can be brought back
 ///
 /// The header `If-Match` names the revision that was read.
-#[utoipa::path(delete, operation_id = "remove_note", path = RemoveNote::PATH, tag = "notes", params(("If-Match" = String, Header, description = "The revision in quotes, or *")),
+#[utoipa::path(delete, operation_id = "remove_note", path = RemoveNote::PATH, tag = "notes", params(("If-Match" = String, Header, pattern = r#"^("[0-9]{1,18}"|\*)$"#, description = "The revision in quotes, or *")),
     responses((status = 204), ApiError))]
 async fn remove(
     State(state): State<AppState>,

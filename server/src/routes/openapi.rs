@@ -4,6 +4,7 @@ use std::sync::LazyLock;
 
 use axum::http::header;
 use axum::response::IntoResponse;
+use serde_json::{Value, json};
 use sightline_api::endpoint::Endpoint;
 use sightline_api::endpoints::ShowOpenApi;
 use sightline_api::wire::{Event, ExpressionProblem, Problem};
@@ -48,8 +49,36 @@ impl Modify for SecuritySchemes {
     }
 }
 
-static JSON: LazyLock<String> =
-    LazyLock::new(|| router().into_openapi().to_json().unwrap_or_else(|error| error.to_string()));
+/// The largest integer that all clients hold exactly, also those that know floating-point numbers only.
+const INTEGER_MAX: u64 = (1 << 53) - 1;
+
+static JSON: LazyLock<String> = LazyLock::new(|| {
+    let mut document = serde_json::to_value(router().into_openapi()).unwrap_or_default();
+    bound_integers(&mut document);
+    document.to_string()
+});
+
+/// States a largest value for every integer whose type does not.
+fn bound_integers(part: &mut Value) {
+    match part {
+        Value::Array(parts) => parts.iter_mut().for_each(bound_integers),
+        Value::Object(parts) => {
+            let is_integer = |of: &Value| {
+                of == "integer" || of.as_array().is_some_and(|all| all.contains(&json!("integer")))
+            };
+            if parts.get("type").is_some_and(is_integer) && !parts.contains_key("maximum") {
+                let max = if parts.get("format").is_some_and(|format| format == "int32") {
+                    i32::MAX as u64
+                } else {
+                    INTEGER_MAX
+                };
+                parts.insert("maximum".to_owned(), json!(max));
+            }
+            parts.values_mut().for_each(bound_integers);
+        }
+        _ => {}
+    }
+}
 
 /// The routes below `/api/v1`.
 pub(crate) fn router() -> OpenApiRouter<AppState> {
@@ -92,7 +121,6 @@ async fn document() -> impl IntoResponse {
 mod tests {
     use std::collections::{BTreeMap, BTreeSet};
 
-    use serde_json::Value;
     use sightline_api::endpoints::ALL;
 
     use super::*;
@@ -107,6 +135,18 @@ mod tests {
         });
         let declared = ALL.iter().map(|(method, path)| (method.to_string(), (*path).to_owned()));
         assert_eq!(described.collect::<BTreeSet<_>>(), declared.collect::<BTreeSet<_>>());
+    }
+
+    #[test]
+    fn every_integer_states_its_largest_value() {
+        let document: Value = serde_json::from_str(&JSON).unwrap();
+        let parameters =
+            document["paths"]["/traverses/{id}/prefetch"]["post"]["parameters"].as_array().unwrap();
+        let from = parameters.iter().find(|parameter| parameter["name"] == "from").unwrap();
+        assert_eq!(from["schema"]["maximum"], 9_007_199_254_740_991_u64);
+        let bits = &document["paths"]["/traverses/{id}/steps/{step}/images/{file}"]["get"]["parameters"];
+        let bits = bits.as_array().unwrap().iter().find(|parameter| parameter["name"] == "bits").unwrap();
+        assert_eq!(bits["schema"]["maximum"], 16, "what a type states itself stays");
     }
 
     #[test]

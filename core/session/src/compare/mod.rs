@@ -53,6 +53,7 @@ pub struct RunName {
 #[serde(deny_unknown_fields)]
 pub struct NewComparison {
     /// Two to four runs; the others are compared with the first.
+    #[schema(min_items = 2, max_items = 4)]
     pub runs: Vec<RunName>,
     /// Which stops stand side by side.
     #[serde(default)]
