@@ -1,5 +1,6 @@
 //! How requests are read: names in paths, query parameters and JSON bodies, with problems that say what is wrong.
 
+use std::any::TypeId;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -169,7 +170,15 @@ pub(crate) async fn whole_body<S: Send + Sync>(mut request: Request, state: &S) 
 }
 
 /// Reads JSON: what is no JSON is a bad request; what does not fit is refused by the name of the field.
-fn parse<T: DeserializeOwned>(bytes: &[u8]) -> ApiResult<T> {
+fn parse<T: DeserializeOwned + 'static>(bytes: &[u8]) -> ApiResult<T> {
+    // serde takes an array for a struct, too; the fields of a request have names.
+    let is_any = TypeId::of::<T>() == TypeId::of::<serde_json::Value>();
+    if !is_any
+        && bytes.trim_ascii_start().starts_with(b"[")
+        && serde_json::from_slice::<IgnoredAny>(bytes).is_ok()
+    {
+        return Err(ApiError::invalid("field", "the body must be an object with names, not an array"));
+    }
     let mut json = serde_json::Deserializer::from_slice(bytes);
     let malformed = |wrong: &serde_json::Error| {
         ApiError::new(StatusCode::BAD_REQUEST, "malformed_json", format!("The body is no JSON: {wrong}."))

@@ -56,6 +56,7 @@ async fn what_cannot_be_read_is_refused() {
     with("application/json", "{\"step\": 0,").await.problem(400, "malformed_json");
     with("application/json", "{\"step\": 0} {}").await.problem(400, "malformed_json");
     with("application/json", "{\"label\": \"no step\"}").await.problem(422, "field");
+    with("application/json", "[0, null]").await.problem(422, "field");
     let four = with("application/json", "{\"step\": 0, \"point_in_rover\": [1, 2, 3, 4]}").await;
     assert_eq!(four.problem(422, "field"), "point_in_rover: has too many elements");
     with("application/x-www-form-urlencoded", "step=0").await.problem(415, "not_json");

@@ -21,7 +21,7 @@ pub struct Document {
     /// Raised by every change; what `If-Match` names.
     pub revision: u64,
     /// What it holds.
-    #[schema(value_type = Object)]
+    #[schema(value_type = Value)]
     pub value: Value,
 }
 

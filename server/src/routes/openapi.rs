@@ -49,9 +49,6 @@ impl Modify for SecuritySchemes {
     }
 }
 
-/// The largest integer that all clients hold exactly, also those that know floating-point numbers only.
-const INTEGER_MAX: u64 = (1 << 53) - 1;
-
 static JSON: LazyLock<String> = LazyLock::new(|| {
     let mut document = serde_json::to_value(router().into_openapi()).unwrap_or_default();
     bound_integers(&mut document);
@@ -67,10 +64,13 @@ fn bound_integers(part: &mut Value) {
                 of == "integer" || of.as_array().is_some_and(|all| all.contains(&json!("integer")))
             };
             if parts.get("type").is_some_and(is_integer) && !parts.contains_key("maximum") {
-                let max = if parts.get("format").is_some_and(|format| format == "int32") {
-                    i32::MAX as u64
-                } else {
-                    INTEGER_MAX
+                let is_signed = !parts.contains_key("minimum");
+                let is_small = parts.get("format").is_some_and(|format| format == "int32");
+                let max = match (is_signed, is_small) {
+                    (true, true) => i32::MAX as u64,
+                    (false, true) => u64::from(u32::MAX),
+                    (true, false) => i64::MAX as u64,
+                    (false, false) => u64::MAX,
                 };
                 parts.insert("maximum".to_owned(), json!(max));
             }
@@ -143,7 +143,7 @@ mod tests {
         let parameters =
             document["paths"]["/traverses/{id}/prefetch"]["post"]["parameters"].as_array().unwrap();
         let from = parameters.iter().find(|parameter| parameter["name"] == "from").unwrap();
-        assert_eq!(from["schema"]["maximum"], 9_007_199_254_740_991_u64);
+        assert_eq!(from["schema"]["maximum"], u64::MAX);
         let bits = &document["paths"]["/traverses/{id}/steps/{step}/images/{file}"]["get"]["parameters"];
         let bits = bits.as_array().unwrap().iter().find(|parameter| parameter["name"] == "bits").unwrap();
         assert_eq!(bits["schema"]["maximum"], 16, "what a type states itself stays");

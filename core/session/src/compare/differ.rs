@@ -74,10 +74,10 @@ pub struct Difference {
     /// Its unit; empty for pure numbers and words.
     pub unit: String,
     /// The first run's value; null where it has none.
-    #[schema(value_type = Object)]
+    #[schema(value_type = Value)]
     pub a: Value,
     /// The other run's value; null where it has none.
-    #[schema(value_type = Object)]
+    #[schema(value_type = Value)]
     pub b: Value,
     /// The other less the first; for lists of numbers the length of their difference.
     pub delta: Option<f64>,

@@ -81,10 +81,10 @@ pub struct SettingChange {
     /// Its name.
     pub setting: String,
     /// The value in the run.
-    #[schema(value_type = Object)]
+    #[schema(value_type = Value)]
     pub from: Value,
     /// The value with which the step turns.
-    #[schema(value_type = Object)]
+    #[schema(value_type = Value)]
     pub to: Value,
     /// Its unit, empty for pure numbers.
     pub unit: String,
