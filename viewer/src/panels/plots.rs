@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use egui::{Color32, RichText, ScrollArea, Ui, vec2};
 use egui_plot::{HLine, HoverPosition, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotUi, Points};
 use sightline_record::{Kind, Quantity, StageSchema, Unit};
-use sightline_session::records;
+use sightline_session::records::{self, RowColumn};
 use sightline_session::step::StepRow;
 use sightline_session::view::RunView;
 use sightline_track::settings::TrackerKind;
@@ -43,9 +43,10 @@ impl Series {
         records::row_quantity(self.column).map_or(self.column, |quantity| quantity.label.as_ref())
     }
 
-    /// The value of a step in `unit`.
-    fn value(&self, unit: Unit, run: &RunView, row: &StepRow) -> Option<f64> {
-        records::row_value_in(row, self.column, unit).filter(|_| (self.is_meant)(run, row))
+    /// What reads the value of a step in `unit`, of any number of steps.
+    fn reader(&self, unit: Unit) -> impl Fn(&RunView, &StepRow) -> Option<f64> {
+        let (column, is_meant) = (RowColumn::named(self.column, unit), self.is_meant);
+        move |run, row| column?.value(row).filter(|_| is_meant(run, row))
     }
 }
 
@@ -184,15 +185,15 @@ pub(crate) fn sheets(state: &State) -> Result<Vec<Sheet>, String> {
         })
         .collect();
     let mut sheet = Sheet::over_steps("Over the steps", columns);
+    let lines = charts.iter().flat_map(|chart| chart.series.iter().map(|line| line.reader(chart.unit)));
+    let lines: Vec<_> = lines.collect();
     for row in &run.rows {
         let mut cells = vec![state_of(row)];
-        for chart in &charts {
-            for line in &chart.series {
-                cells.push(line.value(chart.unit, run, row).into());
-                for (other, rows) in others.iter().zip(&beside) {
-                    let there = rows.get(&row.step).and_then(|row| line.value(chart.unit, other.run, row));
-                    cells.push(there.into());
-                }
+        for value in &lines {
+            cells.push(value(run, row).into());
+            for (other, rows) in others.iter().zip(&beside) {
+                let there = rows.get(&row.step).and_then(|row| value(other.run, row));
+                cells.push(there.into());
             }
         }
         cells.extend(
@@ -347,8 +348,8 @@ fn asked_of(chart: &Chart, row: &StepRow) -> Vec<(&'static str, f64)> {
 
 /// A line over the steps that have a value, broken where one has none.
 fn paint_series(plot: &mut PlotUi<'_>, run: &RunView, unit: Unit, line: &Series) {
-    let point =
-        |row: &StepRow| line.value(unit, run, row).filter(|v| v.is_finite()).map(|v| [row.step as f64, v]);
+    let value = line.reader(unit);
+    let point = |row: &StepRow| value(run, row).filter(|v| v.is_finite()).map(|v| [row.step as f64, v]);
     let points: Vec<Option<[f64; 2]>> = run.rows.iter().map(point).collect();
     for piece in pieces(&points) {
         plot.line(Line::new(line.name(), piece.clone()).color(line.colour).width(1.5).allow_hover(false));
@@ -366,9 +367,10 @@ fn paint_other(
     other: &Other<'_>,
     (unit, line): (Unit, &Series),
 ) {
+    let value = line.reader(unit);
     let point = |row: &StepRow| {
         let step = state.own_beside(other.name, row.step)?;
-        line.value(unit, other.run, row).filter(|v| v.is_finite()).map(|v| [step as f64, v])
+        value(other.run, row).filter(|v| v.is_finite()).map(|v| [step as f64, v])
     };
     let points: Vec<Option<[f64; 2]>> = other.run.rows.iter().map(point).collect();
     let is_main = line.colour == theme::run(run.number);
