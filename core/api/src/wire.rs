@@ -1,5 +1,4 @@
 //! What page and server say to each other, beside the types of `sightline_session::view`: requests, the traverse, and events.
-//!
 //! Server and viewer never see each other's code; these types are their whole common language.
 
 use serde::{Deserialize, Serialize};
