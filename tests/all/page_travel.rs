@@ -58,9 +58,13 @@ async fn play_goes_round_in_its_loop_both_ways_and_nothing_plays_by_itself() {
     browser.press("l").await;
     browser.wait_status("play", "s.playing === 1").await;
     let mut seen = std::collections::BTreeSet::new();
-    for _ in 0..80 {
+    // For some rounds at least, and on a busy machine until every step of the loop was seen.
+    for round in 0..1200 {
         seen.insert(browser.status().await["step"].as_u64().unwrap());
         tokio::time::sleep(Duration::from_millis(50)).await;
+        if round >= 80 && seen.len() >= 3 {
+            break;
+        }
     }
     assert!(seen.iter().all(|step| (1..=3).contains(step)) && seen.len() == 3, "{seen:?}");
     browser.press("l").await;

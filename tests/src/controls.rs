@@ -16,7 +16,7 @@ const PATIENCE: Duration = Duration::from_secs(60);
 /// How long what is rendered or tracked on a busy machine may take to come.
 const LONG_PATIENCE: Duration = Duration::from_secs(300);
 
-/// Waits until the page has painted what is pending, and what that led to.
+/// Waits for three painted frames: a window that grew is moved in the frame after.
 const FRAMES: &str = "return new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => \
     requestAnimationFrame(() => done(null)))))";
 
