@@ -24,6 +24,10 @@ impl<S: Send + Sync> FromRequestParts<S> for Read {
 fn read(headers: &HeaderMap) -> ApiResult<Read> {
     let said = |name| headers.get(name).map(|value| value.to_str().unwrap_or_default().trim().to_owned());
     match (said(header::IF_MATCH), said(header::IF_NONE_MATCH)) {
+        (_, Some(other)) if other != "*" => Err(ApiError::invalid(
+            "if_none_match",
+            "If-None-Match: must be *, for a thing that is not there yet",
+        )),
         (Some(any), _) if any == "*" => Ok(Read(None)),
         (Some(tag), _) => {
             let number =
@@ -33,8 +37,8 @@ fn read(headers: &HeaderMap) -> ApiResult<Read> {
             };
             number.map(|number| Read(Some(number))).ok_or_else(wrong)
         }
-        (None, Some(any)) if any == "*" => Ok(Read(Some(0))),
-        _ => Err(ApiError::new(
+        (None, Some(_)) => Ok(Read(Some(0))),
+        (None, None) => Err(ApiError::new(
             StatusCode::PRECONDITION_REQUIRED,
             "if_match",
             "The header If-Match must name the revision that you have read.",
@@ -81,6 +85,7 @@ mod tests {
         assert_eq!(with(header::IF_MATCH, "*"), Ok(Read(None)));
         assert_eq!(with(header::IF_NONE_MATCH, "*"), Ok(Read(Some(0))));
         assert_eq!(with(header::IF_MATCH, "12"), Err(422));
+        assert_eq!(with(header::IF_NONE_MATCH, "\"12\""), Err(422));
         assert_eq!(read(&HeaderMap::new()).map_err(|e| e.problem().status), Err(428));
     }
 }

@@ -2,10 +2,12 @@
 
 use super::cursors::CURSOR_PERIOD;
 use super::*;
+use redb::{Database, ReadableDatabase};
 use sightline_session::documents::Document;
 use sightline_session::notes::{NewNote, Pin};
 use sightline_session::view::{SavedRun, SavedTarget};
 use sightline_session::{Fork, Session};
+use sightline_track::settings::TrackerKind;
 
 /// A session with a target, a run and a fork of it.
 pub(super) fn saved(id: &str) -> SavedSession {
@@ -96,6 +98,40 @@ fn json_files_of_an_earlier_version_are_read_in_once_and_kept() {
     std::fs::write(folder.path().join("s2.json"), serde_json::to_vec(&older).unwrap()).unwrap();
     assert_eq!(sessions(folder.path()).sessions, vec![saved("s2")]);
     assert!(folder.path().join("s2.imported-2").is_file());
+}
+
+/// What the version 0.1.0 of 2026-11-23 left in form 1: a session with two targets, a fork of a run, a note, a breakpoint and
+/// a cursor, another whose only target was removed, and a document.
+#[test]
+fn a_database_of_form_1_opens_and_its_records_are_all_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let kept = include_bytes!("form_1.redb.gz").as_slice();
+    let mut file = std::fs::File::create(folder.path().join(FILE_NAME)).unwrap();
+    std::io::copy(&mut flate2::read::GzDecoder::new(kept), &mut file).unwrap();
+    drop(file);
+    for opening in ["form 1", "form 2"] {
+        let store = Store::open(folder.path()).unwrap();
+        let found = store.load().unwrap();
+        assert!(found.messages.is_empty(), "{opening}: {:?}", found.messages);
+        let [first, second] = found.sessions.as_slice() else { panic!("{opening}: {:?}", found.sessions) };
+        let runs: Vec<usize> = first.targets.iter().map(|target| target.runs.len()).collect();
+        assert_eq!((first.id.as_str(), runs, found.last_number), ("s1", vec![2, 1], 2), "{opening}");
+        assert_eq!(first.targets[0].label, "the face");
+        assert_eq!(first.targets[0].runs[1].fork, Some(Fork::new(0, 2)));
+        assert_eq!(first.targets[0].runs[1].settings.limits.ncc_min, 0.9999);
+        assert_eq!(first.targets[1].runs[0].settings.tracker, TrackerKind::Features);
+        assert_eq!(first.cursor, Cursor { target: Some(0), run: 1, step: 3 });
+        assert_eq!(first.breakpoints.len(), 1);
+        assert!(second.targets.iter().all(|target| target.removed), "{opening}");
+        let note = found.notes[&1].get(1).unwrap();
+        assert_eq!((note.text.as_str(), note.pin.step), ("Here it is lost.", 2), "{opening}");
+        assert_eq!(store.documents().unwrap()[0].name, "layout");
+        let version = |database: &Database| {
+            let meta = database.begin_read()?.open_table(META)?;
+            Ok(meta.get("version")?.map(|version| version.value()))
+        };
+        assert_eq!(store.disk.read(version).unwrap(), Some(STORE_VERSION), "{opening}");
+    }
 }
 
 #[test]
