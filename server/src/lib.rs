@@ -44,6 +44,7 @@ mod request_id;
 mod idempotency;
 mod extract;
 mod printable;
+mod priority;
 mod problem;
 mod version;
 mod revision;

@@ -3,8 +3,9 @@
 //! Steps are computed again from what a person did, so that a session that nobody asks for can rest as after a restart: its
 //! runs lose their steps and are computed when somebody asks for it again, with the same bits.
 
+use std::convert::Infallible;
 use std::sync::{Arc, Mutex};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use crate::jobs::lock;
 use crate::limits::Limits;
@@ -57,6 +58,21 @@ pub(crate) fn has_room(sessions: &Mutex<Sessions>, limits: &Limits, live: &LiveS
         other.rest();
         of_steps(sessions) < limit.count()
     })
+}
+
+/// Lets the allocator give freed memory back to the system, from time to time, also while nobody asks for anything.
+///
+/// It gives memory back a second after it was freed, but only when some thread frees more or ends.
+pub(crate) async fn give_back() -> Infallible {
+    const PERIOD: Duration = Duration::from_secs(5);
+    loop {
+        tokio::time::sleep(PERIOD).await;
+        let thread = std::thread::Builder::new().name("give-back".to_owned());
+        // A large piece of memory, that the allocator does not keep for the next small one.
+        let freed = || drop(std::hint::black_box(vec![0_u8; 4 << 20]));
+        // A thread that the system refuses now is started the next time.
+        let _ = thread.spawn(freed);
+    }
 }
 
 /// Threads and resident memory of this process, bytes, where the system tells.

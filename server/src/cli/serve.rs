@@ -17,6 +17,8 @@ use crate::first_session;
 use crate::folders::Folders;
 use crate::hosts::Hosts;
 use crate::limits::Limits;
+use crate::memory;
+use crate::priority;
 use crate::public_url::PublicUrl;
 use crate::state::AppState;
 
@@ -77,6 +79,7 @@ impl Serve {
             let message = "listening beyond this machine needs an access token; leave --no-token out";
             return Err(Error::Request(message.to_owned()));
         }
+        priority::begin_shared_threads();
         let token = self.token()?;
         let data = open::data_folder(self.data_dir.as_deref())?;
         let listener = bind(SocketAddr::new(self.listen, self.port))?;
@@ -138,6 +141,7 @@ async fn serve(listener: TcpListener, url: &str, state: AppState) -> Result<()> 
     terminal::line(&format!("Sightline is ready: {url}"))?;
     let ended = tokio::select! {
         never = connections::serve(listener, app, state.limits(), connections) => match never {},
+        never = memory::give_back() => match never {},
         () = told_to_end() => Ok(()),
     };
     // Everything but a cursor that has just moved is on disk already.
