@@ -184,11 +184,11 @@ impl Lane {
             }
             // A job that was in the lane already always finds a place.
             let Some(place) = Place::enter(&lane.queue, usize::MAX, &position) else { return };
-            // The first in the queue gets the permit before this job enters it again.
-            drop(permit);
+            // The job enters the queue while it has its permit: else the next one could be through with its turn, and before it.
             if let Err(problem) = lane.enqueue(place, job) {
                 tracing::error!("a job was not continued: {}", problem.problem().detail);
             }
+            drop(permit);
         };
         let started = std::thread::Builder::new().name("job".to_owned()).spawn(work);
         started.map(|_| ()).map_err(|error| ApiError::internal(format!("cannot start a thread: {error}")))

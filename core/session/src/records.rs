@@ -102,29 +102,8 @@ pub fn row_value(row: &StepRow, column: &str) -> Option<f64> {
 
 /// The same in another unit of its dimension.
 pub fn row_value_in(row: &StepRow, column: &str, unit: Unit) -> Option<f64> {
-    RowColumn::named(column, unit)?.value(row)
-}
-
-/// A column of [`StepRow`] in a unit: found once by its name, then read from any number of rows.
-#[derive(Clone, Copy)]
-pub struct RowColumn {
-    index: usize,
-    /// The unit per the declared unit.
-    factor: f64,
-}
-
-impl RowColumn {
-    /// The column of this name.
-    pub fn named(column: &str, unit: Unit) -> Option<Self> {
-        let quantities = &ROW.schema().quantities;
-        let index = quantities.iter().position(|quantity| quantity.name == column)?;
-        Some(Self { index, factor: unit.per_base() / quantities[index].unit.per_base() })
-    }
-
-    /// The number of a row.
-    pub fn value(self, row: &StepRow) -> Option<f64> {
-        Some(ROW.value(row, self.index).number()? * self.factor)
-    }
+    let declared = row_quantity(column)?.unit;
+    Some(row_value(row, column)? * (unit.per_base() / declared.per_base()))
 }
 
 /// A quantity of a stage: how views that show any number of a step name and read it.

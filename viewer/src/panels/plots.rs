@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use egui::{Color32, RichText, ScrollArea, Ui, vec2};
 use egui_plot::{HLine, HoverPosition, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotUi, Points};
 use sightline_record::{Kind, Quantity, StageSchema, Unit};
-use sightline_session::records::{self, RowColumn};
+use sightline_session::records;
 use sightline_session::step::StepRow;
 use sightline_session::view::RunView;
 use sightline_track::settings::TrackerKind;
@@ -45,10 +45,24 @@ impl Series {
 
     /// What reads the value of a step in `unit`, of any number of steps.
     fn reader(&self, unit: Unit) -> impl Fn(&RunView, &StepRow) -> Option<f64> {
-        let (column, is_meant) = (RowColumn::named(self.column, unit), self.is_meant);
-        move |run, row| column?.value(row).filter(|_| is_meant(run, row))
+        let declared = records::row_quantity(self.column).map_or(unit, |quantity| quantity.unit);
+        let factor = unit.per_base() / declared.per_base();
+        let field = FIELDS.iter().find(|(column, _)| *column == self.column).map(|(_, field)| *field);
+        let is_meant = self.is_meant;
+        move |run, row| Some(field?(row)? * factor).filter(|_| is_meant(run, row))
     }
 }
+
+/// The columns that are plotted, each with its field: every painted frame reads them of all steps.
+const FIELDS: [(&str, fn(&StepRow) -> Option<f64>); 7] = [
+    ("ncc", |row| row.ncc),
+    ("stereo_score", |row| row.stereo_score),
+    ("inliers", |row| row.inliers.map(|count| count as f64)),
+    ("confidence", |row| row.confidence),
+    ("err_px", |row| row.err_px),
+    ("err_m", |row| row.err_m),
+    ("sigma_m", |row| row.sigma_m),
+];
 
 /// One plot with its lines and thresholds.
 struct Chart {
@@ -381,6 +395,24 @@ fn paint_other(
         if is_main {
             let points = Points::new(name.clone(), decimate::marks(piece)).color(colour).radius(3.0);
             plot.points(points.shape(shape(other.look.mark)));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn plotted_fields_are_those_of_their_columns() {
+        let row: StepRow = serde_json::from_value(serde_json::json!({
+            "step": 3, "state": "tracking", "ncc": 0.5, "stereo_score": 0.25, "inliers": 7, "confidence": 0.75, "err_px": 2.5,
+            "err_m": 0.125, "sigma_m": 0.0625, "position_in_rover": [1, 2, 3],
+            "covariance_in_rover": [1, 0, 0, 0, 1, 0, 0, 0, 1],
+        }))
+        .unwrap();
+        for (column, field) in FIELDS {
+            assert!(field(&row).is_some() && field(&row) == records::row_value(&row, column), "{column}");
         }
     }
 }
