@@ -17,7 +17,6 @@ use tokio::sync::{AcquireError, OwnedSemaphorePermit, Semaphore};
 
 use crate::cancel::{CancelFlag, CancelOnDrop, Deadline};
 use crate::limits::SharedLimits;
-use crate::priority::yield_to_requests;
 use crate::problem::{ApiError, ApiResult};
 
 /// Locks, also after a panic elsewhere: what these mutexes guard is never left half changed.
@@ -168,7 +167,6 @@ impl Lane {
         let runtime = Handle::try_current().ok();
         let lane = self.clone();
         let work = move || {
-            yield_to_requests();
             let permit = permit;
             let _inside = runtime.as_ref().map(Handle::enter);
             loop {

@@ -29,18 +29,6 @@ async fn jobs_start_in_the_order_of_their_submission() {
     assert_eq!(done, (0..50).collect::<Vec<_>>());
 }
 
-#[cfg(target_os = "linux")]
-#[tokio::test(flavor = "multi_thread")]
-async fn jobs_yield_the_processors_to_requests() {
-    let niceness = || rustix::process::getpriority_process(None).unwrap();
-    let lane = Lane::new(1, 8);
-    let (sender, mut receiver) = tokio::sync::mpsc::unbounded_channel();
-    let ours = niceness();
-    lane.submit(move || sender.send(niceness()).unwrap()).unwrap();
-    assert_eq!(receiver.recv().await, Some(15));
-    assert_eq!((lane.run(move || Ok(niceness())).await, niceness()), (Ok(ours), ours));
-}
-
 #[tokio::test(flavor = "multi_thread")]
 async fn abandoned_work_keeps_its_permit_and_is_told_to_end() {
     let lane = Lane::new(1, 8);

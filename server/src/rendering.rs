@@ -16,7 +16,6 @@ use tokio::sync::broadcast;
 
 use crate::identity::Identity;
 use crate::jobs::lock;
-use crate::priority::yield_to_requests;
 
 /// How soon a cancelled wait is noticed.
 const GLANCE: Duration = Duration::from_millis(50);
@@ -145,8 +144,7 @@ impl Drop for EndOfTurn<'_> {
 fn pool() -> Option<&'static rayon::ThreadPool> {
     static POOL: OnceLock<Option<rayon::ThreadPool>> = OnceLock::new();
     let name = |number| format!("render-{number}");
-    let pool = || rayon::ThreadPoolBuilder::new().thread_name(name).start_handler(|_| yield_to_requests());
-    POOL.get_or_init(|| pool().build().ok()).as_ref()
+    POOL.get_or_init(|| rayon::ThreadPoolBuilder::new().thread_name(name).build().ok()).as_ref()
 }
 
 /// The background thread that renders the stops ahead of where a person looks.
@@ -176,10 +174,7 @@ impl Ahead {
     pub(crate) fn start() -> std::io::Result<Arc<Self>> {
         let ahead = Arc::new(Self { wish: Mutex::default(), changed: Condvar::new() });
         let own = Arc::clone(&ahead);
-        std::thread::Builder::new().name("render-ahead".to_owned()).spawn(move || {
-            yield_to_requests();
-            own.work();
-        })?;
+        std::thread::Builder::new().name("render-ahead".to_owned()).spawn(move || own.work())?;
         Ok(ahead)
     }
 

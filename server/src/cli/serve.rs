@@ -18,7 +18,6 @@ use crate::folders::Folders;
 use crate::hosts::Hosts;
 use crate::limits::Limits;
 use crate::memory;
-use crate::priority;
 use crate::public_url::PublicUrl;
 use crate::state::AppState;
 
@@ -79,7 +78,6 @@ impl Serve {
             let message = "listening beyond this machine needs an access token; leave --no-token out";
             return Err(Error::Request(message.to_owned()));
         }
-        priority::begin_shared_threads();
         let token = self.token()?;
         let data = open::data_folder(self.data_dir.as_deref())?;
         let listener = bind(SocketAddr::new(self.listen, self.port))?;

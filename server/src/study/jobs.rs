@@ -18,6 +18,7 @@ use super::order::Order;
 use super::saved::{Keeper, KeptStudy};
 use crate::jobs::{Lane, lock};
 use crate::limits::SharedLimits;
+use crate::priority::in_background;
 use crate::problem::{ApiError, ApiResult};
 
 /// The studies of a server.
@@ -189,7 +190,7 @@ impl Shelf {
 
     fn submit(&self, work: &Arc<Work>) -> ApiResult<()> {
         let work = Arc::clone(work);
-        self.jobs.submit(move || work.carry_out())
+        self.jobs.submit(move || in_background(|| work.carry_out()))
     }
 }
 
