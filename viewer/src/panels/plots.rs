@@ -53,8 +53,11 @@ impl Series {
     }
 }
 
+/// What reads a number of a row.
+type Field = fn(&StepRow) -> Option<f64>;
+
 /// The columns that are plotted, each with its field: every painted frame reads them of all steps.
-const FIELDS: [(&str, fn(&StepRow) -> Option<f64>); 7] = [
+const FIELDS: [(&str, Field); 7] = [
     ("ncc", |row| row.ncc),
     ("stereo_score", |row| row.stereo_score),
     ("inliers", |row| row.inliers.map(|count| count as f64)),
