@@ -182,7 +182,7 @@ impl Lane {
             }
             // A job that was in the lane already always finds a place.
             let Some(place) = Place::enter(&lane.queue, usize::MAX, &position) else { return };
-            // The job enters the queue while it has its permit: else the next one could be through with its turn, and before it.
+            // The job joins the queue before it gives its permit back; otherwise the next job could finish its turn and overtake it.
             if let Err(problem) = lane.enqueue(place, job) {
                 tracing::error!("a job was not continued: {}", problem.problem().detail);
             }

@@ -60,17 +60,17 @@ pub(crate) fn has_room(sessions: &Mutex<Sessions>, limits: &Limits, live: &LiveS
     })
 }
 
-/// Lets the allocator give freed memory back to the system, from time to time, also while nobody asks for anything.
+/// Makes the allocator return freed memory to the system every few seconds, also on an idle server.
 ///
-/// It gives memory back a second after it was freed, but only when some thread frees more or ends.
+/// The allocator returns memory a second after it was freed, but only when a thread frees more or ends.
 pub(crate) async fn give_back() -> Infallible {
     const PERIOD: Duration = Duration::from_secs(5);
     loop {
         tokio::time::sleep(PERIOD).await;
         let thread = std::thread::Builder::new().name("give-back".to_owned());
-        // A large piece of memory, that the allocator does not keep for the next small one.
+        // Freeing a block of this size makes the allocator look for memory to return.
         let freed = || drop(std::hint::black_box(vec![0_u8; 4 << 20]));
-        // A thread that the system refuses now is started the next time.
+        // If the system starts no thread, the next round tries again.
         let _ = thread.spawn(freed);
     }
 }

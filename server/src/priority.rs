@@ -1,28 +1,26 @@
-//! The priority of threads: what nobody waits for yields the processors to what somebody looks at.
+//! The priority of threads: studies run in the background, below the answers to requests and the runs that somebody watches.
 
 use std::sync::OnceLock;
 
-/// From now on the system prefers other threads to this one, where every thread has a priority of its own.
-///
-/// That is so on Linux. Elsewhere the priority is that of the whole process and stays as it is.
-pub(crate) fn yield_to_others() {
+/// Lowers the priority of this thread on Linux; elsewhere a priority belongs to the whole process and is not changed.
+pub(crate) fn lower() {
     #[cfg(target_os = "linux")]
     {
         /// The niceness: a thirtieth of the processor time of a thread of ordinary priority.
         const NICE: i32 = 15;
-        // A system that refuses it answers more slowly beside long work, but no less correctly.
+        // If the system refuses, requests are answered more slowly beside a study.
         let _ = rustix::process::setpriority_process(None, NICE);
     }
 }
 
-/// Does `work`, and what it shares between threads, on threads that yield to all others.
+/// Does `work` on a thread pool of low priority; parallel iterators in `work` run on the same pool.
 pub(crate) fn in_background<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     static POOL: OnceLock<Option<rayon::ThreadPool>> = OnceLock::new();
     let name = |number| format!("background-{number}");
-    let pool = || rayon::ThreadPoolBuilder::new().thread_name(name).start_handler(|_| yield_to_others());
+    let pool = || rayon::ThreadPoolBuilder::new().thread_name(name).start_handler(|_| lower());
     match POOL.get_or_init(|| pool().build().ok()) {
         Some(pool) => pool.install(work),
-        // The system refuses threads: then those of the tracker have to do.
+        // The system starts no threads: `work` runs here, at normal priority.
         None => work(),
     }
 }
@@ -32,7 +30,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn work_in_the_background_yields_and_what_begins_it_does_not() {
+    fn background_work_has_low_priority_and_its_caller_does_not() {
         let niceness = || rustix::process::getpriority_process(None).unwrap();
         let ours = niceness();
         assert_eq!(
