@@ -122,6 +122,11 @@ impl Lane {
         self.enqueue(Place::take(&self.queue, self.limit, position)?, Box::new(job))
     }
 
+    /// How many jobs are being done.
+    pub(crate) fn running(&self) -> usize {
+        self.at_a_time - self.permits.available_permits()
+    }
+
     /// How many jobs are before the one at `position`, those that are being done included; `None` unless it waits.
     pub(crate) fn before(&self, position: &Position) -> Option<usize> {
         let place = (*lock(&position.0))?;

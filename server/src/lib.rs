@@ -45,6 +45,7 @@ mod idempotency;
 mod extract;
 mod printable;
 mod priority;
+mod requests_first;
 mod problem;
 mod version;
 mod revision;
@@ -73,6 +74,7 @@ pub fn app(state: AppState) -> Router {
     let api = api.fallback(no_route).method_not_allowed_fallback(page::wrong_method);
     let api = api.layer(middleware::from_fn_with_state(Arc::clone(state.repeated()), idempotency::once));
     let (access, limits) = (state.access().clone(), Arc::clone(state.limits()));
+    let requests = Arc::clone(state.requests());
     let public = access.public().cloned();
     let whole = Router::new()
         .nest("/api/v1", api)
@@ -80,6 +82,7 @@ pub fn app(state: AppState) -> Router {
         .with_state(state)
         .layer(axum::Extension(limits))
         .layer(CatchPanicLayer::custom(panicked))
+        .layer(middleware::from_fn_with_state(requests, requests_first::count))
         .layer(middleware::from_fn_with_state(access, guard::guard));
     match public {
         // Layers come after the routing of their router, so that another one around it changes the path.

@@ -28,6 +28,7 @@ use crate::live_session::LiveSession;
 use crate::memory;
 use crate::problem::{ApiError, ApiResult};
 use crate::rendering::OpenTraverse;
+use crate::requests_first::Requests;
 use crate::sessions::Sessions;
 
 /// What computes runs: the lane in which they wait, and where their progress is told.
@@ -38,6 +39,8 @@ pub(crate) struct Runner {
     /// All sessions, whose steps share the memory for them.
     sessions: Arc<Mutex<Sessions>>,
     limits: SharedLimits,
+    /// They are answered before runs go on.
+    requests: Arc<Requests>,
 }
 
 impl Runner {
@@ -47,8 +50,10 @@ impl Runner {
         events: broadcast::Sender<Event>,
         sessions: &Arc<Mutex<Sessions>>,
         limits: &SharedLimits,
+        requests: &Arc<Requests>,
     ) -> Self {
-        Self { lane, events, sessions: Arc::clone(sessions), limits: Arc::clone(limits) }
+        let (sessions, limits, requests) = (Arc::clone(sessions), Arc::clone(limits), Arc::clone(requests));
+        Self { lane, events, sessions, limits, requests }
     }
 
     /// The lane in which runs are computed.
@@ -145,6 +150,9 @@ impl Runner {
 
     /// Computes the next step of a run; breaks once the run has ended or is told to.
     fn turn(&self, live: &LiveSession, target: usize, run: usize, flag: &CancelFlag) -> ControlFlow<()> {
+        if self.lane.running() >= rayon::current_num_threads() {
+            self.requests.give_way();
+        }
         let deadline = Deadline::begin(self.limits.step_s.time(), flag);
         let outcome = match catch_unwind(AssertUnwindSafe(|| self.one_step(live, target, run, flag))) {
             Ok(Ok(true)) => return ControlFlow::Continue(()),

@@ -21,6 +21,7 @@ use crate::limits::{Limits, SharedLimits};
 use crate::live_session::LiveSession;
 use crate::problem::{ApiError, ApiResult};
 use crate::questions::Questions;
+use crate::requests_first::Requests;
 use crate::rendering::{Ahead, OpenTraverse};
 use crate::routes::counterfactual;
 use crate::runner::Runner;
@@ -60,6 +61,7 @@ struct Inner {
     cache: Arc<Cache>,
     connections: Arc<Connections>,
     repeated: Arc<idempotency::Answers>,
+    requests: Arc<Requests>,
     events: broadcast::Sender<Event>,
     runner: Runner,
     ahead: Arc<Ahead>,
@@ -137,6 +139,7 @@ impl AppState {
         let studies = Shelf::new(folders.studies.clone(), events.clone(), keeper, &limits);
         let sessions = Arc::new(Mutex::new(sessions));
         let runs = lanes::lane(&limits.runs_at_a_time, &limits.runs_waiting);
+        let requests = Arc::<Requests>::default();
         studies.read_back(|new| order(&folders.studies, new))?;
         Ok(Self(Arc::new(Inner {
             access,
@@ -144,11 +147,12 @@ impl AppState {
             given,
             making_drives: Mutex::default(),
             folders: folders.clone(),
-            runner: Runner::new(runs, events.clone(), &sessions, &limits),
+            runner: Runner::new(runs, events.clone(), &sessions, &limits, &requests),
             sessions,
             cache,
             connections: Arc::default(),
             repeated: Arc::new(idempotency::Answers::new(&limits)),
+            requests,
             events,
             ahead,
             store,
@@ -160,6 +164,11 @@ impl AppState {
             questions,
             limits,
         })))
+    }
+
+    /// The requests that are being answered.
+    pub(crate) fn requests(&self) -> &Arc<Requests> {
+        &self.0.requests
     }
 
     /// Who may use the server, and under which names.

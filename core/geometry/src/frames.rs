@@ -37,21 +37,25 @@ pub struct Pixel {
 
 impl Pixel {
     /// The pixel at column `x` and row `y`.
+    #[inline]
     pub const fn new(x: f64, y: f64) -> Self {
         Self { x, y }
     }
 
     /// Euclidean distance to `other`, px.
+    #[inline]
     pub fn distance(self, other: Self) -> f64 {
         (self.x - other.x).hypot(self.y - other.y)
     }
 
     /// The pixel moved by `(dx, dy)`.
+    #[inline]
     pub fn offset(self, dx: f64, dy: f64) -> Self {
         Self::new(self.x + dx, self.y + dy)
     }
 
     /// Whether the pixel lies on an image of `width` × `height`, its border pixels included.
+    #[inline]
     pub fn is_inside(self, width: u32, height: u32) -> bool {
         self.x >= -0.5
             && self.y >= -0.5
@@ -71,6 +75,7 @@ pub struct Ray {
 
 impl Ray {
     /// The point at `distance_m` along the ray.
+    #[inline]
     pub fn at(&self, distance_m: f64) -> Point3 {
         self.origin + self.direction * distance_m
     }

@@ -1,5 +1,6 @@
 //! The calls into the browser: address, storage, files, and the attributes of the canvas.
 
+use std::cell::RefCell;
 use std::sync::OnceLock;
 
 use wasm_bindgen::prelude::*;
@@ -12,15 +13,65 @@ pub(crate) fn keep_canvas(id: String) {
     CANVAS.get_or_init(|| id);
 }
 
-/// What the address has after its `#`.
+/// How long a change waits until it is written into the address, ms: browsers take some milliseconds for it, which a
+/// person who steps quickly would wait for.
+const LINK_DELAY_MS: i32 = 250;
+
+/// What is to be written into the address.
+struct LateLink {
+    fragment: String,
+    /// What the address had after its `#` when this was asked for.
+    in_place_of: String,
+}
+
+thread_local! {
+    static LATE_LINK: RefCell<Option<LateLink>> = const { RefCell::new(None) };
+}
+
+/// What the address has after its `#`, or will have as soon as it is written.
 pub(crate) fn hash() -> String {
+    let written = written_hash();
+    LATE_LINK.with_borrow(|late| match late {
+        Some(late) if late.in_place_of == written => late.fragment.clone(),
+        _ => written,
+    })
+}
+
+fn written_hash() -> String {
     let location = web_sys::window().map(|window| window.location());
     location.and_then(|location| location.hash().ok()).unwrap_or_default().trim_start_matches('#').to_owned()
 }
 
-/// Writes what is looked at into the page's address: as a new place of the browser's history, or in place of the
-/// present one.
+/// Writes what is looked at into the page's address: at once as a new place of the browser's history, or soon in place of
+/// the present one.
 pub(crate) fn keep_link(fragment: &str, is_another_place: bool) {
+    if is_another_place {
+        write_late_link();
+        write_link(fragment, true);
+        return;
+    }
+    let late = LateLink { fragment: fragment.to_owned(), in_place_of: written_hash() };
+    let is_timed = LATE_LINK.replace(Some(late)).is_some();
+    if let Some(window) = web_sys::window().filter(|_| !is_timed) {
+        let write = Closure::once_into_js(write_late_link);
+        let timed = window.set_timeout_with_callback_and_timeout_and_arguments_0(
+            write.unchecked_ref(),
+            LINK_DELAY_MS,
+        );
+        if timed.is_err() {
+            write_late_link();
+        }
+    }
+}
+
+/// Writes what waits, unless the person has gone to another address since.
+fn write_late_link() {
+    if let Some(late) = LATE_LINK.take().filter(|late| late.in_place_of == written_hash()) {
+        write_link(&late.fragment, false);
+    }
+}
+
+fn write_link(fragment: &str, is_another_place: bool) {
     let history = web_sys::window().and_then(|window| window.history().ok());
     if let Some(history) = history {
         let url = format!("#{fragment}");

@@ -32,6 +32,8 @@ const GAP: f32 = 2.0;
 const GUTTER: f32 = 78.0;
 /// How many runs of the target have a band, and how many other targets.
 const BANDS: usize = 5;
+/// How many stretches of equal states the sentence about the timeline names.
+const WORDS: usize = 6;
 
 /// One state band.
 struct Band<'a> {
@@ -262,18 +264,14 @@ fn in_words(state: &State, bands: &[Band<'_>]) -> String {
     let (step, last) = (state.cursor.step, state.stop_count().saturating_sub(1));
     let mut words = format!("timeline: step {step} of {last}, {}", cell(state, step).word());
     if let Some(band) = bands.iter().find(|band| band.is_selected) {
-        let cells: Vec<Cell> = (0..=last).map(|step| cell_of(band.target, band.run, step)).collect();
-        let mut from = 0;
-        let stretches: Vec<String> = cells
-            .chunk_by(|a, b| a == b)
-            .take(6)
-            .map(|stretch| {
-                let to = from + stretch.len() - 1;
-                let text = format!("{} {from} to {to}", stretch[0].word());
-                from = to + 1;
-                text
-            })
-            .collect();
+        let cell = |step: usize| cell_of(band.target, band.run, step);
+        let (mut from, mut stretches) = (0, Vec::new());
+        while from <= last && stretches.len() < WORDS {
+            let first = cell(from);
+            let to = (from..last).find(|step| cell(step + 1) != first).unwrap_or(last);
+            stretches.push(format!("{} {from} to {to}", first.word()));
+            from = to + 1;
+        }
         words += &format!("; {}: {}", band.name, stretches.join(", "));
         if from <= last {
             words += " and further changes";
