@@ -173,7 +173,8 @@ fn from_samples<P: image::Pixel>(
     image: &ImageBuffer<P, Vec<P::Subpixel>>,
     value: impl Fn(&P) -> f64,
 ) -> GrayImage {
-    GrayImage::from_fn(image.width(), image.height(), |x, y| Luma([value(image.get_pixel(x, y)) as f32]))
+    let values = image.pixels().map(|pixel| value(pixel) as f32).collect();
+    GrayImage::from_raw(image.width(), image.height(), values).unwrap_or_default()
 }
 
 fn luma([red, green, blue]: [f64; 3]) -> f64 {

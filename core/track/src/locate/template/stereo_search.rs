@@ -262,8 +262,11 @@ impl Windows<'_> {
 
 /// The square of side `size` at (`left`, `top`), which lies inside.
 fn slice(image: &GrayImage, left: i32, top: i32, size: u32) -> Patch {
-    let rows = image.as_raw().chunks_exact(image.width() as usize).skip(top as usize).take(size as usize);
-    let values = rows.flat_map(|row| &row[left as usize..][..size as usize]).copied().collect();
+    let (left, top, side) = (left as usize, top as usize, size as usize);
+    let mut values = Vec::with_capacity(side * side);
+    for row in image.as_raw().chunks_exact(image.width() as usize).skip(top).take(side) {
+        values.extend_from_slice(&row[left..left + side]);
+    }
     GrayImage::from_raw(size, size, values).unwrap_or_default().into()
 }
 
