@@ -19,7 +19,7 @@ const PAUSE: Duration = Duration::from_millis(3);
 const LONG: Duration = Duration::from_millis(20);
 
 /// The longest wait before a step.
-const LONGEST: Duration = Duration::from_millis(20);
+const LONGEST: Duration = Duration::from_millis(40);
 
 /// How often a waiting run looks.
 const LOOK: Duration = Duration::from_micros(500);
