@@ -54,10 +54,8 @@ pub(crate) fn keep_link(fragment: &str, is_another_place: bool) {
     let is_timed = LATE_LINK.replace(Some(late)).is_some();
     if let Some(window) = web_sys::window().filter(|_| !is_timed) {
         let write = Closure::once_into_js(write_late_link);
-        let timed = window.set_timeout_with_callback_and_timeout_and_arguments_0(
-            write.unchecked_ref(),
-            LINK_DELAY_MS,
-        );
+        let timed = window
+            .set_timeout_with_callback_and_timeout_and_arguments_0(write.unchecked_ref(), LINK_DELAY_MS);
         if timed.is_err() {
             write_late_link();
         }
