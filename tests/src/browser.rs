@@ -176,16 +176,27 @@ impl Browser {
     }
 
     /// Gives the page this size, px. The browser's own bars differ from version to version, so that the size of the window
-    /// does not tell the page's.
+    /// does not tell the page's; and the page follows its window a moment later, so that both are read until they agree.
     pub async fn resize(&self, width: u32, height: u32) {
-        let set = async |[width, height]: [u32; 2]| {
+        let wanted = [i64::from(width), i64::from(height)];
+        let mut window = wanted;
+        for _ in 0..50 {
+            let [width, height] = window.map(|pixels| u32::try_from(pixels).expect("a size of a window"));
             let done = self.client.set_window_size(width, height).await;
             done.unwrap_or_else(|error| panic!("the window cannot have {width} × {height}: {error}"));
-        };
-        set([width, height]).await;
-        let bars = self.evaluate("return [outerWidth - innerWidth, outerHeight - innerHeight]").await;
-        let bar = |k: usize| bars[k].as_u64().expect("a number of pixels") as u32;
-        set([width + bar(0), height + bar(1)]).await;
+            tokio::time::sleep(Duration::from_millis(100)).await;
+            let sizes = self.evaluate("return [innerWidth, innerHeight, outerWidth, outerHeight]").await;
+            let size = |k: usize| sizes[k].as_i64().expect("a number of pixels");
+            let page = [size(0), size(1)];
+            if page == wanted {
+                return;
+            }
+            let is_settled = [size(2), size(3)] == window && (0..2).all(|k| page[k] <= window[k]);
+            if is_settled {
+                window = [0, 1].map(|k| wanted[k] + window[k] - page[k]);
+            }
+        }
+        panic!("the page does not take the size {width} × {height}");
     }
 
     /// The page as it looks now, as a PNG file's bytes.
