@@ -10,6 +10,7 @@ mod shape_tracker;
 mod shape_tracker_recorded;
 mod trackability;
 mod records;
+mod rendering;
 mod registration;
 mod stereo_rendered;
 mod stereo_recorded;
