@@ -1,23 +1,24 @@
 //! Speed of the simulator's renderer, in samples (rays with their shadow and texture) a second.
 //!
-//! **The bound.** What a sample of the soil costs, counted from the source; the noise of a pixel's 16 samples goes in
-//! vectors (`camera/shading.rs`; here of 16 numbers, at about one instruction a cycle), the rest in scalar instructions at
-//! about two a cycle, because ray walks are chains of dependent steps:
+//! **The bound.** The cost of a sample of the soil, counted from the source. The 16 samples of a pixel are computed in vectors
+//! (`ground/packet_cast.rs`, `camera/shading.rs`; here of 16 `f32` or twice 8 `f64`, about one instruction a cycle), the rest
+//! in scalar instructions, about two a cycle:
 //!
 //! | part | instructions | cycles |
 //! |---|---|---|
-//! | texture: 8 octaves of 4 hashed lattice points, two channels, gradient, turn | 8 × 150 / 16 | 75 |
-//! | drifts: 2 octaves; the hashes of grains: 3 cells | (2 × 150 + 3 × 40) / 16 | 26 |
+//! | rays of the samples, made unit | (3 × 14 × 2 + 80) / 16 | 10 |
+//! | distance before which nothing is met: one walk a pixel | 400 / 16 / 2 | 12 |
+//! | ground: about 8 cells a pixel, two of them solved with a root | (8 × 90 + 2 × 200) / 16 | 70 |
+//! | rocks: one in view and one towards the sun, 15 planes each | 2 × 15 × 20 / 16 | 38 |
+//! | noting the sample | 40 | 20 |
+//! | texture: 8 octaves of two channels; half of them hash corners for each sample | 8 × (72 + 80 / 2) / 16 | 56 |
+//! | drifts: 2 octaves in one cell; cells of grains: 3 | (2 × 72 + 3 × 36) / 16 | 16 |
 //! | few grains' shapes | 60 | 30 |
-//! | ground: 4 levels of blocks, about two blocks each, and one quadratic | 4 × 90 + 60 | 210 |
-//! | branches of the walk that cannot be foreseen | 6 × 15 cycles | 90 |
-//! | ray, light, openness, sun grid | 150 | 75 |
-//! | rocks in view and towards the sun: about one interval of 15 planes | 15 × 8 | 60 |
+//! | light, openness, normal | 150 | 75 |
 //!
-//! together about 566 cycles, 4.8 million samples a second on a core at 2.7 GHz; with narrower vectors down to 2.6
-//! million without any. A 1024 × 1024 picture with 16 samples a pixel is 16.8 million samples: 5 s on one core, and 17
-//! stereo pairs under two minutes on two. Building the world is not
-//! counted.
+//! together about 330 cycles, 8.2 million samples a second on a core at 2.7 GHz; without wide vectors about a third of it.
+//! A 1024 × 1024 picture with 16 samples a pixel is 16.8 million samples: 3 s on one core at most, and 17 stereo pairs one
+//! minute on two. Building the world is not counted.
 //!
 //! Run with `cargo bench -p sightline-core --profile dev --bench render` (the profile `dev` is optimised); measured times:
 //! `docs/benchmarks.md`.

@@ -118,6 +118,8 @@ fn meets_box(node: &Node, ray: &Ray, to_m: f64) -> bool {
 /// The rocks by where the sun's rays meet them.
 #[derive(Clone, Debug)]
 pub(crate) struct SunGrid {
+    /// Unit direction towards the sun, site frame.
+    to_sun: Vector3,
     across: [Vector3; 2],
     low_m: [f64; 2],
     cells: [usize; 2],
@@ -145,7 +147,14 @@ impl SunGrid {
             high_m[k] = rocks.iter().map(|rock| span(rock, k)[1]).fold(f64::NEG_INFINITY, f64::max);
         }
         if rocks.is_empty() {
-            return Self { across, low_m: [0.0; 2], cells: [0; 2], starts: vec![0], rocks: Vec::new() };
+            return Self {
+                to_sun: *sun_direction,
+                across,
+                low_m: [0.0; 2],
+                cells: [0; 2],
+                starts: vec![0],
+                rocks: Vec::new(),
+            };
         }
         let cells: [usize; 2] = std::array::from_fn(|k| ((high_m[k] - low_m[k]) / Self::CELL_M) as usize + 1);
         let mut lists = vec![Vec::new(); cells[0] * cells[1]];
@@ -163,7 +172,46 @@ impl SunGrid {
         for list in &lists {
             starts.push(starts[starts.len() - 1] + list.len() as u32);
         }
-        Self { across, low_m, cells, starts, rocks: lists.concat() }
+        Self { to_sun: *sun_direction, across, low_m, cells, starts, rocks: lists.concat() }
+    }
+
+    /// Lists in `found` the rocks whose shadow may fall within `radius_m` of a point; false where the grid has too many
+    /// cells there.
+    pub(crate) fn near(&self, point: &Point3, radius_m: f64, rocks: &[Rock], found: &mut Vec<u32>) -> bool {
+        found.clear();
+        if self.rocks.is_empty() {
+            return true;
+        }
+        let mut range = [[0usize; 2]; 2];
+        let middle_m = self.across.map(|axis| point.coords.dot(&axis));
+        for (k, range) in range.iter_mut().enumerate() {
+            let [from, to] =
+                [-radius_m, radius_m].map(|by| (middle_m[k] + by - self.low_m[k]) / Self::CELL_M);
+            if to < 0.0 || from >= self.cells[k] as f64 {
+                return true;
+            }
+            *range = [from.max(0.0) as usize, (to as usize).min(self.cells[k] - 1)];
+            if range[1] - range[0] > 1 {
+                return false;
+            }
+        }
+        for y in range[1][0]..=range[1][1] {
+            for x in range[0][0]..=range[0][1] {
+                let at = y * self.cells[0] + x;
+                for &index in &self.rocks[self.starts[at] as usize..self.starts[at + 1] as usize] {
+                    let rock = &rocks[index as usize];
+                    let reach_m = rock.radius_m + radius_m;
+                    let off_m = rock.centre - point;
+                    let towards_m = off_m.dot(&self.to_sun);
+                    let aside_m2 = off_m.norm_squared() - towards_m * towards_m;
+                    // A rock behind the point shades nothing there.
+                    if towards_m > -reach_m && aside_m2 <= reach_m * reach_m && !found.contains(&index) {
+                        found.push(index);
+                    }
+                }
+            }
+        }
+        true
     }
 
     /// The rocks that may stand between a point and the sun.
@@ -195,6 +243,30 @@ pub(crate) struct Cone {
     pub half_angle_cos: f64,
     /// Its sine.
     pub half_angle_sin: f64,
+}
+
+impl Cone {
+    /// The narrowest cone around the middle of some rays, widened by `margin_rad`; nothing without rays.
+    pub(crate) fn around<'a>(rays: impl Iterator<Item = &'a Ray> + Clone, margin_rad: f64) -> Option<Self> {
+        let count = rays.clone().count();
+        let apex = rays.clone().nth(count / 2)?.origin;
+        let axis = rays.clone().map(|ray| ray.direction).sum::<Vector3>().normalize();
+        let (mut chord_m2, mut apex_radius_m2) = (0.0f64, 0.0f64);
+        for ray in rays {
+            chord_m2 = chord_m2.max((ray.direction - axis).norm_squared());
+            apex_radius_m2 = apex_radius_m2.max((ray.origin - apex).norm_squared());
+        }
+        // A chord of a narrow cone keeps the digits that a cosine loses.
+        let half_angle_rad = 2.0 * (0.5 * chord_m2.sqrt()).min(1.0).asin() + margin_rad;
+        let (half_angle_sin, half_angle_cos) = half_angle_rad.min(std::f64::consts::FRAC_PI_2).sin_cos();
+        Some(Self { apex, apex_radius_m: apex_radius_m2.sqrt(), axis, half_angle_cos, half_angle_sin })
+    }
+
+    /// Radius of the cone around its axis at distance 0, m, and its growth with the distance along any ray.
+    pub(crate) fn spread(&self) -> [f64; 2] {
+        // The chord of the half angle: points at equal distances, not at equal depths.
+        [self.apex_radius_m, (2.0 * (1.0 - self.half_angle_cos)).sqrt().max(self.half_angle_sin) * 1.000_001]
+    }
 }
 
 /// Whether any ray of the cone can meet a sphere.

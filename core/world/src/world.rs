@@ -15,9 +15,11 @@ use std::sync::{Arc, OnceLock};
 use crate::culling::{SunGrid, Tree};
 use crate::ground::footing::Footing;
 use crate::ground::imprint::{Imprint, Laid};
+use crate::ground::packet_cast::Lanes;
 use crate::ground::rocks::Rock;
 use crate::ground::surface::Surfaces;
 use crate::ground::terrain::Terrain;
+use crate::ground::texture::LANES;
 use crate::light::openness::Openness;
 use crate::light::reflection::Light;
 use crate::solids::{Solid, SolidKind};
@@ -174,6 +176,25 @@ impl World {
     /// Whether a point of a surface gets no sun: another surface, or its own, stands in the way.
     pub fn in_shadow(&self, point: &Point3) -> bool {
         self.is_blocked(&Ray { origin: *point, direction: self.light.to_sun })
+    }
+
+    /// [`World::in_shadow`] of many points where the rocks that can shade them are known.
+    #[inline(always)]
+    pub(crate) fn in_shadow_lanes(&self, points: &[Lanes; 3], count: usize, rocks: &[u32]) -> [bool; LANES] {
+        let direction = self.light.to_sun;
+        let mut is_dark = [false; LANES];
+        for &index in rocks {
+            let [enter_m, leave_m] = self.scenery.rocks[index as usize].passage_lanes(points, &direction);
+            for lane in 0..LANES {
+                is_dark[lane] |= leaves_behind(enter_m[lane], leave_m[lane]);
+            }
+        }
+        for (lane, is_dark) in is_dark.iter_mut().enumerate().take(count) {
+            let origin = Point3::new(points[0][lane], points[1][lane], points[2][lane]);
+            let to_sun = Ray { origin, direction };
+            *is_dark = *is_dark || self.is_blocked_by_solid(&to_sun) || self.is_blocked_by_ground(&to_sun);
+        }
+        is_dark
     }
 
     /// Whether anything stands on a ray to the sun.

@@ -22,11 +22,15 @@
 //!
 //! Frame: site. Sources: domain.md 11.3.
 
+use pulp::{Arch, Simd, WithSimd};
+
 use sightline_geometry::camera::Camera;
-use sightline_geometry::frames::{Pixel, Point3, Ray, Vector3};
+use sightline_geometry::frames::{Pixel, Ray, Vector3};
 
 use crate::camera::shading::Seen;
 use crate::culling::{Cone, in_cone};
+use crate::ground::packet_cast::{Lanes, RayLanes};
+use crate::ground::rocks::Rock;
 use crate::ground::texture::LANES;
 use crate::world::World;
 
@@ -42,6 +46,8 @@ pub(crate) struct Sampler<'a> {
     offsets: Vec<[f64; 2]>,
     rad_per_px: f64,
     axis: Vector3,
+    /// Of the ground, site frame.
+    mean_normal: Vector3,
 }
 
 /// The rays of a tile's pixel corners, rows of `width` + 1.
@@ -62,20 +68,28 @@ impl<'a> Sampler<'a> {
         };
         let offsets = offsets(n);
         let axis = camera_in_site.model.axis();
-        Self { world, camera: camera_in_site, samples_per_axis: n, offsets, rad_per_px, axis }
+        let mean_normal = world.scenery.terrain.mean_normal();
+        Self { world, camera: camera_in_site, samples_per_axis: n, offsets, rad_per_px, axis, mean_normal }
     }
 
     /// Radiances of the tile whose first pixel is (`x0`, `y0`), `width` × `height` px, row by row.
     pub(crate) fn tile(&self, x0: i64, y0: i64, width: usize, height: usize) -> Vec<f32> {
+        Arch::new().dispatch(Tile { sampler: self, first: [x0, y0], size: [width, height] })
+    }
+
+    #[inline(always)]
+    fn sample_tile(&self, [x0, y0]: [i64; 2], [width, height]: [usize; 2]) -> Vec<f32> {
         let corners = self.corners(x0, y0, width, height);
         let rocks = self.rocks_in_view(&corners, height);
-        let (mut radiances, mut seen) = (Vec::with_capacity(width * height), Seen::default());
+        let count = self.offsets.len();
+        let mut seen = Seen::new(width * height * count);
         for y in 0..height {
             for x in 0..width {
-                radiances.push(self.pixel(&corners, x, y, &rocks, &mut seen));
+                self.pixel(&corners, [x, y], &rocks, (y * width + x) * count, &mut seen);
             }
         }
-        radiances
+        let of_pixels = seen.radiances(self.world).chunks(count);
+        of_pixels.map(|samples| samples.iter().sum::<f32>() / count as f32).collect()
     }
 
     fn corners(&self, x0: i64, y0: i64, width: usize, height: usize) -> Corners {
@@ -91,22 +105,9 @@ impl<'a> Sampler<'a> {
 
     /// The rocks that any ray of the tile can meet, the nearest first, with their least distance, m.
     fn rocks_in_view(&self, corners: &Corners, height: usize) -> Vec<(f64, usize)> {
-        let rays: Vec<&Ray> = corners.rays.iter().flatten().collect();
-        let Some(middle) = rays.get(rays.len() / 2) else { return Vec::new() };
-        let sum: Vector3 = rays.iter().map(|ray| ray.direction).sum();
-        let axis = sum.normalize();
-        let widest = rays.iter().map(|ray| axis.dot(&ray.direction)).fold(1.0, f64::min);
-        let origin_spread = rays.iter().map(|ray| (ray.origin - middle.origin).norm()).fold(0.0, f64::max);
         // A tile's edge can bulge beyond its corners by far less than this margin of one pixel.
         let margin_rad = self.rad_per_px * if corners.width.max(height) > 1 { 1.0 } else { 2.0 };
-        let half_angle_rad = widest.clamp(-1.0, 1.0).acos() + margin_rad;
-        let cone = Cone {
-            apex: middle.origin,
-            apex_radius_m: origin_spread,
-            axis,
-            half_angle_cos: half_angle_rad.cos(),
-            half_angle_sin: half_angle_rad.sin(),
-        };
+        let Some(cone) = Cone::around(corners.rays.iter().flatten(), margin_rad) else { return Vec::new() };
         let rocks = self.world.scenery.rocks.iter().enumerate();
         let mut list: Vec<(f64, usize)> = rocks
             .filter(|(_, rock)| in_cone(&cone, &rock.centre, rock.radius_m))
@@ -118,59 +119,95 @@ impl<'a> Sampler<'a> {
         list
     }
 
-    /// The mean radiance of a pixel; black where the camera model gives no ray.
-    fn pixel(&self, corners: &Corners, x: usize, y: usize, rocks: &[(f64, usize)], seen: &mut Seen) -> f32 {
+    /// Notes what the samples of a pixel meet, numbered from `first`; nothing where the camera model gives no ray.
+    #[inline(always)]
+    fn pixel(
+        &self,
+        corners: &Corners,
+        [x, y]: [usize; 2],
+        rocks: &[(f64, usize)],
+        first: usize,
+        seen: &mut Seen,
+    ) {
         let at = y * (corners.width + 1) + x;
         let below = at + corners.width + 1;
         let [Some(a), Some(b), Some(c), Some(d)] =
             [corners.rays[at], corners.rays[at + 1], corners.rays[below], corners.rays[below + 1]]
         else {
-            return 0.0;
+            return;
         };
+        let Some(cone) = Cone::around([a, b, c, d].iter(), 0.0) else { return };
+        let scenery = &*self.world.scenery;
+        let meets = |(_, index): &&(f64, usize)| {
+            in_cone(&cone, &scenery.rocks[*index].centre, scenery.rocks[*index].radius_m)
+        };
+        seen.rocks_in_view.clear();
+        seen.rocks_in_view.extend(rocks.iter().filter(meets));
+        let clear_m = scenery.terrain.clear_m(&cone);
         let corners = [a, b, c, d].map(|ray| on_image_plane(&ray, &self.axis));
-        let mut sum = 0.0;
-        for offsets in self.offsets.chunks(LANES) {
-            seen.clear();
-            for (sample, &[u, v]) in offsets.iter().enumerate() {
-                self.look(sample, &between(&corners, u, v), rocks, seen);
-            }
-            let radiances = seen.radiances(self.world);
-            for radiance in &radiances[..offsets.len()] {
-                sum += radiance;
+        for (chunk, offsets) in self.offsets.chunks(LANES).enumerate() {
+            let rays = between(&corners, offsets);
+            let (nearest_m, met) = self.rocks_met(&rays, &cone, &seen.rocks_in_view);
+            let ground_m = scenery.terrain.cast_lanes(&rays, &cone, clear_m, &nearest_m);
+            for lane in 0..offsets.len() {
+                let rock = met[lane].map(|met| (nearest_m[lane], met));
+                let sample = first + chunk * LANES + lane;
+                self.note(sample, &rays.ray(lane), ground_m[lane], rock, seen);
             }
         }
-        sum / self.offsets.len() as f32
     }
 
-    /// Notes what a sample's ray meets.
+    /// The nearest rock and its plane on each ray, with its distance, m, infinite where there is none.
     #[inline(always)]
-    fn look(&self, sample: usize, ray: &Ray, rocks: &[(f64, usize)], seen: &mut Seen) {
-        let (world, scenery) = (self.world, &*self.world.scenery);
-        let mut nearest_m = f64::INFINITY;
-        let mut met = None;
+    fn rocks_met(
+        &self,
+        rays: &RayLanes,
+        cone: &Cone,
+        rocks: &[(f64, usize)],
+    ) -> (Lanes, [Option<(usize, usize)>; LANES]) {
+        let (mut nearest_m, mut met) = ([f64::INFINITY; LANES], [None; LANES]);
         for &(least_m, index) in rocks {
-            if least_m > nearest_m {
+            if nearest_m.iter().all(|m| least_m > *m) {
                 break;
             }
-            if let Some(interval) = scenery.rocks[index].interval(ray)
-                && interval.enter_m > 0.0
-                && interval.enter_m < nearest_m
-            {
-                nearest_m = interval.enter_m;
-                met = Some((index, interval.plane));
+            let rock = &self.world.scenery.rocks[index];
+            let (enter_m, planes) = if cone.apex_radius_m == 0.0 {
+                rock.enter_lanes(&cone.apex, &rays.direction)
+            } else {
+                enter_one_by_one(rock, rays)
+            };
+            for lane in 0..LANES {
+                if enter_m[lane] < nearest_m[lane] {
+                    (nearest_m[lane], met[lane]) = (enter_m[lane], Some((index, planes[lane])));
+                }
             }
         }
-        let ground_m = scenery.terrain.cast(ray, 0.0, nearest_m);
+        (nearest_m, met)
+    }
+
+    /// Notes what a sample's ray meets: the ground at `ground_m`, m, where finite, or a rock, or something made, or nothing.
+    #[inline(always)]
+    fn note(
+        &self,
+        sample: usize,
+        ray: &Ray,
+        ground_m: f64,
+        rock: Option<(f64, (usize, usize))>,
+        seen: &mut Seen,
+    ) {
+        let (world, scenery) = (self.world, &*self.world.scenery);
+        let is_ground = ground_m < f64::INFINITY;
+        let nearest_m = if is_ground { ground_m } else { rock.map_or(f64::INFINITY, |(rock_m, _)| rock_m) };
         if !world.solids.is_empty()
-            && let Some((solid, distance_m, normal)) = world.solid_on(ray, ground_m.unwrap_or(nearest_m))
+            && let Some((solid, distance_m, normal)) = world.solid_on(ray, nearest_m)
         {
             seen.solid(world, sample, ray, distance_m, (solid, &normal));
-        } else if let Some(distance_m) = ground_m {
-            let emission = -scenery.terrain.mean_normal().dot(&ray.direction);
-            seen.ground(sample, ray, distance_m, self.cutoff_m(distance_m, emission));
-        } else if let Some((rock, plane)) = met {
+        } else if is_ground {
+            let emission = -self.mean_normal.dot(&ray.direction);
+            seen.ground(sample, ray, ground_m, self.cutoff_m(ground_m, emission));
+        } else if let Some((rock_m, (rock, plane))) = rock {
             let emission = -scenery.rocks[rock].normal(plane).dot(&ray.direction);
-            seen.rock(sample, ray, nearest_m, self.cutoff_m(nearest_m, emission), (rock, plane));
+            seen.rock(sample, ray, rock_m, self.cutoff_m(rock_m, emission), (rock, plane));
         } else {
             seen.sky(world, sample, ray);
         }
@@ -197,14 +234,63 @@ fn on_image_plane(ray: &Ray, axis: &Vector3) -> Ray {
     Ray { origin: ray.origin, direction: ray.direction / ray.direction.dot(axis).max(0.1) }
 }
 
-/// The ray at (u, v) between the rays of a pixel's corners: (0,0), (1,0), (0,1), (1,1).
+/// The rays at positions (u, v), [`LANES`] at most, between those of a pixel's corners: (0,0), (1,0), (0,1), (1,1).
 #[inline(always)]
-fn between([a, b, c, d]: &[Ray; 4], u: f64, v: f64) -> Ray {
-    let [wa, wb, wc, wd] = [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v];
-    let direction = a.direction * wa + b.direction * wb + c.direction * wc + d.direction * wd;
-    let offset = (b.origin - a.origin) * wb + (c.origin - a.origin) * wc + (d.origin - a.origin) * wd;
-    let origin: Point3 = a.origin + offset;
-    Ray { origin, direction: direction / direction.norm() }
+fn between([a, b, c, d]: &[Ray; 4], offsets: &[[f64; 2]]) -> RayLanes {
+    let (mut u, mut v) = ([offsets[0][0]; LANES], [offsets[0][1]; LANES]);
+    for (lane, offset) in offsets.iter().enumerate() {
+        [u[lane], v[lane]] = *offset;
+    }
+    let mut rays = RayLanes { origin: [[0.0; LANES]; 3], direction: [[0.0; LANES]; 3] };
+    let mut squares = [0.0; LANES];
+    for k in 0..3 {
+        for lane in 0..LANES {
+            let [u, v] = [u[lane], v[lane]];
+            let [wa, wb, wc, wd] = [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v];
+            let direction =
+                a.direction[k] * wa + b.direction[k] * wb + c.direction[k] * wc + d.direction[k] * wd;
+            let offset = (b.origin[k] - a.origin[k]) * wb
+                + (c.origin[k] - a.origin[k]) * wc
+                + (d.origin[k] - a.origin[k]) * wd;
+            rays.origin[k][lane] = a.origin[k] + offset;
+            rays.direction[k][lane] = direction;
+            squares[lane] += direction * direction;
+        }
+    }
+    let scale = squares.map(|square| 1.0 / square.sqrt());
+    for axis in &mut rays.direction {
+        for lane in 0..LANES {
+            axis[lane] *= scale[lane];
+        }
+    }
+    rays
+}
+
+/// [`Rock::enter_lanes`] for rays whose origins differ.
+fn enter_one_by_one(rock: &Rock, rays: &RayLanes) -> (Lanes, [usize; LANES]) {
+    let (mut enter_m, mut planes) = ([f64::INFINITY; LANES], [0; LANES]);
+    for lane in 0..LANES {
+        if let Some(interval) = rock.interval(&rays.ray(lane)).filter(|interval| interval.enter_m > 0.0) {
+            (enter_m[lane], planes[lane]) = (interval.enter_m, interval.plane);
+        }
+    }
+    (enter_m, planes)
+}
+
+/// A tile of a picture to be sampled with the widest vectors that the processor has.
+struct Tile<'a, 's> {
+    sampler: &'s Sampler<'a>,
+    first: [i64; 2],
+    size: [usize; 2],
+}
+
+impl WithSimd for Tile<'_, '_> {
+    type Output = Vec<f32>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
+        self.sampler.sample_tile(self.first, self.size)
+    }
 }
 
 #[cfg(test)]
@@ -220,7 +306,7 @@ mod tests {
             let corners = [corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0), corner(1.0, 1.0)]
                 .map(|ray| on_image_plane(&ray, &camera.model.axis()));
             for (u, v) in [(0.5, 0.5), (0.1, 0.7), (0.9, 0.9)] {
-                let ray = between(&corners, u, v);
+                let ray = between(&corners, &[[u, v]]).ray(0);
                 let pixel = camera.project(&ray.at(5.0)).unwrap();
                 let wanted = Pixel::new(x + u - 0.5, y + v - 0.5);
                 assert!(pixel.distance(wanted) < 5e-5, "{}", pixel.distance(wanted));

@@ -1,9 +1,7 @@
-//! Shading: the light of what the samples of one pixel met, many at once.
+//! Shading: the light of what the samples of a tile met, many at once.
 //!
-//! The samples of a pixel lie side by side, so that the noise of their textures is the same program on other numbers:
-//! up to [`LANES`] of them are gathered by what they met, and the loops over lanes in `texture.rs` and `details.rs`
-//! become vectors as wide as the processor has, chosen when the program runs. Every sample keeps the bits that it has
-//! alone: no sum runs across lanes, and nothing is joined to a fused product.
+//! The samples of a tile are gathered by what they met, the ground or one rock, and shaded [`LANES`] at a time: the noise of
+//! their textures is the same program on other numbers, and the loops over lanes in `texture.rs` and `details.rs` become vectors as wide as the processor has, chosen when the program runs (`sampling.rs`).
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -11,10 +9,9 @@
 //!
 //! Frame: site.
 
-use pulp::{Arch, Simd, WithSimd};
-
+use crate::ground::packet_cast::Lanes;
 use crate::ground::surface::Face;
-use crate::ground::texture::LANES;
+use crate::ground::texture::{LANES, least};
 use crate::light::reflection::Appearance;
 use crate::world::World;
 use sightline_geometry::frames::{Point3, Ray, Vector3};
@@ -25,21 +22,25 @@ const NOTHING_M: f32 = 1e9;
 /// A sample that met a surface.
 #[derive(Clone, Copy, Debug)]
 struct Sample {
-    /// Its number in the pixel.
+    /// Its number in the tile.
     number: usize,
     point: Point3,
     to_camera: [f32; 3],
     cutoff_m: f32,
 }
 
-/// What up to [`LANES`] samples of a pixel met.
+/// What the samples of a tile met.
 #[derive(Debug, Default)]
 pub(super) struct Seen {
     ground: Vec<Sample>,
     /// With rock and plane.
     rocks: Vec<(Sample, usize, usize)>,
     /// By the samples' numbers; those of made things and of the sky are there at once.
-    radiances: [f32; LANES],
+    radiances: Vec<f32>,
+    /// Rocks that a ray of the pixel can meet, the nearest first, with their least distance, m.
+    pub(super) rocks_in_view: Vec<(f64, usize)>,
+    /// Rocks that can shade the ground of the pixel.
+    shading: Vec<u32>,
 }
 
 impl Sample {
@@ -51,10 +52,9 @@ impl Sample {
 }
 
 impl Seen {
-    /// Forgets the samples of the pixel before.
-    pub(super) fn clear(&mut self) {
-        self.ground.clear();
-        self.rocks.clear();
+    /// Room for this many samples.
+    pub(super) fn new(count: usize) -> Self {
+        Self { radiances: vec![0.0; count], ground: Vec::with_capacity(count), ..Self::default() }
     }
 
     /// A sample met the ground.
@@ -99,79 +99,105 @@ impl Seen {
     }
 
     /// The radiance of every sample, by its number.
-    pub(super) fn radiances(&mut self, world: &World) -> &[f32; LANES] {
-        if !self.ground.is_empty() {
-            self.shade_ground(world);
-        }
-        if !self.rocks.is_empty() {
-            self.shade_rocks(world);
-        }
+    #[inline(always)]
+    pub(super) fn radiances(&mut self, world: &World) -> &[f32] {
+        self.shade_ground(world);
+        self.shade_rocks(world);
         &self.radiances
     }
 
+    #[inline(always)]
     fn shade_ground(&mut self, world: &World) {
-        let looks = Arch::new().dispatch(Soil { world, samples: &self.ground });
-        for (sample, mut look) in self.ground.iter().zip(looks) {
-            let point = &sample.point;
-            if let Some(imprint) = &world.imprint {
-                look = imprint.on_soil(look, point.x, point.y, sample.cutoff_m);
+        for samples in self.ground.chunks(LANES) {
+            let looks = soil(world, samples);
+            let is_dark = in_shadow(world, &points_of(samples.iter()), samples.len(), &mut self.shading);
+            for ((sample, mut look), is_dark) in samples.iter().zip(looks).zip(is_dark) {
+                let point = &sample.point;
+                if let Some(imprint) = &world.imprint {
+                    look = imprint.on_soil(look, point.x, point.y, sample.cutoff_m);
+                }
+                let open = world.scenery.openness.at(point.x, point.y);
+                self.radiances[sample.number] =
+                    world.light.reflected(&look, sample.to_camera, !is_dark, open);
             }
-            let in_sun = !world.in_shadow(point);
-            let open = world.scenery.openness.at(point.x, point.y);
-            self.radiances[sample.number] = world.light.reflected(&look, sample.to_camera, in_sun, open);
         }
     }
 
+    #[inline(always)]
     fn shade_rocks(&mut self, world: &World) {
-        let looks = Arch::new().dispatch(Stone { world, samples: &self.rocks });
-        for ((sample, rock, plane), look) in self.rocks.iter().zip(looks) {
-            let normal = world.scenery.rocks[*rock].normal(*plane);
-            let in_sun = normal.dot(&world.light.to_sun) > 0.0 && !world.in_shadow(&sample.point);
-            self.radiances[sample.number] = world.light.reflected(&look, sample.to_camera, in_sun, 1.0);
+        // Points of one rock lie close together in the noise, those of two do not.
+        self.rocks.sort_by_key(|(_, rock, _)| *rock);
+        for samples in self.rocks.chunk_by(|(_, a, _), (_, b, _)| a == b).flat_map(|one| one.chunks(LANES)) {
+            let looks = stone(world, samples);
+            let points = points_of(samples.iter().map(|(sample, ..)| sample));
+            let is_dark = in_shadow(world, &points, samples.len(), &mut self.shading);
+            for (((sample, rock, plane), look), is_dark) in samples.iter().zip(looks).zip(is_dark) {
+                let normal = world.scenery.rocks[*rock].normal(*plane);
+                let in_sun = normal.dot(&world.light.to_sun) > 0.0 && !is_dark;
+                self.radiances[sample.number] = world.light.reflected(&look, sample.to_camera, in_sun, 1.0);
+            }
         }
     }
+}
+
+/// The points of samples by component and lane, lanes without one repeating the first.
+#[inline(always)]
+fn points_of<'a>(samples: impl Iterator<Item = &'a Sample> + Clone) -> [Lanes; 3] {
+    let first = samples.clone().next().map_or(Point3::origin(), |sample| sample.point);
+    let mut points = [[first.x; LANES], [first.y; LANES], [first.z; LANES]];
+    for (lane, sample) in samples.enumerate().take(LANES) {
+        points[0][lane] = sample.point.x;
+        points[1][lane] = sample.point.y;
+        points[2][lane] = sample.point.z;
+    }
+    points
+}
+
+/// Whether each of the first `count` points gets no sun. `shading` is room for the rocks that can shade them.
+#[inline(always)]
+fn in_shadow(world: &World, points: &[Lanes; 3], count: usize, shading: &mut Vec<u32>) -> [bool; LANES] {
+    let middle = Point3::new(points[0][0], points[1][0], points[2][0]);
+    let mut nearness = [0.0; LANES];
+    for lane in 0..LANES {
+        let (x, y, z) = (points[0][lane] - middle.x, points[1][lane] - middle.y, points[2][lane] - middle.z);
+        nearness[lane] = -(x * x + y * y + z * z);
+    }
+    // Room for rounding, as at the rocks' own spheres.
+    let radius_m = (-least(&nearness)).sqrt() * (1.0 + 1e-9);
+    if world.sun_grid.near(&middle, radius_m, world.rocks(), shading) {
+        return world.in_shadow_lanes(points, count, shading);
+    }
+    let mut is_dark = [false; LANES];
+    for (lane, is_dark) in is_dark.iter_mut().enumerate().take(count) {
+        *is_dark = world.in_shadow(&Point3::new(points[0][lane], points[1][lane], points[2][lane]));
+    }
+    is_dark
 }
 
 /// The look of soil at samples.
-struct Soil<'a> {
-    world: &'a World,
-    samples: &'a [Sample],
-}
-
-impl WithSimd for Soil<'_> {
-    type Output = [Appearance; LANES];
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
-        let (mut p_m, mut cutoff_m) = ([[0.0; LANES]; 2], [NOTHING_M; LANES]);
-        for (lane, sample) in self.samples.iter().enumerate() {
-            (p_m[0][lane], p_m[1][lane]) = (sample.point.x, sample.point.y);
-            cutoff_m[lane] = sample.cutoff_m;
-        }
-        let scenery = &*self.world.scenery;
-        scenery.surfaces.soil(&scenery.terrain, &p_m, &cutoff_m, self.samples.len())
+#[inline(always)]
+fn soil(world: &World, samples: &[Sample]) -> [Appearance; LANES] {
+    // Lanes without a sample repeat the first point.
+    let first = samples.first().map_or(Point3::origin(), |sample| sample.point);
+    let (mut p_m, mut cutoff_m) = ([[first.x; LANES], [first.y; LANES]], [NOTHING_M; LANES]);
+    for (lane, sample) in samples.iter().enumerate() {
+        (p_m[0][lane], p_m[1][lane]) = (sample.point.x, sample.point.y);
+        cutoff_m[lane] = sample.cutoff_m;
     }
+    let scenery = &*world.scenery;
+    scenery.surfaces.soil(&scenery.terrain, &p_m, &cutoff_m, samples.len())
 }
 
-/// The look of rocks at samples.
-struct Stone<'a> {
-    world: &'a World,
-    samples: &'a [(Sample, usize, usize)],
-}
-
-impl WithSimd for Stone<'_> {
-    type Output = [Appearance; LANES];
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
-        let scenery = &*self.world.scenery;
-        let mut faces = [None; LANES];
-        let mut cutoff_m = [NOTHING_M; LANES];
-        for (lane, (sample, rock, plane)) in self.samples.iter().enumerate() {
-            let rock = &scenery.rocks[*rock];
-            faces[lane] = Some(Face { rock, point: sample.point, normal: rock.normal(*plane) });
-            cutoff_m[lane] = sample.cutoff_m;
-        }
-        scenery.surfaces.rock(&faces, &cutoff_m)
+/// The look of one rock at samples.
+#[inline(always)]
+fn stone(world: &World, samples: &[(Sample, usize, usize)]) -> [Appearance; LANES] {
+    let scenery = &*world.scenery;
+    let mut faces = [None; LANES];
+    let mut cutoff_m = [NOTHING_M; LANES];
+    for (lane, (sample, rock, plane)) in samples.iter().enumerate() {
+        let rock = &scenery.rocks[*rock];
+        faces[lane] = Some(Face { rock, point: sample.point, normal: rock.normal(*plane) });
+        cutoff_m[lane] = sample.cutoff_m;
     }
+    scenery.surfaces.rock(&faces, &cutoff_m)
 }

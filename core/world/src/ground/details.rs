@@ -19,8 +19,8 @@
 //!
 //! Frames: soil at (x, y) of the site, rock about its centre. Source: ours, after domain.md 10.4.
 
-use crate::ground::texture::{LANES, OctaveSettings, Octaves, TextureLanes, mix, weight};
-use crate::ground::value_noise::cell_hash;
+use crate::ground::texture::{LANES, OctaveSettings, Octaves, TextureLanes, least, mix, weight};
+use crate::ground::value_noise::{LatticeMap, Points, cell_hash, cell_of};
 
 /// Sides of the cells of the grains' lattices, m: mean diameters 1.3 cm, 6 mm and 3 mm.
 const GRAIN_CELLS_M: [f64; 3] = [0.026, 0.012, 0.006];
@@ -50,6 +50,7 @@ pub(super) struct SoilDetails {
     drift_level: f32,
     /// Probability of a grain in a cell.
     grains: f32,
+    grain_lattices: [LatticeMap<2>; 3],
     contrast: f32,
     seed: u32,
 }
@@ -109,6 +110,8 @@ impl SoilDetails {
             drifts: Octaves::new(&broad_noise(0.8), mix(seed ^ 0xd21f)),
             drift_level: drift_level as f32,
             grains: (grain_cover / levels / GRAIN_PART).min(1.0) as f32,
+            grain_lattices: GRAIN_CELLS_M
+                .map(|cell_m| LatticeMap::new([[1.0 / cell_m, 0.0], [0.0, 1.0 / cell_m]], [0.0; 2])),
             contrast: albedo_std as f32,
             seed: mix(seed ^ 0x92a1) as u32,
         }
@@ -116,11 +119,11 @@ impl SoilDetails {
 
     /// How much of a drift lies at each of many places, 0 to 1.
     #[inline(always)]
-    pub(super) fn drifts(&self, p_m: &[[f64; LANES]; 2]) -> [f32; LANES] {
+    pub(super) fn drifts(&self, points: &Points<2>) -> [f32; LANES] {
         if self.drift_level == f32::INFINITY {
             return [0.0; LANES];
         }
-        let mut drifts = self.drifts.at_lanes(p_m, &[1e-6; LANES]).albedo;
+        let mut drifts = self.drifts.at_lanes(points, &[1e-6; LANES]).albedo;
         for drift in &mut drifts {
             let t = (0.5 + 1.5 * (*drift - self.drift_level)).clamp(0.0, 1.0);
             *drift = t * t * (3.0 - 2.0 * t);
@@ -130,24 +133,35 @@ impl SoilDetails {
 
     /// The grains at each of many places.
     #[inline(always)]
-    pub(super) fn grains(&self, p_m: &[[f64; LANES]; 2], cutoff_m: &[f32; LANES]) -> TextureLanes<2> {
+    pub(super) fn grains(&self, points: &Points<2>, cutoff_m: &[f32; LANES]) -> TextureLanes<2> {
         let mut sum = TextureLanes { albedo: [0.0; LANES], slope: [[0.0; LANES]; 2] };
         if self.grains <= 0.0 {
             return sum;
         }
+        let finest_m = least(cutoff_m);
         for (level, cell_m) in GRAIN_CELLS_M.into_iter().enumerate() {
-            let (mut weights, mut hashes, mut places) = ([0.0; LANES], [0; LANES], [[0.0; LANES]; 2]);
+            if cell_m as f32 <= finest_m {
+                break;
+            }
+            let mut weights = [0.0; LANES];
             for lane in 0..LANES {
                 weights[lane] = weight(cell_m as f32, cutoff_m[lane]);
-                let lattice = [p_m[0][lane] / cell_m, p_m[1][lane] / cell_m];
-                let (hash, [u, v]) = cell_hash(lattice, self.seed ^ level as u32);
-                (hashes[lane], places[0][lane], places[1][lane]) = (hash, u, v);
+            }
+            let cells = self.grain_lattices[level].cells(points);
+            let seed = self.seed ^ level as u32;
+            let mut hashes = [cell_hash(cells.cell(0), seed); LANES];
+            if !cells.is_one {
+                for lane in 0..LANES {
+                    hashes[lane] = cell_hash(cells.cell(lane), seed);
+                }
+            } else if byte(hashes[0], 0) >= self.grains {
+                continue;
             }
             for lane in 0..LANES {
                 if weights[lane] <= 0.0 || byte(hashes[lane], 0) >= self.grains {
                     continue;
                 }
-                if let Some((tone, slope)) = grain(hashes[lane], [places[0][lane], places[1][lane]]) {
+                if let Some((tone, slope)) = grain(hashes[lane], cells.part(lane)) {
                     sum.albedo[lane] += weights[lane] * 5.0 * self.contrast * tone;
                     sum.slope[0][lane] += weights[lane] * slope[0];
                     sum.slope[1][lane] += weights[lane] * slope[1];
@@ -185,11 +199,11 @@ impl RockDetails {
     #[inline(always)]
     pub(super) fn veins(
         &self,
-        p_m: &[[f64; LANES]; 3],
+        points: &Points<3>,
         strength: &[f32; LANES],
         cutoff_m: &[f32; LANES],
     ) -> [f32; LANES] {
-        let mut veins = self.veins.at_lanes(p_m, &[1e-6; LANES]).albedo;
+        let mut veins = self.veins.at_lanes(points, &[1e-6; LANES]).albedo;
         for lane in 0..LANES {
             // Half width 0.05 of the noise's standard deviation: 2 to 5 mm.
             let t = veins[lane] / 0.06;
@@ -206,7 +220,8 @@ impl RockDetails {
         if weight <= 0.0 {
             return Detail::NONE;
         }
-        let (hash, [u, v, w]) = cell_hash(p_m.map(|c| c / PIT_CELL_M), self.seed);
+        let (cell, [u, v, w]) = cell_of(p_m.map(|c| c / PIT_CELL_M));
+        let hash = cell_hash(cell, self.seed);
         if byte(hash, 0) >= 0.6 * strength {
             return Detail::NONE;
         }
@@ -240,9 +255,11 @@ mod tests {
                 std::array::from_fn(|lane| (LANES * k + lane) as f64 * 0.003_71),
                 std::array::from_fn(|lane| ((LANES * k + lane) % 997) as f64 * 0.0131),
             ];
-            let (near, far) = (details.grains(&p_m, &[1e-4; LANES]), details.grains(&p_m, &[0.03; LANES]));
+            let points = Points::new(&p_m);
+            let (near, far) =
+                (details.grains(&points, &[1e-4; LANES]), details.grains(&points, &[0.03; LANES]));
             grains += near.albedo.iter().filter(|albedo| **albedo != 0.0).count() as f64;
-            drifts += details.drifts(&p_m).iter().copied().map(f64::from).sum::<f64>();
+            drifts += details.drifts(&points).iter().copied().map(f64::from).sum::<f64>();
             count += LANES as f64;
             assert_eq!((far.albedo, far.slope), ([0.0; LANES], [[0.0; LANES]; 2]));
         }
@@ -281,7 +298,8 @@ mod tests {
         let (mut veined, mut pitted) = (0, 0);
         for k in 0..50_000 {
             let p = [f64::from(k) * 0.0171, f64::from(k % 991) * 0.013, f64::from(k % 97) * 0.02];
-            let veins = details.veins(&p.map(|axis| [axis; LANES]), &[1.0; LANES], &[1e-4; LANES]);
+            let veins =
+                details.veins(&Points::new(&p.map(|axis| [axis; LANES])), &[1.0; LANES], &[1e-4; LANES]);
             veined += u32::from(veins[0] > 0.1);
             let pit = details.pits(p, 1.0, 1e-4);
             pitted += u32::from(pit.albedo < 0.0);

@@ -22,6 +22,7 @@ use crate::ground::details::{RockDetails, SoilDetails};
 use crate::ground::rocks::Rock;
 use crate::ground::terrain::Terrain;
 use crate::ground::texture::{LANES, OctaveSettings, Octaves, TextureSample, mix};
+use crate::ground::value_noise::Points;
 use crate::light::reflection::Appearance;
 use crate::scenario::TextureSettings;
 
@@ -90,9 +91,10 @@ impl Surfaces {
         cutoff_m: &[f32; LANES],
         count: usize,
     ) -> [Appearance; LANES] {
-        let texture = self.soil.at_lanes(p_m, cutoff_m);
-        let drifts = self.soil_details.drifts(p_m);
-        let grains = self.soil_details.grains(p_m, cutoff_m);
+        let points = Points::new(p_m);
+        let texture = self.soil.at_lanes(&points, cutoff_m);
+        let drifts = self.soil_details.drifts(&points);
+        let grains = self.soil_details.grains(&points, cutoff_m);
         let mut looks = [Appearance::default(); LANES];
         for (lane, look) in looks.iter_mut().enumerate().take(count) {
             let slope = terrain.smooth_slope_at(p_m[0][lane], p_m[1][lane]);
@@ -109,7 +111,7 @@ impl Surfaces {
         looks
     }
 
-    /// Rocks at points of their faces; lanes without one come last.
+    /// One rock at points of its faces; lanes without one come last.
     #[inline(always)]
     pub(crate) fn rock(
         &self,
@@ -126,9 +128,15 @@ impl Surfaces {
             veins[lane] = look.veins;
             has_veins |= look.veins > 0.0;
         }
-        let mut texture = self.rock.at_lanes(&p_m, cutoff_m);
+        for axis in &mut p_m {
+            // Lanes without a point repeat the first.
+            let first = axis[0];
+            axis.iter_mut().skip(faces.iter().flatten().count()).for_each(|at| *at = first);
+        }
+        let points = Points::new(&p_m);
+        let mut texture = self.rock.at_lanes(&points, cutoff_m);
         if has_veins {
-            veins = self.rock_details.veins(&p_m, &veins, cutoff_m);
+            veins = self.rock_details.veins(&points, &veins, cutoff_m);
         }
         let mut looks = [Appearance::default(); LANES];
         for (lane, face) in faces.iter().flatten().enumerate() {

@@ -48,6 +48,8 @@ pub(crate) struct Terrain {
     /// Gradient of the height at the vertices, for smooth shading.
     slope: Vec<[f32; 2]>,
     pub(crate) tops: Vec<Tops>,
+    /// The same for a block with its eight neighbours.
+    pub(crate) wide_tops: Vec<Tops>,
     pub(crate) highest_z_m: f64,
     steepest: f64,
     /// Gradient of the mean plane, m/m; heights above are those of the ground without it.
@@ -92,10 +94,11 @@ impl Terrain {
         tilt: [f64; 2],
     ) -> Self {
         let tops: Vec<Tops> = BLOCK_SHIFT.iter().map(|&shift| tops(&z_m, cells, 1 << shift)).collect();
+        let wide_tops = tops.iter().map(Tops::widened).collect();
         let highest_z_m = tops[0].z_m.iter().copied().fold(MEAN_GROUND_Z_M, |a, b| a.min(f64::from(b)));
         let slope = vertex_slopes(&z_m, cells, cell_m);
         let steepest = steepest(&z_m, cells) / cell_m + tilt[0].hypot(tilt[1]);
-        Self { origin_m, cell_m, cells, z_m, slope, tops, highest_z_m, steepest, tilt, far: None }
+        Self { origin_m, cell_m, cells, z_m, slope, tops, wide_tops, highest_z_m, steepest, tilt, far: None }
     }
 
     /// No part of the ground is steeper than this, m/m.
@@ -179,6 +182,22 @@ impl Terrain {
             let far = corner[2][k] + u * (corner[3][k] - corner[2][k]);
             near + v * (far - near) + self.tilt[k] as f32
         })
+    }
+}
+
+impl Tops {
+    /// The highest point of every block with its eight neighbours.
+    fn widened(&self) -> Self {
+        let (columns, rows) = (self.columns, self.z_m.len() / self.columns);
+        let along = |from: &[f32], count: usize, step: usize, at: usize, k: usize| {
+            let before = if k > 0 { from[at - step] } else { from[at] };
+            let after = if k + 1 < count { from[at + step] } else { from[at] };
+            from[at].min(before).min(after)
+        };
+        let across: Vec<f32> =
+            (0..self.z_m.len()).map(|at| along(&self.z_m, columns, 1, at, at % columns)).collect();
+        let z_m = (0..across.len()).map(|at| along(&across, rows, columns, at, at / columns)).collect();
+        Self { columns, z_m }
     }
 }
 

@@ -2,8 +2,7 @@
 //!
 //! Within a cell, z(u, v) = z00 + a u + b v + c u v and a ray is linear in t, so that
 //! `F(t) = z_ray(t) − z(u(t), v(t))` is a quadratic with the exact root as the hit. F > 0 is below ground
-//! (z points down). Cells are found by nested walks over blocks of 64, 16, 4 and 1 cells; a block is
-//! skipped while the ray stays above its highest point. A ray that enters a cell already below the ground
+//! (z points down). Cells are found by a nested walk over blocks (`block_walk.rs`). A ray that enters a cell already below the ground
 //! is taken as hit where it enters, which closes the rounding gap between neighbouring cells.
 //!
 //! Tilted ground is level ground sheared along z, `z = z_level + a x + b y`. The ray is sheared back, which leaves it
@@ -17,22 +16,17 @@
 //! | u, v | position within a cell, 0 to 1 along x and y | – |
 //! | z | height, `z_m` | m, site frame, down |
 //!
-//! Sources: ours; the walk is a hierarchical digital differential analyser over a pyramid of maxima.
+//! Source: ours.
 
 use sightline_geometry::frames::Ray;
 
+use crate::culling::Cone;
+use crate::ground::block_walk::{Blocks, CellRay};
 use crate::ground::level::MEAN_GROUND_Z_M;
 use crate::ground::terrain::{BLOCK_SHIFT, Terrain};
 
-/// A ray in units of cells: position (p + d t), t in metres.
-struct CellRay {
-    p: [f64; 2],
-    d: [f64; 2],
-    /// 1/d, infinite where the ray does not move along the axis.
-    inverse: [f64; 2],
-    z_m: f64,
-    dz: f64,
-}
+/// The level of blocks at which a walk starts where the ground is near: 4 × 4 cells.
+const NEAR_LEVEL: usize = 2;
 
 impl Terrain {
     /// Distance along `ray` to the ground within [`from_m`, `to_m`], m, or nothing.
@@ -40,25 +34,75 @@ impl Terrain {
     /// A ray that is below ground at `from_m` hits there.
     #[inline(always)]
     pub(crate) fn cast(&self, ray: &Ray, from_m: f64, to_m: f64) -> Option<f64> {
-        let Some(far) = &self.far else { return self.cast_slope(ray, from_m, to_m) };
+        self.cast_beyond(ray, 0.0, from_m, to_m)
+    }
+
+    /// [`Terrain::cast`] for a ray that does not meet the grid before `clear_m`, m ([`Terrain::clear_m`]).
+    #[inline(always)]
+    pub(crate) fn cast_beyond(&self, ray: &Ray, clear_m: f64, from_m: f64, to_m: f64) -> Option<f64> {
+        let Some(far) = &self.far else { return self.cast_slope(ray, clear_m, from_m, to_m) };
         let [enter_m, leave_m] = far.over_slope(ray);
         far.cast(ray, from_m, to_m.min(enter_m))
-            .or_else(|| self.cast_slope(ray, from_m.max(enter_m), to_m.min(leave_m)))
+            .or_else(|| self.cast_slope(ray, clear_m, from_m.max(enter_m), to_m.min(leave_m)))
             .or_else(|| far.cast(ray, from_m.max(leave_m), to_m))
+    }
+
+    /// A distance before which no ray of a narrow cone meets the grid, m.
+    ///
+    /// The cone's axis is walked over the highest points of blocks with their neighbours, lowered by the cone's radius, as
+    /// long as the cone is narrower than a block.
+    pub(crate) fn clear_m(&self, cone: &Cone) -> f64 {
+        let [radius_m, growth] = cone.spread();
+        let lower = 1.0 + self.tilt[0].hypot(self.tilt[1]);
+        let mut ray = self.level(&Ray { origin: cone.apex, direction: cone.axis });
+        ray.origin.z += radius_m * lower;
+        ray.direction.z += growth * lower;
+        let above_m = self.highest_z_m - ray.origin.z;
+        if above_m <= 0.0 {
+            return 0.0;
+        }
+        let start_m = if ray.direction.z > 0.0 { above_m / ray.direction.z } else { return f64::INFINITY };
+        let ray = self.cell_ray(&ray);
+        let (enter_m, leave_m) = self.inside(&ray, 0.0, f64::INFINITY);
+        if enter_m > 0.0 {
+            return 0.0;
+        }
+        if start_m >= leave_m {
+            return leave_m;
+        }
+        let is_narrow = |level: usize, t: f64| {
+            radius_m + growth * t <= self.cell_m * (1usize << BLOCK_SHIFT[level]) as f64
+        };
+        if !is_narrow(0, leave_m) {
+            return start_m;
+        }
+        let blocks = Blocks {
+            tops: &self.wide_tops,
+            cells: self.cells,
+            is_leaf: |level: usize, end: f64| level + 1 == BLOCK_SHIFT.len() || !is_narrow(level + 1, end),
+            leaf: |_: [usize; 2], t: f64, _: f64| Some(t),
+        };
+        blocks.walk(0, &ray, start_m, leave_m).unwrap_or(leave_m)
+    }
+
+    /// A ray over the ground without its tilt; its direction need not be unit.
+    #[inline(always)]
+    fn level(&self, ray: &Ray) -> Ray {
+        let mut ray = *ray;
+        ray.origin.z -= self.tilt_m(ray.origin.x, ray.origin.y);
+        ray.direction.z -= self.tilt_m(ray.direction.x, ray.direction.y);
+        ray
     }
 
     /// The same where the mean ground is a plane.
     #[inline(always)]
-    fn cast_slope(&self, ray: &Ray, from_m: f64, to_m: f64) -> Option<f64> {
-        let mut ray = *ray;
-        ray.origin.z -= self.tilt_m(ray.origin.x, ray.origin.y);
-        ray.direction.z -= self.tilt_m(ray.direction.x, ray.direction.y);
-        self.cast_level(&ray, from_m, to_m)
+    fn cast_slope(&self, ray: &Ray, clear_m: f64, from_m: f64, to_m: f64) -> Option<f64> {
+        self.cast_level(&self.level(ray), clear_m, from_m, to_m)
     }
 
     /// The same over the ground without its tilt; the ray's direction need not be unit.
     #[inline(always)]
-    fn cast_level(&self, ray: &Ray, from_m: f64, to_m: f64) -> Option<f64> {
+    fn cast_level(&self, ray: &Ray, clear_m: f64, from_m: f64, to_m: f64) -> Option<f64> {
         // Nothing can be hit where the ray is above the highest point; most of a camera's ray is.
         let (mut from_m, mut to_m) = (from_m, to_m);
         let above_m = self.highest_z_m - ray.origin.z;
@@ -81,7 +125,20 @@ impl Terrain {
         if enter_m >= leave_m || plane_m < enter_m {
             return on_plane;
         }
-        self.walk(0, [0, 0], &ray, enter_m, leave_m).or(on_plane.filter(|t| *t >= leave_m))
+        let blocks = Blocks {
+            tops: &self.tops,
+            cells: self.cells,
+            is_leaf: |level: usize, _: f64| level + 1 == BLOCK_SHIFT.len(),
+            leaf: |cell: [usize; 2], t: f64, end: f64| self.hit_cell(cell, &ray, t, end),
+        };
+        let from_m = enter_m.max(clear_m);
+        let on_grid = if clear_m > 0.0 {
+            // The ground is near: the coarse blocks would all be entered.
+            (from_m < leave_m).then(|| blocks.walk(NEAR_LEVEL, &ray, from_m, leave_m)).flatten()
+        } else {
+            blocks.walk(0, &ray, from_m, leave_m)
+        };
+        on_grid.or(on_plane.filter(|t| *t >= leave_m))
     }
 
     fn cell_ray(&self, ray: &Ray) -> CellRay {
@@ -113,63 +170,6 @@ impl Terrain {
             leave_m = leave_m.min(a.max(b));
         }
         (enter_m, leave_m)
-    }
-
-    /// Walks the blocks of `level` inside the parent block that starts at cell `first`, over [enter, leave].
-    fn walk(
-        &self,
-        level: usize,
-        first: [usize; 2],
-        ray: &CellRay,
-        enter_m: f64,
-        leave_m: f64,
-    ) -> Option<f64> {
-        let shift = BLOCK_SHIFT[level];
-        let side = (1usize << shift) as f64;
-        let inverse_side = 1.0 / side;
-        let span = if level == 0 { usize::MAX >> 1 } else { 1usize << BLOCK_SHIFT[level - 1] };
-        let (mut block, mut next_m, mut step_m) = ([0usize; 2], [f64::INFINITY; 2], [f64::INFINITY; 2]);
-        let mut last = [0usize; 2];
-        for k in 0..2 {
-            let low = first[k] >> shift;
-            let high = ((first[k] + span).min(self.cells[k]) - 1) >> shift;
-            let position = (ray.p[k] + ray.d[k] * enter_m) * inverse_side;
-            block[k] = (position.max(0.0) as usize).clamp(low, high);
-            last[k] = if ray.d[k] > 0.0 { high } else { low };
-            if ray.d[k] != 0.0 {
-                let border = block[k] + usize::from(ray.d[k] > 0.0);
-                next_m[k] = (border as f64 * side - ray.p[k]) * ray.inverse[k];
-                step_m[k] = side * ray.inverse[k].abs();
-            }
-        }
-        let tops = &self.tops[level];
-        let mut t = enter_m;
-        loop {
-            let axis = usize::from(next_m[1] < next_m[0]);
-            let end = next_m[axis].min(leave_m);
-            let top_m = f64::from(tops.z_m[block[1] * tops.columns + block[0]]);
-            let lowest_m = ray.z_m + ray.dz * if ray.dz > 0.0 { end } else { t };
-            if lowest_m >= top_m && end >= t {
-                let cell = [block[0] << shift, block[1] << shift];
-                let hit = if shift == 0 {
-                    self.hit_cell(cell, ray, t, end)
-                } else {
-                    self.walk(level + 1, cell, ray, t, end)
-                };
-                if hit.is_some() {
-                    return hit;
-                }
-            }
-            if next_m[axis] >= leave_m {
-                return None;
-            }
-            t = end.max(t);
-            next_m[axis] += step_m[axis];
-            if block[axis] == last[axis] {
-                return None;
-            }
-            block[axis] = if ray.d[axis] > 0.0 { block[axis] + 1 } else { block[axis] - 1 };
-        }
     }
 
     /// The first distance in [enter, leave] at which the ray is on or below the patch of a cell.
