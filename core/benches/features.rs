@@ -125,7 +125,7 @@ impl Stops for Drive<'_> {
     fn shared(&self, step: usize) -> Option<Shared<'_>> {
         Some(Shared { store: self.store, stop: step })
     }
-    fn capture(&self, step: usize) -> Result<StereoPair> {
+    fn capture(&self, step: usize, _: Cancel<'_>) -> Result<StereoPair> {
         Ok(self.scene.pairs[step].clone())
     }
 }

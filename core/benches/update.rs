@@ -136,7 +136,11 @@ impl Stops for Plane {
     fn stereo(&self) -> StereoGeometry {
         StereoGeometry::Lateral
     }
-    fn capture(&self, step: usize) -> sightline_geometry::error::Result<StereoPair> {
+    fn capture(
+        &self,
+        step: usize,
+        _: sightline_geometry::cancel::Cancel<'_>,
+    ) -> sightline_geometry::error::Result<StereoPair> {
         Ok(self.pairs[step].clone())
     }
 }

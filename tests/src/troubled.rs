@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use sightline_geometry::camera::{Camera, Mast, MastAngles};
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::{Pixel, Point3, Pose};
 use sightline_geometry::odometry_error::OdometryError;
@@ -79,12 +80,12 @@ impl Stops for Troubled {
     fn stereo(&self) -> StereoGeometry {
         Stops::stereo(&self.traverse)
     }
-    fn capture(&self, step: usize) -> Result<StereoPair> {
+    fn capture(&self, step: usize, cancel: Cancel<'_>) -> Result<StereoPair> {
         if self.missing.contains(&step) {
             let path = PathBuf::from(&self.traverse.index().stops[step].left.image);
             return Err(Error::Read { path, source: std::io::ErrorKind::NotFound.into() });
         }
-        let mut pair = Stops::capture(&self.traverse, step)?;
+        let mut pair = Stops::capture(&self.traverse, step, cancel)?;
         if self.covered.contains(&step) {
             let grey = |image: &GrayImage| {
                 Arc::new(GrayImage::from_pixel(image.width(), image.height(), image::Luma([0.2])))

@@ -11,6 +11,13 @@ use crate::error::{Error, Result};
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Cancel<'a>(Option<&'a AtomicBool>);
 
+impl<'a> Cancel<'a> {
+    /// The flag that requests it, if there is one.
+    pub fn flag(self) -> Option<&'a AtomicBool> {
+        self.0
+    }
+}
+
 impl Cancel<'_> {
     /// Whether the result is not wanted any more.
     pub fn is_requested(self) -> bool {

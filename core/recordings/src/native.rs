@@ -193,13 +193,21 @@ impl Traverse {
     /// No such stop, or an image that is missing, damaged or not of its camera's size; the sentence names it relative to the
     /// folder, because it becomes part of the step's record, which must not depend on where the folder is.
     pub fn capture(&self, step: usize) -> Result<StereoPair> {
+        self.capture_until(step, &AtomicBool::new(false))
+    }
+
+    /// [`Traverse::capture`], which ends soon after `cancel` is set.
+    ///
+    /// # Errors
+    /// As [`Traverse::capture`], and [`Error::Cancelled`].
+    pub fn capture_until(&self, step: usize, cancel: &AtomicBool) -> Result<StereoPair> {
         let stop = self.stop(step)?;
         if let Some(pair) = self.kept_pair(step) {
             return Ok(StereoPair::clone(&pair));
         }
         let cameras = &self.cameras[step];
         let read = || {
-            self.render_step(step, &AtomicBool::new(false))?;
+            self.render_step(step, cancel)?;
             Ok(StereoPair {
                 left: Arc::new(self.read_image(step, "left", &stop.left, &cameras.left)?),
                 right: Arc::new(self.read_image(step, "right", &stop.right, &cameras.right)?),

@@ -28,13 +28,14 @@ use super::check::StopCameras;
 use super::files::{read_text, resolve, write_atomically};
 use super::render_cache::{self, RenderCache};
 use sightline_geometry::camera::Camera;
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_vision::image::{GrayImage, io};
 use sightline_world::camera::exposure::{Rates, automatic, fixed_s};
 use sightline_world::moment::Moment;
 use sightline_world::scenario::ExposureMode;
 use sightline_world::traverse::{Stop, TraverseIndex};
-use sightline_world::{Eye, NoiseSeed, Region, Scenario, World, clean_radiance, develop};
+use sightline_world::{Eye, NoiseSeed, Region, Scenario, World, clean_radiance, develop_until};
 
 /// Pixels of a kept picture that are rendered anew before it is believed.
 const PROBES: u32 = 16;
@@ -80,6 +81,15 @@ impl Simulated {
         self.world.get_or_init(|| World::new(&self.scenario))
     }
 
+    /// [`Simulated::world`], which ends soon after `cancel` is requested. Two who ask at once may both build it.
+    pub(super) fn world_until(&self, cancel: Cancel<'_>) -> Result<&World> {
+        if let Some(world) = self.world.get() {
+            return Ok(world);
+        }
+        let world = World::new_until(&self.scenario, cancel)?;
+        Ok(self.world.get_or_init(|| world))
+    }
+
     /// Renders and writes the images of a stop that are not there yet.
     pub(super) fn render_missing(&self, stops: &Stops<'_>, step: usize, cancel: &AtomicBool) -> Result<()> {
         let _guard = lock(&self.locks[step]);
@@ -90,7 +100,7 @@ impl Simulated {
                 let time_s = self.exposure_s(stops, step, cancel)?;
                 let (camera, radiance) = self.radiance(stops, step, eye, cancel)?;
                 let seed = NoiseSeed { step: step as u32, eye };
-                let image = develop(&radiance, &self.scenario, &camera, time_s, seed);
+                let image = develop_until(&radiance, &self.scenario, &camera, time_s, seed, cancel.into())?;
                 write_atomically(&path, &self.encode(&image)?)?;
             }
         }
@@ -101,7 +111,7 @@ impl Simulated {
     pub(super) fn exposure_s(&self, stops: &Stops<'_>, step: usize, cancel: &AtomicBool) -> Result<f64> {
         let settings = &self.scenario.camera;
         if settings.exposure == ExposureMode::Fixed {
-            return Ok(fixed_s(self.world(), &self.scenario));
+            return Ok(fixed_s(self.world_until(cancel.into())?, &self.scenario));
         }
         let (first, mut time_s) = {
             let known = self.exposures_s.lock().unwrap_or_else(PoisonError::into_inner);
@@ -137,7 +147,7 @@ impl Simulated {
         let camera = camera_in_site(stops, step, eye)?;
         let stop = &stops.index.stops[step];
         let moment = Moment::of(step, stop).ok_or_else(|| Error::Request(needs_truth(step)))?;
-        let world = self.world().at(&moment, &self.scenario);
+        let world = self.world_until(cancel.into())?.at(&moment, &self.scenario);
         let render = |region: Region| clean_radiance(&world, &self.scenario, &camera, region, cancel);
         let key = render_cache::key(&self.scenario, &stop_key(stop, step), &camera);
         if let Some(kept) = self.cache.load(&key, &camera)

@@ -314,3 +314,19 @@ fn both_eyes_share_an_exposure_that_does_not_depend_on_the_order_of_asking() {
     }
     assert!(forward.exposure_s(2, &never).is_err());
 }
+
+#[test]
+fn a_cancelled_capture_builds_no_world_and_writes_no_image() {
+    let folder = tempfile::tempdir().unwrap();
+    create_simulated(&scenario(), folder.path()).unwrap();
+    let traverse = Traverse::open(folder.path()).unwrap();
+    let is_cancelled = |outcome: Result<sightline_track::stages::capture::StereoPair>| {
+        matches!(outcome, Err(Error::Cancelled))
+    };
+    assert!(is_cancelled(traverse.capture_until(0, &AtomicBool::new(true))));
+    assert!(traverse.simulated.as_ref().unwrap().world.get().is_none());
+    assert!(!folder.path().join("images").join("left_0000.png").exists());
+    // The stop is not given up for it.
+    assert!(traverse.capture(0).is_ok());
+    assert!(folder.path().join("images").join("left_0000.png").exists());
+}

@@ -36,8 +36,7 @@ pub fn create_simulated_until(scenario: &Scenario, folder: &Path, cancel: Cancel
         }
         return Err(Error::format(folder, "holds another traverse already; choose another folder"));
     }
-    let world = World::new_until(scenario, cancel);
-    cancel.check()?;
+    let world = World::new_until(scenario, cancel)?;
     let index = sightline_world::index_until(scenario, &world, cancel);
     cancel.check()?;
     let index = index?;

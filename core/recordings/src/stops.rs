@@ -5,6 +5,7 @@
 //! nothing is known to hide a point.
 
 use sightline_geometry::camera::{Camera, Mast, MastAngles};
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
 use sightline_geometry::frames::{Pixel, Point3, Pose};
 use sightline_rover::pipeline::Stops;
@@ -48,12 +49,18 @@ impl Stops for Traverse {
     fn shared(&self, step: usize) -> Option<Shared<'_>> {
         Some(Shared { store: &self.store, stop: step })
     }
-    fn capture(&self, step: usize) -> Result<StereoPair> {
-        self.capture(step)
+    fn capture(&self, step: usize, cancel: Cancel<'_>) -> Result<StereoPair> {
+        match cancel.flag() {
+            Some(flag) => self.capture_until(step, flag),
+            None => self.capture(step),
+        }
     }
 }
 
 impl TruthSource for Traverse {
+    fn prepare(&self, cancel: Cancel<'_>) -> Result<()> {
+        self.simulated.as_ref().map_or(Ok(()), |simulated| simulated.world_until(cancel).map(drop))
+    }
     fn true_site_from_rover(&self, step: usize) -> Option<Pose> {
         self.true_site_from_rover(step)
     }

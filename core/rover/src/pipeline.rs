@@ -52,8 +52,8 @@ pub trait Stops {
     /// The stereo pair.
     ///
     /// # Errors
-    /// A sentence that names the missing or damaged file.
-    fn capture(&self, step: usize) -> Result<StereoPair>;
+    /// A sentence that names the missing or damaged file, or [`Error::Cancelled`] soon after `cancel` is requested.
+    fn capture(&self, step: usize, cancel: Cancel<'_>) -> Result<StereoPair>;
 }
 
 /// The first step of a run: the 3-D position and template of a designated pixel (R16, R19).
@@ -112,7 +112,7 @@ fn designated(
     let step = designation.step;
     let (left, right) = stops.cameras(step);
     let pixel = check_pixel(designation, left)?;
-    let capture = capture::capture(stops.capture(step)?, Some(pixel), settings.subframe_px());
+    let capture = capture::capture(stops.capture(step, cancel)?, Some(pixel), settings.subframe_px());
     let (located, memory) = locate::designate(&DesignateInput {
         step,
         site_from_rover: &stops.site_from_rover(step),
@@ -165,7 +165,7 @@ fn computed_step(
     let carried = update::carry(target, step, &prediction);
     let pointing = pointing(stops, step, &carried);
     let time_s = stops.time_s(step);
-    let pair = match stops.capture(step) {
+    let pair = match stops.capture(step, cancel) {
         Ok(pair) => pair,
         Err(error) => {
             let kind = StepKind::Damaged { predict: prediction, fault: error.to_string() };

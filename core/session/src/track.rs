@@ -35,6 +35,7 @@ pub fn designate_until<D: Drive>(
     settings: &Settings,
     cancel: Cancel<'_>,
 ) -> Result<RunStep> {
+    drive.prepare(cancel)?;
     let mut trace = pipeline::designate_until(drive, designation, settings, cancel)?;
     warn_of_shadow(drive, &mut trace, settings);
     Ok(compared(drive, trace, None))
@@ -79,6 +80,7 @@ impl NextStep<'_> {
     /// [`sightline_geometry::error::Error::Cancelled`] soon after `cancel` is requested.
     pub fn compute<D: Drive>(&self, drive: &D) -> Result<RunStep> {
         let Self { first, last, settings, prediction_px, cancel } = *self;
+        drive.prepare(cancel)?;
         let trace = pipeline::run_step_displaced(drive, &last.update, settings, prediction_px, cancel)?;
         Ok(compared(drive, trace, Some(first)))
     }

@@ -12,6 +12,7 @@ use nalgebra::{Translation3, UnitQuaternion};
 
 use crate::point::Visit;
 use sightline_geometry::camera::{Camera, Mast, MastAngles};
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
 use sightline_geometry::frames::{Pixel, Point3, Pose, Vector3};
 use sightline_geometry::odometry_error::OdometryError;
@@ -82,12 +83,15 @@ impl<D: Drive> Stops for Staged<'_, D> {
     fn shared(&self, step: usize) -> Option<Shared<'_>> {
         self.drive.shared(self.stops[step])
     }
-    fn capture(&self, step: usize) -> Result<StereoPair> {
-        self.drive.capture(self.stops[step])
+    fn capture(&self, step: usize, cancel: Cancel<'_>) -> Result<StereoPair> {
+        self.drive.capture(self.stops[step], cancel)
     }
 }
 
 impl<D: Drive> TruthSource for Staged<'_, D> {
+    fn prepare(&self, cancel: Cancel<'_>) -> Result<()> {
+        self.drive.prepare(cancel)
+    }
     fn true_site_from_rover(&self, step: usize) -> Option<Pose> {
         self.drive.true_site_from_rover(self.stops[step])
     }

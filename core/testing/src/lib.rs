@@ -9,6 +9,7 @@ use std::sync::Arc;
 use image::Luma;
 
 use sightline_geometry::camera::{Cahv, Camera, CameraModel, Mast, MastAngles};
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::{Pixel, Point3, Pose, Vector3};
 use sightline_geometry::odometry_error::OdometryError;
@@ -129,7 +130,7 @@ impl Stops for PlaneWorld {
     fn stereo(&self) -> StereoGeometry {
         StereoGeometry::Lateral
     }
-    fn capture(&self, step: usize) -> Result<StereoPair> {
+    fn capture(&self, step: usize, _: Cancel<'_>) -> Result<StereoPair> {
         if self.troubles[step] == Trouble::Missing {
             return Err(Error::Request(format!("images/left_{step:04}.png is missing")));
         }

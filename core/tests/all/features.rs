@@ -152,7 +152,7 @@ impl OneEyed {
         let settings = settings(&[]);
         let designation = Designation { step: 0, pixel: Pixel::new(140.3, 120.6) };
         let first = track::designate(&self.0, designation, &settings).unwrap();
-        let mut pair = self.0.capture(1).unwrap();
+        let mut pair = self.0.capture(1, Cancel::default()).unwrap();
         std::sync::Arc::make_mut(&mut pair.right).pixels_mut().for_each(|pixel| pixel[0] = 0.4);
         let (left, right) = self.0.cameras(1);
         let seen = sightline_track::locate::features::detect::detect(

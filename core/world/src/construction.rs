@@ -16,27 +16,32 @@ use crate::rover::plan;
 use crate::scenario::Scenario;
 use crate::world::{Scenery, World};
 use sightline_geometry::cancel::Cancel;
+use sightline_geometry::error::Result;
 use sightline_geometry::frames::{Point3, Ray, Vector3};
 
 impl World {
     /// Builds the world of a scenario at the start of the drive, without the rover and what is in its way; the
     /// scenario is taken as valid ([`Scenario::validate`]).
     pub fn new(scenario: &Scenario) -> Self {
-        Self::new_until(scenario, Cancel::default())
+        Self::new_until(scenario, Cancel::default()).unwrap_or_else(|_| unreachable!("nobody cancels"))
     }
 
-    /// The same; once `cancel` is requested, returns a world without its exposure soon, which is to be discarded.
-    pub fn new_until(scenario: &Scenario, cancel: Cancel<'_>) -> Self {
+    /// [`World::new`], which ends soon after `cancel` is requested.
+    ///
+    /// # Errors
+    /// [`sightline_geometry::error::Error::Cancelled`].
+    pub fn new_until(scenario: &Scenario, cancel: Cancel<'_>) -> Result<Self> {
         let approach = Approach {
             goal_m: plan::goal_m(&scenario.drive),
             wheels_reach_m: plan::wheels_reach_m(&scenario.drive),
             around: Around::new(&scenario.drive, &scenario.camera),
         };
         let [x_m, y_m] = plan::ground_extent_m(&scenario.drive);
-        let terrain = Terrain::new(&scenario.terrain, x_m, y_m, scenario.seed);
-        let rocks = rock_field::scatter(&scenario.rocks, &approach, &terrain, scenario.seed);
+        let terrain = Terrain::new_until(&scenario.terrain, x_m, y_m, scenario.seed, cancel)?;
+        let rocks = rock_field::scatter(&scenario.rocks, &approach, &terrain, scenario.seed, cancel)?;
         let light = Light::new(&scenario.sun, scenario.texture.soil_albedo);
         let sun_grid = Arc::new(SunGrid::new(&rocks, &light.to_sun));
+        cancel.check()?;
         let [x_m_goal, y_m_goal] = approach.goal_m;
         let scenery = Scenery {
             tree: Tree::new(&rocks),
@@ -60,7 +65,9 @@ impl World {
         let centre = world.cast(&down).map_or(Point3::new(x_m_goal, y_m_goal, 0.0), |hit| hit.point);
         Arc::make_mut(&mut world.scenery).targets_centre = centre;
         world.solids = fiducials(&scenario.fiducials, &centre);
+        cancel.check()?;
         world.exposure = render::exposure(&world, scenario, cancel);
-        world
+        cancel.check()?;
+        Ok(world)
     }
 }

@@ -65,7 +65,7 @@ pub mod library;
 mod tests;
 
 pub use camera::picture::{Eye, NoiseSeed, Region};
-pub use camera::render::{clean_radiance, develop, render};
+pub use camera::render::{clean_radiance, develop, develop_until, render};
 pub use camera::rig::Rig;
 pub use index::{SCENARIO_FILE, index, index_until, true_camera_in_site};
 pub use scenario::Scenario;

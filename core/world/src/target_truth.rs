@@ -12,6 +12,8 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use sightline_geometry::camera::Camera;
+use sightline_geometry::cancel::Cancel;
+use sightline_geometry::error::Result;
 use sightline_geometry::frames::{Pixel, Point3, Pose};
 use sightline_record::{Declaration, Record, Unit};
 use sightline_track::target::TrackingState;
@@ -19,6 +21,13 @@ use sightline_track::trace::StepTrace;
 
 /// What is true of a traverse.
 pub trait TruthSource: Send + Sync {
+    /// Builds beforehand, so that it can be cancelled, what the truth needs and takes long.
+    ///
+    /// # Errors
+    /// [`sightline_geometry::error::Error::Cancelled`] soon after `cancel` is requested.
+    fn prepare(&self, _cancel: Cancel<'_>) -> Result<()> {
+        Ok(())
+    }
     /// The true pose at a stop, where it is known.
     fn true_site_from_rover(&self, step: usize) -> Option<Pose>;
     /// The true left camera in the rover frame.

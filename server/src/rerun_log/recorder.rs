@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::time::SystemTime;
 
 use rerun::{RecordingStream, RecordingStreamBuilder, TextDocument};
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Point3;
 use sightline_rover::pipeline::Stops;
@@ -184,7 +185,8 @@ fn template_size_px(trace: &RunStep) -> u32 {
 /// traverse.
 fn images(trace: &RunStep, stops: &dyn Stops) -> Option<[Arc<GrayImage>; 2]> {
     let kept = trace.capture()?.pair.clone();
-    let pair = if kept.left.width() > 0 { kept } else { stops.capture(trace.step).ok()? };
+    let pair =
+        if kept.left.width() > 0 { kept } else { stops.capture(trace.step, Cancel::default()).ok()? };
     Some([pair.left, pair.right])
 }
 

@@ -165,7 +165,7 @@ impl Ground {
         if let Some(contradiction) = settings.template.contradiction() {
             return Err(Error::Target(contradiction));
         }
-        let pair = stops.capture(step)?;
+        let pair = stops.capture(step, cancel)?;
         let (left, right) = stops.cameras(step);
         let stereo = StereoSettings::default();
         let surface = StopSurface::shared(stops.shared(step), &pair, [left, right], &stereo, cancel)?;

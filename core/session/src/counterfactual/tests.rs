@@ -74,11 +74,11 @@ impl Stops for Rendered {
     fn stereo(&self) -> StereoGeometry {
         self.world.stereo()
     }
-    fn capture(&self, step: usize) -> Result<StereoPair> {
+    fn capture(&self, step: usize, _: Cancel<'_>) -> Result<StereoPair> {
         if self.world.troubles[step] == Trouble::Missing {
-            return self.world.capture(step);
+            return self.world.capture(step, Cancel::default());
         }
-        Ok(self.pairs[step].get_or_init(|| self.world.capture(step).unwrap()).clone())
+        Ok(self.pairs[step].get_or_init(|| self.world.capture(step, Cancel::default()).unwrap()).clone())
     }
 }
 

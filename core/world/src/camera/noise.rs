@@ -32,6 +32,8 @@ use rand_distr::{Distribution, Poisson, StandardNormal};
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
 
+use sightline_geometry::cancel::Cancel;
+use sightline_geometry::error::Result;
 use sightline_vision::image::GrayImage;
 
 use crate::camera::exposure::Rates;
@@ -42,21 +44,24 @@ use crate::scenario::{CameraSettings, FULL_SCALE_DN, Quantisation, Scenario};
 /// The largest number of 8 bits.
 const BYTE_DN: f64 = 255.0;
 
-/// Records what a picture collects in `time_s`; `first` is its first pixel in the whole picture.
+/// Records what a picture collects in `time_s`; `first` is its first pixel in the whole picture. Fails soon after `cancel`
+/// is requested.
 pub(crate) fn record(
     rates: &Rates,
     scenario: &Scenario,
     time_s: f64,
     seed: NoiseSeed,
     first: [u32; 2],
-) -> GrayImage {
+    cancel: Cancel<'_>,
+) -> Result<GrayImage> {
     let camera = &scenario.camera;
     let key_of = |seed_of_key: u64| mix(seed_of_key ^ mix(0xca3e_0000 + seed.eye.number()));
     let response_key = key_of(scenario.seed);
     let noise_key = mix(key_of(camera.noise_seed.unwrap_or(scenario.seed)) ^ (u64::from(seed.step) + 1));
     let mut recorded = rates.per_s().clone();
     let width = recorded.width().max(1) as usize;
-    recorded.par_chunks_mut(width).enumerate().for_each(|(y, line)| {
+    recorded.par_chunks_mut(width).enumerate().try_for_each(|(y, line)| {
+        cancel.check()?;
         for (x, value) in line.iter_mut().enumerate() {
             let place = ((u64::from(first[1]) + y as u64) << 32) | (u64::from(first[0]) + x as u64);
             let response = normal(&mut stream(response_key, place)) * camera.response_spread;
@@ -65,8 +70,9 @@ pub(crate) fn record(
             let dn = converted(electrons, camera, &mut stream(noise_key, place));
             *value = quantised(dn, camera);
         }
-    });
-    recorded
+        Ok(())
+    })?;
+    Ok(recorded)
 }
 
 /// The stream of random numbers of one pixel.

@@ -4,6 +4,7 @@ use super::*;
 use crate::camera::exposure::Rates;
 use crate::camera::picture::Eye;
 use sightline_geometry::camera::Mast;
+use sightline_geometry::cancel::Cancel;
 
 const SIDE: u32 = 256;
 
@@ -20,7 +21,8 @@ fn recorded_of(level: f64, scenario: &Scenario, seed: NoiseSeed) -> GrayImage {
     let radiance = (electrons / camera.electrons_per_s) as f32;
     let radiance = GrayImage::from_pixel(SIDE, SIDE, image::Luma([radiance]));
     let geometry = Mast::spirit().left_in_head.downsampled(4);
-    record(&Rates::new(&radiance, scenario, &geometry, seed.eye, [0, 0]), scenario, 1.0, seed, [0, 0])
+    let rates = Rates::new(&radiance, scenario, &geometry, seed.eye, [0, 0]);
+    record(&rates, scenario, 1.0, seed, [0, 0], Cancel::default()).unwrap()
 }
 
 fn recorded(level: f64, change: impl Fn(&mut CameraSettings)) -> GrayImage {
@@ -150,4 +152,14 @@ fn another_noise_seed_redraws_the_noise_and_keeps_the_response() {
     let again = take(&scenario);
     scenario.camera.noise_seed = Some(scenario.seed + 2);
     assert!(correlation(&again, &take(&scenario)).abs() < 0.02);
+}
+
+#[test]
+fn a_cancelled_development_records_nothing() {
+    let scenario = Scenario::default();
+    let camera = crate::Rig::new(&scenario.camera).cameras_in_rover(None).0;
+    let radiance = GrayImage::from_pixel(8, 8, image::Luma([0.2]));
+    let rates = Rates::new(&radiance, &scenario, &camera, Eye::Left, [0, 0]);
+    let (flag, seed) = (std::sync::atomic::AtomicBool::new(true), NoiseSeed { step: 0, eye: Eye::Left });
+    assert!(record(&rates, &scenario, 1.0, seed, [0, 0], Cancel::from(&flag)).is_err());
 }

@@ -61,8 +61,24 @@ pub fn develop(
     time_s: f64,
     seed: NoiseSeed,
 ) -> GrayImage {
+    develop_until(radiance, scenario, camera, time_s, seed, Cancel::default()).unwrap_or_default()
+}
+
+/// [`develop`], which ends soon after `cancel` is requested.
+///
+/// # Errors
+/// [`Error::Cancelled`] soon after `cancel` is requested.
+pub fn develop_until(
+    radiance: &GrayImage,
+    scenario: &Scenario,
+    camera: &Camera,
+    time_s: f64,
+    seed: NoiseSeed,
+    cancel: Cancel<'_>,
+) -> Result<GrayImage> {
     let rates = Rates::new(radiance, scenario, camera, seed.eye, [0, 0]);
-    noise::record(&rates, scenario, time_s, seed, [0, 0])
+    cancel.check()?;
+    noise::record(&rates, scenario, time_s, seed, [0, 0], cancel)
 }
 
 /// Radiance behind the optics of a part of a picture, before exposure and detector; stops soon after `cancel`

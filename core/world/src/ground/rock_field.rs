@@ -35,6 +35,8 @@ use crate::ground::rocks::{Rock, RockSeed};
 use crate::ground::terrain::Terrain;
 use crate::ground::texture::mix;
 use crate::scenario::{RockSettings, RockShape};
+use sightline_geometry::cancel::Cancel;
+use sightline_geometry::error::Result;
 
 /// Inner and outer edge of the wheels' tracks, m from the middle line (domain.md 5.4, wheel 16 cm wide).
 const TRACK_Y_M: [f64; 2] = [0.43, 0.70];
@@ -100,7 +102,8 @@ pub(crate) fn scatter(
     approach: &Approach,
     terrain: &Terrain,
     seed: u64,
-) -> Vec<Rock> {
+    cancel: Cancel<'_>,
+) -> Result<Vec<Rock>> {
     let mut random = Pcg64::seed_from_u64(mix(seed ^ 0x20c5));
     let mut candidates = candidates(settings, approach, &mut random);
     candidates.sort_by(|a, b| b.diameter_m.total_cmp(&a.diameter_m));
@@ -108,6 +111,7 @@ pub(crate) fn scatter(
     let mut seeds = placed_seeds(settings, approach, seed);
     seeds.iter().for_each(|rock| taken.add(rock.x_m, rock.y_m, REACH * rock.diameter_m));
     for candidate in &candidates {
+        cancel.check()?;
         let (shape, height_m) = draw_shape(settings, candidate.diameter_m, &mut random);
         let reach_m = REACH * candidate.diameter_m;
         let mut place = draw_place(&candidate.place, approach, &mut random);
@@ -142,7 +146,8 @@ pub(crate) fn scatter(
     }
     let grow = |rock: &RockSeed| {
         let up = terrain.mean_normal_at(rock.x_m, rock.y_m);
-        Rock::grow(rock, terrain.z_at(rock.x_m, rock.y_m), &up)
+        cancel.check()?;
+        Ok(Rock::grow(rock, terrain.z_at(rock.x_m, rock.y_m), &up))
     };
     seeds.par_iter().map(grow).collect()
 }
@@ -295,7 +300,7 @@ mod tests {
 
     fn field(settings: &RockSettings, seed: u64) -> Vec<Rock> {
         let terrain = Terrain::new(&TerrainSettings::default(), [-2.0, 2.0], [-2.0, 2.0], seed);
-        scatter(settings, &approach(), &terrain, seed)
+        scatter(settings, &approach(), &terrain, seed, Cancel::default()).unwrap()
     }
 
     #[test]

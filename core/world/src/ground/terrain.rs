@@ -16,6 +16,8 @@
 //! | a, b | `tilt` | m/m |
 //! | u, v | position within a cell, 0 to 1 along x and y | – |
 
+use sightline_geometry::cancel::Cancel;
+use sightline_geometry::error::Result;
 use sightline_geometry::frames::Vector3;
 
 use crate::ground::far::Far;
@@ -60,12 +62,26 @@ pub(crate) struct Terrain {
 
 impl Terrain {
     /// A fractal ground over the rectangle `x_m` × `y_m` (from, to) of the site frame.
+    #[cfg(test)]
     pub(crate) fn new(settings: &TerrainSettings, x_m: [f64; 2], y_m: [f64; 2], seed: u64) -> Self {
+        Self::new_until(settings, x_m, y_m, seed, Cancel::default()).unwrap()
+    }
+
+    /// A fractal ground over the rectangle `x_m` × `y_m` (from, to) of the site frame; fails soon after `cancel` is
+    /// requested.
+    pub(crate) fn new_until(
+        settings: &TerrainSettings,
+        x_m: [f64; 2],
+        y_m: [f64; 2],
+        seed: u64,
+        cancel: Cancel<'_>,
+    ) -> Result<Self> {
         let cell_m = settings.cell_m;
         let cells = [x_m, y_m].map(|[from, to]| (((to - from) / cell_m).ceil() as usize).max(1));
         let relief = Relief::new(settings, seed);
         let mut z_m = Vec::with_capacity((cells[0] + 1) * (cells[1] + 1));
         for iy in 0..=cells[1] {
+            cancel.check()?;
             for ix in 0..=cells[0] {
                 let (x, y) = (x_m[0] + ix as f64 * cell_m, y_m[0] + iy as f64 * cell_m);
                 let edge_cells = ix.min(cells[0] - ix).min(iy).min(cells[1] - iy);
@@ -82,7 +98,7 @@ impl Terrain {
         let corner_m = x_m[0].abs().max(x_m[1].abs()).hypot(y_m[0].abs().max(y_m[1].abs()));
         let radius_m = settings.slope_reach_m.max(corner_m + 1.0);
         terrain.far = (tangent != 0.0).then(|| Far::new(radius_m, tilt));
-        terrain
+        Ok(terrain)
     }
 
     /// A ground of given vertex heights, m down; `z_m` holds (cells + 1) vertices along each axis.

@@ -7,6 +7,7 @@ use crate::camera::exposure::{Rates, automatic, fixed_s};
 use crate::camera::noise;
 use crate::scenario::{CameraRig, ExposureMode};
 use sightline_geometry::camera::Camera;
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Error;
 use sightline_geometry::frames::Pixel;
 use sightline_vision::image::GrayImage;
@@ -27,7 +28,8 @@ fn recorded(
     let clean = region(world, scenario, camera, window);
     let first = [window.x, window.y];
     let rates = Rates::new(&clean, scenario, camera, seed.eye, first);
-    let noisy = noise::record(&rates, scenario, fixed_s(world, scenario), seed, first);
+    let time_s = fixed_s(world, scenario);
+    let noisy = noise::record(&rates, scenario, time_s, seed, first, Cancel::default()).unwrap();
     (clean, noisy)
 }
 
