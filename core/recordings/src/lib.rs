@@ -5,6 +5,7 @@
 //! into a folder by its importer (`import/`, one file per format).
 
 mod check;
+mod driven;
 pub mod files;
 pub mod import;
 mod index_file;
@@ -15,6 +16,7 @@ mod simulated_traverse;
 mod stops;
 mod truth_files;
 
+pub use driven::DrivenTraverse;
 pub use index_file::{Existing, IndexFormat};
 pub use native::{Traverse, write};
 pub use render_cache::RenderCache;

@@ -114,6 +114,30 @@ impl Traverse {
         self
     }
 
+    /// Puts a stop at the end, or in the place of the last one; its images are those of the index's names.
+    ///
+    /// # Errors
+    /// A stop with implausible numbers.
+    pub(super) fn put_stop(&mut self, number: usize, stop: Stop) -> Result<()> {
+        let problem = |problem| Error::format(&self.index_path, format!("stops[{number}].{problem}"));
+        let cameras = check::check_stop(&stop, &self.folder).map_err(problem)?;
+        self.truncate(number);
+        self.index.stops.push(stop);
+        self.cameras.push(cameras);
+        self.simulated.iter_mut().for_each(Simulated::add_stop);
+        Ok(())
+    }
+
+    /// Forgets the stops from `count` on, with all that was found in their images.
+    pub(super) fn truncate(&mut self, count: usize) {
+        if count < self.index.stops.len() {
+            self.index.stops.truncate(count);
+            self.cameras.truncate(count);
+            self.simulated.iter_mut().for_each(|simulated| simulated.truncate(count));
+            self.store = SharedStore::default();
+        }
+    }
+
     /// The index as it was read.
     pub fn index(&self) -> &TraverseIndex {
         &self.index

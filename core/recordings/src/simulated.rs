@@ -77,6 +77,17 @@ impl Simulated {
         })
     }
 
+    /// Makes room for one more stop.
+    pub(super) fn add_stop(&mut self) {
+        self.locks.push(Mutex::new(()));
+    }
+
+    /// Forgets the exposures of the stops from `count` on.
+    pub(super) fn truncate(&mut self, count: usize) {
+        self.locks.truncate(count);
+        self.exposures_s.get_mut().unwrap_or_else(PoisonError::into_inner).truncate(count);
+    }
+
     pub(super) fn world(&self) -> &World {
         self.world.get_or_init(|| World::new(&self.scenario))
     }

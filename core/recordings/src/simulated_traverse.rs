@@ -122,7 +122,7 @@ impl Traverse {
     }
 
     /// Saves building the world again; one that is there already is the same.
-    fn keep_world(&self, world: World) {
+    pub(super) fn keep_world(&self, world: World) {
         if let Some(simulated) = &self.simulated {
             let _ = simulated.world.set(world);
         }

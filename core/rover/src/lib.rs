@@ -6,4 +6,5 @@
 pub mod pipeline;
 pub mod designate;
 pub mod trackability;
+pub mod driving;
 pub mod version;

@@ -15,7 +15,7 @@ use crate::traverse::{CameraSource, FORMAT_VERSION, Stop, StopTruth, TraverseInd
 use sightline_geometry::camera::{Camera, MastAngles};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
-use sightline_geometry::frames::PoseRecord;
+use sightline_geometry::frames::{Pose, PoseRecord};
 use sightline_geometry::stereo_geometry::StereoGeometry;
 
 use crate::camera::picture::Eye;
@@ -28,7 +28,25 @@ use crate::world::World;
 pub const SCENARIO_FILE: &str = "scenario.toml";
 
 /// Time spent at a stop, s (ours).
-const PAUSE_S: f64 = 60.0;
+pub(crate) const PAUSE_S: f64 = 60.0;
+
+/// The index of a scenario's traverse without its stops.
+pub fn empty_index(scenario: &Scenario) -> TraverseIndex {
+    TraverseIndex {
+        format: FORMAT_VERSION,
+        name: scenario.name.clone(),
+        description: scenario.description.clone(),
+        full_scale_dn: Some(scenario.camera.recorded_full_scale_dn()),
+        stereo: StereoGeometry::Lateral,
+        odometry_error: scenario.odometry_error,
+        mast: match Rig::new(&scenario.camera) {
+            Rig::Mast(mast) => Some(mast),
+            Rig::Body { .. } => None,
+        },
+        scenario: Some(SCENARIO_FILE.into()),
+        stops: Vec::new(),
+    }
+}
 
 /// Builds the index of a scenario's traverse; fails where the drive is impossible on this ground.
 pub fn index(scenario: &Scenario, world: &World) -> Result<TraverseIndex> {
@@ -48,42 +66,44 @@ pub fn index_until(scenario: &Scenario, world: &World, cancel: Cancel<'_>) -> Re
         if let Some(leg) = number.checked_sub(1).and_then(|before| drive.legs.get(before)) {
             time_s += PAUSE_S + leg.duration_s;
         }
-        let (left, right) = rig.cameras_in_rover(truth.angles);
-        let mut stop_truth = StopTruth {
-            site_from_rover: PoseRecord::from(&truth.site_from_rover),
-            left_camera: None,
-            right_camera: None,
-        };
-        if let Some(angles) = true_angles.get(number).filter(|_| mast_error::is_present(&scenario.drive)) {
-            let (left, right) = rig.cameras_in_rover(Some(*angles));
-            (stop_truth.left_camera, stop_truth.right_camera) = (Some(left), Some(right));
-        }
-        stops.push(Stop {
-            time_s,
-            site_from_rover: PoseRecord::from(estimate),
-            mast_angles: truth.angles,
-            left: view("left", number, left),
-            right: view("right", number, right),
-            light: None,
-            truth: Some(stop_truth),
-        });
+        let pointed = true_angles.get(number).copied().filter(|_| mast_error::is_present(&scenario.drive));
+        let poses = [truth.site_from_rover, *estimate];
+        stops.push(simulated_stop(number, time_s, poses, truth.angles, pointed, &rig));
     }
     let handed_over = stops.last().and_then(|last| handed_over(last, stops.len(), &scenario.camera));
     stops.extend(handed_over);
-    Ok(TraverseIndex {
-        format: FORMAT_VERSION,
-        name: scenario.name.clone(),
-        description: describe(scenario, stops.len()),
-        full_scale_dn: Some(scenario.camera.recorded_full_scale_dn()),
-        stereo: StereoGeometry::Lateral,
-        odometry_error: scenario.odometry_error,
-        mast: match rig {
-            Rig::Mast(mast) => Some(mast),
-            Rig::Body { .. } => None,
-        },
-        scenario: Some(SCENARIO_FILE.into()),
-        stops,
-    })
+    let description = describe(scenario, stops.len());
+    Ok(TraverseIndex { description, stops, ..empty_index(scenario) })
+}
+
+/// A stop of a simulated drive; `poses` are the true and the estimated one, `pointed` are the true mast angles where they
+/// differ from those to which the mast was told to turn.
+pub(crate) fn simulated_stop(
+    number: usize,
+    time_s: f64,
+    poses: [Pose; 2],
+    told: Option<MastAngles>,
+    pointed: Option<MastAngles>,
+    rig: &Rig,
+) -> Stop {
+    let (left, right) = rig.cameras_in_rover(told);
+    let (left_camera, right_camera) = match pointed {
+        Some(angles) => {
+            let (left, right) = rig.cameras_in_rover(Some(angles));
+            (Some(left), Some(right))
+        }
+        None => (None, None),
+    };
+    let [truth, estimate] = poses.map(|pose| PoseRecord::from(&pose));
+    Stop {
+        time_s,
+        site_from_rover: estimate,
+        mast_angles: told,
+        left: view("left", number, left),
+        right: view("right", number, right),
+        light: None,
+        truth: Some(StopTruth { site_from_rover: truth, left_camera, right_camera }),
+    }
 }
 
 /// An image of a stop by its eye and number, with its camera.

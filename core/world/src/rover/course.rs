@@ -26,8 +26,6 @@
 //!
 //! Frames: site and rover. Sources: domain.md 5.4 (speeds), 5.5 (slip); papers.md R104, R118, R126.
 
-use nalgebra::Rotation3;
-
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Vector3;
 
@@ -39,9 +37,9 @@ use crate::rover::suspension::Stand;
 use crate::scenario::{Course, Move};
 
 /// Speed of the drive, m/s (domain.md 5.4).
-const SPEED_M_S: f64 = 0.0375;
+pub(super) const SPEED_M_S: f64 = 0.0375;
 /// Speed of a turn in place, rad/s (2.1°/s: domain.md 5.4).
-const TURN_RAD_S: f64 = 2.1 * std::f64::consts::PI / 180.0;
+pub(super) const TURN_RAD_S: f64 = 2.1 * std::f64::consts::PI / 180.0;
 /// Nearest and farthest that a stop may be from the targets' centre, m (ours: nearer, the mast looks down on it).
 const STOP_DISTANCES_M: [f64; 2] = [1.6, 60.0];
 
@@ -175,22 +173,14 @@ impl<'a> Driver<'a> {
         let (length_m, turn_rad) = (length_m / f64::from(pieces), turn_rad / f64::from(pieces));
         let half = 0.5 * turn_rad;
         let chord_m = if half == 0.0 { length_m } else { length_m * half.sin() / half };
-        let direction = [chord_m.signum(), 0.0];
         for _ in 0..pieces {
             let attitude = self.stand().site_from_rover.rotation;
             let slip = forced.map_or_else(
-                || slip::on_slope(self.scene.rover, &attitude, direction),
+                || slip::on_slope(self.scene.rover, &attitude, [chord_m.signum(), 0.0]),
                 |along| Slip { along, aside: 0.0 },
             );
             let turned_rad = turn_rad * (1.0 - forced.unwrap_or(0.0));
-            let [x, y] = slip.true_from_wheels(direction, chord_m.abs());
-            let midway = Rotation3::from_axis_angle(&Vector3::z_axis(), 0.5 * turned_rad);
-            let motion = attitude * (midway * Vector3::new(x, y, 0.0));
-            let place = Place {
-                x_m: self.place.x_m + motion.x,
-                y_m: self.place.y_m + motion.y,
-                yaw_rad: self.place.yaw_rad + turned_rad,
-            };
+            let place = self.place.rolled(&attitude, slip, chord_m, turned_rad);
             self.advance(place, [chord_m, 0.0], turn_rad)?;
         }
         Ok(())

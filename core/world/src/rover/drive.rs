@@ -15,7 +15,7 @@ use crate::scenario::Scenario;
 use crate::world::World;
 
 /// Does something with the scene of a scenario's world.
-fn in_scene<T>(
+pub(super) fn in_scene<T>(
     world: &World,
     scenario: &Scenario,
     cancel: Cancel<'_>,

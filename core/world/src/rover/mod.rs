@@ -11,6 +11,7 @@ pub(crate) mod approach;
 pub(crate) mod course;
 pub(crate) mod plan;
 pub(crate) mod drive;
+pub mod driven;
 pub mod odometry;
 pub(crate) mod mast_error;
 pub(crate) mod body;

@@ -73,25 +73,68 @@ pub fn estimates(true_poses: &[Pose], error: &OdometryError, seed: u64) -> Vec<P
     let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
     let mut estimates: Vec<Pose> = true_poses.first().copied().into_iter().collect();
     for pair in true_poses.windows(2) {
-        let before_from_after = pair[0].inv_mul(&pair[1]);
-        let motion = before_from_after.translation.vector;
-        let length_m = motion.norm();
-        let [along, across, upright] = axes_of(&motion);
-        let seen = motion
-            + along * (normal() * error.along_fraction * length_m)
-            + across * (normal() * error.across_fraction * length_m)
-            + upright * (normal() * error.across_fraction * length_m);
-        let attitude_rad = error.attitude_deg.to_radians();
-        let tilt = attitude_from_roll_pitch_yaw(
-            normal() * attitude_rad,
-            normal() * attitude_rad,
-            normal() * attitude_rad,
-        );
-        let step = Pose::from_parts(Translation3::from(seen), before_from_after.rotation * tilt);
         let last = estimates[estimates.len() - 1];
-        estimates.push(last * step);
+        estimates.push(last * stated_step(&pair[0].inv_mul(&pair[1]), error, &mut normal));
     }
     estimates
+}
+
+/// One step's motion as it is seen under the stated errors.
+fn stated_step(before_from_after: &Pose, error: &OdometryError, mut normal: impl FnMut() -> f64) -> Pose {
+    let motion = before_from_after.translation.vector;
+    let length_m = motion.norm();
+    let [along, across, upright] = axes_of(&motion);
+    let seen = motion
+        + along * (normal() * error.along_fraction * length_m)
+        + across * (normal() * error.across_fraction * length_m)
+        + upright * (normal() * error.across_fraction * length_m);
+    let attitude_rad = error.attitude_deg.to_radians();
+    let tilt = attitude_from_roll_pitch_yaw(
+        normal() * attitude_rad,
+        normal() * attitude_rad,
+        normal() * attitude_rad,
+    );
+    Pose::from_parts(Translation3::from(seen), before_from_after.rotation * tilt)
+}
+
+/// The estimate at one stop of a drive whose legs become known one after the other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Belief {
+    /// The estimated pose.
+    pub(crate) pose: Pose,
+    /// Error of the attitude: roll, pitch, yaw, rad; of `wheels_and_imu` alone.
+    pub(crate) attitude_error_rad: [f64; 3],
+}
+
+impl Belief {
+    /// The estimate after a leg that ends at stop `number`, `poses` being the true ones at its ends.
+    pub(crate) fn after(&self, leg: &Leg, poses: [&Pose; 2], number: usize, scenario: &Scenario) -> Self {
+        let stop_seed = mix(scenario.seed ^ mix(number as u64 ^ 0xac71_0d03));
+        let mut random = Pcg64::new(u128::from(stop_seed), 0xac71_0d03_0d03_72ad);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+        let error = &scenario.odometry_error;
+        let mut after = match scenario.rover.odometry {
+            OdometryModel::Stated => {
+                let step = stated_step(&poses[0].inv_mul(poses[1]), error, &mut normal);
+                Self { pose: self.pose * step, attitude_error_rad: [0.0; 3] }
+            }
+            OdometryModel::WheelsAndImu => {
+                let mut of_drive =
+                    Pcg64::new(u128::from(mix(scenario.seed ^ 0x13a0_0d03)), 0x13a0_0d03_5ee1_0e55);
+                let sensors = Sensors::new(&scenario.rover, error, StandardNormal.sample(&mut of_drive));
+                let [roll, pitch, yaw] = self.attitude_error_rad;
+                let mut believed = AttitudeError { roll, pitch, yaw };
+                let mut position = self.pose.translation.vector;
+                let attitude = &poses[1].rotation;
+                let pose = sensors.leg(leg, attitude, &mut believed, &mut position, &mut normal);
+                Self { pose, attitude_error_rad: [believed.roll, believed.pitch, believed.yaw] }
+            }
+        };
+        for jump in scenario.rover.heading_jumps.iter().filter(|jump| jump.stop as usize == number) {
+            after.pose *= attitude_from_roll_pitch_yaw(0.0, 0.0, jump.yaw_deg.to_radians());
+        }
+        after
+    }
 }
 
 /// The unit vectors along a motion, across it in the level, and across both; forward for none.
@@ -126,30 +169,63 @@ pub(crate) fn wheels_and_imu(
 ) -> Vec<Pose> {
     let mut random = Pcg64::new(u128::from(mix(seed ^ 0x13a0_0d03)), 0x13a0_0d03_5ee1_0e55);
     let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-    let bias_rad_per_s = rover.gyro_bias_deg_per_hour.to_radians() / HOUR_S * normal();
-    let walk_rad = rover.gyro_walk_deg_per_root_hour.to_radians() / HOUR_S.sqrt();
-    let tilt_rad = error.attitude_deg.to_radians();
+    let sensors = Sensors::new(rover, error, normal());
     let Some(first) = drive.stops.first() else { return Vec::new() };
     let mut believed = AttitudeError::default();
     let mut position = first.site_from_rover.translation.vector;
     let mut estimates = vec![first.site_from_rover];
     for (leg, stop) in drive.legs.iter().zip(drive.stops.iter().skip(1)) {
-        let drift_rad = bias_rad_per_s * leg.duration_s + walk_rad * leg.duration_s.sqrt() * normal();
-        let way = believed_way(leg, believed, drift_rad);
+        let attitude = &stop.site_from_rover.rotation;
+        estimates.push(sensors.leg(leg, attitude, &mut believed, &mut position, &mut normal));
+    }
+    estimates
+}
+
+/// The errors of wheels, gyro and accelerometers.
+struct Sensors<'a> {
+    error: &'a OdometryError,
+    bias_rad_per_s: f64,
+    /// Of the gyro, rad/√s.
+    walk_rad: f64,
+    tilt_rad: f64,
+}
+
+impl<'a> Sensors<'a> {
+    /// `bias` is the draw for the drive, in standard deviations.
+    fn new(rover: &RoverSettings, error: &'a OdometryError, bias: f64) -> Self {
+        Self {
+            error,
+            bias_rad_per_s: rover.gyro_bias_deg_per_hour.to_radians() / HOUR_S * bias,
+            walk_rad: rover.gyro_walk_deg_per_root_hour.to_radians() / HOUR_S.sqrt(),
+            tilt_rad: error.attitude_deg.to_radians(),
+        }
+    }
+
+    /// The estimate after a leg that ends with a true attitude; attitude error and position are those before it.
+    fn leg(
+        &self,
+        leg: &Leg,
+        attitude: &UnitQuaternion<f64>,
+        believed: &mut AttitudeError,
+        position: &mut Vector3,
+        mut normal: impl FnMut() -> f64,
+    ) -> Pose {
+        let error = self.error;
+        let drift_rad =
+            self.bias_rad_per_s * leg.duration_s + self.walk_rad * leg.duration_s.sqrt() * normal();
+        let way = believed_way(leg, *believed, drift_rad);
         let [along, across, upright] = axes_of(&way);
-        position += way
+        *position += way
             + along * (normal() * error.along_fraction * leg.driven_m)
             + across * (normal() * error.across_fraction * leg.driven_m)
             + upright * (normal() * error.across_fraction * leg.driven_m);
-        believed = AttitudeError {
-            roll: tilt_rad * normal(),
-            pitch: tilt_rad * normal(),
+        *believed = AttitudeError {
+            roll: self.tilt_rad * normal(),
+            pitch: self.tilt_rad * normal(),
             yaw: believed.yaw + drift_rad,
         };
-        let attitude = believed.seen(&stop.site_from_rover.rotation);
-        estimates.push(Pose::from_parts(Translation3::from(position), attitude));
+        Pose::from_parts(Translation3::from(*position), believed.seen(attitude))
     }
-    estimates
 }
 
 /// The wheels' way of a leg along the believed attitude, site frame, m.

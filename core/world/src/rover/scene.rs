@@ -12,11 +12,14 @@
 //!
 //! Frames: site and rover. Source: papers.md R25, R104.
 
+use nalgebra::{Rotation3, UnitQuaternion};
+
 use sightline_geometry::camera::MastAngles;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::{Point3, Pose, Vector3};
 
 use crate::camera::rig::Rig;
+use crate::rover::slip::Slip;
 use crate::rover::suspension::{Stand, SuspensionAngles, WHEEL_RADIUS_M, axles_in_rover, settle};
 use crate::scenario::{DriveSettings, RoverSettings};
 
@@ -104,6 +107,20 @@ impl Place {
             y_m: self.y_m + part * (to.y_m - self.y_m),
             yaw_rad: self.yaw_rad + part * wrapped(to.yaw_rad - self.yaw_rad),
         }
+    }
+
+    /// The place after wheels with this slip have advanced along a chord, m, while the rover truly turned.
+    pub(super) fn rolled(
+        self,
+        attitude: &UnitQuaternion<f64>,
+        slip: Slip,
+        chord_m: f64,
+        turned_rad: f64,
+    ) -> Self {
+        let [x, y] = slip.true_from_wheels([chord_m.signum(), 0.0], chord_m.abs());
+        let midway = Rotation3::from_axis_angle(&Vector3::z_axis(), 0.5 * turned_rad);
+        let motion = attitude * (midway * Vector3::new(x, y, 0.0));
+        Self { x_m: self.x_m + motion.x, y_m: self.y_m + motion.y, yaw_rad: self.yaw_rad + turned_rad }
     }
 
     /// The places on the way to another, the last one included, in pieces of the length of a leg's.

@@ -59,6 +59,9 @@ pub struct RoverSettings {
     pub soil: Soil,
     /// Factor on the slip of the soil: 1 takes domain.md 5.5 as it is, 0 means none (0, ours).
     pub slip_scale: f64,
+    /// 1σ spread of the slip of a step as a part of it, drawn for each step of a drive on commands (0; 0.2 is plausible, ours).
+    #[serde(skip_serializing_if = "is_zero")]
+    pub slip_spread: f64,
     /// From the way to this stop on nothing but the wheels turns: 100 % of slip; 0 means never (0; R126).
     pub stuck_from_stop: u32,
     /// Where the pose estimate comes from (`stated`).
@@ -80,11 +83,16 @@ pub struct RoverSettings {
     pub heading_jumps: Vec<HeadingJump>,
 }
 
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
 impl Default for RoverSettings {
     fn default() -> Self {
         Self {
             soil: Soil::FirmSoil,
             slip_scale: 0.0,
+            slip_spread: 0.0,
             stuck_from_stop: 0,
             odometry: OdometryModel::Stated,
             gyro_walk_deg_per_root_hour: 0.1,
@@ -101,6 +109,7 @@ impl Default for RoverSettings {
 impl RoverSettings {
     pub(crate) fn validate(&self) -> Result<()> {
         within("rover.slip_scale", self.slip_scale, 0.0, 5.0)?;
+        within("rover.slip_spread", self.slip_spread, 0.0, 1.0)?;
         within("rover.stuck_from_stop", f64::from(self.stuck_from_stop), 0.0, 10_000.0)?;
         for (index, forced) in self.forced_slip.iter().enumerate() {
             within(&format!("rover.forced_slip[{index}].stop"), f64::from(forced.stop), 1.0, 10_000.0)?;

@@ -1,0 +1,49 @@
+//! The world that a closed loop acts on: the simulator moves its true rover, a recording compares.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use sightline_geometry::camera::MastAngles;
+use sightline_geometry::cancel::Cancel;
+use sightline_geometry::error::Result;
+
+use super::select_path::Motion;
+use crate::pipeline::Stops;
+
+/// A world in which the rover can be driven.
+pub trait ActiveWorld {
+    /// The stops driven to so far.
+    fn stops(&self) -> &dyn Stops;
+
+    /// Drives one step from the last stop and adds the stop at which the rover comes to rest, its mast not pointed yet.
+    ///
+    /// # Errors
+    /// [`sightline_geometry::error::Error::Cancelled`], or a world that cannot be driven further; no stop is added then.
+    fn drive(&mut self, motion: &Motion, cancel: Cancel<'_>) -> Result<DriveReport>;
+
+    /// Points the mast of the last stop; `None` leaves it as it is.
+    ///
+    /// # Errors
+    /// Angles that the recording has no image for.
+    fn point_mast(&mut self, angles: Option<MastAngles>) -> Result<()>;
+}
+
+/// What the rover reports of one step.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct DriveReport {
+    /// Length of the wheels' path, m.
+    pub wheels_m: f64,
+    /// Duration, s.
+    pub duration_s: f64,
+    /// Angle between the rover's vertical and that of the site after the step, by the accelerometers, deg.
+    pub tilt_deg: f64,
+    /// Why the wheels did not complete the step; null where they did.
+    pub stall: Option<Stall>,
+}
+
+/// A wheel that met a step too high to climb.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Stall {
+    /// Part of the commanded motion that was completed, 0 to 1.
+    pub completed: f64,
+}

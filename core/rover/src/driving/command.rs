@@ -1,0 +1,141 @@
+//! The command of a targeted drive: standoff, offset and limits (R5–R8). The target is that of the run.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use sightline_geometry::error::{Error, Result};
+use sightline_geometry::frames::Point3;
+
+/// Whether tracking moves the goal.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum GoalRule {
+    /// Each tracking update moves the goal with the target (R6).
+    #[default]
+    FollowsTarget,
+    /// The goal stays where the designation put it: the baseline, on which tracking has no influence (R8, R96).
+    Fixed,
+}
+
+/// The command of a targeted drive.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct DriveCommand {
+    /// Horizontal distance of the goal from the target, m (2; 0.3 to 50).
+    pub standoff_m: f64,
+    /// Added to the goal, x and y of the site frame, m (0, 0; −20 to 20).
+    pub offset_m: [f64; 2],
+    /// Whether tracking moves the goal (`follows_target`).
+    pub goal: GoalRule,
+    /// The rover has arrived when its frame's origin is nearer to the goal than this, horizontally, m (0.05: R7; 0.001 to 1).
+    pub tolerance_m: f64,
+    /// Longest step as a part of the distance to the target (0.10: R104; 0.01 to 0.5).
+    pub step_fraction: f64,
+    /// Most stops, the first included (100; 2 to 1000).
+    pub stops_max: u32,
+    /// The drive stops when the rover tilts by more than this, deg (30: domain.md 5.4; 1 to 45).
+    pub tilt_max_deg: f64,
+    /// The drive stops after this much time on Mars, min (480; 1 to 10,000).
+    pub flight_minutes_max: f64,
+}
+
+impl Default for DriveCommand {
+    fn default() -> Self {
+        Self {
+            standoff_m: 2.0,
+            offset_m: [0.0; 2],
+            goal: GoalRule::FollowsTarget,
+            tolerance_m: 0.05,
+            step_fraction: 0.10,
+            stops_max: 100,
+            tilt_max_deg: 30.0,
+            flight_minutes_max: 480.0,
+        }
+    }
+}
+
+impl DriveCommand {
+    /// Refuses values out of range.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] that names the field and its range.
+    pub fn validate(&self) -> Result<()> {
+        let within = |key: &str, value: f64, low: f64, high: f64| {
+            if (low..=high).contains(&value) {
+                return Ok(());
+            }
+            Err(Error::setting(key, format!("{value} is outside {low} to {high}")))
+        };
+        within("standoff_m", self.standoff_m, 0.3, 50.0)?;
+        within("offset_m[0]", self.offset_m[0], -20.0, 20.0)?;
+        within("offset_m[1]", self.offset_m[1], -20.0, 20.0)?;
+        within("tolerance_m", self.tolerance_m, 0.001, 1.0)?;
+        within("step_fraction", self.step_fraction, 0.01, 0.5)?;
+        within("stops_max", f64::from(self.stops_max), 2.0, 1000.0)?;
+        within("tilt_max_deg", self.tilt_max_deg, 1.0, 45.0)?;
+        within("flight_minutes_max", self.flight_minutes_max, 1.0, 10_000.0)?;
+        if self.tolerance_m >= self.standoff_m {
+            let problem = format!(
+                "{} m is not less than the standoff of {} m: every place would count as the goal",
+                self.tolerance_m, self.standoff_m
+            );
+            return Err(Error::setting("tolerance_m", problem));
+        }
+        Ok(())
+    }
+
+    /// Refuses a command that makes no sense for a target at this position in the rover frame of the designation.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a target behind the rover or nearer than the standoff.
+    pub fn validate_for(&self, target_in_rover: &Point3) -> Result<()> {
+        self.validate()?;
+        let distance_m = target_in_rover.x.hypot(target_in_rover.y);
+        if target_in_rover.x <= 0.0 {
+            let problem = format!(
+                "it lies {:.2} m behind the rover; turn the rover towards it first",
+                -target_in_rover.x
+            );
+            return Err(Error::setting("target", problem));
+        }
+        if self.standoff_m >= distance_m {
+            let problem = format!(
+                "{} m is not less than the {distance_m:.2} m from the rover to the target; choose a smaller standoff",
+                self.standoff_m
+            );
+            return Err(Error::setting("standoff_m", problem));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_is_refused_with_the_field_that_is_wrong() {
+        let ahead = Point3::new(8.0, 1.0, 0.2);
+        let told = |change: fn(&mut DriveCommand), target: Point3| {
+            let mut command = DriveCommand::default();
+            change(&mut command);
+            command.validate_for(&target).map_err(|error| error.to_string())
+        };
+        assert!(told(|_| (), ahead).is_ok());
+        for (change, target, part) in [
+            (
+                (|c| c.standoff_m = 9.0) as fn(&mut DriveCommand),
+                ahead,
+                "standoff_m: 9 m is not less than the 8.06 m",
+            ),
+            (|c| c.standoff_m = f64::NAN, ahead, "standoff_m: NaN is outside"),
+            (|_| (), Point3::new(-3.0, 1.0, 0.2), "3.00 m behind the rover"),
+            (|c| (c.standoff_m, c.tolerance_m) = (0.5, 0.5), ahead, "tolerance_m"),
+            (|c| c.step_fraction = 0.0, ahead, "step_fraction"),
+            (|c| c.stops_max = 1, ahead, "stops_max"),
+        ] {
+            let message = told(change, target).unwrap_err();
+            assert!(message.contains(part), "{message}");
+        }
+    }
+}

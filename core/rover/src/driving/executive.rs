@@ -1,0 +1,173 @@
+//! The loop of targeted driving: from one tracked stop to the next (R94).
+//!
+//! [`advance`] is one cycle. It is a function of the world's state, the last step and the command, so that a drive can be
+//! stepped, resumed and branched; with the same input it has the same bits.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use sightline_geometry::cancel::Cancel;
+use sightline_geometry::error::Result;
+use sightline_geometry::frames::Point3;
+use sightline_track::settings::Settings;
+use sightline_track::stages::predict;
+use sightline_track::stages::update::Updated;
+use sightline_track::target::TrackingState;
+use sightline_track::trace::StepTrace;
+
+use super::active_world::{ActiveWorld, DriveReport};
+use super::command::{DriveCommand, GoalRule};
+use super::flight_time::FlightTime;
+use super::select_path::{Motion, Navigator};
+use super::set_goal::{Goal, set_goal};
+use crate::pipeline::{self, Stops};
+
+/// Why a drive stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum StopReason {
+    /// The rover is within the tolerance of the goal.
+    Arrived,
+    /// The tracker gave the target up.
+    Lost,
+    /// A wheel met a step too high to climb.
+    Stalled,
+    /// The rover tilts more than allowed.
+    Tilt,
+    /// The time on Mars is used up.
+    Time,
+    /// The number of stops is used up.
+    StopLimit,
+}
+
+/// The end of a drive.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Ending {
+    /// Why it stopped.
+    pub reason: StopReason,
+    /// The value that decided, in the unit of its limit: m, deg, min, a count; null for `lost` and `stalled`.
+    pub value: Option<f64>,
+    /// The limit of the command that it met; null alike.
+    pub limit: Option<f64>,
+}
+
+/// What was decided at a stop, after the target was found there.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Cycle {
+    /// The number of the stop.
+    pub step: usize,
+    /// The goal.
+    pub goal: Goal,
+    /// The chosen motion; null where the drive ended.
+    pub motion: Option<Motion>,
+    /// What the rover reported of the motion; null alike.
+    pub report: Option<DriveReport>,
+    /// Time on Mars up to the end of this stop's drive, min.
+    pub flight_minutes: f64,
+    /// The end of the drive; null where it goes on.
+    pub ending: Option<Ending>,
+}
+
+/// What a cycle needs besides the world.
+#[derive(Clone, Copy)]
+pub struct CycleInput<'a> {
+    /// The command.
+    pub command: &'a DriveCommand,
+    /// Chooses the motions.
+    pub navigator: &'a dyn Navigator,
+    /// The step at which the target was designated.
+    pub first: &'a StepTrace,
+    /// The last step: the rover stands at its stop.
+    pub last: &'a StepTrace,
+    /// The cycle of the stop before; `None` at the first.
+    pub before: Option<&'a Cycle>,
+    /// The configuration of the tracker.
+    pub settings: &'a Settings,
+    /// Read several times during the cycle.
+    pub cancel: Cancel<'a>,
+}
+
+/// One cycle: decides at the last stop and, unless the drive ends there, drives, points the mast and tracks at the next.
+///
+/// # Errors
+/// [`sightline_geometry::error::Error::Cancelled`], or what the world cannot do; the world may then have one stop more than
+/// steps, which is to be discarded.
+pub fn advance(world: &mut dyn ActiveWorld, input: &CycleInput<'_>) -> Result<(Cycle, Option<StepTrace>)> {
+    input.cancel.check()?;
+    let step = input.last.step;
+    let stops = world.stops();
+    let pose = stops.site_from_rover(step);
+    let start = stops.site_from_rover(input.first.step).translation.vector;
+    let target_in_site = target_in_site(input, stops);
+    let goal = set_goal(input.command, &target_in_site, [start.x, start.y], &pose);
+    let (left, right) = stops.cameras(step);
+    let sizes = [left, right].map(|camera| camera.size);
+    let target_in_rover = pose.inverse_transform_point(&target_in_site);
+    let step_m = input.command.step_fraction * (target_in_rover - left.model.centre()).norm();
+    let mut time = FlightTime::of_stop(sizes);
+    let minutes =
+        |time: &FlightTime| input.before.map_or(0.0, |before| before.flight_minutes) + time.total_s() / 60.0;
+    let mut cycle =
+        Cycle { step, goal, motion: None, report: None, flight_minutes: minutes(&time), ending: None };
+    cycle.ending = ending(input, &cycle);
+    if cycle.ending.is_some() {
+        return Ok((cycle, None));
+    }
+    let motion = input.navigator.select_path(goal.in_rover_m, step_m);
+    let report = world.drive(&motion, input.cancel)?;
+    time.drive_s = report.duration_s;
+    cycle.flight_minutes = minutes(&time);
+    (cycle.motion, cycle.report) = (Some(motion), Some(report));
+    let trace = track(world, &input.last.update, input)?;
+    Ok((cycle, Some(trace)))
+}
+
+/// The target from which the goal follows, site frame.
+fn target_in_site(input: &CycleInput<'_>, stops: &dyn Stops) -> Point3 {
+    let from = match input.command.goal {
+        GoalRule::FollowsTarget => input.last,
+        GoalRule::Fixed => input.first,
+    };
+    stops.site_from_rover(from.step) * from.update.target.position_in_rover
+}
+
+/// Points the mast of the last stop at the prediction and finds the target there.
+fn track(world: &mut dyn ActiveWorld, last: &Updated, input: &CycleInput<'_>) -> Result<StepTrace> {
+    let stops = world.stops();
+    let [then, now] = [last.target.step, last.target.step + 1].map(|step| stops.site_from_rover(step));
+    let predicted = predict::predict(&last.target, &then, &now, &stops.odometry_error());
+    let wanted = stops.mast().and_then(|mast| mast.point_left_centre_at(&predicted.position_in_rover));
+    world.point_mast(wanted)?;
+    pipeline::run_step_displaced(world.stops(), last, input.settings, None, input.cancel)
+}
+
+/// Why the drive ends at this stop, if it does.
+fn ending(input: &CycleInput<'_>, cycle: &Cycle) -> Option<Ending> {
+    let command = input.command;
+    let end =
+        |reason, value: f64, limit: f64| Some(Ending { reason, value: Some(value), limit: Some(limit) });
+    let named = |reason| Some(Ending { reason, value: None, limit: None });
+    if cycle.goal.arrived {
+        return end(StopReason::Arrived, cycle.goal.distance_m, command.tolerance_m);
+    }
+    // The baseline drives on whatever tracking makes of it.
+    if command.goal == GoalRule::FollowsTarget && input.last.update.state == TrackingState::Failed {
+        return named(StopReason::Lost);
+    }
+    if let Some(report) = input.before.and_then(|before| before.report) {
+        if report.stall.is_some() {
+            return named(StopReason::Stalled);
+        }
+        if report.tilt_deg > command.tilt_max_deg {
+            return end(StopReason::Tilt, report.tilt_deg, command.tilt_max_deg);
+        }
+    }
+    if cycle.flight_minutes > command.flight_minutes_max {
+        return end(StopReason::Time, cycle.flight_minutes, command.flight_minutes_max);
+    }
+    let stops = cycle.step + 1 - input.first.step;
+    if stops >= command.stops_max as usize {
+        return end(StopReason::StopLimit, stops as f64, f64::from(command.stops_max));
+    }
+    None
+}

@@ -1,0 +1,60 @@
+//! Time that a stop takes on Mars, by stage (R147–R150): a processor of 20 MHz, a transfer of tens of seconds a pair.
+//!
+//! | stage | time | source |
+//! |---|---|---|
+//! | point_mast | 5 s | ours |
+//! | capture | 30 s for a 12-bit 1024 × 1024 pair, less with fewer pixels, 5 s at least | R148 |
+//! | locate | 5 s: correlation 4 s, point stereo 1 s | R147 |
+//! | drive | 3.75 cm/s, 2.1°/s | domain.md 5.4 |
+//!
+//! Unit: s.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// Transfer of a full pair, s, and its pixels.
+const CAPTURE_S: f64 = 30.0;
+const CAPTURE_PX: f64 = 2.0 * 1024.0 * 1024.0;
+/// Transfer of the smallest pair, s.
+const CAPTURE_MIN_S: f64 = 5.0;
+
+/// Time of one stop on Mars by stage, s.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct FlightTime {
+    /// Turning the mast.
+    pub point_mast_s: f64,
+    /// Exposing and transferring the pair.
+    pub capture_s: f64,
+    /// Finding the target.
+    pub locate_s: f64,
+    /// Driving to the next stop.
+    pub drive_s: f64,
+}
+
+impl FlightTime {
+    /// A stop whose images have these sizes, px, without the drive that follows.
+    pub fn of_stop(image_sizes: [[u32; 2]; 2]) -> Self {
+        let pixels: f64 =
+            image_sizes.iter().map(|[width, height]| f64::from(*width) * f64::from(*height)).sum();
+        let capture_s = (CAPTURE_S * pixels / CAPTURE_PX).max(CAPTURE_MIN_S);
+        Self { point_mast_s: 5.0, capture_s, locate_s: 5.0, drive_s: 0.0 }
+    }
+
+    /// All stages together, s.
+    pub fn total_s(&self) -> f64 {
+        self.point_mast_s + self.capture_s + self.locate_s + self.drive_s
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_update_takes_half_a_minute_to_a_minute_as_in_flight() {
+        // R149: one update 0.5 to 1 min with full pairs; small pairs are several seconds faster.
+        let full = FlightTime::of_stop([[1024, 1024]; 2]).total_s();
+        assert!((30.0..60.0).contains(&full), "{full}");
+        assert!(FlightTime::of_stop([[256, 256]; 2]).total_s() < 0.5 * full);
+    }
+}

@@ -1,0 +1,19 @@
+//! Targeted driving: the stages after tracking, and the loop that repeats them at every stop (R1–R8, R94–R97, R104–R107).
+//!
+//! ```text
+//! last step ─► set_goal ─► select_path ─► drive ─► point_mast ─► run_step ─► next step
+//! ```
+//! [`executive`] is the loop; it asks an [`ActiveWorld`] to move the rover and sees estimates alone.
+
+pub mod active_world;
+pub mod command;
+pub mod executive;
+pub mod flight_time;
+pub mod select_path;
+pub mod set_goal;
+
+pub use active_world::{ActiveWorld, DriveReport, Stall};
+pub use command::{DriveCommand, GoalRule};
+pub use executive::{Cycle, Ending, StopReason};
+pub use select_path::{ArcNavigator, Motion, Navigator};
+pub use set_goal::Goal;

@@ -1,0 +1,321 @@
+//! A drive on commands: the true rover is moved step by step, each step a function of the stop before, the command and the
+//! scenario's seed.
+//!
+//! The rover rolls as a replayed one that is driven blind (`course.rs`): wheels advance as commanded, slip takes its share,
+//! the suspension settles on the ground after every 5 cm or 5°. The slip of a step is spread by `rover.slip_spread`. A wheel
+//! that meets a rock too high to climb ends the step where the rover stands.
+//!
+//! Everything random is drawn from the seed and the number of the stop, so that a list of [`DrivenStop`]s is the whole state:
+//! cut after any stop, it continues with the same bits.
+//!
+//! Frames: site and rover. Sources: domain.md 5.4, 5.5; papers.md R104, R107.
+
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
+use serde::{Deserialize, Serialize};
+
+use sightline_geometry::camera::MastAngles;
+use sightline_geometry::cancel::Cancel;
+use sightline_geometry::error::{Error, Result};
+use sightline_geometry::frames::{Point3, Pose, PoseRecord, Vector3};
+
+use crate::camera::rig::Rig;
+use crate::ground::texture::mix;
+use crate::index::{PAUSE_S, simulated_stop};
+use crate::rover::body::parts;
+use crate::rover::course::{SPEED_M_S, TURN_RAD_S};
+use crate::rover::drive::{first_stop, in_scene};
+use crate::rover::mast_error;
+use crate::rover::odometry::Belief;
+use crate::rover::scene::{Leg, Place, Scene, pieces};
+use crate::rover::slip::{self, Slip};
+use crate::rover::suspension::Stand;
+use crate::scenario::Scenario;
+use crate::traverse::Stop;
+use crate::world::World;
+
+/// One stop of a drive on commands.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DrivenStop {
+    /// Time since the first stop, s.
+    pub time_s: f64,
+    /// The true pose.
+    pub true_site_from_rover: PoseRecord,
+    /// The estimated pose.
+    pub site_from_rover: PoseRecord,
+    /// Error of the estimated attitude, roll, pitch, yaw, rad, of wheels and IMU.
+    pub attitude_error_rad: [f64; 3],
+    /// The angles to which the mast was pointed; `None` without a mast.
+    pub mast_angles: Option<MastAngles>,
+    /// Length of the wheels' path to this stop, m.
+    pub wheels_m: f64,
+    /// Duration of the drive to this stop, s.
+    pub drive_s: f64,
+    /// Part of the commanded motion that was completed, 0 to 1; less than 1 where a wheel met too high a rock.
+    pub completed: f64,
+    /// Rocks whose corners are inside the rover's body here.
+    pub touched_rocks: u32,
+}
+
+impl DrivenStop {
+    /// The first stop of a scenario's drive, its mast pointed at the targets' centre.
+    ///
+    /// # Errors
+    /// A scenario whose rover cannot stand there, or [`Error::Cancelled`].
+    pub fn first(world: &World, scenario: &Scenario, cancel: Cancel<'_>) -> Result<Self> {
+        let stop = first_stop(world, scenario, cancel)?;
+        let pose = PoseRecord::from(&stop.site_from_rover);
+        Ok(Self {
+            time_s: 0.0,
+            true_site_from_rover: pose,
+            site_from_rover: pose,
+            attitude_error_rad: [0.0; 3],
+            mast_angles: stop.angles,
+            wheels_m: 0.0,
+            drive_s: 0.0,
+            completed: 1.0,
+            touched_rocks: 0,
+        })
+    }
+
+    /// The stop after this one, which has the number `number`, when the wheels advance by `length_m` while the rover is to
+    /// turn by `turn_rad`. Its mast angles are those of this stop.
+    ///
+    /// # Errors
+    /// Ground on which the wheels find no stand, or [`Error::Cancelled`].
+    pub fn next(
+        &self,
+        world: &World,
+        scenario: &Scenario,
+        number: usize,
+        [length_m, turn_rad]: [f64; 2],
+        cancel: Cancel<'_>,
+    ) -> Result<Self> {
+        in_scene(world, scenario, cancel, |scene| {
+            let (leg, completed) = self.roll(scene, scenario, number, [length_m, turn_rad])?;
+            let stand = leg.stands[leg.stands.len() - 1];
+            let before = self.true_site_from_rover.to_pose();
+            let belief =
+                Belief { pose: self.site_from_rover.to_pose(), attitude_error_rad: self.attitude_error_rad };
+            let belief = belief.after(&leg, [&before, &stand.site_from_rover], number, scenario);
+            Ok(Self {
+                time_s: self.time_s + PAUSE_S + leg.duration_s,
+                true_site_from_rover: PoseRecord::from(&stand.site_from_rover),
+                site_from_rover: PoseRecord::from(&belief.pose),
+                attitude_error_rad: belief.attitude_error_rad,
+                mast_angles: self.mast_angles,
+                wheels_m: leg.driven_m,
+                drive_s: leg.duration_s,
+                completed,
+                touched_rocks: touched_rocks(world, &stand),
+            })
+        })
+    }
+
+    /// Rolls the true rover; the leg and the part of the motion that was completed.
+    fn roll(
+        &self,
+        scene: &Scene<'_>,
+        scenario: &Scenario,
+        number: usize,
+        [length_m, turn_rad]: [f64; 2],
+    ) -> Result<(Leg, f64)> {
+        let pose = self.true_site_from_rover.to_pose();
+        let origin = pose.translation.vector;
+        let mut place = Place { x_m: origin.x, y_m: origin.y, yaw_rad: pose.rotation.euler_angles().2 };
+        let stand = scene.settle(place).ok_or_else(|| no_stand(place))?;
+        let mut leg = Leg { stands: vec![stand], wheels_m: Vec::new(), driven_m: 0.0, duration_s: 0.0 };
+        let count = pieces(length_m, turn_rad);
+        let (length_m, turn_rad) = (length_m / f64::from(count), turn_rad / f64::from(count));
+        let half = 0.5 * turn_rad;
+        let chord_m = if half == 0.0 { length_m } else { length_m * half.sin() / half };
+        let spread = slip_factor(scenario, number);
+        let forced = scenario.rover.forced_slip_to(number);
+        for done in 0..count {
+            scene.cancel.check()?;
+            let attitude = leg.stands[leg.stands.len() - 1].site_from_rover.rotation;
+            let slip = forced.map_or_else(
+                || {
+                    let slip = slip::on_slope(scene.rover, &attitude, [chord_m.signum(), 0.0]);
+                    Slip { along: slip.along * spread, aside: slip.aside * spread }
+                },
+                |along| Slip { along, aside: 0.0 },
+            );
+            let next = place.rolled(&attitude, slip, chord_m, turn_rad * (1.0 - forced.unwrap_or(0.0)));
+            let stand = scene.settle(next).ok_or_else(|| no_stand(next))?;
+            if scene.blocked(&stand).is_some() {
+                return Ok((leg, f64::from(done) / f64::from(count)));
+            }
+            place = next;
+            leg.stands.push(stand);
+            leg.wheels_m.push([chord_m, 0.0]);
+            leg.driven_m += chord_m.abs();
+            leg.duration_s += (chord_m.abs() / SPEED_M_S).max(turn_rad.abs() / TURN_RAD_S);
+        }
+        Ok((leg, 1.0))
+    }
+
+    /// Angle between the estimated vertical of the rover and that of the site, deg.
+    pub fn tilt_deg(&self) -> f64 {
+        let down = self.site_from_rover.to_pose().rotation * Vector3::z();
+        down.z.clamp(-1.0, 1.0).acos().to_degrees()
+    }
+}
+
+/// The stops of a traverse's index for stops that were driven, with images to be rendered.
+pub fn index_stops(driven: &[DrivenStop], scenario: &Scenario) -> Vec<Stop> {
+    let rig = Rig::new(&scenario.camera);
+    let told: Vec<MastAngles> = driven.iter().filter_map(|stop| stop.mast_angles).collect();
+    let true_angles = mast_error::true_angles(&told, scenario);
+    let with_error =
+        |number: usize| true_angles.get(number).copied().filter(|_| mast_error::is_present(&scenario.drive));
+    let stop = |(number, stop): (usize, &DrivenStop)| {
+        let poses = [stop.true_site_from_rover, stop.site_from_rover].map(PoseRecord::to_pose);
+        simulated_stop(number, stop.time_s, poses, stop.mast_angles, with_error(number), &rig)
+    };
+    driven.iter().enumerate().map(stop).collect()
+}
+
+/// Factor on the slip of the step to a stop.
+fn slip_factor(scenario: &Scenario, number: usize) -> f64 {
+    let seed = mix(scenario.seed ^ mix(number as u64 ^ 0x511b_0000));
+    let draw: f64 = StandardNormal.sample(&mut Pcg64::new(u128::from(seed), 0x511b_511b_511b_511b));
+    (1.0 + scenario.rover.slip_spread * draw).max(0.0)
+}
+
+fn no_stand(place: Place) -> Error {
+    Error::Request(format!("the wheels find no stand at x {:.2} m, y {:.2} m", place.x_m, place.y_m))
+}
+
+/// How many rocks reach into the body of a standing rover, its wheels and arms left out.
+fn touched_rocks(world: &World, stand: &Stand) -> u32 {
+    let boxes = parts(&stand.angles);
+    let is_inside = |point: Point3| {
+        boxes.iter().filter(|part| matches!(part.name, "body" | "deck")).any(|part| {
+            let off = point - part.centre;
+            part.half_axes.iter().all(|half| off.dot(half).abs() <= half.norm_squared())
+        })
+    };
+    let rover_from_site: Pose = stand.site_from_rover.inverse();
+    let origin = stand.site_from_rover * Point3::origin();
+    let near = world.rocks().iter().filter(|rock| (rock.centre - origin).norm() < 2.0 + rock.radius_m);
+    let touched = near.filter(|rock| {
+        rock.vertices().iter().any(|vertex| is_inside(rover_from_site * (rock.centre + vertex)))
+    });
+    touched.count() as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn drive(scenario: &Scenario, world: &World, motions: &[[f64; 2]]) -> Vec<DrivenStop> {
+        let mut stops = vec![DrivenStop::first(world, scenario, Cancel::default()).unwrap()];
+        for motion in motions {
+            let last = &stops[stops.len() - 1];
+            let next = last.next(world, scenario, stops.len(), *motion, Cancel::default()).unwrap();
+            stops.push(next);
+        }
+        stops
+    }
+
+    fn flat() -> Scenario {
+        let mut scenario = Scenario::default();
+        (scenario.rocks.area_fraction, scenario.rocks.cluster_count) = (0.0, 0);
+        scenario.terrain.rms_at_1m_m = 0.0;
+        scenario.camera.image_size = 64;
+        scenario
+    }
+
+    #[test]
+    fn on_level_ground_without_slip_the_rover_goes_where_it_is_told() {
+        let scenario = flat();
+        let world = World::new(&scenario);
+        let quarter = std::f64::consts::FRAC_PI_2;
+        let stops =
+            drive(&scenario, &world, &[[2.0, 0.0], [3.0 * quarter, quarter], [0.0, -quarter], [-1.0, 0.0]]);
+        let places: Vec<[f64; 2]> = stops
+            .iter()
+            .map(|stop| stop.true_site_from_rover.to_pose().translation.vector)
+            .map(|v| [v.x, v.y])
+            .collect();
+        let expected = [[0.0, 0.0], [2.0, 0.0], [5.0, 3.0], [5.0, 3.0], [4.0, 3.0]];
+        for (place, wanted) in places.iter().zip(expected) {
+            let (dx, dy) = (place[0] - places[0][0] - wanted[0], place[1] - places[0][1] - wanted[1]);
+            assert!(dx.hypot(dy) < 1e-9, "{place:?} {wanted:?}");
+        }
+        // 3.75 cm a second, and a minute at each stop.
+        assert!((stops[1].time_s - (60.0 + 2.0 / 0.0375)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_drive_cut_after_any_stop_continues_with_the_same_bits() {
+        let mut scenario = Scenario { seed: 77, ..Scenario::default() };
+        (scenario.rover.slip_scale, scenario.rover.slip_spread) = (1.0, 0.3);
+        scenario.terrain.slope_deg = 8.0;
+        for odometry in [crate::scenario::OdometryModel::Stated, crate::scenario::OdometryModel::WheelsAndImu]
+        {
+            scenario.rover.odometry = odometry;
+            let world = World::new(&scenario);
+            let motions = [[0.5, 0.1], [0.3, -0.05], [0.0, 0.2], [0.4, 0.0]];
+            let whole = drive(&scenario, &world, &motions);
+            let text = serde_json::to_string(&whole[2]).unwrap();
+            let kept: DrivenStop = serde_json::from_str(&text).unwrap();
+            let next = kept.next(&world, &scenario, 3, motions[2], Cancel::default()).unwrap();
+            assert_eq!(next, whole[3]);
+            // Uphill the wheels lose some of their advance, and not the same part at each step.
+            let advance = |k: usize| {
+                let [a, b] =
+                    [&whole[k - 1], &whole[k]].map(|s| s.true_site_from_rover.to_pose().translation.vector);
+                (b - a).norm() / motions[k - 1][0]
+            };
+            assert!(
+                advance(1) < 0.99 && (advance(1) - advance(2)).abs() > 1e-3,
+                "{} {}",
+                advance(1),
+                advance(2)
+            );
+        }
+    }
+
+    #[test]
+    fn a_wheel_against_a_high_rock_stalls_where_it_stands() {
+        let mut scenario = flat();
+        let rock = |x_m: f64, y_m: f64| crate::scenario::PlacedRock {
+            x_m,
+            y_m,
+            diameter_m: 0.5,
+            height_m: 0.4,
+            yaw_deg: 180.0,
+            shape: crate::scenario::RockShape::Block,
+        };
+        // 10.3 m ahead lies the targets' centre; a rock 2 m ahead of the right front wheel.
+        scenario.rocks.placed = vec![rock(-10.3 + 2.7, 0.53)];
+        let world = World::new(&scenario);
+        let stops = drive(&scenario, &world, &[[4.0, 0.0], [-0.5, 0.0]]);
+        assert!((0.3..0.6).contains(&stops[1].completed), "{}", stops[1].completed);
+        assert_eq!(stops[2].completed, 1.0, "it can go back");
+        assert_eq!(stops[1].touched_rocks, 0);
+    }
+
+    #[test]
+    fn a_rock_in_the_rovers_body_is_counted() {
+        let mut scenario = flat();
+        let shape = crate::scenario::RockShape::Block;
+        let tall = |height_m: f64| crate::scenario::PlacedRock {
+            x_m: -10.3 + 3.0,
+            y_m: 0.0,
+            diameter_m: 0.3,
+            height_m,
+            yaw_deg: 180.0,
+            shape,
+        };
+        for (height_m, touched) in [(0.15, 0), (0.4, 1)] {
+            scenario.rocks.placed = vec![tall(height_m)];
+            let world = World::new(&scenario);
+            let stops = drive(&scenario, &world, &[[3.0, 0.0]]);
+            assert_eq!(stops[1].touched_rocks, touched, "{height_m} m");
+        }
+    }
+}
