@@ -197,7 +197,7 @@ mod tests {
 
     fn scenario() -> Scenario {
         let mut scenario = Scenario { seed: 5, ..Scenario::default() };
-        (scenario.camera.image_size, scenario.camera.samples_per_axis) = (64, 1);
+        (scenario.camera.image_size, scenario.camera.samples_per_axis) = (128, 1);
         (scenario.rocks.area_fraction, scenario.rocks.cluster_count) = (0.02, 4);
         scenario.drive.pointing_error_deg = 0.2;
         scenario

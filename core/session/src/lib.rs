@@ -19,6 +19,7 @@ pub mod summary;
 pub mod records;
 pub mod marks;
 pub mod track;
+pub mod driving;
 pub mod view;
 pub mod photometry;
 pub mod format;

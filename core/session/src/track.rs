@@ -99,7 +99,7 @@ pub fn run<D: Drive>(drive: &D, designation: Designation, settings: &Settings) -
     Ok(steps)
 }
 
-fn compared<D: Drive>(drive: &D, trace: StepTrace, first: Option<&StepTrace>) -> RunStep {
+pub(crate) fn compared<D: Drive>(drive: &D, trace: StepTrace, first: Option<&StepTrace>) -> RunStep {
     let target = &first.unwrap_or(&trace).update.target;
     let truth = TargetTruth::new(drive, target.designation, Some(&target.position_in_rover));
     let truth = truth.and_then(|truth| truth.compare(&trace));

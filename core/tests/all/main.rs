@@ -11,6 +11,7 @@ mod shape_tracker_recorded;
 mod trackability;
 mod records;
 mod rendering;
+mod driving;
 mod registration;
 mod stereo_rendered;
 mod stereo_recorded;

@@ -1,6 +1,7 @@
 //! The command line of the experiments: one file for each.
 
 mod cancel;
+mod driving;
 mod realism;
 mod scenery;
 mod scenery_figure;
@@ -21,6 +22,8 @@ use sightline_server::cli::{exit_code, start_log};
 enum Experiment {
     /// How soon each long computation ends once it is cancelled.
     Cancel(cancel::Cancelled),
+    /// Closed-loop drives on slopes with slip: arrival, errors of target and goal, collisions.
+    Driving(driving::Driving),
     /// How hard the simulated worlds are: plain correlation, without scale and roll, at steps of 5 % and 23 %.
     Realism(realism::Worlds),
     /// The simulated scenery in numbers: rocks, ground, noise and texture against their laws and real frames.
@@ -39,6 +42,7 @@ pub fn run() -> ExitCode {
     start_log();
     exit_code(match experiment {
         Experiment::Cancel(arguments) => arguments.run(),
+        Experiment::Driving(arguments) => arguments.run(),
         Experiment::Realism(arguments) => arguments.run(),
         Experiment::Scenery(arguments) => arguments.run(),
         Experiment::RealMotion(arguments) => arguments.run(),

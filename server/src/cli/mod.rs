@@ -9,6 +9,7 @@ mod simulate;
 mod import;
 mod info;
 mod track;
+mod drive;
 mod presets;
 mod study;
 mod export;
@@ -51,6 +52,8 @@ enum Command {
     Presets(presets::Presets),
     /// Track targets without a browser; one JSON object a step.
     Track(track::Track),
+    /// Drive the simulated rover towards a target on its own estimates; one JSON object a stop.
+    Drive(drive::Drive),
     /// Run a validation experiment: many targets in many worlds against the truth.
     Study(study::Study),
     /// Write a session as a file: a recording, tables, pictures, a report.
@@ -69,6 +72,7 @@ pub fn run() -> ExitCode {
         Command::Info(command) => command.run(),
         Command::Presets(command) => command.run(),
         Command::Track(command) => command.run(),
+        Command::Drive(command) => command.run(),
         Command::Study(command) => command.run(),
         Command::Export(command) => command.run(),
     };

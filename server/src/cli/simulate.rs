@@ -70,7 +70,7 @@ fn write_truth(traverse: &Traverse) -> Result<()> {
 }
 
 /// The scenario with settings changed by name.
-fn with(scenario: &Scenario, changes: &[String]) -> Result<Scenario> {
+pub(super) fn with(scenario: &Scenario, changes: &[String]) -> Result<Scenario> {
     let mut document: toml::Table =
         toml::from_str(&scenario.to_toml()).map_err(|error| Error::Request(error.to_string()))?;
     for change in changes {

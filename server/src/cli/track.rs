@@ -267,7 +267,7 @@ fn follow(
 }
 
 /// A copy without the stop's images, of which a long drive has more than fit into memory.
-fn without_images(trace: &RunStep) -> RunStep {
+pub(super) fn without_images(trace: &RunStep) -> RunStep {
     let mut lighter = trace.clone();
     lighter.update.target.memory.set_image(Arc::default());
     if let Some(capture) = lighter.capture_mut() {

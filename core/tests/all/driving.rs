@@ -1,0 +1,159 @@
+//! Closed-loop drives: the rover goes to a target on its own estimates.
+
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use sightline_geometry::cancel::Cancel;
+use sightline_geometry::error::Error;
+use sightline_recordings::DrivenTraverse;
+use sightline_rover::driving::executive::{self, CycleInput};
+use sightline_rover::driving::{ArcNavigator, DriveCommand, GoalRule, StopReason};
+use sightline_rover::pipeline;
+use sightline_session::driving::TargetedDrive;
+use sightline_track::settings::Settings;
+use sightline_track::target::Designation;
+use sightline_world::{Scenario, choose_targets, library};
+
+fn scenario() -> Scenario {
+    let mut scenario = Scenario { seed: 4402, ..library::scenario("approach-10").unwrap() };
+    (scenario.camera.image_size, scenario.camera.samples_per_axis) = (512, 2);
+    scenario.targets.window_px = 11;
+    scenario.terrain.slope_deg = 3.0;
+    (scenario.rover.slip_scale, scenario.rover.slip_spread) = (1.0, 0.2);
+    scenario.drive.pointing_error_deg = 0.05;
+    scenario
+}
+
+fn command() -> DriveCommand {
+    DriveCommand { standoff_m: 2.0, tolerance_m: 0.01, ..DriveCommand::default() }
+}
+
+fn world(folder: &Path) -> (DrivenTraverse, Designation) {
+    let scenario = scenario();
+    let world = DrivenTraverse::begin(&scenario, folder, Cancel::default()).unwrap();
+    let traverse = world.traverse();
+    let pixel = choose_targets(traverse.world().unwrap(), &scenario, traverse.index())[0];
+    (world, Designation { step: 0, pixel })
+}
+
+fn begin(folder: &Path) -> TargetedDrive {
+    let (world, designation) = world(folder);
+    TargetedDrive::begin(world, designation, command(), &Settings::default(), Cancel::default()).unwrap()
+}
+
+fn drive(folder: &Path) -> TargetedDrive {
+    let mut drive = begin(folder);
+    while drive.advance(&Settings::default(), Cancel::default()).unwrap() {}
+    drive
+}
+
+#[test]
+fn a_drive_arrives_within_centimetres_of_the_true_target() {
+    let folder = tempfile::tempdir().unwrap();
+    let drive = drive(&folder.path().join("drive"));
+    let summary = drive.summary();
+    println!("{summary:?}");
+    assert_eq!((summary.arrived, summary.reason), (true, Some(StopReason::Arrived)));
+    assert_eq!((summary.tracked, summary.collisions), (Some(true), 0));
+    assert!(summary.target_error_m.unwrap() < 0.02 && summary.goal_error_m.unwrap() < 0.05);
+    // The mast follows: the target appears near the image's centre at every stop.
+    for step in &drive.steps[1..] {
+        let centre = step.point_mast.left.centre_pixel();
+        let off_px = step.located().unwrap().left_pixel.unwrap().distance(centre);
+        assert!(off_px < 60.0, "stop {}: {off_px} px", step.step);
+    }
+    // No step is longer than a tenth of the distance to the target.
+    for (step, cycle) in drive.steps.iter().zip(&drive.cycles) {
+        let distance_m = step.update.target.last_distance_m;
+        assert!(cycle.report.is_none_or(|report| report.wheels_m < 0.101 * distance_m));
+    }
+}
+
+#[test]
+fn without_the_comparison_with_the_truth_a_drive_has_the_same_bits() {
+    let folder = tempfile::tempdir().unwrap();
+    let judged = drive(&folder.path().join("judged"));
+    let (mut world, designation) = world(&folder.path().join("blind"));
+    let settings = Settings::default();
+    let mut steps = vec![pipeline::designate(world.traverse(), designation, &settings).unwrap()];
+    let mut cycles = Vec::new();
+    loop {
+        let input = CycleInput {
+            command: &command(),
+            navigator: &ArcNavigator::default(),
+            first: &steps[0],
+            last: &steps[steps.len() - 1],
+            before: cycles.last(),
+            settings: &settings,
+            cancel: Cancel::default(),
+        };
+        let (cycle, step) = executive::advance(&mut world, &input).unwrap();
+        cycles.push(cycle);
+        match step {
+            Some(step) => steps.push(step),
+            None => break,
+        }
+    }
+    assert_eq!(cycles, judged.cycles);
+    assert_eq!(world.state(), judged.world.state());
+    assert_eq!(steps.len(), judged.steps.len());
+    // The designation alone may carry a warning that the truth adds.
+    for (blind, judged) in steps.iter().zip(&judged.steps).skip(1) {
+        assert_eq!(*blind, judged.trace);
+    }
+}
+
+#[test]
+fn a_drive_branched_at_a_stop_leaves_the_trunk_as_it_was() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut trunk = begin(&folder.path().join("trunk"));
+    let settings = Settings::default();
+    for _ in 0..3 {
+        assert!(trunk.advance(&settings, Cancel::default()).unwrap());
+    }
+    let at_stop_2 = trunk.world.state()[..3].to_vec();
+    let kept = (trunk.world.state().to_vec(), trunk.steps.clone(), trunk.cycles.clone());
+    let mut branch = begin(&folder.path().join("branch"));
+    branch.world.restore(at_stop_2).unwrap();
+    (branch.steps, branch.cycles) = (trunk.steps[..3].to_vec(), trunk.cycles[..2].to_vec());
+    branch.command.step_fraction = 0.05;
+    assert!(branch.advance(&settings, Cancel::default()).unwrap());
+    assert_ne!(branch.world.state()[3], trunk.world.state()[3]);
+    assert_eq!((trunk.world.state().to_vec(), trunk.steps.clone(), trunk.cycles.clone()), kept);
+    // With the trunk's command the branch is the trunk.
+    branch.world.restore(trunk.world.state()[..3].to_vec()).unwrap();
+    (branch.steps, branch.cycles) = (trunk.steps[..3].to_vec(), trunk.cycles[..2].to_vec());
+    branch.command = command();
+    assert!(branch.advance(&settings, Cancel::default()).unwrap());
+    assert_eq!(branch.world.state(), trunk.world.state());
+    assert_eq!(branch.steps[3], trunk.steps[3]);
+}
+
+#[test]
+fn a_cancelled_cycle_leaves_the_drive_as_it_was() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut drive = begin(&folder.path().join("drive"));
+    let flag = AtomicBool::new(true);
+    let outcome = drive.advance(&Settings::default(), Cancel::from(&flag));
+    assert!(matches!(outcome, Err(Error::Cancelled)));
+    assert_eq!((drive.steps.len(), drive.cycles.len(), drive.world.state().len()), (1, 0, 1));
+    assert!(drive.advance(&Settings::default(), Cancel::default()).unwrap());
+}
+
+#[test]
+fn a_command_that_makes_no_sense_is_refused_in_one_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    let refused = |name: &str, change: fn(&mut DriveCommand)| {
+        let (world, designation) = world(&folder.path().join(name));
+        let mut command = command();
+        change(&mut command);
+        let settings = Settings::default();
+        let begun = TargetedDrive::begin(world, designation, command, &settings, Cancel::default());
+        begun.err().unwrap().to_string()
+    };
+    assert!(refused("far", |c| c.standoff_m = 20.0).contains("standoff_m: 20 m is not less than"));
+    assert!(refused("lax", |c| (c.standoff_m, c.tolerance_m) = (0.5, 0.6)).contains("tolerance_m"));
+    assert!(
+        refused("fixed", |c| (c.goal, c.step_fraction) = (GoalRule::Fixed, 2.0)).contains("step_fraction")
+    );
+}

@@ -1,0 +1,119 @@
+//! `sightline-experiments driving`: closed-loop drives in many worlds, with a goal that follows the target and a fixed one.
+
+use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
+
+use crate::driving::{Drive, Outcome, drives, outcome};
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+use sightline_geometry::error::{Error, Result};
+use sightline_rover::driving::{DriveCommand, GoalRule};
+use sightline_track::settings::Settings;
+
+use sightline_server::cli::open;
+use sightline_server::cli::terminal::{self, Progress};
+
+/// The worlds and the command.
+#[derive(Debug, Args)]
+pub(super) struct Driving {
+    /// The scenario: a file, or a name that `sightline scenarios` lists.
+    #[arg(default_value = "approach-10")]
+    scenario: PathBuf,
+    /// How many worlds.
+    #[arg(long, default_value_t = 100)]
+    worlds: u64,
+    /// The seed of the first world.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Side of the images, px.
+    #[arg(long, default_value_t = 512)]
+    size: u32,
+    /// Samples along each side of a pixel.
+    #[arg(long, default_value_t = 2)]
+    samples_per_axis: u32,
+    /// Horizontal distance of the goal from the target, m.
+    #[arg(long, default_value_t = 2.0)]
+    standoff: f64,
+    /// Distance from the goal at which the rover has arrived, m.
+    #[arg(long, default_value_t = 0.01)]
+    tolerance: f64,
+    /// Leave out the drives with a fixed goal.
+    #[arg(long)]
+    only_following: bool,
+    /// What is written to the standard output.
+    #[arg(long, default_value = "text")]
+    format: Format,
+}
+
+/// What is written to the standard output.
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+enum Format {
+    /// One line for each rule of the goal.
+    Text,
+    /// One JSON object for each rule of the goal, with every drive.
+    Json,
+}
+
+/// The drives with one rule of the goal.
+#[derive(Serialize)]
+struct Report {
+    goal: GoalRule,
+    outcome: Outcome,
+    drives: Vec<Drive>,
+}
+
+impl Driving {
+    /// Drives and writes the outcome.
+    ///
+    /// # Errors
+    /// A scenario that cannot be read, or no room for images.
+    pub(super) fn run(&self) -> Result<()> {
+        let mut scenario = open::scenario(&self.scenario)?;
+        (scenario.camera.image_size, scenario.camera.samples_per_axis) = (self.size, self.samples_per_axis);
+        // The rule's window is that of 1024 × 1024 images.
+        scenario.targets.window_px = (scenario.targets.window_px * self.size / 1024) | 1;
+        let folder = std::env::temp_dir().join(format!("sightline-driving-{}", std::process::id()));
+        let seeds: Vec<u64> = (self.seed..self.seed + self.worlds).collect();
+        let settings = Settings::default();
+        let rules = [GoalRule::FollowsTarget, GoalRule::Fixed];
+        let count = if self.only_following { 1 } else { 2 };
+        let all = seeds.len() * count;
+        let progress = Mutex::new((0, Progress::new("drive")));
+        let tell = || {
+            let mut progress = progress.lock().unwrap_or_else(PoisonError::into_inner);
+            progress.0 += 1;
+            let done = progress.0;
+            progress.1.tell(done, all);
+        };
+        for goal in rules.into_iter().take(count) {
+            let command = DriveCommand {
+                standoff_m: self.standoff,
+                tolerance_m: self.tolerance,
+                goal,
+                ..DriveCommand::default()
+            };
+            let drives = drives(&scenario, &seeds, &command, &settings, &folder, &tell);
+            let outcome = outcome(&drives);
+            if self.format == Format::Text {
+                terminal::line(&row(goal, &outcome))?;
+                continue;
+            }
+            let report = Report { goal, outcome, drives };
+            let text = serde_json::to_string(&report).map_err(|error| Error::Request(error.to_string()))?;
+            terminal::line(&text)?;
+        }
+        let _ = std::fs::remove_dir_all(&folder);
+        Ok(())
+    }
+}
+
+/// One line of the table.
+fn row(goal: GoalRule, outcome: &Outcome) -> String {
+    let Outcome { drives, arrived, tracked, collisions, target_error_m, goal_error_m } = outcome;
+    let cm = |pair: &[f64; 2]| format!("{:.2} / {:.2} cm", 100.0 * pair[0], 100.0 * pair[1]);
+    format!(
+        "{goal:?}: {arrived} of {drives} arrived, {tracked} tracked, {collisions} collisions; target error {} (median / 99 %), goal error {} (median / 95 %)",
+        cm(target_error_m),
+        cm(goal_error_m)
+    )
+}

@@ -1,0 +1,175 @@
+//! `sightline drive`: drives the simulated rover towards a target on its own estimates.
+//!
+//! Each stop is one line of JSON on the standard output as soon as it is computed: the step's row and, under `cycle`, what was
+//! decided there. The last line is `{"summary": …}`.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+use sightline_geometry::cancel::Cancel;
+use sightline_geometry::error::{Error, Result};
+use sightline_geometry::frames::Pixel;
+use sightline_recordings::DrivenTraverse;
+use sightline_rover::driving::{Cycle, DriveCommand, GoalRule};
+use sightline_session::driving::{DriveSummary, TargetedDrive};
+use sightline_session::step::RunStep;
+use sightline_track::presets::preset;
+use sightline_track::settings::{Changes, Settings, parse_assignment};
+use sightline_track::target::Designation;
+use sightline_world::choose_targets;
+
+use super::terminal::{self, Progress};
+use super::track::{pixel, without_images};
+use super::{open, simulate};
+use crate::exports::rows::Row;
+
+/// Drive the simulated rover towards a target on its own estimates.
+#[derive(Debug, Args)]
+pub(super) struct Drive {
+    /// The scenario: a file, or a name that `sightline scenarios` lists.
+    scenario: PathBuf,
+    /// The position of the target in the first left image, px.
+    #[arg(long, value_name = "X,Y", value_parser = pixel, allow_hyphen_values = true,
+        required_unless_present = "list_targets")]
+    target: Option<Pixel>,
+    /// Print the targets that the scenario's rule chooses, one JSON object a line, and end.
+    #[arg(long)]
+    list_targets: bool,
+    /// Horizontal distance of the goal from the target, m.
+    #[arg(long, value_name = "M", default_value_t = DriveCommand::default().standoff_m)]
+    standoff: f64,
+    /// Added to the goal, x and y of the site frame, m.
+    #[arg(long, value_name = "X,Y", value_parser = pixel, allow_hyphen_values = true)]
+    offset: Option<Pixel>,
+    /// Leave the goal where the designation put it, whatever tracking finds: the baseline.
+    #[arg(long)]
+    fixed_goal: bool,
+    /// Distance from the goal at which the rover has arrived, m.
+    #[arg(long, value_name = "M", default_value_t = DriveCommand::default().tolerance_m)]
+    tolerance: f64,
+    /// Longest step as a part of the distance to the target.
+    #[arg(long, value_name = "PART", default_value_t = DriveCommand::default().step_fraction)]
+    step_fraction: f64,
+    /// Most stops, the first included.
+    #[arg(long, value_name = "N", default_value_t = DriveCommand::default().stops_max)]
+    stops: u32,
+    /// Another seed than the scenario's.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// A named configuration of the tracker, as `sightline presets` lists them; --set changes it further.
+    #[arg(long, value_name = "NAME")]
+    preset: Option<String>,
+    /// A setting of the tracker, for example ncc_min=0.6; can be given more than once.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// A setting of the scenario, for example terrain.slope_deg=5; can be given more than once.
+    #[arg(long, value_name = "KEY=VALUE")]
+    world: Vec<String>,
+    /// The folder to make for the drive, which can be opened and replayed; without it, the images are removed at the end.
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+    /// How the stops are written.
+    #[arg(long, default_value = "jsonl")]
+    format: Format,
+}
+
+/// How the stops are written.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Format {
+    /// One JSON object a stop, then one with the summary.
+    Jsonl,
+}
+
+/// The line of a stop.
+#[derive(Serialize)]
+struct StopLine<'a> {
+    #[serde(flatten)]
+    row: Row,
+    cycle: &'a Cycle,
+}
+
+/// The line of a target.
+#[derive(Serialize)]
+struct TargetLine {
+    target: [f64; 2],
+}
+
+/// The line after the last stop.
+#[derive(Serialize)]
+struct SummaryLine {
+    summary: DriveSummary,
+}
+
+impl Drive {
+    /// Drives until the goal is reached or something ends the drive.
+    ///
+    /// # Errors
+    /// A scenario, target, command or setting that makes no sense, or a folder that cannot be written.
+    pub(super) fn run(self) -> Result<()> {
+        let mut scenario = open::scenario(&self.scenario)?;
+        scenario.seed = self.seed.unwrap_or(scenario.seed);
+        let scenario = simulate::with(&scenario, &self.world)?;
+        let settings = self.settings()?;
+        self.command().validate()?;
+        let temporary =
+            tempfile::tempdir().map_err(|source| Error::Write { path: std::env::temp_dir(), source })?;
+        let folder = self.out.clone().unwrap_or_else(|| temporary.path().join("drive"));
+        let world = DrivenTraverse::begin(&scenario, &folder, Cancel::default())?;
+        if self.list_targets {
+            let traverse = world.traverse();
+            let Some(simulated) = traverse.world() else { return Ok(()) };
+            let targets = choose_targets(simulated, &scenario, traverse.index());
+            return targets.iter().try_for_each(|pixel| line(&TargetLine { target: [pixel.x, pixel.y] }));
+        }
+        // The command line refuses to come here without one.
+        let Some(pixel) = self.target else { return Ok(()) };
+        let designation = Designation { step: 0, pixel };
+        let drive = TargetedDrive::begin(world, designation, self.command(), &settings, Cancel::default())?;
+        follow(drive, &settings)
+    }
+
+    fn command(&self) -> DriveCommand {
+        DriveCommand {
+            standoff_m: self.standoff,
+            offset_m: self.offset.map_or([0.0; 2], |offset| [offset.x, offset.y]),
+            goal: if self.fixed_goal { GoalRule::Fixed } else { GoalRule::FollowsTarget },
+            tolerance_m: self.tolerance,
+            step_fraction: self.step_fraction,
+            stops_max: self.stops,
+            ..DriveCommand::default()
+        }
+    }
+
+    fn settings(&self) -> Result<Settings> {
+        let changes = self.set.iter().map(|text| parse_assignment(text)).collect::<Result<Changes>>()?;
+        let own =
+            self.preset.as_ref().map_or_else(|| Ok(Settings::default()), |name| preset(name)?.settings())?;
+        let settings = own.with(&changes)?;
+        terminal::settings_without_effect(&settings, &changes);
+        Ok(settings)
+    }
+}
+
+/// Drives to the end, one line a stop.
+fn follow(mut drive: TargetedDrive, settings: &Settings) -> Result<()> {
+    let mut progress = Progress::new("drove to stop");
+    loop {
+        let goes_on = drive.advance(settings, Cancel::default())?;
+        let number = drive.cycles.len() - 1;
+        let step: &RunStep = &drive.steps[number];
+        line(&StopLine { row: step.into(), cycle: &drive.cycles[number] })?;
+        progress.tell(number + 1, drive.command.stops_max as usize);
+        if !goes_on {
+            return line(&SummaryLine { summary: drive.summary() });
+        }
+        // The images of stops that were left behind are not needed any more.
+        drive.steps[number] = Arc::new(without_images(&drive.steps[number]));
+    }
+}
+
+fn line(value: &impl Serialize) -> Result<()> {
+    let text = serde_json::to_string(value).map_err(|error| Error::Request(error.to_string()))?;
+    terminal::line(&text)
+}
