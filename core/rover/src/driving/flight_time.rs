@@ -41,7 +41,7 @@ impl FlightTime {
     }
 
     /// All stages together, s.
-    pub fn total_s(&self) -> f64 {
+    pub(crate) fn total_s(&self) -> f64 {
         self.point_mast_s + self.capture_s + self.locate_s + self.drive_s
     }
 }

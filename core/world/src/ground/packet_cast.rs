@@ -46,6 +46,25 @@ struct CellRays {
     dz: Lanes,
 }
 
+/// How rays cross a column of cells.
+struct Crossing {
+    /// Where they enter and leave it, m.
+    enter_m: Lanes,
+    leave_m: Lanes,
+    /// The first and the last row that an open ray crosses there.
+    rows: Option<[i64; 2]>,
+}
+
+/// The hits so far.
+struct Found {
+    /// Infinite where there is none yet, m.
+    hit_m: Lanes,
+    /// Up to where a ray is known to be above the ground, m.
+    open_from_m: Lanes,
+    /// Whether a ray may still be hit.
+    is_open: [bool; LANES],
+}
+
 /// A cell's patch `z00 + a u + b v + c u v` at its place in the grid.
 struct Patch {
     cell: [f64; 2],
@@ -72,19 +91,18 @@ impl Terrain {
     /// No ray meets the grid before `clear_m`, the [`Terrain::clear_m`] of `cone`.
     #[inline(always)]
     pub(crate) fn cast_lanes(&self, rays: &RayLanes, cone: &Cone, clear_m: f64, to_m: &Lanes) -> Lanes {
-        let mut hit_m = [f64::INFINITY; LANES];
-        let mut open_from_m = [clear_m; LANES];
-        let mut is_open = [true; LANES];
+        let mut found =
+            Found { hit_m: [f64::INFINITY; LANES], open_from_m: [clear_m; LANES], is_open: [true; LANES] };
         if self.is_narrow(cone, clear_m) {
-            self.cast_columns(rays, clear_m, to_m, &mut hit_m, &mut open_from_m, &mut is_open);
+            self.cast_columns(rays, clear_m, to_m, &mut found);
         }
         for lane in 0..LANES {
-            if is_open[lane] {
-                let cast = self.cast_beyond(&rays.ray(lane), open_from_m[lane], 0.0, to_m[lane]);
-                hit_m[lane] = cast.unwrap_or(f64::INFINITY);
+            if found.is_open[lane] {
+                let cast = self.cast_beyond(&rays.ray(lane), found.open_from_m[lane], 0.0, to_m[lane]);
+                found.hit_m[lane] = cast.unwrap_or(f64::INFINITY);
             }
         }
-        hit_m
+        found.hit_m
     }
 
     /// Whether a cone of rays that comes near the ground at `clear_m` has a short footprint there.
@@ -131,70 +149,27 @@ impl Terrain {
 
     /// Casts the rays column by column; a ray that stays open is above the ground up to `open_from_m`.
     #[inline(always)]
-    fn cast_columns(
-        &self,
-        rays: &RayLanes,
-        clear_m: f64,
-        to_m: &Lanes,
-        hit_m: &mut Lanes,
-        open_from_m: &mut Lanes,
-        is_open: &mut [bool; LANES],
-    ) {
+    fn cast_columns(&self, rays: &RayLanes, clear_m: f64, to_m: &Lanes, found: &mut Found) {
         let rays = self.cell_rays(rays);
         let major = usize::from(rays.d[1][0].abs() > rays.d[0][0].abs());
-        let minor = 1 - major;
-        let is_forward = rays.d[major][0] > 0.0;
-        let (mut rear, mut turns) = ([0.0; LANES], false);
-        for lane in 0..LANES {
-            let at = rays.p[major][lane] + rays.d[major][lane] * clear_m;
-            rear[lane] = if is_forward { at } else { -at };
-            turns |= (rays.d[major][lane] > 0.0) != is_forward;
-        }
-        if turns {
-            return;
-        }
-        let rear = least(&rear);
-        let mut column = (if is_forward { rear } else { -rear }).floor() as i64;
+        let (minor, is_forward) = (1 - major, rays.d[major][0] > 0.0);
+        let Some(mut column) = rays.rearmost_column(major, is_forward, clear_m) else { return };
         for _ in 0..COLUMNS_MAX {
             if column < 0 || column >= self.cells[major] as i64 {
                 return;
             }
-            let (near, far) = if is_forward { (column, column + 1) } else { (column + 1, column) };
-            let (mut enter_m, mut leave_m) = ([0.0; LANES], [0.0; LANES]);
-            let (mut low, mut high) = ([0.0; LANES], [0.0; LANES]);
-            for lane in 0..LANES {
-                let enter = (near as f64 - rays.p[major][lane]) * rays.inverse[major][lane];
-                let leave = (far as f64 - rays.p[major][lane]) * rays.inverse[major][lane];
-                let enter = if enter > clear_m { enter } else { clear_m };
-                (enter_m[lane], leave_m[lane]) = (enter, leave);
-                let a = rays.p[minor][lane] + rays.d[minor][lane] * enter;
-                let b = rays.p[minor][lane] + rays.d[minor][lane] * leave;
-                let is_here = is_open[lane] && leave > clear_m;
-                low[lane] = if is_here { if a < b { a } else { b } } else { f64::INFINITY };
-                high[lane] = if is_here { if a < b { -b } else { -a } } else { f64::INFINITY };
-            }
-            let (low, high) = (least(&low), -least(&high));
-            if low <= high {
-                let rows = [low.floor() as i64, high.floor() as i64];
-                if rows[0] < 0 || rows[1] >= self.cells[minor] as i64 || rows[1] - rows[0] >= ROWS_MAX {
+            let crossing = rays.cross(major, [column, column + 1], is_forward, clear_m, &found.is_open);
+            if let Some([first, last]) = crossing.rows {
+                if first < 0 || last >= self.cells[minor] as i64 || last - first >= ROWS_MAX {
                     return;
                 }
-                for row in rows[0]..=rows[1] {
+                for row in first..=last {
                     let mut cell = [0usize; 2];
                     (cell[major], cell[minor]) = (column as usize, row as usize);
-                    self.patch(cell).meet(&rays, minor, [&enter_m, &leave_m], hit_m);
+                    self.patch(cell).meet(&rays, minor, &crossing, &mut found.hit_m);
                 }
             }
-            let mut any_open = false;
-            for lane in 0..LANES {
-                // What is hit in a later column is farther.
-                let is_done = hit_m[lane] < f64::INFINITY || leave_m[lane] >= to_m[lane];
-                is_open[lane] &= !is_done;
-                open_from_m[lane] = open_from_m[lane].max(leave_m[lane]);
-                any_open |= is_open[lane];
-                hit_m[lane] = if hit_m[lane] <= to_m[lane] { hit_m[lane] } else { f64::INFINITY };
-            }
-            if !any_open {
+            if !found.close(&crossing.leave_m, to_m) {
                 return;
             }
             column += if is_forward { 1 } else { -1 };
@@ -209,10 +184,73 @@ impl Terrain {
     }
 }
 
-impl Patch {
-    /// Lowers `hit_m` to where rays within their [enter, leave] first are on or below the patch, if they are.
+impl CellRays {
+    /// The column of the ray that has advanced least at `clear_m`; `None` where the rays advance in both directions.
     #[inline(always)]
-    fn meet(&self, rays: &CellRays, minor: usize, [enter_m, leave_m]: [&Lanes; 2], hit_m: &mut Lanes) {
+    fn rearmost_column(&self, major: usize, is_forward: bool, clear_m: f64) -> Option<i64> {
+        let (mut rear, mut turns) = ([0.0; LANES], false);
+        for lane in 0..LANES {
+            let at = self.p[major][lane] + self.d[major][lane] * clear_m;
+            rear[lane] = if is_forward { at } else { -at };
+            turns |= (self.d[major][lane] > 0.0) != is_forward;
+        }
+        let rear = least(&rear);
+        (!turns).then(|| (if is_forward { rear } else { -rear }).floor() as i64)
+    }
+
+    /// How the rays cross the column between two borders.
+    #[inline(always)]
+    fn cross(
+        &self,
+        major: usize,
+        borders: [i64; 2],
+        is_forward: bool,
+        clear_m: f64,
+        is_open: &[bool; LANES],
+    ) -> Crossing {
+        let minor = 1 - major;
+        let [near, far] = if is_forward { borders } else { [borders[1], borders[0]] };
+        let (mut enter_m, mut leave_m) = ([0.0; LANES], [0.0; LANES]);
+        let (mut low, mut high) = ([0.0; LANES], [0.0; LANES]);
+        for lane in 0..LANES {
+            let enter = (near as f64 - self.p[major][lane]) * self.inverse[major][lane];
+            let leave = (far as f64 - self.p[major][lane]) * self.inverse[major][lane];
+            let enter = if enter > clear_m { enter } else { clear_m };
+            (enter_m[lane], leave_m[lane]) = (enter, leave);
+            let a = self.p[minor][lane] + self.d[minor][lane] * enter;
+            let b = self.p[minor][lane] + self.d[minor][lane] * leave;
+            let is_here = is_open[lane] && leave > clear_m;
+            low[lane] = if is_here { if a < b { a } else { b } } else { f64::INFINITY };
+            high[lane] = if is_here { if a < b { -b } else { -a } } else { f64::INFINITY };
+        }
+        let (low, high) = (least(&low), -least(&high));
+        let rows = (low <= high).then(|| [low.floor() as i64, high.floor() as i64]);
+        Crossing { enter_m, leave_m, rows }
+    }
+}
+
+impl Found {
+    /// Closes the rays that were hit, or that end, before they leave a column; whether any stays open.
+    #[inline(always)]
+    fn close(&mut self, leave_m: &Lanes, to_m: &Lanes) -> bool {
+        let mut any_open = false;
+        for lane in 0..LANES {
+            // A hit in a later column is farther.
+            let is_done = self.hit_m[lane] < f64::INFINITY || leave_m[lane] >= to_m[lane];
+            self.is_open[lane] &= !is_done;
+            self.open_from_m[lane] = self.open_from_m[lane].max(leave_m[lane]);
+            any_open |= self.is_open[lane];
+            self.hit_m[lane] = if self.hit_m[lane] <= to_m[lane] { self.hit_m[lane] } else { f64::INFINITY };
+        }
+        any_open
+    }
+}
+
+impl Patch {
+    /// Lowers `hit_m` to where rays within the column first are on or below the patch, if they are.
+    #[inline(always)]
+    fn meet(&self, rays: &CellRays, minor: usize, crossing: &Crossing, hit_m: &mut Lanes) {
+        let (enter_m, leave_m) = (&crossing.enter_m, &crossing.leave_m);
         let (mut from_m, mut until_m) = ([0.0; LANES], [0.0; LANES]);
         let mut is_near = false;
         for lane in 0..LANES {

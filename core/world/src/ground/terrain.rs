@@ -110,7 +110,7 @@ impl Terrain {
         tilt: [f64; 2],
     ) -> Self {
         let tops: Vec<Tops> = BLOCK_SHIFT.iter().map(|&shift| tops(&z_m, cells, 1 << shift)).collect();
-        let wide_tops = tops.iter().map(Tops::widened).collect();
+        let wide_tops = tops.iter().map(Tops::with_neighbours).collect();
         let highest_z_m = tops[0].z_m.iter().copied().fold(MEAN_GROUND_Z_M, |a, b| a.min(f64::from(b)));
         let slope = vertex_slopes(&z_m, cells, cell_m);
         let steepest = steepest(&z_m, cells) / cell_m + tilt[0].hypot(tilt[1]);
@@ -203,7 +203,7 @@ impl Terrain {
 
 impl Tops {
     /// The highest point of every block with its eight neighbours.
-    fn widened(&self) -> Self {
+    fn with_neighbours(&self) -> Self {
         let (columns, rows) = (self.columns, self.z_m.len() / self.columns);
         let along = |from: &[f32], count: usize, step: usize, at: usize, k: usize| {
             let before = if k > 0 { from[at - step] } else { from[at] };
