@@ -85,7 +85,7 @@ mod tests {
     fn end(motion: Motion) -> ([f64; 2], f64) {
         match motion {
             Motion::Turn { angle_rad } => ([0.0; 2], angle_rad),
-            Motion::Arc { length_m, curvature_per_m } if curvature_per_m == 0.0 => ([length_m, 0.0], 0.0),
+            Motion::Arc { length_m, curvature_per_m: 0.0 } => ([length_m, 0.0], 0.0),
             Motion::Arc { length_m, curvature_per_m } => {
                 let turn_rad = length_m * curvature_per_m;
                 ([turn_rad.sin() / curvature_per_m, (1.0 - turn_rad.cos()) / curvature_per_m], turn_rad)

@@ -19,6 +19,11 @@
 //!
 //! Frames: soil at (x, y) of the site, rock about its centre. Source: ours, after domain.md 10.4.
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "plain loops over lanes become vectors, adaptors do not always"
+)]
+
 use crate::ground::texture::{LANES, OctaveSettings, Octaves, TextureLanes, least, mix, weight};
 use crate::ground::value_noise::{LatticeMap, Points, cell_hash, cell_of};
 

@@ -12,6 +12,11 @@
 //!
 //! Frame: site. Source: ours.
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "plain loops over lanes become vectors, adaptors do not always"
+)]
+
 use sightline_geometry::frames::{Point3, Ray, Vector3};
 
 use crate::culling::Cone;

@@ -17,6 +17,11 @@
 //! Frames: soil is evaluated at (x, y) of the site frame, rock at a point relative to the rock's centre.
 //! Sources: domain.md 10.4 (band-limited noise on rocks, fractal ground), 11.3 (anti-aliasing).
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "plain loops over lanes become vectors, adaptors do not always"
+)]
+
 use std::f64::consts::TAU;
 
 use crate::ground::value_noise::{Lattice, LatticeMap, Points, ValueNoise};
@@ -166,10 +171,6 @@ where
     Lattice<DIMENSIONS>: ValueNoise<DIMENSIONS>,
 {
     /// The octave's share of the sum from its noise, under a weight.
-    #[expect(
-        clippy::needless_range_loop,
-        reason = "a product of a matrix and a vector, without adaptors in hot code"
-    )]
     #[inline(always)]
     fn weighted(
         &self,

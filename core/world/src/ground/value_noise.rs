@@ -11,6 +11,11 @@
 //!
 //! Source: domain.md 10.4.
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "plain loops over lanes become vectors, adaptors do not always"
+)]
+
 use crate::ground::texture::LANES;
 
 /// A lattice of points in the plane (2) or in space (3).
@@ -85,10 +90,6 @@ impl<const DIMENSIONS: usize> LatticeMap<DIMENSIONS> {
     }
 
     /// Coordinates of a point.
-    #[expect(
-        clippy::needless_range_loop,
-        reason = "a product of a matrix and a vector, without adaptors in hot code"
-    )]
     #[inline(always)]
     pub(crate) fn at(&self, p_m: [f64; DIMENSIONS]) -> [f64; DIMENSIONS] {
         let mut lattice = [0.0; DIMENSIONS];
@@ -102,7 +103,6 @@ impl<const DIMENSIONS: usize> LatticeMap<DIMENSIONS> {
     }
 
     /// The cells of points.
-    #[expect(clippy::needless_range_loop, reason = "as in `at`")]
     #[inline(always)]
     pub(crate) fn cells(&self, points: &Points<DIMENSIONS>) -> Cells<DIMENSIONS> {
         let (mut cells, mut parts) = ([[0; LANES]; DIMENSIONS], [[0.0; LANES]; DIMENSIONS]);
