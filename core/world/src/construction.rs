@@ -43,10 +43,14 @@ impl World {
         let sun_grid = Arc::new(SunGrid::new(&rocks, &light.to_sun));
         cancel.check()?;
         let [x_m_goal, y_m_goal] = approach.goal_m;
+        let openness = Openness::new(&rocks, x_m, y_m);
+        cancel.check()?;
+        let footing = Footing::new(&rocks, x_m, y_m);
+        cancel.check()?;
         let scenery = Scenery {
             tree: Tree::new(&rocks),
-            openness: Openness::new(&rocks, x_m, y_m),
-            footing: Footing::new(&rocks, x_m, y_m),
+            openness,
+            footing,
             surfaces: Surfaces::new(&scenario.texture, scenario.seed),
             terrain,
             rocks,
