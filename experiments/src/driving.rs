@@ -1,4 +1,4 @@
-//! Closed-loop drives in many worlds: how near does the rover come to what was commanded?
+//! Closed-loop drives in many worlds: arrival, errors of target and goal, collisions.
 //!
 //! Each world has a slope of up to 5° in any direction, slip of firm soil with a spread of 20 %, and one target, the first that
 //! the scenario's rule chooses. Each drive is made twice: with a goal that follows the target and with a fixed one.

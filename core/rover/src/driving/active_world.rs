@@ -1,4 +1,4 @@
-//! The world that a closed loop acts on: the simulator moves its true rover, a recording compares.
+//! The world that a closed loop acts on; the simulator implements it.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -24,7 +24,7 @@ pub trait ActiveWorld {
     /// Points the mast of the last stop; `None` leaves it as it is.
     ///
     /// # Errors
-    /// Angles that the recording has no image for.
+    /// A stop that cannot be stored.
     fn point_mast(&mut self, angles: Option<MastAngles>) -> Result<()>;
 }
 

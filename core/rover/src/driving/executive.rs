@@ -47,11 +47,11 @@ pub struct Ending {
     pub reason: StopReason,
     /// The value that decided, in the unit of its limit: m, deg, min, a count; null for `lost` and `stalled`.
     pub value: Option<f64>,
-    /// The limit of the command that it met; null alike.
+    /// The limit of the command that it met; null for `lost` and `stalled`.
     pub limit: Option<f64>,
 }
 
-/// What was decided at a stop, after the target was found there.
+/// The decision at a stop, made once the target is located there.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Cycle {
     /// The number of the stop.
@@ -60,7 +60,7 @@ pub struct Cycle {
     pub goal: Goal,
     /// The chosen motion; null where the drive ended.
     pub motion: Option<Motion>,
-    /// What the rover reported of the motion; null alike.
+    /// The rover's report of the motion; null where the drive ended.
     pub report: Option<DriveReport>,
     /// Time on Mars up to the end of this stop's drive, min.
     pub flight_minutes: f64,
