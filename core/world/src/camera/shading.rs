@@ -1,7 +1,8 @@
 //! Shading: the light of what the samples of a tile met, many at once.
 //!
 //! The samples of a tile are grouped by surface, the ground or one rock, and shaded [`LANES`] at a time: the noise of
-//! their textures is the same program on other numbers, and the loops over lanes in `texture.rs` and `details.rs` become vectors as wide as the processor has, chosen when the program runs (`sampling.rs`).
+//! their textures is the same program on other numbers, and the loops over lanes in `texture.rs` and `details.rs` become
+//! vectors as wide as the processor has, chosen when the program runs (`sampling.rs`).
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
