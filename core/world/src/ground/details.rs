@@ -25,7 +25,7 @@
 )]
 
 use crate::ground::texture::{LANES, OctaveSettings, Octaves, TextureLanes, least, mix, weight};
-use crate::ground::value_noise::{LatticeMap, Points, cell_hash, cell_of};
+use crate::ground::value_noise::{Cells, Points, cell_hash, cell_of};
 
 /// Sides of the cells of the grains' lattices, m: mean diameters 1.3 cm, 6 mm and 3 mm.
 const GRAIN_CELLS_M: [f64; 3] = [0.026, 0.012, 0.006];
@@ -55,7 +55,6 @@ pub(super) struct SoilDetails {
     drift_level: f32,
     /// Probability of a grain in a cell.
     grains: f32,
-    grain_lattices: [LatticeMap<2>; 3],
     contrast: f32,
     seed: u32,
 }
@@ -115,8 +114,6 @@ impl SoilDetails {
             drifts: Octaves::new(&broad_noise(0.8), mix(seed ^ 0xd21f)),
             drift_level: drift_level as f32,
             grains: (grain_cover / levels / GRAIN_PART).min(1.0) as f32,
-            grain_lattices: GRAIN_CELLS_M
-                .map(|cell_m| LatticeMap::new([[1.0 / cell_m, 0.0], [0.0, 1.0 / cell_m]], [0.0; 2])),
             contrast: albedo_std as f32,
             seed: mix(seed ^ 0x92a1) as u32,
         }
@@ -138,7 +135,7 @@ impl SoilDetails {
 
     /// The grains at each of many places.
     #[inline(always)]
-    pub(super) fn grains(&self, points: &Points<2>, cutoff_m: &[f32; LANES]) -> TextureLanes<2> {
+    pub(super) fn grains(&self, p_m: &[[f64; LANES]; 2], cutoff_m: &[f32; LANES]) -> TextureLanes<2> {
         let mut sum = TextureLanes { albedo: [0.0; LANES], slope: [[0.0; LANES]; 2] };
         if self.grains <= 0.0 {
             return sum;
@@ -152,7 +149,7 @@ impl SoilDetails {
             for lane in 0..LANES {
                 weights[lane] = weight(cell_m as f32, cutoff_m[lane]);
             }
-            let cells = self.grain_lattices[level].cells(points);
+            let cells = Cells::at(p_m, 1.0 / cell_m);
             let seed = self.seed ^ level as u32;
             let mut hashes = [cell_hash(cells.cell(0), seed); LANES];
             if !cells.is_one {
@@ -261,8 +258,7 @@ mod tests {
                 std::array::from_fn(|lane| ((LANES * k + lane) % 997) as f64 * 0.0131),
             ];
             let points = Points::new(&p_m);
-            let (near, far) =
-                (details.grains(&points, &[1e-4; LANES]), details.grains(&points, &[0.03; LANES]));
+            let (near, far) = (details.grains(&p_m, &[1e-4; LANES]), details.grains(&p_m, &[0.03; LANES]));
             grains += near.albedo.iter().filter(|albedo| **albedo != 0.0).count() as f64;
             drifts += details.drifts(&points).iter().copied().map(f64::from).sum::<f64>();
             count += LANES as f64;

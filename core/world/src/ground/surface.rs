@@ -94,7 +94,7 @@ impl Surfaces {
         let points = Points::new(p_m);
         let texture = self.soil.at_lanes(&points, cutoff_m);
         let drifts = self.soil_details.drifts(&points);
-        let grains = self.soil_details.grains(&points, cutoff_m);
+        let grains = self.soil_details.grains(p_m, cutoff_m);
         let mut looks = [Appearance::default(); LANES];
         for (lane, look) in looks.iter_mut().enumerate().take(count) {
             let slope = terrain.smooth_slope_at(p_m[0][lane], p_m[1][lane]);

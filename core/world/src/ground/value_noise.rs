@@ -158,6 +158,23 @@ pub(crate) struct Cells<const DIMENSIONS: usize> {
 }
 
 impl<const DIMENSIONS: usize> Cells<DIMENSIONS> {
+    /// The cells of points on a lattice of this many cells a metre, located in `f64`: for what has edges, where a point
+    /// that moves by the last digit of [`Points`] can come to lie on the other side.
+    #[inline(always)]
+    pub(crate) fn at(p_m: &[[f64; LANES]; DIMENSIONS], per_m: f64) -> Self {
+        let (mut cells, mut parts) = ([[0; LANES]; DIMENSIONS], [[0.0; LANES]; DIMENSIONS]);
+        let mut differs = 0;
+        for k in 0..DIMENSIONS {
+            for lane in 0..LANES {
+                (cells[k][lane], parts[k][lane]) = split(p_m[k][lane] * per_m);
+            }
+            for lane in 0..LANES {
+                differs |= cells[k][lane] ^ cells[k][0];
+            }
+        }
+        Self { cells, parts, is_one: differs == 0 }
+    }
+
     /// The position of a lane within its cell.
     #[inline(always)]
     pub(crate) fn part(&self, lane: usize) -> [f32; DIMENSIONS] {
