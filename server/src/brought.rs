@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use sightline_api::wire::Event;
 use sightline_geometry::error::{Error, Result};
-use sightline_recordings::{IndexFormat, create_simulated_until};
+use sightline_recordings::{DrivenTraverse, IndexFormat, create_simulated_until};
 use sightline_session::Session;
 use sightline_session::breakpoints::BREAKPOINT_LIMIT;
 use sightline_session::notes::Notes;
@@ -17,8 +17,10 @@ use sightline_session::reproduce::{ReproducedTraverse, Reproduction};
 use sightline_session::view::{SavedRun, SavedSession};
 use sightline_track::settings::Settings;
 use sightline_world::Scenario;
+use sightline_world::rover::driven::DrivenStop;
 
 use crate::cancel::CancelFlag;
+use crate::driven;
 use crate::drives::{folder_name, scenario_of};
 use crate::identity::{Identity, Relation};
 use crate::limits::{Limit, Limits};
@@ -43,7 +45,9 @@ pub(crate) fn open(
     })?;
     let text = scenario.to_toml();
     let known = state.traverses();
-    let same = |open: &&Arc<OpenTraverse>| scenario_of(&open.traverse).is_some_and(|own| own == scenario);
+    let same = |open: &&Arc<OpenTraverse>| {
+        open.driven.is_none() && scenario_of(&open.traverse).is_some_and(|own| own == scenario)
+    };
     if let Some(open) = known.iter().find(same) {
         return Ok((Arc::clone(open), false));
     }
@@ -79,7 +83,9 @@ pub(crate) fn open(
 pub(crate) fn remove(state: &AppState, open: &OpenTraverse) -> ApiResult<()> {
     let _making = state.making_drives();
     state.close_traverse(open)?;
-    if let Some(scenario) = scenario_of(&open.traverse) {
+    if open.driven.is_some() {
+        remove_folder(open.traverse.folder())?;
+    } else if let Some(scenario) = scenario_of(&open.traverse) {
         let name = folder_name(&scenario);
         state.store().remove_drive(&name)?;
         remove_folder(&state.folders().traverses.join(&name))?;
@@ -102,9 +108,16 @@ fn remove_folder(folder: &Path) -> Result<()> {
 /// # Errors
 /// A problem that names what is wrong with it; nothing is begun then.
 pub(crate) fn bring(state: &AppState, new: Reproduction, cancel: &CancelFlag) -> ApiResult<Arc<LiveSession>> {
-    let Reproduction { traverse, session, notes } = new;
+    let Reproduction { traverse, mut session, notes } = new;
     check(&session, state.limits())?;
-    let open = drive(state, &traverse, cancel)?;
+    let open = match (&traverse.driven, &traverse.scenario_toml) {
+        (Some(stops), Some(text)) => driven(state, text, stops, cancel)?,
+        _ => {
+            // Nobody drives where the stops are given.
+            session.steering = None;
+            drive(state, &traverse, cancel)?
+        }
+    };
     let stops = open.traverse.stop_count();
     let name = open.id.clone();
     let live = state.enter_session(open, false, |id| {
@@ -115,6 +128,32 @@ pub(crate) fn bring(state: &AppState, new: Reproduction, cancel: &CancelFlag) ->
     })?;
     // Asking for it begins its runs.
     state.session(&live.id)
+}
+
+/// The drive on commands of a file, in a world of its own in the state that the file has.
+fn driven(
+    state: &AppState,
+    text: &str,
+    stops: &[DrivenStop],
+    cancel: &CancelFlag,
+) -> ApiResult<Arc<OpenTraverse>> {
+    let wrong = |error: Error| ApiError::invalid("field", error.to_string());
+    let scenario = Scenario::from_toml(text, Path::new("scenario")).map_err(wrong)?;
+    let most = state.limits().stops.count();
+    if stops.len() > most {
+        let detail = format!("traverse.driven: may have at most {most} stops");
+        return Err(ApiError::invalid("field", detail).hint(state.limits().stops.raise()));
+    }
+    let folder = driven::new_folder(state.folders(), &scenario.name)?;
+    let made = DrivenTraverse::begin_at(&scenario, stops.to_vec(), &folder, cancel.as_ref().into());
+    let opened = made.and_then(|world| {
+        state.limits().check_drive(world.traverse())?;
+        state.add_traverse(Arc::new(driven::open(world, state.cache(), state.events())?))
+    });
+    opened.map_err(|error| {
+        let _ = remove_folder(&folder);
+        wrong(error)
+    })
 }
 
 /// The drive of a file: opened by its scenario, or one that is open.

@@ -34,7 +34,7 @@ pub fn scenario() -> Result<Scenario> {
 /// A session that cannot be written, or too much waiting already.
 pub fn begin(state: &AppState, scenario: &Scenario) -> ApiResult<()> {
     let Some(open) = state.traverses().first().cloned() else { return Ok(()) };
-    if state.sessions().iter().any(|live| live.traverse.id == open.id) {
+    if state.sessions().iter().any(|live| live.traverse().id == open.id) {
         return Ok(());
     }
     let live = state.begin_session(open)?;
@@ -52,13 +52,14 @@ pub fn begin(state: &AppState, scenario: &Scenario) -> ApiResult<()> {
 
 /// Designates the target that the scenario's rule chooses, and begins its run.
 fn designate(state: &AppState, live: &Arc<LiveSession>, scenario: &Scenario) -> Result<()> {
-    let traverse = &live.traverse.traverse;
+    let open = live.traverse();
+    let traverse = &open.traverse;
     let world = traverse.world().ok_or_else(|| Error::Request("the traverse has no world".to_owned()))?;
     let pixel = choose_targets(world, scenario, traverse.index()).first().copied();
     let pixel = pixel.ok_or_else(|| Error::Request("the scenario's rule finds no target".to_owned()))?;
     let settings = Settings::default();
     let designation = Designation { step: 0, pixel };
-    let first = runner::designate(&live.traverse, designation, &settings, &CancelFlag::default())?;
+    let first = runner::designate(&live.traverse(), designation, &settings, &CancelFlag::default())?;
     let problem = |error: crate::problem::ApiError| Error::Request(error.problem().detail.clone());
     let added = state.change(live, |session| {
         let target = session.add_target(Some(LABEL.to_owned()), settings, Arc::new(first));

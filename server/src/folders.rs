@@ -14,6 +14,8 @@ pub(crate) struct Folders {
     pub studies: PathBuf,
     /// Simulated traverses.
     pub traverses: PathBuf,
+    /// Drives on commands.
+    pub driven: PathBuf,
     /// Digests of the files of recorded traverses, from which nothing but time is lost when it is removed.
     pub digests: PathBuf,
 }
@@ -21,8 +23,9 @@ pub(crate) struct Folders {
 impl Folders {
     /// Sessions in `folder` itself, the rest in folders below it.
     pub(crate) fn in_one(folder: &Path) -> Self {
-        let [studies, traverses, digests] = ["studies", "traverses", "digests"].map(|name| folder.join(name));
-        Self { sessions: folder.to_owned(), studies, traverses, digests }
+        let [studies, traverses, driven, digests] =
+            ["studies", "traverses", "driven", "digests"].map(|name| folder.join(name));
+        Self { sessions: folder.to_owned(), studies, traverses, driven, digests }
     }
 
     /// Makes the folders beside that of the sessions, for the owner alone, and begins to remove what a killed server left in
@@ -31,7 +34,7 @@ impl Folders {
     /// # Errors
     /// Those of the system.
     pub(crate) fn prepare(&self) -> Result<()> {
-        let folders = [&self.studies, &self.traverses, &self.digests].map(PathBuf::clone);
+        let folders = [&self.studies, &self.traverses, &self.driven, &self.digests].map(PathBuf::clone);
         folders.iter().try_for_each(|folder| make_private(folder))?;
         let tidy = move || folders.iter().for_each(|folder| tidy(folder, DEPTH));
         std::thread::Builder::new().name("tidy".to_owned()).spawn(tidy).map(|_| ())

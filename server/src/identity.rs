@@ -63,6 +63,11 @@ impl Identity {
         Ok(Self { index_name: name_of(traverse)?, files_sha256 })
     }
 
+    /// The identity of a drive on commands, which grows: the name of its folder.
+    pub(crate) fn driven(name: String) -> Self {
+        Self { index_name: name, files_sha256: None }
+    }
+
     /// The name in paths.
     pub(crate) fn id(&self) -> String {
         match &self.files_sha256 {

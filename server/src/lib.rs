@@ -23,6 +23,7 @@ mod rendering;
 pub mod naming;
 mod identity;
 mod folders;
+mod driven;
 mod drives;
 mod brought;
 mod questions;

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
 use sightline_geometry::error::Result;
 use sightline_session::Session;
@@ -22,8 +22,8 @@ pub(crate) const LABEL_LIMIT: usize = 100;
 pub struct LiveSession {
     /// Its name in paths.
     pub id: String,
-    /// What it works on.
-    pub traverse: Arc<OpenTraverse>,
+    /// What it works on; another value after each stop of a drive on commands.
+    traverse: RwLock<Arc<OpenTraverse>>,
     session: Mutex<Session>,
     notes: Mutex<Notes>,
     /// The runs, by target and number, that are computed now or wait for it.
@@ -48,7 +48,7 @@ impl LiveSession {
     pub fn new(session: Session, traverse: Arc<OpenTraverse>, is_awake: bool) -> Self {
         Self {
             id: session.id.clone(),
-            traverse,
+            traverse: RwLock::new(traverse),
             session: Mutex::new(session),
             notes: Mutex::default(),
             computing: Mutex::default(),
@@ -58,6 +58,19 @@ impl LiveSession {
             used: Mutex::default(),
             memory: StepMemory::default(),
         }
+    }
+
+    /// What it works on now.
+    pub fn traverse(&self) -> Arc<OpenTraverse> {
+        Arc::clone(&self.traverse.read().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Works from now on with the stops that a drive has come to.
+    pub(crate) fn grow(&self, grown: Arc<OpenTraverse>) {
+        let count = grown.traverse.stop_count();
+        // A step that the session has must be in the traverse.
+        *self.traverse.write().unwrap_or_else(PoisonError::into_inner) = grown;
+        self.with(|session| session.stop_count = count);
     }
 
     /// Looks at or changes the session; keep it short.

@@ -63,9 +63,9 @@ impl RecordedStep {
     /// # Errors
     /// Those of the files.
     pub(crate) fn prepare(&mut self, cancel: &CancelFlag) -> ApiResult<()> {
-        self.live.traverse.make_ready(self.recorded.step, cancel)?;
+        self.live.traverse().make_ready(self.recorded.step, cancel)?;
         if let Some(last) = &self.last {
-            self.last = Some(runner::with_image(&self.live.traverse, last)?);
+            self.last = Some(runner::with_image(&self.live.traverse(), last)?);
         }
         Ok(())
     }
@@ -78,13 +78,15 @@ impl RecordedStep {
         if self.recorded.located().is_none_or(|located| located.left_pixel.is_none()) {
             return Ok(Vec::new());
         }
-        let traverse = &self.live.traverse.traverse;
+        let open = self.live.traverse();
+        let traverse = &open.traverse;
         let image = traverse.capture_one(self.recorded.step, true)?;
         let renewals = self.renewals()?;
         let oldest = renewals.len().saturating_sub(count);
         let kept = renewals.iter().enumerate().filter(|(i, _)| *i == 0 || *i >= oldest).map(|(_, step)| step);
-        let steps =
-            kept.map(|step| runner::with_image(&self.live.traverse, step)).collect::<Result<Vec<_>, _>>()?;
+        let steps = kept
+            .map(|step| runner::with_image(&self.live.traverse(), step))
+            .collect::<Result<Vec<_>, _>>()?;
         let earlier = steps.iter().filter_map(|step| step.update.target.memory.template());
         Ok(against_earlier(
             &self.recorded,

@@ -14,6 +14,7 @@ use sightline_geometry::error::{Error, Result};
 use sightline_recordings::Traverse;
 use tokio::sync::broadcast;
 
+use crate::driven::Driven;
 use crate::identity::Identity;
 use crate::jobs::lock;
 
@@ -28,6 +29,8 @@ pub struct OpenTraverse {
     pub traverse: Traverse,
     /// From which its name follows.
     pub(crate) identity: Identity,
+    /// The world of a drive on commands.
+    pub(crate) driven: Option<Arc<Driven>>,
     is_closed: AtomicBool,
     turn: Mutex<Turn>,
     turned: Condvar,
@@ -49,7 +52,18 @@ impl OpenTraverse {
     pub(crate) fn new(identity: Identity, traverse: Traverse, events: broadcast::Sender<Event>) -> Self {
         let id = identity.id();
         let (is_closed, turn, turned) = (AtomicBool::new(false), Mutex::default(), Condvar::new());
-        Self { id, traverse, identity, is_closed, turn, turned, events }
+        Self { id, traverse, identity, driven: None, is_closed, turn, turned, events }
+    }
+
+    /// The traverse of a drive on commands in this world.
+    pub(crate) fn driven_in(self, driven: Arc<Driven>) -> Self {
+        Self { driven: Some(driven), ..self }
+    }
+
+    /// The same drive with more stops.
+    pub(crate) fn grown(&self, traverse: Traverse) -> Self {
+        let grown = Self::new(self.identity.clone(), traverse, self.events.clone());
+        Self { driven: self.driven.clone(), ..grown }
     }
 
     /// Renders nothing any more, because the traverse is removed.

@@ -13,6 +13,7 @@ use std::sync::{Arc, Mutex};
 use sightline_api::wire::Event;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
+use sightline_session::driving::Steering;
 use sightline_session::step::RunStep;
 use sightline_session::track::{self, NextStep};
 use sightline_session::view::waiting_for;
@@ -22,7 +23,8 @@ use sightline_track::target::Designation;
 use tokio::sync::broadcast;
 
 use crate::cancel::{CancelFlag, Deadline};
-use crate::jobs::{Lane, Position};
+use crate::driven::{self, OpenTraverses};
+use crate::jobs::{Lane, Position, lock};
 use crate::limits::SharedLimits;
 use crate::live_session::LiveSession;
 use crate::memory;
@@ -36,6 +38,8 @@ use crate::sessions::Sessions;
 pub(crate) struct Runner {
     lane: Lane,
     events: broadcast::Sender<Event>,
+    /// The open drives, of which one on commands grows.
+    traverses: OpenTraverses,
     /// All sessions, whose steps share the memory for them.
     sessions: Arc<Mutex<Sessions>>,
     limits: SharedLimits,
@@ -48,12 +52,13 @@ impl Runner {
     pub(crate) fn new(
         lane: Lane,
         events: broadcast::Sender<Event>,
+        traverses: &OpenTraverses,
         sessions: &Arc<Mutex<Sessions>>,
         limits: &SharedLimits,
         requests: &Arc<Requests>,
     ) -> Self {
         let (sessions, limits, requests) = (Arc::clone(sessions), Arc::clone(limits), Arc::clone(requests));
-        Self { lane, events, sessions, limits, requests }
+        Self { lane, events, traverses: Arc::clone(traverses), sessions, limits, requests }
     }
 
     /// The lane in which runs are computed.
@@ -131,7 +136,10 @@ impl Runner {
                 current = next.map(|(target, run)| (target, run, live.begin(target, run)));
             }
             let Some((target, run, flag)) = &current else {
-                restoring.take().into_iter().for_each(Restoring::end);
+                if let Some(restored) = restoring.take() {
+                    restored.end();
+                    runner.go_on_driving(&live);
+                }
                 return ControlFlow::Break(());
             };
             if runner.turn(&live, *target, *run, flag).is_break() {
@@ -193,9 +201,12 @@ impl Runner {
                 return Err(Error::Request(limit.hint(way_out)));
             }
             Next::Designate { designation, settings } => {
-                designate(&live.traverse, designation, &settings, flag)?
+                designate(&live.traverse(), designation, &settings, flag)?
             }
             Next::Advance(pending) => self.advance(live, (target, run), &pending, flag)?,
+            // The drive goes on when the session is as it was.
+            Next::Drive { .. } if live.is_restoring() => return Ok(false),
+            Next::Drive { steering, steps } => return self.drive(live, &steering, &steps, flag),
         };
         live.with(|session| {
             if flag.load(Ordering::Relaxed) {
@@ -209,6 +220,52 @@ impl Runner {
         Ok(true)
     }
 
+    /// Drives to another stop; false where the drive ends at the last one.
+    fn drive(
+        &self,
+        live: &LiveSession,
+        steering: &Steering,
+        steps: &[Arc<RunStep>],
+        flag: &CancelFlag,
+    ) -> Result<bool> {
+        let open = live.traverse();
+        let count = open.traverse.stop_count();
+        self.tell(progress(live, steering.target, steering.run, format!("driving to stop {count}")));
+        let Some(grown) = driven::drive_on(&open, steering, steps, flag)? else {
+            // Somebody else may have driven on, and then there is a step to compute.
+            return Ok(live.traverse().traverse.stop_count() > count);
+        };
+        driven::replace(&self.traverses, &grown);
+        self.tell(Some(grown.progress(None)));
+        let all: Vec<_> = lock(&self.sessions).by_number.values().cloned().collect();
+        for other in all.iter().filter(|other| other.traverse().id == grown.id) {
+            other.grow(Arc::clone(&grown));
+            self.tell(Some(Event::SessionChanged { session: other.id.clone() }));
+            self.follow(other, (live, steering));
+        }
+        Ok(true)
+    }
+
+    /// Lets the other runs of a session that had come to the last stop track on to the new one.
+    fn follow(&self, live: &Arc<LiveSession>, (driver, steering): (&LiveSession, &Steering)) {
+        let is_driver =
+            |target, run| driver.id == live.id && (target, run) == (steering.target, steering.run);
+        for (target, run) in live.with(|session| every_run(session)) {
+            let waits = live.with(|session| matches!(session.pending(target, run), Ok(Some(_))));
+            if waits && !is_driver(target, run) && !live.is_computing(target, run) {
+                // A run that finds no place in the queue can be resumed by hand.
+                let _ = self.start(live, target, run);
+            }
+        }
+    }
+
+    /// Lets the run that drives go on once all runs are as they were.
+    fn go_on_driving(&self, live: &Arc<LiveSession>) {
+        if let Some(Steering { target, run, .. }) = live.with(|session| session.steering) {
+            let _ = self.start(live, target, run);
+        }
+    }
+
     /// The step after the last one, from images that are rendered first where they are missing.
     fn advance(
         &self,
@@ -217,16 +274,17 @@ impl Runner {
         pending: &Pending,
         flag: &CancelFlag,
     ) -> Result<RunStep> {
-        let traverse = &live.traverse.traverse;
+        let open = live.traverse();
+        let traverse = &open.traverse;
         let step = pending.last.step + 1;
         if !traverse.is_ready(step) {
             self.tell(progress(live, target, run, format!("rendering stop {step}")));
             // Any other failure is met again by the step itself, which records it as the stop's fault.
-            if let Err(Error::Cancelled) = live.traverse.make_ready(step, flag) {
+            if let Err(Error::Cancelled) = live.traverse().make_ready(step, flag) {
                 return Err(Error::Cancelled);
             }
         }
-        let last = with_image(&live.traverse, &pending.last)?;
+        let last = with_image(&live.traverse(), &pending.last)?;
         let next = NextStep {
             first: &pending.first,
             last: &last,

@@ -125,14 +125,14 @@ impl Sessions {
 
     /// The number of sessions on a traverse.
     pub(crate) fn count_on(&self, traverse: &str) -> usize {
-        self.by_number.values().filter(|live| live.traverse.id == traverse).count()
+        self.by_number.values().filter(|live| live.traverse().id == traverse).count()
     }
 
     /// Takes a session out that was removed from the database, and keeps what the person did.
     pub(crate) fn take(&mut self, number: u64) {
         let Some(live) = self.by_number.remove(&number) else { return };
         let (saved, notes) = live.with(|session| (session.saved(), live.with_notes(|notes| notes.clone())));
-        let (used, traverse) = (live.used(), Arc::clone(&live.traverse));
+        let (used, traverse) = (live.used(), live.traverse());
         self.removed.push_back(Removed { number, saved, notes, used, traverse });
         let surplus = self.removed.len().saturating_sub(RESTORABLE);
         self.removed.drain(..surplus);

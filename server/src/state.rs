@@ -13,6 +13,7 @@ use tokio::sync::broadcast;
 
 use crate::access::Access;
 use crate::connections::Connections;
+use crate::driven::{self, OpenTraverses};
 use crate::drives;
 use crate::folders::Folders;
 use crate::idempotency;
@@ -49,7 +50,7 @@ pub struct AppState(Arc<Inner>);
 
 struct Inner {
     access: Access,
-    traverses: Mutex<Vec<Arc<OpenTraverse>>>,
+    traverses: OpenTraverses,
     /// The names of the traverses that the server was given, which cannot be removed.
     given: BTreeSet<String>,
     /// Held while a drive is made or removed, because both change its folder.
@@ -123,9 +124,11 @@ impl AppState {
         let given = open.iter().map(|open| open.id.clone()).collect();
         let store = Store::open(&folders.sessions)?;
         let drives_lost = drives::open_again(&store, folders, &cache, &mut open, &events)?;
+        let driven_lost = driven::open_again(folders, &cache, &mut open, &events);
         let (sessions, mut notices) = Sessions::read_back(&store, &open)?;
         notices.extend(of_drives);
         notices.extend(drives_lost);
+        notices.extend(driven_lost);
         for notice in &notices {
             tracing::warn!("{}", crate::printable::printable(notice));
         }
@@ -137,17 +140,17 @@ impl AppState {
         let store = Arc::new(store);
         let keeper = Keeper::new(&store);
         let studies = Shelf::new(folders.studies.clone(), events.clone(), keeper, &limits);
-        let sessions = Arc::new(Mutex::new(sessions));
+        let (traverses, sessions) = (Arc::new(Mutex::new(open)), Arc::new(Mutex::new(sessions)));
         let runs = lanes::lane(&limits.runs_at_a_time, &limits.runs_waiting);
         let requests = Arc::<Requests>::default();
         studies.read_back(|new| order(&folders.studies, new))?;
         Ok(Self(Arc::new(Inner {
             access,
-            traverses: Mutex::new(open),
             given,
             making_drives: Mutex::default(),
             folders: folders.clone(),
-            runner: Runner::new(runs, events.clone(), &sessions, &limits, &requests),
+            runner: Runner::new(runs, events.clone(), &traverses, &sessions, &limits, &requests),
+            traverses,
             sessions,
             cache,
             connections: Arc::default(),

@@ -9,6 +9,7 @@ use sightline_session::breakpoints::{BreakpointChange, BreakpointView, NewBreakp
 use sightline_session::compare::{Comparison, NewComparison};
 use sightline_session::counterfactual::wire::Question;
 use sightline_session::documents::Document;
+use sightline_session::driving::{DriveView, Steering};
 use sightline_session::exports::ExportEntry;
 use sightline_session::expression::complete::Completion;
 use sightline_session::metrics::RunMetrics;
@@ -31,8 +32,8 @@ use crate::location::{
 use crate::program::{Health, Version};
 use crate::query::{FirstRow, FirstStop, ImageDepth, MapLimits, MapPixel, SessionPart, ValueName};
 use crate::wire::{
-    Designated, Event, Login, NewRun, NewSession, NewTarget, NewTraverse, RerunStream, SessionEntry,
-    StopDetail, TraverseEntry, TraverseView,
+    Designated, Event, Login, NewDrive, NewRun, NewSession, NewTarget, NewTraverse, RerunStream,
+    SessionEntry, StopDetail, TraverseEntry, TraverseView,
 };
 
 /// Declares a type for each endpoint, and the list of all of them.
@@ -69,6 +70,7 @@ pub const CREATING: &[&str] = &[
     BringSession::PATH,
     DesignateTarget::PATH,
     ForkRun::PATH,
+    BeginDrive::PATH,
     AddNote::PATH,
     AddBreakpoint::PATH,
     StartStudy::PATH,
@@ -126,6 +128,10 @@ endpoints! {
     ShowCursor: Get "/sessions/{session}/cursor", AtSession => Cursor;
     /// Moves the cursor.
     MoveCursor: Put "/sessions/{session}/cursor", AtSession, body Cursor => Cursor;
+    /// The drive of a session: who drives, the decisions and the outcome so far.
+    ShowDrive: Get "/sessions/{session}/drive", AtSession => DriveView;
+    /// Lets a run drive, or changes its command.
+    SteerDrive: Put "/sessions/{session}/drive", AtSession, body Steering => DriveView;
     /// Opens the live Rerun stream of a session.
     StreamRecording: Post "/sessions/{session}/rerun", AtSession => RerunStream;
     /// Closes the live Rerun stream of a session.
@@ -162,6 +168,8 @@ endpoints! {
     CancelRun: Post "/sessions/{session}/targets/{target}/runs/{run}/cancel", AtRun => RunView;
     /// Lets a stopped run go on.
     ResumeRun: Post "/sessions/{session}/targets/{target}/runs/{run}/resume", AtRun => RunView;
+    /// Begins a drive on commands with a run.
+    BeginDrive: Post "/sessions/{session}/targets/{target}/runs/{run}/drive", AtRun, body NewDrive => SessionView;
     /// The metrics of a run.
     ShowMetrics: Get "/sessions/{session}/targets/{target}/runs/{run}/metrics", AtRun => RunMetrics;
     /// The target's brightness over a run as CSV.

@@ -8,6 +8,7 @@ use sightline_geometry::camera::{Camera, MastAngles};
 use sightline_geometry::frames::{Pixel, PoseRecord};
 use sightline_geometry::stereo_geometry::StereoGeometry;
 use sightline_rover::designate::Place;
+use sightline_rover::driving::DriveCommand;
 use sightline_session::Cursor;
 use sightline_session::view::SessionView;
 use sightline_study::wire::StudyJob;
@@ -208,6 +209,21 @@ pub struct NewRun {
     /// Where to put the prediction of that one step in the left image, px; left out: where dead reckoning has it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prediction_px: Option<Pixel>,
+}
+
+/// Begins a drive on commands with a run, in a world of its own.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewDrive {
+    /// What the rover is told.
+    #[serde(default)]
+    pub command: DriveCommand,
+    /// The stop from which it drives; left out: the last one of a drive on commands, the first one of any other.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from_step: Option<usize>,
+    /// The stop at which it waits once the target is located there; left out: it drives on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pause_at: Option<usize>,
 }
 
 /// The live Rerun stream of a session.

@@ -39,6 +39,12 @@ impl DrivenTraverse {
     /// A scenario that no world can be made of or that leaves wheel tracks, a folder that holds something already or cannot
     /// be written, or [`Error::Cancelled`].
     pub fn begin(scenario: &Scenario, folder: &Path, cancel: Cancel<'_>) -> Result<Self> {
+        Self::check(scenario, folder)?;
+        Self::begin_in(World::new_until(scenario, cancel)?, scenario, folder, cancel)
+    }
+
+    /// Refuses what no drive can be begun with.
+    fn check(scenario: &Scenario, folder: &Path) -> Result<()> {
         scenario.validate()?;
         if scenario.rover.tracks {
             let problem = "a drive on commands leaves no wheel tracks yet; set it to false";
@@ -48,7 +54,10 @@ impl DrivenTraverse {
         if !is_empty {
             return Err(Error::format(folder, "is not empty; choose a new folder"));
         }
-        let world = World::new_until(scenario, cancel)?;
+        Ok(())
+    }
+
+    fn begin_in(world: World, scenario: &Scenario, folder: &Path, cancel: Cancel<'_>) -> Result<Self> {
         let first = DrivenStop::first(&world, scenario, cancel)?;
         let mut index = sightline_world::index::empty_index(scenario);
         index.stops = index_stops(std::slice::from_ref(&first), scenario);
@@ -59,6 +68,47 @@ impl DrivenTraverse {
         let driven = Self { traverse, scenario: scenario.clone(), driven: vec![first] };
         driven.save()?;
         Ok(driven)
+    }
+
+    /// Makes the folder of a drive in a world that has this state already, from its first stops on.
+    ///
+    /// # Errors
+    /// As [`Self::begin`], and a state without a stop.
+    pub fn begin_at(
+        scenario: &Scenario,
+        state: Vec<DrivenStop>,
+        folder: &Path,
+        cancel: Cancel<'_>,
+    ) -> Result<Self> {
+        let mut driven = Self::begin(scenario, folder, cancel)?;
+        driven.restore(state)?;
+        Ok(driven)
+    }
+
+    /// Makes another drive of the same world that shares the first `count` stops and goes its own way from there.
+    ///
+    /// # Errors
+    /// A count of none or of more stops than there are, or a folder that holds something already or cannot be written.
+    pub fn branch(&self, count: usize, folder: &Path, cancel: Cancel<'_>) -> Result<Self> {
+        if count == 0 || count > self.driven.len() {
+            let problem =
+                format!("the drive has {} stops, of which {count} cannot be shared", self.driven.len());
+            return Err(Error::Request(problem));
+        }
+        Self::check(&self.scenario, folder)?;
+        let simulated = self.traverse.simulated.as_ref().ok_or_else(no_simulation)?;
+        let world = simulated.world_until(cancel)?.clone();
+        let mut branch = Self::begin_in(world, &self.scenario, folder, cancel)?;
+        branch.restore(self.driven[..count].to_vec())?;
+        for stop in &self.traverse.index().stops[..count] {
+            for name in [&stop.left.image, &stop.right.image] {
+                // What is missing is rendered again with the same bits.
+                if let Ok(bytes) = std::fs::read(self.traverse.folder().join(name)) {
+                    write_atomically(&folder.join(name), &bytes)?;
+                }
+            }
+        }
+        Ok(branch)
     }
 
     /// Opens the folder of a drive to continue it from its last stop.
@@ -111,6 +161,23 @@ impl DrivenTraverse {
         self.save()
     }
 
+    /// What the rover reports of the drive to a stop; `None` at the first stop and where there is none.
+    pub fn report(&self, number: usize) -> Option<DriveReport> {
+        self.driven.get(number).filter(|_| number > 0).map(report)
+    }
+
+    /// The stops so far as a traverse of its own, which later stops do not change.
+    ///
+    /// # Errors
+    /// An index that cannot be read.
+    pub fn snapshot(&self) -> Result<Traverse> {
+        let copy = Traverse::open(self.traverse.folder())?;
+        if let Some(world) = self.traverse.simulated.as_ref().and_then(|simulated| simulated.world.get()) {
+            copy.keep_world(world.clone());
+        }
+        Ok(copy)
+    }
+
     /// Collisions so far: steps that a rock ended, and stops at which a rock reaches into the rover's body.
     pub fn collisions(&self) -> u32 {
         self.driven
@@ -151,6 +218,20 @@ impl DrivenTraverse {
     }
 }
 
+fn no_simulation() -> Error {
+    Error::Request("a recorded drive cannot be driven".to_owned())
+}
+
+/// What the rover reports of the drive to a stop.
+fn report(stop: &DrivenStop) -> DriveReport {
+    DriveReport {
+        wheels_m: stop.wheels_m,
+        duration_s: stop.drive_s,
+        tilt_deg: stop.tilt_deg(),
+        stall: (stop.completed < 1.0).then_some(Stall { completed: stop.completed }),
+    }
+}
+
 impl ActiveWorld for DrivenTraverse {
     fn stops(&self) -> &dyn Stops {
         &self.traverse
@@ -162,19 +243,11 @@ impl ActiveWorld for DrivenTraverse {
             Motion::Turn { angle_rad } => [0.0, angle_rad],
         };
         let number = self.driven.len();
-        let simulated = self.traverse.simulated.as_ref();
-        let simulated =
-            simulated.ok_or_else(|| Error::Request("a recorded drive cannot be driven".to_owned()))?;
+        let simulated = self.traverse.simulated.as_ref().ok_or_else(no_simulation)?;
         let world = simulated.world_until(cancel)?;
         let last = &self.driven[number - 1];
         let next = last.next(world, &self.scenario, number, [length_m, turn_rad], cancel)?;
-        let stall = (next.completed < 1.0).then_some(Stall { completed: next.completed });
-        let report = DriveReport {
-            wheels_m: next.wheels_m,
-            duration_s: next.drive_s,
-            tilt_deg: next.tilt_deg(),
-            stall,
-        };
+        let report = report(&next);
         self.driven.push(next);
         self.put_last()?;
         Ok(report)

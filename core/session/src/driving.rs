@@ -20,6 +20,35 @@ use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
 use sightline_world::target_truth::{TargetTruth, TruthSource};
 
+/// Who drives in a session, and how: the run on whose estimates the rover moves, and its command.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Steering {
+    /// The target's number.
+    pub target: usize,
+    /// The run's number.
+    pub run: usize,
+    /// The command.
+    #[serde(default)]
+    pub command: DriveCommand,
+    /// The stop at which the rover waits once the target is located there; null: it drives on.
+    #[serde(default)]
+    pub pause_at: Option<usize>,
+}
+
+/// A drive as pages and scripts see it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct DriveView {
+    /// Who drives, and how; null before the first command.
+    pub steering: Option<Steering>,
+    /// The decisions at the stops that the run has come to, made on its own estimates.
+    pub cycles: Vec<Cycle>,
+    /// The outcome so far; null before the first command.
+    pub summary: Option<DriveSummary>,
+    /// Whether the next stop is being computed, or waits for it.
+    pub is_driving: bool,
+}
+
 /// A drive towards one target.
 pub struct TargetedDrive {
     /// The world, at the stop of the last step.
@@ -103,11 +132,9 @@ impl TargetedDrive {
             first: &first.trace,
             last: &last.trace,
             before: self.cycles.last(),
-            settings,
-            cancel,
         };
         let before = self.world.state().to_vec();
-        let (cycle, trace) = match executive::advance(&mut self.world, &input) {
+        let (cycle, trace) = match executive::advance(&mut self.world, &input, settings, cancel) {
             Ok(advanced) => advanced,
             Err(error) => {
                 self.world.restore(before)?;
@@ -123,30 +150,58 @@ impl TargetedDrive {
 
     /// The outcome so far.
     pub fn summary(&self) -> DriveSummary {
-        let last = self.steps.last();
-        let truth = last.and_then(|step| step.truth.as_ref());
-        let ending = self.ending();
-        DriveSummary {
-            stops: self.steps.len(),
-            arrived: ending.is_some_and(|ending| ending.reason == StopReason::Arrived),
-            reason: ending.map(|ending| ending.reason),
-            target_error_m: truth.map(|truth| truth.err_m),
-            goal_error_m: self.goal_error_m(),
-            driven_m: self.cycles.iter().filter_map(|cycle| cycle.report).map(|report| report.wheels_m).sum(),
-            collisions: self.world.collisions(),
-            tracked: truth.and_then(|truth| truth.tracked),
-            flight_minutes: self.cycles.last().map_or(0.0, |cycle| cycle.flight_minutes),
-        }
+        summary(&self.world, &self.command, &self.steps, &self.cycles)
     }
+}
 
-    fn goal_error_m(&self) -> Option<f64> {
-        let (first, last) = (self.steps.first()?, self.steps.last()?);
-        let traverse = self.world.traverse();
-        let target = &first.update.target;
-        let truth = TargetTruth::new(traverse, target.designation, Some(&target.position_in_rover))?;
-        let start = TruthSource::true_site_from_rover(traverse, first.step)?.translation.vector;
-        let goal_m = goal_position_m(&self.command, &truth.position_in_site(), [start.x, start.y]);
-        let rover = TruthSource::true_site_from_rover(traverse, last.step)?.translation.vector;
-        Some((rover.x - goal_m[0]).hypot(rover.y - goal_m[1]))
+/// What a run decides at each of its stops under a command, and what the rover reported of the drives between them.
+///
+/// For the run that drives these are the decisions that were followed; for another run they show where it would have gone.
+pub fn cycles(world: &DrivenTraverse, command: &DriveCommand, steps: &[Arc<RunStep>]) -> Vec<Cycle> {
+    let mut cycles = Vec::<Cycle>::with_capacity(steps.len());
+    let Some(first) = steps.first() else { return cycles };
+    for step in steps {
+        let before = cycles.last();
+        let navigator = &ArcNavigator::default();
+        let input = CycleInput { command, navigator, first: &first.trace, last: &step.trace, before };
+        let mut cycle = executive::decide(world.traverse(), &input);
+        if let Some(report) = world.report(step.step + 1) {
+            cycle.add(report);
+        }
+        cycles.push(cycle);
     }
+    cycles
+}
+
+/// The outcome of a drive so far.
+pub fn summary(
+    world: &DrivenTraverse,
+    command: &DriveCommand,
+    steps: &[Arc<RunStep>],
+    cycles: &[Cycle],
+) -> DriveSummary {
+    let truth = steps.last().and_then(|step| step.truth.as_ref());
+    let ending = cycles.last().and_then(|cycle| cycle.ending);
+    DriveSummary {
+        stops: steps.len(),
+        arrived: ending.is_some_and(|ending| ending.reason == StopReason::Arrived),
+        reason: ending.map(|ending| ending.reason),
+        target_error_m: truth.map(|truth| truth.err_m),
+        goal_error_m: goal_error_m(world, command, steps),
+        driven_m: cycles.iter().filter_map(|cycle| cycle.report).map(|report| report.wheels_m).sum(),
+        collisions: world.collisions(),
+        tracked: truth.and_then(|truth| truth.tracked),
+        flight_minutes: cycles.last().map_or(0.0, |cycle| cycle.flight_minutes),
+    }
+}
+
+fn goal_error_m(world: &DrivenTraverse, command: &DriveCommand, steps: &[Arc<RunStep>]) -> Option<f64> {
+    let (first, last) = (steps.first()?, steps.last()?);
+    let traverse = world.traverse();
+    let target = &first.update.target;
+    let truth = TargetTruth::new(traverse, target.designation, Some(&target.position_in_rover))?;
+    let start = TruthSource::true_site_from_rover(traverse, first.step)?.translation.vector;
+    let goal_m = goal_position_m(command, &truth.position_in_site(), [start.x, start.y]);
+    let rover = TruthSource::true_site_from_rover(traverse, last.step)?.translation.vector;
+    Some((rover.x - goal_m[0]).hypot(rover.y - goal_m[1]))
 }

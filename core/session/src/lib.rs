@@ -43,6 +43,7 @@ use utoipa::ToSchema;
 pub use self::breakpoints::Breakpoints;
 pub use self::progress::Next;
 pub use self::run::{Fork, Run};
+use crate::driving::Steering;
 use crate::step::RunStep;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
@@ -89,6 +90,8 @@ pub struct Session {
     pub cursor: Cursor,
     /// The conditions that are looked for.
     pub breakpoints: Breakpoints,
+    /// Who drives; `None` where nobody was told to.
+    pub steering: Option<Steering>,
     /// The removed targets that can be restored, the one removed last at the end.
     removals: VecDeque<usize>,
 }
@@ -111,7 +114,7 @@ impl Session {
     pub fn new(id: impl Into<String>, traverse: impl Into<String>, stop_count: usize) -> Self {
         let (targets, cursor, breakpoints) = (Vec::new(), Cursor::default(), Breakpoints::default());
         let (id, traverse, removals) = (id.into(), traverse.into(), VecDeque::new());
-        Self { id, traverse, stop_count, targets, cursor, breakpoints, removals }
+        Self { id, traverse, stop_count, targets, cursor, breakpoints, steering: None, removals }
     }
 
     /// Adds a target whose designation was computed, and looks at it. Returns its number.

@@ -7,6 +7,8 @@ use super::breakpoints::Breakpoints;
 pub use super::view::SAVED_FORMAT;
 use super::view::{SavedRun, SavedSession, SavedTarget};
 use super::{Pending, Run, Session, TargetRecord};
+use crate::driving::Steering;
+use crate::step::RunStep;
 use sightline_geometry::error::{Error, Result};
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
@@ -26,6 +28,13 @@ pub enum Next {
     },
     /// The step after its last one.
     Advance(Pending),
+    /// A drive to another stop, on the estimates of these steps.
+    Drive {
+        /// Who drives, and how.
+        steering: Steering,
+        /// The run's steps so far; the last is that of the last stop.
+        steps: Vec<Arc<RunStep>>,
+    },
     /// Nothing: it is complete, was stopped, or its target was removed.
     Nothing,
 }
@@ -46,7 +55,8 @@ impl Session {
         let targets = saved.targets.iter().enumerate().map(restore).collect::<Result<_>>()?;
         let breakpoints = Breakpoints::restored(&saved.breakpoints);
         let new = Self::new(&saved.id, &saved.traverse, stop_count);
-        let mut session = Self { targets, breakpoints, ..new };
+        let steering = saved.steering;
+        let mut session = Self { targets, breakpoints, steering, ..new };
         // Those removed before an earlier end of the program count as removed in the order of their numbers.
         for (number, record) in saved.targets.iter().enumerate() {
             if record.removed && !record.runs.is_empty() {
@@ -84,7 +94,35 @@ impl Session {
                 }
             }
         }
-        Ok(self.pending(target, run)?.map_or(Next::Nothing, Next::Advance))
+        if let Some(pending) = self.pending(target, run)? {
+            return Ok(Next::Advance(pending));
+        }
+        Ok(self.drive_of(target, run).unwrap_or(Next::Nothing))
+    }
+
+    /// The drive to another stop, where this run has located the target at the last stop, drives, and is not to wait.
+    fn drive_of(&self, target: usize, number: usize) -> Option<Next> {
+        let steering =
+            self.steering.filter(|steering| (steering.target, steering.run) == (target, number))?;
+        let run = self.run(target, number).ok()?;
+        let last = run.steps.last()?.step;
+        let waits = steering.pause_at.is_some_and(|stop| last >= stop) || run.stop_after.is_some();
+        (last + 1 == self.stop_count && !waits).then(|| Next::Drive { steering, steps: run.steps.clone() })
+    }
+
+    /// Lets a run drive under a command.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when there is no such target or run, or its target is not located yet; [`Error::Setting`] for a command
+    /// that makes no sense for the target.
+    pub fn steer(&mut self, steering: Steering) -> Result<()> {
+        let run = self.run(steering.target, steering.run)?;
+        let first = run.steps.first().ok_or_else(|| {
+            Error::Request("the target is not located yet; wait for the run's first step".to_owned())
+        })?;
+        steering.command.validate_for(&first.update.target.position_in_rover)?;
+        self.steering = Some(steering);
+        Ok(())
     }
 
     /// Stops a run after its last step so far; that survives a restart.
@@ -129,7 +167,7 @@ impl Session {
 
 impl Run {
     /// The steps before `from_step`; none when the run has not come so far.
-    pub(crate) fn steps_before(&self, from_step: usize) -> Option<Vec<Arc<crate::step::RunStep>>> {
+    pub(crate) fn steps_before(&self, from_step: usize) -> Option<Vec<Arc<RunStep>>> {
         let kept: Vec<_> = self.steps.iter().filter(|trace| trace.step < from_step).cloned().collect();
         kept.last().is_some_and(|last| last.step + 1 == from_step).then_some(kept)
     }
@@ -193,6 +231,7 @@ mod tests {
                 runs: vec![run(None, Some(3)), run(Some(Fork::new(0, 3)), None)],
             }],
             breakpoints: vec![Breakpoint { number: 4, expression: "ncc < 0.6".to_owned(), on: false }],
+            steering: None,
         }
     }
 

@@ -12,6 +12,7 @@ use utoipa::ToSchema;
 use super::notes::Note;
 use super::view::SavedSession;
 use sightline_rover::version::tracker_version;
+use sightline_world::rover::driven::DrivenStop;
 
 /// What the file says that it is.
 pub const FORMAT: &str = "sightline-reproduce";
@@ -42,6 +43,10 @@ pub struct ReproducedTraverse {
     /// The scenario of a simulated drive, as TOML; a recorded one must be open already.
     #[serde(default)]
     pub scenario_toml: Option<String>,
+    /// The state of the world of a drive on commands, one stop after the other.
+    #[serde(default)]
+    #[schema(value_type = Option<Vec<Object>>)]
+    pub driven: Option<Vec<DrivenStop>>,
 }
 
 /// A file that was read.
@@ -75,6 +80,7 @@ impl Opened {
             id: part(&traverse["id"], "traverse.id")?,
             name: part(&traverse["name"], "traverse.name")?,
             scenario_toml: part(&traverse["scenario_toml"], "traverse.scenario_toml")?,
+            driven: part(&traverse["driven"], "traverse.driven")?,
         };
         let session = part(&value["session"], "session")?;
         let notes = part(&value["notes"], "notes")?;

@@ -7,6 +7,7 @@ use utoipa::ToSchema;
 
 use super::breakpoints::Breakpoint;
 use super::{Cursor, Fork, Run, Session, TargetRecord};
+use crate::driving::Steering;
 use crate::step::StepRow;
 use crate::summary::{Summary, summarise};
 use sightline_track::settings::{Changes, Settings};
@@ -31,6 +32,9 @@ pub struct SessionView {
     /// The conditions that are looked for; `…/breakpoints` says what they hit.
     #[serde(default)]
     pub breakpoints: Vec<Breakpoint>,
+    /// Who drives, and how; null where nobody was told to.
+    #[serde(default)]
+    pub steering: Option<Steering>,
 }
 
 /// A target as pages and scripts see it.
@@ -96,6 +100,9 @@ pub struct SavedSession {
     /// The conditions that were looked for.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub breakpoints: Vec<Breakpoint>,
+    /// Who drove, and how.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub steering: Option<Steering>,
 }
 
 /// A target as it was designated, and the configurations tried on it.
@@ -145,6 +152,7 @@ impl Session {
             cursor: self.cursor,
             targets: live.map(|(number, record)| self.target_view(number, record)).collect(),
             breakpoints: self.breakpoints.list(),
+            steering: self.steering,
         }
     }
 
@@ -194,6 +202,7 @@ impl Session {
                 })
                 .collect(),
             breakpoints: self.breakpoints.list(),
+            steering: self.steering,
         }
     }
 

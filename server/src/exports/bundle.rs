@@ -44,6 +44,9 @@ pub(crate) fn json(source: &Source, part: Part, cancel: Cancel<'_>) -> Result<St
             "seed": scenario.as_ref().map(|scenario| scenario.seed),
             "scenario_sha256": scenario.as_ref().map(|scenario| hash(scenario.to_toml().as_bytes())),
             "scenario_toml": scenario.as_ref().map(Scenario::to_toml),
+            "driven": source.open.driven.as_ref().map(|driven| {
+                driven.with(|world| world.state().iter().take(index.stops.len()).cloned().collect::<Vec<_>>())
+            }),
         },
         "session": source.session.saved(),
         "notes": source.notes.list,
@@ -69,10 +72,10 @@ fn of_run(source: &Source, run: NamedRun<'_>, cancel: Cancel<'_>) -> Result<Valu
     }))
 }
 
-/// The command line that computes a run again; none for one that left another run on the way.
+/// The command line that computes a run again; none for one that left another run on the way, or in a drive on commands.
 pub(crate) fn command(source: &Source, run: NamedRun<'_>) -> Option<String> {
     let designation = run.record.designation;
-    if run.run.fork.is_some_and(|fork| fork.from_step > designation.step) {
+    if run.run.fork.is_some_and(|fork| fork.from_step > designation.step) || source.open.driven.is_some() {
         return None;
     }
     Some(shell::track(&place_of_traverse(source), designation, &run.run.settings.changes()))

@@ -41,7 +41,7 @@ impl Source {
     /// The session as it stands now.
     pub(crate) fn of(live: &LiveSession) -> Self {
         let (session, notes) = live.with(|session| (session.clone(), live.with_notes(|notes| notes.clone())));
-        Self { session, notes, open: Arc::clone(&live.traverse) }
+        Self { session, notes, open: live.traverse() }
     }
 
     /// Checks that what is asked for is there.

@@ -143,7 +143,8 @@ fn answer(state: &AppState, work: &Work, mut asked: RecordedStep) {
                 state.tell(work.progress());
             }
         };
-        let drive = &asked.live.traverse.traverse;
+        let open = asked.live.traverse();
+        let drive = &open.traverse;
         match counterfactual::look(drive, asked.base(), &work.cancel, &mut on) {
             Ok(answer) => Ok(Some(answer)),
             Err(Error::Cancelled) => Ok(None),

@@ -8,6 +8,7 @@ pub(crate) mod traverses;
 pub(crate) mod sessions;
 pub(crate) mod targets;
 pub(crate) mod runs;
+pub(crate) mod drive;
 pub(crate) mod removal;
 pub(crate) mod steps;
 pub(crate) mod photometry;

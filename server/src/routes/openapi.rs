@@ -15,9 +15,9 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use super::{
-    about, breakpoints, compare, counterfactual, documents, events, exports, expressions, login, notes,
-    photometry, plain, removal, rerun, runs, sessions, settings, steps, studies, targets, trackability,
-    traverses, what_if, why,
+    about, breakpoints, compare, counterfactual, documents, drive, events, exports, expressions, login,
+    notes, photometry, plain, removal, rerun, runs, sessions, settings, steps, studies, targets,
+    trackability, traverses, what_if, why,
 };
 use crate::routes::route::route;
 use crate::state::AppState;
@@ -91,6 +91,7 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
         .merge(sessions::router())
         .merge(targets::router())
         .merge(runs::router())
+        .merge(drive::router())
         .merge(photometry::router())
         .merge(compare::router())
         .merge(steps::router())

@@ -42,7 +42,7 @@ async fn photometry_csv(State(state): State<AppState>, path: RunPath) -> ApiResu
     let flag = cancel.flag();
     // Exposures of a simulated drive may have to be metered again.
     let text =
-        state.exports().run(move || Ok(table(&live.traverse.traverse, &steps, &settings, &flag)?)).await?;
+        state.exports().run(move || Ok(table(&live.traverse().traverse, &steps, &settings, &flag)?)).await?;
     Ok(download("text/csv; charset=utf-8", &name, text))
 }
 

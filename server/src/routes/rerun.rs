@@ -128,7 +128,8 @@ impl Reader {
     async fn advance(&self) -> ApiResult<Vec<u8>> {
         let (live, recording) = (Arc::clone(&self.live), Arc::clone(&self.recording));
         blocking(move || {
-            let (session, traverse) = (live.with(|session| session.clone()), &live.traverse.traverse);
+            let (session, open) = (live.with(|session| session.clone()), live.traverse());
+            let traverse = &open.traverse;
             Ok(lock(&recording).advance(&traverse.index().name, traverse, &session)?)
         })
         .await

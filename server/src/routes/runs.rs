@@ -123,7 +123,7 @@ fn add(
         let (record, parent) = (session.target(target)?, session.run(target, new.run)?);
         Ok::<_, ApiError>((record.designation, parent.settings.with(&new.settings)?))
     })?;
-    let stops = live.traverse.traverse.stop_count();
+    let stops = live.traverse().traverse.stop_count();
     if !(designation.step..stops).contains(&new.from_step) {
         let (first, last, given) = (designation.step, stops - 1, new.from_step);
         return Err(ApiError::invalid(
@@ -137,7 +137,7 @@ fn add(
         return Err(ApiError::invalid("field", detail).hint("Leave it out, or run from a later step."));
     }
     let redesignated = if new.from_step == designation.step {
-        Some(Arc::new(runner::designate(&live.traverse, designation, &settings, cancel)?))
+        Some(Arc::new(runner::designate(&live.traverse(), designation, &settings, cancel)?))
     } else {
         None
     };

@@ -43,7 +43,8 @@ async fn list(State(state): State<AppState>) -> Json<Vec<SessionEntry>> {
 }
 
 fn entry(live: &LiveSession) -> SessionEntry {
-    let traverse = &live.traverse.traverse;
+    let open = live.traverse();
+    let traverse = &open.traverse;
     let used = live.used();
     let (target_count, run_count, step) = live.with(|session| {
         let targets = || session.targets.iter().filter(|target| !target.removed);
@@ -52,7 +53,7 @@ fn entry(live: &LiveSession) -> SessionEntry {
     });
     SessionEntry {
         id: live.id.clone(),
-        traverse: live.traverse.id.clone(),
+        traverse: live.traverse().id.clone(),
         target_count,
         traverse_name: traverse.index().name.clone(),
         run_count,
@@ -74,7 +75,7 @@ async fn begin(State(state): State<AppState>, Body(new): Body<BeginSession>) -> 
     })?;
     blocking(move || {
         let live = state.begin_session(traverse)?;
-        state.look_at(&live.traverse, 0);
+        state.look_at(&live.traverse(), 0);
         let location = location::<ShowSession>(&AtSession { session: live.id.clone() });
         Ok((StatusCode::CREATED, location, Json(state.view(&live))).into_response())
     })
@@ -123,7 +124,7 @@ async fn move_cursor(
             session.move_cursor(cursor).map(|()| before)
         })?;
         if before != cursor {
-            state.look_at(&live.traverse, cursor.step);
+            state.look_at(&live.traverse(), cursor.step);
             state.cursor_moved(&live, cursor);
         }
         Ok(Json(cursor))

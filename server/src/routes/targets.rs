@@ -77,17 +77,17 @@ fn add(
 ) -> ApiResult<Response> {
     let limits = state.limits();
     live.with(|session| has_number(session, limits))?;
-    let named = new.place().name(&live.traverse.traverse, new.step)?;
+    let named = new.place().name(&live.traverse().traverse, new.step)?;
     let designation = named.designation;
-    let first = runner::designate(&live.traverse, designation, &settings, cancel)
-        .map_err(|error| trackability::refusal(state, &live.traverse, designation, &settings, error))?;
+    let first = runner::designate(&live.traverse(), designation, &settings, cancel)
+        .map_err(|error| trackability::refusal(state, &live.traverse(), designation, &settings, error))?;
     let first = Arc::new(first);
     let gap_m = named.gap_m(&first);
     let target = state.change(live, |session| {
         has_number(session, limits)?;
         Ok(session.add_target(new.label, settings, first))
     })?;
-    state.look_at(&live.traverse, designation.step);
+    state.look_at(&live.traverse(), designation.step);
     start_or_say(state, live, target, 0);
     let at = AtTarget { session: live.id.clone(), target };
     Ok((

@@ -46,7 +46,8 @@ async fn what_if(
         .tries()
         .run_until_dropped(move |cancel| {
             asked.prepare(cancel)?;
-            let drive = &asked.live.traverse.traverse;
+            let open = asked.live.traverse();
+            let drive = &open.traverse;
             let tried = try_step(drive, asked.base(), &what_if, cancel.as_ref().into())?;
             Ok(Json(Ghost::new(what_if, &tried, &asked.recorded, &settings)))
         })

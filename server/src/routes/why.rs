@@ -33,7 +33,7 @@ async fn why(asked: RecordedStep, Params(asking): Params<ShowWhy>) -> ApiResult<
             before: asked.last.as_deref(),
             settings: &asked.settings,
             prediction_px: asked.prediction_px,
-            sources: &asked.live.traverse.traverse,
+            sources: &asked.live.traverse().traverse,
         };
         Ok(Json(book.explain(asking.value.as_deref())?))
     })

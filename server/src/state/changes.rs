@@ -45,7 +45,7 @@ impl AppState {
         });
         let is_closed = {
             let mut sessions = lock(&self.0.sessions);
-            let is_closed = made.as_ref().is_ok_and(|live| live.traverse.is_closed());
+            let is_closed = made.as_ref().is_ok_and(|live| live.traverse().is_closed());
             sessions.enter(number, made.as_ref().ok().filter(|_| !is_closed));
             is_closed
         };
@@ -54,8 +54,19 @@ impl AppState {
             self.0.store.remove(&live.id)?;
             return Err(ApiError::not_found("The drive was removed meanwhile."));
         }
+        self.keep_up(&live);
         self.announce(&live);
         Ok(live)
+    }
+
+    /// Gives a session the stops that its drive has come to meanwhile.
+    pub(super) fn keep_up(&self, live: &LiveSession) {
+        let now = live.traverse();
+        if let Ok(current) = self.traverse(&now.id)
+            && current.traverse.stop_count() > now.traverse.stop_count()
+        {
+            live.grow(current);
+        }
     }
 
     /// Changes a session, saves it, and tells every page: all or nothing.

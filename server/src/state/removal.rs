@@ -38,6 +38,8 @@ impl AppState {
         let number = store::number_of(id);
         let number = number.ok_or_else(|| ApiError::not_found("There is no such removed session."))?;
         sessions::restore(&self.0.sessions, &self.0.store, &self.limits().sessions, number)?;
+        let restored = lock(&self.0.sessions).by_number.get(&number).cloned();
+        restored.iter().for_each(|live| self.keep_up(live));
         self.tell(Event::SessionChanged { session: id.to_owned() });
         self.session(id)
     }

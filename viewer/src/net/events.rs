@@ -1,5 +1,7 @@
 //! The server's events over a WebSocket, connected again with growing patience when it is lost.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Duration;
 
 use ewebsock::{Options, WsEvent, WsMessage, WsReceiver, WsSender};
@@ -11,6 +13,10 @@ const PATIENCE_S: f64 = 10.0;
 /// After how long at the latest the page takes in what nobody waits for; mostly it comes with a frame that is laid out
 /// anyway.
 pub(super) const UNHURRIED: Duration = Duration::from_millis(50);
+/// The same while events stream in: a quick run needs the processors more than a picture of each of its steps.
+const STREAMING: Duration = Duration::from_millis(150);
+/// So many events at a time are a stream.
+const STREAM_LENGTH: usize = 6;
 
 /// How the server's events come in.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -36,13 +42,16 @@ pub(super) struct Events {
     is_open: bool,
     attempts: u32,
     retry_at: f64,
+    /// Whether the last events came as a stream.
+    is_stream: Arc<AtomicBool>,
 }
 
 impl Events {
     /// The events of the server at `origin`; the first poll connects.
     pub(super) fn new(origin: &str, context: egui::Context) -> Self {
         let url = format!("{}/api/v1/events", origin.replacen("http", "ws", 1));
-        Self { url, context, socket: None, is_open: false, attempts: 0, retry_at: 0.0 }
+        let is_stream = Arc::default();
+        Self { url, context, socket: None, is_open: false, attempts: 0, retry_at: 0.0, is_stream }
     }
 
     /// Does not wait for the next attempt.
@@ -76,6 +85,7 @@ impl Events {
         if is_lost {
             self.lose(now);
         }
+        self.is_stream.store(told.len() >= STREAM_LENGTH, Relaxed);
         (told, self.connection())
     }
 
@@ -88,8 +98,11 @@ impl Events {
     }
 
     fn connect(&mut self, now: f64) {
-        let context = self.context.clone();
-        let wake = move || context.request_repaint_after(UNHURRIED);
+        let (context, is_stream) = (self.context.clone(), Arc::clone(&self.is_stream));
+        let wake = move || {
+            let pause = if is_stream.load(Relaxed) { STREAMING } else { UNHURRIED };
+            context.request_repaint_after(pause);
+        };
         match ewebsock::connect_with_wakeup(self.url.clone(), Options::default(), wake) {
             Ok(socket) => self.socket = Some(socket),
             Err(_) => self.lose(now),

@@ -77,14 +77,10 @@ pub struct CycleInput<'a> {
     pub navigator: &'a dyn Navigator,
     /// The step at which the target was designated.
     pub first: &'a StepTrace,
-    /// The last step: the rover stands at its stop.
+    /// The step of the stop at which is decided.
     pub last: &'a StepTrace,
     /// The cycle of the stop before; `None` at the first.
     pub before: Option<&'a Cycle>,
-    /// The configuration of the tracker.
-    pub settings: &'a Settings,
-    /// Read several times during the cycle.
-    pub cancel: Cancel<'a>,
 }
 
 /// One cycle: decides at the last stop and, unless the drive ends there, drives, points the mast and tracks at the next.
@@ -92,34 +88,61 @@ pub struct CycleInput<'a> {
 /// # Errors
 /// [`sightline_geometry::error::Error::Cancelled`], or what the world cannot do; the world may then have one stop more than
 /// steps, which is to be discarded.
-pub fn advance(world: &mut dyn ActiveWorld, input: &CycleInput<'_>) -> Result<(Cycle, Option<StepTrace>)> {
-    input.cancel.check()?;
+pub fn advance(
+    world: &mut dyn ActiveWorld,
+    input: &CycleInput<'_>,
+    settings: &Settings,
+    cancel: Cancel<'_>,
+) -> Result<(Cycle, Option<StepTrace>)> {
+    let cycle = drive_on(world, input, cancel)?;
+    if cycle.ending.is_some() {
+        return Ok((cycle, None));
+    }
+    let trace = pipeline::run_step_displaced(world.stops(), &input.last.update, settings, None, cancel)?;
+    Ok((cycle, Some(trace)))
+}
+
+/// Decides at the last stop and, unless the drive ends there, drives to the next and points the mast at the prediction.
+///
+/// # Errors
+/// As [`advance`].
+pub fn drive_on(world: &mut dyn ActiveWorld, input: &CycleInput<'_>, cancel: Cancel<'_>) -> Result<Cycle> {
+    cancel.check()?;
+    let mut cycle = decide(world.stops(), input);
+    if let Some(motion) = cycle.motion {
+        cycle.add(world.drive(&motion, cancel)?);
+        point_mast(world, &input.last.update)?;
+    }
+    Ok(cycle)
+}
+
+/// The decision at a stop, before the rover moves; it depends on nothing but estimates and reports, so that it can be made
+/// again at any time.
+pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
     let step = input.last.step;
-    let stops = world.stops();
     let pose = stops.site_from_rover(step);
     let start = stops.site_from_rover(input.first.step).translation.vector;
     let target_in_site = target_in_site(input, stops);
     let goal = set_goal(input.command, &target_in_site, [start.x, start.y], &pose);
     let (left, right) = stops.cameras(step);
-    let sizes = [left, right].map(|camera| camera.size);
-    let target_in_rover = pose.inverse_transform_point(&target_in_site);
-    let step_m = input.command.step_fraction * (target_in_rover - left.model.centre()).norm();
-    let mut time = FlightTime::of_stop(sizes);
-    let minutes =
-        |time: &FlightTime| input.before.map_or(0.0, |before| before.flight_minutes) + time.total_s() / 60.0;
-    let mut cycle =
-        Cycle { step, goal, motion: None, report: None, flight_minutes: minutes(&time), ending: None };
+    let time = FlightTime::of_stop([left.size, right.size]);
+    let flight_minutes = input.before.map_or(0.0, |before| before.flight_minutes) + time.total_s() / 60.0;
+    let mut cycle = Cycle { step, goal, motion: None, report: None, flight_minutes, ending: None };
     cycle.ending = ending(input, &cycle);
-    if cycle.ending.is_some() {
-        return Ok((cycle, None));
+    if cycle.ending.is_none() {
+        let target_in_rover = pose.inverse_transform_point(&target_in_site);
+        let step_m = input.command.step_fraction * (target_in_rover - left.model.centre()).norm();
+        cycle.motion = Some(input.navigator.select_path(goal.in_rover_m, step_m));
     }
-    let motion = input.navigator.select_path(goal.in_rover_m, step_m);
-    let report = world.drive(&motion, input.cancel)?;
-    time.drive_s = report.duration_s;
-    cycle.flight_minutes = minutes(&time);
-    (cycle.motion, cycle.report) = (Some(motion), Some(report));
-    let trace = track(world, &input.last.update, input)?;
-    Ok((cycle, Some(trace)))
+    cycle
+}
+
+impl Cycle {
+    /// Adds what the rover reports of its motion.
+    pub fn add(&mut self, report: DriveReport) {
+        self.flight_minutes += report.duration_s / 60.0;
+        self.report = Some(report);
+    }
 }
 
 /// The target from which the goal follows, site frame.
@@ -131,14 +154,13 @@ fn target_in_site(input: &CycleInput<'_>, stops: &dyn Stops) -> Point3 {
     stops.site_from_rover(from.step) * from.update.target.position_in_rover
 }
 
-/// Points the mast of the last stop at the prediction and finds the target there.
-fn track(world: &mut dyn ActiveWorld, last: &Updated, input: &CycleInput<'_>) -> Result<StepTrace> {
+/// Points the mast of the last stop at the prediction.
+fn point_mast(world: &mut dyn ActiveWorld, last: &Updated) -> Result<()> {
     let stops = world.stops();
     let [then, now] = [last.target.step, last.target.step + 1].map(|step| stops.site_from_rover(step));
     let predicted = predict::predict(&last.target, &then, &now, &stops.odometry_error());
     let wanted = stops.mast().and_then(|mast| mast.point_left_centre_at(&predicted.position_in_rover));
-    world.point_mast(wanted)?;
-    pipeline::run_step_displaced(world.stops(), last, input.settings, None, input.cancel)
+    world.point_mast(wanted)
 }
 
 /// Why the drive ends at this stop, if it does.

@@ -14,7 +14,7 @@ pub(super) fn all(state: &AppState) -> String {
     let sessions = state.sessions();
     for live in &sessions {
         let count = live.with(|session| session.targets.iter().filter(|target| !target.removed).count());
-        let name = escape(&live.traverse.traverse.index().name);
+        let name = escape(&live.traverse().traverse.index().name);
         let targets = if count == 1 { "1 target".to_owned() } else { format!("{count} targets") };
         let _ = writeln!(
             html,

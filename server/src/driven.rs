@@ -1,0 +1,167 @@
+//! Drives on commands: the worlds in which sessions drive, each in a folder of its own that grows stop by stop.
+//!
+//! An open drive is an [`OpenTraverse`] as any other. After each stop it is replaced by one with a stop more, in the list of
+//! open drives and in the sessions on it: who reads the former one is not disturbed. The folder holds the whole state
+//! (`sightline_recordings::driven`), so that the drive goes on after a restart.
+
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+
+use sightline_api::wire::Event;
+use sightline_geometry::error::{Error, Result};
+use sightline_recordings::DrivenTraverse;
+use sightline_rover::driving::{ArcNavigator, executive};
+use sightline_session::driving::{self, DriveView, Steering};
+use sightline_session::step::RunStep;
+use sightline_track::locate::store::Cache;
+use tokio::sync::broadcast;
+
+use crate::cancel::CancelFlag;
+use crate::folders::{Folders, make_private};
+use crate::identity::Identity;
+use crate::jobs::lock;
+use crate::live_session::LiveSession;
+use crate::naming::slug;
+use crate::rendering::OpenTraverse;
+
+/// The open traverses, those that were opened from a page last.
+pub(crate) type OpenTraverses = Arc<Mutex<Vec<Arc<OpenTraverse>>>>;
+
+/// The world of a drive on commands.
+pub(crate) struct Driven {
+    world: Mutex<DrivenTraverse>,
+    cache: Arc<Cache>,
+}
+
+impl Driven {
+    /// Looks at the world; nobody drives meanwhile.
+    pub(crate) fn with<T>(&self, look: impl FnOnce(&DrivenTraverse) -> T) -> T {
+        look(&lock(&self.world))
+    }
+}
+
+/// A new folder for a drive, and the drive's name, which is that of the folder.
+///
+/// # Errors
+/// A folder that cannot be made.
+pub(crate) fn new_folder(folders: &Folders, name: &str) -> Result<std::path::PathBuf> {
+    let write = |path: &Path, source| Error::Write { path: path.to_owned(), source };
+    make_private(&folders.driven).map_err(|source| write(&folders.driven, source))?;
+    let mut number = 1;
+    loop {
+        let folder = folders.driven.join(format!("{}-driven-{number}", slug(name)));
+        match std::fs::create_dir(&folder) {
+            Ok(()) => return Ok(folder),
+            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => number += 1,
+            Err(error) => return Err(write(&folder, error)),
+        }
+    }
+}
+
+/// Opens the world of a drive under the name of its folder.
+///
+/// # Errors
+/// A folder that cannot be read.
+pub(crate) fn open(
+    world: DrivenTraverse,
+    cache: &Arc<Cache>,
+    events: &broadcast::Sender<Event>,
+) -> Result<OpenTraverse> {
+    let traverse = world.snapshot()?.with_cache(cache);
+    let name = traverse.folder().file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let driven = Arc::new(Driven { world: Mutex::new(world), cache: Arc::clone(cache) });
+    Ok(OpenTraverse::new(Identity::driven(name), traverse, events.clone()).driven_in(driven))
+}
+
+/// Opens the drives of earlier starts; what cannot be opened is said in one sentence each.
+pub(crate) fn open_again(
+    folders: &Folders,
+    cache: &Arc<Cache>,
+    open: &mut Vec<Arc<OpenTraverse>>,
+    events: &broadcast::Sender<Event>,
+) -> Vec<String> {
+    let entries = std::fs::read_dir(&folders.driven).into_iter().flatten().flatten();
+    let mut all: Vec<_> = entries.map(|entry| entry.path()).filter(|path| path.is_dir()).collect();
+    all.sort();
+    let mut lost = Vec::new();
+    for folder in all {
+        let opened = DrivenTraverse::resume(&folder).and_then(|world| self::open(world, cache, events));
+        match opened {
+            Ok(one) => open.push(Arc::new(one)),
+            Err(error) => {
+                lost.push(format!("the drive {} cannot be opened again: {error}", folder.display()))
+            }
+        }
+    }
+    lost
+}
+
+/// Drives from the last stop to the next on the estimates of `steps`, and returns the drive as it is then; `None` where it
+/// ends at the last stop, or somebody else drove on from there.
+///
+/// # Errors
+/// A drive that is none on commands, ground that cannot be driven on, a folder that cannot be written, or
+/// [`Error::Cancelled`]; the world is then as it was.
+pub(crate) fn drive_on(
+    open: &OpenTraverse,
+    steering: &Steering,
+    steps: &[Arc<RunStep>],
+    cancel: &CancelFlag,
+) -> Result<Option<Arc<OpenTraverse>>> {
+    let Some(driven) = &open.driven else {
+        let problem = "this drive was planned or recorded before; it is replayed and cannot be driven on";
+        return Err(Error::Request(problem.to_owned()));
+    };
+    let mut world = lock(&driven.world);
+    let (Some(first), Some(last)) = (steps.first(), steps.last()) else { return Ok(None) };
+    if world.traverse().stop_count() != last.step + 1 {
+        return Ok(None);
+    }
+    let before = driving::cycles(&world, &steering.command, &steps[..steps.len() - 1]);
+    let navigator = &ArcNavigator::default();
+    let input = executive::CycleInput {
+        command: &steering.command,
+        navigator,
+        first: &first.trace,
+        last: &last.trace,
+        before: before.last(),
+    };
+    let state = world.state().to_vec();
+    let moved = executive::drive_on(&mut *world, &input, cancel.as_ref().into());
+    match moved {
+        Ok(cycle) if cycle.ending.is_some() => return Ok(None),
+        Ok(_) => {}
+        Err(error) => {
+            world.restore(state)?;
+            return Err(error);
+        }
+    }
+    let traverse = world.snapshot()?.with_cache(&driven.cache);
+    drop(world);
+    Ok(Some(Arc::new(open.grown(traverse))))
+}
+
+/// The drive of a session.
+pub(crate) fn view(live: &LiveSession) -> DriveView {
+    let open = live.traverse();
+    let steering = live.with(|session| session.steering);
+    let (Some(steering), Some(driven)) = (steering, &open.driven) else {
+        return DriveView { steering, cycles: Vec::new(), summary: None, is_driving: false };
+    };
+    let steps = live.with(|session| {
+        session.run(steering.target, steering.run).map(|run| run.steps.clone()).unwrap_or_default()
+    });
+    let is_driving = live.is_computing(steering.target, steering.run);
+    driven.with(|world| {
+        let cycles = driving::cycles(world, &steering.command, &steps);
+        let summary = driving::summary(world, &steering.command, &steps, &cycles);
+        DriveView { steering: Some(steering), cycles, summary: Some(summary), is_driving }
+    })
+}
+
+/// Puts the drive with a stop more in the place of the former one in the list of open drives.
+pub(crate) fn replace(traverses: &OpenTraverses, grown: &Arc<OpenTraverse>) {
+    if let Some(place) = lock(traverses).iter_mut().find(|open| open.id == grown.id) {
+        *place = Arc::clone(grown);
+    }
+}

@@ -1,0 +1,183 @@
+//! `…/drive`: driving on commands.
+//!
+//! A drive on commands has a world and a session of its own: beginning one, or branching one at an earlier stop, leaves the
+//! session from which it begins as it is.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Response};
+use sightline_api::endpoint::Endpoint;
+use sightline_api::endpoints::{BeginDrive, ShowDrive, ShowSession, SteerDrive};
+use sightline_api::location::AtSession;
+use sightline_api::wire::NewDrive;
+use sightline_recordings::DrivenTraverse;
+use sightline_session::driving::{DriveView, Steering};
+use sightline_session::view::{SavedSession, SavedTarget, SessionView};
+use sightline_session::{Cursor, Session};
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+
+use crate::cancel::CancelFlag;
+use crate::driven;
+use crate::drives::scenario_of;
+use crate::extract::{Body, RunPath, SessionPath};
+use crate::jobs::blocking;
+use crate::live_session::LiveSession;
+use crate::problem::{ApiError, ApiResult};
+use crate::rendering::OpenTraverse;
+use crate::routes::route::{location, route};
+use crate::routes::targets::start_or_say;
+use crate::state::AppState;
+
+/// The routes of this resource.
+pub(crate) fn router() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new()
+        .routes(route::<BeginDrive>(routes!(begin)))
+        .routes(route::<ShowDrive>(routes!(show)))
+        .routes(route::<SteerDrive>(routes!(steer)))
+}
+
+/// Begins a drive on commands with a run
+///
+/// The rover drives towards the run's target on the run's estimates, in a new session with a world of its own. From a drive on
+/// commands it branches at any stop; any other simulated drive is driven anew from its first stop.
+#[utoipa::path(post, operation_id = "begin_drive", path = BeginDrive::PATH, tag = "drive", request_body = NewDrive, responses((status = 201, body = SessionView), ApiError))]
+async fn begin(
+    State(state): State<AppState>,
+    RunPath { live, target, run }: RunPath,
+    Body(new): Body<BeginDrive>,
+) -> ApiResult<Response> {
+    let work_state = state.clone();
+    let work = move |cancel: &CancelFlag| {
+        let driving = add(&work_state, &live, (target, run), &new, cancel)?;
+        let location = location::<ShowSession>(&AtSession { session: driving.id.clone() });
+        Ok((StatusCode::CREATED, location, Json(work_state.view(&driving))).into_response())
+    };
+    state.designations().run_until_dropped(work).await
+}
+
+/// The drive of a session
+#[utoipa::path(get, operation_id = "show_drive", path = ShowDrive::PATH, tag = "drive", responses((status = 200, body = DriveView), ApiError))]
+async fn show(SessionPath(live): SessionPath) -> ApiResult<Json<DriveView>> {
+    blocking(move || Ok(Json(driven::view(&live)))).await
+}
+
+/// Lets a run drive, or changes its command
+///
+/// A run that was stopped goes on. `pause_at` lets the rover wait at a stop: at the present one it is a pause, at the next one a
+/// single step.
+#[utoipa::path(put, operation_id = "steer_drive", path = SteerDrive::PATH, tag = "drive", request_body = Steering, responses((status = 200, body = DriveView), ApiError))]
+async fn steer(
+    State(state): State<AppState>,
+    SessionPath(live): SessionPath,
+    Body(steering): Body<SteerDrive>,
+) -> ApiResult<Json<DriveView>> {
+    blocking(move || {
+        if live.traverse().driven.is_none() {
+            return Err(ApiError::conflict("The drive of this session is not on commands.")
+                .hint("POST …/targets/{target}/runs/{run}/drive begins one from it."));
+        }
+        let Steering { target, run, .. } = steering;
+        state.change(&live, |session| {
+            session.steer(steering)?;
+            if session.run(target, run)?.why_stopped().is_some() {
+                session.resume(target, run)?;
+            }
+            Ok(())
+        })?;
+        start_or_say(&state, &live, target, run);
+        Ok(Json(driven::view(&live)))
+    })
+    .await
+}
+
+/// Makes the world and the session of a drive, and begins to drive.
+fn add(
+    state: &AppState,
+    live: &Arc<LiveSession>,
+    (target, run): (usize, usize),
+    new: &NewDrive,
+    cancel: &CancelFlag,
+) -> ApiResult<Arc<LiveSession>> {
+    let steering = Steering { target, run, command: new.command, pause_at: new.pause_at };
+    let (saved, last) = live.with(|session| {
+        // Refused before a world is made.
+        session.clone().steer(steering)?;
+        Ok::<_, ApiError>((
+            session.saved(),
+            session.run(target, run)?.steps.last().map_or(0, |last| last.step),
+        ))
+    })?;
+    let open = live.traverse();
+    let designated = saved.targets[target].designation.step;
+    let from_step = from_step(&open, new, designated, last)?;
+    let folder = driven::new_folder(state.folders(), &open.traverse.index().name)?;
+    let made = world(&open, from_step, &folder, cancel).and_then(|world| {
+        state.limits().check_drive(world.traverse())?;
+        let opened = driven::open(world, state.cache(), state.events())?;
+        Ok(state.add_traverse(Arc::new(opened))?)
+    });
+    let opened = made.inspect_err(|_| {
+        // What is left is an empty drive without a session, which can be removed like any other.
+        let _ = std::fs::remove_dir_all(&folder);
+    })?;
+    let driving = state.enter_session(Arc::clone(&opened), false, |id| {
+        let saved = session_of(saved, steering, from_step);
+        let saved = SavedSession { id, traverse: opened.id.clone(), ..saved };
+        Ok((Session::restored(&saved, from_step + 1)?, Default::default()))
+    })?;
+    // Asking for it begins its runs, and then the drive.
+    state.session(&driving.id)
+}
+
+/// The stop from which is driven.
+fn from_step(open: &OpenTraverse, new: &NewDrive, designated: usize, last: usize) -> ApiResult<usize> {
+    let is_driven = open.driven.is_some();
+    let step = new.from_step.unwrap_or(if is_driven { last } else { 0 });
+    let wrong = |what: String| Err(ApiError::invalid("field", format!("from_step: {what}")));
+    if !is_driven && (step > 0 || designated > 0) {
+        let what = "the other stops of this drive were planned beforehand; only the first one, 0, can be driven from";
+        return wrong(what.to_owned()).map_err(|problem: ApiError| {
+            problem.hint("Designate the target at the first stop, and begin the drive there.")
+        });
+    }
+    if step < designated || step > last {
+        return wrong(format!("must be from {designated} to {last}, the steps of the run, not {step}"));
+    }
+    Ok(step)
+}
+
+/// The world in which is driven.
+fn world(
+    open: &OpenTraverse,
+    from_step: usize,
+    folder: &std::path::Path,
+    cancel: &CancelFlag,
+) -> ApiResult<DrivenTraverse> {
+    if let Some(driven) = &open.driven {
+        return Ok(driven.with(|world| world.branch(from_step + 1, folder, cancel.as_ref().into()))?);
+    }
+    let scenario = scenario_of(&open.traverse).ok_or_else(|| {
+        ApiError::conflict("A recorded drive cannot be driven.")
+            .hint("Open a scenario: the world must be simulated.")
+    })?;
+    Ok(DrivenTraverse::begin(&scenario, folder, cancel.as_ref().into())?)
+}
+
+/// What the session of the drive begins with: the target with its runs.
+fn session_of(saved: SavedSession, steering: Steering, from_step: usize) -> SavedSession {
+    let Steering { target, run, .. } = steering;
+    let targets = saved.targets.into_iter().skip(target).take(1);
+    let mut targets: Vec<SavedTarget> = targets.collect();
+    // A run that was stopped drives on.
+    targets.iter_mut().filter_map(|target| target.runs.get_mut(run)).for_each(|run| run.stop_after = None);
+    SavedSession {
+        cursor: Cursor { target: Some(0), run, step: from_step },
+        targets,
+        steering: Some(Steering { target: 0, ..steering }),
+        ..saved
+    }
+}
