@@ -96,6 +96,25 @@ pub(crate) fn open_again(
     lost
 }
 
+/// Copies the folder of a drive with its images.
+///
+/// # Errors
+/// Files that cannot be read or written.
+pub(crate) fn copy(from: &Path, to: &Path) -> Result<()> {
+    let failed = |source| Error::Write { path: to.to_owned(), source };
+    std::fs::create_dir_all(to).map_err(failed)?;
+    for entry in std::fs::read_dir(from).map_err(failed)?.flatten() {
+        let (path, copied) = (entry.path(), to.join(entry.file_name()));
+        // Kept radiance is only time.
+        if path.is_dir() && entry.file_name() != "cache" {
+            copy(&path, &copied)?;
+        } else if path.is_file() {
+            std::fs::copy(&path, &copied).map_err(failed)?;
+        }
+    }
+    Ok(())
+}
+
 /// Drives from the last stop to the next on the estimates of `steps`, and returns the drive as it is then; `None` where it
 /// ends at the last stop, or somebody else drove on from there.
 ///

@@ -11,6 +11,7 @@ mod cli;
 mod compare;
 mod copied;
 mod drill;
+mod driving;
 mod ending;
 mod exports;
 mod expressions;

@@ -22,9 +22,9 @@ fn nobody_else_may_read_what_the_server_keeps() {
     server.json("POST", "sessions", &json!({ "traverse": traverse }));
     server.kill();
     let (folder, file) = (data.join("sessions"), data.join("sessions/sessions.redb"));
-    let folders = ["sessions", "studies", "traverses", "digests"].map(|name| data.join(name));
+    let folders = ["sessions", "studies", "traverses", "driven", "digests"].map(|name| data.join(name));
     assert_eq!((mode(&data), mode(&file)), (0o700, 0o600));
-    assert_eq!(folders.each_ref().map(|folder| mode(folder)), [0o700; 4]);
+    assert_eq!(folders.each_ref().map(|folder| mode(folder)), [0o700; 5]);
     // As an earlier version left them.
     for (path, wide) in [(&folder, 0o755), (&file, 0o644)] {
         std::fs::set_permissions(path, PermissionsExt::from_mode(wide)).unwrap();

@@ -27,6 +27,7 @@ mod breakpoints;
 mod command;
 mod compare;
 mod drawing;
+mod driving;
 mod exports;
 mod files;
 mod notes;

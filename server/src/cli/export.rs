@@ -15,6 +15,7 @@ use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
 use sightline_recordings::Traverse;
 use sightline_session::Session;
+use sightline_session::driving::Steering;
 use sightline_session::view::SavedSession;
 use sightline_track::presets::preset;
 use sightline_track::settings::{Changes, Settings, parse_assignment};
@@ -24,6 +25,7 @@ use super::terminal::Progress;
 use super::track::pixel;
 use super::{open, terminal};
 use crate::access::Access;
+use crate::driven;
 use crate::exports::{Kind, Made, Part, Source, make};
 use crate::folders::Folders;
 use crate::hosts::Hosts;
@@ -113,33 +115,42 @@ impl Export {
             Error::Request(format!("{} has no session {id}; there are: {known}", sessions.display()))
         };
         let saved = found.sessions.iter().find(|saved| saved.id == id).ok_or_else(missing)?;
-        let traverse = match &self.traverse {
-            Some(path) => open::open(path, Some(&data))?,
-            None => find_traverse(&data, &saved.traverse)?,
+        let of_commands = data.join("driven").join(&saved.traverse);
+        let (traverses, saved) = if of_commands.is_dir() {
+            driven::copy(&of_commands, &Folders::in_one(folder).driven.join(&saved.traverse))?;
+            // The rover of the copy stays where it is.
+            let steering = saved.steering.map(|steering| Steering { pause_at: Some(0), ..steering });
+            (Vec::new(), SavedSession { steering, ..saved.clone() })
+        } else {
+            (vec![self.traverse_of(id, &saved.traverse, &data)?], saved.clone())
         };
-        let digests = Folders::in_one(&data).digests;
-        let own = Identity::of(&traverse, Some(&digests))?;
-        let theirs = &saved.traverse;
-        match own.relation(theirs) {
-            Relation::Same | Relation::SameIndex => {}
-            Relation::OtherFiles => {
-                let message = "was made on other images than the drive has now; put those back to export it";
-                return Err(Error::Request(format!("session {id} {message} ({theirs}, not {})", own.id())));
-            }
-            Relation::Other => {
-                let own = own.id();
-                return Err(Error::Request(format!(
-                    "session {id} is on the traverse {theirs}, not on {own}"
-                )));
-            }
-        }
         let notes =
             store::number_of(id).and_then(|number| found.notes.get(&number)).cloned().unwrap_or_default();
         let copy = Store::open(folder)?;
-        copy.save(saved)?;
+        copy.save(&saved)?;
         copy.save_notes(id, &notes)?;
         drop(copy);
-        computed(traverse, folder, id)
+        computed(traverses, folder, id)
+    }
+
+    /// The traverse of a session, which must be the one that it was made on.
+    fn traverse_of(&self, id: &str, theirs: &str, data: &Path) -> Result<Traverse> {
+        let traverse = match &self.traverse {
+            Some(path) => open::open(path, Some(data))?,
+            None => find_traverse(data, theirs)?,
+        };
+        let own = Identity::of(&traverse, Some(&Folders::in_one(data).digests))?;
+        match own.relation(theirs) {
+            Relation::Same | Relation::SameIndex => Ok(traverse),
+            Relation::OtherFiles => {
+                let message = "was made on other images than the drive has now; put those back to export it";
+                Err(Error::Request(format!("session {id} {message} ({theirs}, not {})", own.id())))
+            }
+            Relation::Other => {
+                let own = own.id();
+                Err(Error::Request(format!("session {id} is on the traverse {theirs}, not on {own}")))
+            }
+        }
     }
 
     /// Targets on a traverse, as a session that nobody keeps.
@@ -168,15 +179,15 @@ impl Export {
         let copy = Store::open(folder)?;
         copy.save(&saved)?;
         drop(copy);
-        computed(traverse, folder, "s1")
+        computed(vec![traverse], folder, "s1")
     }
 }
 
 /// The session of that name in `folder` with all its runs, which are computed by what computes them in the server.
-fn computed(traverse: Traverse, folder: &Path, id: &str) -> Result<Arc<LiveSession>> {
+fn computed(traverses: Vec<Traverse>, folder: &Path, id: &str) -> Result<Arc<LiveSession>> {
     let runtime = super::runtime()?;
     let _inside = runtime.enter();
-    let state = AppState::new(vec![traverse], folder, Access::without_token(Hosts::new(0, &[])))?;
+    let state = AppState::new(traverses, folder, Access::without_token(Hosts::new(0, &[])))?;
     let live = state.session(id).map_err(refused)?;
     let count = |session: &Session| {
         let live = session.targets.iter().filter(|target| !target.removed);

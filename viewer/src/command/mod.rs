@@ -228,6 +228,8 @@ pub enum Command {
     Tour(Turn),
     /// Asks why a step came out as it did, tries a change, or takes a deed back.
     Why(Ask),
+    /// Something about driving.
+    Drive(crate::driving::Ask),
     /// Something about notes.
     Notes(notes::Ask),
     /// Something about exports.

@@ -24,10 +24,13 @@ macro_rules! panel_table {
             Shape: "shape", "Shape", Home(Group::Views, 2),
                 "What the shape tracker saw: surface, sensor, search, meshes, and the hand-off.",
                 panels::shape::Shape;
-            Budget: "budget", "Error budget", Home(Group::Views, 3),
+            Drive: "drive", "Drive", Home(Group::Views, 3),
+                "Sends the rover towards the target: its command, and the decision at every stop.",
+                driving::panel::Drive;
+            Budget: "budget", "Error budget", Home(Group::Views, 4),
                 "What accuracy stereo, driving and drift leave.",
                 panels::budget::Budget;
-            Studies: "studies", "Studies", Home(Group::Views, 4),
+            Studies: "studies", "Studies", Home(Group::Views, 5),
                 "The paper’s experiments, over worlds whose truth is known.",
                 studies::panel::Studies;
             Strip: "strip", "Template strip", Home(Group::Strip, 0),
@@ -63,7 +66,7 @@ macro_rules! panel_table {
             Messages: "messages", "Messages", Home(Group::Details, 3),
                 "What was refused or failed, with how to mend it",
                 panels::messages::Messages;
-            Runs: "runs", "Runs", Home(Group::Views, 5),
+            Runs: "runs", "Runs", Home(Group::Views, 6),
                 "What each run is worth, and which settings make the difference.",
                 panels::runs::Runs;
             Uncertainty: "uncertainty", "Uncertainty", Home(Group::Plots, 2),

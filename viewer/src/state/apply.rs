@@ -100,6 +100,7 @@ impl State {
             Command::Aim(aim) => self.aim(aim),
             Command::Tour(turn) => self.turn_tour(turn),
             Command::Why(ask) => self.ask_why(ask),
+            Command::Drive(ask) => self.ask_of_driving(ask),
             Command::Notes(ask) => self.ask_of_notes(ask),
             Command::Exports(ask) => self.ask_of_exports(ask),
             Command::Ask(ask) => self.apply_ask(ask),

@@ -53,6 +53,7 @@ impl State {
                     self.progress.insert((target, run), Progress { k, n, doing });
                 }
                 self.run_went_on(target, run);
+                self.drive_went_on();
             }
             Event::RunProgress { .. } => {}
             Event::CursorMoved { session, cursor } if is_ours(&session) => self.cursor_went(cursor),
@@ -215,9 +216,18 @@ impl State {
             (self.designating, self.refusal, self.rendering) = (None, None, None);
             self.forget_deeds();
         }
-        if self.traverse.as_ref().is_none_or(|open| open.id != view.traverse) {
-            self.traverse = None;
-            self.read_traverse(view.traverse.clone());
+        self.drive_went_on();
+        match &self.traverse {
+            Some(open) if open.id == view.traverse => {
+                // A drive on commands has come to another stop.
+                if open.stops.len() < view.stop_count {
+                    self.read_traverse(view.traverse.clone());
+                }
+            }
+            _ => {
+                self.traverse = None;
+                self.read_traverse(view.traverse.clone());
+            }
         }
         self.note_waiting_runs(&view);
         let is_kept = std::mem::take(&mut self.sync.keeps_cursor) && !is_other;

@@ -56,6 +56,7 @@ use crate::compare::Compare;
 use crate::drawing::raster::Raster;
 use crate::drawing::stretch::Stretch;
 use crate::drawing::view2d::View2d;
+use crate::driving::Driving;
 use crate::exports::Exports;
 use crate::files::Files;
 use crate::net::calls::Calls;
@@ -132,6 +133,8 @@ pub struct State {
     pub compare: Compare,
     /// How well a target would do at the stop that is looked at.
     pub trackability: Trackability,
+    /// The drive on commands, and the command in its form.
+    pub driving: Driving,
     /// Where the tour is.
     pub tour: Tour,
     /// Why a step came out as it did, what would have saved it, and what is tried.
@@ -196,6 +199,7 @@ impl State {
             single_keys: true,
             compare: Compare::default(),
             trackability: Trackability::default(),
+            driving: Driving::default(),
             tour: Tour::default(),
             why: Why::default(),
             undo: Undo::default(),
@@ -355,6 +359,7 @@ impl State {
     fn sync_all(&mut self) {
         self.sync_session();
         self.sync_trackability();
+        self.sync_driving();
         self.sync_tour();
         self.sync_ask();
     }

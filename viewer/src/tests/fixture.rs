@@ -61,6 +61,7 @@ pub(crate) fn without_target() -> State {
         cursor: Cursor::default(),
         targets: Vec::new(),
         breakpoints: Vec::new(),
+        steering: None,
     });
     state
 }

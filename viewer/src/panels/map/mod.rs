@@ -23,7 +23,7 @@ use crate::panels::panel::{Panel, TableOf};
 use crate::panels::sheets;
 use crate::pointed::Pointed;
 use crate::state::{State, run_letter};
-use crate::theme;
+use crate::{driving, theme};
 
 /// How near to a stop a click must be to go there, points.
 const CLICK_REACH: f32 = 14.0;
@@ -113,6 +113,7 @@ fn drive(ui: &mut Ui, state: &State, stops: &[StopView], run: Option<&RunView>, 
                 paint_trail(plot, stops, other.run, other.look.colour);
             }
         }
+        driving::map::paint(plot, state);
         if let Some((truth, _)) = truth_in_site(state) {
             let points = Points::new("", on_map(&truth)).color(theme::truth()).radius(6.0);
             plot.points(points.shape(MarkerShape::Plus));
@@ -143,6 +144,10 @@ fn names_of(state: &State, stops: &[StopView]) -> Vec<(Mark, Color32, String)> {
     }
     if let Some((_, off_m)) = truth_in_site(state) {
         names.push((Mark::Plus, theme::truth(), format!("truth, {:.0} cm off", off_m * 100.0)));
+    }
+    if state.cycle_at(state.cursor.step).is_some() {
+        names.push((Mark::Cross, theme::accent(), "goal".to_owned()));
+        names.push((Mark::Stroke(overlay::Line::Dashed), theme::accent(), "planned".to_owned()));
     }
     if state.cloud().ready().is_some() {
         names.push((Mark::Dot, theme::run(state.cursor.run), "bootstrap of this step".to_owned()));

@@ -1,0 +1,36 @@
+//! Driving on commands: the form of the command, the drive as the server has it, and the panel that shows both.
+
+pub(crate) mod map;
+pub(crate) mod panel;
+pub(crate) mod update;
+pub(crate) mod words;
+
+use sightline_rover::driving::DriveCommand;
+use sightline_session::driving::DriveView;
+
+/// The drive of the open session.
+#[derive(Clone, Debug, Default)]
+pub struct Driving {
+    /// The command as it stands in the form.
+    pub command: DriveCommand,
+    /// The drive with the name of its session; `None` before it was read.
+    pub view: Option<(String, DriveView)>,
+    is_asked: bool,
+    is_stale: bool,
+    is_beginning: bool,
+}
+
+/// What a person asks for about driving.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Ask {
+    /// Changes the command in the form.
+    Form(DriveCommand),
+    /// Begins a drive with the run that is looked at: from the first stop, or as a branch at the cursor's stop.
+    Begin,
+    /// Lets the rover wait at its present stop.
+    Pause,
+    /// Drives one stop further.
+    OneStop,
+    /// Drives on with the run that is looked at, under the command in the form.
+    GoOn,
+}

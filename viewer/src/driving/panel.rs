@@ -1,0 +1,220 @@
+//! The panel “Drive”: the command, the buttons that drive, and the decision at every stop.
+
+use egui::{Button, CollapsingHeader, ComboBox, DragValue, Grid, Label, RichText, ScrollArea, Ui};
+use sightline_rover::driving::{DriveCommand, GoalRule};
+use sightline_session::driving::DriveView;
+
+use crate::command::{Command, Go};
+use crate::driving::{Ask, words};
+use crate::panels::digits;
+use crate::panels::panel::Panel;
+use crate::state::{State, run_letter};
+use crate::{panels, theme};
+
+/// The panel “Drive”.
+pub(crate) struct Drive;
+
+impl Panel for Drive {
+    fn show(&self, ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+        show(ui, state, out);
+    }
+
+    fn missing(&self, state: &State) -> Option<String> {
+        state.run().is_none().then(|| state.missing_target())
+    }
+}
+
+/// Shows command, buttons and decisions.
+pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    ScrollArea::both().auto_shrink(false).show(ui, |ui| {
+        form(ui, state, out);
+        match state.drive().filter(|_| state.is_on_commands()) {
+            Some(drive) => {
+                buttons(ui, state, drive, out);
+                standing(ui, drive);
+                decisions(ui, state, drive, out);
+            }
+            None if state.is_on_commands() => {
+                ui.label(theme::note("Reading the drive …"));
+            }
+            None => begin(ui, state, out),
+        }
+    });
+}
+
+/// The command as it can be changed.
+fn form(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let mut command = state.driving.command;
+    ui.horizontal_wrapped(|ui| {
+        number(
+            ui,
+            "standoff",
+            " m",
+            &mut command.standoff_m,
+            (0.3, 50.0),
+            "Horizontal distance of the goal from the target",
+        );
+        number(
+            ui,
+            "tolerance",
+            " m",
+            &mut command.tolerance_m,
+            (0.001, 1.0),
+            "Distance from the goal at which the rover has arrived",
+        );
+        let mut percent = 100.0 * command.step_fraction;
+        number(
+            ui,
+            "step",
+            " %",
+            &mut percent,
+            (1.0, 50.0),
+            "Longest step as a part of the distance to the target",
+        );
+        if percent != 100.0 * command.step_fraction {
+            command.step_fraction = percent / 100.0;
+        }
+        let rule = |rule| match rule {
+            GoalRule::FollowsTarget => "goal follows the target",
+            GoalRule::Fixed => "goal stays where it was",
+        };
+        let choice = ComboBox::from_id_salt("goal rule").width(150.0).selected_text(rule(command.goal));
+        let shown = choice.show_ui(ui, |ui| {
+            for one in [GoalRule::FollowsTarget, GoalRule::Fixed] {
+                if panels::entry(ui, command.goal == one, rule(one)).clicked() {
+                    command.goal = one;
+                }
+            }
+        });
+        shown.response.accessible_name("goal");
+    });
+    CollapsingHeader::new(theme::label("offset and limits")).id_salt("drive limits").show(ui, |ui| {
+        limits(ui, &mut command);
+    });
+    if command != state.driving.command {
+        out.push(Command::Drive(Ask::Form(command)));
+    }
+}
+
+fn limits(ui: &mut Ui, command: &mut DriveCommand) {
+    ui.horizontal_wrapped(|ui| {
+        let [north, east] = &mut command.offset_m;
+        number(ui, "offset north", " m", north, (-20.0, 20.0), "Added to the goal");
+        number(ui, "offset east", " m", east, (-20.0, 20.0), "Added to the goal");
+        let stops = DragValue::new(&mut command.stops_max).range(2..=1000).prefix("stops ");
+        ui.add(stops).accessible_name("stops").on_hover_text("Most stops, the first included");
+        number(ui, "tilt", "°", &mut command.tilt_max_deg, (1.0, 45.0), "Largest tilt after a step");
+        number(ui, "time", " min", &mut command.flight_minutes_max, (1.0, 10_000.0), "Time on Mars");
+    });
+}
+
+fn number(ui: &mut Ui, name: &str, unit: &str, value: &mut f64, (low, high): (f64, f64), help: &str) {
+    let drag = DragValue::new(value).range(low..=high).speed(0.01).max_decimals(3);
+    ui.add(drag.prefix(format!("{name} ")).suffix(unit)).accessible_name(name).on_hover_text(help);
+}
+
+/// The button that begins a drive, or the sentence that says why there is none.
+fn begin(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let is_simulated = state.traverse.as_ref().is_some_and(|traverse| traverse.simulated);
+    if !is_simulated {
+        let sentence = "This drive was recorded: the rover cannot be sent anywhere else. Open a scenario to drive in it.";
+        ui.add(Label::new(RichText::new(sentence).color(theme::lost())).wrap());
+        return;
+    }
+    let run = run_letter(state.cursor.run);
+    if ui
+        .button("Drive")
+        .on_hover_text("Begins a drive from the first stop, in a session of its own")
+        .clicked()
+    {
+        out.push(Command::Drive(Ask::Begin));
+    }
+    let sentence = format!(
+        "This session replays a drive that was planned beforehand. “Drive” sends the rover from the first stop towards the target \
+         on the estimates of run {run}."
+    );
+    ui.add(Label::new(theme::note(sentence)).wrap());
+}
+
+/// What can be done with a drive.
+fn buttons(ui: &mut Ui, state: &State, drive: &DriveView, out: &mut Vec<Command>) {
+    let has_ended = drive.cycles.last().is_some_and(|cycle| cycle.ending.is_some());
+    let is_driver = drive.steering.is_some_and(|steering| {
+        state.cursor.target == Some(steering.target) && state.cursor.run == steering.run
+    });
+    let is_other_command = drive.steering.is_some_and(|steering| steering.command != state.driving.command);
+    ui.horizontal_wrapped(|ui| {
+        let mut button = |name: &str, is_on: bool, help: &str, ask: Ask| {
+            if ui.add_enabled(is_on, Button::new(name)).on_hover_text(help).clicked() {
+                out.push(Command::Drive(ask));
+            }
+        };
+        if drive.is_driving {
+            button(
+                "Pause",
+                true,
+                "The rover waits once the target is located at the present stop",
+                Ask::Pause,
+            );
+        } else {
+            let goes_on = !has_ended || is_other_command || !is_driver;
+            let name = if is_driver {
+                "Drive on".to_owned()
+            } else {
+                format!("Drive on with run {}", run_letter(state.cursor.run))
+            };
+            button(&name, goes_on, "Drives on from the last stop under this command", Ask::GoOn);
+            button("One stop", goes_on, "Drives to the next stop and waits there", Ask::OneStop);
+        }
+        let branch = format!("Branch at stop {}", state.cursor.step);
+        button(
+            &branch,
+            true,
+            "Drives from the stop that is looked at, in a world and a session of its own",
+            Ask::Begin,
+        );
+    });
+}
+
+/// Where the drive stands.
+fn standing(ui: &mut Ui, drive: &DriveView) {
+    let ending = drive.cycles.last().and_then(|cycle| cycle.ending);
+    let (text, colour) = match (ending, drive.is_driving) {
+        (Some(ending), _) => {
+            let is_good = ending.reason == sightline_rover::driving::StopReason::Arrived;
+            (words::ending(&ending), theme::verdict(is_good))
+        }
+        (None, true) => ("drives".to_owned(), theme::text()),
+        (None, false) => ("waits".to_owned(), theme::text()),
+    };
+    ui.add(Label::new(RichText::new(text).color(colour)).wrap());
+    if let Some(summary) = &drive.summary {
+        ui.add(Label::new(theme::note(words::summary(summary))).wrap());
+    }
+}
+
+/// One line a stop.
+fn decisions(ui: &mut Ui, state: &State, drive: &DriveView, out: &mut Vec<Command>) {
+    Grid::new("decisions").num_columns(5).striped(true).spacing([12.0, 2.0]).show(ui, |ui| {
+        for head in ["stop", "to the goal", "motion", "reported", "on Mars"] {
+            ui.label(theme::note(head));
+        }
+        ui.end_row();
+        for cycle in &drive.cycles {
+            let is_here = cycle.step == state.cursor.step;
+            if ui.selectable_label(is_here, theme::number(cycle.step.to_string())).clicked() {
+                out.push(Command::Go(Go::Step(cycle.step)));
+            }
+            ui.label(theme::number(format!("{} m", digits(cycle.goal.distance_m))));
+            let motion = match (&cycle.motion, &cycle.ending) {
+                (Some(motion), _) => words::motion(motion),
+                (None, Some(ending)) => words::reason(ending.reason).to_owned(),
+                (None, None) => String::new(),
+            };
+            ui.label(theme::label(motion).size(12.0));
+            ui.label(theme::number(words::report(cycle)));
+            ui.label(theme::number(format!("{} min", digits(cycle.flight_minutes))));
+            ui.end_row();
+        }
+    });
+}

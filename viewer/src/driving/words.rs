@@ -1,0 +1,96 @@
+//! Motions, ends and outcomes in words.
+
+use sightline_rover::driving::{Cycle, Ending, Motion, StopReason};
+use sightline_session::driving::DriveSummary;
+
+use crate::panels::digits;
+
+/// A motion as a person would tell it.
+pub(super) fn motion(motion: &Motion) -> String {
+    let side = |value: f64| if value > 0.0 { "right" } else { "left" };
+    match *motion {
+        Motion::Turn { angle_rad } => {
+            format!("turn {}° {}", digits(angle_rad.abs().to_degrees()), side(angle_rad))
+        }
+        Motion::Arc { length_m, curvature_per_m } => {
+            let way = if length_m < 0.0 { "back" } else { "ahead" };
+            let length = format!("{} m {way}", digits(length_m.abs()));
+            // Straighter than that nobody can tell.
+            if curvature_per_m.abs() < 1e-3 {
+                return length;
+            }
+            format!("{length}, radius {} m {}", digits(1.0 / curvature_per_m.abs()), side(curvature_per_m))
+        }
+    }
+}
+
+/// Why a drive ended.
+pub(super) fn reason(reason: StopReason) -> &'static str {
+    match reason {
+        StopReason::Arrived => "arrived",
+        StopReason::Lost => "target lost",
+        StopReason::Stalled => "a wheel stalled at a rock",
+        StopReason::Tilt => "tilted too much",
+        StopReason::Time => "time on Mars used up",
+        StopReason::StopLimit => "all stops used up",
+    }
+}
+
+/// The end with the numbers that decided.
+pub(super) fn ending(ending: &Ending) -> String {
+    let unit = match ending.reason {
+        StopReason::Arrived => " m from the goal",
+        StopReason::Tilt => "°",
+        StopReason::Time => " min",
+        StopReason::StopLimit => " stops",
+        StopReason::Lost | StopReason::Stalled => "",
+    };
+    match (ending.value, ending.limit) {
+        (Some(value), Some(limit)) => {
+            format!("{}: {}{unit}, limit {}", reason(ending.reason), digits(value), digits(limit))
+        }
+        _ => reason(ending.reason).to_owned(),
+    }
+}
+
+/// What a drive came to.
+pub(super) fn summary(summary: &DriveSummary) -> String {
+    let centimetres = |value: Option<f64>| {
+        value.map_or_else(|| "not known".to_owned(), |value_m| format!("{} cm", digits(100.0 * value_m)))
+    };
+    format!(
+        "{} stops, {} m driven in {} min on Mars; target off by {}, goal off by {}",
+        summary.stops,
+        digits(summary.driven_m),
+        digits(summary.flight_minutes),
+        centimetres(summary.target_error_m),
+        centimetres(summary.goal_error_m),
+    )
+}
+
+/// What the rover reported of the drive from a stop.
+pub(super) fn report(cycle: &Cycle) -> String {
+    match cycle.report {
+        None => String::new(),
+        Some(report) => match report.stall {
+            Some(stall) => format!("stalled after {} %", digits(100.0 * stall.completed)),
+            None => format!("{} m, tilt {}°", digits(report.wheels_m), digits(report.tilt_deg)),
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn motions_and_ends_are_told_in_words() {
+        let arc = |length_m, curvature_per_m| motion(&Motion::Arc { length_m, curvature_per_m });
+        assert_eq!(arc(0.83, 0.05), "0.830 m ahead, radius 20.00 m right");
+        assert_eq!(arc(-0.2, 0.0), "0.200 m back");
+        assert_eq!(motion(&Motion::Turn { angle_rad: -0.5 }), "turn 28.65° left");
+        let arrived = Ending { reason: StopReason::Arrived, value: Some(0.008), limit: Some(0.01) };
+        assert_eq!(ending(&arrived), "arrived: 0.00800 m from the goal, limit 0.0100");
+        assert_eq!(ending(&Ending { reason: StopReason::Lost, value: None, limit: None }), "target lost");
+    }
+}
