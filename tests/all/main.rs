@@ -28,6 +28,7 @@ mod page;
 mod page_access;
 mod page_compare;
 mod page_debugger;
+mod page_driving;
 mod page_exports;
 mod page_figures;
 mod page_first;

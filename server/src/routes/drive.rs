@@ -104,12 +104,10 @@ fn add(
 ) -> ApiResult<Arc<LiveSession>> {
     let steering = Steering { target, run, command: new.command, pause_at: new.pause_at };
     let (saved, last) = live.with(|session| {
+        let steps = &session.run(target, run).map_err(|error| ApiError::from(error).about_path())?.steps;
         // Refused before a world is made.
         session.clone().steer(steering)?;
-        Ok::<_, ApiError>((
-            session.saved(),
-            session.run(target, run)?.steps.last().map_or(0, |last| last.step),
-        ))
+        Ok::<_, ApiError>((session.saved(), steps.last().map_or(0, |last| last.step)))
     })?;
     let open = live.traverse();
     let designated = saved.targets[target].designation.step;

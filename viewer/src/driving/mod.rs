@@ -15,6 +15,8 @@ pub struct Driving {
     pub command: DriveCommand,
     /// The drive with the name of its session; `None` before it was read.
     pub view: Option<(String, DriveView)>,
+    /// The cursor's stop, and the one to which it goes with the rover once the page knows it.
+    following: Option<[usize; 2]>,
     is_asked: bool,
     is_stale: bool,
     is_beginning: bool,

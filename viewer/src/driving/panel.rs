@@ -1,7 +1,7 @@
 //! The panel “Drive”: the command, the buttons that drive, and the decision at every stop.
 
 use egui::{Button, CollapsingHeader, ComboBox, DragValue, Grid, Label, RichText, ScrollArea, Ui};
-use sightline_rover::driving::{DriveCommand, GoalRule};
+use sightline_rover::driving::{DriveCommand, GoalRule, StopReason};
 use sightline_session::driving::DriveView;
 
 use crate::command::{Command, Go};
@@ -180,10 +180,7 @@ fn buttons(ui: &mut Ui, state: &State, drive: &DriveView, out: &mut Vec<Command>
 fn standing(ui: &mut Ui, drive: &DriveView) {
     let ending = drive.cycles.last().and_then(|cycle| cycle.ending);
     let (text, colour) = match (ending, drive.is_driving) {
-        (Some(ending), _) => {
-            let is_good = ending.reason == sightline_rover::driving::StopReason::Arrived;
-            (words::ending(&ending), theme::verdict(is_good))
-        }
+        (Some(ending), _) => (words::ending(&ending), theme::verdict(ending.reason == StopReason::Arrived)),
         (None, true) => ("drives".to_owned(), theme::text()),
         (None, false) => ("waits".to_owned(), theme::text()),
     };

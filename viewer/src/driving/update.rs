@@ -7,7 +7,7 @@ use sightline_api::wire::NewDrive;
 use sightline_rover::driving::Cycle;
 use sightline_session::driving::{DriveView, Steering};
 
-use crate::driving::Ask;
+use crate::driving::{Ask, words};
 use crate::state::State;
 use crate::state::calls::Notice;
 
@@ -28,6 +28,16 @@ impl State {
         self.drive()?.cycles.iter().find(|cycle| cycle.step == step)
     }
 
+    /// How the drive stands, in a word; `None` where nobody drives.
+    pub(crate) fn drive_word(&self) -> Option<&'static str> {
+        let drive = self.drive()?;
+        Some(match drive.cycles.last().and_then(|cycle| cycle.ending) {
+            Some(ending) => words::reason(ending.reason),
+            None if drive.is_driving => "drives",
+            None => "waits",
+        })
+    }
+
     /// Notes that the drive has gone on.
     pub(crate) fn drive_went_on(&mut self) {
         self.driving.is_stale = true;
@@ -35,6 +45,7 @@ impl State {
 
     /// Reads the drive when it has gone on.
     pub(crate) fn sync_driving(&mut self) {
+        self.follow_rover();
         let Some(session) = self.session.as_ref().filter(|session| session.steering.is_some()) else {
             return;
         };
@@ -63,16 +74,30 @@ impl State {
         let newest = |view: &DriveView| view.cycles.last().map(|cycle| cycle.step);
         let before = self.drive().and_then(newest);
         let is_other = self.driving.view.as_ref().is_none_or(|(known, _)| *known != session);
+        if is_other {
+            self.driving.following = None;
+        }
         if let Some(steering) = view.steering.filter(|_| is_other) {
             self.driving.command = steering.command;
         }
         let now = newest(&view);
         self.driving.view = Some((session, view));
-        if let (Some(before), Some(now)) = (before, now)
-            && self.cursor.step == before
-            && now < self.stop_count()
-        {
-            self.cursor.step = now;
+        let here = self.cursor.step;
+        let is_with_rover = before == Some(here) || self.driving.following.is_some();
+        if let Some(now) = now.filter(|now| is_with_rover && *now > here) {
+            self.driving.following = Some([here, now]);
+        }
+        self.follow_rover();
+    }
+
+    /// Moves the cursor to the rover's stop once its images are known, unless the person went elsewhere.
+    fn follow_rover(&mut self) {
+        let Some([from, to]) = self.driving.following else { return };
+        if self.cursor.step != from {
+            self.driving.following = None;
+        } else if to < self.stop_count() {
+            self.cursor.step = to;
+            self.driving.following = None;
         }
     }
 
@@ -147,5 +172,110 @@ impl State {
                 Notice::Card
             },
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::command::Command;
+    use crate::net::request::Request;
+    use crate::tests::fixture;
+    use serde_json::json;
+    use sightline_api::wire::Event;
+
+    /// A session that drives with its only run, at a stop.
+    fn driving(step: usize) -> State {
+        let mut state = fixture::at_step(&egui::Context::default(), step);
+        let steering = Steering { target: 0, run: 0, command: Default::default(), pause_at: None };
+        if let Some(session) = &mut state.session {
+            session.steering = Some(steering);
+        }
+        state
+    }
+
+    fn view(stops: usize, is_driving: bool) -> DriveView {
+        let goal =
+            json!({ "in_site_m": [4.0, 0.5], "in_rover_m": [3.0, 0.5], "distance_m": 3.0, "arrived": false });
+        let cycle = |step: usize| {
+            json!({ "step": step, "goal": goal, "flight_minutes": 1.0, "ending": null, "report": null,
+                "motion": { "kind": "arc", "length_m": 0.5, "curvature_per_m": 0.01 } })
+        };
+        let steering = json!({ "target": 0, "run": 0, "command": { "standoff_m": 1.5 }, "pause_at": null });
+        let cycles: Vec<_> = (0..stops).map(cycle).collect();
+        serde_json::from_value(
+            json!({ "steering": steering, "cycles": cycles, "summary": null, "is_driving": is_driving }),
+        )
+        .unwrap()
+    }
+
+    fn calls_of(state: &mut State) -> Vec<(String, Option<serde_json::Value>)> {
+        let body = |bytes: Option<Vec<u8>>| bytes.map(|bytes| serde_json::from_slice(&bytes).unwrap());
+        let requests = state.take_requests().into_iter();
+        let calls = requests.filter_map(|request| match request {
+            Request::Call { call, .. } => Some((call.path, body(call.body))),
+            _ => None,
+        });
+        calls.filter(|(path, _)| path.contains("drive")).collect()
+    }
+
+    #[test]
+    fn the_drive_is_read_when_it_goes_on_and_the_cursor_goes_with_the_rover() {
+        let mut state = driving(1);
+        assert_eq!(calls_of(&mut state), [("sessions/s1/drive".to_owned(), None)]);
+        assert_eq!(calls_of(&mut state), [], "it is asked for once");
+        state.driving.is_asked = false;
+        state.took_drive("s1".to_owned(), view(2, true));
+        assert_eq!(state.driving.command.standoff_m, 1.5, "the form shows the command of the drive");
+        assert_eq!(calls_of(&mut state), []);
+        state.told(Event::RunProgress {
+            session: "s1".to_owned(),
+            target: 0,
+            run: 0,
+            k: 3,
+            n: 3,
+            ended: false,
+            doing: "tracking".to_owned(),
+        });
+        assert_eq!(calls_of(&mut state).len(), 1, "an event makes it stale");
+        state.took_drive("s1".to_owned(), view(3, true));
+        assert_eq!(state.cursor.step, 2);
+        // Whoever looks at an earlier stop stays there.
+        state.cursor.step = 0;
+        state.took_drive("s1".to_owned(), view(4, true));
+        assert_eq!(state.cursor.step, 0);
+    }
+
+    #[test]
+    fn pausing_stepping_and_driving_on_are_one_command_to_the_server() {
+        let mut state = driving(1);
+        let _ = calls_of(&mut state);
+        state.took_drive("s1".to_owned(), view(2, true));
+        let last = state.last_stop().unwrap();
+        for (ask, pause_at) in
+            [(Ask::Pause, json!(last)), (Ask::OneStop, json!(last + 1)), (Ask::GoOn, json!(null))]
+        {
+            state.perform(Command::Drive(ask));
+            let (path, body) = calls_of(&mut state).pop().unwrap();
+            assert_eq!(path, "sessions/s1/drive");
+            assert_eq!(body.unwrap()["pause_at"], pause_at);
+        }
+    }
+
+    #[test]
+    fn a_drive_begins_at_the_first_stop_and_branches_at_the_one_that_is_looked_at() {
+        let mut state = fixture::at_step(&egui::Context::default(), 2);
+        state.perform(Command::Drive(Ask::Begin));
+        let (path, body) = calls_of(&mut state).pop().unwrap();
+        assert_eq!(path, "sessions/s1/targets/0/runs/0/drive");
+        assert_eq!(body.unwrap().get("from_step"), None);
+        state.perform(Command::Drive(Ask::Begin));
+        assert_eq!(calls_of(&mut state), [], "one world at a time");
+
+        let mut state = driving(2);
+        let _ = calls_of(&mut state);
+        state.took_drive("s1".to_owned(), view(3, false));
+        state.perform(Command::Drive(Ask::Begin));
+        assert_eq!(calls_of(&mut state).pop().unwrap().1.unwrap()["from_step"], json!(2));
     }
 }

@@ -86,7 +86,7 @@ mod tests {
     #[test]
     fn motions_and_ends_are_told_in_words() {
         let arc = |length_m, curvature_per_m| motion(&Motion::Arc { length_m, curvature_per_m });
-        assert_eq!(arc(0.83, 0.05), "0.830 m ahead, radius 20.00 m right");
+        assert_eq!(arc(0.83, 0.05), "0.830 m ahead, radius 20 m right");
         assert_eq!(arc(-0.2, 0.0), "0.200 m back");
         assert_eq!(motion(&Motion::Turn { angle_rad: -0.5 }), "turn 28.65° left");
         let arrived = Ending { reason: StopReason::Arrived, value: Some(0.008), limit: Some(0.01) };
