@@ -1,4 +1,4 @@
-//! Builds that do not depend on the folders in which they happen.
+//! Builds that do not depend on the folders in which they happen, nor on the time.
 //!
 //! Messages of panics and logs contain the paths of sources. The compilers write fixed names in place of the folders of
 //! this machine:
@@ -20,6 +20,10 @@ use crate::cmd;
 /// A folder, and the name that replaces it.
 type Renamed = (PathBuf, String);
 
+/// What makes C sources that name the time of their compilation (mimalloc's) the same at any time.
+const WITHOUT_TIME: [&str; 3] =
+    ["-Wno-builtin-macro-redefined", "-D__DATE__=\"none\"", "-D__TIME__=\"none\""];
+
 /// Makes a Cargo command that builds into `target_dir` leave this machine's folders out of its results.
 ///
 /// The options replace those of `RUSTFLAGS` and of Cargo's configuration.
@@ -29,7 +33,8 @@ pub(crate) fn apply(cargo: &mut Command, target_dir: &Path) -> Result<()> {
     cargo.env("CARGO_ENCODED_RUSTFLAGS", options.join("\u{1f}"));
     // `CFLAGS` is a list that spaces separate.
     let of_c = renamed.iter().map(|pair| option("-ffile-prefix-map", pair));
-    cargo.env("CFLAGS", of_c.filter(|option| !option.contains(' ')).collect::<Vec<_>>().join(" "));
+    let of_c = of_c.filter(|option| !option.contains(' ')).chain(WITHOUT_TIME.map(str::to_owned));
+    cargo.env("CFLAGS", of_c.collect::<Vec<_>>().join(" "));
     Ok(())
 }
 
@@ -75,6 +80,7 @@ mod tests {
         assert_eq!((options.len(), options[0]), (4, workspace.as_str()));
         assert_eq!(options[2], "--remap-path-prefix=/a b/target=/target");
         assert!(options[3].contains("=/rustc/") && !options[3].ends_with("unknown"));
-        assert!(!value("CFLAGS").expect("options").contains("/a b"));
+        let of_c = value("CFLAGS").expect("options");
+        assert!(!of_c.contains("/a b") && of_c.ends_with("-D__TIME__=\"none\""), "{of_c}");
     }
 }
