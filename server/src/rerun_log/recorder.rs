@@ -44,7 +44,8 @@ pub(super) struct Recorder {
     stream: RecordingStream,
     /// Whether a viewer should follow the newest step.
     live: bool,
-    has_traverse: bool,
+    /// Stops of the traverse that are in the recording; a drive on commands gains more.
+    stop_count: usize,
     /// Stops whose images are in the recording.
     captured: BTreeSet<usize>,
     /// The runs by their names in paths.
@@ -99,21 +100,25 @@ impl Recorder {
     /// A recording into `stream`; its rows carry no clock time, only the step and the traverse's own time.
     pub(super) fn new(stream: RecordingStream, live: bool) -> Self {
         stream.set_log_time_enabled(false);
-        Self { stream, live, has_traverse: false, captured: BTreeSet::new(), runs: BTreeMap::new() }
+        Self { stream, live, stop_count: 0, captured: BTreeSet::new(), runs: BTreeMap::new() }
     }
 
-    /// Logs what does not depend on any run, the first time it is called.
+    /// Logs what does not depend on any run: all of it the first time, later the stops that are new.
     pub(super) fn log_traverse(&mut self, name: &str, stops: &dyn Stops) -> Logged {
-        if std::mem::replace(&mut self.has_traverse, true) {
+        let count = stops.stop_count();
+        let before = std::mem::replace(&mut self.stop_count, count);
+        if before >= count {
             return Ok(());
         }
-        self.stream.send_recording_name(name)?;
-        properties::send(&self.stream, name)?;
-        let about = format!("# {name}\n{} stops. Frames: site x north, y east, z down.", stops.stop_count());
+        if before == 0 {
+            self.stream.send_recording_name(name)?;
+            properties::send(&self.stream, name)?;
+            map::log_site_axes(&self.stream)?;
+        }
+        let about = format!("# {name}\n{count} stops. Frames: site x north, y east, z down.");
         self.stream.log_static("/traverse", &TextDocument::from_markdown(about))?;
-        map::log_site_axes(&self.stream)?;
         map::log_path(&self.stream, stops)?;
-        (0..stops.stop_count()).try_for_each(|step| {
+        (before..count).try_for_each(|step| {
             self.set_time(step, stops);
             log_stop(&self.stream, stops, step)
         })
