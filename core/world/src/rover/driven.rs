@@ -297,6 +297,14 @@ mod tests {
         assert!((0.3..0.6).contains(&stops[1].completed), "{}", stops[1].completed);
         assert_eq!(stops[2].completed, 1.0, "it can go back");
         assert_eq!(stops[1].touched_rocks, 0);
+        // Whether a rock of 24 cm is climbed depends on the setting.
+        scenario.rocks.placed[0].height_m = 0.24;
+        for (climb_m, is_climbed) in [(0.25, true), (0.2, false)] {
+            scenario.rover.climb_m = climb_m;
+            let world = World::new(&scenario);
+            let stops = drive(&scenario, &world, &[[4.0, 0.0]]);
+            assert_eq!(stops[1].completed == 1.0, is_climbed, "{climb_m} m");
+        }
     }
 
     #[test]
