@@ -110,7 +110,7 @@ impl Drives<'_> {
         } else {
             self.without_obstacles(&world, scenario, designation, folder)?
         };
-        let command = *self.command;
+        let command = self.command.clone();
         let mut drive = TargetedDrive::begin(world, designation, command, self.settings, Cancel::default())?;
         while drive.advance(self.settings, Cancel::default())? {}
         Ok(drive.summary())

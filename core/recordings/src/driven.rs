@@ -180,6 +180,12 @@ impl ActiveWorld for DrivenTraverse {
         Ok(report)
     }
 
+    fn stay(&mut self) -> Result<()> {
+        let last = &self.driven[self.driven.len() - 1];
+        self.driven.push(last.stay());
+        self.put_last()
+    }
+
     fn point_mast(&mut self, angles: Option<MastAngles>) -> Result<()> {
         let number = self.driven.len() - 1;
         if angles.is_some() && self.driven[number].mast_angles.is_some() {

@@ -7,7 +7,7 @@ use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Error;
 use sightline_recordings::DrivenTraverse;
 use sightline_rover::driving::executive::{self, CycleInput};
-use sightline_rover::driving::{ArcNavigator, DriveCommand, GoalRule, StopReason};
+use sightline_rover::driving::{ArcNavigator, ArrivalAction, DriveCommand, GoalRule, StopReason};
 use sightline_rover::pipeline;
 use sightline_session::driving::TargetedDrive;
 use sightline_track::settings::Settings;
@@ -66,6 +66,32 @@ fn a_drive_arrives_within_centimetres_of_the_true_target() {
     for (step, cycle) in drive.steps.iter().zip(&drive.cycles) {
         let distance_m = step.update.target.last_distance_m;
         assert!(cycle.report.is_none_or(|report| report.wheels_m < 0.101 * distance_m));
+    }
+}
+
+#[test]
+fn a_look_after_arrival_is_one_more_stop_with_the_target_at_the_centre() {
+    let folder = tempfile::tempdir().unwrap();
+    let (world, designation) = world(&folder.path().join("drive"));
+    let command =
+        DriveCommand { standoff_m: 7.0, on_arrival: vec![ArrivalAction::Look; 2], ..DriveCommand::default() };
+    let settings = Settings::default();
+    let mut drive = TargetedDrive::begin(world, designation, command, &settings, Cancel::default()).unwrap();
+    while drive.advance(&settings, Cancel::default()).unwrap() {}
+    assert_eq!(drive.summary().reason, Some(StopReason::Arrived));
+    let count = drive.steps.len();
+    let decided: Vec<u32> = drive.cycles.iter().map(|cycle| cycle.arrival_actions).collect();
+    assert_eq!(decided[count - 4..], [0, 1, 2, 2]);
+    let state = drive.world.state();
+    for (k, arrived) in [(count - 2, &state[count - 3]), (count - 1, &state[count - 2])] {
+        assert!(drive.cycles[k - 1].motion.is_none() && drive.cycles[k - 1].ending.is_none());
+        assert_eq!(state[k].true_site_from_rover, arrived.true_site_from_rover);
+        assert_eq!(state[k].site_from_rover, arrived.site_from_rover);
+        // The mast points at the target as it was located at the stop before.
+        let step = &drive.steps[k];
+        let predicted = step.point_mast.predicted_left.unwrap();
+        assert!(predicted.distance(step.point_mast.left.centre_pixel()) < 1e-6, "{predicted:?}");
+        assert_ne!(state[k].mast_angles, arrived.mast_angles);
     }
 }
 

@@ -21,6 +21,12 @@ pub trait ActiveWorld {
     /// [`sightline_geometry::error::Error::Cancelled`], or a world that cannot be driven further; no stop is added then.
     fn drive(&mut self, motion: &Motion, cancel: Cancel<'_>) -> Result<DriveReport>;
 
+    /// Adds a stop at which the rover stands as at the last one, for another pair.
+    ///
+    /// # Errors
+    /// A world that cannot be continued, or a stop that cannot be stored.
+    fn stay(&mut self) -> Result<()>;
+
     /// Points the mast of the last stop; `None` leaves it as it is.
     ///
     /// # Errors

@@ -16,7 +16,7 @@ use sightline_track::target::TrackingState;
 use sightline_track::trace::StepTrace;
 
 use super::active_world::{ActiveWorld, DriveReport};
-use super::command::{DriveCommand, GoalRule};
+use super::command::{ArrivalAction, DriveCommand, GoalRule};
 use super::flight_time::FlightTime;
 use super::select_path::{Motion, Navigator};
 use super::set_goal::{Goal, set_goal};
@@ -58,10 +58,12 @@ pub struct Cycle {
     pub step: usize,
     /// The goal.
     pub goal: Goal,
-    /// The chosen motion; null where the drive ended.
+    /// The chosen motion; null where the drive ended or the rover stays.
     pub motion: Option<Motion>,
-    /// The rover's report of the motion; null where the drive ended.
+    /// The rover's report of the motion; null without one.
     pub report: Option<DriveReport>,
+    /// Actions after arrival that were begun, the one decided here included.
+    pub arrival_actions: u32,
     /// Time on Mars up to the end of this stop's drive, min.
     pub flight_minutes: f64,
     /// The end of the drive; null where it goes on.
@@ -107,8 +109,24 @@ pub fn advance(world: &mut dyn ActiveWorld, input: &CycleInput<'_>) -> Result<(C
     let mut time = FlightTime::of_stop(sizes);
     let minutes =
         |time: &FlightTime| input.before.map_or(0.0, |before| before.flight_minutes) + time.total_s() / 60.0;
-    let mut cycle =
-        Cycle { step, goal, motion: None, report: None, flight_minutes: minutes(&time), ending: None };
+    let arrival_actions = input.before.map_or(0, |before| before.arrival_actions);
+    let mut cycle = Cycle {
+        step,
+        goal,
+        motion: None,
+        report: None,
+        arrival_actions,
+        flight_minutes: minutes(&time),
+        ending: None,
+    };
+    let has_arrived = goal.arrived || arrival_actions > 0;
+    let action = input.command.on_arrival.get(arrival_actions as usize).filter(|_| has_arrived);
+    if let Some(ArrivalAction::Look) = action {
+        world.stay()?;
+        cycle.arrival_actions += 1;
+        let trace = track(world, &input.last.update, input)?;
+        return Ok((cycle, Some(trace)));
+    }
     cycle.ending = ending(input, &cycle);
     if cycle.ending.is_some() {
         return Ok((cycle, None));
@@ -147,7 +165,8 @@ fn ending(input: &CycleInput<'_>, cycle: &Cycle) -> Option<Ending> {
     let end =
         |reason, value: f64, limit: f64| Some(Ending { reason, value: Some(value), limit: Some(limit) });
     let named = |reason| Some(Ending { reason, value: None, limit: None });
-    if cycle.goal.arrived {
+    // A later look may put the goal a little elsewhere; the rover has arrived all the same.
+    if cycle.goal.arrived || cycle.arrival_actions > 0 {
         return end(StopReason::Arrived, cycle.goal.distance_m, command.tolerance_m);
     }
     // The baseline drives on whatever tracking makes of it.

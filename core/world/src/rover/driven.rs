@@ -113,6 +113,20 @@ impl DrivenStop {
         })
     }
 
+    /// The stop after this one when the rover does not move.
+    #[must_use]
+    pub fn stay(&self) -> Self {
+        Self {
+            time_s: self.time_s + PAUSE_S,
+            wheels_m: 0.0,
+            drive_s: 0.0,
+            completed: 1.0,
+            // A rock is counted at the stop at which it was reached.
+            touched_rocks: 0,
+            ..self.clone()
+        }
+    }
+
     /// Rolls the true rover; the leg and the part of the motion that was completed.
     fn roll(
         &self,
