@@ -9,6 +9,7 @@
 //! description = "an example"                # optional
 //! full_scale_dn = 4095.0                    # grey value of full scale; default 255 or 65535 by PNG depth
 //! stereo = "lateral"                        # or "convergent": two freely placed views; default lateral
+//! # pointing_error_deg = 0.05               # 1σ error of each mast angle; default 0
 //! # scenario = "scenario.toml"              # simulated: missing images are rendered from this file
 //!
 //! [odometry_error]                          # 1σ error of the pose estimates; these are the defaults

@@ -51,6 +51,7 @@ fn index(stops: usize) -> TraverseIndex {
         full_scale_dn: Some(4095.0),
         stereo: StereoGeometry::Convergent,
         odometry_error: OdometryError { along_fraction: 1.0 / 3.0, ..OdometryError::default() },
+        pointing_error_deg: 0.05,
         mast: None,
         scenario: None,
         stops: (0..stops).map(stop).collect(),

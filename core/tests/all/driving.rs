@@ -62,6 +62,15 @@ fn a_drive_arrives_within_centimetres_of_the_true_target() {
         let off_px = step.located().unwrap().left_pixel.unwrap().distance(centre);
         assert!(off_px < 60.0, "stop {}: {off_px} px", step.step);
     }
+    // The estimate's covariance contains the known error of the mast.
+    for step in &drive.steps {
+        let error = step.point_mast.error_covariance_in_rover.unwrap();
+        let sigma_m = error.symmetric_eigenvalues().max().sqrt();
+        assert!((sigma_m / (0.05f64.to_radians() * step.range_m()) - 1.0).abs() < 0.15, "{sigma_m}");
+        let located = step.located().unwrap().covariance_in_rover.unwrap();
+        let added = step.update.target.covariance_in_rover - located;
+        assert!((added - error).norm() < 0.1 * error.norm(), "stop {}", step.step);
+    }
     // No step is longer than a tenth of the distance to the target.
     for (step, cycle) in drive.steps.iter().zip(&drive.cycles) {
         let distance_m = step.update.target.last_distance_m;

@@ -39,6 +39,7 @@ pub fn empty_index(scenario: &Scenario) -> TraverseIndex {
         full_scale_dn: Some(scenario.camera.recorded_full_scale_dn()),
         stereo: StereoGeometry::Lateral,
         odometry_error: scenario.odometry_error,
+        pointing_error_deg: scenario.drive.pointing_error_deg,
         mast: match Rig::new(&scenario.camera) {
             Rig::Mast(mast) => Some(mast),
             Rig::Body { .. } => None,

@@ -32,6 +32,9 @@ pub struct TraverseIndex {
     /// How the two images of a stop relate.
     #[serde(default)]
     pub stereo: StereoGeometry,
+    /// 1σ error of each mast angle, deg; 0 where it is not known.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub pointing_error_deg: f64,
     /// The error model of the pose estimates.
     #[serde(default)]
     pub odometry_error: OdometryError,
@@ -43,6 +46,10 @@ pub struct TraverseIndex {
     pub scenario: Option<String>,
     /// The stops in driving order.
     pub stops: Vec<Stop>,
+}
+
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 /// One stop of the rover.

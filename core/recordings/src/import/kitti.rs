@@ -117,6 +117,7 @@ impl ImportFormat for Kitti {
             full_scale_dn: None,
             stereo: StereoGeometry::Lateral,
             odometry_error,
+            pointing_error_deg: 0.0,
             mast: None,
             scenario: None,
             stops,

@@ -89,6 +89,7 @@ impl ImportFormat for Pds3 {
             full_scale_dn: Some(scale.full_scale_dn),
             stereo,
             odometry_error: OdometryError::default(),
+            pointing_error_deg: 0.0,
             mast: None,
             scenario: None,
             stops,
