@@ -42,7 +42,8 @@
 //! quaternion_sxyz = [1.0, 0.0, 0.0, 0.0]
 //! ```
 //!
-//! Optional besides: `[mast]` (origin and head cameras), `stops.mast_angles` (azimuth and elevation, rad) and
+//! Optional besides: `[mast]` (origin and head cameras), `stops.mast_angles` (azimuth and elevation, rad),
+//! `stops.metered_px` (`x`, `y`: centre of the exposure subframe in the left image, px) and
 //! `stops.light` (`sun_azimuth_deg`, `sun_elevation_deg` in the site frame, `exposure_s` of the left image).
 //!
 //! A simulated folder also gets `cache/`, from which nothing but time is lost when it is removed, and on demand

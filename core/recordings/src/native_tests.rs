@@ -35,6 +35,7 @@ fn stop(step: usize) -> Stop {
         left: view("left", 0.0),
         right: view("right", 1.0),
         light: None,
+        metered_px: None,
         truth: (step == 1).then(|| StopTruth {
             site_from_rover: PoseRecord::from(&pose.inverse()),
             left_camera: Some(camera(0.3)),

@@ -61,6 +61,8 @@ fn a_drive_arrives_within_centimetres_of_the_true_target() {
         let centre = step.point_mast.left.centre_pixel();
         let off_px = step.located().unwrap().left_pixel.unwrap().distance(centre);
         assert!(off_px < 60.0, "stop {}: {off_px} px", step.step);
+        let metered_px = drive.world.state()[step.step].metered_px.unwrap();
+        assert!(metered_px.distance(step.point_mast.predicted_left.unwrap()) < 1e-9);
     }
     // The estimate's covariance contains the known error of the mast.
     for step in &drive.steps {

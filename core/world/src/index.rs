@@ -103,6 +103,7 @@ pub(crate) fn simulated_stop(
         left: view("left", number, left),
         right: view("right", number, right),
         light: None,
+        metered_px: None,
         truth: Some(StopTruth { site_from_rover: truth, left_camera, right_camera }),
     }
 }
@@ -124,6 +125,7 @@ fn handed_over(last: &Stop, number: usize, settings: &CameraSettings) -> Option<
         left: view("left", number, left),
         right: view("right", number, right),
         light: None,
+        metered_px: None,
         truth: Some(StopTruth {
             site_from_rover: truth.site_from_rover,
             left_camera: None,

@@ -8,7 +8,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::ToSchema;
 
 use sightline_geometry::camera::{Camera, Mast, MastAngles};
-use sightline_geometry::frames::{PoseRecord, Vector3};
+use sightline_geometry::frames::{Pixel, PoseRecord, Vector3};
 use sightline_geometry::odometry_error::OdometryError;
 use sightline_geometry::stereo_geometry::StereoGeometry;
 
@@ -63,6 +63,9 @@ pub struct Stop {
     /// The mast angles at which the pair was taken, where there is a mast.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mast_angles: Option<MastAngles>,
+    /// Centre of the subframe that automatic exposure meters in the left image, px; the image's centre where left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub metered_px: Option<Pixel>,
     /// The left (or first) image.
     pub left: View,
     /// The right (or second) image.

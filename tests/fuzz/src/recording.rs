@@ -78,6 +78,7 @@ fn stop(step: usize) -> Stop {
         left: view("left", 0.0),
         right: view("right", BASELINE_M),
         light: None,
+        metered_px: None,
         truth: None,
     }
 }

@@ -94,6 +94,7 @@ impl ImportFormat for Kitti {
                 left: view("image_0", &cameras[0])?,
                 right: view("image_1", &cameras[1])?,
                 light: None,
+                metered_px: None,
                 truth: Some(StopTruth {
                     site_from_rover: PoseRecord::from(truth),
                     left_camera: None,

@@ -6,6 +6,7 @@ use utoipa::ToSchema;
 use sightline_geometry::camera::MastAngles;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
+use sightline_geometry::frames::Pixel;
 
 use super::select_path::Motion;
 use crate::pipeline::Stops;
@@ -32,6 +33,12 @@ pub trait ActiveWorld {
     /// # Errors
     /// A stop that cannot be stored.
     fn point_mast(&mut self, angles: Option<MastAngles>) -> Result<()>;
+
+    /// Puts the exposure subframe of the last stop around a pixel of the left image (R79); `None` leaves it where it is.
+    ///
+    /// # Errors
+    /// A stop that cannot be stored.
+    fn expose(&mut self, around: Option<Pixel>) -> Result<()>;
 }
 
 /// What the rover reports of one step.

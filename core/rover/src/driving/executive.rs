@@ -149,13 +149,16 @@ fn target_in_site(input: &CycleInput<'_>, stops: &dyn Stops) -> Point3 {
     stops.site_from_rover(from.step) * from.update.target.position_in_rover
 }
 
-/// Points the mast of the last stop at the prediction and finds the target there.
+/// Points the mast of the last stop at the prediction, exposes around it and finds the target there.
 fn track(world: &mut dyn ActiveWorld, last: &Updated, input: &CycleInput<'_>) -> Result<StepTrace> {
     let stops = world.stops();
     let [then, now] = [last.target.step, last.target.step + 1].map(|step| stops.site_from_rover(step));
     let predicted = predict::predict(&last.target, &then, &now, &stops.odometry_error());
     let wanted = stops.mast().and_then(|mast| mast.point_left_centre_at(&predicted.position_in_rover));
     world.point_mast(wanted)?;
+    let (left, _) = world.stops().cameras(last.target.step + 1);
+    let around = left.project(&predicted.position_in_rover);
+    world.expose(around)?;
     pipeline::run_step_displaced(world.stops(), last, input.settings, None, input.cancel)
 }
 

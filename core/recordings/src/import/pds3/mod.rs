@@ -77,6 +77,7 @@ impl ImportFormat for Pds3 {
                 left: write_view(&pair.left, pair.left.camera.clone(), &scale, output)?,
                 right: write_view(&pair.right, pair.right_camera_in_left_rover(), &scale, output)?,
                 light: pair.left.product.light(),
+                metered_px: None,
                 truth: None,
             });
         }
