@@ -119,6 +119,9 @@ impl Stops for Drive<'_> {
     fn odometry_error(&self) -> OdometryError {
         self.scene.index.odometry_error
     }
+    fn pointing_error_deg(&self) -> f64 {
+        self.scene.index.pointing_error_deg
+    }
     fn stereo(&self) -> StereoGeometry {
         self.scene.index.stereo
     }

@@ -133,6 +133,9 @@ impl Stops for Plane {
     fn odometry_error(&self) -> OdometryError {
         OdometryError::default()
     }
+    fn pointing_error_deg(&self) -> f64 {
+        0.0
+    }
     fn stereo(&self) -> StereoGeometry {
         StereoGeometry::Lateral
     }

@@ -1,7 +1,9 @@
 //! Closed-loop drives in many worlds: arrival, errors of target and goal, collisions.
 //!
 //! Each world has a slope of up to 5° in any direction, slip of firm soil with a spread of 20 %, and one target, the first that
-//! the scenario's rule chooses. Each drive is made twice: with a goal that follows the target and with a fixed one.
+//! the scenario's rule chooses. Drives without obstacles have no rock above 10 cm within 1.2 m of the straight line from the
+//! first stop to the goal that follows from the true target (`rocks.clear_path`); all other rocks are those of the world
+//! with obstacles, so that the target is the same.
 
 use std::path::Path;
 
@@ -12,12 +14,15 @@ use serde::Serialize;
 
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
+use sightline_geometry::frames::Point3;
 use sightline_recordings::DrivenTraverse;
+use sightline_rover::driving::set_goal::goal_position_m;
 use sightline_rover::driving::{DriveCommand, GoalRule};
 use sightline_session::driving::{DriveSummary, TargetedDrive};
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
-use sightline_world::scenario::OdometryModel;
+use sightline_world::scenario::{ClearPath, OdometryModel};
+use sightline_world::target_truth::{TargetTruth, TruthSource};
 use sightline_world::{Scenario, choose_targets};
 
 /// One drive.
@@ -59,46 +64,92 @@ pub fn scenario_of(from: &Scenario, seed: u64) -> Scenario {
     scenario
 }
 
-/// Drives in the worlds of these seeds, several at a time; `tell` is called after each.
-pub fn drives(
-    from: &Scenario,
-    seeds: &[u64],
-    command: &DriveCommand,
-    settings: &Settings,
-    folder: &Path,
-    tell: &(dyn Fn() + Sync),
-) -> Vec<Drive> {
-    let one = |&seed: &u64| {
-        let word = if command.goal == GoalRule::Fixed { "fixed" } else { "follows" };
-        let folder = folder.join(format!("{word}-{seed}"));
-        let outcome = drive(&scenario_of(from, seed), command, settings, &folder);
-        // The images of a hundred drives would fill a disk.
-        let _ = std::fs::remove_dir_all(&folder);
-        tell();
-        match outcome {
-            Ok(summary) => Drive { seed, summary: Some(summary), problem: None },
-            Err(error) => Drive { seed, summary: None, problem: Some(error.to_string()) },
-        }
-    };
-    seeds.par_iter().map(one).collect()
+/// What the drives of a study have in common.
+#[derive(Clone, Copy)]
+pub struct Drives<'a> {
+    /// The scenario whose worlds they are in.
+    pub from: &'a Scenario,
+    /// The command.
+    pub command: &'a DriveCommand,
+    /// The configuration of the tracker.
+    pub settings: &'a Settings,
+    /// Whether the rocks on the rover's way remain.
+    pub obstacles: bool,
+    /// A folder for images, which are removed again.
+    pub folder: &'a Path,
 }
 
-/// One drive to its end.
-fn drive(
-    scenario: &Scenario,
-    command: &DriveCommand,
-    settings: &Settings,
-    folder: &Path,
-) -> Result<DriveSummary> {
-    let world = DrivenTraverse::begin(scenario, folder, Cancel::default())?;
-    let traverse = world.traverse();
-    let targets = traverse.world().map(|world| choose_targets(world, scenario, traverse.index()));
-    let pixel = targets.and_then(|targets| targets.first().copied());
-    let pixel = pixel.ok_or_else(|| Error::Target("the world has no target".to_owned()))?;
-    let designation = Designation { step: 0, pixel };
-    let mut drive = TargetedDrive::begin(world, designation, *command, settings, Cancel::default())?;
-    while drive.advance(settings, Cancel::default())? {}
-    Ok(drive.summary())
+impl Drives<'_> {
+    /// Drives in the worlds of these seeds, several at a time; `tell` is called after each.
+    pub fn run(&self, seeds: &[u64], tell: &(dyn Fn() + Sync)) -> Vec<Drive> {
+        let one = |&seed: &u64| {
+            let word = if self.command.goal == GoalRule::Fixed { "fixed" } else { "follows" };
+            let folder = self.folder.join(format!("{word}-{seed}"));
+            let outcome = self.drive(&scenario_of(self.from, seed), &folder);
+            // The images of a hundred drives would fill a disk.
+            let _ = std::fs::remove_dir_all(&folder);
+            tell();
+            match outcome {
+                Ok(summary) => Drive { seed, summary: Some(summary), problem: None },
+                Err(error) => Drive { seed, summary: None, problem: Some(error.to_string()) },
+            }
+        };
+        seeds.par_iter().map(one).collect()
+    }
+
+    /// One drive to its end.
+    fn drive(&self, scenario: &Scenario, folder: &Path) -> Result<DriveSummary> {
+        let world = DrivenTraverse::begin(scenario, &folder.join("open"), Cancel::default())?;
+        let traverse = world.traverse();
+        let targets = traverse.world().map(|world| choose_targets(world, scenario, traverse.index()));
+        let pixel = targets.and_then(|targets| targets.first().copied());
+        let pixel = pixel.ok_or_else(|| Error::Target("the world has no target".to_owned()))?;
+        let designation = Designation { step: 0, pixel };
+        let world = if self.obstacles {
+            world
+        } else {
+            self.without_obstacles(&world, scenario, designation, folder)?
+        };
+        let command = self.command.clone();
+        let mut drive = TargetedDrive::begin(world, designation, command, self.settings, Cancel::default())?;
+        while drive.advance(self.settings, Cancel::default())? {}
+        Ok(drive.summary())
+    }
+
+    /// The same world without high rocks on the way to the goal.
+    ///
+    /// # Errors
+    /// A target that is hidden, or whose own rock reaches into the way.
+    fn without_obstacles(
+        &self,
+        open: &DrivenTraverse,
+        scenario: &Scenario,
+        designation: Designation,
+        folder: &Path,
+    ) -> Result<DrivenTraverse> {
+        let target = target_in_site(open, designation)?;
+        let start = TruthSource::true_site_from_rover(open.traverse(), 0).unwrap_or_default();
+        let start_m = [start.translation.x, start.translation.y];
+        let goal_m = goal_position_m(self.command, &target, start_m);
+        let centre = open.traverse().world().map(|world| world.targets_centre()).unwrap_or_default();
+        let mut cleared = scenario.clone();
+        cleared.rocks.clear_path = Some(ClearPath {
+            to_x_m: goal_m[0] - centre.x,
+            to_y_m: goal_m[1] - centre.y,
+            ..ClearPath::default()
+        });
+        let world = DrivenTraverse::begin(&cleared, &folder.join("cleared"), Cancel::default())?;
+        if (target_in_site(&world, designation)? - target).norm() > 1e-3 {
+            return Err(Error::Target("the target's own rock is in the way".to_owned()));
+        }
+        Ok(world)
+    }
+}
+
+/// The surface point under the target's pixel, site frame.
+fn target_in_site(world: &DrivenTraverse, designation: Designation) -> Result<Point3> {
+    let truth = TargetTruth::new(world.traverse(), designation, None);
+    truth.map(|truth| truth.position_in_site()).ok_or_else(|| Error::Target("it has no surface".to_owned()))
 }
 
 /// Sums up drives.

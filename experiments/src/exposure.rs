@@ -74,7 +74,7 @@ pub(crate) fn exposure_report(scenario: &Scenario, world: &World) -> Result<Vec<
         let seen: Vec<Pixel> =
             targets.iter().filter_map(|target| visible_pixel(&here, &camera, target)).collect();
         let mut level = |mode: usize| {
-            times_s[mode] = automatic(&rates, &modes[mode], times_s[mode]).time_s;
+            times_s[mode] = automatic(&rates, &modes[mode], None, times_s[mode]).time_s;
             mean_dn(&rates.levels(times_s[mode], &modes[mode]), &seen, scenario.targets.window_px)
         };
         let levels = [level(0), level(1)];

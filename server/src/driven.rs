@@ -163,8 +163,8 @@ pub(crate) fn drive_on(
 /// The drive of a session.
 pub(crate) fn view(live: &LiveSession) -> DriveView {
     let open = live.traverse();
-    let steering = live.with(|session| session.steering);
-    let (Some(steering), Some(driven)) = (steering, &open.driven) else {
+    let steering = live.with(|session| session.steering.clone());
+    let (Some(steering), Some(driven)) = (&steering, &open.driven) else {
         return DriveView { steering, cycles: Vec::new(), summary: None, is_driving: false };
     };
     let steps = live.with(|session| {
@@ -174,7 +174,7 @@ pub(crate) fn view(live: &LiveSession) -> DriveView {
     driven.with(|world| {
         let cycles = driving::cycles(world, &steering.command, &steps);
         let summary = driving::summary(world, &steering.command, &steps, &cycles);
-        DriveView { steering: Some(steering), cycles, summary: Some(summary), is_driving }
+        DriveView { steering: Some(steering.clone()), cycles, summary: Some(summary), is_driving }
     })
 }
 

@@ -261,7 +261,7 @@ impl Runner {
 
     /// Lets the run that drives go on once all runs are as they were.
     fn go_on_driving(&self, live: &Arc<LiveSession>) {
-        if let Some(Steering { target, run, .. }) = live.with(|session| session.steering) {
+        if let Some(Steering { target, run, .. }) = live.with(|session| session.steering.clone()) {
             let _ = self.start(live, target, run);
         }
     }

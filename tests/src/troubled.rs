@@ -77,6 +77,9 @@ impl Stops for Troubled {
     fn odometry_error(&self) -> OdometryError {
         Stops::odometry_error(&self.traverse)
     }
+    fn pointing_error_deg(&self) -> f64 {
+        Stops::pointing_error_deg(&self.traverse)
+    }
     fn stereo(&self) -> StereoGeometry {
         Stops::stereo(&self.traverse)
     }

@@ -212,7 +212,7 @@ pub struct NewRun {
 }
 
 /// Begins a drive on commands with a run, in a world of its own.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewDrive {
     /// What the rover is told.

@@ -73,6 +73,10 @@ pub(super) fn check_index(index: &TraverseIndex) -> Result<(), String> {
             return Err(format!("odometry_error.{field}: is {value}, but it must be a number from 0"));
         }
     }
+    let pointing_deg = index.pointing_error_deg;
+    if !(pointing_deg.is_finite() && pointing_deg >= 0.0) {
+        return Err(format!("pointing_error_deg: is {pointing_deg}, but it must be a number from 0"));
+    }
     if let Some(mast) = &index.mast {
         if !mast.origin_in_rover.iter().all(|v| v.is_finite()) {
             return Err("mast.origin_in_rover: must be three finite numbers".to_owned());

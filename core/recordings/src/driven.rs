@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 use sightline_geometry::camera::MastAngles;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
+use sightline_geometry::frames::Pixel;
 use sightline_rover::driving::{ActiveWorld, DriveReport, Motion, Stall};
 use sightline_rover::pipeline::Stops;
 use sightline_world::rover::driven::{DrivenStop, index_stops};
@@ -253,11 +254,27 @@ impl ActiveWorld for DrivenTraverse {
         Ok(report)
     }
 
+    fn stay(&mut self) -> Result<()> {
+        let last = &self.driven[self.driven.len() - 1];
+        self.driven.push(last.stay());
+        self.put_last()
+    }
+
     fn point_mast(&mut self, angles: Option<MastAngles>) -> Result<()> {
         let number = self.driven.len() - 1;
         if angles.is_some() && self.driven[number].mast_angles.is_some() {
             self.forget_images(number)?;
             self.driven[number].mast_angles = angles;
+            self.put_last()?;
+        }
+        self.save()
+    }
+
+    fn expose(&mut self, around: Option<Pixel>) -> Result<()> {
+        let number = self.driven.len() - 1;
+        if around.is_some() && around != self.driven[number].metered_px {
+            self.forget_images(number)?;
+            self.driven[number].metered_px = around;
             self.put_last()?;
         }
         self.save()
@@ -305,6 +322,30 @@ mod tests {
         assert_eq!(replayed.capture(2).unwrap(), resumed.traverse().capture(2).unwrap());
         // The mast's error is that of its stop.
         assert!(replayed.index().stops[2].truth.as_ref().unwrap().left_camera.is_some());
+    }
+
+    #[test]
+    fn a_stop_is_exposed_for_the_pixel_that_was_asked_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut scenario = scenario();
+        scenario.camera.exposure = sightline_world::scenario::ExposureMode::Subframe;
+        scenario.camera.auto_exposure.subframe_px = 11;
+        let mut world =
+            DrivenTraverse::begin(&scenario, &folder.path().join("a"), Cancel::default()).unwrap();
+        go(&mut world, 0.5);
+        let mut level = |around: Pixel| {
+            world.expose(Some(around)).unwrap();
+            assert_eq!(world.traverse().index().stops[1].metered_px, Some(around));
+            let left = world.traverse().capture(1).unwrap().left;
+            let side = |centre: f64| (centre as u32 - 5)..(centre as u32 + 6);
+            let pixels = side(around.y).flat_map(|y| side(around.x).map(move |x| (x, y)));
+            f64::from(pixels.map(|(x, y)| left.get_pixel(x, y).0[0]).fold(0.0, f32::max)) * 4095.0
+        };
+        // One percent of 121 pixels may exceed the cut of 2000: the brightest one.
+        for around in [Pixel::new(64.0, 20.0), Pixel::new(20.0, 100.0), Pixel::new(100.0, 70.0)] {
+            let brightest_dn = level(around);
+            assert!((1800.0..2400.0).contains(&brightest_dn), "{around:?}: {brightest_dn}");
+        }
     }
 
     #[test]

@@ -9,6 +9,7 @@
 //! description = "an example"                # optional
 //! full_scale_dn = 4095.0                    # grey value of full scale; default 255 or 65535 by PNG depth
 //! stereo = "lateral"                        # or "convergent": two freely placed views; default lateral
+//! # pointing_error_deg = 0.05               # 1σ error of each mast angle; default 0
 //! # scenario = "scenario.toml"              # simulated: missing images are rendered from this file
 //!
 //! [odometry_error]                          # 1σ error of the pose estimates; these are the defaults
@@ -41,7 +42,8 @@
 //! quaternion_sxyz = [1.0, 0.0, 0.0, 0.0]
 //! ```
 //!
-//! Optional besides: `[mast]` (origin and head cameras), `stops.mast_angles` (azimuth and elevation, rad) and
+//! Optional besides: `[mast]` (origin and head cameras), `stops.mast_angles` (azimuth and elevation, rad),
+//! `stops.metered_px` (`x`, `y`: centre of the exposure subframe in the left image, px) and
 //! `stops.light` (`sun_azimuth_deg`, `sun_elevation_deg` in the site frame, `exposure_s` of the left image).
 //!
 //! A simulated folder also gets `cache/`, from which nothing but time is lost when it is removed, and on demand

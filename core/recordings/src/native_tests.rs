@@ -35,6 +35,7 @@ fn stop(step: usize) -> Stop {
         left: view("left", 0.0),
         right: view("right", 1.0),
         light: None,
+        metered_px: None,
         truth: (step == 1).then(|| StopTruth {
             site_from_rover: PoseRecord::from(&pose.inverse()),
             left_camera: Some(camera(0.3)),
@@ -51,6 +52,7 @@ fn index(stops: usize) -> TraverseIndex {
         full_scale_dn: Some(4095.0),
         stereo: StereoGeometry::Convergent,
         odometry_error: OdometryError { along_fraction: 1.0 / 3.0, ..OdometryError::default() },
+        pointing_error_deg: 0.05,
         mast: None,
         scenario: None,
         stops: (0..stops).map(stop).collect(),

@@ -134,7 +134,8 @@ impl Simulated {
         for stop in first..=step {
             let (camera, radiance) = self.radiance(stops, stop, Eye::Left, cancel)?;
             let rates = Rates::new(&radiance, &self.scenario, &camera, Eye::Left, [0, 0]);
-            time_s = automatic(&rates, settings, time_s).time_s;
+            let centre = stops.index.stops[stop].metered_px;
+            time_s = automatic(&rates, settings, centre, time_s).time_s;
             let mut known = self.exposures_s.lock().unwrap_or_else(PoisonError::into_inner);
             // Whoever else was at this stop found the same.
             if known.len() == stop {

@@ -43,6 +43,9 @@ impl Stops for Traverse {
     fn odometry_error(&self) -> OdometryError {
         self.index().odometry_error
     }
+    fn pointing_error_deg(&self) -> f64 {
+        self.index().pointing_error_deg
+    }
     fn stereo(&self) -> StereoGeometry {
         self.index().stereo
     }

@@ -43,6 +43,8 @@ pub trait Stops {
     fn mast_angles(&self, step: usize) -> Option<MastAngles>;
     /// The error model of the pose estimates.
     fn odometry_error(&self) -> OdometryError;
+    /// 1σ error of each mast angle, deg; 0 where it is not known.
+    fn pointing_error_deg(&self) -> f64;
     /// How the two images of a stop relate.
     fn stereo(&self) -> StereoGeometry;
     /// Where the targets of the traverse keep what they share, and which stop of the recording this one is.
@@ -246,8 +248,11 @@ fn first_target(
             pixel.x, pixel.y
         )));
     };
-    let (left, _) = stops.cameras(step);
-    let distance_m = (position_in_rover - left.model.centre()).norm();
+    let used = used_pointing(stops, step);
+    let covariance_in_rover = used
+        .error_covariance(&position_in_rover)
+        .map_or(covariance_in_rover, |error| covariance_in_rover + error);
+    let distance_m = (position_in_rover - used.left.model.centre()).norm();
     Ok(Target {
         designation,
         step,
@@ -279,9 +284,23 @@ fn check_pixel(designation: Designation, left: &Camera) -> Result<Pixel> {
 
 /// Cameras and wanted pointing for a target that was carried to `step`.
 fn pointing(stops: &dyn Stops, step: usize, carried: &Target) -> Pointing {
+    point_mast::point_mast(
+        &carried.position_in_rover,
+        &carried.covariance_in_rover,
+        used_pointing(stops, step),
+    )
+}
+
+/// The cameras of a stop as they were used.
+fn used_pointing(stops: &dyn Stops, step: usize) -> UsedPointing<'_> {
     let (left, right) = stops.cameras(step);
-    let used = UsedPointing { mast: stops.mast(), angles: stops.mast_angles(step), left, right };
-    point_mast::point_mast(&carried.position_in_rover, &carried.covariance_in_rover, used)
+    UsedPointing {
+        mast: stops.mast(),
+        angles: stops.mast_angles(step),
+        error_rad: stops.pointing_error_deg().to_radians(),
+        left,
+        right,
+    }
 }
 
 /// A stop among those of its drive.

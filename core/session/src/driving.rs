@@ -21,7 +21,7 @@ use sightline_track::target::Designation;
 use sightline_world::target_truth::{TargetTruth, TruthSource};
 
 /// Who drives in a session, and how: the run on whose estimates the rover moves, and its command.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Steering {
     /// The target's number.
@@ -165,7 +165,7 @@ pub fn cycles(world: &DrivenTraverse, command: &DriveCommand, steps: &[Arc<RunSt
         let navigator = &ArcNavigator::default();
         let input = CycleInput { command, navigator, first: &first.trace, last: &step.trace, before };
         let mut cycle = executive::decide(world.traverse(), &input);
-        if let Some(report) = world.report(step.step + 1) {
+        if let Some(report) = world.report(step.step + 1).filter(|_| cycle.motion.is_some()) {
             cycle.add(report);
         }
         cycles.push(cycle);

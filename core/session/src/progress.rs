@@ -55,7 +55,7 @@ impl Session {
         let targets = saved.targets.iter().enumerate().map(restore).collect::<Result<_>>()?;
         let breakpoints = Breakpoints::restored(&saved.breakpoints);
         let new = Self::new(&saved.id, &saved.traverse, stop_count);
-        let steering = saved.steering;
+        let steering = saved.steering.clone();
         let mut session = Self { targets, breakpoints, steering, ..new };
         // Those removed before an earlier end of the program count as removed in the order of their numbers.
         for (number, record) in saved.targets.iter().enumerate() {
@@ -103,11 +103,12 @@ impl Session {
     /// The drive to another stop, where this run has located the target at the last stop, drives, and is not to wait.
     fn drive_of(&self, target: usize, number: usize) -> Option<Next> {
         let steering =
-            self.steering.filter(|steering| (steering.target, steering.run) == (target, number))?;
+            self.steering.as_ref().filter(|steering| (steering.target, steering.run) == (target, number))?;
         let run = self.run(target, number).ok()?;
         let last = run.steps.last()?.step;
         let waits = steering.pause_at.is_some_and(|stop| last >= stop) || run.stop_after.is_some();
-        (last + 1 == self.stop_count && !waits).then(|| Next::Drive { steering, steps: run.steps.clone() })
+        (last + 1 == self.stop_count && !waits)
+            .then(|| Next::Drive { steering: steering.clone(), steps: run.steps.clone() })
     }
 
     /// Lets a run drive under a command.

@@ -152,7 +152,7 @@ impl Session {
             cursor: self.cursor,
             targets: live.map(|(number, record)| self.target_view(number, record)).collect(),
             breakpoints: self.breakpoints.list(),
-            steering: self.steering,
+            steering: self.steering.clone(),
         }
     }
 
@@ -202,7 +202,7 @@ impl Session {
                 })
                 .collect(),
             breakpoints: self.breakpoints.list(),
-            steering: self.steering,
+            steering: self.steering.clone(),
         }
     }
 

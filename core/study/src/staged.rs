@@ -77,6 +77,9 @@ impl<D: Drive> Stops for Staged<'_, D> {
     fn odometry_error(&self) -> OdometryError {
         self.drive.odometry_error()
     }
+    fn pointing_error_deg(&self) -> f64 {
+        self.drive.pointing_error_deg()
+    }
     fn stereo(&self) -> StereoGeometry {
         self.drive.stereo()
     }

@@ -7,7 +7,7 @@ use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Error;
 use sightline_recordings::DrivenTraverse;
 use sightline_rover::driving::executive::{self, CycleInput};
-use sightline_rover::driving::{ArcNavigator, DriveCommand, GoalRule, StopReason};
+use sightline_rover::driving::{ArcNavigator, ArrivalAction, DriveCommand, GoalRule, StopReason};
 use sightline_rover::pipeline;
 use sightline_session::driving::TargetedDrive;
 use sightline_track::settings::Settings;
@@ -61,11 +61,48 @@ fn a_drive_arrives_within_centimetres_of_the_true_target() {
         let centre = step.point_mast.left.centre_pixel();
         let off_px = step.located().unwrap().left_pixel.unwrap().distance(centre);
         assert!(off_px < 60.0, "stop {}: {off_px} px", step.step);
+        let metered_px = drive.world.state()[step.step].metered_px.unwrap();
+        assert!(metered_px.distance(step.point_mast.predicted_left.unwrap()) < 1e-9);
+    }
+    // The estimate's covariance contains the known error of the mast.
+    for step in &drive.steps {
+        let error = step.point_mast.error_covariance_in_rover.unwrap();
+        let sigma_m = error.symmetric_eigenvalues().max().sqrt();
+        assert!((sigma_m / (0.05f64.to_radians() * step.range_m()) - 1.0).abs() < 0.15, "{sigma_m}");
+        let located = step.located().unwrap().covariance_in_rover.unwrap();
+        let added = step.update.target.covariance_in_rover - located;
+        assert!((added - error).norm() < 0.1 * error.norm(), "stop {}", step.step);
     }
     // No step is longer than a tenth of the distance to the target.
     for (step, cycle) in drive.steps.iter().zip(&drive.cycles) {
         let distance_m = step.update.target.last_distance_m;
         assert!(cycle.report.is_none_or(|report| report.wheels_m < 0.101 * distance_m));
+    }
+}
+
+#[test]
+fn a_look_after_arrival_is_one_more_stop_with_the_target_at_the_centre() {
+    let folder = tempfile::tempdir().unwrap();
+    let (world, designation) = world(&folder.path().join("drive"));
+    let command =
+        DriveCommand { standoff_m: 7.0, on_arrival: vec![ArrivalAction::Look; 2], ..DriveCommand::default() };
+    let settings = Settings::default();
+    let mut drive = TargetedDrive::begin(world, designation, command, &settings, Cancel::default()).unwrap();
+    while drive.advance(&settings, Cancel::default()).unwrap() {}
+    assert_eq!(drive.summary().reason, Some(StopReason::Arrived));
+    let count = drive.steps.len();
+    let decided: Vec<u32> = drive.cycles.iter().map(|cycle| cycle.arrival_actions).collect();
+    assert_eq!(decided[count - 4..], [0, 1, 2, 2]);
+    let state = drive.world.state();
+    for (k, arrived) in [(count - 2, &state[count - 3]), (count - 1, &state[count - 2])] {
+        assert!(drive.cycles[k - 1].motion.is_none() && drive.cycles[k - 1].ending.is_none());
+        assert_eq!(state[k].true_site_from_rover, arrived.true_site_from_rover);
+        assert_eq!(state[k].site_from_rover, arrived.site_from_rover);
+        // The mast points at the target as it was located at the stop before.
+        let step = &drive.steps[k];
+        let predicted = step.point_mast.predicted_left.unwrap();
+        assert!(predicted.distance(step.point_mast.left.centre_pixel()) < 1e-6, "{predicted:?}");
+        assert_ne!(state[k].mast_angles, arrived.mast_angles);
     }
 }
 

@@ -45,7 +45,7 @@ impl World {
         let [x_m_goal, y_m_goal] = approach.goal_m;
         let openness = Openness::new(&rocks, x_m, y_m);
         cancel.check()?;
-        let footing = Footing::new(&rocks, x_m, y_m);
+        let footing = Footing::new(&rocks, x_m, y_m, scenario.rover.climb_m);
         cancel.check()?;
         let scenery = Scenery {
             tree: Tree::new(&rocks),

@@ -39,6 +39,7 @@ pub fn empty_index(scenario: &Scenario) -> TraverseIndex {
         full_scale_dn: Some(scenario.camera.recorded_full_scale_dn()),
         stereo: StereoGeometry::Lateral,
         odometry_error: scenario.odometry_error,
+        pointing_error_deg: scenario.drive.pointing_error_deg,
         mast: match Rig::new(&scenario.camera) {
             Rig::Mast(mast) => Some(mast),
             Rig::Body { .. } => None,
@@ -102,6 +103,7 @@ pub(crate) fn simulated_stop(
         left: view("left", number, left),
         right: view("right", number, right),
         light: None,
+        metered_px: None,
         truth: Some(StopTruth { site_from_rover: truth, left_camera, right_camera }),
     }
 }
@@ -123,6 +125,7 @@ fn handed_over(last: &Stop, number: usize, settings: &CameraSettings) -> Option<
         left: view("left", number, left),
         right: view("right", number, right),
         light: None,
+        metered_px: None,
         truth: Some(StopTruth {
             site_from_rover: truth.site_from_rover,
             left_camera: None,

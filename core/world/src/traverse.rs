@@ -8,7 +8,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::ToSchema;
 
 use sightline_geometry::camera::{Camera, Mast, MastAngles};
-use sightline_geometry::frames::{PoseRecord, Vector3};
+use sightline_geometry::frames::{Pixel, PoseRecord, Vector3};
 use sightline_geometry::odometry_error::OdometryError;
 use sightline_geometry::stereo_geometry::StereoGeometry;
 
@@ -32,6 +32,9 @@ pub struct TraverseIndex {
     /// How the two images of a stop relate.
     #[serde(default)]
     pub stereo: StereoGeometry,
+    /// 1σ error of each mast angle, deg; 0 where it is not known.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub pointing_error_deg: f64,
     /// The error model of the pose estimates.
     #[serde(default)]
     pub odometry_error: OdometryError,
@@ -45,6 +48,10 @@ pub struct TraverseIndex {
     pub stops: Vec<Stop>,
 }
 
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
 /// One stop of the rover.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
@@ -56,6 +63,9 @@ pub struct Stop {
     /// The mast angles at which the pair was taken, where there is a mast.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mast_angles: Option<MastAngles>,
+    /// Centre of the subframe that automatic exposure meters in the left image, px; the image's centre where left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub metered_px: Option<Pixel>,
     /// The left (or first) image.
     pub left: View,
     /// The right (or second) image.

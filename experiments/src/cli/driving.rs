@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
-use crate::driving::{Drive, Outcome, drives, outcome};
+use crate::driving::{Drive, Drives, Outcome, outcome};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use sightline_geometry::error::{Error, Result};
@@ -37,6 +37,9 @@ pub(super) struct Driving {
     /// Distance from the goal at which the rover has arrived, m.
     #[arg(long, default_value_t = 0.01)]
     tolerance: f64,
+    /// Leave the rocks on the rover's way; without it, none above 10 cm is there.
+    #[arg(long)]
+    obstacles: bool,
     /// Leave out the drives with a fixed goal.
     #[arg(long)]
     only_following: bool,
@@ -92,7 +95,14 @@ impl Driving {
                 goal,
                 ..DriveCommand::default()
             };
-            let drives = drives(&scenario, &seeds, &command, &settings, &folder, &tell);
+            let study = Drives {
+                from: &scenario,
+                command: &command,
+                settings: &settings,
+                obstacles: self.obstacles,
+                folder: &folder,
+            };
+            let drives = study.run(&seeds, &tell);
             let outcome = outcome(&drives);
             if self.format == Format::Text {
                 terminal::line(&row(goal, &outcome))?;

@@ -1,6 +1,7 @@
 //! The command line of the experiments: one file for each.
 
 mod cancel;
+mod claims;
 mod driving;
 mod realism;
 mod scenery;
@@ -22,6 +23,8 @@ use sightline_server::cli::{exit_code, start_log};
 enum Experiment {
     /// How soon each long computation ends once it is cancelled.
     Cancel(cancel::Cancelled),
+    /// Tracked targets and their NEES in worlds with pointing error.
+    Claims(claims::Worlds),
     /// Closed-loop drives on slopes with slip: arrival, errors of target and goal, collisions.
     Driving(driving::Driving),
     /// How hard the simulated worlds are: plain correlation, without scale and roll, at steps of 5 % and 23 %.
@@ -42,6 +45,7 @@ pub fn run() -> ExitCode {
     start_log();
     exit_code(match experiment {
         Experiment::Cancel(arguments) => arguments.run(),
+        Experiment::Claims(arguments) => arguments.run(),
         Experiment::Driving(arguments) => arguments.run(),
         Experiment::Realism(arguments) => arguments.run(),
         Experiment::Scenery(arguments) => arguments.run(),

@@ -12,7 +12,7 @@ use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
 use sightline_recordings::DrivenTraverse;
-use sightline_rover::driving::{Cycle, DriveCommand, GoalRule};
+use sightline_rover::driving::{ArrivalAction, Cycle, DriveCommand, GoalRule};
 use sightline_session::driving::{DriveSummary, TargetedDrive};
 use sightline_session::step::RunStep;
 use sightline_track::presets::preset;
@@ -55,6 +55,9 @@ pub(super) struct Drive {
     /// Most stops, the first included.
     #[arg(long, value_name = "N", default_value_t = DriveCommand::default().stops_max)]
     stops: u32,
+    /// An action after arrival; can be given more than once.
+    #[arg(long, value_name = "ACTION")]
+    on_arrival: Vec<OnArrival>,
     /// Another seed than the scenario's.
     #[arg(long)]
     seed: Option<u64>,
@@ -73,6 +76,13 @@ pub(super) struct Drive {
     /// How the stops are written.
     #[arg(long, default_value = "jsonl")]
     format: Format,
+}
+
+/// An action after arrival.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum OnArrival {
+    /// Point the mast at the target, take another pair and locate the target in it.
+    Look,
 }
 
 /// How the stops are written.
@@ -138,6 +148,7 @@ impl Drive {
             tolerance_m: self.tolerance,
             step_fraction: self.step_fraction,
             stops_max: self.stops,
+            on_arrival: self.on_arrival.iter().map(|OnArrival::Look| ArrivalAction::Look).collect(),
             ..DriveCommand::default()
         }
     }

@@ -119,7 +119,7 @@ impl Export {
         let (traverses, saved) = if of_commands.is_dir() {
             driven::copy(&of_commands, &Folders::in_one(folder).driven.join(&saved.traverse))?;
             // The rover of the copy stays where it is.
-            let steering = saved.steering.map(|steering| Steering { pause_at: Some(0), ..steering });
+            let steering = saved.steering.clone().map(|steering| Steering { pause_at: Some(0), ..steering });
             (Vec::new(), SavedSession { steering, ..saved.clone() })
         } else {
             (vec![self.traverse_of(id, &saved.traverse, &data)?], saved.clone())

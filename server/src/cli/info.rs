@@ -61,6 +61,9 @@ fn summary(traverse: &Traverse) -> Vec<String> {
         100.0 * error.across_fraction,
         error.attitude_deg
     ));
+    if index.pointing_error_deg > 0.0 {
+        lines.push(format!("pointing     1σ {:.3}° of each mast angle", index.pointing_error_deg));
+    }
     lines.push(format!("truth        {}", truth(traverse)));
     lines.push(format!("images       {}", images(traverse)));
     lines.extend(traverse.warnings().iter().map(|warning| format!("warning      {warning}")));

@@ -102,11 +102,11 @@ fn add(
     new: &NewDrive,
     cancel: &CancelFlag,
 ) -> ApiResult<Arc<LiveSession>> {
-    let steering = Steering { target, run, command: new.command, pause_at: new.pause_at };
+    let steering = Steering { target, run, command: new.command.clone(), pause_at: new.pause_at };
     let (saved, last) = live.with(|session| {
         let steps = &session.run(target, run).map_err(|error| ApiError::from(error).about_path())?.steps;
         // Refused before a world is made.
-        session.clone().steer(steering)?;
+        session.clone().steer(steering.clone())?;
         Ok::<_, ApiError>((session.saved(), steps.last().map_or(0, |last| last.step)))
     })?;
     let open = live.traverse();

@@ -53,6 +53,7 @@ pub(crate) fn recording() -> Traverse {
             full_scale_dn: None,
             stereo: StereoGeometry::Lateral,
             odometry_error: OdometryError::default(),
+            pointing_error_deg: 0.0,
             mast: None,
             scenario: None,
             stops,
@@ -77,6 +78,7 @@ fn stop(step: usize) -> Stop {
         left: view("left", 0.0),
         right: view("right", BASELINE_M),
         light: None,
+        metered_px: None,
         truth: None,
     }
 }

@@ -14,7 +14,8 @@ const SAMPLES: usize = 24;
 pub(crate) fn paint(plot: &mut PlotUi<'_>, state: &State) {
     let (Some(cycle), Some(stop)) = (state.cycle_at(state.cursor.step), state.stop()) else { return };
     let [north, east] = cycle.goal.in_site_m;
-    let tolerance_m = state.drive().and_then(|drive| drive.steering).map_or(0.0, |s| s.command.tolerance_m);
+    let tolerance_m =
+        state.drive().and_then(|drive| drive.steering.as_ref()).map_or(0.0, |s| s.command.tolerance_m);
     let circle: Vec<[f64; 2]> = (0..=SAMPLES)
         .map(|k| (k as f64 / SAMPLES as f64 * std::f64::consts::TAU).sin_cos())
         .map(|(sine, cosine)| [east + tolerance_m * sine, north + tolerance_m * cosine])

@@ -1,7 +1,7 @@
 //! The panel “Drive”: the command, the buttons that drive, and the decision at every stop.
 
 use egui::{Button, CollapsingHeader, ComboBox, DragValue, Grid, Label, RichText, ScrollArea, Ui};
-use sightline_rover::driving::{DriveCommand, GoalRule, StopReason};
+use sightline_rover::driving::{ArrivalAction, DriveCommand, GoalRule, StopReason};
 use sightline_session::driving::DriveView;
 
 use crate::command::{Command, Go};
@@ -44,7 +44,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 
 /// The command as it can be changed.
 fn form(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    let mut command = state.driving.command;
+    let mut command = state.driving.command.clone();
     ui.horizontal_wrapped(|ui| {
         number(
             ui,
@@ -103,6 +103,12 @@ fn limits(ui: &mut Ui, command: &mut DriveCommand) {
         number(ui, "offset east", " m", east, (-20.0, 20.0), "Added to the goal");
         let stops = DragValue::new(&mut command.stops_max).range(2..=1000).prefix("stops ");
         ui.add(stops).accessible_name("stops").on_hover_text("Most stops, the first included");
+        let mut looks = command.on_arrival.len();
+        let drag = DragValue::new(&mut looks).range(0..=10).prefix("looks on arrival ");
+        let help =
+            "Stops at the goal at which the mast is pointed at the target again and another pair is taken";
+        ui.add(drag).accessible_name("looks on arrival").on_hover_text(help);
+        command.on_arrival.resize(looks, ArrivalAction::Look);
         number(ui, "tilt", "°", &mut command.tilt_max_deg, (1.0, 45.0), "Largest tilt after a step");
         number(ui, "time", " min", &mut command.flight_minutes_max, (1.0, 10_000.0), "Time on Mars");
     });
@@ -139,10 +145,11 @@ fn begin(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 /// What can be done with a drive.
 fn buttons(ui: &mut Ui, state: &State, drive: &DriveView, out: &mut Vec<Command>) {
     let has_ended = drive.cycles.last().is_some_and(|cycle| cycle.ending.is_some());
-    let is_driver = drive.steering.is_some_and(|steering| {
+    let is_driver = drive.steering.as_ref().is_some_and(|steering| {
         state.cursor.target == Some(steering.target) && state.cursor.run == steering.run
     });
-    let is_other_command = drive.steering.is_some_and(|steering| steering.command != state.driving.command);
+    let is_other_command =
+        drive.steering.as_ref().is_some_and(|steering| steering.command != state.driving.command);
     ui.horizontal_wrapped(|ui| {
         let mut button = |name: &str, is_on: bool, help: &str, ask: Ask| {
             if ui.add_enabled(is_on, Button::new(name)).on_hover_text(help).clicked() {
@@ -206,7 +213,7 @@ fn decisions(ui: &mut Ui, state: &State, drive: &DriveView, out: &mut Vec<Comman
             let motion = match (&cycle.motion, &cycle.ending) {
                 (Some(motion), _) => words::motion(motion),
                 (None, Some(ending)) => words::reason(ending.reason).to_owned(),
-                (None, None) => String::new(),
+                (None, None) => "looks again".to_owned(),
             };
             ui.label(theme::label(motion).size(12.0));
             ui.label(theme::number(words::report(cycle)));

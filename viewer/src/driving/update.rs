@@ -77,8 +77,8 @@ impl State {
         if is_other {
             self.driving.following = None;
         }
-        if let Some(steering) = view.steering.filter(|_| is_other) {
-            self.driving.command = steering.command;
+        if let Some(steering) = view.steering.as_ref().filter(|_| is_other) {
+            self.driving.command = steering.command.clone();
         }
         let now = newest(&view);
         self.driving.view = Some((session, view));
@@ -124,13 +124,13 @@ impl State {
     }
 
     fn steered(&self) -> Option<Steering> {
-        self.drive()?.steering
+        self.drive()?.steering.clone()
     }
 
     /// The run that is looked at as the one that drives.
     fn looked_at(&self) -> Option<Steering> {
         let (target, run) = (self.target()?.number, self.run()?.number);
-        Some(Steering { target, run, command: self.driving.command, pause_at: None })
+        Some(Steering { target, run, command: self.driving.command.clone(), pause_at: None })
     }
 
     fn steer(&mut self, steering: Option<Steering>) {

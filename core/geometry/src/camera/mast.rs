@@ -14,9 +14,14 @@
 //! ```
 //!
 //! Aiming the head's x axis at the point instead is wrong by 28 px at 8 m and more than 100 px near 2 m.
+//!
+//! An error of the angles turns a located point about the axes through the origin o. With the pan axis z, the tilt axis
+//! `y' = Rz(az) y` and the standard deviation σ of each angle, independent of the other, the covariance of a point p is
+//! `σ² (a aᵀ + e eᵀ)`, `a = z × (p − o)`, `e = y' × (p − o)`, to first order.
+//!
 //! For CAHVORE, C_h is the entrance pupil of that ray. The mast's limits belong to the rover, not here.
 
-use nalgebra::Translation3;
+use nalgebra::{Matrix3, Rotation3, Translation3};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -86,6 +91,22 @@ impl Mast {
         (self.left_in_head.moved(&rover_from_head), self.right_in_head.moved(&rover_from_head))
     }
 
+    /// Covariance of a point that was located by the cameras, from the error of the angles alone, rover frame, m²; each
+    /// angle has the standard deviation `sigma_rad`.
+    pub fn pointing_covariance(
+        &self,
+        angles: MastAngles,
+        point_in_rover: &Point3,
+        sigma_rad: f64,
+    ) -> Matrix3<f64> {
+        let arm = point_in_rover - self.origin_in_rover;
+        let pan_axis = Vector3::z_axis();
+        let tilt_axis = Rotation3::from_axis_angle(&pan_axis, angles.azimuth_rad) * Vector3::y();
+        let (by_azimuth, by_elevation) = (pan_axis.cross(&arm), tilt_axis.cross(&arm));
+        let sum = by_azimuth * by_azimuth.transpose() + by_elevation * by_elevation.transpose();
+        sum * (sigma_rad * sigma_rad)
+    }
+
     /// The angles that put a point (rover frame, m) on the centre of the left image.
     ///
     /// Azimuth lies in (−π, π]. `None` when the point is nearer to the mast than the ray passes, or right
@@ -136,6 +157,31 @@ mod tests {
                 assert!(angles.azimuth_rad.abs() <= std::f64::consts::PI);
             }
         }
+    }
+
+    #[test]
+    fn pointing_covariance_is_that_of_points_located_by_turned_cameras() {
+        let mast = Mast::spirit();
+        let point = Point3::new(1.9, 1.2, 0.1);
+        let angles = mast.point_left_centre_at(&point).unwrap();
+        // What the told pose makes of a point that the true head sees: told · true⁻¹ · p, differentiated by both angles.
+        let located = |azimuth_rad: f64, elevation_rad: f64| {
+            let turned = MastAngles {
+                azimuth_rad: angles.azimuth_rad + azimuth_rad,
+                elevation_rad: angles.elevation_rad + elevation_rad,
+            };
+            mast.rover_from_head(angles) * mast.rover_from_head(turned).inverse() * point
+        };
+        let step = 1e-6;
+        let [a, e] =
+            [[step, 0.0], [0.0, step]].map(|[da, de]| (located(da, de) - located(-da, -de)) / (2.0 * step));
+        let expected = (a * a.transpose() + e * e.transpose()) * 0.01f64.powi(2);
+        let covariance = mast.pointing_covariance(angles, &point, 0.01);
+        assert!((covariance - expected).norm() < 1e-8 * expected.norm(), "{covariance} {expected}");
+        // Across the line of sight it is about range times angle.
+        let range_m = (point - mast.origin_in_rover).norm();
+        let sigma_m = covariance.symmetric_eigenvalues().max().sqrt();
+        assert!((sigma_m / (0.01 * range_m) - 1.0).abs() < 0.01, "{sigma_m} {range_m}");
     }
 
     #[test]

@@ -94,6 +94,7 @@ impl ImportFormat for Kitti {
                 left: view("image_0", &cameras[0])?,
                 right: view("image_1", &cameras[1])?,
                 light: None,
+                metered_px: None,
                 truth: Some(StopTruth {
                     site_from_rover: PoseRecord::from(truth),
                     left_camera: None,
@@ -117,6 +118,7 @@ impl ImportFormat for Kitti {
             full_scale_dn: None,
             stereo: StereoGeometry::Lateral,
             odometry_error,
+            pointing_error_deg: 0.0,
             mast: None,
             scenario: None,
             stops,

@@ -6,6 +6,7 @@ use utoipa::ToSchema;
 use sightline_geometry::camera::MastAngles;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
+use sightline_geometry::frames::Pixel;
 
 use super::select_path::Motion;
 use crate::pipeline::Stops;
@@ -21,11 +22,23 @@ pub trait ActiveWorld {
     /// [`sightline_geometry::error::Error::Cancelled`], or a world that cannot be driven further; no stop is added then.
     fn drive(&mut self, motion: &Motion, cancel: Cancel<'_>) -> Result<DriveReport>;
 
+    /// Adds a stop at which the rover stands as at the last one, for another pair.
+    ///
+    /// # Errors
+    /// A world that cannot be continued, or a stop that cannot be stored.
+    fn stay(&mut self) -> Result<()>;
+
     /// Points the mast of the last stop; `None` leaves it as it is.
     ///
     /// # Errors
     /// A stop that cannot be stored.
     fn point_mast(&mut self, angles: Option<MastAngles>) -> Result<()>;
+
+    /// Puts the exposure subframe of the last stop around a pixel of the left image (R79); `None` leaves it where it is.
+    ///
+    /// # Errors
+    /// A stop that cannot be stored.
+    fn expose(&mut self, around: Option<Pixel>) -> Result<()>;
 }
 
 /// What the rover reports of one step.

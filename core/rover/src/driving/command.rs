@@ -1,4 +1,4 @@
-//! The command of a targeted drive: standoff, offset and limits (R5–R8). The target is that of the run.
+//! The command of a targeted drive: standoff, offset, limits and actions after arrival (R5–R8). The target is that of the run.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -17,8 +17,19 @@ pub enum GoalRule {
     Fixed,
 }
 
+/// An action after arrival (R5).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ArrivalAction {
+    /// Points the mast at the located target, takes another pair and locates the target in it.
+    Look,
+}
+
+/// Most actions after arrival.
+const ACTIONS_MAX: usize = 10;
+
 /// The command of a targeted drive.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct DriveCommand {
     /// Horizontal distance of the goal from the target, m (2; 0.3 to 50).
@@ -37,6 +48,8 @@ pub struct DriveCommand {
     pub tilt_max_deg: f64,
     /// The drive stops after this much time on Mars, min (480; 1 to 10,000).
     pub flight_minutes_max: f64,
+    /// Actions after arrival, in this order (none; 10 at most). Each is one more stop, at which the rover stays.
+    pub on_arrival: Vec<ArrivalAction>,
 }
 
 impl Default for DriveCommand {
@@ -50,6 +63,7 @@ impl Default for DriveCommand {
             stops_max: 100,
             tilt_max_deg: 30.0,
             flight_minutes_max: 480.0,
+            on_arrival: Vec::new(),
         }
     }
 }
@@ -74,6 +88,7 @@ impl DriveCommand {
         within("stops_max", f64::from(self.stops_max), 2.0, 1000.0)?;
         within("tilt_max_deg", self.tilt_max_deg, 1.0, 45.0)?;
         within("flight_minutes_max", self.flight_minutes_max, 1.0, 10_000.0)?;
+        within("on_arrival (number of actions)", self.on_arrival.len() as f64, 0.0, ACTIONS_MAX as f64)?;
         if self.tolerance_m >= self.standoff_m {
             let problem = format!(
                 "{} m is not less than the standoff of {} m: every place would count as the goal",
@@ -133,6 +148,7 @@ mod tests {
             (|c| (c.standoff_m, c.tolerance_m) = (0.5, 0.5), ahead, "tolerance_m"),
             (|c| c.step_fraction = 0.0, ahead, "step_fraction"),
             (|c| c.stops_max = 1, ahead, "stops_max"),
+            (|c| c.on_arrival = vec![ArrivalAction::Look; 11], ahead, "on_arrival"),
         ] {
             let message = told(change, target).unwrap_err();
             assert!(message.contains(part), "{message}");

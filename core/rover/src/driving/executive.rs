@@ -16,7 +16,7 @@ use sightline_track::target::TrackingState;
 use sightline_track::trace::StepTrace;
 
 use super::active_world::{ActiveWorld, DriveReport};
-use super::command::{DriveCommand, GoalRule};
+use super::command::{ArrivalAction, DriveCommand, GoalRule};
 use super::flight_time::FlightTime;
 use super::select_path::{Motion, Navigator};
 use super::set_goal::{Goal, set_goal};
@@ -58,10 +58,12 @@ pub struct Cycle {
     pub step: usize,
     /// The goal.
     pub goal: Goal,
-    /// The chosen motion; null where the drive ended.
+    /// The chosen motion; null where the drive ended or the rover stays.
     pub motion: Option<Motion>,
-    /// The rover's report of the motion; null where the drive ended.
+    /// The rover's report of the motion; null without one.
     pub report: Option<DriveReport>,
+    /// Actions after arrival that were begun, the one decided here included.
+    pub arrival_actions: u32,
     /// Time on Mars up to the end of this stop's drive, min.
     pub flight_minutes: f64,
     /// The end of the drive; null where it goes on.
@@ -109,10 +111,14 @@ pub fn advance(
 pub fn drive_on(world: &mut dyn ActiveWorld, input: &CycleInput<'_>, cancel: Cancel<'_>) -> Result<Cycle> {
     cancel.check()?;
     let mut cycle = decide(world.stops(), input);
-    if let Some(motion) = cycle.motion {
-        cycle.add(world.drive(&motion, cancel)?);
-        point_mast(world, &input.last.update)?;
+    if cycle.ending.is_some() {
+        return Ok(cycle);
     }
+    match cycle.motion {
+        Some(motion) => cycle.add(world.drive(&motion, cancel)?),
+        None => world.stay()?,
+    }
+    point_mast(world, &input.last.update)?;
     Ok(cycle)
 }
 
@@ -127,7 +133,15 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
     let (left, right) = stops.cameras(step);
     let time = FlightTime::of_stop([left.size, right.size]);
     let flight_minutes = input.before.map_or(0.0, |before| before.flight_minutes) + time.total_s() / 60.0;
-    let mut cycle = Cycle { step, goal, motion: None, report: None, flight_minutes, ending: None };
+    let arrival_actions = input.before.map_or(0, |before| before.arrival_actions);
+    let mut cycle =
+        Cycle { step, goal, motion: None, report: None, arrival_actions, flight_minutes, ending: None };
+    let has_arrived = goal.arrived || arrival_actions > 0;
+    let action = input.command.on_arrival.get(arrival_actions as usize).filter(|_| has_arrived);
+    if let Some(ArrivalAction::Look) = action {
+        cycle.arrival_actions += 1;
+        return cycle;
+    }
     cycle.ending = ending(input, &cycle);
     if cycle.ending.is_none() {
         let target_in_rover = pose.inverse_transform_point(&target_in_site);
@@ -154,13 +168,16 @@ fn target_in_site(input: &CycleInput<'_>, stops: &dyn Stops) -> Point3 {
     stops.site_from_rover(from.step) * from.update.target.position_in_rover
 }
 
-/// Points the mast of the last stop at the prediction.
+/// Points the mast of the last stop at the prediction, and exposes around it.
 fn point_mast(world: &mut dyn ActiveWorld, last: &Updated) -> Result<()> {
     let stops = world.stops();
     let [then, now] = [last.target.step, last.target.step + 1].map(|step| stops.site_from_rover(step));
     let predicted = predict::predict(&last.target, &then, &now, &stops.odometry_error());
     let wanted = stops.mast().and_then(|mast| mast.point_left_centre_at(&predicted.position_in_rover));
-    world.point_mast(wanted)
+    world.point_mast(wanted)?;
+    let (left, _) = world.stops().cameras(last.target.step + 1);
+    let around = left.project(&predicted.position_in_rover);
+    world.expose(around)
 }
 
 /// Why the drive ends at this stop, if it does.
@@ -169,7 +186,8 @@ fn ending(input: &CycleInput<'_>, cycle: &Cycle) -> Option<Ending> {
     let end =
         |reason, value: f64, limit: f64| Some(Ending { reason, value: Some(value), limit: Some(limit) });
     let named = |reason| Some(Ending { reason, value: None, limit: None });
-    if cycle.goal.arrived {
+    // A later look may put the goal a little elsewhere; the rover has arrived all the same.
+    if cycle.goal.arrived || cycle.arrival_actions > 0 {
         return end(StopReason::Arrived, cycle.goal.distance_m, command.tolerance_m);
     }
     // The baseline drives on whatever tracking makes of it.

@@ -13,7 +13,7 @@ pub mod select_path;
 pub mod set_goal;
 
 pub use active_world::{ActiveWorld, DriveReport, Stall};
-pub use command::{DriveCommand, GoalRule};
+pub use command::{ArrivalAction, DriveCommand, GoalRule};
 pub use executive::{Cycle, Ending, StopReason};
 pub use select_path::{ArcNavigator, Motion, Navigator};
 pub use set_goal::Goal;

@@ -71,6 +71,9 @@ impl Stops for Rendered {
     fn odometry_error(&self) -> OdometryError {
         self.world.odometry_error()
     }
+    fn pointing_error_deg(&self) -> f64 {
+        self.world.pointing_error_deg()
+    }
     fn stereo(&self) -> StereoGeometry {
         self.world.stereo()
     }

@@ -133,7 +133,8 @@ mod tests {
         let position = Point3::new(5.0, 0.0, 0.0);
         let covariance = Matrix3::identity() * 1e-4;
         let world = PlaneWorld::new(vec![Pose::identity()]);
-        let used = UsedPointing { mast: None, angles: None, left: &world.left, right: &world.right };
+        let used =
+            UsedPointing { mast: None, angles: None, error_rad: 0.0, left: &world.left, right: &world.right };
         let target = Target {
             designation: Designation { step: 0, pixel: Pixel::new(1.0, 2.0) },
             step: 3,

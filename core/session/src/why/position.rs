@@ -253,11 +253,11 @@ impl Book<'_> {
                         &["predicted_covariance_m2"],
                     ),
                     (true, true) => draft.roughly(
-                        "that of the remembered position carried by the motion, with the motion's own",
+                        "that of the remembered position carried by the motion, with the motion's own and that of the mast angles",
                         &["feature_covariance"],
                     ),
                     (true, false) => draft.roughly(
-                        "the unscented transform of both pixels' covariance through the triangulation",
+                        "the unscented transform of both pixels' covariance through the triangulation, plus that of the mast angles",
                         &[
                             "left_error_px2",
                             "match_covariance_px2",

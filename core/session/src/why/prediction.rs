@@ -76,7 +76,10 @@ impl Book<'_> {
                 "px²",
                 self.trace.point_mast.predicted_covariance_px2?.transpose().iter().copied(),
             )
-            .roughly("J Σ Jᵀ, J = ∂pixel/∂point", &["predicted_covariance_m2", "predicted_left"]),
+            .roughly(
+                "J (Σ + Σ_m) Jᵀ, J = ∂pixel/∂point, Σ_m of the mast angles",
+                &["predicted_covariance_m2", "predicted_left"],
+            ),
             "predicted_sigma_px" => {
                 let covariance = self.trace.point_mast.predicted_covariance_px2?;
                 let sigma_px = covariance.symmetric_eigenvalues().max().max(0.0).sqrt();

@@ -48,7 +48,7 @@ pub struct Located {
     /// Position in the rover frame, m.
     #[schema(value_type = Option<[f64; 3]>)]
     pub position_in_rover: Option<Point3>,
-    /// Covariance of that position, m².
+    /// Covariance of that position, m², for cameras that point as measured; `update` adds the error of the mast angles.
     #[schema(value_type = Option<Vec<f64>>)]
     pub covariance_in_rover: Option<Matrix3<f64>>,
     /// How the surface point moves with the left pixel, m per px.
@@ -328,7 +328,7 @@ impl Record for Located {
         r.quantity("position_in_rover", Unit::Metre, |l| l.position_in_rover)
             .describe("Position in the rover frame.");
         r.quantity("covariance_in_rover", Unit::SquareMetre, |l| l.covariance_in_rover)
-            .describe("Covariance of that position.");
+            .describe("Covariance of that position for cameras that point as measured.");
         r.quantity("surface_by_pixel", Unit::MetrePerPixel, |l| l.surface_by_pixel)
             .describe("Derivative of the surface point by the left pixel.");
         r.quantity("confidence", Unit::One, |l| l.confidence).describe("Confidence of the tracker, 0 to 1.");

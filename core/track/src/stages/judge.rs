@@ -11,7 +11,7 @@
 //! The tolerances are recomputed at every update (R86, R87, ours):
 //! ```text
 //! tol_dist = g √( ΔR(D_old)² + ΔR(D_new)² + (f L_step)² )
-//! tol_pos  = g √( ΔR(D_0)²   + ΔR(D_new)² + (f L_total)² + (D_new/f_p · 0.5 · D_0/D_new)² )
+//! tol_pos  = g √( ΔR(D_0)²   + ΔR(D_new)² + (f L_total)² + (D_new/f_p · 0.5 · D_0/D_new)² + (3 σ_m)² (1 + (D_0/D_new)²) )
 //! ΔR(D)    = D² Δd / (f_p B)                                                     K-Eq 1
 //! ```
 //! | symbol | name | unit |
@@ -20,6 +20,7 @@
 //! | Δd | `limits.disparity_error_px` | px |
 //! | f | `limits.navigation_error_fraction` | – |
 //! | f_p, B | effective focal length at the target, distance of the camera centres | px, m |
+//! | σ_m | largest 1σ of `Pointing::error_covariance_in_rover`: the mast's error at D_new, 0 without a known one (ours) | m |
 //! | L_step, L_total | driven since the last accepted update, since designation | m |
 
 use crate::gate::{DISTANCE_CORRECTION, POSITION_CORRECTION};
@@ -91,6 +92,9 @@ struct Tolerance<'a> {
     limits: &'a Limits,
     focal_px: f64,
     baseline_m: f64,
+    /// 1σ error across the line of sight from the mast angles, m at the distance of the prediction.
+    pointing_m: f64,
+    predicted_m: f64,
 }
 
 impl<'a> Tolerance<'a> {
@@ -98,7 +102,15 @@ impl<'a> Tolerance<'a> {
         let (left, right) = (&pointing.left, &pointing.right);
         let at = pointing.predicted_left.unwrap_or_else(|| left.centre_pixel());
         let focal_px = left.model.focal_length_px(at).unwrap_or(predicted_m.max(1.0));
-        Self { limits, focal_px, baseline_m: (right.model.centre() - left.model.centre()).norm() }
+        let variance_m2 =
+            pointing.error_covariance_in_rover.map_or(0.0, |error| error.symmetric_eigenvalues().max());
+        Self {
+            limits,
+            focal_px,
+            baseline_m: (right.model.centre() - left.model.centre()).norm(),
+            pointing_m: variance_m2.max(0.0).sqrt(),
+            predicted_m,
+        }
     }
 
     /// K-Eq 1, m.
@@ -117,7 +129,9 @@ impl<'a> Tolerance<'a> {
         let stereo = self.stereo_m(target.initial_distance_m).hypot(self.stereo_m(new_m));
         // Half a pixel of the first image, seen from where the rover is now (R40).
         let designation = 0.5 * target.initial_distance_m / self.focal_px;
-        self.limits.tolerance_factor * stereo.hypot(navigation).hypot(designation)
+        // ΔR is a 3σ error. Both positions, of the designation and of this stop, have an error of the mast.
+        let pointing = 3.0 * self.pointing_m * 1f64.hypot(target.initial_distance_m / self.predicted_m);
+        self.limits.tolerance_factor * stereo.hypot(navigation).hypot(designation).hypot(pointing)
     }
 }
 

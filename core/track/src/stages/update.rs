@@ -1,9 +1,9 @@
 //! Stage 6, `update`: the next target (K§4.1 step 5, R28, R70, R78, R92).
 //!
-//! An accepted update renews the position and its covariance, and lets the tracker renew its memory: the template tracker
-//! its template, where the setting `template_update` asks for it (R70, R71), the feature tracker the stops from which it
-//! measures motions (R186), the shape tracker its last view (R189, R205). Otherwise the position is carried by the prediction
-//! alone and the memory stays.
+//! An accepted update renews the position and its covariance, to which that of the mast angles' error is added. It lets the
+//! tracker renew its memory: the template tracker its template, where the setting `template_update` asks for it (R70, R71),
+//! the feature tracker the stops from which it measures motions (R186), the shape tracker its last view (R189, R205).
+//! Otherwise the position is carried by the prediction alone and the memory stays.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -83,10 +83,12 @@ pub fn carry(target: &Target, step: usize, prediction: &Prediction) -> Target {
 
 /// The carried target with the position as located.
 fn found_again(carried: &Target, pointing: &Pointing, located: &Located) -> Option<Target> {
-    let position_in_rover = located.position_in_rover?;
+    let (position_in_rover, covariance) = located.position_in_rover.zip(located.covariance_in_rover)?;
     Some(Target {
         position_in_rover,
-        covariance_in_rover: located.covariance_in_rover?,
+        covariance_in_rover: pointing
+            .error_covariance_in_rover
+            .map_or(covariance, |error| covariance + error),
         last_distance_m: (position_in_rover - pointing.left.model.centre()).norm(),
         travelled_since_update_m: 0.0,
         ..carried.clone()
@@ -106,7 +108,7 @@ impl Record for Updated {
         r.quantity("target.position_in_rover", Unit::Metre, |u| u.target.position_in_rover)
             .describe("Estimated position in the rover frame.");
         r.quantity("target.covariance_in_rover", Unit::SquareMetre, |u| u.target.covariance_in_rover)
-            .describe("Covariance of the estimated position in the rover frame.");
+            .describe("Covariance of the estimated position in the rover frame, pointing error included.");
         r.quantity("target.initial_position_in_site", Unit::Metre, |u| u.target.initial_position_in_site)
             .describe("Position at the designation in the site frame.");
         r.quantity("target.initial_distance_m", Unit::Metre, |u| u.target.initial_distance_m)

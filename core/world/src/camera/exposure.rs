@@ -9,7 +9,8 @@
 //! **Fixed.** t is such that the mean of the first left picture is `mean_level` (`render.rs`).
 //!
 //! **Automatic** (domain.md 5.2, after the parameters of real labels): with h the number above which
-//! `pixel_fraction_percent` of the pixels lie, in the whole picture or in the square around its middle,
+//! `pixel_fraction_percent` of the pixels lie, in the whole picture or in a square around the metered pixel (the predicted
+//! target in a drive on commands, the picture's centre elsewhere),
 //!
 //! ```text
 //! repeat up to 6 times:  t' = t (cut − bias)/(h − bias), limited to a factor 1/8 … 8;  t' = t/4 if h saturates
@@ -35,6 +36,7 @@ use crate::camera::picture::{Eye, Region};
 use crate::scenario::{CameraSettings, ExposureMode, FULL_SCALE_DN, Scenario};
 use crate::world::World;
 use sightline_geometry::camera::Camera;
+use sightline_geometry::frames::Pixel;
 use sightline_vision::image::GrayImage;
 
 /// Unit of the time of exposure, s (domain.md 5.1).
@@ -145,10 +147,16 @@ pub fn fixed_s(world: &World, scenario: &Scenario) -> f64 {
     world.exposure * FULL_SCALE_DN * scenario.camera.gain_electrons_per_dn / scenario.camera.electrons_per_s
 }
 
-/// The automatic exposure (header) of a whole left picture, starting from `start_s`.
-pub fn automatic(rates: &Rates, camera: &CameraSettings, start_s: f64) -> AutoExposure {
+/// The automatic exposure (header) of a whole left picture, starting from `start_s`; a subframe is metered around `centre`,
+/// px, or around the picture's centre.
+pub fn automatic(
+    rates: &Rates,
+    camera: &CameraSettings,
+    centre: Option<Pixel>,
+    start_s: f64,
+) -> AutoExposure {
     let auto = &camera.auto_exposure;
-    let region = metered(rates, camera);
+    let region = metered(rates, camera, centre);
     let mut time_s = whole_units_s(start_s);
     for tried in 1..=auto.iterations {
         let high_dn = rates.high_dn(region, time_s, camera, auto.pixel_fraction_percent);
@@ -167,15 +175,22 @@ pub fn automatic(rates: &Rates, camera: &CameraSettings, start_s: f64) -> AutoEx
     AutoExposure { time_s, tried: auto.iterations }
 }
 
-/// The part of the left picture that the automatic exposure looks at.
-fn metered(rates: &Rates, camera: &CameraSettings) -> Region {
+/// The part of the left picture that the automatic exposure meters; near a border the subframe is moved into the picture.
+fn metered(rates: &Rates, camera: &CameraSettings, centre: Option<Pixel>) -> Region {
     let [width, height] = [rates.per_s.width(), rates.per_s.height()];
     if camera.exposure != ExposureMode::Subframe {
         return Region { x: 0, y: 0, width, height };
     }
     let side = camera.auto_exposure.subframe_px;
     let [w, h] = [width.min(side), height.min(side)];
-    Region { x: (width - w) / 2, y: (height - h) / 2, width: w, height: h }
+    let Some(centre) = centre else {
+        return Region { x: (width - w) / 2, y: (height - h) / 2, width: w, height: h };
+    };
+    let from = |centre_px: f64, side: u32, picture: u32| {
+        let first_px = (centre_px - 0.5 * f64::from(side.saturating_sub(1))).round();
+        first_px.clamp(0.0, f64::from(picture - side)) as u32
+    };
+    Region { x: from(centre.x, w, width), y: from(centre.y, h, height), width: w, height: h }
 }
 
 /// The nearest time that the camera can keep, s.
@@ -226,7 +241,7 @@ mod tests {
         let scenario = scenario(mode);
         let of_share = |rows: u32| {
             let rates = rates(&ground_below_sky(rows), &scenario);
-            let time_s = automatic(&rates, &scenario.camera, 0.43).time_s;
+            let time_s = automatic(&rates, &scenario.camera, None, 0.43).time_s;
             window_dn(&rates.levels(time_s, &scenario.camera))
         };
         [0, 1, 8, 26, 51, 102].map(of_share).to_vec()
@@ -251,9 +266,13 @@ mod tests {
             let scenario = scenario(mode);
             let rates = rates(&ground_below_sky(60), &scenario);
             for start_s in [0.1, 0.43, 2.0, 10.0] {
-                let found = automatic(&rates, &scenario.camera, start_s);
-                let high_dn =
-                    rates.high_dn(metered(&rates, &scenario.camera), found.time_s, &scenario.camera, 1.0);
+                let found = automatic(&rates, &scenario.camera, None, start_s);
+                let high_dn = rates.high_dn(
+                    metered(&rates, &scenario.camera, None),
+                    found.time_s,
+                    &scenario.camera,
+                    1.0,
+                );
                 assert!((high_dn / 2000.0 - 1.0).abs() < 0.05, "{start_s}: {found:?} {high_dn}");
                 let units = found.time_s / UNIT_S;
                 assert!((units - units.round()).abs() < 1e-9 && found.tried <= 6);
@@ -262,16 +281,33 @@ mod tests {
     }
 
     #[test]
+    fn a_subframe_is_metered_around_its_pixel() {
+        let scenario = scenario(ExposureMode::Subframe);
+        // The left half of the picture is twice as bright as the right one.
+        let halves = GrayImage::from_fn(SIDE, SIDE, |x, _| image::Luma([if x < 128 { 0.4 } else { 0.2 }]));
+        let rates = rates(&halves, &scenario);
+        let time_s = |centre: Option<Pixel>| automatic(&rates, &scenario.camera, centre, 0.43).time_s;
+        let [left_s, right_s] = [60.0, 200.0].map(|x| time_s(Some(Pixel::new(x, 90.0))));
+        assert!((right_s / left_s - 2.0).abs() < 0.1, "{left_s} {right_s}");
+        // The middle square reaches into both halves: its brightest hundredth is on the left.
+        assert!((time_s(None) / left_s - 1.0).abs() < 0.05);
+        // A pixel beyond the border meters the square at the border.
+        assert_eq!(time_s(Some(Pixel::new(900.0, -50.0))), right_s);
+        let region = metered(&rates, &scenario.camera, Some(Pixel::new(60.0, 90.0)));
+        assert_eq!((region.x, region.y, region.width, region.height), (40, 70, 41, 41));
+    }
+
+    #[test]
     fn one_step_changes_the_time_by_the_ratio_of_cut_and_number() {
         let mut scenario = scenario(ExposureMode::FullFrame);
         scenario.camera.auto_exposure.iterations = 1;
         let even = rates(&GrayImage::from_pixel(SIDE, SIDE, image::Luma([0.2])), &scenario);
         // 600 000 e⁻/s · 0.2 · 0.512 s / 42 = 1462.9 DN above the bias; the cut is 1980 above it.
-        let found = automatic(&even, &scenario.camera, 0.512);
+        let found = automatic(&even, &scenario.camera, None, 0.512);
         assert_eq!(found.time_s, (100.0 * 1980.0 / (120_000.0 * 0.512 / 42.0_f64)).round() * UNIT_S);
         // At 10 s everything is saturated: a quarter; 1 unit shows next to nothing: eight times as long.
-        assert!((automatic(&even, &scenario.camera, 10.24).time_s - 2.56).abs() < 1e-9);
-        assert!((automatic(&even, &scenario.camera, UNIT_S).time_s - 8.0 * UNIT_S).abs() < 1e-9);
+        assert!((automatic(&even, &scenario.camera, None, 10.24).time_s - 2.56).abs() < 1e-9);
+        assert!((automatic(&even, &scenario.camera, None, UNIT_S).time_s - 8.0 * UNIT_S).abs() < 1e-9);
     }
 
     #[test]

@@ -10,7 +10,7 @@
 //! skirt: g = S d,  z0 = min over vertices v of v_z − S d·(v_x, v_y),   S = max(1, H / (w/2))
 //! footing(x, y) = min of the ground's z and of z over the rocks near there
 //! ```
-//! The top of a rock is met exactly. Rocks whose height H is above [`CLIMB_M`] are no footing: a planner drives around
+//! The top of a rock is met exactly. Rocks whose height H is above `rover.climb_m` are no footing: a planner drives around
 //! them, and a drive that leads a wheel against one is refused (`course.rs`). Fiducials and occluders, which
 //! no rover meets, are none either.
 //!
@@ -30,8 +30,6 @@ use crate::ground::terrain::Terrain;
 use crate::rover::suspension::WHEEL_WIDTH_M;
 use sightline_geometry::frames::{Point3, Ray, Vector3};
 
-/// The highest rock that the rover climbs, m (JPL's stereo heuristics let it climb 0.20 m: domain.md).
-pub(crate) const CLIMB_M: f64 = 0.20;
 /// Side of a cell of the map of rocks, m.
 const CELL_M: f64 = 0.25;
 /// Directions in which a rock has a skirt.
@@ -66,14 +64,14 @@ pub(crate) struct Footing {
 }
 
 impl Footing {
-    /// The rocks that stand on the rectangle `x_m` × `y_m` of the site.
-    pub(crate) fn new(rocks: &[Rock], x_m: [f64; 2], y_m: [f64; 2]) -> Self {
+    /// The rocks that stand on the rectangle `x_m` × `y_m` of the site; wheels climb those of up to `climb_m`.
+    pub(crate) fn new(rocks: &[Rock], x_m: [f64; 2], y_m: [f64; 2], climb_m: f64) -> Self {
         let cells = [x_m, y_m].map(|[from, to]| ((to - from) / CELL_M).ceil().max(1.0) as usize);
         let none = vec![Vec::new(); cells[0] * cells[1]];
         let origin_m = [x_m[0], y_m[0]];
         let mut footing = Self { origin_m, cells, climbed: none.clone(), tents: Vec::new(), avoided: none };
         for (number, rock) in rocks.iter().enumerate() {
-            if rock.height_m > CLIMB_M {
+            if rock.height_m > climb_m {
                 for cell in footing.cells_around(&rock.centre, rock.radius_m) {
                     footing.avoided[cell].push(number as u32);
                 }
@@ -164,6 +162,7 @@ mod tests {
     use crate::scenario::{RockShape, TerrainSettings};
 
     const EXTENT_M: [[f64; 2]; 2] = [[-3.0, 3.0], [-3.0, 3.0]];
+    const CLIMB_M: f64 = 0.25;
 
     fn flat() -> Terrain {
         let settings = TerrainSettings { rms_at_1m_m: 0.0, ..TerrainSettings::default() };
@@ -183,7 +182,7 @@ mod tests {
             let shape =
                 [RockShape::Angular, RockShape::Block, RockShape::Cobble, RockShape::Slab][seed as usize % 4];
             let rock = rock(shape, 0.02 + 0.007 * seed as f64, seed);
-            let footing = Footing::new(std::slice::from_ref(&rock), EXTENT_M[0], EXTENT_M[1]);
+            let footing = Footing::new(std::slice::from_ref(&rock), EXTENT_M[0], EXTENT_M[1], CLIMB_M);
             let steepness = (rock.height_m / 0.08).max(1.0);
             let step_m = rock.radius_m / 50.0;
             let z = |ix: i32, iy: i32| {
@@ -224,7 +223,7 @@ mod tests {
                 seed,
             };
             let rock = Rock::grow(&from, ground_z_m, &-Vector3::z());
-            let footing = Footing::new(&[rock], EXTENT_M[0], EXTENT_M[1]);
+            let footing = Footing::new(&[rock], EXTENT_M[0], EXTENT_M[1], CLIMB_M);
             let stand = settle(&|x, y| footing.z_at(&terrain, x, y), 0.0, 0.0, 0.0).unwrap();
             let (roll, pitch, _) = stand.site_from_rover.rotation.euler_angles();
             let h = ground_z_m - stand.contacts_in_site[0].z;
@@ -240,9 +239,11 @@ mod tests {
     fn a_rock_above_the_limit_is_no_footing_and_blocks_its_outline_alone() {
         let terrain = flat();
         let ground_z_m = f64::from(MEAN_GROUND_Z_M as f32);
-        for (height_m, is_climbed) in [(0.199, true), (0.201, false)] {
+        for (height_m, climb_m, is_climbed) in
+            [(0.249, CLIMB_M, true), (0.251, CLIMB_M, false), (0.199, 0.2, true), (0.201, 0.2, false)]
+        {
             let rocks = [rock(RockShape::Block, height_m, 3)];
-            let footing = Footing::new(&rocks, EXTENT_M[0], EXTENT_M[1]);
+            let footing = Footing::new(&rocks, EXTENT_M[0], EXTENT_M[1], climb_m);
             assert_eq!(footing.z_at(&terrain, 0.70, -0.53) < ground_z_m - 0.1, is_climbed);
             assert_eq!(footing.blocked_by_m(&rocks, 0.70, -0.53).is_none(), is_climbed);
             assert_eq!(footing.blocked_by_m(&rocks, 0.70, 0.53), None);

@@ -13,6 +13,7 @@ pub mod rocks;
 mod shape;
 pub mod rock_law;
 pub(crate) mod around;
+mod clear_path;
 pub(crate) mod rock_field;
 pub(crate) mod footing;
 mod details;

@@ -13,7 +13,8 @@
 //! Rocks are scattered over the wedge that the cameras see, in strips across the drive; the smallest
 //! diameter grows slowly beyond the goal, where smaller ones would span less than about four pixels. Around
 //! the goal a cluster follows the same law with a larger smallest diameter. The wheels' tracks are kept
-//! free of all but pebbles, and between them nothing is higher than the rover's belly.
+//! free of all but pebbles, and between them nothing is higher than the rover's belly. `rocks.clear_path` removes
+//! further rocks once all are placed (`clear_path.rs`).
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -30,6 +31,7 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
 use crate::ground::around::Around;
+use crate::ground::clear_path;
 use crate::ground::rock_law::{draw_diameter_m, number_per_m2};
 use crate::ground::rocks::{Rock, RockSeed};
 use crate::ground::terrain::Terrain;
@@ -143,6 +145,14 @@ pub(crate) fn scatter(
             seeds.push(RockSeed { x_m, y_m, diameter_m, height_m, shape, face_yaw_rad: None, seed });
             break;
         }
+    }
+    if let Some(path) = &settings.clear_path {
+        let scattered = seeds.split_off(settings.placed.len().min(seeds.len()));
+        let is_clear = |rock: &RockSeed| {
+            let reach_m = REACH * rock.diameter_m;
+            !clear_path::removes(path, approach.goal_m, [rock.x_m, rock.y_m], reach_m, rock.height_m)
+        };
+        seeds.extend(scattered.into_iter().filter(is_clear));
     }
     let grow = |rock: &RockSeed| {
         let up = terrain.mean_normal_at(rock.x_m, rock.y_m);
@@ -292,7 +302,8 @@ impl Taken {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scenario::TerrainSettings;
+    use crate::scenario::{ClearPath, TerrainSettings};
+    use sightline_geometry::frames::Point3;
 
     fn approach() -> Approach {
         Approach { goal_m: [10.3, 0.0], wheels_reach_m: 9.7, around: None }
@@ -358,6 +369,32 @@ mod tests {
                 |other: &&Rock| (other.centre - rock.centre).xy().norm() < 0.6 * (other.diameter_m + 0.07);
             assert_eq!(rocks.iter().filter(near).count(), 1);
         }
+    }
+
+    #[test]
+    fn a_clear_path_removes_the_rocks_on_it_and_leaves_all_others_as_they_were() {
+        let path = ClearPath { to_x_m: -2.0, to_y_m: 1.0, ..ClearPath::default() };
+        let open = RockSettings { farthest_m: 12.0, ..RockSettings::default() };
+        let cleared = RockSettings { clear_path: Some(path), ..open.clone() };
+        let mut removed = 0;
+        for seed in 0..5 {
+            let (before, after) = (field(&open, seed), field(&cleared, seed));
+            let in_strip = |rock: &&Rock| {
+                let place_m = [rock.centre.x, rock.centre.y];
+                clear_path::removes(&path, approach().goal_m, place_m, 0.6 * rock.diameter_m, rock.height_m)
+            };
+            let others: Vec<Point3> =
+                before.iter().filter(|rock| !in_strip(rock)).map(|r| r.centre).collect();
+            assert_eq!(after.iter().map(|rock| rock.centre).collect::<Vec<_>>(), others);
+            removed += before.len() - after.len();
+            // Pebbles on the path and the rocks beyond its end are still there.
+            assert!(
+                after.iter().any(|rock| (3.0..7.0).contains(&rock.centre.x) && rock.centre.y.abs() < 0.4)
+            );
+            let near = |rock: &&Rock| (rock.centre.x - 10.3).hypot(rock.centre.y) < 1.5;
+            assert!(after.iter().filter(near).filter(|rock| rock.diameter_m >= 0.25).count() >= 8);
+        }
+        assert!(removed > 0);
     }
 
     #[test]

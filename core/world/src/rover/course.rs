@@ -29,7 +29,6 @@
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Vector3;
 
-use crate::ground::footing::CLIMB_M;
 use crate::rover::approach::distances_m;
 use crate::rover::scene::{Leg, Place, Scene, TrueDrive, TrueStop, pieces, wrapped};
 use crate::rover::slip::{self, Slip};
@@ -102,8 +101,8 @@ impl<'a> Driver<'a> {
     fn check_way(&self, stand: &Stand) -> Result<()> {
         self.scene.blocked(stand).map_or(Ok(()), |(at, height_m)| {
             let problem = format!(
-                "a wheel meets a rock {height_m:.2} m high at x {:.2} m, y {:.2} m; it climbs {CLIMB_M} m",
-                at.x, at.y
+                "a wheel meets a rock {height_m:.2} m high at x {:.2} m, y {:.2} m; it climbs {} m (rover.climb_m)",
+                at.x, at.y, self.scene.rover.climb_m
             );
             Err(self.wrong(problem))
         })

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use sightline_geometry::camera::MastAngles;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
-use sightline_geometry::frames::{Point3, Pose, PoseRecord, Vector3};
+use sightline_geometry::frames::{Pixel, Point3, Pose, PoseRecord, Vector3};
 
 use crate::camera::rig::Rig;
 use crate::ground::texture::mix;
@@ -48,6 +48,9 @@ pub struct DrivenStop {
     pub attitude_error_rad: [f64; 3],
     /// The angles to which the mast was pointed; `None` without a mast.
     pub mast_angles: Option<MastAngles>,
+    /// Centre of the exposure subframe in the left image, px; the image's centre where `None`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub metered_px: Option<Pixel>,
     /// Length of the wheels' path to this stop, m.
     pub wheels_m: f64,
     /// Duration of the drive to this stop, s.
@@ -72,6 +75,7 @@ impl DrivenStop {
             site_from_rover: pose,
             attitude_error_rad: [0.0; 3],
             mast_angles: stop.angles,
+            metered_px: None,
             wheels_m: 0.0,
             drive_s: 0.0,
             completed: 1.0,
@@ -105,12 +109,28 @@ impl DrivenStop {
                 site_from_rover: PoseRecord::from(&belief.pose),
                 attitude_error_rad: belief.attitude_error_rad,
                 mast_angles: self.mast_angles,
+                metered_px: None,
                 wheels_m: leg.driven_m,
                 drive_s: leg.duration_s,
                 completed,
                 touched_rocks: touched_rocks(world, &stand),
             })
         })
+    }
+
+    /// The stop after this one when the rover does not move.
+    #[must_use]
+    pub fn stay(&self) -> Self {
+        Self {
+            time_s: self.time_s + PAUSE_S,
+            wheels_m: 0.0,
+            drive_s: 0.0,
+            metered_px: None,
+            completed: 1.0,
+            // A rock is counted at the stop at which it was reached.
+            touched_rocks: 0,
+            ..self.clone()
+        }
     }
 
     /// Rolls the true rover; the leg and the part of the motion that was completed.
@@ -172,7 +192,9 @@ pub fn index_stops(driven: &[DrivenStop], scenario: &Scenario) -> Vec<Stop> {
         |number: usize| true_angles.get(number).copied().filter(|_| mast_error::is_present(&scenario.drive));
     let stop = |(number, stop): (usize, &DrivenStop)| {
         let poses = [stop.true_site_from_rover, stop.site_from_rover].map(PoseRecord::to_pose);
-        simulated_stop(number, stop.time_s, poses, stop.mast_angles, with_error(number), &rig)
+        let metered_px = stop.metered_px;
+        let made = simulated_stop(number, stop.time_s, poses, stop.mast_angles, with_error(number), &rig);
+        Stop { metered_px, ..made }
     };
     driven.iter().enumerate().map(stop).collect()
 }
@@ -297,6 +319,14 @@ mod tests {
         assert!((0.3..0.6).contains(&stops[1].completed), "{}", stops[1].completed);
         assert_eq!(stops[2].completed, 1.0, "it can go back");
         assert_eq!(stops[1].touched_rocks, 0);
+        // Whether a rock of 24 cm is climbed depends on the setting.
+        scenario.rocks.placed[0].height_m = 0.24;
+        for (climb_m, is_climbed) in [(0.25, true), (0.2, false)] {
+            scenario.rover.climb_m = climb_m;
+            let world = World::new(&scenario);
+            let stops = drive(&scenario, &world, &[[4.0, 0.0]]);
+            assert_eq!(stops[1].completed == 1.0, is_climbed, "{climb_m} m");
+        }
     }
 
     #[test]

@@ -92,6 +92,35 @@ fn towards_the_rover_deg() -> f64 {
     180.0
 }
 
+/// A strip without high rocks from the first stop to a place near the targets' centre, for drives on commands.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct ClearPath {
+    /// End of the strip for the rover frame's origin relative to the targets' centre, m along x of the site (−2: a standoff).
+    pub to_x_m: f64,
+    /// The same along y of the site, m (0).
+    pub to_y_m: f64,
+    /// Half of the strip's width, m (1.2: half of the wheels' track, and room for arcs and for a moving goal; ours).
+    pub half_width_m: f64,
+    /// Height of the highest rock that remains in the strip, m (0.10: R99).
+    pub above_m: f64,
+}
+
+impl Default for ClearPath {
+    fn default() -> Self {
+        Self { to_x_m: -2.0, to_y_m: 0.0, half_width_m: 1.2, above_m: 0.10 }
+    }
+}
+
+impl ClearPath {
+    fn validate(&self) -> Result<()> {
+        within("rocks.clear_path.to_x_m", self.to_x_m, -100.0, 100.0)?;
+        within("rocks.clear_path.to_y_m", self.to_y_m, -100.0, 100.0)?;
+        within("rocks.clear_path.half_width_m", self.half_width_m, 0.1, 10.0)?;
+        within("rocks.clear_path.above_m", self.above_m, 0.0, 2.0)
+    }
+}
+
 /// Rocks by the size distribution of Golombek & Rapp, a cluster near the targets' centre, and single ones.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -120,6 +149,9 @@ pub struct RockSettings {
     /// Rocks that stand where the scenario puts them; scattered rocks give way to them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub placed: Vec<PlacedRock>,
+    /// A strip from which scattered rocks are removed (none); placed rocks remain.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clear_path: Option<ClearPath>,
 }
 
 impl Default for RockSettings {
@@ -136,6 +168,7 @@ impl Default for RockSettings {
             cluster_smallest_m: 0.25,
             cluster_largest_m: 0.9,
             placed: Vec::new(),
+            clear_path: None,
         }
     }
 }
@@ -233,7 +266,8 @@ impl RockSettings {
             let problem = format!("has {} rocks, but may have at most {PLACED_LIMIT}", self.placed.len());
             return Err(Error::setting("rocks.placed", problem));
         }
-        self.placed.iter().try_for_each(PlacedRock::validate)
+        self.placed.iter().try_for_each(PlacedRock::validate)?;
+        self.clear_path.as_ref().map_or(Ok(()), ClearPath::validate)
     }
 }
 

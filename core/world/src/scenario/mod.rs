@@ -32,7 +32,7 @@ pub use camera::{
 pub use drive::{Course, DriveSettings, Move};
 pub use events::{Cloud, EventSettings, Occluder};
 pub use fiducials::Fiducial;
-pub use ground::{PlacedRock, RockSettings, RockShape, TerrainSettings, TextureSettings};
+pub use ground::{ClearPath, PlacedRock, RockSettings, RockShape, TerrainSettings, TextureSettings};
 pub use light::{Reflectance, SunSettings};
 pub use rover::{ForcedSlip, HeadingJump, OdometryModel, RoverSettings, Soil};
 pub use targets::{Arrangement, TargetRule};

@@ -62,6 +62,8 @@ pub struct RoverSettings {
     /// 1σ spread of the slip of a step as a part of it, drawn for each step of a drive on commands (0; 0.2 is plausible, ours).
     #[serde(skip_serializing_if = "is_zero")]
     pub slip_spread: f64,
+    /// Height of the highest rock that a wheel climbs, m; a higher one stalls it (0.25: domain.md 5.4).
+    pub climb_m: f64,
     /// From the way to this stop on nothing but the wheels turns: 100 % of slip; 0 means never (0; R126).
     pub stuck_from_stop: u32,
     /// Where the pose estimate comes from (`stated`).
@@ -93,6 +95,7 @@ impl Default for RoverSettings {
             soil: Soil::FirmSoil,
             slip_scale: 0.0,
             slip_spread: 0.0,
+            climb_m: 0.25,
             stuck_from_stop: 0,
             odometry: OdometryModel::Stated,
             gyro_walk_deg_per_root_hour: 0.1,
@@ -110,6 +113,7 @@ impl RoverSettings {
     pub(crate) fn validate(&self) -> Result<()> {
         within("rover.slip_scale", self.slip_scale, 0.0, 5.0)?;
         within("rover.slip_spread", self.slip_spread, 0.0, 1.0)?;
+        within("rover.climb_m", self.climb_m, 0.0, 0.4)?;
         within("rover.stuck_from_stop", f64::from(self.stuck_from_stop), 0.0, 10_000.0)?;
         for (index, forced) in self.forced_slip.iter().enumerate() {
             within(&format!("rover.forced_slip[{index}].stop"), f64::from(forced.stop), 1.0, 10_000.0)?;

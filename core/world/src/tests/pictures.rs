@@ -251,7 +251,7 @@ fn sky_that_enters_the_frame_darkens_the_target_unless_a_subframe_is_metered() {
             (0..side * side).filter_map(|k| camera.ray(Pixel::new(f64::from(k % side), f64::from(k / side))));
         let sky = rays.filter(|ray| world.cast(ray).is_none()).count() as f64 / f64::from(side * side);
         let rates = Rates::new(&radiance, &scenario, &camera, Eye::Left, [0, 0]);
-        let time_s = automatic(&rates, &scenario.camera, scenario.camera.auto_exposure.start_s).time_s;
+        let time_s = automatic(&rates, &scenario.camera, None, scenario.camera.auto_exposure.start_s).time_s;
         let picture = rates.levels(time_s, &scenario.camera);
         let corner = side / 2 - 10;
         let window = (0..21 * 21).map(|k| picture.get_pixel(corner + k % 21, corner + k / 21).0[0]);

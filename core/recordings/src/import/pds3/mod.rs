@@ -77,6 +77,7 @@ impl ImportFormat for Pds3 {
                 left: write_view(&pair.left, pair.left.camera.clone(), &scale, output)?,
                 right: write_view(&pair.right, pair.right_camera_in_left_rover(), &scale, output)?,
                 light: pair.left.product.light(),
+                metered_px: None,
                 truth: None,
             });
         }
@@ -89,6 +90,7 @@ impl ImportFormat for Pds3 {
             full_scale_dn: Some(scale.full_scale_dn),
             stereo,
             odometry_error: OdometryError::default(),
+            pointing_error_deg: 0.0,
             mast: None,
             scenario: None,
             stops,
