@@ -7,7 +7,7 @@
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
-use sightline_api::wire::Event;
+use sightline_api::event::Event;
 use sightline_geometry::error::{Error, Result};
 use sightline_recordings::DrivenTraverse;
 use sightline_rover::driving::{ArcNavigator, executive};

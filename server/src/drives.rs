@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use rayon::prelude::*;
-use sightline_api::wire::Event;
+use sightline_api::event::Event;
 use sightline_geometry::error::Result;
 use sightline_recordings::{Traverse, create_simulated};
 use sightline_track::locate::store::Cache;

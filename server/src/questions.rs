@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
+use sightline_api::event::Event;
 use sightline_api::location::AtStep;
-use sightline_api::wire::Event;
 use sightline_geometry::error::Result;
 use sightline_session::counterfactual::wire::{Question, QuestionState};
 

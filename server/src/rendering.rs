@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, OnceLock, PoisonError, Weak};
 use std::time::Duration;
 
-use sightline_api::wire::Event;
+use sightline_api::event::Event;
 use sightline_geometry::error::{Error, Result};
 use sightline_recordings::Traverse;
 use tokio::sync::broadcast;

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
-use sightline_api::wire::Event;
+use sightline_api::event::Event;
 use sightline_geometry::error::{Error, Result};
 use sightline_recordings::Traverse;
 use sightline_session::view::SessionView;

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
-use sightline_api::wire::Event;
+use sightline_api::event::Event;
 use sightline_geometry::error::Result;
 use sightline_rover::trackability::{Ground, MapProgress, TrackabilityLimits};
 use sightline_track::settings::Settings;

@@ -2,7 +2,7 @@
 
 use axum::http::Method;
 use serde_json::json;
-use sightline_api::wire::Event;
+use sightline_api::event::Event;
 use sightline_tests::server::{PIXEL, TestServer, long_recording};
 
 /// Stops of the drive; every eighth shows the first image.

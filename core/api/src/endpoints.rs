@@ -25,6 +25,7 @@ use sightline_track::limits::SettingInfo;
 use sightline_track::locate::template::history::AgainstEarlier;
 
 use crate::endpoint::{Done, Endpoint, File, Method, NoBody, NoQuery};
+use crate::event::Event;
 use crate::location::{
     Anywhere, AtBreakpoint, AtDocument, AtExport, AtImage, AtNote, AtRun, AtSession, AtStep, AtStop,
     AtStudyJob, AtTarget, AtTraverse, AtViewerFile,
@@ -32,8 +33,8 @@ use crate::location::{
 use crate::program::{Health, Version};
 use crate::query::{FirstRow, FirstStop, ImageDepth, MapLimits, MapPixel, SessionPart, ValueName};
 use crate::wire::{
-    Designated, Event, Login, NewDrive, NewRun, NewSession, NewTarget, NewTraverse, RerunStream,
-    SessionEntry, StopDetail, TraverseEntry, TraverseView,
+    Designated, Login, NewDrive, NewRun, NewSession, NewTarget, NewTraverse, RerunStream, SessionEntry,
+    StopDetail, TraverseEntry, TraverseView,
 };
 
 /// Declares a type for each endpoint, and the list of all of them.

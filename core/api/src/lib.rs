@@ -3,6 +3,7 @@
 
 pub mod endpoint;
 pub mod endpoints;
+pub mod event;
 pub mod location;
 pub mod program;
 pub mod query;

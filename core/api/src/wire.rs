@@ -9,9 +9,7 @@ use sightline_geometry::frames::{Pixel, PoseRecord};
 use sightline_geometry::stereo_geometry::StereoGeometry;
 use sightline_rover::designate::Place;
 use sightline_rover::driving::DriveCommand;
-use sightline_session::Cursor;
 use sightline_session::view::SessionView;
-use sightline_study::wire::StudyJob;
 use sightline_track::settings::Changes;
 
 /// A traverse in the server's list.
@@ -233,102 +231,6 @@ pub struct RerunStream {
     pub viewer_path: String,
     /// Path below `/api/v1/` of the recording, for another viewer: `curl -N … | rerun -`.
     pub stream_path: String,
-}
-
-/// What the server tells every open page over the WebSocket.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(tag = "event", rename_all = "snake_case")]
-pub enum Event {
-    /// Something of a session changed: read its view again.
-    SessionChanged {
-        /// The session.
-        session: String,
-    },
-    /// A session was removed.
-    SessionRemoved {
-        /// The session.
-        session: String,
-    },
-    /// A drive was removed.
-    TraverseRemoved {
-        /// The traverse.
-        traverse: String,
-    },
-    /// The cursor of a session was moved; nothing else of it changed.
-    CursorMoved {
-        /// The session.
-        session: String,
-        /// Where to.
-        cursor: Cursor,
-    },
-    /// A run went on.
-    RunProgress {
-        /// The session.
-        session: String,
-        /// The target's number.
-        target: usize,
-        /// The run's number.
-        run: usize,
-        /// Steps done.
-        k: usize,
-        /// Steps in all.
-        n: usize,
-        /// Whether it has ended.
-        ended: bool,
-        /// What is being done, in words.
-        doing: String,
-    },
-    /// Images of a simulated traverse were rendered.
-    RenderProgress {
-        /// The traverse.
-        traverse: String,
-        /// Stops done.
-        k: usize,
-        /// Stops in all.
-        n: usize,
-        /// The stop that became ready, where one did.
-        ready: Option<usize>,
-    },
-    /// A study went on.
-    StudyProgress {
-        /// How it stands.
-        job: StudyJob,
-    },
-    /// Rows of a stop's trackability were made.
-    TrackabilityProgress {
-        /// The traverse.
-        traverse: String,
-        /// The stop.
-        step: usize,
-        /// Rows of cells done.
-        k: usize,
-        /// Rows of cells in all; 0 before that is known.
-        n: usize,
-        /// Whether nothing more will come.
-        ended: bool,
-    },
-    /// What would have saved a step is being looked for: read the question again.
-    QuestionProgress {
-        /// The session.
-        session: String,
-        /// The target's number.
-        target: usize,
-        /// The run's number.
-        run: usize,
-        /// The step.
-        step: usize,
-        /// Settings and places looked at.
-        k: usize,
-        /// How many there are.
-        n: usize,
-        /// Whether it has ended.
-        ended: bool,
-    },
-    /// Notes of a session changed: read them again.
-    NotesChanged {
-        /// The session.
-        session: String,
-    },
 }
 
 /// A problem as the server reports it (RFC 9457).

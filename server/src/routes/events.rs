@@ -12,7 +12,7 @@ use axum::http::StatusCode;
 use axum::response::Response;
 use sightline_api::endpoint::Endpoint;
 use sightline_api::endpoints::ListenToEvents;
-use sightline_api::wire::Event;
+use sightline_api::event::Event;
 use tokio::sync::broadcast::Receiver;
 use tokio::sync::broadcast::error::RecvError;
 use utoipa_axum::router::OpenApiRouter;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use sightline_api::wire::Event;
+use sightline_api::event::Event;
 use sightline_session::notes::Notes;
 use sightline_session::{Cursor, Session};
 

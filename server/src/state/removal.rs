@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, MutexGuard};
 
-use sightline_api::wire::Event;
+use sightline_api::event::Event;
 
 use super::AppState;
 use crate::jobs::lock;

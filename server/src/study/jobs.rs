@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
-use sightline_api::wire::Event;
+use sightline_api::event::Event;
 use sightline_geometry::error::Error;
 use sightline_study::row::Row;
 use sightline_study::wire::{NewStudy, StudyJob, StudyState};

@@ -5,8 +5,8 @@ use sightline_api::endpoint::Call;
 use sightline_api::endpoints::{
     AddBreakpoint, ChangeBreakpoint, ListBreakpoints, QuerySession, RemoveBreakpoint, ShowSession,
 };
+use sightline_api::event::Event;
 use sightline_api::location::AtBreakpoint;
-use sightline_api::wire::Event;
 use sightline_session::breakpoints::{Breakpoint, BreakpointView, NewBreakpoint, RunHits};
 use sightline_session::expression::Answers;
 use sightline_session::query::{Query, QueryAnswer, RunAnswer};

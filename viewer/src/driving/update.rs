@@ -182,7 +182,7 @@ mod tests {
     use crate::net::request::Request;
     use crate::tests::fixture;
     use serde_json::json;
-    use sightline_api::wire::Event;
+    use sightline_api::event::Event;
 
     /// A session that drives with its only run, at a stop.
     fn driving(step: usize) -> State {

@@ -5,8 +5,9 @@ use sightline_api::endpoint::Call;
 use sightline_api::endpoints::{
     AddBreakpoint, AddTraverse, BringSession, ListSessions, RemoveSession, ShowSession,
 };
+use sightline_api::event::Event;
 use sightline_api::location::{Anywhere, AtSession};
-use sightline_api::wire::{Event, NewTraverse, Problem, SessionEntry, TraverseEntry};
+use sightline_api::wire::{NewTraverse, Problem, SessionEntry, TraverseEntry};
 use sightline_rover::version::tracker_version;
 use sightline_session::reproduce::{FORMAT, FORMAT_VERSION};
 use sightline_track::settings::Settings;

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Duration;
 
 use ewebsock::{Options, WsEvent, WsMessage, WsReceiver, WsSender};
-use sightline_api::wire::Event;
+use sightline_api::event::Event;
 
 /// The longest pause between two attempts, s.
 const PATIENCE_S: f64 = 10.0;

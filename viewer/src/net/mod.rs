@@ -11,7 +11,7 @@ pub(crate) mod request;
 use std::collections::HashSet;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
-use sightline_api::wire::Event;
+use sightline_api::event::Event;
 
 use self::events::{Connection, Events, UNHURRIED};
 use self::in_order::InOrder;

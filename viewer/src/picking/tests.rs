@@ -3,7 +3,8 @@
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable;
 use sightline_api::endpoints::{CancelTrackability, DesignateTarget, ShowTrackability};
-use sightline_api::wire::{Event, Problem};
+use sightline_api::event::Event;
+use sightline_api::wire::Problem;
 use sightline_geometry::frames::Pixel;
 use sightline_rover::trackability::{Aspect, MapProgress, TrackabilityMap, Verdict};
 

@@ -4,8 +4,9 @@ use std::collections::BTreeSet;
 
 use sightline_api::endpoint::{Call, Method};
 use sightline_api::endpoints::{BeginSession, ListSessions, ListSettings, ListTraverses, ShowTraverse};
+use sightline_api::event::Event;
 use sightline_api::location::{Anywhere, AtTraverse};
-use sightline_api::wire::{Event, NewSession, Problem, RerunStream, SessionEntry, TraverseEntry};
+use sightline_api::wire::{NewSession, Problem, RerunStream, SessionEntry, TraverseEntry};
 use sightline_session::Cursor;
 use sightline_session::view::{RunView, SessionView};
 

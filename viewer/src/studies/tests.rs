@@ -2,8 +2,8 @@
 
 use sightline_api::endpoint::Call;
 use sightline_api::endpoints::{ListStudies, ShowStudyRows, StartStudy};
+use sightline_api::event::Event;
 use sightline_api::location::AtStudyJob;
-use sightline_api::wire::Event;
 use sightline_study::row::Row;
 use sightline_study::wire::{StudyInfo, StudyJob, StudyRows, StudyState};
 

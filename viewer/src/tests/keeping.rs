@@ -2,8 +2,9 @@
 
 use sightline_api::endpoint::{Call, Endpoint};
 use sightline_api::endpoints::{AddNote, ChangeNote, ListExports, ListNotes, RemoveNote, RestoreNote};
+use sightline_api::event::Event;
 use sightline_api::location::AtNote;
-use sightline_api::wire::{Event, Problem};
+use sightline_api::wire::Problem;
 use sightline_session::exports::{ExportEntry, Size};
 use sightline_session::notes::{EditNote, Note, Pin};
 use sightline_session::shell::WITH_TOKEN;

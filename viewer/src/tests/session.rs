@@ -4,9 +4,10 @@ use sightline_api::endpoint::Call;
 use sightline_api::endpoints::{
     DesignateTarget, ListSessions, ListSettings, ListTraverses, MoveCursor, ShowCursor, ShowRun, ShowSession,
 };
+use sightline_api::event::Event;
 use sightline_api::location::{Anywhere, AtRun, AtSession};
 use sightline_api::query::FirstRow;
-use sightline_api::wire::{Event, Problem, SessionEntry};
+use sightline_api::wire::{Problem, SessionEntry};
 use sightline_geometry::frames::Pixel;
 use sightline_session::Cursor;
 use sightline_session::compare::RunName;

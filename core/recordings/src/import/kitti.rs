@@ -103,18 +103,10 @@ impl ImportFormat for Kitti {
             });
         }
         let folder_name = || path.file_name().map(|name| name.to_string_lossy().into_owned());
-        let description = format!(
-            "KITTI odometry sequence, {} stereo frames. Truth: the recording's poses. Estimate: the truth with a \
-             simulated odometry error of {} of the way and {}° a step, seed {}.",
-            stops.len(),
-            options.odometry_fraction,
-            options.attitude_deg,
-            options.seed,
-        );
         Ok(TraverseIndex {
             format: FORMAT_VERSION,
             name: options.name.clone().or_else(folder_name).unwrap_or_default(),
-            description,
+            description: describe(stops.len(), options),
             full_scale_dn: None,
             stereo: StereoGeometry::Lateral,
             odometry_error,
@@ -124,6 +116,15 @@ impl ImportFormat for Kitti {
             stops,
         })
     }
+}
+
+/// What was recorded, for the index.
+fn describe(frames: usize, options: &ImportOptions) -> String {
+    format!(
+        "KITTI odometry sequence, {frames} stereo frames. Truth: the recording's poses. Estimate: the truth with a \
+         simulated odometry error of {} of the way and {}° a step, seed {}.",
+        options.odometry_fraction, options.attitude_deg, options.seed,
+    )
 }
 
 /// Rover x = camera z, y = camera x, z = camera y.

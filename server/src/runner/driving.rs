@@ -1,0 +1,62 @@
+//! Runs that drive: from the last stop to the next, which all runs of the drive then track.
+
+use std::sync::Arc;
+
+use sightline_api::event::Event;
+use sightline_geometry::error::Result;
+use sightline_session::driving::Steering;
+use sightline_session::step::RunStep;
+
+use super::{Runner, every_run, progress};
+use crate::cancel::CancelFlag;
+use crate::driven;
+use crate::jobs::lock;
+use crate::live_session::LiveSession;
+
+impl Runner {
+    /// Drives to another stop; false where the drive ends at the last one.
+    pub(super) fn drive(
+        &self,
+        live: &LiveSession,
+        steering: &Steering,
+        steps: &[Arc<RunStep>],
+        flag: &CancelFlag,
+    ) -> Result<bool> {
+        let open = live.traverse();
+        let count = open.traverse.stop_count();
+        self.tell(progress(live, steering.target, steering.run, format!("driving to stop {count}")));
+        let Some(grown) = driven::drive_on(&open, steering, steps, flag)? else {
+            // Somebody else may have driven on, and then there is a step to compute.
+            return Ok(live.traverse().traverse.stop_count() > count);
+        };
+        driven::replace(&self.traverses, &grown);
+        self.tell(Some(grown.progress(None)));
+        let all: Vec<_> = lock(&self.sessions).by_number.values().cloned().collect();
+        for other in all.iter().filter(|other| other.traverse().id == grown.id) {
+            other.grow(Arc::clone(&grown));
+            self.tell(Some(Event::SessionChanged { session: other.id.clone() }));
+            self.follow(other, (live, steering));
+        }
+        Ok(true)
+    }
+
+    /// Lets the other runs of a session that had come to the last stop track on to the new one.
+    fn follow(&self, live: &Arc<LiveSession>, (driver, steering): (&LiveSession, &Steering)) {
+        let is_driver =
+            |target, run| driver.id == live.id && (target, run) == (steering.target, steering.run);
+        for (target, run) in live.with(|session| every_run(session)) {
+            let waits = live.with(|session| matches!(session.pending(target, run), Ok(Some(_))));
+            if waits && !is_driver(target, run) && !live.is_computing(target, run) {
+                // A run that finds no place in the queue can be resumed by hand.
+                let _ = self.start(live, target, run);
+            }
+        }
+    }
+
+    /// Lets the run that drives go on once all runs are as they were.
+    pub(super) fn go_on_driving(&self, live: &Arc<LiveSession>) {
+        if let Some(Steering { target, run, .. }) = live.with(|session| session.steering.clone()) {
+            let _ = self.start(live, target, run);
+        }
+    }
+}
