@@ -13,6 +13,7 @@
 
 use std::path::Path;
 
+use nalgebra::Matrix3;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -114,7 +115,7 @@ fn end(last: &RunStep) -> Option<End> {
     let truth = last.truth.as_ref()?;
     let exact = last.located().and_then(|located| located.covariance_in_rover);
     let error = last.update.target.position_in_rover - truth.position_in_rover;
-    let nees_angles_exact = exact.and_then(|covariance| covariance.try_inverse());
+    let nees_angles_exact = exact.and_then(Matrix3::try_inverse);
     Some(End {
         is_tracked: truth.tracked == Some(true),
         nees: truth.nees.unwrap_or(f64::NAN),

@@ -23,7 +23,7 @@ use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
 use sightline_world::scenario::{ClearPath, OdometryModel};
 use sightline_world::target_truth::{TargetTruth, TruthSource};
-use sightline_world::{Scenario, choose_targets};
+use sightline_world::{Scenario, World, choose_targets};
 
 /// One drive.
 #[derive(Clone, Debug, Serialize)]
@@ -131,7 +131,7 @@ impl Drives<'_> {
         let start = TruthSource::true_site_from_rover(open.traverse(), 0).unwrap_or_default();
         let start_m = [start.translation.x, start.translation.y];
         let goal_m = goal_position_m(self.command, &target, start_m);
-        let centre = open.traverse().world().map(|world| world.targets_centre()).unwrap_or_default();
+        let centre = open.traverse().world().map(World::targets_centre).unwrap_or_default();
         let mut cleared = scenario.clone();
         cleared.rocks.clear_path = Some(ClearPath {
             to_x_m: goal_m[0] - centre.x,
