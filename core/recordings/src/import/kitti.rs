@@ -50,6 +50,15 @@ const SMALLEST_BASELINE_M: f64 = 1e-3;
 /// The importer.
 pub struct Kitti;
 
+/// The description of a traverse with so many stops.
+fn description(stops: usize, options: &ImportOptions) -> String {
+    format!(
+        "KITTI odometry sequence, {stops} stereo frames. Truth: the recording's poses. Estimate: the truth with a \
+         simulated odometry error of {} of the way and {}° a step, seed {}.",
+        options.odometry_fraction, options.attitude_deg, options.seed,
+    )
+}
+
 impl ImportFormat for Kitti {
     fn name(&self) -> &'static str {
         "KITTI odometry"
@@ -103,14 +112,7 @@ impl ImportFormat for Kitti {
             });
         }
         let folder_name = || path.file_name().map(|name| name.to_string_lossy().into_owned());
-        let description = format!(
-            "KITTI odometry sequence, {} stereo frames. Truth: the recording's poses. Estimate: the truth with a \
-             simulated odometry error of {} of the way and {}° a step, seed {}.",
-            stops.len(),
-            options.odometry_fraction,
-            options.attitude_deg,
-            options.seed,
-        );
+        let description = description(stops.len(), options);
         Ok(TraverseIndex {
             format: FORMAT_VERSION,
             name: options.name.clone().or_else(folder_name).unwrap_or_default(),
