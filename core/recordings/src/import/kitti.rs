@@ -50,6 +50,15 @@ const SMALLEST_BASELINE_M: f64 = 1e-3;
 /// The importer.
 pub struct Kitti;
 
+/// The description of a traverse with so many stops.
+fn description(stops: usize, options: &ImportOptions) -> String {
+    format!(
+        "KITTI odometry sequence, {stops} stereo frames. Truth: the recording's poses. Estimate: the truth with a \
+         simulated odometry error of {} of the way and {}° a step, seed {}.",
+        options.odometry_fraction, options.attitude_deg, options.seed,
+    )
+}
+
 impl ImportFormat for Kitti {
     fn name(&self) -> &'static str {
         "KITTI odometry"
@@ -103,10 +112,11 @@ impl ImportFormat for Kitti {
             });
         }
         let folder_name = || path.file_name().map(|name| name.to_string_lossy().into_owned());
+        let description = description(stops.len(), options);
         Ok(TraverseIndex {
             format: FORMAT_VERSION,
             name: options.name.clone().or_else(folder_name).unwrap_or_default(),
-            description: describe(stops.len(), options),
+            description,
             full_scale_dn: None,
             stereo: StereoGeometry::Lateral,
             odometry_error,
@@ -116,15 +126,6 @@ impl ImportFormat for Kitti {
             stops,
         })
     }
-}
-
-/// What was recorded, for the index.
-fn describe(frames: usize, options: &ImportOptions) -> String {
-    format!(
-        "KITTI odometry sequence, {frames} stereo frames. Truth: the recording's poses. Estimate: the truth with a \
-         simulated odometry error of {} of the way and {}° a step, seed {}.",
-        options.odometry_fraction, options.attitude_deg, options.seed,
-    )
 }
 
 /// Rover x = camera z, y = camera x, z = camera y.
