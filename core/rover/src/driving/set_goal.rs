@@ -14,6 +14,7 @@ use super::command::DriveCommand;
 
 /// Where the rover is to stop.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = DriveGoal)]
 pub struct Goal {
     /// The goal, x and y of the site frame, m.
     pub in_site_m: [f64; 2],
