@@ -71,7 +71,7 @@ struct End {
 ///
 /// # Errors
 /// A drive that is impossible in this world, or images that cannot be written.
-pub fn world_claim(scenario: &Scenario, settings: &Settings, folder: &Path) -> Result<WorldClaim> {
+pub(crate) fn world_claim(scenario: &Scenario, settings: &Settings, folder: &Path) -> Result<WorldClaim> {
     let traverse = create_simulated(scenario, folder)?;
     let world = traverse.world().ok_or_else(|| Error::Request("the drive is not simulated".to_owned()))?;
     let pixels = choose_targets(world, scenario, traverse.index());

@@ -89,7 +89,7 @@ pub(crate) fn open_again(
         match opened {
             Ok(one) => open.push(Arc::new(one)),
             Err(error) => {
-                lost.push(format!("the drive {} cannot be opened again: {error}", folder.display()))
+                lost.push(format!("the drive {} cannot be opened again: {error}", folder.display()));
             }
         }
     }
