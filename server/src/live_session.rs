@@ -22,7 +22,7 @@ pub(crate) const LABEL_LIMIT: usize = 100;
 pub struct LiveSession {
     /// Its name in paths.
     pub id: String,
-    /// What it works on; another value after each stop of a drive on commands.
+    /// The traverse; replaced by a longer one after each stop of a drive on commands.
     traverse: RwLock<Arc<OpenTraverse>>,
     session: Mutex<Session>,
     notes: Mutex<Notes>,
@@ -60,7 +60,7 @@ impl LiveSession {
         }
     }
 
-    /// What it works on now.
+    /// The traverse with its present stops.
     pub fn traverse(&self) -> Arc<OpenTraverse> {
         Arc::clone(&self.traverse.read().unwrap_or_else(PoisonError::into_inner))
     }

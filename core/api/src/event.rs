@@ -46,7 +46,7 @@ pub enum Event {
         n: usize,
         /// Whether it has ended.
         ended: bool,
-        /// What is being done, in words.
+        /// The present activity, in words.
         doing: String,
     },
     /// Images of a simulated traverse were rendered.

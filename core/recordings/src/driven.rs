@@ -103,7 +103,7 @@ impl DrivenTraverse {
         branch.restore(self.driven[..count].to_vec())?;
         for stop in &self.traverse.index().stops[..count] {
             for name in [&stop.left.image, &stop.right.image] {
-                // What is missing is rendered again with the same bits.
+                // A missing image is rendered again with the same bits.
                 if let Ok(bytes) = std::fs::read(self.traverse.folder().join(name)) {
                     write_atomically(&folder.join(name), &bytes)?;
                 }

@@ -119,7 +119,7 @@ fn add(
         Ok(state.add_traverse(Arc::new(opened))?)
     });
     let opened = made.inspect_err(|_| {
-        // What is left is an empty drive without a session, which can be removed like any other.
+        // If this fails too, the next start lists the drive, and it can be removed there.
         let _ = std::fs::remove_dir_all(&folder);
     })?;
     let driving = state.enter_session(Arc::clone(&opened), false, |id| {

@@ -101,7 +101,7 @@ impl State {
         }
     }
 
-    /// Carries out what is asked for.
+    /// Applies a command of the panel.
     pub(crate) fn ask_of_driving(&mut self, ask: Ask) {
         match ask {
             Ask::Form(command) => self.driving.command = command,
