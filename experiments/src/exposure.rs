@@ -63,7 +63,8 @@ pub(crate) fn exposure_report(scenario: &Scenario, world: &World) -> Result<Vec<
     let mut times_s = [scenario.camera.auto_exposure.start_s; 2];
     let mut rows = Vec::new();
     for (number, stop) in index.stops.iter().enumerate() {
-        let (Some(camera), Some(moment)) = (true_camera_in_site(stop, Eye::Left), Moment::of(number, stop))
+        let (Some(camera), Some(moment)) =
+            (true_camera_in_site(stop, Eye::Left), Moment::of(number, &index.stops))
         else {
             continue;
         };

@@ -8,7 +8,7 @@
 //! | `real_motion` | motions between recorded frames against their poses |
 //! | [`registration`] | registration of rocks by their shape, where the motion is known |
 //! | [`cancel`] | how soon each long computation ends once it is cancelled |
-//! | [`claims`] | tracked targets and their NEES in worlds with pointing error |
+//! | `claims` | tracked targets and their NEES in worlds with pointing error |
 //! | [`driving`] | closed-loop drives on slopes with slip |
 //! | [`trackability`] | targets drawn where the map says good, risky or bad, tracked against the truth |
 
@@ -23,6 +23,7 @@ mod realism;
 #[cfg(feature = "command-line")]
 mod real_motion;
 pub mod cancel;
+#[cfg(feature = "command-line")]
 pub mod claims;
 pub mod driving;
 pub mod registration;

@@ -101,10 +101,13 @@ pub(super) fn check_stop_numbers(stop: &Stop) -> Result<(), String> {
     if let Some(light) = &stop.light {
         check_light(light)?;
     }
-    match &stop.truth {
-        Some(truth) => check_pose("truth.site_from_rover", &truth.site_from_rover),
-        None => Ok(()),
+    let Some(truth) = &stop.truth else { return Ok(()) };
+    check_pose("truth.site_from_rover", &truth.site_from_rover)?;
+    let mut places = truth.wheel_places_m.iter().flatten().flatten().flatten();
+    if places.any(|value| !(value.is_finite() && value.abs() <= POSITION_LIMIT_M)) {
+        return Err(format!("truth.wheel_places_m: must be numbers within {POSITION_LIMIT_M:.0e} m"));
     }
+    Ok(())
 }
 
 fn check_light(light: &StopLight) -> Result<(), String> {

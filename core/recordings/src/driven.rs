@@ -37,8 +37,7 @@ impl DrivenTraverse {
     /// Makes the folder of a drive with its first stop, the mast pointed at the targets' centre.
     ///
     /// # Errors
-    /// A scenario that no world can be made of or that leaves wheel tracks, a folder that holds something already or cannot
-    /// be written, or [`Error::Cancelled`].
+    /// A scenario that no world can be made of, a folder that holds something already or cannot be written, or [`Error::Cancelled`].
     pub fn begin(scenario: &Scenario, folder: &Path, cancel: Cancel<'_>) -> Result<Self> {
         Self::check(scenario, folder)?;
         Self::begin_in(World::new_until(scenario, cancel)?, scenario, folder, cancel)
@@ -47,10 +46,6 @@ impl DrivenTraverse {
     /// Refuses what no drive can be begun with.
     fn check(scenario: &Scenario, folder: &Path) -> Result<()> {
         scenario.validate()?;
-        if scenario.rover.tracks {
-            let problem = "a drive on commands leaves no wheel tracks yet; set it to false";
-            return Err(Error::setting("rover.tracks", problem));
-        }
         let is_empty = std::fs::read_dir(folder).map_or(true, |mut entries| entries.next().is_none());
         if !is_empty {
             return Err(Error::format(folder, "is not empty; choose a new folder"));
@@ -282,101 +277,5 @@ impl ActiveWorld for DrivenTraverse {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn scenario() -> Scenario {
-        let mut scenario = Scenario { seed: 5, ..Scenario::default() };
-        (scenario.camera.image_size, scenario.camera.samples_per_axis) = (128, 1);
-        (scenario.rocks.area_fraction, scenario.rocks.cluster_count) = (0.02, 4);
-        scenario.drive.pointing_error_deg = 0.2;
-        scenario
-    }
-
-    fn arc(length_m: f64) -> Motion {
-        Motion::Arc { length_m, curvature_per_m: 0.05 }
-    }
-
-    /// Drives and points the mast a little to the side.
-    fn go(world: &mut DrivenTraverse, length_m: f64) {
-        world.drive(&arc(length_m), Cancel::default()).unwrap();
-        let angles = world.state().last().unwrap().mast_angles.unwrap();
-        world.point_mast(Some(MastAngles { azimuth_rad: angles.azimuth_rad + 0.01, ..angles })).unwrap();
-    }
-
-    #[test]
-    fn a_resumed_drive_continues_with_the_same_bits_and_can_be_replayed() {
-        let folder = tempfile::tempdir().unwrap();
-        let [one, two] = ["one", "two"].map(|name| folder.path().join(name));
-        let mut whole = DrivenTraverse::begin(&scenario(), &one, Cancel::default()).unwrap();
-        [0.5, 0.4, 0.3].into_iter().for_each(|length_m| go(&mut whole, length_m));
-        let mut cut = DrivenTraverse::begin(&scenario(), &two, Cancel::default()).unwrap();
-        go(&mut cut, 0.5);
-        drop(cut);
-        let mut resumed = DrivenTraverse::resume(&two).unwrap();
-        [0.4, 0.3].into_iter().for_each(|length_m| go(&mut resumed, length_m));
-        assert_eq!(resumed.state(), whole.state());
-        assert_eq!(resumed.traverse().index(), whole.traverse().index());
-        let replayed = Traverse::open(&one).unwrap();
-        assert_eq!(replayed.index(), whole.traverse().index());
-        assert_eq!(replayed.capture(2).unwrap(), resumed.traverse().capture(2).unwrap());
-        // The mast's error is that of its stop.
-        assert!(replayed.index().stops[2].truth.as_ref().unwrap().left_camera.is_some());
-    }
-
-    #[test]
-    fn a_stop_is_exposed_for_the_pixel_that_was_asked_for() {
-        let folder = tempfile::tempdir().unwrap();
-        let mut scenario = scenario();
-        scenario.camera.exposure = sightline_world::scenario::ExposureMode::Subframe;
-        scenario.camera.auto_exposure.subframe_px = 11;
-        let mut world =
-            DrivenTraverse::begin(&scenario, &folder.path().join("a"), Cancel::default()).unwrap();
-        go(&mut world, 0.5);
-        let mut level = |around: Pixel| {
-            world.expose(Some(around)).unwrap();
-            assert_eq!(world.traverse().index().stops[1].metered_px, Some(around));
-            let left = world.traverse().capture(1).unwrap().left;
-            let side = |centre: f64| (centre as u32 - 5)..(centre as u32 + 6);
-            let pixels = side(around.y).flat_map(|y| side(around.x).map(move |x| (x, y)));
-            f64::from(pixels.map(|(x, y)| left.get_pixel(x, y).0[0]).fold(0.0, f32::max)) * 4095.0
-        };
-        // One percent of 121 pixels may exceed the cut of 2000: the brightest one.
-        for around in [Pixel::new(64.0, 20.0), Pixel::new(20.0, 100.0), Pixel::new(100.0, 70.0)] {
-            let brightest_dn = level(around);
-            assert!((1800.0..2400.0).contains(&brightest_dn), "{around:?}: {brightest_dn}");
-        }
-    }
-
-    #[test]
-    fn a_restored_world_forgets_what_it_saw_later() {
-        let folder = tempfile::tempdir().unwrap();
-        let mut world =
-            DrivenTraverse::begin(&scenario(), &folder.path().join("a"), Cancel::default()).unwrap();
-        go(&mut world, 0.5);
-        let branch = world.state().to_vec();
-        go(&mut world, 0.8);
-        let trunk = world.state().to_vec();
-        let seen = world.traverse().capture(2).unwrap();
-        world.restore(branch).unwrap();
-        assert_eq!(world.traverse().stop_count(), 2);
-        go(&mut world, -0.3);
-        assert_ne!(world.traverse().capture(2).unwrap().left, seen.left);
-        world.restore(trunk.clone()).unwrap();
-        assert_eq!(world.traverse().capture(2).unwrap(), seen);
-        assert_eq!(world.state(), trunk);
-    }
-
-    #[test]
-    fn a_folder_with_something_in_it_and_tracks_are_refused() {
-        let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("note"), "mine").unwrap();
-        let refused = |scenario: &Scenario, path: &Path| {
-            DrivenTraverse::begin(scenario, path, Cancel::default()).err().unwrap().to_string()
-        };
-        assert!(refused(&scenario(), folder.path()).contains("is not empty"));
-        let mut tracks = scenario();
-        tracks.rover.tracks = true;
-        assert!(refused(&tracks, &folder.path().join("new")).contains("rover.tracks"));
-    }
-}
+#[path = "driven_tests.rs"]
+mod tests;

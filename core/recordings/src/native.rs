@@ -44,7 +44,8 @@
 //!
 //! Optional besides: `[mast]` (origin and head cameras), `stops.mast_angles` (azimuth and elevation, rad),
 //! `stops.metered_px` (`x`, `y`: centre of the exposure subframe in the left image, px) and
-//! `stops.light` (`sun_azimuth_deg`, `sun_elevation_deg` in the site frame, `exposure_s` of the left image).
+//! `stops.light` (`sun_azimuth_deg`, `sun_elevation_deg` in the site frame, `exposure_s` of the left image). The truth of a simulated stop may have
+//! `wheel_places_m`, the wheels' way to it (site frame, m).
 //!
 //! A simulated folder also gets `cache/`, from which nothing but time is lost when it is removed, and on demand
 //! `truth/`, the truth of every pixel (`truth_files.rs` documents it).

@@ -40,6 +40,7 @@ fn stop(step: usize) -> Stop {
             site_from_rover: PoseRecord::from(&pose.inverse()),
             left_camera: Some(camera(0.3)),
             right_camera: None,
+            wheel_places_m: None,
         }),
     }
 }

@@ -157,11 +157,10 @@ impl Simulated {
             return Err(Error::Cancelled);
         }
         let camera = camera_in_site(stops, step, eye)?;
-        let stop = &stops.index.stops[step];
-        let moment = Moment::of(step, stop).ok_or_else(|| Error::Request(needs_truth(step)))?;
+        let moment = Moment::of(step, &stops.index.stops).ok_or_else(|| Error::Request(needs_truth(step)))?;
         let world = self.world_until(cancel.into())?.at(&moment, &self.scenario);
         let render = |region: Region| clean_radiance(&world, &self.scenario, &camera, region, cancel);
-        let key = render_cache::key(&self.scenario, &stop_key(stop, step), &camera);
+        let key = render_cache::key(&self.scenario, &stop_key(&moment, &stops.index.stops[step]), &camera);
         if let Some(kept) = self.cache.load(&key, &camera)
             && renders_alike(&kept, render)?
         {
@@ -201,9 +200,10 @@ fn renders_alike(kept: &GrayImage, render: impl Fn(Region) -> Result<GrayImage>)
     Ok(true)
 }
 
-/// What a stop's light and scenery can depend on besides the scenario: its number, time and truth.
-pub(super) fn stop_key(stop: &Stop, step: usize) -> impl Serialize {
-    (step, stop.time_s, stop.truth.clone())
+/// What a stop's light and scenery can depend on besides the scenario: its number, time and truth, and the wheel tracks up to
+/// there.
+pub(super) fn stop_key(moment: &Moment, stop: &Stop) -> impl Serialize {
+    (moment.stop, stop.time_s, stop.truth.clone(), moment.wheel_places_m.clone())
 }
 
 /// The camera that truly takes a picture of a stop, in the site frame.

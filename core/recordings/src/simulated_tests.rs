@@ -7,6 +7,7 @@ use crate::render_cache;
 use crate::simulated::{camera_in_site, stop_key};
 use sightline_geometry::frames::{Pixel, Vector3};
 use sightline_vision::image::GrayImage;
+use sightline_world::moment::Moment;
 use sightline_world::scenario::{ExposureMode, PlacedRock, Quantisation, RockShape};
 use sightline_world::target_truth::TruthSource;
 use sightline_world::traverse::TraverseIndex;
@@ -277,8 +278,10 @@ fn radiance_that_is_damaged_or_of_another_renderer_is_rendered_anew() {
     assert_eq!(from_own_cache.rendered_count(), 0);
 
     let cache = RenderCache::new(folder.path().join("cache"), 1 << 24);
+    let stops = &from_own_cache.index().stops;
+    let moment = Moment::of(0, stops).unwrap();
     let camera = camera_in_site(&from_own_cache.stops(), 0, Eye::Left).unwrap();
-    let key = render_cache::key(&scenario(), &stop_key(&from_own_cache.index().stops[0], 0), &camera);
+    let key = render_cache::key(&scenario(), &stop_key(&moment, &stops[0]), &camera);
     let mut brighter = cache.load(&key, &camera).unwrap();
     brighter.iter_mut().for_each(|value| *value *= 1.01);
     cache.store(&key, &brighter);

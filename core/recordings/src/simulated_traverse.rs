@@ -110,9 +110,9 @@ impl Traverse {
         let simulated = self.simulated.as_ref();
         let simulated = simulated
             .ok_or_else(|| Error::Request("a recorded traverse has no simulated world".to_owned()))?;
-        let stop = self.index().stops.get(step);
-        let stop = stop.ok_or_else(|| Error::Request(format!("there is no step {step}")))?;
-        let moment = Moment::of(step, stop).ok_or_else(|| Error::Request(needs_truth(step)))?;
+        let stops = &self.index().stops;
+        stops.get(step).ok_or_else(|| Error::Request(format!("there is no step {step}")))?;
+        let moment = Moment::of(step, stops).ok_or_else(|| Error::Request(needs_truth(step)))?;
         Ok(simulated.world().at(&moment, &simulated.scenario))
     }
 

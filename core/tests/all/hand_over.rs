@@ -29,7 +29,7 @@ fn k9_takes_its_last_stop_twice_and_both_pairs_see_the_target() {
         let first = true_camera_in_site(&index.stops[0], Eye::Left).unwrap();
         assert!(((centre - first.model.centre()).norm() - distance_m).abs() < 1e-6);
         for (step, stop) in [(number - 1, before), (number, last)] {
-            let here = world.at(&Moment::of(step, stop).unwrap(), &scenario);
+            let here = world.at(&Moment::of(step, &index.stops).unwrap(), &scenario);
             for eye in [Eye::Left, Eye::Right] {
                 let camera = true_camera_in_site(stop, eye).unwrap();
                 assert_eq!(matches!(camera.model, CameraModel::Cahvore(_)), step == number);

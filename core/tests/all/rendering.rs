@@ -79,7 +79,7 @@ fn strip(scene: &Scene) -> GrayImage {
     let number = usize::try_from(scene.stop).unwrap_or_else(|_| index.stops.len() - 1);
     let stop = &index.stops[number];
     let camera = true_camera_in_site(stop, scene.eye).unwrap();
-    let world = world.at(&Moment::of(number, stop).unwrap(), scenario);
+    let world = world.at(&Moment::of(number, &index.stops).unwrap(), scenario);
     let never = AtomicBool::new(false);
     let mut strip = GrayImage::new(SIDE * CORNERS.len() as u32, SIDE);
     for (k, [x, y]) in (0..).zip(CORNERS) {

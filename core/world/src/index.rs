@@ -104,7 +104,7 @@ pub(crate) fn simulated_stop(
         right: view("right", number, right),
         light: None,
         metered_px: None,
-        truth: Some(StopTruth { site_from_rover: truth, left_camera, right_camera }),
+        truth: Some(StopTruth { site_from_rover: truth, left_camera, right_camera, wheel_places_m: None }),
     }
 }
 
@@ -130,6 +130,7 @@ fn handed_over(last: &Stop, number: usize, settings: &CameraSettings) -> Option<
             site_from_rover: truth.site_from_rover,
             left_camera: None,
             right_camera: None,
+            wheel_places_m: None,
         }),
     })
 }

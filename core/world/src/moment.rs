@@ -24,7 +24,7 @@ use crate::rover::suspension::settle;
 use crate::rover::tracks::Tracks;
 use crate::scenario::{EventSettings, Fiducial, Occluder, Scenario, SunSettings};
 use crate::solids::{Look, Shape, Solid, SolidKind};
-use crate::traverse::Stop;
+use crate::traverse::{Stop, WheelPlaces};
 use crate::world::World;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::{Point3, Pose, Vector3};
@@ -39,7 +39,7 @@ const HALF_THICKNESS_M: f64 = 0.005;
 const LOWEST_SUN_DEG: f64 = 5.0;
 
 /// A stop as the simulator sees it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Moment {
     /// The number of the stop.
     pub stop: u32,
@@ -49,14 +49,19 @@ pub struct Moment {
     pub site_from_rover: Pose,
     /// Centre of the left camera, site frame, m.
     pub left_camera: Point3,
+    /// The places that the wheels passed so far, one list for each stop; `None` where the scenario plans the drive.
+    pub wheel_places_m: Option<Vec<Vec<WheelPlaces>>>,
 }
 
 impl Moment {
-    /// The moment of a stop of a simulated traverse; nothing where the stop carries no truth.
-    pub fn of(number: usize, stop: &Stop) -> Option<Self> {
+    /// The moment of a stop of a simulated traverse; nothing where there is no such stop or it carries no truth.
+    pub fn of(number: usize, stops: &[Stop]) -> Option<Self> {
+        let stop = stops.get(number)?;
+        let places = |stop: &Stop| stop.truth.as_ref()?.wheel_places_m.clone();
+        let wheel_places_m = stops[..=number].iter().map(places).collect();
         let site_from_rover = stop.truth.as_ref()?.site_from_rover.to_pose();
         let left_camera = true_camera_in_site(stop, Eye::Left)?.model.centre();
-        Some(Self { stop: number as u32, time_s: stop.time_s, site_from_rover, left_camera })
+        Some(Self { stop: number as u32, time_s: stop.time_s, site_from_rover, left_camera, wheel_places_m })
     }
 }
 
@@ -80,7 +85,7 @@ impl World {
         }
         let present = events.occluders.iter().filter(|o| covers(o.from_stop, o.to_stop, moment.stop));
         solids.extend(present.map(|o| occluder(o, &moment.left_camera, &self.targets_centre())));
-        let imprint = self.imprint_at(moment.stop, scenario);
+        let imprint = self.imprint_at(moment, scenario);
         Self { scenery: Arc::clone(&self.scenery), light, sun_grid, solids, imprint, exposure: self.exposure }
     }
 
@@ -103,16 +108,20 @@ impl World {
     }
 
     /// The wheel tracks that lie on the ground when the rover stands at a stop.
-    fn imprint_at(&self, stop: u32, scenario: &Scenario) -> Option<Imprint> {
-        if !scenario.rover.tracks || stop == 0 {
+    fn imprint_at(&self, moment: &Moment, scenario: &Scenario) -> Option<Imprint> {
+        if !scenario.rover.tracks || moment.stop == 0 {
             return None;
+        }
+        if let Some(places_m) = &moment.wheel_places_m {
+            let laid = Laid::new(&Tracks::through(places_m, &scenario.rover));
+            return Imprint::at_stop(&Arc::new(laid), moment.stop as usize);
         }
         let laid = self.scenery.laid.get_or_init(|| {
             // A drive that is impossible has no stops at which this could be asked.
             let drive = true_drive(self, scenario, Cancel::default()).ok()?;
             Some(Arc::new(Laid::new(&Tracks::new(&drive, &scenario.rover))))
         });
-        Imprint::at_stop(laid.as_ref()?, stop as usize)
+        Imprint::at_stop(laid.as_ref()?, moment.stop as usize)
     }
 }
 

@@ -136,7 +136,15 @@ pub struct StopTruth {
     /// The true right camera in the rover frame, alike.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "optional_camera")]
     pub right_camera: Option<Camera>,
+    /// Where the six wheels left tracks on the way to this stop: x and y of the places that they passed, in the order of
+    /// time, site frame, m. Left out where they left none, or where the scenario plans the drive.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<Vec<[[f64; 2]; 6]>>)]
+    pub wheel_places_m: Option<Vec<WheelPlaces>>,
 }
+
+/// x and y of the six wheels in the site frame, m: left front, right front, left middle, right middle, left rear, right rear.
+pub type WheelPlaces = [[f64; 2]; 6];
 
 impl<'de> Deserialize<'de> for CameraSource {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {

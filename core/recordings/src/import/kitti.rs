@@ -108,6 +108,7 @@ impl ImportFormat for Kitti {
                     site_from_rover: PoseRecord::from(truth),
                     left_camera: None,
                     right_camera: None,
+                    wheel_places_m: None,
                 }),
             });
         }

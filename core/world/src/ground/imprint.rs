@@ -46,6 +46,8 @@ const PIECES: u32 = 4;
 const STRAIGHT: f64 = 0.999_85;
 /// The cosine of the sharpest corner through which a curve is drawn smoothly.
 const SMOOTH_CORNER: f64 = 0.866;
+/// The longest piece between two places of a wheel, m.
+const GAP_M: f64 = 1.0;
 /// Places within which a wheel's passing counts as one, so that its own neighbouring pieces do not hide each other.
 const ONE_PASSING: u32 = 3;
 
@@ -105,13 +107,17 @@ impl Laid {
         for line in lines {
             let mut places: Vec<(u32, Vector2<f64>)> = Vec::with_capacity(line.points_in_site.len());
             for (number, point) in line.points_in_site.iter().enumerate() {
-                let place = Vector2::new(point.x, point.y);
+                let place = Vector2::from(*point);
                 // Where a wheel stood still its line has no direction.
                 if places.last().is_none_or(|(_, last)| (place - last).norm() > 1e-9) {
                     places.push((number as u32, place));
                 }
             }
-            laid.add_line(line.wheel, &places);
+            // A gap in a recorded way leaves no track.
+            let is_joined = |a: &(u32, Vector2<f64>), b: &(u32, Vector2<f64>)| (b.1 - a.1).norm() <= GAP_M;
+            for part in places.chunk_by(is_joined) {
+                laid.add_line(line.wheel, part);
+            }
         }
         laid
     }

@@ -30,8 +30,9 @@ use crate::rover::odometry::Belief;
 use crate::rover::scene::{Leg, Place, Scene, pieces};
 use crate::rover::slip::{self, Slip};
 use crate::rover::suspension::Stand;
+use crate::rover::tracks::places_m;
 use crate::scenario::Scenario;
-use crate::traverse::Stop;
+use crate::traverse::{Stop, StopTruth, WheelPlaces};
 use crate::world::World;
 
 /// One stop of a drive on commands.
@@ -59,6 +60,9 @@ pub struct DrivenStop {
     pub completed: f64,
     /// Rocks whose corners are inside the rover's body here.
     pub touched_rocks: u32,
+    /// The places that the wheels passed on the way here, site frame, m; none where they leave no tracks.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub wheel_places_m: Vec<WheelPlaces>,
 }
 
 impl DrivenStop {
@@ -80,6 +84,7 @@ impl DrivenStop {
             drive_s: 0.0,
             completed: 1.0,
             touched_rocks: 0,
+            wheel_places_m: Vec::new(),
         })
     }
 
@@ -114,6 +119,7 @@ impl DrivenStop {
                 drive_s: leg.duration_s,
                 completed,
                 touched_rocks: touched_rocks(world, &stand),
+                wheel_places_m: if scenario.rover.tracks { places_m(&leg) } else { Vec::new() },
             })
         })
     }
@@ -129,6 +135,7 @@ impl DrivenStop {
             completed: 1.0,
             // A rock is counted at the stop at which it was reached.
             touched_rocks: 0,
+            wheel_places_m: Vec::new(),
             ..self.clone()
         }
     }
@@ -194,7 +201,9 @@ pub fn index_stops(driven: &[DrivenStop], scenario: &Scenario) -> Vec<Stop> {
         let poses = [stop.true_site_from_rover, stop.site_from_rover].map(PoseRecord::to_pose);
         let metered_px = stop.metered_px;
         let made = simulated_stop(number, stop.time_s, poses, stop.mast_angles, with_error(number), &rig);
-        Stop { metered_px, ..made }
+        let wheel_places_m = scenario.rover.tracks.then(|| stop.wheel_places_m.clone());
+        let truth = made.truth.map(|truth| StopTruth { wheel_places_m, ..truth });
+        Stop { metered_px, truth, ..made }
     };
     driven.iter().enumerate().map(stop).collect()
 }

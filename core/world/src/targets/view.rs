@@ -32,7 +32,7 @@ impl<'a> View<'a> {
     pub(super) fn of(world: &World, scenario: &'a Scenario, index: &TraverseIndex) -> Option<Self> {
         let (first, last) = (index.stops.first()?, index.stops.last()?);
         Some(Self {
-            world: world.at(&Moment::of(0, first)?, scenario),
+            world: world.at(&Moment::of(0, &index.stops)?, scenario),
             camera: true_camera_in_site(first, Eye::Left)?,
             last: [true_camera_in_site(last, Eye::Left)?, true_camera_in_site(last, Eye::Right)?],
             rule: &scenario.targets,

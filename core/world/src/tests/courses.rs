@@ -299,11 +299,11 @@ fn tracks_follow_the_wheels_stop_by_stop() {
     let (lines, laid) = (tracks.lines(), tracks.laid());
     assert_eq!((lines.len(), laid.len(), laid[0], laid[3]), (6, 4, 0, lines[0].points_in_site.len()));
     let (from, to) = (lines[1].points_in_site[0], lines[1].points_in_site[laid[1] - 1]);
-    assert!((from - Point3::new(start.x + 0.7, 0.53, 0.294)).norm() < 1e-12, "{from}");
-    assert!((to - from - Vector3::new(0.5, 0.0, 0.0)).norm() < 1e-9, "{to}");
+    assert!((from[0] - start.x - 0.7).hypot(from[1] - 0.53) < 1e-12, "{from:?}");
+    assert!((to[0] - from[0] - 0.5).hypot(to[1] - from[1]) < 1e-9, "{to:?}");
     // Turning about the middle, each wheel stays on its circle.
     for line in lines {
-        let radius = |point: &Point3| (point.x - start.x - 0.5).hypot(point.y);
+        let radius = |point: &[f64; 2]| (point[0] - start.x - 0.5).hypot(point[1]);
         let radius_m = radius(&line.points_in_site[laid[1]]);
         assert!(line.points_in_site[laid[1]..].iter().all(|point| (radius(point) - radius_m).abs() < 1e-9));
         assert_eq!((line.width_m, line.points_in_site.len()), (0.16, laid[3]));

@@ -33,7 +33,7 @@ fn scene(ball: Solid) -> (Scenario, World, TraverseIndex, Camera) {
 }
 
 fn moment(index: &TraverseIndex, stop: usize) -> Moment {
-    Moment::of(stop, &index.stops[stop]).unwrap()
+    Moment::of(stop, &index.stops).unwrap()
 }
 
 #[test]
@@ -159,6 +159,7 @@ fn the_sun_moves_at_its_rate_and_a_cloud_takes_the_direct_light_alone() {
             time_s,
             site_from_rover: Pose::identity(),
             left_camera: Point3::new(0.5, 0.0, -1.2),
+            wheel_places_m: None,
         };
         world.at(&moment, &scenario)
     };

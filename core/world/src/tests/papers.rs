@@ -243,7 +243,7 @@ fn checkout_3_as_shipped_meets_the_printed_turn_and_distances_and_leaves_tracks(
     );
     assert!(staged.scenario.rover.tracks, "R142: the wheels leave tracks");
     let last = staged.index.stops.len() - 1;
-    let moment = crate::moment::Moment::of(last, &staged.index.stops[last]).unwrap();
+    let moment = crate::moment::Moment::of(last, &staged.index.stops).unwrap();
     assert!(staged.world.at(&moment, &staged.scenario).imprint.is_some());
 }
 
