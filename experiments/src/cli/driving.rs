@@ -8,8 +8,8 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 use sightline_geometry::error::{Error, Result};
 use sightline_rover::driving::{DriveCommand, GoalRule};
-use sightline_track::settings::Settings;
 
+use super::worlds::Worlds;
 use sightline_server::cli::open;
 use sightline_server::cli::terminal::{self, Progress};
 
@@ -22,15 +22,8 @@ pub(super) struct Driving {
     /// How many worlds.
     #[arg(long, default_value_t = 100)]
     worlds: u64,
-    /// The seed of the first world.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Side of the images, px.
-    #[arg(long, default_value_t = 512)]
-    size: u32,
-    /// Samples along each side of a pixel.
-    #[arg(long, default_value_t = 2)]
-    samples_per_axis: u32,
+    #[command(flatten)]
+    of: Worlds,
     /// Horizontal distance of the goal from the target, m.
     #[arg(long, default_value_t = 2.0)]
     standoff: f64,
@@ -72,12 +65,10 @@ impl Driving {
     /// A scenario that cannot be read, or no room for images.
     pub(super) fn run(&self) -> Result<()> {
         let mut scenario = open::scenario(&self.scenario)?;
-        (scenario.camera.image_size, scenario.camera.samples_per_axis) = (self.size, self.samples_per_axis);
-        // The rule's window is that of 1024 × 1024 images.
-        scenario.targets.window_px = (scenario.targets.window_px * self.size / 1024) | 1;
+        self.of.size(&mut scenario);
         let folder = std::env::temp_dir().join(format!("sightline-driving-{}", std::process::id()));
-        let seeds: Vec<u64> = (self.seed..self.seed + self.worlds).collect();
-        let settings = Settings::default();
+        let seeds: Vec<u64> = (self.of.seed..self.of.seed + self.worlds).collect();
+        let settings = self.of.settings()?;
         let rules = [GoalRule::FollowsTarget, GoalRule::Fixed];
         let count = if self.only_following { 1 } else { 2 };
         let all = seeds.len() * count;

@@ -11,6 +11,7 @@ mod scenery_report;
 mod real_motion;
 mod registration;
 mod trackability;
+mod worlds;
 
 use std::process::ExitCode;
 
@@ -24,7 +25,7 @@ enum Experiment {
     /// How soon each long computation ends once it is cancelled.
     Cancel(cancel::Cancelled),
     /// Tracked targets and their NEES in worlds with pointing error.
-    Claims(claims::Worlds),
+    Claims(claims::Claimed),
     /// Closed-loop drives on slopes with slip: arrival, errors of target and goal, collisions.
     Driving(driving::Driving),
     /// How hard the simulated worlds are: plain correlation, without scale and roll, at steps of 5 % and 23 %.

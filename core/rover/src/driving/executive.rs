@@ -8,7 +8,7 @@ use utoipa::ToSchema;
 
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
-use sightline_geometry::frames::Point3;
+use sightline_geometry::frames::{Point3, Pose};
 use sightline_track::settings::Settings;
 use sightline_track::stages::predict;
 use sightline_track::stages::update::Updated;
@@ -17,6 +17,7 @@ use sightline_track::trace::StepTrace;
 
 use super::active_world::{ActiveWorld, DriveReport};
 use super::command::{ArrivalAction, DriveCommand, GoalRule};
+use super::dead_reckoning::Reckoned;
 use super::flight_time::FlightTime;
 use super::select_path::{Motion, Navigator};
 use super::set_goal::{Goal, set_goal};
@@ -58,6 +59,10 @@ pub struct Cycle {
     pub step: usize,
     /// The goal.
     pub goal: Goal,
+    /// The pose estimate in the level, with its covariance since the designation.
+    pub estimated: Reckoned,
+    /// The place by the wheels alone, with its covariance since the designation.
+    pub by_wheels: Reckoned,
     /// The chosen motion; null where the drive ended or the rover stays.
     pub motion: Option<Motion>,
     /// The rover's report of the motion; null without one.
@@ -134,8 +139,18 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
     let time = FlightTime::of_stop([left.size, right.size]);
     let flight_minutes = input.before.map_or(0.0, |before| before.flight_minutes) + time.total_s() / 60.0;
     let arrival_actions = input.before.map_or(0, |before| before.arrival_actions);
-    let mut cycle =
-        Cycle { step, goal, motion: None, report: None, arrival_actions, flight_minutes, ending: None };
+    let [estimated, by_wheels] = reckoned(stops, input, &pose);
+    let mut cycle = Cycle {
+        step,
+        goal,
+        estimated,
+        by_wheels,
+        motion: None,
+        report: None,
+        arrival_actions,
+        flight_minutes,
+        ending: None,
+    };
     let has_arrived = goal.arrived || arrival_actions > 0;
     let action = input.command.on_arrival.get(arrival_actions as usize).filter(|_| has_arrived);
     if let Some(ArrivalAction::Look) = action {
@@ -149,6 +164,18 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
         cycle.motion = Some(input.navigator.select_path(goal.in_rover_m, step_m));
     }
     cycle
+}
+
+/// The place at this stop by the pose estimates and by the wheels alone.
+fn reckoned(stops: &dyn Stops, input: &CycleInput<'_>, pose: &Pose) -> [Reckoned; 2] {
+    let Some(before) = input.before else { return [Reckoned::exactly(pose); 2] };
+    let error = &stops.odometry_error();
+    let (Some(motion), Some(report)) = (&before.motion, &before.report) else {
+        // The rover stayed.
+        return [before.estimated, before.by_wheels];
+    };
+    let part = report.stall.map_or(1.0, |stall| stall.completed);
+    [before.estimated.at(pose, error), before.by_wheels.rolled(motion, part, error)]
 }
 
 impl Cycle {

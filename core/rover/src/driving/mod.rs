@@ -7,6 +7,7 @@
 
 pub mod active_world;
 pub mod command;
+pub mod dead_reckoning;
 pub mod executive;
 pub mod flight_time;
 pub mod select_path;
@@ -14,6 +15,7 @@ pub mod set_goal;
 
 pub use active_world::{ActiveWorld, DriveReport, Stall};
 pub use command::{ArrivalAction, DriveCommand, GoalRule};
+pub use dead_reckoning::Reckoned;
 pub use executive::{Cycle, Ending, StopReason};
 pub use select_path::{ArcNavigator, Motion, Navigator};
 pub use set_goal::Goal;

@@ -36,6 +36,24 @@ pub enum Motion {
     },
 }
 
+impl Motion {
+    /// Where the rover is after a part of the motion, 0 to 1, on level ground without slip: ahead and to the right of its
+    /// start, m, and turned to the right, rad.
+    pub fn after(&self, part: f64) -> ([f64; 2], f64) {
+        match *self {
+            Self::Turn { angle_rad } => ([0.0; 2], part * angle_rad),
+            Self::Arc { length_m, curvature_per_m } => {
+                let (length_m, turn_rad) = (part * length_m, part * length_m * curvature_per_m);
+                // Of a circle so wide the difference from a straight line is below rounding.
+                if turn_rad.abs() < 1e-9 {
+                    return ([length_m, 0.0], turn_rad);
+                }
+                ([turn_rad.sin() / curvature_per_m, (1.0 - turn_rad.cos()) / curvature_per_m], turn_rad)
+            }
+        }
+    }
+}
+
 /// Chooses the next motion.
 pub trait Navigator {
     /// A motion towards a goal ahead and to the right of the rover, m, of at most `step_m`; the goal is not reached yet.
@@ -81,15 +99,27 @@ impl Navigator for ArcNavigator {
 mod tests {
     use super::*;
 
-    /// The place and heading after a motion from the origin, heading along x.
-    fn end(motion: Motion) -> ([f64; 2], f64) {
-        match motion {
-            Motion::Turn { angle_rad } => ([0.0; 2], angle_rad),
-            Motion::Arc { length_m, curvature_per_m: 0.0 } => ([length_m, 0.0], 0.0),
-            Motion::Arc { length_m, curvature_per_m } => {
-                let turn_rad = length_m * curvature_per_m;
-                ([turn_rad.sin() / curvature_per_m, (1.0 - turn_rad.cos()) / curvature_per_m], turn_rad)
+    #[test]
+    fn the_end_of_a_motion_is_that_of_many_small_ones() {
+        for motion in [
+            Motion::Arc { length_m: 2.0, curvature_per_m: 0.4 },
+            Motion::Arc { length_m: -1.0, curvature_per_m: -0.3 },
+            Motion::Arc { length_m: 1.5, curvature_per_m: 0.0 },
+            Motion::Turn { angle_rad: -0.8 },
+        ] {
+            let (length_m, turn_rad) = match motion {
+                Motion::Arc { length_m, curvature_per_m } => (length_m, length_m * curvature_per_m),
+                Motion::Turn { angle_rad } => (0.0, angle_rad),
+            };
+            let (mut place, mut heading_rad) = ([0.0f64; 2], 0.0f64);
+            for _ in 0..100_000 {
+                let half = heading_rad + 0.5e-5 * turn_rad;
+                place = [place[0] + 1e-5 * length_m * half.cos(), place[1] + 1e-5 * length_m * half.sin()];
+                heading_rad += 1e-5 * turn_rad;
             }
+            let (end, turned_rad) = motion.after(1.0);
+            assert!((end[0] - place[0]).hypot(end[1] - place[1]) < 1e-9, "{motion:?}: {end:?} {place:?}");
+            assert!((turned_rad - heading_rad).abs() < 1e-9);
         }
     }
 
@@ -97,7 +127,7 @@ mod tests {
     fn an_arc_that_is_long_enough_ends_in_the_goal() {
         for goal in [[3.0, 0.4], [0.8, -0.1], [5.0, 0.0], [-0.3, 0.001], [-0.2, 0.0]] {
             let motion = ArcNavigator::default().select_path(goal, 100.0);
-            let ([x, y], _) = end(motion);
+            let ([x, y], _) = motion.after(1.0);
             assert!((x - goal[0]).hypot(y - goal[1]) < 1e-12, "{goal:?}: {motion:?} ends at {x} {y}");
         }
     }
@@ -119,7 +149,7 @@ mod tests {
             if let Motion::Arc { length_m, .. } = motion {
                 assert!(length_m.abs() <= 0.3);
             }
-            let ([x, y], turned_rad) = end(motion);
+            let ([x, y], turned_rad) = motion.after(1.0);
             place = [place[0] + cosine * x - sine * y, place[1] + sine * x + cosine * y];
             heading_rad += turned_rad;
             steps += 1;

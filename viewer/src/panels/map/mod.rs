@@ -148,6 +148,7 @@ fn names_of(state: &State, stops: &[StopView]) -> Vec<(Mark, Color32, String)> {
     if state.cycle_at(state.cursor.step).is_some() {
         names.push((Mark::Cross, theme::accent(), "goal".to_owned()));
         names.push((Mark::Stroke(overlay::Line::Dashed), theme::accent(), "planned".to_owned()));
+        names.push((Mark::Stroke(overlay::Line::Dashed), theme::weak(), "by wheels alone, 3σ".to_owned()));
     }
     if state.cloud().ready().is_some() {
         names.push((Mark::Dot, theme::run(state.cursor.run), "bootstrap of this step".to_owned()));
