@@ -11,6 +11,7 @@ pub mod import;
 mod index_file;
 mod native;
 mod render_cache;
+pub mod replayed;
 mod simulated;
 mod simulated_traverse;
 mod stops;

@@ -2,6 +2,12 @@
 //!
 //! [`pipeline`] is one stop on one page. [`designate`] resolves the three ways to name a target, [`trackability`] rates each
 //! pixel of an image as a target before one is designated.
+//!
+//! No type of a crate that knows the ground truth can be named here. The same line compiles in `sightline_world`:
+//!
+//! ```compile_fail
+//! use sightline_world::target_truth::TruthSource;
+//! ```
 
 pub mod pipeline;
 pub mod designate;

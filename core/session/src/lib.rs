@@ -30,6 +30,7 @@ pub mod metrics;
 pub mod expression;
 pub mod breakpoints;
 pub mod query;
+pub mod replayed_drive;
 pub mod reproduce;
 #[cfg(test)]
 mod breakpoint_tests;

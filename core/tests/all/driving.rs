@@ -5,11 +5,12 @@ use std::sync::atomic::AtomicBool;
 
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Error;
-use sightline_recordings::DrivenTraverse;
+use sightline_recordings::{DrivenTraverse, create_simulated};
 use sightline_rover::driving::executive::{self, CycleInput};
 use sightline_rover::driving::{ArcNavigator, ArrivalAction, DriveCommand, GoalRule, StopReason};
 use sightline_rover::pipeline;
 use sightline_session::driving::TargetedDrive;
+use sightline_session::replayed_drive::ReplayedDrive;
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
 use sightline_world::{Scenario, choose_targets, library};
@@ -135,6 +136,48 @@ fn without_the_comparison_with_the_truth_a_drive_has_the_same_bits() {
     // The designation alone may carry a warning that the truth adds.
     for (blind, judged) in steps.iter().zip(&judged.steps).skip(1) {
         assert_eq!(*blind, judged.trace);
+    }
+}
+
+#[test]
+fn one_thread_and_two_drive_with_the_same_bits() {
+    let folder = tempfile::tempdir().unwrap();
+    let drives = [1, 2].map(|count| {
+        let threads = rayon::ThreadPoolBuilder::new().num_threads(count).build().unwrap();
+        threads.install(|| drive(&folder.path().join(format!("{count}"))))
+    });
+    let [one, two] = &drives;
+    assert!(one.steps.len() > 10);
+    assert_eq!(one.world.state(), two.world.state());
+    assert_eq!((&one.steps, &one.cycles), (&two.steps, &two.cycles));
+    let last = one.steps.len() - 1;
+    let images = drives.each_ref().map(|drive| drive.world.traverse().capture(last).unwrap());
+    assert_eq!(images[0], images[1]);
+}
+
+#[test]
+fn a_recording_shows_how_far_the_commands_are_from_what_was_driven() {
+    let folder = tempfile::tempdir().unwrap();
+    let planned = create_simulated(&scenario(), folder.path()).unwrap();
+    let pixel = choose_targets(planned.world().unwrap(), &scenario(), planned.index())[0];
+    let designation = Designation { step: 0, pixel };
+    let settings = Settings::default();
+    let mut drive =
+        ReplayedDrive::begin(&planned, designation, command(), &settings, Cancel::default()).unwrap();
+    while drive.advance(&settings, Cancel::default()).unwrap() {}
+    let summary = drive.summary();
+    println!("{summary:?}");
+    assert_eq!((drive.steps.len(), drive.cycles.len()), (summary.stops, summary.stops));
+    // The approach was planned with steps of a tenth of the distance straight ahead, as the command has them; the target is
+    // beside its centre, so that the commanded path bends.
+    let [median_m, max_m] = summary.apart_m.unwrap();
+    assert!(median_m < 0.05 && max_m < 0.3, "{summary:?}");
+    assert!(summary.holds_target && summary.mast_apart_deg.unwrap() < 15.0, "{summary:?}");
+    for cycle in &drive.cycles[..drive.cycles.len() - 1] {
+        let answer = drive.answer_to(cycle).unwrap();
+        let [then, now] = [cycle.step, cycle.step + 1].map(|step| planned.site_from_rover(step));
+        let moved = then.inv_mul(&now).translation.vector;
+        assert!((answer.recorded_m[0] - moved.x).hypot(answer.recorded_m[1] - moved.y) < 1e-12);
     }
 }
 

@@ -12,6 +12,12 @@
 //!
 //! Stages are pure: no clock, file or hidden state. Geometry is in `f64`, pixels in `f32`. A lost target is data, never an
 //! error. No type of this crate contains ground truth about the world.
+//!
+//! No type of a crate that knows the ground truth can be named here. The same line compiles in `sightline_world`:
+//!
+//! ```compile_fail
+//! use sightline_world::target_truth::TruthSource;
+//! ```
 
 pub mod limits;
 pub mod settings;

@@ -7,6 +7,12 @@
 //! `err_m` is measured in the present rover frame, so that the drift of the site frame is not counted:
 //! `│ p_estimated,rover − (site_from_rover,true)⁻¹ T_site │`. A target counts as tracked when its pixel error is
 //! at most max(5 px, 0.5 px × magnification so far).
+//!
+//! The crates of the stages cannot name these types: their documentation has this line as one that must not compile.
+//!
+//! ```
+//! use sightline_world::target_truth::TruthSource;
+//! ```
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;

@@ -1,4 +1,5 @@
-//! `sightline drive`: drives the simulated rover towards a target on its own estimates.
+//! `sightline drive`: drives the simulated rover towards a target on its own estimates, or follows a recording and compares its
+//! commands with what was recorded.
 //!
 //! Each stop is one line of JSON on the standard output as soon as it is computed: the step's row and, under `cycle`, what was
 //! decided there. The last line is `{"summary": …}`.
@@ -11,9 +12,11 @@ use serde::Serialize;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
-use sightline_recordings::DrivenTraverse;
+use sightline_recordings::replayed::Answer;
+use sightline_recordings::{DrivenTraverse, Traverse};
 use sightline_rover::driving::{ArrivalAction, Cycle, DriveCommand, GoalRule};
 use sightline_session::driving::{DriveSummary, TargetedDrive};
+use sightline_session::replayed_drive::{ReplaySummary, ReplayedDrive};
 use sightline_session::step::RunStep;
 use sightline_track::presets::preset;
 use sightline_track::settings::{Changes, Settings, parse_assignment};
@@ -28,7 +31,8 @@ use crate::exports::rows::Row;
 /// Drive the simulated rover towards a target on its own estimates.
 #[derive(Debug, Args)]
 pub(super) struct Drive {
-    /// The scenario: a file, or a name that `sightline scenarios` lists.
+    /// The scenario: a file, or a name that `sightline scenarios` lists. With the folder of a recording the rover goes where it
+    /// was recorded, and every line compares the command with the recorded step.
     scenario: PathBuf,
     /// The position of the target in the first left image, px.
     #[arg(long, value_name = "X,Y", value_parser = pixel, allow_hyphen_values = true,
@@ -100,6 +104,21 @@ struct StopLine<'a> {
     cycle: &'a Cycle,
 }
 
+/// The line of a stop of a recording.
+#[derive(Serialize)]
+struct ReplayLine<'a> {
+    #[serde(flatten)]
+    row: Row,
+    cycle: &'a Cycle,
+    answer: Option<&'a Answer>,
+}
+
+/// The line after the last stop of a recording.
+#[derive(Serialize)]
+struct ReplaySummaryLine {
+    summary: ReplaySummary,
+}
+
 /// The line of a target.
 #[derive(Serialize)]
 struct TargetLine {
@@ -118,6 +137,9 @@ impl Drive {
     /// # Errors
     /// A scenario, target, command or setting that makes no sense, or a folder that cannot be written.
     pub(super) fn run(self) -> Result<()> {
+        if self.scenario.is_dir() {
+            return self.replay();
+        }
         let mut scenario = open::scenario(&self.scenario)?;
         scenario.seed = self.seed.unwrap_or(scenario.seed);
         let scenario = simulate::with(&scenario, &self.world)?;
@@ -138,6 +160,38 @@ impl Drive {
         let designation = Designation { step: 0, pixel };
         let drive = TargetedDrive::begin(world, designation, self.command(), &settings, Cancel::default())?;
         follow(drive, &settings)
+    }
+
+    /// Follows a recording.
+    fn replay(&self) -> Result<()> {
+        let without_effect = [
+            ("--seed", self.seed.is_some()),
+            ("--world", !self.world.is_empty()),
+            ("--out", self.out.is_some()),
+            ("--list-targets", self.list_targets),
+        ];
+        if let Some((option, _)) = without_effect.iter().find(|(_, is_given)| *is_given) {
+            let problem = format!("{option} has no effect on a recording; leave it out or give a scenario");
+            return Err(Error::Request(problem));
+        }
+        let settings = self.settings()?;
+        let traverse = Traverse::open(&self.scenario)?;
+        let Some(pixel) = self.target else { return Ok(()) };
+        let designation = Designation { step: 0, pixel };
+        let cancel = Cancel::default();
+        let mut drive = ReplayedDrive::begin(&traverse, designation, self.command(), &settings, cancel)?;
+        let mut progress = Progress::new("followed to stop");
+        loop {
+            let goes_on = drive.advance(&settings, cancel)?;
+            let number = drive.cycles.len() - 1;
+            let (step, cycle): (&RunStep, &Cycle) = (&drive.steps[number], &drive.cycles[number]);
+            line(&ReplayLine { row: step.into(), cycle, answer: drive.answer_to(cycle) })?;
+            progress.tell(number + 1, traverse.stop_count());
+            if !goes_on {
+                return line(&ReplaySummaryLine { summary: drive.summary() });
+            }
+            drive.steps[number] = Arc::new(without_images(&drive.steps[number]));
+        }
     }
 
     fn command(&self) -> DriveCommand {

@@ -1,4 +1,4 @@
-//! The world that a closed loop acts on; the simulator implements it.
+//! The world that a closed loop acts on. The simulator drives in it; a recording answers with its recorded data.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -13,7 +13,7 @@ use crate::pipeline::Stops;
 
 /// A world in which the rover can be driven.
 pub trait ActiveWorld {
-    /// The stops driven to so far.
+    /// The stops driven to so far; of a recording all of them.
     fn stops(&self) -> &dyn Stops;
 
     /// Drives one step from the last stop and adds the stop at which the rover comes to rest, its mast not pointed yet.

@@ -1,0 +1,168 @@
+//! A recording as a world to drive in: it answers every command with its recorded data, and compares the command with them.
+//!
+//! The rover goes where it went when the drive was recorded, whatever it is told. An [`Answer`] says how far the commanded
+//! motion and mast angles are from the recorded ones. Every traverse can be replayed, a simulated one too.
+//!
+//! Frame: the rover frame of the stop before, horizontal, m and rad. Source: papers.md R94, R104.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use sightline_geometry::camera::MastAngles;
+use sightline_geometry::cancel::Cancel;
+use sightline_geometry::error::{Error, Result};
+use sightline_geometry::frames::{Pixel, Vector3};
+use sightline_rover::driving::{ActiveWorld, DriveReport, Motion};
+use sightline_rover::pipeline::Stops;
+
+use crate::native::Traverse;
+
+/// How a recorded stop differs from what was commanded.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Answer {
+    /// The number of the stop to which the command led.
+    pub step: usize,
+    /// Where the commanded motion ends: ahead and to the right, m.
+    pub commanded_m: [f64; 2],
+    /// By how much it turns, rad, positive to the right.
+    pub commanded_turn_rad: f64,
+    /// Where the recorded pose estimate of the stop is, alike, m.
+    pub recorded_m: [f64; 2],
+    /// By how much the recorded heading turned, rad.
+    pub recorded_turn_rad: f64,
+    /// Distance between both ends, m.
+    pub apart_m: f64,
+    /// Angle between the commanded and the recorded direction of the mast, deg; null without a mast.
+    pub mast_apart_deg: Option<f64>,
+}
+
+/// A traverse that answers commands.
+pub struct Replayed<'a> {
+    traverse: &'a Traverse,
+    reached: usize,
+    answers: Vec<Answer>,
+}
+
+impl<'a> Replayed<'a> {
+    /// The traverse from a stop on.
+    pub fn new(traverse: &'a Traverse, step: usize) -> Self {
+        Self { traverse, reached: step, answers: Vec::new() }
+    }
+
+    /// Whether there is a stop after the present one.
+    pub fn goes_on(&self) -> bool {
+        self.reached + 1 < self.traverse.stop_count()
+    }
+
+    /// The comparisons so far, one a command.
+    pub fn answers(&self) -> &[Answer] {
+        &self.answers
+    }
+
+    /// Goes on to the next stop.
+    fn go_on(&mut self, motion: Option<&Motion>) -> Result<DriveReport> {
+        if !self.goes_on() {
+            return Err(Error::Request(format!("the recording ends at stop {}", self.reached)));
+        }
+        let [then, now] = [self.reached, self.reached + 1].map(|step| self.traverse.site_from_rover(step));
+        let times_s = [self.reached, self.reached + 1].map(|step| self.traverse.time_s(step));
+        self.reached += 1;
+        let (commanded_m, commanded_turn_rad) = motion.map_or(([0.0; 2], 0.0), |motion| motion.after(1.0));
+        let step = then.inv_mul(&now);
+        let recorded_m = [step.translation.x, step.translation.y];
+        self.answers.push(Answer {
+            step: self.reached,
+            commanded_m,
+            commanded_turn_rad,
+            recorded_m,
+            recorded_turn_rad: step.rotation.euler_angles().2,
+            apart_m: (recorded_m[0] - commanded_m[0]).hypot(recorded_m[1] - commanded_m[1]),
+            mast_apart_deg: None,
+        });
+        Ok(DriveReport {
+            wheels_m: step.translation.vector.norm(),
+            duration_s: (times_s[1] - times_s[0]).max(0.0),
+            tilt_deg: (now.rotation * Vector3::z()).z.clamp(-1.0, 1.0).acos().to_degrees(),
+            stall: None,
+        })
+    }
+}
+
+impl ActiveWorld for Replayed<'_> {
+    fn stops(&self) -> &dyn Stops {
+        self.traverse
+    }
+
+    fn drive(&mut self, motion: &Motion, _cancel: Cancel<'_>) -> Result<DriveReport> {
+        self.go_on(Some(motion))
+    }
+
+    fn stay(&mut self) -> Result<()> {
+        self.go_on(None).map(drop)
+    }
+
+    fn point_mast(&mut self, angles: Option<MastAngles>) -> Result<()> {
+        let recorded = self.traverse.mast_angles(self.reached);
+        if let (Some(answer), Some(wanted), Some(recorded)) = (self.answers.last_mut(), angles, recorded) {
+            answer.mast_apart_deg = Some(apart_deg(wanted, recorded));
+        }
+        Ok(())
+    }
+
+    fn expose(&mut self, _around: Option<Pixel>) -> Result<()> {
+        Ok(())
+    }
+}
+
+/// The angle between two directions of the mast, deg.
+fn apart_deg(a: MastAngles, b: MastAngles) -> f64 {
+    let [a, b] = [a, b].map(|angles| {
+        let (sine, cosine) = angles.elevation_rad.sin_cos();
+        Vector3::new(cosine * angles.azimuth_rad.cos(), cosine * angles.azimuth_rad.sin(), -sine)
+    });
+    a.angle(&b).to_degrees()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::create_simulated;
+    use sightline_world::Scenario;
+
+    fn scenario() -> Scenario {
+        let mut scenario = Scenario { seed: 5, ..Scenario::default() };
+        (scenario.camera.image_size, scenario.camera.samples_per_axis) = (128, 1);
+        scenario.terrain.rms_at_1m_m = 0.0;
+        scenario.odometry_error.along_fraction = 0.0;
+        scenario.odometry_error.across_fraction = 0.0;
+        scenario.odometry_error.attitude_deg = 0.0;
+        scenario
+    }
+
+    #[test]
+    fn a_recording_goes_its_own_way_and_says_how_far_off_the_command_is() {
+        let folder = tempfile::tempdir().unwrap();
+        let traverse = create_simulated(&scenario(), folder.path()).unwrap();
+        let [first, second] = [0, 1].map(|step| traverse.site_from_rover(step));
+        let length_m = (second.translation.vector - first.translation.vector).norm();
+        let mut world = Replayed::new(&traverse, 0);
+        let straight = |length_m| Motion::Arc { length_m, curvature_per_m: 0.0 };
+        let report = world.drive(&straight(length_m), Cancel::default()).unwrap();
+        assert!((report.wheels_m - length_m).abs() < 1e-12 && report.stall.is_none());
+        assert!(world.answers()[0].apart_m < 1e-6, "{:?}", world.answers());
+        let recorded = traverse.mast_angles(1).unwrap();
+        let aside = MastAngles { elevation_rad: recorded.elevation_rad + 0.01, ..recorded };
+        world.point_mast(Some(aside)).unwrap();
+        assert!((world.answers()[0].mast_apart_deg.unwrap() - 0.01f64.to_degrees()).abs() < 1e-9);
+        // A turn instead of the next metre.
+        world.drive(&Motion::Turn { angle_rad: 0.5 }, Cancel::default()).unwrap();
+        let answer = world.answers()[1];
+        assert_eq!((answer.step, answer.commanded_m, answer.commanded_turn_rad), (2, [0.0; 2], 0.5));
+        assert!(answer.recorded_turn_rad.abs() < 1e-6 && answer.apart_m > 0.5, "{answer:?}");
+        assert_eq!(world.stops().stop_count(), traverse.stop_count());
+        let mut last = Replayed::new(&traverse, traverse.stop_count() - 1);
+        assert!(!last.goes_on());
+        let refused = last.drive(&straight(1.0), Cancel::default()).unwrap_err().to_string();
+        assert!(refused.contains("the recording ends at stop"), "{refused}");
+    }
+}

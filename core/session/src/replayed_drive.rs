@@ -1,0 +1,116 @@
+//! A command followed along a recording: at every stop what would have been commanded, beside what was recorded.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::step::RunStep;
+use crate::track;
+use sightline_geometry::cancel::Cancel;
+use sightline_geometry::error::Result;
+use sightline_recordings::Traverse;
+use sightline_recordings::replayed::{Answer, Replayed};
+use sightline_rover::driving::executive::{self, CycleInput};
+use sightline_rover::driving::{ArcNavigator, Cycle, DriveCommand, StopReason};
+use sightline_track::settings::Settings;
+use sightline_track::target::{Designation, TrackingState};
+
+/// A drive along a recording.
+pub struct ReplayedDrive<'a> {
+    traverse: &'a Traverse,
+    world: Replayed<'a>,
+    command: DriveCommand,
+    /// The steps so far; the first is the designation.
+    pub steps: Vec<Arc<RunStep>>,
+    /// The decisions at the stops of the steps.
+    pub cycles: Vec<Cycle>,
+}
+
+/// How a recording compares with the commands of the loop.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ReplaySummary {
+    /// Stops, the first included.
+    pub stops: usize,
+    /// Why the commanded drive would have stopped; null where the recording ends first.
+    pub reason: Option<StopReason>,
+    /// Median and largest distance between the commanded and the recorded end of a step, m; null without a step.
+    pub apart_m: Option<[f64; 2]>,
+    /// Largest angle between the commanded and the recorded direction of the mast, deg; null without a mast.
+    pub mast_apart_deg: Option<f64>,
+    /// Whether the tracker still holds the target at the last stop.
+    pub holds_target: bool,
+}
+
+impl<'a> ReplayedDrive<'a> {
+    /// Designates the target and takes the command.
+    ///
+    /// # Errors
+    /// A pixel without a 3-D position, a command that makes no sense for the target, or
+    /// [`sightline_geometry::error::Error::Cancelled`].
+    pub fn begin(
+        traverse: &'a Traverse,
+        designation: Designation,
+        command: DriveCommand,
+        settings: &Settings,
+        cancel: Cancel<'_>,
+    ) -> Result<Self> {
+        command.validate()?;
+        let first = track::designate_until(traverse, designation, settings, cancel)?;
+        command.validate_for(&first.update.target.position_in_rover)?;
+        let world = Replayed::new(traverse, first.step);
+        Ok(Self { traverse, world, command, steps: vec![Arc::new(first)], cycles: Vec::new() })
+    }
+
+    /// Decides at the last stop and tracks at the next; false once the drive has ended or the recording ends.
+    ///
+    /// # Errors
+    /// [`sightline_geometry::error::Error::Cancelled`].
+    pub fn advance(&mut self, settings: &Settings, cancel: Cancel<'_>) -> Result<bool> {
+        let (Some(first), Some(last)) = (self.steps.first().cloned(), self.steps.last().cloned()) else {
+            return Ok(false);
+        };
+        if self.cycles.len() == self.steps.len() {
+            return Ok(false);
+        }
+        let input = CycleInput {
+            command: &self.command,
+            navigator: &ArcNavigator::default(),
+            first: &first.trace,
+            last: &last.trace,
+            before: self.cycles.last(),
+        };
+        if !self.world.goes_on() {
+            self.cycles.push(executive::decide(self.traverse, &input));
+            return Ok(false);
+        }
+        let (cycle, trace) = executive::advance(&mut self.world, &input, settings, cancel)?;
+        self.cycles.push(cycle);
+        let Some(trace) = trace else { return Ok(false) };
+        self.steps.push(Arc::new(track::compared(self.traverse, trace, Some(&first.trace))));
+        Ok(true)
+    }
+
+    /// How the stop after this one differs from the command that led there.
+    pub fn answer_to(&self, cycle: &Cycle) -> Option<&Answer> {
+        self.world.answers().iter().find(|answer| answer.step == cycle.step + 1)
+    }
+
+    /// The comparison so far.
+    pub fn summary(&self) -> ReplaySummary {
+        let answers = self.world.answers();
+        let mut apart_m: Vec<f64> = answers.iter().map(|answer| answer.apart_m).collect();
+        apart_m.sort_by(f64::total_cmp);
+        let median_m = apart_m.get(apart_m.len() / 2);
+        ReplaySummary {
+            stops: self.steps.len(),
+            reason: self.cycles.last().and_then(|cycle| cycle.ending).map(|ending| ending.reason),
+            apart_m: median_m.zip(apart_m.last()).map(|(median_m, max_m)| [*median_m, *max_m]),
+            mast_apart_deg: answers.iter().filter_map(|answer| answer.mast_apart_deg).reduce(f64::max),
+            holds_target: self
+                .steps
+                .last()
+                .is_some_and(|step| matches!(step.update.state, TrackingState::Tracking)),
+        }
+    }
+}
