@@ -147,6 +147,10 @@ impl DrivenTraverse {
         if state.is_empty() {
             return Err(Error::Request("a state of the world has one stop at least".to_owned()));
         }
+        for (number, stop) in state.iter().enumerate() {
+            let named = |problem| Error::Request(format!("driven[{number}].{problem}"));
+            stop.check().map_err(named)?;
+        }
         let common = self.driven.iter().zip(&state).take_while(|(a, b)| a == b).count();
         self.forget_images(common)?;
         self.traverse.truncate(common);

@@ -132,6 +132,27 @@ fn a_restored_world_forgets_what_it_saw_later() {
 }
 
 #[test]
+fn a_state_with_a_pose_that_is_none_is_refused_and_changes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut world = DrivenTraverse::begin(&scenario(), &folder.path().join("a"), Cancel::default()).unwrap();
+    go(&mut world, 0.5);
+    let before = world.state().to_vec();
+    let mut refused = |change: fn(&mut DrivenStop)| {
+        let mut state = before.clone();
+        change(&mut state[1]);
+        let problem = world.restore(state).unwrap_err().to_string();
+        assert_eq!(world.state(), before);
+        problem
+    };
+    let turned = refused(|stop| stop.true_site_from_rover.quaternion_sxyz[0] *= 1.1);
+    assert!(turned.contains("driven[1].true_site_from_rover: must have") && turned.contains("unit length"));
+    assert!(
+        refused(|stop| stop.site_from_rover.position_m[0] = f64::NAN).contains("driven[1].site_from_rover")
+    );
+    assert!(refused(|stop| stop.completed = 2.0).contains("driven[1].completed: is 2"));
+}
+
+#[test]
 fn a_folder_with_something_in_it_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("note"), "mine").unwrap();

@@ -12,12 +12,15 @@ use crate::step::RunStep;
 use crate::track;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
-use sightline_recordings::DrivenTraverse;
+use sightline_geometry::frames::Vector3;
+use sightline_recordings::{DrivenTraverse, Traverse};
 use sightline_rover::driving::executive::{self, CycleInput};
 use sightline_rover::driving::set_goal::goal_position_m;
 use sightline_rover::driving::{ArcNavigator, Cycle, DriveCommand, Ending, StopReason};
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
+use sightline_track::trace::StepTrace;
+use sightline_world::World;
 use sightline_world::target_truth::{TargetTruth, TruthSource};
 
 /// Who drives in a session, and how: the run on whose estimates the rover moves, and its command.
@@ -106,7 +109,7 @@ impl TargetedDrive {
             return Err(Error::Target(problem));
         }
         let first = track::designate_until(world.traverse(), designation, settings, cancel)?;
-        command.validate_for(&first.update.target.position_in_rover)?;
+        check_command(world.traverse(), &command, &first.trace)?;
         Ok(Self { world, command, steps: vec![Arc::new(first)], cycles: Vec::new() })
     }
 
@@ -152,6 +155,37 @@ impl TargetedDrive {
     pub fn summary(&self) -> DriveSummary {
         summary(&self.world, &self.command, &self.steps, &self.cycles)
     }
+}
+
+/// Refuses a command that makes no sense for a target where it was designated.
+///
+/// # Errors
+/// [`Error::Setting`] as [`DriveCommand::validate_for`], for a goal outside the ground of a simulated world, and for a tilt limit
+/// that the rover exceeds where it stands.
+pub fn check_command(traverse: &Traverse, command: &DriveCommand, first: &StepTrace) -> Result<()> {
+    let target = &first.update.target;
+    command.validate_for(&target.position_in_rover)?;
+    let pose = traverse.site_from_rover(first.step);
+    let tilt_deg = (pose.rotation * Vector3::z()).z.clamp(-1.0, 1.0).acos().to_degrees();
+    if tilt_deg > command.tilt_max_deg {
+        let limit_deg = command.tilt_max_deg;
+        let problem =
+            format!("{limit_deg}° is less than the {tilt_deg:.1}° by which the rover tilts already");
+        return Err(Error::setting("tilt_max_deg", problem));
+    }
+    let start = pose.translation.vector;
+    let goal_m = goal_position_m(command, &(pose * target.position_in_rover), [start.x, start.y]);
+    let Some(ground_m) = traverse.world().map(World::ground_extent_m) else { return Ok(()) };
+    if (0..2).all(|axis| (ground_m[axis][0]..=ground_m[axis][1]).contains(&goal_m[axis])) {
+        return Ok(());
+    }
+    let [[x_from, x_to], [y_from, y_to]] = ground_m;
+    let problem = format!(
+        "the goal at x {:.1} m, y {:.1} m is outside the ground of this world (x {x_from:.1} to {x_to:.1} m, y {y_from:.1} to \
+         {y_to:.1} m); choose a smaller offset",
+        goal_m[0], goal_m[1]
+    );
+    Err(Error::setting("offset_m", problem))
 }
 
 /// What a run decides at each of its stops under a command, and what the rover reported of the drives between them.

@@ -7,9 +7,10 @@ use super::breakpoints::Breakpoints;
 pub use super::view::SAVED_FORMAT;
 use super::view::{SavedRun, SavedSession, SavedTarget};
 use super::{Pending, Run, Session, TargetRecord};
-use crate::driving::Steering;
+use crate::driving::{Steering, check_command};
 use crate::step::RunStep;
 use sightline_geometry::error::{Error, Result};
+use sightline_recordings::Traverse;
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
 
@@ -116,12 +117,12 @@ impl Session {
     /// # Errors
     /// [`Error::Request`] when there is no such target or run, or its target is not located yet; [`Error::Setting`] for a command
     /// that makes no sense for the target.
-    pub fn steer(&mut self, steering: Steering) -> Result<()> {
+    pub fn steer(&mut self, traverse: &Traverse, steering: Steering) -> Result<()> {
         let run = self.run(steering.target, steering.run)?;
         let first = run.steps.first().ok_or_else(|| {
             Error::Request("the target is not located yet; wait for the run's first step".to_owned())
         })?;
-        steering.command.validate_for(&first.update.target.position_in_rover)?;
+        check_command(traverse, &steering.command, &first.trace)?;
         self.steering = Some(steering);
         Ok(())
     }

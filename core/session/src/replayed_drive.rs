@@ -5,6 +5,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::driving::check_command;
 use crate::step::RunStep;
 use crate::track;
 use sightline_geometry::cancel::Cancel;
@@ -57,7 +58,7 @@ impl<'a> ReplayedDrive<'a> {
     ) -> Result<Self> {
         command.validate()?;
         let first = track::designate_until(traverse, designation, settings, cancel)?;
-        command.validate_for(&first.update.target.position_in_rover)?;
+        check_command(traverse, &command, &first.trace)?;
         let world = Replayed::new(traverse, first.step);
         Ok(Self { traverse, world, command, steps: vec![Arc::new(first)], cycles: Vec::new() })
     }

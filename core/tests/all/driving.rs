@@ -230,6 +230,13 @@ fn a_command_that_makes_no_sense_is_refused_in_one_sentence() {
         begun.err().unwrap().to_string()
     };
     assert!(refused("far", |c| c.standoff_m = 20.0).contains("standoff_m: 20 m is not less than"));
+    let outside = refused("outside", |c| c.offset_m = [0.0, -15.0]);
+    assert!(
+        outside.contains("offset_m: the goal at x") && outside.contains("outside the ground"),
+        "{outside}"
+    );
+    let tilted = refused("tilted", |c| c.tilt_max_deg = 1.0);
+    assert!(tilted.contains("tilt_max_deg: 1° is less than the"), "{tilted}");
     assert!(refused("lax", |c| (c.standoff_m, c.tolerance_m) = (0.5, 0.6)).contains("tolerance_m"));
     assert!(
         refused("fixed", |c| (c.goal, c.step_fraction) = (GoalRule::Fixed, 2.0)).contains("step_fraction")

@@ -100,6 +100,12 @@ impl World {
         self.light.to_sun
     }
 
+    /// The rectangle of ground that has relief and rocks: from and to along x, and along y, site frame, m.
+    pub fn ground_extent_m(&self) -> [[f64; 2]; 2] {
+        let Terrain { origin_m, cell_m, cells, .. } = self.scenery.terrain;
+        [0, 1].map(|axis| [origin_m[axis], origin_m[axis] + cell_m * cells[axis] as f64])
+    }
+
     /// Height of the bare ground at a place, m down, site frame.
     pub fn ground_z_at(&self, x_m: f64, y_m: f64) -> f64 {
         self.scenery.terrain.z_at(x_m, y_m)

@@ -76,13 +76,14 @@ async fn steer(
     Body(steering): Body<SteerDrive>,
 ) -> ApiResult<Json<DriveView>> {
     blocking(move || {
-        if live.traverse().driven.is_none() {
+        let open = live.traverse();
+        if open.driven.is_none() {
             return Err(ApiError::conflict("The drive of this session is not on commands.")
                 .hint("POST …/targets/{target}/runs/{run}/drive begins one from it."));
         }
         let Steering { target, run, .. } = steering;
         state.change(&live, |session| {
-            session.steer(steering)?;
+            session.steer(&open.traverse, steering)?;
             if session.run(target, run)?.why_stopped().is_some() {
                 session.resume(target, run)?;
             }
@@ -103,13 +104,13 @@ fn add(
     cancel: &CancelFlag,
 ) -> ApiResult<Arc<LiveSession>> {
     let steering = Steering { target, run, command: new.command.clone(), pause_at: new.pause_at };
+    let open = live.traverse();
     let (saved, last) = live.with(|session| {
         let steps = &session.run(target, run).map_err(|error| ApiError::from(error).about_path())?.steps;
         // Refused before a world is made.
-        session.clone().steer(steering.clone())?;
+        session.clone().steer(&open.traverse, steering.clone())?;
         Ok::<_, ApiError>((session.saved(), steps.last().map_or(0, |last| last.step)))
     })?;
-    let open = live.traverse();
     let designated = saved.targets[target].designation.step;
     let from_step = from_step(&open, new, designated, last)?;
     let folder = driven::new_folder(state.folders(), &open.traverse.index().name)?;

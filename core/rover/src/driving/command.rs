@@ -88,6 +88,14 @@ impl DriveCommand {
         within("stops_max", f64::from(self.stops_max), 2.0, 1000.0)?;
         within("tilt_max_deg", self.tilt_max_deg, 1.0, 45.0)?;
         within("flight_minutes_max", self.flight_minutes_max, 1.0, 10_000.0)?;
+        let looks = self.on_arrival.len();
+        if looks <= ACTIONS_MAX && looks + 2 > self.stops_max as usize {
+            let problem = format!(
+                "{} stops are too few for two stops and {looks} looks after arrival (on_arrival)",
+                self.stops_max
+            );
+            return Err(Error::setting("stops_max", problem));
+        }
         within("on_arrival (number of actions)", self.on_arrival.len() as f64, 0.0, ACTIONS_MAX as f64)?;
         if self.tolerance_m >= self.standoff_m {
             let problem = format!(
@@ -149,6 +157,11 @@ mod tests {
             (|c| c.step_fraction = 0.0, ahead, "step_fraction"),
             (|c| c.stops_max = 1, ahead, "stops_max"),
             (|c| c.on_arrival = vec![ArrivalAction::Look; 11], ahead, "on_arrival"),
+            (
+                |c| (c.stops_max, c.on_arrival) = (3, vec![ArrivalAction::Look; 2]),
+                ahead,
+                "stops_max: 3 stops are too few for two stops and 2 looks",
+            ),
         ] {
             let message = told(change, target).unwrap_err();
             assert!(message.contains(part), "{message}");

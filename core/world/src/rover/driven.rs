@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use sightline_geometry::camera::MastAngles;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
-use sightline_geometry::frames::{Pixel, Point3, Pose, PoseRecord, Vector3};
+use sightline_geometry::frames::{POSITION_LIMIT_M, Pixel, Point3, Pose, PoseRecord, Vector3};
 
 use crate::camera::rig::Rig;
 use crate::ground::texture::mix;
@@ -181,6 +181,26 @@ impl DrivenStop {
             leg.duration_s += (chord_m.abs() / SPEED_M_S).max(turn_rad.abs() / TURN_RAD_S);
         }
         Ok((leg, 1.0))
+    }
+
+    /// Refuses implausible numbers, as a file may have them.
+    ///
+    /// # Errors
+    /// A sentence that begins with the field.
+    pub fn check(&self) -> Result<(), String> {
+        for (field, pose) in
+            [("true_site_from_rover", &self.true_site_from_rover), ("site_from_rover", &self.site_from_rover)]
+        {
+            if !pose.is_plausible() {
+                return Err(format!(
+                    "{field}: must have a position_m within {POSITION_LIMIT_M:.0e} m and a quaternion_sxyz of unit length"
+                ));
+            }
+        }
+        if !(0.0..=1.0).contains(&self.completed) {
+            return Err(format!("completed: is {}, but it must be from 0 to 1", self.completed));
+        }
+        Ok(())
     }
 
     /// Angle between the estimated vertical of the rover and that of the site, deg.
