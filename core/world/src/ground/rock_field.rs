@@ -12,8 +12,9 @@
 //!
 //! Rocks are scattered over the wedge that the cameras see, in strips across the drive; the smallest
 //! diameter grows slowly beyond the goal, where smaller ones would span less than about four pixels. Around
-//! the goal a cluster follows the same law with a larger smallest diameter. The wheels' tracks are kept
-//! free of all but pebbles, and between them nothing is higher than the rover's belly. `rocks.clear_path` removes
+//! the goal a cluster follows the same law with a larger smallest diameter. The wheels' lines of the
+//! planned drive are kept free of all but pebbles, and between them nothing is higher than the rover's belly, unless
+//! `rocks.off_planned_drive` is false: then the rocks do not depend on the drive. `rocks.clear_path` removes
 //! further rocks once all are placed (`clear_path.rs`).
 //!
 //! | symbol | name | unit |
@@ -111,6 +112,9 @@ pub(crate) fn scatter(
     candidates.sort_by(|a, b| b.diameter_m.total_cmp(&a.diameter_m));
     let mut taken = Taken::new();
     let mut seeds = placed_seeds(settings, approach, seed);
+    let is_in_the_way = |place: [f64; 2], reach_m: f64, height_m: f64| {
+        settings.off_planned_drive && is_in_the_way(approach, place, reach_m, height_m)
+    };
     seeds.iter().for_each(|rock| taken.add(rock.x_m, rock.y_m, REACH * rock.diameter_m));
     for candidate in &candidates {
         cancel.check()?;
@@ -121,7 +125,7 @@ pub(crate) fn scatter(
         if approach.around.as_ref().is_some_and(|around| !around.sees(place[0], place[1])) {
             continue;
         }
-        if scattered && is_in_the_way(approach, place[0], place[1], reach_m, height_m) {
+        if scattered && is_in_the_way(place, reach_m, height_m) {
             // Drawing again would crowd what lies beside the tracks; a rock of the cluster must find a place.
             continue;
         }
@@ -136,7 +140,7 @@ pub(crate) fn scatter(
                 };
             }
             let [x_m, y_m] = place;
-            if is_in_the_way(approach, x_m, y_m, reach_m, height_m) || taken.overlaps(x_m, y_m, reach_m) {
+            if is_in_the_way(place, reach_m, height_m) || taken.overlaps(x_m, y_m, reach_m) {
                 continue;
             }
             taken.add(x_m, y_m, reach_m);
@@ -264,7 +268,7 @@ fn beside([x_m, y_m]: [f64; 2], by_m: f64, random: &mut Pcg64) -> [f64; 2] {
 }
 
 /// Whether a rock would stand in a wheel's track or touch the belly.
-fn is_in_the_way(approach: &Approach, x_m: f64, y_m: f64, reach_m: f64, height_m: f64) -> bool {
+fn is_in_the_way(approach: &Approach, [x_m, y_m]: [f64; 2], reach_m: f64, height_m: f64) -> bool {
     if let Some(around) = &approach.around {
         return height_m > ROLLED_OVER_M && around.is_in_the_way(x_m, y_m, reach_m, height_m > BELLY_M);
     }

@@ -70,6 +70,21 @@ fn placed_rocks_stand_where_they_should_and_others_give_way() {
 }
 
 #[test]
+fn rocks_that_need_not_keep_off_the_planned_drive_are_the_same_for_every_drive() {
+    let places = |off_planned_drive: bool, wheels_reach_m: f64| {
+        let settings = RockSettings { off_planned_drive, farthest_m: 12.0, ..RockSettings::default() };
+        let approach = Approach { wheels_reach_m, ..approach() };
+        let terrain = Terrain::new(&TerrainSettings::default(), [-2.0, 2.0], [-2.0, 2.0], 3);
+        let rocks = scatter(&settings, &approach, &terrain, 3, Cancel::default()).unwrap();
+        rocks.iter().map(|rock| [rock.centre.x, rock.centre.y, rock.height_m]).collect::<Vec<_>>()
+    };
+    assert_eq!(places(false, 4.0), places(false, 9.7));
+    assert_ne!(places(true, 4.0), places(true, 9.7));
+    let in_track = |place: &[f64; 3]| place[0] < 9.0 && (0.43..0.70).contains(&place[1].abs());
+    assert!(places(false, 9.7).iter().any(|place| in_track(place) && place[2] > 0.05));
+}
+
+#[test]
 fn a_clear_path_removes_the_rocks_on_it_and_leaves_all_others_as_they_were() {
     let path = ClearPath { to_x_m: -2.0, to_y_m: 1.0, ..ClearPath::default() };
     let open = RockSettings { farthest_m: 12.0, ..RockSettings::default() };

@@ -149,9 +149,18 @@ pub struct RockSettings {
     /// Rocks that stand where the scenario puts them; scattered rocks give way to them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub placed: Vec<PlacedRock>,
+    /// Whether scattered rocks keep off the wheels' lines of the planned drive (true). With false they do not depend on the drive.
+    #[serde(skip_serializing_if = "is_true")]
+    pub off_planned_drive: bool,
     /// A strip from which scattered rocks are removed (none); placed rocks remain.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub clear_path: Option<ClearPath>,
+}
+
+// `serde` passes a reference.
+#[expect(clippy::trivially_copy_pass_by_ref)]
+const fn is_true(value: &bool) -> bool {
+    *value
 }
 
 impl Default for RockSettings {
@@ -168,6 +177,7 @@ impl Default for RockSettings {
             cluster_smallest_m: 0.25,
             cluster_largest_m: 0.9,
             placed: Vec::new(),
+            off_planned_drive: true,
             clear_path: None,
         }
     }
