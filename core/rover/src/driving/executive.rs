@@ -69,6 +69,8 @@ pub struct Cycle {
     pub report: Option<DriveReport>,
     /// Actions after arrival that were begun, the one decided here included.
     pub arrival_actions: u32,
+    /// Time of this stop on Mars, by stage.
+    pub flight: FlightTime,
     /// Time on Mars up to the end of this stop's drive, min.
     pub flight_minutes: f64,
     /// The end of the drive; null where it goes on.
@@ -148,6 +150,7 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
         motion: None,
         report: None,
         arrival_actions,
+        flight: time,
         flight_minutes,
         ending: None,
     };
@@ -181,6 +184,7 @@ fn reckoned(stops: &dyn Stops, input: &CycleInput<'_>, pose: &Pose) -> [Reckoned
 impl Cycle {
     /// Adds what the rover reports of its motion.
     pub fn add(&mut self, report: DriveReport) {
+        self.flight.drive_s = report.duration_s;
         self.flight_minutes += report.duration_s / 60.0;
         self.report = Some(report);
     }

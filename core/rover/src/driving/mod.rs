@@ -17,5 +17,6 @@ pub use active_world::{ActiveWorld, DriveReport, Stall};
 pub use command::{ArrivalAction, DriveCommand, GoalRule};
 pub use dead_reckoning::Reckoned;
 pub use executive::{Cycle, Ending, StopReason};
+pub use flight_time::FlightTime;
 pub use select_path::{ArcNavigator, Motion, Navigator};
 pub use set_goal::Goal;
