@@ -153,6 +153,11 @@ impl Drive {
             let traverse = world.traverse();
             let Some(simulated) = traverse.world() else { return Ok(()) };
             let targets = choose_targets(simulated, &scenario, traverse.index());
+            if targets.is_empty() {
+                let problem = "no pixel of the first image fits the scenario's rule for targets; choose another seed, or a smaller \
+                               targets.window_px with --world";
+                return Err(Error::Target(problem.to_owned()));
+            }
             return targets.iter().try_for_each(|pixel| line(&TargetLine { target: [pixel.x, pixel.y] }));
         }
         // The command line refuses to come here without one.
