@@ -81,8 +81,17 @@ impl RunStep {
                 _ => None,
             },
             failed_gates: self.failed_gates(),
-            reason: self.fault().or_else(|| self.verdict()?.reason.as_deref()).map(str::to_owned),
+            paused_before: self.paused_before(),
+            reason: self.reason(),
         }
+    }
+
+    /// Why an update was rejected, what is wrong with the stop's files, or where the drive is paused.
+    fn reason(&self) -> Option<String> {
+        if let Some(before) = self.paused_before() {
+            return Some(format!("not computed yet: the drive is paused before `{}`", before.word()));
+        }
+        self.fault().or_else(|| self.verdict()?.reason.as_deref()).map(str::to_owned)
     }
 
     fn failed_gates(&self) -> Vec<Gate> {

@@ -185,7 +185,7 @@ impl Follower {
         self.record(drive, None, &first, &last);
         while last.step + 1 < drive.stop_count() {
             let next =
-                NextStep { first: &first, last: &last, settings, prediction_px: None, cancel: cancel.into() };
+                NextStep { first: &first, last: &last, settings, prediction_px: None, before: None, cancel: cancel.into() };
             let next = next.compute(drive)?;
             self.record(drive, Some(&last), &first, &next);
             last = next;

@@ -19,6 +19,8 @@ use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::{Pixel, Point3, Pose, PoseRecord, Vector3};
 
+use sightline_track::cycle_stage::CycleStage;
+
 use crate::camera::rig::Rig;
 use crate::ground::texture::mix;
 use crate::index::{PAUSE_S, simulated_stop};
@@ -59,6 +61,9 @@ pub struct DrivenStop {
     pub completed: f64,
     /// Rocks whose corners are inside the rover's body here.
     pub touched_rocks: u32,
+    /// The first stage that was put off because the drive is paused here: `point_mast` or `capture`; `None` if none was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub awaits: Option<CycleStage>,
 }
 
 impl DrivenStop {
@@ -80,6 +85,7 @@ impl DrivenStop {
             drive_s: 0.0,
             completed: 1.0,
             touched_rocks: 0,
+            awaits: None,
         })
     }
 
@@ -114,6 +120,7 @@ impl DrivenStop {
                 drive_s: leg.duration_s,
                 completed,
                 touched_rocks: touched_rocks(world, &stand),
+                awaits: None,
             })
         })
     }
@@ -129,6 +136,7 @@ impl DrivenStop {
             completed: 1.0,
             // A rock is counted at the stop at which it was reached.
             touched_rocks: 0,
+            awaits: None,
             ..self.clone()
         }
     }
