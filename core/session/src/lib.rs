@@ -120,7 +120,17 @@ impl Session {
     pub fn new(id: impl Into<String>, traverse: impl Into<String>, stop_count: usize) -> Self {
         let (targets, cursor, breakpoints) = (Vec::new(), Cursor::default(), Breakpoints::default());
         let (id, traverse, removals) = (id.into(), traverse.into(), VecDeque::new());
-        Self { id, traverse, stop_count, targets, cursor, breakpoints, steering: None, awaits: None, removals }
+        Self {
+            id,
+            traverse,
+            stop_count,
+            targets,
+            cursor,
+            breakpoints,
+            steering: None,
+            awaits: None,
+            removals,
+        }
     }
 
     /// Adds a target whose designation was computed, and looks at it. Returns its number.

@@ -36,7 +36,7 @@ pub struct StagePause {
 }
 
 /// The place in a drive at which it waits.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
 #[schema(as = DriveHalt)]
 pub struct Halt {
     /// The stop, from 0.
@@ -87,7 +87,7 @@ impl Steering {
         Some(halt.before).filter(|before| *before <= CycleStage::Update)
     }
 
-    /// The decisions up to the pause: the last one without what follows from the stages that are not computed.
+    /// Keeps the decisions up to the pause: the last one without what follows from the stages that are not computed.
     pub(crate) fn up_to_halt(&self, cycles: &mut Vec<Cycle>) {
         let Some((halt, last)) = self.halt().zip(cycles.last_mut()) else { return };
         if last.step < halt.stop || last.report.is_some() {
@@ -114,7 +114,11 @@ impl Session {
 }
 
 /// The place at which the run that drives waits, from its steps and the number of stops.
-pub(crate) fn halted(steering: &Steering, steps: &[std::sync::Arc<RunStep>], stop_count: usize) -> Option<Halt> {
+pub(crate) fn halted(
+    steering: &Steering,
+    steps: &[std::sync::Arc<RunStep>],
+    stop_count: usize,
+) -> Option<Halt> {
     let last = steps.last()?;
     if let Some(before) = last.paused_before() {
         return Some(Halt { stop: last.step, before });

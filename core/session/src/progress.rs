@@ -115,7 +115,8 @@ impl Session {
     fn preparation(&self, target: usize, number: usize) -> Result<Option<Next>> {
         let run = self.any_run(target, number)?;
         let steering = self.steering.as_ref().filter(|s| (s.target, s.run) == (target, number));
-        let (Some(steering), Some(awaits), Some(last)) = (steering, self.awaits, run.whole_steps().last()) else {
+        let (Some(steering), Some(awaits), Some(last)) = (steering, self.awaits, run.whole_steps().last())
+        else {
             return Ok(None);
         };
         let before = steering.halt_within(last.step + 1);
@@ -197,7 +198,8 @@ impl Session {
 impl Run {
     /// The steps before `from_step`; none when the run has not come so far.
     pub(crate) fn steps_before(&self, from_step: usize) -> Option<Vec<Arc<RunStep>>> {
-        let kept: Vec<_> = self.whole_steps().iter().filter(|trace| trace.step < from_step).cloned().collect();
+        let kept: Vec<_> =
+            self.whole_steps().iter().filter(|trace| trace.step < from_step).cloned().collect();
         kept.last().is_some_and(|last| last.step + 1 == from_step).then_some(kept)
     }
 

@@ -88,10 +88,7 @@ impl RunStep {
 
     /// Why an update was rejected, what is wrong with the stop's files, or where the drive is paused.
     fn reason(&self) -> Option<String> {
-        if let Some(before) = self.paused_before() {
-            return Some(format!("not computed yet: the drive is paused before `{}`", before.word()));
-        }
-        self.fault().or_else(|| self.verdict()?.reason.as_deref()).map(str::to_owned)
+        self.why_incomplete().or_else(|| self.verdict()?.reason.clone())
     }
 
     fn failed_gates(&self) -> Vec<Gate> {

@@ -15,13 +15,8 @@ use sightline_track::trace::StepTrace;
 use crate::driving::{begin, command};
 
 /// The stages of a stop before which its step can be paused.
-const WITHIN: [CycleStage; 5] = [
-    CycleStage::PointMast,
-    CycleStage::Capture,
-    CycleStage::Locate,
-    CycleStage::Judge,
-    CycleStage::Update,
-];
+const WITHIN: [CycleStage; 5] =
+    [CycleStage::PointMast, CycleStage::Capture, CycleStage::Locate, CycleStage::Judge, CycleStage::Update];
 
 /// The last step of a drive at its last stop, paused before a stage.
 fn paused(drive: &TargetedDrive, last: &RunStep, before: Option<CycleStage>) -> StepTrace {
@@ -98,7 +93,11 @@ fn a_world_paused_before_any_stage_goes_on_with_the_same_state_and_images() {
         assert_eq!(cycle, drive.cycles[1]);
         drive.world.put_off(Some(CycleStage::PointMast)).unwrap();
         let stop = drive.world.state()[2].clone();
-        assert_eq!((stop.mast_angles, stop.metered_px), (state[1].mast_angles, None), "the mast is not pointed");
+        assert_eq!(
+            (stop.mast_angles, stop.metered_px),
+            (state[1].mast_angles, None),
+            "the mast is not pointed"
+        );
         if put_off != Some(CycleStage::PointMast) {
             executive::point_mast(&mut drive.world, &last.update).unwrap();
             drive.world.put_off(put_off).unwrap();

@@ -176,6 +176,13 @@ impl StepTrace {
         }
     }
 
+    /// Why the step lacks stages: the damage of the stop's files, or the pause of the drive; `None` for a complete step.
+    pub fn why_incomplete(&self) -> Option<String> {
+        let paused =
+            |before: CycleStage| format!("not computed yet: the drive is paused before `{}`", before.word());
+        self.fault().map(str::to_owned).or_else(|| self.paused_before().map(paused))
+    }
+
     /// The evidence of the template locator, where something was located.
     pub fn template(&self) -> Option<&TemplateEvidence> {
         self.located().and_then(|located| located.evidence.template())

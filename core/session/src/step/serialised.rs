@@ -251,7 +251,9 @@ mod tests {
             assert!(error.to_string().contains("no kind of step"), "{stage}: {error}");
         }
         let [.., begun, _] = kinds().map(|kind| serde_json::to_value(step(kind)).unwrap());
-        for (field, value) in [("before", json!("judge")), ("before", json!("capture")), ("carried", Value::Null)] {
+        for (field, value) in
+            [("before", json!("judge")), ("before", json!("capture")), ("carried", Value::Null)]
+        {
             let mut wrong = begun.clone();
             wrong["begun"][field] = value;
             assert!(serde_json::from_value::<RunStep>(wrong).is_err(), "{field}");
