@@ -186,18 +186,14 @@ impl DrivenTraverse {
         self.driven.last().and_then(|last| last.awaits)
     }
 
-    /// Puts off a stage at the last stop, `point_mast` or `capture`: its images are not taken before [`Self::snapshot`] finds
-    /// `None` here.
+    /// Puts off a stage at the last stop, `point_mast` or `capture`: a [`Self::snapshot`] then has no images of it.
     ///
     /// # Errors
     /// A stop that cannot be stored.
     pub fn put_off(&mut self, stage: Option<CycleStage>) -> Result<()> {
         let number = self.driven.len() - 1;
-        if self.driven[number].awaits == stage {
-            return Ok(());
-        }
-        self.driven[number].awaits = stage;
-        self.save()
+        let before = std::mem::replace(&mut self.driven[number].awaits, stage);
+        if before == stage { Ok(()) } else { self.save() }
     }
 
     /// Collisions so far: steps that a rock ended, and stops at which a rock reaches into the rover's body.

@@ -89,6 +89,8 @@ async fn steer(
             }
             Ok(())
         })?;
+        // The pause holds the other runs, too.
+        state.runner().follow(&live, (&live, (target, run)));
         start_or_say(&state, &live, target, run);
         Ok(Json(driven::view(&live)))
     })

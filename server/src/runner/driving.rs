@@ -61,7 +61,7 @@ impl Runner {
     }
 
     /// Lets the other runs of a session that have something to compute at the last stop track on.
-    pub(super) fn follow(&self, live: &Arc<LiveSession>, (driver, driving): (&LiveSession, (usize, usize))) {
+    pub(crate) fn follow(&self, live: &Arc<LiveSession>, (driver, driving): (&LiveSession, (usize, usize))) {
         let is_driver = |target, run| driver.id == live.id && (target, run) == driving;
         for (target, run) in live.with(|session| every_run(session)) {
             let waits = live.with(|session| matches!(session.pending(target, run), Ok(Some(_))));

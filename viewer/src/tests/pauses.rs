@@ -62,8 +62,10 @@ fn paused(context: &egui::Context, before: CycleStage) -> State {
             _ => run.rows.push(begun(before).row()),
         }
     }
-    if !whole {
-        fixture::load(&mut state, begun(before.max(CycleStage::PointMast)));
+    match before {
+        CycleStage::Predict => state.cache.forget(|key| matches!(key, Key::Trace(_) | Key::Arrays(_))),
+        _ if whole => {}
+        _ => fixture::load(&mut state, begun(before)),
     }
     let cycles: Vec<Value> = (0..STOP + usize::from(before > CycleStage::SetGoal)).map(cycle).collect();
     let paused = json!({ "stop": STOP, "before": before.word() });
