@@ -104,6 +104,7 @@ fn end_of(traverse: &Traverse, pixel: Pixel, settings: &Settings) -> Result<Opti
             last: &last,
             settings,
             prediction_px: None,
+            before: None,
             cancel: Default::default(),
         };
         last = next.compute(traverse)?;

@@ -13,6 +13,7 @@ use sightline_recordings::DrivenTraverse;
 use sightline_rover::driving::{ArcNavigator, executive};
 use sightline_session::driving::{self, DriveView, Steering};
 use sightline_session::step::RunStep;
+use sightline_track::cycle_stage::CycleStage;
 use sightline_track::locate::store::Cache;
 use tokio::sync::broadcast;
 
@@ -116,7 +117,7 @@ pub(crate) fn copy(from: &Path, to: &Path) -> Result<()> {
 }
 
 /// Drives from the last stop to the next on the estimates of `steps`, and returns the drive as it is then; `None` where it
-/// ends at the last stop, or somebody else drove on from there.
+/// ends at the last stop, or somebody else drove on from there. The mast is pointed and the images are due if no pause is before.
 ///
 /// # Errors
 /// A drive that is none on commands, ground that cannot be driven on, a folder that cannot be written, or
@@ -146,7 +147,14 @@ pub(crate) fn drive_on(
         before: before.last(),
     };
     let state = world.state().to_vec();
-    let moved = executive::drive_on(&mut *world, &input, cancel.as_ref().into());
+    let before = steering.halt_within(last.step + 1);
+    let moved = executive::drive(&mut *world, &input, cancel.as_ref().into());
+    let moved = moved.and_then(|cycle| {
+        if cycle.ending.is_none() {
+            prepare_stop(&mut world, last, before)?;
+        }
+        Ok(cycle)
+    });
     match moved {
         Ok(cycle) if cycle.ending.is_some() => return Ok(None),
         Ok(_) => {}
@@ -160,22 +168,52 @@ pub(crate) fn drive_on(
     Ok(Some(Arc::new(open.grown(traverse))))
 }
 
+/// Points the mast at the last stop and lets its images be taken, as far as no pause is before; returns the drive as it is then.
+/// `None` if nothing was put off there.
+///
+/// # Errors
+/// A folder that cannot be written; the world is then as it was.
+pub(crate) fn prepare(
+    open: &OpenTraverse,
+    last: &RunStep,
+    before: Option<CycleStage>,
+) -> Result<Option<Arc<OpenTraverse>>> {
+    let Some(driven) = &open.driven else { return Ok(None) };
+    let mut world = lock(&driven.world);
+    if world.traverse().stop_count() != last.step + 2 || world.awaits().is_none() {
+        return Ok(None);
+    }
+    let state = world.state().to_vec();
+    if let Err(error) = prepare_stop(&mut world, last, before) {
+        world.restore(state)?;
+        return Err(error);
+    }
+    let traverse = world.snapshot()?.with_cache(&driven.cache);
+    Ok(Some(Arc::new(open.grown(traverse))))
+}
+
+/// The world's part of `point_mast` and `capture` at the last stop, as far as no pause is before.
+fn prepare_stop(world: &mut DrivenTraverse, last: &RunStep, before: Option<CycleStage>) -> Result<()> {
+    let reaches = |stage| before.is_none_or(|before| before > stage);
+    // Images that are put off show the mast as it was pointed then.
+    if reaches(CycleStage::PointMast) && world.awaits() != Some(CycleStage::Capture) {
+        executive::point_mast(world, &last.update)?;
+    }
+    let put_off = [CycleStage::PointMast, CycleStage::Capture].into_iter().find(|stage| !reaches(*stage));
+    world.put_off(put_off)
+}
+
 /// The drive of a session.
 pub(crate) fn view(live: &LiveSession) -> DriveView {
     let open = live.traverse();
     let steering = live.with(|session| session.steering.clone());
     let (Some(steering), Some(driven)) = (&steering, &open.driven) else {
-        return DriveView { steering, cycles: Vec::new(), summary: None, is_driving: false };
+        return DriveView { steering, ..DriveView::default() };
     };
-    let steps = live.with(|session| {
-        session.run(steering.target, steering.run).map(|run| run.steps.clone()).unwrap_or_default()
-    });
+    let run = live.with(|session| session.run(steering.target, steering.run).cloned());
+    let Ok(run) = run else { return DriveView { steering: Some(steering.clone()), ..DriveView::default() } };
     let is_driving = live.is_computing(steering.target, steering.run);
-    driven.with(|world| {
-        let cycles = driving::cycles(world, &steering.command, &steps);
-        let summary = driving::summary(world, &steering.command, &steps, &cycles);
-        DriveView { steering: Some(steering.clone()), cycles, summary: Some(summary), is_driving }
-    })
+    driven.with(|world| DriveView::of(world, steering, &run, is_driving))
 }
 
 /// Puts the drive with a stop more in the place of the former one in the list of open drives.

@@ -45,7 +45,8 @@ struct Computing {
 
 impl LiveSession {
     /// A session; one that was read back sleeps until somebody asks for it.
-    pub fn new(session: Session, traverse: Arc<OpenTraverse>, is_awake: bool) -> Self {
+    pub fn new(mut session: Session, traverse: Arc<OpenTraverse>, is_awake: bool) -> Self {
+        session.awaits = traverse.traverse.awaits();
         Self {
             id: session.id.clone(),
             traverse: RwLock::new(traverse),
@@ -67,10 +68,10 @@ impl LiveSession {
 
     /// Works from now on with the stops that a drive has come to.
     pub(crate) fn grow(&self, grown: Arc<OpenTraverse>) {
-        let count = grown.traverse.stop_count();
+        let (count, awaits) = (grown.traverse.stop_count(), grown.traverse.awaits());
         // A step that the session has must be in the traverse.
         *self.traverse.write().unwrap_or_else(PoisonError::into_inner) = grown;
-        self.with(|session| session.stop_count = count);
+        self.with(|session| (session.stop_count, session.awaits) = (count, awaits));
     }
 
     /// Looks at or changes the session; keep it short.

@@ -6,6 +6,7 @@ use sightline_api::location::AtStep;
 use sightline_geometry::frames::Pixel;
 use sightline_session::step::RunStep;
 use sightline_session::what_if::Base;
+use sightline_track::cycle_stage::CycleStage;
 use sightline_track::locate::template::history::{AgainstEarlier, against_earlier};
 use sightline_track::settings::Settings;
 
@@ -63,7 +64,10 @@ impl RecordedStep {
     /// # Errors
     /// Those of the files.
     pub(crate) fn prepare(&mut self, cancel: &CancelFlag) -> ApiResult<()> {
-        self.live.traverse().make_ready(self.recorded.step, cancel)?;
+        // A step of a paused drive is computed again up to the pause.
+        if self.recorded.paused_before().is_none_or(|before| before > CycleStage::Capture) {
+            self.live.traverse().make_ready(self.recorded.step, cancel)?;
+        }
         if let Some(last) = &self.last {
             self.last = Some(runner::with_image(&self.live.traverse(), last)?);
         }

@@ -96,7 +96,8 @@ impl OpenTraverse {
 
     /// How many stops are ready, and whether `ready` has just become so.
     pub fn progress(&self, ready: Option<usize>) -> Event {
-        let n = self.traverse.stop_count();
+        // A stop without images yet is none that is rendered.
+        let n = self.traverse.stop_count() - usize::from(self.traverse.awaits().is_some());
         let k = (0..n).filter(|&step| self.traverse.is_ready(step)).count();
         Event::RenderProgress { traverse: self.id.clone(), k, n, ready }
     }
@@ -242,7 +243,8 @@ impl Wish {
         let from = self.from.min(count);
         let mut order = (from..count).chain(0..from);
         let step = order.find(|&step| {
-            !traverse.traverse.is_ready(step) && !self.failed.contains(&(traverse.id.clone(), step))
+            let is_missing = !traverse.traverse.is_ready(step) && !traverse.traverse.is_awaited(step);
+            is_missing && !self.failed.contains(&(traverse.id.clone(), step))
         })?;
         Some((traverse, step))
     }

@@ -19,6 +19,7 @@ use sightline_session::step::RunStep;
 use sightline_session::track::{self, NextStep};
 use sightline_session::view::waiting_for;
 use sightline_session::{Next, Pending, Session};
+use sightline_track::cycle_stage::CycleStage;
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
 use tokio::sync::broadcast;
@@ -206,7 +207,8 @@ impl Runner {
             }
             Next::Advance(pending) => self.advance(live, (target, run), &pending, flag)?,
             // The drive goes on when the session is as it was.
-            Next::Drive { .. } if live.is_restoring() => return Ok(false),
+            Next::Prepare { .. } | Next::Drive { .. } if live.is_restoring() => return Ok(false),
+            Next::Prepare { last, before } => return self.prepare(live, (target, run), &last, before),
             Next::Drive { steering, steps } => return self.drive(live, &steering, &steps, flag),
         };
         live.with(|session| {
@@ -232,7 +234,8 @@ impl Runner {
         let open = live.traverse();
         let traverse = &open.traverse;
         let step = pending.last.step + 1;
-        if !traverse.is_ready(step) {
+        let has_images = pending.before.is_none_or(|before| before > CycleStage::Capture);
+        if has_images && !traverse.is_ready(step) {
             self.tell(progress(live, target, run, format!("rendering stop {step}")));
             // Any other failure is met again by the step itself, which records it as the stop's fault.
             if let Err(Error::Cancelled) = live.traverse().make_ready(step, flag) {
@@ -245,6 +248,7 @@ impl Runner {
             last: &last,
             settings: &pending.settings,
             prediction_px: pending.prediction_px,
+            before: pending.before,
             cancel: flag.as_ref().into(),
         };
         next.compute(traverse).map(without_pair)
@@ -320,19 +324,17 @@ pub(crate) fn with_image(open: &OpenTraverse, step: &Arc<RunStep>) -> Result<Arc
     Ok(step)
 }
 
-/// Adds a step to its run; the one before lets go of its image.
+/// Adds a step to its run, in the place of one that was paused; the one before lets go of its image.
 fn record(session: &mut Session, target: usize, run: usize, trace: RunStep) -> Result<()> {
+    let trace = Arc::new(trace);
     let current = session.run_mut(target, run)?;
-    match current.steps.last_mut() {
-        None => current.steps.push(Arc::new(trace)),
-        Some(last) => {
-            let mut lighter = Arc::clone(last);
-            Arc::make_mut(&mut lighter).update.target.memory.set_image(Arc::default());
-            session.record(target, run, Arc::new(trace))?;
-            let steps = &mut session.run_mut(target, run)?.steps;
-            let before = steps.len() - 2;
-            steps[before] = lighter;
-        }
+    if current.steps.is_empty() {
+        current.steps.push(trace);
+        return Ok(());
+    }
+    session.record(target, run, trace)?;
+    if let [.., before, _] = &mut session.run_mut(target, run)?.steps[..] {
+        Arc::make_mut(before).update.target.memory.set_image(Arc::default());
     }
     Ok(())
 }

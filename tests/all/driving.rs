@@ -15,12 +15,12 @@ use crate::keeping::Killable;
 /// How long a drive of a few small stops may take.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-fn command() -> Value {
+pub(crate) fn command() -> Value {
     json!({ "standoff_m": 3.0, "tolerance_m": 0.05, "stops_max": 7 })
 }
 
 /// Asks until the drive is as wanted.
-fn wait(mut ask: impl FnMut() -> Value, wanted: impl Fn(&Value) -> bool) -> Value {
+pub(crate) fn wait(mut ask: impl FnMut() -> Value, wanted: impl Fn(&Value) -> bool) -> Value {
     let begun = Instant::now();
     loop {
         let drive = ask();
@@ -32,7 +32,7 @@ fn wait(mut ask: impl FnMut() -> Value, wanted: impl Fn(&Value) -> bool) -> Valu
     }
 }
 
-async fn waited(server: &TestServer, session: &str, wanted: impl Fn(&Value) -> bool) -> Value {
+pub(crate) async fn waited(server: &TestServer, session: &str, wanted: impl Fn(&Value) -> bool) -> Value {
     let begun = Instant::now();
     loop {
         let drive = server.get(&format!("sessions/{session}/drive")).await.expect(200);
@@ -48,17 +48,17 @@ fn last_cycle(drive: &Value) -> Value {
     drive["cycles"].as_array().and_then(|cycles| cycles.last()).cloned().unwrap_or_default()
 }
 
-fn has_ended(drive: &Value) -> bool {
+pub(crate) fn has_ended(drive: &Value) -> bool {
     last_cycle(drive)["ending"] != json!(null) && drive["is_driving"] == json!(false)
 }
 
 /// Whether the rover waits at a stop.
-fn waits_at(stop: usize) -> impl Fn(&Value) -> bool {
+pub(crate) fn waits_at(stop: usize) -> impl Fn(&Value) -> bool {
     move |drive| last_cycle(drive)["step"] == json!(stop) && drive["is_driving"] == json!(false)
 }
 
 /// The drive of the command line in the small drive's world: rows without their cycles, cycles, and the summary.
-fn by_command_line(drive: &Path) -> (Vec<Value>, Vec<Value>, Value) {
+pub(crate) fn by_command_line(drive: &Path) -> (Vec<Value>, Vec<Value>, Value) {
     let [x, y] = PIXEL;
     let mut program = Command::new(program());
     program.arg("drive").arg(drive.join("scenario.toml")).args(["--target", &format!("{x},{y}")]);
@@ -73,7 +73,7 @@ fn by_command_line(drive: &Path) -> (Vec<Value>, Vec<Value>, Value) {
 }
 
 /// The rows of a run from an exported `rows.jsonl`, as the command line writes them.
-fn rows(exported: &str) -> Vec<Value> {
+pub(crate) fn rows(exported: &str) -> Vec<Value> {
     let own = |line: &str| {
         let mut row: Value = serde_json::from_str(line).unwrap();
         let fields = row.as_object_mut().unwrap();
@@ -83,12 +83,12 @@ fn rows(exported: &str) -> Vec<Value> {
     exported.lines().map(own).collect()
 }
 
-async fn exported(server: &TestServer, session: &str, run: u64) -> Vec<Value> {
+pub(crate) async fn exported(server: &TestServer, session: &str, run: u64) -> Vec<Value> {
     rows(&server.get(&format!("sessions/{session}/exports/rows.jsonl?target=0&run={run}")).await.text())
 }
 
 /// Begins to drive with the first run of a target at the first stop, and returns the session of the drive.
-async fn begin(server: &TestServer, new: &Value) -> String {
+pub(crate) async fn begin(server: &TestServer, new: &Value) -> String {
     let session = server.begin().await;
     server.pick(&session).await;
     let view = server.post(&format!("sessions/{session}/targets/0/runs/0/drive"), new).await.expect(201);
@@ -157,7 +157,7 @@ async fn a_drive_waits_goes_on_with_other_settings_and_branches() {
     assert!(server.get(&image).await.bytes == seen && !seen.is_empty());
 }
 
-async fn traverse_of(server: &TestServer, session: &str) -> String {
+pub(crate) async fn traverse_of(server: &TestServer, session: &str) -> String {
     let view = server.get(&format!("sessions/{session}")).await.expect(200);
     view["traverse"].as_str().unwrap().to_owned()
 }

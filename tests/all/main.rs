@@ -12,6 +12,7 @@ mod compare;
 mod copied;
 mod drill;
 mod driving;
+mod stage_pause;
 mod ending;
 mod exports;
 mod expressions;

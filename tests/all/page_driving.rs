@@ -41,3 +41,70 @@ async fn the_rover_drives_waits_goes_on_with_another_setting_arrives_and_branche
     browser.shot("drive-branch").await;
     browser.end().await;
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_paused_stage_is_repeated_with_another_setting_and_the_drive_goes_on_stage_by_stage() {
+    let (_bench, browser) = picked(&short_approach()).await;
+    let planned = browser.status().await["session"].as_str().unwrap().to_owned();
+    browser.show_panel("Drive").await;
+    browser.click_on("button", "Drive").await;
+    browser.wait_status("the drive", &format!("s.session !== '{planned}' && s.drive === 'drives'")).await;
+    browser.click_on("button", "Pause").await;
+    browser
+        .wait_status("the rover waits", "s.drive === 'waits' && s.paused_before === 'drive' && s.shown")
+        .await;
+    let stop = browser.status().await["stop_count"].as_u64().unwrap();
+
+    // At the next stop it is to wait after `locate`.
+    browser.click_on("combobox", "pause before or after").await;
+    browser.choose("after").await;
+    browser.click_on("combobox", "stage of the pause").await;
+    browser.choose("locate").await;
+    browser.click_on("button", "Continue").await;
+    let located = format!("s.paused_before === 'judge' && s.step === {stop} && s.shown && !s.running");
+    browser.wait_status("the pause after locate", &located).await;
+    browser.says(&format!("paused at stop {stop}: after locate, before judge")).await;
+    browser.says("paused before judge").await;
+    browser.click_on("button", "judge").await;
+    browser.show_panel("Inspector").await;
+    browser.says("Not computed yet: the drive is paused before `judge`").await;
+    browser.shot("drive-paused-judge").await;
+
+    // The step again with a limit that no match meets, up to the pause and one stage further.
+    browser.press("w").await;
+    browser.set_value("slider", "try ncc_min", "0.99").await;
+    browser.click_on("button", "Run from here as branch").await;
+    let again = format!("s.run === 1 && s.steps_done === {} && !s.running && s.shown", stop + 1);
+    browser.wait_status("the run", &again).await;
+    browser.show_panel("Drive").await;
+    browser.click_on("button", "Next stage").await;
+    browser.wait_status("the verdict", "s.run === 1 && s.paused_before === 'update' && s.shown").await;
+    assert_eq!(browser.status().await["state"], "tracking", "the update is not computed yet");
+    browser.shot("drive-paused-update").await;
+    browser.click_on("button", "Next stage").await;
+    browser.wait_status("the update", "s.paused_before === 'set_goal' && s.state === 'lost'").await;
+    browser.click_on("button", "Next stage").await;
+    browser.wait_status("the goal", "s.paused_before === 'select_path'").await;
+    browser.click_on("button", "set_goal").await;
+    browser.show_panel("Inspector").await;
+    browser.says("ahead of the rover").await;
+    browser.shot("drive-goal").await;
+
+    // The rover drives, and waits where no image is taken yet.
+    browser.show_panel("Drive").await;
+    browser.click_on("button", "Next stage").await;
+    browser.wait_status("the motion", "s.paused_before === 'drive'").await;
+    browser.click_on("button", "Next stage").await;
+    let next = stop + 1;
+    browser
+        .wait_status("the next stop", &format!("s.paused_before === 'predict' && s.step === {next}"))
+        .await;
+    browser.says(&format!("The left image of step {next} is not taken yet.")).await;
+    browser.shot("drive-paused-predict").await;
+    browser.click_on("button", "Continue").await;
+    let located = format!("s.paused_before === 'judge' && s.step === {next} && s.shown");
+    browser.wait_status("the pause after locate at the next stop", &located).await;
+    browser.click_on("button", "Drive on").await;
+    browser.wait_status("the end", "s.drive !== 'drives' && s.drive !== 'waits'").await;
+    browser.end().await;
+}

@@ -1,6 +1,8 @@
-//! The stages and the steps of `locate` that can be selected: names of stages of the record, in the order of each tracker.
+//! The stages and the steps of `locate` that can be selected: names of stages of the record, in the order of each tracker. A
+//! commanded drive adds its stages after `update`.
 
 use sightline_session::records;
+use sightline_track::cycle_stage::CycleStage;
 use sightline_track::locate;
 use sightline_track::records::stages_of;
 use sightline_track::settings::TrackerKind;
@@ -47,6 +49,14 @@ impl Stage {
     pub const JUDGE: Self = Self("judge");
     /// Stage 6.
     pub const UPDATE: Self = Self("update");
+    /// Stage 7, of a commanded drive.
+    pub const SET_GOAL: Self = Self("set_goal");
+    /// Stage 9, of a commanded drive.
+    pub const SELECT_PATH: Self = Self("select_path");
+    /// Stage 10, of a commanded drive.
+    pub const DRIVE: Self = Self("drive");
+    /// The stages that only a commanded drive has.
+    pub const OF_DRIVE: [Self; 3] = [Self::SET_GOAL, Self::SELECT_PATH, Self::DRIVE];
 }
 
 impl Stage {
@@ -57,12 +67,18 @@ impl Stage {
 
     /// The stage of this name, whichever tracker has it.
     pub fn named(name: &str) -> Option<Self> {
-        TrackerKind::ALL.into_iter().flat_map(Self::of).find(|stage| stage.0 == name)
+        let of_trackers = TrackerKind::ALL.into_iter().flat_map(Self::of);
+        of_trackers.chain(Self::OF_DRIVE).find(|stage| stage.0 == name)
     }
 
-    /// The stage so many places on in the tracker's order; the first and the last are where it ends.
-    pub fn neighbour(self, tracker: TrackerKind, by: isize) -> Self {
-        let stages: Vec<Self> = Self::of(tracker).collect();
+    /// Those of the stage bar: of a tracker, and where `is_driven` those of a commanded drive.
+    pub fn bar(tracker: TrackerKind, is_driven: bool) -> impl Iterator<Item = Self> {
+        Self::of(tracker).chain(Self::OF_DRIVE.into_iter().filter(move |_| is_driven))
+    }
+
+    /// The stage so many places on in the stage bar; the first and the last are where it ends.
+    pub fn neighbour(self, tracker: TrackerKind, is_driven: bool, by: isize) -> Self {
+        let stages: Vec<Self> = Self::bar(tracker, is_driven).collect();
         let at = stages.iter().position(|&stage| stage == self.of_tracker(tracker)).unwrap_or(0);
         stages[at.saturating_add_signed(by).min(stages.len() - 1)]
     }
@@ -70,7 +86,7 @@ impl Stage {
     /// The stage itself, or the one that stands in its place where `tracker` does not have it: the first and the second step
     /// of `locate` prepare and match in every tracker, and what follows counts as the last step.
     pub fn of_tracker(self, tracker: TrackerKind) -> Self {
-        if Self::of(tracker).any(|stage| stage == self) {
+        if Self::bar(tracker, true).any(|stage| stage == self) {
             return self;
         }
         let place = |tracker| locate::steps(tracker).iter().position(|step| *step == self.0);
@@ -87,7 +103,22 @@ impl Stage {
 
     /// What it answers.
     pub fn question(self) -> &'static str {
-        records::stage(self.0).map_or("", |stage| &stage.schema().question)
+        match self {
+            Self::SET_GOAL => "Where is the rover to stop?",
+            Self::SELECT_PATH => "Which motion brings the rover nearer to the goal?",
+            Self::DRIVE => "How far did the rover come?",
+            _ => records::stage(self.0).map_or("", |stage| &stage.schema().question),
+        }
+    }
+
+    /// The stage of a stop that it is, or that it is a step of.
+    pub(crate) fn in_cycle(self) -> CycleStage {
+        CycleStage::named(self.0).unwrap_or(CycleStage::Locate)
+    }
+
+    /// Whether only a commanded drive has it.
+    pub(crate) fn is_of_drive(self) -> bool {
+        Self::OF_DRIVE.contains(&self)
     }
 
     /// Whether it is a step of `locate`.
@@ -107,21 +138,26 @@ mod tests {
 
     #[test]
     fn stages_end_at_the_first_and_the_last() {
-        let from = |stage: Stage, by: isize| stage.neighbour(TrackerKind::Template, by);
+        let from = |stage: Stage, by: isize| stage.neighbour(TrackerKind::Template, false, by);
         assert_eq!(from(Stage::PREDICT, -1), Stage::PREDICT);
         assert_eq!(from(Stage::PREDICT, 1), Stage::POINT_MAST);
         assert_eq!(from(Stage::UPDATE, 1), Stage::UPDATE);
         assert_eq!(from(Stage::PREDICT, 99), Stage::UPDATE);
         // A stage of the other tracker counts as the one in its place.
         assert_eq!(from(Stage::FIT_MOTION, 1), Stage::JUDGE);
+        // A commanded drive goes on after the update.
+        assert_eq!(Stage::UPDATE.neighbour(TrackerKind::Shape, true, 1), Stage::SET_GOAL);
+        assert_eq!(Stage::DRIVE.neighbour(TrackerKind::Shape, true, 1), Stage::DRIVE);
     }
 
     #[test]
     fn every_stage_has_a_question_and_is_found_by_its_name() {
-        for stage in TrackerKind::ALL.into_iter().flat_map(Stage::of) {
+        for stage in TrackerKind::ALL.into_iter().flat_map(|tracker| Stage::bar(tracker, true)) {
             assert!(stage.question().ends_with('?'), "{}", stage.word());
             assert_eq!(Stage::named(stage.word()), Some(stage));
         }
+        assert_eq!(Stage::MATCH_TEMPLATE.in_cycle(), CycleStage::Locate);
+        assert_eq!(Stage::JUDGE.in_cycle(), CycleStage::Judge);
         assert_eq!(Stage::named("no such stage"), None);
     }
 }

@@ -9,6 +9,7 @@ use sightline_geometry::frames::{Pixel, PoseRecord};
 use sightline_geometry::stereo_geometry::StereoGeometry;
 use sightline_rover::designate::Place;
 use sightline_rover::driving::DriveCommand;
+use sightline_session::pause::StagePause;
 use sightline_session::view::SessionView;
 use sightline_track::settings::Changes;
 
@@ -219,9 +220,12 @@ pub struct NewDrive {
     /// The stop from which it drives; left out: the last one of a drive on commands, the first one of any other.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub from_step: Option<usize>,
-    /// The stop at which it waits once the target is located there; left out: it drives on.
+    /// The stop at which it waits; left out: it drives on.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pause_at: Option<usize>,
+    /// The stage of that stop before or after which it waits; left out: before `drive`, once the target is located.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pause: Option<StagePause>,
 }
 
 /// The live Rerun stream of a session.

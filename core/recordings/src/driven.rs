@@ -16,6 +16,7 @@ use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
 use sightline_rover::driving::{ActiveWorld, DriveReport, Motion, Stall};
 use sightline_rover::pipeline::Stops;
+use sightline_track::cycle_stage::CycleStage;
 use sightline_world::rover::driven::{DrivenStop, index_stops};
 use sightline_world::{SCENARIO_FILE, Scenario, World};
 
@@ -171,11 +172,27 @@ impl DrivenTraverse {
     /// # Errors
     /// An index that cannot be read.
     pub fn snapshot(&self) -> Result<Traverse> {
-        let copy = Traverse::open(self.traverse.folder())?;
+        let mut copy = Traverse::open(self.traverse.folder())?;
         if let Some(world) = self.traverse.simulated.as_ref().and_then(|simulated| simulated.world.get()) {
             copy.keep_world(world.clone());
         }
+        copy.awaits = self.awaits();
         Ok(copy)
+    }
+
+    /// The first stage that was put off at the last stop: `point_mast` or `capture`; `None` if none was.
+    pub fn awaits(&self) -> Option<CycleStage> {
+        self.driven.last().and_then(|last| last.awaits)
+    }
+
+    /// Puts off a stage at the last stop, `point_mast` or `capture`: a [`Self::snapshot`] then has no images of it.
+    ///
+    /// # Errors
+    /// A stop that cannot be stored.
+    pub fn put_off(&mut self, stage: Option<CycleStage>) -> Result<()> {
+        let number = self.driven.len() - 1;
+        let before = std::mem::replace(&mut self.driven[number].awaits, stage);
+        if before == stage { Ok(()) } else { self.save() }
     }
 
     /// Collisions so far: steps that a rock ended, and stops at which a rock reaches into the rover's body.

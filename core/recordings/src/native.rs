@@ -65,6 +65,7 @@ use super::simulated::{Simulated, Stops};
 use sightline_geometry::camera::Camera;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pose;
+use sightline_track::cycle_stage::CycleStage;
 use sightline_track::locate::store::{Cache, SharedStore};
 use sightline_track::stages::capture::StereoPair;
 use sightline_vision::image::{GrayImage, io};
@@ -81,6 +82,8 @@ pub struct Traverse {
     /// Images, features, surfaces and motions that were found before.
     pub(super) store: SharedStore,
     pub(super) simulated: Option<Simulated>,
+    /// The first stage that a paused drive put off at the last stop.
+    pub(super) awaits: Option<CycleStage>,
 }
 
 impl Traverse {
@@ -107,7 +110,7 @@ impl Traverse {
         let simulated = index.scenario.as_ref().map(read_scenario).transpose().map_err(problem)?;
         let warnings = check::warnings(&index, &folder);
         let store = SharedStore::default();
-        Ok(Self { folder, index_path, index, cameras, warnings, store, simulated })
+        Ok(Self { folder, index_path, index, cameras, warnings, store, simulated, awaits: None })
     }
 
     /// The same traverse, which shares a cache with others.
@@ -195,6 +198,16 @@ impl Traverse {
         self.simulated.as_ref().map(Simulated::world)
     }
 
+    /// The first stage that a paused drive put off at the last stop, `point_mast` or `capture`: the stop has no images yet.
+    pub fn awaits(&self) -> Option<CycleStage> {
+        self.awaits
+    }
+
+    /// Whether a stop has no images because a paused drive has not taken them.
+    pub fn is_awaited(&self, step: usize) -> bool {
+        self.awaits.is_some() && step + 1 == self.stop_count()
+    }
+
     /// Whether the images of a stop need no rendering: always for recorded ones, whether they exist or not.
     pub fn is_ready(&self, step: usize) -> bool {
         let exists = |view: &View| resolve(&self.folder, &view.image).is_ok_and(|path| path.exists());
@@ -207,7 +220,7 @@ impl Traverse {
     /// # Errors
     /// No such stop, images that cannot be written, or [`Error::Cancelled`] soon after `cancel` is set.
     pub fn render_step(&self, step: usize, cancel: &AtomicBool) -> Result<()> {
-        self.stop(step)?;
+        self.stop_with_images(step)?;
         match &self.simulated {
             Some(simulated) if !self.is_ready(step) => simulated.render_missing(&self.stops(), step, cancel),
             _ => Ok(()),
@@ -228,7 +241,7 @@ impl Traverse {
     /// # Errors
     /// As [`Traverse::capture`], and [`Error::Cancelled`].
     pub fn capture_until(&self, step: usize, cancel: &AtomicBool) -> Result<StereoPair> {
-        let stop = self.stop(step)?;
+        let stop = self.stop_with_images(step)?;
         if let Some(pair) = self.kept_pair(step) {
             return Ok(StereoPair::clone(&pair));
         }
@@ -250,7 +263,7 @@ impl Traverse {
     /// # Errors
     /// As [`Self::capture`], of this image.
     pub fn capture_one(&self, step: usize, is_left: bool) -> Result<Arc<GrayImage>> {
-        let stop = self.stop(step)?;
+        let stop = self.stop_with_images(step)?;
         if let Some(pair) = self.kept_pair(step) {
             return Ok(Arc::clone(if is_left { &pair.left } else { &pair.right }));
         }
@@ -292,6 +305,16 @@ impl Traverse {
             Error::Format { path, problem } => Error::Format { path: relative(path), problem },
             other => other,
         }
+    }
+
+    /// A stop that has images, or gets them.
+    fn stop_with_images(&self, step: usize) -> Result<&Stop> {
+        let stop = self.stop(step)?;
+        if self.is_awaited(step) {
+            let problem = format!("stop {step} has no images yet: the drive is paused before `capture`");
+            return Err(Error::Request(problem));
+        }
+        Ok(stop)
     }
 
     fn stop(&self, step: usize) -> Result<&Stop> {

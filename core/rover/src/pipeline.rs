@@ -16,11 +16,12 @@ use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::{Pixel, Pose};
 use sightline_geometry::odometry_error::OdometryError;
 use sightline_geometry::stereo_geometry::StereoGeometry;
+use sightline_track::cycle_stage::CycleStage;
 use sightline_track::locate::store::Shared;
 use sightline_track::locate::{self, DesignateInput, LocateInput, Located, Place, TrackerMemory};
 use sightline_track::settings::Settings;
 use sightline_track::stages::capture::{self, Capture, StereoPair};
-use sightline_track::stages::judge;
+use sightline_track::stages::judge::{self, Verdict};
 use sightline_track::stages::point_mast::{self, Pointing, UsedPointing};
 use sightline_track::stages::predict;
 use sightline_track::stages::update::{self, Updated};
@@ -132,22 +133,34 @@ fn designated(
 
 /// One later step of a run: what `last` left behind is found again at the next stop.
 pub fn run_step(stops: &dyn Stops, last: &Updated, settings: &Settings) -> StepTrace {
-    computed_step(stops, last, settings, None, Cancel::default())
+    computed_step(stops, last, settings, &StepChanges::default(), Cancel::default())
 }
 
-/// The same from a prediction that a person put at a pixel of the left image, where they did.
+/// How a person interferes with a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StepChanges {
+    /// Pixel of the left image at which the prediction is put, px; `None`: where dead reckoning has it.
+    pub prediction_px: Option<Pixel>,
+    /// The stage from which on nothing is computed, from `point_mast` to `update`; `None`: the whole step.
+    pub before: Option<CycleStage>,
+}
+
+/// The same, displaced or paused as a person asks for.
+///
+/// The step paused before a stage has the results of the whole step's earlier stages. Neither the mast nor the images of the stop
+/// are used before their stages. A stop with damaged files is whole after `capture`.
 ///
 /// # Errors
 /// [`Error::Cancelled`] soon after `cancel` is requested.
-pub fn run_step_displaced(
+pub fn run_step_changed(
     stops: &dyn Stops,
     last: &Updated,
     settings: &Settings,
-    prediction_px: Option<Pixel>,
+    changes: &StepChanges,
     cancel: Cancel<'_>,
 ) -> Result<StepTrace> {
     cancel.check()?;
-    let trace = computed_step(stops, last, settings, prediction_px, cancel);
+    let trace = computed_step(stops, last, settings, changes, cancel);
     cancel.check()?;
     Ok(trace)
 }
@@ -157,16 +170,21 @@ fn computed_step(
     stops: &dyn Stops,
     last: &Updated,
     settings: &Settings,
-    prediction_px: Option<Pixel>,
+    changes: &StepChanges,
     cancel: Cancel<'_>,
 ) -> StepTrace {
+    let ends_at = |stage| changes.before.is_some_and(|before| before <= stage);
     let target = &*with_own_memory(stops, &last.target, settings, cancel);
     let step = target.step + 1;
     let site_from_rover = stops.site_from_rover(step);
-    let prediction = prediction(stops, target, prediction_px);
+    let prediction = prediction(stops, target, changes.prediction_px);
     let carried = update::carry(target, step, &prediction);
     let pointing = pointing(stops, step, &carried);
     let time_s = stops.time_s(step);
+    let begun = Begun { step, time_s, predict: &prediction, point_mast: &pointing, carried: &carried, last };
+    if ends_at(CycleStage::Capture) {
+        return begun.trace(!ends_at(CycleStage::PointMast), None, None, None);
+    }
     let pair = match stops.capture(step, cancel) {
         Ok(pair) => pair,
         Err(error) => {
@@ -176,6 +194,9 @@ fn computed_step(
         }
     };
     let capture = capture::capture(pair, pointing.predicted_left, settings.subframe_px());
+    if ends_at(CycleStage::Locate) {
+        return begun.trace(true, Some(capture), None, None);
+    }
     let input = LocateInput {
         prediction: &prediction,
         pointing: &pointing,
@@ -189,11 +210,47 @@ fn computed_step(
         cancel,
     };
     let locate = locate::locate(&input, &target.memory);
+    if ends_at(CycleStage::Judge) {
+        return begun.trace(true, Some(capture), Some(locate), None);
+    }
     let judge =
         judge::judge(target, &prediction, &pointing, &locate, &site_from_rover, last.state, &settings.limits);
+    if ends_at(CycleStage::Update) {
+        return begun.trace(true, Some(capture), Some(locate), Some(judge));
+    }
     let update = update::update(carried, &pointing, &capture, &locate, &judge, &site_from_rover, settings);
     let kind = StepKind::Tracked { predict: prediction, capture, locate, judge };
     StepTrace { step, time_s, point_mast: pointing, kind, update }
+}
+
+/// What every step has that is paused between two stages.
+struct Begun<'a> {
+    step: usize,
+    time_s: f64,
+    predict: &'a predict::Prediction,
+    point_mast: &'a Pointing,
+    carried: &'a Target,
+    last: &'a Updated,
+}
+
+impl Begun<'_> {
+    /// The step with the results so far.
+    fn trace(
+        &self,
+        is_mast_pointed: bool,
+        capture: Option<Capture>,
+        locate: Option<Located>,
+        judge: Option<Verdict>,
+    ) -> StepTrace {
+        let predict = self.predict.clone();
+        StepTrace {
+            step: self.step,
+            time_s: self.time_s,
+            point_mast: self.point_mast.clone(),
+            kind: StepKind::Begun { predict, is_mast_pointed, capture, locate, judge },
+            update: unseen(self.carried.clone(), self.last.state),
+        }
+    }
 }
 
 /// The update of a stop without images: the target is where the prediction puts it, the state stays.

@@ -9,8 +9,8 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::Session;
 use super::expression::{Expression, Refused};
+use super::{Run, Session};
 use crate::step::RunStep;
 use sightline_geometry::error::{Error, Result};
 
@@ -252,7 +252,7 @@ impl Session {
     /// All breakpoints with everything that they hit so far; only steps that are new since the last time are evaluated.
     pub fn breakpoint_views(&mut self) -> Vec<BreakpointView> {
         for (number, target) in self.targets.iter().enumerate().filter(|(_, target)| !target.removed) {
-            let runs: Vec<&[Arc<RunStep>]> = target.runs.iter().map(|run| run.steps.as_slice()).collect();
+            let runs: Vec<&[Arc<RunStep>]> = target.runs.iter().map(Run::whole_steps).collect();
             self.breakpoints.look(number, &runs);
         }
         let targets = &self.targets;

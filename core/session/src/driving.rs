@@ -8,6 +8,8 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::Run;
+use crate::pause::{self, Halt, StagePause};
 use crate::step::RunStep;
 use crate::track;
 use sightline_geometry::cancel::Cancel;
@@ -34,13 +36,16 @@ pub struct Steering {
     /// The command.
     #[serde(default)]
     pub command: DriveCommand,
-    /// The stop at which the rover waits once the target is located there; null: it drives on.
+    /// The stop at which the rover waits; null: it drives on. A later stop counts if the rover has left this one already.
     #[serde(default)]
     pub pause_at: Option<usize>,
+    /// The stage of that stop before or after which the rover waits; null: before `drive`, once the target is located.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pause: Option<StagePause>,
 }
 
 /// A drive as pages and scripts see it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct DriveView {
     /// Who drives, and how; null before the first command.
     pub steering: Option<Steering>,
@@ -50,6 +55,22 @@ pub struct DriveView {
     pub summary: Option<DriveSummary>,
     /// Whether the next stop is being computed, or waits for it.
     pub is_driving: bool,
+    /// The place at which the drive waits; null while it drives, once it has ended, and where its run was stopped.
+    #[serde(default)]
+    pub paused: Option<Halt>,
+}
+
+impl DriveView {
+    /// The drive of a run: its decisions and outcome up to the pause.
+    pub fn of(world: &DrivenTraverse, steering: &Steering, run: &Run, is_driving: bool) -> Self {
+        let mut cycles = cycles(world, &steering.command, run.whole_steps());
+        steering.up_to_halt(&mut cycles);
+        let summary = summary(world, &steering.command, run.whole_steps(), &cycles);
+        let goes_on = !is_driving && summary.reason.is_none() && run.why_stopped().is_none();
+        let halted = || pause::halted(steering, &run.steps, world.traverse().stop_count());
+        let paused = goes_on.then(halted).flatten();
+        Self { steering: Some(steering.clone()), cycles, summary: Some(summary), is_driving, paused }
+    }
 }
 
 /// A drive towards one target.

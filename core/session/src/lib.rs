@@ -20,6 +20,7 @@ pub mod records;
 pub mod marks;
 pub mod track;
 pub mod driving;
+pub mod pause;
 pub mod view;
 pub mod photometry;
 pub mod format;
@@ -48,6 +49,7 @@ use crate::driving::Steering;
 use crate::step::RunStep;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
+use sightline_track::cycle_stage::CycleStage;
 use sightline_track::settings::{Changes, Settings};
 use sightline_track::target::Designation;
 
@@ -93,6 +95,8 @@ pub struct Session {
     pub breakpoints: Breakpoints,
     /// Who drives; `None` where nobody was told to.
     pub steering: Option<Steering>,
+    /// The first stage for which the last stop of a paused drive is not ready: `point_mast` or `capture`; `None` if it is ready.
+    pub awaits: Option<CycleStage>,
     /// The removed targets that can be restored, the one removed last at the end.
     removals: VecDeque<usize>,
 }
@@ -108,6 +112,8 @@ pub struct Pending {
     pub settings: Arc<Settings>,
     /// Where a person put the prediction of the step in the left image, px.
     pub prediction_px: Option<Pixel>,
+    /// The stage before which the step is paused; `None`: the whole step.
+    pub before: Option<CycleStage>,
 }
 
 impl Session {
@@ -115,7 +121,17 @@ impl Session {
     pub fn new(id: impl Into<String>, traverse: impl Into<String>, stop_count: usize) -> Self {
         let (targets, cursor, breakpoints) = (Vec::new(), Cursor::default(), Breakpoints::default());
         let (id, traverse, removals) = (id.into(), traverse.into(), VecDeque::new());
-        Self { id, traverse, stop_count, targets, cursor, breakpoints, steering: None, removals }
+        Self {
+            id,
+            traverse,
+            stop_count,
+            targets,
+            cursor,
+            breakpoints,
+            steering: None,
+            awaits: None,
+            removals,
+        }
     }
 
     /// Adds a target whose designation was computed, and looks at it. Returns its number.
@@ -148,7 +164,7 @@ impl Session {
         let settings = Arc::new(parent.settings.with(changes)?);
         let kept: Vec<_> = match redesignated {
             Some(first) => vec![first],
-            None => parent.steps.iter().filter(|trace| trace.step < from_step).cloned().collect(),
+            None => parent.whole_steps().iter().filter(|trace| trace.step < from_step).cloned().collect(),
         };
         if kept.is_empty() || kept.last().is_some_and(|last| last.step + 1 < from_step) {
             return Err(Error::Request(format!(
@@ -161,32 +177,37 @@ impl Session {
         Ok(record.runs.len() - 1)
     }
 
-    /// What the next step of a run needs; none when the run is complete or stopped.
+    /// What the next step of a run needs; none when the run is complete, stopped, or paused with its drive.
     ///
     /// # Errors
     /// [`Error::Request`] when there is no such target or run.
     pub fn pending(&self, target: usize, run: usize) -> Result<Option<Pending>> {
         let run = self.any_run(target, run)?;
         let end = run.stop_after.map_or(self.stop_count, |stop| self.stop_count.min(stop + 1));
-        let last = run.steps.last().filter(|last| last.step + 1 < end && run.stopped.is_none());
-        Ok(last.map(|last| Pending {
+        let last = run.whole_steps().last().filter(|last| last.step + 1 < end && run.stopped.is_none());
+        let Some(last) = last else { return Ok(None) };
+        let before = self.halt_within(last.step + 1);
+        let reached = run.begun().and_then(|begun| begun.paused_before()).unwrap_or(CycleStage::Predict);
+        Ok(before.is_none_or(|before| before > reached).then(|| Pending {
             first: Arc::clone(&run.steps[0]),
             last: Arc::clone(last),
             settings: Arc::clone(&run.settings),
             prediction_px: run.displaced_at(last.step + 1),
+            before,
         }))
     }
 
-    /// Records the next step of a run; a step that does not follow the last one is refused.
+    /// Records the next step of a run, in the place of one that was paused; a step that does not follow the last one is refused.
     ///
     /// # Errors
     /// [`Error::Request`] when there is no such target or run, or the step is not the next one.
     pub fn record(&mut self, target: usize, run: usize, trace: Arc<RunStep>) -> Result<()> {
         let run = self.run_mut(target, run)?;
-        let expected = run.steps.last().map(|last| last.step + 1);
+        let expected = run.whole_steps().last().map(|last| last.step + 1);
         if expected != Some(trace.step) {
             return Err(Error::Request(format!("step {} does not follow the run's last one", trace.step)));
         }
+        run.steps.truncate(run.whole_steps().len());
         run.steps.push(trace);
         Ok(())
     }

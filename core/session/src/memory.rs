@@ -17,7 +17,7 @@ impl Session {
     /// # Errors
     /// As [`Session::restored`].
     pub fn without_steps(&self) -> Result<Self> {
-        Self::restored(&self.saved(), self.stop_count)
+        Ok(Self { awaits: self.awaits, ..Self::restored(&self.saved(), self.stop_count)? })
     }
 }
 

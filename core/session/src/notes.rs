@@ -11,6 +11,7 @@ use utoipa::ToSchema;
 use super::Session;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
+use sightline_track::cycle_stage::CycleStage;
 use sightline_track::records::stages_of;
 use sightline_track::settings::TrackerKind;
 
@@ -231,11 +232,14 @@ fn checked(text: &str) -> Result<String, String> {
     Ok(text.to_owned())
 }
 
-/// The names of the stages to which a note can be pinned, those of all trackers.
+/// The names of the stages to which a note can be pinned: those of all trackers, then those of a commanded drive.
 fn stages() -> impl Iterator<Item = &'static str> {
     let is_of =
         |name: &&str| TrackerKind::ALL.iter().any(|tracker| stages_of(*tracker).any(|of| of == *name));
-    crate::records::stages().iter().map(|stage| stage.schema().stage.as_ref()).filter(is_of)
+    let of_trackers =
+        crate::records::stages().iter().map(|stage| stage.schema().stage.as_ref()).filter(is_of);
+    let of_drive = CycleStage::ALL.into_iter().filter(|stage| *stage > CycleStage::Update);
+    of_trackers.chain(of_drive.map(CycleStage::word))
 }
 
 fn check_pin(pin: &Pin, session: &Session) -> Result<()> {

@@ -11,6 +11,7 @@ use crate::driving::{Steering, check_command};
 use crate::step::RunStep;
 use sightline_geometry::error::{Error, Result};
 use sightline_recordings::Traverse;
+use sightline_track::cycle_stage::CycleStage;
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
 
@@ -29,6 +30,13 @@ pub enum Next {
     },
     /// The step after its last one.
     Advance(Pending),
+    /// The world's part of the stages before a pause at the last stop: pointing the mast, taking the images.
+    Prepare {
+        /// The run's last whole step, whose target the mast is pointed at.
+        last: Arc<RunStep>,
+        /// The stage before which the drive is paused again; `None`: it is not.
+        before: Option<CycleStage>,
+    },
     /// A drive to another stop, on the estimates of these steps.
     Drive {
         /// Who drives, and how.
@@ -95,10 +103,27 @@ impl Session {
                 }
             }
         }
+        if let Some(prepare) = self.preparation(target, run)? {
+            return Ok(prepare);
+        }
         if let Some(pending) = self.pending(target, run)? {
             return Ok(Next::Advance(pending));
         }
         Ok(self.drive_of(target, run).unwrap_or(Next::Nothing))
+    }
+
+    /// What the world still has to do for the next stage at the last stop, where this run drives and is not to wait for it.
+    fn preparation(&self, target: usize, number: usize) -> Result<Option<Next>> {
+        let run = self.any_run(target, number)?;
+        let steering = self.steering.as_ref().filter(|s| (s.target, s.run) == (target, number));
+        let (Some(steering), Some(awaits), Some(last)) = (steering, self.awaits, run.whole_steps().last())
+        else {
+            return Ok(None);
+        };
+        let before = steering.halt_within(last.step + 1);
+        let is_next = last.step + 2 == self.stop_count && run.stop_after.is_none();
+        let goes_on = is_next && before.is_none_or(|before| before > awaits);
+        Ok(goes_on.then(|| Next::Prepare { last: Arc::clone(last), before }))
     }
 
     /// The drive to another stop, where this run has located the target at the last stop, drives, and is not to wait.
@@ -106,8 +131,8 @@ impl Session {
         let steering =
             self.steering.as_ref().filter(|steering| (steering.target, steering.run) == (target, number))?;
         let run = self.run(target, number).ok()?;
-        let last = run.steps.last()?.step;
-        let waits = steering.pause_at.is_some_and(|stop| last >= stop) || run.stop_after.is_some();
+        let last = run.steps.last().filter(|last| !last.is_begun())?.step;
+        let waits = steering.halt().is_some_and(|halt| last >= halt.stop) || run.stop_after.is_some();
         (last + 1 == self.stop_count && !waits)
             .then(|| Next::Drive { steering: steering.clone(), steps: run.steps.clone() })
     }
@@ -123,6 +148,10 @@ impl Session {
             Error::Request("the target is not located yet; wait for the run's first step".to_owned())
         })?;
         check_command(traverse, &steering.command, &first.trace)?;
+        if steering.pause.is_some() && steering.pause_at.is_none() {
+            let problem = "a pause before or after a stage needs the stop, in `pause_at`";
+            return Err(Error::setting("pause", problem));
+        }
         self.steering = Some(steering);
         Ok(())
     }
@@ -170,7 +199,8 @@ impl Session {
 impl Run {
     /// The steps before `from_step`; none when the run has not come so far.
     pub(crate) fn steps_before(&self, from_step: usize) -> Option<Vec<Arc<RunStep>>> {
-        let kept: Vec<_> = self.steps.iter().filter(|trace| trace.step < from_step).cloned().collect();
+        let kept: Vec<_> =
+            self.whole_steps().iter().filter(|trace| trace.step < from_step).cloned().collect();
         kept.last().is_some_and(|last| last.step + 1 == from_step).then_some(kept)
     }
 

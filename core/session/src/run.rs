@@ -52,6 +52,16 @@ impl Run {
         Self { settings, fork, steps, stop_after: None, stopped: None, removed: false }
     }
 
+    /// The steps without the one at which a drive is paused between two stages.
+    pub fn whole_steps(&self) -> &[Arc<RunStep>] {
+        &self.steps[..self.steps.len() - usize::from(self.begun().is_some())]
+    }
+
+    /// The last step where a drive is paused between two of its stages.
+    pub fn begun(&self) -> Option<&Arc<RunStep>> {
+        self.steps.last().filter(|last| last.is_begun())
+    }
+
     /// The record of a stop, where it was computed.
     pub fn step(&self, step: usize) -> Option<&Arc<RunStep>> {
         let first = self.steps.first()?.step;

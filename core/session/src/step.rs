@@ -81,8 +81,14 @@ impl RunStep {
                 _ => None,
             },
             failed_gates: self.failed_gates(),
-            reason: self.fault().or_else(|| self.verdict()?.reason.as_deref()).map(str::to_owned),
+            paused_before: self.paused_before(),
+            reason: self.reason(),
         }
+    }
+
+    /// Why an update was rejected, what is wrong with the stop's files, or where the drive is paused.
+    fn reason(&self) -> Option<String> {
+        self.why_incomplete().or_else(|| self.verdict()?.reason.clone())
     }
 
     fn failed_gates(&self) -> Vec<Gate> {

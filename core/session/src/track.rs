@@ -6,7 +6,8 @@ use crate::step::RunStep;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
 use sightline_geometry::frames::Pixel;
-use sightline_rover::pipeline::{self, Stops};
+use sightline_rover::pipeline::{self, StepChanges, Stops};
+use sightline_track::cycle_stage::CycleStage;
 use sightline_track::locate::template::warnings;
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
@@ -69,6 +70,8 @@ pub struct NextStep<'a> {
     pub settings: &'a Settings,
     /// Pixel of the left image at which a person put the prediction, px.
     pub prediction_px: Option<Pixel>,
+    /// The stage before which the step is paused, from `point_mast` to `update`; `None`: the whole step.
+    pub before: Option<CycleStage>,
     /// Read several times during the step.
     pub cancel: Cancel<'a>,
 }
@@ -79,9 +82,10 @@ impl NextStep<'_> {
     /// # Errors
     /// [`sightline_geometry::error::Error::Cancelled`] soon after `cancel` is requested.
     pub fn compute<D: Drive>(&self, drive: &D) -> Result<RunStep> {
-        let Self { first, last, settings, prediction_px, cancel } = *self;
+        let Self { first, last, settings, prediction_px, before, cancel } = *self;
         drive.prepare(cancel)?;
-        let trace = pipeline::run_step_displaced(drive, &last.update, settings, prediction_px, cancel)?;
+        let changes = StepChanges { prediction_px, before };
+        let trace = pipeline::run_step_changed(drive, &last.update, settings, &changes, cancel)?;
         Ok(compared(drive, trace, Some(first)))
     }
 }
@@ -102,6 +106,7 @@ pub fn run<D: Drive>(drive: &D, designation: Designation, settings: &Settings) -
 pub(crate) fn compared<D: Drive>(drive: &D, trace: StepTrace, first: Option<&StepTrace>) -> RunStep {
     let target = &first.unwrap_or(&trace).update.target;
     let truth = TargetTruth::new(drive, target.designation, Some(&target.position_in_rover));
-    let truth = truth.and_then(|truth| truth.compare(&trace));
+    // The comparison is one with the update.
+    let truth = truth.filter(|_| !trace.is_begun()).and_then(|truth| truth.compare(&trace));
     RunStep { trace, truth }
 }

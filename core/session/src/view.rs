@@ -171,10 +171,10 @@ impl Session {
             changes,
             settings: run.settings.as_ref().clone(),
             rows: run.steps.iter().skip(from_row).map(|trace| trace.row()).collect(),
-            complete: run.steps.last().is_some_and(|last| last.step + 1 == self.stop_count),
+            complete: run.whole_steps().last().is_some_and(|last| last.step + 1 == self.stop_count),
             stopped: run.why_stopped(),
             waits_for: None,
-            summary: summarise(run.steps.iter().map(AsRef::as_ref)),
+            summary: summarise(run.whole_steps().iter().map(AsRef::as_ref)),
         }
     }
 

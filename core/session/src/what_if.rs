@@ -82,7 +82,10 @@ pub fn try_step<D: Drive>(
         }
         (Some(last), prediction_px) => {
             let prediction_px = prediction_px.or(base.prediction_px);
-            NextStep { first: base.first, last, settings: &settings, prediction_px, cancel }.compute(drive)
+            // A step of a paused drive is tried up to the pause.
+            let before = base.recorded.paused_before();
+            NextStep { first: base.first, last, settings: &settings, prediction_px, before, cancel }
+                .compute(drive)
         }
     }
 }

@@ -184,8 +184,14 @@ impl Follower {
         let mut last = first.clone();
         self.record(drive, None, &first, &last);
         while last.step + 1 < drive.stop_count() {
-            let next =
-                NextStep { first: &first, last: &last, settings, prediction_px: None, cancel: cancel.into() };
+            let next = NextStep {
+                first: &first,
+                last: &last,
+                settings,
+                prediction_px: None,
+                before: None,
+                cancel: cancel.into(),
+            };
             let next = next.compute(drive)?;
             self.record(drive, Some(&last), &first, &next);
             last = next;

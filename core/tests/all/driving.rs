@@ -25,7 +25,7 @@ fn scenario() -> Scenario {
     scenario
 }
 
-fn command() -> DriveCommand {
+pub(crate) fn command() -> DriveCommand {
     DriveCommand { standoff_m: 2.0, tolerance_m: 0.01, ..DriveCommand::default() }
 }
 
@@ -37,7 +37,7 @@ fn world(folder: &Path) -> (DrivenTraverse, Designation) {
     (world, Designation { step: 0, pixel })
 }
 
-fn begin(folder: &Path) -> TargetedDrive {
+pub(crate) fn begin(folder: &Path) -> TargetedDrive {
     let (world, designation) = world(folder);
     TargetedDrive::begin(world, designation, command(), &Settings::default(), Cancel::default()).unwrap()
 }

@@ -83,6 +83,7 @@ fn cancelled_step_returns_no_trace() {
         last: &first,
         settings: &settings,
         prediction_px: None,
+        before: None,
         cancel: (&flag).into(),
     };
     assert_eq!(next.compute(&world).unwrap(), track::advance(&world, &first, &first, &settings));

@@ -26,6 +26,7 @@ pub mod gate;
 pub mod verdict;
 pub mod target;
 mod array_name;
+pub mod cycle_stage;
 pub mod stages;
 pub mod locate;
 pub mod trace;

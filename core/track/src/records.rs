@@ -26,7 +26,7 @@ pub fn stages() -> Vec<Stage<StepTrace>> {
         Stage::of(
             "point_mast",
             "Which pointing centres the prediction, and where does it appear?",
-            |t: &StepTrace| Some(&t.point_mast),
+            StepTrace::pointing,
         )
         .at("point_mast"),
         Stage::of("capture", "What was photographed, and how well is it exposed?", StepTrace::capture)
@@ -37,8 +37,8 @@ pub fn stages() -> Vec<Stage<StepTrace>> {
     stages.extend([
         Stage::of("locate", "Where is the target now?", StepTrace::located).at("locate"),
         Stage::of("judge", "Can the match be trusted?", StepTrace::verdict).at("judge"),
-        Stage::of("update", "What does this stop leave to the next?", |t: &StepTrace| Some(&t.update))
-            .with(|t: &StepTrace| t.update.target.memory.template(), TemplateMemory::declare)
+        Stage::of("update", "What does this stop leave to the next?", StepTrace::updated)
+            .with(|t: &StepTrace| t.updated()?.target.memory.template(), TemplateMemory::declare)
             .at("update"),
     ]);
     stages

@@ -9,6 +9,7 @@ mod memory;
 pub use crate::array_name::ArrayName;
 pub use sightline_record::ArrayView;
 
+use crate::cycle_stage::CycleStage;
 use crate::locate::Located;
 use crate::locate::features::FeatureEvidence;
 use crate::locate::shape_tracker::ShapeEvidence;
@@ -27,11 +28,11 @@ pub struct StepTrace {
     pub step: usize,
     /// Time since the first stop, s.
     pub time_s: f64,
-    /// Stage 2, which every step reaches.
+    /// Stage 2; at a step that is paused before it, the cameras with the mast as it is (see [`StepTrace::pointing`]).
     pub point_mast: Pointing,
     /// The results of the stages that not every step reaches.
     pub kind: StepKind,
-    /// Stage 6.
+    /// Stage 6; at a step that is paused before it, the target carried by the prediction (see [`StepTrace::updated`]).
     pub update: Updated,
 }
 
@@ -64,6 +65,21 @@ pub enum StepKind {
         /// The damage of the stop's files, as one sentence.
         fault: String,
     },
+    /// A later stop at which a commanded drive is paused between two stages: the results of the stages before the pause.
+    ///
+    /// The whole step, computed from the same inputs, replaces it when the drive continues.
+    Begun {
+        /// Stage 1.
+        predict: Prediction,
+        /// Whether stage 2 was reached.
+        is_mast_pointed: bool,
+        /// Stage 3.
+        capture: Option<Capture>,
+        /// Stage 4.
+        locate: Option<Located>,
+        /// Stage 5.
+        judge: Option<Verdict>,
+    },
 }
 
 impl StepTrace {
@@ -71,14 +87,47 @@ impl StepTrace {
     pub const fn prediction(&self) -> Option<&Prediction> {
         match &self.kind {
             StepKind::Designation { .. } => None,
-            StepKind::Tracked { predict, .. } | StepKind::Damaged { predict, .. } => Some(predict),
+            StepKind::Tracked { predict, .. }
+            | StepKind::Damaged { predict, .. }
+            | StepKind::Begun { predict, .. } => Some(predict),
         }
     }
 
-    /// Stage 3; `None` where the stop's files are damaged.
+    /// The first stage that is not computed, at a step of a paused drive; `None` for a whole step.
+    pub const fn paused_before(&self) -> Option<CycleStage> {
+        let StepKind::Begun { is_mast_pointed, capture, locate, judge, .. } = &self.kind else { return None };
+        Some(match (is_mast_pointed, capture, locate, judge) {
+            (false, ..) => CycleStage::PointMast,
+            (true, None, ..) => CycleStage::Capture,
+            (true, Some(_), None, _) => CycleStage::Locate,
+            (true, Some(_), Some(_), None) => CycleStage::Judge,
+            (true, Some(_), Some(_), Some(_)) => CycleStage::Update,
+        })
+    }
+
+    /// Whether a step of a paused drive lacks stages.
+    pub const fn is_begun(&self) -> bool {
+        matches!(self.kind, StepKind::Begun { .. })
+    }
+
+    /// Stage 2; `None` at a step that is paused before it.
+    pub const fn pointing(&self) -> Option<&Pointing> {
+        match &self.kind {
+            StepKind::Begun { is_mast_pointed: false, .. } => None,
+            _ => Some(&self.point_mast),
+        }
+    }
+
+    /// Stage 6; `None` at a step that is paused before it.
+    pub const fn updated(&self) -> Option<&Updated> {
+        if self.is_begun() { None } else { Some(&self.update) }
+    }
+
+    /// Stage 3; `None` where the stop's files are damaged or the drive is paused before it.
     pub const fn capture(&self) -> Option<&Capture> {
         match &self.kind {
             StepKind::Designation { capture, .. } | StepKind::Tracked { capture, .. } => Some(capture),
+            StepKind::Begun { capture, .. } => capture.as_ref(),
             StepKind::Damaged { .. } => None,
         }
     }
@@ -87,14 +136,16 @@ impl StepTrace {
     pub const fn capture_mut(&mut self) -> Option<&mut Capture> {
         match &mut self.kind {
             StepKind::Designation { capture, .. } | StepKind::Tracked { capture, .. } => Some(capture),
+            StepKind::Begun { capture, .. } => capture.as_mut(),
             StepKind::Damaged { .. } => None,
         }
     }
 
-    /// Stage 4; `None` where the stop's files are damaged.
+    /// Stage 4; `None` where the stop's files are damaged or the drive is paused before it.
     pub const fn located(&self) -> Option<&Located> {
         match &self.kind {
             StepKind::Designation { locate, .. } | StepKind::Tracked { locate, .. } => Some(locate),
+            StepKind::Begun { locate, .. } => locate.as_ref(),
             StepKind::Damaged { .. } => None,
         }
     }
@@ -103,14 +154,16 @@ impl StepTrace {
     pub const fn located_mut(&mut self) -> Option<&mut Located> {
         match &mut self.kind {
             StepKind::Designation { locate, .. } | StepKind::Tracked { locate, .. } => Some(locate),
+            StepKind::Begun { locate, .. } => locate.as_mut(),
             StepKind::Damaged { .. } => None,
         }
     }
 
-    /// Stage 5; `None` at the designation and where the stop's files are damaged.
+    /// Stage 5; `None` at the designation, where the stop's files are damaged, or the drive is paused before it.
     pub const fn verdict(&self) -> Option<&Verdict> {
         match &self.kind {
             StepKind::Tracked { judge, .. } => Some(judge),
+            StepKind::Begun { judge, .. } => judge.as_ref(),
             StepKind::Designation { .. } | StepKind::Damaged { .. } => None,
         }
     }
@@ -119,8 +172,15 @@ impl StepTrace {
     pub fn fault(&self) -> Option<&str> {
         match &self.kind {
             StepKind::Damaged { fault, .. } => Some(fault),
-            StepKind::Designation { .. } | StepKind::Tracked { .. } => None,
+            StepKind::Designation { .. } | StepKind::Tracked { .. } | StepKind::Begun { .. } => None,
         }
+    }
+
+    /// Why the step lacks stages: the damage of the stop's files, or the pause of the drive; `None` for a complete step.
+    pub fn why_incomplete(&self) -> Option<String> {
+        let paused =
+            |before: CycleStage| format!("not computed yet: the drive is paused before `{}`", before.word());
+        self.fault().map(str::to_owned).or_else(|| self.paused_before().map(paused))
     }
 
     /// The evidence of the template locator, where something was located.

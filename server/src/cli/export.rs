@@ -15,7 +15,6 @@ use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
 use sightline_recordings::Traverse;
 use sightline_session::Session;
-use sightline_session::driving::Steering;
 use sightline_session::view::SavedSession;
 use sightline_track::presets::preset;
 use sightline_track::settings::{Changes, Settings, parse_assignment};
@@ -117,9 +116,11 @@ impl Export {
         let saved = found.sessions.iter().find(|saved| saved.id == id).ok_or_else(missing)?;
         let of_commands = data.join("driven").join(&saved.traverse);
         let (traverses, saved) = if of_commands.is_dir() {
-            driven::copy(&of_commands, &Folders::in_one(folder).driven.join(&saved.traverse))?;
+            let copied = Folders::in_one(folder).driven.join(&saved.traverse);
+            driven::copy(&of_commands, &copied)?;
+            let last_stop = Traverse::open(&copied)?.stop_count() - 1;
             // The rover of the copy stays where it is.
-            let steering = saved.steering.clone().map(|steering| Steering { pause_at: Some(0), ..steering });
+            let steering = saved.steering.as_ref().map(|steering| steering.staying(last_stop));
             (Vec::new(), SavedSession { steering, ..saved.clone() })
         } else {
             (vec![self.traverse_of(id, &saved.traverse, &data)?], saved.clone())

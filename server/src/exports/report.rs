@@ -74,7 +74,7 @@ pub(crate) fn html(source: &Source, part: Part, cancel: &AtomicBool) -> ApiResul
 /// All runs in one table.
 fn overview(source: &Source, runs: &[NamedRun<'_>]) -> String {
     let row = |run: &NamedRun<'_>| {
-        let summary = sightline_session::summary::summarise(run.run.steps.iter().map(AsRef::as_ref));
+        let summary = sightline_session::summary::summarise(run.run.whole_steps().iter().map(AsRef::as_ref));
         let changes = serde_json::to_string(&run.run.settings.changes()).unwrap_or_default();
         let left = run.run.fork.map_or_else(String::new, |fork| {
             format!("run {} at step {}", sheet::run_letter(fork.run), fork.from_step)

@@ -62,7 +62,8 @@ impl LiveRecording {
                     target: number,
                     run,
                     label: &target.label,
-                    steps: &record.steps,
+                    // A row is logged once: that of a paused step follows when the step is whole.
+                    steps: record.whole_steps(),
                 })
             })
             .collect();

@@ -50,7 +50,7 @@ fn sentence(trace: &StepTrace) -> String {
         TrackingState::Lost { count } => format!("lost ({count} in a row)"),
         state => state.word().to_owned(),
     };
-    let why = trace.fault().or_else(|| trace.verdict().and_then(|v| v.reason.as_deref()));
+    let why = trace.why_incomplete().or_else(|| trace.verdict().and_then(|v| v.reason.clone()));
     match why {
         Some(why) => format!("step {}: {state}: {why}", trace.step),
         None if trace.verdict().is_none() => format!("step {}: designated", trace.step),

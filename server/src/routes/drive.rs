@@ -68,7 +68,8 @@ async fn show(SessionPath(live): SessionPath) -> ApiResult<Json<DriveView>> {
 /// Lets a run drive, or changes its command
 ///
 /// A run that was stopped goes on. `pause_at` lets the rover wait at a stop: at the present one it is a pause, at the next one a
-/// single step.
+/// single step. `pause` chooses the stage before or after which it waits; the step of a stop is then computed up to there, and again
+/// up to there with every run that is forked from it.
 #[utoipa::path(put, operation_id = "steer_drive", path = SteerDrive::PATH, tag = "drive", request_body = Steering, responses((status = 200, body = DriveView), ApiError))]
 async fn steer(
     State(state): State<AppState>,
@@ -89,6 +90,8 @@ async fn steer(
             }
             Ok(())
         })?;
+        // The pause holds the other runs, too.
+        state.runner().follow(&live, (&live, (target, run)));
         start_or_say(&state, &live, target, run);
         Ok(Json(driven::view(&live)))
     })
@@ -103,7 +106,8 @@ fn add(
     new: &NewDrive,
     cancel: &CancelFlag,
 ) -> ApiResult<Arc<LiveSession>> {
-    let steering = Steering { target, run, command: new.command.clone(), pause_at: new.pause_at };
+    let command = new.command.clone();
+    let steering = Steering { target, run, command, pause_at: new.pause_at, pause: new.pause };
     let open = live.traverse();
     let (saved, last) = live.with(|session| {
         let steps = &session.run(target, run).map_err(|error| ApiError::from(error).about_path())?.steps;

@@ -6,12 +6,14 @@ use sightline_api::event::Event;
 use sightline_geometry::error::Result;
 use sightline_session::driving::Steering;
 use sightline_session::step::RunStep;
+use sightline_track::cycle_stage::CycleStage;
 
 use super::{Runner, every_run, progress};
 use crate::cancel::CancelFlag;
 use crate::driven;
 use crate::jobs::lock;
 use crate::live_session::LiveSession;
+use crate::rendering::OpenTraverse;
 
 impl Runner {
     /// Drives to another stop; false where the drive ends at the last one.
@@ -29,21 +31,38 @@ impl Runner {
             // Somebody else may have driven on, and then there is a step to compute.
             return Ok(live.traverse().traverse.stop_count() > count);
         };
-        driven::replace(&self.traverses, &grown);
-        self.tell(Some(grown.progress(None)));
-        let all: Vec<_> = lock(&self.sessions).by_number.values().cloned().collect();
-        for other in all.iter().filter(|other| other.traverse().id == grown.id) {
-            other.grow(Arc::clone(&grown));
-            self.tell(Some(Event::SessionChanged { session: other.id.clone() }));
-            self.follow(other, (live, steering));
-        }
+        self.put_in_place(&grown, (live, (steering.target, steering.run)));
         Ok(true)
     }
 
-    /// Lets the other runs of a session that had come to the last stop track on to the new one.
-    fn follow(&self, live: &Arc<LiveSession>, (driver, steering): (&LiveSession, &Steering)) {
-        let is_driver =
-            |target, run| driver.id == live.id && (target, run) == (steering.target, steering.run);
+    /// Does the world's part of the next stages at a stop where the drive was paused; false where nothing is left to do.
+    pub(super) fn prepare(
+        &self,
+        live: &LiveSession,
+        driver: (usize, usize),
+        last: &RunStep,
+        before: Option<CycleStage>,
+    ) -> Result<bool> {
+        let Some(grown) = driven::prepare(&live.traverse(), last, before)? else { return Ok(false) };
+        self.put_in_place(&grown, (live, driver));
+        Ok(true)
+    }
+
+    /// Puts a drive in the place of its former state everywhere, and lets the other runs track on.
+    fn put_in_place(&self, grown: &Arc<OpenTraverse>, driver: (&LiveSession, (usize, usize))) {
+        driven::replace(&self.traverses, grown);
+        self.tell(Some(grown.progress(None)));
+        let all: Vec<_> = lock(&self.sessions).by_number.values().cloned().collect();
+        for other in all.iter().filter(|other| other.traverse().id == grown.id) {
+            other.grow(Arc::clone(grown));
+            self.tell(Some(Event::SessionChanged { session: other.id.clone() }));
+            self.follow(other, driver);
+        }
+    }
+
+    /// Lets the other runs of a session that have something to compute at the last stop track on.
+    pub(crate) fn follow(&self, live: &Arc<LiveSession>, (driver, driving): (&LiveSession, (usize, usize))) {
+        let is_driver = |target, run| driver.id == live.id && (target, run) == driving;
         for (target, run) in live.with(|session| every_run(session)) {
             let waits = live.with(|session| matches!(session.pending(target, run), Ok(Some(_))));
             if waits && !is_driver(target, run) && !live.is_computing(target, run) {

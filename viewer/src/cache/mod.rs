@@ -12,6 +12,7 @@ use std::sync::Arc;
 
 use sightline_api::wire::{Problem, StopDetail};
 use sightline_session::step::RunStep;
+use sightline_track::cycle_stage::CycleStage;
 use sightline_track::locate::template::history::AgainstEarlier;
 use sightline_track::trace::ArrayName;
 
@@ -163,6 +164,29 @@ impl Cache {
     pub fn retry(&mut self, which: impl Fn(&Key) -> bool) {
         self.entries
             .retain(|key, entry| matches!(entry, Entry::Ready { .. } | Entry::Loading) || !which(key));
+    }
+
+    /// Forgets what was loaded or is being loaded under these names, so that it is asked for again.
+    pub(crate) fn forget(&mut self, which: impl Fn(&Key) -> bool) {
+        let bytes = &mut self.bytes;
+        self.entries.retain(|key, entry| {
+            let is_kept = !which(key);
+            if let (false, Entry::Ready { item, .. }) = (is_kept, entry) {
+                *bytes -= item.bytes();
+            }
+            is_kept
+        });
+    }
+
+    /// The steps of paused drives, each with the first stage that was not computed.
+    pub(crate) fn begun(&self) -> Vec<(StepKey, CycleStage)> {
+        let begun = |(key, entry): (&Key, &Entry)| match (key, entry) {
+            (Key::Trace(key), Entry::Ready { item: Item::Trace(trace), .. }) => {
+                Some((key.clone(), trace.paused_before()?))
+            }
+            _ => None,
+        };
+        self.entries.iter().filter_map(begun).collect()
     }
 
     /// When the first of what is waited for is to be asked for again.

@@ -3,7 +3,7 @@
 use sightline_session::step::StepRow;
 
 use crate::command::table;
-use crate::command::{Command, Go, Stage};
+use crate::command::{Command, Go};
 use crate::exports;
 use crate::figure::wish::{Kind, Wish};
 use crate::layout::command::LayoutCommand;
@@ -92,7 +92,7 @@ fn moves(state: &State) -> Vec<Action> {
         let word = row.map_or("fault", |row| if row.fault { "fault" } else { row.state.as_str() });
         all.push(action(format!("Go to step {step}: {word}"), Command::Go(Go::Step(step))));
     }
-    for stage in Stage::of(state.tracker()) {
+    for stage in state.stages() {
         let title = format!("Stage {}: {}", stage.word(), stage.question());
         all.push(action(title, Command::SelectStage(stage)));
     }

@@ -2,6 +2,8 @@
 
 pub(crate) mod map;
 pub(crate) mod panel;
+pub(crate) mod pause;
+pub(crate) mod stages;
 pub(crate) mod update;
 pub(crate) mod words;
 
@@ -13,6 +15,8 @@ use sightline_session::driving::DriveView;
 pub struct Driving {
     /// The command as it stands in the form.
     pub command: DriveCommand,
+    /// The pause as it stands in the form.
+    pub pause: pause::PauseForm,
     /// The drive with the name of its session; `None` before it was read.
     pub view: Option<(String, DriveView)>,
     /// The cursor's stop, and the one to which it goes with the rover once the page knows it.
@@ -29,8 +33,14 @@ pub enum Ask {
     Form(DriveCommand),
     /// Begins a drive with the run that is looked at: from the first stop, or as a branch at the cursor's stop.
     Begin,
-    /// Lets the rover wait at its present stop.
+    /// Changes the pause in the form.
+    PauseForm(pause::PauseForm),
+    /// Lets the drive wait at the chosen stage of its present stop.
     Pause,
+    /// Goes on to the chosen pause with the run that is looked at.
+    Continue,
+    /// Computes one stage more with the run that is looked at.
+    NextStage,
     /// Drives one stop further.
     OneStop,
     /// Drives on with the run that is looked at, under the command in the form.

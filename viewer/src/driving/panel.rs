@@ -3,9 +3,11 @@
 use egui::{Button, CollapsingHeader, ComboBox, DragValue, Grid, Label, RichText, ScrollArea, Ui};
 use sightline_rover::driving::{ArrivalAction, DriveCommand, GoalRule, StopReason};
 use sightline_session::driving::DriveView;
+use sightline_session::pause::PauseSide;
+use sightline_track::cycle_stage::CycleStage;
 
 use crate::command::{Command, Go};
-use crate::driving::{Ask, words};
+use crate::driving::{Ask, pause, words};
 use crate::panels::digits;
 use crate::panels::panel::Panel;
 use crate::state::{State, run_letter};
@@ -30,6 +32,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         form(ui, state, out);
         match state.drive().filter(|_| state.is_on_commands()) {
             Some(drive) => {
+                pause_form(ui, state, out);
                 buttons(ui, state, drive, out);
                 standing(ui, drive);
                 decisions(ui, state, drive, out);
@@ -142,6 +145,48 @@ fn begin(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.add(Label::new(theme::note(sentence)).wrap());
 }
 
+/// The pause as it can be chosen: side, stage, and stops.
+fn pause_form(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let mut form = state.driving.pause;
+    ui.horizontal_wrapped(|ui| {
+        ui.label(theme::label("pause"));
+        let side = |side| if side == PauseSide::Before { "before" } else { "after" };
+        let sides = [PauseSide::Before, PauseSide::After];
+        choice(ui, "pause before or after", 60.0, sides, &mut form.pause.when, side);
+        choice(ui, "stage of the pause", 100.0, CycleStage::ALL, &mut form.pause.stage, CycleStage::word);
+        let stops = |is_every| if is_every { "at every stop" } else { "at this stop only" };
+        choice(ui, "stops of the pause", 120.0, [true, false], &mut form.is_every_stop, stops);
+    });
+    if form != state.driving.pause {
+        out.push(Command::Drive(Ask::PauseForm(form)));
+    }
+}
+
+/// A list of values from which one is chosen.
+fn choice<T: Copy + PartialEq, const N: usize>(
+    ui: &mut Ui,
+    name: &str,
+    width: f32,
+    all: [T; N],
+    value: &mut T,
+    word: impl Fn(T) -> &'static str,
+) {
+    let list = ComboBox::from_id_salt(name).width(width).selected_text(word(*value));
+    let shown = list.show_ui(ui, |ui| {
+        for one in all {
+            if panels::entry(ui, *value == one, word(one)).clicked() {
+                *value = one;
+            }
+        }
+    });
+    shown.response.accessible_name(name);
+}
+
+/// Whether the motion at a stop is not chosen yet, because the drive is paused before that.
+fn is_undecided(drive: &DriveView, step: usize) -> bool {
+    drive.paused.is_some_and(|halt| halt.stop == step && halt.before <= CycleStage::SelectPath)
+}
+
 /// What can be done with a drive.
 fn buttons(ui: &mut Ui, state: &State, drive: &DriveView, out: &mut Vec<Command>) {
     let has_ended = drive.cycles.last().is_some_and(|cycle| cycle.ending.is_some());
@@ -160,10 +205,13 @@ fn buttons(ui: &mut Ui, state: &State, drive: &DriveView, out: &mut Vec<Command>
             button(
                 "Pause",
                 true,
-                "The rover waits once the target is located at the present stop",
+                "The drive waits at the chosen stage of the present stop, or of the next one that it comes to",
                 Ask::Pause,
             );
         } else {
+            let is_paused = drive.paused.is_some();
+            button("Continue", is_paused, "Goes on to the chosen pause; without one ahead it drives on", Ask::Continue);
+            button("Next stage", is_paused, "Computes the next stage and waits after it", Ask::NextStage);
             let goes_on = !has_ended || is_other_command || !is_driver;
             let name = if is_driver {
                 "Drive on".to_owned()
@@ -186,10 +234,11 @@ fn buttons(ui: &mut Ui, state: &State, drive: &DriveView, out: &mut Vec<Command>
 /// Where the drive stands.
 fn standing(ui: &mut Ui, drive: &DriveView) {
     let ending = drive.cycles.last().and_then(|cycle| cycle.ending);
-    let (text, colour) = match (ending, drive.is_driving) {
-        (Some(ending), _) => (words::ending(&ending), theme::verdict(ending.reason == StopReason::Arrived)),
-        (None, true) => ("drives".to_owned(), theme::text()),
-        (None, false) => ("waits".to_owned(), theme::text()),
+    let (text, colour) = match (ending, drive.is_driving, drive.paused) {
+        (Some(ending), ..) => (words::ending(&ending), theme::verdict(ending.reason == StopReason::Arrived)),
+        (None, true, _) => ("drives".to_owned(), theme::text()),
+        (None, false, Some(halt)) => (pause::in_words(halt), theme::accent()),
+        (None, false, None) => ("waits".to_owned(), theme::text()),
     };
     ui.add(Label::new(RichText::new(text).color(colour)).wrap());
     if let Some(summary) = &drive.summary {
@@ -213,6 +262,7 @@ fn decisions(ui: &mut Ui, state: &State, drive: &DriveView, out: &mut Vec<Comman
             let motion = match (&cycle.motion, &cycle.ending) {
                 (Some(motion), _) => words::motion(motion),
                 (None, Some(ending)) => words::reason(ending.reason).to_owned(),
+                (None, None) if is_undecided(drive, cycle.step) => "not chosen yet".to_owned(),
                 (None, None) => "looks again".to_owned(),
             };
             ui.label(theme::label(motion).size(12.0));

@@ -6,7 +6,9 @@ use sightline_api::location::{AtRun, AtSession};
 use sightline_api::wire::NewDrive;
 use sightline_rover::driving::Cycle;
 use sightline_session::driving::{DriveView, Steering};
+use sightline_session::pause::Halt;
 
+use crate::driving::pause::{self, PauseForm};
 use crate::driving::{Ask, words};
 use crate::state::State;
 use crate::state::calls::Notice;
@@ -71,7 +73,10 @@ impl State {
 
     /// Takes the drive in; a cursor at the rover's last stop goes with the rover.
     fn took_drive(&mut self, session: String, view: DriveView) {
-        let newest = |view: &DriveView| view.cycles.last().map(|cycle| cycle.step);
+        let newest = |view: &DriveView| {
+            let paused = view.paused.map(|halt| halt.stop);
+            view.cycles.last().map(|cycle| cycle.step).max(paused)
+        };
         let before = self.drive().and_then(newest);
         let is_other = self.driving.view.as_ref().is_none_or(|(known, _)| *known != session);
         if is_other {
@@ -79,9 +84,12 @@ impl State {
         }
         if let Some(steering) = view.steering.as_ref().filter(|_| is_other) {
             self.driving.command = steering.command.clone();
+            self.driving.pause.pause = steering.pause.unwrap_or_else(|| PauseForm::default().pause);
         }
         let now = newest(&view);
+        let halt = self.halt();
         self.driving.view = Some((session, view));
+        self.forget_unpointed(halt);
         let here = self.cursor.step;
         let is_with_rover = before == Some(here) || self.driving.following.is_some();
         if let Some(now) = now.filter(|now| is_with_rover && *now > here) {
@@ -105,14 +113,25 @@ impl State {
     pub(crate) fn ask_of_driving(&mut self, ask: Ask) {
         match ask {
             Ask::Form(command) => self.driving.command = command,
+            Ask::PauseForm(form) => self.driving.pause = form,
             Ask::Begin => self.begin_drive(),
             Ask::Pause => {
-                let stop = self.last_stop();
-                self.steer(self.steered().map(|steering| Steering { pause_at: stop, ..steering }));
+                let (stop, pause) = (self.last_stop(), self.driving.pause.told());
+                self.steer(self.steered().map(|steering| Steering { pause_at: stop, pause, ..steering }));
             }
             Ask::OneStop => {
                 let next = self.last_stop().map(|stop| stop + 1);
                 self.steer(self.looked_at().map(|steering| Steering { pause_at: next, ..steering }));
+            }
+            Ask::Continue => {
+                let form = self.driving.pause;
+                let stop = self.halt().and_then(|here| form.next_stop(here));
+                let pause = form.told().filter(|_| stop.is_some());
+                self.steer(self.looked_at().map(|steering| Steering { pause_at: stop, pause, ..steering }));
+            }
+            Ask::NextStage => {
+                let next = self.halt().map(Halt::next);
+                self.steer(self.looked_at().zip(next).map(|(steering, next)| pause::until(steering, next)));
             }
             Ask::GoOn => self.steer(self.looked_at()),
         }
@@ -130,7 +149,7 @@ impl State {
     /// The run that is looked at as the one that drives.
     fn looked_at(&self) -> Option<Steering> {
         let (target, run) = (self.target()?.number, self.run()?.number);
-        Some(Steering { target, run, command: self.driving.command.clone(), pause_at: None })
+        Some(Steering { target, run, command: self.driving.command.clone(), pause_at: None, pause: None })
     }
 
     fn steer(&mut self, steering: Option<Steering>) {
@@ -152,7 +171,7 @@ impl State {
             return;
         };
         let from_step = self.is_on_commands().then_some(self.cursor.step);
-        let new = NewDrive { command: steering.command, from_step, pause_at: None };
+        let new = NewDrive { command: steering.command, from_step, pause_at: None, pause: None };
         let at = AtRun { session, target: steering.target, run: steering.run };
         let call = Call::with_body::<BeginDrive>(&at, &new);
         self.driving.is_beginning = true;
@@ -187,7 +206,8 @@ mod tests {
     /// A session that drives with its only run, at a stop.
     fn driving(step: usize) -> State {
         let mut state = fixture::at_step(&egui::Context::default(), step);
-        let steering = Steering { target: 0, run: 0, command: Default::default(), pause_at: None };
+        let steering =
+            Steering { target: 0, run: 0, command: Default::default(), pause_at: None, pause: None };
         if let Some(session) = &mut state.session {
             session.steering = Some(steering);
         }

@@ -23,6 +23,7 @@
 //!   "designating": false,          // whether a designation waits for its answer
 //!   "advised_against": false,      // whether the place that was picked is a bad one and was not tried
 //!   "drive": "waits",              // "drives", "waits", or why the drive on commands ended; null without one
+//!   "paused_before": "judge",      // the first stage that is not computed at the stop where the drive waits; null while it drives
 //!   "playing": 0,                  // how many times the rate; negative backwards, 0 paused
 //!   "breakpoints": 1, "hits": 4,   // how many there are, and their hits in all runs
 //!   "problem": "sentence or null"  // the newest message, where that is a problem
@@ -117,6 +118,7 @@ pub(crate) fn describe(state: &State, left_image: &LeftImage, zoom: f32) -> Valu
         "designating": state.designating.is_some(),
         "advised_against": state.refusal.as_ref().is_some_and(|refusal| refusal.is_advice),
         "drive": state.drive_word(),
+        "paused_before": state.drive().and_then(|drive| drive.paused).map(|halt| halt.before.word()),
         "playing": state.ask.play.speed,
         "breakpoints": state.ask.breakpoints.len(),
         "hits": state.ask.breakpoints.iter().map(|breakpoint| breakpoint.count).sum::<usize>(),

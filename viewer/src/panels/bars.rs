@@ -5,6 +5,7 @@ use egui::{Align, Button, ComboBox, Layout, Response, RichText, ScrollArea, Ui};
 use sightline_record::Unit;
 use sightline_session::records;
 use sightline_session::step::RunStep;
+use sightline_track::cycle_stage::CycleStage;
 use sightline_track::target::TrackingState;
 
 use crate::command::table::{
@@ -203,22 +204,41 @@ fn newest_message(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 pub(crate) fn stages(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 3.0;
-        for (i, stage) in Stage::of(state.tracker()).enumerate() {
+        let paused_before = state.paused_before(state.cursor.step);
+        for (i, stage) in state.stages().enumerate() {
             if i > 0 {
                 let between = match stage {
                     Stage::JUDGE => ")  ›",
                     step if step.is_first_step(state.tracker()) => "(",
                     _ => "›",
                 };
-                ui.label(theme::note(between));
+                if paused_before.is_some_and(|before| stage.word() == before.word()) {
+                    pause_mark(ui, stage, between);
+                } else {
+                    ui.label(theme::note(between));
+                }
+            } else if paused_before == Some(CycleStage::Predict) {
+                pause_mark(ui, stage, "");
             }
             stage_button(ui, state, stage, out);
         }
     });
 }
 
+/// The mark between two stages at which a commanded drive is paused.
+fn pause_mark(ui: &mut Ui, next: Stage, between: &str) {
+    let words = RichText::new(format!("{between} ||")).strong().color(theme::accent());
+    let name = format!("paused before {}", next.word());
+    let help = "The drive is paused here: the stages on the left are done, the others are not computed yet.";
+    let mark = ui.label(words).on_hover_text(help);
+    mark.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, &name));
+}
+
 fn stage_button(ui: &mut Ui, state: &State, stage: Stage, out: &mut Vec<Command>) {
-    let reached = state.trace().map(|trace| inspector::is_reached(trace, stage));
+    let reached = match stage.is_of_drive() {
+        true => Some(state.is_decided(stage)),
+        false => state.trace().map(|trace| inspector::is_reached(trace, stage)),
+    };
     let colour = match (reached, has_failed(state.trace(), stage)) {
         (_, true) => theme::failed(),
         (Some(true), _) => theme::text(),
@@ -227,9 +247,14 @@ fn stage_button(ui: &mut Ui, state: &State, stage: Stage, out: &mut Vec<Command>
     let size = if stage.is_step_of_locate() { 11.5 } else { 12.5 };
     let words = RichText::new(stage.word()).size(size).color(colour);
     let button = Button::selectable(state.stage() == stage, words);
-    let note = match reached {
-        Some(false) => "\nNot reached at this step.",
-        _ => "",
+    let is_done = reached == Some(true);
+    let note = match state.paused_before(state.cursor.step).filter(|before| stage.in_cycle() >= *before) {
+        Some(before) if stage.in_cycle() == before => {
+            "\nNext: the drive is paused before this stage.".to_owned()
+        }
+        Some(before) => format!("\nNot computed yet: the drive is paused before {}.", before.word()),
+        None if is_done || reached.is_none() => String::new(),
+        None => "\nNot reached at this step.".to_owned(),
     };
     if ui.add(button).on_hover_text(format!("{}{note}", stage.question())).clicked() {
         out.push(Command::SelectStage(stage));

@@ -107,6 +107,11 @@ pub(crate) fn ready_image<'a>(
 ) -> Option<&'a Raster> {
     let word = eye.word();
     let step = state.cursor.step;
+    if state.lacks_images_yet(step) {
+        let sentence = state.missing_by_pause(step).unwrap_or_else(|| state.missing_step());
+        panels::missing(ui, &format!("The {word} image of step {step} is not taken yet."), &sentence);
+        return None;
+    }
     match state.image(eye) {
         Slot::Ready(raster) => return Some(raster),
         Slot::Failed(problem) => broken::show(ui, word, step, problem, out),

@@ -167,6 +167,8 @@ fn how_far(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: 
             .on_hover_text(why);
     } else if run.complete {
         ui.label(theme::note("complete"));
+    } else if let Some(before) = run.rows.last().and_then(|row| row.paused_before) {
+        ui.label(theme::note(format!("paused before {}", before.word())));
     } else {
         ui.label(theme::note(format!("{} steps", run.rows.len())));
     }

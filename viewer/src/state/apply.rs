@@ -42,7 +42,9 @@ impl State {
             Command::OpenTraverse(id) => self.open_traverse(id),
             Command::Look { target, run } => self.look(target, run),
             Command::SelectStage(stage) => self.stage = stage,
-            Command::StageBy(by) => self.stage = self.stage().neighbour(self.tracker(), by),
+            Command::StageBy(by) => {
+                self.stage = self.stage().neighbour(self.tracker(), self.is_on_commands(), by)
+            }
             Command::SetMode(mode) => self.set_mode(mode),
             Command::Pick(pixel) => self.pick(pixel),
             Command::RemoveTarget(target) => self.remove_target(target),

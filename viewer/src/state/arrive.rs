@@ -32,7 +32,10 @@ impl State {
     /// Applies an answer.
     pub fn arrived(&mut self, arrived: Arrived, now: f64) {
         match (arrived.request, arrived.outcome) {
-            (Request::Item(key), Ok(Reply::Item(item))) => self.cache.arrived(key, Ok(item), now),
+            (Request::Item(key), Ok(Reply::Item(item))) => {
+                self.cache.arrived(key, Ok(item), now);
+                self.forget_begun_steps();
+            }
             (Request::Item(key), Err(problem)) => self.cache.arrived(key, Err(problem), now),
             (Request::Call { ticket, .. }, outcome) => self.answered_call(ticket, outcome),
             (Request::Item(_) | Request::Reconnect, _) => {}
@@ -241,6 +244,7 @@ impl State {
         }
         self.sync.linked = Some(view.id.clone());
         self.session = Some(view);
+        self.forget_begun_steps();
         self.follow_link();
         self.keep_cursor_valid();
     }

@@ -15,6 +15,9 @@ impl State {
                 target.label
             );
         }
+        if let Some(sentence) = self.missing_by_pause(step) {
+            return sentence;
+        }
         if self.row().is_none() {
             return match (self.run_progress(), self.run().and_then(|run| run.stopped.as_deref())) {
                 (Some(p), _) => {

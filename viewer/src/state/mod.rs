@@ -255,7 +255,9 @@ impl State {
 
     /// Whether the selected run is still being computed. A page that opens during a run reads rows before its first progress event.
     pub(crate) fn is_running(&self) -> bool {
-        self.run_progress().is_some() || self.run().is_some_and(|run| !run.complete && run.stopped.is_none())
+        let is_incomplete =
+            self.run().is_some_and(|run| !run.complete && run.stopped.is_none() && !self.is_held(run));
+        self.run_progress().is_some() || is_incomplete
     }
 
     /// The name of a step of the run that is looked at.

@@ -93,7 +93,7 @@ impl State {
             return;
         }
         let Some((target, run)) = self.sync.runs_ahead.pop_first() else { return };
-        match self.run_named(RunName { target, run }).map(|(_, known)| known.rows.len()) {
+        match self.run_named(RunName { target, run }).map(|(_, known)| whole_rows(known)) {
             Some(from_row) => {
                 self.sync.rows_asked = true;
                 self.read_rows(session.to_owned(), RunName { target, run }, from_row);
@@ -115,15 +115,17 @@ impl State {
         let targets = open.flat_map(|session| &mut session.targets);
         let runs = targets.filter(|known| known.number == target).flat_map(|known| &mut known.runs);
         let Some(run) = runs.into_iter().find(|run| run.number == tail.number) else { return };
-        if run.rows.len() != from_row {
+        if whole_rows(run) != from_row {
             // The session was read meanwhile.
             self.sync.runs_ahead.insert((target, tail.number));
             return;
         }
         let mut rows = std::mem::take(&mut run.rows);
+        rows.truncate(from_row);
         rows.extend(tail.rows);
         *run = RunView { rows, ..tail };
         self.ask.make_stale();
+        self.forget_begun_steps();
     }
 
     /// Handles the event that a cursor moved: of this page if it is the one that was sent, else of another page. An event may
@@ -158,4 +160,9 @@ impl State {
         self.sync.cursor_messages += 1;
         self.sync.server_cursor = cursor;
     }
+}
+
+/// The rows of a run without that of a step at which a drive is paused, which will be replaced.
+fn whole_rows(run: &RunView) -> usize {
+    run.rows.len() - usize::from(run.rows.last().is_some_and(|last| last.paused_before.is_some()))
 }

@@ -27,9 +27,15 @@ impl State {
         self.run().map_or_else(TrackerKind::default, |run| run.settings.tracker)
     }
 
-    /// The stage that is looked at, in the words of the tracker.
+    /// The selected stage, in the words of the tracker.
     pub fn stage(&self) -> Stage {
-        self.stage.of_tracker(self.tracker())
+        let stage = self.stage.of_tracker(self.tracker());
+        if stage.is_of_drive() && !self.is_on_commands() { Stage::UPDATE } else { stage }
+    }
+
+    /// The stages of the stage bar, in running order.
+    pub fn stages(&self) -> impl Iterator<Item = Stage> {
+        Stage::bar(self.tracker(), self.is_on_commands())
     }
 
     /// What the feature tracker saw at the cursor's step.

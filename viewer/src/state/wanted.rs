@@ -84,7 +84,7 @@ impl State {
         keys.extend(self.stop_detail_key(step).filter(|_| computed.is_none()));
         // The images of a simulated stop take a while: only the one that is looked at is worth that.
         let is_ready = self.traverse.as_ref().and_then(|t| t.stops.get(step)).is_some_and(|stop| stop.ready);
-        if is_ready || !is_neighbour {
+        if (is_ready || !is_neighbour) && !self.lacks_images_yet(step) {
             keys.extend([Eye::Left, Eye::Right].into_iter().filter_map(|eye| self.image_key(step, eye)));
         }
     }

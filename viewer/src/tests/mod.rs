@@ -38,6 +38,7 @@ mod following;
 mod pointed;
 #[path = "../files/tests.rs"]
 mod opening;
+mod pauses;
 mod problems;
 
 use egui_kittest::Harness;
@@ -97,6 +98,14 @@ impl<'a> Shown<'a> {
             has
         });
         assert!(found.count() > 0, "“{words}” is not on the screen, but {:?}", texts.take());
+        self
+    }
+
+    fn hides(&self, words: &str) -> &Self {
+        let found = self.harness.query_all_by(|node| {
+            [node.label(), node.value()].into_iter().flatten().any(|text| text.contains(words))
+        });
+        assert_eq!(found.count(), 0, "“{words}” is on the screen");
         self
     }
 

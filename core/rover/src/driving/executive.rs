@@ -21,7 +21,7 @@ use super::dead_reckoning::Reckoned;
 use super::flight_time::FlightTime;
 use super::select_path::{Motion, Navigator};
 use super::set_goal::{Goal, set_goal};
-use crate::pipeline::{self, Stops};
+use crate::pipeline::{self, StepChanges, Stops};
 
 /// Why a drive stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -103,19 +103,26 @@ pub fn advance(
     settings: &Settings,
     cancel: Cancel<'_>,
 ) -> Result<(Cycle, Option<StepTrace>)> {
-    let cycle = drive_on(world, input, cancel)?;
+    let cycle = drive(world, input, cancel)?;
     if cycle.ending.is_some() {
         return Ok((cycle, None));
     }
-    let trace = pipeline::run_step_displaced(world.stops(), &input.last.update, settings, None, cancel)?;
+    point_mast(world, &input.last.update)?;
+    let trace = pipeline::run_step_changed(
+        world.stops(),
+        &input.last.update,
+        settings,
+        &StepChanges::default(),
+        cancel,
+    )?;
     Ok((cycle, Some(trace)))
 }
 
-/// Decides at the last stop and, unless the drive ends there, drives to the next and points the mast at the prediction.
+/// Decides at the last stop and, unless the drive ends there, drives to the next, where the mast is not pointed yet.
 ///
 /// # Errors
 /// As [`advance`].
-pub fn drive_on(world: &mut dyn ActiveWorld, input: &CycleInput<'_>, cancel: Cancel<'_>) -> Result<Cycle> {
+pub fn drive(world: &mut dyn ActiveWorld, input: &CycleInput<'_>, cancel: Cancel<'_>) -> Result<Cycle> {
     cancel.check()?;
     let mut cycle = decide(world.stops(), input);
     if cycle.ending.is_some() {
@@ -125,7 +132,6 @@ pub fn drive_on(world: &mut dyn ActiveWorld, input: &CycleInput<'_>, cancel: Can
         Some(motion) => cycle.add(world.drive(&motion, cancel)?),
         None => world.stay()?,
     }
-    point_mast(world, &input.last.update)?;
     Ok(cycle)
 }
 
@@ -199,8 +205,11 @@ fn target_in_site(input: &CycleInput<'_>, stops: &dyn Stops) -> Point3 {
     stops.site_from_rover(from.step) * from.update.target.position_in_rover
 }
 
-/// Points the mast of the last stop at the prediction, and exposes around it.
-fn point_mast(world: &mut dyn ActiveWorld, last: &Updated) -> Result<()> {
+/// Points the mast of the last stop at the prediction from the stop before, and exposes around it.
+///
+/// # Errors
+/// A stop that cannot be stored.
+pub fn point_mast(world: &mut dyn ActiveWorld, last: &Updated) -> Result<()> {
     let stops = world.stops();
     let [then, now] = [last.target.step, last.target.step + 1].map(|step| stops.site_from_rover(step));
     let predicted = predict::predict(&last.target, &then, &now, &stops.odometry_error());

@@ -167,6 +167,12 @@ pub fn goal(base: &Base<'_>) -> Result<Goal> {
     if let Some(fault) = base.recorded.fault() {
         return refuse(format!("the files of step {step} are at fault, which no setting mends: {fault}"));
     }
+    if let Some(before) = base.recorded.paused_before() {
+        return refuse(format!(
+            "step {step} is not decided yet: the drive is paused before `{}`",
+            before.word()
+        ));
+    }
     let (Some(verdict), Some(_)) = (base.recorded.verdict(), base.last) else {
         return refuse(format!("the target is designated at step {step}: nothing is judged there"));
     };

@@ -6,6 +6,7 @@ use utoipa::ToSchema;
 
 use sightline_geometry::frames::Pixel;
 use sightline_record::{Declaration, Record, Unit};
+use sightline_track::cycle_stage::CycleStage;
 use sightline_track::gate::Gate;
 
 /// One line of a run: the columns of plots, tables and `sightline track`.
@@ -58,7 +59,7 @@ pub struct StepRow {
     pub budget_without_m: Option<f64>,
     /// What the paper's budget grants tracking that drifts by half a pixel of the first image, m, 3σ (K-Eq 5, R40).
     pub budget_with_m: Option<f64>,
-    /// Why an update was rejected, or what is wrong with the stop's files.
+    /// Why an update was rejected, what is wrong with the stop's files, or where the drive is paused.
     pub reason: Option<String>,
     /// Whether the stop's files are damaged, so that nothing could be done.
     #[serde(default)]
@@ -69,6 +70,10 @@ pub struct StepRow {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(ignore)]
     pub lost_count: Option<u32>,
+    /// The first stage that is not computed, at a step of a paused drive; the schema leaves it out, as `reason` names it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(ignore)]
+    pub paused_before: Option<CycleStage>,
     /// The gates of the verdict that were not met; the schema leaves them out, as expressions name `judge.gates`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(ignore)]

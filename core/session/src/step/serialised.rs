@@ -8,6 +8,7 @@ use utoipa::openapi::schema::Schema;
 use utoipa::{PartialSchema, ToSchema};
 
 use super::RunStep;
+use sightline_track::cycle_stage::CycleStage;
 use sightline_track::locate::Located;
 use sightline_track::stages::capture::Capture;
 use sightline_track::stages::point_mast::Pointing;
@@ -18,7 +19,8 @@ use sightline_track::verdict::Verdict;
 use sightline_world::target_truth::StepTruth;
 
 /// One step of a run. At the designation there is no `predict` and no `judge`; at a stop whose files are
-/// damaged there is a `fault` and nothing after `point_mast`.
+/// damaged there is a `fault` and nothing after `point_mast`. At a stop where a drive is paused, `begun` names the first stage that
+/// is not computed; this and the later ones are null.
 #[derive(Serialize, Deserialize, ToSchema)]
 #[schema(as = StepTrace)]
 struct SerialisedStep<'a> {
@@ -39,9 +41,24 @@ struct SerialisedStep<'a> {
     /// Stage 5.
     judge: Option<Cow<'a, Verdict>>,
     /// Stage 6.
-    update: Cow<'a, Updated>,
+    update: Option<Cow<'a, Updated>>,
+    /// The step of a paused drive; left out of any other.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    begun: Option<SerialisedBegun<'a>>,
     /// The comparison with the truth, where that is known.
     truth: Option<Cow<'a, StepTruth>>,
+}
+
+/// A step of a paused drive: where it is paused, and the values that stand in for stages that are not computed.
+#[derive(Serialize, Deserialize, ToSchema)]
+#[schema(as = BegunStep)]
+struct SerialisedBegun<'a> {
+    /// The first stage that is not computed.
+    before: CycleStage,
+    /// The cameras with the mast as it is; null once it is pointed.
+    mast: Option<Cow<'a, Pointing>>,
+    /// The target carried by the prediction, with the last tracking state.
+    carried: Cow<'a, Updated>,
 }
 
 impl<'a> From<&'a RunStep> for SerialisedStep<'a> {
@@ -51,11 +68,16 @@ impl<'a> From<&'a RunStep> for SerialisedStep<'a> {
             time_s: trace.time_s,
             fault: trace.fault().map(Cow::Borrowed),
             predict: trace.prediction().map(Cow::Borrowed),
-            point_mast: Some(Cow::Borrowed(&trace.point_mast)),
+            point_mast: trace.pointing().map(Cow::Borrowed),
             capture: trace.capture().map(Cow::Borrowed),
             locate: trace.located().map(Cow::Borrowed),
             judge: trace.verdict().map(Cow::Borrowed),
-            update: Cow::Borrowed(&trace.update),
+            update: trace.updated().map(Cow::Borrowed),
+            begun: trace.paused_before().map(|before| SerialisedBegun {
+                before,
+                mast: trace.pointing().is_none().then_some(Cow::Borrowed(&trace.point_mast)),
+                carried: Cow::Borrowed(&trace.update),
+            }),
             truth: truth.as_ref().map(Cow::Borrowed),
         }
     }
@@ -67,6 +89,16 @@ impl SerialisedStep<'_> {
         let fault = self.fault.map(Cow::into_owned);
         let (predict, capture) = (self.predict.map(Cow::into_owned), self.capture.map(Cow::into_owned));
         let (locate, judge) = (self.locate.map(Cow::into_owned), self.judge.map(Cow::into_owned));
+        let (point_mast, update) = (self.point_mast.map(Cow::into_owned), self.update.map(Cow::into_owned));
+        let (step, time_s, truth) = (self.step, self.time_s, self.truth.map(Cow::into_owned));
+        if let Some(SerialisedBegun { before, mast, carried }) = self.begun {
+            let (predict, is_mast_pointed) = (predict?, point_mast.is_some());
+            let point_mast = point_mast.or(mast.map(Cow::into_owned))?;
+            let kind = StepKind::Begun { predict, is_mast_pointed, capture, locate, judge };
+            let trace = StepTrace { step, time_s, point_mast, kind, update: carried.into_owned() };
+            let is_prefix = trace.paused_before() == Some(before) && update.is_none() && fault.is_none();
+            return is_prefix.then_some(RunStep { trace, truth });
+        }
         let kind = match (predict, capture, locate, judge, fault) {
             (None, Some(capture), Some(locate), None, None) => StepKind::Designation { capture, locate },
             (Some(predict), Some(capture), Some(locate), Some(judge), None) => {
@@ -75,14 +107,8 @@ impl SerialisedStep<'_> {
             (Some(predict), None, None, None, Some(fault)) => StepKind::Damaged { predict, fault },
             _ => return None,
         };
-        let trace = StepTrace {
-            step: self.step,
-            time_s: self.time_s,
-            point_mast: self.point_mast?.into_owned(),
-            kind,
-            update: self.update.into_owned(),
-        };
-        Some(RunStep { trace, truth: self.truth.map(Cow::into_owned) })
+        let trace = StepTrace { step, time_s, point_mast: point_mast?, kind, update: update? };
+        Some(RunStep { trace, truth })
     }
 }
 
@@ -119,7 +145,7 @@ impl ToSchema for RunStep {
 #[cfg(test)]
 mod tests {
     use nalgebra::Matrix3;
-    use serde_json::Value;
+    use serde_json::{Value, json};
 
     use super::*;
     use sightline_geometry::frames::{Pixel, Point3, Pose};
@@ -154,7 +180,7 @@ mod tests {
         RunStep { trace: StepTrace { step: 3, time_s: 60.0, point_mast, kind, update }, truth: None }
     }
 
-    fn kinds() -> [StepKind; 3] {
+    fn kinds() -> [StepKind; 5] {
         let predict = Prediction {
             position_in_rover: Point3::new(5.0, 0.0, 0.0),
             position_in_site: Point3::new(5.0, 0.0, 0.0),
@@ -180,9 +206,15 @@ mod tests {
             state: TrackingState::Tracking,
         };
         let locate = Located::default();
+        let begun = |is_mast_pointed, capture| {
+            let predict = predict.clone();
+            StepKind::Begun { predict, is_mast_pointed, capture, locate: None, judge: None }
+        };
         [
             StepKind::Designation { capture: capture.clone(), locate: locate.clone() },
-            StepKind::Tracked { predict: predict.clone(), capture, locate, judge },
+            StepKind::Tracked { predict: predict.clone(), capture: capture.clone(), locate, judge },
+            begun(false, None),
+            begun(true, Some(capture)),
             StepKind::Damaged { predict, fault: "left_0003.png is missing".to_owned() },
         ]
     }
@@ -192,12 +224,16 @@ mod tests {
         let reached = [
             vec!["point_mast", "capture", "locate"],
             vec!["predict", "point_mast", "capture", "locate", "judge"],
+            vec!["begun", "predict"],
+            vec!["begun", "predict", "point_mast", "capture"],
             vec!["fault", "predict", "point_mast"],
         ];
         for (kind, reached) in kinds().into_iter().zip(reached) {
             let step = step(kind);
             let value = serde_json::to_value(&step).unwrap();
-            assert_eq!(value.as_object().unwrap().len(), 10);
+            let is_begun = reached.contains(&"begun");
+            assert_eq!(value.as_object().unwrap().len(), 10 + usize::from(is_begun));
+            assert_eq!(value["update"].is_null(), is_begun);
             for stage in ["fault", "predict", "point_mast", "capture", "locate", "judge"] {
                 assert_eq!(value[stage].is_null(), !reached.contains(&stage), "{stage}");
             }
@@ -207,12 +243,20 @@ mod tests {
 
     #[test]
     fn stages_of_no_kind_of_step_are_refused() {
-        let [_, tracked, _] = kinds().map(|kind| serde_json::to_value(step(kind)).unwrap());
+        let [_, tracked, ..] = kinds().map(|kind| serde_json::to_value(step(kind)).unwrap());
         for stage in ["predict", "point_mast", "capture", "locate", "judge"] {
             let mut without = tracked.clone();
             without[stage] = Value::Null;
             let error = serde_json::from_value::<RunStep>(without).unwrap_err();
             assert!(error.to_string().contains("no kind of step"), "{stage}: {error}");
+        }
+        let [.., begun, _] = kinds().map(|kind| serde_json::to_value(step(kind)).unwrap());
+        for (field, value) in
+            [("before", json!("judge")), ("before", json!("capture")), ("carried", Value::Null)]
+        {
+            let mut wrong = begun.clone();
+            wrong["begun"][field] = value;
+            assert!(serde_json::from_value::<RunStep>(wrong).is_err(), "{field}");
         }
     }
 }

@@ -163,8 +163,9 @@ impl Book<'_> {
             "state" => {
                 let draft = Draft::text("judge", "tracking state", state_words(trace.update.state));
                 let Some(verdict) = trace.verdict() else {
-                    let why = trace.fault().unwrap_or("the target was designated here");
-                    return Some(draft.roughly(why, &["state_before"]));
+                    let why = trace.why_incomplete();
+                    let why = why.unwrap_or_else(|| "the target was designated here".to_owned());
+                    return Some(draft.roughly(&why, &["state_before"]));
                 };
                 let gates: Vec<String> =
                     verdict.gates.iter().map(|gate| format!("gate.{}", gate.name)).collect();

@@ -25,6 +25,9 @@ pub fn verdict(trace: &RunStep, before: Option<&RunStep>, settings: &Settings) -
     if let Some(fault) = trace.fault() {
         return format!("Nothing could be judged, since the files of this stop are at fault: {fault}.");
     }
+    if let Some(before) = trace.paused_before() {
+        return format!("Nothing is decided yet, since the drive is paused before {}.", before.word());
+    }
     let Some(verdict) = trace.verdict() else {
         return "The target was picked here: nothing had to be found again, and nothing is judged."
             .to_owned();

@@ -19,6 +19,8 @@ use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::{POSITION_LIMIT_M, Pixel, Point3, Pose, PoseRecord, Vector3};
 
+use sightline_track::cycle_stage::CycleStage;
+
 use crate::camera::rig::Rig;
 use crate::ground::texture::mix;
 use crate::index::{PAUSE_S, simulated_stop};
@@ -63,6 +65,9 @@ pub struct DrivenStop {
     /// The places that the wheels passed on the way here, site frame, m; none where they leave no tracks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub wheel_places_m: Vec<WheelPlaces>,
+    /// The first stage that was put off because the drive is paused here: `point_mast` or `capture`; `None` if none was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub awaits: Option<CycleStage>,
 }
 
 impl DrivenStop {
@@ -85,6 +90,7 @@ impl DrivenStop {
             completed: 1.0,
             touched_rocks: 0,
             wheel_places_m: Vec::new(),
+            awaits: None,
         })
     }
 
@@ -120,6 +126,7 @@ impl DrivenStop {
                 completed,
                 touched_rocks: touched_rocks(world, &stand),
                 wheel_places_m: if scenario.rover.tracks { places_m(&leg) } else { Vec::new() },
+                awaits: None,
             })
         })
     }
@@ -136,6 +143,7 @@ impl DrivenStop {
             // A rock is counted at the stop at which it was reached.
             touched_rocks: 0,
             wheel_places_m: Vec::new(),
+            awaits: None,
             ..self.clone()
         }
     }

@@ -42,8 +42,8 @@ pub(super) fn html(
         escape(&name),
         sentence(trace)
     );
-    if let Some(fault) = trace.fault() {
-        let _ = writeln!(html, "<p class=\"bad\">{}</p>", escape(fault));
+    if let Some(why) = trace.why_incomplete() {
+        let _ = writeln!(html, "<p class=\"bad\">{}</p>", escape(&why));
     }
     html.push_str(&pictures(source, found, trace, cancel)?);
     html.push_str(&verdict(trace));

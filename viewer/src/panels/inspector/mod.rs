@@ -15,7 +15,7 @@ use crate::command::{Command, Stage};
 use crate::compare::panel::readouts;
 use crate::panels::panel::Panel;
 use crate::state::State;
-use crate::{panels, theme};
+use crate::{driving, panels, theme};
 
 /// The panel “Inspector”.
 pub(crate) struct Inspector;
@@ -32,6 +32,10 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         ui.label(RichText::new(state.stage().word()).strong().color(theme::strong()));
         ui.label(theme::note(state.stage().question()));
     });
+    if state.stage().is_of_drive() {
+        driving::stages::show(ui, state);
+        return;
+    }
     let Some(trace) = state.trace() else {
         panels::missing(ui, "", &state.missing_step());
         return;
@@ -97,6 +101,9 @@ fn section(ui: &mut Ui, trace: &RunStep, stage: RecordedStage, out: &mut Vec<Com
 
 fn not_reached(trace: &RunStep, state: &State) -> String {
     let word = state.stage().word();
+    if let Some(sentence) = state.missing_by_pause(trace.step) {
+        return sentence;
+    }
     match (trace.fault(), trace.prediction().is_none()) {
         (Some(fault), _) => format!("{word} was not reached: {fault}"),
         (None, true) => {
