@@ -174,7 +174,7 @@ fn follow<D: Drive>(drive: &D, ground: &Ground, cell: &Cell, end: usize) -> Outc
         shadow: drive.shadow_share(0, pixel, settings.template.template_size_px),
         measured: numbers.filter(|(_, value)| value.is_finite()).collect(),
     };
-    let Ok(first) = track::designate(drive, Designation { step: 0, pixel }, settings) else {
+    let Ok(first) = track::designate(drive, Designation::new(0, pixel), settings) else {
         return outcome;
     };
     outcome.is_refused = false;

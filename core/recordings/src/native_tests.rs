@@ -42,6 +42,7 @@ fn stop(step: usize) -> Stop {
             right_camera: None,
             wheel_places_m: None,
         }),
+        cameras: Vec::new(),
     }
 }
 

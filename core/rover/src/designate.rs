@@ -92,7 +92,7 @@ impl Place {
                 ));
             }
         };
-        Ok(Named { designation: Designation { step, pixel }, point_in_rover })
+        Ok(Named { designation: Designation::new(step, pixel), point_in_rover })
     }
 
     fn check_angles(&self, taken: Option<MastAngles>, step: usize) -> Result<()> {

@@ -26,7 +26,7 @@ pub(crate) fn settings_arguments(changes: &Changes) -> String {
 
 /// The command that designates a target and tracks it; `drive` is what the command line opens.
 pub fn track(drive: &str, designation: Designation, changes: &Changes) -> String {
-    let Designation { step, pixel } = designation;
+    let Designation { step, pixel, .. } = designation;
     let from = if step == 0 { String::new() } else { format!(" --from-step {step}") };
     let settings = settings_arguments(changes);
     format!("sightline track {} --target {},{}{from}{settings}", quoted(drive), pixel.x, pixel.y)

@@ -172,7 +172,7 @@ impl Follower {
     }
 
     fn follow<D: Drive>(&mut self, drive: &D, settings: &Settings, cancel: &AtomicBool) -> Result<()> {
-        let designation = Designation { step: 0, pixel: self.run.pixel };
+        let designation = Designation::new(0, self.run.pixel);
         let first = match track::designate_until(drive, designation, settings, cancel.into()) {
             Ok(first) => first,
             Err(Error::Cancelled) => return Err(Error::Cancelled),

@@ -34,7 +34,7 @@ fn world(folder: &Path) -> (DrivenTraverse, Designation) {
     let world = DrivenTraverse::begin(&scenario, folder, Cancel::default()).unwrap();
     let traverse = world.traverse();
     let pixel = choose_targets(traverse.world().unwrap(), &scenario, traverse.index())[0];
-    (world, Designation { step: 0, pixel })
+    (world, Designation::new(0, pixel))
 }
 
 fn begin(folder: &Path) -> TargetedDrive {

@@ -157,7 +157,7 @@ impl Drive {
         }
         // The command line refuses to come here without one.
         let Some(pixel) = self.target else { return Ok(()) };
-        let designation = Designation { step: 0, pixel };
+        let designation = Designation::new(0, pixel);
         let drive = TargetedDrive::begin(world, designation, self.command(), &settings, Cancel::default())?;
         follow(drive, &settings)
     }

@@ -167,7 +167,7 @@ impl Export {
         let id = Identity::of(&traverse, None)?.id();
         let mut session = Session::new("s1", id, traverse.stop_count());
         for pixel in &self.target {
-            let designation = Designation { step: self.from_step, pixel: *pixel };
+            let designation = Designation::new(self.from_step, *pixel);
             if self.from_step < traverse.stop_count() {
                 traverse.render_step(self.from_step, &AtomicBool::new(false))?;
             }

@@ -172,7 +172,7 @@ pub(crate) fn refusal(
     settings: &Settings,
     error: Error,
 ) -> ApiError {
-    let Designation { step, pixel: place } = designation;
+    let Designation::new(step, place, ..) = designation;
     let is_refused = matches!(error, Error::Target(_)) && step < open.traverse.stop_count();
     let problem = ApiError::from(error);
     let [width, height] = if is_refused { open.traverse.left_camera(step).size } else { [0, 0] };

@@ -110,7 +110,7 @@ struct Staged {
 impl Staged {
     fn new(world: PlaneWorld, changes: &[(&str, Value)]) -> Self {
         let world = Rendered::new(world);
-        let designation = Designation { step: 0, pixel: Pixel::new(118.3, 131.6) };
+        let designation = Designation::new(0, Pixel::new(118.3, 131.6));
         let mut steps = track::run(&world, designation, &Settings::default()).unwrap();
         steps.truncate(STEP);
         let settings = settings(changes);

@@ -79,7 +79,7 @@ fn target_of(target: &TargetView, settings: Changes) -> NewTarget {
 
 fn track(state: &State, target: &NewTarget) -> Option<String> {
     let drive = &state.traverse.as_ref()?.source;
-    let designation = Designation { step: target.step, pixel: target.pixel? };
+    let designation = Designation::new(target.step, target.pixel?);
     Some(shell::track(drive, designation, &target.settings))
 }
 

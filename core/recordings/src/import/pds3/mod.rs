@@ -79,6 +79,7 @@ impl ImportFormat for Pds3 {
                 light: pair.left.product.light(),
                 metered_px: None,
                 truth: None,
+                cameras: Vec::new(),
             });
         }
         let first = &pairs[0].left.product;
