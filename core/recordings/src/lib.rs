@@ -7,6 +7,7 @@
 mod check;
 mod driven;
 pub mod files;
+mod images;
 pub mod import;
 mod index_file;
 mod native;
@@ -18,6 +19,7 @@ mod stops;
 mod truth_files;
 
 pub use driven::DrivenTraverse;
+pub use images::FurtherCamera;
 pub use index_file::{Existing, IndexFormat};
 pub use native::{Traverse, write};
 pub use render_cache::RenderCache;

@@ -79,3 +79,11 @@ pub fn missing(step: usize, name: CameraName) -> Error {
 pub fn single(step: usize, name: CameraName) -> Error {
     Error::Request(format!("stop {step} has only a single image of `{name}`"))
 }
+
+/// The refusal of a pair as that of a designation in it.
+pub(crate) fn as_target(error: Error) -> Error {
+    match error {
+        Error::Request(sentence) => Error::Target(sentence),
+        other => other,
+    }
+}

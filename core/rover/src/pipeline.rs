@@ -129,11 +129,7 @@ fn designated(
     cancel: Cancel<'_>,
 ) -> Result<(Capture, Located, Option<TrackerMemory>)> {
     let step = designation.step;
-    let as_target = |error| match error {
-        Error::Request(sentence) => Error::Target(sentence),
-        other => other,
-    };
-    let pair = pair::of_stop(stops, step, designation.camera).map_err(as_target)?;
+    let pair = pair::of_stop(stops, step, designation.camera).map_err(pair::as_target)?;
     let pixel = check_pixel(designation, pair.left)?;
     let images = pair::capture(stops, step, designation.camera, cancel)?;
     let capture = capture::capture(images, Some(pixel), settings.subframe_px());
