@@ -63,7 +63,8 @@ impl RecordedStep {
     /// # Errors
     /// Those of the files.
     pub(crate) fn prepare(&mut self, cancel: &CancelFlag) -> ApiResult<()> {
-        self.live.traverse().make_ready(self.recorded.step, cancel)?;
+        let camera = self.recorded.update.target.designation.camera;
+        self.live.traverse().make_camera_ready(self.recorded.step, camera, cancel)?;
         if let Some(last) = &self.last {
             self.last = Some(runner::with_image(&self.live.traverse(), last)?);
         }
@@ -80,7 +81,8 @@ impl RecordedStep {
         }
         let open = self.live.traverse();
         let traverse = &open.traverse;
-        let image = traverse.capture_one(self.recorded.step, true)?;
+        let image =
+            traverse.capture_one(self.recorded.step, self.recorded.update.target.designation.camera, true)?;
         let renewals = self.renewals()?;
         let oldest = renewals.len().saturating_sub(count);
         let kept = renewals.iter().enumerate().filter(|(i, _)| *i == 0 || *i >= oldest).map(|(_, step)| step);

@@ -106,12 +106,7 @@ impl TruthSource for Troubled {
     fn true_left_camera(&self, step: usize, camera: Option<CameraName>) -> Option<&Camera> {
         TruthSource::true_left_camera(&self.traverse, step, camera)
     }
-    fn surface_point_in_site(
-        &self,
-        step: usize,
-        camera: Option<CameraName>,
-        pixel: Pixel,
-    ) -> Option<Point3> {
+    fn surface_point_in_site(&self, step: usize, camera: Option<CameraName>, pixel: Pixel) -> Option<Point3> {
         TruthSource::surface_point_in_site(&self.traverse, step, camera, pixel)
     }
     fn is_visible(&self, step: usize, camera: Option<CameraName>, point_in_site: &Point3) -> bool {

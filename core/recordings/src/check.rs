@@ -151,7 +151,9 @@ fn check_angles(angles: Option<MastAngles>) -> Result<(), String> {
 fn check_names(cameras: &[StopCamera]) -> Result<(), String> {
     let count = cameras.len();
     if count > FURTHER_CAMERAS_LIMIT {
-        return Err(format!("cameras: there are {count}, but a stop may have at most {FURTHER_CAMERAS_LIMIT}"));
+        return Err(format!(
+            "cameras: there are {count}, but a stop may have at most {FURTHER_CAMERAS_LIMIT}"
+        ));
     }
     for (k, camera) in cameras.iter().enumerate() {
         let name = camera.name;
@@ -185,8 +187,14 @@ pub(super) fn check_stop(stop: &Stop, folder: &Path) -> Result<StopCameras, Stri
     Ok(StopCameras {
         left: check_view("left", &stop.left, folder)?,
         right: check_view("right", &stop.right, folder)?,
-        true_left: check_true_camera("truth.left_camera", truth.and_then(|truth| truth.left_camera.as_ref()))?,
-        true_right: check_true_camera("truth.right_camera", truth.and_then(|truth| truth.right_camera.as_ref()))?,
+        true_left: check_true_camera(
+            "truth.left_camera",
+            truth.and_then(|truth| truth.left_camera.as_ref()),
+        )?,
+        true_right: check_true_camera(
+            "truth.right_camera",
+            truth.and_then(|truth| truth.right_camera.as_ref()),
+        )?,
         further: stop.cameras.iter().enumerate().map(further).collect::<Result<_, _>>()?,
     })
 }

@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use sightline_geometry::camera::{Camera, CameraName, MastAngles};
+use sightline_geometry::camera::{Camera, CameraName};
 use sightline_geometry::error::{Error, Result};
-use sightline_rover::pair;
+use sightline_rover::pair::{self, FurtherCamera};
 use sightline_track::locate::store::{Cache, SharedStore};
 use sightline_track::stages::capture::StereoPair;
 use sightline_vision::image::{GrayImage, io};
@@ -51,19 +51,6 @@ impl Stores {
     }
 }
 
-/// A further camera of a stop.
-#[derive(Clone, Copy, Debug)]
-pub struct FurtherCamera<'a> {
-    /// Its name.
-    pub name: CameraName,
-    /// The left camera, or the only one, in the rover frame, O made unit.
-    pub left: &'a Camera,
-    /// The right camera; `None` for a single camera.
-    pub right: Option<&'a Camera>,
-    /// The mast angles at which its images were taken; `None` for a camera on the body.
-    pub mast_angles: Option<MastAngles>,
-}
-
 /// An image of a stop with its names in messages.
 struct Source<'a> {
     words: String,
@@ -86,8 +73,13 @@ impl Traverse {
 
     /// Whether the main pair of a stop needs no rendering: always for recorded ones, whether their files exist or not.
     pub fn is_ready(&self, step: usize) -> bool {
-        let stop = &self.index.stops[step];
-        self.simulated.is_none() || (self.exists(&stop.left) && self.exists(&stop.right))
+        self.is_rendered(step, None)
+    }
+
+    /// The same for the main pair or a further camera; a stop that lacks the camera has nothing to render.
+    pub fn is_rendered(&self, step: usize, camera: Option<CameraName>) -> bool {
+        let Some((left, right)) = views(&self.index.stops[step], camera) else { return true };
+        self.simulated.is_none() || (self.exists(left) && right.is_none_or(|right| self.exists(right)))
     }
 
     fn exists(&self, view: &View) -> bool {
@@ -107,13 +99,13 @@ impl Traverse {
     /// # Errors
     /// As [`Self::render_step`], and a stop without a camera of this name.
     pub fn render_camera(&self, step: usize, camera: Option<CameraName>, cancel: &AtomicBool) -> Result<()> {
-        let stop = self.stop(step)?;
-        let Some(simulated) = &self.simulated else { return Ok(()) };
-        let (left, right) = views(stop, camera).ok_or_else(|| no_camera(step, camera))?;
-        if self.exists(left) && right.is_none_or(|right| self.exists(right)) {
-            return Ok(());
+        views(self.stop(step)?, camera).ok_or_else(|| no_camera(step, camera))?;
+        match &self.simulated {
+            Some(simulated) if !self.is_rendered(step, camera) => {
+                simulated.render_missing(&self.stops(), step, camera, cancel)
+            }
+            _ => Ok(()),
         }
-        simulated.render_missing(&self.stops(), step, camera, cancel)
     }
 
     /// The main stereo pair of a stop, in fractions of full scale; a simulated one is rendered where it is missing.
@@ -271,5 +263,8 @@ pub(super) fn views(stop: &Stop, camera: Option<CameraName>) -> Option<(&View, O
 
 /// The refusal of a stop that lacks a camera; the main pair is never lacking.
 pub(super) fn no_camera(step: usize, camera: Option<CameraName>) -> Error {
-    camera.map_or_else(|| Error::Request(format!("stop {step} has no main pair")), |name| pair::missing(step, name))
+    camera.map_or_else(
+        || Error::Request(format!("stop {step} has no main pair")),
+        |name| pair::missing(step, name),
+    )
 }

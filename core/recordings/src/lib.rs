@@ -19,7 +19,6 @@ mod stops;
 mod truth_files;
 
 pub use driven::DrivenTraverse;
-pub use images::FurtherCamera;
 pub use index_file::{Existing, IndexFormat};
 pub use native::{Traverse, write};
 pub use render_cache::RenderCache;

@@ -115,11 +115,11 @@ impl Simulated {
         cancel: &AtomicBool,
     ) -> Result<()> {
         let _guard = lock(&self.locks[step]);
-        let (left, right) =
-            views(&stops.index.stops[step], camera).ok_or_else(|| no_camera(step, camera))?;
+        let (left, right) = views(&stops.index.stops[step], camera).ok_or_else(|| no_camera(step, camera))?;
         for (eye, view) in [(Eye::Left, Some(left)), (Eye::Right, right)] {
             let Some(View { image, .. }) = view else { continue };
-            let path = resolve(stops.folder, image).map_err(|problem| Error::format(stops.folder, problem))?;
+            let path =
+                resolve(stops.folder, image).map_err(|problem| Error::format(stops.folder, problem))?;
             if !path.exists() {
                 let time_s = match camera {
                     None => self.exposure_s(stops, step, cancel)?,

@@ -10,7 +10,7 @@ use sightline_geometry::camera::{Camera, CameraName, Mast, MastAngles};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
 use sightline_geometry::frames::{Pixel, Point3, Pose};
-use sightline_rover::pair::{self, StopPair};
+use sightline_rover::pair::{self, FurtherCamera, FurtherImages, StopPair};
 use sightline_rover::pipeline::Stops;
 use sightline_track::locate::store::Shared;
 use sightline_track::stages::capture::StereoPair;
@@ -61,6 +61,16 @@ impl Stops for Traverse {
             Some(flag) => self.capture_until(step, flag),
             None => self.capture(step),
         }
+    }
+    fn further_cameras(&self, step: usize) -> Vec<FurtherCamera<'_>> {
+        self.further_cameras(step).collect()
+    }
+    fn images_at_hand(&self, step: usize, name: CameraName) -> Option<FurtherImages> {
+        if !self.is_rendered(step, Some(name)) {
+            return None;
+        }
+        let left = self.capture_one(step, Some(name), true).ok()?;
+        Some((left, self.capture_one(step, Some(name), false).ok()))
     }
     fn further_pair(&self, step: usize, name: CameraName) -> Result<StopPair<'_>> {
         let mut cameras = self.further_cameras(step);

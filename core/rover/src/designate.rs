@@ -144,9 +144,8 @@ impl Place {
         let mast = stops.mast().filter(|_| self.camera.is_none());
         let centring = mast.and_then(|mast| mast.point_left_centre_at(&point));
         let hint = centring.map_or_else(String::new, |angles| {
-            let taken = pair
-                .mast_angles
-                .map_or_else(String::new, |a| format!("; it was taken at {}", words(a)));
+            let taken =
+                pair.mast_angles.map_or_else(String::new, |a| format!("; it was taken at {}", words(a)));
             format!(": the mast would have to point at {}{taken}", words(angles))
         });
         Err(Error::Target(format!(

@@ -3,12 +3,15 @@
 //! For the stages: the cameras of that pair, its mast angles and its images. A stop that lacks the pair is no reason to end
 //! a run; the sentence here becomes the fault of that step.
 
+use std::sync::Arc;
+
 use sightline_geometry::camera::{Camera, CameraName, MastAngles};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_track::locate::store::Shared;
 use sightline_track::stages::capture::StereoPair;
 use sightline_track::stages::point_mast::UsedPointing;
+use sightline_vision::image::GrayImage;
 
 use crate::pipeline::Stops;
 
@@ -25,9 +28,29 @@ pub struct StopPair<'a> {
     pub shared: Option<Shared<'a>>,
 }
 
+/// A camera of a stop beside its main pair: a pair, or a single camera.
+#[derive(Clone, Copy, Debug)]
+pub struct FurtherCamera<'a> {
+    /// Its name.
+    pub name: CameraName,
+    /// The left camera, or the only one, in the rover frame.
+    pub left: &'a Camera,
+    /// The right camera in the rover frame; `None` for a single camera.
+    pub right: Option<&'a Camera>,
+    /// The mast angles at which its images were taken; `None` for a camera on the body.
+    pub mast_angles: Option<MastAngles>,
+}
+
+/// The images of a further camera: the left or only one, and the right one of a pair.
+pub type FurtherImages = (Arc<GrayImage>, Option<Arc<GrayImage>>);
+
 impl StopPair<'_> {
     /// The pair as it was pointed.
-    pub(crate) fn pointing<'a>(&'a self, stops: &'a dyn Stops, camera: Option<CameraName>) -> UsedPointing<'a> {
+    pub(crate) fn pointing<'a>(
+        &'a self,
+        stops: &'a dyn Stops,
+        camera: Option<CameraName>,
+    ) -> UsedPointing<'a> {
         // A further pair without mast angles is fixed to the body.
         let is_carried = camera.is_none() || self.mast_angles.is_some();
         UsedPointing {

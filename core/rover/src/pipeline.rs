@@ -27,7 +27,7 @@ use sightline_track::stages::update::{self, Updated};
 use sightline_track::target::{Designation, Target, TrackingState};
 use sightline_track::trace::{StepKind, StepTrace};
 
-use crate::pair::{self, StopPair};
+use crate::pair::{self, FurtherCamera, FurtherImages, StopPair};
 
 /// The stops of a drive, as the stages see them.
 pub trait Stops {
@@ -58,6 +58,14 @@ pub trait Stops {
     /// # Errors
     /// A sentence that names the missing or damaged file, or [`Error::Cancelled`] soon after `cancel` is requested.
     fn capture(&self, step: usize, cancel: Cancel<'_>) -> Result<StereoPair>;
+    /// The cameras of a stop beside its main pair.
+    fn further_cameras(&self, _step: usize) -> Vec<FurtherCamera<'_>> {
+        Vec::new()
+    }
+    /// The images of such a camera; `None` where they cannot be read, or would have to be rendered first.
+    fn images_at_hand(&self, _step: usize, _name: CameraName) -> Option<FurtherImages> {
+        None
+    }
     /// A pair beside the main one.
     ///
     /// # Errors

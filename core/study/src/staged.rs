@@ -17,7 +17,7 @@ use sightline_geometry::error::Result;
 use sightline_geometry::frames::{Pixel, Point3, Pose, Vector3};
 use sightline_geometry::odometry_error::OdometryError;
 use sightline_geometry::stereo_geometry::StereoGeometry;
-use sightline_rover::pair::StopPair;
+use sightline_rover::pair::{FurtherCamera, FurtherImages, StopPair};
 use sightline_rover::pipeline::Stops;
 use sightline_session::track::Drive;
 use sightline_track::locate::store::Shared;
@@ -89,6 +89,12 @@ impl<D: Drive> Stops for Staged<'_, D> {
     }
     fn capture(&self, step: usize, cancel: Cancel<'_>) -> Result<StereoPair> {
         self.drive.capture(self.stops[step], cancel)
+    }
+    fn further_cameras(&self, step: usize) -> Vec<FurtherCamera<'_>> {
+        self.drive.further_cameras(self.stops[step])
+    }
+    fn images_at_hand(&self, step: usize, name: CameraName) -> Option<FurtherImages> {
+        self.drive.images_at_hand(self.stops[step], name)
     }
     fn further_pair(&self, step: usize, name: CameraName) -> Result<StopPair<'_>> {
         self.drive.further_pair(self.stops[step], name)

@@ -86,7 +86,8 @@ pub struct Stop {
 impl Stop {
     /// All images of the stop, those of the main pair first.
     pub fn views(&self) -> impl Iterator<Item = &View> {
-        let further = self.cameras.iter().flat_map(|camera| std::iter::once(&camera.left).chain(&camera.right));
+        let further =
+            self.cameras.iter().flat_map(|camera| std::iter::once(&camera.left).chain(&camera.right));
         [&self.left, &self.right].into_iter().chain(further)
     }
 

@@ -92,12 +92,7 @@ impl TruthSource for Rendered {
     fn true_left_camera(&self, step: usize, camera: Option<CameraName>) -> Option<&Camera> {
         self.world.true_left_camera(step, camera)
     }
-    fn surface_point_in_site(
-        &self,
-        step: usize,
-        camera: Option<CameraName>,
-        pixel: Pixel,
-    ) -> Option<Point3> {
+    fn surface_point_in_site(&self, step: usize, camera: Option<CameraName>, pixel: Pixel) -> Option<Point3> {
         self.world.surface_point_in_site(step, camera, pixel)
     }
     fn is_visible(&self, step: usize, camera: Option<CameraName>, point_in_site: &Point3) -> bool {

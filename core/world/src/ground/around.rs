@@ -73,8 +73,7 @@ impl Around {
     /// whose wedge and lane are known without it.
     pub(crate) fn new(drive: &DriveSettings, camera: &CameraSettings) -> Option<Self> {
         let is_straight = drive.course == Course::Approach && drive.heading_deg == 0.0;
-        let is_narrow =
-            !camera.rig.is_on_body() && pointing_rad(drive) <= STRAIGHT_POINTING_RAD;
+        let is_narrow = !camera.rig.is_on_body() && pointing_rad(drive) <= STRAIGHT_POINTING_RAD;
         if is_straight && is_narrow {
             return None;
         }

@@ -46,7 +46,7 @@ impl CameraRig {
 /// A pair of cameras beside the main one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct FurtherCamera {
+pub struct FurtherRig {
     /// Its name at every stop.
     pub name: CameraName,
     /// Which pair of cameras; one on the mast points as the mast does for the main pair.
@@ -170,7 +170,7 @@ pub struct CameraSettings {
     pub auto_exposure: AutoExposureSettings,
     /// Pairs beside the main one, which take images at every stop; optics and detector are those of this section.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub further: Vec<FurtherCamera>,
+    pub further: Vec<FurtherRig>,
 }
 
 impl Default for CameraSettings {
@@ -305,7 +305,10 @@ mod tests {
             ("rig = \"mer_side_hazcam\"", "mer_front_hazcam"),
             ("hand_over = \"mer_pancam\"", "camera.hand_over"),
             ("further = [{ name = \"A\", rig = \"mer_pancam\" }]", "camera.further[0].name"),
-            ("further = [{ name = \"a\", rig = \"mer_pancam\", image_size = 9 }]", "camera.further[0].image_size"),
+            (
+                "further = [{ name = \"a\", rig = \"mer_pancam\", image_size = 9 }]",
+                "camera.further[0].image_size",
+            ),
             (
                 "[[camera.further]]\nname = \"a\"\nrig = \"mer_pancam\"\n\
                  [[camera.further]]\nname = \"a\"\nrig = \"mer_navcam\"",
@@ -325,7 +328,10 @@ mod tests {
                     [[camera.further]]\nname = \"hazcam\"\nrig = \"mer_rear_hazcam\"\n";
         let read = Scenario::from_toml(text, Path::new("s.toml")).unwrap();
         assert_eq!((read.camera.noise_seed, read.camera.auto_exposure.subframe_px), (Some(5), 99));
-        assert_eq!((read.camera.further[0].rig, read.camera.further[0].image_size), (CameraRig::MerRearHazcam, 1024));
+        assert_eq!(
+            (read.camera.further[0].rig, read.camera.further[0].image_size),
+            (CameraRig::MerRearHazcam, 1024)
+        );
         assert_eq!(Scenario::from_toml(&read.to_toml(), Path::new("s.toml")).unwrap(), read);
     }
 }
