@@ -150,7 +150,7 @@ fn end_of<D: Drive>(drive: &D, pixel: Pixel, margin_px: f64) -> Option<usize> {
                 (margin_px..=right).contains(&pixel.x) && (margin_px..=bottom).contains(&pixel.y)
             })
         };
-        is_inside(drive.true_left_camera(step))
+        drive.true_left_camera(step, None).is_some_and(is_inside)
             && is_inside(drive.cameras(step).1)
             && drive.is_visible(step, None, &point)
     };

@@ -155,6 +155,7 @@ fn traverse() -> TraverseView {
         left_size: [1024, 1024],
         right_size: [1024, 1024],
         ready: step + 1 < STOPS,
+        cameras: Vec::new(),
     };
     TraverseView {
         id: "drive".to_owned(),
