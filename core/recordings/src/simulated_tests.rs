@@ -88,8 +88,9 @@ fn the_shadow_on_a_window_is_that_of_its_points_and_is_warned_of() {
     let places = || (40..88).flat_map(|y| (40..88).map(move |x| (x, y)));
     let darkest = places().max_by_key(|(x, y)| count(*x, *y)).unwrap();
     let lit = places().min_by_key(|(x, y)| count(*x, *y)).unwrap();
-    let share =
-        |(x, y): (u32, u32)| traverse.shadow_share(0, None, Pixel::new(f64::from(x), f64::from(y)), 21).unwrap();
+    let share = |(x, y): (u32, u32)| {
+        traverse.shadow_share(0, None, Pixel::new(f64::from(x), f64::from(y)), 21).unwrap()
+    };
     for place in [darkest, lit] {
         let truth = count(place.0, place.1) as f64 / 441.0;
         assert!((share(place) - truth).abs() < 0.1, "{place:?}: {} of {truth}", share(place));

@@ -182,7 +182,7 @@ impl Drive {
         let settings = self.settings()?;
         let traverse = Traverse::open(&self.scenario)?;
         let Some(pixel) = self.target else { return Ok(()) };
-        let designation = Designation { step: 0, pixel };
+        let designation = Designation { step: 0, pixel, camera: self.camera };
         let cancel = Cancel::default();
         let mut drive = ReplayedDrive::begin(&traverse, designation, self.command(), &settings, cancel)?;
         let mut progress = Progress::new("followed to stop");

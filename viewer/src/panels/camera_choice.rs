@@ -31,7 +31,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         choice.response.accessible_name("Camera");
         if let Some(target) = state.target().filter(|_| !state.shows_targets_camera()) {
             let of = word(target.designation.camera);
-            ui.label(theme::note(&format!("{} is tracked in {of}: its marks are there", target.label)));
+            ui.label(theme::note(format!("{} is tracked in {of}: its marks are there", target.label)));
         }
     });
 }
