@@ -20,7 +20,7 @@ use sightline_world::scenario::{CameraRig, FurtherRig};
 use sightline_world::target_truth::TruthSource;
 use sightline_world::{Eye, NoiseSeed, Rig, Scenario, choose_targets, library};
 
-const NEVER: AtomicBool = AtomicBool::new(false);
+static NEVER: AtomicBool = AtomicBool::new(false);
 
 fn name(text: &str) -> CameraName {
     text.parse().unwrap()
