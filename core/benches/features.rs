@@ -147,7 +147,7 @@ fn scene() -> &'static (Scene, Vec<Updated>) {
         let scene = Scene::new();
         let drive = Drive { scene: &scene, store: &scene.store };
         let carried = |x: f64| {
-            let designation = Designation { step: 0, pixel: Pixel::new(x, 600.0) };
+            let designation = Designation::new(0, Pixel::new(x, 600.0));
             let first = pipeline::designate(&drive, designation, settings()).expect("there is ground");
             (2..STOPS).fold(first.update, |last, _| pipeline::run_step(&drive, &last, settings()).update)
         };

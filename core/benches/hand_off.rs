@@ -55,7 +55,7 @@ fn scene() -> &'static Scene {
         let pixel = choose_targets(world, &scenario, traverse.index())[0];
         let settings =
             preset("combined").and_then(sightline_track::presets::Preset::settings).expect("a preset");
-        let steps = track::run(&traverse, Designation { step: 0, pixel }, &settings).expect("a run");
+        let steps = track::run(&traverse, Designation::new(0, pixel), &settings).expect("a run");
         Scene { _folder: folder, traverse, settings, steps }
     })
 }

@@ -152,7 +152,7 @@ fn scene() -> &'static (Plane, Updated) {
     static SCENE: OnceLock<(Plane, Updated)> = OnceLock::new();
     SCENE.get_or_init(|| {
         let plane = Plane::new();
-        let designation = Designation { step: 0, pixel: PIXEL };
+        let designation = Designation::new(0, PIXEL);
         let first = pipeline::designate(&plane, designation, &Settings::default());
         let updated = first.expect("the target can be designated").update;
         (plane, updated)

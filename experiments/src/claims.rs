@@ -94,7 +94,7 @@ pub(crate) fn world_claim(scenario: &Scenario, settings: &Settings, folder: &Pat
 
 /// Tracks one target to the last stop; `None` if it was refused.
 fn end_of(traverse: &Traverse, pixel: Pixel, settings: &Settings) -> Result<Option<End>> {
-    let Ok(first) = track::designate(traverse, Designation { step: 0, pixel }, settings) else {
+    let Ok(first) = track::designate(traverse, Designation::new(0, pixel), settings) else {
         return Ok(None);
     };
     let mut last = first.clone();

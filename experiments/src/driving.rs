@@ -104,7 +104,7 @@ impl Drives<'_> {
         let targets = traverse.world().map(|world| choose_targets(world, scenario, traverse.index()));
         let pixel = targets.and_then(|targets| targets.first().copied());
         let pixel = pixel.ok_or_else(|| Error::Target("the world has no target".to_owned()))?;
-        let designation = Designation { step: 0, pixel };
+        let designation = Designation::new(0, pixel);
         let world = if self.obstacles {
             world
         } else {

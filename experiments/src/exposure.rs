@@ -59,7 +59,7 @@ pub(crate) fn exposure_report(scenario: &Scenario, world: &World) -> Result<Vec<
     let targets: Vec<Point3> =
         pixels.iter().filter_map(|pixel| surface_point(world, &first, *pixel)).collect();
     let modes = [ExposureMode::FullFrame, ExposureMode::Subframe]
-        .map(|exposure| CameraSettings { exposure, ..scenario.camera });
+        .map(|exposure| CameraSettings { exposure, ..scenario.camera.clone() });
     let mut times_s = [scenario.camera.auto_exposure.start_s; 2];
     let mut rows = Vec::new();
     for (number, stop) in index.stops.iter().enumerate() {

@@ -67,7 +67,7 @@ pub(crate) fn difficulty<D: Drive>(
     stride: usize,
 ) -> Difficulty {
     let drive = Staged::new(drive, Visit::Every(stride));
-    let run = |&pixel: &Pixel| track::run(&drive, Designation { step: 0, pixel }, settings).ok();
+    let run = |&pixel: &Pixel| track::run(&drive, Designation::new(0, pixel), settings).ok();
     let runs: Vec<Option<Vec<RunStep>>> = targets.par_iter().map(run).collect();
     let mut found = Difficulty {
         stride,

@@ -140,7 +140,7 @@ pub fn measure<D: Drive>(
 
 /// The last stop up to which the surface point under a pixel of the first image is seen at every stop.
 fn end_of<D: Drive>(drive: &D, pixel: Pixel, margin_px: f64) -> Option<usize> {
-    let point = drive.surface_point_in_site(0, pixel)?;
+    let point = drive.surface_point_in_site(0, None, pixel)?;
     let is_seen = |step: usize| {
         let Some(site_from_rover) = drive.true_site_from_rover(step) else { return false };
         let in_rover: Point3 = site_from_rover.inverse() * point;
@@ -150,9 +150,9 @@ fn end_of<D: Drive>(drive: &D, pixel: Pixel, margin_px: f64) -> Option<usize> {
                 (margin_px..=right).contains(&pixel.x) && (margin_px..=bottom).contains(&pixel.y)
             })
         };
-        is_inside(drive.true_left_camera(step))
+        drive.true_left_camera(step, None).is_some_and(is_inside)
             && is_inside(drive.cameras(step).1)
-            && drive.is_visible(step, &point)
+            && drive.is_visible(step, None, &point)
     };
     (1..drive.stop_count()).take_while(|step| is_seen(*step)).last()
 }
@@ -171,10 +171,10 @@ fn follow<D: Drive>(drive: &D, ground: &Ground, cell: &Cell, end: usize) -> Outc
         is_refused: true,
         is_kept: false,
         is_false: false,
-        shadow: drive.shadow_share(0, pixel, settings.template.template_size_px),
+        shadow: drive.shadow_share(0, None, pixel, settings.template.template_size_px),
         measured: numbers.filter(|(_, value)| value.is_finite()).collect(),
     };
-    let Ok(first) = track::designate(drive, Designation { step: 0, pixel }, settings) else {
+    let Ok(first) = track::designate(drive, Designation::new(0, pixel), settings) else {
         return outcome;
     };
     outcome.is_refused = false;

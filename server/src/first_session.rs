@@ -58,7 +58,7 @@ fn designate(state: &AppState, live: &Arc<LiveSession>, scenario: &Scenario) -> 
     let pixel = choose_targets(world, scenario, traverse.index()).first().copied();
     let pixel = pixel.ok_or_else(|| Error::Request("the scenario's rule finds no target".to_owned()))?;
     let settings = Settings::default();
-    let designation = Designation { step: 0, pixel };
+    let designation = Designation::new(0, pixel);
     let first = runner::designate(&live.traverse(), designation, &settings, &CancelFlag::default())?;
     let problem = |error: crate::problem::ApiError| Error::Request(error.problem().detail.clone());
     let added = state.change(live, |session| {

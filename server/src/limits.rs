@@ -179,7 +179,11 @@ impl Limits {
             return Err(Error::Request(format!("{folder} has {stops} stops. {raise}")));
         }
         for step in 0..stops {
-            for camera in [traverse.left_camera(step), traverse.right_camera(step)] {
+            let further = traverse
+                .further_cameras(step)
+                .flat_map(|camera| std::iter::once(camera.left).chain(camera.right));
+            for camera in [traverse.left_camera(step), traverse.right_camera(step)].into_iter().chain(further)
+            {
                 let [width, height] = camera.size;
                 if u64::from(width) * u64::from(height) > self.image_pixels.value {
                     let raise = self.image_pixels.raise();

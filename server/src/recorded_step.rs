@@ -66,7 +66,8 @@ impl RecordedStep {
     pub(crate) fn prepare(&mut self, cancel: &CancelFlag) -> ApiResult<()> {
         // A step of a paused drive is computed again up to the pause.
         if self.recorded.paused_before().is_none_or(|before| before > CycleStage::Capture) {
-            self.live.traverse().make_ready(self.recorded.step, cancel)?;
+            let camera = self.recorded.update.target.designation.camera;
+            self.live.traverse().make_camera_ready(self.recorded.step, camera, cancel)?;
         }
         if let Some(last) = &self.last {
             self.last = Some(runner::with_image(&self.live.traverse(), last)?);
@@ -84,7 +85,8 @@ impl RecordedStep {
         }
         let open = self.live.traverse();
         let traverse = &open.traverse;
-        let image = traverse.capture_one(self.recorded.step, true)?;
+        let image =
+            traverse.capture_one(self.recorded.step, self.recorded.update.target.designation.camera, true)?;
         let renewals = self.renewals()?;
         let oldest = renewals.len().saturating_sub(count);
         let kept = renewals.iter().enumerate().filter(|(i, _)| *i == 0 || *i >= oldest).map(|(_, step)| step);

@@ -10,6 +10,7 @@ use std::sync::{Arc, Condvar, Mutex, OnceLock, PoisonError, Weak};
 use std::time::Duration;
 
 use sightline_api::event::Event;
+use sightline_geometry::camera::CameraName;
 use sightline_geometry::error::{Error, Result};
 use sightline_recordings::Traverse;
 use tokio::sync::broadcast;
@@ -76,22 +77,35 @@ impl OpenTraverse {
         self.is_closed.load(Ordering::Relaxed)
     }
 
-    /// Makes sure that the images of a stop are there; a recorded stop is always ready.
+    /// Makes sure that the images of a stop's main pair are there; a recorded stop is always ready.
     ///
     /// # Errors
     /// As [`Traverse::render_step`]; [`Error::Cancelled`] soon after `cancel` is set.
     pub(crate) fn make_ready(&self, step: usize, cancel: &AtomicBool) -> Result<()> {
-        if self.is_ready(step) {
+        self.make_camera_ready(step, None, cancel)
+    }
+
+    /// The same for the main pair or a further camera; a stop that lacks the camera is ready.
+    ///
+    /// # Errors
+    /// As [`Self::make_ready`].
+    pub(crate) fn make_camera_ready(
+        &self,
+        step: usize,
+        camera: Option<CameraName>,
+        cancel: &AtomicBool,
+    ) -> Result<()> {
+        if self.is_ready(step, camera) {
             return Ok(());
         }
         self.take_turn(step, cancel, None)?;
-        self.render(step, cancel)
+        self.render(step, camera, cancel)
     }
 
     /// The same in the background: gives way to [`Self::make_ready`] with [`Error::Cancelled`].
     fn make_ready_in_background(&self, step: usize, cancel: &Arc<AtomicBool>) -> Result<()> {
         self.take_turn(step, cancel, Some(cancel))?;
-        self.render(step, cancel)
+        self.render(step, None, cancel)
     }
 
     /// How many stops are ready, and whether `ready` has just become so.
@@ -102,8 +116,8 @@ impl OpenTraverse {
         Event::RenderProgress { traverse: self.id.clone(), k, n, ready }
     }
 
-    fn is_ready(&self, step: usize) -> bool {
-        step >= self.traverse.stop_count() || self.traverse.is_ready(step)
+    fn is_ready(&self, step: usize, camera: Option<CameraName>) -> bool {
+        step >= self.traverse.stop_count() || self.traverse.is_rendered(step, camera)
     }
 
     fn take_turn(&self, step: usize, cancel: &AtomicBool, yields: Option<&Arc<AtomicBool>>) -> Result<()> {
@@ -129,18 +143,20 @@ impl OpenTraverse {
     }
 
     /// Renders in this thread's turn, which ends here, also by a panic.
-    fn render(&self, step: usize, cancel: &AtomicBool) -> Result<()> {
+    fn render(&self, step: usize, camera: Option<CameraName>, cancel: &AtomicBool) -> Result<()> {
         let _turn = EndOfTurn(self);
-        if self.is_ready(step) {
+        if self.is_ready(step, camera) {
             return Ok(());
         }
-        let render = || self.traverse.render_step(step, cancel);
+        let render = || self.traverse.render_camera(step, camera, cancel);
         match pool() {
             Some(pool) => pool.install(render),
             None => render(),
         }?;
-        // Nobody may be listening.
-        let _ = self.events.send(self.progress(Some(step)));
+        if camera.is_none() {
+            // Nobody may be listening.
+            let _ = self.events.send(self.progress(Some(step)));
+        }
         Ok(())
     }
 }

@@ -15,6 +15,7 @@ use std::sync::{Arc, Mutex};
 use sightline_api::event::Event;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
+use sightline_rover::pair;
 use sightline_session::step::RunStep;
 use sightline_session::track::{self, NextStep};
 use sightline_session::view::waiting_for;
@@ -235,10 +236,11 @@ impl Runner {
         let traverse = &open.traverse;
         let step = pending.last.step + 1;
         let has_images = pending.before.is_none_or(|before| before > CycleStage::Capture);
-        if has_images && !traverse.is_ready(step) {
+        let camera = pending.first.update.target.designation.camera;
+        if has_images && !traverse.is_rendered(step, camera) {
             self.tell(progress(live, target, run, format!("rendering stop {step}")));
             // Any other failure is met again by the step itself, which records it as the stop's fault.
-            if let Err(Error::Cancelled) = live.traverse().make_ready(step, flag) {
+            if let Err(Error::Cancelled) = open.make_camera_ready(step, camera, flag) {
                 return Err(Error::Cancelled);
             }
         }
@@ -299,13 +301,13 @@ pub(crate) fn designate(
     settings: &Settings,
     cancel: &CancelFlag,
 ) -> Result<RunStep> {
-    let (step, pixel) = (designation.step, designation.pixel);
-    if step < open.traverse.stop_count() {
-        let left = open.traverse.left_camera(step);
-        // A pixel outside is refused by the tracker; nothing needs to be rendered for that.
-        if pixel.is_inside(left.width(), left.height()) {
-            open.make_ready(step, cancel)?;
-        }
+    let Designation { step, pixel, camera } = designation;
+    if step < open.traverse.stop_count()
+        // A missing pair or a pixel outside is refused by the tracker; nothing needs to be rendered for that.
+        && let Ok(pair) = pair::of_stop(&open.traverse, step, camera)
+        && pixel.is_inside(pair.left.width(), pair.left.height())
+    {
+        open.make_camera_ready(step, camera, cancel)?;
     }
     let cancel = Cancel::from(cancel.as_ref());
     track::designate_until(&open.traverse, designation, settings, cancel).map(without_pair)
@@ -318,7 +320,8 @@ pub(crate) fn designate(
 pub(crate) fn with_image(open: &OpenTraverse, step: &Arc<RunStep>) -> Result<Arc<RunStep>> {
     let mut step = Arc::clone(step);
     if let Some(stop) = step.update.target.memory.lacks_image_of() {
-        let image = open.traverse.capture(stop)?.left;
+        let camera = step.update.target.designation.camera;
+        let image = open.traverse.capture_one(stop, camera, true)?;
         Arc::make_mut(&mut step).update.target.memory.set_image(image);
     }
     Ok(step)

@@ -92,6 +92,30 @@ fn the_navcam_pair_opens_as_one_convergent_stop() {
 }
 
 #[test]
+fn a_picture_of_the_hazcams_from_the_same_place_is_a_further_camera() {
+    let Some(source) = data::set("mer1-navcam-sol4087-pair", "the hazcam of the import") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let (_, traverse) = imported(&source, folder.path());
+    let cameras: Vec<_> = traverse.further_cameras(0).collect();
+    assert_eq!(cameras.len(), 1);
+    // The other eye of that moment is not in the folder: a single camera.
+    assert_eq!((cameras[0].name.as_str(), cameras[0].right), ("front_hazcam_left", None));
+    let product = Product::read(&source.join("1F490747543EFFCNY9P1214L0M1.IMG")).unwrap();
+    let image = traverse.capture_one(0, Some(cameras[0].name), true).unwrap();
+    let raster = product.read_raster().unwrap();
+    assert_eq!(image.dimensions(), (raster.width, raster.height));
+    for (dn, fraction) in raster.samples.iter().zip(image.as_raw()) {
+        assert!((f64::from(*fraction) * 4095.0 - f64::from(*dn)).abs() < 1e-3);
+    }
+    // Carried from the rover frame of its own label into that of the stop.
+    let rover_from_site = traverse.site_from_rover(0).inverse();
+    let expected =
+        product.camera().unwrap().moved(&(rover_from_site * product.site_from_rover().unwrap().to_pose()));
+    let apart_m = (expected.model.centre() - cameras[0].left.model.centre()).norm();
+    assert!(apart_m < 1e-9, "{apart_m} m");
+}
+
+#[test]
 fn matched_points_project_to_where_they_were_matched() {
     for (set, count, expected_px) in
         [("mer1-navcam-sol4087-pair", 616, 0.30), ("mer2-navcam-sol1869", 621, 0.85)]

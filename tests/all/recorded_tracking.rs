@@ -24,7 +24,7 @@ fn imported(set: &Path, folder: &Path) -> Traverse {
 }
 
 fn designate(traverse: &Traverse, x: f64, y: f64) -> sightline_geometry::error::Result<Vec<RunStep>> {
-    track::run(traverse, Designation { step: 0, pixel: Pixel::new(x, y) }, &Settings::default())
+    track::run(traverse, Designation::new(0, Pixel::new(x, y)), &Settings::default())
 }
 
 /// The target in the tree: its branches are outlines before a wall, a target against R20. It may be lost, not falsely
@@ -93,7 +93,7 @@ fn pixels_of_one_opportunity_frame_are_found_in_the_other_within_half_a_pixel() 
     let mut distances = Vec::new();
     for row in matches.iter().step_by(8) {
         let n = &row.numbers;
-        let designation = Designation { step: 0, pixel: Pixel::new(n[0], n[1]) };
+        let designation = Designation::new(0, Pixel::new(n[0], n[1]));
         let Ok(first) = track::designate(&traverse, designation, &Settings::default()) else { continue };
         let found = first.located().and_then(|located| located.right_pixel).unwrap();
         let score = first.row().stereo_score.unwrap();

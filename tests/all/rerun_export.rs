@@ -41,7 +41,7 @@ static FIXTURE: LazyLock<Fixture> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
     let drive = Troubled { missing: vec![MISSING], covered: vec![COVERED], ..Troubled::short(folder.path()) };
     let run = |pixel: &Pixel| {
-        let designation = Designation { step: 0, pixel: *pixel };
+        let designation = Designation::new(0, *pixel);
         let steps = track::run(&drive, designation, &Settings::default()).unwrap();
         steps.into_iter().map(Arc::new).collect()
     };

@@ -163,7 +163,7 @@ fn the_first_drive_loses_its_target_where_the_heading_jumps_and_a_wider_search_w
     let run = |changes: &[&str]| {
         let changes = changes.iter().map(|text| parse_assignment(text)).collect::<Result<_, _>>().unwrap();
         let settings = Settings::default().with(&changes).unwrap();
-        let mut steps = vec![track::designate(&staged, Designation { step: 0, pixel }, &settings).unwrap()];
+        let mut steps = vec![track::designate(&staged, Designation::new(0, pixel), &settings).unwrap()];
         for step in 0..3 {
             steps.push(track::advance(&staged, &steps[0], &steps[step], &settings));
         }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use sightline_geometry::camera::{Camera, Mast, MastAngles};
+use sightline_geometry::camera::{Camera, CameraName, Mast, MastAngles};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::{Pixel, Point3, Pose};
@@ -103,13 +103,13 @@ impl TruthSource for Troubled {
     fn true_site_from_rover(&self, step: usize) -> Option<Pose> {
         TruthSource::true_site_from_rover(&self.traverse, step)
     }
-    fn true_left_camera(&self, step: usize) -> &Camera {
-        TruthSource::true_left_camera(&self.traverse, step)
+    fn true_left_camera(&self, step: usize, camera: Option<CameraName>) -> Option<&Camera> {
+        TruthSource::true_left_camera(&self.traverse, step, camera)
     }
-    fn surface_point_in_site(&self, step: usize, pixel: Pixel) -> Option<Point3> {
-        TruthSource::surface_point_in_site(&self.traverse, step, pixel)
+    fn surface_point_in_site(&self, step: usize, camera: Option<CameraName>, pixel: Pixel) -> Option<Point3> {
+        TruthSource::surface_point_in_site(&self.traverse, step, camera, pixel)
     }
-    fn is_visible(&self, step: usize, point_in_site: &Point3) -> bool {
-        TruthSource::is_visible(&self.traverse, step, point_in_site)
+    fn is_visible(&self, step: usize, camera: Option<CameraName>, point_in_site: &Point3) -> bool {
+        TruthSource::is_visible(&self.traverse, step, camera, point_in_site)
     }
 }

@@ -31,7 +31,7 @@ use crate::location::{
     AtStudyJob, AtTarget, AtTraverse, AtViewerFile,
 };
 use crate::program::{Health, Version};
-use crate::query::{FirstRow, FirstStop, ImageDepth, MapLimits, MapPixel, SessionPart, ValueName};
+use crate::query::{FirstRow, FirstStop, ImageWish, MapLimits, MapPixel, SessionPart, ValueName};
 use crate::wire::{
     Designated, Login, NewDrive, NewRun, NewSession, NewTarget, NewTraverse, RerunStream, SessionEntry,
     StopDetail, TraverseEntry, TraverseView,
@@ -102,7 +102,7 @@ endpoints! {
     /// A stop with its cameras.
     ShowStop: Get "/traverses/{id}/steps/{step}", AtStop => StopDetail;
     /// An image of a stop as PNG.
-    ShowImage: Get "/traverses/{id}/steps/{step}/images/{file}", AtImage, query ImageDepth => File;
+    ShowImage: Get "/traverses/{id}/steps/{step}/images/{file}", AtImage, query ImageWish => File;
     /// Renders the stops from this one on before all others.
     Prefetch: Post "/traverses/{id}/prefetch", AtTraverse, query FirstStop => Done;
     /// The trackability of a stop's left image, as far as it is computed.

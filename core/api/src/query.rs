@@ -1,6 +1,7 @@
 //! Query parameters; unknown ones are refused.
 
 use serde::{Deserialize, Serialize};
+use sightline_geometry::camera::CameraName;
 use utoipa::IntoParams;
 
 /// What of a run is asked for.
@@ -13,15 +14,19 @@ pub struct FirstRow {
     pub from_row: usize,
 }
 
-/// How an image is wanted.
+/// Which image of a stop is wanted, and how.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
-pub struct ImageDepth {
+pub struct ImageWish {
     /// Bits of a pixel: 8 (the default) or 16.
     #[serde(default)]
     #[param(minimum = 8, maximum = 16, multiple_of = 8)]
     pub bits: Option<u8>,
+    /// A camera of the stop beside its main pair, by its name; left out: the main pair.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[param(value_type = Option<String>)]
+    pub camera: Option<CameraName>,
 }
 
 /// Which stops are wanted soon.

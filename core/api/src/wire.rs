@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use sightline_geometry::camera::{Camera, MastAngles};
+use sightline_geometry::camera::{Camera, CameraName, MastAngles};
 use sightline_geometry::frames::{Pixel, PoseRecord};
 use sightline_geometry::stereo_geometry::StereoGeometry;
 use sightline_rover::designate::Place;
@@ -97,6 +97,33 @@ pub struct StopView {
     pub right_size: [u32; 2],
     /// Whether the images are there; those of a simulated traverse are rendered when they are first asked for.
     pub ready: bool,
+    /// The cameras beside the main pair.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cameras: Vec<StopCameraView>,
+}
+
+/// A camera of a stop beside its main pair.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct StopCameraView {
+    /// Its name.
+    pub name: CameraName,
+    /// Size of its left or only image (width, height), px.
+    pub left_size: [u32; 2],
+    /// Size of its right image (width, height), px; null for a single camera, in which nothing can be tracked.
+    pub right_size: Option<[u32; 2]>,
+    /// The angles of the mast; null for a camera on the body.
+    pub mast: Option<MastAngles>,
+}
+
+/// The models of a camera beside the main pair, in the rover frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct StopCameraModels {
+    /// Its name.
+    pub name: CameraName,
+    /// The left or only camera, m and px.
+    pub left: Camera,
+    /// The right camera, m and px; null for a single camera.
+    pub right: Option<Camera>,
 }
 
 /// One stop with its cameras.
@@ -110,6 +137,9 @@ pub struct StopDetail {
     pub right: Camera,
     /// The angles of the mast; none without a mast.
     pub mast: Option<MastAngles>,
+    /// The models of the cameras beside the main pair.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cameras: Vec<StopCameraModels>,
 }
 
 /// Exchanges the access token for a cookie. No `Debug`: the token is a secret.
@@ -134,6 +164,9 @@ pub struct NewSession {
 pub struct NewTarget {
     /// The stop at which it is designated.
     pub step: usize,
+    /// The pair of the stop in which it is designated and tracked; left out: the main pair.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<CameraName>,
     /// Its position in the left image, px.
     #[serde(default)]
     pub pixel: Option<Pixel>,
@@ -162,6 +195,7 @@ impl NewTarget {
     pub fn at_pixel(step: usize, pixel: Pixel) -> Self {
         Self {
             step,
+            camera: None,
             pixel: Some(pixel),
             mast: None,
             point_in_rover: None,
@@ -174,6 +208,7 @@ impl NewTarget {
     /// What was said of the target.
     pub fn place(&self) -> Place {
         Place {
+            camera: self.camera,
             pixel: self.pixel,
             mast: self.mast,
             point_in_rover: self.point_in_rover,

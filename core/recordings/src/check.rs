@@ -8,9 +8,11 @@ use std::path::Path;
 use nalgebra::Vector3;
 
 use super::files::{read_text, resolve};
-use sightline_geometry::camera::{Camera, text};
+use sightline_geometry::camera::{Camera, CameraName, MastAngles, text};
 use sightline_geometry::frames::{POSITION_LIMIT_M, PoseRecord};
-use sightline_world::traverse::{CameraSource, FORMAT_VERSION, Stop, StopLight, TraverseIndex, View};
+use sightline_world::traverse::{
+    CameraSource, FORMAT_VERSION, FURTHER_CAMERAS_LIMIT, Stop, StopCamera, StopLight, TraverseIndex, View,
+};
 
 /// The largest width or height of an image, px.
 const IMAGE_SIDE_LIMIT: u32 = 16_384;
@@ -35,6 +37,32 @@ pub(super) struct StopCameras {
     pub(super) right: Camera,
     pub(super) true_left: Option<Camera>,
     pub(super) true_right: Option<Camera>,
+    /// In the order of the index.
+    pub(super) further: Vec<FurtherCameras>,
+}
+
+/// A further pair of a stop, or a single camera, in the rover frame, with O made unit.
+#[derive(Clone, Debug)]
+pub(super) struct FurtherCameras {
+    pub(super) name: CameraName,
+    pub(super) left: Camera,
+    /// `None` for a single camera.
+    pub(super) right: Option<Camera>,
+    pub(super) true_left: Option<Camera>,
+    pub(super) true_right: Option<Camera>,
+}
+
+impl FurtherCameras {
+    /// The true left camera; the given one where no truth is recorded.
+    pub(super) fn true_left(&self) -> &Camera {
+        self.true_left.as_ref().unwrap_or(&self.left)
+    }
+
+    /// The true right camera; the given one where no truth is recorded, `None` for a single camera.
+    pub(super) fn true_right(&self) -> Option<&Camera> {
+        let given = self.right.as_ref()?;
+        Some(self.true_right.as_ref().unwrap_or(given))
+    }
 }
 
 impl StopCameras {
@@ -46,6 +74,11 @@ impl StopCameras {
     /// The true camera of the right image; the given one where no truth is recorded.
     pub(super) fn true_right(&self) -> &Camera {
         self.true_right.as_ref().unwrap_or(&self.right)
+    }
+
+    /// The further camera of this name.
+    pub(super) fn named(&self, name: CameraName) -> Option<&FurtherCameras> {
+        self.further.iter().find(|camera| camera.name == name)
     }
 }
 
@@ -93,11 +126,8 @@ pub(super) fn check_stop_numbers(stop: &Stop) -> Result<(), String> {
         return Err(format!("time_s: is {}, but it must be a finite number", stop.time_s));
     }
     check_pose("site_from_rover", &stop.site_from_rover)?;
-    if let Some(angles) = stop.mast_angles
-        && !(angles.azimuth_rad.is_finite() && angles.elevation_rad.is_finite())
-    {
-        return Err("mast_angles: must be finite numbers".to_owned());
-    }
+    check_angles(stop.mast_angles)?;
+    check_names(&stop.cameras)?;
     if let Some(light) = &stop.light {
         check_light(light)?;
     }
@@ -106,6 +136,31 @@ pub(super) fn check_stop_numbers(stop: &Stop) -> Result<(), String> {
     let mut places = truth.wheel_places_m.iter().flatten().flatten().flatten();
     if places.any(|value| !(value.is_finite() && value.abs() <= POSITION_LIMIT_M)) {
         return Err(format!("truth.wheel_places_m: must be numbers within {POSITION_LIMIT_M:.0e} m"));
+    }
+    Ok(())
+}
+
+fn check_angles(angles: Option<MastAngles>) -> Result<(), String> {
+    if angles.is_none_or(|angles| angles.azimuth_rad.is_finite() && angles.elevation_rad.is_finite()) {
+        return Ok(());
+    }
+    Err("mast_angles: must be finite numbers".to_owned())
+}
+
+/// Checks number, names and mast angles of a stop's further cameras.
+fn check_names(cameras: &[StopCamera]) -> Result<(), String> {
+    let count = cameras.len();
+    if count > FURTHER_CAMERAS_LIMIT {
+        return Err(format!(
+            "cameras: there are {count}, but a stop may have at most {FURTHER_CAMERAS_LIMIT}"
+        ));
+    }
+    for (k, camera) in cameras.iter().enumerate() {
+        let name = camera.name;
+        if cameras[..k].iter().any(|other| other.name == name) {
+            return Err(format!("cameras[{k}].name: {name} is the name of another camera of this stop"));
+        }
+        check_angles(camera.mast_angles).map_err(|problem| format!("cameras[{k}].{problem}"))?;
     }
     Ok(())
 }
@@ -126,17 +181,38 @@ fn check_light(light: &StopLight) -> Result<(), String> {
 pub(super) fn check_stop(stop: &Stop, folder: &Path) -> Result<StopCameras, String> {
     check_stop_numbers(stop)?;
     let truth = stop.truth.as_ref();
-    let true_camera = |side: &str, camera: Option<&Camera>| {
-        camera.cloned().map(|camera| checked(camera).map_err(|problem| format!("truth.{side}: {problem}")))
+    let further = |(k, camera): (usize, &StopCamera)| {
+        check_further(camera, folder).map_err(|problem| format!("cameras[{k}].{problem}"))
     };
     Ok(StopCameras {
         left: check_view("left", &stop.left, folder)?,
         right: check_view("right", &stop.right, folder)?,
-        true_left: true_camera("left_camera", truth.and_then(|truth| truth.left_camera.as_ref()))
-            .transpose()?,
-        true_right: true_camera("right_camera", truth.and_then(|truth| truth.right_camera.as_ref()))
-            .transpose()?,
+        true_left: check_true_camera(
+            "truth.left_camera",
+            truth.and_then(|truth| truth.left_camera.as_ref()),
+        )?,
+        true_right: check_true_camera(
+            "truth.right_camera",
+            truth.and_then(|truth| truth.right_camera.as_ref()),
+        )?,
+        further: stop.cameras.iter().enumerate().map(further).collect::<Result<_, _>>()?,
     })
+}
+
+fn check_further(camera: &StopCamera, folder: &Path) -> Result<FurtherCameras, String> {
+    let right = camera.right.as_ref().map(|right| check_view("right", right, folder));
+    Ok(FurtherCameras {
+        name: camera.name,
+        left: check_view("left", &camera.left, folder)?,
+        right: right.transpose()?,
+        true_left: check_true_camera("true_left_camera", camera.true_left_camera.as_ref())?,
+        true_right: check_true_camera("true_right_camera", camera.true_right_camera.as_ref())?,
+    })
+}
+
+fn check_true_camera(field: &str, camera: Option<&Camera>) -> Result<Option<Camera>, String> {
+    let named = |problem| format!("{field}: {problem}");
+    camera.cloned().map(checked).transpose().map_err(named)
 }
 
 fn check_pose(field: &str, pose: &PoseRecord) -> Result<(), String> {
@@ -222,10 +298,10 @@ pub(super) fn warnings(index: &TraverseIndex, folder: &Path) -> Vec<String> {
     warnings.extend(jumps(index));
     if index.scenario.is_none() {
         let missing = |view: &View| !folder.join(&view.image).is_file();
-        let views = |stop: &Stop| usize::from(missing(&stop.left)) + usize::from(missing(&stop.right));
-        let count: usize = index.stops.iter().map(views).sum();
+        let views = || index.stops.iter().flat_map(Stop::views);
+        let count = views().filter(|view| missing(view)).count();
         if count > 0 {
-            let total = 2 * index.stops.len();
+            let total = views().count();
             warnings.push(format!("{count} of {total} images are missing; their stops cannot be tracked"));
         }
     }

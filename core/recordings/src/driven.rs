@@ -18,6 +18,7 @@ use sightline_rover::driving::{ActiveWorld, DriveReport, Motion, Stall};
 use sightline_rover::pipeline::Stops;
 use sightline_track::cycle_stage::CycleStage;
 use sightline_world::rover::driven::{DrivenStop, index_stops};
+use sightline_world::traverse::View;
 use sightline_world::{SCENARIO_FILE, Scenario, World};
 
 use crate::files::{read_text, write_atomically};
@@ -98,7 +99,7 @@ impl DrivenTraverse {
         let mut branch = Self::begin_in(world, &self.scenario, folder, cancel)?;
         branch.restore(self.driven[..count].to_vec())?;
         for stop in &self.traverse.index().stops[..count] {
-            for name in [&stop.left.image, &stop.right.image] {
+            for View { image: name, .. } in stop.views() {
                 // A missing image is rendered again with the same bits.
                 if let Ok(bytes) = std::fs::read(self.traverse.folder().join(name)) {
                     write_atomically(&folder.join(name), &bytes)?;
@@ -206,7 +207,7 @@ impl DrivenTraverse {
     /// Removes the images of the stops from `count` on: another drive will see something else there.
     fn forget_images(&self, count: usize) -> Result<()> {
         for stop in self.traverse.index().stops.iter().skip(count) {
-            for name in [&stop.left.image, &stop.right.image] {
+            for View { image: name, .. } in stop.views() {
                 let path: PathBuf = self.traverse.folder().join(name);
                 match std::fs::remove_file(&path) {
                     Err(source) if source.kind() != std::io::ErrorKind::NotFound => {

@@ -7,6 +7,7 @@
 mod check;
 mod driven;
 pub mod files;
+mod images;
 pub mod import;
 mod index_file;
 mod native;

@@ -50,37 +50,49 @@
 //! A simulated folder also gets `cache/`, from which nothing but time is lost when it is removed, and on demand
 //! `truth/`, the truth of every pixel (`truth_files.rs` documents it).
 //!
+//! A stop may have any number of cameras (up to 16) beside its main pair, each with a name of its own (`a` to `z`, `0` to `9`
+//! and `_`, at most 32 characters). The same name at another stop is the same camera; a stop may lack it.
+//!
+//! ```toml
+//! [[stops.cameras]]                         # after the other fields of the stop
+//! name = "front_hazcam"
+//! mast_angles = { azimuth_rad = 0.0, elevation_rad = 0.0 }  # left out: fixed to the body
+//! [stops.cameras.left]                      # as stops.left
+//! image = "images/0000_front_hazcam_left.png"
+//! camera = { file = "front_hazcam_left.cahvore" }
+//! [stops.cameras.right]                     # left out: a single camera, in which nothing can be tracked
+//! image = "images/0000_front_hazcam_right.png"
+//! camera = { file = "front_hazcam_right.cahvore" }
+//! # true_left_camera, true_right_camera: optional, as the cameras of stops.truth
+//! ```
+//!
 //! Opening reads the index and the cameras, never an image: a traverse with missing images opens, and the
-//! stops that have theirs can be used. Images are decoded when asked for; the pairs used last are kept in the store that
-//! the targets share ([`SharedStore`]), which has a limit in bytes.
+//! stops that have theirs can be used. `images.rs` reads the images.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 use super::check::{self, StopCameras};
-use super::files::resolve;
+use super::images::Stores;
 use super::index_file::{self, Existing, IndexFormat};
 use super::simulated::{Simulated, Stops};
 use sightline_geometry::camera::Camera;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pose;
 use sightline_track::cycle_stage::CycleStage;
-use sightline_track::locate::store::{Cache, SharedStore};
-use sightline_track::stages::capture::StereoPair;
-use sightline_vision::image::{GrayImage, io};
+use sightline_track::locate::store::Cache;
 use sightline_world::World;
-use sightline_world::traverse::{Stop, TraverseIndex, View};
+use sightline_world::traverse::{Stop, TraverseIndex};
 
 /// An opened traverse.
 pub struct Traverse {
-    folder: PathBuf,
-    index_path: PathBuf,
-    index: TraverseIndex,
-    cameras: Vec<StopCameras>,
+    pub(super) folder: PathBuf,
+    pub(super) index_path: PathBuf,
+    pub(super) index: TraverseIndex,
+    pub(super) cameras: Vec<StopCameras>,
     warnings: Vec<String>,
     /// Images, features, surfaces and motions that were found before.
-    pub(super) store: SharedStore,
+    pub(super) stores: Stores,
     pub(super) simulated: Option<Simulated>,
     /// The first stage that a paused drive put off at the last stop.
     pub(super) awaits: Option<CycleStage>,
@@ -109,14 +121,14 @@ impl Traverse {
         let read_scenario = |name: &String| Simulated::open(&index, name, &folder);
         let simulated = index.scenario.as_ref().map(read_scenario).transpose().map_err(problem)?;
         let warnings = check::warnings(&index, &folder);
-        let store = SharedStore::default();
-        Ok(Self { folder, index_path, index, cameras, warnings, store, simulated, awaits: None })
+        let stores = Stores::new(&Arc::default(), &index);
+        Ok(Self { folder, index_path, index, cameras, warnings, stores, simulated, awaits: None })
     }
 
     /// The same traverse, which shares a cache with others.
     #[must_use]
     pub fn with_cache(mut self, cache: &Arc<Cache>) -> Self {
-        self.store = SharedStore::within(cache);
+        self.stores = Stores::new(cache, &self.index);
         self
     }
 
@@ -128,6 +140,7 @@ impl Traverse {
         let problem = |problem| Error::format(&self.index_path, format!("stops[{number}].{problem}"));
         let cameras = check::check_stop(&stop, &self.folder).map_err(problem)?;
         self.truncate(number);
+        self.stores.add_cameras_of(&stop);
         self.index.stops.push(stop);
         self.cameras.push(cameras);
         self.simulated.iter_mut().for_each(Simulated::add_stop);
@@ -140,7 +153,7 @@ impl Traverse {
             self.index.stops.truncate(count);
             self.cameras.truncate(count);
             self.simulated.iter_mut().for_each(|simulated| simulated.truncate(count));
-            self.store = SharedStore::default();
+            self.stores = Stores::new(&Arc::default(), &self.index);
         }
     }
 
@@ -208,107 +221,13 @@ impl Traverse {
         self.awaits.is_some() && step + 1 == self.stop_count()
     }
 
-    /// Whether the images of a stop need no rendering: always for recorded ones, whether they exist or not.
-    pub fn is_ready(&self, step: usize) -> bool {
-        let exists = |view: &View| resolve(&self.folder, &view.image).is_ok_and(|path| path.exists());
-        let stop = &self.index.stops[step];
-        self.simulated.is_none() || (exists(&stop.left) && exists(&stop.right))
-    }
-
-    /// Renders the images of a simulated stop that are missing; does nothing for a recorded one.
-    ///
-    /// # Errors
-    /// No such stop, images that cannot be written, or [`Error::Cancelled`] soon after `cancel` is set.
-    pub fn render_step(&self, step: usize, cancel: &AtomicBool) -> Result<()> {
-        self.stop_with_images(step)?;
-        match &self.simulated {
-            Some(simulated) if !self.is_ready(step) => simulated.render_missing(&self.stops(), step, cancel),
-            _ => Ok(()),
-        }
-    }
-
-    /// The stereo pair of a stop, in fractions of full scale; a simulated one is rendered where it is missing.
-    ///
-    /// # Errors
-    /// No such stop, or an image that is missing, damaged or not of its camera's size; the sentence names it relative to the
-    /// folder, because it becomes part of the step's record, which must not depend on where the folder is.
-    pub fn capture(&self, step: usize) -> Result<StereoPair> {
-        self.capture_until(step, &AtomicBool::new(false))
-    }
-
-    /// [`Traverse::capture`], which ends soon after `cancel` is set.
-    ///
-    /// # Errors
-    /// As [`Traverse::capture`], and [`Error::Cancelled`].
-    pub fn capture_until(&self, step: usize, cancel: &AtomicBool) -> Result<StereoPair> {
-        let stop = self.stop_with_images(step)?;
-        if let Some(pair) = self.kept_pair(step) {
-            return Ok(StereoPair::clone(&pair));
-        }
-        let cameras = &self.cameras[step];
-        let read = || {
-            self.render_step(step, cancel)?;
-            Ok(StereoPair {
-                left: Arc::new(self.read_image(step, "left", &stop.left, &cameras.left)?),
-                right: Arc::new(self.read_image(step, "right", &stop.right, &cameras.right)?),
-            })
-        };
-        let pair = read().map_err(|error| self.without_folder(error))?;
-        self.keep_pair(step, &pair);
-        Ok(pair)
-    }
-
-    /// One image of a stop, the left or the right one: what is wrong with the other does not matter.
-    ///
-    /// # Errors
-    /// As [`Self::capture`], of this image.
-    pub fn capture_one(&self, step: usize, is_left: bool) -> Result<Arc<GrayImage>> {
-        let stop = self.stop_with_images(step)?;
-        if let Some(pair) = self.kept_pair(step) {
-            return Ok(Arc::clone(if is_left { &pair.left } else { &pair.right }));
-        }
-        let named = |error| self.without_folder(error);
-        self.render_step(step, &AtomicBool::new(false)).map_err(named)?;
-        let cameras = &self.cameras[step];
-        let read = |is_left: bool| {
-            let (side, view, camera) = match is_left {
-                true => ("left", &stop.left, &cameras.left),
-                false => ("right", &stop.right, &cameras.right),
-            };
-            self.read_image(step, side, view, camera).map(Arc::new)
-        };
-        let wanted = read(is_left).map_err(named)?;
-        // The pair is kept, because its other image is usually wanted next.
-        if let Ok(other) = read(!is_left) {
-            let [left, right] = if is_left { [&wanted, &other] } else { [&other, &wanted] };
-            let pair = StereoPair { left: Arc::clone(left), right: Arc::clone(right) };
-            self.keep_pair(step, &pair);
-        }
-        Ok(wanted)
-    }
-
     /// The stops as the renderer sees them.
     pub(super) fn stops(&self) -> Stops<'_> {
         Stops { folder: &self.folder, index: &self.index, cameras: &self.cameras }
     }
 
-    /// The error with the path of its file relative to the folder.
-    fn without_folder(&self, error: Error) -> Error {
-        let relative = |path: PathBuf| match path.strip_prefix(&self.folder) {
-            Ok(inside) if inside != Path::new("") => inside.to_owned(),
-            Ok(_) => PathBuf::from("."),
-            Err(_) => path,
-        };
-        match error {
-            Error::Read { path, source } => Error::Read { path: relative(path), source },
-            Error::Write { path, source } => Error::Write { path: relative(path), source },
-            Error::Format { path, problem } => Error::Format { path: relative(path), problem },
-            other => other,
-        }
-    }
-
     /// A stop that has images, or gets them.
-    fn stop_with_images(&self, step: usize) -> Result<&Stop> {
+    pub(super) fn stop_with_images(&self, step: usize) -> Result<&Stop> {
         let stop = self.stop(step)?;
         if self.is_awaited(step) {
             let problem = format!("stop {step} has no images yet: the drive is paused before `capture`");
@@ -317,47 +236,11 @@ impl Traverse {
         Ok(stop)
     }
 
-    fn stop(&self, step: usize) -> Result<&Stop> {
+    pub(super) fn stop(&self, step: usize) -> Result<&Stop> {
         let count = self.stop_count();
         let missing =
             || Error::Request(format!("there is no step {step}; the traverse has 0 to {}", count - 1));
         self.index.stops.get(step).ok_or_else(missing)
-    }
-
-    fn kept_pair(&self, step: usize) -> Option<Arc<StereoPair>> {
-        self.store.kept(&step, &())
-    }
-
-    fn keep_pair(&self, step: usize, pair: &StereoPair) {
-        // The bytes of the cache are the limit.
-        self.store.keep(step, &(), usize::MAX, Arc::new(pair.clone()));
-    }
-
-    fn read_image(&self, step: usize, side: &str, view: &View, camera: &Camera) -> Result<GrayImage> {
-        let which = format!("the {side} image of step {step}");
-        // Checked again, because a link may have been put there since the folder was opened.
-        let path = resolve(&self.folder, &view.image).map_err(|problem| {
-            Error::format(&self.index_path, format!("stops[{step}].{side}.image: {problem}"))
-        })?;
-        let named = |error| match error {
-            Error::Read { path, source } => Error::format(path, format!("{which} cannot be read ({source})")),
-            Error::Format { path, problem } => Error::format(path, format!("{which}: {problem}")),
-            other => other,
-        };
-        let check = |[width, height]: [u32; 2]| {
-            let [wanted_width, wanted_height] = camera.size;
-            let problem = || {
-                format!(
-                    "{which} has {width} × {height} pixels, but its camera is for {wanted_width} × {wanted_height}"
-                )
-            };
-            ([width, height] == camera.size).then_some(()).ok_or_else(|| Error::format(&path, problem()))
-        };
-        // The header first: decoding takes memory for as many pixels as the file states.
-        check(io::png_size(&path).map_err(named)?)?;
-        let image = io::read_png_of_size(&path, self.index.full_scale_dn, camera.size).map_err(named)?;
-        check(image.dimensions().into())?;
-        Ok(image)
     }
 }
 

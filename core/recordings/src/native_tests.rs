@@ -5,7 +5,11 @@ use sightline_geometry::camera::{Cahv, Cahvor, CameraModel, text};
 use sightline_geometry::frames::{Point3, PoseRecord, Vector3};
 use sightline_geometry::odometry_error::OdometryError;
 use sightline_geometry::stereo_geometry::StereoGeometry;
-use sightline_world::traverse::{CameraSource, FORMAT_VERSION, StopTruth};
+use sightline_vision::image::{GrayImage, io};
+use sightline_world::traverse::{CameraSource, FORMAT_VERSION, StopTruth, View};
+
+#[path = "native_cameras_tests.rs"]
+mod cameras;
 
 const SIZE: [u32; 2] = [8, 6];
 
@@ -42,6 +46,7 @@ fn stop(step: usize) -> Stop {
             right_camera: None,
             wheel_places_m: None,
         }),
+        cameras: Vec::new(),
     }
 }
 
@@ -174,14 +179,14 @@ fn image_of_another_size_is_refused_by_its_header() {
     file[16..24].copy_from_slice(&[0, 0, 0x1f, 0x40, 0, 0, 0x1e, 0xdc]);
     std::fs::write(&path, file).unwrap();
     let traverse = Traverse::open(folder.path()).unwrap();
-    for message in [traverse.capture(0).unwrap_err(), traverse.capture_one(0, true).unwrap_err()] {
+    for message in [traverse.capture(0).unwrap_err(), traverse.capture_one(0, None, true).unwrap_err()] {
         let message = message.to_string();
         assert!(
             message.contains("0000_left.png: the left image of step 0 has 8000 × 7900 pixels"),
             "{message}"
         );
     }
-    assert!(traverse.capture_one(0, false).is_ok());
+    assert!(traverse.capture_one(0, None, false).is_ok());
 }
 
 #[test]
@@ -190,15 +195,19 @@ fn one_image_brings_the_pair_unless_the_other_is_damaged() {
     let path = |name: &str| folder.path().join(name);
     std::fs::write(path("images/0001_right.png"), "no image").unwrap();
     let traverse = Traverse::open(folder.path()).unwrap();
-    let right = traverse.capture_one(0, false).unwrap();
-    let left = traverse.capture_one(1, true).unwrap();
+    let right = traverse.capture_one(0, None, false).unwrap();
+    let left = traverse.capture_one(1, None, true).unwrap();
     for name in ["images/0000_left.png", "images/0000_right.png"] {
         std::fs::remove_file(path(name)).unwrap();
     }
     let pair = traverse.capture(0).unwrap();
     assert!(Arc::ptr_eq(&pair.right, &right) && pair.left.dimensions() == left.dimensions());
     assert!(
-        traverse.capture_one(1, false).unwrap_err().to_string().contains("0001_right.png: the right image")
+        traverse
+            .capture_one(1, None, false)
+            .unwrap_err()
+            .to_string()
+            .contains("0001_right.png: the right image")
     );
 }
 

@@ -12,6 +12,10 @@
 //! Under automatic exposure both eyes take the exposure of the left one, and each stop starts from the stop
 //! before: an image needs the left radiance of all stops up to its own.
 //!
+//! A further camera is exposed for itself: under fixed exposure its first left picture has the mean level, and the automatic
+//! one starts anew at each stop, so that no earlier picture need be rendered. Its noise and its pixels' response are those that
+//! the same rig would have as the main pair.
+//!
 //! Each stop has a lock, so that two who ask for the same stop do not render it twice. The lock is not waited
 //! for inside the thread pool: a pool thread that waits for rendering may be given other work to do, and if
 //! that asks for the same stop it would wait for itself. It renders the stop again instead, with the same
@@ -26,15 +30,16 @@ use serde::Serialize;
 
 use super::check::StopCameras;
 use super::files::{read_text, resolve, write_atomically};
+use super::images::{no_camera, views};
 use super::render_cache::{self, RenderCache};
-use sightline_geometry::camera::Camera;
+use sightline_geometry::camera::{Camera, CameraName};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_vision::image::{GrayImage, io};
-use sightline_world::camera::exposure::{Rates, automatic, fixed_s};
+use sightline_world::camera::exposure::{Rates, automatic, fixed_of_further_s, fixed_s};
 use sightline_world::moment::Moment;
 use sightline_world::scenario::ExposureMode;
-use sightline_world::traverse::{Stop, TraverseIndex};
+use sightline_world::traverse::{Stop, TraverseIndex, View};
 use sightline_world::{Eye, NoiseSeed, Region, Scenario, World, clean_radiance, develop_until};
 
 /// Pixels of a kept picture that are rendered anew before it is believed.
@@ -101,15 +106,26 @@ impl Simulated {
         Ok(self.world.get_or_init(|| world))
     }
 
-    /// Renders and writes the images of a stop that are not there yet.
-    pub(super) fn render_missing(&self, stops: &Stops<'_>, step: usize, cancel: &AtomicBool) -> Result<()> {
+    /// Renders and writes the images of a stop's main pair, or of a further camera, that are not there yet.
+    pub(super) fn render_missing(
+        &self,
+        stops: &Stops<'_>,
+        step: usize,
+        camera: Option<CameraName>,
+        cancel: &AtomicBool,
+    ) -> Result<()> {
         let _guard = lock(&self.locks[step]);
-        let stop = &stops.index.stops[step];
-        for (eye, name) in [(Eye::Left, &stop.left.image), (Eye::Right, &stop.right.image)] {
-            let path = resolve(stops.folder, name).map_err(|problem| Error::format(stops.folder, problem))?;
+        let (left, right) = views(&stops.index.stops[step], camera).ok_or_else(|| no_camera(step, camera))?;
+        for (eye, view) in [(Eye::Left, Some(left)), (Eye::Right, right)] {
+            let Some(View { image, .. }) = view else { continue };
+            let path =
+                resolve(stops.folder, image).map_err(|problem| Error::format(stops.folder, problem))?;
             if !path.exists() {
-                let time_s = self.exposure_s(stops, step, cancel)?;
-                let (camera, radiance) = self.radiance(stops, step, eye, cancel)?;
+                let time_s = match camera {
+                    None => self.exposure_s(stops, step, cancel)?,
+                    Some(name) => self.exposure_of_further_s(stops, step, name, cancel)?,
+                };
+                let (camera, radiance) = self.radiance(stops, step, (camera, eye), cancel)?;
                 let seed = NoiseSeed { step: step as u32, eye };
                 let image = develop_until(&radiance, &self.scenario, &camera, time_s, seed, cancel.into())?;
                 write_atomically(&path, &self.encode(&image)?)?;
@@ -132,7 +148,7 @@ impl Simulated {
             (known.len(), known.last().copied().unwrap_or(settings.auto_exposure.start_s))
         };
         for stop in first..=step {
-            let (camera, radiance) = self.radiance(stops, stop, Eye::Left, cancel)?;
+            let (camera, radiance) = self.radiance(stops, stop, (None, Eye::Left), cancel)?;
             let rates = Rates::new(&radiance, &self.scenario, &camera, Eye::Left, [0, 0]);
             let centre = stops.index.stops[stop].metered_px;
             time_s = automatic(&rates, settings, centre, time_s).time_s;
@@ -145,18 +161,39 @@ impl Simulated {
         Ok(time_s)
     }
 
+    /// The time for which both pictures of a further camera are exposed, s.
+    fn exposure_of_further_s(
+        &self,
+        stops: &Stops<'_>,
+        step: usize,
+        name: CameraName,
+        cancel: &AtomicBool,
+    ) -> Result<f64> {
+        let settings = &self.scenario.camera;
+        if settings.exposure == ExposureMode::Fixed {
+            let world = self.world_until(cancel.into())?;
+            let time_s = fixed_of_further_s(world, &self.scenario, name, cancel.into());
+            Cancel::from(cancel).check()?;
+            // An index may name a camera that the scenario does not have.
+            return Ok(time_s.unwrap_or_else(|| fixed_s(world, &self.scenario)));
+        }
+        let (camera, radiance) = self.radiance(stops, step, (Some(name), Eye::Left), cancel)?;
+        let rates = Rates::new(&radiance, &self.scenario, &camera, Eye::Left, [0, 0]);
+        Ok(automatic(&rates, settings, None, settings.auto_exposure.start_s).time_s)
+    }
+
     /// The camera of a picture in the site and its clean radiance: what was kept, or else rendered and kept.
     fn radiance(
         &self,
         stops: &Stops<'_>,
         step: usize,
-        eye: Eye,
+        picture: (Option<CameraName>, Eye),
         cancel: &AtomicBool,
     ) -> Result<(Camera, GrayImage)> {
         if cancel.load(Ordering::Relaxed) {
             return Err(Error::Cancelled);
         }
-        let camera = camera_in_site(stops, step, eye)?;
+        let camera = camera_in_site(stops, step, picture)?;
         let moment = Moment::of(step, &stops.index.stops).ok_or_else(|| Error::Request(needs_truth(step)))?;
         let world = self.world_until(cancel.into())?.at(&moment, &self.scenario);
         let render = |region: Region| clean_radiance(&world, &self.scenario, &camera, region, cancel);
@@ -207,14 +244,23 @@ pub(super) fn stop_key(moment: &Moment, stop: &Stop) -> impl Serialize {
 }
 
 /// The camera that truly takes a picture of a stop, in the site frame.
-pub(super) fn camera_in_site(stops: &Stops<'_>, step: usize, eye: Eye) -> Result<Camera> {
+pub(super) fn camera_in_site(
+    stops: &Stops<'_>,
+    step: usize,
+    (camera, eye): (Option<CameraName>, Eye),
+) -> Result<Camera> {
     let truth = stops.index.stops[step].truth.as_ref();
     let truth = truth.ok_or_else(|| Error::Request(needs_truth(step)))?;
     let cameras = &stops.cameras[step];
-    let in_rover = match eye {
-        Eye::Left => cameras.true_left(),
-        Eye::Right => cameras.true_right(),
+    let in_rover = match camera {
+        None if eye == Eye::Left => Some(cameras.true_left()),
+        None => Some(cameras.true_right()),
+        Some(name) => cameras.named(name).and_then(|camera| match eye {
+            Eye::Left => Some(camera.true_left()),
+            Eye::Right => camera.true_right(),
+        }),
     };
+    let in_rover = in_rover.ok_or_else(|| no_camera(step, camera))?;
     Ok(in_rover.moved(&truth.site_from_rover.to_pose()))
 }
 
@@ -241,6 +287,15 @@ pub(super) fn needs_truth(step: usize) -> String {
     format!("stops[{step}].truth: is missing, but a simulated stop is rendered from it")
 }
 
+/// The fields of a stop's views, in their order.
+fn sides(stop: &Stop) -> impl Iterator<Item = String> {
+    let further = stop.cameras.iter().enumerate().flat_map(|(k, camera)| {
+        let right = camera.right.as_ref().map(|_| format!("cameras[{k}].right"));
+        std::iter::once(format!("cameras[{k}].left")).chain(right)
+    });
+    ["left", "right"].map(str::to_owned).into_iter().chain(further)
+}
+
 /// Whether all images of an index can be rendered into files of their own.
 fn check_images(index: &TraverseIndex) -> Result<(), String> {
     let mut names = std::collections::HashSet::new();
@@ -248,7 +303,7 @@ fn check_images(index: &TraverseIndex) -> Result<(), String> {
         if stop.truth.is_none() {
             return Err(needs_truth(step));
         }
-        for (side, view) in [("left", &stop.left), ("right", &stop.right)] {
+        for (view, side) in stop.views().zip(sides(stop)) {
             if !view.image.ends_with(".png") {
                 return Err(format!("stops[{step}].{side}.image: must end in .png, because it is rendered"));
             }

@@ -65,9 +65,9 @@ fn a_block_in_the_way_hides_a_point_at_its_own_stops_only() {
         aside_m: 0.0,
     }];
     let traverse = create_simulated(&blocked, folder.path()).unwrap();
-    let point = traverse.surface_point_in_site(0, Pixel::new(63.5, 63.5)).unwrap();
-    assert!(traverse.is_visible(0, &point));
-    assert!(!traverse.is_visible(1, &point));
+    let point = traverse.surface_point_in_site(0, None, Pixel::new(63.5, 63.5)).unwrap();
+    assert!(traverse.is_visible(0, None, &point));
+    assert!(!traverse.is_visible(1, None, &point));
 }
 
 #[test]
@@ -88,8 +88,9 @@ fn the_shadow_on_a_window_is_that_of_its_points_and_is_warned_of() {
     let places = || (40..88).flat_map(|y| (40..88).map(move |x| (x, y)));
     let darkest = places().max_by_key(|(x, y)| count(*x, *y)).unwrap();
     let lit = places().min_by_key(|(x, y)| count(*x, *y)).unwrap();
-    let share =
-        |(x, y): (u32, u32)| traverse.shadow_share(0, Pixel::new(f64::from(x), f64::from(y)), 21).unwrap();
+    let share = |(x, y): (u32, u32)| {
+        traverse.shadow_share(0, None, Pixel::new(f64::from(x), f64::from(y)), 21).unwrap()
+    };
     for place in [darkest, lit] {
         let truth = count(place.0, place.1) as f64 / 441.0;
         assert!((share(place) - truth).abs() < 0.1, "{place:?}: {} of {truth}", share(place));
@@ -101,16 +102,16 @@ fn the_shadow_on_a_window_is_that_of_its_points_and_is_warned_of() {
 fn the_surface_under_a_pixel_is_seen_there_again_from_the_next_stop() {
     let folder = tempfile::tempdir().unwrap();
     let traverse = create_simulated(&scenario(), folder.path()).unwrap();
-    let point = traverse.surface_point_in_site(0, Pixel::new(63.5, 63.5)).unwrap();
+    let point = traverse.surface_point_in_site(0, None, Pixel::new(63.5, 63.5)).unwrap();
     for step in 0..2 {
         let rover_from_site = traverse.true_site_from_rover(step).unwrap().inverse();
         let pixel = traverse.true_left_camera(step).project(&(rover_from_site * point)).unwrap();
-        assert!(traverse.is_visible(step, &point));
-        let again = traverse.surface_point_in_site(step, pixel).unwrap();
+        assert!(traverse.is_visible(step, None, &point));
+        let again = traverse.surface_point_in_site(step, None, pixel).unwrap();
         assert!((again - point).norm() < 1e-6, "step {step}: {again} {point}");
     }
     let below_ground = point + Vector3::z();
-    assert!(!traverse.is_visible(0, &below_ground));
+    assert!(!traverse.is_visible(0, None, &below_ground));
 }
 
 #[test]
@@ -280,7 +281,7 @@ fn radiance_that_is_damaged_or_of_another_renderer_is_rendered_anew() {
     let cache = RenderCache::new(folder.path().join("cache"), 1 << 24);
     let stops = &from_own_cache.index().stops;
     let moment = Moment::of(0, stops).unwrap();
-    let camera = camera_in_site(&from_own_cache.stops(), 0, Eye::Left).unwrap();
+    let camera = camera_in_site(&from_own_cache.stops(), 0, (None, Eye::Left)).unwrap();
     let key = render_cache::key(&scenario(), &stop_key(&moment, &stops[0]), &camera);
     let mut brighter = cache.load(&key, &camera).unwrap();
     brighter.iter_mut().for_each(|value| *value *= 1.01);
@@ -309,7 +310,7 @@ fn both_eyes_share_an_exposure_that_does_not_depend_on_the_order_of_asking() {
     assert_eq!(backward.exposure_s(0, &never).unwrap(), Some(times[0]));
     assert!(times[0] < 2.0, "{times:?}");
     for (eye, picture) in [(Eye::Left, &last.left), (Eye::Right, &last.right)] {
-        let camera = camera_in_site(&forward.stops(), 1, eye).unwrap();
+        let camera = camera_in_site(&forward.stops(), 1, (None, eye)).unwrap();
         let whole = Region::whole(&camera);
         let radiance = clean_radiance(forward.world().unwrap(), &auto, &camera, whole, &never).unwrap();
         let seed = NoiseSeed { step: 1, eye };

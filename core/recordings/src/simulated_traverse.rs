@@ -11,7 +11,7 @@ use super::simulated::{needs_truth, read_scenario};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_world::moment::{Moment, sun_at};
-use sightline_world::traverse::StopLight;
+use sightline_world::traverse::{Stop, StopLight};
 use sightline_world::{SCENARIO_FILE, Scenario, World};
 
 /// Makes the folder of a simulated traverse, without images; opens it where it holds this scenario already.
@@ -40,7 +40,7 @@ pub fn create_simulated_until(scenario: &Scenario, folder: &Path, cancel: Cancel
     let index = sightline_world::index_until(scenario, &world, cancel);
     cancel.check()?;
     let index = index?;
-    for view in index.stops.iter().flat_map(|stop| [&stop.left, &stop.right]) {
+    for view in index.stops.iter().flat_map(Stop::views) {
         let path = folder.join(&view.image);
         if path.exists() {
             return Err(Error::format(path, "is there without a traverse; choose an empty folder"));

@@ -4,10 +4,13 @@
 //! so that no stage can look at it. A recorded traverse knows true poses at most: it has no surface, and
 //! nothing is known to hide a point.
 
-use sightline_geometry::camera::{Camera, Mast, MastAngles};
+use std::sync::atomic::AtomicBool;
+
+use sightline_geometry::camera::{Camera, CameraName, Mast, MastAngles};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
 use sightline_geometry::frames::{Pixel, Point3, Pose};
+use sightline_rover::pair::{self, FurtherCamera, FurtherImages, StopPair};
 use sightline_rover::pipeline::Stops;
 use sightline_track::locate::store::Shared;
 use sightline_track::stages::capture::StereoPair;
@@ -15,6 +18,7 @@ use sightline_world::surface_point;
 use sightline_world::target_truth::TruthSource;
 
 use super::Traverse;
+use super::check::FurtherCameras;
 use sightline_geometry::odometry_error::OdometryError;
 use sightline_geometry::stereo_geometry::StereoGeometry;
 
@@ -50,13 +54,45 @@ impl Stops for Traverse {
         self.index().stereo
     }
     fn shared(&self, step: usize) -> Option<Shared<'_>> {
-        Some(Shared { store: &self.store, stop: step })
+        self.stores.of(None).map(|store| Shared { store, stop: step })
     }
     fn capture(&self, step: usize, cancel: Cancel<'_>) -> Result<StereoPair> {
         match cancel.flag() {
             Some(flag) => self.capture_until(step, flag),
             None => self.capture(step),
         }
+    }
+    fn further_cameras(&self, step: usize) -> Vec<FurtherCamera<'_>> {
+        self.further_cameras(step).collect()
+    }
+    fn images_at_hand(&self, step: usize, name: CameraName) -> Option<FurtherImages> {
+        if !self.is_rendered(step, Some(name)) {
+            return None;
+        }
+        let left = self.capture_one(step, Some(name), true).ok()?;
+        Some((left, self.capture_one(step, Some(name), false).ok()))
+    }
+    fn further_pair(&self, step: usize, name: CameraName) -> Result<StopPair<'_>> {
+        let mut cameras = self.further_cameras(step);
+        let camera = cameras.find(|camera| camera.name == name).ok_or_else(|| pair::missing(step, name))?;
+        Ok(StopPair {
+            left: camera.left,
+            right: camera.right.ok_or_else(|| pair::single(step, name))?,
+            mast_angles: camera.mast_angles,
+            shared: self.stores.of(Some(name)).map(|store| Shared { store, stop: step }),
+        })
+    }
+    fn capture_further(&self, step: usize, name: CameraName, cancel: Cancel<'_>) -> Result<StereoPair> {
+        let never = AtomicBool::new(false);
+        self.capture_pair(step, Some(name), cancel.flag().unwrap_or(&never))
+    }
+}
+
+impl Traverse {
+    /// The true camera of a left image, at the true pose.
+    fn true_left_in_site(&self, step: usize, camera: Option<CameraName>) -> Option<Camera> {
+        let site_from_rover = self.true_site_from_rover(step)?;
+        Some(TruthSource::true_left_camera(self, step, camera)?.moved(&site_from_rover))
     }
 }
 
@@ -67,30 +103,36 @@ impl TruthSource for Traverse {
     fn true_site_from_rover(&self, step: usize) -> Option<Pose> {
         self.true_site_from_rover(step)
     }
-    fn true_left_camera(&self, step: usize) -> &Camera {
-        self.true_left_camera(step)
+    fn true_left_camera(&self, step: usize, camera: Option<CameraName>) -> Option<&Camera> {
+        match camera {
+            None => Some(self.true_left_camera(step)),
+            Some(name) => self.cameras[step].named(name).map(FurtherCameras::true_left),
+        }
     }
-    fn surface_point_in_site(&self, step: usize, pixel: Pixel) -> Option<Point3> {
-        let site_from_rover = self.true_site_from_rover(step)?;
-        surface_point(self.world()?, &self.true_left_camera(step).moved(&site_from_rover), pixel)
+    fn surface_point_in_site(&self, step: usize, camera: Option<CameraName>, pixel: Pixel) -> Option<Point3> {
+        surface_point(self.world()?, &self.true_left_in_site(step, camera)?, pixel)
     }
-    fn is_visible(&self, step: usize, point_in_site: &Point3) -> bool {
+    fn is_visible(&self, step: usize, camera: Option<CameraName>, point_in_site: &Point3) -> bool {
         // What an event puts in the way stands there at some stops only.
         let at_stop = if self.has_occluders() { self.world_at(step).ok() } else { None };
-        let (Some(world), Some(site_from_rover)) =
-            (at_stop.as_ref().or_else(|| self.world()), self.true_site_from_rover(step))
+        let (Some(world), Some(camera_in_site)) =
+            (at_stop.as_ref().or_else(|| self.world()), self.true_left_in_site(step, camera))
         else {
             return true;
         };
-        let camera_in_site = self.true_left_camera(step).moved(&site_from_rover);
         // The ray of the point's pixel starts where the light enters, which is not C in a fisheye lens.
         let ray = camera_in_site.project(point_in_site).and_then(|pixel| camera_in_site.ray(pixel));
         ray.is_some_and(|ray| world.is_visible(&ray.origin, point_in_site))
     }
-    fn shadow_share(&self, step: usize, centre: Pixel, size_px: u32) -> Option<f64> {
-        let site_from_rover = self.true_site_from_rover(step)?;
+    fn shadow_share(
+        &self,
+        step: usize,
+        camera: Option<CameraName>,
+        centre: Pixel,
+        size_px: u32,
+    ) -> Option<f64> {
         let world = self.world_at(step).ok()?;
-        let camera_in_site = self.true_left_camera(step).moved(&site_from_rover);
+        let camera_in_site = self.true_left_in_site(step, camera)?;
         let half_px = f64::from(size_px / 2);
         let offset = |k: u32| half_px * (2.0 * f64::from(k) / f64::from(SHADOW_SAMPLES - 1) - 1.0);
         let places = (0..SHADOW_SAMPLES * SHADOW_SAMPLES)

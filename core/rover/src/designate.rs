@@ -16,8 +16,9 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::pair::{self, StopPair};
 use crate::pipeline::Stops;
-use sightline_geometry::camera::MastAngles;
+use sightline_geometry::camera::{CameraName, MastAngles};
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::{Pixel, Point3};
 use sightline_track::target::Designation;
@@ -30,6 +31,9 @@ const SAME_ANGLES_RAD: f64 = 0.1 * std::f64::consts::PI / 180.0;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Place {
+    /// The pair of the stop in which it is designated and tracked; left out: the main pair.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<CameraName>,
     /// Its position in the left image, px.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pixel: Option<Pixel>,
@@ -69,22 +73,23 @@ impl Place {
     /// The pixel that this names in the left image of `step`.
     ///
     /// # Errors
-    /// [`Error::Target`] when nothing or more than one thing is given, the stop does not exist, the point is not in the
-    /// picture, or the pixel is one of another image.
+    /// [`Error::Target`] when nothing or more than one thing is given, the stop or its pair does not exist, the point is not
+    /// in the picture, or the pixel is one of another image.
     pub fn name(&self, stops: &dyn Stops, step: usize) -> Result<Named> {
         let count = stops.stop_count();
         if step >= count {
             return Err(Error::Target(format!("step {step} does not exist: the traverse has {count} stops")));
         }
+        let pair = pair::of_stop(stops, step, self.camera).map_err(pair::as_target)?;
         let (pixel, point_in_rover) = match (self.pixel, self.point_in_rover, self.point_in_site) {
             (Some(pixel), None, None) => {
-                self.check_angles(stops.mast_angles(step), step)?;
+                self.check_angles(pair.mast_angles, step)?;
                 (pixel, None)
             }
-            (None, Some(point), None) => self.project(stops, step, Point3::from(point))?,
+            (None, Some(point), None) => self.project(stops, &pair, step, Point3::from(point))?,
             (None, None, Some(point)) => {
                 let rover_from_site = stops.site_from_rover(step).inverse();
-                self.project(stops, step, rover_from_site * Point3::from(point))?
+                self.project(stops, &pair, step, rover_from_site * Point3::from(point))?
             }
             _ => {
                 return Err(Error::Target(
@@ -92,7 +97,8 @@ impl Place {
                 ));
             }
         };
-        Ok(Named { designation: Designation { step, pixel }, point_in_rover })
+        let designation = Designation { step, pixel, camera: self.camera };
+        Ok(Named { designation, point_in_rover })
     }
 
     fn check_angles(&self, taken: Option<MastAngles>, step: usize) -> Result<()> {
@@ -116,23 +122,30 @@ impl Place {
         )))
     }
 
-    fn project(&self, stops: &dyn Stops, step: usize, point: Point3) -> Result<(Pixel, Option<Point3>)> {
+    fn project(
+        &self,
+        stops: &dyn Stops,
+        pair: &StopPair<'_>,
+        step: usize,
+        point: Point3,
+    ) -> Result<(Pixel, Option<Point3>)> {
         if self.mast.is_some() {
             return Err(Error::Target("mast: only a pixel is given with mast angles".to_owned()));
         }
         if !point.iter().all(|coordinate| coordinate.is_finite()) {
             return Err(Error::Target("the coordinates of a point must be numbers".to_owned()));
         }
-        let (left, _) = stops.cameras(step);
+        let left = pair.left;
         let pixel = left.project(&point).filter(|p| p.is_inside(left.width(), left.height()));
         if let Some(pixel) = pixel {
             return Ok((pixel, Some(point)));
         }
-        let centring = stops.mast().and_then(|mast| mast.point_left_centre_at(&point));
+        // The mast is pointed for the main pair alone.
+        let mast = stops.mast().filter(|_| self.camera.is_none());
+        let centring = mast.and_then(|mast| mast.point_left_centre_at(&point));
         let hint = centring.map_or_else(String::new, |angles| {
-            let taken = stops
-                .mast_angles(step)
-                .map_or_else(String::new, |a| format!("; it was taken at {}", words(a)));
+            let taken =
+                pair.mast_angles.map_or_else(String::new, |a| format!("; it was taken at {}", words(a)));
             format!(": the mast would have to point at {}{taken}", words(angles))
         });
         Err(Error::Target(format!(

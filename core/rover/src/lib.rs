@@ -10,6 +10,7 @@
 //! ```
 
 pub mod pipeline;
+pub mod pair;
 pub mod designate;
 pub mod trackability;
 pub mod driving;

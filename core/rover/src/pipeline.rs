@@ -10,7 +10,7 @@
 
 use std::borrow::Cow;
 
-use sightline_geometry::camera::{Camera, Mast, MastAngles};
+use sightline_geometry::camera::{Camera, CameraName, Mast, MastAngles};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::{Pixel, Pose};
@@ -22,11 +22,13 @@ use sightline_track::locate::{self, DesignateInput, LocateInput, Located, Place,
 use sightline_track::settings::Settings;
 use sightline_track::stages::capture::{self, Capture, StereoPair};
 use sightline_track::stages::judge::{self, Verdict};
-use sightline_track::stages::point_mast::{self, Pointing, UsedPointing};
+use sightline_track::stages::point_mast::{self, Pointing};
 use sightline_track::stages::predict;
 use sightline_track::stages::update::{self, Updated};
 use sightline_track::target::{Designation, Target, TrackingState};
 use sightline_track::trace::{StepKind, StepTrace};
+
+use crate::pair::{self, FurtherCamera, FurtherImages, StopPair};
 
 /// The stops of a drive, as the stages see them.
 pub trait Stops {
@@ -57,6 +59,28 @@ pub trait Stops {
     /// # Errors
     /// A sentence that names the missing or damaged file, or [`Error::Cancelled`] soon after `cancel` is requested.
     fn capture(&self, step: usize, cancel: Cancel<'_>) -> Result<StereoPair>;
+    /// The cameras of a stop beside its main pair.
+    fn further_cameras(&self, _step: usize) -> Vec<FurtherCamera<'_>> {
+        Vec::new()
+    }
+    /// The images of such a camera; `None` where they cannot be read, or would have to be rendered first.
+    fn images_at_hand(&self, _step: usize, _name: CameraName) -> Option<FurtherImages> {
+        None
+    }
+    /// A pair beside the main one.
+    ///
+    /// # Errors
+    /// A stop without a pair of this name ([`pair::missing`], [`pair::single`]).
+    fn further_pair(&self, step: usize, name: CameraName) -> Result<StopPair<'_>> {
+        Err(pair::missing(step, name))
+    }
+    /// The images of a pair beside the main one.
+    ///
+    /// # Errors
+    /// As [`Self::capture`] and [`Self::further_pair`].
+    fn capture_further(&self, step: usize, name: CameraName, _cancel: Cancel<'_>) -> Result<StereoPair> {
+        Err(pair::missing(step, name))
+    }
 }
 
 /// The first step of a run: the 3-D position and template of a designated pixel (R16, R19).
@@ -87,8 +111,9 @@ pub fn designate_until(
     cancel.check()?;
     let (capture, located, memory) = designated(stops, designation, settings, cancel)?;
     cancel.check()?;
-    let target = first_target(stops, designation, &located, memory)?;
-    let pointing = pointing(stops, step, &target);
+    let pair = pair::of_stop(stops, step, designation.camera)?;
+    let target = first_target(stops, designation, &pair, &located, memory)?;
+    let pointing = pointing(stops, Some(&pair), &target);
     let update = Updated {
         target,
         state: TrackingState::Tracking,
@@ -113,18 +138,19 @@ fn designated(
     cancel: Cancel<'_>,
 ) -> Result<(Capture, Located, Option<TrackerMemory>)> {
     let step = designation.step;
-    let (left, right) = stops.cameras(step);
-    let pixel = check_pixel(designation, left)?;
-    let capture = capture::capture(stops.capture(step, cancel)?, Some(pixel), settings.subframe_px());
+    let pair = pair::of_stop(stops, step, designation.camera).map_err(pair::as_target)?;
+    let pixel = check_pixel(designation, pair.left)?;
+    let images = pair::capture(stops, step, designation.camera, cancel)?;
+    let capture = capture::capture(images, Some(pixel), settings.subframe_px());
     let (located, memory) = locate::designate(&DesignateInput {
         step,
         site_from_rover: &stops.site_from_rover(step),
         pixel,
         capture: &capture,
-        left,
-        right,
+        left: pair.left,
+        right: pair.right,
         stereo: stops.stereo(),
-        shared: stops.shared(step),
+        shared: pair.shared,
         settings,
         cancel,
     });
@@ -177,23 +203,31 @@ fn computed_step(
     let target = &*with_own_memory(stops, &last.target, settings, cancel);
     let step = target.step + 1;
     let site_from_rover = stops.site_from_rover(step);
-    let prediction = prediction(stops, target, changes.prediction_px);
+    let camera = target.designation.camera;
+    let lacks_pair = |error| format!("{error}, which the target was designated in");
+    let pair = pair::of_stop(stops, step, camera).map_err(lacks_pair);
+    let prediction =
+        prediction(stops, target, pair.as_ref().ok().map(|pair| pair.left).zip(changes.prediction_px));
     let carried = update::carry(target, step, &prediction);
-    let pointing = pointing(stops, step, &carried);
+    let pointing = pointing(stops, pair.as_ref().ok(), &carried);
     let time_s = stops.time_s(step);
     let begun = Begun { step, time_s, predict: &prediction, point_mast: &pointing, carried: &carried, last };
     if ends_at(CycleStage::Capture) {
         return begun.trace(!ends_at(CycleStage::PointMast), None, None, None);
     }
-    let pair = match stops.capture(step, cancel) {
-        Ok(pair) => pair,
-        Err(error) => {
-            let kind = StepKind::Damaged { predict: prediction, fault: error.to_string() };
+    let images = |pair| match pair::capture(stops, step, camera, cancel) {
+        Ok(images) => Ok((pair, images)),
+        Err(error) => Err(error.to_string()),
+    };
+    let (pair, images) = match pair.and_then(images) {
+        Ok(captured) => captured,
+        Err(fault) => {
+            let kind = StepKind::Damaged { predict: prediction, fault };
             let update = unseen(carried, last.state);
             return StepTrace { step, time_s, point_mast: pointing, kind, update };
         }
     };
-    let capture = capture::capture(pair, pointing.predicted_left, settings.subframe_px());
+    let capture = capture::capture(images, pointing.predicted_left, settings.subframe_px());
     if ends_at(CycleStage::Locate) {
         return begun.trace(true, Some(capture), None, None);
     }
@@ -203,8 +237,8 @@ fn computed_step(
         capture: &capture,
         site_from_rover: &site_from_rover,
         stereo: stops.stereo(),
-        shared: stops.shared(step),
-        place: place(stops, step, settings),
+        shared: pair.shared,
+        place: place(stops, step, camera, settings),
         lost_count: lost_count(last.state),
         settings,
         cancel,
@@ -258,13 +292,16 @@ fn unseen(carried: Target, state: TrackingState) -> Updated {
     Updated { target: carried, state, template_renewed: false, correction_m: None, correction_px: None }
 }
 
-/// Where the target should be at the next stop, perhaps displaced.
-fn prediction(stops: &dyn Stops, target: &Target, prediction_px: Option<Pixel>) -> predict::Prediction {
+/// Where the target should be at the next stop, perhaps displaced to a pixel of the left camera of its pair.
+fn prediction(
+    stops: &dyn Stops,
+    target: &Target,
+    displaced_to: Option<(&Camera, Pixel)>,
+) -> predict::Prediction {
     let step = target.step + 1;
     let [then, now] = [target.step, step].map(|step| stops.site_from_rover(step));
     let predicted = predict::predict(target, &then, &now, &stops.odometry_error());
-    let left = stops.cameras(step).0;
-    let displaced = prediction_px.and_then(|pixel| predict::displaced(&predicted, left, pixel, &now));
+    let displaced = displaced_to.and_then(|(left, pixel)| predict::displaced(&predicted, left, pixel, &now));
     displaced.unwrap_or(predicted)
 }
 
@@ -292,10 +329,11 @@ fn with_own_memory<'a>(
 fn first_target(
     stops: &dyn Stops,
     designation: Designation,
+    pair: &StopPair<'_>,
     located: &Located,
     memory: Option<TrackerMemory>,
 ) -> Result<Target> {
-    let Designation { step, pixel } = designation;
+    let Designation { step, pixel, camera } = designation;
     let (Some(position_in_rover), Some(covariance_in_rover), Some(memory)) =
         (located.position_in_rover, located.covariance_in_rover, memory)
     else {
@@ -305,7 +343,7 @@ fn first_target(
             pixel.x, pixel.y
         )));
     };
-    let used = used_pointing(stops, step);
+    let used = pair.pointing(stops, camera);
     let covariance_in_rover = used
         .error_covariance(&position_in_rover)
         .map_or(covariance_in_rover, |error| covariance_in_rover + error);
@@ -339,31 +377,26 @@ fn check_pixel(designation: Designation, left: &Camera) -> Result<Pixel> {
     )))
 }
 
-/// Cameras and wanted pointing for a target that was carried to `step`.
-fn pointing(stops: &dyn Stops, step: usize, carried: &Target) -> Pointing {
+/// Cameras and wanted pointing for a target that was carried to a stop, which may lack the target's pair.
+fn pointing(stops: &dyn Stops, pair: Option<&StopPair<'_>>, carried: &Target) -> Pointing {
+    let Some(pair) = pair else {
+        let (left, right) = stops.cameras(carried.step);
+        return point_mast::without_pair(left, right);
+    };
     point_mast::point_mast(
         &carried.position_in_rover,
         &carried.covariance_in_rover,
-        used_pointing(stops, step),
+        pair.pointing(stops, carried.designation.camera),
     )
 }
 
-/// The cameras of a stop as they were used.
-fn used_pointing(stops: &dyn Stops, step: usize) -> UsedPointing<'_> {
-    let (left, right) = stops.cameras(step);
-    UsedPointing {
-        mast: stops.mast(),
-        angles: stops.mast_angles(step),
-        error_rad: stops.pointing_error_deg().to_radians(),
-        left,
-        right,
-    }
-}
-
 /// A stop among those of its drive.
-fn place(stops: &dyn Stops, step: usize, settings: &Settings) -> Place {
+fn place(stops: &dyn Stops, step: usize, camera: Option<CameraName>, settings: &Settings) -> Place {
     let share = settings.limits.same_camera_focal_share;
-    let changes = |from: usize, to: usize| !is_same_pair(stops.cameras(from).0, stops.cameras(to).0, share);
+    let left = |step: usize| pair::of_stop(stops, step, camera).ok().map(|pair| pair.left);
+    // A stop that lacks the pair changes nothing.
+    let changes =
+        |from: usize, to: usize| left(from).zip(left(to)).is_some_and(|(a, b)| !is_same_pair(a, b, share));
     let is_last = step + 1 >= stops.stop_count();
     Place {
         step,

@@ -14,7 +14,7 @@ fn session() -> Session {
     let mut world =
         PlaneWorld::new((0..5).map(|k| Pose::translation(0.3 * f64::from(k), 0.0, 0.0)).collect());
     world.troubles[2] = Trouble::Covered;
-    let designation = Designation { step: 0, pixel: sightline_geometry::frames::Pixel::new(118.3, 131.6) };
+    let designation = Designation::new(0, sightline_geometry::frames::Pixel::new(118.3, 131.6));
     let steps = track::run(&world, designation, &Settings::default()).unwrap();
     let mut steps = steps.into_iter().map(Arc::new);
     let mut session = Session::new("s1", "plane", 5);

@@ -112,7 +112,7 @@ mod tests {
         world.normal = Vector3::new(turn_rad.cos(), -turn_rad.sin(), 0.0);
         let light = StopLight { sun_azimuth_deg: 200.0, sun_elevation_deg: 30.0, exposure_s: Some(0.25) };
         let (settings, centre) = (Settings::default(), Pixel::new(127.5, 127.5));
-        let steps = track::run(&world, Designation { step: 0, pixel: centre }, &settings).unwrap();
+        let steps = track::run(&world, Designation::new(0, centre), &settings).unwrap();
         let to_sun = light.to_sun_in_site();
         for step in &steps {
             let pose = world.site_from_rover(step.step);
@@ -138,7 +138,7 @@ mod tests {
     fn without_light_the_sun_has_no_angles() {
         let world = PlaneWorld::new(vec![Pose::identity()]);
         let (settings, pixel) = (Settings::default(), Pixel::new(127.5, 127.5));
-        let steps = track::run(&world, Designation { step: 0, pixel }, &settings).unwrap();
+        let steps = track::run(&world, Designation::new(0, pixel), &settings).unwrap();
         let found = photometry(&steps[0], &Pose::identity(), None, &settings.template).unwrap();
         assert!(found.incidence_deg.is_none() && found.phase_deg.is_none() && found.rate_per_s.is_none());
         assert!(found.emission_deg.unwrap() < 1.0, "{found:?}");

@@ -248,7 +248,7 @@ mod tests {
     use sightline_geometry::frames::Pixel;
 
     fn saved() -> SavedSession {
-        let designation = Designation { step: 1, pixel: Pixel::new(3.0, 4.0) };
+        let designation = Designation::new(1, Pixel::new(3.0, 4.0));
         let run =
             |fork, stop_after| SavedRun { fork, settings: Settings::default(), stop_after, removed: false };
         SavedSession {

@@ -158,7 +158,7 @@ mod tests {
 
     /// A session of so many targets without steps.
     fn session(targets: usize) -> Session {
-        let designation = Designation { step: 0, pixel: Pixel::new(1.0, 2.0) };
+        let designation = Designation::new(0, Pixel::new(1.0, 2.0));
         let target = |number| TargetRecord {
             label: format!("target {number}"),
             designation,

@@ -26,10 +26,11 @@ pub(crate) fn settings_arguments(changes: &Changes) -> String {
 
 /// The command that designates a target and tracks it; `drive` is what the command line opens.
 pub fn track(drive: &str, designation: Designation, changes: &Changes) -> String {
-    let Designation { step, pixel } = designation;
+    let Designation { step, pixel, camera } = designation;
+    let camera = camera.map_or_else(String::new, |camera| format!(" --camera {camera}"));
     let from = if step == 0 { String::new() } else { format!(" --from-step {step}") };
     let settings = settings_arguments(changes);
-    format!("sightline track {} --target {},{}{from}{settings}", quoted(drive), pixel.x, pixel.y)
+    format!("sightline track {} --target {},{}{camera}{from}{settings}", quoted(drive), pixel.x, pixel.y)
 }
 
 /// Writes the header with the access token; `printf` is part of the shell and no program of its own.

@@ -44,9 +44,9 @@ pub fn designate_until<D: Drive>(
 
 /// Adds the warning of a shadow on the window (R21), which only a source of truth knows.
 fn warn_of_shadow<D: Drive>(drive: &D, trace: &mut StepTrace, settings: &Settings) {
-    let Designation { step, pixel } = trace.update.target.designation;
+    let Designation { step, pixel, camera } = trace.update.target.designation;
     let warning = drive
-        .shadow_share(step, pixel, settings.template.template_size_px)
+        .shadow_share(step, camera, pixel, settings.template.template_size_px)
         .and_then(|share| warnings::of_shadow(share, &settings.limits));
     let evidence = trace.located_mut().and_then(|located| located.evidence.template_mut());
     if let (Some(evidence), Some(warning)) = (evidence, warning) {

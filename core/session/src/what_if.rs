@@ -235,7 +235,7 @@ mod tests {
     }
 
     fn steps(world: &PlaneWorld) -> Vec<RunStep> {
-        let designation = Designation { step: 0, pixel: Pixel::new(118.3, 131.6) };
+        let designation = Designation::new(0, Pixel::new(118.3, 131.6));
         track::run(world, designation, &Settings::default()).unwrap()
     }
 

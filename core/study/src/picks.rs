@@ -79,7 +79,7 @@ fn is_passed(world: &World, traverse: &Traverse, pixel: Pixel, window_px: u32) -
         world.cast(&ray).map(|hit| (hit.surface, hit.distance_m))
     };
     let Some((own, _)) = surface_at(0, pixel) else { return false };
-    let Some(point) = traverse.surface_point_in_site(0, pixel) else { return false };
+    let Some(point) = traverse.surface_point_in_site(0, None, pixel) else { return false };
     (0..traverse.stop_count()).any(|stop| {
         let camera = traverse.true_left_camera(stop);
         let Some(site_from_rover) = traverse.true_site_from_rover(stop) else { return false };
@@ -108,7 +108,7 @@ fn find_fault_steps(traverse: &Traverse, point: &Point, fault: Fault, chosen: &m
         return Ok(());
     }
     let points: Vec<Option<Point3>> =
-        chosen.iter().map(|target| traverse.surface_point_in_site(0, target.pixel)).collect();
+        chosen.iter().map(|target| traverse.surface_point_in_site(0, None, target.pixel)).collect();
     for (step, stop) in point.visit.stops(traverse.stop_count()).into_iter().enumerate() {
         let world = traverse.world_at(stop)?;
         for (target, surface) in chosen.iter_mut().zip(&points) {

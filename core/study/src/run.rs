@@ -172,7 +172,7 @@ impl Follower {
     }
 
     fn follow<D: Drive>(&mut self, drive: &D, settings: &Settings, cancel: &AtomicBool) -> Result<()> {
-        let designation = Designation { step: 0, pixel: self.run.pixel };
+        let designation = Designation::new(0, self.run.pixel);
         let first = match track::designate_until(drive, designation, settings, cancel.into()) {
             Ok(first) => first,
             Err(Error::Cancelled) => return Err(Error::Cancelled),
@@ -225,7 +225,8 @@ impl Follower {
         (run.sigma_m, run.nees) = (row.sigma_m, row.nees);
         run.drift_m = drift_m(drive, first, last);
         let Some(truth) = last.truth.as_ref().map(|truth| truth.position_in_rover) else { return };
-        let camera = drive.true_left_camera(last.step);
+        let of_target = last.update.target.designation.camera;
+        let Some(camera) = drive.true_left_camera(last.step, of_target) else { return };
         run.true_end_pixel = camera.project(&truth);
         let centre = camera.model.centre();
         let sight = truth - centre;
@@ -256,7 +257,9 @@ fn fate<D: Drive>(drive: &D, trace: &RunStep) -> Option<Fate> {
     if trace.update.state != TrackingState::Tracking {
         return Some(Fate::Lost);
     }
-    let pixel = drive.true_left_camera(trace.step).project(&truth.position_in_rover);
+    let pixel = drive
+        .true_left_camera(trace.step, trace.update.target.designation.camera)
+        .and_then(|camera| camera.project(&truth.position_in_rover));
     let located = trace.located().and_then(|located| located.left_pixel);
     let error_px = pixel.zip(located).map(|(a, b)| a.distance(b));
     Some(if error_px.is_some_and(|error| error <= truth.tolerance_px) { Fate::Tracked } else { Fate::False })

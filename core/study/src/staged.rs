@@ -11,12 +11,13 @@
 use nalgebra::{Translation3, UnitQuaternion};
 
 use crate::point::Visit;
-use sightline_geometry::camera::{Camera, Mast, MastAngles};
+use sightline_geometry::camera::{Camera, CameraName, Mast, MastAngles};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
 use sightline_geometry::frames::{Pixel, Point3, Pose, Vector3};
 use sightline_geometry::odometry_error::OdometryError;
 use sightline_geometry::stereo_geometry::StereoGeometry;
+use sightline_rover::pair::{FurtherCamera, FurtherImages, StopPair};
 use sightline_rover::pipeline::Stops;
 use sightline_session::track::Drive;
 use sightline_track::locate::store::Shared;
@@ -89,6 +90,18 @@ impl<D: Drive> Stops for Staged<'_, D> {
     fn capture(&self, step: usize, cancel: Cancel<'_>) -> Result<StereoPair> {
         self.drive.capture(self.stops[step], cancel)
     }
+    fn further_cameras(&self, step: usize) -> Vec<FurtherCamera<'_>> {
+        self.drive.further_cameras(self.stops[step])
+    }
+    fn images_at_hand(&self, step: usize, name: CameraName) -> Option<FurtherImages> {
+        self.drive.images_at_hand(self.stops[step], name)
+    }
+    fn further_pair(&self, step: usize, name: CameraName) -> Result<StopPair<'_>> {
+        self.drive.further_pair(self.stops[step], name)
+    }
+    fn capture_further(&self, step: usize, name: CameraName, cancel: Cancel<'_>) -> Result<StereoPair> {
+        self.drive.capture_further(self.stops[step], name, cancel)
+    }
 }
 
 impl<D: Drive> TruthSource for Staged<'_, D> {
@@ -98,17 +111,23 @@ impl<D: Drive> TruthSource for Staged<'_, D> {
     fn true_site_from_rover(&self, step: usize) -> Option<Pose> {
         self.drive.true_site_from_rover(self.stops[step])
     }
-    fn true_left_camera(&self, step: usize) -> &Camera {
-        self.drive.true_left_camera(self.stops[step])
+    fn true_left_camera(&self, step: usize, camera: Option<CameraName>) -> Option<&Camera> {
+        self.drive.true_left_camera(self.stops[step], camera)
     }
-    fn surface_point_in_site(&self, step: usize, pixel: Pixel) -> Option<Point3> {
-        self.drive.surface_point_in_site(self.stops[step], pixel)
+    fn surface_point_in_site(&self, step: usize, camera: Option<CameraName>, pixel: Pixel) -> Option<Point3> {
+        self.drive.surface_point_in_site(self.stops[step], camera, pixel)
     }
-    fn is_visible(&self, step: usize, point_in_site: &Point3) -> bool {
-        self.drive.is_visible(self.stops[step], point_in_site)
+    fn is_visible(&self, step: usize, camera: Option<CameraName>, point_in_site: &Point3) -> bool {
+        self.drive.is_visible(self.stops[step], camera, point_in_site)
     }
-    fn shadow_share(&self, step: usize, centre: Pixel, size_px: u32) -> Option<f64> {
-        self.drive.shadow_share(self.stops[step], centre, size_px)
+    fn shadow_share(
+        &self,
+        step: usize,
+        camera: Option<CameraName>,
+        centre: Pixel,
+        size_px: u32,
+    ) -> Option<f64> {
+        self.drive.shadow_share(self.stops[step], camera, centre, size_px)
     }
 }
 

@@ -77,7 +77,7 @@ impl StepRecord {
         let truly = |trace: &RunStep| {
             Some(Stand {
                 site_from_rover: drive.true_site_from_rover(trace.step)?,
-                camera: drive.true_left_camera(trace.step),
+                camera: drive.true_left_camera(trace.step, target.designation.camera)?,
                 target_in_rover: trace.truth.as_ref()?.position_in_rover,
             })
         };

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use image::Luma;
 
-use sightline_geometry::camera::{Cahv, Camera, CameraModel, Mast, MastAngles};
+use sightline_geometry::camera::{Cahv, Camera, CameraModel, CameraName, Mast, MastAngles};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::{Pixel, Point3, Pose, Vector3};
@@ -145,13 +145,18 @@ impl TruthSource for PlaneWorld {
     fn true_site_from_rover(&self, step: usize) -> Option<Pose> {
         self.true_poses.get(step).copied()
     }
-    fn true_left_camera(&self, _step: usize) -> &Camera {
-        &self.left
+    fn true_left_camera(&self, _step: usize, camera: Option<CameraName>) -> Option<&Camera> {
+        camera.is_none().then_some(&self.left)
     }
-    fn surface_point_in_site(&self, step: usize, pixel: Pixel) -> Option<Point3> {
+    fn surface_point_in_site(
+        &self,
+        step: usize,
+        _camera: Option<CameraName>,
+        pixel: Pixel,
+    ) -> Option<Point3> {
         self.plane_point(step, &self.left, pixel)
     }
-    fn is_visible(&self, step: usize, _point_in_site: &Point3) -> bool {
+    fn is_visible(&self, step: usize, _camera: Option<CameraName>, _point_in_site: &Point3) -> bool {
         self.troubles[step] != Trouble::Covered
     }
 }

@@ -34,7 +34,7 @@ fn world(folder: &Path) -> (DrivenTraverse, Designation) {
     let world = DrivenTraverse::begin(&scenario, folder, Cancel::default()).unwrap();
     let traverse = world.traverse();
     let pixel = choose_targets(traverse.world().unwrap(), &scenario, traverse.index())[0];
-    (world, Designation { step: 0, pixel })
+    (world, Designation::new(0, pixel))
 }
 
 pub(crate) fn begin(folder: &Path) -> TargetedDrive {
@@ -160,7 +160,7 @@ fn a_recording_shows_how_far_the_commands_are_from_what_was_driven() {
     let folder = tempfile::tempdir().unwrap();
     let planned = create_simulated(&scenario(), folder.path()).unwrap();
     let pixel = choose_targets(planned.world().unwrap(), &scenario(), planned.index())[0];
-    let designation = Designation { step: 0, pixel };
+    let designation = Designation::new(0, pixel);
     let settings = Settings::default();
     let mut drive =
         ReplayedDrive::begin(&planned, designation, command(), &settings, Cancel::default()).unwrap();

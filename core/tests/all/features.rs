@@ -34,7 +34,7 @@ fn drive() -> PlaneWorld {
 }
 
 fn run(world: &PlaneWorld, settings: &Settings) -> Vec<RunStep> {
-    let designation = Designation { step: 0, pixel: Pixel::new(140.3, 120.6) };
+    let designation = Designation::new(0, Pixel::new(140.3, 120.6));
     track::run(world, designation, settings).unwrap()
 }
 
@@ -150,7 +150,7 @@ struct OneEyed(PlaneWorld);
 impl OneEyed {
     fn located(&self) -> String {
         let settings = settings(&[]);
-        let designation = Designation { step: 0, pixel: Pixel::new(140.3, 120.6) };
+        let designation = Designation::new(0, Pixel::new(140.3, 120.6));
         let first = track::designate(&self.0, designation, &settings).unwrap();
         let mut pair = self.0.capture(1, Cancel::default()).unwrap();
         std::sync::Arc::make_mut(&mut pair.right).pixels_mut().for_each(|pixel| pixel[0] = 0.4);
@@ -184,7 +184,7 @@ fn a_covered_eye_leaves_too_few_matches_and_says_so() {
 #[test]
 fn ranges_that_exclude_each_other_are_refused_with_their_names() {
     let settings = settings(&[("feature_range_min_m", json!(50.0)), ("feature_range_max_m", json!(5.0))]);
-    let designation = Designation { step: 0, pixel: Pixel::new(140.3, 120.6) };
+    let designation = Designation::new(0, Pixel::new(140.3, 120.6));
     let refused = track::designate(&drive(), designation, &settings).unwrap_err().to_string();
     assert!(refused.contains("feature_range_min_m") && refused.contains("feature_range_max_m"), "{refused}");
 }

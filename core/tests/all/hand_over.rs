@@ -53,7 +53,7 @@ fn a_handed_over_target_is_followed_to_the_last_stop_or_lost_there_without_a_fai
     let folder = tempfile::tempdir().unwrap();
     let traverse = create_simulated(&scenario, folder.path()).unwrap();
     let pixel = choose_targets(traverse.world().unwrap(), &scenario, traverse.index())[0];
-    let steps = track::run(&traverse, Designation { step: 0, pixel }, &Settings::default()).unwrap();
+    let steps = track::run(&traverse, Designation::new(0, pixel), &Settings::default()).unwrap();
     assert_eq!(steps.len(), traverse.stop_count());
     let sizes = |step: usize| {
         let pair = traverse.capture(step).unwrap();

@@ -17,3 +17,4 @@ mod registration;
 mod stereo_rendered;
 mod stereo_recorded;
 mod hand_over;
+mod cameras;

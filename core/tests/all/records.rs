@@ -16,7 +16,7 @@ use sightline_track::target::Designation;
 /// A short run by each tracker.
 fn runs() -> Vec<(&'static str, Vec<RunStep>)> {
     let world = PlaneWorld::new([0.0, 0.5, 1.0].map(|x| Pose::translation(x, 0.0, 0.0)).to_vec());
-    let designation = Designation { step: 0, pixel: Pixel::new(140.3, 120.6) };
+    let designation = Designation::new(0, Pixel::new(140.3, 120.6));
     let run = |settings: &Settings| track::run(&world, designation, settings).unwrap();
     let by_preset = ["features", "shape", "combined"].map(|name| {
         let settings = preset(name).unwrap().settings().unwrap();

@@ -36,7 +36,7 @@ static SCENE: LazyLock<Scene> = LazyLock::new(|| {
 });
 
 fn run(settings: &Settings) -> Vec<RunStep> {
-    let designation = Designation { step: 0, pixel: SCENE.pixel };
+    let designation = Designation::new(0, SCENE.pixel);
     track::run(&SCENE.traverse, designation, settings).unwrap()
 }
 
@@ -97,7 +97,7 @@ fn a_target_lost_beyond_the_basin_is_not_handed_over_as_if_it_stood_where_it_is_
     let mut settings = combined();
     settings.features = FeatureSettings { features_max: 3, ..settings.features };
     let staged = Staged::new(&SCENE.traverse, Visit::Every(1)).with_position_jump(0.4);
-    let steps = track::run(&staged, Designation { step: 0, pixel: SCENE.pixel }, &settings).unwrap();
+    let steps = track::run(&staged, Designation::new(0, SCENE.pixel), &settings).unwrap();
     let [.., mast, hazcam] = steps.as_slice() else { panic!("too few stops") };
     assert!(mast.update.state.is_lost() && error_m(mast) > 0.3, "the jump must lead out of the basin");
     let found = registration(hazcam);
@@ -135,7 +135,7 @@ fn on_a_flat_wall_the_shape_tracker_says_what_is_missing() {
         PlaneWorld::new((0..3).map(|stop| Pose::translation(0.4 * f64::from(stop), 0.0, 0.0)).collect());
     let settings = Settings { tracker: TrackerKind::Shape, ..Settings::default() };
     let centre = wall.cameras(0).0.centre_pixel();
-    let steps = track::run(&wall, Designation { step: 0, pixel: centre }, &settings).unwrap();
+    let steps = track::run(&wall, Designation::new(0, centre), &settings).unwrap();
     for trace in &steps[1..] {
         let reason = trace.verdict().unwrap().reason.clone().unwrap();
         assert!(trace.update.state.is_lost());

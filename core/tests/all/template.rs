@@ -30,7 +30,7 @@ pub(super) fn approach() -> Vec<Pose> {
 }
 
 pub(super) fn designation(x: f64, y: f64) -> Designation {
-    Designation { step: 0, pixel: Pixel::new(x, y) }
+    Designation::new(0, Pixel::new(x, y))
 }
 
 pub(super) fn run(world: &PlaneWorld, changes: &[(&str, serde_json::Value)]) -> Vec<RunStep> {
@@ -274,7 +274,7 @@ fn a_pixel_outside_the_image_is_refused_with_both_sizes() {
     let world = PlaneWorld::new(approach());
     let refused = track::designate(&world, designation(300.0, 10.0), &Settings::default()).unwrap_err();
     assert!(refused.to_string().contains("300") && refused.to_string().contains("256 x 256"), "{refused}");
-    let late = Designation { step: 9, pixel: Pixel::new(1.0, 1.0) };
+    let late = Designation::new(9, Pixel::new(1.0, 1.0));
     assert!(
         track::designate(&world, late, &Settings::default()).unwrap_err().to_string().contains("6 stops")
     );

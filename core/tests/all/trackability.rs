@@ -146,7 +146,7 @@ fn what_is_good_at_a_pixel_is_accepted_by_the_designation() {
     let ground = ground(&world);
     for pixel in [Pixel::new(140.0, 120.0), Pixel::new(90.3, 180.6), Pixel::new(200.0, 60.0)] {
         let verdict = PixelVerdict::of(&world, &ground, pixel);
-        let first = pipeline::designate(&world, Designation { step: 0, pixel }, &ground.settings).unwrap();
+        let first = pipeline::designate(&world, Designation::new(0, pixel), &ground.settings).unwrap();
         assert_eq!(verdict.verdict, Verdict::Good, "{verdict:?}");
         assert_eq!(verdict.range_m, Some(first.update.target.initial_distance_m));
         assert_eq!(verdict.nearest_good, None);

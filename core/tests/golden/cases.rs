@@ -98,7 +98,7 @@ impl Case {
     pub(crate) fn compute(&self, drive: &Drive) -> Sheet {
         let settings = self.settings();
         let folder = drive.traverse.folder().display().to_string();
-        let designation = Designation { step: 0, pixel: drive.pixel };
+        let designation = Designation::new(0, drive.pixel);
         let mut sheet = Sheet::default();
         let stops = drive.traverse.stop_count().min(self.stops_max);
         sheet.put("stops", stops);

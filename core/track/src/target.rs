@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::locate::TrackerMemory;
+use sightline_geometry::camera::CameraName;
 use sightline_geometry::frames::{Pixel, Point3};
 
 pub use crate::verdict::TrackingState;
@@ -21,6 +22,16 @@ pub struct Designation {
     pub step: usize,
     /// The position, px.
     pub pixel: Pixel,
+    /// The pair of the stop in which the target is tracked; left out: the main pair.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<CameraName>,
+}
+
+impl Designation {
+    /// A position in the left image of the main pair of a stop, px.
+    pub const fn new(step: usize, pixel: Pixel) -> Self {
+        Self { step, pixel, camera: None }
+    }
 }
 
 /// The target as one stop leaves it to the next.

@@ -58,11 +58,11 @@ pub enum StepKind {
         /// Stage 5.
         judge: Verdict,
     },
-    /// A later stop whose files are damaged: the target is carried by the prediction.
+    /// A later stop whose files are damaged, or that lacks the target's pair: the target is carried by the prediction.
     Damaged {
         /// Stage 1.
         predict: Prediction,
-        /// The damage of the stop's files, as one sentence.
+        /// The damage of the stop's files, or the missing pair, as one sentence.
         fault: String,
     },
     /// A later stop at which a commanded drive is paused between two stages: the results of the stages before the pause.

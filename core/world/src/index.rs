@@ -4,6 +4,9 @@
 //! follow from them) and, apart from it, the truth. The true cameras stand in the truth only where they
 //! differ from the ones that the tracker is given, which is when the scenario has a pointing error.
 //!
+//! `camera.further` adds cameras to every stop: their images are rendered from the same poses, those on the mast at the angles
+//! to which the mast is pointed for the main pair (level and ahead where that is on the body).
+//!
 //! With `camera.hand_over` one more stop follows the last: the same poses, true and estimated, and the other pair of
 //! cameras, which is fixed to the body and therefore has no mast angles (R205, R209).
 //!
@@ -11,8 +14,8 @@
 //! for 60 s at each stop (the pause is ours).
 //! Frames: poses in the site frame, cameras in the rover frame. Sources: domain.md 4, 5; R104–R106, R205.
 
-use crate::traverse::{CameraSource, FORMAT_VERSION, Stop, StopTruth, TraverseIndex, View};
-use sightline_geometry::camera::{Camera, MastAngles};
+use crate::traverse::{CameraSource, FORMAT_VERSION, Stop, StopCamera, StopTruth, TraverseIndex, View};
+use sightline_geometry::camera::{Camera, CameraName, MastAngles};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
 use sightline_geometry::frames::{Pose, PoseRecord};
@@ -26,6 +29,9 @@ use crate::world::World;
 
 /// The name of the scenario's file within a traverse folder.
 pub const SCENARIO_FILE: &str = "scenario.toml";
+
+/// The angles of a mast that nobody pointed: level and ahead.
+const AHEAD: MastAngles = MastAngles { azimuth_rad: 0.0, elevation_rad: 0.0 };
 
 /// Time spent at a stop, s (ours).
 pub(crate) const PAUSE_S: f64 = 60.0;
@@ -56,7 +62,7 @@ pub fn index(scenario: &Scenario, world: &World) -> Result<TraverseIndex> {
 
 /// The same, failing soon after `cancel` is requested.
 pub fn index_until(scenario: &Scenario, world: &World, cancel: Cancel<'_>) -> Result<TraverseIndex> {
-    let rig = Rig::new(&scenario.camera);
+    let rigs = Rigs::new(&scenario.camera);
     let drive = drive::true_drive(world, scenario, cancel)?;
     let estimates = odometry::believed(&drive, scenario);
     let told: Vec<MastAngles> = drive.stops.iter().filter_map(|stop| stop.angles).collect();
@@ -69,12 +75,28 @@ pub fn index_until(scenario: &Scenario, world: &World, cancel: Cancel<'_>) -> Re
         }
         let pointed = true_angles.get(number).copied().filter(|_| mast_error::is_present(&scenario.drive));
         let poses = [truth.site_from_rover, *estimate];
-        stops.push(simulated_stop(number, time_s, poses, truth.angles, pointed, &rig));
+        stops.push(simulated_stop(number, time_s, poses, truth.angles, pointed, &rigs));
     }
     let handed_over = stops.last().and_then(|last| handed_over(last, stops.len(), &scenario.camera));
     stops.extend(handed_over);
     let description = describe(scenario, stops.len());
     Ok(TraverseIndex { description, stops, ..empty_index(scenario) })
+}
+
+/// The pairs of cameras of a scenario.
+pub(crate) struct Rigs {
+    main: Rig,
+    further: Vec<(CameraName, Rig)>,
+}
+
+impl Rigs {
+    pub(crate) fn new(settings: &CameraSettings) -> Self {
+        let further = settings.further.iter();
+        Self {
+            main: Rig::new(settings),
+            further: further.map(|camera| (camera.name, Rig::of(camera.rig, camera.image_size))).collect(),
+        }
+    }
 }
 
 /// A stop of a simulated drive; `poses` are the true and the estimated one, `pointed` are the true mast angles where they
@@ -85,16 +107,11 @@ pub(crate) fn simulated_stop(
     poses: [Pose; 2],
     told: Option<MastAngles>,
     pointed: Option<MastAngles>,
-    rig: &Rig,
+    rigs: &Rigs,
 ) -> Stop {
-    let (left, right) = rig.cameras_in_rover(told);
-    let (left_camera, right_camera) = match pointed {
-        Some(angles) => {
-            let (left, right) = rig.cameras_in_rover(Some(angles));
-            (Some(left), Some(right))
-        }
-        None => (None, None),
-    };
+    let (left, right) = rigs.main.cameras_in_rover(told);
+    let (left_camera, right_camera) = true_cameras(&rigs.main, pointed);
+    let further = |(name, rig): &(CameraName, Rig)| further_camera(number, *name, rig, [told, pointed]);
     let [truth, estimate] = poses.map(|pose| PoseRecord::from(&pose));
     Stop {
         time_s,
@@ -105,6 +122,30 @@ pub(crate) fn simulated_stop(
         light: None,
         metered_px: None,
         truth: Some(StopTruth { site_from_rover: truth, left_camera, right_camera, wheel_places_m: None }),
+        cameras: rigs.further.iter().map(further).collect(),
+    }
+}
+
+/// The cameras of a rig at the true mast angles, where these differ from those that the mast was told.
+fn true_cameras(rig: &Rig, pointed: Option<MastAngles>) -> (Option<Camera>, Option<Camera>) {
+    pointed.map(|angles| rig.cameras_in_rover(Some(angles))).unzip()
+}
+
+/// A further camera of a stop, at the told and at the true mast angles of the stop where these differ.
+fn further_camera(number: usize, name: CameraName, rig: &Rig, angles: [Option<MastAngles>; 2]) -> StopCamera {
+    let [told, pointed] = match rig {
+        Rig::Mast(_) => [Some(angles[0].unwrap_or(AHEAD)), angles[1]],
+        Rig::Body { .. } => [None, None],
+    };
+    let (left, right) = rig.cameras_in_rover(told);
+    let (true_left_camera, true_right_camera) = true_cameras(rig, pointed);
+    StopCamera {
+        name,
+        mast_angles: told,
+        left: view(&format!("{name}_left"), number, left),
+        right: Some(view(&format!("{name}_right"), number, right)),
+        true_left_camera,
+        true_right_camera,
     }
 }
 
@@ -118,6 +159,15 @@ fn view(eye: &str, number: usize, camera: Camera) -> View {
 fn handed_over(last: &Stop, number: usize, settings: &CameraSettings) -> Option<Stop> {
     let (left, right) = Rig::of(settings.hand_over?, settings.image_size).cameras_in_rover(None);
     let truth = last.truth.as_ref()?;
+    let renamed = |camera: &StopCamera| {
+        let name = camera.name;
+        let named = |eye: &str, of: &View| View {
+            image: format!("images/{name}_{eye}_{number:04}.png"),
+            camera: of.camera.clone(),
+        };
+        let right = camera.right.as_ref().map(|right| named("right", right));
+        StopCamera { left: named("left", &camera.left), right, ..camera.clone() }
+    };
     Some(Stop {
         time_s: last.time_s + PAUSE_S,
         site_from_rover: last.site_from_rover,
@@ -132,6 +182,7 @@ fn handed_over(last: &Stop, number: usize, settings: &CameraSettings) -> Option<
             right_camera: None,
             wheel_places_m: None,
         }),
+        cameras: last.cameras.iter().map(renamed).collect(),
     })
 }
 
@@ -168,12 +219,13 @@ fn cameras_of(rig: CameraRig) -> &'static str {
         CameraRig::MerNavcam => "Spirit's navcams",
         CameraRig::MerPancam => "Opportunity's pancams",
         CameraRig::MerFrontHazcam => "Opportunity's front hazcams",
+        CameraRig::MerRearHazcam => "rear hazcams like Opportunity's front ones",
         CameraRig::Table1Pancam => "the paper's f = 16 mm pair",
         CameraRig::Table1Navcam => "the paper's f = 6 mm pair",
     }
 }
 
-/// The camera that truly takes an image of a simulated stop, in the site frame.
+/// The camera that truly takes an image of a simulated stop's main pair, in the site frame.
 ///
 /// `None` where the stop carries no truth, or where its camera is in a file.
 pub fn true_camera_in_site(stop: &Stop, eye: Eye) -> Option<Camera> {

@@ -17,7 +17,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use sightline_geometry::camera::Camera;
+use sightline_geometry::camera::{Camera, CameraName};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
 use sightline_geometry::frames::{Pixel, Point3, Pose};
@@ -36,14 +36,21 @@ pub trait TruthSource: Send + Sync {
     }
     /// The true pose at a stop, where it is known.
     fn true_site_from_rover(&self, step: usize) -> Option<Pose>;
-    /// The true left camera in the rover frame.
-    fn true_left_camera(&self, step: usize) -> &Camera;
-    /// The surface point under a pixel of the left image, in the site frame; none where no surface is known.
-    fn surface_point_in_site(&self, step: usize, pixel: Pixel) -> Option<Point3>;
-    /// Whether a point of the site frame is unoccluded in the left image of a stop.
-    fn is_visible(&self, step: usize, point_in_site: &Point3) -> bool;
-    /// The share of a square window of the left image that lies in shadow, 0 to 1; none where no light is known.
-    fn shadow_share(&self, _step: usize, _centre: Pixel, _size_px: u32) -> Option<f64> {
+    /// The true left camera of the main pair, or of a further camera by its name, in the rover frame; `None` at a stop that
+    /// lacks it.
+    fn true_left_camera(&self, step: usize, camera: Option<CameraName>) -> Option<&Camera>;
+    /// The surface point under a pixel of that camera's image, in the site frame; none where no surface is known.
+    fn surface_point_in_site(&self, step: usize, camera: Option<CameraName>, pixel: Pixel) -> Option<Point3>;
+    /// Whether a point of the site frame is unoccluded in that camera's image.
+    fn is_visible(&self, step: usize, camera: Option<CameraName>, point_in_site: &Point3) -> bool;
+    /// The share of a square window of that camera's image that lies in shadow, 0 to 1; none where no light is known.
+    fn shadow_share(
+        &self,
+        _step: usize,
+        _camera: Option<CameraName>,
+        _centre: Pixel,
+        _size_px: u32,
+    ) -> Option<f64> {
         None
     }
 }
@@ -88,6 +95,7 @@ pub struct TargetTruth<'a> {
     kind: TruthKind,
     position_in_site: Point3,
     initial_distance_m: f64,
+    camera: Option<CameraName>,
 }
 
 impl<'a> TargetTruth<'a> {
@@ -98,16 +106,16 @@ impl<'a> TargetTruth<'a> {
         designation: sightline_track::target::Designation,
         estimate_in_rover: Option<&Point3>,
     ) -> Option<Self> {
-        let step = designation.step;
+        let (step, camera) = (designation.step, designation.camera);
         let site_from_rover = source.true_site_from_rover(step)?;
-        let surface = source.surface_point_in_site(step, designation.pixel);
+        let surface = source.surface_point_in_site(step, camera, designation.pixel);
         let (kind, position_in_site) = match surface {
             Some(point) => (TruthKind::Surface, point),
             None => (TruthKind::Carried, site_from_rover * estimate_in_rover?),
         };
-        let centre_in_site = site_from_rover * source.true_left_camera(step).model.centre();
+        let centre_in_site = site_from_rover * source.true_left_camera(step, camera)?.model.centre();
         let initial_distance_m = (position_in_site - centre_in_site).norm();
-        Some(Self { source, kind, position_in_site, initial_distance_m })
+        Some(Self { source, kind, position_in_site, initial_distance_m, camera })
     }
 
     /// The truth's position in the true site frame, m.
@@ -115,16 +123,17 @@ impl<'a> TargetTruth<'a> {
         self.position_in_site
     }
 
-    /// Compares a step with the truth; none where the true pose of that stop is not known.
+    /// Compares a step with the truth; none where the true pose of that stop is not known, or the stop lacks the target's
+    /// pair.
     pub fn compare(&self, trace: &StepTrace) -> Option<StepTruth> {
         let site_from_rover = self.source.true_site_from_rover(trace.step)?;
-        let camera = self.source.true_left_camera(trace.step);
+        let camera = self.source.true_left_camera(trace.step, self.camera)?;
         let position_in_rover = site_from_rover.inverse() * self.position_in_site;
         let distance_m = (position_in_rover - camera.model.centre()).norm();
         let magnification = self.initial_distance_m / distance_m;
         let tolerance_px = (0.5 * magnification).max(5.0);
-        let visible =
-            camera.sees(&position_in_rover) && self.source.is_visible(trace.step, &self.position_in_site);
+        let visible = camera.sees(&position_in_rover)
+            && self.source.is_visible(trace.step, self.camera, &self.position_in_site);
         let left_pixel = if visible { camera.project(&position_in_rover) } else { None };
         let located = trace.located().and_then(|l| l.left_pixel);
         let err_px = left_pixel.zip(located).map(|(a, b)| a.distance(b));

@@ -7,13 +7,15 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::ToSchema;
 
-use sightline_geometry::camera::{Camera, Mast, MastAngles};
+use sightline_geometry::camera::{Camera, CameraName, Mast, MastAngles};
 use sightline_geometry::frames::{Pixel, PoseRecord, Vector3};
 use sightline_geometry::odometry_error::OdometryError;
 use sightline_geometry::stereo_geometry::StereoGeometry;
 
 /// The version of the folder format that this code writes.
 pub const FORMAT_VERSION: u32 = 1;
+/// The most cameras that a stop may have beside its main pair.
+pub const FURTHER_CAMERAS_LIMIT: usize = 16;
 
 /// The index of a traverse: `traverse.toml` or `traverse.json` of the folder.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -76,6 +78,45 @@ pub struct Stop {
     /// What is known to be true, where anything is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truth: Option<StopTruth>,
+    /// Further cameras of the stop beside the main pair `left` and `right`, each with a name of its own.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cameras: Vec<StopCamera>,
+}
+
+impl Stop {
+    /// All images of the stop, those of the main pair first.
+    pub fn views(&self) -> impl Iterator<Item = &View> {
+        let further =
+            self.cameras.iter().flat_map(|camera| std::iter::once(&camera.left).chain(&camera.right));
+        [&self.left, &self.right].into_iter().chain(further)
+    }
+
+    /// The further camera of this name.
+    pub fn camera(&self, name: CameraName) -> Option<&StopCamera> {
+        self.cameras.iter().find(|camera| camera.name == name)
+    }
+}
+
+/// A further stereo pair of a stop, or a single camera.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StopCamera {
+    /// Its name, which no other camera of the stop has; the same name at another stop is the same camera.
+    pub name: CameraName,
+    /// The mast angles at which the images were taken; left out for a camera on the body.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mast_angles: Option<MastAngles>,
+    /// The left image, or the only one.
+    pub left: View,
+    /// The right image; left out for a single camera, in which nothing can be tracked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub right: Option<View>,
+    /// The true left camera in the rover frame, where it differs from the one the tracker is given.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "optional_camera")]
+    pub true_left_camera: Option<Camera>,
+    /// The true right camera in the rover frame, where it differs from the one the tracker is given.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "optional_camera")]
+    pub true_right_camera: Option<Camera>,
 }
 
 /// The light of one stop.

@@ -58,7 +58,7 @@ impl Cancelled {
         let drive = Traverse::open(&self.drive)?;
         open::render(&drive)?;
         let mut works = of_images(&drive)?;
-        works.extend(of_steps(&self.drive, Designation { step: 0, pixel })?);
+        works.extend(of_steps(&self.drive, Designation::new(0, pixel))?);
         works.extend(of_worlds());
         let mut progress = Progress::new("cancel: computation");
         terminal::line("| computation | whole, ms | median latency, ms | worst, ms |\n|---|---|---|---|")?;

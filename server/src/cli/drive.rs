@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use clap::{Args, ValueEnum};
 use serde::Serialize;
+use sightline_geometry::camera::CameraName;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
@@ -38,6 +39,10 @@ pub(super) struct Drive {
     #[arg(long, value_name = "X,Y", value_parser = pixel, allow_hyphen_values = true,
         required_unless_present = "list_targets")]
     target: Option<Pixel>,
+    /// The pair in which the target is designated and tracked, by its name in camera.further; by default the main pair, for
+    /// which the mast is pointed in any case.
+    #[arg(long, value_name = "NAME")]
+    camera: Option<CameraName>,
     /// Print the targets that the scenario's rule chooses, one JSON object a line, and end.
     #[arg(long)]
     list_targets: bool,
@@ -162,7 +167,7 @@ impl Drive {
         }
         // The command line refuses to come here without one.
         let Some(pixel) = self.target else { return Ok(()) };
-        let designation = Designation { step: 0, pixel };
+        let designation = Designation { step: 0, pixel, camera: self.camera };
         let drive = TargetedDrive::begin(world, designation, self.command(), &settings, Cancel::default())?;
         follow(drive, &settings)
     }
@@ -182,7 +187,7 @@ impl Drive {
         let settings = self.settings()?;
         let traverse = Traverse::open(&self.scenario)?;
         let Some(pixel) = self.target else { return Ok(()) };
-        let designation = Designation { step: 0, pixel };
+        let designation = Designation { step: 0, pixel, camera: self.camera };
         let cancel = Cancel::default();
         let mut drive = ReplayedDrive::begin(&traverse, designation, self.command(), &settings, cancel)?;
         let mut progress = Progress::new("followed to stop");

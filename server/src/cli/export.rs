@@ -11,6 +11,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use clap::Args;
+use sightline_geometry::camera::CameraName;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
 use sightline_recordings::Traverse;
@@ -61,6 +62,9 @@ pub(super) struct Export {
     /// The stop in whose left image such targets are designated.
     #[arg(long, value_name = "N", default_value_t = 0, requires = "target")]
     from_step: usize,
+    /// The pair in which such targets are designated and tracked, by its name at that stop; by default the main pair.
+    #[arg(long, value_name = "NAME", requires = "target")]
+    camera: Option<CameraName>,
     /// A named configuration for such targets; --set changes it further.
     #[arg(long, value_name = "NAME", requires = "target")]
     preset: Option<String>,
@@ -168,10 +172,7 @@ impl Export {
         let id = Identity::of(&traverse, None)?.id();
         let mut session = Session::new("s1", id, traverse.stop_count());
         for pixel in &self.target {
-            let designation = Designation { step: self.from_step, pixel: *pixel };
-            if self.from_step < traverse.stop_count() {
-                traverse.render_step(self.from_step, &AtomicBool::new(false))?;
-            }
+            let designation = Designation { step: self.from_step, pixel: *pixel, camera: self.camera };
             let first = sightline_session::track::designate(&traverse, designation, &settings)?;
             session.add_target(None, settings.clone(), Arc::new(first));
         }

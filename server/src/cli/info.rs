@@ -1,13 +1,15 @@
 //! `sightline info`: what a traverse holds, in words.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::Args;
-use sightline_geometry::camera::CameraModel;
+use sightline_geometry::camera::{CameraModel, CameraName};
 use sightline_geometry::error::Result;
 use sightline_geometry::frames::PoseRecord;
 use sightline_geometry::stereo_geometry::StereoGeometry;
 use sightline_recordings::Traverse;
+use sightline_world::traverse::Stop;
 
 use super::{open, terminal};
 use crate::printable::printable;
@@ -48,6 +50,7 @@ fn summary(traverse: &Traverse) -> Vec<String> {
     lines.push(format!("stops        {count}, {way_m:.2} m driven by the estimates, {duration_s:.0} s"));
     lines.push(format!("left camera  {}", camera(traverse, true)));
     lines.push(format!("right camera {}", camera(traverse, false)));
+    lines.extend(further(traverse));
     let stereo = match index.stereo {
         StereoGeometry::Lateral => "lateral: two eyes side by side",
         StereoGeometry::Convergent => "convergent: two freely placed views",
@@ -83,6 +86,25 @@ fn camera(traverse: &Traverse, is_left: bool) -> String {
     format!("{model}, {width} × {height} px, {moves}")
 }
 
+/// One line for each name of a further camera.
+fn further(traverse: &Traverse) -> Vec<String> {
+    let count = traverse.stop_count();
+    let mut found: BTreeMap<CameraName, (usize, String)> = BTreeMap::new();
+    for camera in (0..count).flat_map(|step| traverse.further_cameras(step)) {
+        let [width, height] = camera.left.size;
+        let kind = if camera.right.is_some() { "pair" } else { "single camera" };
+        let place = if camera.mast_angles.is_some() { "on the mast" } else { "on the body" };
+        let words = format!("{kind} of {width} × {height} px {place}");
+        found.entry(camera.name).or_insert((0, words)).0 += 1;
+    }
+    let line = |(name, (stops, words)): (CameraName, (usize, String))| {
+        let at =
+            if stops == count { "at all stops".to_owned() } else { format!("at {stops} of {count} stops") };
+        format!("camera       {name}: {words}, {at}")
+    };
+    found.into_iter().map(line).collect()
+}
+
 fn base_m(traverse: &Traverse) -> f64 {
     (traverse.right_camera(0).model.centre() - traverse.left_camera(0).model.centre()).norm()
 }
@@ -100,12 +122,9 @@ fn truth(traverse: &Traverse) -> String {
 fn images(traverse: &Traverse) -> String {
     let stops = &traverse.index().stops;
     let is_there = |name: &str| traverse.folder().join(name).is_file();
-    let missing: Vec<_> = stops
-        .iter()
-        .flat_map(|stop| [&stop.left.image, &stop.right.image])
-        .filter(|name| !is_there(name))
-        .collect();
-    let all = 2 * stops.len();
+    let missing: Vec<_> =
+        stops.iter().flat_map(Stop::views).map(|view| &view.image).filter(|name| !is_there(name)).collect();
+    let all = stops.iter().flat_map(Stop::views).count();
     match (missing.as_slice(), traverse.index().scenario.is_some()) {
         ([], _) => format!("all {all} there"),
         (missing, true) => format!("{} of {all} to be rendered when they are needed", missing.len()),

@@ -77,16 +77,22 @@ fn library_name(path: &Path) -> Option<&'static str> {
     library::names().find(|name| path == Path::new(name))
 }
 
-/// Renders what is missing of a simulated traverse, telling progress; recorded ones need nothing.
+/// Renders what is missing of a simulated traverse, its further cameras included, telling progress; recorded ones need
+/// nothing.
 ///
 /// # Errors
-/// As [`Traverse::render_step`].
+/// As [`Traverse::render_camera`].
 pub fn render(traverse: &Traverse) -> Result<()> {
-    let missing: Vec<_> = (0..traverse.stop_count()).filter(|&step| !traverse.is_ready(step)).collect();
-    let mut progress = Progress::new("rendered stop");
-    for (done, step) in missing.iter().enumerate() {
+    let cameras = |step: usize| {
+        let further = traverse.further_cameras(step).map(|camera| Some(camera.name));
+        std::iter::once(None).chain(further).map(move |camera| (step, camera))
+    };
+    let all = (0..traverse.stop_count()).flat_map(cameras);
+    let missing: Vec<_> = all.filter(|&(step, camera)| !traverse.is_rendered(step, camera)).collect();
+    let mut progress = Progress::new("rendered pair");
+    for (done, &(step, camera)) in missing.iter().enumerate() {
         progress.tell(done, missing.len());
-        traverse.render_step(*step, &AtomicBool::new(false))?;
+        traverse.render_camera(step, camera, &AtomicBool::new(false))?;
     }
     if !missing.is_empty() {
         progress.tell(missing.len(), missing.len());

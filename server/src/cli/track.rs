@@ -12,7 +12,7 @@ use std::sync::atomic::AtomicBool;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
-use sightline_geometry::camera::MastAngles;
+use sightline_geometry::camera::{CameraName, MastAngles};
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
 use sightline_recordings::Traverse;
@@ -53,6 +53,9 @@ pub(super) struct Track {
     /// The stop in whose left image the targets are designated.
     #[arg(long, value_name = "N", default_value_t = 0)]
     from_step: usize,
+    /// The pair in which the targets are designated and tracked, by its name at that stop; by default the main pair.
+    #[arg(long, value_name = "NAME")]
+    camera: Option<CameraName>,
     /// The tracker, in its validated preset (sightline, features, shape or combined); beside --preset it replaces only the
     /// tracker of that. By default the template tracker.
     #[arg(long, value_parser = trackers())]
@@ -197,9 +200,11 @@ impl Track {
 
     /// The targets: pixels first, then points.
     fn places(&self) -> Vec<Place> {
-        let pixels = self.target.iter().map(|pixel| Place { mast: self.mast, ..Place::of_pixel(*pixel) });
-        let in_rover = |point: &[f64; 3]| Place { point_in_rover: Some(*point), ..Place::default() };
-        let in_site = |point: &[f64; 3]| Place { point_in_site: Some(*point), ..Place::default() };
+        let camera = self.camera;
+        let pixels = self.target.iter();
+        let pixels = pixels.map(|pixel| Place { mast: self.mast, camera, ..Place::of_pixel(*pixel) });
+        let in_rover = |point: &[f64; 3]| Place { point_in_rover: Some(*point), camera, ..Place::default() };
+        let in_site = |point: &[f64; 3]| Place { point_in_site: Some(*point), camera, ..Place::default() };
         pixels
             .chain(self.target_in_rover.iter().map(in_rover))
             .chain(self.target_in_site.iter().map(in_site))
@@ -254,7 +259,8 @@ fn follow(
             break;
         }
         // A stop that cannot be rendered is a fault of that step, which the step itself reports.
-        let _ = traverse.render_step(last.step + 1, &AtomicBool::new(false));
+        let camera = first.update.target.designation.camera;
+        let _ = traverse.render_camera(last.step + 1, camera, &AtomicBool::new(false));
         let next = Arc::new(track::advance(traverse, &first, &last, settings));
         if compares {
             terminal::line(&json(&SearchLine::new(target, traverse, &last, &next, settings))?)?;

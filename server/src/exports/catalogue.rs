@@ -5,8 +5,10 @@ use sightline_api::endpoints::ExportFile;
 use sightline_api::location::AtExport;
 use sightline_session::exports::{ExportEntry, Size};
 
+use sightline_geometry::camera::{Camera, CameraName};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
+use sightline_rover::pair;
 
 use super::kind::{Kind, Part};
 use super::source::Source;
@@ -36,18 +38,18 @@ fn size(kind: Kind, source: &Source, part: Part, cancel: Cancel<'_>) -> Result<S
 /// The images of every stop as PNG, and what the steps saw.
 fn recording_bytes(source: &Source, part: Part) -> u64 {
     let runs = source.runs(part);
-    let mut stops: Vec<usize> = runs.iter().flat_map(|run| &run.run.steps).map(|trace| trace.step).collect();
+    let traces = runs.iter().flat_map(|run| &run.run.steps);
+    let mut stops: Vec<_> =
+        traces.map(|trace| (trace.step, trace.update.target.designation.camera)).collect();
     let steps = stops.len() as u64;
     stops.sort_unstable();
     stops.dedup();
-    let pixels = |step: usize| {
-        let traverse = &source.open.traverse;
-        [traverse.left_camera(step), traverse.right_camera(step)]
-            .iter()
-            .map(|camera| u64::from(camera.size[0]) * u64::from(camera.size[1]))
-            .sum::<u64>()
+    let pixels = |(step, camera): (usize, Option<CameraName>)| {
+        let pair = pair::of_stop(&source.open.traverse, step, camera);
+        let size = |camera: &Camera| u64::from(camera.size[0]) * u64::from(camera.size[1]);
+        pair.map_or(0, |pair| size(pair.left) + size(pair.right))
     };
-    let images: u64 = stops.iter().map(|step| pixels(*step) * 7 / 10).sum();
+    let images: u64 = stops.iter().map(|stop| pixels(*stop) * 7 / 10).sum();
     400_000 + images + 45_000 * steps
 }
 

@@ -112,7 +112,7 @@ pub(super) fn picture_of(
     }
     let trace = &run.run.steps[place];
     // A damaged file is no reason to show nothing of the other steps.
-    let left = match source.images(trace.step, cancel) {
+    let left = match source.images(trace, cancel) {
         Err(Error::Cancelled) => return Err(Error::Cancelled.into()),
         images => images.ok().map(|[left, _]| left),
     };

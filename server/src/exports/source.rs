@@ -106,17 +106,18 @@ impl Source {
         format!("sightline-{}{of}-{}", self.session.id, kind.name())
     }
 
-    /// The left and right image of a stop.
+    /// The left and right image of the pair in which a step was tracked.
     ///
     /// # Errors
-    /// As [`OpenTraverse::make_ready`]; a damaged file.
+    /// As [`OpenTraverse::make_ready`]; a damaged file, and a stop that lacks the pair.
     pub(crate) fn images(
         &self,
-        step: usize,
+        trace: &StepTrace,
         cancel: &AtomicBool,
     ) -> sightline_geometry::error::Result<[Arc<GrayImage>; 2]> {
-        self.open.make_ready(step, cancel)?;
-        let pair = self.open.traverse.capture(step)?;
+        let camera = trace.update.target.designation.camera;
+        self.open.make_camera_ready(trace.step, camera, cancel)?;
+        let pair = self.open.traverse.capture_pair(trace.step, camera, cancel)?;
         Ok([pair.left, pair.right])
     }
 }

@@ -12,6 +12,8 @@
 //! image, from the frame of the subframe, which goes with the target. A run that asks for the shape has two tabs, “Match”
 //! and “Shape”; the second has what the shape tracker saw, the meshes and how well they fit.
 
+use std::collections::BTreeSet;
+
 use rerun::AsComponents;
 use rerun::blueprint::components::ContainerKind::{Grid, Horizontal, Tabs, Vertical};
 use rerun::blueprint::components::{
@@ -22,8 +24,11 @@ use rerun::external::re_sdk_types::blueprint::archetypes::{
     Background, EyeControls3D, PanelBlueprint, PlotLegend, TimePanelBlueprint, VisualBounds2D,
 };
 
+use sightline_geometry::camera::CameraName;
+
 use super::Logged;
 use super::border::point_3d;
+use super::images;
 use super::layout::{self, Container, Part, View};
 use super::map::Outlook;
 use super::palette::{MAP_BACKGROUND, color};
@@ -147,6 +152,8 @@ pub(super) struct Lane<'a> {
     pub(super) close_up_px: [u32; 2],
     /// Whether its tracker asks for the shape: such a run has a tab more.
     pub(super) has_shape: bool,
+    /// The pair in which its target is tracked; `None`: the main pair.
+    pub(super) camera: Option<CameraName>,
 }
 
 /// Sends the layout for these runs; a live one follows the newest step.
@@ -157,14 +164,7 @@ pub(super) fn send(
     live: bool,
 ) -> Logged {
     let roots: Vec<_> = lanes.iter().map(|lane| lane.root).collect();
-    let pictures = Container::new(
-        Horizontal,
-        [
-            picture("left image", "/capture/left", &LEFT, &roots),
-            picture("right image", "/capture/right", &RIGHT, &roots),
-            map(outlook, &roots),
-        ],
-    );
+    let pictures = Container::new(Horizontal, pictures(lanes).into_iter().chain([map(outlook, &roots)]));
     let runs = Container::new(Tabs, lanes.iter().map(run));
     let states = View::new("StateTimeline", "states", of_all(&["/{target}/judge/state"], &roots));
     let words = Container::new(Horizontal, [states.into(), words(&roots)]);
@@ -178,6 +178,20 @@ pub(super) fn send(
     let panels: [(&str, &dyn AsComponents); 3] =
         [("blueprint_panel", &collapsed), ("selection_panel", &collapsed), ("time_panel", &time)];
     layout::send(rows.with_shares([4.0, 4.0, 2.0]), &panels, stream)
+}
+
+/// The images of every pair in which a target is tracked, each with its own runs.
+fn pictures(lanes: &[Lane<'_>]) -> Vec<Part> {
+    let cameras: BTreeSet<_> = lanes.iter().map(|lane| lane.camera).collect();
+    let of_camera = |camera: Option<CameraName>| {
+        let own = lanes.iter().filter(|lane| lane.camera == camera);
+        let roots: Vec<_> = own.map(|lane| lane.root).collect();
+        let of = camera.map_or_else(String::new, |name| format!("{name}: "));
+        [("left", &LEFT[..]), ("right", &RIGHT[..])].map(|(eye, overlays)| {
+            picture(&format!("{of}{eye} image"), &images::of_camera(camera, eye), overlays, &roots)
+        })
+    };
+    cameras.into_iter().flat_map(of_camera).collect()
 }
 
 fn picture(name: &str, origin: &str, overlays: &[&str], roots: &[&str]) -> Part {
@@ -241,7 +255,7 @@ fn shape(lane: &Lane<'_>) -> Part {
 }
 
 fn close_up(lane: &Lane<'_>) -> Part {
-    let contents = std::iter::once("/capture/left".to_owned()).chain(of_all(&LEFT, &[lane.root]));
+    let contents = std::iter::once(images::of_camera(lane.camera, "left")).chain(of_all(&LEFT, &[lane.root]));
     let [x_range, y_range] = lane.close_up_px.map(|length| [0.0, f64::from(length)].into());
     View::new("2D", "close-up", contents)
         .with_origin(path("/{target}/capture/frame", lane.root))

@@ -2,10 +2,12 @@
 //!
 //! Sizes in pixels are those of the image; pens are in screen points, so that a line is as thin at any zoom.
 
-use rerun::{Boxes2D, LineStrips2D, Radius};
+use rerun::{Boxes2D, LineStrips2D, Radius, RecordingStream};
+use sightline_geometry::camera::CameraName;
 use sightline_geometry::frames::Pixel;
+use sightline_rover::pair::FurtherImages;
 use sightline_session::marks::{MarkName, Shape};
-use sightline_vision::image::PixelRect;
+use sightline_vision::image::{GrayImage, PixelRect};
 
 use super::Logged;
 use super::border::{corner_frame, dot, ellipse, haloed, outline, plus, png, point};
@@ -15,14 +17,29 @@ use super::step::Step;
 /// Arm of the truth's plus sign, px.
 const PLUS_ARM_PX: f64 = 6.0;
 
-/// The left image.
+/// The left image of the pair in which the target is tracked.
 pub(super) fn log_left_image(step: &Step<'_>) -> Logged {
-    step.log("/capture/left", step.images.as_ref().and_then(|[left, _]| png(left)))
+    step.log(&of_camera(step.camera(), "left"), step.images.as_ref().and_then(|[left, _]| png(left)))
 }
 
-/// The right image.
+/// The right image of that pair.
 pub(super) fn log_right_image(step: &Step<'_>) -> Logged {
-    step.log("/capture/right", step.images.as_ref().and_then(|[_, right]| png(right)))
+    step.log(&of_camera(step.camera(), "right"), step.images.as_ref().and_then(|[_, right]| png(right)))
+}
+
+/// The images of a camera beside the main pair.
+pub(super) fn log_further(stream: &RecordingStream, name: CameraName, images: &FurtherImages) -> Logged {
+    let log = |eye: &str, image: &GrayImage| match png(image) {
+        Some(png) => stream.log(of_camera(Some(name), eye), &png),
+        None => Ok(()),
+    };
+    log("left", &images.0)?;
+    images.1.as_ref().map_or(Ok(()), |right| log("right", right))
+}
+
+/// The path of an image: of the main pair, or of a further camera.
+pub(super) fn of_camera(camera: Option<CameraName>, eye: &str) -> String {
+    camera.map_or_else(|| format!("/capture/{eye}"), |name| format!("/capture/{name}/{eye}"))
 }
 
 /// The prediction in the left image.

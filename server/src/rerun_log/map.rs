@@ -78,6 +78,15 @@ pub(super) fn log_right_frustum(stream: &RecordingStream, stops: &dyn Stops, ste
     stream.log("/rover/pose/right", &frustum(stops.cameras(step).1, ROVER))
 }
 
+/// The pyramids of the cameras beside the main pair, in the rover frame.
+pub(super) fn log_further_frusta(stream: &RecordingStream, stops: &dyn Stops, step: usize) -> Logged {
+    stops.further_cameras(step).iter().try_for_each(|camera| {
+        let path = |eye: &str| format!("/rover/pose/{}/{eye}", camera.name);
+        stream.log(path("left"), &frustum(camera.left, PREDICTION))?;
+        camera.right.map_or(Ok(()), |right| stream.log(path("right"), &frustum(right, ROVER)))
+    })
+}
+
 /// The predicted position.
 pub(super) fn log_predicted_position(step: &Step<'_>) -> Logged {
     let point = step.trace.prediction().map(|p| dot_3d(p.position_in_site, PREDICTION, "predicted"));

@@ -13,6 +13,10 @@
 //! **Every step has a row.** Where a stage was not reached, its entities get a `Clear`, because a viewer would
 //! go on showing the last step's; a number that is missing is a gap of its line.
 //!
+//! **Further cameras** have the same entities as the main pair below their names: `/rover/pose/{camera}/left` and `right` at
+//! every stop that has the camera, `/capture/{camera}/left` and `right` where a target is tracked in it, and at the other
+//! stops with a step where its images are there without being rendered. A run in such a pair is drawn over its images.
+//!
 //! | path | archetype | when |
 //! |---|---|---|
 //! | `/` | `ViewCoordinates` | once |
@@ -168,10 +172,11 @@ pub fn root(target: usize, run: usize) -> String {
 fn log_stop(stream: &RecordingStream, stops: &dyn Stops, step: usize) -> Logged {
     map::log_pose(stream, stops, step)?;
     map::log_left_frustum(stream, stops, step)?;
-    map::log_right_frustum(stream, stops, step)
+    map::log_right_frustum(stream, stops, step)?;
+    map::log_further_frusta(stream, stops, step)
 }
 
-/// Logs one step of a run, stage by stage; the images only where it is the first run at this stop.
+/// Logs one step of a run, stage by stage; the images only where it is the first run of its pair at this stop.
 fn log_step(step: &Step<'_>, is_first_here: bool) -> Logged {
     map::log_predicted_position(step)?;
     map::log_predicted_covariance(step)?;

@@ -6,15 +6,18 @@ use std::sync::Arc;
 use std::time::SystemTime;
 
 use rerun::{RecordingStream, RecordingStreamBuilder, TextDocument};
+use sightline_geometry::camera::CameraName;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Point3;
+use sightline_rover::pair;
 use sightline_rover::pipeline::Stops;
 use sightline_session::marks::marks;
 use sightline_session::step::RunStep;
 use sightline_vision::image::GrayImage;
 
 use super::blueprint::Lane;
+use super::images::log_further;
 use super::map::Outlook;
 use super::step::Step;
 use super::{Logged, blueprint, log_step, log_stop, map, properties, root, scores, states};
@@ -46,8 +49,8 @@ pub(super) struct Recorder {
     live: bool,
     /// Stops of the traverse that are in the recording; a drive on commands gains more.
     stop_count: usize,
-    /// Stops whose images are in the recording.
-    captured: BTreeSet<usize>,
+    /// Stops and cameras whose images are in the recording.
+    captured: BTreeSet<(usize, Option<CameraName>)>,
     /// The runs by their names in paths.
     runs: BTreeMap<String, Known>,
 }
@@ -62,6 +65,8 @@ struct Known {
     close_up_px: [u32; 2],
     /// Whether its tracker asks for the shape.
     has_shape: bool,
+    /// The pair in which its target is tracked.
+    camera: Option<CameraName>,
 }
 
 impl Known {
@@ -72,6 +77,7 @@ impl Known {
             position_in_site: first.update.target.initial_position_in_site,
             close_up_px: subframe.map_or([161; 2], |rect| [rect.width, rect.height]),
             has_shape: first.shape().is_some(),
+            camera: first.update.target.designation.camera,
         }
     }
 }
@@ -142,6 +148,7 @@ impl Recorder {
             root,
             close_up_px: known.close_up_px,
             has_shape: known.has_shape,
+            camera: known.camera,
         });
         let lanes: Vec<_> = lanes.collect();
         let Some(first) = self.runs.values().next() else { return Ok(()) };
@@ -156,7 +163,9 @@ impl Recorder {
             return Ok(());
         }
         self.set_time(trace.step, stops);
-        let is_first_here = self.captured.insert(trace.step);
+        let camera = trace.update.target.designation.camera;
+        let is_first_here = self.captured.insert((trace.step, camera));
+        self.log_images_at_hand(stops, trace.step, camera)?;
         let step = Step {
             stream: &self.stream,
             root: &root,
@@ -167,6 +176,20 @@ impl Recorder {
             site_from_rover: stops.site_from_rover(trace.step),
         };
         log_step(&step, is_first_here)
+    }
+
+    /// Logs the images of the cameras beside the main pair and `tracked` that are there without being rendered.
+    fn log_images_at_hand(&mut self, stops: &dyn Stops, step: usize, tracked: Option<CameraName>) -> Logged {
+        for name in stops.further_cameras(step).iter().map(|camera| camera.name) {
+            if Some(name) == tracked || self.captured.contains(&(step, Some(name))) {
+                continue;
+            }
+            if let Some(found) = stops.images_at_hand(step, name) {
+                self.captured.insert((step, Some(name)));
+                log_further(&self.stream, name, &found)?;
+            }
+        }
+        Ok(())
     }
 
     /// Whether a step of a run is in the recording.
@@ -190,8 +213,9 @@ fn template_size_px(trace: &RunStep) -> u32 {
 /// traverse.
 fn images(trace: &RunStep, stops: &dyn Stops) -> Option<[Arc<GrayImage>; 2]> {
     let kept = trace.capture()?.pair.clone();
-    let pair =
-        if kept.left.width() > 0 { kept } else { stops.capture(trace.step, Cancel::default()).ok()? };
+    let camera = trace.update.target.designation.camera;
+    let read = || pair::capture(stops, trace.step, camera, Cancel::default()).ok();
+    let pair = if kept.left.width() > 0 { kept } else { read()? };
     Some([pair.left, pair.right])
 }
 

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::Matrix3;
 use rerun::components::AggregationPolicy;
 use rerun::{AsComponents, Clear, Color, Ellipsoids3D, RecordingStream, SeriesLines};
+use sightline_geometry::camera::CameraName;
 use sightline_geometry::frames::{Point3, Pose};
 use sightline_session::marks::{Mark, MarkName, Shape};
 use sightline_session::step::RunStep;
@@ -44,6 +45,11 @@ impl Step<'_> {
             Some(value) => self.stream.log(path, &value),
             None => self.stream.log(path, &Clear::flat()),
         }
+    }
+
+    /// The pair in which the target is tracked.
+    pub(super) fn camera(&self) -> Option<CameraName> {
+        self.trace.update.target.designation.camera
     }
 
     /// The evidence of the template locator.

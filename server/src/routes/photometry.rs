@@ -58,7 +58,7 @@ fn with_image(traverse: &Traverse, trace: &Arc<RunStep>) -> Result<Arc<RunStep>>
     let mut trace = Arc::clone(trace);
     let is_designation = trace.verdict().is_none() && trace.update.target.designation.step == trace.step;
     if is_designation && trace.capture().is_some_and(|capture| capture.pair.left.is_empty()) {
-        let left = traverse.capture(trace.step)?.left;
+        let left = traverse.capture_one(trace.step, trace.update.target.designation.camera, true)?;
         if let Some(capture) = Arc::make_mut(&mut trace).capture_mut() {
             capture.pair.left = left;
         }

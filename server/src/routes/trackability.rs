@@ -172,8 +172,10 @@ pub(crate) fn refusal(
     settings: &Settings,
     error: Error,
 ) -> ApiError {
-    let Designation { step, pixel: place } = designation;
-    let is_refused = matches!(error, Error::Target(_)) && step < open.traverse.stop_count();
+    let Designation { step, pixel: place, camera } = designation;
+    // The map of a stop is that of its main pair.
+    let is_refused =
+        matches!(error, Error::Target(_)) && camera.is_none() && step < open.traverse.stop_count();
     let problem = ApiError::from(error);
     let [width, height] = if is_refused { open.traverse.left_camera(step).size } else { [0, 0] };
     if !place.is_inside(width, height) {

@@ -9,9 +9,13 @@ use axum::response::{IntoResponse, Response};
 use sightline_api::endpoint::Endpoint;
 use sightline_api::endpoints::{AddTraverse, ListTraverses, Prefetch, ShowImage, ShowStop, ShowTraverse};
 use sightline_api::location::{AtImage, AtStop, AtTraverse};
-use sightline_api::query::{FirstStop, ImageDepth};
-use sightline_api::wire::{NewTraverse, StopDetail, StopView, TraverseEntry, TraverseView};
+use sightline_api::query::{FirstStop, ImageWish};
+use sightline_api::wire::{
+    NewTraverse, StopCameraModels, StopCameraView, StopDetail, StopView, TraverseEntry, TraverseView,
+};
+use sightline_geometry::camera::CameraName;
 use sightline_geometry::error::Error;
+use sightline_rover::pair::FurtherCamera;
 use sightline_rover::pipeline::Stops;
 use sightline_vision::image::io;
 use utoipa::ToSchema;
@@ -110,7 +114,13 @@ async fn stop(
     let traverse = &open.traverse;
     let (left, right) = (traverse.left_camera(step).clone(), traverse.right_camera(step).clone());
     let mast = traverse.mast_angles(step);
-    Ok(Json(StopDetail { stop: stop_view(&open, step), left, right, mast }))
+    let models = |camera: FurtherCamera<'_>| StopCameraModels {
+        name: camera.name,
+        left: camera.left.clone(),
+        right: camera.right.cloned(),
+    };
+    let cameras = traverse.further_cameras(step).map(models).collect();
+    Ok(Json(StopDetail { stop: stop_view(&open, step), left, right, mast, cameras }))
 }
 
 fn no_step(step: usize) -> ApiError {
@@ -121,7 +131,7 @@ fn no_step(step: usize) -> ApiError {
 ///
 /// An image of a simulated stop is rendered when it is first asked for, which takes some seconds.
 #[utoipa::path(get, operation_id = "show_image", path = ShowImage::PATH, tag = "traverses", params(("file" = String, Path, description = "left.png or right.png"),
-    ImageDepth), responses(
+    ImageWish), responses(
     (status = 200, content_type = "image/png", body = FileBytes),
     (status = 304, description = "It is the one that you have (If-None-Match)"), ApiError))]
 async fn image(
@@ -144,12 +154,22 @@ async fn image(
     if step >= open.traverse.stop_count() {
         return Err(no_step(step));
     }
+    if let Some(name) = params.camera {
+        let camera = open.traverse.further_cameras(step).find(|camera| camera.name == name);
+        let camera =
+            camera.ok_or_else(|| ApiError::not_found(format!("Step {step} has no camera `{name}`.")))?;
+        if !is_left && camera.right.is_none() {
+            let problem =
+                format!("The camera `{name}` of step {step} is a single one: it has left.png only.");
+            return Err(ApiError::not_found(problem));
+        }
+    }
     let cancel = CancelOnDrop::default();
     let flag = cancel.flag();
     let png = state
         .pictures()
         .run(move || {
-            encode(&open, step, is_left, is_deep, &flag).map_err(|error| {
+            encode(&open, (step, params.camera, is_left), is_deep, &flag).map_err(|error| {
                 let is_of_file = matches!(error, Error::Read { .. } | Error::Format { .. });
                 let problem = ApiError::from(error);
                 if is_of_file { problem.hint(MEND) } else { problem }
@@ -181,6 +201,16 @@ fn stop_view(open: &OpenTraverse, step: usize) -> StopView {
         left_size: traverse.left_camera(step).size,
         right_size: traverse.right_camera(step).size,
         ready: traverse.is_ready(step),
+        cameras: traverse.further_cameras(step).map(camera_view).collect(),
+    }
+}
+
+fn camera_view(camera: FurtherCamera<'_>) -> StopCameraView {
+    StopCameraView {
+        name: camera.name,
+        left_size: camera.left.size,
+        right_size: camera.right.map(|right| right.size),
+        mast: camera.mast_angles,
     }
 }
 
@@ -201,12 +231,11 @@ fn view(open: &OpenTraverse) -> TraverseView {
 /// The image as the bytes of a PNG file; whatever the file on disk is, a full scale of 1 becomes the brightest.
 fn encode(
     open: &OpenTraverse,
-    step: usize,
-    is_left: bool,
+    (step, camera, is_left): (usize, Option<CameraName>, bool),
     is_deep: bool,
     cancel: &AtomicBool,
 ) -> sightline_geometry::error::Result<Vec<u8>> {
-    open.make_ready(step, cancel)?;
-    let image = open.traverse.capture_one(step, is_left)?;
+    open.make_camera_ready(step, camera, cancel)?;
+    let image = open.traverse.capture_one(step, camera, is_left)?;
     if is_deep { io::encode_png_u16(&image, None) } else { io::encode_png_u8(&image) }
 }

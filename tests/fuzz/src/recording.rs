@@ -80,6 +80,7 @@ fn stop(step: usize) -> Stop {
         light: None,
         metered_px: None,
         truth: None,
+        cameras: Vec::new(),
     }
 }
 

@@ -1,6 +1,7 @@
 //! The names of what can be loaded.
 
 pub(crate) use sightline_api::location::AtStep as StepKey;
+use sightline_geometry::camera::CameraName;
 use sightline_track::trace::ArrayName;
 
 /// One of the two images of a stop.
@@ -33,6 +34,8 @@ pub enum Key {
         step: usize,
         /// Which of the two.
         eye: Eye,
+        /// The camera beside the main pair; `None`: the main pair.
+        camera: Option<CameraName>,
     },
     /// A stop with its cameras.
     Stop {

@@ -3,7 +3,7 @@
 use crate::cache::*;
 
 fn key(step: usize) -> Key {
-    Key::Image { traverse: "t".to_owned(), step, eye: Eye::Left }
+    Key::Image { traverse: "t".to_owned(), step, eye: Eye::Left, camera: None }
 }
 
 fn at_most(n: usize) -> impl FnMut(&Key) -> bool {

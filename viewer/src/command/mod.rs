@@ -7,6 +7,7 @@ pub(crate) mod actions;
 pub(crate) mod palette;
 pub(crate) mod help;
 
+use sightline_geometry::camera::CameraName;
 use sightline_geometry::frames::Pixel;
 use sightline_track::settings::Changes;
 
@@ -180,6 +181,8 @@ pub enum Command {
     View(Zoomable, View2d),
     /// Changes what the calculator of the error budget is given.
     SetCalculator(Calculator),
+    /// Shows the images of a further camera of the stops, or of the main pair.
+    ShowCamera(Option<CameraName>),
     /// Stretches the grey values of the images on the screen.
     SetStretch(Stretch),
     /// Filters the features and magnifies their residuals.

@@ -177,7 +177,8 @@ impl State {
     /// The left image of another run's stop.
     pub(crate) fn other_image(&self, other: RunName) -> Slot<'_, Raster> {
         let step = self.beside(other, self.cursor.step);
-        let key = step.and_then(|step| self.image_key(step, Eye::Left));
+        let camera = self.camera_of(other);
+        let key = step.and_then(|step| self.image_key_in(step, camera, Eye::Left));
         key.map_or(Slot::Absent, |key| self.cache.raster(&key))
     }
 

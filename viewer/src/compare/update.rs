@@ -205,7 +205,7 @@ impl State {
                 let Some(there) = there else { continue };
                 keys.extend(self.other_key(other.name, there).map(Key::Trace));
                 if near == step {
-                    keys.extend(self.image_key(there, Eye::Left));
+                    keys.extend(self.image_key_in(there, self.camera_of(other.name), Eye::Left));
                     keys.extend(self.other_key(other.name, there).map(Key::Arrays));
                 }
             }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use sightline_api::endpoint::Call;
 use sightline_api::endpoints::{ShowArrays, ShowEarlierTemplates, ShowImage, ShowStep, ShowStop};
 use sightline_api::location::{AtImage, AtStop};
+use sightline_api::query::ImageWish;
 use sightline_api::wire::Problem;
 use sightline_track::trace::ArrayName;
 use sightline_vision::image::npz;
@@ -17,9 +18,10 @@ use crate::tables::Table;
 /// The call that reads an item. A single array comes with all arrays of its step.
 pub(crate) fn call(key: &Key) -> Call {
     match key {
-        Key::Image { traverse, step, eye } => {
+        Key::Image { traverse, step, eye, camera } => {
             let (id, file) = (traverse.clone(), format!("{}.png", eye.word()));
-            Call::to::<ShowImage>(&AtImage { id, step: *step, file })
+            let wish = ImageWish { bits: None, camera: *camera };
+            Call::with_query::<ShowImage>(&AtImage { id, step: *step, file }, &wish)
         }
         Key::Stop { traverse, step } => Call::to::<ShowStop>(&AtStop { id: traverse.clone(), step: *step }),
         Key::Trace(step) => Call::to::<ShowStep>(step),
@@ -67,8 +69,14 @@ mod tests {
     #[test]
     fn every_thing_has_its_path() {
         let step = StepKey { session: "s1".to_owned(), target: 2, run: 3, step: 4 };
-        let image = Key::Image { traverse: "t".to_owned(), step: 7, eye: Eye::Right };
-        assert_eq!(call(&image).path, "traverses/t/steps/7/images/right.png");
+        let image = |camera: Option<&str>| Key::Image {
+            traverse: "t".to_owned(),
+            step: 7,
+            eye: Eye::Right,
+            camera: camera.map(|name| name.parse().unwrap()),
+        };
+        assert_eq!(call(&image(None)).path, "traverses/t/steps/7/images/right.png");
+        assert_eq!(call(&image(Some("pancam"))).path, "traverses/t/steps/7/images/right.png?camera=pancam");
         assert_eq!(call(&Key::Trace(step.clone())).path, "sessions/s1/targets/2/runs/3/steps/4");
         assert_eq!(call(&Key::Arrays(step)).path, "sessions/s1/targets/2/runs/3/steps/4/arrays.npz");
     }

@@ -9,6 +9,7 @@
 //! | `tg`, `run`, `step` | the cursor: target, run, stop |
 //! | `stage` | the stage that is looked at |
 //! | `lay` | the arrangement of the panels |
+//! | `cam` | the camera of the stops whose images are shown, `-` for the main pair; left out: that of the target |
 //! | `vs` | the runs it is compared with, `target.run` each, commas between |
 //! | `cmp` | how the left image shows them |
 //! | `sort`, `show` | the metric by which the table of runs is sorted (`-` first: the largest comes first), and the words
@@ -18,6 +19,7 @@
 //! Keys that this version does not know are kept as they are. A key whose value cannot be read is left out, and a
 //! sentence says so; nothing else of the link is lost by it.
 
+use sightline_geometry::camera::CameraName;
 use sightline_geometry::frames::Pixel;
 use sightline_session::compare::{RUNS_MAX, RunName};
 
@@ -28,6 +30,9 @@ use crate::layout::presets::Preset;
 
 /// The version of the form.
 const VERSION: &str = "1";
+
+/// The main pair of cameras; no camera has this name.
+const MAIN: &str = "-";
 
 /// Longer fragments are cut: nobody's link is that long.
 const LONGEST: usize = 4_096;
@@ -50,6 +55,8 @@ pub struct Fragment {
     pub stage: Option<Stage>,
     /// The arrangement of the panels.
     pub preset: Option<Preset>,
+    /// The camera whose images are shown, where it is not that of the target.
+    pub camera: Option<Option<CameraName>>,
     /// The runs it is compared with.
     pub others: Vec<RunName>,
     /// How the left image shows them; none shows their marks.
@@ -92,6 +99,7 @@ impl Fragment {
             "step" => put(&mut self.step, value.parse().ok()),
             "stage" => put(&mut self.stage, Stage::named(value)),
             "lay" => put(&mut self.preset, Preset::ALL.into_iter().find(|preset| preset.word() == value)),
+            "cam" => put(&mut self.camera, camera(value)),
             "vs" => runs(value).map(|others| self.others = others).is_some(),
             "cmp" => {
                 put(&mut self.compared, compare::View::ALL.into_iter().find(|view| hyphened(*view) == value))
@@ -117,6 +125,8 @@ impl Fragment {
         parts.extend(number("step", self.step));
         parts.extend(self.stage.map(|stage| format!("stage={}", stage.word())));
         parts.extend(self.preset.map(|preset| format!("lay={}", preset.word())));
+        let word = |camera: Option<CameraName>| camera.map_or(MAIN.to_owned(), |name| name.to_string());
+        parts.extend(self.camera.map(|camera| format!("cam={}", word(camera))));
         if !self.others.is_empty() {
             let names: Vec<String> =
                 self.others.iter().map(|name| format!("{}.{}", name.target, name.run)).collect();
@@ -147,6 +157,11 @@ impl Fragment {
 fn put<T>(place: &mut Option<T>, value: Option<T>) -> bool {
     *place = value;
     place.is_some()
+}
+
+/// A camera: a name, or the word of the main pair.
+fn camera(value: &str) -> Option<Option<CameraName>> {
+    if value == MAIN { Some(None) } else { value.parse().ok().map(Some) }
 }
 
 /// Compared runs: `0.1,0.2`.
@@ -226,11 +241,13 @@ mod tests {
 
     #[test]
     fn a_link_opens_what_it_was_made_of_and_keeps_what_it_does_not_know() {
-        let text = "v=1&session=s7&tg=0&run=2&step=12&stage=judge&lay=match&vs=0.1,1.0&cmp=side-by-side&sort=-ade_px&show=ridge%20ncc_min%3D0.6&L=512.5,300.2,8.000&later=x%20y";
+        let text = "v=1&session=s7&tg=0&run=2&step=12&stage=judge&lay=match&cam=pancam&vs=0.1,1.0&cmp=side-by-side&sort=-ade_px&show=ridge%20ncc_min%3D0.6&L=512.5,300.2,8.000&later=x%20y";
         let link = Fragment::parse(&format!("#{text}"));
         assert_eq!(link.text(), text);
         assert_eq!((link.target, link.run, link.step), (Some(0), Some(2), Some(12)));
         assert_eq!(link.stage, Some(Stage::JUDGE));
+        assert_eq!(link.camera, Some(Some("pancam".parse().unwrap())));
+        assert_eq!(Fragment::parse("session=s7&cam=-").text(), "v=1&session=s7&cam=-");
         assert_eq!(link.left, Some(View2d::At { centre: Pixel::new(512.5, 300.2), scale: 8.0 }));
         let sort = compare::Sort { metric: Some("ade_px".to_owned()), is_descending: true };
         assert_eq!((link.sort.clone(), link.filter.as_deref()), (Some(sort), Some("ridge ncc_min=0.6")));
@@ -246,6 +263,7 @@ mod tests {
         for hostile in [
             "session=../../etc",
             "session=<script>",
+            "cam=../x",
             "L=nan,1,2",
             "L=1,2,1e9",
             "tg=1e3",

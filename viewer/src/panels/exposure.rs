@@ -25,7 +25,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Co
             by_hand(ui, [brightness, contrast, gamma], out);
         }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let words = state.trace().and_then(|trace| trace.capture()).map(exposure);
+            let words = state.trace_on_image().and_then(|trace| trace.capture()).map(exposure);
             if let Some((words, is_bad)) = words {
                 let colour = if is_bad { theme::lost() } else { theme::weak() };
                 let label = egui::Label::new(RichText::new(&words).small().color(colour)).truncate();

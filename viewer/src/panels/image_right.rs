@@ -11,6 +11,7 @@ use crate::compare::panel::marks as compared;
 use crate::drawing::overlay::{Line, Mark, Overlay};
 use crate::drawing::raster::Raster;
 use crate::drawing::view2d::Canvas;
+use crate::panels::camera_choice;
 use crate::panels::epipolar::Curve;
 use crate::panels::features::marks;
 use crate::panels::image_marks::{self, Of};
@@ -41,6 +42,7 @@ impl Panel for RightView {
 
 /// Shows the right image.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    camera_choice::show(ui, state, out);
     let Some(raster) = ready_image(ui, state, Eye::Right, out) else { return };
     raster.stretch(state.stretch);
     let [width, height] = raster.size();
@@ -55,11 +57,14 @@ fn picture(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) 
     let canvas = Canvas::new(ui, state.view(Zoomable::Right), region, STATUS);
     canvas.texture(&raster.texture, region);
     canvas.pixel_grid(region);
-    if state.marks {
+    let of_target = state.shows_targets_camera();
+    if state.marks && of_target {
         marks::paint_right(&canvas, state);
     }
-    marks::hover(&canvas, state, |feature| feature.right);
-    if let Some(trace) = state.trace().filter(|_| state.marks) {
+    if of_target {
+        marks::hover(&canvas, state, |feature| feature.right);
+    }
+    if let Some(trace) = state.trace_on_image().filter(|_| state.marks) {
         paint_marks(&canvas, trace, state);
     }
     compared::paint_right(&Overlay::new(&canvas.painter, &canvas.transform), state);
@@ -76,7 +81,7 @@ fn picture(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) 
 }
 
 fn entries(state: &State) -> Vec<Entry> {
-    let Some(trace) = state.trace() else { return Vec::new() };
+    let Some(trace) = state.trace_on_image() else { return Vec::new() };
     let mut entries = Vec::new();
     if trace.located().is_some_and(|l| l.right_pixel.is_some()) {
         let is_moved = trace.prediction().is_some() && trace.features().is_some();
@@ -118,7 +123,7 @@ fn paint_marks(canvas: &Canvas, trace: &RunStep, state: &State) {
 fn paint_pointed(canvas: &Canvas, state: &State) -> Option<String> {
     let pointed = state.pointed.filter(|_| state.marks)?;
     if let Pointed::Range(range_m) = pointed {
-        let pixel = target_curve(state)?.at(range_m)?;
+        let pixel = curve_on_image(state)?.at(range_m)?;
         let overlay = Overlay::new(&canvas.painter, &canvas.transform);
         overlay.mark(pixel, Mark::Plus, theme::accent());
         return Some(format!("range {range_m:.2} m"));
@@ -136,7 +141,7 @@ fn paint_pointed(canvas: &Canvas, state: &State) -> Option<String> {
 
 /// The range of the target's curve next to the pointer, m.
 fn paint_range(canvas: &Canvas, state: &State, pixel: Pixel) {
-    let near = target_curve(state).and_then(|curve| curve.nearest(pixel));
+    let near = curve_on_image(state).and_then(|curve| curve.nearest(pixel));
     if let Some((range_m, off_px)) = near.filter(|(_, off_px)| state.marks && *off_px <= NEAR_PX) {
         let words = format!("{range_m:.2} m, {off_px:.1} px beside the curve");
         Overlay::new(&canvas.painter, &canvas.transform).words(
@@ -146,6 +151,11 @@ fn paint_range(canvas: &Canvas, state: &State, pixel: Pixel) {
             theme::accent(),
         );
     }
+}
+
+/// The curve of the target's left pixel, where it belongs on the image that is shown.
+fn curve_on_image(state: &State) -> Option<Curve<'_>> {
+    target_curve(state).filter(|_| state.shows_targets_camera())
 }
 
 /// The curve of the target's left pixel.

@@ -2,6 +2,7 @@
 
 use egui::{Margin, Rect, Ui, pos2, vec2};
 use sightline_session::marks::{basin_of, square};
+use sightline_session::view::TargetView;
 use sightline_vision::image::PixelRect;
 
 use crate::cache::{Eye, Slot};
@@ -12,6 +13,7 @@ use crate::drawing::raster::Raster;
 use crate::drawing::view2d::Canvas;
 use crate::layout::left_image::keep_left_image;
 use crate::panels::broken;
+use crate::panels::camera_choice;
 use crate::panels::epipolar::Curve;
 use crate::panels::exposure;
 use crate::panels::features::marks;
@@ -22,7 +24,7 @@ use crate::panels::panel::Panel;
 use crate::panels::status_line::{STATUS, status_line};
 use crate::picking;
 use crate::pointed::Pointed;
-use crate::state::{State, row_of, run_letter};
+use crate::state::{Place, State, row_of, run_letter};
 use crate::what_if::panel;
 use crate::{panels, theme};
 
@@ -46,6 +48,7 @@ pub(crate) fn show(
     state: &State,
     out: &mut Vec<Command>,
 ) -> Option<(crate::drawing::view2d::Transform, [u32; 2])> {
+    camera_choice::show(ui, state, out);
     let raster = ready_image(ui, state, Eye::Left, out)?;
     raster.stretch(state.stretch);
     exposure::show(ui, state, raster, out);
@@ -69,7 +72,7 @@ fn picture(
 ) -> crate::drawing::view2d::Transform {
     let [width, height] = raster.size();
     let region = PixelRect::whole(width, height);
-    let view = state.held_view(state.view(Zoomable::Left), state.trace());
+    let view = state.held_view(state.view(Zoomable::Left), state.trace_on_image());
     let canvas = Canvas::new(ui, view, region, STATUS);
     canvas.texture(&raster.texture, region);
     modes::under(&canvas, state);
@@ -77,8 +80,8 @@ fn picture(
     picking::paint_map(&canvas, state);
     if state.marks {
         paint_others(&canvas, state);
-        marks::paint_left(&canvas, state);
-        if let Some(trace) = state.trace() {
+        if let Some(trace) = state.trace_on_image() {
+            marks::paint_left(&canvas, state);
             let of = Of::Shown(theme::run(state.cursor.run));
             let overlay = Overlay::new(&canvas.painter, &canvas.transform);
             image_marks::paint(&overlay, trace, state.template_side_px(), Eye::Left, of, state);
@@ -87,8 +90,10 @@ fn picture(
     modes::over(ui, &canvas, state, out);
     paint_designation(&canvas, state);
     picking::show(ui, &canvas, raster, state, out);
-    marks::hover(&canvas, state, |feature| Some(feature.pixel));
-    panel::over_image(ui, &canvas, state, out);
+    if state.shows_targets_camera() {
+        marks::hover(&canvas, state, |feature| Some(feature.pixel));
+        panel::over_image(ui, &canvas, state, out);
+    }
     let pointed = paint_pointed(&canvas, state);
     status_line(ui, &canvas, raster, region, pointed);
     out.extend(canvas.hovered(region).map(|pixel| Command::Point(Pointed::Left(pixel))));
@@ -112,6 +117,10 @@ pub(crate) fn ready_image<'a>(
         panels::missing(ui, &format!("The {word} image of step {step} is not taken yet."), &sentence);
         return None;
     }
+    if let Some(sentence) = state.lacks_image(eye) {
+        panels::missing(ui, "", &sentence);
+        return None;
+    }
     match state.image(eye) {
         Slot::Ready(raster) => return Some(raster),
         Slot::Failed(problem) => broken::show(ui, word, step, problem, out),
@@ -122,6 +131,9 @@ pub(crate) fn ready_image<'a>(
 }
 
 fn waiting_words(state: &State, word: &str, step: usize) -> String {
+    if let Some(name) = state.camera() {
+        return format!("Loading the {word} image of {name} at step {step} …");
+    }
     let is_rendered = state.stop().is_some_and(|stop| stop.ready);
     match (is_rendered, state.rendering) {
         (true, _) => format!("Loading the {word} image of step {step} …"),
@@ -138,7 +150,7 @@ fn waiting_words(state: &State, word: &str, step: usize) -> String {
 
 /// What the legend of the left image lists.
 fn entries(state: &State) -> Vec<Entry> {
-    let Some(trace) = state.trace() else { return Vec::new() };
+    let Some(trace) = state.trace_on_image() else { return Vec::new() };
     let evidence = trace.template();
     let matched = evidence.and_then(|e| e.match_template.as_ref());
     let run = theme::run(state.cursor.run);
@@ -194,7 +206,9 @@ fn entries(state: &State) -> Vec<Entry> {
 fn paint_others(canvas: &Canvas, state: &State) {
     let Some(session) = state.session.as_ref().filter(|_| state.shows(Layer::Others)) else { return };
     let overlay = Overlay::new(&canvas.painter, &canvas.transform);
-    for target in session.targets.iter().filter(|target| Some(target.number) != state.cursor.target) {
+    let is_here = |target: &&TargetView| target.designation.camera == state.camera();
+    let others = session.targets.iter().filter(|target| Some(target.number) != state.cursor.target);
+    for target in others.filter(is_here) {
         let row = target.runs.last().and_then(|run| row_of(run, state.cursor.step));
         if let Some(pixel) = row.and_then(|row| row.left_pixel) {
             overlay.mark(pixel, Mark::Diamond, theme::weak());
@@ -205,13 +219,13 @@ fn paint_others(canvas: &Canvas, state: &State) {
 
 /// A designation that is being computed or was refused.
 fn paint_designation(canvas: &Canvas, state: &State) {
-    let here = |step: usize| step == state.cursor.step;
+    let here = |place: &Place| place.step == state.cursor.step && place.camera == state.camera();
     let overlay = Overlay::new(&canvas.painter, &canvas.transform);
-    if let Some(place) = state.designating.filter(|place| here(place.step)) {
+    if let Some(place) = state.designating.filter(here) {
         overlay.mark(place.pixel, Mark::Ring, theme::accent());
         overlay.words(place.pixel, vec2(12.0, 0.0), "computing the position …", theme::accent());
     }
-    if let Some(refusal) = state.refusal.as_ref().filter(|refusal| here(refusal.place.step)) {
+    if let Some(refusal) = state.refusal.as_ref().filter(|refusal| here(&refusal.place)) {
         overlay.mark(refusal.place.pixel, Mark::Cross, theme::failed());
         let at = canvas.transform.to_screen(refusal.place.pixel) + vec2(12.0, 0.0);
         paint_wrapped(canvas, at, &format!("refused: {}", refusal.sentence));
@@ -243,7 +257,7 @@ fn paint_pointed(canvas: &Canvas, state: &State) -> Option<String> {
             Curve::new(from, to, pixel)?.paint(canvas, theme::accent(), Line::Dashed);
             Some(format!("curve of x {:.1}  y {:.1} of the right image", pixel.x, pixel.y))
         }
-        Pointed::Score(pixel) => {
+        Pointed::Score(pixel) if state.shows_targets_camera() => {
             let quad = square(pixel, state.template_side_px(), &nalgebra::Matrix2::identity());
             overlay.outline(&quad, theme::accent(), Line::Dashed);
             overlay.mark(pixel, Mark::Plus, theme::accent());

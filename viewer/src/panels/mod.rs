@@ -89,6 +89,7 @@ pub(crate) mod pane;
 pub(crate) mod panel;
 pub(crate) mod list;
 pub(crate) mod bars;
+pub(crate) mod camera_choice;
 pub(crate) mod card;
 pub(crate) mod chart;
 pub(crate) mod broken;

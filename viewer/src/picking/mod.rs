@@ -199,6 +199,11 @@ fn paint_hint(canvas: &Canvas, border: Rect, words: &str) {
 /// What can be done, and how far the map is.
 fn hint(state: &State) -> String {
     let hint = "Click the point to track, or aim with the arrows and Enter. Esc cancels.";
+    if let Some(name) = state.camera() {
+        return format!(
+            "{hint} The target is tracked in {name}; trackability is known for the main pair alone."
+        );
+    }
     let Some(progress) = &state.trackability.progress else {
         return format!("{hint} Trackability is being looked at …");
     };
@@ -230,6 +235,9 @@ fn made_with(state: &State) -> String {
 /// The image in words, for those who do not see it.
 fn described_words(state: &State, pixel: Option<Pixel>) -> String {
     let mut words = format!("left image of step {}", state.cursor.step);
+    if let Some(name) = state.camera() {
+        words += &format!(", camera {name}");
+    }
     if let Some(map) = state.trackability_map() {
         let [good, risky, bad] = map.shares().map(|share| 100.0 * share);
         words += &format!(", trackability: {good:.0} % good, {risky:.0} % risky, {bad:.0} % bad");

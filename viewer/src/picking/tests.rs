@@ -71,7 +71,7 @@ fn picking(context: &egui::Context) -> State {
 
 fn refused(context: &egui::Context) -> State {
     let mut state = picking(context);
-    let place = Place { step: 0, pixel: PLACE };
+    let place = Place { step: 0, pixel: PLACE, camera: None };
     state.refusal = Some(Refusal {
         place,
         sentence: "no 3-D position here".to_owned(),

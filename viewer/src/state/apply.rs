@@ -68,6 +68,7 @@ impl State {
                 Zoomable::Right => self.views.right = view,
                 Zoomable::Surface => self.views.surface = view,
             },
+            Command::ShowCamera(camera) => self.choose_camera(camera),
             Command::SetCalculator(calculator) => self.calculator = calculator,
             Command::SetStretch(stretch) => self.stretch = stretch,
             Command::SetFeatureView(view) => self.feature_view = view,
@@ -163,8 +164,11 @@ impl State {
 
     fn look(&mut self, target: usize, run: usize) {
         let is_other = self.cursor.target != Some(target) || self.cursor.run != run;
-        let before = self.own_name();
+        let (before, camera) = (self.own_name(), self.camera());
         self.cursor = Cursor { target: Some(target), run, ..self.cursor };
+        if self.camera() != camera {
+            self.fit_images();
+        }
         self.looked_elsewhere(before, self.cursor);
         if is_other {
             self.draft.clear();
@@ -187,7 +191,7 @@ impl State {
     }
 
     fn pick(&mut self, pixel: Pixel) {
-        let place = Place { step: self.cursor.step, pixel };
+        let place = Place { step: self.cursor.step, pixel, camera: self.camera() };
         self.refusal = self.advised_against(place);
         if self.refusal.is_none() {
             self.designate(place);
@@ -201,7 +205,7 @@ impl State {
             return;
         }
         let Some(session) = self.session_id() else { return };
-        let target = NewTarget::at_pixel(place.step, place.pixel);
+        let target = NewTarget { camera: place.camera, ..NewTarget::at_pixel(place.step, place.pixel) };
         let call = Call::with_body::<DesignateTarget>(&AtSession { session }, &target);
         let take = |state: &mut Self, Designated { target, session, .. }| state.designated(target, session);
         self.call_or::<DesignateTarget>(call, take, |state, problem| {

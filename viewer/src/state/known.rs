@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use sightline_geometry::camera::CameraName;
 use sightline_geometry::frames::Pixel;
 use sightline_session::Cursor;
 use sightline_session::view::{SessionView, waiting_for};
@@ -42,6 +43,8 @@ pub struct Place {
     pub step: usize,
     /// The position, px.
     pub pixel: Pixel,
+    /// The camera beside the main pair; `None`: the main pair.
+    pub camera: Option<CameraName>,
 }
 
 /// Why a target was not designated.

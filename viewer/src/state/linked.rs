@@ -19,6 +19,7 @@ impl State {
             run: self.cursor.target.map(|_| self.cursor.run),
             step: Some(self.cursor.step),
             stage: Some(self.stage()),
+            camera: self.camera_to_link(),
             others: self.compare.others.clone(),
             compared: Some(self.compare.view)
                 .filter(|view| self.is_comparing() && *view != compare::View::Marks),
@@ -100,6 +101,11 @@ impl State {
             self.compare.filter = filter;
         }
         self.stage = link.stage.unwrap_or(self.stage);
+        self.keep_cursor_valid();
+        self.chosen_camera = None;
+        if let Some(camera) = link.camera {
+            self.choose_camera(camera);
+        }
         self.views.left = link.left.unwrap_or(View2d::Fit);
         self.views.right = link.right.unwrap_or(View2d::Fit);
     }

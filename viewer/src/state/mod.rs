@@ -7,6 +7,7 @@ mod apply;
 mod arrive;
 pub(crate) mod effect;
 pub(crate) mod calculator;
+mod camera;
 pub(crate) mod calls;
 mod configurations;
 pub(crate) mod deeds;
@@ -44,6 +45,7 @@ use sightline_track::target::TrackingState;
 use sightline_track::trace::ArrayName;
 
 use self::calculator::Calculator;
+use self::camera::ChosenCamera;
 use self::configurations::Configurations;
 use self::deeds::Undo;
 use self::effect::{Effect, Outbox};
@@ -109,6 +111,8 @@ pub struct State {
     pub messages: Messages,
     /// What each panel shows.
     pub views: Views,
+    /// The camera of the stops that a person chose for the images.
+    pub(crate) chosen_camera: Option<ChosenCamera>,
     /// How the images' grey values become brightness on the screen.
     pub stretch: Stretch,
     /// Which features are shown, and how long their residuals are drawn.
@@ -187,6 +191,7 @@ impl State {
             refusal: None,
             messages: Messages::default(),
             views: Views::default(),
+            chosen_camera: None,
             stretch: Stretch::default(),
             feature_view: FeatureView::default(),
             shape_view: ShapeView::default(),
@@ -282,9 +287,9 @@ impl State {
         key.map_or(Slot::Absent, |key| self.cache.earlier_templates(&key))
     }
 
-    /// The name of an image of a stop.
+    /// The name of an image of a stop, of the camera that is shown; `None` where the stop lacks it.
     pub fn image_key(&self, step: usize, eye: Eye) -> Option<Key> {
-        Some(Key::Image { traverse: self.traverse.as_ref()?.id.clone(), step, eye })
+        self.image_key_in(step, self.camera(), eye)
     }
 
     /// The name of the cameras of a stop.

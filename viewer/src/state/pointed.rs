@@ -1,6 +1,5 @@
 //! What the pointer rests on, as the panels ask for it and as the page takes it out of the commands of a frame.
 
-use sightline_geometry::camera::Camera;
 use sightline_geometry::frames::Pixel;
 
 use crate::command::Command;
@@ -19,15 +18,6 @@ impl State {
             Some(Pointed::Step(step)) if step != self.cursor.step && step < self.stop_count() => Some(step),
             _ => None,
         }
-    }
-
-    /// The two cameras of the cursor's step in the rover frame, once they are here.
-    pub fn eyes(&self) -> Option<(&Camera, &Camera)> {
-        if let Some(pointing) = self.trace().map(|trace| &trace.point_mast) {
-            return Some((&pointing.left, &pointing.right));
-        }
-        let stop = self.cache.stop(&self.stop_detail_key(self.cursor.step)?).ready()?;
-        Some((&stop.left, &stop.right))
     }
 }
 

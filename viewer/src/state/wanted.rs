@@ -73,7 +73,13 @@ impl State {
     pub fn unrendered(&self, keys: &[Key]) -> Vec<Key> {
         let is_ready =
             |step: usize| self.traverse.as_ref().and_then(|t| t.stops.get(step)).is_some_and(|s| s.ready);
-        let is_slow = |key: &&Key| matches!(key, Key::Image { step, .. } if !is_ready(*step));
+        let is_simulated = self.traverse.as_ref().is_some_and(|traverse| traverse.simulated);
+        let is_slow = |key: &&Key| match key {
+            Key::Image { step, camera: None, .. } => !is_ready(*step),
+            // The page does not know whether it is rendered.
+            Key::Image { camera: Some(_), .. } => is_simulated,
+            _ => false,
+        };
         keys.iter().filter(is_slow).cloned().collect()
     }
 
@@ -81,9 +87,14 @@ impl State {
         let computed = self.row_at(step).and_then(|_| self.step_key(step));
         keys.extend(computed.iter().flat_map(|key| [Key::Trace(key.clone()), Key::Arrays(key.clone())]));
         // A step that was computed has its cameras in its record.
-        keys.extend(self.stop_detail_key(step).filter(|_| computed.is_none()));
+        let has_cameras = computed.is_some() && self.shows_targets_camera();
+        keys.extend(self.stop_detail_key(step).filter(|_| !has_cameras));
         // The images of a simulated stop take a while: only the one that is looked at is worth that.
-        let is_ready = self.traverse.as_ref().and_then(|t| t.stops.get(step)).is_some_and(|stop| stop.ready);
+        let is_further = self.camera().is_some();
+        let is_ready = self.traverse.as_ref().is_some_and(|traverse| {
+            let is_known = !is_further || !traverse.simulated;
+            is_known && traverse.stops.get(step).is_some_and(|stop| stop.ready)
+        });
         if (is_ready || !is_neighbour) && !self.lacks_images_yet(step) {
             keys.extend([Eye::Left, Eye::Right].into_iter().filter_map(|eye| self.image_key(step, eye)));
         }

@@ -82,7 +82,7 @@ pub(crate) fn at_step(context: &egui::Context, step: usize) -> State {
         waits_for: None,
         summary: summarise(&traces),
     };
-    let designation = Designation { step: 0, pixel: PIXEL };
+    let designation = Designation::new(0, PIXEL);
     let target = TargetView { number: 0, label: "ridge".to_owned(), designation, runs: vec![run] };
     if let Some(session) = &mut state.session {
         session.targets.push(target);
@@ -155,6 +155,7 @@ fn traverse() -> TraverseView {
         left_size: [1024, 1024],
         right_size: [1024, 1024],
         ready: step + 1 < STOPS,
+        cameras: Vec::new(),
     };
     TraverseView {
         id: "drive".to_owned(),

@@ -5,6 +5,7 @@ mod accuracy;
 mod compare;
 #[path = "../breakpoints/tests.rs"]
 mod ask;
+mod cameras;
 pub(crate) mod feature_run;
 mod features;
 mod figures;
@@ -107,6 +108,11 @@ impl<'a> Shown<'a> {
         });
         assert_eq!(found.count(), 0, "“{words}” is on the screen");
         self
+    }
+
+    /// Whether a text or control on the screen is called so.
+    fn has(&self, label: &str) -> bool {
+        self.harness.query_all_by_label(label).count() > 0
     }
 
     fn click(&mut self, label: &str) -> Vec<Command> {

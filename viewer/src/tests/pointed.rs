@@ -80,7 +80,8 @@ fn before_there_is_a_target_the_stop_tells_its_cameras() {
     assert!(state.wanted().contains(&key), "the page asks for them");
     let pointing = trace(0).trace.point_mast;
     let stop = state.stop().unwrap().clone();
-    let detail = StopDetail { stop, left: pointing.left, right: pointing.right, mast: None };
+    let detail =
+        StopDetail { stop, left: pointing.left, right: pointing.right, mast: None, cameras: Vec::new() };
     state.cache.arrived(key, Ok(Item::Stop(Arc::new(detail))), 0.0);
     assert!(state.eyes().is_some());
     // A step that was computed has them in its record.

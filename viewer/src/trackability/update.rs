@@ -23,7 +23,8 @@ impl State {
         let (traverse, step, _) = self.trackability.place.as_ref()?;
         let is_here =
             self.traverse.as_ref().is_some_and(|open| open.id == *traverse) && *step == self.cursor.step;
-        self.trackability.progress.as_ref().filter(|_| is_here)?.map.as_ref()
+        // The map of a stop is that of its main pair.
+        self.trackability.progress.as_ref().filter(|_| is_here && self.camera().is_none())?.map.as_ref()
     }
 
     /// The cell of the map at a pixel of the left image.
@@ -38,7 +39,7 @@ impl State {
             Aim::Put(pixel) => self.trackability.aim = Some(pixel),
             Aim::Nudge { dx, dy } => {
                 let from = self.trackability.aim.unwrap_or_else(|| self.first_aim());
-                let [width, height] = self.stop().map_or([1, 1], |stop| stop.left_size);
+                let [width, height] = self.left_size().unwrap_or([1, 1]);
                 let hold = |v: f64, size: u32| ((v * 10.0).round() / 10.0).clamp(0.0, f64::from(size) - 1.0);
                 self.trackability.aim = Some(Pixel::new(hold(from.x + dx, width), hold(from.y + dy, height)));
             }
@@ -55,7 +56,7 @@ impl State {
             Aim::TakeNearest => {
                 if let Some(pixel) = nearest {
                     self.trackability.aim = None;
-                    self.designate(Place { step: self.cursor.step, pixel });
+                    self.designate(Place { step: self.cursor.step, pixel, camera: self.camera() });
                 }
             }
         }
@@ -71,7 +72,7 @@ impl State {
 
     /// The first aim of the keys: the refused pixel, else the middle of the view.
     fn first_aim(&self) -> Pixel {
-        let [width, height] = self.stop().map_or([1, 1], |stop| stop.left_size);
+        let [width, height] = self.left_size().unwrap_or([1, 1]);
         let middle = match self.views.left {
             View2d::Fit => Pixel::new(f64::from(width / 2), f64::from(height / 2)),
             View2d::At { centre, .. } => centre,
@@ -83,8 +84,8 @@ impl State {
     pub(crate) fn sync_trackability(&mut self) {
         let limits = &self.trackability.limits;
         let here = self.traverse.as_ref().map(|open| (open.id.clone(), self.cursor.step, limits.clone()));
-        let wanted = here.filter(|_| self.mode == Mode::Pick);
-        if wanted.is_none() {
+        let wanted = here.filter(|_| self.mode == Mode::Pick && self.camera().is_none());
+        if self.mode != Mode::Pick {
             self.trackability.aim = None;
         }
         let known = &mut self.trackability;
@@ -92,7 +93,7 @@ impl State {
             let is_made = known.progress.as_ref().is_none_or(|progress| progress.ended);
             let unfinished = known.place.take().filter(|_| !is_made);
             let (limits, form) = (std::mem::take(&mut known.limits), known.form.take());
-            let aim = known.aim.filter(|_| wanted.is_some());
+            let aim = known.aim;
             *known = Trackability { aim, limits, form, ..Trackability::default() };
             (known.is_stale, known.place) = (wanted.is_some(), wanted);
             if let Some(place) = unfinished {

@@ -34,6 +34,7 @@ mod cahvore;
 mod distortion;
 mod motion;
 pub mod mast;
+mod name;
 pub mod text;
 #[cfg(test)]
 mod tests;
@@ -46,6 +47,7 @@ pub use cahv::{Cahv, ImagePlane};
 pub use cahvor::Cahvor;
 pub use cahvore::{Cahvore, Imaging};
 pub use mast::{Mast, MastAngles};
+pub use name::CameraName;
 
 use crate::frames::{Pixel, Point3, Ray, Vector3};
 

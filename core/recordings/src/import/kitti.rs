@@ -110,6 +110,7 @@ impl ImportFormat for Kitti {
                     right_camera: None,
                     wheel_places_m: None,
                 }),
+                cameras: Vec::new(),
             });
         }
         let folder_name = || path.file_name().map(|name| name.to_string_lossy().into_owned());

@@ -136,11 +136,11 @@ mod tests {
                 }
             }
         }
-        for row in 0..3 {
-            for column in 0..3 {
+        for (row, sums) in sum.iter().enumerate() {
+            for (column, value) in sums.iter().enumerate() {
                 let scale = (mean.covariance[row][row] * mean.covariance[column][column]).sqrt();
-                let off = (sum[row][column] - mean.covariance[row][column]).abs() / scale;
-                assert!(off < 0.03, "{row} {column}: {} {}", sum[row][column], mean.covariance[row][column]);
+                let off = (value - mean.covariance[row][column]).abs() / scale;
+                assert!(off < 0.03, "{row} {column}: {value} {}", mean.covariance[row][column]);
             }
         }
     }

@@ -74,7 +74,7 @@ pub fn nearest_good(stops: &dyn Stops, ground: &Ground, pixel: Pixel) -> Option<
 
 fn judge(stops: &dyn Stops, ground: &Ground, pixel: Pixel) -> PixelVerdict {
     let seen = ground.assess(pixel, true);
-    let designation = Designation { step: ground.step, pixel };
+    let designation = Designation::new(ground.step, pixel);
     match pipeline::designate(stops, designation, &ground.settings) {
         Ok(first) => designated(ground, &seen, &first),
         Err(error) => {

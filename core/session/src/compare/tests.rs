@@ -23,7 +23,7 @@ fn changes(list: &[(&str, Value)]) -> Changes {
 
 /// A session with one target on the plane and its complete first run.
 fn session(world: &PlaneWorld) -> Session {
-    let designation = Designation { step: 0, pixel: Pixel::new(128.0, 120.0) };
+    let designation = Designation::new(0, Pixel::new(128.0, 120.0));
     let mut session = Session::new("s", "t", 6);
     let first = track::designate(world, designation, &Settings::default()).unwrap();
     session.add_target(None, Settings::default(), Arc::new(first));
@@ -167,7 +167,7 @@ fn columns_have_the_difference_of_each_run_from_the_first_with_its_unit() {
 fn a_target_picked_later_is_aligned_by_distance_and_time_since_its_pick() {
     let world = world();
     let mut session = session(&world);
-    let designation = Designation { step: 2, pixel: Pixel::new(128.0, 120.0) };
+    let designation = Designation::new(2, Pixel::new(128.0, 120.0));
     let first = track::designate(&world, designation, &Settings::default()).unwrap();
     session.add_target(None, Settings::default(), Arc::new(first));
     complete(&mut session, &world, 1, 0);

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::*;
 use crate::track;
 use crate::what_if::try_step;
-use sightline_geometry::camera::{Camera, Mast, MastAngles};
+use sightline_geometry::camera::{Camera, CameraName, Mast, MastAngles};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::{Point3, Pose, Vector3};
 use sightline_geometry::odometry_error::OdometryError;
@@ -89,14 +89,14 @@ impl TruthSource for Rendered {
     fn true_site_from_rover(&self, step: usize) -> Option<Pose> {
         self.world.true_site_from_rover(step)
     }
-    fn true_left_camera(&self, step: usize) -> &Camera {
-        self.world.true_left_camera(step)
+    fn true_left_camera(&self, step: usize, camera: Option<CameraName>) -> Option<&Camera> {
+        self.world.true_left_camera(step, camera)
     }
-    fn surface_point_in_site(&self, step: usize, pixel: Pixel) -> Option<Point3> {
-        self.world.surface_point_in_site(step, pixel)
+    fn surface_point_in_site(&self, step: usize, camera: Option<CameraName>, pixel: Pixel) -> Option<Point3> {
+        self.world.surface_point_in_site(step, camera, pixel)
     }
-    fn is_visible(&self, step: usize, point_in_site: &Point3) -> bool {
-        self.world.is_visible(step, point_in_site)
+    fn is_visible(&self, step: usize, camera: Option<CameraName>, point_in_site: &Point3) -> bool {
+        self.world.is_visible(step, camera, point_in_site)
     }
 }
 
@@ -110,7 +110,7 @@ struct Staged {
 impl Staged {
     fn new(world: PlaneWorld, changes: &[(&str, Value)]) -> Self {
         let world = Rendered::new(world);
-        let designation = Designation { step: 0, pixel: Pixel::new(118.3, 131.6) };
+        let designation = Designation::new(0, Pixel::new(118.3, 131.6));
         let mut steps = track::run(&world, designation, &Settings::default()).unwrap();
         steps.truncate(STEP);
         let settings = settings(changes);

@@ -20,7 +20,7 @@ fn run(changes: &[(&str, serde_json::Value)]) -> Steps {
     (world.troubles[3], world.troubles[5]) = (Trouble::Covered, Trouble::Missing);
     let changes = changes.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect();
     let settings = Settings::default().with(&changes).unwrap();
-    let designation = Designation { step: 0, pixel: Pixel::new(118.3, 131.6) };
+    let designation = Designation::new(0, Pixel::new(118.3, 131.6));
     track::run(&world, designation, &settings).unwrap().into_iter().map(Arc::new).collect()
 }
 

@@ -25,7 +25,7 @@ fn said(state: TrackingState, err_px: Option<f64>, err_m: f64) -> Said {
 /// A tracked run of the plane with these truths written over it.
 fn run(later: &[Said]) -> Vec<Arc<RunStep>> {
     let world = PlaneWorld::new(vec![Pose::identity(), Pose::translation(0.3, 0.0, 0.0)]);
-    let designation = Designation { step: 0, pixel: Pixel::new(128.0, 120.0) };
+    let designation = Designation::new(0, Pixel::new(128.0, 120.0));
     let [first, second] = track::run(&world, designation, &Settings::default()).unwrap().try_into().unwrap();
     let later = later.iter().enumerate().map(|(i, said)| {
         let mut trace = second.clone();
@@ -136,7 +136,7 @@ fn excluded_steps_are_listed_with_the_reason() {
     let mut world =
         PlaneWorld::new((0..3).map(|i| Pose::translation(0.3 * f64::from(i), 0.0, 0.0)).collect());
     world.troubles[1] = Trouble::Missing;
-    let designation = Designation { step: 0, pixel: Pixel::new(128.0, 120.0) };
+    let designation = Designation::new(0, Pixel::new(128.0, 120.0));
     let steps = track::run(&world, designation, &Settings::default()).unwrap();
     let found = metrics(&steps.into_iter().map(Arc::new).collect::<Vec<_>>());
     assert!(found.excluded.iter().any(|excluded| excluded.why.contains("damaged") && excluded.steps == [1]));

@@ -162,7 +162,7 @@ mod tests {
         let used =
             UsedPointing { mast: None, angles: None, error_rad: 0.0, left: &world.left, right: &world.right };
         let target = Target {
-            designation: Designation { step: 0, pixel: Pixel::new(1.0, 2.0) },
+            designation: Designation::new(0, Pixel::new(1.0, 2.0)),
             step: 3,
             position_in_rover: position,
             covariance_in_rover: covariance,

@@ -33,7 +33,7 @@ fn world() -> PlaneWorld {
 fn run(changes: &[(&str, serde_json::Value)]) -> (PlaneWorld, Vec<RunStep>, Settings) {
     let changes: Changes = changes.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect();
     let (world, settings) = (world(), Settings::default().with(&changes).unwrap());
-    let designation = Designation { step: 0, pixel: Pixel::new(118.3, 131.6) };
+    let designation = Designation::new(0, Pixel::new(118.3, 131.6));
     let steps = track::run(&world, designation, &settings).unwrap();
     (world, steps, settings)
 }

@@ -20,13 +20,14 @@ use sightline_record::{Declaration, Record, Unit};
 /// Pointing and camera models of this stop.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Pointing {
-    /// The angles that would centre the prediction in the left image; null without a mast or out of reach.
+    /// The angles that would centre the prediction in the left image of the main pair, for which the mast is pointed; null
+    /// for a pair that no mast carries, and out of reach.
     pub wanted: Option<MastAngles>,
     /// The angles at which the pair was taken; null without a mast.
     pub used: Option<MastAngles>,
-    /// The left camera in the rover frame, at the pointing used.
+    /// The left camera of the target's pair in the rover frame, at the pointing used; of the main pair at a stop that lacks it.
     pub left: Camera,
-    /// The right camera in the rover frame, at the pointing used.
+    /// The right camera of the same pair in the rover frame, at the pointing used.
     pub right: Camera,
     /// Covariance Σ_m that the error of the mast angles gives a point located at the prediction, rover frame, m²; null
     /// without a known error.
@@ -84,6 +85,21 @@ pub fn point_mast(
         predicted_left: projected.map(|(pixel, _)| pixel),
         predicted_right: used.right.project(position_in_rover),
         predicted_covariance_px2: projected.map(|(_, j)| j * seen * j.transpose()),
+    }
+}
+
+/// The pointing at a stop that lacks the target's pair, with the cameras of its main pair: the target is predicted in no
+/// image, and the mast is not pointed for it.
+pub fn without_pair(left: &Camera, right: &Camera) -> Pointing {
+    Pointing {
+        wanted: None,
+        used: None,
+        left: left.clone(),
+        right: right.clone(),
+        error_covariance_in_rover: None,
+        predicted_left: None,
+        predicted_right: None,
+        predicted_covariance_px2: None,
     }
 }
 

@@ -33,9 +33,12 @@
 
 use crate::camera::optics::FlatField;
 use crate::camera::picture::{Eye, Region};
+use crate::camera::render;
+use crate::camera::rig::Rig;
 use crate::scenario::{CameraSettings, ExposureMode, FULL_SCALE_DN, Scenario};
 use crate::world::World;
-use sightline_geometry::camera::Camera;
+use sightline_geometry::camera::{Camera, CameraName};
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::Pixel;
 use sightline_vision::image::GrayImage;
 
@@ -145,6 +148,19 @@ pub struct AutoExposure {
 /// The time of exposure of a world with fixed exposure, s.
 pub fn fixed_s(world: &World, scenario: &Scenario) -> f64 {
     world.exposure * FULL_SCALE_DN * scenario.camera.gain_electrons_per_dn / scenario.camera.electrons_per_s
+}
+
+/// [`fixed_s`] of a further camera: its first left picture has the mean level. `None` for a name that is none of the
+/// scenario's; meaningless soon after `cancel` is requested.
+pub fn fixed_of_further_s(
+    world: &World,
+    scenario: &Scenario,
+    name: CameraName,
+    cancel: Cancel<'_>,
+) -> Option<f64> {
+    let camera = scenario.camera.further.iter().find(|camera| camera.name == name)?;
+    let exposure = render::exposure_of(world, scenario, &Rig::of(camera.rig, camera.image_size), cancel);
+    Some(fixed_s(&World { exposure, ..world.clone() }, scenario))
 }
 
 /// The automatic exposure (header) of a whole left picture, starting from `start_s`; a subframe is metered around `centre`,

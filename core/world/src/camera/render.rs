@@ -122,10 +122,14 @@ pub fn clean_radiance(
 ///
 /// Returns 1 soon after `cancel` is requested.
 pub(crate) fn exposure(world: &World, scenario: &Scenario, cancel: Cancel<'_>) -> f64 {
+    exposure_of(world, scenario, &Rig::new(&scenario.camera), cancel)
+}
+
+/// [`exposure`] for the pictures of any rig, which is mounted beside the main pair.
+pub(crate) fn exposure_of(world: &World, scenario: &Scenario, rig: &Rig, cancel: Cancel<'_>) -> f64 {
     /// Rays along each side of the picture.
     const SIDE: u32 = 64;
     let Ok(stop) = drive::first_stop(world, scenario, cancel) else { return 1.0 };
-    let rig = Rig::new(&scenario.camera);
     let camera = rig.cameras_in_rover(stop.angles).0.moved(&stop.site_from_rover);
     let sampler = Sampler::new(world, &camera, 1);
     let flat = FlatField::new(scenario, &camera, Eye::Left);

@@ -5,6 +5,7 @@
 //! | `mer_navcam` | Spirit, label | Spirit, label | Spirit's mast |
 //! | `mer_pancam` | Opportunity: C, A, scale | ours | Opportunity's mast |
 //! | `mer_front_hazcam` | Opportunity, label (TV2) | ours: the left one 0.10 m along H' | body |
+//! | `mer_rear_hazcam` | ours: the front one turned by 180° about z | the front one, turned | body |
 //! | `table1_pancam`, `table1_navcam` | ours: ideal, f/pixel | ours | Spirit's mast |
 //!
 //! **Pancam.** Known of the left eye are C and A in the head frame and the effective scale at the centre; its
@@ -74,6 +75,12 @@ impl Rig {
             CameraRig::MerFrontHazcam => {
                 let (left, right) = front_hazcams();
                 Self::Body { left: smaller(left), right: smaller(right) }
+            }
+            CameraRig::MerRearHazcam => {
+                let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI);
+                let turn = Pose::from_parts(Translation3::identity(), turn);
+                let (left, right) = front_hazcams();
+                Self::Body { left: smaller(left.moved(&turn)), right: smaller(right.moved(&turn)) }
             }
             on_mast => {
                 let mast = match on_mast {
@@ -185,10 +192,11 @@ mod tests {
     use super::*;
     use sightline_geometry::frames::Pixel;
 
-    const ALL: [CameraRig; 5] = [
+    const ALL: [CameraRig; 6] = [
         CameraRig::MerNavcam,
         CameraRig::MerPancam,
         CameraRig::MerFrontHazcam,
+        CameraRig::MerRearHazcam,
         CameraRig::Table1Pancam,
         CameraRig::Table1Navcam,
     ];
@@ -209,6 +217,7 @@ mod tests {
         let expected = [
             (45.88, 45.88, 0.200345, [1024, 1024]),
             (16.06, 16.06, 0.30, [1024, 1024]),
+            (125.6, 125.6, 0.10, [1024, 1024]),
             (125.6, 125.6, 0.10, [1024, 1024]),
             (17.1, 12.8, 0.30, [1024, 768]),
             (43.6, 33.4, 0.20, [1024, 768]),
@@ -260,7 +269,7 @@ mod tests {
                 let angles = rig.point_at(&target).unwrap();
                 let (left, _) = rig.cameras_in_rover(angles);
                 assert_eq!(left.width(), size);
-                if kind == CameraRig::MerFrontHazcam {
+                if kind.is_on_body() {
                     assert!(angles.is_none());
                 } else {
                     assert!(left.project(&target).unwrap().distance(left.centre_pixel()) < 1e-9);

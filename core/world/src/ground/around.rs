@@ -21,7 +21,7 @@ use crate::camera::rig::Rig;
 use crate::ground::level::MEAN_GROUND_Z_M;
 use crate::rover::plan::{goal_m, planned};
 use crate::rover::scene::{TrueDrive, TrueStop};
-use crate::scenario::{CameraRig, CameraSettings, Course, DriveSettings};
+use crate::scenario::{CameraSettings, Course, DriveSettings};
 use sightline_geometry::camera::Camera;
 use sightline_geometry::frames::{Pixel, Point3, Pose};
 
@@ -73,8 +73,7 @@ impl Around {
     /// whose wedge and lane are known without it.
     pub(crate) fn new(drive: &DriveSettings, camera: &CameraSettings) -> Option<Self> {
         let is_straight = drive.course == Course::Approach && drive.heading_deg == 0.0;
-        let is_narrow =
-            camera.rig != CameraRig::MerFrontHazcam && pointing_rad(drive) <= STRAIGHT_POINTING_RAD;
+        let is_narrow = !camera.rig.is_on_body() && pointing_rad(drive) <= STRAIGHT_POINTING_RAD;
         if is_straight && is_narrow {
             return None;
         }
@@ -193,6 +192,7 @@ fn border_on_ground(camera: &Camera) -> impl Iterator<Item = [f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scenario::CameraRig;
     use crate::scenario::Move;
 
     #[test]

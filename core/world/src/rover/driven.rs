@@ -21,9 +21,8 @@ use sightline_geometry::frames::{POSITION_LIMIT_M, Pixel, Point3, Pose, PoseReco
 
 use sightline_track::cycle_stage::CycleStage;
 
-use crate::camera::rig::Rig;
 use crate::ground::texture::mix;
-use crate::index::{PAUSE_S, simulated_stop};
+use crate::index::{PAUSE_S, Rigs, simulated_stop};
 use crate::rover::body::parts;
 use crate::rover::course::{SPEED_M_S, TURN_RAD_S};
 use crate::rover::drive::{first_stop, in_scene};
@@ -220,7 +219,7 @@ impl DrivenStop {
 
 /// The stops of a traverse's index for stops that were driven, with images to be rendered.
 pub fn index_stops(driven: &[DrivenStop], scenario: &Scenario) -> Vec<Stop> {
-    let rig = Rig::new(&scenario.camera);
+    let rigs = Rigs::new(&scenario.camera);
     let told: Vec<MastAngles> = driven.iter().filter_map(|stop| stop.mast_angles).collect();
     let true_angles = mast_error::true_angles(&told, scenario);
     let with_error =
@@ -228,7 +227,7 @@ pub fn index_stops(driven: &[DrivenStop], scenario: &Scenario) -> Vec<Stop> {
     let stop = |(number, stop): (usize, &DrivenStop)| {
         let poses = [stop.true_site_from_rover, stop.site_from_rover].map(PoseRecord::to_pose);
         let metered_px = stop.metered_px;
-        let made = simulated_stop(number, stop.time_s, poses, stop.mast_angles, with_error(number), &rig);
+        let made = simulated_stop(number, stop.time_s, poses, stop.mast_angles, with_error(number), &rigs);
         let wheel_places_m = scenario.rover.tracks.then(|| stop.wheel_places_m.clone());
         let truth = made.truth.map(|truth| StopTruth { wheel_places_m, ..truth });
         Stop { metered_px, truth, ..made }

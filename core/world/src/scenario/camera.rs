@@ -4,10 +4,14 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::range::{MAX_SEED, within};
+use crate::traverse::FURTHER_CAMERAS_LIMIT;
+use sightline_geometry::camera::CameraName;
 use sightline_geometry::error::{Error, Result};
 
 /// The largest number of the 12-bit converter.
 pub const FULL_SCALE_DN: f64 = 4095.0;
+/// Widths that images can have, px.
+const IMAGE_SIZES: [u32; 4] = [1024, 512, 256, 128];
 /// Full scale of the 8-bit converter's table, DN.
 const BYTE_DN: f64 = 255.0;
 
@@ -22,12 +26,38 @@ pub enum CameraRig {
     MerPancam,
     /// Opportunity's front hazcams on the body, 1024 × 1024 px, 126°; the right eye is ours (domain.md 5.1).
     MerFrontHazcam,
+    /// Hazcams that look backwards: the front ones turned about the rover's z axis by 180° (ours).
+    MerRearHazcam,
     /// Kim et al.'s example "Pancam" on the mast, 1024 × 768 px, f = 16 mm, baseline 0.30 m (R42).
     #[serde(rename = "table1_pancam")]
     Table1Pancam,
     /// Kim et al.'s example "Navcam" on the mast, 1024 × 768 px, f = 6 mm, baseline 0.20 m (R42).
     #[serde(rename = "table1_navcam")]
     Table1Navcam,
+}
+
+impl CameraRig {
+    /// Whether the pair is fixed to the body, where nothing points it.
+    pub fn is_on_body(self) -> bool {
+        matches!(self, Self::MerFrontHazcam | Self::MerRearHazcam)
+    }
+}
+
+/// A pair of cameras beside the main one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FurtherRig {
+    /// Its name at every stop.
+    pub name: CameraName,
+    /// Which pair of cameras; one on the mast points as the mast does for the main pair.
+    pub rig: CameraRig,
+    /// Width of its images, px: 1024, 512, 256 or 128.
+    #[serde(default = "full_size")]
+    pub image_size: u32,
+}
+
+fn full_size() -> u32 {
+    1024
 }
 
 /// How a recorded number comes from the 12-bit one.
@@ -86,7 +116,7 @@ impl Default for AutoExposureSettings {
 }
 
 /// The cameras (domain.md 5.1, 5.2, 5.3 and 11.3).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CameraSettings {
     /// Which pair of cameras.
@@ -138,6 +168,9 @@ pub struct CameraSettings {
     pub noise_seed: Option<u64>,
     /// The automatic exposure.
     pub auto_exposure: AutoExposureSettings,
+    /// Pairs beside the main one, which take images at every stop; optics and detector are those of this section.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub further: Vec<FurtherRig>,
 }
 
 impl Default for CameraSettings {
@@ -164,6 +197,7 @@ impl Default for CameraSettings {
             mean_level: 0.4,
             noise_seed: None,
             auto_exposure: AutoExposureSettings::default(),
+            further: Vec::new(),
         }
     }
 }
@@ -189,9 +223,10 @@ impl CameraSettings {
     }
 
     pub(crate) fn validate(&self) -> Result<()> {
-        if ![1024, 512, 256, 128].contains(&self.image_size) {
+        if !IMAGE_SIZES.contains(&self.image_size) {
             return Err(Error::setting("camera.image_size", "choose 1024, 512, 256 or 128"));
         }
+        self.validate_further()?;
         if self.hand_over.is_some_and(|rig| rig != CameraRig::MerFrontHazcam || rig == self.rig) {
             let problem = "choose mer_front_hazcam, beside a camera.rig on the mast";
             return Err(Error::setting("camera.hand_over", problem));
@@ -220,6 +255,24 @@ impl CameraSettings {
         within("camera.mean_level", self.mean_level, 0.02, 0.9)?;
         self.auto_exposure.validate()
     }
+
+    fn validate_further(&self) -> Result<()> {
+        let most = FURTHER_CAMERAS_LIMIT;
+        if self.further.len() > most {
+            return Err(Error::setting("camera.further", format!("has more than {most} cameras")));
+        }
+        for (index, camera) in self.further.iter().enumerate() {
+            let key = |field: &str| format!("camera.further[{index}].{field}");
+            if !IMAGE_SIZES.contains(&camera.image_size) {
+                return Err(Error::setting(key("image_size"), "choose 1024, 512, 256 or 128"));
+            }
+            if self.further[..index].iter().any(|other| other.name == camera.name) {
+                let problem = format!("{} is the name of another camera already", camera.name);
+                return Err(Error::setting(key("name"), problem));
+            }
+        }
+        Ok(())
+    }
 }
 
 impl AutoExposureSettings {
@@ -238,6 +291,7 @@ impl AutoExposureSettings {
 mod tests {
     use std::path::Path;
 
+    use super::CameraRig;
     use crate::Scenario;
 
     #[test]
@@ -248,8 +302,18 @@ mod tests {
             ("vignetting = 1.5", "camera.vignetting"),
             ("smear_s = nan", "camera.smear_s"),
             ("[camera.auto_exposure]\niterations = 0", "camera.auto_exposure.iterations"),
-            ("rig = \"mer_rear_hazcam\"", "mer_front_hazcam"),
+            ("rig = \"mer_side_hazcam\"", "mer_front_hazcam"),
             ("hand_over = \"mer_pancam\"", "camera.hand_over"),
+            ("further = [{ name = \"A\", rig = \"mer_pancam\" }]", "camera.further[0].name"),
+            (
+                "further = [{ name = \"a\", rig = \"mer_pancam\", image_size = 9 }]",
+                "camera.further[0].image_size",
+            ),
+            (
+                "[[camera.further]]\nname = \"a\"\nrig = \"mer_pancam\"\n\
+                 [[camera.further]]\nname = \"a\"\nrig = \"mer_navcam\"",
+                "camera.further[1].name: a is the name of another camera already",
+            ),
             ("rig = \"mer_front_hazcam\"\nhand_over = \"mer_front_hazcam\"", "camera.hand_over"),
         ] {
             let error = Scenario::from_toml(&format!("[camera]\n{text}\n"), Path::new("s.toml")).unwrap_err();
@@ -260,9 +324,14 @@ mod tests {
     #[test]
     fn a_changed_camera_survives_toml() {
         let text = "[camera]\nrig = \"table1_pancam\"\nnoise_seed = 5\nexposure = \"subframe\"\nbit_depth = 8\n\
-                    quantisation = \"square_root\"\n[camera.auto_exposure]\nsubframe_px = 99\n";
+                    quantisation = \"square_root\"\n[camera.auto_exposure]\nsubframe_px = 99\n\
+                    [[camera.further]]\nname = \"hazcam\"\nrig = \"mer_rear_hazcam\"\n";
         let read = Scenario::from_toml(text, Path::new("s.toml")).unwrap();
         assert_eq!((read.camera.noise_seed, read.camera.auto_exposure.subframe_px), (Some(5), 99));
+        assert_eq!(
+            (read.camera.further[0].rig, read.camera.further[0].image_size),
+            (CameraRig::MerRearHazcam, 1024)
+        );
         assert_eq!(Scenario::from_toml(&read.to_toml(), Path::new("s.toml")).unwrap(), read);
     }
 }

@@ -27,7 +27,7 @@ use utoipa::ToSchema;
 use sightline_geometry::odometry_error::OdometryError;
 
 pub use camera::{
-    AutoExposureSettings, CameraRig, CameraSettings, ExposureMode, FULL_SCALE_DN, Quantisation,
+    AutoExposureSettings, CameraRig, CameraSettings, ExposureMode, FULL_SCALE_DN, FurtherRig, Quantisation,
 };
 pub use drive::{Course, DriveSettings, Move};
 pub use events::{Cloud, EventSettings, Occluder};

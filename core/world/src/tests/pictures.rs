@@ -180,7 +180,7 @@ fn silhouettes_lie_where_exact_rays_of_the_camera_model_put_them() {
 
 /// The cameras of a rig in the site, with the rover at a stop of the demonstration and the mast at its target.
 fn rig_in_site(rig: CameraRig, image_size: u32, stop: usize) -> (Camera, Camera) {
-    let mut settings = demo().scenario.camera;
+    let mut settings = demo().scenario.camera.clone();
     (settings.rig, settings.image_size) = (rig, image_size);
     let site_from_rover = demo().index.stops[stop].truth.as_ref().unwrap().site_from_rover.to_pose();
     let rig = Rig::new(&settings);

@@ -120,7 +120,7 @@ fn sentence(trace: &RunStep) -> String {
 
 /// The close-up with its marks, and both images of the stop.
 fn pictures(source: &Source, run: &Run, trace: &RunStep, cancel: &AtomicBool) -> ApiResult<String> {
-    let left = match source.images(trace.step, cancel) {
+    let left = match source.images(trace, cancel) {
         Err(Error::Cancelled) => return Err(Error::Cancelled.into()),
         images => images.ok().map(|[left, _]| left),
     };
@@ -140,10 +140,13 @@ fn pictures(source: &Source, run: &Run, trace: &RunStep, cancel: &AtomicBool) ->
         ("left", &pointing.left, located.and_then(|l| l.left_pixel)),
         ("right", &pointing.right, located.and_then(|l| l.right_pixel)),
     ];
+    let camera = trace.update.target.designation.camera;
+    let query = camera.map_or_else(String::new, |camera| format!("?camera={camera}"));
     html.push_str("<div class=\"pair\">\n");
     for (eye, camera, found) in eyes {
         let [width, height] = camera.size;
-        let path = format!("/api/v1/traverses/{}/steps/{}/images/{eye}.png", source.open.id, trace.step);
+        let path =
+            format!("/api/v1/traverses/{}/steps/{}/images/{eye}.png{query}", source.open.id, trace.step);
         let place = found.map_or_else(
             || "the target was not found in it".to_owned(),
             |pixel| format!("the target is at pixel {:.1}, {:.1}", pixel.x, pixel.y),

@@ -8,6 +8,7 @@ use crate::cache::Eye;
 use crate::command::Layer;
 use crate::compare::state::{Look, Other};
 use crate::drawing::overlay::Overlay;
+use crate::panels::camera_choice::word;
 use crate::panels::image_marks::{self, Of};
 use crate::panels::legend::Entry;
 use crate::state::State;
@@ -55,8 +56,11 @@ pub(crate) fn paint_right(overlay: &Overlay<'_>, state: &State) {
     }
 }
 
-/// The record of another run at this very stop: pixels of another stop mean nothing on its image.
+/// The record of another run at this very stop and in this camera: pixels of another image mean nothing here.
 fn here<'a>(state: &'a State, other: &Other<'_>) -> Option<&'a RunStep> {
+    if state.camera_of(other.name) != state.camera() {
+        return None;
+    }
     state.other_trace(other.name).ready().filter(|trace| trace.step == state.cursor.step)
 }
 
@@ -66,6 +70,10 @@ pub(crate) fn elsewhere(state: &State) -> Option<String> {
     others.iter().find_map(|other| {
         let step = state.beside(other.name, state.cursor.step);
         let label = state.run_label(other.name);
+        let camera = state.camera_of(other.name);
+        if camera != state.camera() {
+            return Some(format!("{label} is tracked in {}: choose that camera", word(camera)));
+        }
         match step {
             Some(step) if step == state.cursor.step => None,
             Some(step) => Some(format!("{label} stands at step {step}: press V to see its own image")),

@@ -55,8 +55,8 @@ pub(crate) fn under(canvas: &Canvas, state: &State) {
     let [width, height] = raster.size();
     let mut area = canvas.transform.area(PixelRect::whole(width, height));
     // With the target held still, its place then lies on its place now.
-    let places =
-        state.trace_at(before).ready().and_then(place_of_target).zip(state.trace().and_then(place_of_target));
+    let now = state.trace_on_image().and_then(place_of_target);
+    let places = state.trace_at(before).ready().and_then(place_of_target).zip(now);
     if let Some((then, now)) = places.filter(|_| state.compare.is_held) {
         area = area.translate(canvas.transform.to_screen(now) - canvas.transform.to_screen(then));
     }

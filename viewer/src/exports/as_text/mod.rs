@@ -74,12 +74,16 @@ fn fork(state: &State, words: String, session: &str, target: &TargetView, new: &
 /// The pick of a target, as it would be asked for.
 fn target_of(target: &TargetView, settings: Changes) -> NewTarget {
     let designation = target.designation;
-    NewTarget { settings, ..NewTarget::at_pixel(designation.step, designation.pixel) }
+    NewTarget {
+        settings,
+        camera: designation.camera,
+        ..NewTarget::at_pixel(designation.step, designation.pixel)
+    }
 }
 
 fn track(state: &State, target: &NewTarget) -> Option<String> {
     let drive = &state.traverse.as_ref()?.source;
-    let designation = Designation { step: target.step, pixel: target.pixel? };
+    let designation = Designation { step: target.step, pixel: target.pixel?, camera: target.camera };
     Some(shell::track(drive, designation, &target.settings))
 }
 

@@ -6,12 +6,14 @@
 //!
 //! A folder's pictures are put together to stops (`pairs`): left and right eye of one moment where there are
 //! such (lateral), otherwise two views of one camera from one rover position (convergent). A single file
-//! stands for the stop that it belongs to; [`ImportOptions::files`] chooses the pictures instead.
+//! stands for the stop that it belongs to; [`ImportOptions::files`] chooses the pictures instead. Pictures of other cameras from the
+//! same rover position become further cameras of the stop (`further`), but not beside chosen files.
 //!
 //! Poses are those of the labels, in their site frame; all stops must be of one site, because labels do not
 //! relate sites. Where the two labels of a stop differ in pose (the rover settled between), the second camera
 //! is carried into the first's rover frame. There is no truth.
 
+mod further;
 mod pairs;
 mod product;
 mod raster;
@@ -22,6 +24,7 @@ use std::sync::Arc;
 pub use product::{Product, camera_model, is_product};
 pub use raster::Raster;
 
+use self::further::{Further, further};
 use self::pairs::{Frame, Pair};
 use super::{ImportFormat, ImportOptions, Output};
 use sightline_geometry::camera::Camera;
@@ -29,7 +32,7 @@ use sightline_geometry::error::{Error, Result};
 use sightline_geometry::odometry_error::OdometryError;
 use sightline_geometry::stereo_geometry::StereoGeometry;
 use sightline_vision::image::{GrayImage, io};
-use sightline_world::traverse::{CameraSource, FORMAT_VERSION, Stop, TraverseIndex, View};
+use sightline_world::traverse::{CameraSource, FORMAT_VERSION, Stop, StopCamera, TraverseIndex, View};
 
 /// The largest number of a 16-bit PNG.
 const PNG_LIMIT_DN: f64 = 65_535.0;
@@ -55,16 +58,18 @@ impl ImportFormat for Pds3 {
     }
 
     fn import(&self, path: &Path, options: &ImportOptions, output: &mut Output<'_>) -> Result<TraverseIndex> {
-        let (pairs, stereo) = if options.files.is_empty() {
+        let Chosen { mut pairs, mut further, stereo } = if options.files.is_empty() {
             choose(path, output)?
         } else {
             chosen_by_hand(path, options, output)?
         };
-        let pairs: Vec<Pair> = pairs.into_iter().take(options.max_stops).collect();
+        pairs.truncate(options.max_stops);
+        further.truncate(pairs.len());
         one_site(&pairs)?;
-        output.expect(2 * pairs.len());
+        let frames: Vec<&Frame> = all_frames(&pairs, &further).collect();
+        output.expect(frames.len());
 
-        let scale = Scale::of(&pairs, output)?;
+        let scale = Scale::of(&frames, output)?;
         let first_clock = pairs[0].left.product.clock_s();
         let mut stops = Vec::with_capacity(pairs.len());
         for (step, pair) in pairs.iter().enumerate() {
@@ -79,6 +84,7 @@ impl ImportFormat for Pds3 {
                 light: pair.left.product.light(),
                 metered_px: None,
                 truth: None,
+                cameras: write_further(pair, further.get(step).map_or(&[], Vec::as_slice), &scale, output)?,
             });
         }
         let first = &pairs[0].left.product;
@@ -96,6 +102,44 @@ impl ImportFormat for Pds3 {
             stops,
         })
     }
+}
+
+/// The pictures of an import.
+struct Chosen {
+    pairs: Vec<Pair>,
+    /// Of each pair; empty where the pictures were chosen by hand.
+    further: Vec<Vec<Further>>,
+    stereo: StereoGeometry,
+}
+
+/// The pictures of all stops.
+fn all_frames<'a>(pairs: &'a [Pair], further: &'a [Vec<Further>]) -> impl Iterator<Item = &'a Frame> {
+    let of_pairs = pairs.iter().flat_map(|pair| [&pair.left, &pair.right]);
+    let of_further =
+        further.iter().flatten().flat_map(|camera| std::iter::once(&camera.left).chain(&camera.right));
+    of_pairs.chain(of_further).map(AsRef::as_ref)
+}
+
+/// Writes the pictures of a stop's further cameras, the models carried into the rover frame of the stop.
+fn write_further(
+    stop: &Pair,
+    cameras: &[Further],
+    scale: &Scale,
+    output: &mut Output<'_>,
+) -> Result<Vec<StopCamera>> {
+    let mut view = |frame: &Frame| write_view(frame, stop.camera_in_left_rover(frame), scale, output);
+    let mut written = Vec::with_capacity(cameras.len());
+    for camera in cameras {
+        written.push(StopCamera {
+            name: camera.name,
+            mast_angles: None,
+            left: view(&camera.left)?,
+            right: camera.right.as_ref().map(|right| view(right)).transpose()?,
+            true_left_camera: None,
+            true_right_camera: None,
+        });
+    }
+    Ok(written)
 }
 
 fn description(first: &Product, pairs: &[Pair]) -> String {
@@ -126,7 +170,7 @@ fn product_files(folder: &Path) -> Result<Vec<PathBuf>> {
 }
 
 /// The stops of a folder, or the one that a file belongs to.
-fn choose(path: &Path, output: &mut Output<'_>) -> Result<(Vec<Pair>, StereoGeometry)> {
+fn choose(path: &Path, output: &mut Output<'_>) -> Result<Chosen> {
     let mut frames: Vec<Arc<Frame>> = Vec::new();
     for file in product_files(folder_of(path))? {
         output.check_cancelled()?;
@@ -148,19 +192,18 @@ fn choose(path: &Path, output: &mut Output<'_>) -> Result<(Vec<Pair>, StereoGeom
                        overlapping views of one camera from one rover position); name the files to take";
         return Err(Error::format(path, problem));
     }
-    let used = |frame: &Frame| pairs.iter().any(|pair| pair.uses(frame));
-    for frame in frames.iter().filter(|frame| !used(frame)) {
+    let is_used = |frame: &Frame| pairs.iter().any(|pair| pair.uses(frame));
+    let unused: Vec<_> = frames.iter().filter(|frame| !is_used(frame)).cloned().collect();
+    let further = further(&pairs, &unused);
+    let is_further = |frame: &Frame| further.iter().flatten().any(|camera| camera.uses(frame));
+    for frame in unused.iter().filter(|frame| !is_further(frame)) {
         output.note(format!("left out: {} ({})", frame.product.id(), frame.product.instrument()));
     }
-    Ok((pairs, stereo))
+    Ok(Chosen { pairs, further, stereo })
 }
 
 /// The stops of the files that the person named, left and right in turn.
-fn chosen_by_hand(
-    path: &Path,
-    options: &ImportOptions,
-    output: &mut Output<'_>,
-) -> Result<(Vec<Pair>, StereoGeometry)> {
+fn chosen_by_hand(path: &Path, options: &ImportOptions, output: &mut Output<'_>) -> Result<Chosen> {
     if !options.files.len().is_multiple_of(2) {
         let count = options.files.len();
         return Err(Error::setting(
@@ -175,7 +218,8 @@ fn chosen_by_hand(
         pairs.push(Pair { left: read(&files[0])?, right: read(&files[1])? });
     }
     let lateral = pairs.iter().all(Pair::is_lateral);
-    Ok((pairs, if lateral { StereoGeometry::Lateral } else { StereoGeometry::Convergent }))
+    let stereo = if lateral { StereoGeometry::Lateral } else { StereoGeometry::Convergent };
+    Ok(Chosen { pairs, further: Vec::new(), stereo })
 }
 
 /// Refuses stops whose poses are in different frames.
@@ -200,10 +244,10 @@ struct Scale {
 
 impl Scale {
     /// The same scale for all pictures, so that their brightness can be compared.
-    fn of(pairs: &[Pair], output: &Output<'_>) -> Result<Self> {
+    fn of(frames: &[&Frame], output: &Output<'_>) -> Result<Self> {
         let mut largest = 0.0_f64;
         let mut full_scale = Some(0.0_f64);
-        for frame in pairs.iter().flat_map(|pair| [&pair.left, &pair.right]) {
+        for frame in frames {
             output.check_cancelled()?;
             let raster = frame.product.read_raster()?;
             largest = raster.samples.iter().fold(largest, |largest, &v| largest.max(f64::from(v)));
@@ -212,7 +256,7 @@ impl Scale {
         Ok(match full_scale.filter(|&dn| dn <= PNG_LIMIT_DN) {
             Some(full_scale_dn) => Self { factor: 1.0, full_scale_dn },
             None if largest > 0.0 => Self { factor: PNG_LIMIT_DN / largest, full_scale_dn: PNG_LIMIT_DN },
-            None => return Err(pairs[0].left.product.problem("all samples are zero or less")),
+            None => return Err(frames[0].product.problem("all samples are zero or less")),
         })
     }
 }

@@ -58,7 +58,7 @@ impl Frame {
     }
 
     /// The camera's name without its eye: `NAVCAM` for `NAVCAM_LEFT`, `NAV_B` for `NAV_LEFT_B`.
-    fn family(&self) -> String {
+    pub(super) fn family(&self) -> String {
         let parts = self.product.instrument().split('_');
         parts.filter(|part| !matches!(*part, "LEFT" | "RIGHT")).collect::<Vec<_>>().join("_")
     }
@@ -80,7 +80,7 @@ impl Frame {
             && clocks.is_some_and(|(a, b)| (a - b).abs() <= SAME_MOMENT_S)
     }
 
-    fn is_same_place(&self, other: &Self) -> bool {
+    pub(super) fn is_same_place(&self, other: &Self) -> bool {
         let place = |frame: &Self| frame.product.motion_counter().map(|counter| [counter[0], counter[1]]);
         place(self).is_some() && place(self) == place(other)
     }
@@ -113,13 +113,18 @@ impl Pair {
             && self.overlaps()
     }
 
-    /// The second camera in the first's rover frame; the rover may have settled between.
+    /// The second camera in the first's rover frame.
     pub(super) fn right_camera_in_left_rover(&self) -> Camera {
-        if self.left.pose == self.right.pose {
-            return self.right.camera.clone();
+        self.camera_in_left_rover(&self.right)
+    }
+
+    /// The camera of a picture in the rover frame of the first one; the rover may have settled between.
+    pub(super) fn camera_in_left_rover(&self, frame: &Frame) -> Camera {
+        if self.left.pose == frame.pose {
+            return frame.camera.clone();
         }
         let left_rover_from_site = self.left.pose.to_pose().inverse();
-        self.right.camera.moved(&(left_rover_from_site * self.right.pose.to_pose()))
+        frame.camera.moved(&(left_rover_from_site * frame.pose.to_pose()))
     }
 
     /// Whether any point of the first view, at a usual range, is seen in the second.
@@ -150,7 +155,7 @@ pub(super) fn assemble(frames: &[Arc<Frame>]) -> (Vec<Pair>, StereoGeometry) {
 }
 
 /// Pairs each picture with the nearest later or earlier one that fits; no picture is used twice.
-fn pair_up(frames: &[Arc<Frame>], fits: impl Fn(&Pair) -> bool) -> Vec<Pair> {
+pub(super) fn pair_up(frames: &[Arc<Frame>], fits: impl Fn(&Pair) -> bool) -> Vec<Pair> {
     let mut used = vec![false; frames.len()];
     let mut pairs = Vec::new();
     for first in 0..frames.len() {
