@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use sightline_api::location::AtStep;
 use sightline_geometry::frames::Pixel;
+use sightline_recordings::DrivenTraverse;
 use sightline_session::step::RunStep;
+use sightline_session::times::{StageTime, times};
 use sightline_session::what_if::Base;
 use sightline_track::cycle_stage::CycleStage;
 use sightline_track::locate::template::history::{AgainstEarlier, against_earlier};
@@ -73,6 +75,14 @@ impl RecordedStep {
             self.last = Some(runner::with_image(&self.live.traverse(), last)?);
         }
         Ok(())
+    }
+
+    /// What its stages take on Mars, and took here.
+    pub(crate) fn times(&self) -> Vec<StageTime> {
+        let open = self.live.traverse();
+        let report = |world: &DrivenTraverse| world.report(self.recorded.step + 1);
+        let report = open.driven.as_ref().and_then(|driven| driven.with(report));
+        times(&self.recorded, report.map(|report| report.duration_s))
     }
 
     /// The step's view against the first and the newest `count` templates of its run before it, oldest first (R72).

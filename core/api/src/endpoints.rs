@@ -17,6 +17,7 @@ use sightline_session::notes::{EditNote, NewNote, Note};
 use sightline_session::query::{CompletionQuery, Language, Query, QueryAnswer};
 use sightline_session::reproduce::Reproduction;
 use sightline_session::step::RunStep;
+use sightline_session::times::StageTime;
 use sightline_session::view::{RunView, SessionView};
 use sightline_session::what_if::{Ghost, WhatIf};
 use sightline_session::why::Explanation;
@@ -180,6 +181,8 @@ endpoints! {
 
     /// A step.
     ShowStep: Get "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}", AtStep => RunStep;
+    /// What the stages of a step take on Mars, and took here.
+    ShowTimes: Get "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/times", AtStep => Vec<StageTime>;
     /// All arrays of a step as one NumPy archive.
     ShowArrays: Get "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/arrays.npz", AtStep => File;
     /// The view of a step against the earlier templates of its run.

@@ -9,6 +9,7 @@
 //! use sightline_world::target_truth::TruthSource;
 //! ```
 
+mod begun;
 pub mod pipeline;
 pub mod pair;
 pub mod designate;

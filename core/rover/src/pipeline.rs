@@ -21,13 +21,14 @@ use sightline_track::locate::store::Shared;
 use sightline_track::locate::{self, DesignateInput, LocateInput, Located, Place, TrackerMemory};
 use sightline_track::settings::Settings;
 use sightline_track::stages::capture::{self, Capture, StereoPair};
-use sightline_track::stages::judge::{self, Verdict};
+use sightline_track::stages::judge;
 use sightline_track::stages::point_mast::{self, Pointing};
 use sightline_track::stages::predict;
 use sightline_track::stages::update::{self, Updated};
 use sightline_track::target::{Designation, Target, TrackingState};
 use sightline_track::trace::{StepKind, StepTrace};
 
+use crate::begun::{Begun, unseen};
 use crate::pair::{self, FurtherCamera, FurtherImages, StopPair};
 
 /// The stops of a drive, as the stages see them.
@@ -162,13 +163,15 @@ pub fn run_step(stops: &dyn Stops, last: &Updated, settings: &Settings) -> StepT
     computed_step(stops, last, settings, &StepChanges::default(), Cancel::default())
 }
 
-/// How a person interferes with a step.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct StepChanges {
+/// How a person interferes with a step, or watches it.
+#[derive(Clone, Copy, Default)]
+pub struct StepChanges<'a> {
     /// Pixel of the left image at which the prediction is put, px; `None`: where dead reckoning has it.
     pub prediction_px: Option<Pixel>,
     /// The stage from which on nothing is computed, from `point_mast` to `update`; `None`: the whole step.
     pub before: Option<CycleStage>,
+    /// Called at the end of every stage, for its time; stages have no clock.
+    pub ended: Option<&'a dyn Fn(CycleStage)>,
 }
 
 /// The same, displaced or paused as a person asks for.
@@ -182,7 +185,7 @@ pub fn run_step_changed(
     stops: &dyn Stops,
     last: &Updated,
     settings: &Settings,
-    changes: &StepChanges,
+    changes: &StepChanges<'_>,
     cancel: Cancel<'_>,
 ) -> Result<StepTrace> {
     cancel.check()?;
@@ -196,10 +199,11 @@ fn computed_step(
     stops: &dyn Stops,
     last: &Updated,
     settings: &Settings,
-    changes: &StepChanges,
+    changes: &StepChanges<'_>,
     cancel: Cancel<'_>,
 ) -> StepTrace {
     let ends_at = |stage| changes.before.is_some_and(|before| before <= stage);
+    let ended = |stage| changes.ended.iter().for_each(|ended| ended(stage));
     let target = &*with_own_memory(stops, &last.target, settings, cancel);
     let step = target.step + 1;
     let site_from_rover = stops.site_from_rover(step);
@@ -209,7 +213,9 @@ fn computed_step(
     let prediction =
         prediction(stops, target, pair.as_ref().ok().map(|pair| pair.left).zip(changes.prediction_px));
     let carried = update::carry(target, step, &prediction);
+    ended(CycleStage::Predict);
     let pointing = pointing(stops, pair.as_ref().ok(), &carried);
+    ended(CycleStage::PointMast);
     let time_s = stops.time_s(step);
     let begun = Begun { step, time_s, predict: &prediction, point_mast: &pointing, carried: &carried, last };
     if ends_at(CycleStage::Capture) {
@@ -228,6 +234,7 @@ fn computed_step(
         }
     };
     let capture = capture::capture(images, pointing.predicted_left, settings.subframe_px());
+    ended(CycleStage::Capture);
     if ends_at(CycleStage::Locate) {
         return begun.trace(true, Some(capture), None, None);
     }
@@ -244,52 +251,20 @@ fn computed_step(
         cancel,
     };
     let locate = locate::locate(&input, &target.memory);
+    ended(CycleStage::Locate);
     if ends_at(CycleStage::Judge) {
         return begun.trace(true, Some(capture), Some(locate), None);
     }
     let judge =
         judge::judge(target, &prediction, &pointing, &locate, &site_from_rover, last.state, &settings.limits);
+    ended(CycleStage::Judge);
     if ends_at(CycleStage::Update) {
         return begun.trace(true, Some(capture), Some(locate), Some(judge));
     }
     let update = update::update(carried, &pointing, &capture, &locate, &judge, &site_from_rover, settings);
+    ended(CycleStage::Update);
     let kind = StepKind::Tracked { predict: prediction, capture, locate, judge };
     StepTrace { step, time_s, point_mast: pointing, kind, update }
-}
-
-/// What every step has that is paused between two stages.
-struct Begun<'a> {
-    step: usize,
-    time_s: f64,
-    predict: &'a predict::Prediction,
-    point_mast: &'a Pointing,
-    carried: &'a Target,
-    last: &'a Updated,
-}
-
-impl Begun<'_> {
-    /// The step with the results so far.
-    fn trace(
-        &self,
-        is_mast_pointed: bool,
-        capture: Option<Capture>,
-        locate: Option<Located>,
-        judge: Option<Verdict>,
-    ) -> StepTrace {
-        let predict = self.predict.clone();
-        StepTrace {
-            step: self.step,
-            time_s: self.time_s,
-            point_mast: self.point_mast.clone(),
-            kind: StepKind::Begun { predict, is_mast_pointed, capture, locate, judge },
-            update: unseen(self.carried.clone(), self.last.state),
-        }
-    }
-}
-
-/// The update of a stop without images: the target is where the prediction puts it, the state stays.
-fn unseen(carried: Target, state: TrackingState) -> Updated {
-    Updated { target: carried, state, template_renewed: false, correction_m: None, correction_px: None }
 }
 
 /// Where the target should be at the next stop, perhaps displaced to a pixel of the left camera of its pair.

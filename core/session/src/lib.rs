@@ -33,6 +33,7 @@ pub mod breakpoints;
 pub mod query;
 pub mod replayed_drive;
 pub mod reproduce;
+pub mod times;
 #[cfg(test)]
 mod breakpoint_tests;
 

@@ -13,6 +13,7 @@ pub use self::row::StepRow;
 
 use std::ops::{Deref, DerefMut};
 
+use crate::times::Took;
 use sightline_track::gate::Gate;
 use sightline_track::target::TrackingState;
 use sightline_track::trace::StepTrace;
@@ -25,6 +26,8 @@ pub struct RunStep {
     pub trace: StepTrace,
     /// The comparison with the truth; `None` where the truth is unknown.
     pub truth: Option<StepTruth>,
+    /// What the stages took, where they were computed here; no part of the record.
+    pub took: Took,
 }
 
 impl Deref for RunStep {

@@ -3,6 +3,7 @@
 //! Page, REST and command line all come through these functions, so that they show the same numbers.
 
 use crate::step::RunStep;
+use crate::times::{Stopwatch, Took};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
 use sightline_geometry::frames::Pixel;
@@ -84,9 +85,11 @@ impl NextStep<'_> {
     pub fn compute<D: Drive>(&self, drive: &D) -> Result<RunStep> {
         let Self { first, last, settings, prediction_px, before, cancel } = *self;
         drive.prepare(cancel)?;
-        let changes = StepChanges { prediction_px, before };
+        let watch = Stopwatch::start();
+        let changes = StepChanges { prediction_px, before, ended: Some(&|stage| watch.ended(stage)) };
         let trace = pipeline::run_step_changed(drive, &last.update, settings, &changes, cancel)?;
-        Ok(compared(drive, trace, Some(first)))
+        let took = watch.took();
+        Ok(RunStep { took, ..compared(drive, trace, Some(first)) })
     }
 }
 
@@ -108,5 +111,5 @@ pub(crate) fn compared<D: Drive>(drive: &D, trace: StepTrace, first: Option<&Ste
     let truth = TargetTruth::new(drive, target.designation, Some(&target.position_in_rover));
     // The comparison is one with the update.
     let truth = truth.filter(|_| !trace.is_begun()).and_then(|truth| truth.compare(&trace));
-    RunStep { trace, truth }
+    RunStep { trace, truth, took: Took::default() }
 }

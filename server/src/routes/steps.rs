@@ -5,8 +5,9 @@ use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
 use sightline_api::endpoint::Endpoint;
-use sightline_api::endpoints::{ShowArrays, ShowEarlierTemplates, ShowStep};
+use sightline_api::endpoints::{ShowArrays, ShowEarlierTemplates, ShowStep, ShowTimes};
 use sightline_session::step::RunStep;
+use sightline_session::times::StageTime;
 use sightline_track::locate::template::history::AgainstEarlier;
 use sightline_track::trace::{ArrayName, ArrayView};
 use sightline_vision::image::{npy, npz};
@@ -27,6 +28,7 @@ const EARLIER_LIMIT: usize = 40;
 pub(crate) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
         .routes(route::<ShowStep>(routes!(show)))
+        .routes(route::<ShowTimes>(routes!(times)))
         .routes(route::<ShowArrays>(routes!(arrays)))
         .routes(route::<ShowEarlierTemplates>(routes!(earlier_templates)))
 }
@@ -37,6 +39,14 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
 #[utoipa::path(get, operation_id = "show_step", path = ShowStep::PATH, tag = "steps", responses((status = 200, body = RunStep), ApiError))]
 async fn show(step: RecordedStep) -> ApiResult<Response> {
     blocking(move || Ok(Json(step.recorded.as_ref()).into_response())).await
+}
+
+/// What the stages of a step take
+///
+/// On Mars, by the model of the papers' processor of 20 MHz; on this machine, as measured when the step was computed.
+#[utoipa::path(get, operation_id = "show_times", path = ShowTimes::PATH, tag = "steps", responses((status = 200, body = Vec<StageTime>), ApiError))]
+async fn times(step: RecordedStep) -> ApiResult<Json<Vec<StageTime>>> {
+    blocking(move || Ok(Json(step.times()))).await
 }
 
 /// All arrays to which a step came, as one NumPy file (`numpy.load` gives them by name); NaN where invalid

@@ -12,6 +12,7 @@ use std::sync::Arc;
 
 use sightline_api::wire::{Problem, StopDetail};
 use sightline_session::step::RunStep;
+use sightline_session::times::StageTime;
 use sightline_track::cycle_stage::CycleStage;
 use sightline_track::locate::template::history::AgainstEarlier;
 use sightline_track::trace::ArrayName;
@@ -44,6 +45,8 @@ pub enum Item {
     Arrays(BTreeMap<ArrayName, Item>),
     /// Of [`Key::EarlierTemplates`].
     EarlierTemplates(Vec<AgainstEarlier>),
+    /// Of [`Key::Times`].
+    Times(Vec<StageTime>),
 }
 
 impl Item {
@@ -51,7 +54,9 @@ impl Item {
         match self {
             Self::Raster(raster) => vec![raster.as_ref()],
             Self::Arrays(all) => all.values().flat_map(Self::rasters).collect(),
-            Self::Stop(_) | Self::Trace(_) | Self::Table(_) | Self::EarlierTemplates(_) => Vec::new(),
+            Self::Stop(_) | Self::Trace(_) | Self::Table(_) | Self::EarlierTemplates(_) | Self::Times(_) => {
+                Vec::new()
+            }
         }
     }
 
@@ -63,6 +68,7 @@ impl Item {
             Self::Table(table) => table.bytes(),
             Self::Arrays(all) => all.values().map(Self::bytes).sum(),
             Self::EarlierTemplates(all) => size_of_val(all.as_slice()),
+            Self::Times(all) => size_of_val(all.as_slice()),
         }
     }
 }
@@ -245,6 +251,14 @@ impl Cache {
             Slot::Ready(_) | Slot::Absent => Slot::Absent,
             Slot::Loading => Slot::Loading,
             Slot::Failed(problem) => Slot::Failed(problem),
+        }
+    }
+
+    /// What the stages of a step take.
+    pub fn times(&self, key: &StepKey) -> Option<&[StageTime]> {
+        match self.slot(&Key::Times(key.clone())) {
+            Slot::Ready(Item::Times(all)) => Some(all),
+            _ => None,
         }
     }
 

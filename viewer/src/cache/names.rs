@@ -52,4 +52,6 @@ pub enum Key {
     Arrays(StepKey),
     /// The view of a step against the earlier templates of its run.
     EarlierTemplates(StepKey),
+    /// What the stages of a step take.
+    Times(StepKey),
 }

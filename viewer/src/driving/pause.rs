@@ -108,7 +108,7 @@ impl State {
             if has_more && open.as_ref() == Some(&key.session) {
                 self.cache.forget(|kept| match kept {
                     Key::Trace(kept) | Key::Array(kept, _) | Key::Arrays(kept) => *kept == key,
-                    Key::EarlierTemplates(kept) => *kept == key,
+                    Key::EarlierTemplates(kept) | Key::Times(kept) => *kept == key,
                     Key::Image { .. } | Key::Stop { .. } => false,
                 });
             }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use sightline_api::endpoint::Call;
-use sightline_api::endpoints::{ShowArrays, ShowEarlierTemplates, ShowImage, ShowStep, ShowStop};
+use sightline_api::endpoints::{ShowArrays, ShowEarlierTemplates, ShowImage, ShowStep, ShowStop, ShowTimes};
 use sightline_api::location::{AtImage, AtStop};
 use sightline_api::query::ImageWish;
 use sightline_api::wire::Problem;
@@ -27,6 +27,7 @@ pub(crate) fn call(key: &Key) -> Call {
         Key::Trace(step) => Call::to::<ShowStep>(step),
         Key::Array(step, _) | Key::Arrays(step) => Call::to::<ShowArrays>(step),
         Key::EarlierTemplates(step) => Call::to::<ShowEarlierTemplates>(step),
+        Key::Times(step) => Call::to::<ShowTimes>(step),
     }
 }
 
@@ -35,6 +36,7 @@ pub(super) fn read(key: &Key, bytes: &[u8], context: &egui::Context) -> Result<I
     match key {
         Key::Stop { .. } => Ok(Item::Stop(Arc::new(parse::<ShowStop>(bytes)?))),
         Key::EarlierTemplates(_) => Ok(Item::EarlierTemplates(parse::<ShowEarlierTemplates>(bytes)?)),
+        Key::Times(_) => Ok(Item::Times(parse::<ShowTimes>(bytes)?)),
         Key::Trace(_) => Ok(Item::Trace(Arc::new(parse::<ShowStep>(bytes)?))),
         Key::Image { step, eye, .. } => {
             let name = format!("the {} image of step {step}", eye.word());

@@ -18,6 +18,7 @@ impl State {
         let step = self.cursor.step;
         let mut keys = self.wanted_here();
         if self.are_settled(&keys) {
+            keys.extend(self.row().and_then(|_| self.step_key(step)).map(Key::Times));
             for step in [step.checked_add(1), step.checked_sub(1)].into_iter().flatten() {
                 if step < self.stop_count() {
                     self.want_step(step, true, &mut keys);

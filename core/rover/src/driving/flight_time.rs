@@ -10,6 +10,7 @@
 //! Unit: s.
 
 use serde::{Deserialize, Serialize};
+use sightline_track::cycle_stage::CycleStage;
 use utoipa::ToSchema;
 
 /// Transfer of a full pair, s, and its pixels.
@@ -38,6 +39,21 @@ impl FlightTime {
             image_sizes.iter().map(|[width, height]| f64::from(*width) * f64::from(*height)).sum();
         let capture_s = (CAPTURE_S * pixels / CAPTURE_PX).max(CAPTURE_MIN_S);
         Self { point_mast_s: 5.0, capture_s, locate_s: 5.0, drive_s: 0.0 }
+    }
+
+    /// The time of a stage, s; 0 for those that take next to none.
+    pub const fn of(&self, stage: CycleStage) -> f64 {
+        match stage {
+            CycleStage::PointMast => self.point_mast_s,
+            CycleStage::Capture => self.capture_s,
+            CycleStage::Locate => self.locate_s,
+            CycleStage::Drive => self.drive_s,
+            CycleStage::Predict
+            | CycleStage::Judge
+            | CycleStage::Update
+            | CycleStage::SetGoal
+            | CycleStage::SelectPath => 0.0,
+        }
     }
 
     /// All stages together, s.

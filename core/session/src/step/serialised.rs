@@ -8,6 +8,7 @@ use utoipa::openapi::schema::Schema;
 use utoipa::{PartialSchema, ToSchema};
 
 use super::RunStep;
+use crate::times::Took;
 use sightline_track::cycle_stage::CycleStage;
 use sightline_track::locate::Located;
 use sightline_track::stages::capture::Capture;
@@ -62,7 +63,7 @@ struct SerialisedBegun<'a> {
 }
 
 impl<'a> From<&'a RunStep> for SerialisedStep<'a> {
-    fn from(RunStep { trace, truth }: &'a RunStep) -> Self {
+    fn from(RunStep { trace, truth, .. }: &'a RunStep) -> Self {
         Self {
             step: trace.step,
             time_s: trace.time_s,
@@ -97,7 +98,7 @@ impl SerialisedStep<'_> {
             let kind = StepKind::Begun { predict, is_mast_pointed, capture, locate, judge };
             let trace = StepTrace { step, time_s, point_mast, kind, update: carried.into_owned() };
             let is_prefix = trace.paused_before() == Some(before) && update.is_none() && fault.is_none();
-            return is_prefix.then_some(RunStep { trace, truth });
+            return is_prefix.then(|| RunStep { trace, truth, took: Took::default() });
         }
         let kind = match (predict, capture, locate, judge, fault) {
             (None, Some(capture), Some(locate), None, None) => StepKind::Designation { capture, locate },
@@ -108,7 +109,7 @@ impl SerialisedStep<'_> {
             _ => return None,
         };
         let trace = StepTrace { step, time_s, point_mast: point_mast?, kind, update: update? };
-        Some(RunStep { trace, truth })
+        Some(RunStep { trace, truth, took: Took::default() })
     }
 }
 
@@ -177,7 +178,11 @@ mod tests {
         let update =
             Updated { target, state, template_renewed: false, correction_m: None, correction_px: None };
         let point_mast = point_mast(&position, &covariance, used);
-        RunStep { trace: StepTrace { step: 3, time_s: 60.0, point_mast, kind, update }, truth: None }
+        RunStep {
+            trace: StepTrace { step: 3, time_s: 60.0, point_mast, kind, update },
+            truth: None,
+            took: Took::default(),
+        }
     }
 
     fn kinds() -> [StepKind; 5] {

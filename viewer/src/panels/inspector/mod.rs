@@ -1,6 +1,7 @@
 //! The inspector: the quantities that the selected stage declares, then the rest of its evidence as a tree.
 
 mod quantities;
+mod times;
 mod tree;
 
 use egui::{RichText, ScrollArea, Ui};
@@ -32,6 +33,9 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         ui.label(RichText::new(state.stage().word()).strong().color(theme::strong()));
         ui.label(theme::note(state.stage().question()));
     });
+    if let Some(times) = times::line(state) {
+        ui.label(theme::note(times)).on_hover_text(times::HELP);
+    }
     if state.stage().is_of_drive() {
         driving::stages::show(ui, state);
         return;

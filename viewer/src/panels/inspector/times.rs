@@ -1,0 +1,56 @@
+//! What the selected stage and the whole stop take, on Mars and here.
+
+use sightline_session::times::StageTime;
+use sightline_track::cycle_stage::CycleStage;
+
+use crate::panels::digits;
+use crate::state::State;
+
+/// What the line means.
+pub(super) const HELP: &str = "On Mars: by the model of the flown processor of 20 MHz, with the transfer of the images and the drive. Here: \
+     as measured when this server computed the step.";
+
+/// The line of the cursor's step; `None` before the times are here.
+pub(super) fn line(state: &State) -> Option<String> {
+    let times = state.step_key(state.cursor.step).and_then(|key| state.cache.times(&key))?;
+    Some(words(times, state.stage().in_cycle()))
+}
+
+fn words(times: &[StageTime], stage: CycleStage) -> String {
+    let of_stage = times.iter().find(|time| time.stage == stage);
+    let flight_s: f64 = times.iter().map(|time| time.flight_s).sum();
+    let own_s: Vec<f64> = times.iter().filter_map(|time| time.own_s).collect();
+    let here = |own_s: Option<f64>| own_s.map_or("not measured".to_owned(), milliseconds);
+    let whole_s = (!own_s.is_empty()).then(|| own_s.iter().sum());
+    let whole = format!("the stop: {} s on Mars, here {}", digits(flight_s), here(whole_s));
+    match of_stage {
+        Some(time) => {
+            format!("{} s on Mars, here {}; {whole}", digits(time.flight_s), here(time.own_s))
+        }
+        None => whole,
+    }
+}
+
+fn milliseconds(time_s: f64) -> String {
+    format!("{} ms", digits(1e3 * time_s))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_line_has_the_stage_and_the_sum_of_all() {
+        let time = |stage, flight_s, own_s| StageTime { stage, flight_s, own_s };
+        let times = [
+            time(CycleStage::Predict, 0.0, Some(0.000_02)),
+            time(CycleStage::Capture, 7.5, Some(0.040)),
+            time(CycleStage::Locate, 5.0, Some(0.010_98)),
+            time(CycleStage::Drive, 20.0, None),
+        ];
+        let line = words(&times, CycleStage::Capture);
+        assert_eq!(line, "7.5 s on Mars, here 40 ms; the stop: 32.5 s on Mars, here 51 ms");
+        assert!(words(&times, CycleStage::Drive).starts_with("20 s on Mars, here not measured; "));
+        assert!(words(&times, CycleStage::SetGoal).starts_with("the stop: 32.5 s"));
+    }
+}
