@@ -65,7 +65,7 @@ fn the_navcam_pair_opens_as_one_convergent_stop() {
     let folder = tempfile::tempdir().unwrap();
     let (made, traverse) = imported(&source, folder.path());
     assert_eq!((traverse.stop_count(), traverse.index().stereo), (1, StereoGeometry::Convergent));
-    assert_eq!(made.notes, ["left out: 1F490747543EFFCNY9P1214L0M1 (FRONT_HAZCAM_LEFT)"]);
+    assert!(made.notes.is_empty(), "{:?}", made.notes);
     let stop = &traverse.index().stops[0];
     assert_eq!(stop.site_from_rover.position_m, [73.9193, 65.9703, 6.56288]);
     assert_eq!(stop.site_from_rover.quaternion_sxyz, [0.580525, 0.0333603, -0.128929, 0.803278]);

@@ -1,3 +1,5 @@
+//! Drives on commands in folders: resumed, restored, branched and refused.
+
 use sightline_world::surface_point;
 
 use super::*;

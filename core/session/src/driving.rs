@@ -183,7 +183,7 @@ impl TargetedDrive {
 /// # Errors
 /// [`Error::Setting`] as [`DriveCommand::validate_for`], for a goal outside the ground of a simulated world, and for a tilt limit
 /// that the rover exceeds where it stands.
-pub fn check_command(traverse: &Traverse, command: &DriveCommand, first: &StepTrace) -> Result<()> {
+pub(crate) fn check_command(traverse: &Traverse, command: &DriveCommand, first: &StepTrace) -> Result<()> {
     let target = &first.update.target;
     command.validate_for(&target.position_in_rover)?;
     let pose = traverse.site_from_rover(first.step);

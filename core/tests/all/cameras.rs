@@ -136,8 +136,15 @@ fn a_target_is_tracked_in_the_pair_in_which_it_was_designated() {
         let designation = designation(&traverse, from, name(camera), point);
         let steps = track::run(&traverse, designation, &Settings::default()).unwrap();
         println!("{camera}: {:?}", summary(&steps));
-        assert!(steps.len() >= 4, "{camera}: {} stops", steps.len());
-        for step in &steps {
+        // The target leaves the narrow picture of the pancams as the rover comes nearer: the template then does not fit any more.
+        let is_inside = |step: &&RunStep| {
+            let size = f64::from(step.point_mast.left.width());
+            let pixel = step.truth.as_ref().and_then(|truth| truth.left_pixel);
+            pixel.is_some_and(|pixel| pixel.x.min(pixel.y) > 14.0 && pixel.x.max(pixel.y) < size - 14.0)
+        };
+        let seen: Vec<_> = steps.iter().take_while(is_inside).collect();
+        assert!(seen.len() >= if camera == "pancam" { 10 } else { 4 }, "{camera}: {} stops", seen.len());
+        for step in seen {
             let truth = step.truth.as_ref().unwrap();
             assert_eq!(truth.tracked, Some(true), "{camera}, stop {}", step.step);
             assert!(truth.err_m < tolerance_m, "{camera}, stop {}: {} m", step.step, truth.err_m);

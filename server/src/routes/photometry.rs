@@ -14,6 +14,7 @@ use sightline_recordings::Traverse;
 use sightline_session::photometry::photometry;
 use sightline_session::step::RunStep;
 use sightline_track::settings::Settings;
+use sightline_world::traverse::StopLight;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
@@ -78,7 +79,11 @@ pub(crate) fn table(
 ) -> Result<String> {
     let mut text = format!("{HEADER}\n");
     for trace in steps {
-        let light = traverse.light(trace.step, cancel)?;
+        let is_of_main = trace.update.target.designation.camera.is_none();
+        // The exposure of a stop is that of its main pair.
+        let exposed =
+            |light: StopLight| StopLight { exposure_s: light.exposure_s.filter(|_| is_of_main), ..light };
+        let light = traverse.light(trace.step, cancel)?.map(exposed);
         let pose = traverse.site_from_rover(trace.step);
         let trace = with_image(traverse, trace)?;
         let Some(found) = photometry(&trace, &pose, light.as_ref(), &settings.template) else { continue };

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use sightline_api::endpoint::Endpoint;
 use sightline_api::endpoints::DesignateTarget;
 use sightline_api::wire::{NewTarget, StopCameraView, StopDetail};
 use sightline_geometry::camera::CameraName;
@@ -14,6 +13,7 @@ use crate::drawing::raster::Raster;
 use crate::drawing::view2d::View2d;
 use crate::panels::pane::Pane;
 use crate::state::State;
+use crate::tests::calls::{bodies, calls};
 use crate::tests::{Shown, fixture};
 
 fn name(text: &str) -> CameraName {
@@ -105,15 +105,13 @@ fn a_pick_in_a_camera_designates_with_its_name() {
     let mut state = showing(&egui::Context::default(), 2, hazcam);
     state.views.left = View2d::At { centre: Pixel::new(10.0, 10.0), scale: 4.0 };
     state.perform(Command::SetMode(Mode::Pick));
-    let asked = state.take_requests();
-    assert!(!asked.iter().any(|request| format!("{request:?}").contains("trackability")), "{asked:?}");
+    let asked = calls(&mut state);
+    assert!(!asked.iter().any(|call| call.path.contains("trackability")), "{asked:?}");
     state.perform(Command::Pick(Pixel::new(20.0, 30.0)));
     assert_eq!(state.designating.unwrap().camera, hazcam);
-    let asked = format!("{:?}", state.take_requests());
-    assert!(asked.contains("targets") && asked.contains("front_hazcam"), "{asked}");
-    let new = NewTarget { camera: hazcam, ..NewTarget::at_pixel(2, Pixel::new(20.0, 30.0)) };
-    assert_eq!(serde_json::to_value(new).unwrap()["camera"], "front_hazcam");
-    assert_eq!(DesignateTarget::PATH, "/sessions/{session}/targets");
+    let sent = bodies::<DesignateTarget>(&mut state);
+    let expected = NewTarget { camera: hazcam, ..NewTarget::at_pixel(2, Pixel::new(20.0, 30.0)) };
+    assert_eq!(sent, [expected]);
     // Another camera is shown in full, because the view meant the image before.
     state.views.left = View2d::At { centre: Pixel::new(10.0, 10.0), scale: 4.0 };
     state.perform(Command::ShowCamera(None));

@@ -38,7 +38,7 @@ pub enum CameraRig {
 
 impl CameraRig {
     /// Whether the pair is fixed to the body, where nothing points it.
-    pub fn is_on_body(self) -> bool {
+    pub(crate) fn is_on_body(self) -> bool {
         matches!(self, Self::MerFrontHazcam | Self::MerRearHazcam)
     }
 }
