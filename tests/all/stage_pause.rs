@@ -136,11 +136,11 @@ async fn a_drive_stepped_through_every_stage_has_the_bits_of_one_that_is_never_p
     let paused = Whole { folder: folder.path().join("driven").join(&traverse), session, traverse };
     let path = format!("sessions/{}/drive", paused.session);
     for stop in 1..=2 {
-        for stage in 0..STAGES.len() {
+        for (stage, before) in STAGES.into_iter().enumerate() {
             // Both ways to say the same pause, each of them at every stage.
             let told = pause_before(stop, stage, (stop + stage) % 2 == 0);
             server.json(Method::PUT, &path, &told).await.expect(200);
-            let drive = waited(&server, &paused.session, is_paused(stop, STAGES[stage])).await;
+            let drive = waited(&server, &paused.session, is_paused(stop, before)).await;
             check_pause(&server, &whole, &paused, (stop, stage)).await;
             check_decisions(&drive, &cycles, (stop, stage));
         }
