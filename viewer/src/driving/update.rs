@@ -215,14 +215,8 @@ mod tests {
     }
 
     fn view(stops: usize, is_driving: bool) -> DriveView {
-        let goal =
-            json!({ "in_site_m": [4.0, 0.5], "in_rover_m": [3.0, 0.5], "distance_m": 3.0, "arrived": false });
-        let cycle = |step: usize| {
-            json!({ "step": step, "goal": goal, "flight_minutes": 1.0, "ending": null, "report": null, "arrival_actions": 0,
-                "motion": { "kind": "arc", "length_m": 0.5, "curvature_per_m": 0.01 } })
-        };
         let steering = json!({ "target": 0, "run": 0, "command": { "standoff_m": 1.5 }, "pause_at": null });
-        let cycles: Vec<_> = (0..stops).map(cycle).collect();
+        let cycles: Vec<_> = (0..stops).map(fixture::cycle).collect();
         serde_json::from_value(
             json!({ "steering": steering, "cycles": cycles, "summary": null, "is_driving": is_driving }),
         )

@@ -4,6 +4,7 @@ mod record;
 
 pub(crate) use record::trace;
 
+use serde_json::json;
 use sightline_api::wire::{StopView, TraverseEntry, TraverseView};
 use sightline_geometry::frames::{Pixel, Pose, PoseRecord};
 use sightline_geometry::stereo_geometry::StereoGeometry;
@@ -127,6 +128,16 @@ pub(crate) fn with_history(context: &egui::Context, step: usize) -> State {
         }
     }
     state
+}
+
+/// The decision of a stop of a commanded drive, as the server sends it.
+pub(crate) fn cycle(step: usize) -> serde_json::Value {
+    let place = json!({ "position_m": [0.0, 0.0], "heading_rad": 0.0, "covariance": [[0.0; 3]; 3] });
+    json!({ "step": step, "estimated": place, "by_wheels": place, "flight_minutes": 1.0,
+        "flight": { "point_mast_s": 5.0, "capture_s": 7.5, "locate_s": 5.0, "drive_s": 0.0 },
+        "ending": null, "report": null, "arrival_actions": 0,
+        "goal": { "in_site_m": [4.0, 0.5], "in_rover_m": [3.25, 0.5], "distance_m": 3.0, "arrived": false },
+        "motion": { "kind": "arc", "length_m": 0.5, "curvature_per_m": 0.0625 } })
 }
 
 /// Loads the record of a step of the first run.

@@ -39,12 +39,6 @@ fn begun(before: CycleStage) -> RunStep {
     begun
 }
 
-fn cycle(step: usize) -> Value {
-    json!({ "step": step, "flight_minutes": 1.0, "ending": null, "report": null, "arrival_actions": 0,
-        "goal": { "in_site_m": [4.0, 0.5], "in_rover_m": [3.25, 0.5], "distance_m": 3.0, "arrived": false },
-        "motion": { "kind": "arc", "length_m": 0.5, "curvature_per_m": 0.0625 } })
-}
-
 /// A drive whose rover is at its last stop, paused there before a stage.
 fn paused(context: &egui::Context, before: CycleStage) -> State {
     let mut state = fixture::at_step(context, STOP);
@@ -67,7 +61,8 @@ fn paused(context: &egui::Context, before: CycleStage) -> State {
         _ if whole => {}
         _ => fixture::load(&mut state, begun(before)),
     }
-    let cycles: Vec<Value> = (0..STOP + usize::from(before > CycleStage::SetGoal)).map(cycle).collect();
+    let cycles: Vec<Value> =
+        (0..STOP + usize::from(before > CycleStage::SetGoal)).map(fixture::cycle).collect();
     let paused = json!({ "stop": STOP, "before": before.word() });
     let view = json!({ "steering": steering, "cycles": cycles, "summary": null, "is_driving": false, "paused": paused });
     state.driving.view = Some(("s1".to_owned(), serde_json::from_value(view).unwrap()));

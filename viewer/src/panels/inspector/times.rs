@@ -3,7 +3,6 @@
 use sightline_session::times::StageTime;
 use sightline_track::cycle_stage::CycleStage;
 
-use crate::panels::digits;
 use crate::state::State;
 
 /// What the line means.
@@ -22,17 +21,22 @@ fn words(times: &[StageTime], stage: CycleStage) -> String {
     let own_s: Vec<f64> = times.iter().filter_map(|time| time.own_s).collect();
     let here = |own_s: Option<f64>| own_s.map_or("not measured".to_owned(), milliseconds);
     let whole_s = (!own_s.is_empty()).then(|| own_s.iter().sum());
-    let whole = format!("the stop: {} s on Mars, here {}", digits(flight_s), here(whole_s));
+    let whole = format!("the stop: {} s on Mars, here {}", short(flight_s), here(whole_s));
     match of_stage {
         Some(time) => {
-            format!("{} s on Mars, here {}; {whole}", digits(time.flight_s), here(time.own_s))
+            format!("{} s on Mars, here {}; {whole}", short(time.flight_s), here(time.own_s))
         }
         None => whole,
     }
 }
 
 fn milliseconds(time_s: f64) -> String {
-    format!("{} ms", digits(1e3 * time_s))
+    format!("{} ms", short(1e3 * time_s))
+}
+
+/// Tenths below ten, whole numbers from there on.
+fn short(value: f64) -> String {
+    if value < 9.95 { format!("{value:.1}") } else { format!("{value:.0}") }
 }
 
 #[cfg(test)]
@@ -46,11 +50,11 @@ mod tests {
             time(CycleStage::Predict, 0.0, Some(0.000_02)),
             time(CycleStage::Capture, 7.5, Some(0.040)),
             time(CycleStage::Locate, 5.0, Some(0.010_98)),
-            time(CycleStage::Drive, 20.0, None),
+            time(CycleStage::Drive, 20.4, None),
         ];
         let line = words(&times, CycleStage::Capture);
-        assert_eq!(line, "7.5 s on Mars, here 40 ms; the stop: 32.5 s on Mars, here 51 ms");
+        assert_eq!(line, "7.5 s on Mars, here 40 ms; the stop: 33 s on Mars, here 51 ms");
         assert!(words(&times, CycleStage::Drive).starts_with("20 s on Mars, here not measured; "));
-        assert!(words(&times, CycleStage::SetGoal).starts_with("the stop: 32.5 s"));
+        assert!(words(&times, CycleStage::SetGoal).starts_with("the stop: 33 s"));
     }
 }
