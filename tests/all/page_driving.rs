@@ -87,17 +87,19 @@ async fn a_paused_stage_is_repeated_with_another_setting_and_the_drive_goes_on_s
     browser.says("Not computed yet: the drive is paused before `judge`").await;
     browser.shot("drive-paused-judge").await;
 
-    // The step again with a limit that no match meets, up to the pause and one stage further.
+    // The verdict, and again with a limit that this match does not meet: on the same images, up to the pause.
+    browser.show_panel("Drive").await;
+    browser.click_on("button", "Next stage").await;
+    browser.wait_status("the verdict", "s.run === 0 && s.paused_before === 'update' && s.shown").await;
     browser.press("w").await;
     browser.set_value("slider", "try ncc_min", "0.99").await;
     browser.click_on("button", "Run from here as branch").await;
     let again = format!("s.run === 1 && s.steps_done === {} && !s.running && s.shown", stop + 1);
     browser.wait_status("the run", &again).await;
-    browser.show_panel("Drive").await;
-    browser.click_on("button", "Next stage").await;
-    browser.wait_status("the verdict", "s.run === 1 && s.paused_before === 'update' && s.shown").await;
+    browser.says("Rejected").await;
     assert_eq!(browser.status().await["state"], "tracking", "the update is not computed yet");
     browser.shot("drive-paused-update").await;
+    browser.show_panel("Drive").await;
     browser.click_on("button", "Next stage").await;
     browser.wait_status("the update", "s.paused_before === 'set_goal' && s.state === 'lost'").await;
     browser.click_on("button", "Next stage").await;

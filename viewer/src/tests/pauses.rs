@@ -108,7 +108,7 @@ fn the_inspector_shows_what_exists_and_says_why_the_rest_does_not() {
     inspector(CycleStage::Predict, Stage::PREDICT).says("paused before `predict`");
     inspector(CycleStage::SelectPath, Stage::SET_GOAL).says("ahead of the rover").says("3.250 m");
     inspector(CycleStage::SelectPath, Stage::SELECT_PATH).says("paused before `select_path`");
-    inspector(CycleStage::Drive, Stage::SELECT_PATH).says("radius 16.00 m right");
+    inspector(CycleStage::Drive, Stage::SELECT_PATH).says("radius 16 m right");
     inspector(CycleStage::Drive, Stage::DRIVE).says("paused before `drive`");
 }
 
