@@ -25,7 +25,7 @@ pub fn verdict(trace: &RunStep, before: Option<&RunStep>, settings: &Settings) -
     if let Some(fault) = trace.fault() {
         return format!("Nothing could be judged, since the files of this stop are at fault: {fault}.");
     }
-    if let Some(before) = trace.paused_before() {
+    if let (Some(before), None) = (trace.paused_before(), trace.verdict()) {
         return format!("Nothing is decided yet, since the drive is paused before {}.", before.word());
     }
     let Some(verdict) = trace.verdict() else {
