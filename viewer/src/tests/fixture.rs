@@ -132,7 +132,8 @@ pub(crate) fn with_history(context: &egui::Context, step: usize) -> State {
 
 /// The decision of a stop of a commanded drive, as the server sends it.
 pub(crate) fn cycle(step: usize) -> serde_json::Value {
-    let place = json!({ "position_m": [0.0, 0.0], "heading_rad": 0.0, "covariance": [[0.0; 3]; 3] });
+    let exact = [[0.0; 3]; 3];
+    let place = json!({ "position_m": [0.0, 0.0], "heading_rad": 0.0, "covariance": exact });
     json!({ "step": step, "estimated": place, "by_wheels": place, "flight_minutes": 1.0,
         "flight": { "point_mast_s": 5.0, "capture_s": 7.5, "locate_s": 5.0, "drive_s": 0.0 },
         "ending": null, "report": null, "arrival_actions": 0,
