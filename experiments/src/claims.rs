@@ -105,6 +105,7 @@ fn end_of(traverse: &Traverse, pixel: Pixel, settings: &Settings) -> Result<Opti
             settings,
             prediction_px: None,
             before: None,
+            ended: None,
             cancel: Default::default(),
         };
         last = next.compute(traverse)?;

@@ -34,6 +34,7 @@ pub mod limits;
 mod step_memory;
 mod memory;
 mod jobs;
+mod stopwatch;
 mod store;
 mod streams;
 pub mod hosts;

@@ -35,6 +35,7 @@ use crate::problem::{ApiError, ApiResult};
 use crate::rendering::OpenTraverse;
 use crate::requests_first::Requests;
 use crate::sessions::Sessions;
+use crate::stopwatch::Stopwatch;
 
 /// What computes runs: the lane in which they wait, and where their progress is told.
 #[derive(Clone)]
@@ -245,15 +246,19 @@ impl Runner {
             }
         }
         let last = with_image(&live.traverse(), &pending.last)?;
+        let watch = Stopwatch::start();
+        let ended = |stage| watch.ended(stage);
         let next = NextStep {
             first: &pending.first,
             last: &last,
             settings: &pending.settings,
             prediction_px: pending.prediction_px,
             before: pending.before,
+            ended: Some(&ended),
             cancel: flag.as_ref().into(),
         };
-        next.compute(traverse).map(without_pair)
+        let step = next.compute(traverse)?;
+        Ok(without_pair(RunStep { took: watch.took(), ..step }))
     }
 }
 

@@ -174,6 +174,14 @@ pub struct StepChanges<'a> {
     pub ended: Option<&'a dyn Fn(CycleStage)>,
 }
 
+impl StepChanges<'_> {
+    /// Tells the end of a stage; whether the step is paused after it.
+    fn end(&self, stage: CycleStage) -> bool {
+        self.ended.iter().for_each(|ended| ended(stage));
+        stage.next().is_some_and(|next| self.before.is_some_and(|before| before <= next))
+    }
+}
+
 /// The same, displaced or paused as a person asks for.
 ///
 /// The step paused before a stage has the results of the whole step's earlier stages. Neither the mast nor the images of the stop
@@ -202,8 +210,6 @@ fn computed_step(
     changes: &StepChanges<'_>,
     cancel: Cancel<'_>,
 ) -> StepTrace {
-    let ends_at = |stage| changes.before.is_some_and(|before| before <= stage);
-    let ended = |stage| changes.ended.iter().for_each(|ended| ended(stage));
     let target = &*with_own_memory(stops, &last.target, settings, cancel);
     let step = target.step + 1;
     let site_from_rover = stops.site_from_rover(step);
@@ -213,19 +219,15 @@ fn computed_step(
     let prediction =
         prediction(stops, target, pair.as_ref().ok().map(|pair| pair.left).zip(changes.prediction_px));
     let carried = update::carry(target, step, &prediction);
-    ended(CycleStage::Predict);
+    changes.end(CycleStage::Predict);
     let pointing = pointing(stops, pair.as_ref().ok(), &carried);
-    ended(CycleStage::PointMast);
     let time_s = stops.time_s(step);
     let begun = Begun { step, time_s, predict: &prediction, point_mast: &pointing, carried: &carried, last };
-    if ends_at(CycleStage::Capture) {
-        return begun.trace(!ends_at(CycleStage::PointMast), None, None, None);
+    if changes.end(CycleStage::PointMast) {
+        return begun.trace(changes.before != Some(CycleStage::PointMast), None, None, None);
     }
-    let images = |pair| match pair::capture(stops, step, camera, cancel) {
-        Ok(images) => Ok((pair, images)),
-        Err(error) => Err(error.to_string()),
-    };
-    let (pair, images) = match pair.and_then(images) {
+    let images = |pair| pair::capture(stops, step, camera, cancel).map(|images| (pair, images));
+    let (pair, images) = match pair.and_then(|pair| images(pair).map_err(|error| error.to_string())) {
         Ok(captured) => captured,
         Err(fault) => {
             let kind = StepKind::Damaged { predict: prediction, fault };
@@ -234,8 +236,7 @@ fn computed_step(
         }
     };
     let capture = capture::capture(images, pointing.predicted_left, settings.subframe_px());
-    ended(CycleStage::Capture);
-    if ends_at(CycleStage::Locate) {
+    if changes.end(CycleStage::Capture) {
         return begun.trace(true, Some(capture), None, None);
     }
     let input = LocateInput {
@@ -251,18 +252,16 @@ fn computed_step(
         cancel,
     };
     let locate = locate::locate(&input, &target.memory);
-    ended(CycleStage::Locate);
-    if ends_at(CycleStage::Judge) {
+    if changes.end(CycleStage::Locate) {
         return begun.trace(true, Some(capture), Some(locate), None);
     }
     let judge =
         judge::judge(target, &prediction, &pointing, &locate, &site_from_rover, last.state, &settings.limits);
-    ended(CycleStage::Judge);
-    if ends_at(CycleStage::Update) {
+    if changes.end(CycleStage::Judge) {
         return begun.trace(true, Some(capture), Some(locate), Some(judge));
     }
     let update = update::update(carried, &pointing, &capture, &locate, &judge, &site_from_rover, settings);
-    ended(CycleStage::Update);
+    changes.end(CycleStage::Update);
     let kind = StepKind::Tracked { predict: prediction, capture, locate, judge };
     StepTrace { step, time_s, point_mast: pointing, kind, update }
 }

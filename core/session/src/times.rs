@@ -1,9 +1,7 @@
-//! What the stages of a stop take: on Mars, by the model of [`FlightTime`], and on this machine, as measured.
+//! What the stages of a stop take: on Mars, by the model of [`FlightTime`], and on this machine, as the server measured them
+//! (the images of a simulated stop are rendered before).
 //!
 //! Unit: s.
-
-use std::cell::RefCell;
-use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -34,30 +32,6 @@ impl PartialEq for Took {
     }
 }
 
-/// Measures the stages of a step, each from the end of the one before.
-pub(crate) struct Stopwatch {
-    last: RefCell<Instant>,
-    took: RefCell<Took>,
-}
-
-impl Stopwatch {
-    pub(crate) fn start() -> Self {
-        Self { last: RefCell::new(Instant::now()), took: RefCell::default() }
-    }
-
-    /// Takes the end of a stage.
-    pub(crate) fn ended(&self, stage: CycleStage) {
-        let now = Instant::now();
-        let before = self.last.replace(now);
-        self.took.borrow_mut().0.push((stage, (now - before).as_secs_f64()));
-    }
-
-    /// The times so far.
-    pub(crate) fn took(self) -> Took {
-        self.took.into_inner()
-    }
-}
-
 /// The times of a step's stages in running order; `drive_s` is the duration of the drive from its stop, s, of a drive on commands.
 pub fn times(step: &RunStep, drive_s: Option<f64>) -> Vec<StageTime> {
     let pointing = &step.point_mast;
@@ -70,22 +44,4 @@ pub fn times(step: &RunStep, drive_s: Option<f64>) -> Vec<StageTime> {
         stage => step.paused_before().is_none_or(|before| *stage < before),
     });
     reached.map(|stage| StageTime { stage, flight_s: flight.of(stage), own_s: own_s(stage) }).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_stage_takes_the_time_from_the_end_of_the_one_before() {
-        let watch = Stopwatch::start();
-        watch.ended(CycleStage::Predict);
-        std::thread::sleep(std::time::Duration::from_millis(20));
-        watch.ended(CycleStage::Capture);
-        let took = watch.took();
-        let [(first, first_s), (second, second_s)] = took.0[..] else { panic!("{took:?}") };
-        assert_eq!((first, second), (CycleStage::Predict, CycleStage::Capture));
-        assert!(first_s >= 0.0 && second_s >= 0.02, "{took:?}");
-        assert_eq!(took, Took::default(), "times make no difference");
-    }
 }

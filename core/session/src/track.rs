@@ -3,7 +3,7 @@
 //! Page, REST and command line all come through these functions, so that they show the same numbers.
 
 use crate::step::RunStep;
-use crate::times::{Stopwatch, Took};
+use crate::times::Took;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
 use sightline_geometry::frames::Pixel;
@@ -61,7 +61,7 @@ pub fn advance<D: Drive>(drive: &D, first: &StepTrace, last: &StepTrace, setting
 }
 
 /// The step after the last one of a run, as a person may have changed it and may cancel it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct NextStep<'a> {
     /// The run's designation.
     pub first: &'a StepTrace,
@@ -73,6 +73,8 @@ pub struct NextStep<'a> {
     pub prediction_px: Option<Pixel>,
     /// The stage before which the step is paused, from `point_mast` to `update`; `None`: the whole step.
     pub before: Option<CycleStage>,
+    /// Called at the end of every stage.
+    pub ended: Option<&'a dyn Fn(CycleStage)>,
     /// Read several times during the step.
     pub cancel: Cancel<'a>,
 }
@@ -83,13 +85,11 @@ impl NextStep<'_> {
     /// # Errors
     /// [`sightline_geometry::error::Error::Cancelled`] soon after `cancel` is requested.
     pub fn compute<D: Drive>(&self, drive: &D) -> Result<RunStep> {
-        let Self { first, last, settings, prediction_px, before, cancel } = *self;
+        let Self { first, last, settings, prediction_px, before, ended, cancel } = *self;
         drive.prepare(cancel)?;
-        let watch = Stopwatch::start();
-        let changes = StepChanges { prediction_px, before, ended: Some(&|stage| watch.ended(stage)) };
+        let changes = StepChanges { prediction_px, before, ended };
         let trace = pipeline::run_step_changed(drive, &last.update, settings, &changes, cancel)?;
-        let took = watch.took();
-        Ok(RunStep { took, ..compared(drive, trace, Some(first)) })
+        Ok(compared(drive, trace, Some(first)))
     }
 }
 

@@ -84,8 +84,16 @@ pub fn try_step<D: Drive>(
             let prediction_px = prediction_px.or(base.prediction_px);
             // A step of a paused drive is tried up to the pause.
             let before = base.recorded.paused_before();
-            NextStep { first: base.first, last, settings: &settings, prediction_px, before, cancel }
-                .compute(drive)
+            NextStep {
+                first: base.first,
+                last,
+                settings: &settings,
+                prediction_px,
+                before,
+                ended: None,
+                cancel,
+            }
+            .compute(drive)
         }
     }
 }

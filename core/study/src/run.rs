@@ -190,6 +190,7 @@ impl Follower {
                 settings,
                 prediction_px: None,
                 before: None,
+                ended: None,
                 cancel: cancel.into(),
             };
             let next = next.compute(drive)?;

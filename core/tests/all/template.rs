@@ -84,6 +84,7 @@ fn cancelled_step_returns_no_trace() {
         settings: &settings,
         prediction_px: None,
         before: None,
+        ended: None,
         cancel: (&flag).into(),
     };
     assert_eq!(next.compute(&world).unwrap(), track::advance(&world, &first, &first, &settings));

@@ -132,8 +132,15 @@ fn of_steps(folder: &Path, designation: Designation) -> Result<Vec<Named<'static
 }
 
 fn advance(folder: &Path, first: &RunStep, settings: &Settings, cancel: &AtomicBool) -> Result<RunStep> {
-    let next =
-        NextStep { first, last: first, settings, prediction_px: None, before: None, cancel: cancel.into() };
+    let next = NextStep {
+        first,
+        last: first,
+        settings,
+        prediction_px: None,
+        before: None,
+        ended: None,
+        cancel: cancel.into(),
+    };
     next.compute(&fresh(folder))
 }
 

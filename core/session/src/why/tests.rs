@@ -351,8 +351,15 @@ fn a_displaced_prediction_is_told_as_what_a_person_did() {
     let pixel = Pixel::new(110.0, 140.0);
     let (first, last) = (&steps[0], &steps[1]);
     let prediction_px = Some(pixel);
-    let next =
-        NextStep { first, last, settings: &settings, prediction_px, before: None, cancel: Cancel::default() };
+    let next = NextStep {
+        first,
+        last,
+        settings: &settings,
+        prediction_px,
+        before: None,
+        ended: None,
+        cancel: Cancel::default(),
+    };
     let tried = next.compute(&world).unwrap();
     let book = Book { trace: &tried, prediction_px: Some(pixel), ..book(&world, &steps, &settings, 2) };
     let node = book.ask("predicted_position").unwrap();
