@@ -1,4 +1,4 @@
-//! A step that is paused between two stages.
+//! A step that ends before it is whole: paused between two stages, or at a stop without images.
 
 use sightline_track::locate::Located;
 use sightline_track::stages::capture::Capture;
@@ -6,10 +6,10 @@ use sightline_track::stages::judge::Verdict;
 use sightline_track::stages::point_mast::Pointing;
 use sightline_track::stages::predict::Prediction;
 use sightline_track::stages::update::Updated;
-use sightline_track::target::{Target, TrackingState};
+use sightline_track::target::Target;
 use sightline_track::trace::{StepKind, StepTrace};
 
-/// What every step has that is paused between two stages.
+/// What such a step has in any case.
 pub(crate) struct Begun<'a> {
     pub(crate) step: usize,
     pub(crate) time_s: f64,
@@ -29,17 +29,24 @@ impl Begun<'_> {
         judge: Option<Verdict>,
     ) -> StepTrace {
         let predict = self.predict.clone();
-        StepTrace {
-            step: self.step,
-            time_s: self.time_s,
-            point_mast: self.point_mast.clone(),
-            kind: StepKind::Begun { predict, is_mast_pointed, capture, locate, judge },
-            update: unseen(self.carried.clone(), self.last.state),
-        }
+        self.unseen(StepKind::Begun { predict, is_mast_pointed, capture, locate, judge })
     }
-}
 
-/// The update of a stop without images: the target is where the prediction puts it, the state stays.
-pub(crate) fn unseen(carried: Target, state: TrackingState) -> Updated {
-    Updated { target: carried, state, template_renewed: false, correction_m: None, correction_px: None }
+    /// The step of a stop whose images cannot be had.
+    pub(crate) fn damaged(&self, fault: String) -> StepTrace {
+        self.unseen(StepKind::Damaged { predict: self.predict.clone(), fault })
+    }
+
+    /// A step without an update: the target is where the prediction puts it, the state stays.
+    fn unseen(&self, kind: StepKind) -> StepTrace {
+        let update = Updated {
+            target: self.carried.clone(),
+            state: self.last.state,
+            template_renewed: false,
+            correction_m: None,
+            correction_px: None,
+        };
+        let Self { step, time_s, .. } = *self;
+        StepTrace { step, time_s, point_mast: self.point_mast.clone(), kind, update }
+    }
 }

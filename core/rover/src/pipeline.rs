@@ -28,7 +28,7 @@ use sightline_track::stages::update::{self, Updated};
 use sightline_track::target::{Designation, Target, TrackingState};
 use sightline_track::trace::{StepKind, StepTrace};
 
-use crate::begun::{Begun, unseen};
+use crate::begun::Begun;
 use crate::pair::{self, FurtherCamera, FurtherImages, StopPair};
 
 /// The stops of a drive, as the stages see them.
@@ -224,16 +224,12 @@ fn computed_step(
     let time_s = stops.time_s(step);
     let begun = Begun { step, time_s, predict: &prediction, point_mast: &pointing, carried: &carried, last };
     if changes.end(CycleStage::PointMast) {
-        return begun.trace(changes.before != Some(CycleStage::PointMast), None, None, None);
+        return begun.trace(changes.before > Some(CycleStage::PointMast), None, None, None);
     }
     let images = |pair| pair::capture(stops, step, camera, cancel).map(|images| (pair, images));
     let (pair, images) = match pair.and_then(|pair| images(pair).map_err(|error| error.to_string())) {
         Ok(captured) => captured,
-        Err(fault) => {
-            let kind = StepKind::Damaged { predict: prediction, fault };
-            let update = unseen(carried, last.state);
-            return StepTrace { step, time_s, point_mast: pointing, kind, update };
-        }
+        Err(fault) => return begun.damaged(fault),
     };
     let capture = capture::capture(images, pointing.predicted_left, settings.subframe_px());
     if changes.end(CycleStage::Capture) {
