@@ -33,9 +33,8 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         ui.label(RichText::new(state.stage().word()).strong().color(theme::strong()));
         ui.label(theme::note(state.stage().question()));
     });
-    if let Some(times) = times::line(state) {
-        ui.label(theme::note(times)).on_hover_text(times::HELP);
-    }
+    // The line keeps its place before the times are here.
+    ui.label(theme::note(times::line(state).unwrap_or_default())).on_hover_text(times::HELP);
     if state.stage().is_of_drive() {
         driving::stages::show(ui, state);
         return;
