@@ -19,7 +19,7 @@ use super::check::FurtherCameras;
 use super::files::resolve;
 use super::native::Traverse;
 
-/// What was found before, for each pair of cameras.
+/// Earlier results, for each pair of cameras.
 pub(super) struct Stores {
     cache: Arc<Cache>,
     main: SharedStore,
@@ -151,7 +151,7 @@ impl Traverse {
         Ok(pair)
     }
 
-    /// One image of a stop, the left or the right one of a camera: what is wrong with the other does not matter.
+    /// The left or the right image of a camera at a stop; the other image may be damaged.
     ///
     /// # Errors
     /// As [`Self::capture`], of this image; a stop without a camera of this name, and the right image of a single one.

@@ -1,4 +1,4 @@
-//! Stops with several cameras: what is written, what is refused, and whose images are read.
+//! Tests of stops with several cameras: writing, refusals, and the images of each camera.
 
 use std::sync::atomic::AtomicBool;
 

@@ -17,18 +17,18 @@ use sightline_rover::pipeline::Stops;
 
 use crate::native::Traverse;
 
-/// How a recorded stop differs from what was commanded.
+/// The difference between a command and the recorded stop.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Answer {
     /// The number of the stop to which the command led.
     pub step: usize,
-    /// Where the commanded motion ends: ahead and to the right, m.
+    /// The end of the commanded motion, ahead and to the right, m.
     pub commanded_m: [f64; 2],
-    /// By how much it turns, rad, positive to the right.
+    /// The commanded turn, rad, positive to the right.
     pub commanded_turn_rad: f64,
-    /// Where the recorded pose estimate of the stop is, alike, m.
+    /// The position of the recorded pose estimate, ahead and to the right, m.
     pub recorded_m: [f64; 2],
-    /// By how much the recorded heading turned, rad.
+    /// The recorded turn of the heading, rad, positive to the right.
     pub recorded_turn_rad: f64,
     /// Distance between both ends, m.
     pub apart_m: f64,

@@ -24,7 +24,7 @@ pub struct StopPair<'a> {
     pub right: &'a Camera,
     /// The mast angles of this pair; `None` for cameras on the body and where they are unknown.
     pub mast_angles: Option<MastAngles>,
-    /// Where the targets of this pair keep what they share.
+    /// The store of results that all targets of this pair share.
     pub shared: Option<Shared<'a>>,
 }
 

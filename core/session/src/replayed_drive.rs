@@ -1,4 +1,4 @@
-//! A command followed along a recording: at every stop what would have been commanded, beside what was recorded.
+//! A drive command evaluated along a recording: the decision at every stop beside the recorded motion.
 
 use std::sync::Arc;
 
