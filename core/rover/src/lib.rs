@@ -15,4 +15,5 @@ pub mod pair;
 pub mod designate;
 pub mod trackability;
 pub mod driving;
+pub mod visual_odometry;
 pub mod version;

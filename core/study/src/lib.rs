@@ -26,4 +26,5 @@ mod hand_over_row;
 pub mod hand_over_table;
 mod spread;
 pub mod row;
+pub mod odometry;
 pub mod wire;

@@ -18,3 +18,4 @@ mod stereo_rendered;
 mod stereo_recorded;
 mod hand_over;
 mod cameras;
+mod visual_odometry;

@@ -7,6 +7,7 @@
 
 pub mod image;
 pub mod correlate;
+pub mod corners;
 pub mod sift;
 pub mod stereo;
 pub mod registration;

@@ -24,6 +24,7 @@ pub mod difference;
 pub mod sdog;
 pub mod similarity;
 pub mod peak;
+pub mod pseudo;
 pub mod coarse_to_fine;
 pub mod lucas_kanade;
 pub mod focus;

@@ -239,7 +239,7 @@ impl TerrainSettings {
         within("terrain.rms_at_1m_m", self.rms_at_1m_m, 0.0, 0.2)?;
         within("terrain.hurst", self.hurst, 0.1, 1.5)?;
         within("terrain.longest_wavelength_m", self.longest_wavelength_m, 0.1, 50.0)?;
-        within("terrain.slope_deg", self.slope_deg, 0.0, 30.0)?;
+        within("terrain.slope_deg", self.slope_deg, 0.0, 35.0)?;
         within("terrain.slope_azimuth_deg", self.slope_azimuth_deg, -360.0, 360.0)?;
         within("terrain.slope_reach_m", self.slope_reach_m, 30.0, 10_000.0)?;
         within("terrain.ripple_height_m", self.ripple_height_m, 0.0, 0.3)?;

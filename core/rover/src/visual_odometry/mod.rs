@@ -1,0 +1,493 @@
+//! Visual odometry: the motion between two stops from their stereo pairs, or "no update" with its reason (R10, R11, R38, R126).
+//!
+//! ```text
+//! points → coarse_search → match → consistent_set → fit_motion → gates
+//! ```
+//! Corners of the left image before become points by stereo. A search over translations in coarse images puts up with wheels
+//! that slip. The points are matched in both images after, those that keep their distances agree on a motion, and their full
+//! covariances give the motion of most likelihood. Gates refuse what is not certain: the estimate of wheels and gyro stays,
+//! and the reason says which gate failed, with value and margin.
+//!
+//! The update is a function of two stereo pairs, their cameras and the motion by wheels and gyro. It knows no target.
+//!
+//! | symbol | name | unit, frame |
+//! |---|---|---|
+//! | T | `after_from_before` | m; from the rover frame before to that after |
+//! | Σ | `covariance` of a small motion (τ, ω) about the rover's origin that follows T | m², m rad, rad²; rover frame after |
+//!
+//! Sources: Maimone, Cheng & Matthies 2007; Howard 2008; domain.md 9.
+
+mod coarse;
+mod gates;
+pub mod look;
+mod matches;
+mod motion;
+mod points;
+mod reduce;
+mod rigidity;
+pub mod settings;
+mod windows;
+
+pub use coarse::{CoarseSearch, Translation};
+pub use settings::{OdometryPreset, OdometrySettings};
+
+use nalgebra::{Matrix3, Matrix6, SMatrix};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use sightline_geometry::camera::{Camera, Mast, MastAngles};
+use sightline_geometry::cancel::Cancel;
+use sightline_geometry::error::Result;
+use sightline_geometry::frames::{Pixel, Pose, PoseRecord, Vector3};
+use sightline_track::gate::Gate;
+use sightline_track::stages::capture::StereoPair;
+use sightline_vision::corners::{CornerSettings, corners};
+
+use self::gates::Judged;
+use self::matches::{Match, NoMatch};
+use self::motion::Fitted;
+use self::points::{Eyes, NoPoint, Point};
+use self::reduce::Reduced;
+use self::windows::Eye;
+
+/// Half the side of the second search window, px.
+const SECOND_REACH_PX: u32 = 3;
+/// Translations farther apart than this are those of two motions, m.
+const OTHER_MOTION_M: f64 = 0.015;
+/// Wheels that moved less than this have no slip, m.
+const SLIP_MIN_M: f64 = 0.02;
+
+/// The stereo pair of a stop with its cameras.
+#[derive(Clone, Copy)]
+pub struct OdometryView<'a> {
+    /// The images.
+    pub pair: &'a StereoPair,
+    /// The left camera in the rover frame of the stop.
+    pub left: &'a Camera,
+    /// The right camera.
+    pub right: &'a Camera,
+    /// The angles of the mast that carries them; `None` for cameras on the body and where they are unknown.
+    pub mast_angles: Option<MastAngles>,
+}
+
+/// What an update is made from.
+#[derive(Clone, Copy)]
+pub struct OdometryInput<'a> {
+    /// The stop before.
+    pub before: OdometryView<'a>,
+    /// The stop after.
+    pub after: OdometryView<'a>,
+    /// The motion by wheels, gyro and accelerometers: from the rover frame before to that after.
+    pub predicted_after_from_before: &'a Pose,
+    /// The mast with the 1σ error of each angle, rad; `None` without one.
+    pub mast: Option<(&'a Mast, f64)>,
+    /// The settings.
+    pub settings: &'a OdometrySettings,
+    /// Whether to stop early.
+    pub cancel: Cancel<'a>,
+}
+
+/// What became of a corner.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Fate {
+    /// It agrees with the motion.
+    Inlier,
+    /// It does not agree with the motion.
+    Outlier,
+    /// No match between the eyes before the motion.
+    NoStereo,
+    /// Its range is beyond the limits.
+    OutOfRange,
+    /// It is out of view after the motion.
+    OutOfView,
+    /// No match between the stops.
+    NoMatch,
+    /// No match between the eyes after the motion.
+    NoStereoAfter,
+    /// There is no motion to agree with.
+    Unused,
+}
+
+/// A corner with what became of it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct OdometryCorner {
+    /// In the left image before, px of the whole image.
+    #[schema(value_type = [f64; 2])]
+    pub before_px: [f64; 2],
+    /// Its match in the left image after, px of the whole image; null without one.
+    pub after_px: Option<[f64; 2]>,
+    /// Distance from the left camera before, m; null without a point.
+    pub range_m: Option<f64>,
+    /// Residual under the motion in standard deviations; null without match or motion.
+    pub residual_sigmas: Option<f64>,
+    /// What became of it.
+    pub fate: Fate,
+}
+
+/// Slip of a step.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = OdometrySlip)]
+pub struct Slip {
+    /// Part of the wheels' motion that was lost along it: 1 = the rover stayed.
+    pub along: f64,
+    /// Movement to the right of the motion, as a part of it.
+    pub aside: f64,
+    /// 1σ error of `along`.
+    pub along_sigma: f64,
+}
+
+/// The outcome of an update.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct OdometryUpdate {
+    /// Corners of the left image before.
+    pub corners: usize,
+    /// Corners with a position by stereo.
+    pub points: usize,
+    /// Points matched in both images after.
+    pub matches: usize,
+    /// Matches that keep their distances from each other.
+    pub consistent: usize,
+    /// Matches that agree with the motion.
+    pub inliers: usize,
+    /// The search over translations; null where it is switched off or had too few points.
+    pub coarse_search: Option<CoarseSearch>,
+    /// The motion, accepted or not: from the rover frame before to that after; null where none was found.
+    pub after_from_before: Option<PoseRecord>,
+    /// Covariance of a small motion (translation in m, turn in rad) about the rover's origin that follows it, rover frame after.
+    #[schema(value_type = Option<Vec<f64>>)]
+    pub covariance: Option<SMatrix<f64, 6, 6>>,
+    /// χ² per degree of freedom of the residuals.
+    pub chi2_per_dof: Option<f64>,
+    /// Mean change of the view over the matches that agree: 0.1 where windows grow by a tenth.
+    pub change: Option<f64>,
+    /// The slip by this motion; null without a motion, and where the wheels hardly moved.
+    pub slip: Option<Slip>,
+    /// Inliers of another motion, from another start of the coarse search, as a part of those of the motion; 0 without one.
+    pub ambiguity: f64,
+    /// The gates.
+    pub gates: Vec<Gate>,
+    /// Why there is no motion, as one sentence.
+    pub missing: Option<String>,
+    /// Whether all gates are passed.
+    pub accepted: bool,
+    /// The corners, one by one.
+    #[serde(skip)]
+    #[schema(ignore)]
+    pub table: Vec<OdometryCorner>,
+}
+
+impl OdometryUpdate {
+    /// The motion if it is accepted.
+    pub fn accepted_motion(&self) -> Option<Pose> {
+        self.after_from_before.filter(|_| self.accepted).map(PoseRecord::to_pose)
+    }
+
+    /// Why there is no update, as one sentence; `None` for an accepted one.
+    pub fn refusal(&self) -> Option<String> {
+        if self.accepted {
+            return None;
+        }
+        let failed = self.gates.iter().find(|gate| !gate.passed && gate.value.is_some());
+        let sentence = failed.and_then(|gate| {
+            let relation = if gate.at_least { "less" } else { "more" };
+            let (value, unit) = (gate.value?, &gate.unit);
+            let space = if unit.is_empty() { "" } else { " " };
+            Some(format!(
+                "no update: {} is {value:.3}{space}{unit}, {relation} than {:.3}{space}{unit}",
+                gate.name, gate.limit
+            ))
+        });
+        sentence.or_else(|| self.missing.as_ref().map(|why| format!("no update: {why}")))
+    }
+}
+
+/// The motion between two stops.
+///
+/// # Errors
+/// [`sightline_geometry::error::Error::Cancelled`].
+pub fn update(input: &OdometryInput<'_>) -> Result<OdometryUpdate> {
+    let settings = input.settings;
+    let reduced = Stops::new(input);
+    let [before, after] = [reduced.eyes(0), reduced.eyes(1)];
+    let found = corners(
+        before.left.image,
+        &CornerSettings {
+            half_px: 3,
+            count: settings.corners_max as usize,
+            spacing_px: settings.corner_spacing_px,
+            border_px: settings.window_px / 2 + 3,
+            strength_min: settings.corner_contrast_min.powi(2) as f32,
+        },
+    );
+    let mut progress = Progress::new(found.iter().map(|corner| corner.pixel), reduced.factor);
+    let mut points = Vec::new();
+    for (corner, found) in found.iter().enumerate() {
+        input.cancel.check()?;
+        match points::point(&before, found.pixel, settings) {
+            Ok(point) => points.push((corner, point)),
+            Err(reason) => progress.fates[corner] = fate_of(reason),
+        }
+    }
+    let all: Vec<Point> = points.iter().map(|(_, point)| *point).collect();
+    let predicted = input.predicted_after_from_before;
+    let coarse =
+        settings.coarse_search.then(|| coarse::coarse_search(&before, &after, &all, predicted)).flatten();
+    input.cancel.check()?;
+    let starts = coarse.as_ref().map_or_else(|| vec![*predicted], |coarse| coarse.starts(predicted));
+    let search = Search { eyes: [&before, &after], points: &all, settings, cancel: input.cancel };
+    let mut found = Vec::new();
+    for start in &starts {
+        found.push(search.refined(start)?);
+    }
+    let (best, ambiguity) = chosen(found);
+    for (point, reason) in &best.lost {
+        progress.fates[points[*point].0] = fate_without_match(*reason);
+    }
+    progress.add(&points, &best.matches, best.fitted.as_ref().ok());
+    Ok(outcome(input, progress, points.len(), coarse, ambiguity, best))
+}
+
+/// Matches around one start, and the motion that they agree on.
+struct Refined {
+    matches: Vec<Match>,
+    lost: Vec<(usize, NoMatch)>,
+    fitted: Result<Fitted, String>,
+}
+
+impl Refined {
+    fn inliers(&self) -> usize {
+        self.fitted.as_ref().map_or(0, |fitted| fitted.inliers.len())
+    }
+}
+
+/// The search for matches in the whole images.
+struct Search<'a> {
+    eyes: [&'a Eyes<'a>; 2],
+    points: &'a [Point],
+    settings: &'a OdometrySettings,
+    cancel: Cancel<'a>,
+}
+
+impl Search<'_> {
+    /// Matches around a start, then around the motion that fits them.
+    fn refined(&self, start: &Pose) -> Result<Refined> {
+        let mut motion = *start;
+        let mut refined = Refined { matches: Vec::new(), lost: Vec::new(), fitted: Err(String::new()) };
+        for reach_px in [self.settings.search_px, SECOND_REACH_PX] {
+            refined.matches.clear();
+            refined.lost.clear();
+            for point in self.points.iter().enumerate() {
+                self.cancel.check()?;
+                match matches::find(self.eyes, point, &motion, reach_px, self.settings) {
+                    Ok(found) => refined.matches.push(found),
+                    Err(reason) => refined.lost.push((point.0, reason)),
+                }
+            }
+            refined.fitted = motion::fit(&refined.matches, self.settings);
+            match &refined.fitted {
+                Ok(fitted) => motion = fitted.after_from_before,
+                Err(_) => break,
+            }
+        }
+        Ok(refined)
+    }
+}
+
+/// The result with most inliers, of equal ones the first; and the inliers of the best other motion as a part of its own.
+fn chosen(found: Vec<Refined>) -> (Refined, f64) {
+    let mut found = found.into_iter();
+    let nothing =
+        Refined { matches: Vec::new(), lost: Vec::new(), fitted: Err("there is no start".to_owned()) };
+    let mut best = found.next().unwrap_or(nothing);
+    let mut rest = Vec::new();
+    for next in found {
+        if next.inliers() > best.inliers() {
+            rest.push(std::mem::replace(&mut best, next));
+        } else {
+            rest.push(next);
+        }
+    }
+    let Ok(fitted) = &best.fitted else { return (best, 0.0) };
+    let is_other = |other: &&Refined| {
+        let Ok(other) = &other.fitted else { return false };
+        let between = other.after_from_before * fitted.after_from_before.inverse();
+        between.translation.vector.norm() > OTHER_MOTION_M
+    };
+    let most = rest.iter().filter(is_other).map(Refined::inliers).max().unwrap_or(0);
+    let ambiguity = most as f64 / fitted.inliers.len().max(1) as f64;
+    (best, ambiguity)
+}
+
+/// The outcome of what was found.
+fn outcome(
+    input: &OdometryInput<'_>,
+    progress: Progress,
+    points: usize,
+    coarse: Option<CoarseSearch>,
+    ambiguity: f64,
+    Refined { matches, fitted, .. }: Refined,
+) -> OdometryUpdate {
+    let matches = matches.as_slice();
+    let matched = matches.len();
+    let predicted = input.predicted_after_from_before;
+    let motion = fitted.as_ref().ok();
+    let covariance = motion.map(|motion| covariance(input, motion, matches));
+    let judged =
+        Judged { predicted, fitted: motion, covariance: covariance.as_ref(), matches: matched, ambiguity };
+    let gates = gates::judge(&judged, input.settings);
+    let accepted = motion.is_some() && gates.iter().all(|gate| gate.passed);
+    let slip = motion
+        .zip(covariance.as_ref())
+        .and_then(|(motion, covariance)| slip(&motion.after_from_before, covariance, predicted));
+    OdometryUpdate {
+        corners: progress.corners.len(),
+        points,
+        matches: matched,
+        consistent: motion.map_or(0, |motion| motion.consistent),
+        inliers: motion.map_or(0, |motion| motion.inliers.len()),
+        coarse_search: coarse,
+        after_from_before: motion.map(|motion| PoseRecord::from(&motion.after_from_before)),
+        covariance,
+        chi2_per_dof: motion.map(|motion| motion.chi2_per_dof),
+        change: motion.map(|motion| motion.change(matches)),
+        slip,
+        ambiguity,
+        gates,
+        missing: fitted.as_ref().err().cloned(),
+        accepted,
+        table: progress.table(),
+    }
+}
+
+/// The whole covariance of a motion.
+fn covariance(input: &OdometryInput<'_>, fitted: &Fitted, matches: &[Match]) -> Matrix6<f64> {
+    let [always_px, by_change_px] = input.settings.common_px;
+    let common_px = always_px.hypot(by_change_px * fitted.change(matches));
+    let common = motion::by_common_shift(matches, fitted) * common_px.powi(2);
+    let angles = input.before.mast_angles.zip(input.after.mast_angles);
+    let mast = input.mast.zip(angles).map_or_else(Matrix6::zeros, |((mast, error_rad), (before, after))| {
+        motion::by_mast(mast, [before, after], &fitted.after_from_before) * (error_rad * error_rad)
+    });
+    fitted.covariance + common + mast
+}
+
+/// The slip by a motion against the motion of the wheels.
+fn slip(motion: &Pose, covariance: &Matrix6<f64>, predicted: &Pose) -> Option<Slip> {
+    let (wheels, seen) = (predicted.inverse().translation.vector, motion.inverse().translation.vector);
+    let length_m = wheels.norm();
+    if length_m < SLIP_MIN_M {
+        return None;
+    }
+    let along = wheels / length_m;
+    let aside = Vector3::z().cross(&along).normalize();
+    let turn = motion.rotation.to_rotation_matrix();
+    let translation: Matrix3<f64> = covariance.fixed_view::<3, 3>(0, 0).into_owned();
+    let displacement = turn.transpose() * translation * turn;
+    Some(Slip {
+        along: 1.0 - seen.dot(&along) / length_m,
+        aside: seen.dot(&aside) / length_m,
+        along_sigma: along.dot(&(displacement * along)).max(0.0).sqrt() / length_m,
+    })
+}
+
+/// The images of both stops as they are compared.
+struct Stops<'a> {
+    whole: [[Eye<'a>; 2]; 2],
+    reduced: Option<[[Reduced; 2]; 2]>,
+    factor: u32,
+}
+
+impl<'a> Stops<'a> {
+    fn new(input: &OdometryInput<'a>) -> Self {
+        let whole = [input.before, input.after].map(|view| {
+            [
+                Eye { camera: view.left, image: &view.pair.left },
+                Eye { camera: view.right, image: &view.pair.right },
+            ]
+        });
+        let factor = input.before.left.width().div_ceil(input.settings.width_max_px);
+        let reduced = (factor > 1).then(|| whole.map(|eyes| eyes.map(|eye| Reduced::new(eye, factor))));
+        Self { whole, reduced, factor }
+    }
+
+    fn eyes(&self, stop: usize) -> Eyes<'_> {
+        let [left, right] = match &self.reduced {
+            Some(reduced) => [reduced[stop][0].eye(), reduced[stop][1].eye()],
+            None => self.whole[stop],
+        };
+        Eyes { left, right }
+    }
+}
+
+/// What became of the corners so far.
+struct Progress {
+    corners: Vec<Pixel>,
+    fates: Vec<Fate>,
+    ranges_m: Vec<Option<f64>>,
+    after: Vec<Option<Pixel>>,
+    sigmas: Vec<Option<f64>>,
+    factor: u32,
+}
+
+impl Progress {
+    fn new(corners: impl Iterator<Item = Pixel>, factor: u32) -> Self {
+        let corners: Vec<Pixel> = corners.collect();
+        let count = corners.len();
+        Self {
+            corners,
+            fates: vec![Fate::Unused; count],
+            ranges_m: vec![None; count],
+            after: vec![None; count],
+            sigmas: vec![None; count],
+            factor,
+        }
+    }
+
+    /// Adds points, matches and residuals.
+    fn add(&mut self, points: &[(usize, Point)], matches: &[Match], fitted: Option<&Fitted>) {
+        for (corner, point) in points {
+            self.ranges_m[*corner] = Some(point.position.coords.norm());
+        }
+        for (number, found) in matches.iter().enumerate() {
+            let corner = points[found.point].0;
+            self.after[corner] = Some(found.left);
+            let Some(fitted) = fitted else {
+                self.fates[corner] = Fate::Unused;
+                continue;
+            };
+            let square = motion::squared_distance(&found.pair, &fitted.after_from_before);
+            self.sigmas[corner] = square.map(f64::sqrt);
+            let is_inlier = fitted.inliers.binary_search(&number).is_ok();
+            self.fates[corner] = if is_inlier { Fate::Inlier } else { Fate::Outlier };
+        }
+    }
+
+    fn table(self) -> Vec<OdometryCorner> {
+        let factor = f64::from(self.factor);
+        let whole = |pixel: Pixel| [pixel.x, pixel.y].map(|at| factor * at + 0.5 * (factor - 1.0));
+        let row = |corner: usize| OdometryCorner {
+            before_px: whole(self.corners[corner]),
+            after_px: self.after[corner].map(whole),
+            range_m: self.ranges_m[corner],
+            residual_sigmas: self.sigmas[corner],
+            fate: self.fates[corner],
+        };
+        (0..self.corners.len()).map(row).collect()
+    }
+}
+
+fn fate_of(reason: NoPoint) -> Fate {
+    match reason {
+        NoPoint::Outside | NoPoint::LowScore => Fate::NoStereo,
+        NoPoint::OutOfRange => Fate::OutOfRange,
+    }
+}
+
+fn fate_without_match(reason: NoMatch) -> Fate {
+    match reason {
+        NoMatch::OutOfView => Fate::OutOfView,
+        NoMatch::LowScore => Fate::NoMatch,
+        NoMatch::NoStereo => Fate::NoStereoAfter,
+    }
+}

@@ -1,0 +1,108 @@
+//! Windows of two cameras that show the same part of the ground, and the best match of one in a region of an image.
+//!
+//! A window is read in the one image as the other camera sees it, with the map `∂from/∂to` of the plane through the point:
+//! ```text
+//! X(u) = o + d (n·(P − o))/(n·d)          the ray (o, d) of pixel u meets the plane (P, n)
+//! ∂to/∂from = ∂ project(to, X(u)) / ∂u    by differences of one pixel
+//! ```
+//! A plane that is seen at a grazing angle is tilted towards the camera until it makes 0.15 with the ray.
+
+use nalgebra::{Matrix2, Vector2};
+
+use sightline_geometry::camera::Camera;
+use sightline_geometry::frames::{Pixel, Point3, Pose, Ray, Vector3};
+use sightline_vision::correlate::peak::peak_at;
+use sightline_vision::correlate::pseudo::pseudo_surface;
+use sightline_vision::correlate::{Surface, zncc};
+use sightline_vision::image::sample::Kernel;
+use sightline_vision::image::{GrayImage, Patch, PixelRect, resample};
+
+use super::settings::OdometryScore;
+
+/// Least cosine between a plane's normal and the ray to the camera.
+const GRAZING: f64 = 0.15;
+
+/// A camera with its image.
+#[derive(Clone, Copy)]
+pub(super) struct Eye<'a> {
+    /// In the rover frame of its stop.
+    pub(super) camera: &'a Camera,
+    pub(super) image: &'a GrayImage,
+}
+
+/// A match below the pixel.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Found {
+    pub(super) pixel: Pixel,
+    pub(super) score: f64,
+    /// Covariance for noise that is independent from pixel to pixel, px².
+    pub(super) covariance_px2: Matrix2<f64>,
+}
+
+/// `∂to/∂from` of the plane through `point` (frame of `from`), px per px.
+pub(super) fn map_of_plane(
+    from: &Camera,
+    to: &Camera,
+    to_from_from: &Pose,
+    pixel: Pixel,
+    point: &Point3,
+    normal: &Vector3,
+) -> Option<Matrix2<f64>> {
+    let middle = from.ray(pixel)?.direction;
+    let facing = middle.dot(normal);
+    // The normal points to the camera's side.
+    let normal = if facing > 0.0 { -normal } else { *normal };
+    let facing = -facing.abs();
+    let normal = if facing > -GRAZING { normal - middle * (facing + GRAZING) } else { normal };
+    let seen = |ray: Ray| {
+        let along = normal.dot(&(point - ray.origin)) / normal.dot(&ray.direction);
+        to.project(&(to_from_from * ray.at(along)))
+    };
+    let at = |dx: f64, dy: f64| seen(from.ray(pixel.offset(dx, dy))?);
+    let between = |a: Pixel, b: Pixel| Vector2::new(b.x - a.x, b.y - a.y) / 2.0;
+    let columns = [between(at(-1.0, 0.0)?, at(1.0, 0.0)?), between(at(0.0, -1.0)?, at(0.0, 1.0)?)];
+    let map = Matrix2::from_columns(&columns);
+    map.iter().all(|value| value.is_finite()).then_some(map)
+}
+
+/// The window about a pixel of `image` as it appears where `∂to/∂from` is `map`; `None` where it is not whole.
+pub(super) fn window(image: &GrayImage, pixel: Pixel, map: &Matrix2<f64>, half: u32) -> Option<Patch> {
+    let from_to = map.try_inverse()?;
+    let patch = Patch::from(resample::window(image, pixel, &from_to, half, Kernel::Bicubic));
+    patch.is_complete().then_some(patch)
+}
+
+/// The scores of a window at the positions of a region that hold it.
+pub(super) fn surface(
+    template: &Patch,
+    image: &GrayImage,
+    region: PixelRect,
+    score: OdometryScore,
+) -> Option<Surface> {
+    match score {
+        OdometryScore::Normalised => zncc::zncc_surface(template, image, region),
+        OdometryScore::PseudoNormalised => pseudo_surface(template, image, region),
+    }
+}
+
+/// The highest of the scores at whole pixels that are allowed, refined below the pixel; `None` where it is at the border of the
+/// surface.
+pub(super) fn best(surface: &Surface, is_allowed: impl Fn(Pixel) -> bool) -> Option<Found> {
+    let mut highest: Option<(u32, u32, f32)> = None;
+    for iy in 0..surface.height {
+        for ix in 0..surface.width {
+            let Some(score) = surface.at(ix, iy) else { continue };
+            if highest.is_none_or(|(.., best)| score > best) && is_allowed(surface.pixel_of(ix, iy)) {
+                highest = Some((ix, iy, score));
+            }
+        }
+    }
+    let (ix, iy, _) = highest?;
+    let peak = peak_at(surface, ix, iy, true).filter(|peak| !peak.at_edge)?;
+    Some(Found { pixel: peak.pixel, score: peak.score, covariance_px2: peak.covariance_px2 })
+}
+
+/// The square region around a pixel in which a window of side 2·half + 1 is looked for up to `reach` px away.
+pub(super) fn around(pixel: Pixel, half: u32, reach: u32) -> PixelRect {
+    PixelRect::centred(pixel, 2 * (half + reach) + 1)
+}
