@@ -12,6 +12,7 @@ mod track;
 mod drive;
 mod presets;
 mod study;
+mod study_odometry;
 mod export;
 pub mod open;
 pub mod terminal;

@@ -12,6 +12,7 @@ use sightline_study::plan::Plan;
 use sightline_study::row::Row;
 
 use super::open;
+use super::study_odometry::OdometryStudy;
 use super::terminal::{self, Progress};
 use crate::jobs::lock;
 use crate::naming::slug;
@@ -58,6 +59,8 @@ enum Experiment {
     FeatureFaults(Experimental),
     /// Without features on the way: how far off may the target be for the shape to find it again?
     Recovery(Experimental),
+    /// Visual odometry: how often it converges, how often it is silently wrong, and how it drifts.
+    Odometry(OdometryStudy),
 }
 
 /// What a study over worlds, configurations and a grid takes.
@@ -129,6 +132,7 @@ impl Study {
             Experiment::FeatureCovariance(arguments) => arguments.run("feature-covariance"),
             Experiment::FeatureFaults(arguments) => arguments.run("feature-faults"),
             Experiment::Recovery(arguments) => arguments.run("recovery"),
+            Experiment::Odometry(arguments) => arguments.run(),
         }
     }
 }

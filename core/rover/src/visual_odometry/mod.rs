@@ -18,6 +18,8 @@
 //! Sources: Maimone, Cheng & Matthies 2007; Howard 2008; domain.md 9.
 
 mod coarse;
+mod corner_fates;
+mod outcome;
 mod gates;
 pub mod look;
 mod matches;
@@ -29,24 +31,23 @@ pub mod settings;
 mod windows;
 
 pub use coarse::{CoarseSearch, Translation};
+pub use outcome::{Fate, OdometryCorner, OdometryUpdate, Slip};
 pub use settings::{OdometryPreset, OdometrySettings};
 
-use nalgebra::{Matrix3, Matrix6, SMatrix};
-use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
+use nalgebra::{Matrix3, Matrix6};
 
 use sightline_geometry::camera::{Camera, Mast, MastAngles};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
-use sightline_geometry::frames::{Pixel, Pose, PoseRecord, Vector3};
-use sightline_track::gate::Gate;
+use sightline_geometry::frames::{Pose, PoseRecord, Vector3};
 use sightline_track::stages::capture::StereoPair;
 use sightline_vision::corners::{CornerSettings, corners};
 
+use self::corner_fates::CornerFates;
 use self::gates::Judged;
 use self::matches::{Match, NoMatch};
 use self::motion::Fitted;
-use self::points::{Eyes, NoPoint, Point};
+use self::points::{Eyes, Point};
 use self::reduce::Reduced;
 use self::windows::Eye;
 
@@ -87,121 +88,6 @@ pub struct OdometryInput<'a> {
     pub cancel: Cancel<'a>,
 }
 
-/// What became of a corner.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Fate {
-    /// It agrees with the motion.
-    Inlier,
-    /// It does not agree with the motion.
-    Outlier,
-    /// No match between the eyes before the motion.
-    NoStereo,
-    /// Its range is beyond the limits.
-    OutOfRange,
-    /// It is out of view after the motion.
-    OutOfView,
-    /// No match between the stops.
-    NoMatch,
-    /// No match between the eyes after the motion.
-    NoStereoAfter,
-    /// There is no motion to agree with.
-    Unused,
-}
-
-/// A corner with what became of it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
-pub struct OdometryCorner {
-    /// In the left image before, px of the whole image.
-    #[schema(value_type = [f64; 2])]
-    pub before_px: [f64; 2],
-    /// Its match in the left image after, px of the whole image; null without one.
-    pub after_px: Option<[f64; 2]>,
-    /// Distance from the left camera before, m; null without a point.
-    pub range_m: Option<f64>,
-    /// Residual under the motion in standard deviations; null without match or motion.
-    pub residual_sigmas: Option<f64>,
-    /// What became of it.
-    pub fate: Fate,
-}
-
-/// Slip of a step.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
-#[schema(as = OdometrySlip)]
-pub struct Slip {
-    /// Part of the wheels' motion that was lost along it: 1 = the rover stayed.
-    pub along: f64,
-    /// Movement to the right of the motion, as a part of it.
-    pub aside: f64,
-    /// 1σ error of `along`.
-    pub along_sigma: f64,
-}
-
-/// The outcome of an update.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
-pub struct OdometryUpdate {
-    /// Corners of the left image before.
-    pub corners: usize,
-    /// Corners with a position by stereo.
-    pub points: usize,
-    /// Points matched in both images after.
-    pub matches: usize,
-    /// Matches that keep their distances from each other.
-    pub consistent: usize,
-    /// Matches that agree with the motion.
-    pub inliers: usize,
-    /// The search over translations; null where it is switched off or had too few points.
-    pub coarse_search: Option<CoarseSearch>,
-    /// The motion, accepted or not: from the rover frame before to that after; null where none was found.
-    pub after_from_before: Option<PoseRecord>,
-    /// Covariance of a small motion (translation in m, turn in rad) about the rover's origin that follows it, rover frame after.
-    #[schema(value_type = Option<Vec<f64>>)]
-    pub covariance: Option<SMatrix<f64, 6, 6>>,
-    /// χ² per degree of freedom of the residuals.
-    pub chi2_per_dof: Option<f64>,
-    /// Mean change of the view over the matches that agree: 0.1 where windows grow by a tenth.
-    pub change: Option<f64>,
-    /// The slip by this motion; null without a motion, and where the wheels hardly moved.
-    pub slip: Option<Slip>,
-    /// Inliers of another motion, from another start of the coarse search, as a part of those of the motion; 0 without one.
-    pub ambiguity: f64,
-    /// The gates.
-    pub gates: Vec<Gate>,
-    /// Why there is no motion, as one sentence.
-    pub missing: Option<String>,
-    /// Whether all gates are passed.
-    pub accepted: bool,
-    /// The corners, one by one.
-    #[serde(skip)]
-    #[schema(ignore)]
-    pub table: Vec<OdometryCorner>,
-}
-
-impl OdometryUpdate {
-    /// The motion if it is accepted.
-    pub fn accepted_motion(&self) -> Option<Pose> {
-        self.after_from_before.filter(|_| self.accepted).map(PoseRecord::to_pose)
-    }
-
-    /// Why there is no update, as one sentence; `None` for an accepted one.
-    pub fn refusal(&self) -> Option<String> {
-        if self.accepted {
-            return None;
-        }
-        let failed = self.gates.iter().find(|gate| !gate.passed && gate.value.is_some());
-        let sentence = failed.and_then(|gate| {
-            let relation = if gate.at_least { "less" } else { "more" };
-            let (value, unit) = (gate.value?, &gate.unit);
-            let space = if unit.is_empty() { "" } else { " " };
-            Some(format!(
-                "no update: {} is {value:.3}{space}{unit}, {relation} than {:.3}{space}{unit}",
-                gate.name, gate.limit
-            ))
-        });
-        sentence.or_else(|| self.missing.as_ref().map(|why| format!("no update: {why}")))
-    }
-}
-
 /// The motion between two stops.
 ///
 /// # Errors
@@ -220,13 +106,13 @@ pub fn update(input: &OdometryInput<'_>) -> Result<OdometryUpdate> {
             strength_min: settings.corner_contrast_min.powi(2) as f32,
         },
     );
-    let mut progress = Progress::new(found.iter().map(|corner| corner.pixel), reduced.factor);
+    let mut fates = CornerFates::new(found.iter().map(|corner| corner.pixel), reduced.factor);
     let mut points = Vec::new();
     for (corner, found) in found.iter().enumerate() {
         input.cancel.check()?;
         match points::point(&before, found.pixel, settings) {
             Ok(point) => points.push((corner, point)),
-            Err(reason) => progress.fates[corner] = fate_of(reason),
+            Err(reason) => fates.without_point(corner, reason),
         }
     }
     let all: Vec<Point> = points.iter().map(|(_, point)| *point).collect();
@@ -242,10 +128,10 @@ pub fn update(input: &OdometryInput<'_>) -> Result<OdometryUpdate> {
     }
     let (best, ambiguity) = chosen(found);
     for (point, reason) in &best.lost {
-        progress.fates[points[*point].0] = fate_without_match(*reason);
+        fates.without_match(points[*point].0, *reason);
     }
-    progress.add(&points, &best.matches, best.fitted.as_ref().ok());
-    Ok(outcome(input, progress, points.len(), coarse, ambiguity, best))
+    fates.add(&points, &best.matches, best.fitted.as_ref().ok());
+    Ok(outcome(input, fates, points.len(), coarse, ambiguity, best))
 }
 
 /// Matches around one start, and the motion that they agree on.
@@ -322,7 +208,7 @@ fn chosen(found: Vec<Refined>) -> (Refined, f64) {
 /// The outcome of what was found.
 fn outcome(
     input: &OdometryInput<'_>,
-    progress: Progress,
+    fates: CornerFates,
     points: usize,
     coarse: Option<CoarseSearch>,
     ambiguity: f64,
@@ -341,7 +227,7 @@ fn outcome(
         .zip(covariance.as_ref())
         .and_then(|(motion, covariance)| slip(&motion.after_from_before, covariance, predicted));
     OdometryUpdate {
-        corners: progress.corners.len(),
+        corners: fates.count(),
         points,
         matches: matched,
         consistent: motion.map_or(0, |motion| motion.consistent),
@@ -356,7 +242,7 @@ fn outcome(
         gates,
         missing: fitted.as_ref().err().cloned(),
         accepted,
-        table: progress.table(),
+        table: fates.table(),
     }
 }
 
@@ -417,77 +303,5 @@ impl<'a> Stops<'a> {
             None => self.whole[stop],
         };
         Eyes { left, right }
-    }
-}
-
-/// What became of the corners so far.
-struct Progress {
-    corners: Vec<Pixel>,
-    fates: Vec<Fate>,
-    ranges_m: Vec<Option<f64>>,
-    after: Vec<Option<Pixel>>,
-    sigmas: Vec<Option<f64>>,
-    factor: u32,
-}
-
-impl Progress {
-    fn new(corners: impl Iterator<Item = Pixel>, factor: u32) -> Self {
-        let corners: Vec<Pixel> = corners.collect();
-        let count = corners.len();
-        Self {
-            corners,
-            fates: vec![Fate::Unused; count],
-            ranges_m: vec![None; count],
-            after: vec![None; count],
-            sigmas: vec![None; count],
-            factor,
-        }
-    }
-
-    /// Adds points, matches and residuals.
-    fn add(&mut self, points: &[(usize, Point)], matches: &[Match], fitted: Option<&Fitted>) {
-        for (corner, point) in points {
-            self.ranges_m[*corner] = Some(point.position.coords.norm());
-        }
-        for (number, found) in matches.iter().enumerate() {
-            let corner = points[found.point].0;
-            self.after[corner] = Some(found.left);
-            let Some(fitted) = fitted else {
-                self.fates[corner] = Fate::Unused;
-                continue;
-            };
-            let square = motion::squared_distance(&found.pair, &fitted.after_from_before);
-            self.sigmas[corner] = square.map(f64::sqrt);
-            let is_inlier = fitted.inliers.binary_search(&number).is_ok();
-            self.fates[corner] = if is_inlier { Fate::Inlier } else { Fate::Outlier };
-        }
-    }
-
-    fn table(self) -> Vec<OdometryCorner> {
-        let factor = f64::from(self.factor);
-        let whole = |pixel: Pixel| [pixel.x, pixel.y].map(|at| factor * at + 0.5 * (factor - 1.0));
-        let row = |corner: usize| OdometryCorner {
-            before_px: whole(self.corners[corner]),
-            after_px: self.after[corner].map(whole),
-            range_m: self.ranges_m[corner],
-            residual_sigmas: self.sigmas[corner],
-            fate: self.fates[corner],
-        };
-        (0..self.corners.len()).map(row).collect()
-    }
-}
-
-fn fate_of(reason: NoPoint) -> Fate {
-    match reason {
-        NoPoint::Outside | NoPoint::LowScore => Fate::NoStereo,
-        NoPoint::OutOfRange => Fate::OutOfRange,
-    }
-}
-
-fn fate_without_match(reason: NoMatch) -> Fate {
-    match reason {
-        NoMatch::OutOfView => Fate::OutOfView,
-        NoMatch::LowScore => Fate::NoMatch,
-        NoMatch::NoStereo => Fate::NoStereoAfter,
     }
 }

@@ -1,0 +1,225 @@
+//! Visual odometry in simulated drives: how often it converges, how often it is silently wrong, and how it drifts.
+//!
+//! A drive has no target. At every stop the mast looks at the ground ahead, one pair is taken, and the motion since the stop
+//! before is measured and compared with the true one:
+//!
+//! ```text
+//! error of an update   δ:  T_true = exp(δ) T        NEES per dof = δᵀ Σ⁻¹ δ / 6
+//! silently wrong       accepted, while √(τᵀ Σ_τ⁻¹ τ) > 5 and |τ| > max(1 cm, 4 % of the step),
+//!                      or the turn's error > 0.2° and > 5 σ
+//! drift                distance of the last estimated position from the true one, % of the true way
+//! ```
+//! Steps that are refused are taken from wheels and gyro. Frames: rover frame after, site. Source: design.md, domain.md 9.
+
+mod drive;
+mod row;
+
+pub use row::{OdometryRow, OdometryStep, OdometrySummary, summary};
+
+use std::path::Path;
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use sightline_geometry::cancel::Cancel;
+use sightline_geometry::error::{Error, Result};
+use sightline_rover::visual_odometry::OdometrySettings;
+use sightline_world::scenario::{ForcedSlip, OdometryModel};
+use sightline_world::{Scenario, library};
+
+use self::drive::OdometryDrive;
+
+/// Metres that are driven before the first update where the mast looks back at tracks.
+const TRACKS_BEFORE: usize = 4;
+
+/// The ground of the drives of a study.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Scene {
+    /// Soil with rocks and texture; every step has a slip of 0 to 125 % that is drawn.
+    Textured,
+    /// The same with the slip of soil and slope: the drives whose drift counts.
+    Slope,
+    /// Smooth ground on which the rover looks back at its own tracks.
+    OwnTracks,
+    /// The same, straight on and without any texture of the ground: tracks that repeat themselves.
+    PicketFence,
+    /// Ground without texture.
+    Featureless,
+}
+
+impl Scene {
+    /// All scenes.
+    pub const ALL: [Self; 5] =
+        [Self::Textured, Self::Slope, Self::OwnTracks, Self::PicketFence, Self::Featureless];
+
+    /// The name in rows and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Textured => "textured",
+            Self::Slope => "slope",
+            Self::OwnTracks => "own-tracks",
+            Self::PicketFence => "picket-fence",
+            Self::Featureless => "featureless",
+        }
+    }
+
+    /// Whether the mast looks back.
+    fn looks_back(self) -> bool {
+        matches!(self, Self::OwnTracks | Self::PicketFence)
+    }
+}
+
+/// The drives of a study.
+#[derive(Clone, Copy, Debug)]
+pub struct OdometryDrives<'a> {
+    /// Name of the settings.
+    pub configuration: &'a str,
+    /// The settings.
+    pub settings: &'a OdometrySettings,
+    /// The ground.
+    pub scene: Scene,
+    /// Steps of a drive.
+    pub steps: usize,
+    /// Side of the images, px.
+    pub size: u32,
+    /// Samples along each side of a pixel.
+    pub samples_per_axis: u32,
+}
+
+/// A step as it is commanded.
+#[derive(Clone, Copy, Debug)]
+struct Commanded {
+    length_m: f64,
+    turn_rad: f64,
+}
+
+impl OdometryDrives<'_> {
+    /// The scenario of a world; the seed draws slope, sun and slips as well.
+    ///
+    /// # Errors
+    /// The library's scenario, or one that no world can be made of.
+    pub fn scenario(&self, seed: u64) -> Result<Scenario> {
+        let mut random = Pcg64::seed_from_u64(seed ^ 0x0d0e_7291);
+        let mut scenario = Scenario { seed, ..library::scenario("approach-10")? };
+        scenario.terrain.slope_deg = random.random_range(0.0..31.0);
+        scenario.terrain.slope_azimuth_deg = random.random_range(-180.0..180.0);
+        scenario.sun.azimuth_deg = random.random_range(0.0..360.0);
+        // Higher than the slope is steep, so that the ground is lit.
+        scenario.sun.elevation_deg = random.random_range(35.0..70.0);
+        (scenario.camera.image_size, scenario.camera.samples_per_axis) = (self.size, self.samples_per_axis);
+        scenario.rover.odometry = OdometryModel::WheelsAndImu;
+        match self.scene {
+            Scene::Slope => (scenario.rover.slip_scale, scenario.rover.slip_spread) = (1.0, 0.2),
+            _ => {
+                let slips = (1..=(self.steps + TRACKS_BEFORE) as u32)
+                    .map(|stop| ForcedSlip { stop, slip: random.random_range(0.0..1.25) });
+                scenario.rover.forced_slip = slips.collect();
+            }
+        }
+        if self.scene.looks_back() {
+            scenario.rover.tracks = true;
+            scenario.rover.forced_slip.iter_mut().for_each(|forced| forced.slip *= 0.4);
+        }
+        if self.scene != Scene::Textured && self.scene != Scene::Slope {
+            smooth(&mut scenario, self.scene);
+        }
+        scenario.validate()?;
+        Ok(scenario)
+    }
+
+    /// The steps of a drive.
+    fn commanded(&self, seed: u64) -> Vec<Commanded> {
+        let mut random = Pcg64::seed_from_u64(seed ^ 0x57e9_57e9);
+        let mut heading_rad = 0.0f64;
+        let step = |_| {
+            let length_m = random.random_range(0.25..0.75);
+            let turn_deg: f64 = random.random_range(-18.0..18.0);
+            // The drive keeps near its first direction.
+            let turn_rad = match self.scene {
+                Scene::PicketFence => 0.0,
+                _ if heading_rad.abs() > 0.7 => -heading_rad.signum() * turn_deg.abs().to_radians(),
+                _ => turn_deg.to_radians(),
+            };
+            heading_rad += turn_rad;
+            Commanded { length_m, turn_rad }
+        };
+        (0..self.steps).map(step).collect()
+    }
+
+    /// The drives of some worlds, several at a time, in the order of their seeds; `tell` is called after each.
+    ///
+    /// # Errors
+    /// A world that cannot be made, or [`Error::Cancelled`].
+    pub fn run(
+        &self,
+        seeds: &[u64],
+        folder: &Path,
+        cancel: Cancel<'_>,
+        tell: &(dyn Fn() + Sync),
+    ) -> Result<Vec<OdometryRow>> {
+        let one = |&seed: &u64| {
+            let row = self.drive(seed, &folder.join(format!("{}-{seed}", self.scene.name())), cancel);
+            tell();
+            row
+        };
+        seeds.par_iter().map(one).collect()
+    }
+
+    /// One drive in a folder that is removed afterwards; it ends early where the rover cannot go on.
+    ///
+    /// # Errors
+    /// A world that cannot be made, or [`Error::Cancelled`].
+    pub fn drive(&self, seed: u64, folder: &Path, cancel: Cancel<'_>) -> Result<OdometryRow> {
+        let scenario = self.scenario(seed)?;
+        let outcome = self.driven(&scenario, seed, folder, cancel);
+        // A failure to remove leaves a folder in the way of nobody.
+        let _ = std::fs::remove_dir_all(folder);
+        outcome
+    }
+
+    fn driven(
+        &self,
+        scenario: &Scenario,
+        seed: u64,
+        folder: &Path,
+        cancel: Cancel<'_>,
+    ) -> Result<OdometryRow> {
+        let mut drive = OdometryDrive::begin(scenario, self, folder, cancel)?;
+        if self.scene.looks_back() {
+            drive.lay_tracks(cancel)?;
+        }
+        let (mut problem, mut stalls) = (None, 0);
+        for commanded in self.commanded(seed) {
+            // After a stall the rover turns away from the rock.
+            let turned = |side: f64| Commanded { length_m: 0.0, turn_rad: side * 18f64.to_radians() };
+            let commanded = match stalls {
+                0 => commanded,
+                _ => turned(if seed % 2 == 0 { 1.0 } else { -1.0 }),
+            };
+            match drive.step(commanded, cancel) {
+                Ok(true) => stalls = 2,
+                Ok(false) => stalls = i32::max(stalls - 1, 0),
+                Err(Error::Cancelled) => return Err(Error::Cancelled),
+                Err(error) => {
+                    problem = Some(error.to_string());
+                    break;
+                }
+            }
+        }
+        Ok(drive.row(scenario, seed, problem))
+    }
+}
+
+/// Takes the texture from the ground.
+fn smooth(scenario: &mut Scenario, scene: Scene) {
+    (scenario.rocks.area_fraction, scenario.rocks.cluster_count) = (0.0, 0);
+    scenario.terrain.rms_at_1m_m = 0.005;
+    scenario.texture.grain_cover = 0.0;
+    scenario.texture.drift_cover = 0.0;
+    let part = if scene == Scene::OwnTracks { 0.2 } else { 0.02 };
+    scenario.texture.albedo_std *= part;
+    scenario.texture.soil_slope_std *= part;
+}
