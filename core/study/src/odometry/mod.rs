@@ -197,7 +197,7 @@ impl OdometryDrives<'_> {
             let turned = |side: f64| Commanded { length_m: 0.0, turn_rad: side * 18f64.to_radians() };
             let commanded = match stalls {
                 0 => commanded,
-                _ => turned(if seed % 2 == 0 { 1.0 } else { -1.0 }),
+                _ => turned(if seed.is_multiple_of(2) { 1.0 } else { -1.0 }),
             };
             match drive.step(commanded, cancel) {
                 Ok(true) => stalls = 2,
