@@ -195,20 +195,20 @@ mod tests {
     const SETTINGS: CornerSettings =
         CornerSettings { half_px: 2, count: 100, spacing_px: 6.0, border_px: 8, strength_min: 1e-4 };
 
-    /// Bright squares of 8 px, 24 px apart, on black.
+    /// Bright squares of 12 px, 24 px apart, on black.
     fn squares(side: u32) -> GrayImage {
-        GrayImage::from_fn(side, side, |x, y| Luma([f32::from(x % 24 < 8 && y % 24 < 8)]))
+        GrayImage::from_fn(side, side, |x, y| Luma([f32::from(x % 24 < 12 && y % 24 < 12)]))
     }
 
     #[test]
     fn corners_of_squares_are_found_and_their_edges_are_not() {
         let found = corners(&squares(120), &SETTINGS);
-        // Five rows of squares, four corners each; those within the border are left out.
-        assert_eq!(found.len(), 64, "{found:?}");
+        // Each way nine edges beyond the border.
+        assert_eq!(found.len(), 81, "{found:?}");
         for corner in &found {
             let off = |v: f64| {
                 let at = v % 24.0;
-                (at + 0.5).min((at - 7.5).abs()).min((at - 23.5).abs())
+                (at + 0.5).min((at - 11.5).abs()).min((at - 23.5).abs())
             };
             assert!(off(corner.pixel.x) <= 2.0 && off(corner.pixel.y) <= 2.0, "{corner:?}");
         }
