@@ -95,7 +95,7 @@ fn the_motion_is_found_within_millimetres_whatever_the_wheels_say() {
 }
 
 #[test]
-fn the_flown_preset_follows_the_wheels_and_refuses_a_step_that_slipped_far() {
+fn the_flown_preset_finds_the_motion_whether_or_not_the_wheels_spin() {
     let folder = tempfile::tempdir().unwrap();
     let flown = OdometryPreset::Mer2007.settings();
     let world = two_stops(0.05, &folder.path().join("firm"));
@@ -105,9 +105,10 @@ fn the_flown_preset_follows_the_wheels_and_refuses_a_step_that_slipped_far() {
     assert!(error_m < 0.01 && error_deg < 0.1, "{error_m} m, {error_deg}°");
     // Corners are given in the whole image.
     assert!(found.table.iter().any(|corner| corner.before_px[0] > 300.0));
+    // Of spinning wheels far points are predicted well enough; their motion leads to the near ones.
     let world = two_stops(1.0, &folder.path().join("stuck"));
     let found = between(world.traverse(), [0, 1], &flown, Cancel::default()).unwrap();
-    assert!(!found.accepted && found.refusal().unwrap().starts_with("no update: "), "{found:?}");
+    assert!(found.accepted && error(world.traverse(), &found)[0] < 0.01, "{:?}", found.refusal());
 }
 
 #[test]
