@@ -102,7 +102,7 @@ pub fn update(input: &OdometryInput<'_>) -> Result<OdometryUpdate> {
             half_px: 3,
             count: settings.corners_max as usize,
             spacing_px: settings.corner_spacing_px,
-            border_px: settings.window_px / 2 + 3,
+            border_px: settings.window_px / 2 + 4,
             strength_min: settings.corner_contrast_min.powi(2) as f32,
         },
     );
@@ -278,30 +278,29 @@ fn slip(motion: &Pose, covariance: &Matrix6<f64>, predicted: &Pose) -> Option<Sl
 }
 
 /// The images of both stops as they are compared.
-struct Stops<'a> {
-    whole: [[Eye<'a>; 2]; 2],
-    reduced: Option<[[Reduced; 2]; 2]>,
+struct Stops {
+    eyes: [[Reduced; 2]; 2],
     factor: u32,
 }
 
-impl<'a> Stops<'a> {
-    fn new(input: &OdometryInput<'a>) -> Self {
-        let whole = [input.before, input.after].map(|view| {
+impl Stops {
+    fn new(input: &OdometryInput<'_>) -> Self {
+        let factor = input.before.left.width().div_ceil(input.settings.width_max_px);
+        let compared = |eye: Eye<'_>| match factor {
+            1 => Reduced::smoothed(eye),
+            _ => Reduced::new(eye, factor),
+        };
+        let eyes = [input.before, input.after].map(|view| {
             [
-                Eye { camera: view.left, image: &view.pair.left },
-                Eye { camera: view.right, image: &view.pair.right },
+                compared(Eye { camera: view.left, image: &view.pair.left }),
+                compared(Eye { camera: view.right, image: &view.pair.right }),
             ]
         });
-        let factor = input.before.left.width().div_ceil(input.settings.width_max_px);
-        let reduced = (factor > 1).then(|| whole.map(|eyes| eyes.map(|eye| Reduced::new(eye, factor))));
-        Self { whole, reduced, factor }
+        Self { eyes, factor }
     }
 
     fn eyes(&self, stop: usize) -> Eyes<'_> {
-        let [left, right] = match &self.reduced {
-            Some(reduced) => [reduced[stop][0].eye(), reduced[stop][1].eye()],
-            None => self.whole[stop],
-        };
-        Eyes { left, right }
+        let [left, right] = &self.eyes[stop];
+        Eyes { left: left.eye(), right: right.eye() }
     }
 }

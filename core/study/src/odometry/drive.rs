@@ -87,7 +87,7 @@ impl<'a> OdometryDrive<'a> {
     /// Drives, looks and measures; whether a rock stopped the wheels.
     pub(super) fn step(&mut self, commanded: Commanded, cancel: Cancel<'_>) -> Result<bool> {
         let Commanded { length_m, turn_rad } = commanded;
-        let motion = if length_m > 0.0 {
+        let motion = if length_m != 0.0 {
             Motion::Arc { length_m, curvature_per_m: turn_rad / length_m }
         } else {
             Motion::Turn { angle_rad: turn_rad }
@@ -165,7 +165,7 @@ impl<'a> OdometryDrive<'a> {
         let shift_m = error.map(|(shift, _)| shift.norm());
         let turn_deg = error.map(|(_, turn)| turn.norm().to_degrees());
         let is_far = |distance: Option<f64>| distance.is_none_or(|distance| distance > 5.0);
-        let by_shift = shift_m.is_some_and(|error| error > f64::max(0.01, 0.04 * commanded.length_m))
+        let by_shift = shift_m.is_some_and(|error| error > f64::max(0.01, 0.04 * commanded.length_m.abs()))
             && is_far(judged.and_then(|judged| judged.1));
         let by_turn = turn_deg.is_some_and(|error| error > 0.2) && is_far(judged.and_then(|judged| judged.2));
         Ok(OdometryStep {

@@ -96,6 +96,17 @@ struct Commanded {
     turn_rad: f64,
 }
 
+impl Commanded {
+    /// Away from the rock that stopped this step, last command first: back where the rover came from, and a turn of 36° to one
+    /// side, which an odd number makes the left.
+    fn escape(self, side: u64) -> Vec<Self> {
+        let side = if side.is_multiple_of(2) { 1.0 } else { -1.0 };
+        let turn = Self { length_m: 0.0, turn_rad: side * 18f64.to_radians() };
+        let back_m = if self.length_m < 0.0 { 0.5 } else { -0.5 };
+        vec![turn, turn, Self { length_m: back_m, turn_rad: 0.0 }]
+    }
+}
+
 impl OdometryDrives<'_> {
     /// The scenario of a world; the seed draws slope, sun and slips as well.
     ///
@@ -191,17 +202,15 @@ impl OdometryDrives<'_> {
         if self.scene.looks_back() {
             drive.lay_tracks(cancel)?;
         }
-        let (mut problem, mut stalls) = (None, 0);
-        for commanded in self.commanded(seed) {
-            // After a stall the rover turns away from the rock.
-            let turned = |side: f64| Commanded { length_m: 0.0, turn_rad: side * 18f64.to_radians() };
-            let commanded = match stalls {
-                0 => commanded,
-                _ => turned(if seed.is_multiple_of(2) { 1.0 } else { -1.0 }),
-            };
+        let (mut problem, mut escape, mut stalls) = (None, Vec::new(), 0);
+        for planned in self.commanded(seed) {
+            let commanded = escape.pop().unwrap_or(planned);
             match drive.step(commanded, cancel) {
-                Ok(true) => stalls = 2,
-                Ok(false) => stalls = i32::max(stalls - 1, 0),
+                Ok(true) => {
+                    stalls += 1;
+                    escape = commanded.escape(seed + stalls / 2);
+                }
+                Ok(false) => {}
                 Err(Error::Cancelled) => return Err(Error::Cancelled),
                 Err(error) => {
                     problem = Some(error.to_string());
