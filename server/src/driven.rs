@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex};
 use sightline_api::event::Event;
 use sightline_geometry::error::{Error, Result};
 use sightline_recordings::DrivenTraverse;
-use sightline_rover::driving::{ArcNavigator, executive};
+use sightline_rover::driving::{ActiveWorld, ArcNavigator, DriveCommand, executive};
 use sightline_session::driving::{self, DriveView, Steering};
 use sightline_session::step::RunStep;
 use sightline_track::cycle_stage::CycleStage;
@@ -149,19 +149,16 @@ pub(crate) fn drive_on(
     let state = world.state().to_vec();
     let before = steering.halt_within(last.step + 1);
     let moved = executive::drive(&mut *world, &input, cancel.as_ref().into());
-    let moved = moved.and_then(|cycle| {
-        if cycle.ending.is_none() {
-            prepare_stop(&mut world, last, before)?;
-        }
-        Ok(cycle)
-    });
-    match moved {
+    drop(world);
+    let prepared = match moved {
         Ok(cycle) if cycle.ending.is_some() => return Ok(None),
-        Ok(_) => {}
-        Err(error) => {
-            world.restore(state)?;
-            return Err(error);
-        }
+        Ok(_) => prepare_stop(driven, last, &steering.command, before, cancel),
+        Err(error) => Err(error),
+    };
+    let mut world = lock(&driven.world);
+    if let Err(error) = prepared {
+        world.restore(state)?;
+        return Err(error);
     }
     let traverse = world.snapshot()?.with_cache(&driven.cache);
     drop(world);
@@ -172,19 +169,24 @@ pub(crate) fn drive_on(
 /// `None` if nothing was put off there.
 ///
 /// # Errors
-/// A folder that cannot be written; the world is then as it was.
+/// A folder that cannot be written, or [`Error::Cancelled`]; the world is then as it was.
 pub(crate) fn prepare(
     open: &OpenTraverse,
     last: &RunStep,
+    command: &DriveCommand,
     before: Option<CycleStage>,
+    cancel: &CancelFlag,
 ) -> Result<Option<Arc<OpenTraverse>>> {
     let Some(driven) = &open.driven else { return Ok(None) };
-    let mut world = lock(&driven.world);
+    let world = lock(&driven.world);
     if world.traverse().stop_count() != last.step + 2 || world.awaits().is_none() {
         return Ok(None);
     }
     let state = world.state().to_vec();
-    if let Err(error) = prepare_stop(&mut world, last, before) {
+    drop(world);
+    let prepared = prepare_stop(driven, last, command, before, cancel);
+    let mut world = lock(&driven.world);
+    if let Err(error) = prepared {
         world.restore(state)?;
         return Err(error);
     }
@@ -192,15 +194,40 @@ pub(crate) fn prepare(
     Ok(Some(Arc::new(open.grown(traverse))))
 }
 
-/// The world's part of `point_mast` and `capture` at the last stop, as far as no pause is before.
-fn prepare_stop(world: &mut DrivenTraverse, last: &RunStep, before: Option<CycleStage>) -> Result<()> {
+/// The world's part of `point_mast` and `capture` at the last stop, as far as no pause is before. Others may look at the world
+/// while images are rendered and vision measures the motion.
+fn prepare_stop(
+    driven: &Driven,
+    last: &RunStep,
+    command: &DriveCommand,
+    before: Option<CycleStage>,
+    cancel: &CancelFlag,
+) -> Result<()> {
     let reaches = |stage| before.is_none_or(|before| before > stage);
+    let step = last.step + 1;
+    let mut world = lock(&driven.world);
     // Images that are put off show the mast as it was pointed then.
     if reaches(CycleStage::PointMast) && world.awaits() != Some(CycleStage::Capture) {
-        executive::point_mast(world, &last.update)?;
+        executive::point_mast(&mut *world, &last.update)?;
     }
-    let put_off = [CycleStage::PointMast, CycleStage::Capture].into_iter().find(|stage| !reaches(*stage));
-    world.put_off(put_off)
+    if !reaches(CycleStage::Capture) {
+        let put_off =
+            if reaches(CycleStage::PointMast) { CycleStage::Capture } else { CycleStage::PointMast };
+        return world.put_off(Some(put_off));
+    }
+    // After a restart the motion is measured before the target is searched for.
+    world.put_off(Some(CycleStage::Capture))?;
+    let stops = world.snapshot_with_images()?.with_cache(&driven.cache);
+    drop(world);
+    let measured = executive::measured(&stops, command, step, cancel.as_ref().into())?;
+    let mut world = lock(&driven.world);
+    if world.traverse().stop_count() != step + 1 {
+        return Ok(());
+    }
+    if let Some(measured) = measured {
+        world.correct(measured)?;
+    }
+    world.put_off(None)
 }
 
 /// The drive of a session.

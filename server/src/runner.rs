@@ -210,7 +210,7 @@ impl Runner {
             Next::Advance(pending) => self.advance(live, (target, run), &pending, flag)?,
             // The drive goes on when the session is as it was.
             Next::Prepare { .. } | Next::Drive { .. } if live.is_restoring() => return Ok(false),
-            Next::Prepare { last, before } => return self.prepare(live, (target, run), &last, before),
+            Next::Prepare { last, before } => return self.prepare(live, (target, run), &last, before, flag),
             Next::Drive { steering, steps } => return self.drive(live, &steering, &steps, flag),
         };
         live.with(|session| {

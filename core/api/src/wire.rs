@@ -9,6 +9,7 @@ use sightline_geometry::frames::{Pixel, PoseRecord};
 use sightline_geometry::stereo_geometry::StereoGeometry;
 use sightline_rover::designate::Place;
 use sightline_rover::driving::DriveCommand;
+use sightline_rover::visual_odometry::MeasuredMotion;
 use sightline_session::pause::StagePause;
 use sightline_session::view::SessionView;
 use sightline_track::settings::Changes;
@@ -97,6 +98,9 @@ pub struct StopView {
     pub right_size: [u32; 2],
     /// Whether the images are there; those of a simulated traverse are rendered when they are first asked for.
     pub ready: bool,
+    /// How vision measured the motion to this stop; left out where it did not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub odometry: Option<MeasuredMotion>,
     /// The cameras beside the main pair.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cameras: Vec<StopCameraView>,

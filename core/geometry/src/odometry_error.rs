@@ -1,5 +1,6 @@
 //! The error model of the pose estimates of wheel odometry and inertial measurement.
 
+use nalgebra::Matrix6;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -13,6 +14,16 @@ pub struct OdometryError {
     pub across_fraction: f64,
     /// 1σ error of each attitude angle per step, deg.
     pub attitude_deg: f64,
+}
+
+/// The error of the change of the pose estimate from one stop to the next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PoseChangeError {
+    /// That of wheels, gyro and accelerometers.
+    Modelled(OdometryError),
+    /// The covariance of a small motion (translation in m, turn in rad) about the rover's origin that follows the change; rover
+    /// frame after.
+    Measured(Matrix6<f64>),
 }
 
 impl Default for OdometryError {

@@ -10,6 +10,7 @@ use nalgebra::Vector3;
 use super::files::{read_text, resolve};
 use sightline_geometry::camera::{Camera, CameraName, MastAngles, text};
 use sightline_geometry::frames::{POSITION_LIMIT_M, PoseRecord};
+use sightline_rover::visual_odometry::MeasuredMotion;
 use sightline_world::traverse::{
     CameraSource, FORMAT_VERSION, FURTHER_CAMERAS_LIMIT, Stop, StopCamera, StopLight, TraverseIndex, View,
 };
@@ -126,6 +127,7 @@ pub(super) fn check_stop_numbers(stop: &Stop) -> Result<(), String> {
         return Err(format!("time_s: is {}, but it must be a finite number", stop.time_s));
     }
     check_pose("site_from_rover", &stop.site_from_rover)?;
+    stop.odometry.as_ref().map_or(Ok(()), MeasuredMotion::check)?;
     check_angles(stop.mast_angles)?;
     check_names(&stop.cameras)?;
     if let Some(light) = &stop.light {

@@ -16,6 +16,7 @@ use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
 use sightline_rover::driving::{ActiveWorld, DriveReport, Motion, Stall};
 use sightline_rover::pipeline::Stops;
+use sightline_rover::visual_odometry::MeasuredMotion;
 use sightline_track::cycle_stage::CycleStage;
 use sightline_world::rover::driven::{DrivenStop, index_stops};
 use sightline_world::traverse::View;
@@ -181,6 +182,16 @@ impl DrivenTraverse {
         Ok(copy)
     }
 
+    /// The same with the images of the last stop, also where they are put off: vision measures the motion in them first.
+    ///
+    /// # Errors
+    /// As [`Self::snapshot`].
+    pub fn snapshot_with_images(&self) -> Result<Traverse> {
+        let mut copy = self.snapshot()?;
+        copy.awaits = None;
+        Ok(copy)
+    }
+
     /// The first stage that was put off at the last stop: `point_mast` or `capture`; `None` if none was.
     pub fn awaits(&self) -> Option<CycleStage> {
         self.driven.last().and_then(|last| last.awaits)
@@ -275,6 +286,16 @@ impl ActiveWorld for DrivenTraverse {
         let last = &self.driven[self.driven.len() - 1];
         self.driven.push(last.stay());
         self.put_last()
+    }
+
+    fn correct(&mut self, measured: MeasuredMotion) -> Result<()> {
+        let number = self.driven.len() - 1;
+        let Some(before) = number.checked_sub(1).map(|before| self.driven[before].site_from_rover) else {
+            return Err(Error::Request("there is no motion to the first stop".to_owned()));
+        };
+        self.driven[number].correct(measured, &before.to_pose());
+        self.put_last()?;
+        self.save()
     }
 
     fn point_mast(&mut self, angles: Option<MastAngles>) -> Result<()> {

@@ -40,6 +40,7 @@ fn stop(step: usize) -> Stop {
         right: view("right", 1.0),
         light: None,
         metered_px: None,
+        odometry: None,
         truth: (step == 1).then(|| StopTruth {
             site_from_rover: PoseRecord::from(&pose.inverse()),
             left_camera: Some(camera(0.3)),

@@ -14,6 +14,7 @@ use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::{Pixel, Vector3};
 use sightline_rover::driving::{ActiveWorld, DriveReport, Motion};
 use sightline_rover::pipeline::Stops;
+use sightline_rover::visual_odometry::MeasuredMotion;
 
 use crate::native::Traverse;
 
@@ -99,6 +100,10 @@ impl ActiveWorld for Replayed<'_> {
 
     fn stay(&mut self) -> Result<()> {
         self.go_on(None).map(drop)
+    }
+
+    fn correct(&mut self, _measured: MeasuredMotion) -> Result<()> {
+        Ok(())
     }
 
     fn point_mast(&mut self, angles: Option<MastAngles>) -> Result<()> {

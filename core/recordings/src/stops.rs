@@ -12,6 +12,7 @@ use sightline_geometry::error::Result;
 use sightline_geometry::frames::{Pixel, Point3, Pose};
 use sightline_rover::pair::{self, FurtherCamera, FurtherImages, StopPair};
 use sightline_rover::pipeline::Stops;
+use sightline_rover::visual_odometry::MeasuredMotion;
 use sightline_track::locate::store::Shared;
 use sightline_track::stages::capture::StereoPair;
 use sightline_world::surface_point;
@@ -46,6 +47,9 @@ impl Stops for Traverse {
     }
     fn odometry_error(&self) -> OdometryError {
         self.index().odometry_error
+    }
+    fn measured_motion(&self, step: usize) -> Option<&MeasuredMotion> {
+        self.index().stops[step].odometry.as_ref()
     }
     fn pointing_error_deg(&self) -> f64 {
         self.index().pointing_error_deg

@@ -30,6 +30,7 @@ use sightline_track::trace::{StepKind, StepTrace};
 
 use crate::begun::Begun;
 use crate::pair::{self, FurtherCamera, FurtherImages, StopPair};
+use crate::visual_odometry::{MeasuredMotion, pose_change_error};
 
 /// The stops of a drive, as the stages see them.
 pub trait Stops {
@@ -45,8 +46,12 @@ pub trait Stops {
     fn mast(&self) -> Option<&Mast>;
     /// The mast angles in use.
     fn mast_angles(&self, step: usize) -> Option<MastAngles>;
-    /// The error model of the pose estimates.
+    /// The error model of the pose estimates by wheels, gyro and accelerometers.
     fn odometry_error(&self) -> OdometryError;
+    /// How vision measured the motion to a stop; `None` where it did not.
+    fn measured_motion(&self, _step: usize) -> Option<&MeasuredMotion> {
+        None
+    }
     /// 1σ error of each mast angle, deg; 0 where it is not known.
     fn pointing_error_deg(&self) -> f64;
     /// How the two images of a stop relate.
@@ -270,7 +275,7 @@ fn prediction(
 ) -> predict::Prediction {
     let step = target.step + 1;
     let [then, now] = [target.step, step].map(|step| stops.site_from_rover(step));
-    let predicted = predict::predict(target, &then, &now, &stops.odometry_error());
+    let predicted = predict::predict(target, &then, &now, &pose_change_error(stops, step));
     let displaced = displaced_to.and_then(|(left, pixel)| predict::displaced(&predicted, left, pixel, &now));
     displaced.unwrap_or(predicted)
 }

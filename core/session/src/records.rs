@@ -1,7 +1,7 @@
 //! The record of a step: its row, the stages of all trackers in running order, and the comparison with the truth.
 //!
 //! ```text
-//! RunStep ─► step (the row) ─► the stages of `track::records` ─► truth
+//! RunStep ─► step (the row) ─► visual_odometry ─► the stages of `track::records` ─► truth
 //! ```
 //! Tables, comparisons, expressions, plots, explanations, logs and pages are views of this list.
 
@@ -23,7 +23,13 @@ static STAGES: LazyLock<Vec<Stage<RunStep>>> = LazyLock::new(|| {
         Stage::of("truth", "How far is the estimate from the truth?", |step: &RunStep| step.truth.as_ref())
             .at("truth");
     let stages = stages.into_iter().map(|stage| stage.within(|step: &RunStep| Some(&step.trace), &[""]));
-    once(row).chain(stages).chain(once(truth)).collect()
+    let odometry = Stage::of(
+        "visual_odometry",
+        "How did the rover move since the stop before, as its cameras see it?",
+        |step: &RunStep| step.odometry.as_deref(),
+    )
+    .at("odometry");
+    [row, odometry].into_iter().chain(stages).chain(once(truth)).collect()
 });
 
 static ROW: LazyLock<Stage<StepRow>> = LazyLock::new(|| {

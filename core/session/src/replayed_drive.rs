@@ -14,6 +14,7 @@ use sightline_recordings::Traverse;
 use sightline_recordings::replayed::{Answer, Replayed};
 use sightline_rover::driving::executive::{self, CycleInput};
 use sightline_rover::driving::{ArcNavigator, Cycle, DriveCommand, StopReason};
+use sightline_rover::visual_odometry::OdometryMode;
 use sightline_track::settings::Settings;
 use sightline_track::target::{Designation, TrackingState};
 
@@ -57,6 +58,8 @@ impl<'a> ReplayedDrive<'a> {
         cancel: Cancel<'_>,
     ) -> Result<Self> {
         command.validate()?;
+        // A recording keeps its poses.
+        let command = DriveCommand { odometry: OdometryMode::Off, ..command };
         let first = track::designate_until(traverse, designation, settings, cancel)?;
         check_command(traverse, &command, &first.trace)?;
         let world = Replayed::new(traverse, first.step);

@@ -14,6 +14,7 @@ pub use self::row::StepRow;
 use std::ops::{Deref, DerefMut};
 
 use crate::times::Took;
+use sightline_rover::visual_odometry::MeasuredMotion;
 use sightline_track::gate::Gate;
 use sightline_track::target::TrackingState;
 use sightline_track::trace::StepTrace;
@@ -26,6 +27,8 @@ pub struct RunStep {
     pub trace: StepTrace,
     /// The comparison with the truth; `None` where the truth is unknown.
     pub truth: Option<StepTruth>,
+    /// How vision measured the motion to this stop; `None` where it did not.
+    pub odometry: Option<Box<MeasuredMotion>>,
     /// What the stages took, where they were computed here; no part of the record.
     pub took: Took,
 }

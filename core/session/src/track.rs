@@ -111,5 +111,6 @@ pub(crate) fn compared<D: Drive>(drive: &D, trace: StepTrace, first: Option<&Ste
     let truth = TargetTruth::new(drive, target.designation, Some(&target.position_in_rover));
     // The comparison is one with the update.
     let truth = truth.filter(|_| !trace.is_begun()).and_then(|truth| truth.compare(&trace));
-    RunStep { trace, truth, took: Took::default() }
+    let odometry = drive.measured_motion(trace.step).cloned().map(Box::new);
+    RunStep { trace, truth, odometry, took: Took::default() }
 }

@@ -63,7 +63,8 @@ fn a_drive_arrives_within_centimetres_of_the_true_target() {
         let off_px = step.located().unwrap().left_pixel.unwrap().distance(centre);
         assert!(off_px < 60.0, "stop {}: {off_px} px", step.step);
         let metered_px = drive.world.state()[step.step].metered_px.unwrap();
-        assert!(metered_px.distance(step.point_mast.predicted_left.unwrap()) < 1e-9);
+        // Around the prediction by wheels, which vision then corrects by a few pixels.
+        assert!(metered_px.distance(step.point_mast.predicted_left.unwrap()) < 8.0);
     }
     // The estimate's covariance contains the known error of the mast.
     for step in &drive.steps {

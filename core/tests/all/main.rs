@@ -12,6 +12,7 @@ mod trackability;
 mod records;
 mod rendering;
 mod driving;
+mod driving_odometry;
 mod stage_pause;
 mod registration;
 mod stereo_rendered;

@@ -30,7 +30,7 @@ fn paused(drive: &TargetedDrive, last: &RunStep, before: Option<CycleStage>) -> 
 fn check_prefix(begun: StepTrace, whole: &RunStep, before: CycleStage) {
     assert_eq!(begun.paused_before(), Some(before));
     assert_eq!(begun.update.state, whole.verdict().unwrap().state_before);
-    let begun = RunStep { trace: begun, truth: None, took: Default::default() };
+    let begun = RunStep { trace: begun, truth: None, odometry: None, took: Default::default() };
     let order: Vec<&str> = stages_of(whole.update.target.memory.tracker()).collect();
     let place = |name: &str| order.iter().position(|stage| *stage == name);
     let names = records::stages().iter().map(|stage| stage.schema().stage.as_ref());

@@ -121,6 +121,7 @@ pub(crate) fn simulated_stop(
         right: view("right", number, right),
         light: None,
         metered_px: None,
+        odometry: None,
         truth: Some(StopTruth { site_from_rover: truth, left_camera, right_camera, wheel_places_m: None }),
         cameras: rigs.further.iter().map(further).collect(),
     }
@@ -176,6 +177,7 @@ fn handed_over(last: &Stop, number: usize, settings: &CameraSettings) -> Option<
         right: view("right", number, right),
         light: None,
         metered_px: None,
+        odometry: None,
         truth: Some(StopTruth {
             site_from_rover: truth.site_from_rover,
             left_camera: None,

@@ -11,6 +11,7 @@ use sightline_geometry::camera::{Camera, CameraName, Mast, MastAngles};
 use sightline_geometry::frames::{Pixel, PoseRecord, Vector3};
 use sightline_geometry::odometry_error::OdometryError;
 use sightline_geometry::stereo_geometry::StereoGeometry;
+use sightline_rover::visual_odometry::MeasuredMotion;
 
 /// The version of the folder format that this code writes.
 pub const FORMAT_VERSION: u32 = 1;
@@ -62,6 +63,9 @@ pub struct Stop {
     pub time_s: f64,
     /// The estimated pose of the rover in the site frame.
     pub site_from_rover: PoseRecord,
+    /// How vision measured the motion to this stop, where it did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub odometry: Option<MeasuredMotion>,
     /// The mast angles at which the pair was taken, where there is a mast.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mast_angles: Option<MastAngles>,

@@ -16,6 +16,7 @@ use sightline_geometry::frames::Pixel;
 use sightline_recordings::replayed::Answer;
 use sightline_recordings::{DrivenTraverse, Traverse};
 use sightline_rover::driving::{ArrivalAction, Cycle, DriveCommand, GoalRule};
+use sightline_rover::visual_odometry::OdometryMode;
 use sightline_session::driving::{DriveSummary, TargetedDrive};
 use sightline_session::replayed_drive::{ReplaySummary, ReplayedDrive};
 use sightline_session::step::RunStep;
@@ -24,6 +25,7 @@ use sightline_track::settings::{Changes, Settings, parse_assignment};
 use sightline_track::target::Designation;
 use sightline_world::choose_targets;
 
+use super::study_odometry::Configuration;
 use super::terminal::{self, Progress};
 use super::track::{pixel, without_images};
 use super::{open, simulate};
@@ -64,6 +66,15 @@ pub(super) struct Drive {
     /// Most stops, the first included.
     #[arg(long, value_name = "N", default_value_t = DriveCommand::default().stops_max)]
     stops: u32,
+    /// What visual odometry is used for.
+    #[arg(long, value_name = "USE", default_value = "full")]
+    odometry: Odometry,
+    /// The settings of visual odometry.
+    #[arg(long, value_name = "NAME", default_value = "sightline")]
+    odometry_preset: Configuration,
+    /// Slip of a step, as a part of the wheels' motion, above which the drive stops.
+    #[arg(long, value_name = "PART", default_value_t = DriveCommand::default().slip_max)]
+    slip_max: f64,
     /// An action after arrival; can be given more than once.
     #[arg(long, value_name = "ACTION")]
     on_arrival: Vec<OnArrival>,
@@ -92,6 +103,27 @@ pub(super) struct Drive {
 enum OnArrival {
     /// Point the mast at the target, take another pair and locate the target in it.
     Look,
+}
+
+/// What visual odometry is used for.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Odometry {
+    /// It does not run: the pose is that of wheels, gyro and accelerometers.
+    Off,
+    /// It measures the slip, which may end the drive; the pose is that of wheels, gyro and accelerometers.
+    SlipCheck,
+    /// Accepted updates correct the pose as well.
+    Full,
+}
+
+impl Odometry {
+    const fn mode(self) -> OdometryMode {
+        match self {
+            Self::Off => OdometryMode::Off,
+            Self::SlipCheck => OdometryMode::SlipCheck,
+            Self::Full => OdometryMode::Full,
+        }
+    }
 }
 
 /// How the stops are written.
@@ -212,6 +244,9 @@ impl Drive {
             tolerance_m: self.tolerance,
             step_fraction: self.step_fraction,
             stops_max: self.stops,
+            odometry: self.odometry.mode(),
+            odometry_preset: self.odometry_preset.preset().1,
+            slip_max: self.slip_max,
             on_arrival: self.on_arrival.iter().map(|OnArrival::Look| ArrivalAction::Look).collect(),
             ..DriveCommand::default()
         }

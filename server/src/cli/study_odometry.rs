@@ -69,7 +69,7 @@ impl From<SceneName> for Scene {
 
 /// The settings by their name.
 #[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
-enum Configuration {
+pub(super) enum Configuration {
     /// Ours.
     Sightline,
     /// As flown on the Mars Exploration Rovers: 256 × 256 px, pseudo-normalised correlation.
@@ -77,7 +77,7 @@ enum Configuration {
 }
 
 impl Configuration {
-    const fn preset(self) -> (&'static str, OdometryPreset) {
+    pub(super) const fn preset(self) -> (&'static str, OdometryPreset) {
         match self {
             Self::Sightline => ("sightline", OdometryPreset::Sightline),
             Self::Mer2007 => ("mer2007", OdometryPreset::Mer2007),
@@ -152,7 +152,7 @@ impl OdometryStudy {
 fn sentence(found: &OdometrySummary) -> String {
     let wrong = found.silently_wrong_below_percent.map_or_else(
         || format!("{} silently wrong", found.silently_wrong),
-        |bound| format!("0 silently wrong (below {bound:.2} % with 95 %)"),
+        |bound| format!("0 silently wrong (below {:.2} % with 95 %)", bound.min(100.0)),
     );
     let nees = found.nees_per_dof.map_or_else(String::new, |[mean, spread]| {
         format!(", NEES per degree of freedom {mean:.2} ± {spread:.2} over drives")
@@ -160,8 +160,9 @@ fn sentence(found: &OdometrySummary) -> String {
     let slip = found
         .slip_error_points
         .map_or_else(String::new, |points| format!(", error of the slip {points:.2} points (95 %)"));
+    let drives = if found.drives == 1 { "drive" } else { "drives" };
     format!(
-        "{} {}: {:.2} % of {} updates in {} drives converged, {wrong}, drift {:.2} % (median) and {:.2} % (95 %){slip}{nees}",
+        "{} {}: {:.2} % of {} updates in {} {drives} converged, {wrong}, drift {:.2} % (median) and {:.2} % (95 %){slip}{nees}",
         found.configuration,
         found.scene.name(),
         found.converged_percent,

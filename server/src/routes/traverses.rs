@@ -201,6 +201,7 @@ fn stop_view(open: &OpenTraverse, step: usize) -> StopView {
         left_size: traverse.left_camera(step).size,
         right_size: traverse.right_camera(step).size,
         ready: traverse.is_ready(step),
+        odometry: stop.odometry.clone(),
         cameras: traverse.further_cameras(step).map(camera_view).collect(),
     }
 }

@@ -42,8 +42,12 @@ impl Runner {
         driver: (usize, usize),
         last: &RunStep,
         before: Option<CycleStage>,
+        flag: &CancelFlag,
     ) -> Result<bool> {
-        let Some(grown) = driven::prepare(&live.traverse(), last, before)? else { return Ok(false) };
+        let steering = live.with(|session| session.steering.clone());
+        let command = steering.map(|steering| steering.command).unwrap_or_default();
+        let grown = driven::prepare(&live.traverse(), last, &command, before, flag)?;
+        let Some(grown) = grown else { return Ok(false) };
         self.put_in_place(&grown, (live, driver));
         Ok(true)
     }

@@ -79,6 +79,7 @@ fn stop(step: usize) -> Stop {
         right: view("right", BASELINE_M),
         light: None,
         metered_px: None,
+        odometry: None,
         truth: None,
         cameras: Vec::new(),
     }

@@ -2,6 +2,7 @@
 
 use egui::{Button, CollapsingHeader, ComboBox, DragValue, Grid, Label, RichText, ScrollArea, Ui};
 use sightline_rover::driving::{ArrivalAction, DriveCommand, GoalRule, StopReason};
+use sightline_rover::visual_odometry::{OdometryMode, OdometryPreset};
 use sightline_session::driving::DriveView;
 use sightline_session::pause::PauseSide;
 use sightline_track::cycle_stage::CycleStage;
@@ -81,15 +82,10 @@ fn form(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             GoalRule::FollowsTarget => "goal follows the target",
             GoalRule::Fixed => "goal stays where it was",
         };
-        let choice = ComboBox::from_id_salt("goal rule").width(150.0).selected_text(rule(command.goal));
-        let shown = choice.show_ui(ui, |ui| {
-            for one in [GoalRule::FollowsTarget, GoalRule::Fixed] {
-                if panels::entry(ui, command.goal == one, rule(one)).clicked() {
-                    command.goal = one;
-                }
-            }
-        });
-        shown.response.accessible_name("goal");
+        let rules = [GoalRule::FollowsTarget, GoalRule::Fixed];
+        choice(ui, "goal", 150.0, rules, &mut command.goal, rule);
+        let modes = [OdometryMode::Off, OdometryMode::SlipCheck, OdometryMode::Full];
+        choice(ui, "visual odometry", 160.0, modes, &mut command.odometry, words::odometry);
     });
     CollapsingHeader::new(theme::label("offset and limits")).id_salt("drive limits").show(ui, |ui| {
         limits(ui, &mut command);
@@ -112,6 +108,14 @@ fn limits(ui: &mut Ui, command: &mut DriveCommand) {
             "Stops at the goal at which the mast is pointed at the target again and another pair is taken";
         ui.add(drag).accessible_name("looks on arrival").on_hover_text(help);
         command.on_arrival.resize(looks, ArrivalAction::Look);
+        let presets = [OdometryPreset::Sightline, OdometryPreset::Mer2007];
+        choice(ui, "settings of odometry", 80.0, presets, &mut command.odometry_preset, words::preset);
+        let mut percent = 100.0 * command.slip_max;
+        let help = "Largest slip of a step, by vision; the drive stops where it is exceeded";
+        number(ui, "slip", " %", &mut percent, (5.0, 200.0), help);
+        if percent != 100.0 * command.slip_max {
+            command.slip_max = percent / 100.0;
+        }
         number(ui, "tilt", "°", &mut command.tilt_max_deg, (1.0, 45.0), "Largest tilt after a step");
         number(ui, "time", " min", &mut command.flight_minutes_max, (1.0, 10_000.0), "Time on Mars");
     });
@@ -248,8 +252,8 @@ fn standing(ui: &mut Ui, drive: &DriveView) {
 
 /// One line a stop.
 fn decisions(ui: &mut Ui, state: &State, drive: &DriveView, out: &mut Vec<Command>) {
-    Grid::new("decisions").num_columns(5).striped(true).spacing([12.0, 2.0]).show(ui, |ui| {
-        for head in ["stop", "to the goal", "motion", "reported", "on Mars"] {
+    Grid::new("decisions").num_columns(6).striped(true).spacing([12.0, 2.0]).show(ui, |ui| {
+        for head in ["stop", "slip on the way", "to the goal", "motion", "reported", "on Mars"] {
             ui.label(theme::note(head));
         }
         ui.end_row();
@@ -257,6 +261,11 @@ fn decisions(ui: &mut Ui, state: &State, drive: &DriveView, out: &mut Vec<Comman
             let is_here = cycle.step == state.cursor.step;
             if ui.selectable_label(is_here, theme::number(cycle.step.to_string())).clicked() {
                 out.push(Command::Go(Go::Step(cycle.step)));
+            }
+            let measured = state.measured_motion(cycle.step);
+            let slip = ui.label(theme::number(measured.map(words::slip).unwrap_or_default()));
+            if let Some(refusal) = measured.and_then(|measured| measured.update.refusal()) {
+                slip.on_hover_text(refusal);
             }
             ui.label(theme::number(format!("{} m", digits(cycle.goal.distance_m))));
             let motion = match (&cycle.motion, &cycle.ending) {

@@ -1,6 +1,7 @@
 //! Motions, ends and outcomes in words.
 
 use sightline_rover::driving::{Cycle, Ending, Motion, StopReason};
+use sightline_rover::visual_odometry::{MeasuredMotion, OdometryMode, OdometryPreset};
 use sightline_session::driving::DriveSummary;
 
 use crate::panels::digits;
@@ -30,9 +31,36 @@ pub(super) fn reason(reason: StopReason) -> &'static str {
         StopReason::Arrived => "arrived",
         StopReason::Lost => "target lost",
         StopReason::Stalled => "a wheel stalled at a rock",
+        StopReason::Slip => "slipped too much",
         StopReason::Tilt => "tilted too much",
         StopReason::Time => "time on Mars used up",
         StopReason::StopLimit => "all stops used up",
+    }
+}
+
+/// What visual odometry is used for.
+pub(super) fn odometry(mode: OdometryMode) -> &'static str {
+    match mode {
+        OdometryMode::Off => "no visual odometry",
+        OdometryMode::SlipCheck => "vision checks the slip",
+        OdometryMode::Full => "vision corrects the pose",
+    }
+}
+
+/// The settings of visual odometry.
+pub(super) fn preset(preset: OdometryPreset) -> &'static str {
+    match preset {
+        OdometryPreset::Sightline => "sightline",
+        OdometryPreset::Mer2007 => "mer2007",
+    }
+}
+
+/// The slip of the step to a stop by vision, or that it was refused.
+pub(super) fn slip(measured: &MeasuredMotion) -> String {
+    match (measured.update.accepted, measured.update.slip) {
+        (false, _) => "no update".to_owned(),
+        (true, None) => "turned".to_owned(),
+        (true, Some(slip)) => format!("{:.1} % ± {:.1}", 100.0 * slip.along, 100.0 * slip.along_sigma),
     }
 }
 
@@ -43,7 +71,7 @@ pub(super) fn ending(ending: &Ending) -> String {
         StopReason::Tilt => "°",
         StopReason::Time => " min",
         StopReason::StopLimit => " stops",
-        StopReason::Lost | StopReason::Stalled => "",
+        StopReason::Lost | StopReason::Stalled | StopReason::Slip => "",
     };
     match (ending.value, ending.limit) {
         (Some(value), Some(limit)) => {

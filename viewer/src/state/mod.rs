@@ -35,6 +35,7 @@ use std::sync::LazyLock;
 use serde_json::Value;
 use sightline_api::wire::{StopView, TraverseEntry, TraverseView};
 use sightline_geometry::camera::Camera;
+use sightline_rover::visual_odometry::MeasuredMotion;
 use sightline_session::Cursor;
 use sightline_session::step::{RunStep, StepRow};
 use sightline_session::view::{RunView, SessionView, TargetView};
@@ -279,6 +280,11 @@ impl State {
     /// What the cursor's step saw and decided, once it is here.
     pub fn trace(&self) -> Option<&RunStep> {
         self.trace_at(self.cursor.step).ready()
+    }
+
+    /// How vision measured the motion to a stop; `None` where it did not.
+    pub fn measured_motion(&self, step: usize) -> Option<&MeasuredMotion> {
+        self.traverse.as_ref()?.stops.get(step)?.odometry.as_ref()
     }
 
     /// The view of the cursor's step against the earlier templates of its run.

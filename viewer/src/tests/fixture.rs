@@ -164,6 +164,7 @@ fn traverse() -> TraverseView {
         time_s: 60.0 * step as f64,
         site_from_rover: PoseRecord::from(&pose(step)),
         true_site_from_rover: Some(PoseRecord::from(&pose(step))),
+        odometry: None,
         left_size: [1024, 1024],
         right_size: [1024, 1024],
         ready: step + 1 < STOPS,

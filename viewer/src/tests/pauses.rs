@@ -34,7 +34,7 @@ fn begun(before: CycleStage) -> RunStep {
         locate: reached(CycleStage::Locate).then_some(locate),
         judge: reached(CycleStage::Judge).then_some(judge),
     };
-    let mut begun = RunStep { trace: whole, truth: None, took: Default::default() };
+    let mut begun = RunStep { trace: whole, truth: None, odometry: None, took: Default::default() };
     begun.trace.kind = kind;
     begun
 }

@@ -104,6 +104,7 @@ impl ImportFormat for Kitti {
                 right: view("image_1", &cameras[1])?,
                 light: None,
                 metered_px: None,
+                odometry: None,
                 truth: Some(StopTruth {
                     site_from_rover: PoseRecord::from(truth),
                     left_camera: None,

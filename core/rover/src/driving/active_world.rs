@@ -10,6 +10,7 @@ use sightline_geometry::frames::Pixel;
 
 use super::select_path::Motion;
 use crate::pipeline::Stops;
+use crate::visual_odometry::MeasuredMotion;
 
 /// A world in which the rover can be driven.
 pub trait ActiveWorld {
@@ -27,6 +28,13 @@ pub trait ActiveWorld {
     /// # Errors
     /// A world that cannot be continued, or a stop that cannot be stored.
     fn stay(&mut self) -> Result<()>;
+
+    /// Keeps how vision measured the motion to the last stop, and corrects the estimated pose there by it. A recording keeps
+    /// its poses.
+    ///
+    /// # Errors
+    /// A stop that cannot be stored.
+    fn correct(&mut self, measured: MeasuredMotion) -> Result<()>;
 
     /// Points the mast of the last stop; `None` leaves it as it is.
     ///

@@ -6,6 +6,8 @@ use utoipa::ToSchema;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Point3;
 
+use crate::visual_odometry::{OdometryMode, OdometryPreset};
+
 /// Whether tracking moves the goal.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
@@ -44,6 +46,13 @@ pub struct DriveCommand {
     pub step_fraction: f64,
     /// Most stops, the first included (100; 2 to 1000).
     pub stops_max: u32,
+    /// What visual odometry is used for (`full`).
+    pub odometry: OdometryMode,
+    /// Its settings (`sightline`).
+    pub odometry_preset: OdometryPreset,
+    /// The drive stops when the slip of a step is measured as larger, as a part of the wheels' motion (0.9; 0.05 to 2). Without
+    /// odometry it has no effect.
+    pub slip_max: f64,
     /// The drive stops when the rover tilts by more than this, deg (30: domain.md 5.4; 1 to 45).
     pub tilt_max_deg: f64,
     /// The drive stops after this much time on Mars, min (480; 1 to 10,000).
@@ -61,6 +70,9 @@ impl Default for DriveCommand {
             tolerance_m: 0.05,
             step_fraction: 0.10,
             stops_max: 100,
+            odometry: OdometryMode::Full,
+            odometry_preset: OdometryPreset::Sightline,
+            slip_max: 0.9,
             tilt_max_deg: 30.0,
             flight_minutes_max: 480.0,
             on_arrival: Vec::new(),
@@ -86,6 +98,7 @@ impl DriveCommand {
         within("tolerance_m", self.tolerance_m, 0.001, 1.0)?;
         within("step_fraction", self.step_fraction, 0.01, 0.5)?;
         within("stops_max", f64::from(self.stops_max), 2.0, 1000.0)?;
+        within("slip_max", self.slip_max, 0.05, 2.0)?;
         within("tilt_max_deg", self.tilt_max_deg, 1.0, 45.0)?;
         within("flight_minutes_max", self.flight_minutes_max, 1.0, 10_000.0)?;
         let looks = self.on_arrival.len();
@@ -156,6 +169,7 @@ mod tests {
             (|c| (c.standoff_m, c.tolerance_m) = (0.5, 0.5), ahead, "tolerance_m"),
             (|c| c.step_fraction = 0.0, ahead, "step_fraction"),
             (|c| c.stops_max = 1, ahead, "stops_max"),
+            (|c| c.slip_max = 0.0, ahead, "slip_max"),
             (|c| c.on_arrival = vec![ArrivalAction::Look; 11], ahead, "on_arrival"),
             (
                 |c| (c.stops_max, c.on_arrival) = (3, vec![ArrivalAction::Look; 2]),

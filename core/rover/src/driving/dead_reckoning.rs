@@ -7,6 +7,8 @@
 //! F  = [1 0 −Δy; 0 1 Δx; 0 0 1]      G = the axes along and across the step, and the heading
 //! ```
 //!
+//! A step that vision measured adds `M Σ Mᵀ` instead, where M takes its error (τ, ω) from the rover frame to x, y and heading.
+//!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
 //! | Δx, Δy, L | the step and its length | m, site |
@@ -14,12 +16,12 @@
 //!
 //! Slip is in neither covariance. Frame: site, horizontal. Sources: domain.md 5.5; papers.md R10.
 
-use nalgebra::{Matrix3, Vector2};
+use nalgebra::{Matrix3, Matrix3x6, Vector2};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use sightline_geometry::frames::Pose;
-use sightline_geometry::odometry_error::OdometryError;
+use sightline_geometry::odometry_error::{OdometryError, PoseChangeError};
 
 use super::select_path::Motion;
 
@@ -43,9 +45,19 @@ impl Reckoned {
     }
 
     /// The place at the next stop by the pose estimated there.
-    pub(super) fn at(&self, pose: &Pose, error: &OdometryError) -> Self {
+    pub(super) fn at(&self, pose: &Pose, error: &PoseChangeError) -> Self {
         let there = Self::exactly(pose);
-        Self { covariance: self.grown(there.position_m, error), ..there }
+        let covariance = match error {
+            PoseChangeError::Modelled(error) => self.grown(there.position_m, error),
+            PoseChangeError::Measured(covariance) => {
+                let axes = pose.rotation.to_rotation_matrix();
+                let mut level = Matrix3x6::zeros();
+                level.fixed_view_mut::<2, 3>(0, 0).copy_from(&axes.matrix().fixed_rows::<2>(0));
+                level.fixed_view_mut::<1, 3>(2, 3).copy_from(&axes.matrix().fixed_rows::<1>(2));
+                self.grown_by(there.position_m, level * covariance * level.transpose())
+            }
+        };
+        Self { covariance, ..there }
     }
 
     /// The place after wheels have done a part of a motion, as on level ground without slip.
@@ -65,7 +77,6 @@ impl Reckoned {
         let step = Vector2::from(to_m) - Vector2::from(self.position_m);
         let length_m = step.norm();
         let along = step.try_normalize(0.0).unwrap_or_else(Vector2::x);
-        let carried = Matrix3::new(1.0, 0.0, -step.y, 0.0, 1.0, step.x, 0.0, 0.0, 1.0);
         let axes = Matrix3::new(along.x, -along.y, 0.0, along.y, along.x, 0.0, 0.0, 0.0, 1.0);
         let sigmas = [
             error.along_fraction * length_m,
@@ -73,8 +84,15 @@ impl Reckoned {
             error.attitude_deg.to_radians(),
         ];
         let added = Matrix3::from_diagonal(&sigmas.map(|sigma| sigma * sigma).into());
+        self.grown_by(to_m, axes * added * axes.transpose())
+    }
+
+    /// The covariance after a step to a place that adds an error of its own.
+    fn grown_by(&self, to_m: [f64; 2], added: Matrix3<f64>) -> [[f64; 3]; 3] {
+        let step = Vector2::from(to_m) - Vector2::from(self.position_m);
+        let carried = Matrix3::new(1.0, 0.0, -step.y, 0.0, 1.0, step.x, 0.0, 0.0, 1.0);
         let before = Matrix3::from(self.covariance).transpose();
-        let after = carried * before * carried.transpose() + axes * added * axes.transpose();
+        let after = carried * before * carried.transpose() + added;
         std::array::from_fn(|row| std::array::from_fn(|column| after[(row, column)]))
     }
 }
@@ -151,7 +169,7 @@ mod tests {
         let [x, y] = wheels.position_m;
         let turn = nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.0, wheels.heading_rad);
         let pose = Pose::from_parts(nalgebra::Translation3::new(x, y, 0.3), turn);
-        let estimated = start().at(&pose, &ERROR);
+        let estimated = start().at(&pose, &PoseChangeError::Modelled(ERROR));
         assert!((estimated.heading_rad - wheels.heading_rad).abs() < 1e-12);
         assert_eq!((estimated.position_m, estimated.covariance), (wheels.position_m, wheels.covariance));
     }

@@ -9,6 +9,7 @@ use utoipa::ToSchema;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
 use sightline_geometry::frames::{Point3, Pose};
+use sightline_geometry::odometry_error::PoseChangeError;
 use sightline_track::settings::Settings;
 use sightline_track::stages::predict;
 use sightline_track::stages::update::Updated;
@@ -22,6 +23,13 @@ use super::flight_time::FlightTime;
 use super::select_path::{Motion, Navigator};
 use super::set_goal::{Goal, set_goal};
 use crate::pipeline::{self, StepChanges, Stops};
+use crate::visual_odometry::{MeasuredMotion, OdometryMode, pose_change_error};
+
+/// Longest step and largest turn that odometry follows, m and rad (driving.md 1: 75 cm, 18°).
+const STEP_MAX_M: f64 = 0.75;
+const TURN_MAX_RAD: f64 = 18.0 * std::f64::consts::PI / 180.0;
+/// Slip either way that the next step makes good.
+const SLIP_MADE_GOOD: f64 = 0.5;
 
 /// Why a drive stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -33,6 +41,8 @@ pub enum StopReason {
     Lost,
     /// A wheel met a step too high to climb.
     Stalled,
+    /// The wheels slipped more than allowed.
+    Slip,
     /// The rover tilts more than allowed.
     Tilt,
     /// The time on Mars is used up.
@@ -46,7 +56,7 @@ pub enum StopReason {
 pub struct Ending {
     /// Why it stopped.
     pub reason: StopReason,
-    /// The value that decided, in the unit of its limit: m, deg, min, a count; null for `lost` and `stalled`.
+    /// The value that decided, in the unit of its limit: m, a part, deg, min, a count; null for `lost` and `stalled`.
     pub value: Option<f64>,
     /// The limit of the command that it met; null for `lost` and `stalled`.
     pub limit: Option<f64>,
@@ -108,6 +118,9 @@ pub fn advance(
         return Ok((cycle, None));
     }
     point_mast(world, &input.last.update)?;
+    if let Some(measured) = measured(world.stops(), input.command, input.last.step + 1, cancel)? {
+        world.correct(measured)?;
+    }
     let trace = pipeline::run_step_changed(
         world.stops(),
         &input.last.update,
@@ -166,11 +179,12 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
         cycle.arrival_actions += 1;
         return cycle;
     }
-    cycle.ending = ending(input, &cycle);
+    cycle.ending = ending(stops, input, &cycle);
     if cycle.ending.is_none() {
         let target_in_rover = pose.inverse_transform_point(&target_in_site);
         let step_m = input.command.step_fraction * (target_in_rover - left.model.centre()).norm();
-        cycle.motion = Some(input.navigator.select_path(goal.in_rover_m, step_m));
+        let motion = input.navigator.select_path(goal.in_rover_m, step_m);
+        cycle.motion = Some(followable(motion, input.command, slip_to(stops, step)));
     }
     cycle
 }
@@ -178,13 +192,13 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
 /// The place at this stop by the pose estimates and by the wheels alone.
 fn reckoned(stops: &dyn Stops, input: &CycleInput<'_>, pose: &Pose) -> [Reckoned; 2] {
     let Some(before) = input.before else { return [Reckoned::exactly(pose); 2] };
-    let error = &stops.odometry_error();
     let (Some(motion), Some(report)) = (&before.motion, &before.report) else {
         // The rover stayed.
         return [before.estimated, before.by_wheels];
     };
     let part = report.stall.map_or(1.0, |stall| stall.completed);
-    [before.estimated.at(pose, error), before.by_wheels.rolled(motion, part, error)]
+    let change_error = pose_change_error(stops, input.last.step);
+    [before.estimated.at(pose, &change_error), before.by_wheels.rolled(motion, part, &stops.odometry_error())]
 }
 
 impl Cycle {
@@ -205,6 +219,46 @@ fn target_in_site(input: &CycleInput<'_>, stops: &dyn Stops) -> Point3 {
     stops.site_from_rover(from.step) * from.update.target.position_in_rover
 }
 
+/// The motion to a stop whose mast is pointed, as vision measures it; `None` without odometry, and where the rover stayed.
+///
+/// # Errors
+/// Images that cannot be read, or [`sightline_geometry::error::Error::Cancelled`].
+pub fn measured(
+    stops: &dyn Stops,
+    command: &DriveCommand,
+    step: usize,
+    cancel: Cancel<'_>,
+) -> Result<Option<MeasuredMotion>> {
+    let mode = command.odometry;
+    if mode == OdometryMode::Off || stops.site_from_rover(step) == stops.site_from_rover(step - 1) {
+        return Ok(None);
+    }
+    MeasuredMotion::measure(stops, step, (mode, command.odometry_preset), cancel).map(Some)
+}
+
+/// A motion that odometry can follow: at most 75 cm and 18°, and longer by the slip of the step before (driving.md 1).
+fn followable(motion: Motion, command: &DriveCommand, slip: Option<f64>) -> Motion {
+    if command.odometry == OdometryMode::Off {
+        return motion;
+    }
+    match motion {
+        Motion::Turn { angle_rad } => {
+            Motion::Turn { angle_rad: angle_rad.clamp(-TURN_MAX_RAD, TURN_MAX_RAD) }
+        }
+        Motion::Arc { length_m, curvature_per_m } => {
+            let max_m = STEP_MAX_M.min(TURN_MAX_RAD / curvature_per_m.abs());
+            let lost = slip.unwrap_or(0.0).clamp(-SLIP_MADE_GOOD, SLIP_MADE_GOOD);
+            Motion::Arc { length_m: length_m.clamp(-max_m, max_m) / (1.0 - lost), curvature_per_m }
+        }
+    }
+}
+
+/// The slip along the motion to a stop, where it was measured.
+fn slip_to(stops: &dyn Stops, step: usize) -> Option<f64> {
+    let update = &stops.measured_motion(step)?.update;
+    Some(update.slip.filter(|_| update.accepted)?.along)
+}
+
 /// Points the mast of the last stop at the prediction from the stop before, and exposes around it.
 ///
 /// # Errors
@@ -212,7 +266,8 @@ fn target_in_site(input: &CycleInput<'_>, stops: &dyn Stops) -> Point3 {
 pub fn point_mast(world: &mut dyn ActiveWorld, last: &Updated) -> Result<()> {
     let stops = world.stops();
     let [then, now] = [last.target.step, last.target.step + 1].map(|step| stops.site_from_rover(step));
-    let predicted = predict::predict(&last.target, &then, &now, &stops.odometry_error());
+    let predicted =
+        predict::predict(&last.target, &then, &now, &PoseChangeError::Modelled(stops.odometry_error()));
     let wanted = stops.mast().and_then(|mast| mast.point_left_centre_at(&predicted.position_in_rover));
     world.point_mast(wanted)?;
     let (left, _) = world.stops().cameras(last.target.step + 1);
@@ -221,7 +276,7 @@ pub fn point_mast(world: &mut dyn ActiveWorld, last: &Updated) -> Result<()> {
 }
 
 /// Why the drive ends at this stop, if it does.
-fn ending(input: &CycleInput<'_>, cycle: &Cycle) -> Option<Ending> {
+fn ending(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &Cycle) -> Option<Ending> {
     let command = input.command;
     let end =
         |reason, value: f64, limit: f64| Some(Ending { reason, value: Some(value), limit: Some(limit) });
@@ -237,6 +292,9 @@ fn ending(input: &CycleInput<'_>, cycle: &Cycle) -> Option<Ending> {
     if let Some(report) = input.before.and_then(|before| before.report) {
         if report.stall.is_some() {
             return named(StopReason::Stalled);
+        }
+        if let Some(slip) = slip_to(stops, cycle.step).filter(|slip| *slip > command.slip_max) {
+            return end(StopReason::Slip, slip, command.slip_max);
         }
         if report.tilt_deg > command.tilt_max_deg {
             return end(StopReason::Tilt, report.tilt_deg, command.tilt_max_deg);

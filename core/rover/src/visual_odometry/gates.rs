@@ -37,6 +37,10 @@ const ATTITUDE: GateKind =
     kind(45, "odometry_attitude_deg", "turn against the gyro", Unit::Degree, Side::AtMost);
 const AMBIGUITY: GateKind = kind(46, "odometry_ambiguity", "ambiguity", Unit::One, Side::AtMost);
 
+/// All gates, in the order in which they are judged.
+pub(super) const KINDS: [GateKind; 7] =
+    [INLIERS, INLIER_SHARE, CHI2, SIGMA, TRANSLATION, ATTITUDE, AMBIGUITY];
+
 /// What is judged.
 pub(super) struct Judged<'a> {
     pub(super) predicted: &'a Pose,

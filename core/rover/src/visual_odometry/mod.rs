@@ -23,6 +23,7 @@ mod outcome;
 mod gates;
 pub mod look;
 mod matches;
+mod measured;
 mod motion;
 mod points;
 mod reduce;
@@ -31,6 +32,7 @@ pub mod settings;
 mod windows;
 
 pub use coarse::{CoarseSearch, Translation};
+pub use measured::{MeasuredMotion, OdometryMode, pose_change_error};
 pub use outcome::{Fate, OdometryCorner, OdometryUpdate, Slip};
 pub use settings::{OdometryPreset, OdometrySettings};
 
@@ -234,6 +236,7 @@ fn outcome(
         inliers: motion.map_or(0, |motion| motion.inliers.len()),
         coarse_search: coarse,
         after_from_before: motion.map(|motion| PoseRecord::from(&motion.after_from_before)),
+        wheels_m: predicted.inverse().translation.vector.into(),
         covariance,
         chi2_per_dof: motion.map(|motion| motion.chi2_per_dof),
         change: motion.map(|motion| motion.change(matches)),

@@ -76,6 +76,8 @@ pub struct OdometryUpdate {
     pub coarse_search: Option<CoarseSearch>,
     /// The motion, accepted or not: from the rover frame before to that after; null where none was found.
     pub after_from_before: Option<PoseRecord>,
+    /// Movement of the rover's origin by the wheels, rover frame before, m.
+    pub wheels_m: [f64; 3],
     /// Covariance of a small motion (translation in m, turn in rad) about the rover's origin that follows it, rover frame after.
     #[schema(value_type = Option<Vec<f64>>)]
     pub covariance: Option<SMatrix<f64, 6, 6>>,

@@ -71,14 +71,14 @@ pub struct OdometrySettings {
     pub consistent_set: ConsistentSet,
     /// Standard deviations within which a match agrees with the motion (3.4; 1 to 10).
     pub outlier_sigma: f64,
-    /// 1σ error of a match between the two stops beside that of its own scores, px (0.04; 0 to 2).
+    /// 1σ error of a match between the two stops beside that of its own scores, px (0.05; 0 to 2).
     pub match_sigma_px: f64,
-    /// The same for a match between the two eyes, px (0.04; 0 to 2).
+    /// The same for a match between the two eyes, px (0.05; 0 to 2).
     pub stereo_sigma_px: f64,
     /// 1σ error of a match between the stops by the relief within its window, px for each unit of change of the view, which is
     /// 0.1 where the window grows by a tenth (0.5; 0 to 10).
     pub relief_px: f64,
-    /// 1σ error that all matches have in common, px, and its growth for each unit of change (0.012, 0.32; 0 to 10 each).
+    /// 1σ error that all matches have in common, px, and its growth for each unit of change (0.016, 0.46; 0 to 10 each).
     pub common_px: [f64; 2],
     /// Gate: least number of matches that agree (25; 4 to 1000).
     pub inliers_min: u32,
@@ -113,10 +113,10 @@ impl Default for OdometrySettings {
             search_px: 12,
             consistent_set: ConsistentSet::Rigidity,
             outlier_sigma: 3.4,
-            match_sigma_px: 0.04,
-            stereo_sigma_px: 0.04,
+            match_sigma_px: 0.05,
+            stereo_sigma_px: 0.05,
             relief_px: 0.5,
-            common_px: [0.012, 0.32],
+            common_px: [0.016, 0.46],
             inliers_min: 25,
             inlier_share_min: 0.35,
             chi2_max: 3.0,

@@ -9,6 +9,7 @@ use utoipa::{PartialSchema, ToSchema};
 
 use super::RunStep;
 use crate::times::Took;
+use sightline_rover::visual_odometry::MeasuredMotion;
 use sightline_track::cycle_stage::CycleStage;
 use sightline_track::locate::Located;
 use sightline_track::stages::capture::Capture;
@@ -46,6 +47,9 @@ struct SerialisedStep<'a> {
     /// The step of a paused drive; left out of any other.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     begun: Option<SerialisedBegun<'a>>,
+    /// How vision measured the motion to this stop; left out where it did not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    odometry: Option<Cow<'a, MeasuredMotion>>,
     /// The comparison with the truth, where that is known.
     truth: Option<Cow<'a, StepTruth>>,
 }
@@ -63,7 +67,7 @@ struct SerialisedBegun<'a> {
 }
 
 impl<'a> From<&'a RunStep> for SerialisedStep<'a> {
-    fn from(RunStep { trace, truth, .. }: &'a RunStep) -> Self {
+    fn from(RunStep { trace, truth, odometry, .. }: &'a RunStep) -> Self {
         Self {
             step: trace.step,
             time_s: trace.time_s,
@@ -79,6 +83,7 @@ impl<'a> From<&'a RunStep> for SerialisedStep<'a> {
                 mast: trace.pointing().is_none().then_some(Cow::Borrowed(&trace.point_mast)),
                 carried: Cow::Borrowed(&trace.update),
             }),
+            odometry: odometry.as_deref().map(Cow::Borrowed),
             truth: truth.as_ref().map(Cow::Borrowed),
         }
     }
@@ -92,13 +97,14 @@ impl SerialisedStep<'_> {
         let (locate, judge) = (self.locate.map(Cow::into_owned), self.judge.map(Cow::into_owned));
         let (point_mast, update) = (self.point_mast.map(Cow::into_owned), self.update.map(Cow::into_owned));
         let (step, time_s, truth) = (self.step, self.time_s, self.truth.map(Cow::into_owned));
+        let odometry = self.odometry.map(|measured| Box::new(measured.into_owned()));
         if let Some(SerialisedBegun { before, mast, carried }) = self.begun {
             let (predict, is_mast_pointed) = (predict?, point_mast.is_some());
             let point_mast = point_mast.or(mast.map(Cow::into_owned))?;
             let kind = StepKind::Begun { predict, is_mast_pointed, capture, locate, judge };
             let trace = StepTrace { step, time_s, point_mast, kind, update: carried.into_owned() };
             let is_prefix = trace.paused_before() == Some(before) && update.is_none() && fault.is_none();
-            return is_prefix.then(|| RunStep { trace, truth, took: Took::default() });
+            return is_prefix.then(|| RunStep { trace, truth, odometry, took: Took::default() });
         }
         let kind = match (predict, capture, locate, judge, fault) {
             (None, Some(capture), Some(locate), None, None) => StepKind::Designation { capture, locate },
@@ -109,7 +115,7 @@ impl SerialisedStep<'_> {
             _ => return None,
         };
         let trace = StepTrace { step, time_s, point_mast: point_mast?, kind, update: update? };
-        Some(RunStep { trace, truth, took: Took::default() })
+        Some(RunStep { trace, truth, odometry, took: Took::default() })
     }
 }
 
@@ -181,6 +187,7 @@ mod tests {
         RunStep {
             trace: StepTrace { step: 3, time_s: 60.0, point_mast, kind, update },
             truth: None,
+            odometry: None,
             took: Took::default(),
         }
     }

@@ -9,18 +9,20 @@
 //! an attitude error of σ_a about each axis moves the target by `[p]×`: `Σ_a = σ_a² [p]× [p]×ᵀ`.
 //! The papers give no covariance for the prediction; this is ours, with the error model of the traverse.
 //!
+//! Where vision measured the motion with covariance Σ of (τ, ω), the target moves by `τ + ω × p`: `J Σ Jᵀ`, `J = [I, −[p]×]`.
+//!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
 //! | p_rover,old | `target.position_in_rover` | m, rover frame of the last stop |
 //! | p_rover,new | `position_in_rover` | m, rover frame of this stop |
 //! | L | `step_length_m` | m |
 
-use nalgebra::{Matrix3, Rotation3};
+use nalgebra::{Matrix3, Matrix3x6, Rotation3};
 
 use crate::target::Target;
 use sightline_geometry::camera::Camera;
 use sightline_geometry::frames::{Pixel, Point3, Pose, Vector3};
-use sightline_geometry::odometry_error::OdometryError;
+use sightline_geometry::odometry_error::PoseChangeError;
 use sightline_record::{Declaration, Record, Unit};
 
 pub use super::prediction::Prediction;
@@ -30,7 +32,7 @@ pub fn predict(
     target: &Target,
     site_from_rover_then: &Pose,
     site_from_rover_now: &Pose,
-    odometry: &OdometryError,
+    error: &PoseChangeError,
 ) -> Prediction {
     let now_from_then = site_from_rover_now.inverse() * site_from_rover_then;
     let position_in_rover = now_from_then * target.position_in_rover;
@@ -42,7 +44,7 @@ pub fn predict(
     Prediction {
         position_in_rover,
         position_in_site: site_from_rover_now * position_in_rover,
-        covariance_in_rover: turned + motion_covariance(&position_in_rover, &way, odometry),
+        covariance_in_rover: turned + motion_covariance(&position_in_rover, &way, error),
         step_length_m,
         travelled_since_update_m: target.travelled_since_update_m + step_length_m,
         travelled_m: target.travelled_m + step_length_m,
@@ -79,7 +81,17 @@ pub fn displaced(
 }
 
 /// What the error of one pose change adds to the covariance of a point, m², rover frame.
-fn motion_covariance(point: &Point3, way: &Vector3, odometry: &OdometryError) -> Matrix3<f64> {
+fn motion_covariance(point: &Point3, way: &Vector3, error: &PoseChangeError) -> Matrix3<f64> {
+    let cross = point.coords.cross_matrix();
+    let odometry = match error {
+        PoseChangeError::Modelled(odometry) => odometry,
+        PoseChangeError::Measured(covariance) => {
+            let mut moved = Matrix3x6::zeros();
+            moved.fixed_view_mut::<3, 3>(0, 0).copy_from(&Matrix3::identity());
+            moved.fixed_view_mut::<3, 3>(0, 3).copy_from(&-cross);
+            return moved * covariance * moved.transpose();
+        }
+    };
     let length_m = way.norm();
     let along = odometry.along_fraction * length_m;
     let across = odometry.across_fraction * length_m;
@@ -89,7 +101,6 @@ fn motion_covariance(point: &Point3, way: &Vector3, odometry: &OdometryError) ->
     let diagonal = Matrix3::from_diagonal(&Vector3::new(along * along, across * across, across * across));
     let translation = rover_from_way.matrix() * diagonal * rover_from_way.matrix().transpose();
     let attitude_rad = odometry.attitude_deg.to_radians();
-    let cross = point.coords.cross_matrix();
     translation + cross * cross.transpose() * (attitude_rad * attitude_rad)
 }
 

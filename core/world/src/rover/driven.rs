@@ -10,6 +10,8 @@
 //!
 //! Frames: site and rover. Sources: domain.md 5.4, 5.5; papers.md R104, R107.
 
+use std::f64::consts::{PI, TAU};
+
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
@@ -19,6 +21,7 @@ use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::{POSITION_LIMIT_M, Pixel, Point3, Pose, PoseRecord, Vector3};
 
+use sightline_rover::visual_odometry::MeasuredMotion;
 use sightline_track::cycle_stage::CycleStage;
 
 use crate::ground::texture::mix;
@@ -64,6 +67,9 @@ pub struct DrivenStop {
     /// The places that the wheels passed on the way here, site frame, m; none where they leave no tracks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub wheel_places_m: Vec<WheelPlaces>,
+    /// How vision measured the motion to this stop; `None` where it did not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub odometry: Option<MeasuredMotion>,
     /// The first stage that was put off because the drive is paused here: `point_mast` or `capture`; `None` if none was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub awaits: Option<CycleStage>,
@@ -89,6 +95,7 @@ impl DrivenStop {
             completed: 1.0,
             touched_rocks: 0,
             wheel_places_m: Vec::new(),
+            odometry: None,
             awaits: None,
         })
     }
@@ -125,6 +132,7 @@ impl DrivenStop {
                 completed,
                 touched_rocks: touched_rocks(world, &stand),
                 wheel_places_m: if scenario.rover.tracks { places_m(&leg) } else { Vec::new() },
+                odometry: None,
                 awaits: None,
             })
         })
@@ -142,9 +150,24 @@ impl DrivenStop {
             // A rock is counted at the stop at which it was reached.
             touched_rocks: 0,
             wheel_places_m: Vec::new(),
+            odometry: None,
             awaits: None,
             ..self.clone()
         }
+    }
+
+    /// Keeps how vision measured the motion to this stop, and corrects the estimated pose by it, the next steps' heading too.
+    /// `before` is the estimated pose at the stop before.
+    pub fn correct(&mut self, measured: MeasuredMotion, before: &Pose) {
+        let pose = measured.pose_after(before);
+        if measured.corrects {
+            let truth = self.true_site_from_rover.to_pose().rotation.euler_angles();
+            let (roll, pitch, yaw) = pose.rotation.euler_angles();
+            let off = |angle: f64| (angle + PI).rem_euclid(TAU) - PI;
+            self.attitude_error_rad = [off(roll - truth.0), off(pitch - truth.1), off(yaw - truth.2)];
+        }
+        self.site_from_rover = PoseRecord::from(&pose);
+        self.odometry = Some(measured);
     }
 
     /// Rolls the true rover; the leg and the part of the motion that was completed.
@@ -204,6 +227,7 @@ impl DrivenStop {
                 ));
             }
         }
+        self.odometry.as_ref().map_or(Ok(()), MeasuredMotion::check)?;
         if !(0.0..=1.0).contains(&self.completed) {
             return Err(format!("completed: is {}, but it must be from 0 to 1", self.completed));
         }
@@ -230,7 +254,7 @@ pub fn index_stops(driven: &[DrivenStop], scenario: &Scenario) -> Vec<Stop> {
         let made = simulated_stop(number, stop.time_s, poses, stop.mast_angles, with_error(number), &rigs);
         let wheel_places_m = scenario.rover.tracks.then(|| stop.wheel_places_m.clone());
         let truth = made.truth.map(|truth| StopTruth { wheel_places_m, ..truth });
-        Stop { metered_px, truth, ..made }
+        Stop { metered_px, truth, odometry: stop.odometry.clone(), ..made }
     };
     driven.iter().enumerate().map(stop).collect()
 }

@@ -83,6 +83,7 @@ impl ImportFormat for Pds3 {
                 right: write_view(&pair.right, pair.right_camera_in_left_rover(), &scale, output)?,
                 light: pair.left.product.light(),
                 metered_px: None,
+                odometry: None,
                 truth: None,
                 cameras: write_further(pair, further.get(step).map_or(&[], Vec::as_slice), &scale, output)?,
             });

@@ -1,0 +1,191 @@
+//! The motion to a stop as vision measured it, with what the wheels had to say: the result that a stop keeps.
+
+use nalgebra::Matrix6;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use sightline_geometry::cancel::Cancel;
+use sightline_geometry::error::Result;
+use sightline_geometry::frames::{Point3, Pose, PoseRecord, Vector3};
+use sightline_geometry::odometry_error::PoseChangeError;
+use sightline_record::{Declaration, GateRecord, Record, Unit};
+
+use super::{OdometryInput, OdometryPreset, OdometryUpdate, OdometryView, update};
+use crate::pipeline::Stops;
+
+/// What visual odometry is used for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum OdometryMode {
+    /// It does not run: the pose is that of wheels, gyro and accelerometers (R10).
+    Off,
+    /// It measures the slip, which may end the drive; the pose is that of wheels, gyro and accelerometers.
+    SlipCheck,
+    /// Accepted updates correct the pose as well (R11).
+    #[default]
+    Full,
+}
+
+/// The motion to a stop as vision measured it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MeasuredMotion {
+    /// The settings.
+    pub preset: OdometryPreset,
+    /// The pose by wheels, gyro and accelerometers, from the estimated pose of the stop before; site frame.
+    pub wheels_site_from_rover: PoseRecord,
+    /// Whether the estimated pose of the stop is by this motion, and its error that of this motion.
+    pub corrects: bool,
+    /// The motion with its gates.
+    pub update: OdometryUpdate,
+}
+
+impl MeasuredMotion {
+    /// Measures the motion to stop `step` from the main pairs there and at the stop before. The estimated pose of the stop is
+    /// that of wheels, gyro and accelerometers.
+    ///
+    /// # Errors
+    /// Images that cannot be read, or [`sightline_geometry::error::Error::Cancelled`].
+    pub fn measure(
+        stops: &dyn Stops,
+        step: usize,
+        (mode, preset): (OdometryMode, OdometryPreset),
+        cancel: Cancel<'_>,
+    ) -> Result<Self> {
+        let by_wheels = stops.site_from_rover(step);
+        let update = between(stops, step, &by_wheels, preset, cancel)?;
+        let update = OdometryUpdate { table: Vec::new(), ..update };
+        let corrects = mode == OdometryMode::Full && update.accepted;
+        Ok(Self { preset, wheels_site_from_rover: PoseRecord::from(&by_wheels), corrects, update })
+    }
+
+    /// The same update once more, with its corners, which no stop keeps.
+    ///
+    /// # Errors
+    /// As [`Self::measure`].
+    pub fn again(&self, stops: &dyn Stops, step: usize, cancel: Cancel<'_>) -> Result<OdometryUpdate> {
+        between(stops, step, &self.wheels_site_from_rover.to_pose(), self.preset, cancel)
+    }
+
+    /// The estimated pose of the stop, where that of the stop before is `before`; both site frame.
+    pub fn pose_after(&self, before: &Pose) -> Pose {
+        let accepted = self.update.accepted_motion().filter(|_| self.corrects);
+        accepted.map_or_else(|| self.wheels_site_from_rover.to_pose(), |motion| before * motion.inverse())
+    }
+
+    /// Refuses implausible values, as a file may have them.
+    ///
+    /// # Errors
+    /// A sentence that begins with the field.
+    pub fn check(&self) -> Result<(), String> {
+        let motion = self.update.after_from_before;
+        if !(self.wheels_site_from_rover.is_plausible() && motion.is_none_or(|motion| motion.is_plausible()))
+        {
+            return Err(
+                "odometry: its poses must have positions in m and quaternions of unit length".to_owned()
+            );
+        }
+        let is_covariance = |matrix: &Matrix6<f64>| {
+            matrix.iter().all(|value| value.is_finite())
+                && (matrix - matrix.transpose()).amax() <= 1e-9 * matrix.amax()
+                && matrix.diagonal().iter().all(|variance| *variance >= 0.0)
+        };
+        if !self.update.covariance.iter().all(is_covariance) {
+            return Err("odometry.update.covariance: must be a symmetric matrix without negative variances"
+                .to_owned());
+        }
+        if self.corrects && (self.update.accepted_motion().is_none() || self.update.covariance.is_none()) {
+            return Err("odometry.corrects: needs an accepted motion with its covariance".to_owned());
+        }
+        Ok(())
+    }
+
+    /// Movement of the rover's origin by vision, rover frame of the stop before, m.
+    fn displacement(&self) -> Option<Vector3> {
+        Some(self.update.after_from_before?.to_pose().inverse().translation.vector)
+    }
+
+    /// Distance between the places by vision and by wheels, m.
+    fn wheels_apart_m(&self) -> Option<f64> {
+        Some((self.displacement()? - Vector3::from(self.update.wheels_m)).norm())
+    }
+
+    /// The covariance of the pose change, where it is by vision.
+    fn covariance(&self) -> Option<Matrix6<f64>> {
+        self.update.covariance.filter(|_| self.corrects)
+    }
+}
+
+/// The error of the pose change from the stop before to stop `step`.
+pub fn pose_change_error(stops: &dyn Stops, step: usize) -> PoseChangeError {
+    let measured = stops.measured_motion(step).and_then(MeasuredMotion::covariance);
+    measured.map_or_else(|| PoseChangeError::Modelled(stops.odometry_error()), PoseChangeError::Measured)
+}
+
+fn between(
+    stops: &dyn Stops,
+    step: usize,
+    by_wheels: &Pose,
+    preset: OdometryPreset,
+    cancel: Cancel<'_>,
+) -> Result<OdometryUpdate> {
+    let pairs = [stops.capture(step - 1, cancel)?, stops.capture(step, cancel)?];
+    let view = |number: usize| {
+        let stop = step - 1 + number;
+        let (left, right) = stops.cameras(stop);
+        OdometryView { pair: &pairs[number], left, right, mast_angles: stops.mast_angles(stop) }
+    };
+    let predicted = by_wheels.inverse() * stops.site_from_rover(step - 1);
+    let error_rad = stops.pointing_error_deg().to_radians();
+    update(&OdometryInput {
+        before: view(0),
+        after: view(1),
+        predicted_after_from_before: &predicted,
+        mast: stops.mast().map(|mast| (mast, error_rad)),
+        settings: &preset.settings(),
+        cancel,
+    })
+}
+
+impl Record for MeasuredMotion {
+    fn declare(r: &mut Declaration<Self>) {
+        r.quantity("accepted", Unit::One, |m| m.update.accepted).describe("Whether every gate is passed.");
+        r.quantity("corrects", Unit::One, |m| m.corrects)
+            .describe("Whether the estimated pose of the stop is by this motion.");
+        r.quantity("slip", Unit::One, |m| m.update.slip.map(|slip| slip.along))
+            .describe("Part of the wheels' motion that was lost along it; 1: the rover stayed.");
+        r.quantity("slip_aside", Unit::One, |m| m.update.slip.map(|slip| slip.aside))
+            .describe("Movement to the right of the wheels' motion, as a part of it.");
+        r.quantity("slip_sigma", Unit::One, |m| m.update.slip.map(|slip| slip.along_sigma))
+            .describe("1σ error of the slip.");
+        r.quantity("motion_m", Unit::Metre, |m| m.displacement().map(Point3::from))
+            .describe("Movement of the rover's origin by vision, in the rover frame of the stop before.");
+        r.quantity("wheels_apart_m", Unit::Metre, Self::wheels_apart_m)
+            .describe("Distance between the places of the rover by vision and by wheels.");
+        r.quantity("sigma_m", Unit::Metre, |m| {
+            m.update.covariance.map(|covariance| worst_sigma_m(&covariance))
+        })
+        .describe("1σ error of the translation in its worst direction.");
+        r.quantity("corners", Unit::One, |m| m.update.corners).describe("Corners of the left image before.");
+        r.quantity("points", Unit::One, |m| m.update.points).describe("Corners with a position by stereo.");
+        r.quantity("matches", Unit::One, |m| m.update.matches)
+            .describe("Points matched in both images after.");
+        r.quantity("inliers", Unit::One, |m| m.update.inliers)
+            .describe("Matches that agree with the motion.");
+        r.quantity("chi2_per_dof", Unit::One, |m| m.update.chi2_per_dof)
+            .describe("χ² per degree of freedom of the residuals.");
+        r.quantity("change", Unit::One, |m| m.update.change)
+            .describe("Mean change of the view: 0.1 where windows grow by a tenth.");
+        r.quantity("ambiguity", Unit::One, |m| m.update.ambiguity)
+            .describe("Inliers of another motion as a part of those of the motion.");
+        for kind in super::gates::KINDS {
+            r.gate(kind.name, kind.unit, kind.side, "");
+        }
+        r.gates(|m| m.update.gates.iter().map(GateRecord::from).collect());
+        r.reason(|m| m.update.refusal());
+    }
+}
+
+fn worst_sigma_m(covariance: &Matrix6<f64>) -> f64 {
+    covariance.fixed_view::<3, 3>(0, 0).into_owned().symmetric_eigenvalues().max().max(0.0).sqrt()
+}

@@ -1,0 +1,112 @@
+//! Drives whose poses vision corrects: on a slope where the wheels slip, and with wheels that turn on the spot.
+
+use std::path::Path;
+
+use sightline_geometry::cancel::Cancel;
+use sightline_geometry::frames::Pose;
+use sightline_recordings::{DrivenTraverse, Traverse};
+use sightline_rover::driving::{DriveCommand, StopReason};
+use sightline_rover::visual_odometry::OdometryMode;
+use sightline_session::driving::TargetedDrive;
+use sightline_track::settings::Settings;
+use sightline_track::target::Designation;
+use sightline_world::scenario::{ClearPath, ForcedSlip, OdometryModel};
+use sightline_world::target_truth::TruthSource;
+use sightline_world::{Scenario, choose_targets, library};
+
+/// A slope on which the wheels lose a third of their way and slide aside.
+fn slope() -> Scenario {
+    let mut scenario = Scenario { seed: 5301, ..library::scenario("approach-10").unwrap() };
+    (scenario.camera.image_size, scenario.camera.samples_per_axis) = (512, 2);
+    scenario.targets.window_px = 11;
+    (scenario.terrain.slope_deg, scenario.terrain.slope_azimuth_deg) = (16.0, 60.0);
+    (scenario.rover.slip_scale, scenario.rover.slip_spread) = (1.0, 0.2);
+    scenario.rover.odometry = OdometryModel::WheelsAndImu;
+    scenario.rocks.clear_path = Some(ClearPath::default());
+    scenario
+}
+
+fn drive(scenario: &Scenario, command: DriveCommand, stops: usize, folder: &Path) -> TargetedDrive {
+    let world = DrivenTraverse::begin(scenario, folder, Cancel::default()).unwrap();
+    let traverse = world.traverse();
+    let pixel = choose_targets(traverse.world().unwrap(), scenario, traverse.index())[0];
+    let (settings, cancel) = (Settings::default(), Cancel::default());
+    let mut drive =
+        TargetedDrive::begin(world, Designation::new(0, pixel), command, &settings, cancel).unwrap();
+    while drive.steps.len() < stops && drive.advance(&settings, cancel).unwrap() {}
+    drive
+}
+
+fn with(odometry: OdometryMode) -> DriveCommand {
+    DriveCommand { odometry, tilt_max_deg: 40.0, ..DriveCommand::default() }
+}
+
+/// Distance of the estimated pose from the true one at the last stop, m, and the angle between them, deg.
+fn off(traverse: &Traverse) -> (f64, f64) {
+    let last = traverse.stop_count() - 1;
+    let truth = TruthSource::true_site_from_rover(traverse, last).unwrap();
+    let apart: Pose = truth.inverse() * traverse.site_from_rover(last);
+    (apart.translation.vector.norm(), apart.rotation.angle().to_degrees())
+}
+
+#[test]
+fn on_a_slope_vision_keeps_the_pose_that_wheels_lose() {
+    let folder = tempfile::tempdir().unwrap();
+    let [full, check, none] = [OdometryMode::Full, OdometryMode::SlipCheck, OdometryMode::Off]
+        .map(|mode| drive(&slope(), with(mode), 6, &folder.path().join(format!("{mode:?}"))));
+    let [seen, checked, blind] = [&full, &check, &none].map(|drive| off(drive.world.traverse()));
+    println!("{seen:?} {checked:?} {blind:?}");
+    assert!(seen.0 < 0.02 && seen.1 < 0.2, "{seen:?}");
+    assert!(blind.0 > 0.2 && checked.0 > 0.2, "{blind:?} {checked:?}");
+    for step in &full.steps[1..] {
+        let measured = step.odometry.as_ref().unwrap();
+        assert!(measured.corrects && measured.update.accepted, "{:?}", measured.update.refusal());
+        // The covariance of the prediction is that of vision, an order below that of wheels.
+        let sigma_m = step.prediction().unwrap().covariance_in_rover.symmetric_eigenvalues().max().sqrt();
+        assert!(sigma_m < 0.1, "{sigma_m}");
+    }
+    for (step, blind) in check.steps[1..].iter().zip(&none.steps[1..]) {
+        let measured = step.odometry.as_ref().unwrap();
+        let slip = measured.update.slip.unwrap();
+        assert!(!measured.corrects && slip.along.hypot(slip.aside) > 0.05, "{slip:?}");
+        assert!(blind.odometry.is_none());
+    }
+    // No step is longer than odometry follows, and the next step makes its slip good.
+    let reports = full.cycles.iter().filter_map(|cycle| cycle.report);
+    assert!(reports.clone().all(|report| report.wheels_m < 1.51));
+}
+
+#[test]
+fn a_drive_with_odometry_is_resumed_with_the_same_bits_and_replayed_with_the_same_poses() {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = drive(&slope(), with(OdometryMode::Full), 4, &folder.path().join("whole"));
+    let opened = Traverse::open(&folder.path().join("whole")).unwrap();
+    for stop in 0..opened.stop_count() {
+        assert_eq!(opened.site_from_rover(stop), whole.world.traverse().site_from_rover(stop));
+        assert_eq!(opened.index().stops[stop].odometry, whole.world.state()[stop].odometry);
+    }
+    let resumed = DrivenTraverse::resume(&folder.path().join("whole")).unwrap();
+    assert_eq!(resumed.state(), whole.world.state());
+    let again = drive(&slope(), with(OdometryMode::Full), 4, &folder.path().join("again"));
+    assert_eq!(again.world.state(), whole.world.state());
+    // The corners, which are not kept, come with the same update when it is computed again.
+    let kept = opened.index().stops[2].odometry.as_ref().unwrap();
+    let mut computed = kept.again(&opened, 2, Cancel::default()).unwrap();
+    assert!(computed.table.len() > 50);
+    computed.table.clear();
+    assert_eq!(computed, kept.update);
+}
+
+#[test]
+fn wheels_that_turn_on_the_spot_end_the_drive_with_its_reason() {
+    let mut scenario = slope();
+    (scenario.terrain.slope_deg, scenario.rover.slip_scale) = (2.0, 0.0);
+    scenario.rover.forced_slip = vec![ForcedSlip { stop: 2, slip: 1.0 }, ForcedSlip { stop: 3, slip: 1.0 }];
+    let folder = tempfile::tempdir().unwrap();
+    let checked = drive(&scenario, with(OdometryMode::SlipCheck), 6, &folder.path().join("checked"));
+    let ending = checked.ending().unwrap();
+    assert_eq!((ending.reason, checked.steps.len()), (StopReason::Slip, 3));
+    assert!((ending.value.unwrap() - 1.0).abs() < 0.03 && ending.limit == Some(0.9), "{ending:?}");
+    let blind = drive(&scenario, with(OdometryMode::Off), 4, &folder.path().join("blind"));
+    assert!(blind.ending().is_none());
+}
