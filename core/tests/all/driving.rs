@@ -75,10 +75,10 @@ fn a_drive_arrives_within_centimetres_of_the_true_target() {
         let added = step.update.target.covariance_in_rover - located;
         assert!((added - error).norm() < 0.1 * error.norm(), "stop {}", step.step);
     }
-    // No step is longer than a tenth of the distance to the target.
+    // No step is longer than a tenth of the distance to the target, beside what makes good the slip of the step before.
     for (step, cycle) in drive.steps.iter().zip(&drive.cycles) {
         let distance_m = step.update.target.last_distance_m;
-        assert!(cycle.report.is_none_or(|report| report.wheels_m < 0.101 * distance_m));
+        assert!(cycle.report.is_none_or(|report| report.wheels_m < 0.115 * distance_m));
     }
 }
 
