@@ -9,6 +9,7 @@ mod scenery_figure;
 mod scenery_pictures;
 mod scenery_report;
 mod real_motion;
+mod real_odometry;
 mod registration;
 mod trackability;
 mod worlds;
@@ -32,7 +33,7 @@ enum Experiment {
     Realism(realism::Worlds),
     /// The simulated scenery in numbers: rocks, ground, noise and texture against their laws and real frames.
     Scenery(scenery::Scenery),
-    /// Recorded frames: the motion that features find against the motion that is known of them.
+    /// Recorded frames: the motion that features or visual odometry find against the motion that is known of them.
     RealMotion(real_motion::RealMotion),
     /// Rocks registered by their shape: basin of convergence, accuracy, and the result for another rock.
     Registration(registration::Registrations),

@@ -1,7 +1,9 @@
-//! `sightline-experiments real-motion`: the motion that features find between recorded frames, against their poses.
+//! `sightline-experiments real-motion`: the motion that features or visual odometry find between recorded frames, against
+//! their poses.
 
 use std::path::PathBuf;
 
+use super::real_odometry;
 use crate::real_motion::{MotionError, Row, Summary, measure, summarise};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
@@ -11,14 +13,26 @@ use sightline_track::settings::{Changes, Settings, parse_assignment};
 
 use sightline_server::cli::terminal;
 
+/// The configuration of the features without `--preset`.
+const FEATURES: &str = "features";
+
 /// Measure motions between recorded frames.
 #[derive(Debug, Args)]
 pub(super) struct RealMotion {
     /// The folder with the recordings kitti-seq1-frames-0-19, euroc-v101 and opencv-chessboard-stereo.
     #[arg(long, value_name = "FOLDER")]
     data: PathBuf,
+    /// How motions are found; odometry leaves the chessboard out, whose cameras stand still.
+    #[arg(long, default_value = "features")]
+    method: Method,
+    /// A JSON file for the inliers of odometry, which `python/odometry_pnp.py` reads.
+    #[arg(long, value_name = "FILE")]
+    matches: Option<PathBuf>,
+    /// A folder for the frames as odometry is given them: PNG files without distortion.
+    #[arg(long, value_name = "FOLDER")]
+    frames: Option<PathBuf>,
     /// The configuration of the features; `sightline presets` lists them.
-    #[arg(long, default_value = "features", value_name = "NAME")]
+    #[arg(long, default_value = FEATURES, value_name = "NAME")]
     preset: String,
     /// A change to it; can be given more than once.
     #[arg(long, value_name = "KEY=VALUE")]
@@ -28,9 +42,18 @@ pub(super) struct RealMotion {
     format: Format,
 }
 
+/// How motions are found.
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+enum Method {
+    /// By features, without a prediction.
+    Features,
+    /// By visual odometry, with the predictions and settings that `real_motion::odometry` states.
+    Odometry,
+}
+
 /// What is written to the standard output.
 #[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
-enum Format {
+pub(super) enum Format {
     /// A line for every pair of frames, then one for every set.
     Text,
     /// One JSON object with both.
@@ -48,8 +71,19 @@ impl RealMotion {
     /// Measures the motions and says them.
     ///
     /// # Errors
-    /// A recording that is missing or damaged, an unknown configuration, or a bad setting.
+    /// A recording that is missing or damaged, an unknown configuration, a bad setting, options of the other method, or a file
+    /// that cannot be written.
     pub(super) fn run(&self) -> Result<()> {
+        if self.method == Method::Odometry {
+            if !self.set.is_empty() || self.preset != FEATURES {
+                return Err(Error::Request("--preset and --set need --method features".to_owned()));
+            }
+            let [matches, frames] = [&self.matches, &self.frames].map(Option::as_deref);
+            return real_odometry::run(&self.data, self.format, matches, frames);
+        }
+        if self.matches.is_some() || self.frames.is_some() {
+            return Err(Error::Request("--matches and --frames need --method odometry".to_owned()));
+        }
         let rows = measure(&self.data, &self.settings()?.features)?;
         let sets = summarise(&rows);
         if self.format == Format::Json {
@@ -68,7 +102,7 @@ impl RealMotion {
 }
 
 /// One motion in a line.
-fn row_words(row: &Row) -> String {
+pub(super) fn row_words(row: &Row) -> String {
     let error = row.error.map_or_else(|| "no motion found".to_owned(), error_words);
     format!(
         "{:26} {:>8}  {:4} of {:4} matches agree  {:7.2}° {:6.3} m  {error}",
@@ -87,7 +121,7 @@ fn error_words(error: MotionError) -> String {
 }
 
 /// One set in a line: each error as median and worst.
-fn set_words(set: &Summary) -> String {
+pub(super) fn set_words(set: &Summary) -> String {
     let both = |values: Option<[f64; 2]>, scale: f64, unit: &str| {
         let words = |[median, worst]: [f64; 2]| format!("{:.2}{unit} ({:.2})", scale * median, scale * worst);
         values.map_or_else(|| "-".to_owned(), words)
