@@ -290,3 +290,5 @@ fn pair(left: GrayImage, right: GrayImage) -> StereoPair {
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod odometry_tests;

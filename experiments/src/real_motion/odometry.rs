@@ -58,6 +58,10 @@ pub(crate) struct OdometryRow {
     /// The motion in the frame of the rig, and its error against the truth.
     #[serde(flatten)]
     pub row: Row,
+    /// Corners of the left image before.
+    pub corners: usize,
+    /// Corners with a position by stereo.
+    pub points: usize,
     /// Whether all gates are passed.
     pub accepted: bool,
     /// Why there is no update, as one sentence; null for an accepted one.
@@ -163,6 +167,8 @@ fn odometry_row(row: Row, update: &OdometryUpdate, predicted: &Pose, truth: &Pos
     };
     let found = update.after_from_before.map(PoseRecord::to_pose);
     OdometryRow {
+        corners: update.corners,
+        points: update.points,
         accepted: update.accepted,
         refusal: update.refusal(),
         predicted_after_from_before: PoseRecord::from(predicted),

@@ -10,7 +10,7 @@ use sightline_geometry::frames::Vector3;
 use sightline_track::presets::preset;
 
 /// The folder of the recordings, if it contains `set`.
-fn recorded(set: &str) -> Option<PathBuf> {
+pub(super) fn recorded(set: &str) -> Option<PathBuf> {
     let folder = sightline_testdata::recorded(set, "the recorded motion")?;
     folder.parent().map(Path::to_path_buf)
 }
