@@ -157,7 +157,7 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
     let target_in_site = target_in_site(input, stops);
     let goal = set_goal(input.command, &target_in_site, [start.x, start.y], &pose);
     let (left, right) = stops.cameras(step);
-    let time = FlightTime::of_stop([left.size, right.size]);
+    let time = FlightTime::of_stop([left.size, right.size], stops.measured_motion(step).is_some());
     let flight_minutes = input.before.map_or(0.0, |before| before.flight_minutes) + time.total_s() / 60.0;
     let arrival_actions = input.before.map_or(0, |before| before.arrival_actions);
     let [estimated, by_wheels] = reckoned(stops, input, &pose);

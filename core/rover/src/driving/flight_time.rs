@@ -5,6 +5,7 @@
 //! | point_mast | 5 s | ours |
 //! | capture | 30 s for a 12-bit 1024 × 1024 pair, less with fewer pixels, 5 s at least | R148 |
 //! | locate | 5 s: correlation 4 s, point stereo 1 s | R147 |
+//! | visual odometry | 90 s, where it runs | R149 |
 //! | drive | 3.75 cm/s, 2.1°/s | domain.md 5.4 |
 //!
 //! Unit: s.
@@ -18,10 +19,15 @@ const CAPTURE_S: f64 = 30.0;
 const CAPTURE_PX: f64 = 2.0 * 1024.0 * 1024.0;
 /// Transfer of the smallest pair, s.
 const CAPTURE_MIN_S: f64 = 5.0;
+/// One update of visual odometry, s.
+const ODOMETRY_S: f64 = 90.0;
 
 /// Time of one stop on Mars by stage, s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct FlightTime {
+    /// Measuring the motion to the stop by vision; 0 where that is not done.
+    #[serde(default)]
+    pub odometry_s: f64,
     /// Turning the mast.
     pub point_mast_s: f64,
     /// Exposing and transferring the pair.
@@ -34,31 +40,29 @@ pub struct FlightTime {
 
 impl FlightTime {
     /// A stop whose images have these sizes, px, without the drive that follows.
-    pub fn of_stop(image_sizes: [[u32; 2]; 2]) -> Self {
+    pub fn of_stop(image_sizes: [[u32; 2]; 2], with_odometry: bool) -> Self {
         let pixels: f64 =
             image_sizes.iter().map(|[width, height]| f64::from(*width) * f64::from(*height)).sum();
         let capture_s = (CAPTURE_S * pixels / CAPTURE_PX).max(CAPTURE_MIN_S);
-        Self { point_mast_s: 5.0, capture_s, locate_s: 5.0, drive_s: 0.0 }
+        let odometry_s = if with_odometry { ODOMETRY_S } else { 0.0 };
+        Self { odometry_s, point_mast_s: 5.0, capture_s, locate_s: 5.0, drive_s: 0.0 }
     }
 
-    /// The time of a stage, s; 0 for those that take next to none.
+    /// The time of a stage, s; 0 for those that take next to none. Visual odometry comes before the prediction and counts with it.
     pub const fn of(&self, stage: CycleStage) -> f64 {
         match stage {
+            CycleStage::Predict => self.odometry_s,
             CycleStage::PointMast => self.point_mast_s,
             CycleStage::Capture => self.capture_s,
             CycleStage::Locate => self.locate_s,
             CycleStage::Drive => self.drive_s,
-            CycleStage::Predict
-            | CycleStage::Judge
-            | CycleStage::Update
-            | CycleStage::SetGoal
-            | CycleStage::SelectPath => 0.0,
+            CycleStage::Judge | CycleStage::Update | CycleStage::SetGoal | CycleStage::SelectPath => 0.0,
         }
     }
 
     /// All stages together, s.
     pub(crate) fn total_s(&self) -> f64 {
-        self.point_mast_s + self.capture_s + self.locate_s + self.drive_s
+        self.odometry_s + self.point_mast_s + self.capture_s + self.locate_s + self.drive_s
     }
 }
 
@@ -69,8 +73,11 @@ mod tests {
     #[test]
     fn an_update_takes_half_a_minute_to_a_minute_as_in_flight() {
         // R149: one update 0.5 to 1 min with full pairs; small pairs are several seconds faster.
-        let full = FlightTime::of_stop([[1024, 1024]; 2]).total_s();
+        let full = FlightTime::of_stop([[1024, 1024]; 2], false).total_s();
         assert!((30.0..60.0).contains(&full), "{full}");
-        assert!(FlightTime::of_stop([[256, 256]; 2]).total_s() < 0.5 * full);
+        assert!(FlightTime::of_stop([[256, 256]; 2], false).total_s() < 0.5 * full);
+        // R149: 1.5 to 2 min for an update of visual odometry.
+        let with_odometry = FlightTime::of_stop([[1024, 1024]; 2], true).total_s();
+        assert!((90.0..=120.0).contains(&(with_odometry - full)), "{with_odometry}");
     }
 }
