@@ -32,6 +32,7 @@ mod page_cameras;
 mod page_compare;
 mod page_debugger;
 mod page_driving;
+mod page_odometry;
 mod page_exports;
 mod page_figures;
 mod page_first;

@@ -32,7 +32,8 @@ pub mod settings;
 mod windows;
 
 pub use coarse::{CoarseSearch, Translation};
-pub use measured::{MeasuredMotion, OdometryMode, pose_change_error};
+pub(crate) use measured::pose_change_error;
+pub use measured::{MeasuredMotion, OdometryMode};
 pub use outcome::{Fate, OdometryCorner, OdometryUpdate, Slip};
 pub use settings::{OdometryPreset, OdometrySettings};
 

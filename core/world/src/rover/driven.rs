@@ -19,21 +19,20 @@ use serde::{Deserialize, Serialize};
 use sightline_geometry::camera::MastAngles;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
-use sightline_geometry::frames::{POSITION_LIMIT_M, Pixel, Point3, Pose, PoseRecord, Vector3};
+use sightline_geometry::frames::{POSITION_LIMIT_M, Pixel, Pose, PoseRecord, Vector3};
 
 use sightline_rover::visual_odometry::MeasuredMotion;
 use sightline_track::cycle_stage::CycleStage;
 
 use crate::ground::texture::mix;
 use crate::index::{PAUSE_S, Rigs, simulated_stop};
-use crate::rover::body::parts;
 use crate::rover::course::{SPEED_M_S, TURN_RAD_S};
 use crate::rover::drive::{first_stop, in_scene};
 use crate::rover::mast_error;
 use crate::rover::odometry::Belief;
 use crate::rover::scene::{Leg, Place, Scene, pieces};
 use crate::rover::slip::{self, Slip};
-use crate::rover::suspension::Stand;
+use crate::rover::touch::touched_rocks;
 use crate::rover::tracks::places_m;
 use crate::scenario::Scenario;
 use crate::traverse::{Stop, StopTruth, WheelPlaces};
@@ -268,24 +267,6 @@ fn slip_factor(scenario: &Scenario, number: usize) -> f64 {
 
 fn no_stand(place: Place) -> Error {
     Error::Request(format!("the wheels find no stand at x {:.2} m, y {:.2} m", place.x_m, place.y_m))
-}
-
-/// How many rocks reach into the body of a standing rover, its wheels and arms left out.
-fn touched_rocks(world: &World, stand: &Stand) -> u32 {
-    let boxes = parts(&stand.angles);
-    let is_inside = |point: Point3| {
-        boxes.iter().filter(|part| matches!(part.name, "body" | "deck")).any(|part| {
-            let off = point - part.centre;
-            part.half_axes.iter().all(|half| off.dot(half).abs() <= half.norm_squared())
-        })
-    };
-    let rover_from_site: Pose = stand.site_from_rover.inverse();
-    let origin = stand.site_from_rover * Point3::origin();
-    let near = world.rocks().iter().filter(|rock| (rock.centre - origin).norm() < 2.0 + rock.radius_m);
-    let touched = near.filter(|rock| {
-        rock.vertices().iter().any(|vertex| is_inside(rover_from_site * (rock.centre + vertex)))
-    });
-    touched.count() as u32
 }
 
 #[cfg(test)]

@@ -15,4 +15,5 @@ pub mod driven;
 pub mod odometry;
 pub(crate) mod mast_error;
 pub(crate) mod body;
+mod touch;
 pub(crate) mod tracks;
