@@ -17,13 +17,13 @@ pub struct OdometryError {
 }
 
 /// The error of the change of the pose estimate from one stop to the next.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum PoseChangeError {
     /// That of wheels, gyro and accelerometers.
     Modelled(OdometryError),
     /// The covariance of a small motion (translation in m, turn in rad) about the rover's origin that follows the change; rover
     /// frame after.
-    Measured(Matrix6<f64>),
+    Measured(Box<Matrix6<f64>>),
 }
 
 impl Default for OdometryError {

@@ -54,7 +54,7 @@ impl Reckoned {
                 let mut level = Matrix3x6::zeros();
                 level.fixed_view_mut::<2, 3>(0, 0).copy_from(&axes.matrix().fixed_rows::<2>(0));
                 level.fixed_view_mut::<1, 3>(2, 3).copy_from(&axes.matrix().fixed_rows::<1>(2));
-                self.grown_by(there.position_m, level * covariance * level.transpose())
+                self.grown_by(there.position_m, level * **covariance * level.transpose())
             }
         };
         Self { covariance, ..there }

@@ -119,7 +119,10 @@ impl MeasuredMotion {
 /// The error of the pose change from the stop before to stop `step`.
 pub(crate) fn pose_change_error(stops: &dyn Stops, step: usize) -> PoseChangeError {
     let measured = stops.measured_motion(step).and_then(MeasuredMotion::covariance);
-    measured.map_or_else(|| PoseChangeError::Modelled(stops.odometry_error()), PoseChangeError::Measured)
+    measured.map_or_else(
+        || PoseChangeError::Modelled(stops.odometry_error()),
+        |covariance| PoseChangeError::Measured(Box::new(covariance)),
+    )
 }
 
 fn between(

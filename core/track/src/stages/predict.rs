@@ -89,7 +89,7 @@ fn motion_covariance(point: &Point3, way: &Vector3, error: &PoseChangeError) -> 
             let mut moved = Matrix3x6::zeros();
             moved.fixed_view_mut::<3, 3>(0, 0).copy_from(&Matrix3::identity());
             moved.fixed_view_mut::<3, 3>(0, 3).copy_from(&-cross);
-            return moved * covariance * moved.transpose();
+            return moved * **covariance * moved.transpose();
         }
     };
     let length_m = way.norm();
