@@ -174,10 +174,7 @@ impl DrivenTraverse {
     /// # Errors
     /// An index that cannot be read.
     pub fn snapshot(&self) -> Result<Traverse> {
-        let mut copy = Traverse::open(self.traverse.folder())?;
-        if let Some(world) = self.traverse.simulated.as_ref().and_then(|simulated| simulated.world.get()) {
-            copy.keep_world(world.clone());
-        }
+        let mut copy = self.traverse.reopened()?;
         copy.awaits = self.awaits();
         Ok(copy)
     }

@@ -17,6 +17,7 @@ mod simulated;
 mod simulated_traverse;
 mod stops;
 mod truth_files;
+mod with_odometry;
 
 pub use driven::DrivenTraverse;
 pub use index_file::{Existing, IndexFormat};

@@ -125,6 +125,18 @@ impl Traverse {
         Ok(Self { folder, index_path, index, cameras, warnings, stores, simulated, awaits: None })
     }
 
+    /// The same folder, opened anew, with the world that is built already.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub(super) fn reopened(&self) -> Result<Self> {
+        let copy = Self::open(&self.folder)?;
+        if let Some(world) = self.simulated.as_ref().and_then(|simulated| simulated.world.get()) {
+            copy.keep_world(world.clone());
+        }
+        Ok(copy)
+    }
+
     /// The same traverse, which shares a cache with others.
     #[must_use]
     pub fn with_cache(mut self, cache: &Arc<Cache>) -> Self {

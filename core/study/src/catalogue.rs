@@ -7,7 +7,7 @@
 //! | `turn-in-place` | K§5.3, R123 | turn-in-place | `turn_step_deg` |
 //! | `claim` | abstract, R127 | claim (`randomised`) | none: the seed draws drive and light as well |
 //! | `approach` | K§4.2, R41, R46 | approach-10 | none |
-//! | `terrain` | K§5.5, R124–R126 | slope-…, stuck | `terrain` |
+//! | `terrain` | K§5.5, R124–R126 | slope-…, stuck | `terrain` × `odometry` |
 //! | `checkout-1`, `-2`, `-3` | K§7.1–7.3, R130–R143 | checkout-… | `position`: one row a step |
 //! | `faults` | K§4.6, R88, R126 | several | `fault` |
 //! | `recovery` | D§4, R155, R214 | k9-5 | `start_error_cm` |
@@ -21,6 +21,7 @@ use serde_json::Value;
 
 use super::point::{Fault, Picks, Point, Visit};
 use sightline_geometry::error::{Error, Result};
+use sightline_rover::visual_odometry::OdometryMode;
 use sightline_track::presets::PRESETS;
 
 /// What the grid of a study may hold.
@@ -59,6 +60,10 @@ pub struct Study {
 
 /// The search windows of the sideways study, px (R120: 200 and 600; a window here has an odd side).
 pub(crate) const SIDEWAYS_WINDOWS_PX: [u32; 2] = [201, 601];
+
+/// What visual odometry is used for in the terrain study.
+const ODOMETRY: [(&str, OdometryMode); 3] =
+    [("off", OdometryMode::Off), ("slip-check", OdometryMode::SlipCheck), ("full", OdometryMode::Full)];
 
 /// The step at which a jump happens.
 const JUMP_STEP: usize = 3;
@@ -153,7 +158,7 @@ pub const STUDIES: &[Study] = &[
         default_grid: TERRAINS,
         ..study(
             "terrain",
-            "Does tracking survive slopes and slip with wheels and gyro as the only sense of place (K§5.5, R124–R126)?",
+            "Does tracking survive slopes and slip, without and with visual odometry (K§5.5, R124–R126)?",
             &["sightline", "ncc-scale-roll"],
         )
     },
@@ -309,7 +314,10 @@ impl Study {
                 let point = Point { visit: Visit::Every(step_deg as usize / 5), ..point };
                 Ok(if self.name == "sideways" { with_windows(&point) } else { vec![point] })
             }
-            Grid::Words(words) if words.contains(&value) => Ok(vec![self.word(value)]),
+            Grid::Words(words) if words.contains(&value) => {
+                let point = self.word(value);
+                Ok(if self.name == "terrain" { with_odometry(&point) } else { vec![point] })
+            }
             Grid::Words(words) => Err(format!("must be one of {}", words.join(", "))),
             Grid::One => Err(format!("the study {} has no grid", self.name)),
         }
@@ -371,6 +379,16 @@ fn with_windows(point: &Point) -> Vec<Point> {
         point
     };
     SIDEWAYS_WINDOWS_PX.map(with).to_vec()
+}
+
+/// A point of the terrain study with each use of visual odometry.
+fn with_odometry(point: &Point) -> Vec<Point> {
+    let with = |(word, mode): (&str, OdometryMode)| {
+        let mut point = point.clone();
+        point.variables.push(("odometry".to_owned(), word.into()));
+        Point { odometry: Some(mode), ..point }
+    };
+    ODOMETRY.map(with).to_vec()
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 //! plan        what is to be done, keys   staged      a drive as a study stages it
 //! picks       which pixels, and faults   run         one target tracked and judged     step_record   one step of it
 //! row         the table's rows           evenness    rows of targets                   calibration   NEES
+//! by_pose     why targets are lost, odometry   terrain_table   Table II
 //! wire        what page and server say to each other about studies
 //! randomised  approaches that the seed draws
 //! ```
@@ -19,11 +20,14 @@ pub mod paper;
 pub mod plan;
 pub mod picks;
 mod step_record;
+pub mod by_pose;
+pub mod by_pose_row;
 pub mod run;
 mod evenness;
 mod hand_over;
 mod hand_over_row;
 pub mod hand_over_table;
+pub mod terrain_table;
 mod spread;
 pub mod row;
 pub mod odometry;

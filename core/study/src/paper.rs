@@ -52,6 +52,47 @@ impl Study {
     }
 }
 
+/// A line of Table II: tracking with visual odometry on terrains (K§5.5, R125).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct PaperTerrain {
+    /// The scenario of ours.
+    pub terrain: &'static str,
+    /// The paper's word for it.
+    pub word: &'static str,
+    /// Trials.
+    pub trials: u32,
+    /// Failures.
+    pub failures: u32,
+    /// Their cause, as printed in short.
+    pub cause: &'static str,
+}
+
+/// Table II (R125); its total is 26 trials with 2 failures.
+pub const TABLE_II: [PaperTerrain; 4] = [
+    PaperTerrain {
+        terrain: "slope-flat",
+        word: "Flat",
+        trials: 11,
+        failures: 1,
+        cause: "azimuth change above 10° with occlusion",
+    },
+    PaperTerrain { terrain: "slope-shallow", word: "Shallow incline", trials: 4, failures: 0, cause: "–" },
+    PaperTerrain {
+        terrain: "slope-steep",
+        word: "Steep incline",
+        trials: 6,
+        failures: 0,
+        cause: "none although slip reached 100 % at times",
+    },
+    PaperTerrain {
+        terrain: "slope-oblique",
+        word: "Oblique",
+        trials: 5,
+        failures: 1,
+        cause: "dramatic lighting change",
+    },
+];
+
 /// Table III (R133), by position.
 fn checkout_1() -> Vec<PaperValue> {
     let table: [(&'static str, [f64; 7]); 4] = [

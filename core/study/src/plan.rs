@@ -8,6 +8,7 @@
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use super::by_pose_row::DriveOdometry;
 use super::catalogue::Study;
 use super::point::Point;
 use sightline_geometry::error::{Error, Result};
@@ -143,6 +144,9 @@ pub struct Unit {
     pub configuration: String,
     /// The point of the grid.
     pub point: Point,
+    /// What odometry did in the drive, where the study asks.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub odometry: Option<DriveOdometry>,
     /// The runs, one a target.
     pub runs: Vec<super::run::Run>,
 }

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use sightline_rover::visual_odometry::OdometryMode;
 use sightline_track::settings::TrackerKind;
 
 /// Which stops of a drive are visited.
@@ -103,6 +104,9 @@ pub struct Point {
     pub changes: Vec<String>,
     /// What goes wrong.
     pub fault: Option<Fault>,
+    /// What visual odometry is used for in the drive; `None` where the study does not ask: the poses are those of the scenario.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub odometry: Option<OdometryMode>,
 }
 
 impl Point {
@@ -115,6 +119,7 @@ impl Point {
             picks: Picks::Rule,
             changes: Vec::new(),
             fault: None,
+            odometry: None,
         }
     }
 }

@@ -3,7 +3,7 @@
 //! Counts are of runs, one a target, judged at the last step (R116), unless they end in `_steps`. Targets on an occluding
 //! boundary that stand among others are counted apart, as the paper does (R119), and so are those before which another
 //! rock passes on the way. A refused designation is a target that
-//! was not tracked. *False tracking*: state `tracking` while not tracked. *False loss*: lost or failed while the
+//! was not tracked, and so is one at which the drive ended early because the wheels slipped (`not_driven`). *False tracking*: state `tracking` while not tracked. *False loss*: lost or failed while the
 //! evidence, had it been accepted, was right. Where the truth is hidden at the last step the run is `unjudged`.
 //!
 //! Errors at the last step come with their number: `err_px`, `err_m` and `drift_m` of the runs that are tracked, and
@@ -17,6 +17,7 @@ use utoipa::ToSchema;
 
 use sightline_geometry::estimate::quantile::median;
 
+use super::by_pose_row::DriveOdometry;
 use super::calibration::Calibration;
 use super::catalogue::Study;
 use super::confidence::Trust;
@@ -67,7 +68,9 @@ pub fn rows(study: &Study, unit: &Unit) -> Vec<Row> {
     if study.is_by_step {
         unit.runs.iter().flat_map(by_step).map(row).collect()
     } else {
-        vec![row(columns(&unit.runs.iter().collect::<Vec<_>>(), 1))]
+        let mut columns = columns(&unit.runs.iter().collect::<Vec<_>>(), 1);
+        columns.extend(unit.odometry.iter().flat_map(DriveOdometry::columns));
+        vec![row(columns)]
     }
 }
 
@@ -111,12 +114,13 @@ pub fn columns(runs: &[&Run], worlds: usize) -> BTreeMap<String, Value> {
     }
     columns.extend(faults(&own));
     columns.extend(super::hand_over_row::columns(&own));
+    columns.extend(super::by_pose_row::columns(&own));
     columns
 }
 
-/// Whether a run is tracked at its last step.
+/// Whether a run is tracked at the last step of the drive.
 pub fn is_tracked(run: &Run) -> bool {
-    run.summary.run_tracked == Some(true)
+    run.summary.run_tracked == Some(true) && !run.is_not_driven()
 }
 
 fn counts(runs: &[&Run]) -> BTreeMap<String, Value> {

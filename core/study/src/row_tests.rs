@@ -78,6 +78,7 @@ fn a_row_is_flat_json() {
         seed: 7,
         configuration: "ncc".to_owned(),
         point: Point::plain("approach-5", "n_skip", 4),
+        odometry: None,
         runs: vec![run("all", Some(true), "tracking", 0.01)],
     };
     let rows = rows(Study::named("straight").unwrap(), &unit);

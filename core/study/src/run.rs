@@ -16,6 +16,7 @@ use std::sync::atomic::AtomicBool;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::by_pose::ByPose;
 use super::confidence::Trust;
 use super::hand_over::HandOver;
 use super::point::{Fault, Point};
@@ -87,6 +88,9 @@ pub struct Run {
     /// What the shape was worth, where it was asked.
     #[serde(default)]
     pub hand_over: HandOver,
+    /// Why it was lost, where the study asks for the effect of the poses.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub by_pose: Option<ByPose>,
     /// What became of it at the last step; null without truth.
     pub end: Option<Fate>,
     /// Whether the last step was lost although its evidence was right.
@@ -100,6 +104,19 @@ pub struct Run {
     /// Every step, where the study asks for them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub steps: Vec<StepRecord>,
+}
+
+impl Run {
+    /// Takes in that slip ended the drive at the last step: a target that is tracked there is not driven to the end.
+    pub fn end_early(&mut self) {
+        let is_tracked = self.end == Some(Fate::Tracked);
+        self.by_pose.iter_mut().for_each(|by_pose| by_pose.not_driven = is_tracked);
+    }
+
+    /// Whether it was tracked at the stop at which slip ended the drive.
+    pub fn is_not_driven(&self) -> bool {
+        self.by_pose.as_ref().is_some_and(|by_pose| by_pose.not_driven)
+    }
 }
 
 /// Who waits for a study: told after every run, and able to stop it.
@@ -130,6 +147,7 @@ pub fn measure<D: Drive>(
     };
     let one = |(target, chosen): (usize, &Chosen)| -> Result<Run> {
         let mut follower = Follower::new(target, chosen, keep_steps);
+        follower.run.by_pose = point.odometry.map(|_| ByPose::default());
         follower.follow(&staged, settings, watch.cancel)?;
         (watch.tell)();
         Ok(follower.run)
@@ -161,6 +179,7 @@ impl Follower {
             nees: None,
             trust: Trust::default(),
             hand_over: HandOver::default(),
+            by_pose: None,
             end: None,
             end_is_false_loss: false,
             fault_step: chosen.fault_step,
@@ -182,7 +201,7 @@ impl Follower {
             }
         };
         let mut last = first.clone();
-        self.record(drive, None, &first, &last);
+        self.record(drive, None, [&first, &last], settings);
         while last.step + 1 < drive.stop_count() {
             let next = NextStep {
                 first: &first,
@@ -194,20 +213,27 @@ impl Follower {
                 cancel: cancel.into(),
             };
             let next = next.compute(drive)?;
-            self.record(drive, Some(&last), &first, &next);
+            self.record(drive, Some(&last), [&first, &next], settings);
             last = next;
         }
         self.conclude(drive, &first, &last);
         Ok(())
     }
 
-    fn record<D: Drive>(&mut self, drive: &D, before: Option<&RunStep>, first: &RunStep, trace: &RunStep) {
+    fn record<D: Drive>(
+        &mut self,
+        drive: &D,
+        before: Option<&RunStep>,
+        [first, trace]: [&RunStep; 2],
+        settings: &Settings,
+    ) {
         if let Some(before) = before {
             self.run.hand_over.add(drive, [first, before, trace]);
             self.run.trust.add(drive, trace, drift_m(drive, first, trace));
         }
         add(&mut self.run.summary, &summarise([trace]));
         let fate = fate(drive, trace);
+        self.run.by_pose.iter_mut().for_each(|by_pose| by_pose.add(trace, fate, settings));
         if let Some(at) = self.run.fault_step.filter(|at| trace.step >= *at) {
             self.run.at_fault = if trace.step == at { fate } else { self.run.at_fault };
             self.run.false_after_fault += usize::from(fate == Some(Fate::False));

@@ -19,6 +19,7 @@ use sightline_geometry::odometry_error::OdometryError;
 use sightline_geometry::stereo_geometry::StereoGeometry;
 use sightline_rover::pair::{FurtherCamera, FurtherImages, StopPair};
 use sightline_rover::pipeline::Stops;
+use sightline_rover::visual_odometry::MeasuredMotion;
 use sightline_session::track::Drive;
 use sightline_track::locate::store::Shared;
 use sightline_track::stages::capture::StereoPair;
@@ -77,6 +78,12 @@ impl<D: Drive> Stops for Staged<'_, D> {
     }
     fn odometry_error(&self) -> OdometryError {
         self.drive.odometry_error()
+    }
+    fn measured_motion(&self, step: usize) -> Option<&MeasuredMotion> {
+        // It is that from the stop before, and without the jump.
+        let is_next = step > 0 && self.stops[step] == self.stops[step - 1] + 1;
+        let is_jump = self.jump.is_some_and(|(from, _)| from == step);
+        self.drive.measured_motion(self.stops[step]).filter(|_| is_next && !is_jump)
     }
     fn pointing_error_deg(&self) -> f64 {
         self.drive.pointing_error_deg()

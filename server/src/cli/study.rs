@@ -10,6 +10,7 @@ use sightline_geometry::error::{Error, Result};
 use sightline_study::hand_over_table;
 use sightline_study::plan::Plan;
 use sightline_study::row::Row;
+use sightline_study::terrain_table;
 
 use super::open;
 use super::study_odometry::OdometryStudy;
@@ -37,7 +38,8 @@ enum Experiment {
     Claim(Experimental),
     /// Approaches from 10 m to 2 m: the error at the end and whether the covariance says so.
     Approach(Experimental),
-    /// Slopes and slip with wheels and gyro as the only sense of place (the paper's Table II).
+    /// Slopes and slip with the pose by wheels and IMU, with a check of the slip, and with visual odometry (the paper's
+    /// Table II).
     Terrain(Experimental),
     /// Around a rock, step by step (the paper's Table III).
     #[command(name = "checkout-1")]
@@ -158,7 +160,8 @@ impl Experimental {
             }
             Format::Csv => terminal::line(tables::rows_csv(&outcome.rows).trim_end()),
             Format::Text => {
-                let table = hand_over_table::lines(&outcome.rows, variable);
+                let mut table = hand_over_table::lines(&outcome.rows, variable);
+                table.extend(terrain_table::lines(&outcome.rows));
                 let sentences = outcome.rows.iter().map(sentence);
                 sentences.chain(table).try_for_each(|line| terminal::line(&line))
             }
@@ -214,8 +217,16 @@ fn join(seeds: &[u64]) -> String {
 fn sentence(row: &Row) -> String {
     let number = |column: &str| row.number(column);
     let whole = |column: &str| number(column).map_or_else(|| "?".to_owned(), |v| format!("{v:.0}"));
-    let own =
-        ["n_skip", "azimuth_step_deg", "search_window_px", "turn_step_deg", "terrain", "fault", "position"];
+    let own = [
+        "n_skip",
+        "azimuth_step_deg",
+        "search_window_px",
+        "turn_step_deg",
+        "terrain",
+        "odometry",
+        "fault",
+        "position",
+    ];
     let variables: Vec<String> =
         own.iter().filter_map(|name| Some(format!("{name} {}", row.columns.get(*name)?))).collect();
     let error = number("err_m_median")

@@ -8,12 +8,14 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use rayon::prelude::*;
 use sightline_geometry::error::{Error, Result};
 use sightline_recordings::{Traverse, create_simulated};
+use sightline_rover::visual_odometry::{OdometryMode, OdometryPreset};
+use sightline_study::by_pose_row::DriveOdometry;
 use sightline_study::picks;
 use sightline_study::plan::{Configuration, Plan, Unit, key};
 use sightline_study::point::{Picks, Point};
 use sightline_study::randomised;
 use sightline_study::row::{Row, rows};
-use sightline_study::run::{Chosen, Watch, measure};
+use sightline_study::run::{Chosen, Run, Watch, measure};
 use sightline_world::Scenario;
 
 use super::log::ResultLog;
@@ -203,14 +205,30 @@ impl Conduct<'_> {
         self.count(&kept);
         self.render(&traverse, &world)?;
         let missing: Vec<&Task<'_>> = tasks.iter().filter(|task| self.log.get(&task.key).is_none()).collect();
+        let drives = self.drives(&traverse, &missing)?;
         let found: Result<Vec<Unit>> = missing
             .par_iter()
             .map(|task| {
                 let of_point = chosen.iter().find(|(point, _)| *point == task.point);
-                self.unit(&traverse, scenario, task, of_point.map_or(&[], |(_, chosen)| chosen.as_slice()))
+                let own = drives.iter().find(|(mode, _)| Some(*mode) == task.point.odometry);
+                let drive = own.map_or(&traverse, |(_, drive)| drive);
+                let chosen = of_point.map_or(&[][..], |(_, chosen)| chosen.as_slice());
+                self.unit([&traverse, drive], scenario, task, chosen)
             })
             .collect();
         Ok(Some(kept.into_iter().chain(found?).collect()))
+    }
+
+    /// The drives of a world with the uses of odometry that some tasks ask for.
+    fn drives(&self, traverse: &Traverse, tasks: &[&Task<'_>]) -> Result<Vec<(OdometryMode, Traverse)>> {
+        let mut drives: Vec<(OdometryMode, Traverse)> = Vec::new();
+        for mode in tasks.iter().filter_map(|task| task.point.odometry) {
+            if drives.iter().all(|(known, _)| *known != mode) {
+                let preset = OdometryPreset::Sightline;
+                drives.push((mode, traverse.with_odometry(mode, preset, self.cancel.into())?));
+            }
+        }
+        Ok(drives)
     }
 
     fn tasks(&self, scenario: &Scenario, points: &[&Point]) -> Result<Vec<Task<'_>>> {
@@ -224,9 +242,10 @@ impl Conduct<'_> {
         Ok(tasks)
     }
 
+    /// One unit in a drive as it was planned and as it goes with the task's odometry.
     fn unit(
         &self,
-        traverse: &Traverse,
+        [planned, drive]: [&Traverse; 2],
         scenario: &Scenario,
         task: &Task<'_>,
         chosen: &[Chosen],
@@ -234,13 +253,18 @@ impl Conduct<'_> {
         let settings = Plan::settings(task.configuration, task.point)?;
         let keep_steps = self.order.plan.study.is_by_step;
         let watch = Watch { cancel: self.cancel, tell: &|| () };
-        let runs = measure(traverse, task.point, chosen, &settings, keep_steps, &watch)?;
+        let mut runs = measure(drive, task.point, chosen, &settings, keep_steps, &watch)?;
+        let odometry = task.point.odometry.map(|_| DriveOdometry::of(drive, planned.stop_count()));
+        if odometry.as_ref().is_some_and(DriveOdometry::is_cut_short) {
+            runs.iter_mut().for_each(Run::end_early);
+        }
         let unit = Unit {
             key: task.key.clone(),
             scenario: task.point.scenario.clone(),
             seed: scenario.seed,
             configuration: task.configuration.name.clone(),
             point: task.point.clone(),
+            odometry,
             runs,
         };
         self.log.add(&unit)?;

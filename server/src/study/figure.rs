@@ -74,7 +74,7 @@ pub(crate) fn series(plan: &Plan, units: &[Unit]) -> Vec<Series> {
                 .filter(|unit| unit.configuration == configuration.name && unit.point == *point)
                 .collect();
             let others: Vec<String> =
-                point.variables.iter().skip(1).map(|(name, value)| format!(", {name} {value}")).collect();
+                point.variables.iter().skip(1).map(|(name, value)| format!(", {name} {}", words_in(value))).collect();
             let label = format!("{}{}", configuration.name, others.concat());
             let (x, word) = place(point.variables.first().map(|(_, value)| value), &mut words);
             let runs: Vec<&Run> = of_point.iter().flat_map(|unit| &unit.runs).collect();
@@ -94,6 +94,11 @@ pub(crate) fn series(plan: &Plan, units: &[Unit]) -> Vec<Series> {
         }
     }
     found
+}
+
+/// A value as a person reads it: words without quotation marks.
+fn words_in(value: &Value) -> String {
+    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 
 /// Where a value stands on the horizontal axis: a number where it is, a word in the order of the grid.

@@ -122,6 +122,7 @@ mod tests {
             seed: 1,
             configuration: "ncc".to_owned(),
             point: Point::plain("s", "n_skip", 0),
+            odometry: None,
             runs: Vec::new(),
         }
     }

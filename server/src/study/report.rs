@@ -7,6 +7,8 @@ use sightline_geometry::error::{Error, Result};
 use sightline_recordings::files::write_atomically;
 use sightline_rover::version::tracker_version;
 use sightline_study::plan::{Plan, Unit};
+use sightline_study::row::{Row, rows};
+use sightline_study::terrain_table;
 
 use super::figure::{Figure, Series, SeriesPoint, figures, series};
 use super::order::Order;
@@ -57,6 +59,7 @@ fn html(order: &Order, units: &[Unit], figures: &[Figure]) -> String {
             escape(&figure.sentence)
         );
     }
+    text.push_str(&table_ii(&units.iter().flat_map(|unit| rows(plan.study, unit)).collect::<Vec<_>>()));
     if plan.study.is_by_step {
         text.push_str(&step_table(plan, units));
     } else {
@@ -65,6 +68,25 @@ fn html(order: &Order, units: &[Unit], figures: &[Figure]) -> String {
     text.push_str(&settings(order));
     text.push_str("</body></html>\n");
     text
+}
+
+/// Table II with ours beside it, for the study that has odometry.
+fn table_ii(rows: &[Row]) -> String {
+    let table = terrain_table::table(rows);
+    if table.is_empty() {
+        return String::new();
+    }
+    let row = |tag: &str, cells: &[String]| {
+        let cells = cells.iter().map(|cell| format!("<{tag}>{}</{tag}>", escape(cell)));
+        format!("<tr>{}</tr>\n", cells.collect::<String>())
+    };
+    let head = row("th", &terrain_table::HEADINGS.map(str::to_owned));
+    let body: String = table.iter().map(|line| row("td", &line.cells())).collect();
+    format!(
+        "<h2>Table II</h2>\n<p>Paper: 26 trials of one target each with visual odometry, 2 failures. Lost by pose: the target was \
+         out of reach of the search around its prediction. Not driven: slip ended the drive.</p>\n<div class=\"wide\"><table>\
+         {head}{body}</table></div>\n"
+    )
 }
 
 /// How much was done.

@@ -2,6 +2,7 @@
 
 use egui::{ComboBox, Grid, RichText, ScrollArea, TextEdit, Ui, vec2};
 use sightline_study::row::Row;
+use sightline_study::terrain_table;
 use sightline_study::wire::{StudyInfo, StudyJob, StudyState};
 
 use crate::command::Command;
@@ -11,11 +12,13 @@ use crate::state::State;
 use crate::{panels, theme};
 
 /// Columns of the table behind configuration, seed and the study's variable: name in the record, heading, factor.
-const COLUMNS: [(&str, &str, f64); 8] = [
+const COLUMNS: [(&str, &str, f64); 10] = [
     ("targets", "targets", 1.0),
     ("tracked", "tracked", 1.0),
     ("false_tracked", "false tracked", 1.0),
     ("false_lost", "false lost", 1.0),
+    ("lost_by_pose", "lost by pose", 1.0),
+    ("not_driven", "not driven", 1.0),
     ("err_px_median", "median, px", 1.0),
     ("err_px_p95", "95 %, px", 1.0),
     ("err_m_median", "median, cm", 100.0),
@@ -180,12 +183,17 @@ fn table(ui: &mut Ui, state: &State) {
     let of_job = state.studies.jobs.iter().find(|known| &known.id == job);
     let infos = state.studies.infos.iter().flatten();
     let variable = of_job.and_then(|job| infos.clone().find(|info| info.name == job.study));
-    let variable =
-        variable.map(|info| info.variable.as_str()).filter(|name| rows[0].columns.contains_key(*name));
+    let variables: Vec<&str> = variable
+        .map(|info| info.variable.as_str())
+        .into_iter()
+        .chain(["odometry"])
+        .filter(|name| rows[0].columns.contains_key(*name))
+        .collect();
+    table_ii(ui, rows, job);
     let columns: Vec<_> = COLUMNS.iter().filter(|(name, ..)| rows[0].columns.contains_key(*name)).collect();
     ScrollArea::horizontal().auto_shrink([false, true]).show(ui, |ui| {
         Grid::new(("rows", job)).striped(true).spacing([12.0, 2.0]).show(ui, |ui| {
-            let headings = ["configuration", "seed"].into_iter().chain(variable);
+            let headings = ["configuration", "seed"].into_iter().chain(variables.iter().copied());
             for heading in headings.chain(columns.iter().map(|(_, heading, _)| *heading)) {
                 ui.label(theme::note(heading.replace('_', " ")));
             }
@@ -193,7 +201,7 @@ fn table(ui: &mut Ui, state: &State) {
             for row in rows {
                 ui.label(RichText::new(&row.configuration).size(12.0));
                 ui.label(theme::number(row.seed.to_string()));
-                if let Some(name) = variable {
+                for name in &variables {
                     ui.label(theme::number(cell(row, name, 1.0)));
                 }
                 for (name, _, factor) in &columns {
@@ -203,6 +211,30 @@ fn table(ui: &mut Ui, state: &State) {
             }
         });
     });
+}
+
+/// Table II with ours beside it, for the study that has odometry.
+fn table_ii(ui: &mut Ui, rows: &[Row], job: &str) {
+    let table = terrain_table::table(rows);
+    if table.is_empty() {
+        return;
+    }
+    ui.label(theme::note("Table II (R125), the paper's rows beside ours"));
+    ScrollArea::horizontal().id_salt(("table II scroll", job)).auto_shrink([false, true]).show(ui, |ui| {
+        Grid::new(("table II", job)).striped(true).spacing([12.0, 2.0]).show(ui, |ui| {
+            for heading in terrain_table::HEADINGS {
+                ui.label(theme::note(heading));
+            }
+            ui.end_row();
+            for line in &table {
+                for cell in line.cells() {
+                    ui.label(theme::number(cell));
+                }
+                ui.end_row();
+            }
+        });
+    });
+    ui.separator();
 }
 
 /// A value of a row; a dash where there is none.

@@ -1,0 +1,96 @@
+//! The columns of poses and their odometry in a study's table: what the drive's odometry did, and why targets were lost.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use sightline_geometry::estimate::quantile::median;
+use sightline_geometry::frames::Pose;
+use sightline_recordings::Traverse;
+
+use super::by_pose::{ByPose, Loss, LossCause};
+use super::run::Run;
+
+/// What odometry did in one drive, against the truth.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DriveOdometry {
+    /// Stops that were planned.
+    pub stops_planned: usize,
+    /// Stops that were driven.
+    pub stops: usize,
+    /// Motions that were measured.
+    pub measured: usize,
+    /// Of these the accepted ones.
+    pub accepted: usize,
+    /// Largest slip along of an accepted measurement, as a part of the wheels' motion.
+    pub slip_max: Option<f64>,
+    /// Distance of the estimated pose from the true one at the last stop, site frame, m.
+    pub pose_err_m: Option<f64>,
+    /// The angle between them, degrees.
+    pub pose_err_deg: Option<f64>,
+}
+
+impl DriveOdometry {
+    /// What odometry did in a drive of which `planned` stops were planned.
+    pub fn of(drive: &Traverse, planned: usize) -> Self {
+        let motions = || drive.index().stops.iter().filter_map(|stop| stop.odometry.as_ref());
+        let accepted = || motions().filter(|motion| motion.update.accepted);
+        let slips = accepted().filter_map(|motion| motion.update.slip).map(|slip| slip.along);
+        let last = drive.stop_count() - 1;
+        let truth = drive.true_site_from_rover(last);
+        let apart: Option<Pose> = truth.map(|truth| truth.inverse() * drive.site_from_rover(last));
+        Self {
+            stops_planned: planned,
+            stops: drive.stop_count(),
+            measured: motions().count(),
+            accepted: accepted().count(),
+            slip_max: slips.reduce(f64::max),
+            pose_err_m: apart.map(|apart| apart.translation.vector.norm()),
+            pose_err_deg: apart.map(|apart| apart.rotation.angle().to_degrees()),
+        }
+    }
+
+    /// Whether slip ended the drive.
+    pub fn is_cut_short(&self) -> bool {
+        self.stops < self.stops_planned
+    }
+
+    /// Its columns.
+    pub(super) fn columns(&self) -> BTreeMap<String, Value> {
+        [
+            ("stops_planned", self.stops_planned.into()),
+            ("stops_driven", self.stops.into()),
+            ("motions_measured", self.measured.into()),
+            ("motions_accepted", self.accepted.into()),
+            ("slip_max", self.slip_max.into()),
+            ("pose_err_m", self.pose_err_m.into()),
+            ("pose_err_deg", self.pose_err_deg.into()),
+        ]
+        .map(|(name, value): (&str, Value)| (name.to_owned(), value))
+        .into()
+    }
+}
+
+/// Why targets were lost; empty where the study does not ask.
+pub(super) fn columns(runs: &[&Run]) -> BTreeMap<String, Value> {
+    let asked: Vec<&ByPose> = runs.iter().filter_map(|run| run.by_pose.as_ref()).collect();
+    if asked.is_empty() {
+        return BTreeMap::new();
+    }
+    let losses = || asked.iter().filter_map(|target| target.loss.as_ref());
+    let of = |cause: LossCause| losses().filter(|loss| loss.cause == cause).count();
+    let steps: Vec<f64> = losses().map(|loss: &Loss| loss.step as f64).collect();
+    let by_pose = losses().filter(|loss| loss.cause == LossCause::Pose);
+    let off: Vec<f64> = by_pose.filter_map(|loss| loss.off_px).collect();
+    [
+        ("not_driven", asked.iter().filter(|target| target.not_driven).count().into()),
+        ("lost_by_pose", of(LossCause::Pose).into()),
+        ("lost_hidden", of(LossCause::Hidden).into()),
+        ("lost_by_match", of(LossCause::Match).into()),
+        ("loss_step_median", median(&steps).into()),
+        ("prediction_off_px_median", median(&off).into()),
+    ]
+    .map(|(name, value): (&str, Value)| (name.to_owned(), value))
+    .into()
+}
