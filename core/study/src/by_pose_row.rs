@@ -81,11 +81,12 @@ pub(super) fn columns(runs: &[&Run]) -> BTreeMap<String, Value> {
     let losses = || asked.iter().filter_map(|target| target.loss.as_ref());
     let of = |cause: LossCause| losses().filter(|loss| loss.cause == cause).count();
     let steps: Vec<f64> = losses().map(|loss: &Loss| loss.step as f64).collect();
-    let by_pose = losses().filter(|loss| loss.cause == LossCause::Pose);
-    let off: Vec<f64> = by_pose.filter_map(|loss| loss.off_px).collect();
+    let off: Vec<f64> = losses().filter_map(|loss| loss.off_px).collect();
     [
         ("not_driven", asked.iter().filter(|target| target.not_driven).count().into()),
-        ("lost_by_pose", of(LossCause::Pose).into()),
+        ("lost_by_pose", (of(LossCause::Window) + of(LossCause::Correction)).into()),
+        ("lost_by_window", of(LossCause::Window).into()),
+        ("lost_by_correction", of(LossCause::Correction).into()),
         ("lost_hidden", of(LossCause::Hidden).into()),
         ("lost_by_match", of(LossCause::Match).into()),
         ("loss_step_median", median(&steps).into()),

@@ -7,7 +7,7 @@ use super::row::Row;
 use sightline_geometry::estimate::quantile::median;
 
 /// The headings of the table; [`TerrainLine::cells`] has a cell for each.
-pub const HEADINGS: [&str; 17] = [
+pub const HEADINGS: [&str; 18] = [
     "terrain",
     "paper: trials",
     "failures",
@@ -18,7 +18,8 @@ pub const HEADINGS: [&str; 17] = [
     "targets",
     "kept",
     "kept, %",
-    "lost: pose",
+    "lost: window",
+    "lost: correction",
     "lost: match",
     "lost: hidden",
     "false",
@@ -44,13 +45,13 @@ pub struct TerrainLine {
     pub targets: u64,
     /// Targets tracked to the end of the planned drive.
     pub kept: u64,
-    /// Lost because of the pose, by the match, and hidden (`by_pose`).
-    pub lost: [u64; 3],
+    /// Lost because of the pose, by the window and by the correction, by the match, and hidden (`by_pose`).
+    pub lost: [u64; 4],
     /// Targets that are taken for tracked at the end and are not; they are among those lost.
     pub false_tracked: u64,
     /// Targets that were tracked where slip ended the drive.
     pub not_driven: u64,
-    /// Distance of the target from its prediction where targets were lost because of the pose, median over the worlds, px.
+    /// Distance of the target from its prediction where targets were lost, median over the worlds, px.
     pub prediction_off_px: Option<f64>,
     /// Distance of the estimated pose from the true one at the last stop, median over the worlds, m.
     pub pose_err_m: Option<f64>,
@@ -62,7 +63,7 @@ impl TerrainLine {
         let dash = || "–".to_owned();
         let printed = |of: fn(&PaperTerrain) -> String| self.paper.as_ref().map_or_else(dash, of);
         let number = |value: Option<f64>| value.map_or_else(dash, |value| format!("{value:.1}"));
-        let [by_pose, by_match, hidden] = self.lost.map(|count| count.to_string());
+        let [by_window, by_correction, by_match, hidden] = self.lost.map(|count| count.to_string());
         [
             self.terrain.clone(),
             printed(|paper| paper.trials.to_string()),
@@ -74,7 +75,8 @@ impl TerrainLine {
             self.targets.to_string(),
             self.kept.to_string(),
             number(Some(100.0 * self.kept as f64 / self.targets.max(1) as f64)),
-            by_pose,
+            by_window,
+            by_correction,
             by_match,
             hidden,
             self.false_tracked.to_string(),
@@ -102,9 +104,8 @@ pub fn table(rows: &[Row]) -> Vec<TerrainLine> {
             terrains.push(terrain);
         }
     });
-    let of_terrain = |terrain: &String| {
-        labels.iter().filter(|label| label.0 == *terrain).cloned().collect::<Vec<_>>()
-    };
+    let of_terrain =
+        |terrain: &String| labels.iter().filter(|label| label.0 == *terrain).cloned().collect::<Vec<_>>();
     let ordered = terrains.iter().flat_map(|terrain| of_terrain(terrain));
     ordered
         .map(|own| {
@@ -122,7 +123,7 @@ fn line((terrain, configuration, odometry): (String, String, String), rows: &[&R
         worlds: rows.len(),
         targets: sum("targets"),
         kept: sum("tracked"),
-        lost: ["lost_by_pose", "lost_by_match", "lost_hidden"].map(sum),
+        lost: ["lost_by_window", "lost_by_correction", "lost_by_match", "lost_hidden"].map(sum),
         false_tracked: sum("false_tracked"),
         not_driven: sum("not_driven"),
         prediction_off_px: middle("prediction_off_px_median"),
@@ -159,7 +160,7 @@ mod tests {
     fn row(seed: u64, terrain: &str, odometry: &str, kept: u64) -> Row {
         let columns = json!({
             "terrain": terrain, "odometry": odometry, "targets": 20, "tracked": kept, "false_tracked": 0,
-            "not_driven": 0, "lost_by_pose": 20 - kept, "lost_by_match": 0, "lost_hidden": 0,
+            "not_driven": 0, "lost_by_window": 20 - kept, "lost_by_correction": 0, "lost_by_match": 0, "lost_hidden": 0,
             "prediction_off_px_median": (kept < 20).then_some(70.0), "pose_err_m": 0.01 * seed as f64,
         });
         Row {
@@ -182,10 +183,10 @@ mod tests {
         let table = table(&rows);
         assert_eq!(table.len(), 3);
         let [off, full, stuck] = [&table[0], &table[1], &table[2]];
-        assert_eq!((off.worlds, off.targets, off.kept, off.lost), (2, 40, 3, [37, 0, 0]));
+        assert_eq!((off.worlds, off.targets, off.kept, off.lost), (2, 40, 3, [37, 0, 0, 0]));
         assert_eq!((full.odometry.as_str(), full.kept, full.prediction_off_px), ("full", 20, None));
         assert_eq!((off.paper.unwrap().trials, stuck.paper), (6, None));
-        assert!((off.pose_err_m.unwrap() - 0.015).abs() < 1e-12 && off.cells()[16] == "1.5");
+        assert!((off.pose_err_m.unwrap() - 0.015).abs() < 1e-12 && off.cells()[17] == "1.5");
         let lines = lines(&rows);
         assert!(lines.len() == 4 && lines[1].contains("slip reached 100 %"), "{lines:?}");
     }

@@ -13,6 +13,7 @@ mod records;
 mod rendering;
 mod driving;
 mod driving_odometry;
+mod terrain_odometry;
 mod stage_pause;
 mod registration;
 mod stereo_rendered;

@@ -4,29 +4,66 @@ use std::path::Path;
 
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::Pose;
+use sightline_geometry::odometry_error::PoseChangeError;
 use sightline_recordings::{Traverse, create_simulated};
 use sightline_rover::pipeline::Stops;
 use sightline_rover::visual_odometry::{OdometryMode, OdometryPreset, pose_change_error};
-use sightline_geometry::odometry_error::PoseChangeError;
 use sightline_world::scenario::Move;
 use sightline_world::{Scenario, library};
 
-/// A world of few small images.
-fn small(name: &str) -> Scenario {
+/// A drive of the library in a world of small images, planned.
+fn planned(name: &str, change: impl FnOnce(&mut Scenario), folder: &Path) -> Traverse {
     let mut scenario = Scenario { seed: 5311, ..library::scenario(name).unwrap() };
     (scenario.camera.image_size, scenario.camera.samples_per_axis) = (512, 2);
-    scenario
+    change(&mut scenario);
+    create_simulated(&scenario, folder).unwrap()
 }
 
 fn with(planned: &Traverse, mode: OdometryMode) -> Traverse {
     planned.with_odometry(mode, OdometryPreset::Sightline, Cancel::default()).unwrap()
 }
 
-/// Distances of the estimated positions from the true ones, m.
-fn off_m(drive: &Traverse) -> Vec<f64> {
-    let off = |stop: usize| {
-        let apart: Pose = drive.true_site_from_rover(stop).unwrap().inverse() * drive.site_from_rover(stop);
-        apart.translation.vector.norm()
+/// Distance of the estimated position from the true one at the last stop, m.
+fn off_m(drive: &Traverse) -> f64 {
+    let last = drive.stop_count() - 1;
+    let apart: Pose = drive.true_site_from_rover(last).unwrap().inverse() * drive.site_from_rover(last);
+    apart.translation.vector.norm()
+}
+
+#[test]
+fn on_a_steep_slope_a_planned_drive_is_near_the_truth_with_odometry_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let shorten = |scenario: &mut Scenario| scenario.drive.end_distance_m = 6.6;
+    let planned = planned("slope-steep", shorten, folder.path());
+    let index = std::fs::read(folder.path().join("traverse.toml")).unwrap();
+    let [off, full] = [OdometryMode::Off, OdometryMode::Full].map(|mode| with(&planned, mode));
+    println!("{} m off, {} m full, {} stops", off_m(&off), off_m(&full), full.stop_count());
+    assert!(off_m(&off) > 0.2 && off_m(&full) < 0.03);
+    assert_eq!(off.index(), planned.index());
+    // The error of the prediction is that of vision where it corrects the pose.
+    for stop in 1..full.stop_count() {
+        let measured = full.measured_motion(stop).unwrap();
+        let by_vision = matches!(pose_change_error(&full, stop), PoseChangeError::Measured(_));
+        assert_eq!(by_vision, measured.corrects);
+        assert_eq!(full.site_from_rover(stop), measured.pose_after(&full.site_from_rover(stop - 1)));
+    }
+    // The folder stays as it is.
+    assert_eq!(std::fs::read(folder.path().join("traverse.toml")).unwrap(), index);
+}
+
+#[test]
+fn a_check_of_the_slip_ends_a_planned_drive_where_the_rover_is_stuck() {
+    let folder = tempfile::tempdir().unwrap();
+    let shorten = |scenario: &mut Scenario| {
+        scenario.drive.moves = vec![Move::Forward { distance_m: 2.8, stops: 7 }];
     };
-    (0..drive.stop_count()).map(off).collect()
+    let planned = planned("stuck", shorten, folder.path());
+    let checked = with(&planned, OdometryMode::SlipCheck);
+    assert_eq!((planned.stop_count(), checked.stop_count()), (8, 6));
+    let slip = checked.measured_motion(5).unwrap().update.slip.unwrap().along;
+    assert!((slip - 1.0).abs() < 0.05, "{slip}");
+    // The poses stay those of the wheels; full odometry drives on, and knows that the rover stood.
+    assert!((0..6).all(|stop| checked.site_from_rover(stop) == planned.site_from_rover(stop)));
+    let full = with(&planned, OdometryMode::Full);
+    assert!(full.stop_count() == 8 && off_m(&full) < 0.05 && off_m(&planned) > 0.4, "{}", off_m(&full));
 }

@@ -73,8 +73,12 @@ pub(crate) fn series(plan: &Plan, units: &[Unit]) -> Vec<Series> {
                 .iter()
                 .filter(|unit| unit.configuration == configuration.name && unit.point == *point)
                 .collect();
-            let others: Vec<String> =
-                point.variables.iter().skip(1).map(|(name, value)| format!(", {name} {}", words_in(value))).collect();
+            let others: Vec<String> = point
+                .variables
+                .iter()
+                .skip(1)
+                .map(|(name, value)| format!(", {name} {}", words_in(value)))
+                .collect();
             let label = format!("{}{}", configuration.name, others.concat());
             let (x, word) = place(point.variables.first().map(|(_, value)| value), &mut words);
             let runs: Vec<&Run> = of_point.iter().flat_map(|unit| &unit.runs).collect();

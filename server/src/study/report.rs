@@ -83,8 +83,9 @@ fn table_ii(rows: &[Row]) -> String {
     let head = row("th", &terrain_table::HEADINGS.map(str::to_owned));
     let body: String = table.iter().map(|line| row("td", &line.cells())).collect();
     format!(
-        "<h2>Table II</h2>\n<p>Paper: 26 trials of one target each with visual odometry, 2 failures. Lost by pose: the target was \
-         out of reach of the search around its prediction. Not driven: slip ended the drive.</p>\n<div class=\"wide\"><table>\
+        "<h2>Table II</h2>\n<p>Paper: 26 trials of one target each with visual odometry, 2 failures. Lost by the \
+         pose: the target was out of reach of the search around its prediction (window), or was found and refused because \
+         it lay too far from the prediction (correction). Not driven: slip ended the drive.</p>\n<div class=\"wide\"><table>\
          {head}{body}</table></div>\n"
     )
 }
