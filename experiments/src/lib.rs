@@ -10,6 +10,7 @@
 //! | [`cancel`] | how soon each long computation ends once it is cancelled |
 //! | `claims` | tracked targets and their NEES in worlds with pointing error |
 //! | [`driving`] | closed-loop drives on slopes with slip |
+//! | [`spirit137`] | visual odometry along the path that Spirit drove at site 137 |
 //! | [`trackability`] | targets drawn where the map says good, risky or bad, tracked against the truth |
 
 #[cfg(feature = "command-line")]
@@ -27,6 +28,7 @@ pub mod cancel;
 pub mod claims;
 pub mod driving;
 pub mod registration;
+pub mod spirit137;
 pub mod trackability;
 #[cfg(feature = "command-line")]
 pub mod cli;

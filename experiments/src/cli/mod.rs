@@ -11,6 +11,7 @@ mod scenery_report;
 mod real_motion;
 mod real_odometry;
 mod registration;
+mod spirit137;
 mod trackability;
 mod worlds;
 
@@ -37,6 +38,9 @@ enum Experiment {
     RealMotion(real_motion::RealMotion),
     /// Rocks registered by their shape: basin of convergence, accuracy, and the result for another rock.
     Registration(registration::Registrations),
+    /// Visual odometry along the path that Spirit drove at site 137, in a rendered world.
+    #[command(name = "spirit-137")]
+    Spirit137(spirit137::Spirit137),
     /// Targets drawn where the trackability map says good, risky or bad: which of them are tracked to the end?
     Trackability(trackability::Worlds),
 }
@@ -53,6 +57,7 @@ pub fn run() -> ExitCode {
         Experiment::Scenery(arguments) => arguments.run(),
         Experiment::RealMotion(arguments) => arguments.run(),
         Experiment::Registration(arguments) => arguments.run(),
+        Experiment::Spirit137(arguments) => arguments.run(),
         Experiment::Trackability(arguments) => arguments.run(),
     })
 }
