@@ -1,6 +1,6 @@
 //! Visual odometry along the path that Spirit drove at site 137, in a rendered world.
 //!
-//! At 131 drive counters of sols 1869 to 1965 the rover's pose was recorded: drives backwards of 0.5 m a step, and the
+//! At 131 drive counters (April to July 2009) the rover's pose was recorded: drives backwards of 0.5 m a step, and the
 //! stretch where the wheels sank in and the rover moved by millimetres a command. Here these poses are the true ones in a
 //! simulated world with the site's slope. At each the mast looks at the ground ahead, a pair is rendered, and the motion
 //! since the pose before is measured and compared with the recorded one. Gaps of the record, 5 m, 3 m and 2 m, are steps as
