@@ -114,7 +114,7 @@ impl Run {
     }
 
     /// Whether it was tracked at the stop at which slip ended the drive.
-    pub fn is_not_driven(&self) -> bool {
+    pub(crate) fn is_not_driven(&self) -> bool {
         self.by_pose.as_ref().is_some_and(|by_pose| by_pose.not_driven)
     }
 }

@@ -145,7 +145,7 @@ impl SpiritStep {
     }
 
     /// Whether the translation that was found differs from none.
-    pub fn is_resolved(&self) -> bool {
+    pub(crate) fn is_resolved(&self) -> bool {
         self.accepted && self.motion_sigmas.is_some_and(|sigmas| sigmas > 3.0)
     }
 }
@@ -153,7 +153,7 @@ impl SpiritStep {
 impl SpiritReport {
     /// Adds what the updates come to together.
     #[must_use]
-    pub fn with_steps(self, steps: Vec<SpiritStep>) -> Self {
+    pub(crate) fn with_steps(self, steps: Vec<SpiritStep>) -> Self {
         let accepted = || steps.iter().filter(|step| step.accepted);
         let nees: Vec<f64> = accepted().filter_map(|step| step.nees_per_dof).collect();
         let worst = accepted().filter(|step| step.error_m.is_some()).max_by(|a, b| {
