@@ -42,7 +42,10 @@ fn on_a_steep_slope_a_planned_drive_is_near_the_truth_with_odometry_alone() {
     for stop in 1..full.stop_count() {
         let measured = full.measured_motion(stop).unwrap();
         assert_eq!(measured.corrects, measured.update.accepted);
-        assert_eq!(full.site_from_rover(stop), measured.pose_after(&full.site_from_rover(stop - 1)));
+        // A record normalizes its quaternion again, so the last bits may differ.
+        let after = measured.pose_after(&full.site_from_rover(stop - 1));
+        let apart: Pose = full.site_from_rover(stop).inverse() * after;
+        assert!(apart.rotation.angle() < 1e-12 && apart.translation.vector.norm() < 1e-12);
     }
     // The folder stays as it is.
     assert_eq!(std::fs::read(folder.path().join("traverse.toml")).unwrap(), index);
