@@ -71,6 +71,7 @@ impl From<(Vector3, f64)> for Translation {
 
 /// The outcome of the coarse search.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = OdometryCoarseSearch)]
 pub struct CoarseSearch {
     /// The best translation.
     pub best: Translation,

@@ -69,6 +69,9 @@ pub struct DrivenStop {
     /// How vision measured the motion to this stop; `None` where it did not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub odometry: Option<MeasuredMotion>,
+    /// Tilt of the rover by the accelerometers, deg; `None` where the estimated pose still has it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub measured_tilt_deg: Option<f64>,
     /// The first stage that was put off because the drive is paused here: `point_mast` or `capture`; `None` if none was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub awaits: Option<CycleStage>,
@@ -95,6 +98,7 @@ impl DrivenStop {
             touched_rocks: 0,
             wheel_places_m: Vec::new(),
             odometry: None,
+            measured_tilt_deg: None,
             awaits: None,
         })
     }
@@ -132,6 +136,7 @@ impl DrivenStop {
                 touched_rocks: touched_rocks(world, &stand),
                 wheel_places_m: if scenario.rover.tracks { places_m(&leg) } else { Vec::new() },
                 odometry: None,
+                measured_tilt_deg: None,
                 awaits: None,
             })
         })
@@ -159,6 +164,7 @@ impl DrivenStop {
     /// `before` is the estimated pose at the stop before.
     pub fn correct(&mut self, measured: MeasuredMotion, before: &Pose) {
         let pose = measured.pose_after(before);
+        self.measured_tilt_deg = Some(self.tilt_deg());
         if measured.corrects {
             let truth = self.true_site_from_rover.to_pose().rotation.euler_angles();
             let (roll, pitch, yaw) = pose.rotation.euler_angles();
@@ -233,10 +239,12 @@ impl DrivenStop {
         Ok(())
     }
 
-    /// Angle between the estimated vertical of the rover and that of the site, deg.
+    /// Angle between the rover's vertical and that of the site by the accelerometers, deg.
     pub fn tilt_deg(&self) -> f64 {
-        let down = self.site_from_rover.to_pose().rotation * Vector3::z();
-        down.z.clamp(-1.0, 1.0).acos().to_degrees()
+        self.measured_tilt_deg.unwrap_or_else(|| {
+            let down = self.site_from_rover.to_pose().rotation * Vector3::z();
+            down.z.clamp(-1.0, 1.0).acos().to_degrees()
+        })
     }
 }
 
