@@ -36,7 +36,7 @@ const HALF_PX: u32 = 3;
 /// Most points that are compared.
 const POINTS_MAX: usize = 40;
 /// Slips along the motion that are tried.
-const SLIPS: [f64; 2] = [-0.4, 1.4];
+pub(super) const SLIPS: [f64; 2] = [-0.4, 1.4];
 /// Movement aside that is tried: as a part of the wheels' motion, and at least, m.
 const ASIDE: f64 = 0.45;
 const ASIDE_MIN_M: f64 = 0.05;

@@ -9,6 +9,7 @@
 //! | `odometry_translation_m` | distance from the translation of the wheels | domain.md 9.2, step 8 |
 //! | `odometry_attitude_deg` | angle from the turn of gyro and accelerometers | domain.md 9.2, step 8 |
 //! | `odometry_ambiguity` | inliers of another motion as a part of those of the best | ours |
+//! | `odometry_repetition` | how well another way along the motion fits, as a part of how well the motion fits | ours |
 //!
 //! Numbers continue those of the trackers (`locate::gate_kinds`).
 
@@ -36,10 +37,11 @@ const TRANSLATION: GateKind =
 const ATTITUDE: GateKind =
     kind(45, "odometry_attitude_deg", "turn against the gyro", Unit::Degree, Side::AtMost);
 const AMBIGUITY: GateKind = kind(46, "odometry_ambiguity", "ambiguity", Unit::One, Side::AtMost);
+const REPETITION: GateKind = kind(47, "odometry_repetition", "repetition", Unit::One, Side::AtMost);
 
 /// All gates, in the order in which they are judged.
-pub(super) const KINDS: [GateKind; 7] =
-    [INLIERS, INLIER_SHARE, CHI2, SIGMA, TRANSLATION, ATTITUDE, AMBIGUITY];
+pub(super) const KINDS: [GateKind; 8] =
+    [INLIERS, INLIER_SHARE, CHI2, SIGMA, TRANSLATION, ATTITUDE, AMBIGUITY, REPETITION];
 
 /// What is judged.
 pub(super) struct Judged<'a> {
@@ -48,11 +50,12 @@ pub(super) struct Judged<'a> {
     pub(super) covariance: Option<&'a Matrix6<f64>>,
     pub(super) matches: usize,
     pub(super) ambiguity: f64,
+    pub(super) repetition: f64,
 }
 
 /// All gates; those of a motion that does not exist have no value and fail.
 pub(super) fn judge(judged: &Judged<'_>, settings: &OdometrySettings) -> Vec<Gate> {
-    let Judged { predicted, fitted, covariance, matches, ambiguity } = judged;
+    let Judged { predicted, fitted, covariance, matches, ambiguity, repetition } = judged;
     let named = |kind: GateKind, setting: &'static str, value: Option<f64>, limit: f64| {
         GateKind { setting: Some(setting), ..kind }.judge(value, limit)
     };
@@ -78,5 +81,6 @@ pub(super) fn judge(judged: &Judged<'_>, settings: &OdometrySettings) -> Vec<Gat
         named(TRANSLATION, "slip_max", apart_m, settings.slip_max * wheels.norm() + TRANSLATION_MIN_M),
         named(ATTITUDE, "attitude_max_deg", turned_deg, settings.attitude_max_deg),
         named(AMBIGUITY, "ambiguity_max", fitted.map(|_| *ambiguity), settings.ambiguity_max),
+        named(REPETITION, "repetition_max", fitted.map(|_| *repetition), settings.repetition_max),
     ]
 }

@@ -181,6 +181,8 @@ impl Record for MeasuredMotion {
             .describe("Mean change of the view: 0.1 where windows grow by a tenth.");
         r.quantity("ambiguity", Unit::One, |m| m.update.ambiguity)
             .describe("Inliers of another motion as a part of those of the motion.");
+        r.quantity("repetition", Unit::One, |m| m.update.repetition)
+            .describe("How well another way along the motion fits, as a part of how well the motion fits.");
         for kind in super::gates::KINDS {
             r.gate(kind.name, kind.unit, kind.side, "");
         }

@@ -27,6 +27,7 @@ mod measured;
 mod motion;
 mod points;
 mod reduce;
+mod repetition;
 mod rigidity;
 pub mod settings;
 mod windows;
@@ -130,11 +131,15 @@ pub fn update(input: &OdometryInput<'_>) -> Result<OdometryUpdate> {
         found.push(search.refined(start)?);
     }
     let (best, ambiguity) = chosen(found);
+    let wheels = predicted.inverse().translation.vector;
+    let repetition = best.fitted.as_ref().map_or(0.0, |fitted| {
+        repetition::repetition([&before, &after], &all, (&best.matches, fitted), &wheels, settings)
+    });
     for (point, reason) in &best.lost {
         fates.without_match(points[*point].0, *reason);
     }
     fates.add(&points, &best.matches, best.fitted.as_ref().ok());
-    Ok(outcome(input, fates, points.len(), coarse, ambiguity, best))
+    Ok(outcome(input, fates, points.len(), coarse, [ambiguity, repetition], best))
 }
 
 /// Matches around one start, and the motion that they agree on.
@@ -214,7 +219,7 @@ fn outcome(
     fates: CornerFates,
     points: usize,
     coarse: Option<CoarseSearch>,
-    ambiguity: f64,
+    [ambiguity, repetition]: [f64; 2],
     Refined { matches, fitted, .. }: Refined,
 ) -> OdometryUpdate {
     let matches = matches.as_slice();
@@ -222,8 +227,14 @@ fn outcome(
     let predicted = input.predicted_after_from_before;
     let motion = fitted.as_ref().ok();
     let covariance = motion.map(|motion| covariance(input, motion, matches));
-    let judged =
-        Judged { predicted, fitted: motion, covariance: covariance.as_ref(), matches: matched, ambiguity };
+    let judged = Judged {
+        predicted,
+        fitted: motion,
+        covariance: covariance.as_ref(),
+        matches: matched,
+        ambiguity,
+        repetition,
+    };
     let gates = gates::judge(&judged, input.settings);
     let accepted = motion.is_some() && gates.iter().all(|gate| gate.passed);
     let slip = motion
@@ -243,6 +254,7 @@ fn outcome(
         change: motion.map(|motion| motion.change(matches)),
         slip,
         ambiguity,
+        repetition,
         gates,
         missing: fitted.as_ref().err().cloned(),
         accepted,

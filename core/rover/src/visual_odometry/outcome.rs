@@ -89,6 +89,10 @@ pub struct OdometryUpdate {
     pub slip: Option<Slip>,
     /// Inliers of another motion, from another start of the coarse search, as a part of those of the motion; 0 without one.
     pub ambiguity: f64,
+    /// How well another way along the motion of the wheels fits, as a part of how well the motion fits; near 1 where the ground
+    /// repeats itself.
+    #[serde(default)]
+    pub repetition: f64,
     /// The gates.
     pub gates: Vec<Gate>,
     /// Why there is no motion, as one sentence.

@@ -94,6 +94,8 @@ pub struct OdometrySettings {
     pub attitude_max_deg: f64,
     /// Gate: most inliers of another motion as a part of those of the best (0.7; 0.1 to 1).
     pub ambiguity_max: f64,
+    /// Gate: how well another way along the motion may fit, as a part of how well the motion fits (0.96; 0.1 to 2).
+    pub repetition_max: f64,
 }
 
 impl Default for OdometrySettings {
@@ -124,6 +126,7 @@ impl Default for OdometrySettings {
             slip_max: 1.4,
             attitude_max_deg: 2.0,
             ambiguity_max: 0.7,
+            repetition_max: 0.96,
         }
     }
 }
@@ -153,6 +156,7 @@ impl OdometryPreset {
                 slip_max: 1.3,
                 attitude_max_deg: 3.0,
                 ambiguity_max: 1.0,
+                repetition_max: 2.0,
                 ..ours
             },
         }
@@ -200,6 +204,7 @@ impl OdometrySettings {
         within("sigma_max_m", self.sigma_max_m, 0.001, 1.0)?;
         within("slip_max", self.slip_max, 0.0, 5.0)?;
         within("attitude_max_deg", self.attitude_max_deg, 0.1, 45.0)?;
-        within("ambiguity_max", self.ambiguity_max, 0.1, 1.0)
+        within("ambiguity_max", self.ambiguity_max, 0.1, 1.0)?;
+        within("repetition_max", self.repetition_max, 0.1, 2.0)
     }
 }

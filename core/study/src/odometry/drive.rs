@@ -186,6 +186,7 @@ impl<'a> OdometryDrive<'a> {
             chi2_per_dof: found.chi2_per_dof,
             change: found.change,
             ambiguity: found.ambiguity,
+            repetition: found.repetition,
         })
     }
 

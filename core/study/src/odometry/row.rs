@@ -147,4 +147,6 @@ pub struct OdometryStep {
     pub change: Option<f64>,
     /// Inliers of another motion as a part of those of the motion.
     pub ambiguity: f64,
+    /// How well another way along the motion fits, as a part of how well the motion fits.
+    pub repetition: f64,
 }
