@@ -170,6 +170,10 @@ async fn image(
         .pictures()
         .run(move || {
             encode(&open, (step, params.camera, is_left), is_deep, &flag).map_err(|error| {
+                // A drive that goes on takes them: the page asks again.
+                if open.traverse.is_awaited(step) {
+                    return ApiError::conflict(error.to_string());
+                }
                 let is_of_file = matches!(error, Error::Read { .. } | Error::Format { .. });
                 let problem = ApiError::from(error);
                 if is_of_file { problem.hint(MEND) } else { problem }
