@@ -82,7 +82,7 @@ impl Replay<'_> {
         let mut steps = Vec::new();
         for (number, predicted) in (1..).zip(&by_wheels) {
             let how = (OdometryMode::Full, OdometryPreset::Sightline);
-            let found = MeasuredMotion::measure(traverse, number, how, cancel)?.update;
+            let found = MeasuredMotion::measure(traverse, number, None, how, cancel)?.update;
             let truth = poses[number].inv_mul(&poses[number - 1]);
             steps.push(SpiritStep::new(self.path.drives[number], &found, &truth, predicted));
             wheels *= predicted.inverse();
@@ -132,6 +132,7 @@ fn stop(number: usize, poses: [&Pose; 2], mast_angles: Option<MastAngles>, wheel
         site_from_rover: estimate,
         attitude_error_rad: [0.0; 3],
         mast_angles,
+        odometry_look: None,
         metered_px: None,
         wheels_m,
         drive_s: 0.0,

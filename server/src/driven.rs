@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex};
 use sightline_api::event::Event;
 use sightline_geometry::error::{Error, Result};
 use sightline_recordings::DrivenTraverse;
-use sightline_rover::driving::{ActiveWorld, ArcNavigator, DriveCommand, executive};
+use sightline_rover::driving::{ArcNavigator, DriveCommand, OdometryPair, executive, odometry};
 use sightline_session::driving::{self, DriveView, Steering};
 use sightline_session::step::RunStep;
 use sightline_track::cycle_stage::CycleStage;
@@ -24,6 +24,7 @@ use crate::jobs::lock;
 use crate::live_session::LiveSession;
 use crate::naming::slug;
 use crate::rendering::OpenTraverse;
+use crate::shared_world::SharedWorld;
 
 /// The open traverses, those that were opened from a page last.
 pub(crate) type OpenTraverses = Arc<Mutex<Vec<Arc<OpenTraverse>>>>;
@@ -205,29 +206,30 @@ fn prepare_stop(
 ) -> Result<()> {
     let reaches = |stage| before.is_none_or(|before| before > stage);
     let step = last.step + 1;
-    let mut world = lock(&driven.world);
     // Images that are put off show the mast as it was pointed then.
-    if reaches(CycleStage::PointMast) && world.awaits() != Some(CycleStage::Capture) {
+    let is_pointed = lock(&driven.world).awaits() == Some(CycleStage::Capture);
+    let odometry = || {
+        let mut shared = SharedWorld::new(&driven.world, &driven.cache)?;
+        odometry::run(&mut shared, command, step, cancel.as_ref().into())
+    };
+    if !is_pointed {
+        // After a restart the drive goes on from here.
+        lock(&driven.world).put_off(Some(CycleStage::PointMast))?;
+        if !reaches(CycleStage::PointMast) {
+            return Ok(());
+        }
+        if command.odometry_pair == OdometryPair::Own {
+            odometry()?;
+        }
+        let mut world = lock(&driven.world);
         executive::point_mast(&mut *world, &last.update)?;
+        world.put_off(Some(CycleStage::Capture))?;
     }
     if !reaches(CycleStage::Capture) {
-        let put_off =
-            if reaches(CycleStage::PointMast) { CycleStage::Capture } else { CycleStage::PointMast };
-        return world.put_off(Some(put_off));
-    }
-    // After a restart the motion is measured before the target is searched for.
-    world.put_off(Some(CycleStage::Capture))?;
-    let stops = world.snapshot_with_images()?.with_cache(&driven.cache);
-    drop(world);
-    let measured = executive::measured(&stops, command, step, cancel.as_ref().into())?;
-    let mut world = lock(&driven.world);
-    if world.traverse().stop_count() != step + 1 {
         return Ok(());
     }
-    if let Some(measured) = measured {
-        world.correct(measured)?;
-    }
-    world.put_off(None)
+    odometry()?;
+    lock(&driven.world).put_off(None)
 }
 
 /// The drive of a session.

@@ -16,6 +16,7 @@
 pub mod state;
 mod live_session;
 mod sessions;
+mod shared_world;
 pub mod first_session;
 mod recorded_step;
 mod runner;

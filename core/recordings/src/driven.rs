@@ -10,7 +10,7 @@
 
 use std::path::{Path, PathBuf};
 
-use sightline_geometry::camera::MastAngles;
+use sightline_geometry::camera::{CameraName, MastAngles};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
@@ -155,7 +155,7 @@ impl DrivenTraverse {
             stop.check().map_err(named)?;
         }
         let common = self.driven.iter().zip(&state).take_while(|(a, b)| a == b).count();
-        self.forget_images(common)?;
+        self.forget_images(common, |_| true)?;
         self.traverse.truncate(common);
         self.driven = state;
         for (number, stop) in index_stops(&self.driven, &self.scenario).into_iter().enumerate().skip(common) {
@@ -212,10 +212,16 @@ impl DrivenTraverse {
             .sum()
     }
 
-    /// Removes the images of the stops from `count` on: another drive will see something else there.
-    fn forget_images(&self, count: usize) -> Result<()> {
+    /// Removes the images of the stops from `count` on, of all cameras or those of visual odometry's own pair, or those of the
+    /// others: they will show something else.
+    fn forget_images(&self, count: usize, which: impl Fn(bool) -> bool) -> Result<()> {
         for stop in self.traverse.index().stops.iter().skip(count) {
-            for View { image: name, .. } in stop.views() {
+            let own = stop.camera(CameraName::ODOMETRY);
+            let is_own = |image: &str| {
+                let views = own.iter().flat_map(|own| std::iter::once(&own.left).chain(&own.right));
+                views.into_iter().any(|view| view.image == image)
+            };
+            for View { image: name, .. } in stop.views().filter(|view| which(is_own(&view.image))) {
                 let path: PathBuf = self.traverse.folder().join(name);
                 match std::fs::remove_file(&path) {
                     Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
@@ -298,8 +304,18 @@ impl ActiveWorld for DrivenTraverse {
     fn point_mast(&mut self, angles: Option<MastAngles>) -> Result<()> {
         let number = self.driven.len() - 1;
         if angles.is_some() && self.driven[number].mast_angles.is_some() {
-            self.forget_images(number)?;
+            self.forget_images(number, |is_own| !is_own)?;
             self.driven[number].mast_angles = angles;
+            self.put_last()?;
+        }
+        self.save()
+    }
+
+    fn look(&mut self, angles: MastAngles) -> Result<()> {
+        let number = self.driven.len() - 1;
+        if self.driven[number].odometry_look != Some(angles) {
+            self.forget_images(number, |is_own| is_own)?;
+            self.driven[number].odometry_look = Some(angles);
             self.put_last()?;
         }
         self.save()
@@ -308,7 +324,7 @@ impl ActiveWorld for DrivenTraverse {
     fn expose(&mut self, around: Option<Pixel>) -> Result<()> {
         let number = self.driven.len() - 1;
         if around.is_some() && around != self.driven[number].metered_px {
-            self.forget_images(number)?;
+            self.forget_images(number, |is_own| !is_own)?;
             self.driven[number].metered_px = around;
             self.put_last()?;
         }

@@ -114,6 +114,10 @@ impl ActiveWorld for Replayed<'_> {
         Ok(())
     }
 
+    fn look(&mut self, _angles: MastAngles) -> Result<()> {
+        Ok(())
+    }
+
     fn expose(&mut self, _around: Option<Pixel>) -> Result<()> {
         Ok(())
     }

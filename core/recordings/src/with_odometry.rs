@@ -41,7 +41,7 @@ impl Traverse {
             if wheels[step - 1] == wheels[step] {
                 continue;
             }
-            let measured = MeasuredMotion::measure(&traverse, step, (mode, preset), cancel)?;
+            let measured = MeasuredMotion::measure(&traverse, step, None, (mode, preset), cancel)?;
             let is_stuck = mode == OdometryMode::SlipCheck && slips(&measured);
             let stop = &mut traverse.index.stops[step];
             if measured.corrects {

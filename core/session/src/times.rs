@@ -36,8 +36,10 @@ impl PartialEq for Took {
 pub fn times(step: &RunStep, drive_s: Option<f64>) -> Vec<StageTime> {
     let pointing = &step.point_mast;
     let sizes = [pointing.left.size, pointing.right.size];
-    let flight =
-        FlightTime { drive_s: drive_s.unwrap_or(0.0), ..FlightTime::of_stop(sizes, step.odometry.is_some()) };
+    let flight = FlightTime {
+        drive_s: drive_s.unwrap_or(0.0),
+        ..FlightTime::of_stop(sizes, step.odometry.as_deref())
+    };
     let own_s = |stage: CycleStage| step.took.0.iter().find(|(own, _)| *own == stage).map(|(_, s)| *s);
     let reached = CycleStage::ALL.into_iter().filter(|stage| match stage {
         CycleStage::SetGoal | CycleStage::SelectPath => false,

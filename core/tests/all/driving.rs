@@ -3,16 +3,21 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+use sightline_geometry::camera::CameraName;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Error;
 use sightline_recordings::{DrivenTraverse, create_simulated};
 use sightline_rover::driving::executive::{self, CycleInput};
-use sightline_rover::driving::{ArcNavigator, ArrivalAction, DriveCommand, GoalRule, StopReason};
+use sightline_rover::driving::{
+    ArcNavigator, ArrivalAction, DriveCommand, GoalRule, OdometryPair, StopReason,
+};
 use sightline_rover::pipeline;
 use sightline_session::driving::TargetedDrive;
 use sightline_session::replayed_drive::ReplayedDrive;
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
+use sightline_world::rover::driven::DrivenStop;
+use sightline_world::scenario::{PlacedRock, RockShape};
 use sightline_world::{Scenario, choose_targets, library};
 
 fn scenario() -> Scenario {
@@ -242,4 +247,79 @@ fn a_command_that_makes_no_sense_is_refused_in_one_sentence() {
     assert!(
         refused("fixed", |c| (c.goal, c.step_fraction) = (GoalRule::Fixed, 2.0)).contains("step_fraction")
     );
+}
+
+/// Ground on which little but the rover's own tracks can be told apart, and a rock ahead.
+fn smooth_ground(texture: f64) -> Scenario {
+    let mut scenario = scenario();
+    (scenario.terrain.slope_deg, scenario.terrain.rms_at_1m_m) = (0.0, 0.005);
+    (scenario.rocks.area_fraction, scenario.rocks.cluster_count) = (0.0, 0);
+    (scenario.texture.grain_cover, scenario.texture.drift_cover) = (0.0, 0.0);
+    scenario.texture.albedo_std *= texture;
+    scenario.texture.soil_slope_std *= texture;
+    scenario.rover.tracks = true;
+    let shape = RockShape::Block;
+    let rock =
+        |x_m: f64, y_m: f64| PlacedRock { x_m, y_m, diameter_m: 0.5, height_m: 0.3, yaw_deg: 30.0, shape };
+    scenario.rocks.placed = vec![rock(0.0, 0.0), rock(0.6, 0.5)];
+    scenario
+}
+
+/// The stops of a short drive on smooth ground.
+fn on_smooth_ground(texture: f64, odometry_pair: OdometryPair) -> Vec<DrivenStop> {
+    let folder = tempfile::tempdir().unwrap();
+    let scenario = smooth_ground(texture);
+    let world = DrivenTraverse::begin(&scenario, &folder.path().join("drive"), Cancel::default()).unwrap();
+    let traverse = world.traverse();
+    let pixel = choose_targets(traverse.world().unwrap(), &scenario, traverse.index())[0];
+    let command = DriveCommand { stops_max: 5, odometry_pair, ..command() };
+    let (designation, settings) = (Designation::new(0, pixel), Settings::default());
+    let mut drive = TargetedDrive::begin(world, designation, command, &settings, Cancel::default()).unwrap();
+    while drive.advance(&settings, Cancel::default()).unwrap() {}
+    assert_eq!(drive.steps.len(), 5);
+    // The state has all of it: the drive continues from its folder.
+    let resumed = DrivenTraverse::resume(&folder.path().join("drive")).unwrap();
+    assert_eq!(resumed.state(), drive.world.state());
+    drive.world.state().to_vec()
+}
+
+/// Distance of the estimated from the true place, m.
+fn off_m(stop: &DrivenStop) -> f64 {
+    let [estimated, truth] =
+        [stop.site_from_rover, stop.true_site_from_rover].map(|pose| pose.to_pose().translation.vector);
+    (estimated - truth).norm()
+}
+
+#[test]
+fn where_the_ground_ahead_tells_nothing_the_rover_looks_back_at_its_tracks() {
+    let stops = on_smooth_ground(0.4, OdometryPair::Shared);
+    assert!(stops[0].odometry_look.is_none(), "the first motion is measured in the tracker's pairs");
+    let first = stops[1].odometry.as_ref().unwrap();
+    assert_eq!((first.camera, first.update.accepted, &first.refused_too), (None, false, &None));
+    for (number, stop) in (2..).zip(&stops[2..]) {
+        let measured = stop.odometry.as_ref().unwrap();
+        let camera = (measured.camera, measured.update.accepted, measured.corrects);
+        assert_eq!(camera, (Some(CameraName::ODOMETRY), true, true), "{number}: {measured:?}");
+        let ahead = measured.refused_too.as_ref().unwrap();
+        assert!(ahead.contains("odometry_inliers"), "{number}: {ahead}");
+        assert!(off_m(stop) - off_m(&stops[number - 1]) < 0.005, "{number}");
+    }
+    for stop in &stops[1..] {
+        assert!(stop.odometry_look.unwrap().azimuth_rad.cos() < -0.9, "{:?}", stop.odometry_look);
+    }
+}
+
+#[test]
+fn pairs_of_its_own_measure_the_motion_before_the_mast_points_at_the_target() {
+    let stops = on_smooth_ground(0.5, OdometryPair::Own);
+    for (number, stop) in stops.iter().enumerate() {
+        let look = stop.odometry_look.unwrap();
+        assert!(look.azimuth_rad.cos() > 0.9 && look.elevation_rad < -0.3, "{number}: {look:?}");
+        if let Some(measured) = &stop.odometry {
+            assert_eq!((measured.camera, measured.corrects), (Some(CameraName::ODOMETRY), true), "{number}");
+            assert!(off_m(stop) < 0.005, "{number}: {} m", off_m(stop));
+        } else {
+            assert_eq!(number, 0);
+        }
+    }
 }

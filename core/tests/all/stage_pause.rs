@@ -2,7 +2,7 @@
 
 use sightline_geometry::cancel::Cancel;
 use sightline_rover::driving::executive::{self, CycleInput};
-use sightline_rover::driving::{ActiveWorld, ArcNavigator};
+use sightline_rover::driving::{ArcNavigator, odometry};
 use sightline_rover::pipeline::{self, StepChanges};
 use sightline_session::driving::TargetedDrive;
 use sightline_session::records;
@@ -120,9 +120,7 @@ fn a_world_paused_before_any_stage_goes_on_with_the_same_state_and_images() {
         if put_off == Some(CycleStage::PointMast) {
             executive::point_mast(&mut drive.world, &last.update).unwrap();
         }
-        let stops = drive.world.snapshot_with_images().unwrap();
-        let measured = executive::measured(&stops, &command(), 2, Cancel::default()).unwrap();
-        drive.world.correct(measured.unwrap()).unwrap();
+        odometry::run(&mut drive.world, &command(), 2, Cancel::default()).unwrap();
         drive.world.put_off(None).unwrap();
         assert_eq!(drive.world.state(), state);
         assert_eq!(drive.world.traverse().capture(2).unwrap(), images);

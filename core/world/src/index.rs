@@ -127,6 +127,12 @@ pub(crate) fn simulated_stop(
     }
 }
 
+/// The pair that visual odometry takes of its own at a stop, with the cameras of the main pair; the angles are the told and the
+/// true ones where these differ.
+pub(crate) fn odometry_pair(number: usize, rigs: &Rigs, angles: [Option<MastAngles>; 2]) -> StopCamera {
+    further_camera(number, CameraName::ODOMETRY, &rigs.main, angles)
+}
+
 /// The cameras of a rig at the true mast angles, where these differ from those that the mast was told.
 fn true_cameras(rig: &Rig, pointed: Option<MastAngles>) -> (Option<Camera>, Option<Camera>) {
     pointed.map(|angles| rig.cameras_in_rover(Some(angles))).unzip()

@@ -15,7 +15,7 @@ use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
 use sightline_recordings::replayed::Answer;
 use sightline_recordings::{DrivenTraverse, Traverse};
-use sightline_rover::driving::{ArrivalAction, Cycle, DriveCommand, GoalRule};
+use sightline_rover::driving::{ArrivalAction, Cycle, DriveCommand, GoalRule, OdometryPair};
 use sightline_rover::visual_odometry::OdometryMode;
 use sightline_session::driving::{DriveSummary, TargetedDrive};
 use sightline_session::replayed_drive::{ReplaySummary, ReplayedDrive};
@@ -69,6 +69,9 @@ pub(super) struct Drive {
     /// What visual odometry is used for.
     #[arg(long, value_name = "USE", default_value = "full")]
     odometry: Odometry,
+    /// The pairs in which vision measures the motion.
+    #[arg(long, value_name = "PAIRS", default_value = "shared")]
+    odometry_pair: Pairs,
     /// The settings of visual odometry.
     #[arg(long, value_name = "NAME", default_value = "sightline")]
     odometry_preset: Configuration,
@@ -114,6 +117,15 @@ enum Odometry {
     SlipCheck,
     /// Accepted updates correct the pose as well.
     Full,
+}
+
+/// The pairs in which vision measures the motion.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Pairs {
+    /// Those of the tracker; where an update is refused, also pairs that look back.
+    Shared,
+    /// Pairs of its own at every stop, ahead, and back once an update is refused.
+    Own,
 }
 
 impl Odometry {
@@ -245,6 +257,10 @@ impl Drive {
             step_fraction: self.step_fraction,
             stops_max: self.stops,
             odometry: self.odometry.mode(),
+            odometry_pair: match self.odometry_pair {
+                Pairs::Shared => OdometryPair::Shared,
+                Pairs::Own => OdometryPair::Own,
+            },
             odometry_preset: self.odometry_preset.preset().1,
             slip_max: self.slip_max,
             on_arrival: self.on_arrival.iter().map(|OnArrival::Look| ArrivalAction::Look).collect(),

@@ -21,6 +21,9 @@ pub struct CameraName(
 );
 
 impl CameraName {
+    /// The pair that visual odometry takes of its own.
+    pub const ODOMETRY: Self = Self(*b"odometry\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0");
+
     /// The name as text.
     pub fn as_str(&self) -> &str {
         let length = self.0.iter().position(|&c| c == 0).unwrap_or(LENGTH_LIMIT);

@@ -42,6 +42,15 @@ pub trait ActiveWorld {
     /// A stop that cannot be stored.
     fn point_mast(&mut self, angles: Option<MastAngles>) -> Result<()>;
 
+    /// Takes a pair of its own for visual odometry at the last stop ([`CameraName::ODOMETRY`]), the mast at these angles, in the
+    /// place of one that is there. A recording has the pairs that were recorded.
+    ///
+    /// # Errors
+    /// A stop that cannot be stored.
+    ///
+    /// [`CameraName::ODOMETRY`]: sightline_geometry::camera::CameraName::ODOMETRY
+    fn look(&mut self, angles: MastAngles) -> Result<()>;
+
     /// Puts the exposure subframe of the last stop around a pixel of the left image (R79); `None` leaves it where it is.
     ///
     /// # Errors

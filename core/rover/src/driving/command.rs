@@ -6,6 +6,7 @@ use utoipa::ToSchema;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Point3;
 
+use super::odometry::OdometryPair;
 use crate::visual_odometry::{OdometryMode, OdometryPreset};
 
 /// Whether tracking moves the goal.
@@ -48,6 +49,8 @@ pub struct DriveCommand {
     pub stops_max: u32,
     /// What visual odometry is used for (`full`).
     pub odometry: OdometryMode,
+    /// The pairs in which it measures the motion (`shared`).
+    pub odometry_pair: OdometryPair,
     /// Its settings (`sightline`).
     pub odometry_preset: OdometryPreset,
     /// The drive stops when the slip of a step is measured as larger, as a part of the wheels' motion (0.9; 0.05 to 2). Without
@@ -71,6 +74,7 @@ impl Default for DriveCommand {
             step_fraction: 0.10,
             stops_max: 100,
             odometry: OdometryMode::Full,
+            odometry_pair: OdometryPair::Shared,
             odometry_preset: OdometryPreset::Sightline,
             slip_max: 0.9,
             tilt_max_deg: 30.0,

@@ -20,10 +20,11 @@ use super::active_world::{ActiveWorld, DriveReport};
 use super::command::{ArrivalAction, DriveCommand, GoalRule};
 use super::dead_reckoning::Reckoned;
 use super::flight_time::FlightTime;
+use super::odometry::{self, OdometryPair};
 use super::select_path::{Motion, Navigator};
 use super::set_goal::{Goal, set_goal};
 use crate::pipeline::{self, StepChanges, Stops};
-use crate::visual_odometry::{MeasuredMotion, OdometryMode, pose_change_error};
+use crate::visual_odometry::{OdometryMode, pose_change_error};
 
 /// Longest step and largest turn that odometry follows, m and rad (driving.md 1: 75 cm, 18°).
 const STEP_MAX_M: f64 = 0.75;
@@ -117,10 +118,7 @@ pub fn advance(
     if cycle.ending.is_some() {
         return Ok((cycle, None));
     }
-    point_mast(world, &input.last.update)?;
-    if let Some(measured) = measured(world.stops(), input.command, input.last.step + 1, cancel)? {
-        world.correct(measured)?;
-    }
+    arrive(world, input, cancel)?;
     let trace = pipeline::run_step_changed(
         world.stops(),
         &input.last.update,
@@ -129,6 +127,18 @@ pub fn advance(
         cancel,
     )?;
     Ok((cycle, Some(trace)))
+}
+
+/// Measures the motion to the last stop by vision and points the mast there. Where the pair of the tracker serves both, its
+/// mast is pointed by the wheels.
+fn arrive(world: &mut dyn ActiveWorld, input: &CycleInput<'_>, cancel: Cancel<'_>) -> Result<()> {
+    let step = input.last.step + 1;
+    let is_before = input.command.odometry_pair == OdometryPair::Own;
+    if is_before {
+        odometry::run(world, input.command, step, cancel)?;
+    }
+    point_mast(world, &input.last.update)?;
+    if is_before { Ok(()) } else { odometry::run(world, input.command, step, cancel) }
 }
 
 /// Decides at the last stop and, unless the drive ends there, drives to the next, where the mast is not pointed yet.
@@ -142,7 +152,10 @@ pub fn drive(world: &mut dyn ActiveWorld, input: &CycleInput<'_>, cancel: Cancel
         return Ok(cycle);
     }
     match cycle.motion {
-        Some(motion) => cycle.add(world.drive(&motion, cancel)?),
+        Some(motion) => {
+            odometry::before_drive(world, input.command)?;
+            cycle.add(world.drive(&motion, cancel)?);
+        }
         None => world.stay()?,
     }
     Ok(cycle)
@@ -157,7 +170,7 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
     let target_in_site = target_in_site(input, stops);
     let goal = set_goal(input.command, &target_in_site, [start.x, start.y], &pose);
     let (left, right) = stops.cameras(step);
-    let time = FlightTime::of_stop([left.size, right.size], stops.measured_motion(step).is_some());
+    let time = FlightTime::of_stop([left.size, right.size], stops.measured_motion(step));
     let flight_minutes = input.before.map_or(0.0, |before| before.flight_minutes) + time.total_s() / 60.0;
     let arrival_actions = input.before.map_or(0, |before| before.arrival_actions);
     let [estimated, by_wheels] = reckoned(stops, input, &pose);
@@ -217,23 +230,6 @@ fn target_in_site(input: &CycleInput<'_>, stops: &dyn Stops) -> Point3 {
         GoalRule::Fixed => input.first,
     };
     stops.site_from_rover(from.step) * from.update.target.position_in_rover
-}
-
-/// The motion to a stop whose mast is pointed, as vision measures it; `None` without odometry, and where the rover stayed.
-///
-/// # Errors
-/// Images that cannot be read, or [`sightline_geometry::error::Error::Cancelled`].
-pub fn measured(
-    stops: &dyn Stops,
-    command: &DriveCommand,
-    step: usize,
-    cancel: Cancel<'_>,
-) -> Result<Option<MeasuredMotion>> {
-    let mode = command.odometry;
-    if mode == OdometryMode::Off || stops.site_from_rover(step) == stops.site_from_rover(step - 1) {
-        return Ok(None);
-    }
-    MeasuredMotion::measure(stops, step, (mode, command.odometry_preset), cancel).map(Some)
 }
 
 /// A motion that odometry can follow: at most 75 cm and 18°, and longer by the slip of the step before (driving.md 1).

@@ -5,7 +5,7 @@
 //! | point_mast | 5 s | ours |
 //! | capture | 30 s for a 12-bit 1024 × 1024 pair, less with fewer pixels, 5 s at least | R148 |
 //! | locate | 5 s: correlation 4 s, point stereo 1 s | R147 |
-//! | visual odometry | 90 s, where it runs | R149 |
+//! | visual odometry | 90 s for each update, and point_mast and capture for a pair of its own | R149 |
 //! | drive | 3.75 cm/s, 2.1°/s | domain.md 5.4 |
 //!
 //! Unit: s.
@@ -14,11 +14,15 @@ use serde::{Deserialize, Serialize};
 use sightline_track::cycle_stage::CycleStage;
 use utoipa::ToSchema;
 
+use crate::visual_odometry::MeasuredMotion;
+
 /// Transfer of a full pair, s, and its pixels.
 const CAPTURE_S: f64 = 30.0;
 const CAPTURE_PX: f64 = 2.0 * 1024.0 * 1024.0;
 /// Transfer of the smallest pair, s.
 const CAPTURE_MIN_S: f64 = 5.0;
+/// Turning the mast, s.
+const POINT_MAST_S: f64 = 5.0;
 /// One update of visual odometry, s.
 const ODOMETRY_S: f64 = 90.0;
 
@@ -40,12 +44,15 @@ pub struct FlightTime {
 
 impl FlightTime {
     /// A stop whose images have these sizes, px, without the drive that follows.
-    pub fn of_stop(image_sizes: [[u32; 2]; 2], with_odometry: bool) -> Self {
+    pub fn of_stop(image_sizes: [[u32; 2]; 2], odometry: Option<&MeasuredMotion>) -> Self {
         let pixels: f64 =
             image_sizes.iter().map(|[width, height]| f64::from(*width) * f64::from(*height)).sum();
         let capture_s = (CAPTURE_S * pixels / CAPTURE_PX).max(CAPTURE_MIN_S);
-        let odometry_s = if with_odometry { ODOMETRY_S } else { 0.0 };
-        Self { odometry_s, point_mast_s: 5.0, capture_s, locate_s: 5.0, drive_s: 0.0 }
+        let pair_s = POINT_MAST_S + capture_s;
+        let odometry_s = odometry.map_or(0.0, |measured| {
+            f64::from(measured.updates()) * ODOMETRY_S + f64::from(measured.own_pairs()) * pair_s
+        });
+        Self { odometry_s, point_mast_s: POINT_MAST_S, capture_s, locate_s: 5.0, drive_s: 0.0 }
     }
 
     /// The time of a stage, s; 0 for those that take next to none. Visual odometry comes before the prediction and counts with it.
@@ -68,16 +75,21 @@ impl FlightTime {
 
 #[cfg(test)]
 mod tests {
+    use sightline_geometry::camera::CameraName;
+
     use super::*;
 
     #[test]
     fn an_update_takes_half_a_minute_to_a_minute_as_in_flight() {
         // R149: one update 0.5 to 1 min with full pairs; small pairs are several seconds faster.
-        let full = FlightTime::of_stop([[1024, 1024]; 2], false).total_s();
+        let full = FlightTime::of_stop([[1024, 1024]; 2], None).total_s();
         assert!((30.0..60.0).contains(&full), "{full}");
-        assert!(FlightTime::of_stop([[256, 256]; 2], false).total_s() < 0.5 * full);
+        assert!(FlightTime::of_stop([[256, 256]; 2], None).total_s() < 0.5 * full);
         // R149: 1.5 to 2 min for an update of visual odometry.
-        let with_odometry = FlightTime::of_stop([[1024, 1024]; 2], true).total_s();
-        assert!((90.0..=120.0).contains(&(with_odometry - full)), "{with_odometry}");
+        for (camera, expected_s) in [(None, 90.0), (Some(CameraName::ODOMETRY), 125.0)] {
+            let measured = MeasuredMotion { camera, ..crate::visual_odometry::accepted() };
+            let with_odometry = FlightTime::of_stop([[1024, 1024]; 2], Some(&measured)).total_s();
+            assert!((with_odometry - full - expected_s).abs() < 1e-9, "{with_odometry}");
+        }
     }
 }

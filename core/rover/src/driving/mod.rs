@@ -1,7 +1,7 @@
 //! Targeted driving: the stages after tracking, and the loop that repeats them at every stop (R1–R8, R94–R97, R104–R107).
 //!
 //! ```text
-//! last step ─► set_goal ─► select_path ─► drive ─► point_mast ─► run_step ─► next step
+//! last step ─► set_goal ─► select_path ─► drive ─► point_mast ─► odometry ─► run_step ─► next step
 //! ```
 //! [`executive`] is the loop; it asks an [`ActiveWorld`] to move the rover and sees estimates alone.
 
@@ -10,6 +10,7 @@ pub mod command;
 pub mod dead_reckoning;
 pub mod executive;
 pub mod flight_time;
+pub mod odometry;
 pub mod select_path;
 pub mod set_goal;
 
@@ -18,5 +19,6 @@ pub use command::{ArrivalAction, DriveCommand, GoalRule};
 pub use dead_reckoning::Reckoned;
 pub use executive::{Cycle, Ending, StopReason};
 pub use flight_time::FlightTime;
+pub use odometry::OdometryPair;
 pub use select_path::{ArcNavigator, Motion, Navigator};
 pub use set_goal::Goal;

@@ -6,6 +6,8 @@
 //! A view straight ahead keeps at least 60 % of the ground in steps of 0.75 m; a turn of 18° of a field of 45° does so only
 //! where the mast gives way (domain.md 9.2: at least 60 % of overlap). Frame: rover. Source: ours.
 
+use std::f64::consts::{PI, TAU};
+
 use sightline_geometry::camera::{Mast, MastAngles};
 use sightline_geometry::frames::{Point3, Pose};
 
@@ -21,6 +23,22 @@ pub fn look(mast: &Mast, before: Option<f64>, predicted_after_from_before: &Pose
     let ground =
         Point3::new(origin.x + AHEAD_M * azimuth_rad.cos(), origin.y + AHEAD_M * azimuth_rad.sin(), 0.0);
     mast.point_left_centre_at(&ground)
+}
+
+/// The same looking back, at the rover's own tracks (R142).
+pub(crate) fn look_back(
+    mast: &Mast,
+    before: Option<f64>,
+    predicted_after_from_before: &Pose,
+) -> Option<MastAngles> {
+    let from_straight_back = |azimuth_rad: f64| azimuth_rad.rem_euclid(TAU) - PI;
+    let ahead = look(mast, before.map(from_straight_back), predicted_after_from_before)?;
+    Some(MastAngles { azimuth_rad: ahead.azimuth_rad + PI, ..ahead })
+}
+
+/// Whether the mast looks back.
+pub(crate) fn is_back(angles: MastAngles) -> bool {
+    angles.azimuth_rad.cos() < 0.0
 }
 
 #[cfg(test)]
@@ -42,5 +60,11 @@ mod tests {
         // To the right by 18°: the view before is 18° to the left, the new one 9°.
         let right = look(&mast, Some(0.0), &turned(18.0)).unwrap();
         assert!((right.azimuth_rad - ahead.azimuth_rad + 9f64.to_radians()).abs() < 0.01, "{right:?}");
+        // Back, too, and the view before wherever the mast counts its angle from.
+        for turns in [-TAU, 0.0, TAU] {
+            let back = look_back(&mast, Some(PI + turns), &turned(18.0)).unwrap();
+            assert!((back.azimuth_rad - right.azimuth_rad - PI).abs() < 0.01, "{back:?}");
+            assert!(is_back(back) && !is_back(right) && back.elevation_rad == right.elevation_rad);
+        }
     }
 }

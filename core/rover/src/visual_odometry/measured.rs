@@ -4,6 +4,7 @@ use nalgebra::Matrix6;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use sightline_geometry::camera::CameraName;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
 use sightline_geometry::frames::{Point3, Pose, PoseRecord, Vector3};
@@ -11,6 +12,7 @@ use sightline_geometry::odometry_error::PoseChangeError;
 use sightline_record::{Declaration, GateRecord, Record, Unit};
 
 use super::{OdometryInput, OdometryPreset, OdometryUpdate, OdometryView, update};
+use crate::pair::{self, StopPair};
 use crate::pipeline::Stops;
 
 /// What visual odometry is used for.
@@ -36,27 +38,35 @@ pub struct MeasuredMotion {
     pub wheels_site_from_rover: PoseRecord,
     /// Whether the estimated pose of the stop is by this motion, and its error that of this motion.
     pub corrects: bool,
+    /// The pair of both stops in which it was measured; null: the main one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<CameraName>,
     /// The motion with its gates.
     pub update: OdometryUpdate,
+    /// Why it was refused in the other pair, where two were tried.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub refused_too: Option<String>,
 }
 
 impl MeasuredMotion {
-    /// Measures the motion to stop `step` from the main pairs there and at the stop before. The estimated pose of the stop is
-    /// that of wheels, gyro and accelerometers.
+    /// Measures the motion to stop `step` from the main pairs there and at the stop before, or from further pairs. The estimated
+    /// pose of the stop is that of wheels, gyro and accelerometers.
     ///
     /// # Errors
-    /// Images that cannot be read, or [`sightline_geometry::error::Error::Cancelled`].
+    /// A stop without such a pair, images that cannot be read, or [`sightline_geometry::error::Error::Cancelled`].
     pub fn measure(
         stops: &dyn Stops,
         step: usize,
+        camera: Option<CameraName>,
         (mode, preset): (OdometryMode, OdometryPreset),
         cancel: Cancel<'_>,
     ) -> Result<Self> {
         let by_wheels = stops.site_from_rover(step);
-        let update = between(stops, step, &by_wheels, preset, cancel)?;
+        let update = between(stops, (step, camera), &by_wheels, preset, cancel)?;
         let update = OdometryUpdate { table: Vec::new(), ..update };
         let corrects = mode == OdometryMode::Full && update.accepted;
-        Ok(Self { preset, wheels_site_from_rover: PoseRecord::from(&by_wheels), corrects, update })
+        let wheels_site_from_rover = PoseRecord::from(&by_wheels);
+        Ok(Self { preset, wheels_site_from_rover, corrects, camera, update, refused_too: None })
     }
 
     /// The same update once more, with its corners, which no stop keeps.
@@ -64,13 +74,20 @@ impl MeasuredMotion {
     /// # Errors
     /// As [`Self::measure`].
     pub fn again(&self, stops: &dyn Stops, step: usize, cancel: Cancel<'_>) -> Result<OdometryUpdate> {
-        between(stops, step, &self.wheels_site_from_rover.to_pose(), self.preset, cancel)
+        between(stops, (step, self.camera), &self.wheels_site_from_rover.to_pose(), self.preset, cancel)
     }
 
     /// The estimated pose of the stop, where that of the stop before is `before`; both site frame.
     pub fn pose_after(&self, before: &Pose) -> Pose {
         let accepted = self.update.accepted_motion().filter(|_| self.corrects);
         accepted.map_or_else(|| self.wheels_site_from_rover.to_pose(), |motion| before * motion.inverse())
+    }
+
+    /// Why there is no update, as one sentence; `None` for an accepted one.
+    pub fn refusal(&self) -> Option<String> {
+        let refusal = self.update.refusal()?;
+        let too = self.refused_too.as_ref();
+        Some(too.map_or_else(|| refusal.clone(), |too| format!("{refusal}; looking back, {too}")))
     }
 
     /// Refuses implausible values, as a file may have them.
@@ -100,6 +117,16 @@ impl MeasuredMotion {
         Ok(())
     }
 
+    /// Updates that were computed.
+    pub(crate) fn updates(&self) -> u32 {
+        1 + u32::from(self.refused_too.is_some())
+    }
+
+    /// Pairs that vision took of its own: the one in which it measured, and the one that looks back after a refusal.
+    pub(crate) fn own_pairs(&self) -> u32 {
+        u32::from(self.camera.is_some()) + u32::from(!self.update.accepted)
+    }
+
     /// Movement of the rover's origin by vision, rover frame of the stop before, m.
     fn displacement(&self) -> Option<Vector3> {
         Some(self.update.after_from_before?.to_pose().inverse().translation.vector)
@@ -127,16 +154,17 @@ pub(crate) fn pose_change_error(stops: &dyn Stops, step: usize) -> PoseChangeErr
 
 fn between(
     stops: &dyn Stops,
-    step: usize,
+    (step, camera): (usize, Option<CameraName>),
     by_wheels: &Pose,
     preset: OdometryPreset,
     cancel: Cancel<'_>,
 ) -> Result<OdometryUpdate> {
-    let pairs = [stops.capture(step - 1, cancel)?, stops.capture(step, cancel)?];
+    let cameras = [pair::of_stop(stops, step - 1, camera)?, pair::of_stop(stops, step, camera)?];
+    let images =
+        [pair::capture(stops, step - 1, camera, cancel)?, pair::capture(stops, step, camera, cancel)?];
     let view = |number: usize| {
-        let stop = step - 1 + number;
-        let (left, right) = stops.cameras(stop);
-        OdometryView { pair: &pairs[number], left, right, mast_angles: stops.mast_angles(stop) }
+        let StopPair { left, right, mast_angles, .. } = cameras[number];
+        OdometryView { pair: &images[number], left, right, mast_angles }
     };
     let predicted = by_wheels.inverse() * stops.site_from_rover(step - 1);
     let error_rad = stops.pointing_error_deg().to_radians();
@@ -187,10 +215,44 @@ impl Record for MeasuredMotion {
             r.gate(kind.name, kind.unit, kind.side, "");
         }
         r.gates(|m| m.update.gates.iter().map(GateRecord::from).collect());
-        r.reason(|m| m.update.refusal());
+        r.reason(Self::refusal);
     }
 }
 
 fn worst_sigma_m(covariance: &Matrix6<f64>) -> f64 {
     covariance.fixed_view::<3, 3>(0, 0).into_owned().symmetric_eigenvalues().max().max(0.0).sqrt()
+}
+
+/// A motion straight ahead that was accepted.
+#[cfg(test)]
+pub(crate) fn accepted() -> MeasuredMotion {
+    let pose = PoseRecord::from(&Pose::identity());
+    let update = OdometryUpdate {
+        corners: 0,
+        points: 0,
+        matches: 0,
+        consistent: 0,
+        inliers: 0,
+        coarse_search: None,
+        after_from_before: Some(pose),
+        wheels_m: [0.0; 3],
+        covariance: Some(Matrix6::identity()),
+        chi2_per_dof: None,
+        change: None,
+        slip: None,
+        ambiguity: 0.0,
+        repetition: 0.0,
+        gates: Vec::new(),
+        missing: None,
+        accepted: true,
+        table: Vec::new(),
+    };
+    MeasuredMotion {
+        preset: OdometryPreset::Sightline,
+        wheels_site_from_rover: pose,
+        corrects: true,
+        camera: None,
+        update,
+        refused_too: None,
+    }
 }

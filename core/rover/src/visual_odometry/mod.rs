@@ -33,6 +33,8 @@ pub mod settings;
 mod windows;
 
 pub use coarse::{CoarseSearch, Translation};
+#[cfg(test)]
+pub(crate) use measured::accepted;
 pub(crate) use measured::pose_change_error;
 pub use measured::{MeasuredMotion, OdometryMode};
 pub use outcome::{Fate, OdometryCorner, OdometryUpdate, Slip};

@@ -25,7 +25,7 @@ use sightline_rover::visual_odometry::MeasuredMotion;
 use sightline_track::cycle_stage::CycleStage;
 
 use crate::ground::texture::mix;
-use crate::index::{PAUSE_S, Rigs, simulated_stop};
+use crate::index::{PAUSE_S, Rigs, odometry_pair, simulated_stop};
 use crate::rover::course::{SPEED_M_S, TURN_RAD_S};
 use crate::rover::drive::{first_stop, in_scene};
 use crate::rover::mast_error;
@@ -52,6 +52,9 @@ pub struct DrivenStop {
     pub attitude_error_rad: [f64; 3],
     /// The angles to which the mast was pointed; `None` without a mast.
     pub mast_angles: Option<MastAngles>,
+    /// The angles to which the mast was pointed for a pair that visual odometry took of its own; `None` without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub odometry_look: Option<MastAngles>,
     /// Centre of the exposure subframe in the left image, px; the image's centre where `None`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub metered_px: Option<Pixel>,
@@ -91,6 +94,7 @@ impl DrivenStop {
             site_from_rover: pose,
             attitude_error_rad: [0.0; 3],
             mast_angles: stop.angles,
+            odometry_look: None,
             metered_px: None,
             wheels_m: 0.0,
             drive_s: 0.0,
@@ -129,6 +133,7 @@ impl DrivenStop {
                 site_from_rover: PoseRecord::from(&belief.pose),
                 attitude_error_rad: belief.attitude_error_rad,
                 mast_angles: self.mast_angles,
+                odometry_look: None,
                 metered_px: None,
                 wheels_m: leg.driven_m,
                 drive_s: leg.duration_s,
@@ -149,6 +154,7 @@ impl DrivenStop {
             time_s: self.time_s + PAUSE_S,
             wheels_m: 0.0,
             drive_s: 0.0,
+            odometry_look: None,
             metered_px: None,
             completed: 1.0,
             // A rock is counted at the stop at which it was reached.
@@ -259,9 +265,15 @@ pub fn index_stops(driven: &[DrivenStop], scenario: &Scenario) -> Vec<Stop> {
         let poses = [stop.true_site_from_rover, stop.site_from_rover].map(PoseRecord::to_pose);
         let metered_px = stop.metered_px;
         let made = simulated_stop(number, stop.time_s, poses, stop.mast_angles, with_error(number), &rigs);
+        let mut cameras = made.cameras;
+        cameras.extend(stop.odometry_look.map(|told| {
+            let pointed = mast_error::true_angles_of_look(told, scenario, number);
+            let pointed = Some(pointed).filter(|_| mast_error::is_present(&scenario.drive));
+            odometry_pair(number, &rigs, [Some(told), pointed])
+        }));
         let wheel_places_m = scenario.rover.tracks.then(|| stop.wheel_places_m.clone());
         let truth = made.truth.map(|truth| StopTruth { wheel_places_m, ..truth });
-        Stop { metered_px, truth, odometry: stop.odometry.clone(), ..made }
+        Stop { metered_px, truth, odometry: stop.odometry.clone(), cameras, ..made }
     };
     driven.iter().enumerate().map(stop).collect()
 }

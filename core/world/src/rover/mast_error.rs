@@ -23,6 +23,11 @@ use crate::ground::texture::mix;
 use crate::scenario::{DriveSettings, Scenario};
 use sightline_geometry::camera::MastAngles;
 
+/// The head before the first stop.
+const AHEAD: MastAngles = MastAngles { azimuth_rad: 0.0, elevation_rad: 0.0 };
+/// Added to the number of a stop for the random error of a further look.
+const LOOK: usize = 1 << 20;
+
 /// Whether the true mast angles differ from the measured ones.
 pub(crate) fn is_present(drive: &DriveSettings) -> bool {
     drive.pointing_error_deg > 0.0 || drive.mast_backlash_deg > 0.0 || drive.mast_offset_deg != [0.0; 2]
@@ -30,35 +35,41 @@ pub(crate) fn is_present(drive: &DriveSettings) -> bool {
 
 /// The angles that the mast truly takes when told `told`, one after the other, the mast starting straight ahead.
 pub(crate) fn true_angles(told: &[MastAngles], scenario: &Scenario) -> Vec<MastAngles> {
-    let half_play_rad = 0.5 * scenario.drive.mast_backlash_deg.to_radians();
-    let [azimuth_rad, elevation_rad] = scenario.drive.mast_offset_deg.map(f64::to_radians);
-    let follow =
-        |head_rad: f64, told_rad: f64| head_rad.max(told_rad - half_play_rad).min(told_rad + half_play_rad);
-    let mut head = MastAngles { azimuth_rad: 0.0, elevation_rad: 0.0 };
+    let mut head = AHEAD;
     told.iter()
         .enumerate()
         .map(|(stop, told)| {
-            head = MastAngles {
-                azimuth_rad: follow(head.azimuth_rad, told.azimuth_rad),
-                elevation_rad: follow(head.elevation_rad, told.elevation_rad),
-            };
-            let pointed = MastAngles {
-                azimuth_rad: head.azimuth_rad + azimuth_rad,
-                elevation_rad: head.elevation_rad + elevation_rad,
-            };
-            with_noise(pointed, scenario, stop)
+            head = turned(head, *told, &scenario.drive);
+            with_noise(head, scenario, stop)
         })
         .collect()
 }
 
-/// The angles with the random error of one stop.
-fn with_noise(angles: MastAngles, scenario: &Scenario, stop: usize) -> MastAngles {
+/// The head after it was told to turn, without offset and noise.
+fn turned(head: MastAngles, told: MastAngles, drive: &DriveSettings) -> MastAngles {
+    let half_play_rad = 0.5 * drive.mast_backlash_deg.to_radians();
+    let follow =
+        |head_rad: f64, told_rad: f64| head_rad.max(told_rad - half_play_rad).min(told_rad + half_play_rad);
+    MastAngles {
+        azimuth_rad: follow(head.azimuth_rad, told.azimuth_rad),
+        elevation_rad: follow(head.elevation_rad, told.elevation_rad),
+    }
+}
+
+/// The same for the pair that visual odometry takes of its own at a stop: the mast turns to it from straight ahead.
+pub(crate) fn true_angles_of_look(told: MastAngles, scenario: &Scenario, stop: usize) -> MastAngles {
+    with_noise(turned(AHEAD, told, &scenario.drive), scenario, stop | LOOK)
+}
+
+/// The angles of the head with the offset and the random error of one stop.
+fn with_noise(head: MastAngles, scenario: &Scenario, stop: usize) -> MastAngles {
+    let [azimuth_rad, elevation_rad] = scenario.drive.mast_offset_deg.map(f64::to_radians);
     let sigma_rad = scenario.drive.pointing_error_deg.to_radians();
     let mut random = Pcg64::new(u128::from(mix(scenario.seed ^ mix(stop as u64 ^ 0x9a57))), 0x9a57_9a57);
     let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
     MastAngles {
-        azimuth_rad: angles.azimuth_rad + sigma_rad * normal(),
-        elevation_rad: angles.elevation_rad + sigma_rad * normal(),
+        azimuth_rad: head.azimuth_rad + azimuth_rad + sigma_rad * normal(),
+        elevation_rad: head.elevation_rad + elevation_rad + sigma_rad * normal(),
     }
 }
 
@@ -78,6 +89,20 @@ mod tests {
             assert!((angles.azimuth_rad.to_degrees() - (deg + 0.5)).abs() < 1e-9, "{angles:?}");
             assert!((angles.elevation_rad.to_degrees() - (-deg - 0.3)).abs() < 1e-9, "{angles:?}");
         }
+    }
+
+    #[test]
+    fn a_further_look_has_an_error_of_its_own() {
+        let mut scenario = Scenario::default();
+        scenario.drive.pointing_error_deg = 0.1;
+        let told = MastAngles { azimuth_rad: 0.3, elevation_rad: -0.4 };
+        let looks: Vec<_> = (0..3).map(|stop| true_angles_of_look(told, &scenario, stop)).collect();
+        let main = true_angles(&[told; 3], &scenario);
+        for (k, look) in looks.iter().enumerate() {
+            assert!((look.azimuth_rad - told.azimuth_rad).abs() < 5.0 * 0.1f64.to_radians(), "{look:?}");
+            assert!(!main.contains(look) && !looks[..k].contains(look), "{look:?}");
+        }
+        assert_eq!(true_angles_of_look(told, &scenario, 1), looks[1]);
     }
 
     #[test]

@@ -266,6 +266,10 @@ impl CameraSettings {
             if !IMAGE_SIZES.contains(&camera.image_size) {
                 return Err(Error::setting(key("image_size"), "choose 1024, 512, 256 or 128"));
             }
+            if camera.name == CameraName::ODOMETRY {
+                let problem = format!("{} is the pair that visual odometry takes of its own", camera.name);
+                return Err(Error::setting(&key("name"), problem));
+            }
             if self.further[..index].iter().any(|other| other.name == camera.name) {
                 let problem = format!("{} is the name of another camera already", camera.name);
                 return Err(Error::setting(key("name"), problem));
@@ -305,6 +309,10 @@ mod tests {
             ("rig = \"mer_side_hazcam\"", "mer_front_hazcam"),
             ("hand_over = \"mer_pancam\"", "camera.hand_over"),
             ("further = [{ name = \"A\", rig = \"mer_pancam\" }]", "camera.further[0].name"),
+            (
+                "further = [{ name = \"odometry\", rig = \"mer_navcam\" }]",
+                "camera.further[0].name: odometry is the pair",
+            ),
             (
                 "further = [{ name = \"a\", rig = \"mer_pancam\", image_size = 9 }]",
                 "camera.further[0].image_size",

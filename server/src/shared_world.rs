@@ -1,0 +1,75 @@
+//! The world of a drive for one who takes long: it is held for each change alone, and read in a snapshot, so that others may
+//! look at it while images are rendered and vision measures a motion.
+
+use std::sync::{Arc, Mutex};
+
+use sightline_geometry::camera::MastAngles;
+use sightline_geometry::cancel::Cancel;
+use sightline_geometry::error::Result;
+use sightline_geometry::frames::Pixel;
+use sightline_recordings::{DrivenTraverse, Traverse};
+use sightline_rover::driving::{ActiveWorld, DriveReport, Motion};
+use sightline_rover::pipeline::Stops;
+use sightline_rover::visual_odometry::MeasuredMotion;
+use sightline_track::locate::store::Cache;
+
+use crate::jobs::lock;
+
+/// A world that others look at meanwhile.
+pub(crate) struct SharedWorld<'a> {
+    world: &'a Mutex<DrivenTraverse>,
+    cache: &'a Arc<Cache>,
+    stops: Traverse,
+}
+
+impl<'a> SharedWorld<'a> {
+    /// The world as it is now, with the images of the last stop also where they are put off.
+    ///
+    /// # Errors
+    /// An index that cannot be read.
+    pub(crate) fn new(world: &'a Mutex<DrivenTraverse>, cache: &'a Arc<Cache>) -> Result<Self> {
+        let stops = snapshot(&lock(world), cache)?;
+        Ok(Self { world, cache, stops })
+    }
+
+    fn change<T>(&mut self, change: impl FnOnce(&mut DrivenTraverse) -> Result<T>) -> Result<T> {
+        let mut world = lock(self.world);
+        let changed = change(&mut world)?;
+        self.stops = snapshot(&world, self.cache)?;
+        Ok(changed)
+    }
+}
+
+fn snapshot(world: &DrivenTraverse, cache: &Arc<Cache>) -> Result<Traverse> {
+    Ok(world.snapshot_with_images()?.with_cache(cache))
+}
+
+impl ActiveWorld for SharedWorld<'_> {
+    fn stops(&self) -> &dyn Stops {
+        &self.stops
+    }
+
+    fn drive(&mut self, motion: &Motion, cancel: Cancel<'_>) -> Result<DriveReport> {
+        self.change(|world| world.drive(motion, cancel))
+    }
+
+    fn stay(&mut self) -> Result<()> {
+        self.change(DrivenTraverse::stay)
+    }
+
+    fn correct(&mut self, measured: MeasuredMotion) -> Result<()> {
+        self.change(|world| world.correct(measured))
+    }
+
+    fn point_mast(&mut self, angles: Option<MastAngles>) -> Result<()> {
+        self.change(|world| world.point_mast(angles))
+    }
+
+    fn look(&mut self, angles: MastAngles) -> Result<()> {
+        self.change(|world| world.look(angles))
+    }
+
+    fn expose(&mut self, around: Option<Pixel>) -> Result<()> {
+        self.change(|world| world.expose(around))
+    }
+}
