@@ -32,6 +32,7 @@ use crate::streams::Streams;
 use crate::study::jobs::Shelf;
 use crate::study::order::order;
 use crate::study::saved::Keeper;
+use crate::odometry_tables::OdometryTables;
 use crate::trackability_maps::Maps;
 
 mod bounds;
@@ -72,6 +73,7 @@ struct Inner {
     studies: Shelf,
     streams: Streams,
     maps: Maps,
+    odometry: OdometryTables,
     questions: Questions,
 }
 
@@ -164,6 +166,7 @@ impl AppState {
             studies,
             streams: Streams::default(),
             maps: Maps::new(&limits),
+            odometry: OdometryTables::new(&limits),
             questions,
             limits,
         })))
@@ -304,6 +307,11 @@ impl AppState {
     /// The trackability of stops.
     pub(crate) fn maps(&self) -> &Maps {
         &self.0.maps
+    }
+
+    /// The odometry of stops with its corners.
+    pub(crate) fn odometry(&self) -> &OdometryTables {
+        &self.0.odometry
     }
 
     /// The live Rerun streams, by session.
