@@ -20,6 +20,7 @@ use crate::idempotency;
 use crate::jobs::{Lane, lock};
 use crate::limits::{Limits, SharedLimits};
 use crate::live_session::LiveSession;
+use crate::odometry_tables::OdometryTables;
 use crate::problem::{ApiError, ApiResult};
 use crate::questions::Questions;
 use crate::rendering::{Ahead, OpenTraverse};
@@ -32,7 +33,6 @@ use crate::streams::Streams;
 use crate::study::jobs::Shelf;
 use crate::study::order::order;
 use crate::study::saved::Keeper;
-use crate::odometry_tables::OdometryTables;
 use crate::trackability_maps::Maps;
 
 mod bounds;

@@ -3,6 +3,7 @@
 use std::sync::LazyLock;
 
 use egui::{Align2, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
+use sightline_rover::visual_odometry;
 use sightline_track::gate::GateKind;
 use sightline_track::locate::gate_kinds;
 use sightline_track::stages::judge::{Gate, Verdict};
@@ -83,7 +84,8 @@ fn transition(verdict: &Verdict, state: &State) -> String {
     }
 }
 
-fn show_gate(ui: &mut Ui, step: usize, gate: &Gate, out: &mut Vec<Command>) {
+/// A gate with its value, limit and margin.
+pub(crate) fn show_gate(ui: &mut Ui, step: usize, gate: &Gate, out: &mut Vec<Command>) {
     let colour = theme::verdict(gate.passed);
     let relation = if gate.at_least { "≥" } else { "≤" };
     ui.horizontal(|ui| {
@@ -143,7 +145,8 @@ fn fractions(gate: &Gate) -> (Option<f32>, f32) {
 /// A gate's name in words.
 pub(crate) fn readable(name: &str) -> &str {
     static KINDS: LazyLock<Vec<GateKind>> = LazyLock::new(gate_kinds);
-    KINDS.iter().find(|kind| kind.name == name).map_or(name, |kind| kind.label)
+    let mut all = KINDS.iter().chain(visual_odometry::gate_kinds());
+    all.find(|kind| kind.name == name).map_or(name, |kind| kind.label)
 }
 
 /// Name, value and limit of a gate that was not met, lengths in centimetres: `range change 25.0 > 12.0 cm`.

@@ -33,6 +33,7 @@ pub mod settings;
 mod windows;
 
 pub use coarse::{CoarseSearch, Translation};
+pub use gates::gate_kinds;
 pub(crate) use measured::pose_change_error;
 pub use measured::{MeasuredMotion, OdometryMode};
 pub use outcome::{Fate, OdometryCorner, OdometryUpdate, Slip};
