@@ -12,7 +12,7 @@ use sightline_geometry::frames::Pixel;
 use sightline_rover::visual_odometry::Fate;
 use sightline_track::settings::Changes;
 
-pub(crate) use crate::stage::Stage;
+pub(crate) use crate::stage::{Extent, Stage};
 
 use crate::drawing::stretch::Stretch;
 use crate::drawing::view2d::View2d;

@@ -16,10 +16,11 @@ use sightline_vision::image::{GrayImage, io};
 
 use super::{Shown, fixture};
 use crate::cache::{Eye, Item, Key};
-use crate::command::{Command, Layer};
+use crate::command::{Command, Layer, Stage};
 use crate::drawing::raster::Raster;
 use crate::net::request::Request;
 use crate::odometry::corners;
+use crate::panels::bars;
 use crate::panels::pane::{Need, Pane};
 use crate::state::State;
 use crate::theme;
@@ -272,4 +273,36 @@ fn corners_are_read_only_where_they_are_shown() {
     let key = Key::Odometry { traverse: "t1".to_owned(), step: 4 };
     assert_eq!(crate::net::items::call(&key).path, "traverses/t1/steps/4/odometry");
     assert!(!Request::Item(key).is_invisible());
+}
+
+#[test]
+fn odometry_is_the_first_stage_of_a_drive_and_its_record_is_inspected() {
+    let recorded = |context: &egui::Context, accepted: bool| {
+        let mut state = driven(context, accepted);
+        let mut trace = fixture::trace(STEP);
+        trace.odometry = state.measured_motion(STEP).cloned().map(Box::new);
+        state.cache.forget(|key| matches!(key, Key::Trace(_)));
+        fixture::load(&mut state, trace);
+        state.perform(Command::SelectStage(Stage::VISUAL_ODOMETRY));
+        state
+    };
+    let bar = |make: fn(&egui::Context) -> State| Shown::new([1200.0, 60.0], make, bars::stages);
+    let mut shown = Shown::new([1200.0, 60.0], move |context| recorded(context, true), bars::stages);
+    assert_eq!(shown.click("visual_odometry"), vec![Command::SelectStage(Stage::VISUAL_ODOMETRY)]);
+    bar(|context| fixture::at_step(context, STEP)).hides("visual_odometry").says("predict");
+
+    let inspector = |make: Box<dyn FnOnce(&egui::Context) -> State>| {
+        Shown::new([500.0, 700.0], make, |ui, state, out| {
+            super::show_pane(ui, Pane::Inspector, state, out);
+        })
+    };
+    let shown = inspector(Box::new(move |context| recorded(context, true)));
+    shown.says("How did the rover move since the stop before").says("wheels apart").says("slip aside");
+    let without = inspector(Box::new(|context| {
+        let mut state = driven(context, true);
+        state.traverse.as_mut().unwrap().stops[STEP].odometry = None;
+        state.perform(Command::SelectStage(Stage::VISUAL_ODOMETRY));
+        state
+    }));
+    without.says("Step 3 has no odometry");
 }
