@@ -81,6 +81,7 @@ impl EntityDoc {
 pub fn shared_entities() -> Vec<EntityDoc> {
     let doc =
         |path: &str, archetype, style, rows| EntityDoc { path: path.to_owned(), archetype, style, rows };
+    let measured = Rows::EachStep { when: "the stop has odometry", holds: |t| t.odometry.is_some() };
     let captured = Rows::EachStep { when: "the stop's files are whole", holds: |t| t.capture().is_some() };
     vec![
         doc("/", "ViewCoordinates", None, Rows::Once),
@@ -91,6 +92,9 @@ pub fn shared_entities() -> Vec<EntityDoc> {
         doc("/rover/pose/right", "LineStrips3D", None, Rows::EachStop),
         doc("/capture/left", "EncodedImage", None, captured),
         doc("/capture/right", "EncodedImage", None, captured),
+        doc("/capture/left/odometry/before", "Points2D", None, measured),
+        doc("/capture/left/odometry/after", "Points2D", None, measured),
+        doc("/capture/left/odometry/flow", "LineStrips2D", None, measured),
     ]
 }
 

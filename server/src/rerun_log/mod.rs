@@ -27,6 +27,9 @@
 //! | `/rover/pose/right` | `LineStrips3D` | every stop |
 //! | `/capture/left` | `EncodedImage` | the stop's files are whole |
 //! | `/capture/right` | `EncodedImage` | the stop's files are whole |
+//! | `/capture/left/odometry/before` | `Points2D` | the stop has odometry |
+//! | `/capture/left/odometry/after` | `Points2D` | the stop has odometry |
+//! | `/capture/left/odometry/flow` | `LineStrips2D` | the stop has odometry |
 //! | `/{target}` | `TextDocument` | once |
 //! | `/{target}/predict/position` | `Points3D` | predicted |
 //! | `/{target}/predict/covariance` | `Ellipsoids3D` | predicted |
@@ -135,6 +138,7 @@ mod layout;
 mod live;
 mod map;
 mod memory;
+mod odometry;
 pub(crate) mod page;
 mod palette;
 mod properties;
@@ -148,6 +152,7 @@ mod templates;
 
 use rerun::{RecordingStream, RecordingStreamResult};
 use sightline_rover::pipeline::Stops;
+use sightline_session::step::RunStep;
 
 pub use entities::{EntityDoc, Rows, documented_entities, entities_of, shared_entities};
 pub use export::export;
@@ -174,6 +179,14 @@ fn log_stop(stream: &RecordingStream, stops: &dyn Stops, step: usize) -> Logged 
     map::log_left_frustum(stream, stops, step)?;
     map::log_right_frustum(stream, stops, step)?;
     map::log_further_frusta(stream, stops, step)
+}
+
+/// Logs the odometry of a stop, whichever runs come by.
+fn log_odometry(stream: &RecordingStream, stops: &dyn Stops, trace: &RunStep) -> Logged {
+    let corners = odometry::corners(stops, trace);
+    odometry::log_before(stream, corners.as_deref())?;
+    odometry::log_after(stream, corners.as_deref())?;
+    odometry::log_flow(stream, corners.as_deref())
 }
 
 /// Logs one step of a run, stage by stage; the images only where it is the first run of its pair at this stop.

@@ -20,7 +20,7 @@ use super::blueprint::Lane;
 use super::images::log_further;
 use super::map::Outlook;
 use super::step::Step;
-use super::{Logged, blueprint, log_step, log_stop, map, properties, root, scores, states};
+use super::{Logged, blueprint, log_odometry, log_step, log_stop, map, properties, root, scores, states};
 
 /// One run: which it is, and its steps.
 #[derive(Clone, Copy, Debug)]
@@ -51,6 +51,10 @@ pub(super) struct Recorder {
     stop_count: usize,
     /// Stops and cameras whose images are in the recording.
     captured: BTreeSet<(usize, Option<CameraName>)>,
+    /// Steps whose odometry is in the recording.
+    measured: BTreeSet<usize>,
+    /// Whether the layout shows odometry.
+    shows_odometry: bool,
     /// The runs by their names in paths.
     runs: BTreeMap<String, Known>,
 }
@@ -106,7 +110,15 @@ impl Recorder {
     /// A recording into `stream`; its rows carry no clock time, only the step and the traverse's own time.
     pub(super) fn new(stream: RecordingStream, live: bool) -> Self {
         stream.set_log_time_enabled(false);
-        Self { stream, live, stop_count: 0, captured: BTreeSet::new(), runs: BTreeMap::new() }
+        Self {
+            stream,
+            live,
+            stop_count: 0,
+            captured: BTreeSet::new(),
+            measured: BTreeSet::new(),
+            shows_odometry: false,
+            runs: BTreeMap::new(),
+        }
     }
 
     /// Logs what does not depend on any run: all of it the first time, later the stops that are new.
@@ -141,9 +153,11 @@ impl Recorder {
             scores::log_styles(&self.stream, &root)?;
             self.runs.insert(root, Known::new(first));
         }
-        if self.runs.len() == known {
+        let has_odometry = (0..stops.stop_count()).any(|step| stops.measured_motion(step).is_some());
+        if self.runs.len() == known && self.shows_odometry == has_odometry {
             return Ok(());
         }
+        self.shows_odometry = has_odometry;
         let lanes = self.runs.iter().map(|(root, known)| Lane {
             root,
             close_up_px: known.close_up_px,
@@ -153,7 +167,7 @@ impl Recorder {
         let lanes: Vec<_> = lanes.collect();
         let Some(first) = self.runs.values().next() else { return Ok(()) };
         let outlook = Outlook::over(stops, &first.position_in_site);
-        blueprint::send(&self.stream, &lanes, &outlook, self.live)
+        blueprint::send(&self.stream, &lanes, &outlook, (has_odometry, self.live))
     }
 
     /// Logs one step of a run that was made known, unless it is in the recording already.
@@ -175,7 +189,11 @@ impl Recorder {
             images: if is_first_here { images(trace, stops) } else { None },
             site_from_rover: stops.site_from_rover(trace.step),
         };
-        log_step(&step, is_first_here)
+        log_step(&step, is_first_here)?;
+        if self.measured.insert(trace.step) {
+            log_odometry(&self.stream, stops, trace)?;
+        }
+        Ok(())
     }
 
     /// Logs the images of the cameras beside the main pair and `tracked` that are there without being rendered.
