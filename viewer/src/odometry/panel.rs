@@ -113,6 +113,7 @@ fn images(ui: &mut Ui, state: &State, most: f32, out: &mut Vec<Command>) {
     let corners: &[OdometryCorner] = match state.stop_odometry() {
         Slot::Ready(odometry) => {
             legend::above(ui, &corners::entries(&odometry.corners), state, out);
+            ui.add_space(4.0);
             &odometry.corners
         }
         Slot::Failed(problem) => {
