@@ -128,9 +128,7 @@ impl AppState {
         let drives_lost = drives::open_again(&store, folders, &cache, &mut open, &events)?;
         let driven_lost = driven::open_again(folders, &cache, &mut open, &events);
         let (sessions, mut notices) = Sessions::read_back(&store, &open)?;
-        notices.extend(of_drives);
-        notices.extend(drives_lost);
-        notices.extend(driven_lost);
+        notices.extend(of_drives.into_iter().chain(drives_lost).chain(driven_lost));
         for notice in &notices {
             tracing::warn!("{}", crate::printable::printable(notice));
         }

@@ -8,7 +8,7 @@
 
 use egui::{Grid, Ui};
 use nalgebra::Matrix3;
-use sightline_geometry::frames::Pose;
+use sightline_geometry::frames::{Pose, PoseRecord};
 use sightline_rover::visual_odometry::MeasuredMotion;
 
 use crate::theme;
@@ -31,7 +31,7 @@ const NAMES: [&str; 6] = ["ahead, cm", "right, cm", "down, cm", "roll, °", "pit
 /// The axes of a motion from a stop whose estimated pose is `before`.
 pub(super) fn axes(measured: &MeasuredMotion, before: &Pose) -> [Axis; 6] {
     let wheels = numbers(&(before.inverse() * measured.wheels_site_from_rover.to_pose()));
-    let motion = measured.update.after_from_before.map(|motion| motion.to_pose());
+    let motion = measured.update.after_from_before.map(PoseRecord::to_pose);
     let vision = motion.map(|motion| numbers(&motion.inverse()));
     let sigmas = motion.zip(measured.update.covariance).map(|(motion, covariance)| {
         let turn = motion.rotation.to_rotation_matrix();

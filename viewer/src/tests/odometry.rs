@@ -158,7 +158,7 @@ fn the_panel_says_by_how_much_wheels_and_vision_disagree() {
     );
     // Axes in centimetres and degrees: vision, wheels, difference, 1σ.
     shown.says("+35.00").says("+50.00").says("-15.00").says("0.30").says("+2.000");
-    shown.says("σ of the translation").says("≤ 0.015 m").says("0.003");
+    shown.says("σ of the translation").says("≤ 0.015 m").says("0.003").says("≥ 25");
     shown.says("slip over the steps: 10.0 to 30.0 % along the motion at 3 steps");
 }
 
