@@ -29,6 +29,7 @@ mod drives;
 mod brought;
 mod questions;
 mod trackability_maps;
+mod odometry_tables;
 mod clock;
 mod cancel;
 pub mod limits;

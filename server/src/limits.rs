@@ -4,8 +4,8 @@
 //! it and the option that raises it. Lengths of texts and the ranges of settings are part of the formats, so that they are
 //! constants beside their types.
 //!
-//! What the server keeps in memory is bounded by `cache_bytes` + `step_bytes` + `answer_bytes`, and by `maps` and `grounds`
-//! (their sizes are in the table). Work in progress comes on top; how much there is at a time is limited, too.
+//! What the server keeps in memory is bounded by `cache_bytes` + `step_bytes` + `answer_bytes`, and by `maps`, `grounds` and
+//! `odometry_tables` (their sizes are in the table). Work in progress comes on top; how much there is at a time is limited, too.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -130,6 +130,7 @@ limits! {
     maps_waiting = 8, 1, "maps", "trackability maps that wait; one is made at a time";
     maps = 64, 1, "maps", "trackability maps in memory, half a megabyte each";
     grounds = 2, 1, "stops", "surfaces behind trackability maps in memory, 24 bytes for each pixel";
+    odometry_tables = 64, 1, "stops", "corners of visual odometry in memory, 20 kilobytes a stop";
     cache_bytes = 512 << 20, 0, "bytes", "images, features, surfaces and motions in memory, of all drives; the idle ones go first";
     step_bytes = 4 << 30, 1, "bytes", "steps of runs in memory, of all sessions; sessions that nobody asks for go first and are computed again";
     rest_s = 60, 0, "s", "time for which nobody must have asked for a session before its steps go";

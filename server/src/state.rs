@@ -20,6 +20,7 @@ use crate::idempotency;
 use crate::jobs::{Lane, lock};
 use crate::limits::{Limits, SharedLimits};
 use crate::live_session::LiveSession;
+use crate::odometry_tables::OdometryTables;
 use crate::problem::{ApiError, ApiResult};
 use crate::questions::Questions;
 use crate::rendering::{Ahead, OpenTraverse};
@@ -72,6 +73,7 @@ struct Inner {
     studies: Shelf,
     streams: Streams,
     maps: Maps,
+    odometry: OdometryTables,
     questions: Questions,
 }
 
@@ -126,9 +128,7 @@ impl AppState {
         let drives_lost = drives::open_again(&store, folders, &cache, &mut open, &events)?;
         let driven_lost = driven::open_again(folders, &cache, &mut open, &events);
         let (sessions, mut notices) = Sessions::read_back(&store, &open)?;
-        notices.extend(of_drives);
-        notices.extend(drives_lost);
-        notices.extend(driven_lost);
+        notices.extend(of_drives.into_iter().chain(drives_lost).chain(driven_lost));
         for notice in &notices {
             tracing::warn!("{}", crate::printable::printable(notice));
         }
@@ -164,6 +164,7 @@ impl AppState {
             studies,
             streams: Streams::default(),
             maps: Maps::new(&limits),
+            odometry: OdometryTables::new(&limits),
             questions,
             limits,
         })))
@@ -304,6 +305,11 @@ impl AppState {
     /// The trackability of stops.
     pub(crate) fn maps(&self) -> &Maps {
         &self.0.maps
+    }
+
+    /// The odometry of stops with its corners.
+    pub(crate) fn odometry(&self) -> &OdometryTables {
+        &self.0.odometry
     }
 
     /// The live Rerun streams, by session.

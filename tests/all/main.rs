@@ -14,6 +14,7 @@ mod copied;
 mod drill;
 mod driving;
 mod stage_pause;
+mod odometry;
 mod ending;
 mod exports;
 mod expressions;

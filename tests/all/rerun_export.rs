@@ -1,6 +1,7 @@
 //! The `.rrd` export and the live stream, on a short simulated drive with a missing image and covered eyes; and the
 //! entities of the feature tracker, from tables made up for the same drive (`shape`: those of the shape tracker).
 
+mod odometry;
 mod shape;
 
 use std::ops::ControlFlow;

@@ -31,6 +31,7 @@ mod driving;
 mod exports;
 mod files;
 mod notes;
+mod odometry;
 mod page;
 mod picking;
 mod studies;

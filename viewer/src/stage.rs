@@ -1,5 +1,5 @@
 //! The stages and the steps of `locate` that can be selected: names of stages of the record, in the order of each tracker. A
-//! commanded drive adds its stages after `update`.
+//! commanded drive adds visual odometry before them and its own stages after `update`.
 
 use sightline_session::records;
 use sightline_track::cycle_stage::CycleStage;
@@ -11,8 +11,21 @@ use sightline_track::settings::TrackerKind;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Stage(&'static str);
 
+/// Which stages the bar has beside those of the tracker.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// None: a recording without odometry.
+    Tracker,
+    /// Visual odometry: a recording whose stops have it.
+    Odometry,
+    /// Visual odometry, and the stages of a commanded drive.
+    Drive,
+}
+
 /// Those that the page names.
 impl Stage {
+    /// Stage 0, of a drive with visual odometry.
+    pub const VISUAL_ODOMETRY: Self = Self("visual_odometry");
     /// Stage 1.
     pub const PREDICT: Self = Self("predict");
     /// Stage 2.
@@ -68,17 +81,20 @@ impl Stage {
     /// The stage of this name, whichever tracker has it.
     pub fn named(name: &str) -> Option<Self> {
         let of_trackers = TrackerKind::ALL.into_iter().flat_map(Self::of);
-        of_trackers.chain(Self::OF_DRIVE).find(|stage| stage.0 == name)
+        let further = Self::OF_DRIVE.into_iter().chain([Self::VISUAL_ODOMETRY]);
+        of_trackers.chain(further).find(|stage| stage.0 == name)
     }
 
-    /// Those of the stage bar: of a tracker, and where `is_driven` those of a commanded drive.
-    pub fn bar(tracker: TrackerKind, is_driven: bool) -> impl Iterator<Item = Self> {
-        Self::of(tracker).chain(Self::OF_DRIVE.into_iter().filter(move |_| is_driven))
+    /// Those of the stage bar: of a tracker, and those of the extent around them.
+    pub fn bar(tracker: TrackerKind, extent: Extent) -> impl Iterator<Item = Self> {
+        let odometry = [Self::VISUAL_ODOMETRY].into_iter().filter(move |_| extent != Extent::Tracker);
+        let of_drive = Self::OF_DRIVE.into_iter().filter(move |_| extent == Extent::Drive);
+        odometry.chain(Self::of(tracker)).chain(of_drive)
     }
 
     /// The stage so many places on in the stage bar; the first and the last are where it ends.
-    pub fn neighbour(self, tracker: TrackerKind, is_driven: bool, by: isize) -> Self {
-        let stages: Vec<Self> = Self::bar(tracker, is_driven).collect();
+    pub fn neighbour(self, tracker: TrackerKind, extent: Extent, by: isize) -> Self {
+        let stages: Vec<Self> = Self::bar(tracker, extent).collect();
         let at = stages.iter().position(|&stage| stage == self.of_tracker(tracker)).unwrap_or(0);
         stages[at.saturating_add_signed(by).min(stages.len() - 1)]
     }
@@ -86,7 +102,7 @@ impl Stage {
     /// The stage itself, or the one that stands in its place where `tracker` does not have it: the first and the second step
     /// of `locate` prepare and match in every tracker, and what follows counts as the last step.
     pub fn of_tracker(self, tracker: TrackerKind) -> Self {
-        if Self::bar(tracker, true).any(|stage| stage == self) {
+        if Self::bar(tracker, Extent::Drive).any(|stage| stage == self) {
             return self;
         }
         let place = |tracker| locate::steps(tracker).iter().position(|step| *step == self.0);
@@ -113,7 +129,9 @@ impl Stage {
 
     /// The stage of a stop that it is, or that it is a step of.
     pub(crate) fn in_cycle(self) -> CycleStage {
-        CycleStage::named(self.0).unwrap_or(CycleStage::Locate)
+        // Odometry is measured in the pair that `capture` takes; it corrects the prediction afterwards.
+        let other = if self == Self::VISUAL_ODOMETRY { CycleStage::Capture } else { CycleStage::Locate };
+        CycleStage::named(self.0).unwrap_or(other)
     }
 
     /// Whether only a commanded drive has it.
@@ -138,21 +156,25 @@ mod tests {
 
     #[test]
     fn stages_end_at_the_first_and_the_last() {
-        let from = |stage: Stage, by: isize| stage.neighbour(TrackerKind::Template, false, by);
+        let from = |stage: Stage, by: isize| stage.neighbour(TrackerKind::Template, Extent::Tracker, by);
         assert_eq!(from(Stage::PREDICT, -1), Stage::PREDICT);
         assert_eq!(from(Stage::PREDICT, 1), Stage::POINT_MAST);
         assert_eq!(from(Stage::UPDATE, 1), Stage::UPDATE);
         assert_eq!(from(Stage::PREDICT, 99), Stage::UPDATE);
         // A stage of the other tracker counts as the one in its place.
         assert_eq!(from(Stage::FIT_MOTION, 1), Stage::JUDGE);
-        // A commanded drive goes on after the update.
-        assert_eq!(Stage::UPDATE.neighbour(TrackerKind::Shape, true, 1), Stage::SET_GOAL);
-        assert_eq!(Stage::DRIVE.neighbour(TrackerKind::Shape, true, 1), Stage::DRIVE);
+        // A commanded drive begins with odometry and goes on after the update.
+        let in_drive = |stage: Stage, by: isize| stage.neighbour(TrackerKind::Shape, Extent::Drive, by);
+        assert_eq!(in_drive(Stage::UPDATE, 1), Stage::SET_GOAL);
+        assert_eq!(in_drive(Stage::DRIVE, 1), Stage::DRIVE);
+        assert_eq!(in_drive(Stage::PREDICT, -1), Stage::VISUAL_ODOMETRY);
+        let replayed = Stage::bar(TrackerKind::Template, Extent::Odometry).next();
+        assert_eq!(replayed, Some(Stage::VISUAL_ODOMETRY));
     }
 
     #[test]
     fn every_stage_has_a_question_and_is_found_by_its_name() {
-        for stage in TrackerKind::ALL.into_iter().flat_map(|tracker| Stage::bar(tracker, true)) {
+        for stage in TrackerKind::ALL.into_iter().flat_map(|tracker| Stage::bar(tracker, Extent::Drive)) {
             assert!(stage.question().ends_with('?'), "{}", stage.word());
             assert_eq!(Stage::named(stage.word()), Some(stage));
         }

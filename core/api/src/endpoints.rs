@@ -35,7 +35,7 @@ use crate::program::{Health, Version};
 use crate::query::{FirstRow, FirstStop, ImageWish, MapLimits, MapPixel, SessionPart, ValueName};
 use crate::wire::{
     Designated, Login, NewDrive, NewRun, NewSession, NewTarget, NewTraverse, RerunStream, SessionEntry,
-    StopDetail, TraverseEntry, TraverseView,
+    StopDetail, StopOdometry, TraverseEntry, TraverseView,
 };
 
 /// Declares a type for each endpoint, and the list of all of them.
@@ -104,6 +104,8 @@ endpoints! {
     ShowStop: Get "/traverses/{id}/steps/{step}", AtStop => StopDetail;
     /// An image of a stop as PNG.
     ShowImage: Get "/traverses/{id}/steps/{step}/images/{file}", AtImage, query ImageWish => File;
+    /// The motion to a stop by visual odometry, with its corners.
+    ShowStopOdometry: Get "/traverses/{id}/steps/{step}/odometry", AtStop => StopOdometry;
     /// Renders the stops from this one on before all others.
     Prefetch: Post "/traverses/{id}/prefetch", AtTraverse, query FirstStop => Done;
     /// The trackability of a stop's left image, as far as it is computed.

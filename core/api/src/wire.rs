@@ -9,7 +9,7 @@ use sightline_geometry::frames::{Pixel, PoseRecord};
 use sightline_geometry::stereo_geometry::StereoGeometry;
 use sightline_rover::designate::Place;
 use sightline_rover::driving::DriveCommand;
-use sightline_rover::visual_odometry::MeasuredMotion;
+use sightline_rover::visual_odometry::{MeasuredMotion, OdometryCorner, OdometrySettings};
 use sightline_session::pause::StagePause;
 use sightline_session::view::SessionView;
 use sightline_track::settings::Changes;
@@ -144,6 +144,17 @@ pub struct StopDetail {
     /// The models of the cameras beside the main pair.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cameras: Vec<StopCameraModels>,
+}
+
+/// How vision measured the motion to a stop, corner by corner.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct StopOdometry {
+    /// The settings of the preset.
+    pub settings: OdometrySettings,
+    /// The pose by the wheels and the update with its gates, slip and covariance.
+    pub measured: MeasuredMotion,
+    /// The corners of the left image of the stop before; no drive stores them, they are computed again.
+    pub corners: Vec<OdometryCorner>,
 }
 
 /// Exchanges the access token for a cookie. No `Debug`: the token is a secret.

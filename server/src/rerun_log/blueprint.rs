@@ -10,7 +10,8 @@
 //! An entity shows only in the views that name it: what lies over the left image is listed here and not found
 //! by its path, because paths follow the stages and not the pictures. The close-up shows the same as the left
 //! image, from the frame of the subframe, which goes with the target. A run that asks for the shape has two tabs, “Match”
-//! and “Shape”; the second has what the shape tracker saw, the meshes and how well they fit.
+//! and “Shape”; the second has what the shape tracker saw, the meshes and how well they fit. Beside the left image is a tab with
+//! the corners of odometry, where stops have it.
 
 use std::collections::BTreeSet;
 
@@ -125,13 +126,14 @@ type Series = (&'static str, Corner2D, &'static [&'static str]);
 
 /// What the tracker decided on.
 #[rustfmt::skip]
-const DECISIONS: [Series; 7] = [
+const DECISIONS: [Series; 8] = [
     ("scores", Corner2D::LeftBottom, &["/{target}/judge/ncc/**", "/{target}/judge/stereo_ncc/**", "/{target}/locate/match_template/second_peak_ratio"]),
     ("confidence", Corner2D::LeftBottom, &["/{target}/judge/confidence/**"]),
     ("inliers", Corner2D::LeftBottom, &["/{target}/locate/fit_motion/inliers"]),
     ("gates, m", Corner2D::LeftTop, &["/{target}/judge/distance_correction_m/**", "/{target}/judge/position_correction_m/**"]),
     ("scale and roll", Corner2D::LeftTop, &["/{target}/locate/scale_roll/scale", "/{target}/locate/scale_roll/roll_deg"]),
     ("pointing, deg", Corner2D::LeftBottom, &["/{target}/point_mast/wanted_azimuth_deg", "/{target}/point_mast/used_azimuth_deg", "/{target}/point_mast/wanted_elevation_deg", "/{target}/point_mast/used_elevation_deg"]),
+    ("slip", Corner2D::LeftTop, &["/{target}/record/visual_odometry/slip", "/{target}/record/visual_odometry/slip_aside"]),
     ("exposure", Corner2D::LeftTop, &["/{target}/capture/subframe_mean", "/{target}/capture/subframe_saturated"]),
 ];
 
@@ -156,15 +158,16 @@ pub(super) struct Lane<'a> {
     pub(super) camera: Option<CameraName>,
 }
 
-/// Sends the layout for these runs; a live one follows the newest step.
+/// Sends the layout for these runs; a live one follows the newest step, and one with odometry has a tab for it.
 pub(super) fn send(
     stream: &rerun::RecordingStream,
     lanes: &[Lane<'_>],
     outlook: &Outlook,
-    live: bool,
+    (odometry, live): (&BTreeSet<Option<CameraName>>, bool),
 ) -> Logged {
     let roots: Vec<_> = lanes.iter().map(|lane| lane.root).collect();
-    let pictures = Container::new(Horizontal, pictures(lanes).into_iter().chain([map(outlook, &roots)]));
+    let pictures =
+        Container::new(Horizontal, pictures(lanes, odometry).into_iter().chain([map(outlook, &roots)]));
     let runs = Container::new(Tabs, lanes.iter().map(run));
     let states = View::new("StateTimeline", "states", of_all(&["/{target}/judge/state"], &roots));
     let words = Container::new(Horizontal, [states.into(), words(&roots)]);
@@ -181,14 +184,24 @@ pub(super) fn send(
 }
 
 /// The images of every pair in which a target is tracked, each with its own runs.
-fn pictures(lanes: &[Lane<'_>]) -> Vec<Part> {
+fn pictures(lanes: &[Lane<'_>], odometry: &BTreeSet<Option<CameraName>>) -> Vec<Part> {
     let cameras: BTreeSet<_> = lanes.iter().map(|lane| lane.camera).collect();
     let of_camera = |camera: Option<CameraName>| {
         let own = lanes.iter().filter(|lane| lane.camera == camera);
         let roots: Vec<_> = own.map(|lane| lane.root).collect();
         let of = camera.map_or_else(String::new, |name| format!("{name}: "));
         [("left", &LEFT[..]), ("right", &RIGHT[..])].map(|(eye, overlays)| {
-            picture(&format!("{of}{eye} image"), &images::of_camera(camera, eye), overlays, &roots)
+            let shown =
+                picture(&format!("{of}{eye} image"), &images::of_camera(camera, eye), overlays, &roots);
+            if eye == "right" || camera.is_some() || odometry.is_empty() {
+                return shown;
+            }
+            let corners = odometry.iter().map(|pair| {
+                let name =
+                    pair.map_or_else(|| "odometry".to_owned(), |name| format!("odometry, camera {name}"));
+                View::new("2D", &name, ["$origin/**"]).with_origin(&images::of_camera(*pair, "left")).into()
+            });
+            Container::new(Tabs, std::iter::once(shown).chain(corners)).into()
         })
     };
     cameras.into_iter().flat_map(of_camera).collect()

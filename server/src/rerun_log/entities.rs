@@ -81,6 +81,10 @@ impl EntityDoc {
 pub fn shared_entities() -> Vec<EntityDoc> {
     let doc =
         |path: &str, archetype, style, rows| EntityDoc { path: path.to_owned(), archetype, style, rows };
+    let measured = Rows::EachStep {
+        when: "the stop has odometry in the main pair",
+        holds: |t| t.odometry.as_ref().is_some_and(|measured| measured.camera.is_none()),
+    };
     let captured = Rows::EachStep { when: "the stop's files are whole", holds: |t| t.capture().is_some() };
     vec![
         doc("/", "ViewCoordinates", None, Rows::Once),
@@ -91,6 +95,9 @@ pub fn shared_entities() -> Vec<EntityDoc> {
         doc("/rover/pose/right", "LineStrips3D", None, Rows::EachStop),
         doc("/capture/left", "EncodedImage", None, captured),
         doc("/capture/right", "EncodedImage", None, captured),
+        doc("/capture/left/odometry/before", "Points2D", None, measured),
+        doc("/capture/left/odometry/after", "Points2D", None, measured),
+        doc("/capture/left/odometry/flow", "LineStrips2D", None, measured),
     ]
 }
 

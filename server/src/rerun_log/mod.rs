@@ -15,7 +15,8 @@
 //!
 //! **Further cameras** have the same entities as the main pair below their names: `/rover/pose/{camera}/left` and `right` at
 //! every stop that has the camera, `/capture/{camera}/left` and `right` where a target is tracked in it, and at the other
-//! stops with a step where its images are there without being rendered. A run in such a pair is drawn over its images.
+//! stops with a step where its images are there without being rendered. A run in such a pair is drawn over its images, and so
+//! are the corners of odometry: `/capture/{camera}/left/odometry/{before, after, flow}`.
 //!
 //! | path | archetype | when |
 //! |---|---|---|
@@ -27,6 +28,9 @@
 //! | `/rover/pose/right` | `LineStrips3D` | every stop |
 //! | `/capture/left` | `EncodedImage` | the stop's files are whole |
 //! | `/capture/right` | `EncodedImage` | the stop's files are whole |
+//! | `/capture/left/odometry/before` | `Points2D` | the stop has odometry in the main pair |
+//! | `/capture/left/odometry/after` | `Points2D` | the stop has odometry in the main pair |
+//! | `/capture/left/odometry/flow` | `LineStrips2D` | the stop has odometry in the main pair |
 //! | `/{target}` | `TextDocument` | once |
 //! | `/{target}/predict/position` | `Points3D` | predicted |
 //! | `/{target}/predict/covariance` | `Ellipsoids3D` | predicted |
@@ -135,6 +139,7 @@ mod layout;
 mod live;
 mod map;
 mod memory;
+mod odometry;
 pub(crate) mod page;
 mod palette;
 mod properties;
@@ -148,6 +153,7 @@ mod templates;
 
 use rerun::{RecordingStream, RecordingStreamResult};
 use sightline_rover::pipeline::Stops;
+use sightline_session::step::RunStep;
 
 pub use entities::{EntityDoc, Rows, documented_entities, entities_of, shared_entities};
 pub use export::export;
@@ -174,6 +180,17 @@ fn log_stop(stream: &RecordingStream, stops: &dyn Stops, step: usize) -> Logged 
     map::log_left_frustum(stream, stops, step)?;
     map::log_right_frustum(stream, stops, step)?;
     map::log_further_frusta(stream, stops, step)
+}
+
+/// Logs the odometry of a stop, whichever runs come by, over the pair in which it was measured.
+fn log_odometry(stream: &RecordingStream, stops: &dyn Stops, trace: &RunStep) -> Logged {
+    let corners = odometry::corners(stops, trace);
+    let camera = trace.odometry.as_ref().and_then(|measured| measured.camera);
+    let mut cameras = odometry::cameras(stops);
+    cameras.insert(None);
+    cameras
+        .into_iter()
+        .try_for_each(|known| odometry::log(stream, known, corners.as_deref().filter(|_| known == camera)))
 }
 
 /// Logs one step of a run, stage by stage; the images only where it is the first run of its pair at this stop.

@@ -20,7 +20,9 @@ use super::blueprint::Lane;
 use super::images::log_further;
 use super::map::Outlook;
 use super::step::Step;
-use super::{Logged, blueprint, log_step, log_stop, map, properties, root, scores, states};
+use super::{
+    Logged, blueprint, log_odometry, log_step, log_stop, map, odometry, properties, root, scores, states,
+};
 
 /// One run: which it is, and its steps.
 #[derive(Clone, Copy, Debug)]
@@ -51,6 +53,10 @@ pub(super) struct Recorder {
     stop_count: usize,
     /// Stops and cameras whose images are in the recording.
     captured: BTreeSet<(usize, Option<CameraName>)>,
+    /// Steps whose odometry is in the recording.
+    measured: BTreeSet<usize>,
+    /// The pairs whose odometry the layout shows.
+    odometry: BTreeSet<Option<CameraName>>,
     /// The runs by their names in paths.
     runs: BTreeMap<String, Known>,
 }
@@ -106,7 +112,15 @@ impl Recorder {
     /// A recording into `stream`; its rows carry no clock time, only the step and the traverse's own time.
     pub(super) fn new(stream: RecordingStream, live: bool) -> Self {
         stream.set_log_time_enabled(false);
-        Self { stream, live, stop_count: 0, captured: BTreeSet::new(), runs: BTreeMap::new() }
+        Self {
+            stream,
+            live,
+            stop_count: 0,
+            captured: BTreeSet::new(),
+            measured: BTreeSet::new(),
+            odometry: BTreeSet::new(),
+            runs: BTreeMap::new(),
+        }
     }
 
     /// Logs what does not depend on any run: all of it the first time, later the stops that are new.
@@ -141,9 +155,11 @@ impl Recorder {
             scores::log_styles(&self.stream, &root)?;
             self.runs.insert(root, Known::new(first));
         }
-        if self.runs.len() == known {
+        let odometry = odometry::cameras(stops);
+        if self.runs.len() == known && self.odometry == odometry {
             return Ok(());
         }
+        self.odometry = odometry;
         let lanes = self.runs.iter().map(|(root, known)| Lane {
             root,
             close_up_px: known.close_up_px,
@@ -153,7 +169,7 @@ impl Recorder {
         let lanes: Vec<_> = lanes.collect();
         let Some(first) = self.runs.values().next() else { return Ok(()) };
         let outlook = Outlook::over(stops, &first.position_in_site);
-        blueprint::send(&self.stream, &lanes, &outlook, self.live)
+        blueprint::send(&self.stream, &lanes, &outlook, (&self.odometry, self.live))
     }
 
     /// Logs one step of a run that was made known, unless it is in the recording already.
@@ -165,7 +181,6 @@ impl Recorder {
         self.set_time(trace.step, stops);
         let camera = trace.update.target.designation.camera;
         let is_first_here = self.captured.insert((trace.step, camera));
-        self.log_images_at_hand(stops, trace.step, camera)?;
         let step = Step {
             stream: &self.stream,
             root: &root,
@@ -175,7 +190,12 @@ impl Recorder {
             images: if is_first_here { images(trace, stops) } else { None },
             site_from_rover: stops.site_from_rover(trace.step),
         };
-        log_step(&step, is_first_here)
+        log_step(&step, is_first_here)?;
+        if self.measured.insert(trace.step) {
+            log_odometry(&self.stream, stops, trace)?;
+        }
+        // Last: those in which the motion was measured are there by now.
+        self.log_images_at_hand(stops, trace.step, camera)
     }
 
     /// Logs the images of the cameras beside the main pair and `tracked` that are there without being rendered.

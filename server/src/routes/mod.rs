@@ -23,6 +23,7 @@ pub(crate) mod breakpoints;
 pub(crate) mod expressions;
 pub(crate) mod events;
 pub(crate) mod trackability;
+pub(crate) mod odometry;
 pub(crate) mod counterfactual;
 pub(crate) mod what_if;
 pub(crate) mod why;

@@ -17,7 +17,7 @@ use utoipa_axum::routes;
 
 use super::{
     about, breakpoints, compare, counterfactual, documents, drive, events, exports, expressions, login,
-    notes, photometry, plain, removal, rerun, runs, sessions, settings, steps, studies, targets,
+    notes, odometry, photometry, plain, removal, rerun, runs, sessions, settings, steps, studies, targets,
     trackability, traverses, what_if, why,
 };
 use crate::routes::route::route;
@@ -104,6 +104,7 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
         .merge(plain::router())
         .merge(events::router())
         .merge(trackability::router())
+        .merge(odometry::router())
         .merge(what_if::router())
         .merge(why::router())
         .merge(counterfactual::router())

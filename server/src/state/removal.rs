@@ -71,6 +71,7 @@ impl AppState {
         sessions.forget_removed_on(id);
         traverses.retain(|other| other.id != *id);
         self.0.maps.forget(id);
+        self.0.odometry.forget(id);
         Ok(())
     }
 }

@@ -10,7 +10,7 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
-use sightline_api::wire::{Problem, StopDetail};
+use sightline_api::wire::{Problem, StopDetail, StopOdometry};
 use sightline_session::step::RunStep;
 use sightline_session::times::StageTime;
 use sightline_track::cycle_stage::CycleStage;
@@ -35,6 +35,8 @@ const RETRY_S: f64 = 2.0;
 pub enum Item {
     /// Of [`Key::Stop`].
     Stop(Arc<StopDetail>),
+    /// Of [`Key::Odometry`].
+    Odometry(Arc<StopOdometry>),
     /// Of [`Key::Trace`].
     Trace(Arc<RunStep>),
     /// Of [`Key::Image`] and of a [`Key::Array`] that is a picture.
@@ -54,15 +56,15 @@ impl Item {
         match self {
             Self::Raster(raster) => vec![raster.as_ref()],
             Self::Arrays(all) => all.values().flat_map(Self::rasters).collect(),
-            Self::Stop(_) | Self::Trace(_) | Self::Table(_) | Self::EarlierTemplates(_) | Self::Times(_) => {
-                Vec::new()
-            }
+            Self::Stop(_) | Self::Odometry(_) | Self::Trace(_) | Self::Table(_) => Vec::new(),
+            Self::EarlierTemplates(_) | Self::Times(_) => Vec::new(),
         }
     }
 
     fn bytes(&self) -> usize {
         match self {
             Self::Stop(_) => size_of::<StopDetail>(),
+            Self::Odometry(odometry) => size_of::<StopOdometry>() + size_of_val(odometry.corners.as_slice()),
             Self::Trace(_) => TRACE_BYTES,
             Self::Raster(raster) => raster.bytes(),
             Self::Table(table) => table.bytes(),
@@ -216,6 +218,14 @@ impl Cache {
     pub fn stop(&self, key: &Key) -> Slot<'_, StopDetail> {
         self.slot(key).and(|item| match item {
             Item::Stop(stop) => Some(stop.as_ref()),
+            _ => None,
+        })
+    }
+
+    /// The odometry of a stop with its corners.
+    pub(crate) fn odometry(&self, key: &Key) -> Slot<'_, StopOdometry> {
+        self.slot(key).and(|item| match item {
+            Item::Odometry(odometry) => Some(odometry.as_ref()),
             _ => None,
         })
     }

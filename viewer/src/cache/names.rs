@@ -44,6 +44,13 @@ pub enum Key {
         /// The stop.
         step: usize,
     },
+    /// The odometry of a stop with its corners.
+    Odometry {
+        /// The traverse.
+        traverse: String,
+        /// The stop.
+        step: usize,
+    },
     /// What a step saw and decided.
     Trace(StepKey),
     /// An array of a step.

@@ -9,9 +9,10 @@ pub(crate) mod help;
 
 use sightline_geometry::camera::CameraName;
 use sightline_geometry::frames::Pixel;
+use sightline_rover::visual_odometry::Fate;
 use sightline_track::settings::Changes;
 
-pub(crate) use crate::stage::Stage;
+pub(crate) use crate::stage::{Extent, Stage};
 
 use crate::drawing::stretch::Stretch;
 use crate::drawing::view2d::View2d;
@@ -94,11 +95,16 @@ pub enum Layer {
     Compared,
     /// How well a target would do, while one is picked.
     Trackability,
+    /// The corners of visual odometry on the left image.
+    Odometry,
+    /// The corners of one fate, on the left image and in the panel of odometry.
+    Corners(Fate),
 }
 
 impl Layer {
     /// Those that would drown the picture: they are switched on by whoever wants them.
-    pub const HIDDEN_AT_FIRST: [Self; 3] = [Self::Keypoints, Self::OutlierFlow, Self::Residuals];
+    pub const HIDDEN_AT_FIRST: [Self; 4] =
+        [Self::Keypoints, Self::OutlierFlow, Self::Residuals, Self::Odometry];
 }
 
 /// What the pointer and the keys mean at the moment.

@@ -109,7 +109,7 @@ impl State {
                 self.cache.forget(|kept| match kept {
                     Key::Trace(kept) | Key::Array(kept, _) | Key::Arrays(kept) => *kept == key,
                     Key::EarlierTemplates(kept) | Key::Times(kept) => *kept == key,
-                    Key::Image { .. } | Key::Stop { .. } => false,
+                    Key::Image { .. } | Key::Stop { .. } | Key::Odometry { .. } => false,
                 });
             }
         }
@@ -125,7 +125,7 @@ impl State {
 }
 
 /// Why a stage is not there at a pause, and how to get it.
-pub(super) fn not_computed(before: CycleStage) -> String {
+pub(crate) fn not_computed(before: CycleStage) -> String {
     format!(
         "Not computed yet: the drive is paused before `{}`. “Next stage” or “Continue” in the panel Drive goes on.",
         before.word()

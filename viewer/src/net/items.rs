@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use sightline_api::endpoint::Call;
-use sightline_api::endpoints::{ShowArrays, ShowEarlierTemplates, ShowImage, ShowStep, ShowStop, ShowTimes};
+use sightline_api::endpoints::{
+    ShowArrays, ShowEarlierTemplates, ShowImage, ShowStep, ShowStop, ShowStopOdometry, ShowTimes,
+};
 use sightline_api::location::{AtImage, AtStop};
 use sightline_api::query::ImageWish;
 use sightline_api::wire::Problem;
@@ -24,6 +26,9 @@ pub(crate) fn call(key: &Key) -> Call {
             Call::with_query::<ShowImage>(&AtImage { id, step: *step, file }, &wish)
         }
         Key::Stop { traverse, step } => Call::to::<ShowStop>(&AtStop { id: traverse.clone(), step: *step }),
+        Key::Odometry { traverse, step } => {
+            Call::to::<ShowStopOdometry>(&AtStop { id: traverse.clone(), step: *step })
+        }
         Key::Trace(step) => Call::to::<ShowStep>(step),
         Key::Array(step, _) | Key::Arrays(step) => Call::to::<ShowArrays>(step),
         Key::EarlierTemplates(step) => Call::to::<ShowEarlierTemplates>(step),
@@ -35,6 +40,7 @@ pub(crate) fn call(key: &Key) -> Call {
 pub(super) fn read(key: &Key, bytes: &[u8], context: &egui::Context) -> Result<Item, Problem> {
     match key {
         Key::Stop { .. } => Ok(Item::Stop(Arc::new(parse::<ShowStop>(bytes)?))),
+        Key::Odometry { .. } => Ok(Item::Odometry(Arc::new(parse::<ShowStopOdometry>(bytes)?))),
         Key::EarlierTemplates(_) => Ok(Item::EarlierTemplates(parse::<ShowEarlierTemplates>(bytes)?)),
         Key::Times(_) => Ok(Item::Times(parse::<ShowTimes>(bytes)?)),
         Key::Trace(_) => Ok(Item::Trace(Arc::new(parse::<ShowStep>(bytes)?))),

@@ -5,7 +5,6 @@ use egui::{Align, Button, ComboBox, Layout, Response, RichText, ScrollArea, Ui};
 use sightline_record::Unit;
 use sightline_session::records;
 use sightline_session::step::RunStep;
-use sightline_track::cycle_stage::CycleStage;
 use sightline_track::target::TrackingState;
 
 use crate::command::table::{
@@ -217,8 +216,6 @@ pub(crate) fn stages(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
                 } else {
                     ui.label(theme::note(between));
                 }
-            } else if paused_before == Some(CycleStage::Predict) {
-                pause_mark(ui, stage, "");
             }
             stage_button(ui, state, stage, out);
         }
@@ -265,6 +262,7 @@ fn stage_button(ui: &mut Ui, state: &State, stage: Stage, out: &mut Vec<Command>
 fn has_failed(trace: Option<&RunStep>, stage: Stage) -> bool {
     let Some(trace) = trace else { return false };
     match stage {
+        Stage::VISUAL_ODOMETRY => trace.odometry.as_ref().is_some_and(|measured| !measured.update.accepted),
         Stage::CAPTURE => trace.fault().is_some(),
         Stage::LOCATE => trace.located().is_some_and(|located| located.missing.is_some()),
         Stage::JUDGE => trace.verdict().is_some_and(|verdict| !verdict.good),

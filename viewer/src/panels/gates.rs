@@ -3,6 +3,7 @@
 use std::sync::LazyLock;
 
 use egui::{Align2, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
+use sightline_rover::visual_odometry;
 use sightline_track::gate::GateKind;
 use sightline_track::locate::gate_kinds;
 use sightline_track::stages::judge::{Gate, Verdict};
@@ -83,7 +84,8 @@ fn transition(verdict: &Verdict, state: &State) -> String {
     }
 }
 
-fn show_gate(ui: &mut Ui, step: usize, gate: &Gate, out: &mut Vec<Command>) {
+/// A gate with its value, limit and margin.
+pub(crate) fn show_gate(ui: &mut Ui, step: usize, gate: &Gate, out: &mut Vec<Command>) {
     let colour = theme::verdict(gate.passed);
     let relation = if gate.at_least { "≥" } else { "≤" };
     ui.horizontal(|ui| {
@@ -96,13 +98,18 @@ fn show_gate(ui: &mut Ui, step: usize, gate: &Gate, out: &mut Vec<Command>) {
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             let word = if gate.passed { "pass" } else { "FAIL" };
             column(ui, 28.0, RichText::new(word).strong().color(colour));
-            let limit = format!("{relation} {:.3} {}", gate.limit, gate.unit);
+            let limit = format!("{relation} {} {}", digits(gate.limit), gate.unit);
             column(ui, 56.0, theme::note(limit.trim_end()));
-            let value = gate.value.map_or_else(|| "none".to_owned(), |v| format!("{v:.3}"));
+            let value = gate.value.map_or_else(|| "none".to_owned(), digits);
             column(ui, 38.0, theme::number(value));
         });
     });
     bar(ui, gate, colour);
+}
+
+/// A number with three decimals; a count of ten or more without.
+fn digits(value: f64) -> String {
+    if value.fract() == 0.0 && value.abs() >= 10.0 { format!("{value:.0}") } else { format!("{value:.3}") }
 }
 
 /// A text in a column of its own, right aligned.
@@ -127,7 +134,8 @@ fn bar(ui: &mut Ui, gate: &Gate, colour: egui::Color32) {
         painter.rect_filled(fill, 2.0, colour.gamma_multiply(0.85));
     }
     painter.vline(at(limit), rail.expand(2.0).y_range(), egui::Stroke::new(2.0, theme::strong()));
-    let margin = gate.margin.map_or_else(|| "–".to_owned(), |m| format!("{m:+.3}"));
+    let sign = if gate.margin.is_some_and(|margin| margin >= 0.0) { "+" } else { "" };
+    let margin = gate.margin.map_or_else(|| "–".to_owned(), |m| format!("{sign}{}", digits(m)));
     painter.text(rect.right_center(), Align2::RIGHT_CENTER, margin, theme::digit_font(), colour);
     response.on_hover_text("At the end: the margin, positive on the good side of the limit.");
 }
@@ -143,7 +151,8 @@ fn fractions(gate: &Gate) -> (Option<f32>, f32) {
 /// A gate's name in words.
 pub(crate) fn readable(name: &str) -> &str {
     static KINDS: LazyLock<Vec<GateKind>> = LazyLock::new(gate_kinds);
-    KINDS.iter().find(|kind| kind.name == name).map_or(name, |kind| kind.label)
+    let mut all = KINDS.iter().chain(visual_odometry::gate_kinds());
+    all.find(|kind| kind.name == name).map_or(name, |kind| kind.label)
 }
 
 /// Name, value and limit of a gate that was not met, lengths in centimetres: `range change 25.0 > 12.0 cm`.
@@ -177,5 +186,10 @@ mod tests {
         assert_eq!(fractions(&gate(Some(1.725), 1.15, true)), (Some(0.75), 0.5));
         let edge = Gate { unit: "m".to_owned(), ..gate(Some(0.004), 0.004, true) };
         assert_eq!(fractions(&edge), (Some(0.5), 0.5));
+    }
+
+    #[test]
+    fn counts_have_no_decimals() {
+        assert_eq!([97.0, 1.0, -12.5].map(digits), ["97", "1.000", "-12.500"]);
     }
 }

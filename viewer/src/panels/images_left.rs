@@ -12,6 +12,7 @@ use crate::drawing::overlay::{Line, Mark, Overlay};
 use crate::drawing::raster::Raster;
 use crate::drawing::view2d::Canvas;
 use crate::layout::left_image::keep_left_image;
+use crate::odometry::corners;
 use crate::panels::broken;
 use crate::panels::camera_choice;
 use crate::panels::epipolar::Curve;
@@ -80,6 +81,7 @@ fn picture(
     picking::paint_map(&canvas, state);
     if state.marks {
         paint_others(&canvas, state);
+        corners::paint_left(&canvas, state);
         if let Some(trace) = state.trace_on_image() {
             marks::paint_left(&canvas, state);
             let of = Of::Shown(theme::run(state.cursor.run));
@@ -94,6 +96,7 @@ fn picture(
         marks::hover(&canvas, state, |feature| Some(feature.pixel));
         panel::over_image(ui, &canvas, state, out);
     }
+    corners::hover_left(&canvas, state);
     let pointed = paint_pointed(&canvas, state);
     status_line(ui, &canvas, raster, region, pointed);
     out.extend(canvas.hovered(region).map(|pixel| Command::Point(Pointed::Left(pixel))));
@@ -199,6 +202,7 @@ fn entries(state: &State) -> Vec<Entry> {
     }
     entries.extend(marks::left_entries(state));
     entries.extend(compared::entries(state));
+    entries.extend(corners::left_entry(state));
     entries
 }
 

@@ -78,6 +78,12 @@ pub(crate) fn width_of(ui: &Ui, entry: &Entry) -> f32 {
     galley.size().x + MARK
 }
 
+/// The legend in rows above what follows.
+pub(crate) fn above(ui: &mut Ui, entries: &[Entry], state: &State, out: &mut Vec<Command>) {
+    let widths: Vec<f32> = entries.iter().map(|entry| width_of(ui, entry)).collect();
+    rows(ui, entries, &widths, state, out);
+}
+
 /// The entries one after the other, in as many rows as they need.
 fn rows(ui: &mut Ui, entries: &[Entry], widths: &[f32], state: &State, out: &mut Vec<Command>) {
     let area = ui.available_rect_before_wrap();

@@ -27,6 +27,9 @@ macro_rules! panel_table {
             Drive: "drive", "Drive", Home(Group::Views, 3),
                 "Sends the rover towards the target: its command, and the decision at every stop.",
                 driving::panel::Drive;
+            Odometry: "odometry", "Odometry", Home(Group::Views, 7),
+                "The motion since the stop before by vision, against wheels and gyro: slip, gates and corners.",
+                odometry::panel::Odometry;
             Budget: "budget", "Error budget", Home(Group::Views, 4),
                 "What accuracy stereo, driving and drift leave.",
                 panels::budget::Budget;

@@ -58,6 +58,8 @@ pub enum Need {
     Explanation,
     /// The studies that the server offers.
     Studies,
+    /// The corners of visual odometry.
+    Odometry,
 }
 
 /// Makes the enum of the panels from their table.
@@ -174,6 +176,8 @@ mod tests {
             ("why", Pane::Why),
             ("notes", Pane::Notes),
             ("breakpoints", Pane::Breakpoints),
+            ("drive", Pane::Drive),
+            ("odometry", Pane::Odometry),
         ];
         for (name, pane) in stored {
             let text = serde_json::to_string(&pane).unwrap();

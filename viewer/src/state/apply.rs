@@ -43,7 +43,7 @@ impl State {
             Command::Look { target, run } => self.look(target, run),
             Command::SelectStage(stage) => self.stage = stage,
             Command::StageBy(by) => {
-                self.stage = self.stage().neighbour(self.tracker(), self.is_on_commands(), by);
+                self.stage = self.stage().neighbour(self.tracker(), self.extent(), by);
             }
             Command::SetMode(mode) => self.set_mode(mode),
             Command::Pick(pixel) => self.pick(pixel),

@@ -126,6 +126,8 @@ pub struct State {
     pub studies: Studies,
     /// Whether the windows of all steps are on the screen.
     pub wants_history: bool,
+    /// Whether a panel shows the corners of visual odometry.
+    pub(crate) wants_odometry: bool,
     /// Layers of marks that are switched off.
     pub hidden: HashSet<Layer>,
     /// Whether marks are shown at all.
@@ -199,6 +201,7 @@ impl State {
             calculator: Calculator::default(),
             studies: Studies::default(),
             wants_history: false,
+            wants_odometry: false,
             hidden: HashSet::from(Layer::HIDDEN_AT_FIRST),
             marks: true,
             looks: Looks::default(),

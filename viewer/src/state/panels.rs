@@ -20,6 +20,7 @@ impl State {
     pub(crate) fn fetch_for_panels(&mut self, needs: &[Need]) {
         self.compare.wants_metrics = needs.contains(&Need::Metrics);
         self.wants_history = needs.contains(&Need::MatchedWindows);
+        self.wants_odometry = needs.contains(&Need::Odometry);
         self.want_tried_scores(needs.contains(&Need::TriedScores));
         if needs.contains(&Need::Explanation) {
             self.want_question();

@@ -12,7 +12,7 @@ use sightline_track::trace::ArrayName;
 use sightline_vision::stereo::{AlignSettings, Alignment};
 
 use crate::cache::{Key, Slot};
-use crate::command::Stage;
+use crate::command::{Extent, Stage};
 use crate::state::State;
 use crate::tables::Table;
 
@@ -30,12 +30,26 @@ impl State {
     /// The selected stage, in the words of the tracker.
     pub fn stage(&self) -> Stage {
         let stage = self.stage.of_tracker(self.tracker());
-        if stage.is_of_drive() && !self.is_on_commands() { Stage::UPDATE } else { stage }
+        match (stage, self.extent()) {
+            (Stage::VISUAL_ODOMETRY, Extent::Tracker) => Stage::PREDICT,
+            (of_drive, Extent::Tracker | Extent::Odometry) if of_drive.is_of_drive() => Stage::UPDATE,
+            _ => stage,
+        }
+    }
+
+    /// Which stages the bar has beside those of the tracker.
+    pub(crate) fn extent(&self) -> Extent {
+        let stops = || self.traverse.iter().flat_map(|traverse| &traverse.stops);
+        match self.is_on_commands() {
+            true => Extent::Drive,
+            false if stops().any(|stop| stop.odometry.is_some()) => Extent::Odometry,
+            false => Extent::Tracker,
+        }
     }
 
     /// The stages of the stage bar, in running order.
     pub fn stages(&self) -> impl Iterator<Item = Stage> {
-        Stage::bar(self.tracker(), self.is_on_commands())
+        Stage::bar(self.tracker(), self.extent())
     }
 
     /// What the feature tracker saw at the cursor's step.

@@ -40,6 +40,7 @@ mod pointed;
 #[path = "../files/tests.rs"]
 mod opening;
 mod pauses;
+pub(crate) mod odometry;
 mod problems;
 
 use egui_kittest::Harness;

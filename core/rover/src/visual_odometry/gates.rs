@@ -40,8 +40,13 @@ const AMBIGUITY: GateKind = kind(46, "odometry_ambiguity", "ambiguity", Unit::On
 const REPETITION: GateKind = kind(47, "odometry_repetition", "repetition", Unit::One, Side::AtMost);
 
 /// All gates, in the order in which they are judged.
-pub(super) const KINDS: [GateKind; 8] =
+pub(super) static KINDS: [GateKind; 8] =
     [INLIERS, INLIER_SHARE, CHI2, SIGMA, TRANSLATION, ATTITUDE, AMBIGUITY, REPETITION];
+
+/// All gates of an update, for those who name them.
+pub fn gate_kinds() -> &'static [GateKind] {
+    &KINDS
+}
 
 /// What is judged.
 pub(super) struct Judged<'a> {

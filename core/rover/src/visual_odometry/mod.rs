@@ -33,6 +33,7 @@ pub mod settings;
 mod windows;
 
 pub use coarse::{CoarseSearch, Translation};
+pub use gates::gate_kinds;
 #[cfg(test)]
 pub(crate) use measured::accepted;
 pub(crate) use measured::pose_change_error;

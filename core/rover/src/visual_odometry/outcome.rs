@@ -10,7 +10,7 @@ use sightline_track::gate::Gate;
 use super::coarse::CoarseSearch;
 
 /// What became of a corner.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Fate {
     /// It agrees with the motion.

@@ -38,7 +38,8 @@ pub(super) fn judged(gate: &str) -> &str {
 
 impl Book<'_> {
     pub(super) fn find_gate(&self, name: &str) -> Option<&Gate> {
-        self.trace.verdict()?.gates.iter().find(|gate| gate.name == name)
+        let mut judged = self.trace.verdict().into_iter().flat_map(|verdict| &verdict.gates);
+        judged.find(|gate| gate.name == name).or_else(|| self.odometry_gate(name))
     }
 
     /// A criterion: its margin.
@@ -49,7 +50,7 @@ impl Book<'_> {
             if gate.at_least { ("≥", "value − limit") } else { ("≤", "limit − value") };
         let inputs = [format!("value.{name}"), format!("limit.{name}")];
         let label = format!("margin of criterion {} ({name} {relation} limit): {word}", gate.criterion);
-        let draft = Draft::numbers("judge", &label, &gate.unit, gate.margin);
+        let draft = Draft::numbers(self.judge_of(gate), &label, &gate.unit, gate.margin);
         let draft = Draft { text: Some(word.to_owned()), ..draft };
         let inputs: Vec<&str> = inputs.iter().map(String::as_str).collect();
         Some(match gate.margin {
@@ -62,13 +63,18 @@ impl Book<'_> {
     pub(super) fn gate_value(&self, name: &str) -> Option<Draft> {
         let gate = self.find_gate(name)?;
         let Some(value) = gate.value else {
-            let missing = self.trace.located().and_then(|located| located.missing.clone());
+            let judge = self.judge_of(gate);
+            let missing = match &self.trace.odometry {
+                Some(measured) if judge != "judge" => measured.update.missing.clone(),
+                _ => self.trace.located().and_then(|located| located.missing.clone()),
+            };
             let why = missing.unwrap_or_else(|| "nothing was found to judge".to_owned());
-            return Some(Draft::text("judge", name, "none").roughly(&why, &[judged(name)]));
+            return Some(Draft::text(judge, name, "none").roughly(&why, &[judged(name)]));
         };
         // The same number under its own name; where it has none, its own words.
         let own = self
-            .of_template(judged(name))
+            .odometry_value(gate)
+            .or_else(|| self.of_template(judged(name)))
             .or_else(|| self.of_stereo(judged(name)))
             .or_else(|| self.of_position(judged(name)))
             .or_else(|| self.of_others(judged(name)))

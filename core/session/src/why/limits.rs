@@ -15,7 +15,10 @@ impl Book<'_> {
     pub(super) fn gate_limit(&self, name: &str) -> Option<Draft> {
         let gate = self.find_gate(name)?;
         let label = format!("limit of {name}");
-        let draft = Draft::number("judge", &label, &gate.unit, gate.limit);
+        let draft = Draft::number(self.judge_of(gate), &label, &gate.unit, gate.limit);
+        if let Some(of_odometry) = self.odometry_limit(gate, draft.clone()) {
+            return Some(of_odometry);
+        }
         Some(match name {
             "distance_correction_m" => draft.exactly(
                 "tolerance_factor · √(stereo_error_old_m² + stereo_error_new_m² + navigation_step_m²)",

@@ -13,6 +13,7 @@
 //! | `limits` | the limits, the tolerances of K§4.6 term by term |
 //! | `template` | the match and point stereo |
 //! | `prediction`, `position` | prediction, position, covariance |
+//! | `odometry` | the gates of visual odometry, and its part in a loss |
 //! | `truth` | errors against the truth |
 //! | `others` | features, shape, state, settings |
 //! | `recorded` | every other quantity, as its stage declares it |
@@ -21,6 +22,7 @@
 pub mod gates;
 mod limits;
 mod node;
+mod odometry;
 mod others;
 mod position;
 mod prediction;
@@ -30,6 +32,8 @@ mod template;
 mod truth;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod odometry_tests;
 pub mod words;
 
 use serde::{Deserialize, Serialize};
@@ -129,6 +133,8 @@ impl<'a> Book<'a> {
     /// The names that can be asked for: those that have a value at this step.
     pub fn names(&self) -> Vec<String> {
         let gates = self.trace.verdict().into_iter().flat_map(|verdict| &verdict.gates);
+        let of_odometry = self.trace.odometry.iter().flat_map(|measured| &measured.update.gates);
+        let gates = gates.chain(of_odometry);
         let of_gates = gates.flat_map(|gate| {
             [format!("gate.{}", gate.name), format!("value.{}", gate.name), format!("limit.{}", gate.name)]
         });

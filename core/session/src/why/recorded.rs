@@ -39,7 +39,7 @@ impl Book<'_> {
     }
 
     /// What a stage computes its quantities from.
-    fn origin_of(&self, stage: &str, draft: Draft) -> Draft {
+    pub(super) fn origin_of(&self, stage: &str, draft: Draft) -> Draft {
         let step = self.trace.step;
         match stage {
             "predict" | "point_mast" | "update" => {

@@ -2,9 +2,10 @@
 //!
 //! It names what failed, the worst first, with value, limit and by how much; then what the evidence adds: a peak at the rim
 //! of the search window, a second peak as good, how far off the prediction was, whether the truth lay outside the window;
-//! and at the end what the truth says of the decision.
+//! then what the truth says of the decision, and at the end the part that visual odometry had in a loss.
 
 use super::gates::by_margin;
+use super::odometry;
 use super::template::edge_distance_px;
 use super::words::{number, told_apart};
 use crate::step::RunStep;
@@ -15,7 +16,7 @@ use sightline_track::stages::judge::{Gate, Verdict};
 use sightline_track::target::TrackingState;
 
 /// A peak so near to the rim may belong to one beyond it, px.
-const AT_RIM_PX: f64 = 3.0;
+pub(super) const AT_RIM_PX: f64 = 3.0;
 
 /// A second peak of such a share of the best may as well be the right one.
 const AMBIGUOUS: f64 = 0.95;
@@ -39,6 +40,10 @@ pub fn verdict(trace: &RunStep, before: Option<&RunStep>, settings: &Settings) -
     let mut sentence = parts.join("; ");
     sentence.push('.');
     if let Some(words) = truth_words(trace, verdict) {
+        sentence.push(' ');
+        sentence.push_str(&words);
+    }
+    if let Some(words) = odometry::finding(trace, before, settings) {
         sentence.push(' ');
         sentence.push_str(&words);
     }

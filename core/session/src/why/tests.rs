@@ -30,7 +30,7 @@ fn world() -> PlaneWorld {
     world
 }
 
-fn run(changes: &[(&str, serde_json::Value)]) -> (PlaneWorld, Vec<RunStep>, Settings) {
+pub(super) fn run(changes: &[(&str, serde_json::Value)]) -> (PlaneWorld, Vec<RunStep>, Settings) {
     let changes: Changes = changes.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect();
     let (world, settings) = (world(), Settings::default().with(&changes).unwrap());
     let designation = Designation::new(0, Pixel::new(118.3, 131.6));
@@ -38,12 +38,17 @@ fn run(changes: &[(&str, serde_json::Value)]) -> (PlaneWorld, Vec<RunStep>, Sett
     (world, steps, settings)
 }
 
-fn book<'a>(world: &'a PlaneWorld, steps: &'a [RunStep], settings: &'a Settings, step: usize) -> Book<'a> {
+pub(super) fn book<'a>(
+    world: &'a PlaneWorld,
+    steps: &'a [RunStep],
+    settings: &'a Settings,
+    step: usize,
+) -> Book<'a> {
     let before = step.checked_sub(1).map(|before| &steps[before]);
     Book { trace: &steps[step], before, settings, prediction_px: None, sources: world }
 }
 
-fn numbers(node: &Node) -> Vec<f64> {
+pub(super) fn numbers(node: &Node) -> Vec<f64> {
     node.numbers.iter().map(|number| number.unwrap_or(f64::NAN)).collect()
 }
 
@@ -192,7 +197,7 @@ fn errors(node: &Node, name: &str) -> Option<Vec<f64>> {
 }
 
 /// Checks a tree; counts the closed forms that were recomputed.
-fn check(node: &Node, count: &mut usize) {
+pub(super) fn check(node: &Node, count: &mut usize) {
     node.inputs.iter().for_each(|input| check(input, count));
     if !node.is_closed_form || node.has_more {
         return;

@@ -12,7 +12,7 @@ use sightline_session::step::RunStep;
 use sightline_track::settings::TrackerKind;
 
 use self::tree::Place;
-use crate::command::{Command, Stage};
+use crate::command::{Command, Extent, Stage};
 use crate::compare::panel::readouts;
 use crate::panels::panel::Panel;
 use crate::state::State;
@@ -77,7 +77,7 @@ fn recorded(trace: &RunStep, stage: Stage) -> Vec<RecordedStage> {
     let mut shown: Vec<RecordedStage> = Vec::new();
     for recorded in records::stages().iter().filter(|recorded| is_in_bar(recorded)) {
         let word = recorded.schema().stage.as_ref();
-        let own = Stage::of(tracker).find(|stage| stage.word() == word);
+        let own = Stage::bar(tracker, Extent::Odometry).find(|stage| stage.word() == word);
         of = own.unwrap_or(if of.is_step_of_locate() { of } else { Stage::LOCATE });
         // `detect` counts the results of its next two steps.
         let counts = matches!(stage, Stage::MATCH_FEATURES | Stage::TRIANGULATE) && of == Stage::DETECT;
@@ -105,6 +105,9 @@ fn section(ui: &mut Ui, trace: &RunStep, stage: RecordedStage, out: &mut Vec<Com
 fn not_reached(trace: &RunStep, state: &State) -> String {
     let word = state.stage().word();
     if let Some(sentence) = state.missing_by_pause(trace.step) {
+        return sentence;
+    }
+    if let Some(sentence) = state.missing_odometry().filter(|_| state.stage() == Stage::VISUAL_ODOMETRY) {
         return sentence;
     }
     match (trace.fault(), trace.prediction().is_none()) {

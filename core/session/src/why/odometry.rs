@@ -1,0 +1,157 @@
+//! Visual odometry in Why: its gates, and what it has to do with a target that is lost.
+//!
+//! The findings need no truth: they are made of the record of odometry, and where there is none of what the matches say
+//! about the pose.
+
+use sightline_rover::visual_odometry::MeasuredMotion;
+use sightline_track::settings::Settings;
+use sightline_track::stages::judge::{Gate, Verdict};
+
+use super::Book;
+use super::gates::by_margin;
+use super::node::{Draft, OriginKind};
+use super::sentence::AT_RIM_PX;
+use super::template::edge_distance_px;
+use super::words::{number, signed, told_apart};
+use crate::metrics::uncertainty::nis;
+use crate::step::RunStep;
+
+/// Its stage in the record.
+const STAGE: &str = "visual_odometry";
+
+/// A disagreement of so many standard deviations is none by chance.
+const SIGMAS: f64 = 3.0;
+
+/// The number of the last criterion that scores a match; those after it are about the position.
+const LAST_SCORE: u8 = 2;
+
+/// What odometry has to do with the loss of the target, as one sentence; `None` where it is not lost, or where nothing says that
+/// the pose is to blame.
+pub(super) fn finding(trace: &RunStep, before: Option<&RunStep>, settings: &Settings) -> Option<String> {
+    let verdict = trace.verdict().filter(|verdict| !verdict.good)?;
+    match trace.odometry.as_deref() {
+        Some(measured) if !measured.update.accepted => Some(refused(measured)),
+        Some(measured) => not_used(measured),
+        None => {
+            let evidence = against_the_pose(trace, verdict, before, settings)?;
+            Some(format!(
+                "The pose is without visual odometry, and {evidence}: the rover may have slipped from where its wheels put it."
+            ))
+        }
+    }
+}
+
+/// The refusal with the worst gate.
+fn refused(measured: &MeasuredMotion) -> String {
+    let margins = by_margin(&measured.update.gates);
+    let failed = margins.iter().map(|margin| margin.gate).find(|gate| !gate.passed && gate.value.is_some());
+    let reason = failed.and_then(gate_words).or_else(|| measured.update.missing.clone());
+    let reason = reason.unwrap_or_else(|| "there is no motion".to_owned());
+    format!("Visual odometry refused its update: {reason}; the pose is that of wheels and gyro.")
+}
+
+/// Value, limit and margin of a gate that has a value.
+fn gate_words(gate: &Gate) -> Option<String> {
+    let [value, limit] = told_apart(gate.value?, gate.limit);
+    let unit = if gate.unit.is_empty() { String::new() } else { format!(" {}", gate.unit) };
+    Some(format!(
+        "{} is {value}{unit}, limit {limit}{unit}, margin {}{unit}",
+        gate.name,
+        signed(gate.margin?)
+    ))
+}
+
+/// That an accepted motion does not correct the pose, where it is significantly elsewhere.
+fn not_used(measured: &MeasuredMotion) -> Option<String> {
+    let update = &measured.update;
+    let (motion, covariance) = (update.after_from_before?, update.covariance?);
+    let seen = motion.to_pose().inverse().translation.vector;
+    let apart_m = (seen - nalgebra::Vector3::from(update.wheels_m)).norm();
+    let block = covariance.fixed_view::<3, 3>(0, 0).into_owned();
+    let sigma_m = block.symmetric_eigenvalues().max().max(0.0).sqrt();
+    (!measured.corrects && apart_m > SIGMAS * sigma_m).then(|| {
+        format!(
+            "Visual odometry checks the slip alone: it puts the rover {} m ({} σ) from the pose of wheels and gyro, which is used.",
+            number(apart_m),
+            number(apart_m / sigma_m)
+        )
+    })
+}
+
+/// What says that the pose is wrong: a good match at an impossible position, a peak at the rim, or the step before.
+fn against_the_pose(
+    trace: &RunStep,
+    verdict: &Verdict,
+    before: Option<&RunStep>,
+    settings: &Settings,
+) -> Option<String> {
+    let is_match = !verdict.gates.iter().any(|gate| gate.criterion <= LAST_SCORE && !gate.passed);
+    let is_of_position = |gate: &&Gate| gate.name.ends_with("_correction_m") && !gate.passed;
+    if let Some(words) = verdict.gates.iter().find(is_of_position).filter(|_| is_match).and_then(gate_words) {
+        return Some(format!("the scores of the match are good but {words}"));
+    }
+    let matched = trace.template().and_then(|evidence| evidence.match_template.as_ref());
+    let at_rim = matched.filter(|matched| {
+        matched.descent.is_none()
+            && edge_distance_px(matched, settings.template.template_size_px) <= AT_RIM_PX
+    });
+    if at_rim.is_some() {
+        return Some("the best match is at the rim of the search window".to_owned());
+    }
+    let before = before?;
+    let sigmas = nis(before)?.sqrt();
+    (sigmas > SIGMAS).then(|| {
+        format!("at step {} the match was {} σ from its prediction already", before.step, number(sigmas))
+    })
+}
+
+impl Book<'_> {
+    /// A gate of odometry.
+    pub(super) fn odometry_gate(&self, name: &str) -> Option<&Gate> {
+        self.trace.odometry.as_ref()?.update.gates.iter().find(|gate| gate.name == name)
+    }
+
+    /// The stage that judges a gate.
+    pub(super) fn judge_of(&self, gate: &Gate) -> &'static str {
+        if self.odometry_gate(&gate.name).is_some() { STAGE } else { "judge" }
+    }
+
+    /// The value of a gate of odometry.
+    pub(super) fn odometry_value(&self, gate: &Gate) -> Option<Draft> {
+        self.odometry_gate(&gate.name)?;
+        let quantity = match gate.name.as_str() {
+            "odometry_inliers" => "inliers",
+            "odometry_chi2" => "chi2_per_dof",
+            "odometry_sigma_m" => "sigma_m",
+            "odometry_translation_m" => "wheels_apart_m",
+            "odometry_ambiguity" => "ambiguity",
+            "odometry_repetition" => "repetition",
+            _ => "",
+        };
+        let draft = self.of_record(STAGE, quantity).unwrap_or_else(|| {
+            let draft = Draft::numbers(STAGE, &gate.name, &gate.unit, gate.value);
+            self.origin_of(STAGE, draft)
+        });
+        Some(match gate.name.as_str() {
+            "odometry_inlier_share" => draft.roughly(
+                "inliers as a part of the matches",
+                &["visual_odometry.inliers", "visual_odometry.matches"],
+            ),
+            "odometry_attitude_deg" => {
+                draft.roughly("angle between the turn by vision and that of gyro and accelerometers", &[])
+            }
+            _ => draft,
+        })
+    }
+
+    /// The limit of a gate of odometry: its preset gives it, and the tracker has no such setting.
+    pub(super) fn odometry_limit(&self, gate: &Gate, draft: Draft) -> Option<Draft> {
+        self.odometry_gate(&gate.name)?;
+        let setting = gate.setting.as_deref().unwrap_or_default();
+        let formula = match setting {
+            "slip_max" => "slip_max · the motion of the wheels + 5 cm".to_owned(),
+            setting => format!("{setting} of the odometry preset of the drive"),
+        };
+        Some(draft.roughly(&formula, &[]).from(OriginKind::Setting, format!("odometry {setting}"), None))
+    }
+}

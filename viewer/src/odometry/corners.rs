@@ -1,0 +1,176 @@
+//! The corners of visual odometry on the images: where each was at the stop before, where it was matched, and its fate.
+//!
+//! | mark | fate |
+//! |---|---|
+//! | dot, solid line | inlier: from its place before to its match |
+//! | cross, dashed line | outlier |
+//! | ring, dotted line | matched, without a motion to agree with |
+//! | square, diamond, triangle, plus, small ring | lost: out of view, no match, no stereo after, no stereo, out of range |
+
+use egui::{Color32, Pos2};
+use sightline_geometry::frames::Pixel;
+use sightline_rover::visual_odometry::{Fate, OdometryCorner};
+
+use crate::command::{Layer, Mode};
+use crate::drawing::overlay::{Line, Mark, Overlay, paint_mark};
+use crate::drawing::view2d::Canvas;
+use crate::panels::legend::Entry;
+use crate::state::State;
+use crate::theme;
+
+/// Half the size of the mark of a corner, points.
+const REACH: f32 = 3.0;
+/// How near to a corner the pointer must be to read it, points.
+const HOVER_REACH: f32 = 8.0;
+
+/// The fates in the order of the legend.
+const FATES: [Fate; 8] = [
+    Fate::Inlier,
+    Fate::Outlier,
+    Fate::Unused,
+    Fate::NoMatch,
+    Fate::OutOfView,
+    Fate::NoStereoAfter,
+    Fate::NoStereo,
+    Fate::OutOfRange,
+];
+
+/// An image on which corners are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum At {
+    /// The left image of the stop before.
+    Before,
+    /// The left image of the stop.
+    After,
+}
+
+impl At {
+    /// Where a corner is on the image; `None` where it has no match.
+    fn place(self, corner: &OdometryCorner) -> Option<Pixel> {
+        let [x, y] = match self {
+            Self::Before => corner.before_px,
+            Self::After => corner.after_px?,
+        };
+        Some(Pixel::new(x, y))
+    }
+}
+
+/// Mark, colour and word of a fate.
+fn looks(fate: Fate) -> (Mark, Color32, &'static str) {
+    match fate {
+        Fate::Inlier => (Mark::Dot, theme::inlier(), "inliers"),
+        Fate::Outlier => (Mark::Cross, theme::outlier(), "outliers"),
+        Fate::Unused => (Mark::Ring, theme::lost(), "matched, no motion"),
+        Fate::NoMatch => (Mark::Diamond, theme::search(), "no match"),
+        Fate::OutOfView => (Mark::Square, theme::prediction(), "out of view"),
+        Fate::NoStereoAfter => (Mark::Triangle, theme::run(1), "no stereo after"),
+        Fate::NoStereo => (Mark::Plus, theme::keypoint(), "no stereo before"),
+        Fate::OutOfRange => (Mark::Ring, theme::keypoint(), "out of range"),
+    }
+}
+
+/// The legend: the fates that corners have, with their counts.
+pub(crate) fn entries(corners: &[OdometryCorner]) -> Vec<Entry> {
+    let entry = |fate: Fate| {
+        let count = corners.iter().filter(|corner| corner.fate == fate).count();
+        let (mark, colour, word) = looks(fate);
+        (count > 0).then(|| Entry::new(Layer::Corners(fate), mark, colour, format!("{word} {count}")))
+    };
+    FATES.into_iter().filter_map(entry).collect()
+}
+
+/// What the legend of the page's left image lists: one entry for all corners, where the stop has odometry.
+pub(crate) fn left_entry(state: &State) -> Option<Entry> {
+    let step = state.cursor.step;
+    let measured = state.odometry_on_image()?;
+    let word = format!("odometry from step {}, {} inliers", step.saturating_sub(1), measured.update.inliers);
+    Some(Entry::new(Layer::Odometry, Mark::Stroke(Line::Solid), theme::inlier(), word))
+}
+
+/// The corners on the page's left image; none while their layer is hidden.
+fn on_left_image(state: &State) -> &[OdometryCorner] {
+    let is_shown = state.shows(Layer::Odometry) && state.odometry_on_image().is_some();
+    let odometry = state.stop_odometry().ready().filter(|_| is_shown);
+    odometry.map_or(&[], |odometry| odometry.corners.as_slice())
+}
+
+/// Paints the matches on the page's left image.
+pub(crate) fn paint_left(canvas: &Canvas, state: &State) {
+    paint(canvas, state, on_left_image(state), At::After);
+}
+
+/// Says what the corner under the pointer on the page's left image is.
+pub(crate) fn hover_left(canvas: &Canvas, state: &State) {
+    let corners = on_left_image(state);
+    if let Some(corner) = pointed(canvas, state, corners, At::After) {
+        ring(canvas, &corners[corner], At::After);
+        canvas.response.clone().on_hover_text_at_pointer(words(&corners[corner]));
+    }
+}
+
+/// Paints the corners whose fates are shown; at the stop itself with a line from where each was before.
+pub(crate) fn paint(canvas: &Canvas, state: &State, corners: &[OdometryCorner], at: At) {
+    let overlay = Overlay::new(&canvas.painter, &canvas.transform);
+    for corner in corners.iter().filter(|corner| state.shows(Layer::Corners(corner.fate))) {
+        let Some(place) = at.place(corner) else { continue };
+        let (mark, colour, _) = looks(corner.fate);
+        if at == At::After
+            && let Some(before) = At::Before.place(corner)
+        {
+            let line = match corner.fate {
+                Fate::Inlier => Line::Solid,
+                Fate::Outlier => Line::Dashed,
+                _ => Line::Dotted,
+            };
+            overlay.thin_line(&[before, place], colour, line);
+        }
+        paint_mark(&canvas.painter, canvas.transform.to_screen(place), mark, colour, REACH);
+    }
+}
+
+/// A ring around a corner.
+pub(crate) fn ring(canvas: &Canvas, corner: &OdometryCorner, at: At) {
+    if let Some(place) = at.place(corner) {
+        Overlay::new(&canvas.painter, &canvas.transform).mark(place, Mark::Ring, theme::accent());
+    }
+}
+
+/// The corner under the pointer, by its place in the table.
+pub(crate) fn pointed(canvas: &Canvas, state: &State, corners: &[OdometryCorner], at: At) -> Option<usize> {
+    let pointer: Pos2 = canvas.response.hover_pos().filter(|_| state.mode == Mode::Look)?;
+    let distance = |corner: &OdometryCorner| {
+        let place = at.place(corner).filter(|_| state.shows(Layer::Corners(corner.fate)))?;
+        Some(canvas.transform.to_screen(place).distance(pointer)).filter(|d| *d <= HOVER_REACH)
+    };
+    let near = corners.iter().enumerate().filter_map(|(k, corner)| Some((k, distance(corner)?)));
+    near.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(k, _)| k)
+}
+
+/// The numbers of a corner, a line each.
+pub(crate) fn words(corner: &OdometryCorner) -> String {
+    let [x, y] = corner.before_px;
+    let mut lines = vec![format!("before at {x:.1}, {y:.1}")];
+    if let Some([x, y]) = corner.after_px {
+        lines.push(format!("matched at {x:.1}, {y:.1}"));
+    }
+    if let Some(range_m) = corner.range_m {
+        lines.push(format!("range before {range_m:.2} m"));
+    }
+    if let Some(sigmas) = corner.residual_sigmas {
+        lines.push(format!("residual {sigmas:.2} σ"));
+    }
+    lines.push(
+        match corner.fate {
+            Fate::Inlier => "inlier: it agrees with the motion",
+            Fate::Outlier => "outlier: it does not agree with the motion",
+            Fate::Unused => "matched, but there is no motion to agree with",
+            Fate::NoMatch => "lost: no match between the stops",
+            Fate::OutOfView => "lost: out of view after the motion",
+            Fate::NoStereoAfter => "lost: no match between the eyes after the motion",
+            Fate::NoStereo => "lost: no match between the eyes before the motion",
+            Fate::OutOfRange => "lost: its range is beyond the limits",
+        }
+        .to_owned(),
+    );
+    lines.join("\n")
+}
