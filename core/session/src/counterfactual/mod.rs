@@ -3,7 +3,8 @@
 //!
 //! ```text
 //! recorded step ──► goal ──► candidates: settings that tracker and stage use ──► search ──► the step, really run ──► finding
-//!                        └─► the prediction, moved to where the match is ──────┘
+//!                        ├─► the prediction, moved to where the match is ──────┤
+//!                        └─► the prediction, where visual odometry puts it ────┘
 //! ```
 //! | the recorded step | the goal |
 //! |---|---|
@@ -24,6 +25,7 @@
 //!
 //! No clock, no chance: the same step gives the same findings.
 
+mod by_vision;
 mod candidates;
 mod directed;
 mod moved;
@@ -153,7 +155,7 @@ pub struct Answer {
     pub runs: usize,
     /// What was found: right first, then the smallest change.
     pub findings: Vec<Finding>,
-    /// What was looked at without success: settings by name, and `prediction`.
+    /// What was looked at without success: settings by name, `prediction` and `visual odometry`.
     pub without: Vec<String>,
 }
 
@@ -206,13 +208,19 @@ pub fn look<D: Drive>(
     let mut trials = Trials::new(drive, base, goal, cancel);
     let combined = directed::combined(&trials);
     let is_moved = base.recorded.template().is_some() || base.recorded.shape().is_some();
-    let n = infos.len() + usize::from(combined.is_some()) + usize::from(is_moved);
+    let has_vision = is_moved && by_vision::applies(base.recorded);
+    let n = infos.len() + usize::from(combined.is_some()) + usize::from(is_moved) + usize::from(has_vision);
     let (findings, without) = (Vec::new(), Vec::new());
     let mut answer = Answer { goal, k: 0, n, doing: String::new(), runs: 0, findings, without };
     if let Some(changes) = combined {
         answer.begin("the failed limits together", on);
         let found = directed::together(&mut trials, &changes)?;
         answer.end("limits together", found, &trials, on);
+    }
+    if has_vision {
+        answer.begin("visual odometry", on);
+        let found = by_vision::look(&mut trials, cancel.into())?;
+        answer.end("visual odometry", found, &trials, on);
     }
     if is_moved {
         answer.begin("the prediction, moved", on);

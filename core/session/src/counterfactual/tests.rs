@@ -14,6 +14,7 @@ use sightline_geometry::frames::{Point3, Pose, Vector3};
 use sightline_geometry::odometry_error::OdometryError;
 use sightline_geometry::stereo_geometry::StereoGeometry;
 use sightline_rover::pipeline::Stops;
+use sightline_rover::visual_odometry::{MeasuredMotion, OdometryMode, OdometryPreset};
 use sightline_testing::{PlaneWorld, Trouble};
 use sightline_track::settings::Settings;
 use sightline_track::stages::capture::StereoPair;
@@ -195,6 +196,39 @@ fn the_prediction_need_only_move_until_the_match_is_in_the_window() {
     );
     let short = WhatIf { prediction_px: Some(nearer), ..WhatIf::default() };
     assert!(!is_accepted(&try_step(&staged.world, staged.base(), &short, Cancel::default()).unwrap()));
+}
+
+#[test]
+fn a_slip_that_odometry_would_have_seen_is_answered_by_the_place_where_it_puts_the_prediction() {
+    let staged = Staged::new(world(0.4), &[("search_window_px", json!(61))]);
+    let by_vision = |staged: &Staged| {
+        let answer = staged.answer();
+        let is_it = |finding: &&Finding| {
+            finding.moved.as_ref().is_some_and(|moved| moved.because.contains("visual odometry"))
+        };
+        (answer.findings.iter().find(is_it).cloned(), answer)
+    };
+    let (finding, _) = by_vision(&staged);
+    let finding = finding.unwrap();
+    let truth = staged.steps[STEP].truth.as_ref().unwrap().left_pixel.unwrap();
+    let moved = finding.moved.as_ref().unwrap();
+    assert!(moved.from.distance(truth) > 30.0 && moved.to.distance(truth) < 1.5, "{moved:?} {truth:?}");
+    assert_eq!(finding.outcome, Outcome::Right);
+    assert!(finding.sentence.contains("which the drive runs without"), "{}", finding.sentence);
+    // A refused motion names its gate; a correction of the pose leaves nothing to ask.
+    let mut refused = staged;
+    let how = (OdometryMode::Full, OdometryPreset::Sightline);
+    let mut measured = MeasuredMotion::measure(&refused.world, STEP, None, how, Cancel::default()).unwrap();
+    let gate = measured.update.gates.iter_mut().find(|gate| gate.name == "odometry_sigma_m").unwrap();
+    (gate.limit, gate.passed, gate.margin) = (1e-6, false, gate.value.map(|value| 1e-6 - value));
+    (measured.update.accepted, measured.corrects) = (false, false);
+    refused.steps[STEP].odometry = Some(Box::new(measured.clone()));
+    let (named, _) = by_vision(&refused);
+    assert!(named.unwrap().sentence.contains("odometry_sigma_m is "), "the gate is named");
+    (measured.update.accepted, measured.corrects) = (true, true);
+    refused.steps[STEP].odometry = Some(Box::new(measured));
+    let (none, answer) = by_vision(&refused);
+    assert!(none.is_none() && !answer.without.contains(&"visual odometry".to_owned()));
 }
 
 #[test]

@@ -42,6 +42,11 @@ impl<'a, D: Drive> Trials<'a, D> {
         Self { drive, base, goal, runs: 0, cancel: cancel.into() }
     }
 
+    /// Where the step is.
+    pub(super) const fn drive(&self) -> &'a D {
+        self.drive
+    }
+
     /// Ends the search once it was cancelled.
     pub(super) fn check(&self) -> Result<()> {
         self.cancel.check()

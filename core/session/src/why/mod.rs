@@ -22,7 +22,7 @@
 pub mod gates;
 mod limits;
 mod node;
-mod odometry;
+pub(crate) mod odometry;
 mod others;
 mod position;
 mod prediction;

@@ -30,8 +30,9 @@ const LAST_SCORE: u8 = 2;
 pub(super) fn finding(trace: &RunStep, before: Option<&RunStep>, settings: &Settings) -> Option<String> {
     let verdict = trace.verdict().filter(|verdict| !verdict.good)?;
     match trace.odometry.as_deref() {
-        Some(measured) if !measured.update.accepted => Some(refused(measured)),
-        Some(measured) => not_used(measured),
+        Some(measured) => {
+            refusal(measured).map_or_else(|| not_used(measured), |reason| Some(refused(&reason)))
+        }
         None => {
             let evidence = against_the_pose(trace, verdict, before, settings)?;
             Some(format!(
@@ -41,12 +42,18 @@ pub(super) fn finding(trace: &RunStep, before: Option<&RunStep>, settings: &Sett
     }
 }
 
-/// The refusal with the worst gate.
-fn refused(measured: &MeasuredMotion) -> String {
+/// Why a motion is refused, as a clause with value and limit of its worst gate; `None` for an accepted one.
+pub(crate) fn refusal(measured: &MeasuredMotion) -> Option<String> {
+    if measured.update.accepted {
+        return None;
+    }
     let margins = by_margin(&measured.update.gates);
     let failed = margins.iter().map(|margin| margin.gate).find(|gate| !gate.passed && gate.value.is_some());
     let reason = failed.and_then(gate_words).or_else(|| measured.update.missing.clone());
-    let reason = reason.unwrap_or_else(|| "there is no motion".to_owned());
+    Some(reason.unwrap_or_else(|| "there is no motion".to_owned()))
+}
+
+fn refused(reason: &str) -> String {
     format!("Visual odometry refused its update: {reason}; the pose is that of wheels and gyro.")
 }
 
