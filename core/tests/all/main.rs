@@ -20,4 +20,5 @@ mod stereo_rendered;
 mod stereo_recorded;
 mod hand_over;
 mod cameras;
+mod odometry_scenarios;
 mod visual_odometry;

@@ -268,7 +268,7 @@ impl CameraSettings {
             }
             if camera.name == CameraName::ODOMETRY {
                 let problem = format!("{} is the pair that visual odometry takes of its own", camera.name);
-                return Err(Error::setting(&key("name"), problem));
+                return Err(Error::setting(key("name"), problem));
             }
             if self.further[..index].iter().any(|other| other.name == camera.name) {
                 let problem = format!("{} is the name of another camera already", camera.name);
