@@ -199,7 +199,7 @@ fn pictures(lanes: &[Lane<'_>], odometry: &BTreeSet<Option<CameraName>>) -> Vec<
             let corners = odometry.iter().map(|pair| {
                 let name =
                     pair.map_or_else(|| "odometry".to_owned(), |name| format!("odometry, camera {name}"));
-                View::new("2D", &name, ["$origin/**"]).with_origin(&images::of_camera(*pair, "left")).into()
+                View::new("2D", &name, ["$origin/**"]).with_origin(images::of_camera(*pair, "left")).into()
             });
             Container::new(Tabs, std::iter::once(shown).chain(corners)).into()
         })
