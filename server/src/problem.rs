@@ -73,6 +73,11 @@ impl ApiError {
         Self::new(StatusCode::CONFLICT, "conflict", detail)
     }
 
+    /// It is being made: the same request succeeds soon.
+    pub(crate) fn awaited(detail: impl Into<String>) -> Self {
+        Self::new(StatusCode::ACCEPTED, "awaited", detail)
+    }
+
     /// The request may not come from there.
     pub(crate) fn forbidden(code: &str, detail: impl Into<String>) -> Self {
         Self::new(StatusCode::FORBIDDEN, code, detail)

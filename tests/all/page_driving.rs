@@ -62,7 +62,7 @@ async fn choose_stage(browser: &Browser, stage: &str) {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_paused_stage_is_repeated_with_another_setting_and_the_drive_goes_on_stage_by_stage() {
-    let (_bench, browser) = picked(&short_approach()).await;
+    let (bench, browser) = picked(&short_approach()).await;
     let planned = browser.status().await["session"].as_str().unwrap().to_owned();
     browser.show_panel("Drive").await;
     browser.click_on("button", "Drive").await;
@@ -71,7 +71,10 @@ async fn a_paused_stage_is_repeated_with_another_setting_and_the_drive_goes_on_s
     browser
         .wait_status("the rover waits", "s.drive === 'waits' && s.paused_before === 'drive' && s.shown")
         .await;
-    let stop = browser.status().await["stop_count"].as_u64().unwrap();
+    let session = browser.status().await["session"].as_str().unwrap().to_owned();
+    let drive = bench.json(&format!("/api/v1/sessions/{session}/drive"));
+    let stop = drive["paused"]["stop"].as_u64().unwrap() + 1;
+    browser.wait_status("the last stop", &format!("s.stop_count === {stop}")).await;
 
     // At the next stop it is to wait after `locate`.
     browser.click_on("combobox", "pause before or after").await;

@@ -99,7 +99,7 @@ async fn check_pause(server: &TestServer, whole: &Whole, paused: &Whole, (stop, 
     let image = |traverse: &str| format!("traverses/{traverse}/steps/{stop}/images/left.png");
     let taken = server.get(&image(&paused.traverse)).await;
     if stage < 3 {
-        assert_eq!(taken.status, 409, "{place}: it is to be asked for again");
+        assert_eq!(taken.status, 202, "{place}: it is to be asked for again");
         assert!(
             taken.text().contains(&format!("stop {stop} has no images yet")),
             "{place}: {}",

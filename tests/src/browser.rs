@@ -180,7 +180,7 @@ impl Browser {
     pub async fn resize(&self, width: u32, height: u32) {
         let wanted = [i64::from(width), i64::from(height)];
         let mut window = wanted;
-        for _ in 0..50 {
+        for _ in 0..200 {
             let [width, height] = window.map(|pixels| u32::try_from(pixels).expect("a size of a window"));
             let done = self.client.set_window_size(width, height).await;
             done.unwrap_or_else(|error| panic!("the window cannot have {width} × {height}: {error}"));

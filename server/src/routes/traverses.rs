@@ -11,7 +11,7 @@ use sightline_api::endpoints::{AddTraverse, ListTraverses, Prefetch, ShowImage, 
 use sightline_api::location::{AtImage, AtStop, AtTraverse};
 use sightline_api::query::{FirstStop, ImageWish};
 use sightline_api::wire::{
-    NewTraverse, StopCameraModels, StopCameraView, StopDetail, StopView, TraverseEntry, TraverseView,
+    NewTraverse, Problem, StopCameraModels, StopCameraView, StopDetail, StopView, TraverseEntry, TraverseView,
 };
 use sightline_geometry::camera::CameraName;
 use sightline_geometry::error::Error;
@@ -129,10 +129,12 @@ fn no_step(step: usize) -> ApiError {
 
 /// An image of a stop as PNG
 ///
-/// An image of a simulated stop is rendered when it is first asked for, which takes some seconds.
+/// An image of a simulated stop is rendered when it is first asked for, which takes some seconds. 202 without an image: the drive
+/// has not taken it yet; ask again.
 #[utoipa::path(get, operation_id = "show_image", path = ShowImage::PATH, tag = "traverses", params(("file" = String, Path, description = "left.png or right.png"),
     ImageWish), responses(
     (status = 200, content_type = "image/png", body = FileBytes),
+    (status = 202, description = "The drive has not taken it yet", body = Problem, content_type = "application/problem+json"),
     (status = 304, description = "It is the one that you have (If-None-Match)"), ApiError))]
 async fn image(
     State(state): State<AppState>,
@@ -172,7 +174,7 @@ async fn image(
             encode(&open, (step, params.camera, is_left), is_deep, &flag).map_err(|error| {
                 // A drive that goes on takes them: the page asks again.
                 if open.traverse.is_awaited(step) {
-                    return ApiError::conflict(error.to_string());
+                    return ApiError::awaited(error.to_string());
                 }
                 let is_of_file = matches!(error, Error::Read { .. } | Error::Format { .. });
                 let problem = ApiError::from(error);
