@@ -140,6 +140,7 @@ fn stop(number: usize, poses: [&Pose; 2], mast_angles: Option<MastAngles>, wheel
         touched_rocks: 0,
         wheel_places_m: Vec::new(),
         odometry: None,
+        odometry_alone: false,
         measured_tilt_deg: None,
         awaits: None,
     }

@@ -11,6 +11,7 @@ use sightline_api::event::Event;
 use sightline_geometry::error::{Error, Result};
 use sightline_recordings::DrivenTraverse;
 use sightline_rover::driving::{ArcNavigator, DriveCommand, OdometryPair, executive, odometry};
+use sightline_rover::pipeline::Stops;
 use sightline_session::driving::{self, DriveView, Steering};
 use sightline_session::step::RunStep;
 use sightline_track::cycle_stage::CycleStage;
@@ -208,6 +209,7 @@ fn prepare_stop(
     let step = last.step + 1;
     // Images that are put off show the mast as it was pointed then.
     let is_pointed = lock(&driven.world).awaits() == Some(CycleStage::Capture);
+    let is_alone = lock(&driven.world).traverse().is_odometry_alone(step);
     let odometry = || {
         let mut shared = SharedWorld::new(&driven.world, &driven.cache)?;
         odometry::run(&mut shared, command, step, cancel.as_ref().into())
@@ -220,6 +222,9 @@ fn prepare_stop(
         }
         if command.odometry_pair == OdometryPair::Own {
             odometry()?;
+            if is_alone {
+                return lock(&driven.world).put_off(None);
+            }
         }
         let mut world = lock(&driven.world);
         executive::point_mast(&mut *world, &last.update)?;

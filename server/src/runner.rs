@@ -16,6 +16,7 @@ use sightline_api::event::Event;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_rover::pair;
+use sightline_rover::pipeline::Stops;
 use sightline_session::step::RunStep;
 use sightline_session::track::{self, NextStep};
 use sightline_session::view::waiting_for;
@@ -236,7 +237,8 @@ impl Runner {
         let open = live.traverse();
         let traverse = &open.traverse;
         let step = pending.last.step + 1;
-        let has_images = pending.before.is_none_or(|before| before > CycleStage::Capture);
+        let has_images = pending.before.is_none_or(|before| before > CycleStage::Capture)
+            && !traverse.is_odometry_alone(step);
         let camera = pending.first.update.target.designation.camera;
         if has_images && !traverse.is_rendered(step, camera) {
             self.tell(progress(live, target, run, format!("rendering stop {step}")));

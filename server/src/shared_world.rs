@@ -61,6 +61,10 @@ impl ActiveWorld for SharedWorld<'_> {
         self.change(|world| world.correct(measured))
     }
 
+    fn leave_to_odometry(&mut self) -> Result<()> {
+        self.change(DrivenTraverse::leave_to_odometry)
+    }
+
     fn point_mast(&mut self, angles: Option<MastAngles>) -> Result<()> {
         self.change(|world| world.point_mast(angles))
     }

@@ -301,6 +301,12 @@ impl ActiveWorld for DrivenTraverse {
         self.save()
     }
 
+    fn leave_to_odometry(&mut self) -> Result<()> {
+        let number = self.driven.len() - 1;
+        self.driven[number].odometry_alone = true;
+        self.put_last()
+    }
+
     fn point_mast(&mut self, angles: Option<MastAngles>) -> Result<()> {
         let number = self.driven.len() - 1;
         if angles.is_some() && self.driven[number].mast_angles.is_some() {

@@ -41,6 +41,7 @@ fn stop(step: usize) -> Stop {
         light: None,
         metered_px: None,
         odometry: None,
+        odometry_alone: false,
         truth: (step == 1).then(|| StopTruth {
             site_from_rover: PoseRecord::from(&pose.inverse()),
             left_camera: Some(camera(0.3)),

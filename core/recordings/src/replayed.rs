@@ -106,6 +106,10 @@ impl ActiveWorld for Replayed<'_> {
         Ok(())
     }
 
+    fn leave_to_odometry(&mut self) -> Result<()> {
+        Ok(())
+    }
+
     fn point_mast(&mut self, angles: Option<MastAngles>) -> Result<()> {
         let recorded = self.traverse.mast_angles(self.reached);
         if let (Some(answer), Some(wanted), Some(recorded)) = (self.answers.last_mut(), angles, recorded) {

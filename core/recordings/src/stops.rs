@@ -51,6 +51,9 @@ impl Stops for Traverse {
     fn measured_motion(&self, step: usize) -> Option<&MeasuredMotion> {
         self.index().stops[step].odometry.as_ref()
     }
+    fn is_odometry_alone(&self, step: usize) -> bool {
+        self.index().stops[step].odometry_alone
+    }
     fn pointing_error_deg(&self) -> f64 {
         self.index().pointing_error_deg
     }

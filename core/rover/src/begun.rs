@@ -1,4 +1,4 @@
-//! A step that ends before it is whole: paused between two stages, or at a stop without images.
+//! A step that ends before it is whole: paused between two stages, or at a stop without images for the tracker.
 
 use sightline_track::locate::Located;
 use sightline_track::stages::capture::Capture;
@@ -30,6 +30,11 @@ impl Begun<'_> {
     ) -> StepTrace {
         let predict = self.predict.clone();
         self.unseen(StepKind::Begun { predict, is_mast_pointed, capture, locate, judge })
+    }
+
+    /// The step of a stop at which visual odometry runs alone.
+    pub(crate) fn odometry_alone(&self) -> StepTrace {
+        self.unseen(StepKind::OdometryAlone { predict: self.predict.clone() })
     }
 
     /// The step of a stop whose images cannot be had.

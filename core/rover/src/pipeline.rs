@@ -5,8 +5,7 @@
 //! run_step:    predict → point_mast → capture → locate → judge → update
 //! ```
 //! The comparison with the truth is not a stage: `session::track` adds it to the record.
-//! Everything is a function of the traverse, the target as the last stop left it, and the settings: the same
-//! input gives the same bits, and going back is a read of what was recorded.
+//! Everything is a function of the traverse, the target as the last stop left it, and the settings: going back is a read.
 
 use std::borrow::Cow;
 
@@ -51,6 +50,10 @@ pub trait Stops {
     /// How vision measured the motion to a stop; `None` where it did not.
     fn measured_motion(&self, _step: usize) -> Option<&MeasuredMotion> {
         None
+    }
+    /// Whether visual odometry runs alone at a stop of a drive: the tracker does not look for its target there.
+    fn is_odometry_alone(&self, _step: usize) -> bool {
+        false
     }
     /// 1σ error of each mast angle, deg; 0 where it is not known.
     fn pointing_error_deg(&self) -> f64;
@@ -216,9 +219,8 @@ fn computed_step(
     cancel: Cancel<'_>,
 ) -> StepTrace {
     let target = &*with_own_memory(stops, &last.target, settings, cancel);
-    let step = target.step + 1;
-    let site_from_rover = stops.site_from_rover(step);
-    let camera = target.designation.camera;
+    let (step, camera) = (target.step + 1, target.designation.camera);
+    let (site_from_rover, time_s) = (stops.site_from_rover(step), stops.time_s(step));
     let lacks_pair = |error| format!("{error}, which the target was designated in");
     let pair = pair::of_stop(stops, step, camera).map_err(lacks_pair);
     let prediction =
@@ -226,10 +228,12 @@ fn computed_step(
     let carried = update::carry(target, step, &prediction);
     changes.end(CycleStage::Predict);
     let pointing = pointing(stops, pair.as_ref().ok(), &carried);
-    let time_s = stops.time_s(step);
     let begun = Begun { step, time_s, predict: &prediction, point_mast: &pointing, carried: &carried, last };
     if changes.end(CycleStage::PointMast) {
         return begun.trace(changes.before > Some(CycleStage::PointMast), None, None, None);
+    }
+    if stops.is_odometry_alone(step) {
+        return begun.odometry_alone();
     }
     let images = |pair| pair::capture(stops, step, camera, cancel).map(|images| (pair, images));
     let (pair, images) = match pair.and_then(|pair| images(pair).map_err(|error| error.to_string())) {

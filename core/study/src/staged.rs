@@ -85,6 +85,9 @@ impl<D: Drive> Stops for Staged<'_, D> {
         let is_jump = self.jump.is_some_and(|(from, _)| from == step);
         self.drive.measured_motion(self.stops[step]).filter(|_| is_next && !is_jump)
     }
+    fn is_odometry_alone(&self, step: usize) -> bool {
+        self.drive.is_odometry_alone(self.stops[step])
+    }
     fn pointing_error_deg(&self) -> f64 {
         self.drive.pointing_error_deg()
     }

@@ -5,9 +5,11 @@ use std::path::Path;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::Pose;
 use sightline_recordings::{DrivenTraverse, Traverse};
-use sightline_rover::driving::{DriveCommand, StopReason};
+use sightline_rover::driving::{DriveCommand, Motion, OdometryPair, StopReason, TrackedStops};
 use sightline_rover::visual_odometry::OdometryMode;
 use sightline_session::driving::TargetedDrive;
+use sightline_session::metrics::metrics;
+use sightline_session::step::RunStep;
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
 use sightline_world::scenario::{ClearPath, ForcedSlip, OdometryModel};
@@ -109,4 +111,62 @@ fn wheels_that_turn_on_the_spot_end_the_drive_with_its_reason() {
     assert!((ending.value.unwrap() - 1.0).abs() < 0.03 && ending.limit == Some(0.9), "{ending:?}");
     let blind = drive(&scenario, with(OdometryMode::Off), 4, &folder.path().join("blind"));
     assert!(blind.ending().is_none());
+}
+
+#[test]
+fn odometry_runs_alone_at_the_stops_between_two_steps() {
+    let mut scenario = slope();
+    (scenario.terrain.slope_deg, scenario.rover.slip_spread) = (4.0, 0.0);
+    let folder = tempfile::tempdir().unwrap();
+    let driven = |name: &str, command: DriveCommand| drive(&scenario, command, 8, &folder.path().join(name));
+    let every = DriveCommand { standoff_m: 3.0, ..with(OdometryMode::Full) };
+    let by_distance = DriveCommand { tracked_stops: TrackedStops::ByDistance, ..every.clone() };
+    let own = DriveCommand { odometry_pair: OdometryPair::Own, ..by_distance.clone() };
+    let [every, shared, own] = [("every", every), ("shared", by_distance), ("own", own)]
+        .map(|(name, command)| driven(name, command));
+    assert!(every.steps.iter().all(|step| !step.is_odometry_alone()));
+    for drive in [&shared, &own] {
+        let stops = drive.world.state();
+        let mut left_m = 0.0;
+        for (step, cycle) in drive.steps[1..].iter().zip(&drive.cycles) {
+            let place = format!("stop {}", step.step);
+            assert_eq!(step.is_odometry_alone(), cycle.odometry_alone, "{place}");
+            assert_eq!(step.is_odometry_alone(), stops[step.step].odometry_alone, "{place}");
+            assert!(step.odometry.as_ref().unwrap().update.accepted, "{place}");
+            let Some(Motion::Arc { length_m, .. }) = cycle.motion else { panic!("{place} follows no arc") };
+            // Two parts of one step have the same length up to what the slip left.
+            if step.is_odometry_alone() {
+                left_m = length_m;
+                assert!(length_m < 0.75 / 0.9 && step.verdict().is_none() && step.capture().is_none());
+                assert!(cycle.flight.locate_s == 5.0 && step.row().reason.unwrap().contains("alone"));
+            } else if left_m > 0.0 {
+                assert!((length_m / left_m - 1.0).abs() < 0.2, "{place}: {length_m} m after {left_m} m");
+                left_m = 0.0;
+            }
+            // The range alone is known to 5 cm at 8 m.
+            assert!(step.truth.as_ref().unwrap().err_m < 0.1, "{place}");
+        }
+        let alone: Vec<usize> =
+            drive.steps.iter().filter(|step| step.is_odometry_alone()).map(|step| step.step).collect();
+        // Steps of 1.0, 0.9 and 0.8 m have two parts each.
+        assert_eq!(alone, [1, 3, 5]);
+        for cycle in drive.cycles.iter().filter(|cycle| alone.contains(&cycle.step)) {
+            assert_eq!(cycle.flight.locate_s, 0.0);
+        }
+        assert_eq!(
+            metrics(&drive.steps).excluded.iter().find(|one| one.why.contains("alone")).unwrap().steps,
+            alone
+        );
+        // What was written is read back as it was.
+        let text = serde_json::to_string(drive.steps[1].as_ref()).unwrap();
+        assert!(serde_json::from_str::<RunStep>(&text).unwrap().is_odometry_alone());
+    }
+    let sum = |drive: &TargetedDrive| drive.cycles.iter().map(|cycle| cycle.flight.locate_s).sum::<f64>();
+    assert!(sum(&shared) < sum(&every));
+    // The tracker's pair was never taken where vision has one of its own.
+    let taken = |drive: &TargetedDrive, step: usize| {
+        let traverse = drive.world.traverse();
+        traverse.folder().join(&traverse.index().stops[step].left.image).exists()
+    };
+    assert!(taken(&shared, 1) && !taken(&own, 1) && taken(&own, 2));
 }

@@ -58,6 +58,11 @@ pub enum StepKind {
         /// Stage 5.
         judge: Verdict,
     },
+    /// A later stop of a drive at which visual odometry runs alone: the target is carried by the prediction.
+    OdometryAlone {
+        /// Stage 1.
+        predict: Prediction,
+    },
     /// A later stop whose files are damaged, or that lacks the target's pair: the target is carried by the prediction.
     Damaged {
         /// Stage 1.
@@ -82,12 +87,16 @@ pub enum StepKind {
     },
 }
 
+/// Why a stop for odometry alone has no match.
+pub const ODOMETRY_ALONE: &str = "visual odometry ran alone, and the position is the prediction";
+
 impl StepTrace {
     /// Stage 1; `None` at the designation.
     pub const fn prediction(&self) -> Option<&Prediction> {
         match &self.kind {
             StepKind::Designation { .. } => None,
             StepKind::Tracked { predict, .. }
+            | StepKind::OdometryAlone { predict }
             | StepKind::Damaged { predict, .. }
             | StepKind::Begun { predict, .. } => Some(predict),
         }
@@ -103,6 +112,11 @@ impl StepTrace {
             (true, Some(_), Some(_), None) => CycleStage::Judge,
             (true, Some(_), Some(_), Some(_)) => CycleStage::Update,
         })
+    }
+
+    /// Whether visual odometry ran alone at the stop: the tracker did not look for the target.
+    pub const fn is_odometry_alone(&self) -> bool {
+        matches!(self.kind, StepKind::OdometryAlone { .. })
     }
 
     /// Whether a step of a paused drive lacks stages.
@@ -123,12 +137,12 @@ impl StepTrace {
         if self.is_begun() { None } else { Some(&self.update) }
     }
 
-    /// Stage 3; `None` where the stop's files are damaged or the drive is paused before it.
+    /// Stage 3; `None` where the stop's files are damaged, odometry runs alone, or the drive is paused before it.
     pub const fn capture(&self) -> Option<&Capture> {
         match &self.kind {
             StepKind::Designation { capture, .. } | StepKind::Tracked { capture, .. } => Some(capture),
             StepKind::Begun { capture, .. } => capture.as_ref(),
-            StepKind::Damaged { .. } => None,
+            StepKind::OdometryAlone { .. } | StepKind::Damaged { .. } => None,
         }
     }
 
@@ -137,16 +151,16 @@ impl StepTrace {
         match &mut self.kind {
             StepKind::Designation { capture, .. } | StepKind::Tracked { capture, .. } => Some(capture),
             StepKind::Begun { capture, .. } => capture.as_mut(),
-            StepKind::Damaged { .. } => None,
+            StepKind::OdometryAlone { .. } | StepKind::Damaged { .. } => None,
         }
     }
 
-    /// Stage 4; `None` where the stop's files are damaged or the drive is paused before it.
+    /// Stage 4; `None` where the stop's files are damaged, odometry runs alone, or the drive is paused before it.
     pub const fn located(&self) -> Option<&Located> {
         match &self.kind {
             StepKind::Designation { locate, .. } | StepKind::Tracked { locate, .. } => Some(locate),
             StepKind::Begun { locate, .. } => locate.as_ref(),
-            StepKind::Damaged { .. } => None,
+            StepKind::OdometryAlone { .. } | StepKind::Damaged { .. } => None,
         }
     }
 
@@ -155,16 +169,16 @@ impl StepTrace {
         match &mut self.kind {
             StepKind::Designation { locate, .. } | StepKind::Tracked { locate, .. } => Some(locate),
             StepKind::Begun { locate, .. } => locate.as_mut(),
-            StepKind::Damaged { .. } => None,
+            StepKind::OdometryAlone { .. } | StepKind::Damaged { .. } => None,
         }
     }
 
-    /// Stage 5; `None` at the designation, where the stop's files are damaged, or the drive is paused before it.
+    /// Stage 5; `None` at the designation and as [`StepTrace::capture`].
     pub const fn verdict(&self) -> Option<&Verdict> {
         match &self.kind {
             StepKind::Tracked { judge, .. } => Some(judge),
             StepKind::Begun { judge, .. } => judge.as_ref(),
-            StepKind::Designation { .. } | StepKind::Damaged { .. } => None,
+            StepKind::Designation { .. } | StepKind::OdometryAlone { .. } | StepKind::Damaged { .. } => None,
         }
     }
 
@@ -172,15 +186,17 @@ impl StepTrace {
     pub fn fault(&self) -> Option<&str> {
         match &self.kind {
             StepKind::Damaged { fault, .. } => Some(fault),
-            StepKind::Designation { .. } | StepKind::Tracked { .. } | StepKind::Begun { .. } => None,
+            _ => None,
         }
     }
 
-    /// Why the step lacks stages: the damage of the stop's files, or the pause of the drive; `None` for a complete step.
+    /// Why the step lacks stages: the damage of the stop's files, the pause of the drive, or a stop for odometry alone; `None`
+    /// for a complete step.
     pub fn why_incomplete(&self) -> Option<String> {
         let paused =
             |before: CycleStage| format!("not computed yet: the drive is paused before `{}`", before.word());
-        self.fault().map(str::to_owned).or_else(|| self.paused_before().map(paused))
+        let alone = || self.is_odometry_alone().then(|| ODOMETRY_ALONE.to_owned());
+        self.fault().map(str::to_owned).or_else(|| self.paused_before().map(paused)).or_else(alone)
     }
 
     /// The evidence of the template locator, where something was located.

@@ -122,6 +122,7 @@ pub(crate) fn simulated_stop(
         light: None,
         metered_px: None,
         odometry: None,
+        odometry_alone: false,
         truth: Some(StopTruth { site_from_rover: truth, left_camera, right_camera, wheel_places_m: None }),
         cameras: rigs.further.iter().map(further).collect(),
     }
@@ -184,6 +185,7 @@ fn handed_over(last: &Stop, number: usize, settings: &CameraSettings) -> Option<
         light: None,
         metered_px: None,
         odometry: None,
+        odometry_alone: false,
         truth: Some(StopTruth {
             site_from_rover: truth.site_from_rover,
             left_camera: None,

@@ -66,6 +66,9 @@ pub struct Stop {
     /// How vision measured the motion to this stop, where it did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub odometry: Option<MeasuredMotion>,
+    /// Whether visual odometry ran alone here: no tracker looks for its target at this stop.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub odometry_alone: bool,
     /// The mast angles at which the pair was taken, where there is a mast.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mast_angles: Option<MastAngles>,

@@ -15,7 +15,7 @@ use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
 use sightline_recordings::replayed::Answer;
 use sightline_recordings::{DrivenTraverse, Traverse};
-use sightline_rover::driving::{ArrivalAction, Cycle, DriveCommand, GoalRule, OdometryPair};
+use sightline_rover::driving::{ArrivalAction, Cycle, DriveCommand, GoalRule, OdometryPair, TrackedStops};
 use sightline_rover::visual_odometry::OdometryMode;
 use sightline_session::driving::{DriveSummary, TargetedDrive};
 use sightline_session::replayed_drive::{ReplaySummary, ReplayedDrive};
@@ -63,6 +63,9 @@ pub(super) struct Drive {
     /// Longest step as a part of the distance to the target.
     #[arg(long, value_name = "PART", default_value_t = DriveCommand::default().step_fraction)]
     step_fraction: f64,
+    /// The stops at which the target is looked for; between them, odometry alone.
+    #[arg(long, value_name = "STOPS", default_value = "every")]
+    tracked_stops: Tracked,
     /// Most stops, the first included.
     #[arg(long, value_name = "N", default_value_t = DriveCommand::default().stops_max)]
     stops: u32,
@@ -126,6 +129,15 @@ enum Pairs {
     Shared,
     /// Pairs of its own at every stop, ahead, and back once an update is refused.
     Own,
+}
+
+/// The stops at which the target is looked for.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Tracked {
+    /// Every stop.
+    Every,
+    /// Once a step of --step-fraction and once a turn; odometry alone at the stops that it needs between.
+    ByDistance,
 }
 
 impl Odometry {
@@ -257,6 +269,10 @@ impl Drive {
             step_fraction: self.step_fraction,
             stops_max: self.stops,
             odometry: self.odometry.mode(),
+            tracked_stops: match self.tracked_stops {
+                Tracked::Every => TrackedStops::Every,
+                Tracked::ByDistance => TrackedStops::ByDistance,
+            },
             odometry_pair: match self.odometry_pair {
                 Pairs::Shared => OdometryPair::Shared,
                 Pairs::Own => OdometryPair::Own,

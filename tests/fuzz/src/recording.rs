@@ -80,6 +80,7 @@ fn stop(step: usize) -> Stop {
         light: None,
         metered_px: None,
         odometry: None,
+        odometry_alone: false,
         truth: None,
         cameras: Vec::new(),
     }

@@ -1,7 +1,9 @@
 //! The panel “Drive”: the command, the buttons that drive, and the decision at every stop.
 
 use egui::{Button, CollapsingHeader, ComboBox, DragValue, Grid, Label, RichText, ScrollArea, Ui};
-use sightline_rover::driving::{ArrivalAction, DriveCommand, GoalRule, OdometryPair, StopReason};
+use sightline_rover::driving::{
+    ArrivalAction, DriveCommand, GoalRule, OdometryPair, StopReason, TrackedStops,
+};
 use sightline_rover::visual_odometry::{OdometryMode, OdometryPreset};
 use sightline_session::driving::DriveView;
 use sightline_session::pause::PauseSide;
@@ -110,6 +112,8 @@ fn limits(ui: &mut Ui, command: &mut DriveCommand) {
         command.on_arrival.resize(looks, ArrivalAction::Look);
         let presets = [OdometryPreset::Sightline, OdometryPreset::Mer2007];
         let pairs = [OdometryPair::Shared, OdometryPair::Own];
+        let stops = [TrackedStops::Every, TrackedStops::ByDistance];
+        choice(ui, "tracked stops", 140.0, stops, &mut command.tracked_stops, words::tracked_stops);
         choice(ui, "pairs of odometry", 150.0, pairs, &mut command.odometry_pair, words::odometry_pair);
         choice(ui, "settings of odometry", 80.0, presets, &mut command.odometry_preset, words::preset);
         let mut percent = 100.0 * command.slip_max;

@@ -1,6 +1,6 @@
 //! Motions, ends and outcomes in words.
 
-use sightline_rover::driving::{Cycle, Ending, Motion, OdometryPair, StopReason};
+use sightline_rover::driving::{Cycle, Ending, Motion, OdometryPair, StopReason, TrackedStops};
 use sightline_rover::visual_odometry::{MeasuredMotion, OdometryMode, OdometryPreset};
 use sightline_session::driving::DriveSummary;
 
@@ -44,6 +44,14 @@ pub(super) fn odometry(mode: OdometryMode) -> &'static str {
         OdometryMode::Off => "no visual odometry",
         OdometryMode::SlipCheck => "vision checks the slip",
         OdometryMode::Full => "vision corrects the pose",
+    }
+}
+
+/// The stops at which the target is looked for.
+pub(super) fn tracked_stops(stops: TrackedStops) -> &'static str {
+    match stops {
+        TrackedStops::Every => "track at every stop",
+        TrackedStops::ByDistance => "track once a step",
     }
 }
 

@@ -105,6 +105,7 @@ impl ImportFormat for Kitti {
                 light: None,
                 metered_px: None,
                 odometry: None,
+                odometry_alone: false,
                 truth: Some(StopTruth {
                     site_from_rover: PoseRecord::from(truth),
                     left_camera: None,

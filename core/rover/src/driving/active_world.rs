@@ -36,6 +36,13 @@ pub trait ActiveWorld {
     /// A stop that cannot be stored.
     fn correct(&mut self, measured: MeasuredMotion) -> Result<()>;
 
+    /// Leaves the last stop to visual odometry alone: the tracker does not look for its target there. A recording is tracked at
+    /// every stop.
+    ///
+    /// # Errors
+    /// A stop that cannot be stored.
+    fn leave_to_odometry(&mut self) -> Result<()>;
+
     /// Points the mast of the last stop; `None` leaves it as it is.
     ///
     /// # Errors

@@ -20,6 +20,18 @@ pub enum GoalRule {
     Fixed,
 }
 
+/// The stops at which the tracker looks for the target.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum TrackedStops {
+    /// Every stop.
+    #[default]
+    Every,
+    /// Once a step of `step_fraction` of the distance and once a turn. Where visual odometry needs shorter motions than these, it
+    /// runs alone at the stops between.
+    ByDistance,
+}
+
 /// An action after arrival (R5).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
@@ -45,6 +57,8 @@ pub struct DriveCommand {
     pub tolerance_m: f64,
     /// Longest step as a part of the distance to the target (0.10: R104; 0.01 to 0.5).
     pub step_fraction: f64,
+    /// The stops at which the target is looked for (`every`). Without odometry it has no effect.
+    pub tracked_stops: TrackedStops,
     /// Most stops, the first included (100; 2 to 1000).
     pub stops_max: u32,
     /// What visual odometry is used for (`full`).
@@ -73,6 +87,7 @@ impl Default for DriveCommand {
             tolerance_m: 0.05,
             step_fraction: 0.10,
             stops_max: 100,
+            tracked_stops: TrackedStops::Every,
             odometry: OdometryMode::Full,
             odometry_pair: OdometryPair::Shared,
             odometry_preset: OdometryPreset::Sightline,

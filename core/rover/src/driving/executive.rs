@@ -17,7 +17,7 @@ use sightline_track::target::TrackingState;
 use sightline_track::trace::StepTrace;
 
 use super::active_world::{ActiveWorld, DriveReport};
-use super::command::{ArrivalAction, DriveCommand, GoalRule};
+use super::command::{ArrivalAction, DriveCommand, GoalRule, TrackedStops};
 use super::dead_reckoning::Reckoned;
 use super::flight_time::FlightTime;
 use super::odometry::{self, OdometryPair};
@@ -31,6 +31,8 @@ const STEP_MAX_M: f64 = 0.75;
 const TURN_MAX_RAD: f64 = 18.0 * std::f64::consts::PI / 180.0;
 /// Slip either way that the next step makes good.
 const SLIP_MADE_GOOD: f64 = 0.5;
+/// Shortest part of a step, where the slip left less of it, m.
+const PART_MIN_M: f64 = 0.1;
 
 /// Why a drive stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -76,6 +78,8 @@ pub struct Cycle {
     pub by_wheels: Reckoned,
     /// The chosen motion; null where the drive ended or the rover stays.
     pub motion: Option<Motion>,
+    /// Whether odometry runs alone at the stop that the motion leads to: it is a part of a step.
+    pub odometry_alone: bool,
     /// The rover's report of the motion; null without one.
     pub report: Option<DriveReport>,
     /// Actions after arrival that were begun, the one decided here included.
@@ -136,6 +140,9 @@ fn arrive(world: &mut dyn ActiveWorld, input: &CycleInput<'_>, cancel: Cancel<'_
     let is_before = input.command.odometry_pair == OdometryPair::Own;
     if is_before {
         odometry::run(world, input.command, step, cancel)?;
+        if world.stops().is_odometry_alone(step) {
+            return Ok(());
+        }
     }
     point_mast(world, &input.last.update)?;
     if is_before { Ok(()) } else { odometry::run(world, input.command, step, cancel) }
@@ -155,6 +162,9 @@ pub fn drive(world: &mut dyn ActiveWorld, input: &CycleInput<'_>, cancel: Cancel
         Some(motion) => {
             odometry::before_drive(world, input.command)?;
             cycle.add(world.drive(&motion, cancel)?);
+            if cycle.odometry_alone {
+                world.leave_to_odometry()?;
+            }
         }
         None => world.stay()?,
     }
@@ -170,7 +180,10 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
     let target_in_site = target_in_site(input, stops);
     let goal = set_goal(input.command, &target_in_site, [start.x, start.y], &pose);
     let (left, right) = stops.cameras(step);
-    let time = FlightTime::of_stop([left.size, right.size], stops.measured_motion(step));
+    let mut time = FlightTime::of_stop([left.size, right.size], stops.measured_motion(step));
+    if input.last.is_odometry_alone() {
+        time = time.without_tracking(input.command.odometry_pair);
+    }
     let flight_minutes = input.before.map_or(0.0, |before| before.flight_minutes) + time.total_s() / 60.0;
     let arrival_actions = input.before.map_or(0, |before| before.arrival_actions);
     let [estimated, by_wheels] = reckoned(stops, input, &pose);
@@ -180,24 +193,28 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
         estimated,
         by_wheels,
         motion: None,
+        odometry_alone: false,
         report: None,
         arrival_actions,
         flight: time,
         flight_minutes,
         ending: None,
     };
-    let has_arrived = goal.arrived || arrival_actions > 0;
+    let has_arrived = (goal.arrived && !input.last.is_odometry_alone()) || arrival_actions > 0;
     let action = input.command.on_arrival.get(arrival_actions as usize).filter(|_| has_arrived);
     if let Some(ArrivalAction::Look) = action {
         cycle.arrival_actions += 1;
         return cycle;
     }
     cycle.ending = ending(stops, input, &cycle);
-    if cycle.ending.is_none() {
+    // Where odometry alone brought the rover to the goal, it stays for the tracker.
+    if cycle.ending.is_none() && !goal.arrived {
         let target_in_rover = pose.inverse_transform_point(&target_in_site);
-        let step_m = input.command.step_fraction * (target_in_rover - left.model.centre()).norm();
-        let motion = input.navigator.select_path(goal.in_rover_m, step_m);
-        cycle.motion = Some(followable(motion, input.command, slip_to(stops, step)));
+        let distance_m = (target_in_rover - left.model.centre()).norm();
+        let motion = input.navigator.select_path(goal.in_rover_m, step_m(input, distance_m));
+        let (motion, is_part) = followable(motion, input.command, slip_to(stops, step));
+        cycle.motion = Some(motion);
+        cycle.odometry_alone = is_part && input.command.tracked_stops == TrackedStops::ByDistance;
     }
     cycle
 }
@@ -232,19 +249,36 @@ fn target_in_site(input: &CycleInput<'_>, stops: &dyn Stops) -> Point3 {
     stops.site_from_rover(from.step) * from.update.target.position_in_rover
 }
 
-/// A motion that odometry can follow: at most 75 cm and 18°, and longer by the slip of the step before (driving.md 1).
-fn followable(motion: Motion, command: &DriveCommand, slip: Option<f64>) -> Motion {
+/// Length of the next motion at most, m: what is left of the step, where odometry alone ran at this stop.
+fn step_m(input: &CycleInput<'_>, distance_m: f64) -> f64 {
+    let step_m = input.command.step_fraction * distance_m;
+    if !input.last.is_odometry_alone() {
+        return step_m;
+    }
+    (step_m - input.last.update.target.travelled_since_update_m).max(PART_MIN_M)
+}
+
+/// A motion that odometry can follow: at most 75 cm and 18°, and longer by the slip of the step before (driving.md 1). True where
+/// it is a part of the wanted one.
+fn followable(motion: Motion, command: &DriveCommand, slip: Option<f64>) -> (Motion, bool) {
     if command.odometry == OdometryMode::Off {
-        return motion;
+        return (motion, false);
     }
     match motion {
         Motion::Turn { angle_rad } => {
-            Motion::Turn { angle_rad: angle_rad.clamp(-TURN_MAX_RAD, TURN_MAX_RAD) }
+            let followed_rad = angle_rad.clamp(-TURN_MAX_RAD, TURN_MAX_RAD);
+            (Motion::Turn { angle_rad: followed_rad }, followed_rad != angle_rad)
         }
         Motion::Arc { length_m, curvature_per_m } => {
             let max_m = STEP_MAX_M.min(TURN_MAX_RAD / curvature_per_m.abs());
             let lost = slip.unwrap_or(0.0).clamp(-SLIP_MADE_GOOD, SLIP_MADE_GOOD);
-            Motion::Arc { length_m: length_m.clamp(-max_m, max_m) / (1.0 - lost), curvature_per_m }
+            let is_part = length_m.abs() > max_m;
+            let followed_m = match command.tracked_stops {
+                TrackedStops::Every => length_m.clamp(-max_m, max_m),
+                // The parts of a step have the same length.
+                TrackedStops::ByDistance => length_m / (length_m.abs() / max_m).ceil().max(1.0),
+            };
+            (Motion::Arc { length_m: followed_m / (1.0 - lost), curvature_per_m }, is_part)
         }
     }
 }
@@ -278,7 +312,7 @@ fn ending(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &Cycle) -> Option<En
         |reason, value: f64, limit: f64| Some(Ending { reason, value: Some(value), limit: Some(limit) });
     let named = |reason| Some(Ending { reason, value: None, limit: None });
     // A later look may put the goal a little elsewhere; the rover has arrived all the same.
-    if cycle.goal.arrived || cycle.arrival_actions > 0 {
+    if (cycle.goal.arrived && !input.last.is_odometry_alone()) || cycle.arrival_actions > 0 {
         return end(StopReason::Arrived, cycle.goal.distance_m, command.tolerance_m);
     }
     // The baseline drives on whatever tracking makes of it.

@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use sightline_track::cycle_stage::CycleStage;
 use utoipa::ToSchema;
 
+use super::odometry::OdometryPair;
 use crate::visual_odometry::MeasuredMotion;
 
 /// Transfer of a full pair, s, and its pixels.
@@ -43,7 +44,7 @@ pub struct FlightTime {
 }
 
 impl FlightTime {
-    /// A stop whose images have these sizes, px, without the drive that follows.
+    /// A tracked stop whose images have these sizes, px, without the drive that follows.
     pub fn of_stop(image_sizes: [[u32; 2]; 2], odometry: Option<&MeasuredMotion>) -> Self {
         let pixels: f64 =
             image_sizes.iter().map(|[width, height]| f64::from(*width) * f64::from(*height)).sum();
@@ -53,6 +54,15 @@ impl FlightTime {
             f64::from(measured.updates()) * ODOMETRY_S + f64::from(measured.own_pairs()) * pair_s
         });
         Self { odometry_s, point_mast_s: POINT_MAST_S, capture_s, locate_s: 5.0, drive_s: 0.0 }
+    }
+
+    /// The same of a stop at which odometry runs alone, in the pair that the tracker would have or in one of its own.
+    pub(crate) fn without_tracking(self, pair: OdometryPair) -> Self {
+        let alone = Self { locate_s: 0.0, ..self };
+        match pair {
+            OdometryPair::Shared => alone,
+            OdometryPair::Own => Self { point_mast_s: 0.0, capture_s: 0.0, ..alone },
+        }
     }
 
     /// The time of a stage, s; 0 for those that take next to none. Visual odometry comes before the prediction and counts with it.

@@ -15,7 +15,7 @@ pub mod select_path;
 pub mod set_goal;
 
 pub use active_world::{ActiveWorld, DriveReport, Stall};
-pub use command::{ArrivalAction, DriveCommand, GoalRule};
+pub use command::{ArrivalAction, DriveCommand, GoalRule, TrackedStops};
 pub use dead_reckoning::Reckoned;
 pub use executive::{Cycle, Ending, StopReason};
 pub use flight_time::FlightTime;

@@ -139,6 +139,7 @@ impl Judged<'_> {
 pub fn metrics(steps: &[Arc<RunStep>]) -> RunMetrics {
     let later = steps.iter().skip(1).map(AsRef::as_ref);
     let (faulty, good): (Vec<&RunStep>, Vec<&RunStep>) = later.partition(|trace| trace.fault().is_some());
+    let (alone, good): (Vec<_>, Vec<_>) = good.into_iter().partition(|trace| trace.is_odometry_alone());
     let judged: Vec<Judged<'_>> = good
         .into_iter()
         .map(|trace| Judged {
@@ -160,13 +161,17 @@ pub fn metrics(steps: &[Arc<RunStep>]) -> RunMetrics {
         version: VERSION,
         truth,
         steps: steps.len(),
-        excluded: excluded(steps.first().map(AsRef::as_ref), &faulty, &judged),
+        excluded: excluded(steps.first().map(AsRef::as_ref), [&faulty, &alone], &judged),
         metrics: found,
         uncertainty,
     }
 }
 
-fn excluded(pick: Option<&RunStep>, faulty: &[&RunStep], judged: &[Judged<'_>]) -> Vec<Excluded> {
+fn excluded(
+    pick: Option<&RunStep>,
+    [faulty, alone]: [&[&RunStep]; 2],
+    judged: &[Judged<'_>],
+) -> Vec<Excluded> {
     let of =
         |of: &str, why: &str, steps: Vec<usize>| Excluded { of: of.to_owned(), why: why.to_owned(), steps };
     let those =
@@ -174,6 +179,7 @@ fn excluded(pick: Option<&RunStep>, faulty: &[&RunStep], judged: &[Judged<'_>]) 
     let mut found = vec![
         of("all metrics", "here the target was picked", pick.map(|trace| trace.step).into_iter().collect()),
         of("all metrics", "the stop's files are damaged", faulty.iter().map(|trace| trace.step).collect()),
+        of("all metrics", "visual odometry ran alone there", alone.iter().map(|trace| trace.step).collect()),
         of(
             "all metrics against the truth",
             "the truth is not known there",

@@ -111,6 +111,7 @@ impl SerialisedStep<'_> {
             (Some(predict), Some(capture), Some(locate), Some(judge), None) => {
                 StepKind::Tracked { predict, capture, locate, judge }
             }
+            (Some(predict), None, None, None, None) => StepKind::OdometryAlone { predict },
             (Some(predict), None, None, None, Some(fault)) => StepKind::Damaged { predict, fault },
             _ => return None,
         };
@@ -192,7 +193,7 @@ mod tests {
         }
     }
 
-    fn kinds() -> [StepKind; 5] {
+    fn kinds() -> [StepKind; 6] {
         let predict = Prediction {
             position_in_rover: Point3::new(5.0, 0.0, 0.0),
             position_in_site: Point3::new(5.0, 0.0, 0.0),
@@ -227,6 +228,7 @@ mod tests {
             StepKind::Tracked { predict: predict.clone(), capture: capture.clone(), locate, judge },
             begun(false, None),
             begun(true, Some(capture)),
+            StepKind::OdometryAlone { predict: predict.clone() },
             StepKind::Damaged { predict, fault: "left_0003.png is missing".to_owned() },
         ]
     }
@@ -238,6 +240,7 @@ mod tests {
             vec!["predict", "point_mast", "capture", "locate", "judge"],
             vec!["begun", "predict"],
             vec!["begun", "predict", "point_mast", "capture"],
+            vec!["predict", "point_mast"],
             vec!["fault", "predict", "point_mast"],
         ];
         for (kind, reached) in kinds().into_iter().zip(reached) {

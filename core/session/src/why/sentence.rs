@@ -14,6 +14,7 @@ use sightline_track::locate::Evidence;
 use sightline_track::settings::Settings;
 use sightline_track::stages::judge::{Gate, Verdict};
 use sightline_track::target::TrackingState;
+use sightline_track::trace::ODOMETRY_ALONE;
 
 /// A peak so near to the rim may belong to one beyond it, px.
 pub(super) const AT_RIM_PX: f64 = 3.0;
@@ -28,6 +29,9 @@ pub fn verdict(trace: &RunStep, before: Option<&RunStep>, settings: &Settings) -
     }
     if let (Some(before), None) = (trace.paused_before(), trace.verdict()) {
         return format!("Nothing is decided yet, since the drive is paused before {}.", before.word());
+    }
+    if trace.is_odometry_alone() {
+        return format!("Nothing is judged here, since {ODOMETRY_ALONE}.");
     }
     let Some(verdict) = trace.verdict() else {
         return "The target was picked here: nothing had to be found again, and nothing is judged."

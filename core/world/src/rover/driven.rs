@@ -72,6 +72,9 @@ pub struct DrivenStop {
     /// How vision measured the motion to this stop; `None` where it did not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub odometry: Option<MeasuredMotion>,
+    /// Whether visual odometry runs alone at this stop.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub odometry_alone: bool,
     /// Tilt of the rover by the accelerometers, deg; `None` where the estimated pose still has it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub measured_tilt_deg: Option<f64>,
@@ -102,6 +105,7 @@ impl DrivenStop {
             touched_rocks: 0,
             wheel_places_m: Vec::new(),
             odometry: None,
+            odometry_alone: false,
             measured_tilt_deg: None,
             awaits: None,
         })
@@ -141,6 +145,7 @@ impl DrivenStop {
                 touched_rocks: touched_rocks(world, &stand),
                 wheel_places_m: if scenario.rover.tracks { places_m(&leg) } else { Vec::new() },
                 odometry: None,
+                odometry_alone: false,
                 measured_tilt_deg: None,
                 awaits: None,
             })
@@ -161,6 +166,7 @@ impl DrivenStop {
             touched_rocks: 0,
             wheel_places_m: Vec::new(),
             odometry: None,
+            odometry_alone: false,
             awaits: None,
             ..self.clone()
         }
@@ -273,7 +279,8 @@ pub fn index_stops(driven: &[DrivenStop], scenario: &Scenario) -> Vec<Stop> {
         }));
         let wheel_places_m = scenario.rover.tracks.then(|| stop.wheel_places_m.clone());
         let truth = made.truth.map(|truth| StopTruth { wheel_places_m, ..truth });
-        Stop { metered_px, truth, odometry: stop.odometry.clone(), cameras, ..made }
+        let (odometry, odometry_alone) = (stop.odometry.clone(), stop.odometry_alone);
+        Stop { metered_px, truth, odometry, odometry_alone, cameras, ..made }
     };
     driven.iter().enumerate().map(stop).collect()
 }

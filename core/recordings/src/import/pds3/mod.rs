@@ -84,6 +84,7 @@ impl ImportFormat for Pds3 {
                 light: pair.left.product.light(),
                 metered_px: None,
                 odometry: None,
+                odometry_alone: false,
                 truth: None,
                 cameras: write_further(pair, further.get(step).map_or(&[], Vec::as_slice), &scale, output)?,
             });
