@@ -37,6 +37,7 @@ mod page_odometry;
 mod page_exports;
 mod page_figures;
 mod page_first;
+mod page_image;
 mod page_panels;
 mod page_picking;
 mod page_removal;

@@ -64,6 +64,7 @@ impl SightlineApp {
         let mut state = State::new(link.origin.clone(), link.fragment.session.clone());
         state.looks = kept.looks().unwrap_or_default();
         state.single_keys = kept.single_keys();
+        state.stretch = kept.stretch().unwrap_or_default();
         theme::apply(context, state.looks);
         let mut workspace = Workspace::restored(kept.layout());
         if let Some(preset) = link.fragment.preset.filter(|preset| *preset != workspace.preset()) {
@@ -205,6 +206,9 @@ impl SightlineApp {
                 timeline::show(ui, state, &mut out);
             });
         tour::here(ui.ctx(), tour::TIMELINE, band.response.rect);
+        if let Some(size) = state.left_size() {
+            self.workspace.fit_images(size);
+        }
         let mut panels = Panels::new(state, &mut out);
         CentralPanel::default()
             .frame(Frame::new().fill(theme::page()))

@@ -69,6 +69,8 @@ pub enum Layer {
     Template,
     /// The match with its ellipse.
     Match,
+    /// The target's pixels at the steps before and after.
+    Track,
     /// The truth.
     Truth,
     /// The epipolar curve with its ticks.

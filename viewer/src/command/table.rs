@@ -205,7 +205,7 @@ pub(crate) static TABLE: &[Line] = &[
     line(
         "stretch dark images automatically, or show them as recorded",
         &[Do::new("Stretch dark images, or show them as recorded", &[On::plain(Key::I)], |state| {
-            Command::SetStretch(if state.stretch == Stretch::None { Stretch::Auto } else { Stretch::None })
+            Command::SetStretch(if state.stretch == Stretch::Auto { Stretch::None } else { Stretch::Auto })
         })],
     ),
     line("cancel what was begun", &[Do::new("", &[On::plain(Key::Escape)], cancel)]),
@@ -213,7 +213,7 @@ pub(crate) static TABLE: &[Line] = &[
     line("the palette: whatever can be asked for, by name", &[PALETTE]),
     Line {
         help: "arrangements of the panels, from the overview to the report",
-        gesture: "Shift+1 … Shift+7",
+        gesture: "Shift+1 … Shift+8",
         commands: &[
             Do::new("", &[On::shift(Key::Num1)], |_| arrange(Preset::Overview)),
             Do::new("", &[On::shift(Key::Num2)], |_| arrange(Preset::Match)),
@@ -222,6 +222,7 @@ pub(crate) static TABLE: &[Line] = &[
             Do::new("", &[On::shift(Key::Num5)], |_| arrange(Preset::Compare)),
             Do::new("", &[On::shift(Key::Num6)], |_| arrange(Preset::Sweep)),
             Do::new("", &[On::shift(Key::Num7)], |_| arrange(Preset::Report)),
+            Do::new("", &[On::shift(Key::Num8)], |_| arrange(Preset::Image)),
         ],
     },
     Line {

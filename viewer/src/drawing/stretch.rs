@@ -22,9 +22,9 @@ const BINS: usize = 4096;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Stretch {
     /// As recorded.
-    #[default]
     None,
     /// From the image's own dark and bright end.
+    #[default]
     Auto,
     /// By hand.
     Manual {
@@ -47,6 +47,31 @@ impl Stretch {
             Self::None => "as recorded",
             Self::Auto => "automatic",
             Self::Manual { .. } => "by hand",
+        }
+    }
+
+    /// The text under which a browser keeps it.
+    pub(crate) fn kept(self) -> String {
+        match self {
+            Self::None => "none".to_owned(),
+            Self::Auto => "auto".to_owned(),
+            Self::Manual { brightness, contrast, gamma } => format!("{brightness} {contrast} {gamma}"),
+        }
+    }
+
+    /// The stretch that was kept as this text.
+    pub(crate) fn of_kept(text: &str) -> Option<Self> {
+        match text {
+            "none" => Some(Self::None),
+            "auto" => Some(Self::Auto),
+            numbers => {
+                let numbers: Option<Vec<f32>> = numbers
+                    .split(' ')
+                    .map(|number| number.parse().ok().filter(|n: &f32| n.is_finite()))
+                    .collect();
+                let [brightness, contrast, gamma] = numbers?.try_into().ok()?;
+                Some(Self::Manual { brightness, contrast, gamma })
+            }
         }
     }
 
@@ -116,6 +141,18 @@ mod tests {
         assert_eq!(Stretch::Auto.apply(high, [low, high]), 1.0);
         let middle = Stretch::Auto.apply((low + high) / 2.0, [low, high]);
         assert!((middle - 0.5_f32.powf(1.0 / 1.4)).abs() < 1e-4, "{middle}");
+    }
+
+    #[test]
+    fn a_stretch_comes_back_as_it_was_kept() {
+        for stretch in
+            [Stretch::None, Stretch::Auto, Stretch::Manual { brightness: -0.1, contrast: 2.5, gamma: 0.7 }]
+        {
+            assert_eq!(Stretch::of_kept(&stretch.kept()), Some(stretch));
+        }
+        for damaged in ["", "bright", "1 2", "1 2 NaN", "1 2 3 4"] {
+            assert_eq!(Stretch::of_kept(damaged), None, "{damaged}");
+        }
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `command` | what can be asked of the arrangement |
 //! | `left_image` | where the left image is on the screen |
-//! | `presets` | the seven arrangements that come with the page, and the one for narrow windows |
+//! | `presets` | the eight arrangements that come with the page, and the one for narrow windows |
 //! | `workspace` | the arrangement in use: presets, the panel with the keyboard, the one that fills the page; kept across reloads |
 
 pub(crate) mod command;

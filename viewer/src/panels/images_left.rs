@@ -19,10 +19,10 @@ use crate::panels::epipolar::Curve;
 use crate::panels::exposure;
 use crate::panels::features::marks;
 use crate::panels::image_marks::{self, Of};
-use crate::panels::legend;
 use crate::panels::legend::Entry;
 use crate::panels::panel::Panel;
 use crate::panels::status_line::{STATUS, status_line};
+use crate::panels::track;
 use crate::picking;
 use crate::pointed::Pointed;
 use crate::state::{Place, State, row_of, run_letter};
@@ -52,16 +52,12 @@ pub(crate) fn show(
     camera_choice::show(ui, state, out);
     let raster = ready_image(ui, state, Eye::Left, out)?;
     raster.stretch(state.stretch);
-    exposure::show(ui, state, raster, out);
+    exposure::show(ui, state, raster, &entries(state), out);
     bar::show(ui, state, out);
     if let Some(shown) = modes::instead(ui, state, raster, out) {
         return shown;
     }
-    let [width, height] = raster.size();
-    let shape = (width as f32 / height.max(1) as f32, STATUS);
-    let transform =
-        legend::beside(ui, &entries(state), shape, state, out, |ui, out| picture(ui, state, raster, out));
-    Some((transform, raster.size()))
+    Some((picture(ui, state, raster, out), raster.size()))
 }
 
 /// The image itself with its marks and the line below it.
@@ -80,30 +76,35 @@ fn picture(
     canvas.pixel_grid(region);
     picking::paint_map(&canvas, state);
     if state.marks {
-        paint_others(&canvas, state);
-        corners::paint_left(&canvas, state);
-        if let Some(trace) = state.trace_on_image() {
-            marks::paint_left(&canvas, state);
-            let of = Of::Shown(theme::run(state.cursor.run));
-            let overlay = Overlay::new(&canvas.painter, &canvas.transform);
-            image_marks::paint(&overlay, trace, state.template_side_px(), Eye::Left, of, state);
-        }
+        theme::on_image(|| paint_marks(&canvas, state));
     }
     modes::over(ui, &canvas, state, out);
-    paint_designation(&canvas, state);
+    theme::on_image(|| paint_designation(&canvas, state));
     picking::show(ui, &canvas, raster, state, out);
     if state.shows_targets_camera() {
         marks::hover(&canvas, state, |feature| Some(feature.pixel));
         panel::over_image(ui, &canvas, state, out);
     }
     corners::hover_left(&canvas, state);
-    let pointed = paint_pointed(&canvas, state);
+    let pointed = theme::on_image(|| paint_pointed(&canvas, state));
     status_line(ui, &canvas, raster, region, pointed);
     out.extend(canvas.hovered(region).map(|pixel| Command::Point(Pointed::Left(pixel))));
     if let Some(view) = canvas.moved {
         out.push(Command::View(Zoomable::Left, view));
     }
     canvas.transform
+}
+
+/// The marks of the step: other targets, corners, features, and what the tracker knew of its target.
+fn paint_marks(canvas: &Canvas, state: &State) {
+    paint_others(canvas, state);
+    corners::paint_left(canvas, state);
+    let Some(trace) = state.trace_on_image() else { return };
+    marks::paint_left(canvas, state);
+    let overlay = Overlay::new(&canvas.painter, &canvas.transform);
+    track::paint(&overlay, state);
+    let of = Of::Shown(theme::run(state.cursor.run));
+    image_marks::paint(&overlay, trace, state.template_side_px(), Eye::Left, of, state);
 }
 
 /// An image of the cursor's stop, or the sentence that says why it is not there yet.
@@ -196,6 +197,14 @@ fn entries(state: &State) -> Vec<Entry> {
     }
     if trace.capture().is_some_and(|c| c.subframe.is_some()) {
         entries.push(Entry::new(Layer::Subframe, Mark::Stroke(Line::Dotted), theme::subframe(), "subframe"));
+    }
+    if track::is_there(state) {
+        entries.push(Entry::new(
+            Layer::Track,
+            Mark::Stroke(Line::Solid),
+            run,
+            "track: past solid, future dotted",
+        ));
     }
     if state.session.as_ref().is_some_and(|s| s.targets.len() > 1) {
         entries.push(Entry::new(Layer::Others, Mark::Diamond, theme::weak(), "other targets"));
