@@ -4,6 +4,7 @@ use nalgebra::Matrix3;
 
 use super::Book;
 use super::node::{Draft, OriginKind};
+use super::pose_change::PoseChange;
 use sightline_geometry::frames::{Pixel, Point3, Pose};
 use sightline_track::locate::Evidence;
 
@@ -60,6 +61,13 @@ impl Book<'_> {
             .or_else(|| self.of_covariance(name))
     }
 
+    /// The change of the estimated pose since the stop before.
+    fn pose_change(&self) -> Option<PoseChange> {
+        let [before, now] = [self.before?.step, self.trace.step].map(|step| self.sources.site_from_rover(step));
+        let measured = self.trace.odometry.as_deref();
+        Some(PoseChange::between(&before, &now, &self.sources.pose_error(), measured))
+    }
+
     fn of_geometry(&self, name: &str) -> Option<Draft> {
         let step = self.trace.step;
         let last = || Some(&self.before?.update.target);
@@ -74,6 +82,18 @@ impl Book<'_> {
         Some(match name {
             "pose" => pose("site_from_rover now", step),
             "pose_before" => pose("site_from_rover at the step before", self.before?.step),
+            "pose_change" => {
+                let label = "pose change: Δx, Δy, Δz in m, Δroll, Δpitch, Δyaw in deg; rover frame before";
+                Draft::numbers("predict", label, "m, deg", self.pose_change()?.change)
+                    .exactly("pose_before⁻¹ · pose", &["pose_before", "pose", "pose_change_sigma"])
+            }
+            "pose_change_sigma" => {
+                let draft =
+                    Draft::numbers("predict", "1σ of the pose change", "m, deg", self.pose_change()?.sigma);
+                draft
+                    .roughly("the error model of the pose estimates; of visual odometry where it corrects them", &[])
+                    .from(OriginKind::Pose, format!("pose estimate of stop {step}"), Some(step))
+            }
             "camera_centre" => Draft::numbers(
                 "point_mast",
                 "centre of the left camera, rover frame",
