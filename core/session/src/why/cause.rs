@@ -9,9 +9,11 @@
 //! | 5 | slip, or a match on another surface | good scores, range change beyond its tolerance |
 //! | 6 | the right image | a good match, a poor stereo score |
 //! | 7 | two places alike | a good match, a second peak nearly as good |
-//! | 8 | a search window that is too small | the peak at its rim |
-//! | 9 | a hidden or changed target | the score fell in one step, prediction and change of pose being consistent |
+//! | 8 | no contrast | nearly all positions are flat |
+//! | 9 | a search window that is too small | the scores rise towards its rim |
+//! | 10 | a hidden or changed target | the score fell in one step, prediction and change of pose being consistent |
 
+use sightline_track::locate::template::match_template::TemplateMatch;
 use sightline_track::settings::TrackerKind;
 use sightline_track::stages::judge::{Gate, Verdict};
 use sightline_track::target::TrackingState;
@@ -34,6 +36,8 @@ const CONSISTENT_SIGMAS: f64 = 3.0;
 const SLIP_SHARE: f64 = 1.2;
 /// A relative change of the mean grey value that changes how the target looks.
 const BRIGHTNESS: f64 = 0.25;
+/// A search window with a larger share of flat positions has no contrast.
+const FLAT: f64 = 0.9;
 /// A larger saturated share hides the texture.
 const SATURATED: f64 = 0.1;
 
@@ -44,17 +48,17 @@ pub(super) struct Cause {
     pub(super) sentence: String,
     /// The evidence beside it, as a clause.
     pub(super) evidence: Option<String>,
-    /// Whether it explains the error of the pose.
-    pub(super) is_of_pose: bool,
+    /// Whether the rover may have slipped.
+    pub(super) is_slip: bool,
 }
 
 impl Cause {
     fn new(sentence: String) -> Self {
-        Self { sentence, evidence: None, is_of_pose: false }
+        Self { sentence, evidence: None, is_slip: false }
     }
 
-    fn of_pose(sentence: String) -> Self {
-        Self { is_of_pose: true, ..Self::new(sentence) }
+    fn slip(sentence: String) -> Self {
+        Self { is_slip: true, ..Self::new(sentence) }
     }
 }
 
@@ -70,7 +74,7 @@ pub(super) fn find(book: &Book<'_>, verdict: &Verdict) -> Option<Cause> {
     let by_template = book.settings.tracker == TrackerKind::Template;
     let found = by_template.then(|| jump::find(book, rejected_before)).flatten().map(|jump| of_jump(book, jump));
     let found = found.or_else(|| earlier(rejected_before)).or_else(|| nothing_matched(book));
-    let found = found.or_else(|| odometry::disagreement(book.trace).map(Cause::of_pose));
+    let found = found.or_else(|| odometry::disagreement(book.trace).map(Cause::slip));
     found.or_else(|| of_match(book, verdict))
 }
 
@@ -108,7 +112,7 @@ fn of_jump(book: &Book<'_>, jump: Jump) -> Cause {
         Some(px) => format!("the prediction is {px:.0} px off and the target is outside the search window"),
         None => "the target is predicted out of the camera's view".to_owned(),
     };
-    Cause { evidence: Some(usual), ..Cause::of_pose(format!("{what}; {effect}")) }
+    Cause { evidence: Some(usual), ..Cause::new(format!("{what}; {effect}")) }
 }
 
 /// What the match itself says.
@@ -121,7 +125,7 @@ fn of_match(book: &Book<'_>, verdict: &Verdict) -> Option<Cause> {
         return of_range(book, gate);
     }
     if let Some(gate) = failed("position_correction_m").filter(|_| is_good && is_seen) {
-        return Some(Cause::of_pose(format!(
+        return Some(Cause::slip(format!(
             "The match is good, but {} m from the designated position in the site frame: the pose estimate drifted, or another \
              place looks alike",
             number(gate.value?)
@@ -143,7 +147,7 @@ fn of_match(book: &Book<'_>, verdict: &Verdict) -> Option<Cause> {
             number(second.ratio)
         )));
     }
-    at_rim(book).or_else(|| fallen(book))
+    without_contrast(matched).or_else(|| at_rim(book)).or_else(|| fallen(book))
 }
 
 /// A good match at an unexpected distance.
@@ -162,7 +166,18 @@ fn of_range(book: &Book<'_>, gate: &Gate) -> Option<Cause> {
     } else {
         let how = if change_m > 0.0 { "less" } else { "farther" };
         let why = format!("the rover moved {how} than the {} m of its pose estimate (slip)", number(way_m));
-        Cause::of_pose(format!("{what}: {why}"))
+        Cause::slip(format!("{what}: {why}"))
+    })
+}
+
+/// A search window in which nearly nothing can be compared.
+fn without_contrast(matched: &TemplateMatch) -> Option<Cause> {
+    let share = f64::from(matched.flat_positions) / f64::from(matched.positions.max(1));
+    (share >= FLAT).then(|| {
+        Cause::new(format!(
+            "The search window has no contrast: {:.0} % of its positions are flat (covered, saturated, or in deep shadow)",
+            100.0 * share
+        ))
     })
 }
 
@@ -174,7 +189,7 @@ fn at_rim(book: &Book<'_>) -> Option<Cause> {
     // A poor peak at the rim may be chance: it must score better than half of what is asked.
     let is_rising = matched.score > 0.5 * book.settings.limits.ncc_min;
     (matched.descent.is_none() && rim_px <= AT_RIM_PX && is_rising).then(|| {
-        Cause::of_pose(format!(
+        Cause::slip(format!(
             "The prediction is at least {:.0} px off: the scores rise towards the rim of the search window",
             predicted.distance(matched.pixel)
         ))

@@ -127,6 +127,21 @@ mod tests {
     }
 
     #[test]
+    fn a_quantity_that_a_gate_judges_is_named_like_the_gate() {
+        for (gate, quantities) in [
+            ("ncc", ["step.ncc", "match_template.score"]),
+            ("stereo_ncc", ["step.stereo_score", "point_stereo.score"]),
+            ("distance_correction_m", ["step.distance_correction_m"; 2]),
+            ("position_correction_m", ["step.position_correction_m"; 2]),
+        ] {
+            for name in quantities {
+                let quantity = crate::records::StageQuantity::named(name).unwrap();
+                assert_eq!(quantity.declared().label, label(gate), "{name}");
+            }
+        }
+    }
+
+    #[test]
     fn expressions_name_every_gate() {
         let gates = crate::expression::catalogue::gates();
         let named: std::collections::BTreeSet<&str> = gates.iter().map(|gate| gate.name.as_ref()).collect();

@@ -78,7 +78,7 @@ impl Book<'_> {
         context.extend(lost_before(verdict, self.before));
         let context = (!context.is_empty()).then(|| format!("{}.", capitalised(&context.join("; "))));
         // Odometry has no part in a loss whose cause is known to be another.
-        let is_open = cause.as_ref().is_none_or(|cause| !cause.is_of_pose);
+        let is_open = cause.as_ref().is_none_or(|cause| cause.is_slip);
         let odometry = odometry::finding(trace, self.before, self.settings).filter(|finding| {
             (is_open || finding.is_refusal) && Some(&finding.sentence) != cause.as_ref().map(|c| &c.sentence)
         });
