@@ -80,7 +80,7 @@ async fn branch(browser: &Browser, least: &str, number: usize) {
     browser.go_to("2", 2).await;
     browser.press("w").await;
     browser.says("Accepted").await;
-    browser.set_value("slider", "try ncc_min", least).await;
+    browser.set_value("slider", "try match score limit", least).await;
     browser.click_on("button", "Run from here as branch").await;
     browser
         .wait_status("the branch", &format!("s.run === {number} && !s.running && s.steps_done > s.step"))

@@ -6,11 +6,11 @@ use std::sync::atomic::AtomicBool;
 use sightline_geometry::estimate::quantile::quantile;
 use sightline_record::Unit;
 use sightline_rover::version::tracker_version;
-use sightline_session::{Fork, format};
 use sightline_session::metrics::{Metric, metrics};
 use sightline_session::notes::Note;
 use sightline_session::records::{self, StageQuantity};
 use sightline_session::step::RunStep;
+use sightline_session::{Fork, format};
 use sightline_track::settings::Changes;
 
 use super::kind::Part;
@@ -118,7 +118,8 @@ fn overview(source: &Source, runs: &[NamedRun<'_>]) -> String {
 fn changed(settings: &Changes, fork: Option<Fork>) -> String {
     let settings = (!settings.is_empty()).then(|| serde_json::to_string(settings).unwrap_or_default());
     let moved = fork.and_then(|fork| Some((fork.from_step, fork.prediction_px?)));
-    let moved = moved.map(|(step, to)| format!("prediction moved to ({:.1}, {:.1}) px at step {step}", to.x, to.y));
+    let moved =
+        moved.map(|(step, to)| format!("prediction moved to ({:.1}, {:.1}) px at step {step}", to.x, to.y));
     let all: Vec<String> = settings.into_iter().chain(moved).collect();
     if all.is_empty() { "defaults".to_owned() } else { all.join("; ") }
 }

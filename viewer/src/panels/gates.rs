@@ -102,11 +102,8 @@ pub(crate) fn show_gate(ui: &mut Ui, step: usize, gate: &Gate, out: &mut Vec<Com
     let word = if gate.passed { "pass" } else { "FAIL" };
     let limit = format!("{relation} {} {}", digits(gate.limit), gate.unit);
     let value = gate.value.map_or_else(|| "none".to_owned(), digits);
-    let columns = [
-        RichText::new(word).strong().color(colour),
-        theme::note(limit.trim_end()),
-        theme::number(value),
-    ];
+    let columns =
+        [RichText::new(word).strong().color(colour), theme::note(limit.trim_end()), theme::number(value)];
     let widths: [f32; 3] = std::array::from_fn(|k| width_of(ui, &columns[k]).max(COLUMNS[k]));
     let name = RichText::new(readable(&gate.name)).size(12.0).color(theme::text());
     let number = theme::note(gate.criterion.to_string());

@@ -66,12 +66,16 @@ fn sentence(state: &State, now: TrackingState) -> String {
     let n = retries(state);
     match now {
         TrackingState::Cleared => "Nothing is tracked at this step.".to_owned(),
-        TrackingState::Tracking => format!("Tracking. A bad update leads to Lost ({}).", gates::retries_left(n)),
+        TrackingState::Tracking => {
+            format!("Tracking. A bad update leads to Lost ({}).", gates::retries_left(n))
+        }
         TrackingState::Lost { count } => {
             let left = gates::retries_left(n - used(count, n));
             format!("Lost ({left}). A good update leads back to Tracking.")
         }
-        TrackingState::Failed => "Failed (no retry left). Designate the target anew to track it again.".to_owned(),
+        TrackingState::Failed => {
+            "Failed (no retry left). Designate the target anew to track it again.".to_owned()
+        }
     }
 }
 

@@ -164,11 +164,7 @@ fn a_window_too_small_for_a_displaced_prediction_is_answered_by_the_least_window
     assert!(finding.row.err_px.unwrap() < 2.0 && finding.margin_after.unwrap() > 0.0, "{finding:?}");
     assert!(finding.runs <= 26, "{}", finding.runs);
     assert!((finding.relative - f64::from(least - 61) / 61.0).abs() < 1e-12);
-    assert!(
-        finding
-            .sentence
-            .starts_with(&format!("search window 61 → {least} px: accepted, correct"))
-    );
+    assert!(finding.sentence.starts_with(&format!("search window 61 → {least} px: accepted, correct")));
     let margin = finding.with_margin.as_ref().unwrap();
     let wide = staged.with("search_window_px", margin.to.clone());
     let wide_px = wide.template().unwrap().match_template.as_ref().unwrap().edge_distance_px.unwrap();

@@ -12,9 +12,7 @@ pub(super) fn sentence(finding: &Finding, trace: &RunStep) -> String {
     let mut what: Vec<String> = finding
         .changes
         .iter()
-        .map(|change| {
-            format!("{} {}", setting_name(&change.setting), change.words())
-        })
+        .map(|change| format!("{} {}", setting_name(&change.setting), change.words()))
         .collect();
     if let Some(moved) = &finding.moved {
         let (dx, dy) = (moved.to.x - moved.from.x, moved.to.y - moved.from.y);

@@ -69,10 +69,13 @@ pub(super) fn find(book: &Book<'_>, verdict: &Verdict) -> Option<Cause> {
         _ => 0,
     };
     if verdict.state_before == TrackingState::Failed {
-        return Some(Cause::new("The target had failed before and is not looked at again until it is designated anew".to_owned()));
+        return Some(Cause::new(
+            "The target had failed before and is not looked at again until it is designated anew".to_owned(),
+        ));
     }
     let by_template = book.settings.tracker == TrackerKind::Template;
-    let found = by_template.then(|| jump::find(book, rejected_before)).flatten().map(|jump| of_jump(book, jump));
+    let found =
+        by_template.then(|| jump::find(book, rejected_before)).flatten().map(|jump| of_jump(book, jump));
     let found = found.or_else(|| earlier(rejected_before)).or_else(|| nothing_matched(book));
     let found = found.or_else(|| odometry::disagreement(book.trace).map(Cause::slip));
     found.or_else(|| of_match(book, verdict))
@@ -100,7 +103,10 @@ fn of_jump(book: &Book<'_>, jump: Jump) -> Cause {
     let side = if jump.by > 0.0 { "right" } else { "left" };
     let (what, usual) = match jump.jumped {
         Jumped::Heading => (
-            format!("The heading estimate jumped by {:.1}° to the {side}{at} while the rover drove straight", jump.by.abs()),
+            format!(
+                "The heading estimate jumped by {:.1}° to the {side}{at} while the rover drove straight",
+                jump.by.abs()
+            ),
             format!("the heading changed by at most {:.1}° more than usual at the steps before", jump.usual),
         ),
         Jumped::Position => (
@@ -208,7 +214,9 @@ fn fallen(book: &Book<'_>) -> Option<Cause> {
     let fell = format!("The match score fell from {} to {} in one step", number(then), number(now));
     Some(Cause::new(match brightness(book) {
         Some(words) => format!("{fell}: {words}"),
-        None => format!("{fell} although the pose changed as usual: the target is hidden, or its appearance changed"),
+        None => format!(
+            "{fell} although the pose changed as usual: the target is hidden, or its appearance changed"
+        ),
     }))
 }
 

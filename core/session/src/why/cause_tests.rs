@@ -35,7 +35,8 @@ fn with_heading_jump(deg: f64) -> PlaneWorld {
 fn summary_at(world: &PlaneWorld, step: usize, changes: &[(&str, Value)]) -> sentence::Summary {
     let changes: Changes = changes.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect();
     let settings = Settings::default().with(&changes).unwrap();
-    let mut steps = track::run(world, Designation::new(0, Pixel::new(118.3, 131.6)), &Settings::default()).unwrap();
+    let mut steps =
+        track::run(world, Designation::new(0, Pixel::new(118.3, 131.6)), &Settings::default()).unwrap();
     steps.truncate(STEP);
     while steps.len() <= step {
         let next = track::advance(world, &steps[0], &steps[steps.len() - 1], &settings);
@@ -57,7 +58,9 @@ fn narrow() -> [(&'static str, Value); 1] {
 fn a_heading_jump_is_named_with_its_size_and_effect() {
     for (deg, side) in [(7.0, "right"), (-7.0, "left")] {
         let summary = summary_at(&with_heading_jump(deg), STEP, &narrow());
-        let expected = format!("The heading estimate jumped by 7.0° to the {side} while the rover drove straight; the prediction is ");
+        let expected = format!(
+            "The heading estimate jumped by 7.0° to the {side} while the rover drove straight; the prediction is "
+        );
         assert!(summary.headline.starts_with(&expected), "{summary:?}");
         let off: f64 = summary.headline[expected.len()..].split(' ').next().unwrap().parse().unwrap();
         // 7° at a focal length of 600 px, and a little perspective.
@@ -105,7 +108,10 @@ fn a_covered_target_is_named_as_a_window_without_contrast() {
     let mut world = PlaneWorld::new(poses());
     world.troubles[STEP] = Trouble::Covered;
     let summary = summary_at(&world, STEP, &[]);
-    assert!(summary.headline.starts_with("The search window has no contrast: 100 % of its positions are flat"), "{summary:?}");
+    assert!(
+        summary.headline.starts_with("The search window has no contrast: 100 % of its positions are flat"),
+        "{summary:?}"
+    );
     // The step after it is lost for the same reason, which is told at the first.
     world.troubles[STEP + 1] = Trouble::Covered;
     let summary = summary_at(&world, STEP + 1, &[]);

@@ -147,12 +147,11 @@ fn at_stop(book: &Book<'_>, stop: usize) -> Option<(Jumped, f64, f64, Pose)> {
     let aside_deg = within_half_turn(change.direction_deg? - usual_direction.median);
     let translation = change.before_from_after.translation;
     if let Some(by) = usual_yaw.outlier(change.yaw_deg, YAW_MIN_DEG) {
-        let without = change.before_from_after.rotation
-            * attitude_from_roll_pitch_yaw(0.0, 0.0, -by.to_radians());
+        let without =
+            change.before_from_after.rotation * attitude_from_roll_pitch_yaw(0.0, 0.0, -by.to_radians());
         let is_straight = aside_deg.abs() < CHORD_SHARE * by.abs();
-        return is_straight.then(|| {
-            (Jumped::Heading, by, usual_yaw.largest, Pose::from_parts(translation, without))
-        });
+        return is_straight
+            .then(|| (Jumped::Heading, by, usual_yaw.largest, Pose::from_parts(translation, without)));
     }
     let off = usual_direction.outlier(change.direction_deg?, DIRECTION_MIN_DEG)?.to_radians();
     let back = Rotation3::from_axis_angle(&Vector3::z_axis(), -off) * translation.vector;
@@ -167,8 +166,7 @@ fn is_turn_by_vision(book: &Book<'_>, stop: usize, by_deg: f64) -> bool {
     let motion = measured.and_then(|measured| measured.update.after_from_before);
     motion.is_some_and(|motion| {
         let [.., seen_deg] = components(&motion.to_pose().inverse());
-        let [.., estimated_deg] =
-            components(&Change::to(book, stop).before_from_after);
+        let [.., estimated_deg] = components(&Change::to(book, stop).before_from_after);
         (seen_deg - estimated_deg).abs() < by_deg.abs() / 2.0
     })
 }
@@ -178,12 +176,12 @@ fn is_turn_by_vision(book: &Book<'_>, stop: usize, by_deg: f64) -> bool {
 fn effect(book: &Book<'_>, stop: usize, without: &Pose) -> Option<Option<f64>> {
     let trace = book.trace;
     let (predicted, prediction) = (trace.point_mast.predicted_left?, trace.prediction()?);
-    let [before, at, now] =
-        [stop - 1, stop, trace.step].map(|stop| book.sources.site_from_rover(stop));
+    let [before, at, now] = [stop - 1, stop, trace.step].map(|stop| book.sources.site_from_rover(stop));
     let site_from_rover = before * without * at.inverse() * now;
     let there = site_from_rover.inverse() * prediction.position_in_site;
     let Some(pixel) = trace.point_mast.left.project(&there) else { return Some(None) };
-    is_outside(trace, book.settings.template.template_size_px, pixel)?.then_some(Some(predicted.distance(pixel)))
+    is_outside(trace, book.settings.template.template_size_px, pixel)?
+        .then_some(Some(predicted.distance(pixel)))
 }
 
 /// Whether a pixel is none of the positions at which the template was compared; `None` where none was.

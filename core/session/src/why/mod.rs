@@ -41,6 +41,8 @@ mod tests;
 mod odometry_tests;
 #[cfg(test)]
 mod cause_tests;
+#[cfg(test)]
+mod scenario_tests;
 pub mod words;
 
 use serde::{Deserialize, Serialize};

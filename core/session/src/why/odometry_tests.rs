@@ -92,8 +92,13 @@ fn told(odometry: Option<MeasuredMotion>, displaced_px: f64) -> String {
     };
     let finding = odometry::finding(&lost, Some(&before), &settings);
     assert_eq!(finding, odometry::finding(&blind(lost.clone()), Some(&blind(before.clone())), &settings));
-    let book =
-        Book { trace: &lost, before: Some(&before), settings: &settings, prediction_px: None, sources: &world };
+    let book = Book {
+        trace: &lost,
+        before: Some(&before),
+        settings: &settings,
+        prediction_px: None,
+        sources: &world,
+    };
     book.summary().text()
 }
 

@@ -44,7 +44,8 @@ impl PoseChange {
         let sigma = match measured {
             Some(covariance) => {
                 let turn = before_from_after.rotation.to_rotation_matrix();
-                let block = |at: usize| -> Matrix3<f64> { covariance.fixed_view::<3, 3>(at, at).into_owned() };
+                let block =
+                    |at: usize| -> Matrix3<f64> { covariance.fixed_view::<3, 3>(at, at).into_owned() };
                 let turned = |at: usize| turn.matrix() * block(at) * turn.matrix().transpose();
                 joined(&roots(&turned(0)), &roots(&turned(3)).map(f64::to_degrees))
             }

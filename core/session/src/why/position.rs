@@ -63,7 +63,8 @@ impl Book<'_> {
 
     /// The change of the estimated pose since the stop before.
     fn pose_change(&self) -> Option<PoseChange> {
-        let [before, now] = [self.before?.step, self.trace.step].map(|step| self.sources.site_from_rover(step));
+        let [before, now] =
+            [self.before?.step, self.trace.step].map(|step| self.sources.site_from_rover(step));
         let measured = self.trace.odometry.as_deref();
         Some(PoseChange::between(&before, &now, &self.sources.pose_error(), measured))
     }
@@ -91,7 +92,10 @@ impl Book<'_> {
                 let draft =
                     Draft::numbers("predict", "1σ of the pose change", "m, deg", self.pose_change()?.sigma);
                 draft
-                    .roughly("the error model of the pose estimates; of visual odometry where it corrects them", &[])
+                    .roughly(
+                        "the error model of the pose estimates; of visual odometry where it corrects them",
+                        &[],
+                    )
                     .from(OriginKind::Pose, format!("pose estimate of stop {step}"), Some(step))
             }
             "camera_centre" => Draft::numbers(

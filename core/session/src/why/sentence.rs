@@ -50,10 +50,15 @@ impl Book<'_> {
     pub fn summary(&self) -> Summary {
         let trace = self.trace;
         if let Some(fault) = trace.fault() {
-            return Summary::new(format!("Nothing could be judged: the files of this stop are damaged: {fault}."));
+            return Summary::new(format!(
+                "Nothing could be judged: the files of this stop are damaged: {fault}."
+            ));
         }
         if let (Some(before), None) = (trace.paused_before(), trace.verdict()) {
-            return Summary::new(format!("Nothing is decided yet: the drive is paused before {}.", before.word()));
+            return Summary::new(format!(
+                "Nothing is decided yet: the drive is paused before {}.",
+                before.word()
+            ));
         }
         if trace.is_odometry_alone() {
             return Summary::new(format!("Nothing is judged here: {ODOMETRY_ALONE}."));
@@ -177,9 +182,7 @@ fn prediction_words(trace: &RunStep, settings: &Settings, accepted: bool) -> Opt
 fn lost_before(verdict: &Verdict, before: Option<&RunStep>) -> Option<String> {
     match (verdict.state_before, verdict.good) {
         (TrackingState::Lost { count: 1 }, false) => Some("the update before was bad, too".to_owned()),
-        (TrackingState::Lost { count }, false) => {
-            Some(format!("the {count} updates before were bad, too"))
-        }
+        (TrackingState::Lost { count }, false) => Some(format!("the {count} updates before were bad, too")),
         (TrackingState::Failed, _) => {
             let step =
                 before.map_or_else(String::new, |before| format!(" at step {} or before", before.step));

@@ -212,12 +212,10 @@ impl<'a> Book<'a> {
         let stage = "point_stereo";
         let from_image = |draft: Draft| draft.from(OriginKind::Image, self.image(1), Some(self.trace.step));
         Some(match name {
-            "stereo_score" => {
-                from_image(Draft::number(stage, "stereo score", "", stereo.score).roughly(
-                    "the best normalised correlation of the left window along the epipolar curve (R76)",
-                    &["left_px", "right_px", "setting.epipolar_tolerance_px", "setting.disparity_range_px"],
-                ))
-            }
+            "stereo_score" => from_image(Draft::number(stage, "stereo score", "", stereo.score).roughly(
+                "the best normalised correlation of the left window along the epipolar curve (R76)",
+                &["left_px", "right_px", "setting.epipolar_tolerance_px", "setting.disparity_range_px"],
+            )),
             "right_px" => from_image(
                 Draft::numbers(
                     stage,

@@ -345,12 +345,10 @@ fn the_sentence_of_a_lost_step_names_value_limit_rim_and_how_far_the_prediction_
     assert!(summary.bullets[0].starts_with("Rejected: ") && summary.bullets.len() <= 3, "{words}");
     let failed = format!("match score {} is below 0.700 by ", words::number(row.ncc.unwrap()));
     assert!(words.contains(&failed), "{words}");
-    assert!(
-        words.contains(&format!(
-            "prediction is {} px from the truth, which is outside the search window",
-            words::number(off)
-        ))
-    );
+    assert!(words.contains(&format!(
+        "prediction is {} px from the truth, which is outside the search window",
+        words::number(off)
+    )));
     assert!(words.contains("Correct rejection: the match is "), "{words}");
     let rim = template::edge_distance_px(
         lost.template().unwrap().match_template.as_ref().unwrap(),

@@ -3,8 +3,8 @@
 use egui::{Grid, RichText, Ui};
 use sightline_session::why::pose_change::AXES;
 
-use crate::panels::numbers;
 use crate::command::Command;
+use crate::panels::numbers;
 use crate::state::State;
 use crate::theme;
 

@@ -29,7 +29,7 @@ pub(super) fn show(ui: &mut Ui, trace: &RunStep, stage: RecordedStage, out: &mut
         egui::Grid::new(ui.next_auto_id()).num_columns(2).spacing([10.0, 2.0]).show(ui, |ui| {
             for (quantity, value) in entries {
                 let name = format!("{}.{}", schema.stage, quantity.name);
-                show_quantity(ui, trace.step, (&name, quantity), value, out);
+                show_quantity(ui, trace.step, (&name, *quantity), value, out);
                 ui.end_row();
             }
         });

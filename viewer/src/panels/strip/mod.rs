@@ -68,7 +68,9 @@ fn caption(trace: &RunStep, array: ArrayName) -> (String, String) {
             let scale = applied(["scale_roll.applied_scale", "scale_roll.scale"], |v| format!("×{v:.3}"));
             ("scaled", scale)
         }
-        ArrayName::ROLLED if number("scale_roll.warped") == Some(1.0) => ("warp: surface slope", String::new()),
+        ArrayName::ROLLED if number("scale_roll.warped") == Some(1.0) => {
+            ("warp: surface slope", String::new())
+        }
         ArrayName::ROLLED => {
             let roll = applied(["scale_roll.applied_roll_rad", "scale_roll.roll_rad"], |v| {
                 format!("{:+.2}°", v.to_degrees())

@@ -82,8 +82,11 @@ fn progress(ui: &mut Ui, question: &Question, out: &mut Vec<Command>) {
                 if ui.button("Cancel search").clicked() {
                     out.push(Command::Why(Ask::CancelSaved));
                 }
-                let words =
-                    if n == 0 { "waiting for its turn".to_owned() } else { format!("{k} of {n}: {}", setting_name(doing)) };
+                let words = if n == 0 {
+                    "waiting for its turn".to_owned()
+                } else {
+                    format!("{k} of {n}: {}", setting_name(doing))
+                };
                 ui.add(ProgressBar::new(k as f32 / n.max(1) as f32).text(words));
             });
         }
@@ -142,10 +145,8 @@ fn show_finding(ui: &mut Ui, state: &State, number: usize, finding: &Finding, ou
 
 /// The changes of a finding, each with its unit.
 fn changes(finding: &Finding) -> String {
-    let settings = finding
-        .changes
-        .iter()
-        .map(|change| format!("{} {}", setting_name(&change.setting), change.words()));
+    let settings =
+        finding.changes.iter().map(|change| format!("{} {}", setting_name(&change.setting), change.words()));
     let moved = finding.moved.as_ref().map(|moved| {
         let [dx, dy] = [moved.to.x - moved.from.x, moved.to.y - moved.from.y];
         format!("prediction moved by ({dx:+.1}, {dy:+.1}) px")
