@@ -1,5 +1,6 @@
 //! The panels of configurations, tolerances and the state machine.
 
+use egui_kittest::kittest::Queryable;
 use serde_json::json;
 use sightline_track::stages::judge::Gate;
 
@@ -100,7 +101,7 @@ fn in_a_narrow_panel_the_names_of_gates_are_beside_their_values() {
             [width, 420.0],
             |context| fixture::at_step(context, 3),
             |ui, state, out| {
-                show_pane(ui, Pane::Gates, state, out);
+                crate::layout::show_pane(ui, Pane::Gates, state, out);
             },
         );
         let name = shown.harness.get_by_label("match score").rect();

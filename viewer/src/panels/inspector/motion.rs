@@ -25,7 +25,7 @@ pub(super) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         }
         ui.end_row();
         for (k, (name, unit)) in AXES.iter().enumerate() {
-            ui.label(theme::label(name).size(12.0));
+            ui.label(theme::label(*name).size(12.0));
             ui.label(theme::number(value(found.change[k], unit)));
             ui.label(theme::number(value(found.sigma[k], unit).trim_start_matches('+').to_owned()));
             if let Some(error) = error.map(|error| error[k]) {
