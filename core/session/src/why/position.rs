@@ -54,6 +54,7 @@ impl Book<'_> {
     pub(super) fn of_position(&self, name: &str) -> Option<Draft> {
         self.of_prediction(name)
             .or_else(|| self.of_projection(name))
+            .or_else(|| self.of_pose_change(name))
             .or_else(|| self.of_geometry(name))
             .or_else(|| self.of_location(name))
             .or_else(|| self.of_correction(name))
@@ -67,6 +68,28 @@ impl Book<'_> {
             [self.before?.step, self.trace.step].map(|step| self.sources.site_from_rover(step));
         let measured = self.trace.odometry.as_deref();
         Some(PoseChange::between(&before, &now, &self.sources.pose_error(), measured))
+    }
+
+    fn of_pose_change(&self, name: &str) -> Option<Draft> {
+        let step = self.trace.step;
+        Some(match name {
+            "pose_change" => {
+                let label = "pose change: Δx, Δy, Δz in m, Δroll, Δpitch, Δyaw in deg; rover frame before";
+                Draft::numbers("predict", label, "m, deg", self.pose_change()?.change)
+                    .exactly("pose_before⁻¹ · pose", &["pose_before", "pose", "pose_change_sigma"])
+            }
+            "pose_change_sigma" => {
+                let draft =
+                    Draft::numbers("predict", "1σ of the pose change", "m, deg", self.pose_change()?.sigma);
+                draft
+                    .roughly(
+                        "the error model of the pose estimates; of visual odometry where it corrects them",
+                        &[],
+                    )
+                    .from(OriginKind::Pose, format!("pose estimate of stop {step}"), Some(step))
+            }
+            _ => return None,
+        })
     }
 
     fn of_geometry(&self, name: &str) -> Option<Draft> {
@@ -83,21 +106,6 @@ impl Book<'_> {
         Some(match name {
             "pose" => pose("site_from_rover now", step),
             "pose_before" => pose("site_from_rover at the step before", self.before?.step),
-            "pose_change" => {
-                let label = "pose change: Δx, Δy, Δz in m, Δroll, Δpitch, Δyaw in deg; rover frame before";
-                Draft::numbers("predict", label, "m, deg", self.pose_change()?.change)
-                    .exactly("pose_before⁻¹ · pose", &["pose_before", "pose", "pose_change_sigma"])
-            }
-            "pose_change_sigma" => {
-                let draft =
-                    Draft::numbers("predict", "1σ of the pose change", "m, deg", self.pose_change()?.sigma);
-                draft
-                    .roughly(
-                        "the error model of the pose estimates; of visual odometry where it corrects them",
-                        &[],
-                    )
-                    .from(OriginKind::Pose, format!("pose estimate of stop {step}"), Some(step))
-            }
             "camera_centre" => Draft::numbers(
                 "point_mast",
                 "centre of the left camera, rover frame",
