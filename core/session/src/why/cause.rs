@@ -2,16 +2,16 @@
 //!
 //! | order | cause | evidence |
 //! |---|---|---|
-//! | 1 | an earlier loss | bad updates in a row, without a jump of the pose since |
-//! | 2 | nothing was matched | the reason of the tracker |
-//! | 3 | a jump of heading or position | `jump`: no earlier step changes like that, and the target leaves the search window |
+//! | 1 | a jump of heading or position | `jump`: no earlier step changes like that, and the target leaves the search window |
+//! | 2 | an earlier loss | bad updates in a row, without a jump of the pose since |
+//! | 3 | nothing was matched | the reason of the tracker |
 //! | 4 | slip measured by vision | `odometry`: the pose used is significantly elsewhere |
-//! | 5 | slip, or a match on another surface | good scores, range change beyond its tolerance |
-//! | 6 | the right image | a good match, a poor stereo score |
-//! | 7 | two places alike | a good match, a second peak nearly as good |
-//! | 8 | no contrast | nearly all positions are flat |
-//! | 9 | a search window that is too small | the scores rise towards its rim |
-//! | 10 | a hidden or changed target | the score fell in one step, prediction and change of pose being consistent |
+//! | 5 | no contrast | nearly all positions are flat |
+//! | 6 | a search window that is too small | a poor score that rises towards its rim |
+//! | 7 | a hidden or changed target | the score fell in one step, prediction and change of pose being consistent |
+//! | 8 | the right image | a good match, a poor stereo score |
+//! | 9 | slip, or a match on another surface | a good match, range or site position beyond its tolerance |
+//! | 10 | two places alike | a good match, a second peak nearly as good |
 
 use sightline_track::locate::template::match_template::TemplateMatch;
 use sightline_track::settings::TrackerKind;
@@ -107,11 +107,11 @@ fn of_jump(book: &Book<'_>, jump: Jump) -> Cause {
                 "The heading estimate jumped by {:.1}° to the {side}{at} while the rover drove straight",
                 jump.by.abs()
             ),
-            format!("the heading changed by at most {:.1}° more than usual at the steps before", jump.usual),
+            format!("at the steps before, the change of heading deviated by at most {:.1}°", jump.usual),
         ),
         Jumped::Position => (
             format!("The position estimate jumped by {} m to the {side}{at}", number(jump.by.abs())),
-            format!("the position was at most {} m aside at the steps before", number(jump.usual)),
+            format!("at the steps before, the position deviated by at most {} m", number(jump.usual)),
         ),
     };
     let effect = match jump.shift_px {
@@ -125,19 +125,15 @@ fn of_jump(book: &Book<'_>, jump: Jump) -> Cause {
 fn of_match(book: &Book<'_>, verdict: &Verdict) -> Option<Cause> {
     let matched = book.trace.template()?.match_template.as_ref()?;
     let failed = |name: &str| verdict.gates.iter().find(|gate| gate.name == name && !gate.passed);
-    let is_good = failed("ncc").is_none() && failed("far_ncc").is_none();
-    let is_seen = failed("stereo_ncc").is_none();
-    if let Some(gate) = failed("distance_correction_m").filter(|_| is_good && is_seen) {
-        return of_range(book, gate);
+    let poor = without_contrast(matched).or_else(|| failed("ncc").and_then(|_| at_rim(book)));
+    if let Some(cause) = poor.or_else(|| fallen(book)) {
+        return Some(cause);
     }
-    if let Some(gate) = failed("position_correction_m").filter(|_| is_good && is_seen) {
-        return Some(Cause::slip(format!(
-            "The match is good, but {} m from the designated position in the site frame: the pose estimate drifted, or another \
-             place looks alike",
-            number(gate.value?)
-        )));
+    // The gate of far matches fails with those of the position, whose consequence it is.
+    if failed("ncc").is_some() {
+        return None;
     }
-    if let Some(score) = failed("stereo_ncc").and_then(|gate| gate.value).filter(|_| is_good) {
+    if let Some(score) = failed("stereo_ncc").and_then(|gate| gate.value) {
         return Some(Cause::new(format!(
             "Only the right image disagrees: the match is good (match score {}), the stereo score is {}; a depth edge or an \
              occlusion in one of the eyes",
@@ -145,15 +141,25 @@ fn of_match(book: &Book<'_>, verdict: &Verdict) -> Option<Cause> {
             number(score)
         )));
     }
+    if let Some(gate) = failed("distance_correction_m") {
+        return of_range(book, gate);
+    }
+    if let Some(gate) = failed("position_correction_m") {
+        return Some(Cause::slip(format!(
+            "The match is good, but {} m from the designated position in the site frame: the pose estimate drifted (slip), or \
+             another place looks alike",
+            number(gate.value?)
+        )));
+    }
     let second = matched.second_peak.as_ref().filter(|second| second.ratio >= AMBIGUOUS);
-    if let Some(second) = second.filter(|_| failed("ncc").is_none()) {
-        return Some(Cause::new(format!(
+    let second = second.map(|second| {
+        Cause::new(format!(
             "Two places {} px apart look alike: the second peak has {} of the best score",
             number(second.distance_px),
             number(second.ratio)
-        )));
-    }
-    without_contrast(matched).or_else(|| at_rim(book)).or_else(|| fallen(book))
+        ))
+    });
+    second.or_else(|| at_rim(book))
 }
 
 /// A good match at an unexpected distance.

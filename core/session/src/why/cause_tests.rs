@@ -120,10 +120,10 @@ fn a_covered_target_is_named_as_a_window_without_contrast() {
 
 #[test]
 fn a_step_without_a_trouble_has_no_cause() {
-    let strict = [("ncc_min", json!(1.0))];
+    let strict = [("match_sigma_max_px", json!(0.001))];
     let summary = summary_at(&PlaneWorld::new(poses()), STEP, &strict);
     assert_eq!(summary.headline, "No single cause is visible.", "{summary:?}");
-    assert!(summary.bullets[0].starts_with("Rejected: match score "), "{summary:?}");
+    assert!(summary.bullets[0].starts_with("Rejected: match σ "), "{summary:?}");
     // A rover that truly turns on an arc is no jump, and a jump inside the search window is no cause.
     let mut world = PlaneWorld::new(poses());
     for stop in STEP..6 {

@@ -1,20 +1,24 @@
 //! The cause of the first loss in drives of the library, each with a known trouble.
 
+use serde_json::{Value, json};
+
 use super::*;
 use crate::track;
 use sightline_recordings::create_simulated;
+use sightline_track::settings::Changes;
 use sightline_track::target::Designation;
 use sightline_world::{choose_targets, library};
 
 /// The first rejected step of a drive and its summary without the truth; `None` where all steps up to `last` are accepted.
-fn first_loss(name: &str, last: usize) -> Option<(usize, sentence::Summary)> {
+fn first_loss(name: &str, last: usize, changes: &[(&str, Value)]) -> Option<(usize, sentence::Summary)> {
     let mut scenario = library::scenario(name).unwrap();
     (scenario.camera.image_size, scenario.camera.samples_per_axis) = (512, 1);
     scenario.targets.window_px = 11;
     let folder = tempfile::tempdir().unwrap();
     let traverse = create_simulated(&scenario, &folder.path().join("drive")).unwrap();
     let pixel = choose_targets(traverse.world().unwrap(), &scenario, traverse.index())[0];
-    let settings = Settings::default();
+    let changes: Changes = changes.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect();
+    let settings = Settings::default().with(&changes).unwrap();
     let mut steps = vec![track::designate(&traverse, Designation::new(0, pixel), &settings).unwrap()];
     while steps.len() <= last && steps.len() < traverse.index().stops.len() {
         let mut next = track::advance(&traverse, &steps[0], &steps[steps.len() - 1], &settings);
@@ -32,11 +36,27 @@ fn first_loss(name: &str, last: usize) -> Option<(usize, sentence::Summary)> {
 }
 
 #[test]
-fn explore() {
-    for name in std::env::var("NAMES").unwrap_or_default().split(',').filter(|n| !n.is_empty()) {
-        match first_loss(name, 22) {
-            Some((step, summary)) => println!("== {name} step {step}: {summary:#?}"),
-            None => println!("== {name}: never lost"),
-        }
+fn the_cause_of_a_loss_in_a_simulated_drive_is_its_trouble() {
+    for (name, trouble_at, cause) in [
+        (
+            "heading-jump",
+            18,
+            "The heading estimate jumped by 6.8° to the right while the rover drove straight; ",
+        ),
+        ("occlusion", 5, "The match score fell from 0.99"),
+        ("self-shadow", 15, "The match score fell from 0.97"),
+        ("stuck", 6, "The match is good, but 0.865 m from the designated position in the site frame: "),
+    ] {
+        let (step, summary) = first_loss(name, trouble_at, &[]).expect(name);
+        assert_eq!(step, trouble_at, "{name}: {summary:?}");
+        assert!(summary.headline.starts_with(cause), "{name}: {summary:?}");
+    }
+}
+
+#[test]
+fn a_simulated_step_that_is_lost_by_a_strict_limit_has_no_cause() {
+    for name in ["occlusion", "turn-in-place", "sideways-70"] {
+        let (step, summary) = first_loss(name, 4, &[("match_sigma_max_px", json!(0.001))]).expect(name);
+        assert_eq!((step, summary.headline.as_str()), (1, "No single cause is visible."), "{name}");
     }
 }
