@@ -57,7 +57,7 @@ fn a_tree_that_is_asked_for_is_scrolled_into_view() {
         },
     );
     shown.harness.run_steps(60);
-    let title = shown.harness.get_by_label_contains("why state, run A").rect();
+    let title = shown.harness.get_by_label_contains("WHY STATE, RUN A").rect();
     assert!(title.top() >= 0.0 && title.bottom() <= 150.0, "{title:?}");
 }
 
@@ -86,7 +86,7 @@ fn predict_shows_the_pose_change_with_sigma_and_error() {
         state
     });
     // 1 m and 7 cm ahead; 2 % of the way along and across; 7 cm too far.
-    shown.says("pose change since the stop before").says("Δyaw").says("+107.00 cm").says("2.15 cm");
+    shown.says("POSE CHANGE SINCE THE STOP BEFORE").says("Δyaw").says("+107.00 cm").says("2.15 cm");
     shown.says("+7.00 cm").says("0.20°");
 }
 

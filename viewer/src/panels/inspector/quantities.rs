@@ -61,7 +61,7 @@ fn show_quantity(
     let rows = matrix_of(quantity.kind, value);
     let mut help = quantity.description.to_string();
     if !quantity.formula.is_empty() {
-        help += &format!("\n= {}", quantity.formula);
+        help += &format!("\n= {}", theme::formula(&quantity.formula));
     }
     let link = ui.link(RichText::new(quantity.label.as_ref()).size(12.0)).on_hover_text(help);
     numbers::ask(&link, step, name, &words, out);
@@ -74,7 +74,8 @@ fn show_quantity(
             }
         }
         let formula = Some(&quantity.formula).filter(|formula| !formula.is_empty());
-        let notes = [quantity.unit_label(), formula.map_or_else(String::new, |f| format!("= {f}"))];
+        let notes =
+            [quantity.unit_label(), formula.map_or_else(String::new, |f| format!("= {}", theme::formula(f)))];
         for note in notes.into_iter().filter(|note| !note.is_empty()) {
             ui.label(theme::note(note));
         }

@@ -74,7 +74,12 @@ fn branch(ui: &mut Ui, node: &Node, id: Id, depth: usize, out: &mut Vec<Command>
             if let Some(formula) = &node.formula {
                 let sign = if node.is_closed_form { "= " } else { "" };
                 ui.add(
-                    Label::new(RichText::new(format!("{sign}{formula}")).small().color(theme::text())).wrap(),
+                    Label::new(
+                        RichText::new(format!("{sign}{}", theme::formula(formula)))
+                            .small()
+                            .color(theme::text()),
+                    )
+                    .wrap(),
                 );
             }
             if let Some(origin) = &node.origin {
