@@ -19,7 +19,8 @@ async fn a_number_leads_to_where_it_came_from_and_on_from_there() {
     browser.shot("why-ncc").await;
     // One of its inputs, and back.
     let inputs = browser.controls().await;
-    let input = inputs.iter().find(|c| c.role == "link" && c.region == "Why" && !c.name.starts_with("match score"));
+    let input =
+        inputs.iter().find(|c| c.role == "link" && c.region == "Why" && !c.name.starts_with("match score"));
     let input = input.expect("the score has inputs").clone();
     browser.activate("link", &input.name).await;
     browser.control("button", "Back").await;

@@ -1,5 +1,8 @@
 //! The card of Why and what belongs to it: the headline, the pose change, the tree in view, and the end of a trial.
 
+use std::cell::{Cell, RefCell};
+use std::rc::Rc;
+
 use egui_kittest::kittest::{NodeT, Queryable};
 use serde_json::json;
 use sightline_api::endpoints::{ForkRun, ShowWhy, TryStep};
@@ -44,21 +47,32 @@ fn a_tree_that_is_asked_for_is_scrolled_into_view() {
         values: Vec::new(),
         tree: None,
     };
+    let asked = Rc::new(RefCell::new(None));
+    let is_asked = Rc::new(Cell::new(false));
+    let (made, shows_asked) = (Rc::clone(&asked), Rc::clone(&is_asked));
     let mut shown = Shown::new(
         [420.0, 150.0],
         move |context| {
             let mut state = fixture::at_step(context, LOST);
             state.perform(Command::Why(Ask::Value { step: LOST, value: "state".to_owned() }));
             answer::<ShowWhy>(&mut state, &explanation);
-            state
+            *made.borrow_mut() = Some(state);
+            fixture::at_step(context, LOST)
         },
-        |ui, state, out| {
+        move |ui, state, out| {
+            let asked = asked.borrow();
+            let state = asked.as_ref().filter(|_| shows_asked.get()).unwrap_or(state);
             crate::layout::show_pane(ui, Pane::Why, state, out);
         },
     );
+    let headline = |shown: &Shown<'_>| shown.harness.get_by_label("Why this state?").rect().top();
+    shown.harness.run_steps(5);
+    let before = headline(&shown);
+    is_asked.set(true);
     shown.harness.run_steps(60);
     let title = shown.harness.get_by_label_contains("WHY STATE, RUN A").rect();
     assert!(title.top() >= 0.0 && title.bottom() <= 150.0, "{title:?}");
+    assert!(headline(&shown) < before, "the tree was below the fold");
 }
 
 #[test]

@@ -4,6 +4,7 @@
 mod criteria;
 mod saved;
 mod tree;
+mod view;
 
 use egui::{CollapsingHeader, Frame, Id, Label, Margin, RichText, ScrollArea, Sense, Stroke, Ui, UiBuilder};
 use sightline_session::why::sentence::Summary;

@@ -11,6 +11,7 @@ use sightline_session::why::words::{number, setting_name, signed};
 use crate::command::Command;
 use crate::state::{State, run_letter};
 use crate::theme;
+use crate::why::panel::view;
 use crate::why::{Ask, Told};
 
 /// The button that asks.
@@ -29,6 +30,7 @@ pub(crate) fn button(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 
 /// The findings so far.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let top = ui.cursor().top();
     match state.question() {
         None => {}
         Some(Told::Waiting) => {
@@ -38,6 +40,14 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             ui.add(Label::new(RichText::new(why).color(theme::lost())).wrap());
         }
         Some(Told::Here(question)) => show_question(ui, state, question, out),
+    }
+    // At another step the card comes first; at this one the answer that was asked for.
+    let answered = state.question().map(|told| match told {
+        Told::Here(question) => question.answer.as_ref().is_some_and(|answer| !answer.findings.is_empty()),
+        _ => false,
+    });
+    if let Some(key) = state.step_key(state.cursor.step) {
+        view::follow(ui, &format!("saved {key:?}"), Some(answered), top);
     }
 }
 

@@ -9,17 +9,18 @@ use crate::cache::StepKey;
 use crate::command::{Command, Go};
 use crate::state::State;
 use crate::theme;
+use crate::why::panel::view;
 use crate::why::{Ask, Told};
 
 /// How many levels are open at first.
 const OPEN: usize = 2;
 
-/// Height of a tree that is scrolled into view, points.
-const FIRST_LINES: f32 = 140.0;
-
 /// Shows the tree of the value that was asked for last.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    let Some((key, value, told)) = state.explained() else { return };
+    let Some((key, value, told)) = state.explained() else {
+        view::follow(ui, "tree", None::<(StepKey, String, bool)>, ui.cursor().top());
+        return;
+    };
     ui.add_space(2.0);
     let top = ui.cursor().top();
     ui.horizontal_wrapped(|ui| {
@@ -47,18 +48,8 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             }
         }
     }
-    bring_into_view(ui, top, &(key.clone(), value.to_owned(), matches!(told, Told::Waiting)));
-}
-
-/// Scrolls to the title and the first lines of a tree when another one is shown.
-fn bring_into_view(ui: &Ui, top: f32, shown: &(StepKey, String, bool)) {
-    let id = Id::unique("the tree that was shown last");
-    if ui.data(|data| data.get_temp::<(StepKey, String, bool)>(id)).as_ref() == Some(shown) {
-        return;
-    }
-    ui.data_mut(|data| data.insert_temp(id, shown.clone()));
-    let bottom = ui.cursor().top().min(top + FIRST_LINES);
-    ui.scroll_to_rect(ui.max_rect().with_min_y(top).with_max_y(bottom), None);
+    let shown = (key.clone(), value.to_owned(), matches!(told, Told::Waiting));
+    view::follow(ui, "tree", Some(shown), top);
 }
 
 /// One value with what it was made of.
