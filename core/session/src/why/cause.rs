@@ -11,7 +11,7 @@
 //! | 7 | a hidden or changed target | the score fell in one step, prediction and change of pose being consistent |
 //! | 8 | the right image | a good match, a poor stereo score |
 //! | 9 | slip, or a match on another surface | a good match, range or site position beyond its tolerance |
-//! | 10 | two places alike | a good match, a second peak nearly as good |
+//! | 10 | two places alike | a good match, a second peak beyond its gate |
 
 use sightline_track::locate::template::match_template::TemplateMatch;
 use sightline_track::settings::TrackerKind;
@@ -19,7 +19,7 @@ use sightline_track::stages::judge::{Gate, Verdict};
 use sightline_track::target::TrackingState;
 
 use super::jump::{self, Jump, Jumped};
-use super::sentence::{AMBIGUOUS, AT_RIM_PX};
+use super::sentence::AT_RIM_PX;
 use super::template::edge_distance_px;
 use super::words::{number, signed};
 use super::{Book, odometry};
@@ -151,7 +151,7 @@ fn of_match(book: &Book<'_>, verdict: &Verdict) -> Option<Cause> {
             number(gate.value?)
         )));
     }
-    let second = matched.second_peak.as_ref().filter(|second| second.ratio >= AMBIGUOUS);
+    let second = matched.second_peak.as_ref().filter(|_| failed("second_peak_ratio").is_some());
     let second = second.map(|second| {
         Cause::new(format!(
             "Two places {} px apart look alike: the second peak has {} of the best score",

@@ -22,7 +22,7 @@ use sightline_track::trace::ODOMETRY_ALONE;
 pub(super) const AT_RIM_PX: f64 = 3.0;
 
 /// A second peak of such a share of the best may as well be the right one.
-pub(super) const AMBIGUOUS: f64 = 0.95;
+const AMBIGUOUS: f64 = 0.95;
 
 /// What came of a step and why, in sentences.
 #[derive(Clone, Debug, PartialEq, Eq)]
