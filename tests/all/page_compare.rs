@@ -41,7 +41,7 @@ async fn branched() -> (Bench, Browser) {
     browser.wait_status("the step", &format!("s.step === {FORK} && s.shown")).await;
     browser.press("w").await;
     browser.says("Accepted").await;
-    browser.set_value("slider", "try ncc_min", "0.9999").await;
+    browser.set_value("slider", "try match score limit", "0.9999").await;
     browser.click_on("button", "Run from here as branch").await;
     browser.wait_status("the branch", "s.run === 1 && !s.running && s.steps_done > s.step").await;
     browser.wait_status("the loss", &format!("s.step === {FORK} && s.state !== 'tracking' && s.shown")).await;

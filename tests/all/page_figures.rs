@@ -87,7 +87,7 @@ async fn a_panel_is_saved_as_svg_and_png_which_look_alike_and_a_plot_is_read_as_
     browser.click_on("button", "Over the steps as table").await;
     let table = browser.control("table", "Over the steps, ").await;
     assert_eq!(table.region, "Over the steps");
-    browser.control("columnheader", "scores ncc").await;
+    browser.control("columnheader", "scores match score").await;
     browser.control("row", "step 0").await;
     browser.click_on("button", "go to step 2").await;
     browser.wait_status("the step", "s.step === 2 && s.shown").await;

@@ -271,7 +271,7 @@ fn scores(state: &State, colour: Color32) -> Chart {
             series("stereo_score", theme::prediction(), Mark::Square, MarkerShape::Square),
         ],
         thresholds: vec![limits.ncc_min, limits.stereo_ncc_min],
-        threshold: "least allowed".to_owned(),
+        threshold: "threshold".to_owned(),
         in_view: [0.9, 1.0],
     }
 }

@@ -290,6 +290,7 @@ impl State {
         }
         self.cursor = Cursor { target: Some(target), run: number, ..self.cursor };
         self.draft.clear();
+        self.end_trial();
         self.did(Deed::Branched { target, run: number });
         self.messages.note(format!("Run {} goes on from here.", run_letter(number)));
     }

@@ -107,7 +107,7 @@ fn form(ui: &mut Ui, state: &State, chosen: &StudyInfo, out: &mut Vec<Command>) 
         }
         match &problem {
             Some(problem) => ui.label(RichText::new(problem).small().color(theme::lost())),
-            None => ui.label(theme::note("Left empty, a field means what stands in it in grey.")),
+            None => ui.label(theme::note("Empty fields use the grey defaults.")),
         };
     });
     if order != state.studies.order {

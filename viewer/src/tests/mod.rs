@@ -34,6 +34,8 @@ mod tour;
 #[path = "../why/tests.rs"]
 mod why;
 mod undo;
+#[path = "../why/card_tests.rs"]
+mod why_card;
 #[path = "../why/follow_tests.rs"]
 mod following;
 mod pointed;

@@ -196,6 +196,11 @@ pub(crate) fn title(text: &str) -> RichText {
     RichText::new(text.to_uppercase()).size(10.5).extra_letter_spacing(1.1).color(weak())
 }
 
+/// A formula in signs that the fonts have.
+pub(crate) fn formula(text: &str) -> String {
+    text.replace('ᵀ', "^T")
+}
+
 /// A label beside a value.
 pub(crate) fn label(text: impl Into<String>) -> RichText {
     RichText::new(text).color(weak())

@@ -27,7 +27,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
                 Ask::Stabilise,
             ),
             (
-                "step before",
+                "overlay previous step",
                 "The step before shines through (onion skin)",
                 compare.has_onion_skin,
                 Ask::OnionSkin,
@@ -63,8 +63,8 @@ fn choices(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         out.push(Command::Compare(Ask::Align(align)));
     });
     let close = compare.closeness;
-    let all = Closeness::ALL.map(|close| (close, close.word(), "What counts as a difference."));
-    choice(ui, ("counts", "closeness"), close.word(), all, close, |closeness| {
+    let all = Closeness::ALL.map(|close| (close, close.word(), "Smaller differences count as none."));
+    choice(ui, ("ignore differences below", "closeness"), close.word(), all, close, |closeness| {
         out.push(Command::Compare(Ask::Closeness(closeness)));
     });
 }

@@ -93,7 +93,7 @@ pub(crate) fn record(ui: &mut Ui, state: &State, record: impl Fn(&RunStep) -> Op
     let (own, there) = (record(own).unwrap_or_default(), record(there).unwrap_or_default());
     let found = differences(&there, &own, &state.tolerance());
     let title = match found.len() {
-        0 => format!("Δ vs {label}: alike ({})", state.compare.closeness.word()),
+        0 => format!("Δ vs {label}: alike (differences below {} ignored)", state.compare.closeness.word()),
         1 => format!("Δ vs {label}: 1 value differs"),
         count => format!("Δ vs {label}: {count} values differ"),
     };

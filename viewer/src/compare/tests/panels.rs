@@ -30,10 +30,10 @@ fn the_row_above_the_image_says_the_sentence_and_chooses_how_to_compare() {
     shown
         .says("vs run B: first differ at step 3 in match_template")
         .says("aligned by: step")
-        .says("counts: every bit");
+        .says("ignore differences below: none");
     assert_eq!(shown.click("First divergence (D)"), vec![Command::Compare(Ask::FirstDivergence)]);
     assert_eq!(shown.click("hold target"), vec![Command::Compare(Ask::Stabilise)]);
-    assert_eq!(shown.click("step before"), vec![Command::Compare(Ask::OnionSkin)]);
+    assert_eq!(shown.click("overlay previous step"), vec![Command::Compare(Ask::OnionSkin)]);
     shown.click("compare by: marks");
     assert_eq!(shown.click("difference"), vec![Command::Compare(Ask::View(View::Difference))]);
 }
@@ -219,7 +219,7 @@ fn gates_and_inspector_say_what_differs_from_the_other_run() {
         state.stage = Stage::MATCH_TEMPLATE;
         state
     });
-    alike.says("Δ vs run B: alike (every bit)");
+    alike.says("Δ vs run B: alike (differences below none ignored)");
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! The inspector: the quantities that the selected stage declares, then the rest of its evidence as a tree.
 
+mod motion;
 mod quantities;
 mod times;
 mod tree;
@@ -50,6 +51,9 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     }
     ScrollArea::vertical().auto_shrink(false).id_salt(state.stage()).show(ui, |ui| {
         readouts::record(ui, state, |trace| self::record(trace, state.stage()));
+        if state.stage() == Stage::PREDICT {
+            motion::show(ui, state, out);
+        }
         for (index, stage) in stages.into_iter().enumerate() {
             if index > 0 {
                 ui.add_space(4.0);

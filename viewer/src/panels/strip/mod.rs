@@ -58,7 +58,7 @@ fn caption(trace: &RunStep, array: ArrayName) -> (String, String) {
         let is_on = number(applied) == number(computed);
         number(applied).filter(|_| is_on).map_or_else(|| "off".to_owned(), words)
     };
-    let score = |name: &str| number(name).map_or_else(String::new, |score| format!("ncc {score:.2}"));
+    let score = |name: &str| number(name).map_or_else(String::new, |score| format!("score {score:.2}"));
     let (title, step) = match array {
         ArrayName::REFERENCE => {
             let step = number("scale_roll.template_step").unwrap_or_default();
@@ -68,7 +68,9 @@ fn caption(trace: &RunStep, array: ArrayName) -> (String, String) {
             let scale = applied(["scale_roll.applied_scale", "scale_roll.scale"], |v| format!("×{v:.3}"));
             ("scaled", scale)
         }
-        ArrayName::ROLLED if number("scale_roll.warped") == Some(1.0) => ("warped", "slope".to_owned()),
+        ArrayName::ROLLED if number("scale_roll.warped") == Some(1.0) => {
+            ("warp: surface slope", String::new())
+        }
         ArrayName::ROLLED => {
             let roll = applied(["scale_roll.applied_roll_rad", "scale_roll.roll_rad"], |v| {
                 format!("{:+.2}°", v.to_degrees())

@@ -62,6 +62,13 @@ impl Corner {
         let at = self.centre.offset(half, half);
         let Some(response) = handle(ui, canvas, self.key, at, colour) else { return };
         response.widget_info(|| WidgetInfo::slider(true, side as f64, format!("{} handle, px", self.name)));
+        // Without limits of its own a slider in the page's document ends at 100.
+        ui.ctx().accesskit_node_builder(response.id, |node| {
+            let [least, most] = self.limits.map(|limit| limit as f64);
+            node.set_min_numeric_value(least);
+            node.set_max_numeric_value(most);
+            node.set_numeric_value_step(2.0);
+        });
         let dragged = response.dragged().then(|| response.interact_pointer_pos()).flatten();
         if let Some(pointer) = dragged {
             let to = canvas.transform.to_pixel(pointer);
