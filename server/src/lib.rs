@@ -27,6 +27,8 @@ mod folders;
 mod driven;
 mod drives;
 mod brought;
+mod imports;
+mod recordings;
 mod questions;
 mod trackability_maps;
 mod odometry_tables;

@@ -1,7 +1,7 @@
 //! What the handlers share: the open traverses, the sessions, and the ways to compute, to save and to tell.
 
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 use sightline_api::event::Event;
@@ -17,6 +17,7 @@ use crate::driven::{self, OpenTraverses};
 use crate::drives;
 use crate::folders::Folders;
 use crate::idempotency;
+use crate::imports::{self, Imports};
 use crate::jobs::{Lane, lock};
 use crate::limits::{Limits, SharedLimits};
 use crate::live_session::LiveSession;
@@ -75,6 +76,7 @@ struct Inner {
     maps: Maps,
     odometry: OdometryTables,
     questions: Questions,
+    imports: Imports,
 }
 
 impl Drop for Inner {
@@ -106,6 +108,21 @@ impl AppState {
         Self::with_folders(traverses, &Folders::in_one(folder), access, limits)
     }
 
+    /// The same, whose pages may open the recordings below these folders.
+    ///
+    /// # Errors
+    /// As `Self::with_folders`, or a folder that does not exist.
+    pub fn with_recordings(
+        traverses: Vec<Traverse>,
+        folder: &Path,
+        access: Access,
+        limits: Limits,
+        recordings: &[PathBuf],
+    ) -> Result<Self> {
+        let folders = Folders::in_one(folder).with_recordings(recordings)?;
+        Self::with_folders(traverses, &folders, access, limits)
+    }
+
     /// Opens the state on its folders.
     ///
     /// # Errors
@@ -127,8 +144,9 @@ impl AppState {
         let store = Store::open(&folders.sessions)?;
         let drives_lost = drives::open_again(&store, folders, &cache, &mut open, &events)?;
         let driven_lost = driven::open_again(folders, &cache, &mut open, &events);
+        let imports_lost = imports::open_again(folders, &cache, &mut open, &events);
         let (sessions, mut notices) = Sessions::read_back(&store, &open)?;
-        notices.extend(of_drives.into_iter().chain(drives_lost).chain(driven_lost));
+        notices.extend(of_drives.into_iter().chain(drives_lost).chain(driven_lost).chain(imports_lost));
         for notice in &notices {
             tracing::warn!("{}", crate::printable::printable(notice));
         }
@@ -166,6 +184,7 @@ impl AppState {
             maps: Maps::new(&limits),
             odometry: OdometryTables::new(&limits),
             questions,
+            imports: Imports::new(&limits),
             limits,
         })))
     }
@@ -310,6 +329,11 @@ impl AppState {
     /// The odometry of stops with its corners.
     pub(crate) fn odometry(&self) -> &OdometryTables {
         &self.0.odometry
+    }
+
+    /// The imports of recordings.
+    pub(crate) fn imports(&self) -> &Imports {
+        &self.0.imports
     }
 
     /// The live Rerun streams, by session.
