@@ -18,6 +18,8 @@ pub(crate) struct Folders {
     pub driven: PathBuf,
     /// Recordings that were imported from pages, and references to those that are opened in place.
     pub imported: PathBuf,
+    /// Recordings that pages send, until they are imported; emptied at each start.
+    pub uploads: PathBuf,
     /// Digests of the files of recorded traverses, from which nothing but time is lost when it is removed.
     pub digests: PathBuf,
     /// The folders below which pages may open recordings; canonical, and not the server's own.
@@ -27,10 +29,20 @@ pub(crate) struct Folders {
 impl Folders {
     /// Sessions in `folder` itself, the rest in folders below it.
     pub(crate) fn in_one(folder: &Path) -> Self {
-        let [studies, traverses, driven, imported, digests] =
-            ["studies", "traverses", "driven", "imported", "digests"].map(|name| folder.join(name));
+        let [studies, traverses, driven, imported, uploads, digests] =
+            ["studies", "traverses", "driven", "imported", "uploads", "digests"]
+                .map(|name| folder.join(name));
         let recordings = Vec::new();
-        Self { sessions: folder.to_owned(), studies, traverses, driven, imported, digests, recordings }
+        Self {
+            sessions: folder.to_owned(),
+            studies,
+            traverses,
+            driven,
+            imported,
+            uploads,
+            digests,
+            recordings,
+        }
     }
 
     /// The same folders, with those below which pages may open recordings.
@@ -55,7 +67,11 @@ impl Folders {
     /// # Errors
     /// Those of the system.
     pub(crate) fn prepare(&self) -> Result<()> {
-        let folders = [&self.studies, &self.traverses, &self.driven, &self.imported, &self.digests].map(PathBuf::clone);
+        let folders =
+            [&self.studies, &self.traverses, &self.driven, &self.imported, &self.uploads, &self.digests];
+        let folders = folders.map(PathBuf::clone);
+        // Nobody sends the rest of an upload of an earlier start.
+        let _ = std::fs::remove_dir_all(&self.uploads);
         folders.iter().try_for_each(|folder| make_private(folder))?;
         let tidy = move || folders.iter().for_each(|folder| tidy(folder, DEPTH));
         std::thread::Builder::new().name("tidy".to_owned()).spawn(tidy).map(|_| ())

@@ -25,7 +25,7 @@ use crate::jobs::{Lane, lock};
 use crate::limits::SharedLimits;
 use crate::naming::{hash, slug};
 use crate::problem::{ApiError, ApiResult};
-use crate::recordings::{Confined, confine, refusal};
+use crate::recordings::{Confined, confine_named, refusal};
 use crate::rendering::OpenTraverse;
 use crate::state::AppState;
 
@@ -75,7 +75,8 @@ impl Imports {
             let ended = ended.ok_or_else(|| ApiError::full(&self.limits.imports))?;
             jobs.remove(ended);
         }
-        let numbers = jobs.iter().filter_map(|job| job.view().id.strip_prefix("import-")?.parse::<u64>().ok());
+        let numbers =
+            jobs.iter().filter_map(|job| job.view().id.strip_prefix("import-")?.parse::<u64>().ok());
         let view = ImportJob {
             id: format!("import-{}", numbers.max().unwrap_or(0) + 1),
             path: recording.path.display().to_string(),
@@ -153,10 +154,36 @@ impl Job {
         make_private(&folders.imported)
             .map_err(|source| Error::Write { path: folders.imported.clone(), source })?;
         let examined = examine(&self.recording.path, &options, &self.cancel).map_err(refusal)?;
-        if examined.is_native {
+        if examined.is_native && !self.recording.is_upload {
             return self.open_in_place(state);
         }
         let folder = new_folder(&folders.imported, &examined.index.name)?;
+        let made = self
+            .fill(state, &folder, examined.is_native)
+            .and_then(|notes| Ok((notes, self.open(state, &folder)?)));
+        let (notes, open) = made.inspect_err(|_| {
+            // The first problem is the one to tell.
+            let _ = remove_folder(&folder);
+        })?;
+        if open.traverse.folder() != folder {
+            // It was open already.
+            remove_folder(&folder)?;
+        }
+        if self.recording.is_upload {
+            state.uploads().imported(self.recording.root());
+        }
+        self.change(state, |view| view.notes = notes);
+        Ok(open.id.clone())
+    }
+
+    /// Makes the drive in its folder; what was left out or assumed.
+    fn fill(&self, state: &AppState, folder: &Path, is_native: bool) -> ApiResult<Vec<String>> {
+        if is_native {
+            // The folder is empty, so that the other one takes its place.
+            let moved = std::fs::rename(&self.recording.path, folder);
+            moved.map_err(|source| Error::Write { path: folder.to_owned(), source })?;
+            return Ok(Vec::new());
+        }
         let mut told = 0;
         let mut progress = |k: usize, n: usize| {
             // A hundred messages are enough for a bar.
@@ -166,19 +193,9 @@ impl Job {
                 self.change(state, |view| (view.k, view.n) = (k, n));
             }
         };
-        let made = import(&self.recording.path, &options, &folder, &mut progress, &self.cancel)
-            .map_err(refusal)
-            .and_then(|made| Ok((made, self.open(state, &folder)?)));
-        let (made, open) = made.inspect_err(|_| {
-            // The first problem is the one to tell.
-            let _ = remove_folder(&folder);
-        })?;
-        if open.traverse.folder() != folder {
-            // It was open already.
-            remove_folder(&folder)?;
-        }
-        self.change(state, |view| view.notes = made.notes);
-        Ok(open.id.clone())
+        let options = self.recording.options();
+        let made = import(&self.recording.path, &options, folder, &mut progress, &self.cancel);
+        Ok(made.map_err(refusal)?.notes)
     }
 
     /// Opens a native drive where it is.
@@ -284,7 +301,7 @@ fn place(folders: &Folders, entry: &Path) -> std::result::Result<Option<PathBuf>
         return Ok(None);
     }
     let path = std::fs::read_to_string(entry).map_err(|error| format!("{} ({error})", entry.display()))?;
-    let confined = confine(folders, &path).map_err(|problem| {
+    let confined = confine_named(folders, &path).map_err(|problem| {
         let Some(hint) = &problem.problem().hint else { return problem.problem().detail.clone() };
         format!("{} {hint}", problem.problem().detail)
     })?;

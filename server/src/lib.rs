@@ -29,6 +29,7 @@ mod drives;
 mod brought;
 mod imports;
 mod recordings;
+mod uploads;
 mod questions;
 mod trackability_maps;
 mod odometry_tables;

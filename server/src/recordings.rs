@@ -12,6 +12,7 @@ use sightline_recordings::import::examine::{Examined, examine, find};
 use crate::folders::Folders;
 use crate::limits::Limits;
 use crate::problem::{ApiError, ApiResult};
+use crate::state::AppState;
 
 /// How many folders below a named one recordings are looked for.
 const DEPTH: usize = 4;
@@ -23,11 +24,18 @@ const PAIRS_SHOWN: usize = 3;
 pub(crate) struct Confined {
     /// The recording, with all links resolved.
     pub(crate) path: PathBuf,
-    /// The named folder that it is in.
+    /// The named folder, or that of the upload, that it is in.
     root: PathBuf,
+    /// Whether it was sent by a page.
+    pub(crate) is_upload: bool,
 }
 
 impl Confined {
+    /// The folder that nothing of the recording may leave.
+    pub(crate) fn root(&self) -> &Path {
+        &self.root
+    }
+
     /// How the recording is imported.
     pub(crate) fn options(&self) -> ImportOptions {
         ImportOptions { within: Some(self.root.clone()), ..ImportOptions::default() }
@@ -55,22 +63,55 @@ pub(crate) fn list(folders: &Folders, limits: &Limits) -> RecordingList {
 ///
 /// # Errors
 /// A problem when no folder was named, or the path is not below one.
-pub(crate) fn confine(folders: &Folders, path: &str) -> ApiResult<Confined> {
+pub(crate) fn confine(state: &AppState, path: &str) -> ApiResult<Confined> {
+    let real = Path::new(path).canonicalize().ok().filter(|_| Path::new(path).is_absolute());
+    let sent = real.and_then(|real| Some((state.uploads().root_of(&real)?, real)));
+    match sent {
+        Some((root, path)) => only_one(Confined { path, root, is_upload: true }),
+        None => confine_named(state.folders(), path).and_then(only_one),
+    }
+}
+
+/// The recording itself where a path names a folder around one.
+fn only_one(confined: Confined) -> ApiResult<Confined> {
+    if !confined.path.is_dir() {
+        return Ok(confined);
+    }
+    match find(&confined.path, DEPTH, 2).0.as_slice() {
+        [one] => Ok(Confined { path: one.path.clone(), ..confined }),
+        [first, second, ..] => {
+            let shown = |path: &Path| path.strip_prefix(&confined.path).unwrap_or(path).display().to_string();
+            let (first, second) = (shown(&first.path), shown(&second.path));
+            let detail = format!("path: the folder contains more than one recording ({first}, {second} …).");
+            Err(ApiError::invalid("path", detail).hint("Choose the folder of one of them."))
+        }
+        [] => Ok(confined),
+    }
+}
+
+/// Resolves a path below the named folders.
+///
+/// # Errors
+/// As [`confine`].
+pub(crate) fn confine_named(folders: &Folders, path: &str) -> ApiResult<Confined> {
     let shown: String = crate::printable::printable(path).chars().take(200).collect();
     if path.trim().is_empty() {
         let problem = ApiError::invalid("path", "path: is empty, but must name a folder or file.");
         return Err(problem.hint("Choose one of the recordings that `GET recordings` lists."));
     }
     if folders.recordings.is_empty() {
-        let detail = format!("path: “{shown}” cannot be opened, because the server was started without a folder of recordings.");
-        return Err(ApiError::invalid("path", detail)
-            .hint("Start it with `sightline serve --recordings FOLDER`, where FOLDER contains the recording."));
+        let detail = format!(
+            "path: “{shown}” cannot be opened, because the server was started without a folder of recordings."
+        );
+        return Err(ApiError::invalid("path", detail).hint(
+            "Start it with `sightline serve --recordings FOLDER`, where FOLDER contains the recording.",
+        ));
     }
     // A relative path is one below a named folder; an absolute one replaces it.
     let found = folders.recordings.iter().find_map(|folder| {
         let real = folder.join(path).canonicalize().ok()?;
         let root = folders.recordings.iter().find(|root| real.starts_with(root))?.clone();
-        Some(Confined { path: real, root })
+        Some(Confined { path: real, root, is_upload: false })
     });
     found.ok_or_else(|| {
         let detail = format!("path: “{shown}” is nothing below the folders of recordings.");
@@ -86,7 +127,11 @@ pub(crate) fn confine(folders: &Folders, path: &str) -> ApiResult<Confined> {
 ///
 /// # Errors
 /// A problem that names the file and what is wrong with it.
-pub(crate) fn contents(recording: &Confined, limits: &Limits, cancel: &AtomicBool) -> ApiResult<RecordingView> {
+pub(crate) fn contents(
+    recording: &Confined,
+    limits: &Limits,
+    cancel: &AtomicBool,
+) -> ApiResult<RecordingView> {
     let Examined { format, is_native, index, left_size, right_size, image_count, notes } =
         examine(&recording.path, &recording.options(), cancel).map_err(refusal)?;
     let stop_count = index.stops.len();

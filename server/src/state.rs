@@ -35,6 +35,7 @@ use crate::study::jobs::Shelf;
 use crate::study::order::order;
 use crate::study::saved::Keeper;
 use crate::trackability_maps::Maps;
+use crate::uploads::Uploads;
 
 mod bounds;
 mod changes;
@@ -77,6 +78,7 @@ struct Inner {
     odometry: OdometryTables,
     questions: Questions,
     imports: Imports,
+    uploads: Uploads,
 }
 
 impl Drop for Inner {
@@ -185,6 +187,7 @@ impl AppState {
             odometry: OdometryTables::new(&limits),
             questions,
             imports: Imports::new(&limits),
+            uploads: Uploads::new(&limits),
             limits,
         })))
     }
@@ -334,6 +337,11 @@ impl AppState {
     /// The imports of recordings.
     pub(crate) fn imports(&self) -> &Imports {
         &self.0.imports
+    }
+
+    /// The recordings that pages send.
+    pub(crate) fn uploads(&self) -> &Uploads {
+        &self.0.uploads
     }
 
     /// The live Rerun streams, by session.

@@ -48,6 +48,7 @@ mod page_undo;
 mod recorded_cameras;
 mod recorded_tracking;
 mod records;
+mod recordings;
 mod removal;
 mod repeated;
 mod rerun_export;

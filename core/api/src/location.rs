@@ -46,6 +46,14 @@ pub struct AtImport {
     pub import: String,
 }
 
+/// A recording that a page sends.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, IntoParams)]
+#[into_params(parameter_in = Path)]
+pub struct AtUpload {
+    /// The upload's id.
+    pub upload: String,
+}
+
 /// A session.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, IntoParams)]
 #[into_params(parameter_in = Path)]

@@ -75,6 +75,28 @@ pub struct RecordedPair {
     pub right: String,
 }
 
+/// A recording that a page sends.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct UploadView {
+    /// Its name in paths.
+    pub id: String,
+    /// The folder that its files are in, which `GET recordings/contents` takes.
+    pub path: String,
+    /// How many files have arrived.
+    pub files: usize,
+    /// How many bytes have arrived, or were unpacked.
+    pub bytes: u64,
+}
+
+/// Names a file of an upload.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub struct UploadPath {
+    /// Its path in the recording, with `/`: for example `drive/image_0/000000.png`.
+    pub path: String,
+}
+
 /// Imports a recording.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]

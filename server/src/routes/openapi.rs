@@ -17,8 +17,8 @@ use utoipa_axum::routes;
 
 use super::{
     about, breakpoints, compare, counterfactual, documents, drive, events, exports, expressions, login,
-    notes, odometry, photometry, plain, recordings, removal, rerun, runs, sessions, settings, steps, studies, targets,
-    trackability, traverses, what_if, why,
+    notes, odometry, photometry, plain, recordings, removal, rerun, runs, sessions, settings, steps, studies,
+    targets, trackability, traverses, what_if, why,
 };
 use crate::routes::route::route;
 use crate::state::AppState;

@@ -23,6 +23,7 @@ impl State {
                 self.files.is_open = true;
                 self.files.refused = None;
                 self.read_recent();
+                self.read_recordings();
             }
             Ask::Close => self.files.is_open = false,
             Ask::Choose => self.outbox.add(Effect::ChooseFile),
@@ -41,6 +42,7 @@ impl State {
                 let here = self.cursor.step;
                 self.cache.retry(|key| matches!(key, Key::Image { step, .. } if *step == here));
             }
+            Ask::Recording(ask) => self.ask_of_recordings(ask),
             Ask::RemoveSession(entry) => self.remove_session(*entry),
             Ask::RestoreSession(id) => self.restore_session(id),
             Ask::ConfirmDrive(id) => self.files.confirming = id,
@@ -89,7 +91,7 @@ impl State {
     }
 
     /// Opens the drive of a scenario.
-    fn open_drive(&mut self, file: String, scenario: String) {
+    pub(super) fn open_drive(&mut self, file: String, scenario: String) {
         let call = Call::with_body::<AddTraverse>(&Anywhere {}, &NewTraverse { scenario });
         self.open_file::<AddTraverse>(file, call, |state, file, entry| {
             state.messages.note(format!("{file} is the drive {}.", entry.name));

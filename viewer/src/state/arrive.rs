@@ -70,6 +70,7 @@ impl State {
             }
             Event::NotesChanged { session } => self.notes_changed(session),
             Event::SessionRemoved { session } => self.session_removed(&session),
+            Event::ImportProgress { job } => self.import_went_on(job),
             Event::TraverseRemoved { traverse } => self.drive_removed(&traverse),
         }
     }

@@ -22,7 +22,10 @@ pub(super) fn check(path: &Path, root: &Path, cancel: &AtomicBool) -> Result<()>
     let unreadable = |path: &Path, source| Error::Read { path: path.to_owned(), source };
     let first = folder.canonicalize().map_err(|source| unreadable(folder, source))?;
     let leads_out = |path: &Path| {
-        Error::format(path, "is a link that leads out of the recordings folder or nowhere; copy the file instead")
+        Error::format(
+            path,
+            "is a link that leads out of the recordings folder or nowhere; copy the file instead",
+        )
     };
     if !first.starts_with(root) {
         return Err(leads_out(folder));
@@ -36,7 +39,8 @@ pub(super) fn check(path: &Path, root: &Path, cancel: &AtomicBool) -> Result<()>
             let entry = entry.map_err(|source| unreadable(&folder, source))?;
             count += 1;
             if count > ENTRY_LIMIT {
-                let problem = format!("has more than {ENTRY_LIMIT} files; choose the folder of one recording");
+                let problem =
+                    format!("has more than {ENTRY_LIMIT} files; choose the folder of one recording");
                 return Err(Error::format(path, problem));
             }
             let kind = entry.file_type().map_err(|source| unreadable(&entry.path(), source))?;
