@@ -55,5 +55,6 @@ mod rerun_export;
 mod studies;
 mod surviving;
 mod trackability;
+mod uploads;
 mod why;
 mod zncc_reference;

@@ -56,7 +56,7 @@ async fn import(server: &TestServer, path: &Path) -> Value {
     ended(server, job["id"].as_str().unwrap()).await
 }
 
-async fn ended(server: &TestServer, id: &str) -> Value {
+pub(crate) async fn ended(server: &TestServer, id: &str) -> Value {
     let begun = Instant::now();
     loop {
         let job = server.get(&format!("imports/{id}")).await.expect(200);

@@ -6,6 +6,8 @@ pub(crate) mod documents;
 pub(crate) mod inbox;
 pub(crate) mod window;
 pub(crate) mod download;
+#[cfg(target_arch = "wasm32")]
+mod outgoing;
 pub(crate) mod recording;
 mod recording_window;
 mod removal;

@@ -2,16 +2,19 @@
 
 use sightline_api::endpoint::Call;
 use sightline_api::endpoints::{
-    CancelImport, ListRecordings, ListTraverses, ShowImport, ShowRecording, StartImport,
+    BeginUpload, CancelImport, ListRecordings, ListTraverses, RemoveUpload, ShowImport, ShowRecording,
+    StartImport,
 };
-use sightline_api::location::{Anywhere, AtImport};
+use sightline_api::location::{Anywhere, AtImport, AtUpload};
 use sightline_api::recording::{
-    ImportJob, ImportState, NewImport, RecordingList, RecordingPath, RecordingView,
+    ImportJob, ImportState, NewImport, RecordingList, RecordingPath, RecordingView, UploadView,
 };
 use sightline_api::wire::Problem;
 use sightline_world::library;
 
+use crate::files::inbox::Chosen;
 use crate::state::State;
+use crate::state::effect::Effect;
 
 /// What a person asks of recordings.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,8 +29,24 @@ pub enum Ask {
     Cancel,
     /// Goes back to the list.
     Back,
+    /// Lets the person choose a folder, or an archive, that is sent to the server.
+    Choose {
+        /// Whether it is an archive.
+        is_archive: bool,
+    },
+    /// Sends no more of it.
+    StopSending,
     /// Opens a scenario that comes with the program, by its name.
     Scenario(&'static str),
+}
+
+/// A recording that is sent to the server.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Sending {
+    /// What was chosen.
+    pub chosen: Chosen,
+    /// How many files are sent.
+    pub sent: usize,
 }
 
 /// What is known of recordings.
@@ -43,6 +62,10 @@ pub struct Recordings {
     pub shown: Option<RecordingView>,
     /// Why the recording cannot be examined or imported.
     pub problem: Option<Problem>,
+    /// The recording that is sent.
+    pub sending: Option<Sending>,
+    /// The upload that the server has of this page.
+    pub upload: Option<UploadView>,
     /// Whether the import of the recording that is shown was asked for and not answered yet.
     pub is_starting: bool,
     /// The import that this page started and that has not ended.
@@ -69,6 +92,13 @@ impl State {
             Ask::Back => {
                 let recordings = &mut self.files.recordings;
                 (recordings.shown, recordings.problem) = (None, None);
+                self.remove_upload();
+            }
+            Ask::Choose { is_archive } => self.outbox.add(Effect::ChooseRecording { is_archive }),
+            Ask::StopSending => {
+                self.files.recordings.sending = None;
+                self.outbox.add(Effect::StopSending);
+                self.remove_upload();
             }
             Ask::Scenario(name) => {
                 let Some(scenario) = library::toml(name) else { return };
@@ -94,6 +124,57 @@ impl State {
                 Err(problem) => recordings.problem = Some(problem),
             }
         });
+    }
+
+    /// Sends the recording that was chosen.
+    pub(super) fn recording_chosen(&mut self, chosen: Chosen) {
+        self.remove_upload();
+        self.files.is_open = true;
+        let recordings = &mut self.files.recordings;
+        (recordings.shown, recordings.problem) = (None, None);
+        recordings.sending = Some(Sending { chosen, sent: 0 });
+        let call = Call::to::<BeginUpload>(&Anywhere {});
+        self.call_with_problem::<BeginUpload>(call, |state, outcome| match outcome {
+            Ok(upload) => {
+                let id = upload.id.clone();
+                state.files.recordings.upload = Some(upload);
+                if state.files.recordings.sending.is_some() {
+                    state.outbox.add(Effect::SendRecording(id));
+                } else {
+                    // It was cancelled meanwhile.
+                    state.remove_upload();
+                }
+            }
+            Err(problem) => state.not_sent(problem),
+        });
+    }
+
+    /// So many files are sent; the last one was the last to wait for.
+    pub(super) fn files_sent(&mut self, sent: usize) {
+        let recordings = &mut self.files.recordings;
+        let Some(sending) = &mut recordings.sending else { return };
+        sending.sent = sent;
+        if sent >= sending.chosen.file_count {
+            recordings.sending = None;
+            if let Some(upload) = recordings.upload.clone() {
+                self.examine(upload.path);
+            }
+        }
+    }
+
+    /// A file was refused.
+    pub(super) fn not_sent(&mut self, problem: Problem) {
+        let recordings = &mut self.files.recordings;
+        (recordings.sending, recordings.problem) = (None, Some(problem));
+        self.remove_upload();
+    }
+
+    /// Removes what this page has sent and not imported.
+    fn remove_upload(&mut self) {
+        let Some(upload) = self.files.recordings.upload.take() else { return };
+        let call = Call::to::<RemoveUpload>(&AtUpload { upload: upload.id });
+        // The server may have removed it: an import takes it over.
+        self.call_with_problem::<RemoveUpload>(call, |_, _| {});
     }
 
     fn import(&mut self) {
@@ -137,7 +218,8 @@ impl State {
         recordings.import = None;
         match (job.state, job.traverse) {
             (ImportState::Done, Some(traverse)) => {
-                recordings.shown = None;
+                // The server has taken over what was sent.
+                (recordings.shown, recordings.upload) = (None, None);
                 self.files.is_open = false;
                 job.notes.into_iter().for_each(|note| self.messages.note(note));
                 self.open_imported(traverse);

@@ -6,7 +6,7 @@ use sightline_api::endpoints::{
 };
 use sightline_api::event::Event;
 use sightline_api::recording::{
-    ImportJob, ImportState, NewImport, RecordedPair, RecordingEntry, RecordingList, RecordingView,
+    ImportJob, ImportState, NewImport, RecordedPair, RecordingEntry, RecordingList, RecordingView, UploadView,
 };
 use sightline_api::wire::{Problem, TraverseEntry};
 use sightline_geometry::stereo_geometry::StereoGeometry;
@@ -14,9 +14,11 @@ use sightline_world::library;
 
 use crate::command::Command;
 use crate::files::Ask as FilesAsk;
+use crate::files::inbox::{Arrival, Chosen};
 use crate::files::recording::Ask;
 use crate::files::window;
 use crate::state::State;
+use crate::state::effect::Effect;
 use crate::tests::calls::{answer, bodies, calls, calls_of, refuse};
 use crate::tests::{Shown, fixture};
 
@@ -195,6 +197,55 @@ fn without_folders_the_window_says_how_the_server_is_started_with_one() {
         state
     };
     shown(without).says("sightline serve --recordings FOLDER").hides("path of a recording");
+}
+
+#[test]
+fn a_chosen_folder_is_sent_and_examined_and_what_is_not_imported_is_removed() {
+    let chosen = || Chosen { name: "kitti".to_owned(), file_count: 3, bytes: 2_500_000 };
+    let upload =
+        UploadView { id: "upload-1".to_owned(), path: "/up/upload-1".to_owned(), files: 0, bytes: 0 };
+    let sending = move || {
+        let mut state = opened();
+        ask(&mut state, Ask::Choose { is_archive: false });
+        assert!(state.take_effects().contains(&Effect::ChooseRecording { is_archive: false }));
+        state.file_arrived(Arrival::Chosen(chosen()));
+        answer::<BeginUpload>(&mut state, &upload);
+        assert!(state.take_effects().contains(&Effect::SendRecording("upload-1".to_owned())));
+        state.file_arrived(Arrival::Sent(1));
+        state
+    };
+    let mut card = Shown::new([1000.0, 800.0], move |_| sending(), window::show);
+    card.says("kitti: sent 1 of 3 files, 2.5 MB");
+    assert_eq!(card.click("Cancel sending"), vec![Command::Files(FilesAsk::Recording(Ask::StopSending))]);
+    let upload =
+        UploadView { id: "upload-1".to_owned(), path: "/up/upload-1".to_owned(), files: 0, bytes: 0 };
+    let begun = || {
+        let mut state = opened();
+        state.file_arrived(Arrival::Chosen(chosen()));
+        answer::<BeginUpload>(&mut state, &upload);
+        state.take_effects();
+        state
+    };
+    let mut state = begun();
+    ask(&mut state, Ask::StopSending);
+    assert_eq!(calls_of::<RemoveUpload>(&mut state)[0].path, "uploads/upload-1");
+
+    let mut state = begun();
+    state.file_arrived(Arrival::Sent(3));
+    assert_eq!(calls_of::<ShowRecording>(&mut state)[0].path, "recordings/contents?path=%2Fup%2Fupload-1");
+    answer::<ShowRecording>(&mut state, &contents());
+    ask(&mut state, Ask::Back);
+    assert_eq!(calls_of::<RemoveUpload>(&mut state).len(), 1);
+
+    let mut state = begun();
+    state.file_arrived(Arrival::NotSent(Problem::new(
+        413,
+        "too_large",
+        "",
+        "The upload has more than 9 bytes.",
+    )));
+    assert_eq!(calls_of::<RemoveUpload>(&mut state).len(), 1);
+    assert_eq!(state.files.recordings.problem.as_ref().unwrap().detail, "The upload has more than 9 bytes.");
 }
 
 #[test]

@@ -8,7 +8,7 @@ use sightline_geometry::stereo_geometry::StereoGeometry;
 use sightline_world::library;
 
 use crate::files::Ask as FilesAsk;
-use crate::files::recording::Ask;
+use crate::files::recording::{Ask, Sending};
 use crate::files::window::{Pressed, row};
 use crate::state::State;
 use crate::theme;
@@ -58,6 +58,9 @@ pub(super) fn list(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(FilesAsk)) {
             path(ui, state, ask);
         }
     }
+    if cfg!(any(test, target_arch = "wasm32")) {
+        send(ui, state, ask);
+    }
     if let Some(path) = &recordings.examining {
         ui.horizontal(|ui| {
             ui.spinner();
@@ -87,6 +90,30 @@ fn path(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(FilesAsk)) {
         }
         if (is_entered || button.clicked()) && can_examine {
             ask(FilesAsk::Recording(Ask::Examine(text.trim().to_owned())));
+        }
+    });
+}
+
+/// Buttons that choose a recording on the person's own machine, and the progress of sending it.
+fn send(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(FilesAsk)) {
+    ui.horizontal(|ui| {
+        if let Some(Sending { chosen, sent }) = &state.files.recordings.sending {
+            let megabytes = chosen.bytes as f64 / 1e6;
+            let words =
+                format!("{}: sent {sent} of {} files, {megabytes:.1} MB", chosen.name, chosen.file_count);
+            let share = *sent as f32 / chosen.file_count.max(1) as f32;
+            ui.add(ProgressBar::new(share).desired_width(440.0).text(words));
+            let cancel = Button::new("Cancel").min_size(vec2(24.0, 24.0));
+            if ui.add(cancel).accessible_name("Cancel sending").clicked() {
+                ask(FilesAsk::Recording(Ask::StopSending));
+            }
+            return;
+        }
+        ui.label(theme::label("on this machine:"));
+        for (label, is_archive) in [("Choose a folder …", false), ("Choose a zip archive …", true)] {
+            if ui.add(Button::new(label).min_size(vec2(24.0, 24.0))).clicked() {
+                ask(FilesAsk::Recording(Ask::Choose { is_archive }));
+            }
         }
     });
 }

@@ -62,6 +62,9 @@ impl State {
                 Ok(document) => self.open_document(&name, document),
                 Err(why) => self.messages.refused_file(why),
             },
+            Arrival::Chosen(chosen) => self.recording_chosen(chosen),
+            Arrival::Sent(count) => self.files_sent(count),
+            Arrival::NotSent(problem) => self.not_sent(problem),
         }
     }
 
