@@ -39,6 +39,7 @@ mod page_figures;
 mod page_first;
 mod page_panels;
 mod page_picking;
+mod page_recordings;
 mod page_removal;
 mod page_speed;
 mod page_travel;
