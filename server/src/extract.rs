@@ -213,17 +213,17 @@ pub(crate) fn check_content_type(method: &Method, path: &str, headers: &HeaderMa
         return Ok(());
     }
     let is_file = method == Method::PUT && path.starts_with(UPLOADS);
-    let expected = if is_file { "application/octet-stream" } else { "application/json" };
-    let is_json = |value: &axum::http::HeaderValue| {
+    let is_allowed = |value: &axum::http::HeaderValue| {
         let media_type = value.to_str().unwrap_or_default().split(';').next().unwrap_or_default().trim();
-        media_type.eq_ignore_ascii_case(expected)
+        media_type.eq_ignore_ascii_case("application/json")
+            || is_file && media_type.eq_ignore_ascii_case("application/octet-stream")
     };
     let length = headers.get(header::CONTENT_LENGTH);
     let has_body =
         length.is_some_and(|length| length != "0") || headers.contains_key(header::TRANSFER_ENCODING);
     let mut types = headers.get_all(header::CONTENT_TYPE).iter().peekable();
     let is_unsaid = types.peek().is_none();
-    if (is_unsaid && has_body) || !types.all(is_json) {
+    if (is_unsaid && has_body) || !types.all(is_allowed) {
         return Err(if is_file { not_bytes() } else { not_json() });
     }
     Ok(())

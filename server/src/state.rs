@@ -144,11 +144,9 @@ impl AppState {
         let (mut open, of_drives) = drives::open_given(traverses, folders, &events)?;
         let given = open.iter().map(|open| open.id.clone()).collect();
         let store = Store::open(&folders.sessions)?;
-        let drives_lost = drives::open_again(&store, folders, &cache, &mut open, &events)?;
-        let driven_lost = driven::open_again(folders, &cache, &mut open, &events);
-        let imports_lost = imports::open_again(folders, &cache, &mut open, &events);
+        let lost = open_again(&store, folders, &cache, &mut open, &events)?;
         let (sessions, mut notices) = Sessions::read_back(&store, &open)?;
-        notices.extend(of_drives.into_iter().chain(drives_lost).chain(driven_lost).chain(imports_lost));
+        notices.extend(of_drives.into_iter().chain(lost));
         for notice in &notices {
             tracing::warn!("{}", crate::printable::printable(notice));
         }
@@ -353,4 +351,21 @@ impl AppState {
     pub(crate) fn questions(&self) -> &Questions {
         &self.0.questions
     }
+}
+
+/// Opens the drives of earlier starts; what cannot be opened is said in one sentence each.
+///
+/// # Errors
+/// As [`drives::open_again`].
+fn open_again(
+    store: &Store,
+    folders: &Folders,
+    cache: &Arc<Cache>,
+    open: &mut Vec<Arc<OpenTraverse>>,
+    events: &broadcast::Sender<Event>,
+) -> Result<Vec<String>> {
+    let mut lost = drives::open_again(store, folders, cache, open, events)?;
+    lost.extend(driven::open_again(folders, cache, open, events));
+    lost.extend(imports::open_again(folders, cache, open, events));
+    Ok(lost)
 }
