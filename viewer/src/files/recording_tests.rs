@@ -1,8 +1,8 @@
 //! Opening a recording of one's own: found, examined, imported with progress and Cancel, and refused with the fix.
 
 use sightline_api::endpoints::{
-    AddTraverse, CancelImport, ListRecordings, ListSessions, ListTraverses, ShowImport, ShowRecording,
-    StartImport,
+    AddTraverse, BeginUpload, CancelImport, ListRecordings, ListSessions, ListTraverses, RemoveUpload,
+    ShowImport, ShowRecording, StartImport,
 };
 use sightline_api::event::Event;
 use sightline_api::recording::{
