@@ -43,7 +43,8 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
 #[utoipa::path(get, operation_id = "list_recordings", path = ListRecordings::PATH, tag = "recordings", responses(
     (status = 200, body = RecordingList), ApiError))]
 async fn list(State(state): State<AppState>) -> ApiResult<Json<RecordingList>> {
-    blocking(move || Ok(Json(recordings::list(state.folders(), state.limits())))).await
+    let own = state.clone();
+    state.pictures().run(move || Ok(Json(recordings::list(own.folders(), own.limits())))).await
 }
 
 /// What a recording contains

@@ -187,14 +187,28 @@ impl State {
             state.files.recordings.is_starting = false;
             match outcome {
                 Ok(job) => {
-                    let at = AtImport { import: job.id.clone() };
                     state.files.recordings.import = Some(job);
                     // It may have ended before the page knew its name.
-                    let call = Call::to::<ShowImport>(&at);
-                    state.call::<ShowImport>(call, Self::import_went_on);
+                    state.follow_import();
                 }
                 Err(problem) => state.files.recordings.problem = Some(problem),
             }
+        });
+    }
+
+    /// Asks how far the import of this page is, whose events it may have missed.
+    pub(crate) fn follow_import(&mut self) {
+        let Some(job) = &self.files.recordings.import else { return };
+        let call = Call::to::<ShowImport>(&AtImport { import: job.id.clone() });
+        self.call_with_problem::<ShowImport>(call, |state, outcome| match outcome {
+            Ok(job) => state.import_went_on(job),
+            // A server that was started anew does not have it; one that does not answer is asked again later.
+            Err(problem) if problem.status == 404 => {
+                let detail = "The server was started again during the import; import the recording again.";
+                state.files.recordings.import = None;
+                state.files.recordings.problem = Some(Problem::new(404, "import", "", detail));
+            }
+            Err(_) => {}
         });
     }
 

@@ -17,6 +17,7 @@ use crate::files::Ask as FilesAsk;
 use crate::files::inbox::{Arrival, Chosen};
 use crate::files::recording::Ask;
 use crate::files::window;
+use crate::net::events::Connection;
 use crate::state::State;
 use crate::state::effect::Effect;
 use crate::tests::calls::{answer, bodies, calls, calls_of, refuse};
@@ -160,6 +161,25 @@ fn an_import_shows_its_progress_and_can_be_cancelled() {
     state.told(Event::ImportProgress { job: job(ImportState::Cancelled, 11) });
     assert_eq!((state.files.is_open, &state.files.recordings.import), (true, &None));
     assert!(state.messages.newest().unwrap().text.contains("cancelled"));
+}
+
+#[test]
+fn an_import_is_followed_when_the_server_answers_again() {
+    let away = || {
+        let mut state = importing();
+        state.connected(Connection::Live);
+        state.connected(Connection::Gone { attempts: 1 });
+        state.take_requests();
+        state.connected(Connection::Live);
+        state
+    };
+    let mut state = away();
+    answer::<ShowImport>(&mut state, &job(ImportState::Done, 40));
+    assert_eq!((state.files.is_open, &state.files.recordings.import), (false, &None));
+    let mut state = away();
+    refuse::<ShowImport>(&mut state, Problem::new(404, "not_found", "", "There is no such import."));
+    assert_eq!(state.files.recordings.import, None);
+    assert!(state.files.recordings.problem.unwrap().detail.contains("import the recording again"));
 }
 
 #[test]

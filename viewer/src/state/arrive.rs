@@ -87,6 +87,7 @@ impl State {
                     self.read_notes(session);
                 }
                 self.messages.note("The server answers again.");
+                self.follow_import();
                 self.catch_up();
             }
             // Before the first connection an event can only have been missed since the first answers.
