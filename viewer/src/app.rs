@@ -175,9 +175,18 @@ impl SightlineApp {
             Effect::ChooseFile | Effect::ReadFile(_) => self.inbox.choose(),
             #[cfg(not(target_arch = "wasm32"))]
             Effect::ReadFile(path) => self.inbox.open_path(std::path::Path::new(&path)),
+            #[cfg(target_arch = "wasm32")]
+            Effect::ChooseRecording { is_archive } => self.inbox.choose_recording(is_archive),
+            #[cfg(target_arch = "wasm32")]
+            Effect::SendRecording(upload) => self.inbox.send_recording(&self.state.origin, upload),
+            #[cfg(target_arch = "wasm32")]
+            Effect::StopSending => self.inbox.stop_sending(),
             // Outside a browser a file is named by its path.
             #[cfg(not(target_arch = "wasm32"))]
-            Effect::ChooseFile => {}
+            Effect::ChooseFile
+            | Effect::ChooseRecording { .. }
+            | Effect::SendRecording(_)
+            | Effect::StopSending => {}
         }
     }
 

@@ -70,6 +70,7 @@ impl State {
             }
             Event::NotesChanged { session } => self.notes_changed(session),
             Event::SessionRemoved { session } => self.session_removed(&session),
+            Event::ImportProgress { job } => self.import_went_on(job),
             Event::TraverseRemoved { traverse } => self.drive_removed(&traverse),
         }
     }
@@ -86,6 +87,7 @@ impl State {
                     self.read_notes(session);
                 }
                 self.messages.note("The server answers again.");
+                self.follow_import();
                 self.catch_up();
             }
             // Before the first connection an event can only have been missed since the first answers.

@@ -41,6 +41,8 @@ mod following;
 mod pointed;
 #[path = "../files/tests.rs"]
 mod opening;
+#[path = "../files/recording_tests.rs"]
+mod recordings;
 mod pauses;
 pub(crate) mod odometry;
 mod problems;
