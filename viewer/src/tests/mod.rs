@@ -190,6 +190,7 @@ fn the_designation_says_that_nothing_had_to_be_matched() {
 #[test]
 fn the_left_image_has_a_legend_that_switches_its_layers() {
     let mut shown = Shown::pane(Pane::Left, |context| fixture::at_step(context, 2));
+    shown.click("legend");
     for word in ["truth", "match, 3σ · run A", "predicted, 3σ gate", "search window", "subframe"] {
         shown.says(&format!("{word} (legend)"));
     }

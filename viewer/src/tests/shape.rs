@@ -183,6 +183,7 @@ fn a_prediction_that_may_lie_outside_the_basin_is_warned_of() {
 #[test]
 fn the_left_image_has_the_registered_target_and_the_basin_about_the_prediction() {
     let mut shown = left_image(2);
+    shown.click("legend");
     shown.says("registered here, 1σ 2σ 3σ").says("basin, half width 25 cm (legend)");
     assert_eq!(shown.click("basin, half width 25 cm (legend)"), vec![Command::ToggleLayer(Layer::Basin)]);
     left_image(0).says("picked");

@@ -79,6 +79,7 @@ pub struct Cycle {
     /// The chosen motion; null where the drive ended or the rover stays.
     pub motion: Option<Motion>,
     /// Whether odometry runs alone at the stop that the motion leads to: it is a part of a step.
+    #[serde(default)]
     pub odometry_alone: bool,
     /// The rover's report of the motion; null without one.
     pub report: Option<DriveReport>,

@@ -41,6 +41,7 @@ fn the_row_above_the_image_says_the_sentence_and_chooses_how_to_compare() {
 #[test]
 fn all_runs_are_marked_on_one_image_with_their_names() {
     let mut shown = panel(Pane::Left, View::Marks);
+    shown.click("legend");
     assert_eq!(shown.click("compared: run B (legend)"), vec![Command::ToggleLayer(Layer::Compared)]);
     assert!(paints(&shown, "run B"));
     let hidden = Shown::pane(Pane::Left, |context| {
@@ -54,6 +55,7 @@ fn all_runs_are_marked_on_one_image_with_their_names() {
 #[test]
 fn the_right_image_marks_the_compared_runs_as_well() {
     let mut shown = panel(Pane::Right, View::Marks);
+    shown.click("legend");
     assert_eq!(shown.click("compared: run B (legend)"), vec![Command::ToggleLayer(Layer::Compared)]);
     assert!(paints(&shown, "run B"));
 }
