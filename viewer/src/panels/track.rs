@@ -1,10 +1,11 @@
-//! The target's track on the left image: the pixels where it was found at the steps before, and at those after.
+//! The target's track on the left image: the pixels where it was tracked at the steps before, and at those after.
 
 use sightline_geometry::frames::Pixel;
+use sightline_track::target::TrackingState;
 
 use crate::command::Layer;
 use crate::drawing::overlay::{Line, Overlay};
-use crate::state::State;
+use crate::state::{State, state_of};
 use crate::theme;
 
 /// How many steps before and after the present one are shown.
@@ -33,7 +34,7 @@ fn pixels(state: &State) -> [Vec<Pixel>; 2] {
     let here = state.cursor.step;
     let found = |from: usize, to: usize| -> Vec<Pixel> {
         let rows = run.rows.iter().filter(|row| (from..=to).contains(&row.step));
-        rows.filter_map(|row| row.left_pixel).collect()
+        rows.filter(|row| state_of(row) == TrackingState::Tracking).filter_map(|row| row.left_pixel).collect()
     };
     [found(here.saturating_sub(STEPS), here), found(here, here + STEPS)]
 }

@@ -35,13 +35,14 @@ fn curves(run: &RunView) -> [Curve; 2] {
         let value: fn(&StepRow) -> Option<f64> = |row| row.confidence;
         Curve { name: "confidence".to_owned(), value, span: [0.0, 1.0], is_low_bad: true }
     };
-    let (name, value): (&str, fn(&StepRow) -> Option<f64>) = if has(|row| row.err_px) {
-        ("px error", |row| row.err_px)
+    let ([name, unit], value): ([&str; 2], fn(&StepRow) -> Option<f64>) = if has(|row| row.err_px) {
+        (["err", "px"], |row| row.err_px)
     } else {
-        ("cm 1σ", |row| row.sigma_m.map(|sigma| 100.0 * sigma))
+        (["1σ", "cm"], |row| row.sigma_m.map(|sigma| 100.0 * sigma))
     };
     let largest = run.rows.iter().filter_map(value).fold(0.0, f64::max);
-    let name = format!("≤ {} {name}", sightline_session::format::number(largest));
+    let decimals = usize::from(largest < 10.0);
+    let name = format!("{name} ≤ {largest:.decimals$} {unit}");
     [score, Curve { name, value, span: [0.0, largest.max(1e-9)], is_low_bad: false }]
 }
 

@@ -1,6 +1,6 @@
 //! Handles in the left image: the search window's and the template's corners, and the predicted point.
 
-use egui::{Color32, CursorIcon, Rect, Response, Sense, Ui, Vec2, WidgetInfo, vec2};
+use egui::{Color32, CursorIcon, Rect, Response, Sense, Stroke, StrokeKind, Ui, Vec2, WidgetInfo, vec2};
 use serde_json::json;
 use sightline_geometry::frames::Pixel;
 use sightline_track::settings::TrackerKind;
@@ -103,7 +103,7 @@ fn point(ui: &mut Ui, canvas: &Canvas, at: Pixel, out: &mut Vec<Command>) {
     response.on_hover_cursor(CursorIcon::Move).on_hover_text("Drag to try another prediction");
 }
 
-/// A handle, where it is on the canvas.
+/// A handle, where it is on the canvas; it is painted while the pointer or the keyboard is there.
 fn handle(ui: &mut Ui, canvas: &Canvas, id: &str, at: Pixel, colour: Color32) -> Option<Response> {
     let place = canvas.transform.to_screen(at);
     if !canvas.transform.rect.contains(place) {
@@ -113,8 +113,14 @@ fn handle(ui: &mut Ui, canvas: &Canvas, id: &str, at: Pixel, colour: Color32) ->
     let response = ui.interact(area, ui.scope_id().with(("what if", id)), Sense::drag());
     let reach = if response.hovered() || response.dragged() { MARK + 2.0 } else { MARK };
     let mark = Rect::from_center_size(place, vec2(2.0 * reach, 2.0 * reach));
-    canvas.painter.rect_filled(mark.expand(1.0), 1.0, theme::halo());
-    canvas.painter.rect_filled(mark, 1.0, colour);
+    // Without pointer or keyboard on the image nothing covers it.
+    let is_near =
+        ui.rect_contains_pointer(canvas.transform.rect) || response.dragged() || response.has_focus();
+    if is_near {
+        for (colour, width) in [(theme::on_image(theme::halo), 3.4), (colour, 1.4)] {
+            canvas.painter.rect_stroke(mark, 1.0, Stroke::new(width, colour), StrokeKind::Middle);
+        }
+    }
     Some(response)
 }
 
