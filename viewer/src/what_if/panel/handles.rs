@@ -30,11 +30,11 @@ pub(crate) fn show(ui: &mut Ui, canvas: &Canvas, state: &State, trace: &StepTrac
         let template = side(state, "template_size_px").unwrap_or(LEAST[1]);
         let limits = [LEAST[0].max(template), MOST[0]];
         let corner = Corner { name: "search window size", key: "search_window_px", centre, limits };
-        corner.show(ui, canvas, window, theme::search(), state, out);
+        corner.show(ui, canvas, window, theme::on_image(theme::search), state, out);
         let matched = trace.located().and_then(|located| located.left_pixel).unwrap_or(centre);
         let limits = [LEAST[1], MOST[1].min(window)];
         let corner = Corner { name: "template size", key: "template_size_px", centre: matched, limits };
-        let colour = theme::run(state.cursor.run);
+        let colour = theme::on_image(|| theme::run(state.cursor.run));
         corner.show(ui, canvas, template, colour, state, out);
     }
     point(ui, canvas, centre, out);
@@ -88,7 +88,9 @@ impl Corner {
 
 /// The handle of the predicted point.
 fn point(ui: &mut Ui, canvas: &Canvas, at: Pixel, out: &mut Vec<Command>) {
-    let Some(response) = handle(ui, canvas, "prediction", at, theme::prediction()) else { return };
+    let Some(response) = handle(ui, canvas, "prediction", at, theme::on_image(theme::prediction)) else {
+        return;
+    };
     let words = format!("prediction handle, at {:.1}, {:.1} px", at.x, at.y);
     response.widget_info(|| WidgetInfo::labeled(egui::Role::Button, true, &words));
     let dragged = response.dragged().then(|| response.interact_pointer_pos()).flatten();
