@@ -35,7 +35,7 @@ use crate::program::{Health, Version};
 use crate::query::{FirstRow, FirstStop, ImageWish, MapLimits, MapPixel, SessionPart, ValueName};
 use crate::wire::{
     Designated, Login, NewDrive, NewRun, NewSession, NewTarget, NewTraverse, RerunStream, SessionEntry,
-    StopDetail, StopOdometry, TraverseEntry, TraverseView,
+    StopDetail, StopOdometry, TargetLabel, TraverseEntry, TraverseView,
 };
 
 /// Declares a type for each endpoint, and the list of all of them.
@@ -155,6 +155,8 @@ endpoints! {
 
     /// Designates a target.
     DesignateTarget: Post "/sessions/{session}/targets", AtSession, body NewTarget => Designated;
+    /// Renames a target.
+    RenameTarget: Put "/sessions/{session}/targets/{target}/label", AtTarget, body TargetLabel => SessionView;
     /// Removes a target.
     RemoveTarget: Delete "/sessions/{session}/targets/{target}", AtTarget => SessionView;
     /// Takes the removal of a target back.

@@ -21,6 +21,7 @@ use crate::picking::aim::Aim;
 use crate::pointed::Pointed;
 use crate::shape_view::ShapeView;
 use crate::state::calculator::Calculator;
+use crate::state::rename::Rename;
 use crate::studies::Order;
 use crate::tables::FeatureView;
 use crate::theme::Looks;
@@ -156,6 +157,8 @@ pub enum Command {
     Pick(Pixel),
     /// Removes a target.
     RemoveTarget(usize),
+    /// Renames a target.
+    Rename(Rename),
     /// Changes a setting of the draft; none takes the change back.
     Draft {
         /// The setting's name.

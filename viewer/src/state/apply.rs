@@ -48,6 +48,7 @@ impl State {
             Command::SetMode(mode) => self.set_mode(mode),
             Command::Pick(pixel) => self.pick(pixel),
             Command::RemoveTarget(target) => self.remove_target(target),
+            Command::Rename(rename) => self.rename(rename),
             Command::Draft { key, value } => {
                 match value {
                     Some(value) => self.draft.insert(key, value),
@@ -236,7 +237,10 @@ impl State {
         let from_step = self.cursor.step.clamp(first, computed + 1);
         let new = NewRun { run, from_step, settings: changes, prediction_px: None };
         if self.fork(target, &new) {
-            self.messages.note(format!("Running {} again from step {from_step} …", run_letter(run)));
+            self.messages.note_of_session(format!(
+                "Running {} again from step {from_step} …",
+                run_letter(run)
+            ));
         }
     }
 

@@ -21,6 +21,7 @@ pub(crate) mod messages;
 mod missing;
 mod panels;
 pub(crate) mod pointed;
+pub(crate) mod rename;
 pub(crate) mod tracker;
 mod undo;
 mod wanted;
@@ -52,6 +53,7 @@ use self::deeds::Undo;
 use self::effect::{Effect, Outbox};
 use self::known::Sync;
 use self::messages::Messages;
+use self::rename::Renaming;
 use crate::breakpoints::Asking;
 use crate::cache::{Cache, Eye, Key, Slot, StepKey};
 use crate::command::{Layer, Mode, Stage, Zoomable};
@@ -106,8 +108,10 @@ pub struct State {
     pub rendering: Option<(usize, usize)>,
     /// A designation that waits for its answer.
     pub designating: Option<Place>,
-    /// The last designation that was refused.
+    /// The last designation that was advised against or refused.
     pub refusal: Option<Refusal>,
+    /// The name of a target that is being typed.
+    pub renaming: Option<Renaming>,
     /// What was said to the person.
     pub messages: Messages,
     /// What each panel shows.
@@ -192,6 +196,7 @@ impl State {
             rendering: None,
             designating: None,
             refusal: None,
+            renaming: None,
             messages: Messages::default(),
             views: Views::default(),
             chosen_camera: None,
