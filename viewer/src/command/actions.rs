@@ -11,7 +11,7 @@ use crate::layout::presets::Preset;
 use crate::panels::digits;
 use crate::panels::pane::Pane;
 use crate::panels::sheets::of_panel;
-use crate::state::rename::Rename;
+use crate::state::targets::Rename;
 use crate::state::{State, events, run_letter};
 use crate::theme::Looks;
 

@@ -82,7 +82,7 @@ fn picture(
     if state.marks {
         paint_others(&canvas, state);
         corners::paint_left(&canvas, state);
-        if let Some(trace) = state.trace_on_image() {
+        if let Some(trace) = state.trace_on_image().filter(|_| state.shows_target()) {
             marks::paint_left(&canvas, state);
             let of = Of::Shown(theme::run(state.cursor.run));
             let overlay = Overlay::new(&canvas.painter, &canvas.transform);
@@ -215,7 +215,8 @@ fn paint_others(canvas: &Canvas, state: &State) {
     let overlay = Overlay::new(&canvas.painter, &canvas.transform);
     let is_here = |target: &&TargetView| target.designation.camera == state.camera();
     let others = session.targets.iter().filter(|target| Some(target.number) != state.cursor.target);
-    for target in others.filter(is_here) {
+    let is_shown = |target: &&TargetView| !state.hidden_targets.contains(&target.number);
+    for target in others.filter(is_here).filter(is_shown) {
         let row = target.runs.last().and_then(|run| row_of(run, state.cursor.step));
         if let Some(pixel) = row.and_then(|row| row.left_pixel) {
             overlay.mark(pixel, Mark::Diamond, theme::weak());

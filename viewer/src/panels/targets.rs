@@ -9,7 +9,7 @@ use crate::drawing::overlay::{paint_mark, run_mark};
 use crate::panels::pane::Pane;
 use crate::panels::panel::Panel;
 use crate::panels::{run_tree, timeline};
-use crate::state::rename::{Rename, Renaming};
+use crate::state::targets::{Rename, Renaming};
 use crate::state::{State, run_letter};
 use crate::why::Ask;
 use crate::{panels, theme};
@@ -58,6 +58,11 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 fn show_target(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Command>) {
     let is_selected = state.cursor.target == Some(target.number);
     ui.horizontal(|ui| {
+        let mut is_shown = !state.hidden_targets.contains(&target.number);
+        let check = ui.checkbox(&mut is_shown, "").accessible_name(format!("marks of {}", target.label));
+        if check.on_hover_text("Shows or hides its marks in the images").changed() {
+            out.push(Command::ToggleTarget(target.number));
+        }
         let renaming = state.renaming.as_ref().filter(|renaming| renaming.target == target.number);
         match renaming {
             Some(renaming) => name_field(ui, renaming, out),
@@ -79,7 +84,18 @@ fn show_target(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Co
     });
     let at = target.designation;
     let place = format!("designated at step {}, pixel {:.1}, {:.1}", at.step, at.pixel.x, at.pixel.y);
-    ui.label(theme::note(place));
+    ui.horizontal(|ui| {
+        let is_elsewhere = is_selected && state.cursor.step != at.step;
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let help = "Designates it again at this stop, as a target of its own with the same settings";
+            if is_elsewhere && ui.small_button("Re-pick here").on_hover_text(help).clicked() {
+                out.push(Command::Repick(target.number));
+            }
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                ui.add(egui::Label::new(theme::note(place)).truncate());
+            });
+        });
+    });
     for sentence in warnings(state, target) {
         ui.add(egui::Label::new(RichText::new(format!("! {sentence}")).small().color(theme::lost())).wrap())
             .on_hover_text("A warning about the pick; it can be tracked all the same.");

@@ -94,7 +94,9 @@ fn closed(sentence: &str) -> String {
 fn hint(state: &State) -> String {
     let hint = "Click the target, or aim with the arrows and press Enter. Esc cancels.";
     if let Some(name) = state.camera() {
-        return format!("{hint} The target is tracked in {name}; only the main pair has a map of trackability.");
+        return format!(
+            "{hint} The target is tracked in {name}; only the main pair has a map of trackability."
+        );
     }
     let Some(progress) = &state.trackability.progress else {
         return format!("{hint} Map: requested …");

@@ -37,7 +37,10 @@ pub(super) fn paint(canvas: &Canvas, raster: &Raster, pixel: Pixel, template_px:
         let shown = Rect::from_min_max(to_frame(inside.min), to_frame(inside.max));
         painter.image(raster.texture.id(), shown, inside, theme::UNTINTED);
     }
-    let template = Rect::from_center_size(frame.center(), vec2(1.0, 1.0) * (template_px as f32 / pixels * frame.width()));
+    let template = Rect::from_center_size(
+        frame.center(),
+        vec2(1.0, 1.0) * (template_px as f32 / pixels * frame.width()),
+    );
     for (width, colour) in [(3.0, theme::halo()), (1.0, theme::accent())] {
         painter.rect_stroke(template, 0.0, Stroke::new(width, colour), egui::StrokeKind::Middle);
     }

@@ -46,9 +46,8 @@ fn fills(map: &TrackabilityMap, transform: &Transform) -> Mesh {
 
 /// Thin lines along the border of the areas of risky cells.
 fn outlines(map: &TrackabilityMap, transform: &Transform) -> Vec<Shape> {
-    let is_risky = |column: usize, row: usize| {
-        map.cell(column, row).is_some_and(|cell| cell.verdict == Verdict::Risky)
-    };
+    let is_risky =
+        |column: usize, row: usize| map.cell(column, row).is_some_and(|cell| cell.verdict == Verdict::Risky);
     let stroke = Stroke::new(OUTLINE, outline_colour());
     let mut shapes = Vec::new();
     for row in 0..map.rows_done() {
@@ -63,7 +62,8 @@ fn outlines(map: &TrackabilityMap, transform: &Transform) -> Vec<Shape> {
                 (row.checked_sub(1).map(|above| [column, above]), [cell.left_top(), cell.right_top()]),
                 (Some([column, row + 1]), [cell.left_bottom(), cell.right_bottom()]),
             ];
-            let borders = sides.into_iter().filter(|(beside, _)| !beside.is_some_and(|[x, y]| is_risky(x, y)));
+            let borders =
+                sides.into_iter().filter(|(beside, _)| !beside.is_some_and(|[x, y]| is_risky(x, y)));
             shapes.extend(borders.map(|(_, side)| Shape::line_segment(side, stroke)));
         }
     }

@@ -217,7 +217,8 @@ impl State {
             (self.sync.cursor_stale, self.sync.runs_ahead) = (false, BTreeSet::new());
             self.draft.clear();
             self.forget_comparisons(true);
-            (self.mode, self.renaming) = (Mode::Look, None);
+            (self.mode, self.renaming, self.repicks) = (Mode::Look, None, None);
+            self.hidden_targets.clear();
             (self.designating, self.refusal, self.rendering) = (None, None, None);
             self.forget_deeds();
         }
@@ -266,6 +267,7 @@ impl State {
 
     pub(super) fn designated(&mut self, target: usize, session: SessionView) {
         (self.designating, self.refusal, self.mode) = (None, None, Mode::Look);
+        self.repicks = None;
         self.adopt(session, true);
         self.cursor.target = Some(target);
         self.cursor.run = 0;

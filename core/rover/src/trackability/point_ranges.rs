@@ -102,8 +102,7 @@ impl PointRanges {
 
 impl Node {
     fn of(input: &StereoInput<'_>, template: &TemplateSettings, score_min: f64) -> Self {
-        let none =
-            |outcome| Self { disparity_px: f32::NAN, outcome, point_m: [f32::NAN; 3] };
+        let none = |outcome| Self { disparity_px: f32::NAN, outcome, point_m: [f32::NAN; 3] };
         let Some(ray) = input.left.ray(input.left_pixel) else { return none(Outcome::Outside) };
         let found = match point_stereo(input, template) {
             Ok(found) => found,

@@ -92,7 +92,7 @@ fn empty(ui: &Ui, frame: Rect, words: &str) -> String {
 }
 
 /// Which patch is cut from the left image.
-#[derive(Clone, Copy, Hash)]
+#[derive(Clone, Copy, Debug, Hash)]
 pub(super) enum Cut {
     /// The one about the pointer.
     Pointed,

@@ -1,10 +1,13 @@
-//! Renaming a target: the name that is typed, and its way to the server and back.
+//! What is done to a target in the list: renaming it, hiding its marks, designating it again at another stop.
 
 use sightline_api::endpoint::Call;
 use sightline_api::endpoints::RenameTarget;
 use sightline_api::location::AtTarget;
 use sightline_api::wire::TargetLabel;
+use sightline_session::view::TargetView;
+use sightline_track::settings::Changes;
 
+use crate::command::Mode;
 use crate::state::State;
 use crate::state::deeds::Deed;
 
@@ -45,16 +48,44 @@ impl State {
             }
             Rename::Save => {
                 let Some(Renaming { target, text }) = self.renaming.take() else { return };
-                let Some(before) = self.label_of(target).filter(|before| *before != text.trim()) else { return };
+                let Some(before) = self.label_of(target).filter(|before| *before != text.trim()) else {
+                    return;
+                };
                 self.rename_target(target, text, Some(before));
             }
             Rename::Cancel => self.renaming = None,
         }
     }
 
+    fn target_numbered(&self, target: usize) -> Option<&TargetView> {
+        self.session.as_ref()?.targets.iter().find(|known| known.number == target)
+    }
+
     fn label_of(&self, target: usize) -> Option<String> {
-        let targets = &self.session.as_ref()?.targets;
-        targets.iter().find(|known| known.number == target).map(|known| known.label.clone())
+        self.target_numbered(target).map(|known| known.label.clone())
+    }
+
+    /// Whether the marks of the cursor's target are shown in the images.
+    pub(crate) fn shows_target(&self) -> bool {
+        self.cursor.target.is_none_or(|target| !self.hidden_targets.contains(&target))
+    }
+
+    pub(super) fn toggle_target(&mut self, target: usize) {
+        if !self.hidden_targets.remove(&target) {
+            self.hidden_targets.insert(target);
+        }
+    }
+
+    pub(super) fn repick(&mut self, target: usize) {
+        self.set_mode(Mode::Pick);
+        self.repicks = self.target_numbered(target).map(|target| target.number);
+    }
+
+    /// Label and settings of the target that is designated again at a stop: those of its newest run.
+    pub(super) fn repicked(&self, step: usize) -> Option<(String, Changes)> {
+        let target = self.target_numbered(self.repicks?)?;
+        let settings = target.runs.last().map(|run| run.changes.clone()).unwrap_or_default();
+        Some((format!("{}, from stop {step}", target.label), settings))
     }
 
     /// Gives a target a name; with its former name the change can be undone.
