@@ -149,11 +149,17 @@ fn verdict_reason_range_and_longest_step_are_said_in_words_and_the_layer_can_be_
     );
     assert!(picking::words(&map.at(Pixel::new(36.0, 30.0)).unwrap()).starts_with("Risky: depth edge"));
     assert_eq!(picking::words(&map.at(GOOD).unwrap()), "Good · range 6.00 m · longest safe step 0.60 m");
-    let mut shown = Shown::pane(Pane::Left, |context| {
-        let mut state = picking(context);
-        state.perform(Command::Aim(Aim::Put(PLACE)));
-        state
-    });
+    let mut shown = Shown::new(
+        [900.0, 420.0],
+        |context| {
+            let mut state = picking(context);
+            state.perform(Command::Aim(Aim::Put(PLACE)));
+            state
+        },
+        |ui, state, out| {
+            images_left::show(ui, state, out);
+        },
+    );
     shown
         .says("trackability: 38 % good, 12 % risky, 50 % poor")
         .says("at 20.0, 30.0: Poor: depth edge 2 px away");
