@@ -218,7 +218,7 @@ fn convergent_plane() -> PlaneWorld {
     let axis = Vector3::new(cosine, sine, 0.0);
     let horizontal = Vector3::new(-sine, cosine, 0.0) * 600.0 + axis * 127.5;
     let vertical = Vector3::z() * 600.0 + axis * 127.5;
-    let centre = world.left.model.centre() + Vector3::new(0.5, 0.25, 0.0);
+    let centre = world.left.model.centre() + Vector3::new(0.3, 0.2, 0.0);
     let model = CameraModel::Cahv(Cahv::as_printed(centre, axis, horizontal, vertical));
     world.right = Camera::new(model, 256, 256);
     world.stereo = StereoGeometry::Convergent;

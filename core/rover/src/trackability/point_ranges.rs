@@ -37,6 +37,10 @@ pub(super) const SPACING_PX: u32 = 4;
 /// A match that leads back farther from its node is not believed, px.
 const BACK_MAX_PX: f64 = 1.5;
 
+/// Nearest range of the search, baselines: nearer surfaces differ too much between the views, and their part of the
+/// epipolar curve has no bound.
+const RANGE_MIN_BASELINES: f64 = 4.0;
+
 /// Ranges on a grid of the left image.
 pub(super) struct PointRanges {
     /// Disparities and outcomes of the nodes, row by row.
@@ -66,7 +70,8 @@ impl PointRanges {
         cancel: Cancel<'_>,
     ) -> Result<Self> {
         let [width, height] = left.size.map(|side| side.saturating_sub(1) / SPACING_PX + 1);
-        let template = search_settings(&settings.template);
+        let baseline_m = (right.model.centre() - left.model.centre()).norm();
+        let template = search_settings(&settings.template, baseline_m);
         let node = |x: u32, y: u32| -> Node {
             let input = StereoInput {
                 left_pixel: Pixel::new(f64::from(x * SPACING_PX), f64::from(y * SPACING_PX)),
@@ -123,8 +128,9 @@ impl Node {
 }
 
 /// The settings of the search at a node: the window of a designation, compared once.
-fn search_settings(template: &TemplateSettings) -> TemplateSettings {
-    TemplateSettings { surface_warp: false, focus_px: 0.0, ..template.clone() }
+fn search_settings(template: &TemplateSettings, baseline_m: f64) -> TemplateSettings {
+    let range_min_m = template.range_min_m.max(RANGE_MIN_BASELINES * baseline_m).min(template.range_max_m);
+    TemplateSettings { surface_warp: false, focus_px: 0.0, range_min_m, ..template.clone() }
 }
 
 /// Why a match gives no range; `None` if it does.
