@@ -109,7 +109,7 @@ impl Bench {
             .wait_status("the target, or advice against the place", "s.target === 0 || s.advised_against")
             .await;
         if browser.status().await["target"] != 0 {
-            browser.click_on("button", "Pick it all the same").await;
+            browser.click_on("button", "Pick anyway").await;
         }
         browser.wait_status("the target", "s.target === 0").await;
         browser.wait_status("the run", &format!("s.steps_done === {} && !s.running", self.stop_count)).await;

@@ -38,7 +38,7 @@ use crate::recording::{
 };
 use crate::wire::{
     Designated, Login, NewDrive, NewRun, NewSession, NewTarget, NewTraverse, RerunStream, SessionEntry,
-    StopDetail, StopOdometry, TraverseEntry, TraverseView,
+    StopDetail, StopOdometry, TargetLabel, TraverseEntry, TraverseView,
 };
 
 /// Declares a type for each endpoint, and the list of all of them.
@@ -179,6 +179,8 @@ endpoints! {
 
     /// Designates a target.
     DesignateTarget: Post "/sessions/{session}/targets", AtSession, body NewTarget => Designated;
+    /// Renames a target.
+    RenameTarget: Put "/sessions/{session}/targets/{target}/label", AtTarget, body TargetLabel => SessionView;
     /// Removes a target.
     RemoveTarget: Delete "/sessions/{session}/targets/{target}", AtTarget => SessionView;
     /// Takes the removal of a target back.

@@ -236,6 +236,14 @@ impl NewTarget {
     }
 }
 
+/// The name of a target.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TargetLabel {
+    /// The name; blank: `target` and its number.
+    pub label: String,
+}
+
 /// A target that was designated, with the session that now has it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Designated {

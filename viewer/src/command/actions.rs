@@ -11,6 +11,7 @@ use crate::layout::presets::Preset;
 use crate::panels::digits;
 use crate::panels::pane::Pane;
 use crate::panels::sheets::of_panel;
+use crate::state::targets::Rename;
 use crate::state::{State, events, run_letter};
 use crate::theme::Looks;
 
@@ -106,6 +107,8 @@ fn works(state: &State) -> Vec<Action> {
             let title = format!("Look at {}, run {}", target.label, run_letter(run.number));
             all.push(action(title, Command::Look { target: target.number, run: run.number }));
         }
+        let rename = Command::Rename(Rename::Begin(target.number));
+        all.push(action(format!("Rename {}", target.label), rename));
         all.push(action(format!("Remove {}", target.label), Command::RemoveTarget(target.number)));
     }
     for entry in state.traverses.iter().flatten() {

@@ -63,7 +63,7 @@ fn picture(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) 
     if of_target {
         marks::hover(&canvas, state, |feature| feature.right);
     }
-    if let Some(trace) = state.trace_on_image().filter(|_| state.marks) {
+    if let Some(trace) = state.trace_on_image().filter(|_| state.marks && state.shows_target()) {
         theme::on_image(|| paint_marks(&canvas, trace, state));
     }
     compared::paint_right(&Overlay::new(&canvas.painter, &canvas.transform), state);

@@ -214,11 +214,13 @@ impl State {
         if is_other {
             self.open_notes(&view.id);
             self.ask.forget();
+            self.messages.forget_session();
             self.progress.clear();
             (self.sync.cursor_stale, self.sync.runs_ahead) = (false, BTreeSet::new());
             self.draft.clear();
             self.forget_comparisons(true);
-            self.mode = Mode::Look;
+            (self.mode, self.renaming, self.repicks) = (Mode::Look, None, None);
+            self.hidden_targets.clear();
             (self.designating, self.refusal, self.rendering) = (None, None, None);
             self.forget_deeds();
         }
@@ -267,6 +269,7 @@ impl State {
 
     pub(super) fn designated(&mut self, target: usize, session: SessionView) {
         (self.designating, self.refusal, self.mode) = (None, None, Mode::Look);
+        self.repicks = None;
         self.adopt(session, true);
         self.cursor.target = Some(target);
         self.cursor.run = 0;
@@ -274,11 +277,14 @@ impl State {
         self.did(Deed::Picked { target });
         self.keep_cursor_valid();
         if let Some(target) = self.target() {
-            let text = format!(
-                "{} is picked; the run goes on by itself. Step along with Right and Left.",
-                target.label
-            );
-            self.messages.note(text);
+            let step = target.designation.step;
+            let label = with_capital(&target.label);
+            let text = if step + 1 < self.stop_count() {
+                format!("{label} set; tracking all stops … Use ← →.")
+            } else {
+                format!("{label} set at the last stop of the drive.")
+            };
+            self.messages.note_of_session(text);
         }
     }
 
@@ -294,6 +300,13 @@ impl State {
         self.draft.clear();
         self.end_trial();
         self.did(Deed::Branched { target, run: number });
-        self.messages.note(format!("Run {} goes on from here.", run_letter(number)));
+        self.messages.note_of_session(format!("Run {} goes on from here.", run_letter(number)));
     }
+}
+
+/// The text with a capital letter.
+fn with_capital(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();
+    format!("{first}{}", letters.as_str())
 }

@@ -30,6 +30,8 @@ pub struct Message {
     pub about: Option<Box<About>>,
     /// The deed that it tells of, which can be taken back while it is the last one.
     pub deed: Option<u64>,
+    /// Whether it is about a target or a run of the open session.
+    pub is_of_session: bool,
 }
 
 /// What else is known of a problem.
@@ -73,6 +75,19 @@ impl Messages {
     /// Something happened as asked.
     pub fn note(&mut self, text: impl Into<String>) {
         self.add(Weight::Note, text.into(), None, None);
+    }
+
+    /// Something happened to a target or a run of the open session.
+    pub(crate) fn note_of_session(&mut self, text: impl Into<String>) {
+        self.note(text);
+        if let Some(last) = self.list.last_mut() {
+            last.is_of_session = true;
+        }
+    }
+
+    /// Forgets the notes about targets and runs: another session is open.
+    pub(crate) fn forget_session(&mut self) {
+        self.list.retain(|message| !message.is_of_session);
     }
 
     /// Something happened as asked, and there is a page to it.
@@ -160,7 +175,7 @@ impl Messages {
             return;
         }
         let (id, about, deed) = (self.next, None, None);
-        self.list.push(Message { id, weight, text, hint, link, count: 1, about, deed });
+        self.list.push(Message { id, weight, text, hint, link, count: 1, about, deed, is_of_session: false });
         self.next += 1;
         if self.list.len() > KEPT {
             self.list.remove(0);

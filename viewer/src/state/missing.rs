@@ -12,7 +12,7 @@ impl State {
         if step < target.designation.step {
             let first = target.designation.step;
             return format!(
-                "{} was picked at step {first}. Go there, or press PgDn for the next event.",
+                "{} was designated at step {first}. Go there, or press PgDn for the next event.",
                 target.label
             );
         }
@@ -42,13 +42,21 @@ impl State {
                 (None, Some(located)) if located.missing.is_some() => {
                     located.missing.clone().unwrap_or_default()
                 }
-                _ if trace.prediction().is_none() => {
-                    "Here the target was picked: nothing had to be matched. Go one step on (Right) to see a match.".to_owned()
-                }
+                _ if trace.prediction().is_none() => self.designated_here(),
                 _ => "This stage was not reached at this step.".to_owned(),
             },
             Slot::Absent | Slot::Loading => format!("Loading step {step} …"),
         }
+    }
+
+    /// Why the step of the designation has no match.
+    fn designated_here(&self) -> String {
+        let way = if self.cursor.step + 1 < self.stop_count() {
+            "Press → for the first one."
+        } else {
+            "The drive has no further stop."
+        };
+        format!("Target designated here; no match yet. {way}")
     }
 
     /// Why there is no target, as a sentence that says how to get one.
@@ -59,7 +67,7 @@ impl State {
                 "The server has no traverse. Import one with `sightline import`, or simulate one with `sightline simulate`.".to_owned()
             }
             (None, Some(_)) => "Opening the traverse …".to_owned(),
-            (Some(_), _) => "No target yet. Press T, then click a rock in the left image.".to_owned(),
+            (Some(_), _) => "No target yet. Click a rock in the left image, or press T for the map of trackability.".to_owned(),
         }
     }
 }

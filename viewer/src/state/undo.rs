@@ -135,6 +135,10 @@ impl State {
         match deed {
             Deed::Picked { target } => self.show_target(*target, again, None),
             Deed::RemovedTarget { target } => self.show_target(*target, !again, None),
+            Deed::Renamed { target, before, after } => {
+                let label = if again { after } else { before }.clone();
+                self.rename_target(*target, label, None);
+            }
             Deed::Branched { target, run } => {
                 self.end_trial();
                 self.show_run(*target, *run, again, None);

@@ -79,7 +79,7 @@ fn at_the_pick_the_panel_says_that_there_is_no_motion_yet() {
 #[test]
 fn without_features_the_panel_says_how_to_get_them() {
     panel(|context| fixture::at_step(context, 2)).says("looks for no features").says("preset “features”");
-    panel(|_| fixture::without_target()).says("Press T");
+    panel(|_| fixture::without_target()).says("press T");
 }
 
 #[test]

@@ -151,7 +151,7 @@ fn without_a_target_every_panel_tells_how_to_get_one() {
     for pane in
         [Pane::Targets, Pane::Settings, Pane::Strip, Pane::Surface, Pane::Plots, Pane::Gates, Pane::Inspector]
     {
-        Shown::pane(pane, |_| fixture::without_target()).says("Press T");
+        Shown::pane(pane, |_| fixture::without_target()).says("press T");
     }
 }
 
@@ -180,11 +180,15 @@ fn a_step_that_is_not_computed_yet_says_how_far_the_run_is() {
 }
 
 #[test]
-fn the_designation_says_that_nothing_had_to_be_matched() {
+fn the_designation_says_that_there_is_no_match_yet() {
     for pane in [Pane::Surface, Pane::Gates] {
-        Shown::pane(pane, |context| fixture::at_step(context, 0)).says("Here the target was picked");
+        Shown::pane(pane, |context| fixture::at_step(context, 0))
+            .says("Target designated here; no match yet. Press → for the first one.");
     }
-    Shown::pane(Pane::Strip, |context| fixture::at_step(context, 0)).says("right image patch");
+    let strip = Shown::pane(Pane::Strip, |context| fixture::at_step(context, 0));
+    strip.says("template patch").says("right image patch").hides("designated here");
+    let stereo = Shown::pane(Pane::StereoProfile, |context| fixture::at_step(context, 0));
+    stereo.says("no prediction: the whole curve").hides("designated here");
 }
 
 #[test]

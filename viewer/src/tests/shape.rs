@@ -147,7 +147,7 @@ fn no_part_is_blank_without_a_sentence_that_says_why() {
         loading.says("Loading step 4");
     }
     Shown::pane(Pane::Shape, |context| fixture::at_step(context, 2)).says("Choose the preset “combined”");
-    Shown::pane(Pane::Shape, |_| fixture::without_target()).says("Press T");
+    Shown::pane(Pane::Shape, |_| fixture::without_target()).says("press T");
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! The template strip: how the reference became what was compared, and what remained.
 
+mod designated;
 mod patch;
 mod pointed;
 
@@ -107,13 +108,18 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let patches = state.trace().map(patches).unwrap_or_default();
     let area = ui.available_rect_before_wrap();
     let has_pointer = state.trace().is_some_and(|trace| pointed::is_there(trace));
-    let count = (patches.len() + usize::from(has_pointer)) as f32;
+    let template = state.trace().and_then(designated::pixel).filter(|_| !patches.is_empty());
+    let count = (patches.len() + usize::from(has_pointer) + usize::from(template.is_some())) as f32;
     let across = (area.width() - BETWEEN * (count - 1.0)) / count;
     let side = across.min(area.height() - WORDS.0 - WORDS.1).max(16.0);
     let width = side * count + BETWEEN * (count - 1.0);
     let mut at = pos2(area.left() + ((area.width() - width) / 2.0).max(0.0), area.top() + WORDS.0);
+    if let Some(pixel) = template {
+        designated::show(ui, state, pixel, Rect::from_min_size(at, vec2(side, side)));
+        at.x += side + BETWEEN;
+    }
     for (i, patch) in patches.iter().enumerate() {
-        if i > 0 {
+        if i > 0 || template.is_some() {
             arrow(ui, pos2(at.x - BETWEEN / 2.0, at.y + side / 2.0), &patch.step);
         }
         let frame = Rect::from_min_size(at, vec2(side, side));
