@@ -107,6 +107,7 @@ impl State {
         self.progress.clear();
         self.sync.session_stale = true;
         self.trackability_stale();
+        self.studies.make_stale();
         if self.settings.is_empty() {
             self.read_settings();
         }
