@@ -58,8 +58,7 @@ pub(crate) const PICK: Do = Do::new("Pick a target", &[On::plain(Key::T)], |stat
 pub(crate) const PIN_NOTE: Do =
     Do::new("Pin a note here", &[On::plain(Key::M)], |_| Command::Notes(notes::Ask::Pin));
 /// Takes the last change back.
-pub(crate) const UNDO: Do =
-    Do::new("Take the last deed back (undo)", &[On::ctrl(Key::Z)], |_| Command::Why(why::Ask::Undo));
+pub(crate) const UNDO: Do = Do::new("Undo", &[On::ctrl(Key::Z)], |_| Command::Why(why::Ask::Undo));
 /// Opens the window of exports.
 pub(crate) const EXPORT: Do =
     Do::new("Export: recording, tables, report, pictures", &[On::ctrl(Key::S)], |_| {
@@ -128,7 +127,7 @@ pub(crate) static TABLE: &[Line] = &[
         ],
     ),
     line(
-        "no loop any more",
+        "clear the loop",
         &[Do::new("Remove the loop", &[On::plain(Key::Backspace)], |_| shuttle(Shuttle::ClearLoop))],
     ),
     line(
@@ -143,8 +142,8 @@ pub(crate) static TABLE: &[Line] = &[
         ],
     ),
     line(
-        "break at this step, or no longer",
-        &[Do::new("Breakpoints: break here, or no longer", &[On::no_shift(Key::B)], |state| {
+        "toggle a breakpoint at this step",
+        &[Do::new("Breakpoints: toggle breakpoint here", &[On::no_shift(Key::B)], |state| {
             Command::Ask(breakpoints::Ask::BreakAt(state.cursor.step))
         })],
     ),
@@ -155,7 +154,7 @@ pub(crate) static TABLE: &[Line] = &[
         })],
     ),
     gesture("Tab  Enter", "in the expression box: take the suggestion, set the breakpoint"),
-    gesture("Click above the timeline", "break at that step, or no longer"),
+    gesture("Click above the timeline", "toggle a breakpoint at that step"),
     line(
         "previous, next stage",
         &[
@@ -183,12 +182,10 @@ pub(crate) static TABLE: &[Line] = &[
         })],
     ),
     line(
-        "take the last deed back, do it again",
+        "undo, redo",
         &[
             UNDO,
-            Do::new("Do it again (redo)", &[On::ctrl(Key::Y), On::ctrl_shift(Key::Z)], |_| {
-                Command::Why(why::Ask::Redo)
-            }),
+            Do::new("Redo", &[On::ctrl(Key::Y), On::ctrl_shift(Key::Z)], |_| Command::Why(why::Ask::Redo)),
         ],
     ),
     line(
@@ -348,7 +345,7 @@ mod tests {
         let lines: Vec<(String, &str)> = sheet().collect();
         let keys = |help: &str| lines.iter().find(|(_, of)| *of == help).unwrap().0.as_str();
         assert_eq!(keys("next, previous step"), "Right  Left");
-        assert_eq!(keys("take the last deed back, do it again"), "Ctrl+Z  Ctrl+Y");
+        assert_eq!(keys("undo, redo"), "Ctrl+Z  Ctrl+Y");
         assert_eq!(keys("this sheet"), "?");
         assert_eq!(keys("next, previous panel; Tab goes on inside it"), "Q  Shift+Q");
         assert_eq!(lines.len(), 42);

@@ -22,7 +22,9 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         let height = (ui.ctx().content_rect().height() - 150.0).max(200.0);
         ui.label(RichText::new("Export").size(16.0).strong().color(theme::strong()));
         parts(ui, state, out);
-        ScrollArea::vertical().max_height(height).auto_shrink([false, true]).show(ui, |ui| {
+        // The window has its full height from the first frame: it must not move under the pointer when files are listed.
+        let list = ScrollArea::vertical().max_height(height).min_scrolled_height(height).auto_shrink(false);
+        list.show(ui, |ui| {
             files(ui, state, out);
             ui.add_space(8.0);
             pictures(ui, state, out);

@@ -42,7 +42,7 @@ impl Preset {
             Self::Stereo => "Stereo",
             Self::Map => "Map",
             Self::Compare => "Compare",
-            Self::Sweep => "Sweep",
+            Self::Sweep => "Studies",
             Self::Report => "Report",
         }
     }

@@ -43,11 +43,21 @@ impl State {
                     located.missing.clone().unwrap_or_default()
                 }
                 _ if trace.prediction().is_none() => {
-                    "Here the target was picked: nothing had to be matched. Go one step on (Right) to see a match.".to_owned()
+                    let next = self.next_step_words("for the first one");
+                    format!("Target designated here; no match yet.{next}")
                 }
                 _ => "This stage was not reached at this step.".to_owned(),
             },
             Slot::Absent | Slot::Loading => format!("Loading step {step} …"),
+        }
+    }
+
+    /// Where to go from a step that has nothing to show, as a sentence; empty at the last stop.
+    pub(crate) fn next_step_words(&self, purpose: &str) -> String {
+        if self.cursor.step + 1 < self.stop_count() {
+            format!(" Press → {purpose}.")
+        } else {
+            " This drive has no further stop.".to_owned()
         }
     }
 

@@ -43,13 +43,25 @@ fn one(ui: &mut Ui, sheet: &Sheet, tall: f32, out: &mut Vec<Command>) {
         ui.spacing_mut().item_spacing = vec2(0.0, 0.0);
         head(ui, sheet, &widths);
         // A long table keeps its head in sight and makes only the rows that are seen.
-        let rows = ScrollArea::vertical().id_salt("rows").max_height(tall).auto_shrink([false, true]);
+        let mut rows = ScrollArea::vertical().id_salt("rows").max_height(tall).auto_shrink([false, true]);
+        if let Some(at) = came_to(ui, sheet) {
+            rows = rows.vertical_scroll_offset((at as f32 * ROW - 0.5 * tall).max(0.0));
+        }
         rows.show_rows(ui, ROW, sheet.rows.len(), |ui, range| {
             for (number, row) in range.clone().zip(&sheet.rows[range]) {
                 ui.push_id(number, |ui| line(ui, row, &widths, out));
             }
         });
     });
+}
+
+/// The row of the cursor's step, in the frame in which the cursor came there.
+fn came_to(ui: &Ui, sheet: &Sheet) -> Option<usize> {
+    let present = sheet.rows.iter().position(|row| row.is_present);
+    let id = ui.unique_id().with("present row");
+    let before =
+        ui.data_mut(|data| std::mem::replace(data.get_temp_mut_or_default::<Option<usize>>(id), present));
+    present.filter(|_| before != present)
 }
 
 /// The width of every column: that of its longest word.

@@ -315,11 +315,13 @@ fn words(state: &State, band: Option<&Band<'_>>, step: usize, in_lane: bool) -> 
             words += &format!("\n{reason}");
         }
     }
-    for hit in state.hit_at(step).into_iter().take(4) {
+    let of_run = shown.and_then(|(target, run)| Some((target.number, run?.number)));
+    let hits = of_run.map(|(target, run)| state.hit_at(target, run, step)).unwrap_or_default();
+    for hit in hits.into_iter().take(4) {
         words += &format!("\n◆ {hit}");
     }
     if in_lane {
-        words += "\nclick: break at this step, or no longer";
+        words += "\nclick: toggle breakpoint here";
     }
     if !is_ready(state, step) {
         words += "\nits images are not rendered yet";
