@@ -30,6 +30,8 @@ pub struct Message {
     pub about: Option<Box<About>>,
     /// The deed that it tells of, which can be taken back while it is the last one.
     pub deed: Option<u64>,
+    /// Whether it no longer applies: the list keeps it, the status line does not show it.
+    pub is_past: bool,
 }
 
 /// What else is known of a problem.
@@ -148,19 +150,37 @@ impl Messages {
         &self.list
     }
 
-    /// The newest.
+    /// The newest, unless it no longer applies.
     pub fn newest(&self) -> Option<&Message> {
-        self.list.last()
+        self.list.last().filter(|message| !message.is_past)
+    }
+
+    /// A request succeeded: problems of the same request no longer apply, and a card of one is closed.
+    pub(crate) fn mended(&mut self, asked: &str) {
+        let is_of = |message: &Message| {
+            let details = message.about.iter().flat_map(|about| &about.details);
+            details.into_iter().any(|(name, value)| *name == "asked" && value == asked)
+        };
+        for message in self.list.iter_mut().filter(|message| is_of(message)) {
+            message.is_past = true;
+            self.card = self.card.filter(|card| *card != message.id);
+        }
+    }
+
+    /// Another session was opened: notes of the earlier one no longer apply.
+    pub(crate) fn leave_session(&mut self) {
+        self.list.iter_mut().filter(|message| message.weight == Weight::Note).for_each(|m| m.is_past = true);
     }
 
     fn add(&mut self, weight: Weight, text: String, hint: Option<String>, link: Option<String>) {
         if let Some(last) = self.list.last_mut().filter(|last| last.text == text && last.weight == weight) {
             last.count += 1;
+            last.is_past = false;
             last.link = link.or(last.link.take());
             return;
         }
         let (id, about, deed) = (self.next, None, None);
-        self.list.push(Message { id, weight, text, hint, link, count: 1, about, deed });
+        self.list.push(Message { id, weight, text, hint, link, count: 1, about, deed, is_past: false });
         self.next += 1;
         if self.list.len() > KEPT {
             self.list.remove(0);

@@ -178,7 +178,7 @@ fn a_step_that_is_not_computed_yet_says_how_far_the_run_is() {
 #[test]
 fn the_designation_says_that_nothing_had_to_be_matched() {
     for pane in [Pane::Surface, Pane::Gates] {
-        Shown::pane(pane, |context| fixture::at_step(context, 0)).says("Here the target was picked");
+        Shown::pane(pane, |context| fixture::at_step(context, 0)).says("Target designated here");
     }
     Shown::pane(Pane::Strip, |context| fixture::at_step(context, 0)).says("right image patch");
 }
