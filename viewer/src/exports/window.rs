@@ -117,10 +117,9 @@ fn pictures(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         }
         figure_menu::burn_in(ui, state, out);
     });
+    ui.horizontal_wrapped(|ui| figure_menu::sheets(ui, state, out));
     let seen = |pane: &Pane| state.exports.panes.contains(pane);
-    for (words, is_seen) in
-        [("on the screen, as it is there", true), ("not on the screen, drawn apart", false)]
-    {
+    for (words, is_seen) in [("on the screen", true), ("not on the screen", false)] {
         ui.label(theme::note(words));
         ui.horizontal_wrapped(|ui| {
             for pane in Pane::ALL.into_iter().filter(|pane| seen(pane) == is_seen) {

@@ -91,6 +91,7 @@ fn picture(
     }
     modes::over(ui, &canvas, state, out);
     paint_designation(&canvas, state);
+    crate::notes::marks::image(&canvas, state);
     picking::show(ui, &canvas, raster, state, out);
     if state.shows_targets_camera() {
         marks::hover(&canvas, state, |feature| Some(feature.pixel));

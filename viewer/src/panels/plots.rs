@@ -16,6 +16,7 @@ use crate::compare::state::Other;
 use crate::drawing::decimate;
 use crate::drawing::overlay;
 use crate::drawing::overlay::Mark;
+use crate::figure;
 use crate::panels::chart::{over_steps, pieces, shape, step_of};
 use crate::panels::names;
 use crate::panels::names::HEIGHT as NAMES;
@@ -111,7 +112,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         lines.extend(state.others().iter().map(|o| (o.look.mark, o.look.colour, state.run_label(o.name))));
         ui.horizontal(|ui| {
             names::show(ui, &title, &lines);
-            if i == 0 {
+            if i == 0 && !figure::is_on_paper() {
                 choice(ui, out);
             }
         });

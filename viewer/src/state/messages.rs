@@ -206,6 +206,39 @@ mod tests {
     }
 
     #[test]
+    fn a_problem_leaves_the_status_line_once_its_request_succeeds() {
+        let problem = Problem {
+            code: "grid".to_owned(),
+            title: String::new(),
+            status: 422,
+            detail: "grid: 99 is too large".to_owned(),
+            hint: None,
+            nearest_pixel: None,
+            received: None,
+        };
+        let mut messages = Messages::default();
+        messages.refused(&problem, "post /studies/jobs".to_owned(), true);
+        messages.mended("post /sessions");
+        assert!(messages.newest().is_some() && messages.card().is_some());
+        messages.mended("post /studies/jobs");
+        assert!(messages.newest().is_none() && messages.card().is_none());
+        assert_eq!(messages.all().len(), 1, "the list keeps it");
+        messages.refused(&problem, "post /studies/jobs".to_owned(), true);
+        assert!(messages.newest().is_some() && messages.card().is_some(), "it happened again");
+    }
+
+    #[test]
+    fn notes_of_an_earlier_session_leave_the_status_line() {
+        let mut messages = Messages::default();
+        messages.note("target 1 is picked");
+        messages.leave_session();
+        assert!(messages.newest().is_none());
+        messages.problem("no", None);
+        messages.leave_session();
+        assert!(messages.newest().is_some(), "problems stay");
+    }
+
+    #[test]
     fn the_list_stays_short() {
         let mut messages = Messages::default();
         for i in 0..200 {

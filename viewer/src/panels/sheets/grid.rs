@@ -134,3 +134,28 @@ fn role(ui: &Ui, role: egui::Role, name: &str) {
         }
     });
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::panels::sheets::Column;
+
+    #[test]
+    fn a_long_table_shows_the_row_of_the_cursor_s_step() {
+        let sheet = |present: usize| {
+            let mut sheet = Sheet::over_steps("Over the steps", vec![Column::new("ncc", "")]);
+            (0..200).for_each(|step| sheet.step(step, present, vec![Some(0.5).into()]));
+            sheet
+        };
+        let mut harness = egui_kittest::Harness::builder()
+            .with_size([300.0, 300.0])
+            .build_ui_state(move |ui, present: &mut usize| show(ui, &[sheet(*present)], &mut Vec::new()), 0);
+        for step in [150, 20] {
+            *harness.state_mut() = step;
+            harness.run_steps(4);
+            let name = format!("go to step {step}");
+            let row = egui_kittest::kittest::Queryable::query_by_label(&harness, &name);
+            assert!(row.is_some(), "step {step} is not on the screen");
+        }
+    }
+}
