@@ -176,7 +176,7 @@ fn history(ui: &mut Ui, state: &State, run: &RunView, row: &StepRow, out: &mut V
         if run.rows.first().is_some_and(|first| first.step == row.step) {
             ui.label(theme::note("picked here"));
         } else if row.failed_gates.is_empty() {
-            ui.label(theme::note(row.reason.as_deref().unwrap_or("no criterion fired")));
+            ui.label(theme::note(row.reason.as_deref().unwrap_or("no gate failed")));
         }
         for gate in &row.failed_gates {
             let words = format!("criterion {}: {}", gate.criterion, gates::failed_words(gate));

@@ -73,7 +73,7 @@ fn the_tolerances_say_value_tolerance_and_where_they_fired() {
 #[test]
 fn the_state_machine_shows_state_counter_and_what_fired() {
     let tracking = Shown::pane(Pane::Machine, |context| fixture::at_step(context, 2));
-    tracking.says("state tracking").says("with 2 retries").says("picked here").says("no criterion fired");
+    tracking.says("state tracking").says("with 2 retries").says("picked here").says("no gate failed");
     let mut lost = Shown::pane(Pane::Machine, fires_at_three);
     lost.says("retry 0 of 2").says("criterion 1: match score 0.410 < 0.700");
     lost.says("criterion 3: range change 25.0 > 12.0 cm");
