@@ -5,6 +5,7 @@ use egui_plot::{GridInput, GridMark, MarkerShape, Plot};
 
 use crate::drawing::decimate;
 use crate::drawing::overlay::Mark;
+use crate::theme;
 
 /// A plot over the steps, which moves with its neighbours; only the lowest one has numbers of steps.
 pub(crate) fn over_steps<'a>(plot: Plot<'a>, last: f64, is_last: bool) -> Plot<'a> {
@@ -16,6 +17,7 @@ pub(crate) fn over_steps<'a>(plot: Plot<'a>, last: f64, is_last: bool) -> Plot<'
         .show_axes([is_last, true])
         .include_x(-0.4)
         .include_x(last + 0.4)
+        .grid_color(theme::line())
         .x_grid_spacer(step_marks)
         .y_grid_spacer(few_marks)
         .y_axis_formatter(plain)

@@ -8,6 +8,7 @@ use egui_plot::{GridMark, HoverPosition, Line, Plot, Points};
 use sightline_study::row::Row;
 
 use crate::drawing::overlay::Mark;
+use crate::panels::chart::{few_marks, plain};
 use crate::panels::names;
 use crate::theme;
 
@@ -44,6 +45,9 @@ pub(super) fn show(ui: &mut Ui, rows: &[Row], variable: &str, id: &str) {
         .include_x(values.len() as f64 - 0.7)
         .x_axis_label(axis)
         .y_axis_min_width(30.0)
+        .grid_color(theme::line())
+        .y_grid_spacer(few_marks)
+        .y_axis_formatter(plain)
         .x_grid_spacer(|input| {
             let (low, high) = (input.bounds.0.ceil() as i64, input.bounds.1.floor() as i64);
             (low..=high).map(|i| GridMark { value: i as f64, step_size: 1.0 }).collect()

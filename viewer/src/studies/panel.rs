@@ -4,6 +4,7 @@ use egui::{ComboBox, Grid, RichText, ScrollArea, TextEdit, Ui, vec2};
 use sightline_study::wire::{StudyInfo, StudyJob, StudyState};
 
 use crate::command::Command;
+use crate::figure;
 use crate::panels::numbers::counted;
 use crate::panels::pane::Need;
 use crate::panels::panel::Panel;
@@ -43,8 +44,10 @@ impl Panel for Studies {
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let Some(chosen) = state.studies.chosen() else { return };
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        form(ui, state, chosen, out);
-        ui.separator();
+        if !figure::is_on_paper() {
+            form(ui, state, chosen, out);
+            ui.separator();
+        }
         if state.studies.jobs.is_empty() {
             ui.label(theme::note("No study was started yet."));
         }
@@ -122,7 +125,6 @@ fn show_job(ui: &mut Ui, state: &State, job: &StudyJob, out: &mut Vec<Command>) 
     let (word, colour) = word_of(job.state);
     ui.horizontal_wrapped(|ui| {
         ui.label(RichText::new(&job.study).strong().color(theme::strong())).on_hover_text(&job.command);
-        ui.label(theme::note(estimate::settings(job)));
         ui.label(RichText::new(word).color(colour));
         if job.n > 0 {
             ui.label(theme::number(format!("{} of {}", job.k, counted(job.n, "run"))).size(11.0));
@@ -130,28 +132,14 @@ fn show_job(ui: &mut Ui, state: &State, job: &StudyJob, out: &mut Vec<Command>) 
         if let Some(left) = estimate::left(job) {
             ui.label(theme::note(left));
         }
-        match job.state {
-            StudyState::Waiting | StudyState::Running => {
-                if ui.small_button("Cancel").clicked() {
-                    out.push(Command::CancelStudy(job.id.clone()));
-                }
-            }
-            StudyState::Cancelled | StudyState::Failed => {
-                if ui.small_button("Resume").clicked() {
-                    out.push(Command::ResumeStudy(job.id.clone()));
-                }
-            }
-            StudyState::Done => {
-                if ui.small_button("Report").on_hover_text("Opens the report in a new tab").clicked() {
-                    out.push(Command::OpenReport(job.id.clone()));
-                }
-            }
-        }
-        let is_looked = state.studies.looked.as_ref() == Some(&job.id);
-        if ui.add(egui::Button::selectable(is_looked, RichText::new("Result").size(12.0))).clicked() {
-            out.push(Command::LookAtStudy(job.id.clone()));
+        if !figure::is_on_paper() {
+            buttons(ui, state, job, out);
         }
     });
+    let settings = estimate::settings(job);
+    if !settings.is_empty() {
+        ui.add(egui::Label::new(theme::note(settings)).wrap());
+    }
     if matches!(job.state, StudyState::Waiting | StudyState::Running) {
         let bar = egui::ProgressBar::new(job.share as f32).desired_height(6.0).fill(theme::accent());
         ui.add(bar).accessible_name(format!("{:.0} % done", 100.0 * job.share));
@@ -164,6 +152,31 @@ fn show_job(ui: &mut Ui, state: &State, job: &StudyJob, out: &mut Vec<Command>) 
         ui.add(egui::Label::new(RichText::new(format!("! {notice}")).small().color(theme::lost())).wrap());
     }
     ui.add_space(4.0);
+}
+
+/// What can be done with a job.
+fn buttons(ui: &mut Ui, state: &State, job: &StudyJob, out: &mut Vec<Command>) {
+    match job.state {
+        StudyState::Waiting | StudyState::Running => {
+            if ui.small_button("Cancel").clicked() {
+                out.push(Command::CancelStudy(job.id.clone()));
+            }
+        }
+        StudyState::Cancelled | StudyState::Failed => {
+            if ui.small_button("Resume").clicked() {
+                out.push(Command::ResumeStudy(job.id.clone()));
+            }
+        }
+        StudyState::Done => {
+            if ui.small_button("Report").on_hover_text("Opens the report in a new tab").clicked() {
+                out.push(Command::OpenReport(job.id.clone()));
+            }
+        }
+    }
+    let is_looked = state.studies.looked.as_ref() == Some(&job.id);
+    if ui.add(egui::Button::selectable(is_looked, RichText::new("Result").size(12.0))).clicked() {
+        out.push(Command::LookAtStudy(job.id.clone()));
+    }
 }
 
 fn word_of(state: StudyState) -> (&'static str, egui::Color32) {

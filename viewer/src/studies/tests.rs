@@ -9,6 +9,8 @@ use sightline_study::row::Row;
 use sightline_study::wire::{StudyInfo, StudyJob, StudyRows, StudyState};
 
 use crate::command::Command;
+use crate::figure::save;
+use crate::figure::wish::{Kind, Wish};
 use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::studies::Order;
@@ -172,4 +174,37 @@ fn the_table_has_a_row_for_each_unit_and_grows_with_the_job() {
         },
     );
     shown.says("median, cm").says("ncc-scale").says("19").says("1.23").says("–");
+}
+
+/// A study with results.
+fn with_result() -> State {
+    let mut page = with_job(StudyState::Done);
+    page.perform(Command::LookAtStudy("j1".to_owned()));
+    let rows = (0..10u64).map(|k| Row {
+        study: "straight".to_owned(),
+        configuration: ["ncc", "sightline"][(k % 2) as usize].to_owned(),
+        scenario: "approach-5".to_owned(),
+        seed: 7,
+        columns: serde_json::from_value(
+            serde_json::json!({"n_skip": k / 2, "targets": 20, "tracked": 20 - k}),
+        )
+        .unwrap(),
+    });
+    answer::<ShowStudyRows>(&mut page, &StudyRows { rows: rows.collect() });
+    page
+}
+
+#[test]
+fn a_figure_of_a_study_has_its_result_and_no_form() {
+    let shown = Shown::pane(Pane::Studies, |_| with_result());
+    shown.says("Start the study").says("targets tracked, %");
+    let context = egui::Context::default();
+    let mut output = context.run_ui(egui::RawInput::default(), |_| {});
+    output.textures_delta.clear();
+    let wish = Wish { pane: Pane::Studies, kind: Kind::Svg };
+    let file = save::take(&context, &with_result(), &[], wish).unwrap();
+    let text = String::from_utf8(file.bytes).unwrap();
+    assert!(text.contains("targets tracked, %") && !text.contains("Start the study"), "{text}");
+    // Three numbered ticks: 0, 50 and 100.
+    assert!(text.contains(">50</text>"), "{text}");
 }

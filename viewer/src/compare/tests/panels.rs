@@ -224,7 +224,7 @@ fn gates_and_inspector_say_what_differs_from_the_other_run() {
         state.stage = Stage::MATCH_TEMPLATE;
         state
     });
-    alike.says("Δ vs run B: alike (every bit)");
+    alike.says("Δ vs run B: identical");
 }
 
 #[test]

@@ -12,11 +12,11 @@ use sightline_geometry::frames::Point3;
 use sightline_session::step::StepRow;
 use sightline_session::view::RunView;
 
-use crate::panels::numbers::fixed;
 use crate::compare::state::{Look, Other};
 use crate::drawing::{decimate, ellipse};
 use crate::panels::chart::shape;
 use crate::panels::map::site::{in_site, on_map, truth_in_site};
+use crate::panels::numbers::fixed;
 use crate::state::State;
 use crate::theme;
 
