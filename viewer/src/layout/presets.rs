@@ -52,7 +52,7 @@ impl Preset {
             Self::Stereo => "Stereo",
             Self::Map => "Map",
             Self::Compare => "Compare",
-            Self::Sweep => "Sweep",
+            Self::Sweep => "Studies",
             Self::Report => "Report",
             Self::Image => "Image",
         }

@@ -312,6 +312,50 @@ mod tests {
         assert!(active.contains(&gates));
     }
 
+    /// The workspace on a page with one panel beside the other, in an order that Q follows.
+    fn page() -> egui_kittest::Harness<'static, Workspace> {
+        let state = crate::tests::fixture::nothing();
+        let mut harness = egui_kittest::Harness::builder().with_size([1280.0, 720.0]).build_ui_state(
+            move |ui, workspace: &mut Workspace| {
+                let mut out = Vec::new();
+                workspace.show(ui, &mut Panels::new(&state, &mut out));
+            },
+            Workspace::default(),
+        );
+        harness.run_steps(3);
+        harness
+    }
+
+    #[test]
+    fn every_press_of_q_goes_one_panel_on() {
+        let mut harness = page();
+        let seen = harness.state().seen.clone();
+        assert!(seen.len() > 2, "{seen:?}");
+        for expected in &seen {
+            harness.state_mut().apply(LayoutCommand::Panel(1));
+            harness.run_steps(3);
+            assert_eq!(harness.state().current, Some(*expected));
+        }
+    }
+
+    #[test]
+    fn the_panel_that_was_clicked_fills_the_page() {
+        let mut harness = page();
+        harness.state_mut().apply(LayoutCommand::Panel(1));
+        harness.run_steps(3);
+        let focused = harness.state().current;
+        harness.hover_at(egui::pos2(1200.0, 600.0));
+        harness.run_steps(2);
+        harness.drag_at(egui::pos2(1200.0, 600.0));
+        harness.run_steps(2);
+        harness.drop_at(egui::pos2(1200.0, 600.0));
+        harness.run_steps(2);
+        let clicked = harness.state().current;
+        assert_ne!(clicked, focused);
+        harness.state_mut().apply(LayoutCommand::Maximise(None));
+        assert_eq!(harness.state().maximised, clicked);
+    }
+
     #[test]
     fn the_keyboard_goes_round_the_panels_that_are_seen() {
         let mut workspace =

@@ -79,6 +79,7 @@ fn picture(
         theme::on_image(|| paint_marks(&canvas, state));
     }
     modes::over(ui, &canvas, state, out);
+    theme::on_image(|| crate::notes::marks::image(&canvas, state));
     let described = picking::show(ui, &canvas, raster, state, out);
     if state.shows_targets_camera() {
         marks::hover(&canvas, state, |feature| Some(feature.pixel));

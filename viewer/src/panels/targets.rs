@@ -6,6 +6,7 @@ use sightline_session::view::{RunView, TargetView};
 use crate::command::table::PICK;
 use crate::command::{Command, Mode};
 use crate::drawing::overlay::{paint_mark, run_mark};
+use crate::panels::numbers::counted;
 use crate::panels::pane::Pane;
 use crate::panels::panel::Panel;
 use crate::panels::{run_tree, timeline};
@@ -221,7 +222,7 @@ fn how_far(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: 
     } else if let Some(before) = run.rows.last().and_then(|row| row.paused_before) {
         ui.label(theme::note(format!("paused before {}", before.word())));
     } else {
-        ui.label(theme::note(format!("{} steps", run.rows.len())));
+        ui.label(theme::note(counted(run.rows.len(), "step")));
     }
 }
 
@@ -246,5 +247,5 @@ fn summary(run: &RunView) -> String {
     if let Some(err_px) = summary.final_err_px {
         words.push(format!("last {err_px:.1} px"));
     }
-    if words.is_empty() { format!("{} steps", summary.steps) } else { words.join(", ") }
+    if words.is_empty() { counted(summary.steps, "step") } else { words.join(", ") }
 }

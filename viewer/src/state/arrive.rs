@@ -109,6 +109,7 @@ impl State {
         self.progress.clear();
         self.sync.session_stale = true;
         self.trackability_stale();
+        self.studies.make_stale();
         if self.settings.is_empty() {
             self.read_settings();
         }
@@ -212,6 +213,10 @@ impl State {
         let is_other = self.session.as_ref().is_none_or(|open| open.id != view.id);
         self.ask.make_stale();
         if is_other {
+            // Notes of the first session are about opening it.
+            if self.session.is_some() {
+                self.messages.leave_session();
+            }
             self.open_notes(&view.id);
             self.ask.forget();
             self.messages.forget_session();

@@ -42,21 +42,23 @@ impl State {
                 (None, Some(located)) if located.missing.is_some() => {
                     located.missing.clone().unwrap_or_default()
                 }
-                _ if trace.prediction().is_none() => self.designated_here(),
+                _ if trace.prediction().is_none() => {
+                    let next = self.next_step_words("for the first one");
+                    format!("Target designated here; no match yet.{next}")
+                }
                 _ => "This stage was not reached at this step.".to_owned(),
             },
             Slot::Absent | Slot::Loading => format!("Loading step {step} …"),
         }
     }
 
-    /// Why the step of the designation has no match.
-    fn designated_here(&self) -> String {
-        let way = if self.cursor.step + 1 < self.stop_count() {
-            "Press → for the first one."
+    /// Where to go from a step that has nothing to show, as a sentence; empty at the last stop.
+    pub(crate) fn next_step_words(&self, purpose: &str) -> String {
+        if self.cursor.step + 1 < self.stop_count() {
+            format!(" Press → {purpose}.")
         } else {
-            "The drive has no further stop."
-        };
-        format!("Target designated here; no match yet. {way}")
+            " This drive has no further stop.".to_owned()
+        }
     }
 
     /// Why there is no target, as a sentence that says how to get one.

@@ -60,5 +60,5 @@ fn the_map_says_how_the_ellipses_shrink() {
         }
         state
     });
-    shown.says("3σ, cm: pick 6.0, here 1.5, end 0.4");
+    shown.says("3σ (cm): at pick 6.0 · now 1.5 · at end 0.4");
 }

@@ -4,7 +4,7 @@ mod accuracy;
 #[path = "../compare/tests/mod.rs"]
 mod compare;
 #[path = "../breakpoints/tests.rs"]
-mod ask;
+pub(crate) mod ask;
 mod cameras;
 pub(crate) mod feature_run;
 mod features;

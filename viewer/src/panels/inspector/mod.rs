@@ -119,9 +119,8 @@ fn not_reached(trace: &RunStep, state: &State) -> String {
         (None, true) => {
             let mut steps = Stage::of(state.tracker()).filter(|stage| stage.is_step_of_locate());
             let other = steps.find(|stage| is_reached(trace, *stage)).unwrap_or(Stage::LOCATE).word();
-            format!(
-                "{word} is not part of the designation. Go one step on (Right) to see it, or select `{other}`."
-            )
+            let next = state.next_step_words("to see it");
+            format!("{word} is not part of the designation.{next} `{other}` can be selected here.")
         }
         (None, false) => format!("{word} was not reached: {}", state.missing_step()),
     }

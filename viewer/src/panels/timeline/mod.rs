@@ -105,6 +105,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     film::paint(&painter, all.with_max_y(lane.bottom() + FILM), state, &scale);
     let below = all.bottom() - curves::HEIGHT;
     curves::paint(&painter, drive, below, GUTTER, state, &scale);
+    crate::notes::marks::timeline(&painter, lane, state, &scale);
     marks::loop_range(&painter, all, state, &scale, count);
     marks::playhead(&painter, all, state.cursor.step.min(count - 1), &scale);
     let pointed = response.hover_pos().or(response.interact_pointer_pos());
@@ -322,14 +323,41 @@ fn words(state: &State, band: Option<&Band<'_>>, step: usize, in_lane: bool) -> 
             words += &format!("\n{reason}");
         }
     }
-    for hit in state.hit_at(step).into_iter().take(4) {
+    let of_run = shown.and_then(|(target, run)| Some((target.number, run?.number)));
+    let hits = of_run.map(|(target, run)| state.hit_at(target, run, step)).unwrap_or_default();
+    for hit in hits.into_iter().take(4) {
         words += &format!("\n◆ {hit}");
     }
+    for note in crate::notes::marks::words(state, step).into_iter().take(3) {
+        words += &format!("\n{note}");
+    }
     if in_lane {
-        words += "\nclick: break at this step, or no longer";
+        words += "\nclick: toggle breakpoint here";
     }
     if !is_ready(state, step) {
         words += "\nits images are not rendered yet";
     }
     words
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::ask::breakpoint;
+    use crate::tests::fixture;
+
+    #[test]
+    fn the_tooltip_of_another_run_has_the_hits_of_that_run() {
+        let mut state = fixture::at_step(&egui::Context::default(), 2);
+        let target = &mut state.session.as_mut().unwrap().targets[0];
+        let second = RunView { number: 1, ..target.runs[0].clone() };
+        target.runs.push(second);
+        let mut hit = breakpoint(0, "ncc < 0.6", &[3]);
+        hit.hits[0].run = 1;
+        state.ask.breakpoints = vec![hit];
+        let bands = bands(&state);
+        let words = |run: usize| words(&state, Some(&bands[run]), 3, false);
+        assert!(!words(0).contains("◆ ncc < 0.6"), "{}", words(0));
+        assert!(words(1).contains("◆ ncc < 0.6"), "{}", words(1));
+    }
 }
