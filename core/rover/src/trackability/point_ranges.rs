@@ -32,7 +32,7 @@ use sightline_track::stages::capture::StereoPair;
 use sightline_vision::stereo::{DisparityMap, Outcome};
 
 /// Pixels between two nodes of the grid.
-pub(super) const SPACING_PX: u32 = 4;
+pub(super) const SPACING_PX: u32 = 8;
 
 /// A match that leads back farther from its node is not believed, px.
 const BACK_MAX_PX: f64 = 1.5;
@@ -40,6 +40,9 @@ const BACK_MAX_PX: f64 = 1.5;
 /// Nearest range of the search, baselines: nearer surfaces differ too much between the views, and their part of the
 /// epipolar curve has no bound.
 const RANGE_MIN_BASELINES: f64 = 4.0;
+
+/// Parts of a ray whose images are compared with the borders of the right image.
+const CURVE_SAMPLES: u32 = 8;
 
 /// Ranges on a grid of the left image.
 pub(super) struct PointRanges {
@@ -108,7 +111,10 @@ impl PointRanges {
 impl Node {
     fn of(input: &StereoInput<'_>, template: &TemplateSettings, score_min: f64) -> Self {
         let none = |outcome| Self { disparity_px: f32::NAN, outcome, point_m: [f32::NAN; 3] };
-        let Some(ray) = input.left.ray(input.left_pixel) else { return none(Outcome::Outside) };
+        let ray = input.left.ray(input.left_pixel);
+        let Some(ray) = ray.filter(|ray| may_be_seen(ray, input.right, template)) else {
+            return none(Outcome::Outside);
+        };
         let found = match point_stereo(input, template) {
             Ok(found) => found,
             Err(failure) => return none(outcome_of(&failure)),
@@ -125,6 +131,20 @@ impl Node {
             point_m: ray.at(found.range_m).coords.map(|value| value as f32).into(),
         }
     }
+}
+
+/// Whether a part of the ray may be in the right image: most nodes of a pair with little overlap need no search.
+fn may_be_seen(ray: &Ray, right: &Camera, template: &TemplateSettings) -> bool {
+    let far = 1.0 / template.range_max_m;
+    let near = 1.0 / template.range_min_m;
+    let samples = (0..=CURVE_SAMPLES).map(|k| far + (near - far) * f64::from(k) / f64::from(CURVE_SAMPLES));
+    let seen: Vec<Pixel> = samples.filter_map(|inverse| right.project(&ray.at(1.0 / inverse))).collect();
+    // The box of two neighbours contains the nearly straight curve between them.
+    let [width, height] = right.size.map(f64::from);
+    seen.windows(2).any(|pair| {
+        let (a, b) = (pair[0], pair[1]);
+        a.x.max(b.x) >= 0.0 && a.x.min(b.x) <= width && a.y.max(b.y) >= 0.0 && a.y.min(b.y) <= height
+    })
 }
 
 /// The settings of the search at a node: the window of a designation, compared once.
