@@ -243,7 +243,7 @@ fn a_chosen_folder_is_sent_and_examined_and_what_is_not_imported_is_removed() {
         let mut state = opened();
         state.file_arrived(Arrival::Chosen(chosen()));
         answer::<BeginUpload>(&mut state, &upload);
-        state.take_effects();
+        state.take_requests();
         state
     };
     let mut state = begun();
