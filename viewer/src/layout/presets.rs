@@ -87,7 +87,7 @@ impl Preset {
     }
 
     /// The arrangement for images of this shape.
-    pub(crate) fn tree(self, shape: ImageShape) -> Tree<Pane> {
+    pub fn tree(self, shape: ImageShape) -> Tree<Pane> {
         let mut tiles = Tiles::default();
         let root = build(&mut tiles, self.table(shape));
         Tree::new(egui::Id::unique("panels"), root, tiles)
@@ -112,7 +112,7 @@ impl Preset {
 /// The shape of a traverse's images, on which depends whether they stand beside or above each other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum ImageShape {
+pub enum ImageShape {
     /// About as wide as high.
     #[default]
     Square,

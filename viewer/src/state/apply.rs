@@ -60,12 +60,8 @@ impl State {
             Command::UsePreset(name) => self.draft = self.changes_to(name).unwrap_or_default(),
             Command::ClearDraft => self.draft.clear(),
             Command::RunFromHere(changes) => self.run_from_here(changes),
-            Command::CancelRun { target, run } => {
-                self.switch_run::<CancelRun>(target, run);
-            }
-            Command::ResumeRun { target, run } => {
-                self.switch_run::<ResumeRun>(target, run);
-            }
+            Command::CancelRun { target, run } => self.switch_run::<CancelRun>(target, run),
+            Command::ResumeRun { target, run } => self.switch_run::<ResumeRun>(target, run),
             Command::View(panel, view) => match panel {
                 Zoomable::Left => self.views.left = view,
                 Zoomable::Right => self.views.right = view,

@@ -132,5 +132,5 @@ fn format_of(folder: &Path) -> Option<&'static str> {
     if index_file::find(folder).is_ok() {
         return Some(NATIVE);
     }
-    FORMATS.into_iter().find(|format| format.sniff(folder)).map(|format| format.name())
+    FORMATS.into_iter().find(|format| format.sniff(folder)).map(super::ImportFormat::name)
 }
