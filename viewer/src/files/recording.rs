@@ -239,7 +239,7 @@ impl State {
                 self.open_imported(traverse);
             }
             (ImportState::Cancelled, _) => {
-                self.messages.note("The import was cancelled; nothing of it is kept.")
+                self.messages.note("The import was cancelled; nothing of it is kept.");
             }
             _ => {
                 let detail = job.problem.unwrap_or_else(|| "The import failed.".to_owned());

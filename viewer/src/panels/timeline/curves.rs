@@ -17,10 +17,13 @@ const GAP: f32 = 1.0;
 /// Height of all curves, points.
 pub(super) const HEIGHT: f32 = 2.0 * (LANE + GAP);
 
+/// The value of a curve at a step.
+type Value = fn(&StepRow) -> Option<f64>;
+
 /// One curve: what it is, its value at a step, and the values at the bottom and at the top of its lane.
 struct Curve {
     name: String,
-    value: fn(&StepRow) -> Option<f64>,
+    value: Value,
     span: [f64; 2],
     /// Whether the smaller of two values is the worse one.
     is_low_bad: bool,
@@ -28,14 +31,14 @@ struct Curve {
 
 /// The curves of a run: the match score, or the confidence of a tracker without one; the error, or 1σ without a truth.
 fn curves(run: &RunView) -> [Curve; 2] {
-    let has = |value: fn(&StepRow) -> Option<f64>| run.rows.iter().any(|row| value(row).is_some());
+    let has = |value: Value| run.rows.iter().any(|row| value(row).is_some());
     let score = if has(|row| row.ncc) {
         Curve { name: "ncc".to_owned(), value: |row| row.ncc, span: [0.0, 1.0], is_low_bad: true }
     } else {
-        let value: fn(&StepRow) -> Option<f64> = |row| row.confidence;
+        let value: Value = |row| row.confidence;
         Curve { name: "confidence".to_owned(), value, span: [0.0, 1.0], is_low_bad: true }
     };
-    let ([name, unit], value): ([&str; 2], fn(&StepRow) -> Option<f64>) = if has(|row| row.err_px) {
+    let ([name, unit], value): ([&str; 2], Value) = if has(|row| row.err_px) {
         (["err", "px"], |row| row.err_px)
     } else {
         (["1σ", "cm"], |row| row.sigma_m.map(|sigma| 100.0 * sigma))
