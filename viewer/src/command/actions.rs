@@ -253,7 +253,7 @@ mod tests {
         assert_eq!(first("go lost"), "Go to lost: step 3");
         assert!(first("branch").starts_with("Run from this step"), "{}", first("branch"));
         assert_eq!(first("zoom"), "Fit all images");
-        assert_eq!(first("rename"), "Show Targets and runs");
+        assert_eq!(first("rename"), "Rename ridge");
     }
 
     #[test]

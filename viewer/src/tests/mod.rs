@@ -203,7 +203,9 @@ fn the_left_image_has_a_legend_that_switches_its_layers() {
 
 #[test]
 fn the_right_image_names_the_epipolar_curve() {
-    Shown::pane(Pane::Right, |context| fixture::at_step(context, 2)).says("epipolar curve");
+    let mut shown = Shown::pane(Pane::Right, |context| fixture::at_step(context, 2));
+    shown.click("legend");
+    shown.says("epipolar curve");
 }
 
 #[test]

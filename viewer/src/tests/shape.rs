@@ -186,7 +186,9 @@ fn the_left_image_has_the_registered_target_and_the_basin_about_the_prediction()
     shown.click("legend");
     shown.says("registered here, 1σ 2σ 3σ").says("basin, half width 25 cm (legend)");
     assert_eq!(shown.click("basin, half width 25 cm (legend)"), vec![Command::ToggleLayer(Layer::Basin)]);
-    left_image(0).says("picked");
+    let mut designated = left_image(0);
+    designated.click("legend");
+    designated.says("picked");
 }
 
 #[test]
