@@ -106,7 +106,7 @@ async fn a_handle_is_dragged_and_a_removed_branch_comes_back() {
     let (x, y) = browser.control("slider", "search window size handle").await.middle();
     browser.drag((x, y), (x + 24.0, y + 24.0)).await;
     browser.control("button", "discard what if").await;
-    browser.says("search_window_px").await;
+    browser.says("search window").await;
     browser.shot("handle").await;
     let predicted = browser.control("button", "prediction handle").await;
     let (x, y) = predicted.middle();

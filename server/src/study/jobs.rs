@@ -238,13 +238,14 @@ impl Work {
     fn change<T>(&self, change: impl FnOnce(&mut Inside) -> T) -> T {
         let mut inside = lock(&self.inside);
         let result = change(&mut inside);
-        if let Some(began) = inside.began {
-            inside.view.seconds = began.elapsed().as_secs_f64();
-        }
-        inside.view.revision += 1;
+        inside.stamp();
+        self.tell(&inside);
+        result
+    }
+
+    fn tell(&self, inside: &Inside) {
         // Nobody may be listening.
         let _ = self.events.send(Event::StudyProgress { job: inside.view.clone() });
-        result
     }
 
     fn carry_out(&self) {
@@ -280,12 +281,12 @@ impl Work {
 
     /// Ends it: on disk before anybody sees it, so that what a person saw outlives the server.
     fn finish(&self, end: impl FnOnce(&mut Inside)) {
-        {
-            let mut inside = lock(&self.inside);
-            end(&mut inside);
-            self.keep(&inside);
-        }
-        self.change(|_| ());
+        let mut inside = lock(&self.inside);
+        end(&mut inside);
+        inside.stamp();
+        inside.began = None;
+        self.keep(&inside);
+        self.tell(&inside);
     }
 
     fn hear(&self, progress: Progress) {
@@ -301,6 +302,16 @@ impl Work {
             }),
             Progress::Notice(text) => self.change(|inside| inside.view.notices.push(text)),
         }
+    }
+}
+
+impl Inside {
+    /// Gives the state its number and how long the study took.
+    fn stamp(&mut self) {
+        if let Some(began) = self.began {
+            self.view.seconds = began.elapsed().as_secs_f64();
+        }
+        self.view.revision += 1;
     }
 }
 
