@@ -157,7 +157,7 @@ fn odometry_runs_alone_at_the_stops_between_two_steps() {
             metrics(&drive.steps).excluded.iter().find(|one| one.why.contains("alone")).unwrap().steps,
             alone
         );
-        // What was written is read back as it was.
+        // The kind of the step survives serialisation.
         let text = serde_json::to_string(drive.steps[1].as_ref()).unwrap();
         assert!(serde_json::from_str::<RunStep>(&text).unwrap().is_odometry_alone());
     }

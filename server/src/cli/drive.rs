@@ -63,7 +63,7 @@ pub(super) struct Drive {
     /// Longest step as a part of the distance to the target.
     #[arg(long, value_name = "PART", default_value_t = DriveCommand::default().step_fraction)]
     step_fraction: f64,
-    /// The stops at which the target is looked for; between them, odometry alone.
+    /// The stops at which the tracker looks for the target.
     #[arg(long, value_name = "STOPS", default_value = "every")]
     tracked_stops: Tracked,
     /// Most stops, the first included.
@@ -136,7 +136,7 @@ enum Pairs {
 enum Tracked {
     /// Every stop.
     Every,
-    /// Once a step of --step-fraction and once a turn; odometry alone at the stops that it needs between.
+    /// After each step of --step-fraction and after each turn; odometry runs alone at the intermediate stops.
     ByDistance,
 }
 

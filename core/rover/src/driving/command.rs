@@ -27,8 +27,8 @@ pub enum TrackedStops {
     /// Every stop.
     #[default]
     Every,
-    /// Once a step of `step_fraction` of the distance and once a turn. Where visual odometry needs shorter motions than these, it
-    /// runs alone at the stops between.
+    /// After each step of `step_fraction` of the distance and after each turn. If visual odometry needs shorter motions, it runs
+    /// alone at the intermediate stops.
     ByDistance,
 }
 

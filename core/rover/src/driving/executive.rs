@@ -250,7 +250,7 @@ fn target_in_site(input: &CycleInput<'_>, stops: &dyn Stops) -> Point3 {
     stops.site_from_rover(from.step) * from.update.target.position_in_rover
 }
 
-/// Length of the next motion at most, m: what is left of the step, where odometry alone ran at this stop.
+/// Largest length of the next motion, m. After a stop for odometry alone, this is the rest of the step.
 fn step_m(input: &CycleInput<'_>, distance_m: f64) -> f64 {
     let step_m = input.command.step_fraction * distance_m;
     if !input.last.is_odometry_alone() {
