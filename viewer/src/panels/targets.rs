@@ -6,9 +6,11 @@ use sightline_session::view::{RunView, TargetView};
 use crate::command::table::PICK;
 use crate::command::{Command, Mode};
 use crate::drawing::overlay::{paint_mark, run_mark};
+use crate::panels::numbers::counted;
 use crate::panels::pane::Pane;
 use crate::panels::panel::Panel;
 use crate::panels::{run_tree, timeline};
+use crate::state::targets::{Rename, Renaming};
 use crate::state::{State, run_letter};
 use crate::why::Ask;
 use crate::{panels, theme};
@@ -18,6 +20,9 @@ const PURPOSE: &str = Pane::Targets.about().help;
 
 /// How much a branch stands in from what it left, points.
 const INDENT: f32 = 12.0;
+
+/// Room beside the field of a name for “Remove”, points.
+const NAME_BESIDE: f32 = 80.0;
 
 /// The panel “Targets and runs”.
 pub(crate) struct Targets;
@@ -54,14 +59,15 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 fn show_target(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Command>) {
     let is_selected = state.cursor.target == Some(target.number);
     ui.horizontal(|ui| {
-        let text = RichText::new(&target.label).strong().color(if is_selected {
-            theme::strong()
-        } else {
-            theme::text()
-        });
-        if ui.add(egui::Label::new(text).sense(Sense::click())).clicked() {
-            let run = target.runs.last().map_or(0, |run| run.number);
-            out.push(Command::Look { target: target.number, run });
+        let mut is_shown = !state.hidden_targets.contains(&target.number);
+        let check = ui.checkbox(&mut is_shown, "").accessible_name(format!("marks of {}", target.label));
+        if check.on_hover_text("Shows or hides its marks in the images").changed() {
+            out.push(Command::ToggleTarget(target.number));
+        }
+        let renaming = state.renaming.as_ref().filter(|renaming| renaming.target == target.number);
+        match renaming {
+            Some(renaming) => name_field(ui, renaming, out),
+            None => name(ui, target, is_selected, out),
         }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             if ui
@@ -71,10 +77,26 @@ fn show_target(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Co
             {
                 out.push(Command::RemoveTarget(target.number));
             }
+            let help = "Gives the target another name (double-click the name)";
+            if renaming.is_none() && ui.small_button("Rename").on_hover_text(help).clicked() {
+                out.push(Command::Rename(Rename::Begin(target.number)));
+            }
         });
     });
     let at = target.designation;
-    ui.label(theme::note(format!("picked at step {}, pixel {:.1}, {:.1}", at.step, at.pixel.x, at.pixel.y)));
+    let place = format!("designated at step {}, pixel {:.1}, {:.1}", at.step, at.pixel.x, at.pixel.y);
+    ui.horizontal(|ui| {
+        let is_elsewhere = is_selected && state.cursor.step != at.step;
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let help = "Designates it again at this stop, as a target of its own with the same settings";
+            if is_elsewhere && ui.small_button("Re-pick here").on_hover_text(help).clicked() {
+                out.push(Command::Repick(target.number));
+            }
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                ui.add(egui::Label::new(theme::note(place)).truncate());
+            });
+        });
+    });
     for sentence in warnings(state, target) {
         ui.add(egui::Label::new(RichText::new(format!("! {sentence}")).small().color(theme::lost())).wrap())
             .on_hover_text("A warning about the pick; it can be tracked all the same.");
@@ -84,6 +106,36 @@ fn show_target(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Co
             ui.add_space(INDENT * depth as f32);
             ui.vertical(|ui| show_run(ui, state, target, run, out));
         });
+    }
+}
+
+/// The name of a target: a click shows its newest run, a double click renames it.
+fn name(ui: &mut Ui, target: &TargetView, is_selected: bool, out: &mut Vec<Command>) {
+    let colour = if is_selected { theme::strong() } else { theme::text() };
+    let text = RichText::new(&target.label).strong().color(colour);
+    let label = ui.add(egui::Label::new(text).sense(Sense::click()));
+    if label.double_clicked() {
+        out.push(Command::Rename(Rename::Begin(target.number)));
+    } else if label.clicked() {
+        let run = target.runs.last().map_or(0, |run| run.number);
+        out.push(Command::Look { target: target.number, run });
+    }
+}
+
+/// The field in which a name is typed: Enter or leaving it saves, Esc cancels.
+fn name_field(ui: &mut Ui, renaming: &Renaming, out: &mut Vec<Command>) {
+    let mut text = renaming.text.clone();
+    let width = (ui.available_width() - NAME_BESIDE).max(60.0);
+    let field = ui.add(egui::TextEdit::singleline(&mut text).desired_width(width).char_limit(100));
+    let field = field.accessible_name("name of the target");
+    if field.changed() {
+        out.push(Command::Rename(Rename::Type(text)));
+    }
+    if field.lost_focus() {
+        let is_cancelled = ui.input(|input| input.key_pressed(egui::Key::Escape));
+        out.push(Command::Rename(if is_cancelled { Rename::Cancel } else { Rename::Save }));
+    } else if !field.has_focus() {
+        field.request_focus();
     }
 }
 
@@ -170,7 +222,7 @@ fn how_far(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: 
     } else if let Some(before) = run.rows.last().and_then(|row| row.paused_before) {
         ui.label(theme::note(format!("paused before {}", before.word())));
     } else {
-        ui.label(theme::note(format!("{} steps", run.rows.len())));
+        ui.label(theme::note(counted(run.rows.len(), "step")));
     }
 }
 
@@ -195,5 +247,5 @@ fn summary(run: &RunView) -> String {
     if let Some(err_px) = summary.final_err_px {
         words.push(format!("last {err_px:.1} px"));
     }
-    if words.is_empty() { format!("{} steps", summary.steps) } else { words.join(", ") }
+    if words.is_empty() { counted(summary.steps, "step") } else { words.join(", ") }
 }
