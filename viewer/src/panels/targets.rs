@@ -21,6 +21,9 @@ const PURPOSE: &str = Pane::Targets.about().help;
 /// How much a branch stands in from what it left, points.
 const INDENT: f32 = 12.0;
 
+/// Width of the band of a run's states, points.
+const BAND_WIDTH: f32 = 56.0;
+
 /// Room beside the field of a name for “Remove”, points.
 const NAME_BESIDE: f32 = 80.0;
 
@@ -48,12 +51,32 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         panels::missing(ui, PURPOSE, &state.missing_target());
         return;
     }
+    selected_run(ui, state);
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         for target in targets {
             show_target(ui, state, target, out);
             ui.add_space(6.0);
         }
     });
+}
+
+/// All of the run that is looked at, below the list: a line of the list has no room for it.
+fn selected_run(ui: &mut Ui, state: &State) {
+    let (Some(target), Some(run)) = (state.target(), state.run()) else { return };
+    egui::Panel::bottom("the run that is looked at").frame(egui::Frame::new()).show(ui, |ui| {
+        ui.add_space(2.0);
+        let mut lines = vec![format!("run {}: {}", run_letter(run.number), summary(run))];
+        lines.extend(about(target, run));
+        for line in lines {
+            ui.add(egui::Label::new(theme::note(line)).wrap());
+        }
+    });
+}
+
+/// Where a run comes from and what it changes, each as a line.
+fn about(target: &TargetView, run: &RunView) -> Vec<String> {
+    let from = run.fork.map(|fork| format!("from run {} at step {}", run_letter(fork.run), fork.from_step));
+    from.into_iter().chain(run_tree::changed(&target.runs, run)).collect()
 }
 
 fn show_target(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Command>) {
@@ -150,11 +173,11 @@ fn warnings<'a>(state: &'a State, target: &TargetView) -> Vec<&'a str> {
 fn show_run(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: &mut Vec<Command>) {
     let is_selected = state.cursor.target == Some(target.number) && state.cursor.run == run.number;
     let fill = if is_selected { theme::selected() } else { egui::Color32::TRANSPARENT };
-    let frame = egui::Frame::new().fill(fill).corner_radius(4).inner_margin(egui::Margin::symmetric(6, 3));
-    // The card hears of a click only where no button in it does: it comes before what is in it.
-    let card = egui::UiBuilder::new().id_salt(("run", target.number, run.number)).sense(Sense::click());
-    let inside = ui.scope_builder(card, |ui| {
-        frame.show(ui, |ui| card_of(ui, state, target, run, out));
+    let frame = egui::Frame::new().fill(fill).corner_radius(4).inner_margin(egui::Margin::symmetric(6, 1));
+    // The line hears of a click only where no button in it does: it comes before what is in it.
+    let line = egui::UiBuilder::new().id_salt(("run", target.number, run.number)).sense(Sense::click());
+    let inside = ui.scope_builder(line, |ui| {
+        frame.show(ui, |ui| line_of(ui, state, target, run, out));
     });
     let response = inside.response;
     response.widget_info(|| {
@@ -170,37 +193,40 @@ fn show_run(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out:
     }
 }
 
-/// What a run's card says, and what can be done with the run.
-fn card_of(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: &mut Vec<Command>) {
+/// One line: the run's mark, its states over the steps, what it changes, how far it is, and what can be done with it.
+fn line_of(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: &mut Vec<Command>) {
     ui.set_width(ui.available_width());
     ui.horizontal(|ui| {
         let (mark, _) = ui.allocate_exact_size(vec2(14.0, 14.0), Sense::hover());
         paint_mark(ui.painter(), mark.center(), run_mark(run.number), theme::run(run.number), 6.0);
-        ui.label(RichText::new(format!("run {}", run_letter(run.number))).color(theme::strong()));
-        if let Some(preset) = state.configurations.named(&run.settings) {
-            ui.label(RichText::new(preset.name).color(theme::accent())).on_hover_text(preset.description);
-        }
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| how_far(ui, state, target, run, out));
+        ui.label(RichText::new(run_letter(run.number)).color(theme::strong()));
+        let (band, _) = ui.allocate_exact_size(vec2(BAND_WIDTH, 6.0), Sense::hover());
+        timeline::thin_band(ui.painter(), band, target, run, state.stop_count());
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            if target.runs.len() > 1 {
+                let name = format!("remove run {}", run_letter(run.number));
+                let help = "Hides the run; what left it keeps its steps. Ctrl+Z takes it back";
+                let button = ui.small_button("×").accessible_name(name).on_hover_text(help);
+                if button.clicked() {
+                    out.push(Command::Why(Ask::RemoveRun { target: target.number, run: run.number }));
+                }
+            }
+            how_far(ui, state, target, run, out);
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| settings_of(ui, state, target, run));
+        });
     });
-    sparkline(ui, target, run, state.stop_count());
-    if let Some(fork) = run.fork {
-        ui.label(theme::note(format!("from run {} at step {}", run_letter(fork.run), fork.from_step)));
-    }
-    ui.label(theme::note(summary(run)));
-    // A preset's name says them all.
-    let unnamed = state.configurations.named(&run.settings).is_none();
+}
+
+/// The preset of a run, or what it changes.
+fn settings_of(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView) {
+    let named = state.configurations.named(&run.settings);
     let is_branch = run_tree::parent(&target.runs, run).is_some();
-    let lines = if unnamed || is_branch { run_tree::changed(&target.runs, run) } else { Vec::new() };
-    for line in lines {
-        ui.add(egui::Label::new(theme::note(line).monospace()).wrap());
-    }
-    if target.runs.len() > 1 {
-        let name = format!("remove run {}", run_letter(run.number));
-        let help = "Hides the run; what left it keeps its steps. Ctrl+Z takes it back";
-        let button = ui.small_button("Remove run").accessible_name(name).on_hover_text(help);
-        if button.clicked() {
-            out.push(Command::Why(Ask::RemoveRun { target: target.number, run: run.number }));
-        }
+    if let Some(preset) = named.filter(|_| !is_branch) {
+        let text = RichText::new(preset.name).small().color(theme::accent());
+        ui.add(egui::Label::new(text).truncate()).on_hover_text(preset.description);
+    } else {
+        let lines = about(target, run);
+        ui.add(egui::Label::new(theme::note(lines.join(", "))).truncate()).on_hover_text(lines.join("\n"));
     }
 }
 
@@ -224,12 +250,6 @@ fn how_far(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: 
     } else {
         ui.label(theme::note(counted(run.rows.len(), "step")));
     }
-}
-
-/// The states of a run as a thin band.
-fn sparkline(ui: &mut Ui, target: &TargetView, run: &RunView, stop_count: usize) {
-    let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), 5.0), Sense::hover());
-    timeline::thin_band(ui.painter(), rect, target, run, stop_count);
 }
 
 fn summary(run: &RunView) -> String {
