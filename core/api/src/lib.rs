@@ -7,6 +7,5 @@ pub mod event;
 pub mod location;
 pub mod program;
 pub mod query;
-pub mod recording;
 pub mod table;
 pub mod wire;

@@ -47,8 +47,6 @@ pub struct PlaneWorld {
     pub right: Camera,
     /// What goes wrong at each stop.
     pub troubles: Vec<Trouble>,
-    /// How the two cameras relate.
-    pub stereo: StereoGeometry,
 }
 
 impl PlaneWorld {
@@ -69,7 +67,6 @@ impl PlaneWorld {
             left: eye(-0.1),
             right: eye(0.1),
             troubles,
-            stereo: StereoGeometry::Lateral,
         }
     }
 
@@ -134,7 +131,7 @@ impl Stops for PlaneWorld {
         0.0
     }
     fn stereo(&self) -> StereoGeometry {
-        self.stereo
+        StereoGeometry::Lateral
     }
     fn capture(&self, step: usize, _: Cancel<'_>) -> Result<StereoPair> {
         if self.troubles[step] == Trouble::Missing {

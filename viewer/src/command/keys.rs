@@ -191,7 +191,7 @@ mod tests {
         assert_eq!(press(Key::G, &state), Some(Command::SetMode(Mode::GoTo(String::new()))));
         assert_eq!(press(Key::T, &state), Some(Command::SetMode(Mode::Pick)));
         assert_eq!(press(Key::F, &state), Some(Command::FitAll));
-        assert_eq!(press(Key::I, &state), Some(Command::SetStretch(Stretch::None)));
+        assert_eq!(press(Key::I, &state), Some(Command::SetStretch(Stretch::Auto)));
         assert_eq!(press(Key::M, &state), Some(Command::Notes(notes::Ask::Pin)));
         let save = command(Key::S, Modifiers::COMMAND, &state);
         assert_eq!(save, Some(Command::Exports(exports::Ask::Open)));

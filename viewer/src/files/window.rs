@@ -8,7 +8,6 @@ use sightline_api::wire::{SessionEntry, TraverseEntry};
 use crate::command::Command;
 use crate::files::Ask;
 use crate::files::documents::OPENABLE;
-use crate::files::recording_window;
 use crate::state::State;
 use crate::theme;
 
@@ -29,18 +28,11 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         let height = (ui.ctx().content_rect().height() - 150.0).max(200.0);
         ui.label(RichText::new("Open").size(16.0).strong().color(theme::strong()));
         ScrollArea::vertical().max_height(height).auto_shrink([false, true]).show(ui, |ui| {
-            if recording_window::card(ui, state, &mut ask) {
-                return;
-            }
-            recording_window::list(ui, state, &mut ask);
+            file(ui, state, &mut ask);
             ui.add_space(8.0);
             recent(ui, state, &mut ask);
             ui.add_space(8.0);
             drives(ui, state, &mut ask);
-            ui.add_space(8.0);
-            recording_window::scenarios(ui, &mut ask);
-            ui.add_space(8.0);
-            file(ui, state, &mut ask);
         });
         ui.separator();
         ui.add(Button::new("Close").min_size(vec2(24.0, 24.0))).clicked()
@@ -139,7 +131,9 @@ fn drives(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(Ask)) {
     ui.label(theme::title("a new session on a drive of this server"));
     let list = state.traverses.as_deref().unwrap_or_default();
     if list.is_empty() {
-        ui.label(theme::note("The server has no drive: open a recording above, or a scenario below."));
+        ui.label(theme::note(
+            "The server has no drive: drop a scenario, or start it with a folder, `sightline serve FOLDER`.",
+        ));
     }
     for entry in list {
         let kind = if entry.simulated { "simulated" } else { "recorded" };
@@ -173,7 +167,7 @@ fn confirm(ui: &mut Ui, entry: &TraverseEntry, ask: &mut dyn FnMut(Ask)) {
 }
 
 /// The button of a line that was pressed.
-pub(super) enum Pressed {
+enum Pressed {
     /// The line itself.
     Row,
     /// The small button beside it.
@@ -181,7 +175,7 @@ pub(super) enum Pressed {
 }
 
 /// A line that is one button (title, and more about it), perhaps with a small one beside it (label and accessible name).
-pub(super) fn row(
+fn row(
     ui: &mut Ui,
     [title, words]: [&str; 2],
     is_on: bool,

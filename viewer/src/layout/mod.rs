@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `command` | what can be asked of the arrangement |
 //! | `left_image` | where the left image is on the screen |
-//! | `presets` | the eight arrangements that come with the page, and the one for narrow windows |
+//! | `presets` | the seven arrangements that come with the page, and the one for narrow windows |
 //! | `workspace` | the arrangement in use: presets, the panel with the keyboard, the one that fills the page; kept across reloads |
 
 pub(crate) mod command;
@@ -84,8 +84,7 @@ impl<'a> Panels<'a> {
         if self.takes_keyboard && self.current == Some(pane) {
             whole.request_focus();
         }
-        // A panel that only keeps the focus must not take the turn of the one that gets it.
-        if whole.gained_focus() || is_pressed(ui, place) {
+        if whole.has_focus() {
             self.current = Some(pane);
         }
         Frame::new().fill(theme::panel()).inner_margin(margin).show(ui, |ui| {
@@ -128,11 +127,6 @@ impl<'a> Panels<'a> {
             }
         });
     }
-}
-
-/// Whether the pointer is pressed in a panel in this frame, and not on a window above it.
-fn is_pressed(ui: &Ui, place: egui::Rect) -> bool {
-    ui.input(|input| input.pointer.any_pressed()) && ui.rect_contains_pointer(place)
 }
 
 /// Makes what `ui` holds a region with a name.

@@ -25,23 +25,21 @@ pub struct Home(pub Group, pub u8);
 /// The groups of tabs of the overview.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Group {
-    /// The right column, top: targets and settings.
+    /// The left column: targets and settings.
     Lists,
     /// The left image, alone.
     LeftImage,
-    /// Right of the left image, above: the target's close-up.
-    CloseUp,
     /// Right of the left image: the other views of the step and of the session.
     Views,
-    /// Below the images: windows of the template.
+    /// The low band below the images.
     Strip,
-    /// Beside the map: scores.
+    /// Below the band, left: scores.
     Scores,
-    /// Right of the other views: the map.
+    /// Below the band, middle: the map.
     Map,
-    /// Beside the map: plots over the steps.
+    /// Below the band, right: plots over the steps.
     Plots,
-    /// The right column, middle: the verdict.
+    /// The right column, top: the verdict.
     Verdict,
     /// The right column, bottom: details as text.
     Details,
@@ -157,7 +155,6 @@ mod tests {
             ("targets", Pane::Targets),
             ("settings", Pane::Settings),
             ("left", Pane::Left),
-            ("close_up", Pane::CloseUp),
             ("right", Pane::Right),
             ("strip", Pane::Strip),
             ("history", Pane::History),

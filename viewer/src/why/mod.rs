@@ -3,7 +3,6 @@
 //! A what-if belongs to one step. While it changes, at most one of its requests is under way; when the answer comes, the
 //! newest change is asked for next, so that dragging never queues.
 
-mod book;
 mod follow;
 pub(crate) mod panel;
 mod update;

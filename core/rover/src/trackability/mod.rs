@@ -1,7 +1,7 @@
 //! Trackability: how well a target would do at each place of a left image, before one is picked (R20, R21).
 //!
 //! ```text
-//! pair ─► dense stereo ─► ranges, depth edges ┐      point stereo on a grid where the pair is convergent
+//! pair ─► dense stereo ─► ranges, depth edges ┐
 //! left image ─► noise, light, texture         ├─► criteria of a window ─► good │ risky │ bad, with one reason
 //! cameras ─► rim, range error, longest step   ┘
 //! ```
@@ -36,7 +36,6 @@ pub mod ground;
 pub mod limits;
 pub mod map;
 pub mod pixel;
-mod point_ranges;
 pub mod texture;
 
 use serde::{Deserialize, Serialize};
@@ -68,21 +67,12 @@ impl Verdict {
     /// All of them, the best first.
     pub const ALL: [Self; 3] = [Self::Good, Self::Risky, Self::Bad];
 
-    /// Its word in sentences and tables; records have `bad` for `poor`.
+    /// Its word.
     pub const fn word(self) -> &'static str {
         match self {
             Self::Good => "good",
             Self::Risky => "risky",
-            Self::Bad => "poor",
-        }
-    }
-
-    /// Its word at the beginning of a sentence.
-    pub const fn title(self) -> &'static str {
-        match self {
-            Self::Good => "Good",
-            Self::Risky => "Risky",
-            Self::Bad => "Poor",
+            Self::Bad => "bad",
         }
     }
 

@@ -5,11 +5,9 @@ use egui::{Id, Label, RichText, Ui};
 use sightline_session::why::words::number;
 use sightline_session::why::{Node, Origin, OriginKind};
 
-use crate::cache::StepKey;
 use crate::command::{Command, Go};
 use crate::state::State;
 use crate::theme;
-use crate::why::panel::view;
 use crate::why::{Ask, Told};
 
 /// How many levels are open at first.
@@ -17,12 +15,8 @@ const OPEN: usize = 2;
 
 /// Shows the tree of the value that was asked for last.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    let Some((key, value, told)) = state.explained() else {
-        view::follow(ui, "tree", None::<(StepKey, String, bool)>, ui.cursor().top());
-        return;
-    };
+    let Some((key, value, told)) = state.explained() else { return };
     ui.add_space(2.0);
-    let top = ui.cursor().top();
     ui.horizontal_wrapped(|ui| {
         ui.label(theme::title(&format!("why {value}, {}", state.whose(key))));
         if state.why.asked.len() > 1
@@ -48,8 +42,6 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             }
         }
     }
-    let shown = (key.clone(), value.to_owned(), matches!(told, Told::Waiting));
-    view::follow(ui, "tree", Some(shown), top);
 }
 
 /// One value with what it was made of.
@@ -65,12 +57,7 @@ fn branch(ui: &mut Ui, node: &Node, id: Id, depth: usize, out: &mut Vec<Command>
             if let Some(formula) = &node.formula {
                 let sign = if node.is_closed_form { "= " } else { "" };
                 ui.add(
-                    Label::new(
-                        RichText::new(format!("{sign}{}", theme::formula(formula)))
-                            .small()
-                            .color(theme::text()),
-                    )
-                    .wrap(),
+                    Label::new(RichText::new(format!("{sign}{formula}")).small().color(theme::text())).wrap(),
                 );
             }
             if let Some(origin) = &node.origin {

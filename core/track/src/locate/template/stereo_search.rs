@@ -353,8 +353,7 @@ impl Candidates {
             if let Some(fit) = Fit::quadratic(&neighbours) {
                 best.along += fit.offset.x * self.spacing;
                 best.across += fit.offset.y;
-                // The fit may rise above the highest score of a correlation.
-                best.score = fit.score.min(1.0);
+                best.score = fit.score;
             }
         }
         Some(best)
