@@ -38,10 +38,11 @@ async fn the_rover_drives_waits_goes_on_with_another_setting_arrives_and_branche
     browser.says("min on Mars").await;
     browser.shot("drive-arrived").await;
 
-    // From an earlier stop in a world of its own.
+    // From the stop where run B began, in a world of its own.
     let trunk = browser.status().await["session"].as_str().unwrap().to_owned();
-    browser.go_to("1", 1).await;
-    browser.click_on("button", "Branch at stop 1").await;
+    let began = stops - 1;
+    browser.go_to(&format!("{began}"), began as usize).await;
+    browser.click_on("button", &format!("Branch at stop {began}")).await;
     browser.wait_status("the branch", &format!("s.session !== '{trunk}' && s.drive === 'arrived'")).await;
     browser.shot("drive-branch").await;
     browser.end().await;
