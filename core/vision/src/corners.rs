@@ -11,6 +11,8 @@
 //! | G | structure tensor | (fraction of full scale per px)² |
 //! | h | [`CornerSettings::half_px`] | px |
 
+use pulp::Arch;
+
 use crate::image::GrayImage;
 use sightline_geometry::frames::Pixel;
 
@@ -48,7 +50,11 @@ pub fn corners(image: &GrayImage, settings: &CornerSettings) -> Vec<Corner> {
     if width <= 2 * border || height <= 2 * border || settings.count == 0 {
         return Vec::new();
     }
-    let strengths = strengths(image, settings.half_px as usize);
+    let half = settings.half_px as usize;
+    let strengths = Arch::new().dispatch(
+        #[inline(always)]
+        || strengths(image, half),
+    );
     let mut maxima = Vec::new();
     for y in border..height - border {
         for x in border..width - border {
@@ -123,24 +129,27 @@ impl Kept {
 }
 
 /// The smaller eigenvalue at every pixel; not a number where the window leaves the image or touches an invalid pixel.
+#[inline(always)]
 fn strengths(image: &GrayImage, half: usize) -> Vec<f32> {
     let [width, height] = [image.width() as usize, image.height() as usize];
     let pixels = image.as_raw();
     let side = 2 * half + 1;
     let scale = 1.0 / (side * side) as f32;
     let mut strengths = vec![f32::NAN; width * height];
-    // Sums of the products over the columns of a window: added to below and taken from above would let errors and invalid
-    // pixels stay, so that each row of windows adds its own rows of products.
-    let mut products: Vec<[Vec<f32>; 3]> =
-        (0..height).map(|y| row_products(pixels, width, height, y)).collect();
-    for row in &mut products {
-        for product in row.iter_mut() {
-            *product = windowed(product, half);
+    // Sums of the products over the columns of a window, for the rows of one window at a time: added to below and taken from
+    // above would let errors and invalid pixels stay, so that each row of windows adds its own rows of products.
+    let empty = || [vec![f32::NAN; width], vec![f32::NAN; width], vec![f32::NAN; width]];
+    let mut rows: Vec<[Vec<f32>; 3]> = (0..side).map(|_| empty()).collect();
+    let (mut products, mut sums) = (empty(), empty());
+    for y in 0..height {
+        row_products(pixels, [width, height], y, &mut products);
+        for (sum, product) in rows[y % side].iter_mut().zip(&products) {
+            windowed(product, half, sum);
         }
-    }
-    for y in half + 1..height.saturating_sub(half + 1) {
-        let mut sums = [vec![0.0f32; width], vec![0.0f32; width], vec![0.0f32; width]];
-        for row in &products[y - half..=y + half] {
+        // The middle of the window whose last row this is.
+        let Some(middle) = y.checked_sub(half).filter(|middle| *middle > half) else { continue };
+        sums.iter_mut().for_each(|sum| sum.fill(0.0));
+        for row in (y + 1 - side..=y).map(|y| &rows[y % side]) {
             for (sum, product) in sums.iter_mut().zip(row) {
                 for (sum, product) in sum.iter_mut().zip(product) {
                     *sum += product;
@@ -148,7 +157,7 @@ fn strengths(image: &GrayImage, half: usize) -> Vec<f32> {
             }
         }
         let [xx, xy, yy] = &sums;
-        let line = &mut strengths[y * width..(y + 1) * width];
+        let line = &mut strengths[middle * width..(middle + 1) * width];
         for (((strength, xx), xy), yy) in line.iter_mut().zip(xx).zip(xy).zip(yy) {
             let (mean, half_gap) = (0.5 * (xx + yy), 0.5 * (xx - yy));
             *strength = scale * (mean - (half_gap * half_gap + xy * xy).sqrt());
@@ -158,14 +167,15 @@ fn strengths(image: &GrayImage, half: usize) -> Vec<f32> {
 }
 
 /// The products of the gradients in a row: along x twice, mixed, along y twice; not a number at the border.
-fn row_products(pixels: &[f32], width: usize, height: usize, y: usize) -> [Vec<f32>; 3] {
-    let mut products = [vec![f32::NAN; width], vec![f32::NAN; width], vec![f32::NAN; width]];
+#[inline(always)]
+fn row_products(pixels: &[f32], [width, height]: [usize; 2], y: usize, products: &mut [Vec<f32>; 3]) {
     if y == 0 || y + 1 >= height || width < 3 {
-        return products;
+        products.iter_mut().for_each(|product| product.fill(f32::NAN));
+        return;
     }
     let row = |y: usize| &pixels[y * width..(y + 1) * width];
     let (above, here, below) = (row(y - 1), row(y), row(y + 1));
-    let [xx, xy, yy] = &mut products;
+    let [xx, xy, yy] = products;
     for x in 1..width - 1 {
         let gx = 0.5 * (here[x + 1] - here[x - 1]);
         let gy = 0.5 * (below[x] - above[x]);
@@ -173,17 +183,19 @@ fn row_products(pixels: &[f32], width: usize, height: usize, y: usize) -> [Vec<f
         xy[x] = gx * gy;
         yy[x] = gy * gy;
     }
-    products
 }
 
 /// Sums over the 2·half + 1 values around each; not a number where one is missing.
-fn windowed(values: &[f32], half: usize) -> Vec<f32> {
-    let mut sums = vec![f32::NAN; values.len()];
-    let side = 2 * half + 1;
-    for (sum, window) in sums[half..].iter_mut().zip(values.windows(side)) {
-        *sum = window.iter().sum();
+#[inline(always)]
+fn windowed(values: &[f32], half: usize, sums: &mut [f32]) {
+    let inner = &mut sums[half..values.len() - half];
+    inner.fill(0.0);
+    // One value of all windows after another: the additions of neighbouring windows go side by side.
+    for shift in 0..=2 * half {
+        for (sum, value) in inner.iter_mut().zip(&values[shift..]) {
+            *sum += value;
+        }
     }
-    sums
 }
 
 #[cfg(test)]

@@ -22,7 +22,6 @@ use utoipa::ToSchema;
 
 use sightline_geometry::frames::{Pixel, Point3, Pose, Vector3};
 use sightline_vision::correlate::Surface;
-use sightline_vision::image::{GrayImage, PixelRect};
 
 use super::points::{Eyes, Point, ground_normal};
 use super::reduce::Reduced;
@@ -237,7 +236,5 @@ fn surface(before: &Reduced, after: &Reduced, point: &Point, pixel: Pixel, motio
     let (from, to) = (&before.camera, &after.camera);
     let map = windows::map_of_plane(from, to, motion, pixel, &point.position, &normal)?;
     let template = windows::window(&before.image, pixel, &map, HALF_PX)?;
-    let image: &GrayImage = &after.image;
-    let whole = PixelRect::whole(image.width(), image.height());
-    windows::surface(&template, image, whole, OdometryScore::Normalised)
+    windows::surface(&template, &after.image, after.inside(), OdometryScore::Normalised)
 }

@@ -28,6 +28,8 @@ use super::windows::{self, Eye, Found};
 
 /// A match that lies farther beside its epipolar line is none, px.
 const BESIDE_MAX_PX: f64 = 1.6;
+/// How far beside the line scores are computed at most, px: the peak's neighbours are two pixels farther.
+const BESIDE_SCORES_PX: f64 = BESIDE_MAX_PX + 2.0;
 /// Part of the ground's range at which the search begins.
 const NEAREST_PART: f64 = 0.5;
 /// Range of the two ends of an epipolar line's tangent, as parts of a predicted range.
@@ -119,10 +121,14 @@ impl Line {
         Self { ends: [middle.offset(-along[0], -along[1]), middle.offset(along[0], along[1])] }
     }
 
-    /// The pixels around the line that hold the windows on it.
+    /// The pixels that hold the windows on the line, `margin_px` beyond its ends, and beside it as far as a match may be.
     fn region(&self, half: u32, margin_px: f64) -> PixelRect {
-        let reach = f64::from(half) + margin_px;
+        let beside_px = margin_px.min(BESIDE_SCORES_PX);
+        let reach = f64::from(half) + beside_px;
         let [a, b] = self.ends;
+        let length = a.distance(b).max(1e-9);
+        let [dx, dy] = [b.x - a.x, b.y - a.y].map(|side| side / length * (margin_px - beside_px));
+        let (a, b) = (a.offset(-dx, -dy), b.offset(dx, dy));
         let (x, y) = ((a.x.min(b.x) - reach).floor(), (a.y.min(b.y) - reach).floor());
         let span = |a: f64, b: f64| (a - b).abs() + 2.0 * reach + 2.0;
         PixelRect::new(x as i32, y as i32, span(a.x, b.x) as u32, span(a.y, b.y) as u32)

@@ -6,7 +6,7 @@
 use image::Luma;
 
 use sightline_geometry::camera::Camera;
-use sightline_vision::image::GrayImage;
+use sightline_vision::image::{GrayImage, PixelRect};
 
 use super::windows::Eye;
 
@@ -53,6 +53,16 @@ impl Reduced {
             }
         }
         Self { camera: eye.camera.clone(), image }
+    }
+
+    /// The image without its outermost pixels where these are invalid, as smoothing leaves them.
+    pub(super) fn inside(&self) -> PixelRect {
+        let [width, height] = [self.image.width(), self.image.height()];
+        let is_whole = self.image.as_raw().first().is_some_and(|value| value.is_finite());
+        if is_whole {
+            return PixelRect::whole(width, height);
+        }
+        PixelRect::new(1, 1, width.saturating_sub(2), height.saturating_sub(2))
     }
 
     pub(super) fn eye(&self) -> Eye<'_> {

@@ -82,7 +82,11 @@ impl<'a> Line<'a> {
     }
 
     fn pixel(&self, point: &Point, way_m: f64) -> Option<Pixel> {
-        self.eyes[1].left.camera.project(&(self.motion(way_m) * point.position))
+        self.pixel_by(point, &self.motion(way_m))
+    }
+
+    fn pixel_by(&self, point: &Point, motion: &Pose) -> Option<Pixel> {
+        self.eyes[1].left.camera.project(&(motion * point.position))
     }
 
     /// Distance between two places, m; none where nothing moves in the image.
@@ -110,10 +114,10 @@ impl<'a> Line<'a> {
         Reference::new(&windows::window(before.image, point.left, &map, self.half)?)
     }
 
-    /// The score of a window where the point would be.
-    fn score(&self, window: &Reference, point: &Point, way_m: f64) -> Option<f64> {
+    /// The score of a window where a motion would put the point.
+    fn score(&self, window: &Reference, point: &Point, motion: &Pose) -> Option<f64> {
         let image = self.eyes[1].left.image;
-        let there = windows::around(self.pixel(point, way_m)?, self.half, 0);
+        let there = windows::around(self.pixel_by(point, motion)?, self.half, 0);
         let is_whole = there.intersect(&PixelRect::whole(image.width(), image.height())) == Some(there);
         let seen = is_whole.then(|| Patch::from(crop(image, &there)))?;
         window.score(&seen).map(f64::from)
@@ -126,16 +130,17 @@ impl<'a> Line<'a> {
         let places = SLIPS.map(|slip| ((1.0 - slip) * wheels.norm() - seen_m) / spacing_m);
         let first = places[1].floor().clamp(-PLACES_MAX, -1.0) as i32;
         let last = places[0].ceil().clamp(1.0, PLACES_MAX) as i32;
-        let mut sums = vec![(0.0, 0usize); (last - first + 1) as usize];
+        let places = (first..=last).map(|place| f64::from(place) * spacing_m);
+        let places: Vec<(f64, Pose)> = places.map(|way_m| (way_m, self.motion(way_m))).collect();
+        let mut sums = vec![(0.0, 0usize); places.len()];
         for point in points {
             let mut window = (None, None);
-            for (place, sum) in (first..=last).zip(&mut sums) {
-                let way_m = f64::from(place) * spacing_m;
+            for ((way_m, motion), sum) in places.iter().zip(&mut sums) {
                 let number = (way_m / WINDOWS_M).round();
                 if window.0 != Some(number) {
                     window = (Some(number), self.window(point, number * WINDOWS_M));
                 }
-                let score = window.1.as_ref().and_then(|window| self.score(window, point, way_m));
+                let score = window.1.as_ref().and_then(|window| self.score(window, point, motion));
                 if let Some(score) = score {
                     *sum = (sum.0 + score, sum.1 + 1);
                 }

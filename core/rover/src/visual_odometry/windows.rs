@@ -88,16 +88,16 @@ pub(super) fn surface(
 /// The highest of the scores at whole pixels that are allowed, refined below the pixel; `None` where it is at the border of the
 /// surface.
 pub(super) fn best(surface: &Surface, is_allowed: impl Fn(Pixel) -> bool) -> Option<Found> {
-    let mut highest: Option<(u32, u32, f32)> = None;
-    for iy in 0..surface.height {
-        for ix in 0..surface.width {
-            let Some(score) = surface.at(ix, iy) else { continue };
-            if highest.is_none_or(|(.., best)| score > best) && is_allowed(surface.pixel_of(ix, iy)) {
-                highest = Some((ix, iy, score));
+    let mut highest = (None, f32::NEG_INFINITY);
+    for (iy, row) in (0..).zip(surface.scores.chunks_exact((surface.width as usize).max(1))) {
+        for (ix, score) in (0..).zip(row) {
+            // An excluded position, whose score is no number, is not above any.
+            if *score > highest.1 && is_allowed(surface.pixel_of(ix, iy)) {
+                highest = (Some((ix, iy)), *score);
             }
         }
     }
-    let (ix, iy, _) = highest?;
+    let (ix, iy) = highest.0?;
     let peak = peak_at(surface, ix, iy, true).filter(|peak| !peak.at_edge)?;
     Some(Found { pixel: peak.pixel, score: peak.score, covariance_px2: peak.covariance_px2 })
 }
