@@ -43,7 +43,7 @@ async fn the_left_image_has_most_of_the_page() {
         browser.resize(width, height).await;
         for (digit, name, least) in [("1", "overview", least[0]), ("8", "image", least[1])] {
             browser.chord(&["Shift"], digit).await;
-            browser.wait_status("the image", "s.shown && s.complete && s.image_to_screen").await;
+            browser.wait_status("the image", "s.shown && s.complete && s.image_to_screen !== null").await;
             tokio::time::sleep(std::time::Duration::from_millis(700)).await;
             let share = browser.evaluate(SHARE).await.as_f64().unwrap();
             println!("{width} × {height}, {name}: {:.1} %", 100.0 * share);

@@ -277,3 +277,13 @@ fn a_scenario_of_the_program_is_opened_with_one_click() {
     answer::<AddTraverse>(&mut state, &entry);
     assert!(!state.files.is_open && !calls(&mut state).is_empty());
 }
+
+#[test]
+fn the_window_stays_where_it_is_from_the_second_frame_on() {
+    use egui_kittest::kittest::Queryable;
+    let mut window = shown(opened);
+    let place = |window: &Shown<'_>| window.harness.get_by_label("recording kitti/01").rect();
+    let first = place(&window);
+    window.harness.run_steps(12);
+    assert_eq!(place(&window), first);
+}

@@ -15,6 +15,9 @@ use crate::theme;
 /// How many recent sessions are listed.
 const LISTED: usize = 30;
 
+/// The window's height at most, points. It does not depend on what has come in: lines must not move under the pointer.
+const MAX_HEIGHT: f32 = 640.0;
+
 /// The room for the small button beside a line.
 const BESIDE_WIDTH: f32 = 84.0;
 
@@ -26,9 +29,10 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let mut ask = |ask: Ask| out.push(Command::Files(ask));
     let modal = Modal::new(Id::unique("open")).backdrop_color(theme::shade()).show(ui.ctx(), |ui| {
         ui.set_width(600.0);
-        let height = (ui.ctx().content_rect().height() - 150.0).max(200.0);
+        let height = (ui.ctx().content_rect().height() - 150.0).clamp(200.0, MAX_HEIGHT);
         ui.label(RichText::new("Open").size(16.0).strong().color(theme::strong()));
-        ScrollArea::vertical().max_height(height).auto_shrink([false, true]).show(ui, |ui| {
+        let list = ScrollArea::vertical().max_height(height).min_scrolled_height(height).auto_shrink(false);
+        list.show(ui, |ui| {
             if recording_window::card(ui, state, &mut ask) {
                 return;
             }
@@ -201,7 +205,7 @@ pub(super) fn row(
     ui.horizontal(|ui| {
         let width = ui.available_width() - if beside.is_some() { BESIDE_WIDTH } else { 0.0 };
         let size = vec2(width, 26.0);
-        let button = Button::selectable(is_on, job).truncate().min_size(size);
+        let button = Button::selectable(is_on, (job, egui::Atom::grow())).truncate().min_size(size);
         let is_pressed = ui.add_sized(size, button).accessible_name(name).clicked();
         let is_beside = beside.is_some_and(|(label, name)| {
             let button = Button::new(label).min_size(vec2(24.0, 24.0));

@@ -197,9 +197,9 @@ const MAP_AND_PLOTS: &[Group] = &[Group::Map, Group::Plots, Group::Scores];
 
 /// Right of the images.
 const COLUMN: Area = Column(&[
-    (Home(&[Group::Lists]), 0.26),
-    (Home(&[Group::Verdict]), 0.36),
-    (Home(&[Group::Details]), 0.38),
+    (Home(&[Group::Lists]), 0.25),
+    (Home(&[Group::Verdict]), 0.43),
+    (Home(&[Group::Details]), 0.32),
 ]);
 
 const IMAGE: Area = Row(&[

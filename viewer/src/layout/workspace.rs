@@ -339,6 +339,23 @@ mod tests {
     }
 
     #[test]
+    fn arrows_and_enter_stay_the_pages_while_a_whole_panel_has_the_keyboard() {
+        let mut harness = page();
+        harness.state_mut().apply(LayoutCommand::Panel(1));
+        harness.run_steps(3);
+        let focused = harness.ctx.memory(|memory| memory.focused()).expect("a panel has the keyboard");
+        assert!(crate::layout::is_panel(&harness.ctx, focused));
+        harness.key_press(egui::Key::ArrowRight);
+        harness.run_steps(3);
+        let after = harness.ctx.memory(|memory| memory.focused());
+        assert_eq!(after, Some(focused), "an arrow took the keyboard to a control");
+        harness.key_press(egui::Key::Tab);
+        harness.run_steps(3);
+        let after = harness.ctx.memory(|memory| memory.focused()).expect("Tab goes on in the panel");
+        assert!(after != focused && !crate::layout::is_panel(&harness.ctx, after));
+    }
+
+    #[test]
     fn the_panel_that_was_clicked_fills_the_page() {
         let mut harness = page();
         harness.state_mut().apply(LayoutCommand::Panel(1));

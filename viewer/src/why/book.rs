@@ -41,6 +41,12 @@ impl State {
         Some(Book { trace: self.trace()?, before, settings: &run.settings, prediction_px, sources: poses })
     }
 
+    /// Whether the record of the cursor's step is here and has this value.
+    pub(crate) fn has_value(&self, name: &str) -> bool {
+        let poses = self.poses();
+        poses.as_ref().and_then(|poses| self.book(poses)).is_some_and(|book| book.ask(name).is_ok())
+    }
+
     /// The change of the estimated pose to the cursor's stop, and its error where the truth is known.
     pub(crate) fn pose_change(&self) -> Option<(PoseChange, Option<[f64; 6]>)> {
         let traverse = self.traverse.as_ref()?;

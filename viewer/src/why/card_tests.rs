@@ -39,7 +39,7 @@ fn after_a_branch_nothing_is_tried_any_more() {
 }
 
 #[test]
-fn a_tree_that_is_asked_for_is_scrolled_into_view() {
+fn a_tree_that_is_asked_for_is_scrolled_into_view_and_the_key_of_the_panel_brings_the_card_back() {
     let explanation = Explanation {
         step: LOST,
         sentence: String::new(),
@@ -49,7 +49,8 @@ fn a_tree_that_is_asked_for_is_scrolled_into_view() {
     };
     let asked = Rc::new(RefCell::new(None));
     let is_asked = Rc::new(Cell::new(false));
-    let (made, shows_asked) = (Rc::clone(&asked), Rc::clone(&is_asked));
+    let (made, read) = (Rc::clone(&asked), Rc::clone(&asked));
+    let shows_asked = Rc::clone(&is_asked);
     let mut shown = Shown::new(
         [420.0, 150.0],
         move |context| {
@@ -60,7 +61,7 @@ fn a_tree_that_is_asked_for_is_scrolled_into_view() {
             fixture::at_step(context, LOST)
         },
         move |ui, state, out| {
-            let asked = asked.borrow();
+            let asked = read.borrow();
             let state = asked.as_ref().filter(|_| shows_asked.get()).unwrap_or(state);
             crate::layout::show_pane(ui, Pane::Why, state, out);
         },
@@ -73,6 +74,9 @@ fn a_tree_that_is_asked_for_is_scrolled_into_view() {
     let title = shown.harness.get_by_label_contains("WHY STATE, RUN A").rect();
     assert!(title.top() >= 0.0 && title.bottom() <= 150.0, "{title:?}");
     assert!(headline(&shown) < before, "the tree was below the fold");
+    asked.borrow_mut().as_mut().unwrap().perform(Command::Why(Ask::Selected));
+    shown.harness.run_steps(60);
+    assert!((headline(&shown) - before).abs() < 1.0, "{} and {before}", headline(&shown));
 }
 
 #[test]

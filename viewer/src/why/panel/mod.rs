@@ -41,7 +41,11 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let Some(book) = state.book(&poses) else { return };
     let trace = book.trace;
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        let top = ui.cursor().top();
         card(ui, state, &book.summary());
+        if !state.why.in_view.is_tree {
+            view::bring(ui, state.why.in_view.count, top, true);
+        }
         ui.horizontal_wrapped(|ui| {
             let explain =
                 ui.button("Why this state?").on_hover_text("Where the tracking state of this step came from");

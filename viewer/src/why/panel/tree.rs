@@ -5,7 +5,6 @@ use egui::{Id, Label, RichText, Ui};
 use sightline_session::why::words::number;
 use sightline_session::why::{Node, Origin, OriginKind};
 
-use crate::cache::StepKey;
 use crate::command::{Command, Go};
 use crate::state::State;
 use crate::theme;
@@ -18,7 +17,6 @@ const OPEN: usize = 2;
 /// Shows the tree of the value that was asked for last.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let Some((key, value, told)) = state.explained() else {
-        view::follow(ui, "tree", None::<(StepKey, String, bool)>, ui.cursor().top());
         return;
     };
     ui.add_space(2.0);
@@ -48,8 +46,9 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             }
         }
     }
-    let shown = (key.clone(), value.to_owned(), matches!(told, Told::Waiting));
-    view::follow(ui, "tree", Some(shown), top);
+    if state.why.in_view.is_tree {
+        view::bring(ui, state.why.in_view.count, top, !matches!(told, Told::Waiting));
+    }
 }
 
 /// One value with what it was made of.
