@@ -154,6 +154,16 @@ async fn a_drive_waits_goes_on_with_other_settings_and_branches() {
     waited(&server, &branch, has_ended).await;
     assert_eq!(exported(&server, &branch, 0).await, wanted);
     assert_eq!(exported(&server, &session, 1).await, trunk);
+
+    // From the same stop the second run drives on with its own settings, which it took up only at stop 3.
+    let begun = server.post(&format!("sessions/{session}/targets/0/runs/1/drive"), &new).await.expect(201);
+    let branch = begun["id"].as_str().unwrap().to_owned();
+    let ended = waited(&server, &branch, has_ended).await;
+    let own = exported(&server, &branch, 1).await;
+    assert_eq!(ended["summary"]["stops"], json!(own.len()));
+    assert_eq!(own[..2], wanted[..2]);
+    let view = server.get(&format!("sessions/{branch}/targets/0/runs/1")).await.expect(200);
+    assert_eq!((&view["fork"]["from_step"], &view["changes"]["ncc_min"]), (&json!(2), &json!(0.65)));
     assert!(server.get(&image).await.bytes == seen && !seen.is_empty());
 }
 

@@ -16,7 +16,7 @@ use sightline_api::wire::NewDrive;
 use sightline_recordings::DrivenTraverse;
 use sightline_session::driving::{DriveView, Steering};
 use sightline_session::view::{SavedSession, SavedTarget, SessionView};
-use sightline_session::{Cursor, Session};
+use sightline_session::{Cursor, Fork, Session};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
@@ -177,6 +177,11 @@ fn session_of(saved: SavedSession, steering: Steering, from_step: usize) -> Save
     let mut targets: Vec<SavedTarget> = targets.collect();
     // A run that was stopped drives on.
     targets.iter_mut().filter_map(|target| target.runs.get_mut(run)).for_each(|run| run.stop_after = None);
+    // The new drive lacks the later stops: what was changed there is changed from here on.
+    let forks = targets.iter_mut().flat_map(|target| &mut target.runs).filter_map(|run| run.fork.as_mut());
+    for fork in forks.filter(|fork| fork.from_step > from_step) {
+        *fork = Fork::new(fork.run, from_step);
+    }
     SavedSession {
         cursor: Cursor { target: Some(0), run, step: from_step },
         targets,
