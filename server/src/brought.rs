@@ -23,6 +23,7 @@ use crate::cancel::CancelFlag;
 use crate::driven;
 use crate::drives::{folder_name, scenario_of};
 use crate::identity::{Identity, Relation};
+use crate::imports;
 use crate::limits::{Limit, Limits};
 use crate::live_session::{LABEL_LIMIT, LiveSession};
 use crate::problem::{ApiError, ApiResult};
@@ -85,6 +86,8 @@ pub(crate) fn remove(state: &AppState, open: &OpenTraverse) -> ApiResult<()> {
     state.close_traverse(open)?;
     if open.driven.is_some() {
         remove_folder(open.traverse.folder())?;
+    } else if imports::forget(state.folders(), open)? {
+        // Its folder is removed, or only the reference to one that is not the server's.
     } else if let Some(scenario) = scenario_of(&open.traverse) {
         let name = folder_name(&scenario);
         state.store().remove_drive(&name)?;
@@ -94,7 +97,7 @@ pub(crate) fn remove(state: &AppState, open: &OpenTraverse) -> ApiResult<()> {
     Ok(())
 }
 
-fn remove_folder(folder: &Path) -> Result<()> {
+pub(crate) fn remove_folder(folder: &Path) -> Result<()> {
     match std::fs::remove_dir_all(folder) {
         Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
             Err(Error::Write { path: folder.to_owned(), source })

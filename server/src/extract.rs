@@ -204,21 +204,35 @@ fn parse<T: DeserializeOwned + 'static>(bytes: &[u8]) -> ApiResult<T> {
     Ok(value)
 }
 
-/// Refuses bodies that are not JSON, so that a form on a foreign page cannot reach a route.
-pub(crate) fn check_content_type(method: &Method, headers: &HeaderMap) -> ApiResult<()> {
+/// The paths whose bodies are files.
+const UPLOADS: &str = "/api/v1/uploads/";
+
+/// Refuses bodies that are not JSON, or not bytes where files are sent, so that a form on a foreign page cannot reach a route.
+pub(crate) fn check_content_type(method: &Method, path: &str, headers: &HeaderMap) -> ApiResult<()> {
     if method.is_safe() {
         return Ok(());
     }
-    let is_json = |value: &axum::http::HeaderValue| {
+    let is_file = method == Method::PUT && path.starts_with(UPLOADS);
+    let is_allowed = |value: &axum::http::HeaderValue| {
         let media_type = value.to_str().unwrap_or_default().split(';').next().unwrap_or_default().trim();
         media_type.eq_ignore_ascii_case("application/json")
+            || is_file && media_type.eq_ignore_ascii_case("application/octet-stream")
     };
     let length = headers.get(header::CONTENT_LENGTH);
     let has_body =
         length.is_some_and(|length| length != "0") || headers.contains_key(header::TRANSFER_ENCODING);
     let mut types = headers.get_all(header::CONTENT_TYPE).iter().peekable();
     let is_unsaid = types.peek().is_none();
-    if (is_unsaid && has_body) || !types.all(is_json) { Err(not_json()) } else { Ok(()) }
+    if (is_unsaid && has_body) || !types.all(is_allowed) {
+        return Err(if is_file { not_bytes() } else { not_json() });
+    }
+    Ok(())
+}
+
+fn not_bytes() -> ApiError {
+    let detail =
+        "The body of this request is a file, said by the header `Content-Type: application/octet-stream`.";
+    ApiError::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, "not_bytes", detail)
 }
 
 fn not_json() -> ApiError {

@@ -16,16 +16,49 @@ pub(crate) struct Folders {
     pub traverses: PathBuf,
     /// Drives on commands.
     pub driven: PathBuf,
+    /// Recordings that were imported from pages, and references to those that are opened in place.
+    pub imported: PathBuf,
+    /// Recordings that pages send, until they are imported; emptied at each start.
+    pub uploads: PathBuf,
     /// Digests of the files of recorded traverses, from which nothing but time is lost when it is removed.
     pub digests: PathBuf,
+    /// The folders below which pages may open recordings; canonical, and not the server's own.
+    pub recordings: Vec<PathBuf>,
 }
 
 impl Folders {
     /// Sessions in `folder` itself, the rest in folders below it.
     pub(crate) fn in_one(folder: &Path) -> Self {
-        let [studies, traverses, driven, digests] =
-            ["studies", "traverses", "driven", "digests"].map(|name| folder.join(name));
-        Self { sessions: folder.to_owned(), studies, traverses, driven, digests }
+        let [studies, traverses, driven, imported, uploads, digests] =
+            ["studies", "traverses", "driven", "imported", "uploads", "digests"]
+                .map(|name| folder.join(name));
+        let recordings = Vec::new();
+        Self {
+            sessions: folder.to_owned(),
+            studies,
+            traverses,
+            driven,
+            imported,
+            uploads,
+            digests,
+            recordings,
+        }
+    }
+
+    /// The same folders, with those below which pages may open recordings.
+    ///
+    /// # Errors
+    /// What is no folder.
+    pub(crate) fn with_recordings(self, recordings: &[PathBuf]) -> sightline_geometry::error::Result<Self> {
+        let real = |path: &PathBuf| {
+            let real = path.canonicalize().ok().filter(|real| real.is_dir());
+            real.ok_or_else(|| {
+                let problem = "is no folder; give --recordings a folder that exists";
+                sightline_geometry::error::Error::format(path, problem)
+            })
+        };
+        let recordings = recordings.iter().map(real).collect::<sightline_geometry::error::Result<_>>()?;
+        Ok(Self { recordings, ..self })
     }
 
     /// Makes the folders beside that of the sessions, for the owner alone, and begins to remove what a killed server left in
@@ -34,7 +67,11 @@ impl Folders {
     /// # Errors
     /// Those of the system.
     pub(crate) fn prepare(&self) -> Result<()> {
-        let folders = [&self.studies, &self.traverses, &self.driven, &self.digests].map(PathBuf::clone);
+        let folders =
+            [&self.studies, &self.traverses, &self.driven, &self.imported, &self.uploads, &self.digests];
+        let folders = folders.map(PathBuf::clone);
+        // Nobody sends the rest of an upload of an earlier start.
+        let _ = std::fs::remove_dir_all(&self.uploads);
         folders.iter().try_for_each(|folder| make_private(folder))?;
         let tidy = move || folders.iter().for_each(|folder| tidy(folder, DEPTH));
         std::thread::Builder::new().name("tidy".to_owned()).spawn(tidy).map(|_| ())

@@ -77,7 +77,7 @@ fn check(access: &Access, method: &Method, uri: &Uri, headers: &HeaderMap) -> Ap
     if is_foreign && !is_navigation {
         return Err(ApiError::forbidden("origin", "A page of another site may not read this."));
     }
-    check_content_type(method, headers)?;
+    check_content_type(method, uri.path(), headers)?;
     if uri.path().starts_with("/api") && uri.path() != LOGIN {
         access.check(headers)?;
     }

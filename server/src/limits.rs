@@ -111,6 +111,12 @@ limits! {
     target_numbers = 4096, 1, "targets", "targets of a session, the removed ones included";
     runs = 256, 1, "runs", "runs of a target";
     drives = 64, 1, "drives", "drives that are opened from pages";
+    imports = 64, 1, "imports", "imports of recordings in the list";
+    imports_waiting = 16, 1, "imports", "imports that wait; one is carried out at a time";
+    recordings = 200, 1, "recordings", "recordings that are listed below the folders named at start";
+    uploads = 4, 1, "uploads", "recordings that pages have sent and not imported yet";
+    upload_bytes = 4 << 30, 1, "bytes", "a recording that a page sends, and what its archive unpacks to";
+    upload_files = 50_000, 1, "files", "files of a recording that a page sends";
     stops = 20_000, 1, "stops", "stops of a drive";
     image_pixels = 64_000_000, 1, "pixels", "pixels of an image";
     studies = 64, 1, "studies", "studies in the list";

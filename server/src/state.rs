@@ -1,7 +1,7 @@
 //! What the handlers share: the open traverses, the sessions, and the ways to compute, to save and to tell.
 
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 use sightline_api::event::Event;
@@ -17,6 +17,7 @@ use crate::driven::{self, OpenTraverses};
 use crate::drives;
 use crate::folders::Folders;
 use crate::idempotency;
+use crate::imports::{self, Imports};
 use crate::jobs::{Lane, lock};
 use crate::limits::{Limits, SharedLimits};
 use crate::live_session::LiveSession;
@@ -34,6 +35,7 @@ use crate::study::jobs::Shelf;
 use crate::study::order::order;
 use crate::study::saved::Keeper;
 use crate::trackability_maps::Maps;
+use crate::uploads::Uploads;
 
 mod bounds;
 mod changes;
@@ -75,6 +77,8 @@ struct Inner {
     maps: Maps,
     odometry: OdometryTables,
     questions: Questions,
+    imports: Imports,
+    uploads: Uploads,
 }
 
 impl Drop for Inner {
@@ -106,6 +110,21 @@ impl AppState {
         Self::with_folders(traverses, &Folders::in_one(folder), access, limits)
     }
 
+    /// The same, whose pages may open the recordings below these folders.
+    ///
+    /// # Errors
+    /// As `Self::with_folders`, or a folder that does not exist.
+    pub fn with_recordings(
+        traverses: Vec<Traverse>,
+        folder: &Path,
+        access: Access,
+        limits: Limits,
+        recordings: &[PathBuf],
+    ) -> Result<Self> {
+        let folders = Folders::in_one(folder).with_recordings(recordings)?;
+        Self::with_folders(traverses, &folders, access, limits)
+    }
+
     /// Opens the state on its folders.
     ///
     /// # Errors
@@ -125,10 +144,9 @@ impl AppState {
         let (mut open, of_drives) = drives::open_given(traverses, folders, &events)?;
         let given = open.iter().map(|open| open.id.clone()).collect();
         let store = Store::open(&folders.sessions)?;
-        let drives_lost = drives::open_again(&store, folders, &cache, &mut open, &events)?;
-        let driven_lost = driven::open_again(folders, &cache, &mut open, &events);
+        let lost = open_again(&store, folders, &cache, &mut open, &events)?;
         let (sessions, mut notices) = Sessions::read_back(&store, &open)?;
-        notices.extend(of_drives.into_iter().chain(drives_lost).chain(driven_lost));
+        notices.extend(of_drives.into_iter().chain(lost));
         for notice in &notices {
             tracing::warn!("{}", crate::printable::printable(notice));
         }
@@ -166,6 +184,8 @@ impl AppState {
             maps: Maps::new(&limits),
             odometry: OdometryTables::new(&limits),
             questions,
+            imports: Imports::new(&limits),
+            uploads: Uploads::new(&limits),
             limits,
         })))
     }
@@ -312,6 +332,16 @@ impl AppState {
         &self.0.odometry
     }
 
+    /// The imports of recordings.
+    pub(crate) fn imports(&self) -> &Imports {
+        &self.0.imports
+    }
+
+    /// The recordings that pages send.
+    pub(crate) fn uploads(&self) -> &Uploads {
+        &self.0.uploads
+    }
+
     /// The live Rerun streams, by session.
     pub(crate) fn streams(&self) -> &Streams {
         &self.0.streams
@@ -321,4 +351,21 @@ impl AppState {
     pub(crate) fn questions(&self) -> &Questions {
         &self.0.questions
     }
+}
+
+/// Opens the drives of earlier starts; what cannot be opened is said in one sentence each.
+///
+/// # Errors
+/// As [`drives::open_again`].
+fn open_again(
+    store: &Store,
+    folders: &Folders,
+    cache: &Arc<Cache>,
+    open: &mut Vec<Arc<OpenTraverse>>,
+    events: &broadcast::Sender<Event>,
+) -> Result<Vec<String>> {
+    let mut lost = drives::open_again(store, folders, cache, open, events)?;
+    lost.extend(driven::open_again(folders, cache, open, events));
+    lost.extend(imports::open_again(folders, cache, open, events));
+    Ok(lost)
 }

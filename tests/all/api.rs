@@ -63,6 +63,28 @@ async fn the_same_target_can_be_named_by_pixel_by_rover_point_and_by_site_point(
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_target_keeps_its_new_name_over_a_restart() {
+    let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
+    let server = TestServer::open(drive.path(), folder.path());
+    let session = server.begin().await;
+    server.pick(&session).await;
+    let path = format!("sessions/{session}/targets/0/label");
+    let name = |label: &str| json!({ "label": label });
+    let renamed = server.json(Method::PUT, &path, &name("  tall ridge ")).await.expect(200);
+    assert_eq!(renamed["targets"][0]["label"], "tall ridge");
+    let long = server.json(Method::PUT, &path, &name(&"x".repeat(101))).await.problem(422, "field");
+    assert!(long.contains("label"), "{long}");
+    let none = format!("sessions/{session}/targets/7/label");
+    assert_eq!(server.json(Method::PUT, &none, &name("a")).await.status, 404);
+    drop(server);
+    let server = TestServer::open(drive.path(), folder.path());
+    let view = server.get(&format!("sessions/{session}")).await.expect(200);
+    assert_eq!(view["targets"][0]["label"], "tall ridge");
+    let blank = server.json(Method::PUT, &path, &name(" ")).await.expect(200);
+    assert_eq!(blank["targets"][0]["label"], "target 1");
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn the_light_of_a_target_is_a_table_with_a_line_for_every_accepted_update() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), folder.path());

@@ -70,6 +70,10 @@ fn bad_commands_and_bad_input_have_their_own_exit_codes() {
     refused(&["simulate", "--out", folder, "--set", "sun.height=3"], 3, "sun.height");
     refused(&["import", folder, "--out", "x"], 3, "native traverse");
     refused(&["serve", "/nowhere/at/all", "--port", "0"], 3, "/nowhere/at/all");
+    let kitti = crate::recordings::kitti(1);
+    let sequence = kitti.path().join("drive");
+    refused(&["serve", text(&sequence), "--port", "0"], 3, "sightline serve --recordings");
+    refused(&["serve", folder, "--port", "0", "--recordings", "/nowhere/at/all"], 3, "/nowhere/at/all");
     refused(&["serve", folder, "--port", "0", "--listen", "0.0.0.0"], 3, "--allow-host");
     let beyond = ["serve", folder, "--port", "0", "--listen", "0.0.0.0", "--allow-host", "rover.example"];
     refused(&[&beyond[..], &["--no-token"]].concat(), 3, "access token");

@@ -41,7 +41,7 @@ async fn branched() -> (Bench, Browser) {
     browser.wait_status("the step", &format!("s.step === {FORK} && s.shown")).await;
     browser.press("w").await;
     browser.says("Accepted").await;
-    browser.set_value("slider", "try ncc_min", "0.9999").await;
+    browser.set_value("slider", "try match score limit", "0.9999").await;
     browser.click_on("button", "Run from here as branch").await;
     browser.wait_status("the branch", "s.run === 1 && !s.running && s.steps_done > s.step").await;
     browser.wait_status("the loss", &format!("s.step === {FORK} && s.state !== 'tracking' && s.shown")).await;
@@ -106,7 +106,7 @@ async fn a_handle_is_dragged_and_a_removed_branch_comes_back() {
     let (x, y) = browser.control("slider", "search window size handle").await.middle();
     browser.drag((x, y), (x + 24.0, y + 24.0)).await;
     browser.control("button", "discard what if").await;
-    browser.says("search_window_px").await;
+    browser.says("search window").await;
     browser.shot("handle").await;
     let predicted = browser.control("button", "prediction handle").await;
     let (x, y) = predicted.middle();

@@ -58,7 +58,7 @@ async fn a_change_is_tried_branched_compared_and_taken_back() {
     browser.press("w").await;
     browser.says("Accepted").await;
     // A limit that the match does not meet: the ghost says what the step would have been.
-    browser.set_value("slider", "try ncc_min", "0.999").await;
+    browser.set_value("slider", "try match score limit", "0.999").await;
     browser.control("button", "Run from here as branch").await;
     browser.shot("what-if").await;
     browser.press("Escape").await;

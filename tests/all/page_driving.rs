@@ -26,7 +26,7 @@ async fn the_rover_drives_waits_goes_on_with_another_setting_arrives_and_branche
     // The last step again with another limit, on the same images; then one stop with that run, and on to the end.
     browser.go_to(&format!("{}", stops - 1), (stops - 1) as usize).await;
     browser.press("w").await;
-    browser.set_value("slider", "try ncc_min", "0.6").await;
+    browser.set_value("slider", "try match score limit", "0.6").await;
     browser.click_on("button", "Run from here as branch").await;
     browser.wait_status("the run", &format!("s.run === 1 && s.steps_done === {stops} && !s.running")).await;
     browser.show_panel("Drive").await;
@@ -97,7 +97,7 @@ async fn a_paused_stage_is_repeated_with_another_setting_and_the_drive_goes_on_s
     browser.click_on("button", "Next stage").await;
     browser.wait_status("the verdict", "s.run === 0 && s.paused_before === 'update' && s.shown").await;
     browser.press("w").await;
-    browser.set_value("slider", "try ncc_min", "0.9999").await;
+    browser.set_value("slider", "try match score limit", "0.9999").await;
     browser.click_on("button", "Run from here as branch").await;
     let again = format!("s.run === 1 && s.steps_done === {} && !s.running && s.shown", stop + 1);
     browser.wait_status("the run", &again).await;

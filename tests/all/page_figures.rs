@@ -57,7 +57,7 @@ async fn a_panel_is_saved_as_svg_and_png_which_look_alike_and_a_plot_is_read_as_
     browser.evaluate(CATCH).await;
     browser.press("ArrowRight").await;
     browser.wait_status("a step with scores", "s.step === 1 && s.shown").await;
-    browser.activate("tab", "Match scores").await;
+    browser.show_panel("Match scores").await;
     tokio::time::sleep(Duration::from_millis(1500)).await;
 
     let (name, png) = save(&browser, "Match scores", "PNG 2x").await;
@@ -83,11 +83,11 @@ async fn a_panel_is_saved_as_svg_and_png_which_look_alike_and_a_plot_is_read_as_
     println!("screen against PNG: mean {mean:.2} of 255, {:.1} % far", far * 100.0);
     assert!(mean < 6.0 && far < 0.08, "mean {mean:.2} of 255, {:.1} % of the pixels far off", far * 100.0);
 
-    browser.activate("tab", "Over the steps").await;
+    browser.show_panel("Over the steps").await;
     browser.click_on("button", "Over the steps as table").await;
     let table = browser.control("table", "Over the steps, ").await;
     assert_eq!(table.region, "Over the steps");
-    browser.control("columnheader", "scores ncc").await;
+    browser.control("columnheader", "scores match score").await;
     browser.control("row", "step 0").await;
     browser.click_on("button", "go to step 2").await;
     browser.wait_status("the step", "s.step === 2 && s.shown").await;

@@ -65,7 +65,8 @@ async fn a_new_user_finds_why_the_first_target_was_lost_and_what_saves_it() {
     browser.shot("first-2-lost").await;
     walk.press("w", "why").await;
     browser.says("Rejected:").await;
-    browser.says("prediction off by").await;
+    browser.says("The heading estimate jumped by").await;
+    browser.says("the target is outside the search window").await;
     browser.shot("first-3-why").await;
     assert!(walk.done.len() <= TO_THE_CAUSE, "{:?}", walk.done);
     println!("to the cause: {:?}", walk.done);

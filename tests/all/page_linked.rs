@@ -64,6 +64,7 @@ async fn a_place_that_is_pointed_at_is_shown_by_every_panel() {
     browser.point_at(x, y).await;
     browser.says("of the right image").await;
     browser.shot("linked-right").await;
+    browser.show_panel("Match scores").await;
     let (x, y) = browser.control("region", "Match scores").await.middle();
     browser.point_at(x, y).await;
     browser.says("template at x ").await;

@@ -19,7 +19,8 @@ async fn a_number_leads_to_where_it_came_from_and_on_from_there() {
     browser.shot("why-ncc").await;
     // One of its inputs, and back.
     let inputs = browser.controls().await;
-    let input = inputs.iter().find(|c| c.role == "link" && c.region == "Why" && !c.name.starts_with("score"));
+    let input =
+        inputs.iter().find(|c| c.role == "link" && c.region == "Why" && !c.name.starts_with("match score"));
     let input = input.expect("the score has inputs").clone();
     browser.activate("link", &input.name).await;
     browser.control("button", "Back").await;
@@ -80,7 +81,7 @@ async fn branch(browser: &Browser, least: &str, number: usize) {
     browser.go_to("2", 2).await;
     browser.press("w").await;
     browser.says("Accepted").await;
-    browser.set_value("slider", "try ncc_min", least).await;
+    browser.set_value("slider", "try match score limit", least).await;
     browser.click_on("button", "Run from here as branch").await;
     browser
         .wait_status("the branch", &format!("s.run === {number} && !s.running && s.steps_done > s.step"))

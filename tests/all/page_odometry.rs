@@ -56,9 +56,11 @@ async fn check_panel(browser: &Browser) {
     browser.shot("odometry-panel-large").await;
     browser.resize(1600, 1000).await;
     // The same corners are a layer of the page's left image.
+    browser.click_on("button", "legend").await;
     browser.click_on("checkbox", "odometry from step 1").await;
     browser.shot("odometry-layer").await;
     browser.click_on("checkbox", "odometry from step 1").await;
+    browser.press("Escape").await;
     browser.click_on("button", "visual_odometry").await;
     browser.show_panel("Inspector").await;
     browser.says("How did the rover move since the stop before").await;

@@ -38,7 +38,7 @@ async fn files_are_opened_by_dropping_bad_ones_are_told_why_and_a_recent_session
     drop_one(&browser, "log.rrd", b"RRF2").await;
     browser.says("“log.rrd” is a Rerun recording: open it with `rerun FILE`").await;
     drop_one(&browser, "left.png", &[137, 80, 78, 71]).await;
-    browser.says("“left.png” is a picture").await;
+    browser.says("“left.png” is a single image").await;
     drop_one(&browser, "core.toml", &[127, 69, 0, 255]).await;
     browser.says("“core.toml” is no text").await;
     drop_one(&browser, "nothing.toml", b"").await;

@@ -1,4 +1,4 @@
-//! Picking a target in a real browser: the map of good and bad places, a refusal with its way out, the aim by keys; and
+//! Picking a target in a real browser: the map of good and poor places, advice against a place with its ways on, the aim by keys; and
 //! the plain page of a step for whom the viewer cannot run.
 
 use sightline_geometry::frames::Pixel;
@@ -7,27 +7,27 @@ use sightline_tests::browser::Browser;
 use sightline_tests::scenario::short_approach;
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_bad_place_is_refused_with_the_reason_and_the_nearest_good_one_is_taken() {
+async fn a_poor_place_gives_its_reason_and_the_nearest_good_one_is_taken() {
     let bench = Bench::start(&short_approach()).await;
     let browser = Browser::start().await;
     bench.open(&browser).await;
     browser.press("t").await;
     browser.wait_status("pick mode", "s.pick_mode").await;
-    // The map comes by itself, with its legend in words.
-    browser.says("bad place, crossed").await;
+    // The map comes by itself.
+    browser.says("Map made with the default limits").await;
     browser.says("% good").await;
     browser.shot("trackability").await;
-    // Over the sky it says why not, before anything is clicked; a click there is refused with the same reason.
+    // Over the sky it says why not, before anything is clicked; a click there gives the same reason and two ways on.
     let (x, y) = place(&browser, Pixel::new(250.0, 20.0)).await;
     browser.point_at(x, y).await;
-    browser.says(": bad: ").await;
+    browser.says(": Poor: ").await;
     browser.shot("trackability-hover").await;
     browser.click(x, y).await;
-    browser.control("button", "Take the nearest good pixel").await;
-    browser.control("button", "Pick it all the same").await;
+    browser.control("button", "Use (").await;
+    browser.control("button", "Pick anyway").await;
     assert_eq!(browser.status().await["targets"], 0);
     browser.shot("refused").await;
-    browser.click_on("button", "Take the nearest good pixel").await;
+    browser.click_on("button", "Use (").await;
     browser
         .wait_status(
             "the target",

@@ -71,7 +71,7 @@ async fn while_the_server_is_gone_loaded_steps_stay_and_then_all_goes_on() {
     browser.click(x, y).await;
     browser.wait_status("the target, or advice", "s.target === 0 || s.advised_against").await;
     if browser.status().await["target"] != 0 {
-        browser.click_on("button", "Pick it all the same").await;
+        browser.click_on("button", "Pick anyway").await;
     }
     browser.wait_status("the run", "s.target === 0 && s.steps_done === s.stop_count && !s.running").await;
     for step in 1..=2 {

@@ -149,12 +149,12 @@ async fn the_limits_of_trackability_are_changed_and_the_map_is_made_by_them() {
     browser.control("textbox", "edge_bad_px").await;
     // What cannot be is told at once, with the name of the field, and nothing is lost.
     browser.set_value("textbox", "edge_risky_focus", "many").await;
-    browser.activate("button", "Make the map with these").await;
+    browser.activate("button", "Apply").await;
     browser.says("edge_risky_focus: must be a number").await;
     browser.shot("limits-wrong").await;
     browser.set_value("textbox", "edge_risky_focus", "0").await;
     browser.set_value("textbox", "edge_bad_px", "0").await;
-    browser.activate("button", "Make the map with these").await;
+    browser.activate("button", "Apply").await;
     browser.gone("textbox", "edge_bad_px").await;
     let start = std::time::Instant::now();
     loop {

@@ -2,6 +2,7 @@
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
+use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
@@ -9,6 +10,7 @@ use std::time::Duration;
 use serde_json::Value;
 use sightline_geometry::frames::Pixel;
 use sightline_recordings::{Traverse, create_simulated};
+use sightline_server::limits::Limits;
 use sightline_server::state::AppState;
 use sightline_world::Scenario;
 
@@ -34,19 +36,29 @@ impl Bench {
         let folder = rendered(scenario);
         let traverse = Traverse::open(&folder.path().join("approach")).unwrap();
         let rock = rock(scenario, &traverse);
-        Self::serve(traverse, rock, folder).await
+        Self::serve(traverse, rock, folder, &[]).await
+    }
+
+    /// The same, whose page may open the recordings below a folder.
+    pub async fn with_recordings(scenario: &Scenario, recordings: PathBuf) -> Self {
+        let folder = rendered(scenario);
+        let traverse = Traverse::open(&folder.path().join("approach")).unwrap();
+        let rock = rock(scenario, &traverse);
+        Self::serve(traverse, rock, folder, &[recordings]).await
     }
 
     /// Serves the recording in a folder, with a pixel of its first left image at which a rock is.
     pub async fn recording(folder: TempDir, rock: Pixel) -> Self {
-        Self::serve(Traverse::open(folder.path()).unwrap(), rock, folder).await
+        Self::serve(Traverse::open(folder.path()).unwrap(), rock, folder, &[]).await
     }
 
-    async fn serve(traverse: Traverse, rock: Pixel, folder: TempDir) -> Self {
+    async fn serve(traverse: Traverse, rock: Pixel, folder: TempDir, recordings: &[PathBuf]) -> Self {
         let stop_count = traverse.stop_count();
         let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
         let port = listener.local_addr().unwrap().port();
-        let state = AppState::new(vec![traverse], &folder.path().join("sessions"), access(port)).unwrap();
+        let (sessions, limits) = (folder.path().join("sessions"), Limits::default());
+        let state = AppState::with_recordings(vec![traverse], &sessions, access(port), limits, recordings);
+        let state = state.unwrap();
         tokio::spawn(async move { axum::serve(listener, sightline_server::app(state)).await });
         Self { port, rock, stop_count, _folder: folder }
     }
@@ -97,7 +109,7 @@ impl Bench {
             .wait_status("the target, or advice against the place", "s.target === 0 || s.advised_against")
             .await;
         if browser.status().await["target"] != 0 {
-            browser.click_on("button", "Pick it all the same").await;
+            browser.click_on("button", "Pick anyway").await;
         }
         browser.wait_status("the target", "s.target === 0").await;
         browser.wait_status("the run", &format!("s.steps_done === {} && !s.running", self.stop_count)).await;

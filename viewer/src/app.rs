@@ -25,7 +25,7 @@ use crate::panels::pane::{Need, Pane};
 use crate::panels::{bars, card, timeline};
 use crate::state::State;
 use crate::state::effect::Effect;
-use crate::state::pointed::taken_out;
+use crate::state::pointed::{is_covered, taken_out};
 use crate::tour::bubbles;
 use crate::trackability::limits_window;
 use crate::{figure, theme, tour};
@@ -64,6 +64,7 @@ impl SightlineApp {
         let mut state = State::new(link.origin.clone(), link.fragment.session.clone());
         state.looks = kept.looks().unwrap_or_default();
         state.single_keys = kept.single_keys();
+        state.stretch = kept.stretch().unwrap_or_default();
         theme::apply(context, state.looks);
         let mut workspace = Workspace::restored(kept.layout());
         if let Some(preset) = link.fragment.preset.filter(|preset| *preset != workspace.preset()) {
@@ -174,9 +175,18 @@ impl SightlineApp {
             Effect::ChooseFile | Effect::ReadFile(_) => self.inbox.choose(),
             #[cfg(not(target_arch = "wasm32"))]
             Effect::ReadFile(path) => self.inbox.open_path(std::path::Path::new(&path)),
+            #[cfg(target_arch = "wasm32")]
+            Effect::ChooseRecording { is_archive } => self.inbox.choose_recording(is_archive),
+            #[cfg(target_arch = "wasm32")]
+            Effect::SendRecording(upload) => self.inbox.send_recording(&self.state.origin, upload),
+            #[cfg(target_arch = "wasm32")]
+            Effect::StopSending => self.inbox.stop_sending(),
             // Outside a browser a file is named by its path.
             #[cfg(not(target_arch = "wasm32"))]
-            Effect::ChooseFile => {}
+            Effect::ChooseFile
+            | Effect::ChooseRecording { .. }
+            | Effect::SendRecording(_)
+            | Effect::StopSending => {}
         }
     }
 
@@ -205,6 +215,9 @@ impl SightlineApp {
                 timeline::show(ui, state, &mut out);
             });
         tour::here(ui.ctx(), tour::TIMELINE, band.response.rect);
+        if let Some(size) = state.left_size() {
+            self.workspace.fit_images(size);
+        }
         let mut panels = Panels::new(state, &mut out);
         CentralPanel::default()
             .frame(Frame::new().fill(theme::page()))
@@ -229,7 +242,9 @@ impl SightlineApp {
 
     /// Takes in what the pointer rests on: the next frame shows it in all panels.
     fn point(&mut self, context: &Context, commands: &mut Vec<Command>) {
-        let pointed = taken_out(commands);
+        let below = taken_out(commands);
+        // What lies under a window or a bubble is not pointed at.
+        let pointed = below.filter(|_| !is_covered(context));
         if pointed != self.state.pointed {
             self.state.pointed = pointed;
             context.request_repaint();

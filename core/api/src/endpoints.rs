@@ -28,14 +28,17 @@ use sightline_track::locate::template::history::AgainstEarlier;
 use crate::endpoint::{Done, Endpoint, File, Method, NoBody, NoQuery};
 use crate::event::Event;
 use crate::location::{
-    Anywhere, AtBreakpoint, AtDocument, AtExport, AtImage, AtNote, AtRun, AtSession, AtStep, AtStop,
-    AtStudyJob, AtTarget, AtTraverse, AtViewerFile,
+    Anywhere, AtBreakpoint, AtDocument, AtExport, AtImage, AtImport, AtNote, AtRun, AtSession, AtStep,
+    AtStop, AtStudyJob, AtTarget, AtTraverse, AtUpload, AtViewerFile,
 };
 use crate::program::{Health, Version};
 use crate::query::{FirstRow, FirstStop, ImageWish, MapLimits, MapPixel, SessionPart, ValueName};
+use crate::recording::{
+    ImportJob, NewImport, RecordingList, RecordingPath, RecordingView, UploadPath, UploadView,
+};
 use crate::wire::{
     Designated, Login, NewDrive, NewRun, NewSession, NewTarget, NewTraverse, RerunStream, SessionEntry,
-    StopDetail, StopOdometry, TraverseEntry, TraverseView,
+    StopDetail, StopOdometry, TargetLabel, TraverseEntry, TraverseView,
 };
 
 /// Declares a type for each endpoint, and the list of all of them.
@@ -76,6 +79,8 @@ pub const CREATING: &[&str] = &[
     AddNote::PATH,
     AddBreakpoint::PATH,
     StartStudy::PATH,
+    StartImport::PATH,
+    BeginUpload::PATH,
 ];
 
 endpoints! {
@@ -116,6 +121,25 @@ endpoints! {
     /// Stops computing a map.
     CancelTrackability: Post "/traverses/{id}/steps/{step}/trackability/cancel", AtStop, query MapLimits => Done;
 
+    /// The recordings below the folders that were named when the server was started.
+    ListRecordings: Get "/recordings", Anywhere => RecordingList;
+    /// What a recording contains.
+    ShowRecording: Get "/recordings/contents", Anywhere, query RecordingPath => RecordingView;
+    /// Begins to send a recording.
+    BeginUpload: Post "/uploads", Anywhere => UploadView;
+    /// Sends a file of a recording; the body is the file.
+    SendFile: Put "/uploads/{upload}/files", AtUpload, query UploadPath => UploadView;
+    /// Sends a recording as one zip archive; the body is the archive.
+    SendArchive: Put "/uploads/{upload}/archive", AtUpload => UploadView;
+    /// Removes a recording that was sent.
+    RemoveUpload: Delete "/uploads/{upload}", AtUpload => Done;
+    /// Imports a recording as a drive.
+    StartImport: Post "/imports", Anywhere, body NewImport => ImportJob;
+    /// How far an import is.
+    ShowImport: Get "/imports/{import}", AtImport => ImportJob;
+    /// Cancels an import.
+    CancelImport: Post "/imports/{import}/cancel", AtImport => ImportJob;
+
     /// The sessions on open traverses.
     ListSessions: Get "/sessions", Anywhere => Vec<SessionEntry>;
     /// Begins a session.
@@ -155,6 +179,8 @@ endpoints! {
 
     /// Designates a target.
     DesignateTarget: Post "/sessions/{session}/targets", AtSession, body NewTarget => Designated;
+    /// Renames a target.
+    RenameTarget: Put "/sessions/{session}/targets/{target}/label", AtTarget, body TargetLabel => SessionView;
     /// Removes a target.
     RemoveTarget: Delete "/sessions/{session}/targets/{target}", AtTarget => SessionView;
     /// Takes the removal of a target back.

@@ -6,6 +6,8 @@ use utoipa::ToSchema;
 use sightline_session::Cursor;
 use sightline_study::wire::StudyJob;
 
+use crate::recording::ImportJob;
+
 /// What the server tells every open page over the WebSocket.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "event", rename_all = "snake_case")]
@@ -24,6 +26,11 @@ pub enum Event {
     TraverseRemoved {
         /// The traverse.
         traverse: String,
+    },
+    /// An import of a recording went on.
+    ImportProgress {
+        /// How far it is.
+        job: ImportJob,
     },
     /// The cursor of a session was moved; nothing else of it changed.
     CursorMoved {

@@ -7,5 +7,6 @@ pub mod event;
 pub mod location;
 pub mod program;
 pub mod query;
+pub mod recording;
 pub mod table;
 pub mod wire;

@@ -38,6 +38,22 @@ pub struct AtImage {
     pub file: String,
 }
 
+/// An import of a recording.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, IntoParams)]
+#[into_params(parameter_in = Path)]
+pub struct AtImport {
+    /// The import's id.
+    pub import: String,
+}
+
+/// A recording that a page sends.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, IntoParams)]
+#[into_params(parameter_in = Path)]
+pub struct AtUpload {
+    /// The upload's id.
+    pub upload: String,
+}
+
 /// A session.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, IntoParams)]
 #[into_params(parameter_in = Path)]

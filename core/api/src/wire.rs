@@ -6,6 +6,7 @@ use utoipa::ToSchema;
 
 use sightline_geometry::camera::{Camera, CameraName, MastAngles};
 use sightline_geometry::frames::{Pixel, PoseRecord};
+use sightline_geometry::odometry_error::OdometryError;
 use sightline_geometry::stereo_geometry::StereoGeometry;
 use sightline_rover::designate::Place;
 use sightline_rover::driving::DriveCommand;
@@ -79,6 +80,9 @@ pub struct TraverseView {
     pub stereo: StereoGeometry,
     /// What was odd when it was opened.
     pub warnings: Vec<String>,
+    /// The error model of the pose estimates.
+    #[serde(default)]
+    pub odometry_error: OdometryError,
     /// Its stops.
     pub stops: Vec<StopView>,
 }
@@ -230,6 +234,14 @@ impl NewTarget {
             point_in_site: self.point_in_site,
         }
     }
+}
+
+/// The name of a target.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TargetLabel {
+    /// The name; blank: `target` and its number.
+    pub label: String,
 }
 
 /// A target that was designated, with the session that now has it.

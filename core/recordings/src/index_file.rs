@@ -58,7 +58,7 @@ pub(super) fn find(path: &Path) -> Result<(PathBuf, IndexFormat)> {
             [false, true] => Ok((path.join(IndexFormat::Json.file_name()), IndexFormat::Json)),
             [false, false] => Err(Error::format(
                 path,
-                "holds neither traverse.toml nor traverse.json; import a foreign recording first",
+                "contains neither traverse.toml nor traverse.json; import a foreign recording first: `sightline import FOLDER --out DRIVE`",
             )),
         };
     }

@@ -139,12 +139,20 @@ impl Session {
     pub fn add_target(&mut self, label: Option<String>, settings: Settings, first: Arc<RunStep>) -> usize {
         let number = self.targets.len();
         let designation = first.update.target.designation;
-        let label =
-            label.filter(|l| !l.trim().is_empty()).unwrap_or_else(|| format!("target {}", number + 1));
+        let label = target_label(number, &label.unwrap_or_default());
         let run = Run::new(Arc::new(settings), None, vec![first]);
         self.targets.push(TargetRecord { label, designation, runs: vec![run], removed: false });
         self.cursor = Cursor { target: Some(number), run: 0, step: designation.step };
         number
+    }
+
+    /// Renames a target.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when there is no such target.
+    pub fn rename_target(&mut self, target: usize, label: &str) -> Result<()> {
+        self.target_mut(target)?.label = target_label(target, label);
+        Ok(())
     }
 
     /// Forks `run`: the steps before `from_step` are shared, the later ones are computed with changed settings.
@@ -255,4 +263,10 @@ impl Session {
         let found = self.targets.get_mut(target).filter(|record| !record.removed);
         found.ok_or(Error::Request(message))
     }
+}
+
+/// The label that was given, or `target` and the number from 1 if it is blank.
+fn target_label(number: usize, given: &str) -> String {
+    let given = given.trim();
+    if given.is_empty() { format!("target {}", number + 1) } else { given.to_owned() }
 }

@@ -121,7 +121,7 @@ pub const STUDIES: &[Study] = &[
         unit: "images",
         grid: Grid::Skips,
         default_grid: &["0", "1", "2", "3", "4"],
-        ..study("straight", "How large may a step of a straight approach be (K§5.1, R108–R117)?", &[])
+        ..study("straight", "How large may a step of a straight approach be (Kim 2009, §5.1)?", &[])
     },
     Study {
         variable: "azimuth_step_deg",
@@ -130,7 +130,7 @@ pub const STUDIES: &[Study] = &[
         default_grid: &["5", "10", "15", "20", "30", "60"],
         ..study(
             "sideways",
-            "How far may the line of sight turn in one step (K§5.2, R118–R122)?",
+            "How far may the line of sight turn in one step (Kim 2009, §5.2)?",
             &["ncc", "ncc-scale", "ncc-scale-roll", "sightline", "sightline+surface_warp=false"],
         )
     },
@@ -139,17 +139,17 @@ pub const STUDIES: &[Study] = &[
         unit: "°",
         grid: Grid::Angles(90),
         default_grid: &["5", "10", "15", "20", "25", "30", "35", "40", "45"],
-        ..study("turn-in-place", "How far may the rover turn on the spot in one step (K§5.3, R123)?", &[])
+        ..study("turn-in-place", "How far may the rover turn on the spot in one step (Kim 2009, §5.3)?", &[])
     },
     study(
         "claim",
         "Is a target on natural rock tracked within several pixels, or a few centimetres, over a 10-m approach in \
-         steps of 10 % (K abstract, R127)? The seed draws the world, where the drive starts, where it heads, and the sun.",
+         steps of 10 % (Kim 2009, abstract)? The seed draws the world, where the drive starts, where it heads, and the sun.",
         &["ncc", "ncc-scale", "ncc-scale-roll", "sightline"],
     ),
     study(
         "approach",
-        "How near to the target does an approach from 10 m to 2 m end, and does the covariance say so (K§4.2, R41)?",
+        "How near to the target does an approach from 10 m to 2 m end, and does the covariance say so (Kim 2009, §4.2)?",
         &["sightline", "half-pixel", "ncc-scale-roll"],
     ),
     Study {
@@ -158,7 +158,7 @@ pub const STUDIES: &[Study] = &[
         default_grid: TERRAINS,
         ..study(
             "terrain",
-            "Does tracking survive slopes and slip, without and with visual odometry (K§5.5, R124–R126)?",
+            "Does tracking survive slopes and slip, without and with visual odometry (Kim 2009, §5.5)?",
             &["sightline", "ncc-scale-roll"],
         )
     },
@@ -167,7 +167,7 @@ pub const STUDIES: &[Study] = &[
         is_by_step: true,
         ..study(
             "checkout-1",
-            "What did each move around the rock change (K§7.1, Table III, R130–R135)?",
+            "What did each move around the rock change (Kim 2009, §7.1, Table III)?",
             &["ncc-scale-roll", "ncc-scale", "sightline"],
         )
     },
@@ -176,7 +176,7 @@ pub const STUDIES: &[Study] = &[
         is_by_step: true,
         ..study(
             "checkout-2",
-            "How much is corrected on the way from 9.65 m to 1.92 m (K§7.2, R137, R138)?",
+            "How much is corrected on the way from 9.65 m to 1.92 m (Kim 2009, §7.2)?",
             &["ncc-scale-roll", "sightline"],
         )
     },
@@ -185,7 +185,7 @@ pub const STUDIES: &[Study] = &[
         is_by_step: true,
         ..study(
             "checkout-3",
-            "Is the target kept through turning, backing up and coming back (K§7.3, R140–R142)?",
+            "Is the target kept through turning, backing up and coming back (Kim 2009, §7.3)?",
             &["ncc-scale-roll", "sightline"],
         )
     },
@@ -195,7 +195,7 @@ pub const STUDIES: &[Study] = &[
         default_grid: FAULTS,
         ..study(
             "faults",
-            "Is a target that something happens to still tracked, or declared lost within the step (K§4.6, R88)?",
+            "Is a target that something happens to still tracked, or declared lost within the step (Kim 2009, §4.6)?",
             &["sightline", "ncc-scale-roll"],
         )
     },
@@ -204,7 +204,7 @@ pub const STUDIES: &[Study] = &[
         default_grid: K9,
         ..study(
             "k9",
-            "How much error does tracking by features add over the K9 rover's three drives (D§4, R209–R215)?",
+            "How much error does tracking by features add over the K9 rover's three drives (Deans 2005, §4)?",
             &["features", "features-paper", "sightline", "combined", "combined-paper"],
         )
     },
@@ -215,13 +215,13 @@ pub const STUDIES: &[Study] = &[
         default_grid: START_ERRORS_CM,
         ..study(
             "recovery",
-            "Without features on the way, how far off may the target be for the shape to find it again (R155, R214)?",
+            "Without features on the way, how far off may the target be for the shape to find it again (Deans 2005, §4)?",
             &["combined", "combined-paper"],
         )
     },
     study(
         "feature-covariance",
-        "Does the covariance of a target that follows the features say how far off it is (D§2, R172–R177)?",
+        "Does the covariance of a target that follows the features say how far off it is (Deans 2005, §2)?",
         &["features", "features-paper"],
     ),
     Study {
@@ -230,7 +230,7 @@ pub const STUDIES: &[Study] = &[
         default_grid: FEATURE_FAULTS,
         ..study(
             "feature-faults",
-            "Does the confidence fall before the drift grows, and is the target found again (D§1, R185, R208)?",
+            "Does the confidence fall before the drift grows, and is the target found again (Deans 2005, §1)?",
             &["features", "features-paper"],
         )
     },

@@ -23,6 +23,8 @@ pub struct StudyInfo {
     pub configurations: Vec<String>,
     /// The scenarios of its grid by default.
     pub scenarios: Vec<String>,
+    /// Points per value of the grid; some studies cross their variable with a second one.
+    pub points_per_value: usize,
 }
 
 /// Starts a study.
@@ -80,6 +82,15 @@ pub struct StudyJob {
     pub k: usize,
     /// Units in all.
     pub n: usize,
+    /// Share of the work that is done, from 0 to 1, with the rendering of the worlds.
+    #[serde(default)]
+    pub share: f64,
+    /// Time since the study began or was resumed, s.
+    #[serde(default)]
+    pub seconds: f64,
+    /// Number of changes of this job so far: the larger one is the newer of two answers.
+    #[serde(default)]
+    pub revision: u64,
     /// What is being done, in words; why it stopped, where it failed.
     pub doing: String,
     /// What was odd on the way, one sentence each.

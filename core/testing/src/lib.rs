@@ -47,6 +47,8 @@ pub struct PlaneWorld {
     pub right: Camera,
     /// What goes wrong at each stop.
     pub troubles: Vec<Trouble>,
+    /// How the two cameras relate.
+    pub stereo: StereoGeometry,
 }
 
 impl PlaneWorld {
@@ -67,6 +69,7 @@ impl PlaneWorld {
             left: eye(-0.1),
             right: eye(0.1),
             troubles,
+            stereo: StereoGeometry::Lateral,
         }
     }
 
@@ -131,7 +134,7 @@ impl Stops for PlaneWorld {
         0.0
     }
     fn stereo(&self) -> StereoGeometry {
-        StereoGeometry::Lateral
+        self.stereo
     }
     fn capture(&self, step: usize, _: Cancel<'_>) -> Result<StereoPair> {
         if self.troubles[step] == Trouble::Missing {

@@ -88,6 +88,7 @@ impl Import {
             attitude_deg: self.attitude_deg,
             seed: self.seed,
             existing: if self.replace { Existing::Replace } else { Existing::Refuse },
+            within: None,
         };
         let mut progress = Progress::new("imported image");
         let mut tell = |done, all| progress.tell(done, all);

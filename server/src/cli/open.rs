@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use sightline_geometry::error::{Error, Result};
+use sightline_recordings::import::recognise;
 use sightline_recordings::{Traverse, create_simulated};
 use sightline_world::{Scenario, library};
 
@@ -41,8 +42,19 @@ pub fn open(path: &Path, data: Option<&Path>) -> Result<Traverse> {
     }
     match read_scenario_or_index(path)? {
         Some(scenario) => simulated(&scenario, &data_folder(data)?),
-        None => Traverse::open(path),
+        None => Traverse::open(path).map_err(|error| foreign(path).unwrap_or(error)),
     }
+}
+
+/// The error that says how a foreign recording is opened, where `path` is one.
+fn foreign(path: &Path) -> Option<Error> {
+    let format = recognise(path).ok()?.name();
+    let shown = path.display();
+    let problem = format!(
+        "is a {format} recording, and not a drive yet; open it in the page after `sightline serve --recordings {shown}`, \
+         or make a drive with `sightline import {shown} --out DRIVE`"
+    );
+    Some(Error::format(path, problem))
 }
 
 /// The traverse of a scenario: the same scenario always has the same folder, so that images are rendered once.

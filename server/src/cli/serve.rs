@@ -32,6 +32,9 @@ const TOKEN_VARIABLE: &str = "SIGHTLINE_TOKEN";
 pub(super) struct Serve {
     /// Folders or indexes of traverses, or scenarios to simulate; none for the first drive, with a target that is lost.
     traverses: Vec<PathBuf>,
+    /// A folder below which pages may open recordings (KITTI, PDS3, drives); can be given more than once.
+    #[arg(long, value_name = "FOLDER")]
+    recordings: Vec<PathBuf>,
     /// The port; 0 for any free one.
     #[arg(long, default_value_t = 7700)]
     port: u16,
@@ -85,6 +88,7 @@ impl Serve {
         let _lock = lock(&data)?;
         let traverses = self.open_traverses(&data)?;
         let folders = Folders { sessions: data.join("sessions"), ..Folders::in_one(&data) };
+        let folders = folders.with_recordings(&self.recordings)?;
         let runtime = super::runtime()?;
         let inside = runtime.enter();
         let hosts = Hosts::new(address.port(), &self.allow_host);

@@ -261,10 +261,10 @@ impl Teller {
 
     fn tell(&mut self, progress: study::Progress) {
         match progress {
-            study::Progress::Units { k, n } => self.units.tell(k, n),
+            study::Progress::Units { k, n, .. } => self.units.tell(k, n),
             study::Progress::Rows(_) => {}
             study::Progress::Notice(text) => terminal::error(&text),
-            study::Progress::Rendering { world, k, n } => {
+            study::Progress::Rendering { world, k, n, .. } => {
                 if self.rendering.as_ref().is_none_or(|(known, _)| *known != world) {
                     self.rendering = Some((world.clone(), Progress::new(format!("{world}: rendered stop"))));
                 }

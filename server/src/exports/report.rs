@@ -6,11 +6,12 @@ use std::sync::atomic::AtomicBool;
 use sightline_geometry::estimate::quantile::quantile;
 use sightline_record::Unit;
 use sightline_rover::version::tracker_version;
-use sightline_session::format;
 use sightline_session::metrics::{Metric, metrics};
 use sightline_session::notes::Note;
 use sightline_session::records::{self, StageQuantity};
 use sightline_session::step::RunStep;
+use sightline_session::{Fork, format};
+use sightline_track::settings::Changes;
 
 use super::kind::Part;
 use super::source::{NamedRun, Source};
@@ -75,7 +76,6 @@ pub(crate) fn html(source: &Source, part: Part, cancel: &AtomicBool) -> ApiResul
 fn overview(source: &Source, runs: &[NamedRun<'_>]) -> String {
     let row = |run: &NamedRun<'_>| {
         let summary = sightline_session::summary::summarise(run.run.whole_steps().iter().map(AsRef::as_ref));
-        let changes = serde_json::to_string(&run.run.settings.changes()).unwrap_or_default();
         let left = run.run.fork.map_or_else(String::new, |fork| {
             format!("run {} at step {}", sheet::run_letter(fork.run), fork.from_step)
         });
@@ -89,7 +89,7 @@ fn overview(source: &Source, runs: &[NamedRun<'_>]) -> String {
             summary.false_tracked.map_or_else(|| "–".to_owned(), |count| count.to_string()),
             number(summary.final_err_px, 2),
             number(summary.final_err_m.map(|m| 100.0 * m), 2),
-            if changes == "{}" { "defaults".to_owned() } else { changes },
+            changed(&run.run.settings.changes(), run.run.fork),
         ]
     };
     let head = [
@@ -102,7 +102,7 @@ fn overview(source: &Source, runs: &[NamedRun<'_>]) -> String {
         "tracked falsely",
         "last error, px",
         "last error, cm",
-        "settings changed",
+        "changed",
     ];
     let rows: Vec<Vec<String>> = runs.iter().map(row).collect();
     let seed = bundle::scenario(source)
@@ -112,6 +112,16 @@ fn overview(source: &Source, runs: &[NamedRun<'_>]) -> String {
         escape(seed.trim()),
         table("Every run of this report; – where the truth is not known.", &head, &rows)
     )
+}
+
+/// What a run does otherwise than the defaults: its settings, and the prediction that a person moved.
+fn changed(settings: &Changes, fork: Option<Fork>) -> String {
+    let settings = (!settings.is_empty()).then(|| serde_json::to_string(settings).unwrap_or_default());
+    let moved = fork.and_then(|fork| Some((fork.from_step, fork.prediction_px?)));
+    let moved =
+        moved.map(|(step, to)| format!("prediction moved to ({:.1}, {:.1}) px at step {step}", to.x, to.y));
+    let all: Vec<String> = settings.into_iter().chain(moved).collect();
+    if all.is_empty() { "defaults".to_owned() } else { all.join("; ") }
 }
 
 /// The notes that belong to the part.
@@ -368,4 +378,22 @@ fn origin(source: &Source) -> String {
     ];
     let rows: Vec<Vec<String>> = rows.into_iter().map(|(name, value)| vec![name.to_owned(), value]).collect();
     format!("<h2>Origin</h2>\n{}", table("What made this report.", &["", ""], &rows))
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+    use sightline_geometry::frames::Pixel;
+
+    use super::*;
+
+    #[test]
+    fn a_run_with_a_moved_prediction_is_not_reported_as_defaults() {
+        let moved = Fork { prediction_px: Some(Pixel::new(271.25, 140.0)), ..Fork::new(0, 18) };
+        assert_eq!(changed(&Changes::new(), None), "defaults");
+        assert_eq!(changed(&Changes::new(), Some(Fork::new(0, 18))), "defaults");
+        assert_eq!(changed(&Changes::new(), Some(moved)), "prediction moved to (271.2, 140.0) px at step 18");
+        let both = changed(&Changes::from([("ncc_min".to_owned(), json!(0.4))]), Some(moved));
+        assert!(both.starts_with("{\"ncc_min\":0.4}; prediction moved to "), "{both}");
+    }
 }

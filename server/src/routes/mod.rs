@@ -5,6 +5,7 @@ pub(crate) mod about;
 pub(crate) mod login;
 pub(crate) mod settings;
 pub(crate) mod traverses;
+pub(crate) mod recordings;
 pub(crate) mod sessions;
 pub(crate) mod targets;
 pub(crate) mod runs;

@@ -17,8 +17,8 @@ use utoipa_axum::routes;
 
 use super::{
     about, breakpoints, compare, counterfactual, documents, drive, events, exports, expressions, login,
-    notes, odometry, photometry, plain, removal, rerun, runs, sessions, settings, steps, studies, targets,
-    trackability, traverses, what_if, why,
+    notes, odometry, photometry, plain, recordings, removal, rerun, runs, sessions, settings, steps, studies,
+    targets, trackability, traverses, what_if, why,
 };
 use crate::routes::route::route;
 use crate::state::AppState;
@@ -89,6 +89,7 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
         .routes(route::<ShowOpenApi>(routes!(document)))
         .merge(settings::router())
         .merge(traverses::router())
+        .merge(recordings::router())
         .merge(sessions::router())
         .merge(targets::router())
         .merge(runs::router())

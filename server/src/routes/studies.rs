@@ -139,5 +139,6 @@ fn info(study: &Study) -> Result<StudyInfo, Error> {
         grid: owned(study.default_grid()),
         configurations: owned(&study.default_configurations()),
         scenarios: owned(&plan.scenarios()),
+        points_per_value: plan.points.len() / study.default_grid().len().max(1),
     })
 }

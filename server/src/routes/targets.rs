@@ -1,4 +1,4 @@
-//! `sessions/{session}/targets`: designating targets and removing them.
+//! `sessions/{session}/targets`: designating, renaming and removing targets.
 
 use std::sync::Arc;
 
@@ -7,9 +7,9 @@ use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 use sightline_api::endpoint::Endpoint;
-use sightline_api::endpoints::{DesignateTarget, RemoveTarget};
+use sightline_api::endpoints::{DesignateTarget, RemoveTarget, RenameTarget};
 use sightline_api::location::AtTarget;
-use sightline_api::wire::{Designated, NewTarget};
+use sightline_api::wire::{Designated, NewTarget, TargetLabel};
 use sightline_session::Session;
 use sightline_session::view::SessionView;
 use sightline_track::settings::Settings;
@@ -31,6 +31,7 @@ use crate::state::AppState;
 pub(crate) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
         .routes(route::<DesignateTarget>(routes!(designate)))
+        .routes(route::<RenameTarget>(routes!(rename)))
         .routes(route::<RemoveTarget>(routes!(remove)))
 }
 
@@ -43,12 +44,40 @@ async fn designate(
     SessionPath(live): SessionPath,
     Body(new): Body<DesignateTarget>,
 ) -> ApiResult<Response> {
-    if new.label.as_ref().is_some_and(|label| label.chars().count() > LABEL_LIMIT) {
-        return Err(ApiError::invalid("field", format!("label: may have at most {LABEL_LIMIT} characters")));
-    }
+    check_label(new.label.as_deref().unwrap_or_default())?;
     let settings = Settings::default().with(&new.settings)?;
     let work_state = state.clone();
     state.designations().run_until_dropped(move |cancel| add(&work_state, &live, new, settings, cancel)).await
+}
+
+/// Whether a label is short enough.
+///
+/// # Errors
+/// A problem that names the field and the limit.
+fn check_label(label: &str) -> ApiResult<()> {
+    if label.chars().count() <= LABEL_LIMIT {
+        return Ok(());
+    }
+    Err(ApiError::invalid("field", format!("label: may have at most {LABEL_LIMIT} characters")))
+}
+
+/// Renames a target
+///
+/// A blank label restores the default one, `target` and the number from 1.
+#[utoipa::path(put, operation_id = "rename_target", path = RenameTarget::PATH, tag = "targets", request_body = TargetLabel, responses((status = 200, body = SessionView), ApiError))]
+async fn rename(
+    State(state): State<AppState>,
+    TargetPath { live, target }: TargetPath,
+    Body(TargetLabel { label }): Body<RenameTarget>,
+) -> ApiResult<Json<SessionView>> {
+    check_label(&label)?;
+    blocking(move || {
+        state.change(&live, |session| {
+            session.rename_target(target, &label).map_err(|error| ApiError::from(error).about_path())
+        })?;
+        Ok(Json(state.view(&live)))
+    })
+    .await
 }
 
 /// Removes a target; its number is not used again

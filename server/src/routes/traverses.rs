@@ -231,6 +231,7 @@ fn view(open: &OpenTraverse) -> TraverseView {
         source: drives::argument(traverse),
         stereo: index.stereo,
         warnings: traverse.warnings().to_vec(),
+        odometry_error: index.odometry_error,
         stops: (0..index.stops.len()).map(|step| stop_view(open, step)).collect(),
     }
 }

@@ -26,6 +26,9 @@ use super::tables;
 /// Seeds that are tried for each world asked for.
 const SEEDS_PER_WORLD: u64 = 10;
 
+/// Share of the work that is rendering, where no world is rendered yet.
+const RENDERING: f64 = 0.5;
+
 /// How far a study has come.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Progress {
@@ -35,6 +38,8 @@ pub enum Progress {
         k: usize,
         /// All.
         n: usize,
+        /// Share of the work that is done, from 0 to 1.
+        share: f64,
     },
     /// Stops of a world rendered, of those that were missing.
     Rendering {
@@ -44,6 +49,8 @@ pub enum Progress {
         k: usize,
         /// All.
         n: usize,
+        /// Share of the work that is done, from 0 to 1.
+        share: f64,
     },
     /// Rows that were found or kept.
     Rows(Vec<Row>),
@@ -73,8 +80,16 @@ pub fn carry_out(mut order: Order, cancel: &AtomicBool, tell: &(dyn Fn(Progress)
     let folder = order.folder.join(order.plan.study.name);
     let log = ResultLog::open(&folder)?;
     log.notices.iter().for_each(|notice| tell(Progress::Notice(notice.clone())));
-    let conduct =
-        Conduct { order: &order, log, cancel, tell, done: AtomicUsize::new(0), found: AtomicUsize::new(0) };
+    let conduct = Conduct {
+        order: &order,
+        log,
+        cancel,
+        tell,
+        done: AtomicUsize::new(0),
+        found: AtomicUsize::new(0),
+        rendered: AtomicUsize::new(0),
+    };
+    tell(Progress::Units { k: 0, n: conduct.all(), share: 0.0 });
     let mut units = Vec::new();
     for name in order.plan.scenarios() {
         units.extend(conduct.scenario(name)?);
@@ -108,6 +123,8 @@ struct Conduct<'a> {
     tell: &'a (dyn Fn(Progress) + Sync),
     done: AtomicUsize,
     found: AtomicUsize,
+    /// Worlds whose stops are all rendered.
+    rendered: AtomicUsize,
 }
 
 /// One unit that is to be had.
@@ -178,6 +195,7 @@ impl Conduct<'_> {
         };
         let kept: Vec<Unit> = tasks.iter().filter_map(kept_of).collect();
         if kept.len() == tasks.len() {
+            self.rendered.fetch_add(1, Ordering::Relaxed);
             self.count(&kept);
             return Ok(Some(kept));
         }
@@ -276,10 +294,21 @@ impl Conduct<'_> {
     fn render(&self, traverse: &Traverse, world: &str) -> Result<()> {
         let missing: Vec<_> = (0..traverse.stop_count()).filter(|&step| !traverse.is_ready(step)).collect();
         for (k, &step) in missing.iter().enumerate() {
-            (self.tell)(Progress::Rendering { world: world.to_owned(), k, n: missing.len() });
+            let n = missing.len();
+            let share = self.share(k as f64 / n as f64);
+            (self.tell)(Progress::Rendering { world: world.to_owned(), k, n, share });
             traverse.render_step(step, self.cancel)?;
         }
+        self.rendered.fetch_add(1, Ordering::Relaxed);
         Ok(())
+    }
+
+    /// Share of the work that is done, from 0 to 1, with `of_world` of a further world rendered.
+    fn share(&self, of_world: f64) -> f64 {
+        let worlds = self.worlds() * self.order.plan.scenarios().len();
+        let rendered = self.rendered.load(Ordering::Relaxed) as f64 + of_world;
+        let tracked = self.done.load(Ordering::Relaxed) as f64 / self.all().max(1) as f64;
+        (RENDERING * rendered / worlds.max(1) as f64 + (1.0 - RENDERING) * tracked).min(1.0)
     }
 
     /// Tells that these units are done.
@@ -291,15 +320,19 @@ impl Conduct<'_> {
         (self.tell)(Progress::Rows(
             units.iter().flat_map(|unit| rows(self.order.plan.study, unit)).collect(),
         ));
-        (self.tell)(Progress::Units { k, n: self.all() });
+        (self.tell)(Progress::Units { k, n: self.all(), share: self.share(0.0) });
     }
 
-    /// How many units the study has.
-    fn all(&self) -> usize {
-        let worlds = match &self.order.seeds {
+    /// Number of worlds of each scenario.
+    fn worlds(&self) -> usize {
+        match &self.order.seeds {
             Seeds::Named(seeds) => seeds.len(),
             Seeds::Count { worlds, .. } => *worlds as usize,
-        };
-        worlds * self.order.plan.points.len() * self.order.plan.configurations.len()
+        }
+    }
+
+    /// Number of units of the study.
+    fn all(&self) -> usize {
+        self.worlds() * self.order.plan.points.len() * self.order.plan.configurations.len()
     }
 }

@@ -6,6 +6,7 @@
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
+use std::time::Instant;
 
 use sightline_api::event::Event;
 use sightline_geometry::error::Error;
@@ -46,6 +47,8 @@ struct Inside {
     rows: Vec<Row>,
     report: Option<String>,
     cancel: Arc<AtomicBool>,
+    /// When it began or was resumed; `None` while it waits.
+    began: Option<Instant>,
 }
 
 impl Shelf {
@@ -74,7 +77,7 @@ impl Shelf {
             let rows = kept.read_rows();
             let KeptStudy { new, job: view, report, .. } = kept.after_a_restart();
             let Ok(order) = order(&new) else { continue };
-            let inside = Mutex::new(Inside { view, rows, report, cancel: Arc::default() });
+            let inside = Mutex::new(Inside { view, rows, report, cancel: Arc::default(), began: None });
             let (events, keeper) = (self.events.clone(), self.keeper.clone());
             works.push(Arc::new(Work { number, new, order, keeper, events, inside }));
         }
@@ -124,11 +127,14 @@ impl Shelf {
                 state: StudyState::Waiting,
                 k: 0,
                 n: 0,
+                share: 0.0,
+                seconds: 0.0,
+                revision: 0,
                 doing: "waiting".to_owned(),
                 notices: Vec::new(),
                 command: order.command.clone(),
             };
-            let inside = Inside { view, rows: Vec::new(), report: None, cancel: Arc::default() };
+            let inside = Inside { view, rows: Vec::new(), report: None, cancel: Arc::default(), began: None };
             let (events, keeper) = (self.events.clone(), self.keeper.clone());
             let work = Arc::new(Work { number, new, order, keeper, events, inside: Mutex::new(inside) });
             self.keeper.keep_new(number, &work.kept(&lock(&work.inside)))?;
@@ -157,6 +163,7 @@ impl Shelf {
             if may {
                 (inside.cancel, inside.rows) = (Arc::default(), Vec::new());
                 (inside.view.state, inside.view.k) = (StudyState::Waiting, 0);
+                (inside.view.share, inside.view.seconds, inside.began) = (0.0, 0.0, None);
                 "waiting".clone_into(&mut inside.view.doing);
             }
             may
@@ -227,25 +234,29 @@ impl Work {
         KeptStudy { new: self.new.clone(), job, rows, report }
     }
 
-    /// Changes it and tells every page.
+    /// Changes it and sends the change to every page, in the order of the changes.
     fn change<T>(&self, change: impl FnOnce(&mut Inside) -> T) -> T {
-        let (result, job) = {
-            let mut inside = lock(&self.inside);
-            let result = change(&mut inside);
-            (result, inside.view.clone())
-        };
-        // Nobody may be listening.
-        let _ = self.events.send(Event::StudyProgress { job });
+        let mut inside = lock(&self.inside);
+        let result = change(&mut inside);
+        inside.stamp();
+        self.tell(&inside);
         result
+    }
+
+    fn tell(&self, inside: &Inside) {
+        // Nobody may be listening.
+        let _ = self.events.send(Event::StudyProgress { job: inside.view.clone() });
     }
 
     fn carry_out(&self) {
         let cancel = Arc::clone(&lock(&self.inside).cancel);
         if cancel.load(Ordering::Relaxed) {
-            self.finish(|inside| end(inside, StudyState::Cancelled, "cancelled"));
+            self.finish(|inside| end(inside, StudyState::Cancelled, ""));
             return;
         }
-        self.change(|inside| inside.view.state = StudyState::Running);
+        self.change(|inside| {
+            (inside.view.state, inside.began) = (StudyState::Running, Some(Instant::now()));
+        });
         self.keep(&lock(&self.inside));
         let work = std::panic::AssertUnwindSafe(|| {
             carry_out(self.order.clone(), &cancel, &|progress| self.hear(progress))
@@ -253,10 +264,12 @@ impl Work {
         match std::panic::catch_unwind(work) {
             Ok(Ok(outcome)) => self.finish(|inside| {
                 (inside.rows, inside.report) = (outcome.rows, Some(outcome.report));
-                end(inside, StudyState::Done, "done");
+                inside.view.share = 1.0;
+                // The state says it already.
+                end(inside, StudyState::Done, "");
             }),
             Ok(Err(Error::Cancelled)) => {
-                self.finish(|inside| end(inside, StudyState::Cancelled, "cancelled"));
+                self.finish(|inside| end(inside, StudyState::Cancelled, ""));
             }
             Ok(Err(error)) => self.finish(|inside| end(inside, StudyState::Failed, &error.to_string())),
             Err(_) => {
@@ -268,26 +281,37 @@ impl Work {
 
     /// Ends it: on disk before anybody sees it, so that what a person saw outlives the server.
     fn finish(&self, end: impl FnOnce(&mut Inside)) {
-        {
-            let mut inside = lock(&self.inside);
-            end(&mut inside);
-            self.keep(&inside);
-        }
-        self.change(|_| ());
+        let mut inside = lock(&self.inside);
+        end(&mut inside);
+        inside.stamp();
+        inside.began = None;
+        self.keep(&inside);
+        self.tell(&inside);
     }
 
     fn hear(&self, progress: Progress) {
         match progress {
             Progress::Rows(rows) => lock(&self.inside).rows.extend(rows),
-            Progress::Units { k, n } => self.change(|inside| {
-                (inside.view.k, inside.view.n) = (k, n);
+            Progress::Units { k, n, share } => self.change(|inside| {
+                (inside.view.k, inside.view.n, inside.view.share) = (k, n, share);
                 "tracking".clone_into(&mut inside.view.doing);
             }),
-            Progress::Rendering { world, k, n } => self.change(|inside| {
+            Progress::Rendering { world, k, n, share } => self.change(|inside| {
+                inside.view.share = share;
                 inside.view.doing = format!("rendering stop {} of {n} of {world}", k + 1);
             }),
             Progress::Notice(text) => self.change(|inside| inside.view.notices.push(text)),
         }
+    }
+}
+
+impl Inside {
+    /// Gives the state its number and how long the study took.
+    fn stamp(&mut self) {
+        if let Some(began) = self.began {
+            self.view.seconds = began.elapsed().as_secs_f64();
+        }
+        self.view.revision += 1;
     }
 }
 

@@ -8,7 +8,7 @@ use crate::breakpoints::Ask;
 use crate::breakpoints::derived::Derived;
 use crate::command::{Command, Go};
 use crate::drawing::decimate;
-use crate::panels::chart::{over_steps, pieces};
+use crate::panels::chart::{over_steps, pieces, step_of};
 use crate::panels::digits;
 use crate::panels::step_marks::{cursors, point};
 use crate::state::State;
@@ -36,11 +36,11 @@ pub(crate) fn show(
     let plot = over_steps(Plot::new(id), last, is_last)
         .height(height)
         .set_margin_fraction(vec2(0.0, 0.12))
-        .label_formatter(move |near| match near {
-            HoverPosition::NearDataPoint { position, .. } => {
-                Some(format!("step {}\n{name} {}", position.x, digits(position.y)))
-            }
-            HoverPosition::Elsewhere { .. } => None,
+        .label_formatter(move |near| {
+            let (HoverPosition::NearDataPoint { position, .. } | HoverPosition::Elsewhere { position }) =
+                near;
+            let step = step_of(position.x, last)?;
+            Some(format!("step {step}\n{name} {}", digits(value_at(of_run, step)?)))
         });
     let response = plot.show(ui, |plot| {
         cursors(plot, state);

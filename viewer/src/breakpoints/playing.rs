@@ -126,7 +126,9 @@ impl State {
             (false, false) => (step - 1).min(last),
         };
         self.cursor.step = next;
-        let hit = self.hit_at(next).join("`, `");
+        let target = self.cursor.target;
+        let hits = target.map(|target| self.hit_at(target, self.cursor.run, next)).unwrap_or_default();
+        let hit = hits.join("`, `");
         if !hit.is_empty() {
             self.ask.play.stop();
             self.messages.note(format!("Stopped at step {next}: `{hit}`."));

@@ -105,12 +105,10 @@ impl State {
         }
     }
 
-    /// The conditions of the breakpoints that a step hits in the run at the cursor.
-    pub(crate) fn hit_at(&self, step: usize) -> Vec<&str> {
-        let Some(target) = self.cursor.target else { return Vec::new() };
-        let is_hit = |breakpoint: &BreakpointView| {
-            Asking::hits(breakpoint, target, self.cursor.run).binary_search(&step).is_ok()
-        };
+    /// The conditions of the breakpoints that a step hits in a run of a target.
+    pub(crate) fn hit_at(&self, target: usize, run: usize, step: usize) -> Vec<&str> {
+        let is_hit =
+            |breakpoint: &BreakpointView| Asking::hits(breakpoint, target, run).binary_search(&step).is_ok();
         let hit = self.ask.watched().filter(|(_, breakpoint)| is_hit(breakpoint));
         hit.map(|(_, breakpoint)| breakpoint.expression.as_str()).collect()
     }

@@ -2,6 +2,7 @@
 
 use sightline_session::step::StepRow;
 
+use crate::breakpoints::goto;
 use crate::command::table;
 use crate::command::{Command, Go};
 use crate::exports;
@@ -11,6 +12,7 @@ use crate::layout::presets::Preset;
 use crate::panels::digits;
 use crate::panels::pane::Pane;
 use crate::panels::sheets::of_panel;
+use crate::state::targets::Rename;
 use crate::state::{State, events, run_letter};
 use crate::theme::Looks;
 
@@ -47,9 +49,50 @@ pub(crate) fn find(state: &State, words: &str) -> Vec<Action> {
     found
 }
 
-/// Where the words begin in a title, added up; none where one of them is not in it.
+/// Words that people type for words of the titles.
+const SYNONYMS: [(&str, &[&str]); 28] = [
+    ("panel", &["show"]),
+    ("view", &["show", "layout"]),
+    ("window", &["show"]),
+    ("export", &["save", "copy"]),
+    ("download", &["export", "save"]),
+    ("screenshot", &["save"]),
+    ("picture", &["save"]),
+    ("figure", &["save"]),
+    ("jump", &["go to", "next event"]),
+    ("branch", &["run from", "as a branch"]),
+    ("fork", &["run from"]),
+    ("rerun", &["run from"]),
+    ("zoom", &["fit all", "fill the page"]),
+    ("fullscreen", &["fill the page"]),
+    ("maximise", &["fill the page"]),
+    ("maximize", &["fill the page"]),
+    ("rename", &["targets and runs", "label"]),
+    ("delete", &["remove"]),
+    ("import", &["open"]),
+    ("load", &["open"]),
+    ("share", &["link", "export"]),
+    ("url", &["link"]),
+    ("shortcut", &["keys"]),
+    ("help", &["keys", "tour"]),
+    ("theme", &["looks"]),
+    ("colour", &["looks"]),
+    ("csv", &["table", "export"]),
+    ("arrangement", &["layout"]),
+];
+
+/// How far behind a title's own words a synonym ranks.
+const SYNONYM_RANK: usize = 1000;
+
+/// Where the words begin in a title, added up, in any order; `None` where one of them is not in it, nor a synonym.
 fn rank(title: &str, wanted: &[String]) -> Option<usize> {
-    wanted.iter().map(|word| title.find(word.as_str())).sum()
+    wanted.iter().map(|word| place(title, word)).sum()
+}
+
+fn place(title: &str, word: &str) -> Option<usize> {
+    let own = title.find(word);
+    let others = SYNONYMS.iter().filter(|(typed, _)| *typed == word).flat_map(|(_, words)| words.iter());
+    own.or_else(|| others.filter_map(|other| title.find(other)).min().map(|at| SYNONYM_RANK + at))
 }
 
 /// Going to the step that a number names.
@@ -87,6 +130,12 @@ fn of_table(state: &State) -> Vec<Action> {
 
 fn moves(state: &State) -> Vec<Action> {
     let mut all = Vec::new();
+    for name in goto::EVENTS {
+        if let Ok(step) = state.step_meant(name) {
+            let title = format!("Go to {name}: step {step}");
+            all.push(action(title, Command::Go(Go::Step(step))));
+        }
+    }
     for step in state.run().map(events).unwrap_or_default() {
         let row = state.row_at(step);
         let word = row.map_or("fault", |row| if row.fault { "fault" } else { row.state.as_str() });
@@ -106,6 +155,8 @@ fn works(state: &State) -> Vec<Action> {
             let title = format!("Look at {}, run {}", target.label, run_letter(run.number));
             all.push(action(title, Command::Look { target: target.number, run: run.number }));
         }
+        let rename = Command::Rename(Rename::Begin(target.number));
+        all.push(action(format!("Rename {}", target.label), rename));
         all.push(action(format!("Remove {}", target.label), Command::RemoveTarget(target.number)));
     }
     for entry in state.traverses.iter().flatten() {
@@ -189,6 +240,20 @@ mod tests {
         assert_eq!(titles("next panel"), ["Next panel"]);
         assert_eq!(titles("stereo layout")[0], "Layout Stereo: how the point was found in space");
         assert!(titles("no such thing at all").is_empty());
+    }
+
+    #[test]
+    fn words_match_in_any_order_and_by_synonym() {
+        let state = fixture::at_step(&egui::Context::default(), 0);
+        let first =
+            |words: &str| find(&state, words).first().map(|action| action.title.clone()).unwrap_or_default();
+        assert_eq!(first("panel runs"), "Show Runs");
+        assert_eq!(first("runs panel"), "Show Runs");
+        assert!(first("export svg").starts_with("Save ") && first("export svg").ends_with("SVG"));
+        assert_eq!(first("go lost"), "Go to lost: step 3");
+        assert!(first("branch").starts_with("Run from this step"), "{}", first("branch"));
+        assert_eq!(first("zoom"), "Fit all images");
+        assert_eq!(first("rename"), "Rename ridge");
     }
 
     #[test]

@@ -101,9 +101,46 @@ impl UserCommand {
     }
 }
 
+/// A group of lines of the help sheet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Group {
+    /// Moving along the drive.
+    Steps,
+    /// Breakpoints, loop and playing.
+    Playing,
+    /// Targets, runs, and explanations.
+    Target,
+    /// Images and plots.
+    Images,
+    /// Comparing runs.
+    Compare,
+    /// Panels, files, and the page.
+    Page,
+}
+
+impl Group {
+    /// All groups, in the order of the sheet.
+    pub(crate) const ALL: [Self; 6] =
+        [Self::Steps, Self::Playing, Self::Target, Self::Images, Self::Compare, Self::Page];
+
+    /// The heading on the sheet.
+    pub(crate) const fn title(self) -> &'static str {
+        match self {
+            Self::Steps => "Steps and stages",
+            Self::Playing => "Playing and breakpoints",
+            Self::Target => "Target, runs and causes",
+            Self::Images => "Images and plots",
+            Self::Compare => "Comparing runs",
+            Self::Page => "Panels, files and page",
+        }
+    }
+}
+
 /// A line of the help sheet with the commands that it explains.
 #[derive(Clone, Copy)]
 pub(crate) struct Line {
+    /// The group on the help sheet.
+    pub group: Group,
     /// The explanation on the help sheet; empty: the commands have no line there.
     pub help: &'static str,
     /// Keys or gestures that are no shortcut of a command; empty: the shortcuts of the commands are shown.

@@ -24,7 +24,9 @@ fn sheet(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         // What follows the list stays on the screen, however small that is.
         let height = (ui.ctx().content_rect().height() - 260.0).max(120.0);
         ui.label(theme::title("Keys and pointer"));
-        egui::ScrollArea::vertical().max_height(height).auto_shrink([false, true]).show(ui, key_list);
+        let words = search(ui);
+        let list = egui::ScrollArea::vertical().max_height(height).min_scrolled_height(height);
+        list.auto_shrink(false).show(ui, |ui| key_list(ui, &words));
         ui.add_space(6.0);
         ui.label(theme::title("Conventions"));
         for line in [
@@ -53,15 +55,47 @@ fn sheet(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     }
 }
 
-/// Every key with its meaning.
-fn key_list(ui: &mut Ui) {
-    egui::Grid::new("keys").num_columns(2).spacing([20.0, 3.0]).show(ui, |ui| {
-        for (keys, meaning) in table::sheet() {
-            ui.label(RichText::new(keys).monospace().color(theme::accent()));
-            ui.label(meaning);
-            ui.end_row();
+/// The field that filters the keys; returns its words.
+fn search(ui: &mut Ui) -> String {
+    let id = ui.scope_id().with("help search");
+    let mut words = ui.data_mut(|data| data.get_temp::<String>(id)).unwrap_or_default();
+    let field = egui::TextEdit::singleline(&mut words).hint_text("search keys").desired_width(f32::INFINITY);
+    ui.add(field).accessible_name("search keys");
+    ui.data_mut(|data| data.insert_temp(id, words.clone()));
+    words
+}
+
+/// The keys whose line contains all words, by group.
+fn key_list(ui: &mut Ui, words: &str) {
+    let mut is_empty = true;
+    for group in table::Group::ALL {
+        let lines: Vec<_> = table::sheet(group).filter(|(keys, help)| matches(words, keys, help)).collect();
+        if lines.is_empty() {
+            continue;
         }
-    });
+        is_empty = false;
+        ui.add_space(4.0);
+        ui.label(theme::title(group.title()));
+        egui::Grid::new(group.title()).num_columns(2).spacing([20.0, 3.0]).min_col_width(130.0).show(
+            ui,
+            |ui| {
+                for (keys, meaning) in lines {
+                    ui.label(RichText::new(keys).monospace().color(theme::accent()));
+                    ui.label(meaning);
+                    ui.end_row();
+                }
+            },
+        );
+    }
+    if is_empty {
+        ui.label(theme::label("No key matches."));
+    }
+}
+
+/// Whether a line of the sheet contains all words.
+fn matches(words: &str, keys: &str, help: &str) -> bool {
+    let line = format!("{keys} {help}").to_lowercase();
+    words.to_lowercase().split_whitespace().all(|word| line.contains(word))
 }
 
 fn go_to(ui: &mut Ui, state: &State, typed: &str, out: &mut Vec<Command>) {

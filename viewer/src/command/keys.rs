@@ -5,6 +5,7 @@ use egui::{Context, Event, Key, Modifiers};
 use crate::command::{Command, Go, Mode};
 use crate::command::{actions, table};
 use crate::compare::keys as comparison;
+use crate::layout;
 use crate::picking::aim::Aim;
 use crate::state::State;
 use crate::tour::update as tour;
@@ -27,7 +28,7 @@ pub(crate) fn commands(context: &Context, state: &State) -> Vec<Command> {
     if context.text_edit_focused() {
         return Vec::new();
     }
-    let is_held = context.memory(|memory| memory.focused().is_some());
+    let is_held = context.memory(|memory| memory.focused()).is_some_and(|id| !layout::is_panel(context, id));
     let is_divided = comparison::is_divider_focused(context);
     let held = comparison::held(context, state);
     context.input(|input| {
@@ -116,7 +117,7 @@ fn is_of_widgets(key: Key, modifiers: Modifiers) -> bool {
 /// Whether Shift and this key choose an arrangement of panels.
 fn is_of_arrangements(key: Key) -> bool {
     use Key::*;
-    [Num1, Num2, Num3, Num4, Num5, Num6, Num7].contains(&key)
+    [Num1, Num2, Num3, Num4, Num5, Num6, Num7, Num8].contains(&key)
 }
 
 /// Whether a key writes a character: such keys can be switched off, for who speaks to the machine (WCAG 2.1.4).
@@ -191,7 +192,7 @@ mod tests {
         assert_eq!(press(Key::G, &state), Some(Command::SetMode(Mode::GoTo(String::new()))));
         assert_eq!(press(Key::T, &state), Some(Command::SetMode(Mode::Pick)));
         assert_eq!(press(Key::F, &state), Some(Command::FitAll));
-        assert_eq!(press(Key::I, &state), Some(Command::SetStretch(Stretch::Auto)));
+        assert_eq!(press(Key::I, &state), Some(Command::SetStretch(Stretch::None)));
         assert_eq!(press(Key::M, &state), Some(Command::Notes(notes::Ask::Pin)));
         let save = command(Key::S, Modifiers::COMMAND, &state);
         assert_eq!(save, Some(Command::Exports(exports::Ask::Open)));

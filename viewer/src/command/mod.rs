@@ -21,6 +21,7 @@ use crate::picking::aim::Aim;
 use crate::pointed::Pointed;
 use crate::shape_view::ShapeView;
 use crate::state::calculator::Calculator;
+use crate::state::targets::Rename;
 use crate::studies::Order;
 use crate::tables::FeatureView;
 use crate::theme::Looks;
@@ -69,6 +70,8 @@ pub enum Layer {
     Template,
     /// The match with its ellipse.
     Match,
+    /// The target's pixels at the steps before and after.
+    Track,
     /// The truth.
     Truth,
     /// The epipolar curve with its ticks.
@@ -156,6 +159,12 @@ pub enum Command {
     Pick(Pixel),
     /// Removes a target.
     RemoveTarget(usize),
+    /// Renames a target.
+    Rename(Rename),
+    /// Hides the marks of a target in the images, or shows them.
+    ToggleTarget(usize),
+    /// Begins to designate a target again at the cursor's stop, as a target of its own.
+    Repick(usize),
     /// Changes a setting of the draft; none takes the change back.
     Draft {
         /// The setting's name.

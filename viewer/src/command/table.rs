@@ -5,7 +5,7 @@
 
 use egui::{Key, Modifiers};
 
-pub(crate) use super::entry::{Line, Shortcut, UserCommand};
+pub(crate) use super::entry::{Group, Line, Shortcut, UserCommand};
 
 use crate::breakpoints::play::Shuttle;
 use crate::command::{Command, Go, Mode, Search};
@@ -18,14 +18,15 @@ use crate::tour::Turn;
 use crate::trackability::limits;
 use crate::{breakpoints, exports, files, notes, why};
 
-const fn line(help: &'static str, commands: &'static [UserCommand]) -> Line {
-    Line { help, gesture: "", commands }
+const fn line(group: Group, help: &'static str, commands: &'static [UserCommand]) -> Line {
+    Line { group, help, gesture: "", commands }
 }
 
-const fn gesture(gesture: &'static str, help: &'static str) -> Line {
-    Line { help, gesture, commands: &[] }
+const fn gesture(group: Group, gesture: &'static str, help: &'static str) -> Line {
+    Line { group, help, gesture, commands: &[] }
 }
 
+use Group::{Compare, Images, Page, Playing, Steps, Target};
 use {Shortcut as On, UserCommand as Do};
 
 /// One step forward.
@@ -58,8 +59,7 @@ pub(crate) const PICK: Do = Do::new("Pick a target", &[On::plain(Key::T)], |stat
 pub(crate) const PIN_NOTE: Do =
     Do::new("Pin a note here", &[On::plain(Key::M)], |_| Command::Notes(notes::Ask::Pin));
 /// Takes the last change back.
-pub(crate) const UNDO: Do =
-    Do::new("Take the last deed back (undo)", &[On::ctrl(Key::Z)], |_| Command::Why(why::Ask::Undo));
+pub(crate) const UNDO: Do = Do::new("Undo", &[On::ctrl(Key::Z)], |_| Command::Why(why::Ask::Undo));
 /// Opens the window of exports.
 pub(crate) const EXPORT: Do =
     Do::new("Export: recording, tables, report, pictures", &[On::ctrl(Key::S)], |_| {
@@ -97,22 +97,29 @@ pub(crate) const MAXIMISE: Do =
 
 /// Every user command, in the order of the help sheet.
 pub(crate) static TABLE: &[Line] = &[
-    line("next, previous step", &[NEXT_STEP, PREVIOUS_STEP]),
+    line(Steps, "next, previous step", &[NEXT_STEP, PREVIOUS_STEP]),
     line(
+        Steps,
         "ten steps on, back",
         &[
             Do::new("Ten steps on", &[On::shift(Key::ArrowRight)], |_| Command::Go(Go::By(10))),
             Do::new("Ten steps back", &[On::shift(Key::ArrowLeft)], |_| Command::Go(Go::By(-10))),
         ],
     ),
-    line("first, last step", &[FIRST_STEP, LAST_STEP]),
-    line("next, previous event (change of state)", &[NEXT_EVENT, PREVIOUS_EVENT]),
+    line(Steps, "first, last step", &[FIRST_STEP, LAST_STEP]),
+    line(Steps, "next, previous event (change of state)", &[NEXT_EVENT, PREVIOUS_EVENT]),
     line(
+        Steps,
         "go to a step: 12, +5, last, t=3.5, or an event such as lost",
         &[Do::new("Go to a step", &[On::plain(Key::G)], |_| Command::SetMode(Mode::GoTo(String::new())))],
     ),
-    line("play, pause", &[Do::new("Play or pause", &[On::plain(Key::Space)], |_| shuttle(Shuttle::Toggle))]),
     line(
+        Playing,
+        "play, pause",
+        &[Do::new("Play or pause", &[On::plain(Key::Space)], |_| shuttle(Shuttle::Toggle))],
+    ),
+    line(
+        Playing,
         "play backwards, stop, play forwards; again: twice as fast",
         &[
             Do::new("Play backwards", &[On::plain(Key::J)], |_| shuttle(Shuttle::Reverse)),
@@ -121,6 +128,7 @@ pub(crate) static TABLE: &[Line] = &[
         ],
     ),
     line(
+        Playing,
         "a loop begins, ends at this step",
         &[
             Do::new("Begin the loop here", &[On::plain(Key::OpenBracket)], |_| shuttle(Shuttle::LoopIn)),
@@ -128,10 +136,12 @@ pub(crate) static TABLE: &[Line] = &[
         ],
     ),
     line(
-        "no loop any more",
+        Playing,
+        "clear the loop",
         &[Do::new("Remove the loop", &[On::plain(Key::Backspace)], |_| shuttle(Shuttle::ClearLoop))],
     ),
     line(
+        Playing,
         "next, previous hit of a breakpoint",
         &[
             Do::new("Breakpoints: next hit", &[On::no_shift(Key::N)], |_| {
@@ -143,77 +153,86 @@ pub(crate) static TABLE: &[Line] = &[
         ],
     ),
     line(
-        "break at this step, or no longer",
-        &[Do::new("Breakpoints: break here, or no longer", &[On::no_shift(Key::B)], |state| {
+        Playing,
+        "toggle a breakpoint at this step",
+        &[Do::new("Breakpoints: toggle breakpoint here", &[On::no_shift(Key::B)], |state| {
             Command::Ask(breakpoints::Ask::BreakAt(state.cursor.step))
         })],
     ),
     line(
+        Playing,
         "break when: write a condition",
         &[Do::new("Breakpoints: write a condition", &[On::shift(Key::B)], |_| {
             Command::Ask(breakpoints::Ask::Focus)
         })],
     ),
-    gesture("Tab  Enter", "in the expression box: take the suggestion, set the breakpoint"),
-    gesture("Click above the timeline", "break at that step, or no longer"),
+    gesture(Playing, "Tab  Enter", "in the expression box: take the suggestion, set the breakpoint"),
+    gesture(Playing, "Click above the timeline", "toggle a breakpoint at that step"),
     line(
+        Steps,
         "previous, next stage",
         &[
             Do::new("Stage before", &[On::plain(Key::ArrowUp)], |_| Command::StageBy(-1)),
             Do::new("Stage after", &[On::plain(Key::ArrowDown)], |_| Command::StageBy(1)),
         ],
     ),
-    line("pick a target: then click in the left image", &[PICK]),
-    gesture("Arrows, Enter", "while picking: move the aim by 0.1 px (Shift 1 px), take it"),
-    gesture("Enter  Backspace  Esc", "in the tour: next, back, skip"),
+    line(Target, "pick a target: then click in the left image", &[PICK]),
+    gesture(Target, "Arrows, Enter", "while picking: move the aim by 0.1 px (Shift 1 px), take it"),
+    gesture(Page, "Enter  Backspace  Esc", "in the tour: next, back, skip"),
     line(
+        Target,
         "run from this step with the changed settings, or as a branch with what is tried",
         &[Do::new("Run from this step with the changed settings", &[On::plain(Key::R)], run_or_branch)],
     ),
     line(
+        Target,
         "why: where the selected value came from",
         &[Do::new("Why: where the selected value came from", &[On::plain(Key::W)], |_| {
             Command::Why(why::Ask::Selected)
         })],
     ),
     line(
+        Target,
         "what would have saved this step",
         &[Do::new("What would have saved this step?", &[On::plain(Key::C)], |_| {
             Command::Why(why::Ask::Saved)
         })],
     ),
     line(
-        "take the last deed back, do it again",
+        Target,
+        "undo, redo",
         &[
             UNDO,
-            Do::new("Do it again (redo)", &[On::ctrl(Key::Y), On::ctrl_shift(Key::Z)], |_| {
-                Command::Why(why::Ask::Redo)
-            }),
+            Do::new("Redo", &[On::ctrl(Key::Y), On::ctrl_shift(Key::Z)], |_| Command::Why(why::Ask::Redo)),
         ],
     ),
     line(
+        Images,
         "fit all images to their panels",
         &[Do::new("Fit all images", &[On::plain(Key::F)], |_| Command::FitAll)],
     ),
-    line("pin a note here", &[PIN_NOTE]),
-    line("export: files, pictures, commands", &[EXPORT]),
-    line("open: a file, a recent session, a drive; or drop a file on the page", &[OPEN]),
+    line(Target, "pin a note here", &[PIN_NOTE]),
+    line(Page, "export: files, pictures, commands", &[EXPORT]),
+    line(Page, "open: a file, a recent session, a drive; or drop a file on the page", &[OPEN]),
     line(
+        Images,
         "hide or show all marks",
         &[Do::new("Hide or show all marks", &[On::plain(Key::H)], |_| Command::ToggleMarks)],
     ),
     line(
+        Images,
         "stretch dark images automatically, or show them as recorded",
         &[Do::new("Stretch dark images, or show them as recorded", &[On::plain(Key::I)], |state| {
-            Command::SetStretch(if state.stretch == Stretch::None { Stretch::Auto } else { Stretch::None })
+            Command::SetStretch(if state.stretch == Stretch::Auto { Stretch::None } else { Stretch::Auto })
         })],
     ),
-    line("cancel what was begun", &[Do::new("", &[On::plain(Key::Escape)], cancel)]),
-    line("this sheet", &[HELP]),
-    line("the palette: whatever can be asked for, by name", &[PALETTE]),
+    line(Page, "cancel what was begun", &[Do::new("", &[On::plain(Key::Escape)], cancel)]),
+    line(Page, "this sheet", &[HELP]),
+    line(Page, "the palette: whatever can be asked for, by name", &[PALETTE]),
     Line {
+        group: Page,
         help: "arrangements of the panels, from the overview to the report",
-        gesture: "Shift+1 … Shift+7",
+        gesture: "Shift+1 … Shift+8",
         commands: &[
             Do::new("", &[On::shift(Key::Num1)], |_| arrange(Preset::Overview)),
             Do::new("", &[On::shift(Key::Num2)], |_| arrange(Preset::Match)),
@@ -222,9 +241,11 @@ pub(crate) static TABLE: &[Line] = &[
             Do::new("", &[On::shift(Key::Num5)], |_| arrange(Preset::Compare)),
             Do::new("", &[On::shift(Key::Num6)], |_| arrange(Preset::Sweep)),
             Do::new("", &[On::shift(Key::Num7)], |_| arrange(Preset::Report)),
+            Do::new("", &[On::shift(Key::Num8)], |_| arrange(Preset::Image)),
         ],
     },
     Line {
+        group: Page,
         help: "next, previous panel; Tab goes on inside it",
         gesture: "",
         commands: &[
@@ -232,25 +253,28 @@ pub(crate) static TABLE: &[Line] = &[
             Do::new("Previous panel", &[On::shift(Key::Q)], |_| Command::Layout(LayoutCommand::Panel(-1))),
         ],
     },
-    line("let the panel fill the page, and again to restore", &[MAXIMISE]),
-    line("copy a link to what is looked at", &[COPY_LINK]),
-    gesture("Wheel", "zoom at the pointer"),
-    gesture("Drag", "pan"),
-    gesture("Double click", "fit the image or plot"),
+    line(Page, "let the panel fill the page, and again to restore", &[MAXIMISE]),
+    line(Page, "copy a link to what is looked at", &[COPY_LINK]),
+    gesture(Images, "Wheel", "zoom at the pointer"),
+    gesture(Images, "Drag", "pan"),
+    gesture(Images, "Double click", "fit the image or plot"),
     line(
+        Compare,
         "first divergence of the compared runs: step and stage",
         &[Do::new("Compare: first divergence", &[On::plain(Key::D)], |_| {
             Command::Compare(compare::Ask::FirstDivergence)
         })],
     ),
     line(
+        Compare,
         "next way of comparing the left image",
         &[Do::new("Compare: next way of the left image", &[On::plain(Key::V)], |_| {
             Command::Compare(compare::Ask::NextView)
         })],
     ),
-    gesture("X (hold)", "show the other run while the key is held"),
+    gesture(Compare, "X (hold)", "show the other run while the key is held"),
     line(
+        Compare,
         "hold the target still in the left image",
         &[Do::new("Hold the target still in the left image", &[On::plain(Key::S)], |_| {
             Command::Compare(compare::Ask::Stabilise)
@@ -258,6 +282,7 @@ pub(crate) static TABLE: &[Line] = &[
     ),
     // Commands without a key are in the palette only.
     line(
+        Page,
         "",
         &[
             Do::new("Trackability: limits of the map", &[], |_| Command::Limits(limits::Ask::Open)),
@@ -312,9 +337,10 @@ pub(crate) fn keys_of(state: &State, command: &Command) -> String {
     entry.map(UserCommand::keys).unwrap_or_default()
 }
 
-/// The lines of the help sheet: keys or gestures, and the explanation.
-pub(crate) fn sheet() -> impl Iterator<Item = (String, &'static str)> {
-    TABLE.iter().filter(|line| !line.help.is_empty()).map(|line| (line.keys(), line.help))
+/// The lines of a group of the help sheet: keys or gestures, and the explanation.
+pub(crate) fn sheet(group: Group) -> impl Iterator<Item = (String, &'static str)> {
+    let lines = TABLE.iter().filter(move |line| line.group == group && !line.help.is_empty());
+    lines.map(|line| (line.keys(), line.help))
 }
 
 #[cfg(test)]
@@ -345,10 +371,10 @@ mod tests {
 
     #[test]
     fn the_sheet_shows_the_keys_that_act() {
-        let lines: Vec<(String, &str)> = sheet().collect();
+        let lines: Vec<(String, &str)> = Group::ALL.into_iter().flat_map(sheet).collect();
         let keys = |help: &str| lines.iter().find(|(_, of)| *of == help).unwrap().0.as_str();
         assert_eq!(keys("next, previous step"), "Right  Left");
-        assert_eq!(keys("take the last deed back, do it again"), "Ctrl+Z  Ctrl+Y");
+        assert_eq!(keys("undo, redo"), "Ctrl+Z  Ctrl+Y");
         assert_eq!(keys("this sheet"), "?");
         assert_eq!(keys("next, previous panel; Tab goes on inside it"), "Q  Shift+Q");
         assert_eq!(lines.len(), 42);

@@ -78,9 +78,9 @@ impl Closeness {
     /// Its word.
     pub const fn word(self) -> &'static str {
         match self {
-            Self::Exact => "every bit",
-            Self::Rounding => "beyond 1e-9",
-            Self::Visible => "beyond 0.01 px, 1 mm",
+            Self::Exact => "none",
+            Self::Rounding => "1e-9",
+            Self::Visible => "0.01 px, 1 mm",
         }
     }
 

@@ -1,4 +1,4 @@
-//! Marks on images: lines of 2 points with a dark halo of 1 point, so that they read on any rock.
+//! Marks on images: lines of 1.4 points with a dark halo of 1 point, so that they read on any rock.
 
 use egui::{Align2, Color32, Painter, Pos2, Rect, Shape, Stroke, Vec2, pos2, vec2};
 use nalgebra::Matrix2;
@@ -10,7 +10,7 @@ use crate::drawing::view2d::Transform;
 use crate::theme;
 
 /// Width of a line, points.
-const WIDTH: f32 = 2.0;
+const WIDTH: f32 = 1.4;
 /// Width of a line that is one of many, points.
 const THIN: f32 = 1.0;
 /// Width of its halo on either side, points.

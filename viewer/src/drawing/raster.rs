@@ -117,7 +117,7 @@ impl Raster {
         let size = [values.width() as usize, values.height() as usize];
         let texture = context.load_texture(name, ColorImage::new(size, colours), options);
         let (mean, sigma) = statistics(&values);
-        let (levels, stretched) = (levels(&values), egui::mutex::Mutex::default());
+        let (levels, stretched) = (levels(&values), egui::mutex::Mutex::new(Stretch::None));
         let look = egui::mutex::Mutex::default();
         Self { values, texture, mean, sigma, levels, options, array: None, stretched, look }
     }

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! as recorded   s = v
-//! automatic     s = ( (v − l) / (h − l) )^(1/1.4)                      l, h: 0.5 % and 99.5 % of the pixels lie below
+//! automatic     s = (v − l) / (h − l)                                   l, h: 0.5 % and 99.5 % of the pixels lie below
 //! by hand       s = ( c (v − 0.5) + 0.5 + b )^(1/γ)
 //! ```
 //! v and s are fractions of full scale, s is held in 0 to 1. What the tracker sees is never changed.
@@ -12,9 +12,6 @@ use sightline_vision::image::GrayImage;
 /// Share of the pixels below the black, and above the white, of the automatic stretch.
 const TAIL: f64 = 0.005;
 
-/// Gamma of the automatic stretch: shadows of a frame with much sky would stay black without.
-const AUTO_GAMMA: f32 = 1.4;
-
 /// Steps of grey that the automatic stretch tells apart.
 const BINS: usize = 4096;
 
@@ -22,9 +19,9 @@ const BINS: usize = 4096;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Stretch {
     /// As recorded.
-    #[default]
     None,
     /// From the image's own dark and bright end.
+    #[default]
     Auto,
     /// By hand.
     Manual {
@@ -50,12 +47,37 @@ impl Stretch {
         }
     }
 
+    /// The text under which a browser keeps it.
+    pub(crate) fn kept(self) -> String {
+        match self {
+            Self::None => "none".to_owned(),
+            Self::Auto => "auto".to_owned(),
+            Self::Manual { brightness, contrast, gamma } => format!("{brightness} {contrast} {gamma}"),
+        }
+    }
+
+    /// The stretch that was kept as this text.
+    pub(crate) fn of_kept(text: &str) -> Option<Self> {
+        match text {
+            "none" => Some(Self::None),
+            "auto" => Some(Self::Auto),
+            numbers => {
+                let numbers: Option<Vec<f32>> = numbers
+                    .split(' ')
+                    .map(|number| number.parse().ok().filter(|n: &f32| n.is_finite()))
+                    .collect();
+                let [brightness, contrast, gamma] = numbers?.try_into().ok()?;
+                Some(Self::Manual { brightness, contrast, gamma })
+            }
+        }
+    }
+
     /// What it does to an image whose dark and bright ends are `levels`, in words.
     pub fn describe(self, levels: [f32; 2]) -> String {
         match self {
             Self::None => "as recorded: 0 is black, 1 is white".to_owned(),
             Self::Auto => {
-                format!("automatic: {:.3} is black, {:.3} is white, γ {AUTO_GAMMA}", levels[0], levels[1])
+                format!("automatic: {:.3} is black, {:.3} is white", levels[0], levels[1])
             }
             Self::Manual { brightness, contrast, gamma } => {
                 format!("by hand: brightness {brightness:+.2}, contrast ×{contrast:.2}, γ {gamma:.2}")
@@ -68,7 +90,7 @@ impl Stretch {
         let raised = |v: f32, gamma: f32| v.clamp(0.0, 1.0).powf(1.0 / gamma);
         match self {
             Self::None => value,
-            Self::Auto => raised((value - levels[0]) / (levels[1] - levels[0]).max(1e-6), AUTO_GAMMA),
+            Self::Auto => ((value - levels[0]) / (levels[1] - levels[0]).max(1e-6)).clamp(0.0, 1.0),
             Self::Manual { brightness, contrast, gamma } => {
                 raised(contrast * (value - 0.5) + 0.5 + brightness, gamma)
             }
@@ -115,7 +137,19 @@ mod tests {
         assert_eq!(Stretch::Auto.apply(low, [low, high]), 0.0);
         assert_eq!(Stretch::Auto.apply(high, [low, high]), 1.0);
         let middle = Stretch::Auto.apply((low + high) / 2.0, [low, high]);
-        assert!((middle - 0.5_f32.powf(1.0 / 1.4)).abs() < 1e-4, "{middle}");
+        assert!((middle - 0.5).abs() < 1e-4, "{middle}");
+    }
+
+    #[test]
+    fn a_stretch_comes_back_as_it_was_kept() {
+        for stretch in
+            [Stretch::None, Stretch::Auto, Stretch::Manual { brightness: -0.1, contrast: 2.5, gamma: 0.7 }]
+        {
+            assert_eq!(Stretch::of_kept(&stretch.kept()), Some(stretch));
+        }
+        for damaged in ["", "bright", "1 2", "1 2 NaN", "1 2 3 4"] {
+            assert_eq!(Stretch::of_kept(damaged), None, "{damaged}");
+        }
     }
 
     #[test]

@@ -4,7 +4,7 @@ use egui::{Button, Ui, vec2};
 
 use crate::command::Command;
 use crate::exports::Ask;
-use crate::figure::wish::{Kind, Wish};
+use crate::figure::wish::{Kind, Sheet, Wish};
 use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::theme;
@@ -23,7 +23,18 @@ pub(crate) fn entries(ui: &mut Ui, state: &State, pane: Pane, out: &mut Vec<Comm
             }
         }
     });
+    sheets(ui, state, out);
     burn_in(ui, state, out);
+}
+
+/// Ground and width of figures.
+pub(crate) fn sheets(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    for sheet in Sheet::ALL {
+        let button = Button::selectable(state.exports.sheet == sheet, sheet.words());
+        if ui.add(button.min_size(vec2(24.0, 24.0))).clicked() {
+            out.push(Command::Exports(Ask::Sheet(sheet)));
+        }
+    }
 }
 
 /// Whether a line above the figure says what it is of.

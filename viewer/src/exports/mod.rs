@@ -7,7 +7,7 @@ pub(crate) mod update;
 
 use sightline_session::exports::ExportEntry;
 
-use crate::figure::wish::{Kind, Wish};
+use crate::figure::wish::{Kind, Sheet, Wish};
 use crate::panels::pane::Pane;
 
 /// What a person asks of exports.
@@ -25,6 +25,8 @@ pub enum Ask {
     Figure(Wish),
     /// Chooses what the figures of the window are saved as.
     Kind(Kind),
+    /// Chooses ground and width of figures.
+    Sheet(Sheet),
     /// Puts a line above figures that says of what they are, or does not.
     BurnIn(bool),
     /// Opens the plain page of the step.
@@ -58,6 +60,8 @@ pub struct Exports {
     pub panes: Vec<Pane>,
     /// What the figures of the window are saved as.
     pub kind: Kind,
+    /// Ground and width of figures.
+    pub sheet: Sheet,
     /// Whether a line above a figure says of what it is.
     pub burns_in: bool,
 }

@@ -37,6 +37,7 @@ impl State {
             Ask::Download(path) => self.open_path(&path),
             Ask::Figure(wish) => self.outbox.add(Effect::SaveFigure(wish)),
             Ask::Kind(kind) => self.exports.kind = kind,
+            Ask::Sheet(sheet) => self.exports.sheet = sheet,
             Ask::BurnIn(is_on) => self.exports.burns_in = is_on,
             Ask::PlainPage => self.open_path(&self.plain_page()),
         }

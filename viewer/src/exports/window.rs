@@ -22,7 +22,9 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         let height = (ui.ctx().content_rect().height() - 150.0).max(200.0);
         ui.label(RichText::new("Export").size(16.0).strong().color(theme::strong()));
         parts(ui, state, out);
-        ScrollArea::vertical().max_height(height).auto_shrink([false, true]).show(ui, |ui| {
+        // The window has its full height from the first frame: it must not move under the pointer when files are listed.
+        let list = ScrollArea::vertical().max_height(height).min_scrolled_height(height).auto_shrink(false);
+        list.show(ui, |ui| {
             files(ui, state, out);
             ui.add_space(8.0);
             pictures(ui, state, out);
@@ -115,10 +117,9 @@ fn pictures(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         }
         figure_menu::burn_in(ui, state, out);
     });
+    ui.horizontal_wrapped(|ui| figure_menu::sheets(ui, state, out));
     let seen = |pane: &Pane| state.exports.panes.contains(pane);
-    for (words, is_seen) in
-        [("on the screen, as it is there", true), ("not on the screen, drawn apart", false)]
-    {
+    for (words, is_seen) in [("on the screen", true), ("not on the screen", false)] {
         ui.label(theme::note(words));
         ui.horizontal_wrapped(|ui| {
             for pane in Pane::ALL.into_iter().filter(|pane| seen(pane) == is_seen) {

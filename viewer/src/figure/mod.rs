@@ -24,9 +24,20 @@ pub(crate) mod svg;
 pub(crate) mod wish;
 pub(crate) mod words;
 
+use std::cell::Cell;
 use std::sync::Arc;
 
 use egui::{Color32, ColorImage, FontFamily, Pos2, Rect, Stroke, Vec2};
+
+thread_local! {
+    /// Whether a figure for a paper is being drawn; the page paints on one thread.
+    static ON_PAPER: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Whether a figure for a paper is being drawn: controls are left out then.
+pub(crate) fn is_on_paper() -> bool {
+    ON_PAPER.get()
+}
 
 /// What is painted of a panel, in points from the figure's upper left corner.
 #[derive(Clone, Debug)]

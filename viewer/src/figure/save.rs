@@ -4,15 +4,17 @@
 use egui::epaint::{ClippedShape, TextShape};
 use egui::{Context, FontDefinitions, Frame, LayerId, Margin, RawInput, Rect, Stroke, Vec2, pos2, vec2};
 
-use crate::figure::wish::{Kind, Wish};
+use crate::figure::wish::{Kind, Sheet, Wish};
 use crate::figure::{Figure, Form, Ink, Piece, bitmap, shapes, svg, words};
 use crate::layout::show_pane;
 use crate::panels::pane::Pane;
 use crate::state::{State, run_letter};
-use crate::theme;
+use crate::theme::{self, Looks};
 
 /// Size of the figure of a panel that is not on the screen, points.
 const APART: Vec2 = vec2(720.0, 480.0);
+/// Height at which a panel shows all of a list, points.
+const TALL: f32 = 3000.0;
 /// Frames that are painted of it: the first ones only measure.
 const FRAMES: usize = 3;
 /// Room around the words of the line above a figure, points.
@@ -43,9 +45,10 @@ pub(crate) fn take(
 ) -> Result<File, String> {
     let scale = if let Kind::Png(scale) = wish.kind { scale } else { 1 };
     let place = places.iter().find(|(pane, _)| *pane == wish.pane).map(|(_, place)| *place);
-    let figure = match place {
-        Some(place) => of_layer(context, state, place, f32::from(scale)),
-        None => apart(state, wish.pane, f32::from(scale)),
+    let figure = match (state.exports.sheet, place) {
+        (Sheet::Screen, Some(place)) => of_layer(context, state, place, f32::from(scale)),
+        (Sheet::Screen, None) => apart(state, wish.pane, f32::from(scale), APART),
+        (Sheet::Paper(width), place) => on_paper(state, wish.pane, f32::from(scale), f32::from(width), place),
     };
     let figure = named(context, state, wish.pane, figure);
     let fonts = fonts(context);
@@ -87,16 +90,45 @@ pub(crate) fn of_layer(context: &Context, state: &State, place: Rect, scale: f32
     shapes::figure(&painted, place, scale, &|id| state.pixels_of(id))
 }
 
+/// A panel for a paper: white, without controls, `width` points wide, and so high that all of a list is on it.
+fn on_paper(state: &State, pane: Pane, scale: f32, width: f32, place: Option<Rect>) -> Figure {
+    let looks = theme::looks();
+    super::ON_PAPER.set(true);
+    theme::choose(Looks::Light);
+    let tall = apart(state, pane, scale, vec2(width, TALL));
+    let figure = match end_of_list(&tall) {
+        Some(height) => Figure { size: vec2(width, height), ..tall },
+        None => {
+            let aspect = place.map_or(APART.y / APART.x, |place| place.height() / place.width().max(1.0));
+            apart(state, pane, scale, vec2(width, (width * aspect.clamp(0.3, 1.5)).round()))
+        }
+    };
+    super::ON_PAPER.set(false);
+    theme::choose(looks);
+    figure
+}
+
+/// Where the contents of a tall figure end; `None` for a panel that fills any height, such as a plot or an image.
+fn end_of_list(tall: &Figure) -> Option<f32> {
+    let all = Rect::from_min_size(pos2(0.0, 0.0), tall.size);
+    let seen = tall.pieces.iter().map(|piece| piece.ink.bounds().intersect(piece.clip).intersect(all));
+    // The ground is no contents.
+    let contents = seen.filter(|bounds| bounds.is_positive() && bounds.height() < 0.9 * TALL);
+    let end = contents.map(|bounds| bounds.bottom()).fold(0.0, f32::max);
+    (end > 0.0 && end < 0.9 * TALL).then(|| (end + f32::from(theme::MARGIN)).ceil())
+}
+
 /// A panel painted where nobody sees it.
-fn apart(state: &State, pane: Pane, scale: f32) -> Figure {
+fn apart(state: &State, pane: Pane, scale: f32, size: Vec2) -> Figure {
     let context = Context::default();
-    theme::apply(&context, state.looks);
-    let screen = Rect::from_min_size(pos2(0.0, 0.0), APART);
+    theme::apply(&context, theme::looks());
+    let screen = Rect::from_min_size(pos2(0.0, 0.0), size);
+    let paper = if super::is_on_paper() { theme::well() } else { theme::panel() };
     let mut painted = Vec::new();
     for _ in 0..FRAMES {
         let input = RawInput { screen_rect: Some(screen), ..RawInput::default() };
         let mut output = context.run_ui(input, |ui| {
-            let ground = Frame::new().fill(theme::panel()).inner_margin(Margin::same(theme::MARGIN));
+            let ground = Frame::new().fill(paper).inner_margin(Margin::same(theme::MARGIN));
             ground.show(ui, |ui| {
                 // What it asks for is nobody's wish.
                 show_pane(ui, pane, state, &mut Vec::new());
@@ -106,7 +138,7 @@ fn apart(state: &State, pane: Pane, scale: f32) -> Figure {
         output.textures_delta.clear();
         painted = output.shapes;
     }
-    shapes::figure(&painted, screen, scale, &|id| state.pixels_of(id))
+    Figure { ground: paper, ..shapes::figure(&painted, screen, scale, &|id| state.pixels_of(id)) }
 }
 
 /// The figure with its title and description, and the line above it where that is wanted.

@@ -30,6 +30,34 @@ impl Kind {
     }
 }
 
+/// Ground and width of a figure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sheet {
+    /// As the panel is on the screen.
+    Screen,
+    /// For a paper: white, without controls, this many points wide.
+    Paper(u16),
+}
+
+impl Default for Sheet {
+    fn default() -> Self {
+        Self::Paper(720)
+    }
+}
+
+impl Sheet {
+    /// All choices.
+    pub const ALL: [Self; 4] = [Self::Paper(360), Self::Paper(720), Self::Paper(1080), Self::Screen];
+
+    /// The words of its button.
+    pub fn words(self) -> String {
+        match self {
+            Self::Screen => "as on the screen".to_owned(),
+            Self::Paper(width) => format!("white, {width} points wide"),
+        }
+    }
+}
+
 /// A figure that is wanted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Wish {

@@ -22,6 +22,12 @@ pub(crate) const TEXT_LIMIT: u64 = 512 << 10;
 /// How many characters of a file's name are shown.
 const NAME_SHOWN: usize = 60;
 
+/// How a folder is opened, as the end of a sentence.
+const OPEN_FOLDER: &str = "press Open (Ctrl+O) and choose its folder there; for a folder on the server's machine, start \
+                           the server with `sightline serve --recordings FOLDER`";
+/// The text files of a KITTI recording.
+const KITTI_FILES: [&str; 3] = ["calib.txt", "poses.txt", "times.txt"];
+
 /// What can be opened, each with what comes of it.
 pub(crate) const OPENABLE: [(&str, &str); 4] = [
     ("a scenario (.toml)", "opens the simulated drive that it describes"),
@@ -82,7 +88,7 @@ pub(crate) fn before_reading(name: &str, size_bytes: u64, is_folder: bool) -> Re
         return Err(format!("{file} {why}"));
     }
     if size_bytes == 0 && ending.is_empty() {
-        return Err(format!("{file} is empty, or a folder: open a folder with `sightline serve FOLDER`."));
+        return Err(format!("{file} is empty, or a folder: {OPEN_FOLDER}."));
     }
     if size_bytes == 0 {
         return Err(format!("{file} is empty: save or export it again."));
@@ -99,17 +105,11 @@ pub(crate) fn before_reading(name: &str, size_bytes: u64, is_folder: bool) -> Re
 
 /// What is said of a file that the browser or the system cannot read.
 pub(crate) fn unreadable(name: &str) -> String {
-    format!(
-        "{} cannot be read: if it is a folder, open it with `sightline serve FOLDER`; else look at who may read it.",
-        shown(name)
-    )
+    format!("{} cannot be read: if it is a folder, {OPEN_FOLDER}; else check who may read it.", shown(name))
 }
 
 fn folder(name: &str) -> String {
-    format!(
-        "{} is a folder: start the server with it, `sightline serve FOLDER`, or drop one of its files.",
-        shown(name)
-    )
+    format!("{} is a folder: {OPEN_FOLDER}.", shown(name))
 }
 
 fn ending(name: &str) -> String {
@@ -127,22 +127,24 @@ fn other_kind(name: &str, ending: &str) -> Option<String> {
     Some(match ending {
         "rrd" => "is a Rerun recording: open it with `rerun FILE` (Rerun 0.36), or press “Open in Rerun” for this session.".to_owned(),
         "png" | "jpg" | "jpeg" | "apng" | "gif" | "webp" | "bmp" | "tif" | "tiff" => {
-            "is a picture, and a drive is a folder with an index: make one with `sightline import FOLDER --out DRIVE`, then `sightline serve DRIVE`.".to_owned()
+            format!("is a single image: {OPEN_FOLDER}.")
         }
         "csv" | "jsonl" | "parquet" => format!("is a table of results: {session}."),
         "html" | "htm" => format!("is a report for reading in a browser tab: {session}."),
         "img" | "lbl" | "vic" | "mcap" | "bag" | "db3" | "zip" | "tar" | "gz" | "tgz" | "7z" => {
-            "is recorded data, perhaps packed: unpack it and make a drive with `sightline import FOLDER --out DRIVE`, then `sightline serve DRIVE`.".to_owned()
+            format!("is recorded data: unpack it if it is packed, and {OPEN_FOLDER}.")
         }
         "redb" => "is the server's own database: start the server with its folder, `sightline serve --data-dir FOLDER`.".to_owned(),
         _ if name.eq_ignore_ascii_case("traverse.toml") => index(),
+        "txt" if KITTI_FILES.iter().any(|known| name.eq_ignore_ascii_case(known)) => {
+            format!("is one file of a KITTI recording: {OPEN_FOLDER}.")
+        }
         _ => return None,
     })
 }
 
 fn index() -> String {
-    "is the index of a drive whose images lie beside it: start the server with its folder, `sightline serve FOLDER`."
-        .to_owned()
+    format!("is the index of a drive whose images are beside it: {OPEN_FOLDER}.")
 }
 
 /// Finds out what the contents are.
@@ -163,7 +165,7 @@ pub(crate) fn read(name: &str, bytes: &[u8]) -> Result<Document, String> {
     }
     let is_json =
         ending(name) == "json" || text.trim_start().starts_with(['{', '[']) && ending(name) != "toml";
-    let read = if is_json { of_json(text) } else { of_toml(text) };
+    let read = if is_json { of_json(text) } else { of_toml(text, &ending(name)) };
     read.map_err(|why| format!("{file} {why}"))
 }
 
@@ -189,9 +191,14 @@ fn of_json(text: &str) -> Result<Document, String> {
     }
 }
 
-fn of_toml(text: &str) -> Result<Document, String> {
-    let table: toml::Table =
-        toml_text::read(text).map_err(|said| format!("is no TOML: {said}; mend that line."))?;
+fn of_toml(text: &str, ending: &str) -> Result<Document, String> {
+    let table: toml::Table = toml_text::read(text).map_err(|said| {
+        if ending == "toml" {
+            format!("is no TOML: {said}; mend that line.")
+        } else {
+            "is neither a scenario nor a tracker configuration: `sightline scenarios` and `sightline presets` show what they have.".to_owned()
+        }
+    })?;
     if table.contains_key("stops") || table.contains_key("format") {
         return Err(index());
     }

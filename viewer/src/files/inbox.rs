@@ -6,6 +6,7 @@
 use std::sync::mpsc::{Receiver, Sender, channel};
 
 use egui::Context;
+use sightline_api::wire::Problem;
 
 use crate::files::documents;
 
@@ -21,6 +22,23 @@ pub enum Arrival {
         /// Its bytes.
         bytes: Vec<u8>,
     },
+    /// A recording was chosen: a folder, or an archive.
+    Chosen(Chosen),
+    /// So many files of the recording that was chosen are sent.
+    Sent(usize),
+    /// A file of it was refused, and the others are not sent.
+    NotSent(Problem),
+}
+
+/// A recording that was chosen to be sent.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Chosen {
+    /// The name of the folder or archive.
+    pub name: String,
+    /// How many files it has; an archive is one.
+    pub file_count: usize,
+    /// Its size, bytes.
+    pub bytes: u64,
 }
 
 /// Where files arrive.
@@ -28,13 +46,21 @@ pub(crate) struct Inbox {
     sender: Sender<Arrival>,
     receiver: Receiver<Arrival>,
     context: Context,
+    #[cfg(target_arch = "wasm32")]
+    outgoing: crate::files::outgoing::Outgoing,
 }
 
 impl Inbox {
     /// Nothing has arrived; `context` is woken when something does.
     pub(crate) fn new(context: Context) -> Self {
         let (sender, receiver) = channel();
-        Self { sender, receiver, context }
+        Self {
+            sender,
+            receiver,
+            context,
+            #[cfg(target_arch = "wasm32")]
+            outgoing: Default::default(),
+        }
     }
 
     /// What arrived since the last time, with what was dropped in this frame.
@@ -93,8 +119,33 @@ impl Inbox {
 impl Inbox {
     fn take(&self, file: &egui::DroppedFileHandle) {
         if let Some(file) = file.web_file() {
-            read_file(file.clone(), self.sender.clone(), self.context.clone());
+            let (sender, context) = (self.sender.clone(), self.context.clone());
+            if file.name().to_lowercase().ends_with(".zip") {
+                return self
+                    .outgoing
+                    .chosen(vec![file.clone()], true, &|arrival| tell(&sender, &context, arrival));
+            }
+            read_file(file.clone(), sender, context);
         }
+    }
+
+    /// Lets the person choose the folder of a recording, or an archive of one.
+    pub(crate) fn choose_recording(&self, is_archive: bool) {
+        let (sender, context, outgoing) = (self.sender.clone(), self.context.clone(), self.outgoing.clone());
+        crate::page::web::choose_recording(is_archive, move |files| {
+            outgoing.chosen(files, is_archive, &|arrival| tell(&sender, &context, arrival));
+        });
+    }
+
+    /// Sends the recording that was chosen last.
+    pub(crate) fn send_recording(&self, origin: &str, upload: String) {
+        let (sender, context) = (self.sender.clone(), self.context.clone());
+        self.outgoing.send(origin, upload, move |arrival| tell(&sender, &context, arrival));
+    }
+
+    /// Sends no more of it.
+    pub(crate) fn stop_sending(&self) {
+        self.outgoing.stop();
     }
 
     /// Lets the person choose a file in the browser's dialog.

@@ -6,6 +6,10 @@ pub(crate) mod documents;
 pub(crate) mod inbox;
 pub(crate) mod window;
 pub(crate) mod download;
+#[cfg(target_arch = "wasm32")]
+mod outgoing;
+pub(crate) mod recording;
+mod recording_window;
 mod removal;
 mod update;
 
@@ -36,6 +40,8 @@ pub enum Ask {
     ConfirmDrive(Option<String>),
     /// Removes a drive with its images.
     RemoveDrive(String),
+    /// Asks something of recordings.
+    Recording(recording::Ask),
     /// Asks again for what of the cursor's stop could not be shown.
     TryAgain,
 }
@@ -55,6 +61,8 @@ pub struct Files {
     pub opening: Option<String>,
     /// The path that is being typed.
     pub path: String,
+    /// The recordings on the server's machine.
+    pub recordings: recording::Recordings,
     /// The sessions that were removed here and can be restored, the last one at the end.
     pub removed: Vec<SessionEntry>,
     /// The drive about whose removal the user is asked.

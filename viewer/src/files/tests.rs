@@ -72,14 +72,17 @@ fn whatever_else_is_dropped_gets_one_sentence_that_names_the_file_and_the_fix() 
     let json = |value: Value| value.to_string().into_bytes();
     for (name, bytes, fix) in [
         ("log.rrd", b"RRF2".to_vec(), "rerun FILE"),
-        ("left_0001.png", vec![137, 80, 78, 71], "sightline import"),
+        ("left_0001.png", vec![137, 80, 78, 71], "press Open (Ctrl+O) and choose its folder"),
+        ("calib.txt", b"P0: 1 0 0".to_vec(), "is one file of a KITTI recording: press Open (Ctrl+O)"),
+        ("poses.txt", b"1 0 0 0".to_vec(), "sightline serve --recordings FOLDER"),
+        ("notes.txt", b"P0: 1 0 0".to_vec(), "sightline scenarios"),
         ("rows.csv", b"step,ncc".to_vec(), "reproduce.json"),
         ("drive.zip", b"PK".to_vec(), "unpack it"),
-        ("traverse.toml", b"format = 1".to_vec(), "sightline serve FOLDER"),
-        ("index.toml", b"[[stops]]\ntime_s = 0".to_vec(), "sightline serve FOLDER"),
+        ("traverse.toml", b"format = 1".to_vec(), "sightline serve --recordings FOLDER"),
+        ("index.toml", b"[[stops]]\ntime_s = 0".to_vec(), "sightline serve --recordings FOLDER"),
         ("empty.toml", Vec::new(), "export it again"),
         ("blank.toml", b"\n  \n".to_vec(), "export it again"),
-        ("folder", Vec::new(), "sightline serve FOLDER"),
+        ("folder", Vec::new(), "sightline serve --recordings FOLDER"),
         ("core", vec![0x7f, b'E', b'L', b'F', 0, 0xff, 0xfe], "no text"),
         ("nul.toml", b"seed = 4\0".to_vec(), "no text"),
         (

@@ -23,6 +23,7 @@ impl State {
                 self.files.is_open = true;
                 self.files.refused = None;
                 self.read_recent();
+                self.read_recordings();
             }
             Ask::Close => self.files.is_open = false,
             Ask::Choose => self.outbox.add(Effect::ChooseFile),
@@ -41,6 +42,7 @@ impl State {
                 let here = self.cursor.step;
                 self.cache.retry(|key| matches!(key, Key::Image { step, .. } if *step == here));
             }
+            Ask::Recording(ask) => self.ask_of_recordings(ask),
             Ask::RemoveSession(entry) => self.remove_session(*entry),
             Ask::RestoreSession(id) => self.restore_session(id),
             Ask::ConfirmDrive(id) => self.files.confirming = id,
@@ -60,6 +62,9 @@ impl State {
                 Ok(document) => self.open_document(&name, document),
                 Err(why) => self.messages.refused_file(why),
             },
+            Arrival::Chosen(chosen) => self.recording_chosen(chosen),
+            Arrival::Sent(count) => self.files_sent(count),
+            Arrival::NotSent(problem) => self.not_sent(problem),
         }
     }
 
@@ -89,7 +94,7 @@ impl State {
     }
 
     /// Opens the drive of a scenario.
-    fn open_drive(&mut self, file: String, scenario: String) {
+    pub(super) fn open_drive(&mut self, file: String, scenario: String) {
         let call = Call::with_body::<AddTraverse>(&Anywhere {}, &NewTraverse { scenario });
         self.open_file::<AddTraverse>(file, call, |state, file, entry| {
             state.messages.note(format!("{file} is the drive {}.", entry.name));

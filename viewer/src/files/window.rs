@@ -8,11 +8,15 @@ use sightline_api::wire::{SessionEntry, TraverseEntry};
 use crate::command::Command;
 use crate::files::Ask;
 use crate::files::documents::OPENABLE;
+use crate::files::recording_window;
 use crate::state::State;
 use crate::theme;
 
 /// How many recent sessions are listed.
 const LISTED: usize = 30;
+
+/// The window's height at most, points. It does not depend on what has come in: lines must not move under the pointer.
+const MAX_HEIGHT: f32 = 640.0;
 
 /// The room for the small button beside a line.
 const BESIDE_WIDTH: f32 = 84.0;
@@ -25,14 +29,22 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let mut ask = |ask: Ask| out.push(Command::Files(ask));
     let modal = Modal::new(Id::unique("open")).backdrop_color(theme::shade()).show(ui.ctx(), |ui| {
         ui.set_width(600.0);
-        let height = (ui.ctx().content_rect().height() - 150.0).max(200.0);
+        let height = (ui.ctx().content_rect().height() - 150.0).clamp(200.0, MAX_HEIGHT);
         ui.label(RichText::new("Open").size(16.0).strong().color(theme::strong()));
-        ScrollArea::vertical().max_height(height).auto_shrink([false, true]).show(ui, |ui| {
-            file(ui, state, &mut ask);
+        let list = ScrollArea::vertical().max_height(height).min_scrolled_height(height).auto_shrink(false);
+        list.show(ui, |ui| {
+            if recording_window::card(ui, state, &mut ask) {
+                return;
+            }
+            recording_window::list(ui, state, &mut ask);
             ui.add_space(8.0);
             recent(ui, state, &mut ask);
             ui.add_space(8.0);
             drives(ui, state, &mut ask);
+            ui.add_space(8.0);
+            recording_window::scenarios(ui, &mut ask);
+            ui.add_space(8.0);
+            file(ui, state, &mut ask);
         });
         ui.separator();
         ui.add(Button::new("Close").min_size(vec2(24.0, 24.0))).clicked()
@@ -131,9 +143,7 @@ fn drives(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(Ask)) {
     ui.label(theme::title("a new session on a drive of this server"));
     let list = state.traverses.as_deref().unwrap_or_default();
     if list.is_empty() {
-        ui.label(theme::note(
-            "The server has no drive: drop a scenario, or start it with a folder, `sightline serve FOLDER`.",
-        ));
+        ui.label(theme::note("The server has no drive: open a recording above, or a scenario below."));
     }
     for entry in list {
         let kind = if entry.simulated { "simulated" } else { "recorded" };
@@ -167,7 +177,7 @@ fn confirm(ui: &mut Ui, entry: &TraverseEntry, ask: &mut dyn FnMut(Ask)) {
 }
 
 /// The button of a line that was pressed.
-enum Pressed {
+pub(super) enum Pressed {
     /// The line itself.
     Row,
     /// The small button beside it.
@@ -175,7 +185,7 @@ enum Pressed {
 }
 
 /// A line that is one button (title, and more about it), perhaps with a small one beside it (label and accessible name).
-fn row(
+pub(super) fn row(
     ui: &mut Ui,
     [title, words]: [&str; 2],
     is_on: bool,
@@ -195,7 +205,7 @@ fn row(
     ui.horizontal(|ui| {
         let width = ui.available_width() - if beside.is_some() { BESIDE_WIDTH } else { 0.0 };
         let size = vec2(width, 26.0);
-        let button = Button::selectable(is_on, job).truncate().min_size(size);
+        let button = Button::selectable(is_on, (job, egui::Atom::grow())).truncate().min_size(size);
         let is_pressed = ui.add_sized(size, button).accessible_name(name).clicked();
         let is_beside = beside.is_some_and(|(label, name)| {
             let button = Button::new(label).min_size(vec2(24.0, 24.0));

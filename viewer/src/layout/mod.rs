@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `command` | what can be asked of the arrangement |
 //! | `left_image` | where the left image is on the screen |
-//! | `presets` | the seven arrangements that come with the page, and the one for narrow windows |
+//! | `presets` | the eight arrangements that come with the page, and the one for narrow windows |
 //! | `workspace` | the arrangement in use: presets, the panel with the keyboard, the one that fills the page; kept across reloads |
 
 pub(crate) mod command;
@@ -12,7 +12,7 @@ pub(crate) mod left_image;
 pub(crate) mod presets;
 pub(crate) mod workspace;
 
-use egui::{Color32, Frame, RichText, Stroke, Ui, Visuals, WidgetText};
+use egui::{Color32, EventFilter, Frame, RichText, Stroke, Ui, Visuals, WidgetText};
 use egui_tiles::{Behavior, SimplificationOptions, TabState, TileId, Tiles, UiResponse};
 
 use self::command::LayoutCommand;
@@ -84,7 +84,8 @@ impl<'a> Panels<'a> {
         if self.takes_keyboard && self.current == Some(pane) {
             whole.request_focus();
         }
-        if whole.has_focus() {
+        // A panel that only keeps the focus must not take the turn of the one that gets it.
+        if whole.gained_focus() || is_pressed(ui, place) {
             self.current = Some(pane);
         }
         Frame::new().fill(theme::panel()).inner_margin(margin).show(ui, |ui| {
@@ -92,6 +93,11 @@ impl<'a> Panels<'a> {
             ui.take_available_space();
         });
         if whole.has_focus() {
+            // A panel has nothing that arrows move: they step along the drive as everywhere else.
+            let arrows =
+                EventFilter { horizontal_arrows: true, vertical_arrows: true, ..EventFilter::default() };
+            ui.memory_mut(|memory| memory.set_focus_lock_filter(whole.id, arrows));
+            ui.data_mut(|data| data.insert_temp(panel_with_keyboard(), whole.id));
             let ring = Stroke::new(1.5, theme::accent());
             ui.painter().rect_stroke(place.shrink(1.0), 2.0, ring, egui::StrokeKind::Inside);
         }
@@ -127,6 +133,21 @@ impl<'a> Panels<'a> {
             }
         });
     }
+}
+
+/// Under which name the panel that had the keyboard last is remembered.
+fn panel_with_keyboard() -> egui::Id {
+    egui::Id::unique("panel with the keyboard")
+}
+
+/// Whether a control that has the keyboard is a whole panel, to which no key means anything.
+pub(crate) fn is_panel(context: &egui::Context, id: egui::Id) -> bool {
+    context.data(|data| data.get_temp(panel_with_keyboard())) == Some(id)
+}
+
+/// Whether the pointer is pressed in a panel in this frame, and not on a window above it.
+fn is_pressed(ui: &Ui, place: egui::Rect) -> bool {
+    ui.input(|input| input.pointer.any_pressed()) && ui.rect_contains_pointer(place)
 }
 
 /// Makes what `ui` holds a region with a name.

@@ -27,12 +27,22 @@ pub enum Preset {
     Sweep,
     /// What is told of a drive.
     Report,
+    /// The image with little else.
+    Image,
 }
 
 impl Preset {
     /// All of them, in the order of their numbers from 1 on.
-    pub const ALL: [Self; 7] =
-        [Self::Overview, Self::Match, Self::Stereo, Self::Map, Self::Compare, Self::Sweep, Self::Report];
+    pub const ALL: [Self; 8] = [
+        Self::Overview,
+        Self::Match,
+        Self::Stereo,
+        Self::Map,
+        Self::Compare,
+        Self::Sweep,
+        Self::Report,
+        Self::Image,
+    ];
 
     /// Its name.
     pub const fn title(self) -> &'static str {
@@ -42,8 +52,9 @@ impl Preset {
             Self::Stereo => "Stereo",
             Self::Map => "Map",
             Self::Compare => "Compare",
-            Self::Sweep => "Sweep",
+            Self::Sweep => "Studies",
             Self::Report => "Report",
+            Self::Image => "Image",
         }
     }
 
@@ -57,6 +68,7 @@ impl Preset {
             Self::Compare => "compare",
             Self::Sweep => "sweep",
             Self::Report => "report",
+            Self::Image => "image",
         }
     }
 
@@ -70,19 +82,23 @@ impl Preset {
             Self::Compare => "runs beside each other",
             Self::Sweep => "many runs at once",
             Self::Report => "what is told of a drive",
+            Self::Image => "the image with little else",
         }
     }
 
-    /// The arrangement.
-    pub fn tree(self) -> Tree<Pane> {
+    /// The arrangement for images of this shape.
+    pub fn tree(self, shape: ImageShape) -> Tree<Pane> {
         let mut tiles = Tiles::default();
-        let root = build(&mut tiles, self.table());
+        let root = build(&mut tiles, self.table(shape));
         Tree::new(egui::Id::unique("panels"), root, tiles)
     }
 
-    const fn table(self) -> &'static Area {
+    const fn table(self, shape: ImageShape) -> &'static Area {
         match self {
+            Self::Overview if matches!(shape, ImageShape::Wide) => &WIDE_OVERVIEW,
+            Self::Image if matches!(shape, ImageShape::Wide) => &WIDE_IMAGE,
             Self::Overview => &OVERVIEW,
+            Self::Image => &IMAGE,
             Self::Match => &MATCH,
             Self::Stereo => &STEREO,
             Self::Map => &MAP,
@@ -93,17 +109,38 @@ impl Preset {
     }
 }
 
-/// All panels as the tabs of one group: for windows too narrow for two columns.
+/// The shape of a traverse's images, on which depends whether they stand beside or above each other.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ImageShape {
+    /// About as wide as high.
+    #[default]
+    Square,
+    /// At least twice as wide as high.
+    Wide,
+}
+
+impl ImageShape {
+    /// The shape of an image of this width and height, px.
+    pub(crate) fn of([width, height]: [u32; 2]) -> Self {
+        if width >= 2 * height { Self::Wide } else { Self::Square }
+    }
+}
+
+/// For windows too narrow for two columns: the left image, and below it all other panels as tabs.
 pub(crate) fn narrow() -> Tree<Pane> {
     let mut tiles = Tiles::default();
-    let root = build(&mut tiles, &Area::Tabs(&Pane::ALL));
+    let image = tabs(&mut tiles, &[Pane::Left]);
+    let others: Vec<Pane> = Pane::ALL.into_iter().filter(|pane| *pane != Pane::Left).collect();
+    let others = tabs(&mut tiles, &others);
+    let root = tiles.insert_vertical_tile(vec![image, others]);
     Tree::new(egui::Id::unique("panels of a narrow window"), root, tiles)
 }
 
 /// A part of an arrangement; numbers are shares of its width or height.
 enum Area {
-    /// The panels whose home is this group.
-    Home(Group),
+    /// The panels whose home is one of these groups.
+    Home(&'static [Group]),
     /// These panels.
     Tabs(&'static [Pane]),
     Row(&'static [(Area, f32)]),
@@ -112,18 +149,81 @@ enum Area {
 
 use Area::{Column, Home, Row, Tabs};
 
-/// Every panel where it says that its home is.
+/// Every panel where it says that its home is: the left image large, beside it the target's close-up above other views.
 const OVERVIEW: Area = Row(&[
-    (Home(Group::Lists), 0.17),
     (
         Column(&[
-            (Row(&[(Home(Group::LeftImage), 1.0), (Home(Group::Views), 1.0)]), 0.53),
-            (Home(Group::Strip), 0.175),
-            (Row(&[(Home(Group::Scores), 1.0), (Home(Group::Map), 1.1), (Home(Group::Plots), 1.1)]), 0.295),
+            (
+                Row(&[
+                    (Home(&[Group::LeftImage]), 0.43),
+                    (
+                        Column(&[
+                            (Home(&[Group::CloseUp]), 0.46),
+                            (Row(&[(Home(&[Group::Views]), 1.0), (Home(MAP_AND_PLOTS), 1.0)]), 0.54),
+                        ]),
+                        0.57,
+                    ),
+                ]),
+                0.765,
+            ),
+            (Home(&[Group::Strip]), 0.235),
         ]),
-        0.63,
+        0.76,
     ),
-    (Column(&[(Home(Group::Verdict), 0.38), (Home(Group::Details), 0.62)]), 0.2),
+    (COLUMN, 0.24),
+]);
+
+/// The same with the left image across, the other views below it.
+const WIDE_OVERVIEW: Area = Row(&[
+    (
+        Column(&[
+            (Home(&[Group::LeftImage]), 0.46),
+            (
+                Row(&[
+                    (Home(&[Group::CloseUp]), 1.0),
+                    (Home(&[Group::Views]), 1.0),
+                    (Home(MAP_AND_PLOTS), 1.0),
+                ]),
+                0.32,
+            ),
+            (Home(&[Group::Strip]), 0.22),
+        ]),
+        0.78,
+    ),
+    (COLUMN, 0.22),
+]);
+
+const MAP_AND_PLOTS: &[Group] = &[Group::Map, Group::Plots, Group::Scores];
+
+/// Right of the images.
+const COLUMN: Area = Column(&[
+    (Home(&[Group::Lists]), 0.25),
+    (Home(&[Group::Verdict]), 0.43),
+    (Home(&[Group::Details]), 0.32),
+]);
+
+const IMAGE: Area = Row(&[
+    (Tabs(&[Pane::Left, Pane::Right]), 0.68),
+    (
+        Column(&[
+            (Tabs(&[Pane::CloseUp, Pane::Surface]), 0.3),
+            (Tabs(&[Pane::Targets, Pane::Settings, Pane::Drive]), 0.28),
+            (Tabs(&[Pane::Why, Pane::Gates, Pane::Inspector, Pane::Messages]), 0.42),
+        ]),
+        0.32,
+    ),
+]);
+
+const WIDE_IMAGE: Area = Column(&[
+    (Tabs(&[Pane::Left]), 0.44),
+    (Tabs(&[Pane::Right, Pane::CloseUp, Pane::Surface]), 0.34),
+    (
+        Row(&[
+            (Tabs(&[Pane::Targets, Pane::Settings, Pane::Drive]), 1.0),
+            (Tabs(&[Pane::Gates, Pane::Why, Pane::Inspector, Pane::Messages]), 1.0),
+        ]),
+        0.22,
+    ),
 ]);
 
 const MATCH: Area = Row(&[
@@ -216,7 +316,10 @@ const REPORT: Area = Row(&[
 
 fn build(tiles: &mut Tiles<Pane>, area: &Area) -> TileId {
     match area {
-        Home(group) => tabs(tiles, &Pane::of_group(*group)),
+        Home(groups) => {
+            let panes: Vec<Pane> = groups.iter().flat_map(|group| Pane::of_group(*group)).collect();
+            tabs(tiles, &panes)
+        }
         Tabs(panes) => tabs(tiles, panes),
         Row(parts) => linear(tiles, LinearDir::Horizontal, parts),
         Column(parts) => linear(tiles, LinearDir::Vertical, parts),
@@ -242,17 +345,22 @@ fn linear(tiles: &mut Tiles<Pane>, direction: LinearDir, parts: &[(Area, f32)]) 
 mod tests {
     use super::*;
 
+    fn all() -> impl Iterator<Item = (Preset, ImageShape)> {
+        let shapes = [ImageShape::Square, ImageShape::Wide];
+        Preset::ALL.into_iter().flat_map(move |preset| shapes.map(|shape| (preset, shape)))
+    }
+
     #[test]
     fn every_panel_is_in_the_overview_once_and_in_no_arrangement_twice() {
-        for preset in Preset::ALL {
-            let tree = preset.tree();
+        for (preset, shape) in all() {
+            let tree = preset.tree(shape);
             for pane in Pane::ALL {
                 let count = tree
                     .tiles
                     .tiles()
                     .filter(|tile| matches!(tile, egui_tiles::Tile::Pane(p) if *p == pane))
                     .count();
-                assert!(count <= 1, "{preset:?} has {pane:?} {count} times");
+                assert!(count <= 1, "{preset:?} {shape:?} has {pane:?} {count} times");
                 assert!(count == 1 || preset != Preset::Overview, "the overview lacks {pane:?}");
             }
         }
@@ -260,8 +368,8 @@ mod tests {
 
     #[test]
     fn every_arrangement_shows_the_left_image_and_where_messages_are() {
-        for preset in Preset::ALL {
-            let tree = preset.tree();
+        for (preset, shape) in all() {
+            let tree = preset.tree(shape);
             for pane in [Pane::Left, Pane::Messages, Pane::Targets] {
                 assert!(tree.tiles.find_pane(&pane).is_some(), "{preset:?} lacks {pane:?}");
             }

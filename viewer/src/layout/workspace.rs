@@ -6,7 +6,7 @@ use egui_tiles::{Container, Tile, TileId, Tree};
 use serde::{Deserialize, Serialize};
 
 use crate::layout::command::LayoutCommand;
-use crate::layout::presets::{Preset, narrow};
+use crate::layout::presets::{ImageShape, Preset, narrow};
 use crate::layout::{Panels, show_pane};
 use crate::panels::pane::Pane;
 use crate::theme;
@@ -15,13 +15,15 @@ use crate::theme;
 const NARROW: f32 = 900.0;
 
 /// The version of the kept form.
-const KEPT_FORMAT: u32 = 1;
+const KEPT_FORMAT: u32 = 2;
 
 /// The arrangement in use.
 pub(crate) struct Workspace {
     tree: Tree<Pane>,
     narrow: Tree<Pane>,
     preset: Preset,
+    /// The shape of the images that the arrangement was made for.
+    shape: ImageShape,
     maximised: Option<Pane>,
     current: Option<Pane>,
     /// The panels on the screen, in reading order.
@@ -36,15 +38,17 @@ pub(crate) struct Workspace {
 struct Kept {
     format: u32,
     preset: Preset,
+    shape: ImageShape,
     tree: Tree<Pane>,
 }
 
 impl Default for Workspace {
     fn default() -> Self {
         Self {
-            tree: Preset::Overview.tree(),
+            tree: Preset::Overview.tree(ImageShape::Square),
             narrow: narrow(),
             preset: Preset::Overview,
+            shape: ImageShape::Square,
             maximised: None,
             current: None,
             seen: Vec::new(),
@@ -62,13 +66,15 @@ impl Workspace {
         usable.map_or_else(Self::default, |kept| Self {
             tree: kept.tree,
             preset: kept.preset,
+            shape: kept.shape,
             ..Self::default()
         })
     }
 
     /// What the browser is to keep.
     pub(crate) fn kept(&self) -> String {
-        let kept = Kept { format: KEPT_FORMAT, preset: self.preset, tree: self.tree.clone() };
+        let kept =
+            Kept { format: KEPT_FORMAT, preset: self.preset, shape: self.shape, tree: self.tree.clone() };
         serde_json::to_string(&kept).unwrap_or_default()
     }
 
@@ -86,7 +92,7 @@ impl Workspace {
     pub(crate) fn apply(&mut self, command: LayoutCommand) {
         match command {
             LayoutCommand::Use(preset) => {
-                (self.tree, self.preset, self.maximised) = (preset.tree(), preset, None);
+                (self.tree, self.preset, self.maximised) = (preset.tree(self.shape), preset, None);
             }
             LayoutCommand::Show(pane) => self.show_panel(pane),
             LayoutCommand::Close(pane) => self.close(pane),
@@ -96,6 +102,37 @@ impl Workspace {
             }
             LayoutCommand::Maximise(_) => self.maximised = None,
         }
+    }
+
+    /// Takes in the size of the images, px. An arrangement that nobody changed follows their shape.
+    pub(crate) fn fit_images(&mut self, size: [u32; 2]) {
+        let shape = ImageShape::of(size);
+        if shape == self.shape {
+            return;
+        }
+        if self.is_as_it_came() {
+            self.tree = self.preset.tree(shape);
+        }
+        self.shape = shape;
+    }
+
+    /// Whether no panel was moved, closed or resized since the arrangement was chosen.
+    fn is_as_it_came(&self) -> bool {
+        let places = |tree: &Tree<Pane>| {
+            let tiles = tree.tiles.tiles();
+            let mut shares: Vec<String> = tiles
+                .map(|tile| match tile {
+                    Tile::Container(Container::Linear(linear)) => {
+                        format!("{:?} {:?}", linear.dir, linear.shares)
+                    }
+                    Tile::Container(Container::Tabs(tabs)) => tabs.children.len().to_string(),
+                    other => format!("{other:?}"),
+                })
+                .collect();
+            shares.sort();
+            shares
+        };
+        places(&self.tree) == places(&self.preset.tree(self.shape))
     }
 
     fn tree_in_use(&mut self) -> &mut Tree<Pane> {
@@ -273,6 +310,67 @@ mod tests {
         let active = workspace.tree.active_tiles();
         let gates = workspace.tree.tiles.find_pane(&Pane::Gates).unwrap();
         assert!(active.contains(&gates));
+    }
+
+    /// The workspace on a page with one panel beside the other, in an order that Q follows.
+    fn page() -> egui_kittest::Harness<'static, Workspace> {
+        let state = crate::tests::fixture::nothing();
+        let mut harness = egui_kittest::Harness::builder().with_size([1280.0, 720.0]).build_ui_state(
+            move |ui, workspace: &mut Workspace| {
+                let mut out = Vec::new();
+                workspace.show(ui, &mut Panels::new(&state, &mut out));
+            },
+            Workspace::default(),
+        );
+        harness.run_steps(3);
+        harness
+    }
+
+    #[test]
+    fn every_press_of_q_goes_one_panel_on() {
+        let mut harness = page();
+        let seen = harness.state().seen.clone();
+        assert!(seen.len() > 2, "{seen:?}");
+        for expected in &seen {
+            harness.state_mut().apply(LayoutCommand::Panel(1));
+            harness.run_steps(3);
+            assert_eq!(harness.state().current, Some(*expected));
+        }
+    }
+
+    #[test]
+    fn arrows_and_enter_stay_the_pages_while_a_whole_panel_has_the_keyboard() {
+        let mut harness = page();
+        harness.state_mut().apply(LayoutCommand::Panel(1));
+        harness.run_steps(3);
+        let focused = harness.ctx.memory(|memory| memory.focused()).expect("a panel has the keyboard");
+        assert!(crate::layout::is_panel(&harness.ctx, focused));
+        harness.key_press(egui::Key::ArrowRight);
+        harness.run_steps(3);
+        let after = harness.ctx.memory(|memory| memory.focused());
+        assert_eq!(after, Some(focused), "an arrow took the keyboard to a control");
+        harness.key_press(egui::Key::Tab);
+        harness.run_steps(3);
+        let after = harness.ctx.memory(|memory| memory.focused()).expect("Tab goes on in the panel");
+        assert!(after != focused && !crate::layout::is_panel(&harness.ctx, after));
+    }
+
+    #[test]
+    fn the_panel_that_was_clicked_fills_the_page() {
+        let mut harness = page();
+        harness.state_mut().apply(LayoutCommand::Panel(1));
+        harness.run_steps(3);
+        let focused = harness.state().current;
+        harness.hover_at(egui::pos2(1200.0, 600.0));
+        harness.run_steps(2);
+        harness.drag_at(egui::pos2(1200.0, 600.0));
+        harness.run_steps(2);
+        harness.drop_at(egui::pos2(1200.0, 600.0));
+        harness.run_steps(2);
+        let clicked = harness.state().current;
+        assert_ne!(clicked, focused);
+        harness.state_mut().apply(LayoutCommand::Maximise(None));
+        assert_eq!(harness.state().maximised, clicked);
     }
 
     #[test]

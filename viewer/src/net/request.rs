@@ -3,7 +3,7 @@
 use sightline_api::endpoint::Call;
 use sightline_api::endpoints::{
     AddBreakpoint, AddNote, ChangeBreakpoint, ChangeNote, ListBreakpoints, MoveCursor, RemoveBreakpoint,
-    RemoveNote, RemoveRun, RemoveTarget, RestoreNote, RestoreRun, RestoreTarget,
+    RemoveNote, RemoveRun, RemoveTarget, RenameTarget, RestoreNote, RestoreRun, RestoreTarget,
 };
 use sightline_api::wire::Problem;
 
@@ -27,9 +27,10 @@ pub enum Request {
 
 /// The calls that are sent one after the other: quick changes that a user makes and takes back, and the list that they
 /// change. Connections are parallel, so that a removal could otherwise overtake the change that it takes back.
-const IN_ORDER: [fn(&Call) -> bool; 12] = [
+const IN_ORDER: [fn(&Call) -> bool; 13] = [
     Call::is_to::<RemoveTarget>,
     Call::is_to::<RestoreTarget>,
+    Call::is_to::<RenameTarget>,
     Call::is_to::<RemoveRun>,
     Call::is_to::<RestoreRun>,
     Call::is_to::<AddNote>,

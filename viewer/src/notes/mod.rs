@@ -5,6 +5,7 @@
 
 pub(crate) mod panel;
 pub(crate) mod markdown;
+pub(crate) mod marks;
 mod update;
 
 use sightline_session::notes::{Note, Pin};

@@ -76,37 +76,45 @@ fn show_note(ui: &mut Ui, state: &State, note: &Note, place: usize, count: usize
     let fill = if is_at { theme::selected() } else { theme::bar() };
     egui::Frame::new().fill(fill).corner_radius(4).inner_margin(6).show(ui, |ui| {
         ui.set_width(ui.available_width());
-        ui.horizontal(|ui| {
-            let words =
-                RichText::new(format!("{}. {}", place + 1, whereabouts(state, note))).color(theme::accent());
-            let button = egui::Button::new(words).frame(false).min_size(egui::vec2(24.0, 24.0));
-            let name = format!("go to note {}: {}", place + 1, whereabouts(state, note));
-            if ui.add(button).on_hover_text(&note.made).accessible_name(name).clicked() {
-                ask(Ask::GoTo(note.id));
-            }
-            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                let mut small = |words: &str, help: &str, is_on: bool| {
-                    let button = egui::Button::new(words).min_size(egui::vec2(24.0, 24.0));
-                    let name = format!("{help} note {}", place + 1);
-                    ui.add_enabled(is_on, button).on_hover_text(help).accessible_name(name).clicked()
-                };
-                if small("Remove", "remove", true) {
-                    ask(Ask::Remove(note.id));
-                }
-                if small("Edit", "edit", true) {
-                    ask(Ask::Edit(note.id));
-                }
-                if small("▼", "later in the tour:", place + 1 < count) {
-                    ask(Ask::Move { id: note.id, place: place + 1 });
-                }
-                if small("▲", "earlier in the tour:", place > 0) {
-                    ask(Ask::Move { id: note.id, place: place - 1 });
+        // From the right: the title gets what the buttons leave.
+        ui.with_layout(Layout::right_to_left(Align::Center).with_main_wrap(false), |ui| {
+            ui.set_height(24.0);
+            buttons(ui, note, (place, count), ask);
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                let title = format!("{}. {}", place + 1, whereabouts(state, note));
+                let words = RichText::new(title).color(theme::accent());
+                let button =
+                    egui::Button::new(words).frame(false).min_size(egui::vec2(24.0, 24.0)).truncate();
+                let name = format!("go to note {}: {}", place + 1, whereabouts(state, note));
+                if ui.add(button).on_hover_text(&note.made).accessible_name(name).clicked() {
+                    ask(Ask::GoTo(note.id));
                 }
             });
         });
         ui.add(egui::Label::new(markdown::layout(&note.text)).wrap().selectable(true));
     });
     ui.add_space(3.0);
+}
+
+/// What can be done with a note, from the right.
+fn buttons(ui: &mut Ui, note: &Note, (place, count): (usize, usize), ask: &mut dyn FnMut(Ask)) {
+    let mut small = |words: &str, help: &str, is_on: bool| {
+        let button = egui::Button::new(words).min_size(egui::vec2(24.0, 24.0));
+        let name = format!("{help} note {}", place + 1);
+        ui.add_enabled(is_on, button).on_hover_text(help).accessible_name(name).clicked()
+    };
+    if small("Remove", "remove", true) {
+        ask(Ask::Remove(note.id));
+    }
+    if small("Edit", "edit", true) {
+        ask(Ask::Edit(note.id));
+    }
+    if small("▼", "later in the tour:", place + 1 < count) {
+        ask(Ask::Move { id: note.id, place: place + 1 });
+    }
+    if small("▲", "earlier in the tour:", place > 0) {
+        ask(Ask::Move { id: note.id, place: place - 1 });
+    }
 }
 
 /// Where a note is pinned, in words.

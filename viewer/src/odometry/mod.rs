@@ -58,10 +58,8 @@ impl State {
             return None;
         }
         if step == 0 {
-            return Some(
-                "The drive begins at step 0: no motion led there. Go one step on (Right) to see one."
-                    .to_owned(),
-            );
+            let next = self.next_step_words("to see one");
+            return Some(format!("The drive begins at step 0: no motion led there.{next}"));
         }
         if let Some(halt) = self.halt().filter(|_| self.lacks_images_yet(step)) {
             return Some(pause::not_computed(halt.before));

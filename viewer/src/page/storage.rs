@@ -1,7 +1,9 @@
-//! What the browser keeps of the page across reloads: the arrangement of the panels, the looks, and which keys act.
+//! What the browser keeps of the page across reloads: the arrangement of the panels, the looks, the stretch of the images, and
+//! which keys act.
 
 use egui::Context;
 
+use crate::drawing::stretch::Stretch;
 use crate::state::State;
 use crate::theme::Looks;
 
@@ -11,6 +13,8 @@ const LAYOUT: &str = "sightline.layout";
 const LOOKS: &str = "sightline.looks";
 /// Under which name is kept whether keys that write a character act: `on` or `off`.
 const KEYS: &str = "sightline.keys";
+/// Under which name the stretch of the images is kept.
+const STRETCH: &str = "sightline.stretch";
 /// How long the page waits before it writes a change, s: dragging a border changes the arrangement in every frame.
 const PAUSE_S: f64 = 0.5;
 
@@ -19,6 +23,7 @@ const PAUSE_S: f64 = 0.5;
 pub(crate) struct Kept {
     layout: Option<String>,
     looks: Option<Looks>,
+    stretch: Option<Stretch>,
     single_keys: bool,
     write_at: Option<f64>,
 }
@@ -30,6 +35,7 @@ impl Kept {
         Self {
             layout: kept(LAYOUT),
             looks,
+            stretch: kept(STRETCH).as_deref().and_then(Stretch::of_kept),
             single_keys: kept(KEYS).as_deref() != Some("off"),
             write_at: None,
         }
@@ -43,6 +49,11 @@ impl Kept {
     /// The looks.
     pub(crate) fn looks(&self) -> Option<Looks> {
         self.looks
+    }
+
+    /// The stretch of the images.
+    pub(crate) fn stretch(&self) -> Option<Stretch> {
+        self.stretch
     }
 
     /// Whether keys that write a character act.
@@ -60,6 +71,10 @@ impl Kept {
         if self.looks != Some(looks) {
             self.looks = Some(looks);
             keep(LOOKS, looks.word());
+        }
+        if self.stretch != Some(state.stretch) && !context.input(|input| input.pointer.any_down()) {
+            self.stretch = Some(state.stretch);
+            keep(STRETCH, &state.stretch.kept());
         }
         let now = context.input(|input| input.time);
         let is_busy = context.input(|input| input.pointer.any_down());

@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 use std::sync::OnceLock;
 
+use sightline_api::wire::Problem;
 use wasm_bindgen::prelude::*;
 
 /// The canvas on which the application runs.
@@ -148,4 +149,79 @@ fn try_choose_file(chosen: impl FnOnce(web_sys::File) + 'static) -> Result<(), J
     input.add_event_listener_with_callback("change", changed.unchecked_ref())?;
     input.click();
     Ok(())
+}
+
+/// Lets the person choose a folder, or one archive; `chosen` gets its files, and is never called where none is chosen.
+pub(crate) fn choose_recording(is_archive: bool, chosen: impl FnOnce(Vec<web_sys::File>) + 'static) {
+    // Where the browser refuses, no dialog opens.
+    let _ = try_choose_recording(is_archive, chosen);
+}
+
+fn try_choose_recording(
+    is_archive: bool,
+    chosen: impl FnOnce(Vec<web_sys::File>) + 'static,
+) -> Result<(), JsValue> {
+    let document = web_sys::window().and_then(|window| window.document()).ok_or(JsValue::NULL)?;
+    let input: web_sys::HtmlInputElement = document.create_element("input")?.dyn_into()?;
+    input.set_type("file");
+    if is_archive {
+        input.set_accept(".zip");
+    } else {
+        input.set_attribute("webkitdirectory", "")?;
+    }
+    let from = input.clone();
+    let changed = Closure::once_into_js(move || {
+        let files = from.files();
+        let count = files.as_ref().map_or(0, web_sys::FileList::length);
+        let all = (0..count).filter_map(|index| files.as_ref().and_then(|files| files.get(index)));
+        chosen(all.collect());
+    });
+    input.add_event_listener_with_callback("change", changed.unchecked_ref())?;
+    input.click();
+    Ok(())
+}
+
+/// The path of a file in the folder that was chosen, with that folder's name; the file's name where it was chosen by itself.
+pub(crate) fn path_in_folder(file: &web_sys::File) -> String {
+    let path =
+        js_sys::Reflect::get(file, &"webkitRelativePath".into()).ok().and_then(|path| path.as_string());
+    path.filter(|path| !path.is_empty()).unwrap_or_else(|| file.name())
+}
+
+/// Sends a file as the body of a PUT.
+pub(crate) async fn put_file(url: &str, file: &web_sys::File) -> Result<(), Problem> {
+    let unreachable = |_| {
+        Problem::new(
+            0,
+            "unreachable",
+            "no answer",
+            "The server does not answer; check that it runs, and try again.",
+        )
+    };
+    let response = try_put_file(url, file).await.map_err(unreachable)?;
+    if response.ok() {
+        return Ok(());
+    }
+    let text = match response.text() {
+        Ok(text) => wasm_bindgen_futures::JsFuture::from(text).await.ok().and_then(|text| text.as_string()),
+        Err(_) => None,
+    };
+    let problem = text.and_then(|text| serde_json::from_str(&text).ok());
+    let status = response.status();
+    Err(problem
+        .unwrap_or_else(|| Problem::new(status, "unexpected", "", format!("The server answered {status}."))))
+}
+
+async fn try_put_file(url: &str, file: &web_sys::File) -> Result<web_sys::Response, JsValue> {
+    let headers = web_sys::Headers::new()?;
+    headers.set("Content-Type", "application/octet-stream")?;
+    let request = web_sys::RequestInit::new();
+    request.set_method("PUT");
+    // With the cookie that has the access token.
+    request.set_credentials(web_sys::RequestCredentials::SameOrigin);
+    request.set_headers(&headers);
+    request.set_body(file);
+    let window = web_sys::window().ok_or(JsValue::NULL)?;
+    let answer = wasm_bindgen_futures::JsFuture::from(window.fetch_with_str_and_init(url, &request));
+    answer.await?.dyn_into()
 }

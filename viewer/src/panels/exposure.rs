@@ -1,4 +1,4 @@
-//! The row above an image: how it was exposed where it matters, and the stretch with which it is shown.
+//! The row above an image: the stretch with which it is shown, its legend, and how it was exposed where it matters.
 
 use egui::{Align, ComboBox, DragValue, Layout, RichText, Ui};
 use sightline_track::stages::capture::Capture;
@@ -6,6 +6,7 @@ use sightline_track::stages::capture::Capture;
 use crate::command::Command;
 use crate::drawing::raster::Raster;
 use crate::drawing::stretch::Stretch;
+use crate::panels::legend::{self, Entry};
 use crate::state::State;
 use crate::{panels, theme};
 
@@ -16,11 +17,12 @@ const HEIGHT: f32 = 20.0;
 const SATURATED_SHARE: f32 = 0.01;
 
 /// Shows the row.
-pub(crate) fn show(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) {
+pub(crate) fn show(ui: &mut Ui, state: &State, raster: &Raster, entries: &[Entry], out: &mut Vec<Command>) {
     ui.horizontal(|ui| {
         ui.set_height(HEIGHT);
         ui.spacing_mut().item_spacing.x = 4.0;
         choice(ui, state, raster, out);
+        legend::button(ui, entries, state, out);
         if let Stretch::Manual { brightness, contrast, gamma } = state.stretch {
             by_hand(ui, [brightness, contrast, gamma], out);
         }

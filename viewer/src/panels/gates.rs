@@ -1,11 +1,7 @@
 //! The gates: the loss criteria with value, limit and margin, and the verdict as a sentence.
 
-use std::sync::LazyLock;
-
 use egui::{Align2, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
-use sightline_rover::visual_odometry;
-use sightline_track::gate::GateKind;
-use sightline_track::locate::gate_kinds;
+use sightline_session::why::words::capitalised;
 use sightline_track::stages::judge::{Gate, Verdict};
 use sightline_track::target::TrackingState;
 
@@ -18,6 +14,10 @@ use crate::theme;
 
 /// Room for the margin in digits, points.
 const MARGIN: f32 = 50.0;
+/// Least widths of the columns: pass or fail, limit, value; points.
+const COLUMNS: [f32; 3] = [28.0, 56.0, 38.0];
+/// Space between the columns, points.
+const SPACE: f32 = 5.0;
 /// Height of a margin bar, points.
 const BAR: f32 = 8.0;
 
@@ -71,16 +71,27 @@ fn sentence(ui: &mut Ui, verdict: &Verdict, state: &State) {
 
 /// The change of state, with how many retries remain.
 fn transition(verdict: &Verdict, state: &State) -> String {
-    let retries = state.run_settings().limits.n_retry;
-    let before = verdict.state_before.word();
+    let limits = &state.run_settings().limits;
+    let retries = limits.n_retry.saturating_sub(u32::from(limits.count_detecting_update));
+    let [before, now] = [verdict.state_before.word(), verdict.state.word()].map(capitalised);
     match verdict.state {
         TrackingState::Lost { count } => {
-            format!("{before} → lost, bad update {count}; {retries} may follow the loss")
+            let left = retries.saturating_sub(count.saturating_sub(1));
+            format!("{before} → {now} (bad update {count}; {})", retries_left(left))
         }
-        TrackingState::Failed if before != "failed" => format!("{before} → failed: no retries are left"),
-        TrackingState::Failed => "stays failed until the target is picked again".to_owned(),
-        other if other.word() == before => format!("stays {before}"),
-        other => format!("{before} → {}", other.word()),
+        TrackingState::Failed if before != now => format!("{before} → {now} ({})", retries_left(0)),
+        TrackingState::Failed => "Failed: designate the target anew to track it again".to_owned(),
+        _ if now == before => format!("Stays {}", verdict.state.word()),
+        _ => format!("{before} → {now}"),
+    }
+}
+
+/// The number of retries that remain, in words.
+pub(crate) fn retries_left(left: u32) -> String {
+    match left {
+        0 => "no retry left".to_owned(),
+        1 => "1 retry left".to_owned(),
+        left => format!("{left} retries left"),
     }
 }
 
@@ -88,23 +99,48 @@ fn transition(verdict: &Verdict, state: &State) -> String {
 pub(crate) fn show_gate(ui: &mut Ui, step: usize, gate: &Gate, out: &mut Vec<Command>) {
     let colour = theme::verdict(gate.passed);
     let relation = if gate.at_least { "≥" } else { "≤" };
-    ui.horizontal(|ui| {
-        ui.spacing_mut().item_spacing.x = 5.0;
-        ui.label(theme::note(gate.criterion.to_string()));
-        let name = ui.link(RichText::new(readable(&gate.name)).size(12.0).color(theme::text()));
-        let name = name.on_hover_text("Why? Where this margin comes from");
+    let word = if gate.passed { "pass" } else { "FAIL" };
+    let limit = format!("{relation} {} {}", digits(gate.limit), gate.unit);
+    let value = gate.value.map_or_else(|| "none".to_owned(), digits);
+    let columns =
+        [RichText::new(word).strong().color(colour), theme::note(limit.trim_end()), theme::number(value)];
+    let widths: [f32; 3] = std::array::from_fn(|k| width_of(ui, &columns[k]).max(COLUMNS[k]));
+    let name = RichText::new(readable(&gate.name)).size(12.0).color(theme::text());
+    let number = theme::note(gate.criterion.to_string());
+    let named = width_of(ui, &name) + width_of(ui, &number) + SPACE;
+    let needed = named + widths.iter().sum::<f32>() + 4.0 * SPACE;
+    let show_name = |ui: &mut Ui, out: &mut Vec<Command>| {
+        ui.label(number);
+        let link = ui.link(name).on_hover_text("Why? Where this margin comes from");
         let copied = gate.value.map_or_else(|| "none".to_owned(), |value| value.to_string());
-        numbers::ask(&name, step, &format!("gate.{}", gate.name), &copied, out);
+        numbers::ask(&link, step, &format!("gate.{}", gate.name), &copied, out);
+    };
+    let show_columns = |ui: &mut Ui| {
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            let word = if gate.passed { "pass" } else { "FAIL" };
-            column(ui, 28.0, RichText::new(word).strong().color(colour));
-            let limit = format!("{relation} {} {}", digits(gate.limit), gate.unit);
-            column(ui, 56.0, theme::note(limit.trim_end()));
-            let value = gate.value.map_or_else(|| "none".to_owned(), digits);
-            column(ui, 38.0, theme::number(value));
+            for (text, width) in columns.into_iter().zip(widths) {
+                column(ui, width, text);
+            }
         });
+    };
+    ui.scope(|ui| {
+        ui.spacing_mut().item_spacing.x = SPACE;
+        if ui.available_width() >= needed {
+            ui.horizontal(|ui| {
+                show_name(ui, out);
+                show_columns(ui);
+            });
+        } else {
+            ui.horizontal_wrapped(|ui| show_name(ui, out));
+            ui.horizontal(show_columns);
+        }
     });
     bar(ui, gate, colour);
+}
+
+/// Width of a text on one line, points.
+fn width_of(ui: &Ui, text: &RichText) -> f32 {
+    let text: egui::WidgetText = text.clone().into();
+    text.into_galley(ui, Some(egui::TextWrapMode::Extend), f32::INFINITY, egui::TextStyle::Body).size().x
 }
 
 /// A number with three decimals; a count of ten or more without.
@@ -148,11 +184,9 @@ fn fractions(gate: &Gate) -> (Option<f32>, f32) {
     (gate.value.map(fraction), fraction(gate.limit))
 }
 
-/// A gate's name in words.
+/// The display name of a gate.
 pub(crate) fn readable(name: &str) -> &str {
-    static KINDS: LazyLock<Vec<GateKind>> = LazyLock::new(gate_kinds);
-    let mut all = KINDS.iter().chain(visual_odometry::gate_kinds());
-    all.find(|kind| kind.name == name).map_or(name, |kind| kind.label)
+    sightline_session::why::gates::label(name)
 }
 
 /// Name, value and limit of a gate that was not met, lengths in centimetres: `range change 25.0 > 12.0 cm`.

@@ -45,9 +45,8 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     camera_choice::show(ui, state, out);
     let Some(raster) = ready_image(ui, state, Eye::Right, out) else { return };
     raster.stretch(state.stretch);
-    let [width, height] = raster.size();
-    let shape = (width as f32 / height.max(1) as f32, STATUS);
-    legend::beside(ui, &entries(state), shape, state, out, |ui, out| picture(ui, state, raster, out));
+    ui.horizontal(|ui| legend::button(ui, &entries(state), state, out));
+    picture(ui, state, raster, out);
 }
 
 /// The image itself with its marks and the line below it.
@@ -59,13 +58,13 @@ fn picture(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) 
     canvas.pixel_grid(region);
     let of_target = state.shows_targets_camera();
     if state.marks && of_target {
-        marks::paint_right(&canvas, state);
+        theme::on_image(|| marks::paint_right(&canvas, state));
     }
     if of_target {
         marks::hover(&canvas, state, |feature| feature.right);
     }
-    if let Some(trace) = state.trace_on_image().filter(|_| state.marks) {
-        paint_marks(&canvas, trace, state);
+    if let Some(trace) = state.trace_on_image().filter(|_| state.marks && state.shows_target()) {
+        theme::on_image(|| paint_marks(&canvas, trace, state));
     }
     compared::paint_right(&Overlay::new(&canvas.painter, &canvas.transform), state);
     let pointed = paint_pointed(&canvas, state);

@@ -1,6 +1,6 @@
 //! The left image with all that the tracker knew of the target in it.
 
-use egui::{Margin, Rect, Ui, pos2, vec2};
+use egui::{Margin, Ui, vec2};
 use sightline_session::marks::{basin_of, square};
 use sightline_session::view::TargetView;
 use sightline_vision::image::PixelRect;
@@ -19,13 +19,13 @@ use crate::panels::epipolar::Curve;
 use crate::panels::exposure;
 use crate::panels::features::marks;
 use crate::panels::image_marks::{self, Of};
-use crate::panels::legend;
 use crate::panels::legend::Entry;
 use crate::panels::panel::Panel;
 use crate::panels::status_line::{STATUS, status_line};
+use crate::panels::track;
 use crate::picking;
 use crate::pointed::Pointed;
-use crate::state::{Place, State, row_of, run_letter};
+use crate::state::{State, row_of, run_letter};
 use crate::what_if::panel;
 use crate::{panels, theme};
 
@@ -52,16 +52,12 @@ pub(crate) fn show(
     camera_choice::show(ui, state, out);
     let raster = ready_image(ui, state, Eye::Left, out)?;
     raster.stretch(state.stretch);
-    exposure::show(ui, state, raster, out);
+    exposure::show(ui, state, raster, &entries(state), out);
     bar::show(ui, state, out);
     if let Some(shown) = modes::instead(ui, state, raster, out) {
         return shown;
     }
-    let [width, height] = raster.size();
-    let shape = (width as f32 / height.max(1) as f32, STATUS);
-    let transform =
-        legend::beside(ui, &entries(state), shape, state, out, |ui, out| picture(ui, state, raster, out));
-    Some((transform, raster.size()))
+    Some((picture(ui, state, raster, out), raster.size()))
 }
 
 /// The image itself with its marks and the line below it.
@@ -78,32 +74,41 @@ fn picture(
     canvas.texture(&raster.texture, region);
     modes::under(&canvas, state);
     canvas.pixel_grid(region);
-    picking::paint_map(&canvas, state);
+    picking::map::paint(&canvas, state);
     if state.marks {
-        paint_others(&canvas, state);
-        corners::paint_left(&canvas, state);
-        if let Some(trace) = state.trace_on_image() {
-            marks::paint_left(&canvas, state);
-            let of = Of::Shown(theme::run(state.cursor.run));
-            let overlay = Overlay::new(&canvas.painter, &canvas.transform);
-            image_marks::paint(&overlay, trace, state.template_side_px(), Eye::Left, of, state);
-        }
+        theme::on_image(|| paint_marks(&canvas, state));
     }
     modes::over(ui, &canvas, state, out);
-    paint_designation(&canvas, state);
-    picking::show(ui, &canvas, raster, state, out);
+    theme::on_image(|| crate::notes::marks::image(&canvas, state));
+    let described = picking::show(ui, &canvas, raster, state, out);
     if state.shows_targets_camera() {
         marks::hover(&canvas, state, |feature| Some(feature.pixel));
         panel::over_image(ui, &canvas, state, out);
     }
     corners::hover_left(&canvas, state);
-    let pointed = paint_pointed(&canvas, state);
-    status_line(ui, &canvas, raster, region, pointed);
+    let pointed = theme::on_image(|| paint_pointed(&canvas, state));
+    if picking::footer::is_shown(state) {
+        picking::footer::show(ui, &canvas, state, described, out);
+    } else {
+        status_line(ui, &canvas, raster, region, pointed);
+    }
     out.extend(canvas.hovered(region).map(|pixel| Command::Point(Pointed::Left(pixel))));
     if let Some(view) = canvas.moved {
         out.push(Command::View(Zoomable::Left, view));
     }
     canvas.transform
+}
+
+/// The marks of the step: other targets, corners, features, and what the tracker knew of its target.
+fn paint_marks(canvas: &Canvas, state: &State) {
+    paint_others(canvas, state);
+    corners::paint_left(canvas, state);
+    let Some(trace) = state.trace_on_image().filter(|_| state.shows_target()) else { return };
+    marks::paint_left(canvas, state);
+    let overlay = Overlay::new(&canvas.painter, &canvas.transform);
+    track::paint(&overlay, state);
+    let of = Of::Shown(theme::run(state.cursor.run));
+    image_marks::paint(&overlay, trace, state.template_side_px(), Eye::Left, of, state);
 }
 
 /// An image of the cursor's stop, or the sentence that says why it is not there yet.
@@ -197,6 +202,14 @@ fn entries(state: &State) -> Vec<Entry> {
     if trace.capture().is_some_and(|c| c.subframe.is_some()) {
         entries.push(Entry::new(Layer::Subframe, Mark::Stroke(Line::Dotted), theme::subframe(), "subframe"));
     }
+    if track::is_there(state) {
+        entries.push(Entry::new(
+            Layer::Track,
+            Mark::Stroke(Line::Solid),
+            run,
+            "track: past solid, future dotted",
+        ));
+    }
     if state.session.as_ref().is_some_and(|s| s.targets.len() > 1) {
         entries.push(Entry::new(Layer::Others, Mark::Diamond, theme::weak(), "other targets"));
     }
@@ -212,44 +225,14 @@ fn paint_others(canvas: &Canvas, state: &State) {
     let overlay = Overlay::new(&canvas.painter, &canvas.transform);
     let is_here = |target: &&TargetView| target.designation.camera == state.camera();
     let others = session.targets.iter().filter(|target| Some(target.number) != state.cursor.target);
-    for target in others.filter(is_here) {
+    let is_shown = |target: &&TargetView| !state.hidden_targets.contains(&target.number);
+    for target in others.filter(is_here).filter(is_shown) {
         let row = target.runs.last().and_then(|run| row_of(run, state.cursor.step));
         if let Some(pixel) = row.and_then(|row| row.left_pixel) {
             overlay.mark(pixel, Mark::Diamond, theme::weak());
             overlay.words(pixel, vec2(10.0, 0.0), &target.label, theme::weak());
         }
     }
-}
-
-/// A designation that is being computed or was refused.
-fn paint_designation(canvas: &Canvas, state: &State) {
-    let here = |place: &Place| place.step == state.cursor.step && place.camera == state.camera();
-    let overlay = Overlay::new(&canvas.painter, &canvas.transform);
-    if let Some(place) = state.designating.filter(here) {
-        overlay.mark(place.pixel, Mark::Ring, theme::accent());
-        overlay.words(place.pixel, vec2(12.0, 0.0), "computing the position …", theme::accent());
-    }
-    if let Some(refusal) = state.refusal.as_ref().filter(|refusal| here(&refusal.place)) {
-        overlay.mark(refusal.place.pixel, Mark::Cross, theme::failed());
-        let at = canvas.transform.to_screen(refusal.place.pixel) + vec2(12.0, 0.0);
-        paint_wrapped(canvas, at, &format!("refused: {}", refusal.sentence));
-    }
-}
-
-/// Words near a place, wrapped and held inside the canvas.
-fn paint_wrapped(canvas: &Canvas, at: egui::Pos2, words: &str) {
-    let mut area = canvas.transform.rect.shrink(6.0);
-    // Below stands the hint of the pick mode.
-    area.max.y -= 22.0;
-    let width = 280.0_f32.min(area.width());
-    let galley = canvas.painter.layout(words.to_owned(), theme::image_font(), theme::lost(), width);
-    let size = galley.size();
-    let corner = pos2(
-        at.x.clamp(area.left(), (area.right() - size.x).max(area.left())),
-        (at.y - size.y / 2.0).clamp(area.top(), (area.bottom() - size.y).max(area.top())),
-    );
-    canvas.painter.rect_filled(Rect::from_min_size(corner, size).expand(4.0), 3.0, theme::scrim());
-    canvas.painter.galley(corner, galley, theme::lost());
 }
 
 /// What is pointed at in another panel; what that is, in words.

@@ -1,8 +1,8 @@
 //! The legend of an image: each mark with its shape and its word; a click hides or shows it.
 //!
-//! It never covers the image: it stands beside it where the image's shape leaves room there, else in rows above it.
+//! An image has it behind a button above it, so that the image has all the room; a panel has it in rows.
 
-use egui::{Rect, Sense, Ui, UiBuilder, vec2};
+use egui::{Rect, Sense, Ui, vec2};
 
 use crate::command::{Command, Layer};
 use crate::drawing::overlay::{Mark, paint_legend_row};
@@ -35,41 +35,31 @@ const ROW: f32 = 15.0;
 /// What a row's mark and margins take beside its word, points.
 const MARK: f32 = 32.0;
 
-/// Lays the legend out and gives the rest of the room to `show`: the image, `width_by_height` in shape, with
-/// `below` points under it.
-pub(crate) fn beside<R>(
-    ui: &mut Ui,
-    entries: &[Entry],
-    (width_by_height, below): (f32, f32),
-    state: &State,
-    out: &mut Vec<Command>,
-    show: impl FnOnce(&mut Ui, &mut Vec<Command>) -> R,
-) -> R {
+/// The legend of an image as a button: it opens a list of the marks, in which a click hides or shows one.
+pub(crate) fn button(ui: &mut Ui, entries: &[Entry], state: &State, out: &mut Vec<Command>) {
     if entries.is_empty() || !state.marks {
-        return show(ui, out);
+        return;
     }
-    let widths: Vec<f32> = entries.iter().map(|entry| width_of(ui, entry)).collect();
-    let widest = widths.iter().copied().fold(0.0_f32, f32::max);
-    let area = ui.available_rect_before_wrap();
-    let legend_height = ROW * entries.len() as f32;
-    if !has_column(area, widest, legend_height, width_by_height, below) {
-        rows(ui, entries, &widths, state, out);
-        return show(ui, out);
-    }
-    let (left, rest) = area.split_left_right_at_x(area.left() + widest);
-    for (i, entry) in entries.iter().enumerate() {
-        let top = left.left_top() + vec2(0.0, 3.0 + ROW * i as f32);
-        row(ui, Rect::from_min_size(top, vec2(widest, ROW)), entry, state, out);
-    }
-    let shown = show(&mut ui.new_child(UiBuilder::new().max_rect(rest).id_salt("beside")), out);
-    ui.advance_cursor_after_rect(area);
-    shown
-}
-
-/// Whether a column for the legend takes nothing from the image.
-fn has_column(area: Rect, widest: f32, height: f32, width_by_height: f32, below: f32) -> bool {
-    let room = area.height() - below;
-    room >= height && area.width() - widest >= room * width_by_height
+    let hidden = entries.iter().filter(|entry| state.hidden.contains(&entry.layer)).count();
+    let words = match hidden {
+        0 => format!("marks: {}", entries.len()),
+        hidden => format!("marks: {} of {}", entries.len() - hidden, entries.len()),
+    };
+    let button = ui.add(egui::Button::new(egui::RichText::new(words).size(11.0)).small());
+    let button = button
+        .accessible_name("legend")
+        .on_hover_text("What the marks are; a click on one hides or shows it");
+    let ground = theme::on_image(theme::panel);
+    let popup = egui::Popup::menu(&button).close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside);
+    popup.frame(egui::Frame::popup(ui.style()).fill(ground)).show(|ui| {
+        theme::on_image(|| {
+            for entry in entries {
+                let width = width_of(ui, entry);
+                let (place, _) = ui.allocate_exact_size(vec2(width, ROW), Sense::hover());
+                row(ui, place, entry, state, out);
+            }
+        });
+    });
 }
 
 /// What an entry takes beside others, points.
@@ -109,19 +99,5 @@ pub(crate) fn row(ui: &Ui, row: Rect, entry: &Entry, state: &State, out: &mut Ve
     });
     if response.on_hover_text(format!("Click to {action} “{}”", entry.word)).clicked() {
         out.push(Command::ToggleLayer(entry.layer));
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_legend_stands_beside_the_image_only_where_that_makes_it_no_smaller() {
-        let area = |width: f32| Rect::from_min_size(egui::Pos2::ZERO, vec2(width, 324.0));
-        // A square image of 300 points and a legend of 150.
-        assert!(has_column(area(450.0), 150.0, 100.0, 1.0, 24.0));
-        assert!(!has_column(area(449.0), 150.0, 100.0, 1.0, 24.0));
-        assert!(!has_column(area(450.0), 150.0, 301.0, 1.0, 24.0), "the legend itself must fit");
     }
 }

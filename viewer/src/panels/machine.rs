@@ -66,12 +66,16 @@ fn sentence(state: &State, now: TrackingState) -> String {
     let n = retries(state);
     match now {
         TrackingState::Cleared => "Nothing is tracked at this step.".to_owned(),
-        TrackingState::Tracking => format!("Tracking; a bad update leads to lost, with {n} retries."),
-        TrackingState::Lost { count } => {
-            let k = used(count, n);
-            format!("Lost: retry {k} of {n} is used. A good update leads back to tracking.")
+        TrackingState::Tracking => {
+            format!("Tracking. A bad update leads to Lost ({}).", gates::retries_left(n))
         }
-        TrackingState::Failed => "Failed until the target is cleared: no retry is left.".to_owned(),
+        TrackingState::Lost { count } => {
+            let left = gates::retries_left(n - used(count, n));
+            format!("Lost ({left}). A good update leads back to Tracking.")
+        }
+        TrackingState::Failed => {
+            "Failed (no retry left). Designate the target anew to track it again.".to_owned()
+        }
     }
 }
 
@@ -174,12 +178,12 @@ fn history(ui: &mut Ui, state: &State, run: &RunView, row: &StepRow, out: &mut V
             state_word.on_hover_text(reason);
         }
         if run.rows.first().is_some_and(|first| first.step == row.step) {
-            ui.label(theme::note("picked here"));
+            ui.label(theme::note("designated here"));
         } else if row.failed_gates.is_empty() {
-            ui.label(theme::note(row.reason.as_deref().unwrap_or("no criterion fired")));
+            ui.label(theme::note(row.reason.as_deref().unwrap_or("all gates passed")));
         }
         for gate in &row.failed_gates {
-            let words = format!("criterion {}: {}", gate.criterion, gates::failed_words(gate));
+            let words = format!("gate {}: {}", gate.criterion, gates::failed_words(gate));
             ui.add(egui::Label::new(RichText::new(words).size(11.5).color(theme::lost())).wrap());
         }
     });

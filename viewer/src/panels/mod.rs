@@ -15,6 +15,9 @@ macro_rules! panel_table {
             Left: "left", "Left image", Home(Group::LeftImage, 0),
                 "The left image with what the tracker knew of the target",
                 panels::images_left::LeftView;
+            CloseUp: "close_up", "Close-up", Home(Group::CloseUp, 0),
+                "The target in both images, four times magnified, with its marks",
+                panels::close_up::CloseUp;
             Right: "right", "Right image", Home(Group::Views, 0),
                 "The right image with the epipolar curve and the stereo match",
                 panels::image_right::RightView;
@@ -57,10 +60,10 @@ macro_rules! panel_table {
             Tolerances: "tolerances", "Tolerances", Home(Group::Plots, 1),
                 "Criteria 3 and 4: each correction against its tolerance, step by step.",
                 panels::tolerances::Tolerances;
-            Gates: "gates", "Gates", Home(Group::Verdict, 0),
+            Gates: "gates", "Gates", Home(Group::Verdict, 1),
                 "Whether the match can be trusted: the criteria with their limits.",
                 panels::gates::Gates;
-            Machine: "machine", "State machine", Home(Group::Verdict, 1),
+            Machine: "machine", "State machine", Home(Group::Verdict, 2),
                 "Where tracking stands, and which criterion fired at each past update.",
                 panels::machine::Machine;
             Inspector: "inspector", "Inspector", Home(Group::Details, 0),
@@ -75,13 +78,13 @@ macro_rules! panel_table {
             Uncertainty: "uncertainty", "Uncertainty", Home(Group::Plots, 2),
                 "Whether errors are as large as the covariances say.",
                 panels::uncertainty::UncertaintyPanel;
-            Why: "why", "Why", Home(Group::Details, 1),
+            Why: "why", "Why", Home(Group::Verdict, 0),
                 "Why a step was accepted or rejected, what would have saved it, and where a number comes from.",
                 why::panel::Why;
             Notes: "notes", "Notes", Home(Group::Details, 2),
                 "What you wrote about places of the drive; the list is a tour that can be stepped through.",
                 notes::panel::Notes;
-            Breakpoints: "breakpoints", "Breakpoints", Home(Group::Verdict, 2),
+            Breakpoints: "breakpoints", "Breakpoints", Home(Group::Verdict, 3),
                 "Conditions that are looked for at all steps of all runs at once.",
                 breakpoints::panel::Breakpoints;
         }
@@ -95,6 +98,7 @@ pub(crate) mod bars;
 pub(crate) mod camera_choice;
 pub(crate) mod card;
 pub(crate) mod chart;
+pub(crate) mod close_up;
 pub(crate) mod broken;
 pub(crate) mod budget;
 pub(crate) mod epipolar;
@@ -127,6 +131,7 @@ pub(crate) mod strip;
 pub(crate) mod surface;
 pub(crate) mod targets;
 pub(crate) mod timeline;
+pub(crate) mod track;
 pub(crate) mod tolerances;
 pub(crate) mod uncertainty;
 pub(crate) mod view_menu;

@@ -1,4 +1,4 @@
-//! A number that can be asked about: a click leads to where it came from, the menu copies it too.
+//! Numbers: one that can be asked about, whose click leads to where it came from; and a count with its noun.
 
 use egui::{Response, RichText, Ui};
 
@@ -10,6 +10,18 @@ pub(crate) fn show(ui: &mut Ui, text: RichText, step: usize, name: &str, out: &m
     let words = text.text().to_owned();
     let response = ui.link(text).on_hover_text(format!("Why? Where {name} comes from"));
     ask(&response, step, name, &words, out);
+}
+
+/// A number with its noun: `1 step`, `2 steps`.
+pub(crate) fn counted(n: usize, noun: &str) -> String {
+    if n == 1 { format!("1 {noun}") } else { format!("{n} {noun}s") }
+}
+
+/// Formats a number with fixed decimals; what rounds to zero has no sign.
+pub(crate) fn fixed(value: f64, decimals: usize) -> String {
+    let words = format!("{value:.decimals$}");
+    let is_zero = words.bytes().all(|byte| matches!(byte, b'-' | b'0' | b'.'));
+    if is_zero { words.trim_start_matches('-').to_owned() } else { words }
 }
 
 /// Lets a click on something lead to where a value came from.
@@ -28,4 +40,18 @@ pub(crate) fn ask(response: &Response, step: usize, name: &str, copied: &str, ou
             ui.close();
         }
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_has_no_plural_and_zero_no_sign() {
+        assert_eq!(
+            [counted(0, "step"), counted(1, "step"), counted(2, "step")],
+            ["0 steps", "1 step", "2 steps"]
+        );
+        assert_eq!([fixed(-0.004, 2), fixed(-0.006, 2), fixed(1.0, 0)], ["0.00", "-0.01", "1"]);
+    }
 }

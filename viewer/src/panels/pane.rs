@@ -25,21 +25,23 @@ pub struct Home(pub Group, pub u8);
 /// The groups of tabs of the overview.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Group {
-    /// The left column: targets and settings.
+    /// The right column, top: targets and settings.
     Lists,
     /// The left image, alone.
     LeftImage,
+    /// Right of the left image, above: the target's close-up.
+    CloseUp,
     /// Right of the left image: the other views of the step and of the session.
     Views,
-    /// The low band below the images.
+    /// Below the images: windows of the template.
     Strip,
-    /// Below the band, left: scores.
+    /// Beside the map: scores.
     Scores,
-    /// Below the band, middle: the map.
+    /// Right of the other views: the map.
     Map,
-    /// Below the band, right: plots over the steps.
+    /// Beside the map: plots over the steps.
     Plots,
-    /// The right column, top: the verdict.
+    /// The right column, middle: the verdict.
     Verdict,
     /// The right column, bottom: details as text.
     Details,
@@ -155,6 +157,7 @@ mod tests {
             ("targets", Pane::Targets),
             ("settings", Pane::Settings),
             ("left", Pane::Left),
+            ("close_up", Pane::CloseUp),
             ("right", Pane::Right),
             ("strip", Pane::Strip),
             ("history", Pane::History),

@@ -5,6 +5,7 @@ use egui::{Button, DragValue, RichText, Ui, vec2};
 use crate::breakpoints::Ask;
 use crate::breakpoints::play::{RATES, Shuttle};
 use crate::command::Command;
+use crate::panels::numbers::counted;
 use crate::state::State;
 use crate::theme;
 
@@ -41,7 +42,7 @@ pub(crate) fn controls(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     if play.loop_in.is_some() || play.loop_out.is_some() {
         let end = |end: Option<usize>| end.map_or_else(|| "…".to_owned(), |step| step.to_string());
         ui.label(theme::note(format!("loop {} to {}", end(play.loop_in), end(play.loop_out))));
-        if button(ui, "x", "no loop", "no loop any more (Backspace)") {
+        if button(ui, "x", "no loop", "Clear loop (Backspace)") {
             out.push(Command::Ask(Ask::Shuttle(Shuttle::ClearLoop)));
         }
     }
@@ -55,7 +56,7 @@ fn others(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         return;
     }
     let mut shown = state.ask.shows_others;
-    let words = RichText::new(format!("{count} other targets")).small();
+    let words = RichText::new(counted(count, "other target")).small();
     if ui.checkbox(&mut shown, words).on_hover_text("their state bands on the timeline").changed() {
         out.push(Command::Ask(Ask::ShowOthers(shown)));
     }

@@ -16,14 +16,15 @@ use crate::compare::state::Other;
 use crate::drawing::decimate;
 use crate::drawing::overlay;
 use crate::drawing::overlay::Mark;
-use crate::panels::chart::{over_steps, pieces, shape};
-use crate::panels::entry;
+use crate::figure;
+use crate::panels::chart::{over_steps, pieces, shape, step_of};
 use crate::panels::names;
 use crate::panels::names::HEIGHT as NAMES;
 use crate::panels::panel::{Panel, TableOf};
 use crate::panels::sheets::sheet::state_of;
 use crate::panels::sheets::{Column, Sheet};
 use crate::panels::step_marks::{cursors, point};
+use crate::panels::{digits, entry};
 use crate::state::State;
 use crate::state::tracker::confidence_of;
 use crate::theme;
@@ -111,7 +112,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         lines.extend(state.others().iter().map(|o| (o.look.mark, o.look.colour, state.run_label(o.name))));
         ui.horizontal(|ui| {
             names::show(ui, &title, &lines);
-            if i == 0 {
+            if i == 0 && !figure::is_on_paper() {
                 choice(ui, out);
             }
         });
@@ -271,7 +272,7 @@ fn scores(state: &State, colour: Color32) -> Chart {
             series("stereo_score", theme::prediction(), Mark::Square, MarkerShape::Square),
         ],
         thresholds: vec![limits.ncc_min, limits.stereo_ncc_min],
-        threshold: "least allowed".to_owned(),
+        threshold: "threshold".to_owned(),
         in_view: [0.9, 1.0],
     }
 }
@@ -330,11 +331,10 @@ fn plot(
             .include_y(chart.in_view[0])
             .include_y(chart.in_view[1])
             .set_margin_fraction(vec2(0.0, 0.12))
-            .label_formatter(|near| match near {
-                HoverPosition::NearDataPoint { plot_name, position, .. } => {
-                    Some(format!("step {}\n{plot_name} {:.3}", position.x, position.y))
-                }
-                HoverPosition::Elsewhere { .. } => None,
+            .label_formatter(|near| {
+                let (HoverPosition::NearDataPoint { position, .. } | HoverPosition::Elsewhere { position }) =
+                    near;
+                Some(readout(state, run, chart, step_of(position.x, last)?))
             });
     let response = plot.show(ui, |plot| {
         cursors(plot, state);
@@ -355,6 +355,29 @@ fn plot(
     let plotted: Vec<(&str, f64)> = state.row().map(|row| asked_of(chart, row)).unwrap_or_default();
     crate::breakpoints::panel::menu(&response.response, &plotted, out);
     response.inner
+}
+
+/// The values of a chart at a step, one a line: of this run, then of the compared ones.
+fn readout(state: &State, run: &RunView, chart: &Chart, step: usize) -> String {
+    let symbol = chart.unit.symbol();
+    let unit = if symbol.is_empty() { String::new() } else { format!(" {symbol}") };
+    let mut words = format!("step {step}");
+    let row = crate::state::row_of(run, step);
+    for line in &chart.series {
+        let value = line.reader(chart.unit);
+        if let Some(value) = row.and_then(|row| value(run, row)) {
+            words += &format!("\n{} {}{unit}", line.name(), digits(value));
+        }
+        for other in state.others() {
+            let mut rows = other.run.rows.iter();
+            let there = rows.find(|row| state.own_beside(other.name, row.step) == Some(step));
+            if let Some(value) = there.and_then(|row| value(other.run, row)) {
+                words +=
+                    &format!("\n{}, {} {}{unit}", line.name(), state.run_label(other.name), digits(value));
+            }
+        }
+    }
+    words
 }
 
 /// What a chart shows of a row, as expressions with their values.

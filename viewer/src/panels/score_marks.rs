@@ -13,6 +13,11 @@ use crate::drawing::raster::Raster;
 use crate::drawing::view2d::Canvas;
 use crate::theme;
 
+/// Vertical distance of the words from their mark, points.
+const WORDS: f32 = 12.0;
+/// Height of a line of words, points.
+const LINE: f32 = 15.0;
+
 /// The pixels on which the template's centre lay: the search window less half a template on each side.
 pub(crate) fn region_of(search_window: PixelRect, size: [u32; 2]) -> PixelRect {
     let inset = |whole: u32, inner: u32| (whole.saturating_sub(inner) / 2) as i32;
@@ -66,21 +71,41 @@ pub(crate) fn paint_peaks(canvas: &Canvas, marked: &Marked<'_>) {
     }
     if let Some(second) = &matched.second_peak {
         overlay.mark(second.pixel, Mark::Square, theme::strong());
-        let words = format!("2nd: {:.0} % at {:.0} px", second.ratio * 100.0, second.distance_px);
-        overlay.words(second.pixel, vec2(12.0, 12.0), &words, theme::strong());
+        let words = format!("second peak: {:.2} of best, {:.0} px away", second.ratio, second.distance_px);
+        overlay.words(second.pixel, vec2(12.0, second_offset(canvas, matched)), &words, theme::strong());
     }
     let peak = &matched.peak;
     overlay.ellipse(peak.pixel, &matched.covariance_px2, 3.0, run, Line::Solid);
     overlay.mark(peak.pixel, Mark::Ring, run);
-    overlay.words(peak.pixel, vec2(12.0, -12.0), &format!("peak {:.3}", peak.score), theme::strong());
+    overlay.words(peak.pixel, vec2(12.0, -WORDS), &format!("peak {:.3}", peak.score), theme::strong());
     if let Some(pixel) = marked.truth {
         overlay.mark(pixel, Mark::Plus, theme::truth());
     }
 }
 
+/// Vertical offset of the words of the second peak, so that they are clear of those of the best one, points.
+fn second_offset(canvas: &Canvas, matched: &TemplateMatch) -> f32 {
+    let y = |pixel: Pixel| canvas.transform.to_screen(pixel).y;
+    let second = matched.second_peak.as_ref().map_or(0.0, |second| y(second.pixel));
+    clear_of(second, y(matched.peak.pixel) - WORDS)
+}
+
+/// The offset from `at` of words that keep a line of distance from those at `other`: below the mark, else above it.
+fn clear_of(at: f32, other: f32) -> f32 {
+    if (at + WORDS - other).abs() < LINE { -WORDS - LINE } else { WORDS }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_words_of_two_peaks_are_a_line_apart() {
+        for second in (0..60).map(|k| 100.0 + k as f32) {
+            let peak = 130.0 - WORDS;
+            assert!((second + clear_of(second, peak) - peak).abs() >= LINE, "{second}");
+        }
+    }
 
     #[test]
     fn the_region_of_the_scores_is_the_window_less_half_a_template() {

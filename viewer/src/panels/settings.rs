@@ -112,7 +112,7 @@ fn foot(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     });
     let letter = run_letter(state.cursor.run);
     let words = match state.draft.len() {
-        0 => format!("As in run {letter}; runs anew from step {step}"),
+        0 => format!("No changes to run {letter}; would restart at step {step}"),
         1 => format!("1 change against run {letter}, from step {step}"),
         n => format!("{n} changes against run {letter}, from step {step}"),
     };

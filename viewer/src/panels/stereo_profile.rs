@@ -105,7 +105,7 @@ fn names_of(run: Color32, is_predicted: bool) -> Vec<(Mark, Color32, String)> {
     let mut names = vec![
         (Mark::Stroke(overlay::Line::Solid), theme::search(), "searched".to_owned()),
         (Mark::Ring, run, "best".to_owned()),
-        (Mark::Stroke(overlay::Line::Dashed), theme::failed(), "least allowed".to_owned()),
+        (Mark::Stroke(overlay::Line::Dashed), theme::failed(), "threshold".to_owned()),
     ];
     if is_predicted {
         names.push((Mark::Stroke(overlay::Line::Dotted), theme::prediction(), "predicted ± 3σ".to_owned()));

@@ -6,9 +6,11 @@ use sightline_session::view::{RunView, TargetView};
 use crate::command::table::PICK;
 use crate::command::{Command, Mode};
 use crate::drawing::overlay::{paint_mark, run_mark};
+use crate::panels::numbers::counted;
 use crate::panels::pane::Pane;
 use crate::panels::panel::Panel;
 use crate::panels::{run_tree, timeline};
+use crate::state::targets::{Rename, Renaming};
 use crate::state::{State, run_letter};
 use crate::why::Ask;
 use crate::{panels, theme};
@@ -18,6 +20,12 @@ const PURPOSE: &str = Pane::Targets.about().help;
 
 /// How much a branch stands in from what it left, points.
 const INDENT: f32 = 12.0;
+
+/// Width of the band of a run's states, points.
+const BAND_WIDTH: f32 = 56.0;
+
+/// Room beside the field of a name for “Remove”, points.
+const NAME_BESIDE: f32 = 80.0;
 
 /// The panel “Targets and runs”.
 pub(crate) struct Targets;
@@ -43,6 +51,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         panels::missing(ui, PURPOSE, &state.missing_target());
         return;
     }
+    selected_run(ui, state);
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         for target in targets {
             show_target(ui, state, target, out);
@@ -51,17 +60,37 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     });
 }
 
+/// All of the run that is looked at, below the list: a line of the list has no room for it.
+fn selected_run(ui: &mut Ui, state: &State) {
+    let (Some(target), Some(run)) = (state.target(), state.run()) else { return };
+    egui::Panel::bottom("the run that is looked at").frame(egui::Frame::new()).show(ui, |ui| {
+        ui.add_space(2.0);
+        let mut lines = vec![format!("run {}: {}", run_letter(run.number), summary(run))];
+        lines.extend(about(target, run));
+        for line in lines {
+            ui.add(egui::Label::new(theme::note(line)).wrap());
+        }
+    });
+}
+
+/// Where a run comes from and what it changes, each as a line.
+fn about(target: &TargetView, run: &RunView) -> Vec<String> {
+    let from = run.fork.map(|fork| format!("from run {} at step {}", run_letter(fork.run), fork.from_step));
+    from.into_iter().chain(run_tree::changed(&target.runs, run)).collect()
+}
+
 fn show_target(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Command>) {
     let is_selected = state.cursor.target == Some(target.number);
     ui.horizontal(|ui| {
-        let text = RichText::new(&target.label).strong().color(if is_selected {
-            theme::strong()
-        } else {
-            theme::text()
-        });
-        if ui.add(egui::Label::new(text).sense(Sense::click())).clicked() {
-            let run = target.runs.last().map_or(0, |run| run.number);
-            out.push(Command::Look { target: target.number, run });
+        let mut is_shown = !state.hidden_targets.contains(&target.number);
+        let check = ui.checkbox(&mut is_shown, "").accessible_name(format!("marks of {}", target.label));
+        if check.on_hover_text("Shows or hides its marks in the images").changed() {
+            out.push(Command::ToggleTarget(target.number));
+        }
+        let renaming = state.renaming.as_ref().filter(|renaming| renaming.target == target.number);
+        match renaming {
+            Some(renaming) => name_field(ui, renaming, out),
+            None => name(ui, target, is_selected, out),
         }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             if ui
@@ -71,10 +100,26 @@ fn show_target(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Co
             {
                 out.push(Command::RemoveTarget(target.number));
             }
+            let help = "Gives the target another name (double-click the name)";
+            if renaming.is_none() && ui.small_button("Rename").on_hover_text(help).clicked() {
+                out.push(Command::Rename(Rename::Begin(target.number)));
+            }
         });
     });
     let at = target.designation;
-    ui.label(theme::note(format!("picked at step {}, pixel {:.1}, {:.1}", at.step, at.pixel.x, at.pixel.y)));
+    let place = format!("designated at step {}, pixel {:.1}, {:.1}", at.step, at.pixel.x, at.pixel.y);
+    ui.horizontal(|ui| {
+        let is_elsewhere = is_selected && state.cursor.step != at.step;
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let help = "Designates it again at this stop, as a target of its own with the same settings";
+            if is_elsewhere && ui.small_button("Re-pick here").on_hover_text(help).clicked() {
+                out.push(Command::Repick(target.number));
+            }
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                ui.add(egui::Label::new(theme::note(place)).truncate());
+            });
+        });
+    });
     for sentence in warnings(state, target) {
         ui.add(egui::Label::new(RichText::new(format!("! {sentence}")).small().color(theme::lost())).wrap())
             .on_hover_text("A warning about the pick; it can be tracked all the same.");
@@ -84,6 +129,36 @@ fn show_target(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Co
             ui.add_space(INDENT * depth as f32);
             ui.vertical(|ui| show_run(ui, state, target, run, out));
         });
+    }
+}
+
+/// The name of a target: a click shows its newest run, a double click renames it.
+fn name(ui: &mut Ui, target: &TargetView, is_selected: bool, out: &mut Vec<Command>) {
+    let colour = if is_selected { theme::strong() } else { theme::text() };
+    let text = RichText::new(&target.label).strong().color(colour);
+    let label = ui.add(egui::Label::new(text).sense(Sense::click()));
+    if label.double_clicked() {
+        out.push(Command::Rename(Rename::Begin(target.number)));
+    } else if label.clicked() {
+        let run = target.runs.last().map_or(0, |run| run.number);
+        out.push(Command::Look { target: target.number, run });
+    }
+}
+
+/// The field in which a name is typed: Enter or leaving it saves, Esc cancels.
+fn name_field(ui: &mut Ui, renaming: &Renaming, out: &mut Vec<Command>) {
+    let mut text = renaming.text.clone();
+    let width = (ui.available_width() - NAME_BESIDE).max(60.0);
+    let field = ui.add(egui::TextEdit::singleline(&mut text).desired_width(width).char_limit(100));
+    let field = field.accessible_name("name of the target");
+    if field.changed() {
+        out.push(Command::Rename(Rename::Type(text)));
+    }
+    if field.lost_focus() {
+        let is_cancelled = ui.input(|input| input.key_pressed(egui::Key::Escape));
+        out.push(Command::Rename(if is_cancelled { Rename::Cancel } else { Rename::Save }));
+    } else if !field.has_focus() {
+        field.request_focus();
     }
 }
 
@@ -98,11 +173,11 @@ fn warnings<'a>(state: &'a State, target: &TargetView) -> Vec<&'a str> {
 fn show_run(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: &mut Vec<Command>) {
     let is_selected = state.cursor.target == Some(target.number) && state.cursor.run == run.number;
     let fill = if is_selected { theme::selected() } else { egui::Color32::TRANSPARENT };
-    let frame = egui::Frame::new().fill(fill).corner_radius(4).inner_margin(egui::Margin::symmetric(6, 3));
-    // The card hears of a click only where no button in it does: it comes before what is in it.
-    let card = egui::UiBuilder::new().id_salt(("run", target.number, run.number)).sense(Sense::click());
-    let inside = ui.scope_builder(card, |ui| {
-        frame.show(ui, |ui| card_of(ui, state, target, run, out));
+    let frame = egui::Frame::new().fill(fill).corner_radius(4).inner_margin(egui::Margin::symmetric(6, 1));
+    // The line hears of a click only where no button in it does: it comes before what is in it.
+    let line = egui::UiBuilder::new().id_salt(("run", target.number, run.number)).sense(Sense::click());
+    let inside = ui.scope_builder(line, |ui| {
+        frame.show(ui, |ui| line_of(ui, state, target, run, out));
     });
     let response = inside.response;
     response.widget_info(|| {
@@ -118,37 +193,40 @@ fn show_run(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out:
     }
 }
 
-/// What a run's card says, and what can be done with the run.
-fn card_of(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: &mut Vec<Command>) {
+/// One line: the run's mark, its states over the steps, what it changes, how far it is, and what can be done with it.
+fn line_of(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: &mut Vec<Command>) {
     ui.set_width(ui.available_width());
     ui.horizontal(|ui| {
         let (mark, _) = ui.allocate_exact_size(vec2(14.0, 14.0), Sense::hover());
         paint_mark(ui.painter(), mark.center(), run_mark(run.number), theme::run(run.number), 6.0);
-        ui.label(RichText::new(format!("run {}", run_letter(run.number))).color(theme::strong()));
-        if let Some(preset) = state.configurations.named(&run.settings) {
-            ui.label(RichText::new(preset.name).color(theme::accent())).on_hover_text(preset.description);
-        }
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| how_far(ui, state, target, run, out));
+        ui.label(RichText::new(run_letter(run.number)).color(theme::strong()));
+        let (band, _) = ui.allocate_exact_size(vec2(BAND_WIDTH, 6.0), Sense::hover());
+        timeline::thin_band(ui.painter(), band, target, run, state.stop_count());
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            if target.runs.len() > 1 {
+                let name = format!("remove run {}", run_letter(run.number));
+                let help = "Hides the run; what left it keeps its steps. Ctrl+Z takes it back";
+                let button = ui.small_button("×").accessible_name(name).on_hover_text(help);
+                if button.clicked() {
+                    out.push(Command::Why(Ask::RemoveRun { target: target.number, run: run.number }));
+                }
+            }
+            how_far(ui, state, target, run, out);
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| settings_of(ui, state, target, run));
+        });
     });
-    sparkline(ui, target, run, state.stop_count());
-    if let Some(fork) = run.fork {
-        ui.label(theme::note(format!("from run {} at step {}", run_letter(fork.run), fork.from_step)));
-    }
-    ui.label(theme::note(summary(run)));
-    // A preset's name says them all.
-    let unnamed = state.configurations.named(&run.settings).is_none();
+}
+
+/// The preset of a run, or what it changes.
+fn settings_of(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView) {
+    let named = state.configurations.named(&run.settings);
     let is_branch = run_tree::parent(&target.runs, run).is_some();
-    let lines = if unnamed || is_branch { run_tree::changed(&target.runs, run) } else { Vec::new() };
-    for line in lines {
-        ui.add(egui::Label::new(theme::note(line).monospace()).wrap());
-    }
-    if target.runs.len() > 1 {
-        let name = format!("remove run {}", run_letter(run.number));
-        let help = "Hides the run; what left it keeps its steps. Ctrl+Z takes it back";
-        let button = ui.small_button("Remove run").accessible_name(name).on_hover_text(help);
-        if button.clicked() {
-            out.push(Command::Why(Ask::RemoveRun { target: target.number, run: run.number }));
-        }
+    if let Some(preset) = named.filter(|_| !is_branch) {
+        let text = RichText::new(preset.name).small().color(theme::accent());
+        ui.add(egui::Label::new(text).truncate()).on_hover_text(preset.description);
+    } else {
+        let lines = about(target, run);
+        ui.add(egui::Label::new(theme::note(lines.join(", "))).truncate()).on_hover_text(lines.join("\n"));
     }
 }
 
@@ -170,14 +248,8 @@ fn how_far(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: 
     } else if let Some(before) = run.rows.last().and_then(|row| row.paused_before) {
         ui.label(theme::note(format!("paused before {}", before.word())));
     } else {
-        ui.label(theme::note(format!("{} steps", run.rows.len())));
+        ui.label(theme::note(counted(run.rows.len(), "step")));
     }
-}
-
-/// The states of a run as a thin band.
-fn sparkline(ui: &mut Ui, target: &TargetView, run: &RunView, stop_count: usize) {
-    let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), 5.0), Sense::hover());
-    timeline::thin_band(ui.painter(), rect, target, run, stop_count);
 }
 
 fn summary(run: &RunView) -> String {
@@ -195,5 +267,5 @@ fn summary(run: &RunView) -> String {
     if let Some(err_px) = summary.final_err_px {
         words.push(format!("last {err_px:.1} px"));
     }
-    if words.is_empty() { format!("{} steps", summary.steps) } else { words.join(", ") }
+    if words.is_empty() { counted(summary.steps, "step") } else { words.join(", ") }
 }

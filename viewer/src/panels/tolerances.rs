@@ -1,10 +1,10 @@
 //! The tolerances of criteria 3 and 4 over the steps, each with the value that is held against it (R86, K-Fig 5).
 //!
 //! Both grow with what was driven and with the range of the stereo measurements that they compare; `stages::judge`
-//! has the equations. Where a value exceeds its tolerance the criterion fires: a cross in vermilion with the word.
+//! has the equations. Where a value exceeds its tolerance the criterion fires: a cross in vermilion, which the row above names.
 
-use egui::{Align2, Color32, RichText, Ui, vec2};
-use egui_plot::{Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotUi, Points, Text, VLine};
+use egui::{Color32, RichText, Ui, vec2};
+use egui_plot::{Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotUi, Points, VLine};
 use sightline_session::step::StepRow;
 use sightline_session::view::RunView;
 use sightline_track::settings::TrackerKind;
@@ -214,8 +214,6 @@ fn paint(plot: &mut PlotUi<'_>, run: &RunView, criterion: &Criterion) {
     for &[step, value_cm] in decimate::evenly(&criterion.fired(run), FIRED) {
         let mark = Points::new("", [step, value_cm]).color(theme::failed()).radius(6.0);
         plot.points(mark.shape(MarkerShape::Cross));
-        let word = Text::new("", PlotPoint::new(step, value_cm), theme::note("fired").color(theme::failed()));
-        plot.text(word.anchor(Align2::CENTER_BOTTOM));
     }
 }
 

@@ -135,9 +135,9 @@ fn summary(
         let outside = |value: f64| value < found.band_of_one[0] || value > found.band_of_one[1];
         let count = found.steps.iter().filter(|step| outside(step.value)).count();
         format!(
-            "{}: mean {mean}, {count} of {} steps outside the band",
+            "{}: mean {mean}, {count} of {} outside the band",
             state.run_label(run.name),
-            found.steps.len()
+            crate::panels::numbers::counted(found.steps.len(), "step")
         )
     };
     let runs: Vec<String> = shown.iter().map(run).collect();

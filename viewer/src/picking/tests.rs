@@ -1,15 +1,20 @@
-//! Picking: the map is asked for and given up, its verdicts are said in words, a refusal offers a way out, keys do all of it.
+//! Picking: the map is requested and cancelled, its verdicts are told in words, a place that is not good offers its ways
+//! on below the image, keys do all of it.
+
+use std::rc::Rc;
 
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable;
 use sightline_api::endpoints::{CancelTrackability, DesignateTarget, ShowTrackability};
 use sightline_api::event::Event;
-use sightline_api::wire::Problem;
+use sightline_api::wire::{Designated, Problem};
 use sightline_geometry::frames::Pixel;
+use sightline_rover::trackability::map::Cell;
 use sightline_rover::trackability::{Aspect, MapProgress, TrackabilityMap, Verdict};
 
 use crate::command::keys;
 use crate::command::{Command, Layer, Mode};
+use crate::panels::images_left;
 use crate::panels::pane::Pane;
 use crate::picking;
 use crate::picking::aim::Aim;
@@ -140,25 +145,35 @@ fn verdict_reason_range_and_longest_step_are_said_in_words_and_the_layer_can_be_
     let map = map(8);
     assert_eq!(
         picking::words(&map.at(PLACE).unwrap()),
-        "bad: depth edge 2 px away · 6.00 m away · longest safe step 0.60 m"
+        "Poor: depth edge 2 px away · range 6.00 m · longest safe step 0.60 m"
     );
-    assert!(picking::words(&map.at(Pixel::new(36.0, 30.0)).unwrap()).starts_with("risky: depth edge"));
-    assert_eq!(picking::words(&map.at(GOOD).unwrap()), "good · 6.00 m away · longest safe step 0.60 m");
-    let mut shown = Shown::pane(Pane::Left, |context| {
-        let mut state = picking(context);
-        state.perform(Command::Aim(Aim::Put(PLACE)));
-        state
-    });
+    assert!(picking::words(&map.at(Pixel::new(36.0, 30.0)).unwrap()).starts_with("Risky: depth edge"));
+    assert_eq!(picking::words(&map.at(GOOD).unwrap()), "Good · range 6.00 m · longest safe step 0.60 m");
+    let mut shown = Shown::new(
+        [900.0, 420.0],
+        |context| {
+            let mut state = picking(context);
+            state.perform(Command::Aim(Aim::Put(PLACE)));
+            state
+        },
+        |ui, state, out| {
+            images_left::show(ui, state, out);
+        },
+    );
     shown
-        .says("trackability: 38 % good, 12 % risky, 50 % bad")
-        .says("at 20.0, 30.0: bad: depth edge 2 px away");
-    assert_eq!(shown.click("risky place, hatched (legend)"), vec![Command::ToggleLayer(Layer::Trackability)]);
+        .says("trackability: 38 % good, 12 % risky, 50 % poor")
+        .says("at 20.0, 30.0: Poor: depth edge 2 px away");
+    for word in ["good (legend)", "risky (legend)", "poor (legend)"] {
+        shown.says(word);
+    }
+    assert_eq!(shown.click("risky (legend)"), vec![Command::ToggleLayer(Layer::Trackability)]);
 }
 
 #[test]
 fn a_refused_pick_offers_the_nearest_good_pixel_by_button_and_by_enter() {
     let mut shown = Shown::pane(Pane::Left, refused);
-    assert_eq!(shown.click("Take the nearest good pixel (44, 36)"), vec![Command::Aim(Aim::TakeNearest)]);
+    shown.says("No 3-D position here.").hides("Pick anyway");
+    assert_eq!(shown.click("Use (44, 36)"), vec![Command::Aim(Aim::TakeNearest)]);
     for aim in [Aim::TakeNearest, Aim::Accept] {
         let mut state = refused(&egui::Context::default());
         state.perform(Command::Aim(aim));
@@ -290,33 +305,142 @@ fn the_map_says_by_which_limits_it_was_made() {
     );
     window.harness.get_by_role_and_label(egui::accesskit::Role::TextInput, "slant_risky_deg");
     window.says("default 80.0").says("deg");
-    assert_eq!(window.click("Make the map with these"), vec![Command::Limits(limits::Ask::Use)]);
-    assert_eq!(window.click("Put the defaults"), vec![Command::Limits(limits::Ask::Defaults)]);
+    assert_eq!(window.click("Apply"), vec![Command::Limits(limits::Ask::Use)]);
+    assert_eq!(window.click("Reset"), vec![Command::Limits(limits::Ask::Defaults)]);
+}
+
+/// The first cell of a verdict on the map of [`picking`].
+fn cell(state: &State, verdict: Verdict) -> Cell {
+    state.trackability_map().unwrap().cells().find(|cell| cell.verdict == verdict).unwrap()
+}
+
+fn is_designated(state: &mut State) -> bool {
+    !calls_of::<DesignateTarget>(state).is_empty()
 }
 
 #[test]
-fn a_place_that_the_map_calls_bad_is_refused_before_it_is_asked_for_unless_one_insists() {
+fn a_risky_or_poor_place_gives_its_reason_and_can_be_picked_anyway() {
+    for (verdict, word) in [(Verdict::Bad, "Poor"), (Verdict::Risky, "Risky")] {
+        let mut state = picking(&egui::Context::default());
+        let place = cell(&state, verdict);
+        let nearest = state.trackability_map().unwrap().nearest_good(place.pixel);
+        assert!(nearest.is_some());
+        state.perform(Command::Pick(place.pixel));
+        assert!(!is_designated(&mut state), "the person is asked first");
+        let refusal = state.refusal.clone().unwrap();
+        assert_eq!((refusal.place.pixel, refusal.nearest, refusal.is_advice), (place.pixel, nearest, true));
+        assert_eq!(refusal.sentence, format!("{word}: depth edge 2 px away"));
+        assert_eq!(state.mode, Mode::Pick, "the person chooses on");
+        state.perform(Command::Aim(Aim::Insist));
+        assert!(is_designated(&mut state) && state.refusal.is_none());
+    }
     let mut state = picking(&egui::Context::default());
-    let map = state.trackability_map().unwrap();
-    let bad = map.cells().find(|cell| cell.verdict == Verdict::Bad).unwrap();
-    let nearest = map.nearest_good(bad.pixel);
-    assert!(nearest.is_some());
-    let is_asked = |state: &mut State| !calls_of::<DesignateTarget>(state).is_empty();
-    state.perform(Command::Pick(bad.pixel));
-    assert!(!is_asked(&mut state), "nothing is designated");
-    let refusal = state.refusal.clone().unwrap();
-    assert_eq!((refusal.place.pixel, refusal.nearest, refusal.is_advice), (bad.pixel, nearest, true));
-    assert_eq!(Some(refusal.sentence), bad.sentence());
-    assert_eq!(state.mode, Mode::Pick, "the person chooses on");
-    state.perform(Command::Aim(Aim::Insist));
-    assert!(is_asked(&mut state) && state.refusal.is_none());
+    let good = cell(&state, Verdict::Good);
+    state.perform(Command::Pick(good.pixel));
+    assert!(is_designated(&mut state) && state.refusal.is_none());
 
     let mut state = picking(&egui::Context::default());
-    state.perform(Command::Pick(bad.pixel));
+    let poor = cell(&state, Verdict::Bad);
+    state.perform(Command::Pick(poor.pixel));
     state.perform(Command::Aim(Aim::TakeNearest));
-    assert!(is_asked(&mut state), "the nearest good one is no place to be refused");
-    // What the server refused was tried: there is nothing to insist on.
+    assert!(is_designated(&mut state), "the nearest good one is designated at once");
+    // The server tried this place: there is nothing to insist on.
     let mut state = refused(&egui::Context::default());
     state.perform(Command::Aim(Aim::Insist));
-    assert!(!is_asked(&mut state) && state.refusal.is_some());
+    assert!(!is_designated(&mut state) && state.refusal.is_some());
+}
+
+fn advised(context: &egui::Context) -> State {
+    let mut state = picking(context);
+    state.perform(Command::Pick(PLACE));
+    state
+}
+
+#[test]
+fn advice_is_below_the_image_and_no_control_covers_it_or_another() {
+    for size in [[360.0, 300.0], [520.0, 420.0], [900.0, 500.0]] {
+        let place = Rc::new(std::cell::Cell::new(None));
+        let kept = Rc::clone(&place);
+        let mut shown = Shown::new(size, advised, move |ui, state, out| {
+            kept.set(images_left::show(ui, state, out).map(|(transform, _)| transform.rect));
+        });
+        let image: egui::Rect = place.get().expect("an image");
+        let control = |label: &str| shown.harness.get_by_label(label).rect();
+        let labels = ["Poor: depth edge 2 px away.", "Use (44, 28)", "Pick anyway"];
+        let controls = labels.map(control);
+        for (number, control) in controls.iter().enumerate() {
+            assert!(control.top() >= image.bottom(), "{control:?} covers the image {image:?}");
+            assert!(control.bottom() <= size[1], "{control:?} leaves the panel");
+            let others = controls.iter().skip(number + 1);
+            assert!(others.into_iter().all(|other| !other.intersects(*control)), "{controls:?}");
+        }
+        assert_eq!(shown.click("Pick anyway"), vec![Command::Aim(Aim::Insist)]);
+    }
+}
+
+#[test]
+fn the_image_stays_in_its_place_while_a_target_is_picked() {
+    let image = |state: fn(&egui::Context) -> State| {
+        let place = Rc::new(std::cell::Cell::new(None));
+        let kept = Rc::clone(&place);
+        Shown::new([520.0, 420.0], state, move |ui, state, out| {
+            kept.set(images_left::show(ui, state, out).map(|(transform, _)| transform));
+        });
+        place.get().expect("an image")
+    };
+    let looking = image(|context| fixture::at_step(context, 0));
+    assert_eq!(looking, image(picking));
+    assert_eq!(looking, image(advised));
+    assert_eq!(looking, image(refused));
+    let designating = |context: &egui::Context| {
+        let mut state = picking(context);
+        state.perform(Command::Pick(GOOD));
+        state
+    };
+    assert_eq!(looking, image(designating));
+}
+
+#[test]
+fn without_a_target_a_click_on_the_left_image_picks() {
+    let without = |context: &egui::Context| {
+        let mut state = fixture::at_step(context, 0);
+        state.session.as_mut().unwrap().targets.clear();
+        state.keep_cursor_valid();
+        state
+    };
+    let click = |state: fn(&egui::Context) -> State| {
+        let mut shown = Shown::pane(Pane::Left, state);
+        let middle = egui::pos2(260.0, 210.0);
+        shown.harness.event(egui::Event::PointerMoved(middle));
+        shown.harness.run_steps(2);
+        for pressed in [true, false] {
+            let button = egui::PointerButton::Primary;
+            let modifiers = Modifiers::NONE;
+            shown.harness.event(egui::Event::PointerButton { pos: middle, button, pressed, modifiers });
+            shown.harness.run_steps(1);
+        }
+        shown.asked().into_iter().filter(|command| matches!(command, Command::Pick(_))).count()
+    };
+    assert_eq!(click(without), 1);
+    assert_eq!(click(|context| fixture::at_step(context, 0)), 0, "a target is there: T begins another pick");
+    Shown::pane(Pane::Left, without).says("Click a rock to track it.");
+    let mut state = without(&egui::Context::default());
+    state.perform(Command::Pick(GOOD));
+    assert!(is_designated(&mut state));
+}
+
+#[test]
+fn the_note_about_a_pick_is_forgotten_with_its_session() {
+    let mut state = fixture::at_step(&egui::Context::default(), 0);
+    let session = state.session.clone().unwrap();
+    state.perform(Command::SetMode(Mode::Pick));
+    state.perform(Command::Pick(GOOD));
+    let answer = Designated { target: 0, gap_m: None, session: session.clone() };
+    calls::answer::<DesignateTarget>(&mut state, &answer);
+    let note = |state: &State| state.messages.newest().map(|message| message.text.clone());
+    assert_eq!(note(&state).as_deref(), Some("Ridge set; tracking all stops … Use ← →."));
+    let mut other = session;
+    (other.id, other.targets) = ("s2".to_owned(), Vec::new());
+    state.adopt(other, false);
+    assert_eq!(note(&state), None, "the other session has no target");
 }

@@ -48,6 +48,9 @@ impl State {
             Command::SetMode(mode) => self.set_mode(mode),
             Command::Pick(pixel) => self.pick(pixel),
             Command::RemoveTarget(target) => self.remove_target(target),
+            Command::Rename(rename) => self.rename(rename),
+            Command::ToggleTarget(target) => self.toggle_target(target),
+            Command::Repick(target) => self.repick(target),
             Command::Draft { key, value } => {
                 match value {
                     Some(value) => self.draft.insert(key, value),
@@ -57,12 +60,8 @@ impl State {
             Command::UsePreset(name) => self.draft = self.changes_to(name).unwrap_or_default(),
             Command::ClearDraft => self.draft.clear(),
             Command::RunFromHere(changes) => self.run_from_here(changes),
-            Command::CancelRun { target, run } => {
-                self.switch_run::<CancelRun>(target, run);
-            }
-            Command::ResumeRun { target, run } => {
-                self.switch_run::<ResumeRun>(target, run);
-            }
+            Command::CancelRun { target, run } => self.switch_run::<CancelRun>(target, run),
+            Command::ResumeRun { target, run } => self.switch_run::<ResumeRun>(target, run),
             Command::View(panel, view) => match panel {
                 Zoomable::Left => self.views.left = view,
                 Zoomable::Right => self.views.right = view,
@@ -176,6 +175,9 @@ impl State {
     }
 
     pub(crate) fn set_mode(&mut self, mode: Mode) {
+        if mode == Mode::Look {
+            self.repicks = None;
+        }
         if mode == Mode::Look && self.mode == Mode::Look {
             self.refusal = None;
             self.messages.close_card();
@@ -205,7 +207,10 @@ impl State {
             return;
         }
         let Some(session) = self.session_id() else { return };
-        let target = NewTarget { camera: place.camera, ..NewTarget::at_pixel(place.step, place.pixel) };
+        let again = self.repicked(place.step);
+        let (label, settings) = again.map(|(label, settings)| (Some(label), settings)).unwrap_or_default();
+        let at = NewTarget::at_pixel(place.step, place.pixel);
+        let target = NewTarget { camera: place.camera, label, settings, ..at };
         let call = Call::with_body::<DesignateTarget>(&AtSession { session }, &target);
         let take = |state: &mut Self, Designated { target, session, .. }| state.designated(target, session);
         self.call_or::<DesignateTarget>(call, take, |state, problem| {
@@ -236,7 +241,8 @@ impl State {
         let from_step = self.cursor.step.clamp(first, computed + 1);
         let new = NewRun { run, from_step, settings: changes, prediction_px: None };
         if self.fork(target, &new) {
-            self.messages.note(format!("Running {} again from step {from_step} …", run_letter(run)));
+            self.messages
+                .note_of_session(format!("Running {} again from step {from_step} …", run_letter(run)));
         }
     }
 

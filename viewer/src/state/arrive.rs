@@ -70,6 +70,7 @@ impl State {
             }
             Event::NotesChanged { session } => self.notes_changed(session),
             Event::SessionRemoved { session } => self.session_removed(&session),
+            Event::ImportProgress { job } => self.import_went_on(job),
             Event::TraverseRemoved { traverse } => self.drive_removed(&traverse),
         }
     }
@@ -86,6 +87,7 @@ impl State {
                     self.read_notes(session);
                 }
                 self.messages.note("The server answers again.");
+                self.follow_import();
                 self.catch_up();
             }
             // Before the first connection an event can only have been missed since the first answers.
@@ -107,6 +109,7 @@ impl State {
         self.progress.clear();
         self.sync.session_stale = true;
         self.trackability_stale();
+        self.studies.make_stale();
         if self.settings.is_empty() {
             self.read_settings();
         }
@@ -210,13 +213,19 @@ impl State {
         let is_other = self.session.as_ref().is_none_or(|open| open.id != view.id);
         self.ask.make_stale();
         if is_other {
+            // Notes of the first session are about opening it.
+            if self.session.is_some() {
+                self.messages.leave_session();
+            }
             self.open_notes(&view.id);
             self.ask.forget();
+            self.messages.forget_session();
             self.progress.clear();
             (self.sync.cursor_stale, self.sync.runs_ahead) = (false, BTreeSet::new());
             self.draft.clear();
             self.forget_comparisons(true);
-            self.mode = Mode::Look;
+            (self.mode, self.renaming, self.repicks) = (Mode::Look, None, None);
+            self.hidden_targets.clear();
             (self.designating, self.refusal, self.rendering) = (None, None, None);
             self.forget_deeds();
         }
@@ -265,6 +274,7 @@ impl State {
 
     pub(super) fn designated(&mut self, target: usize, session: SessionView) {
         (self.designating, self.refusal, self.mode) = (None, None, Mode::Look);
+        self.repicks = None;
         self.adopt(session, true);
         self.cursor.target = Some(target);
         self.cursor.run = 0;
@@ -272,11 +282,14 @@ impl State {
         self.did(Deed::Picked { target });
         self.keep_cursor_valid();
         if let Some(target) = self.target() {
-            let text = format!(
-                "{} is picked; the run goes on by itself. Step along with Right and Left.",
-                target.label
-            );
-            self.messages.note(text);
+            let step = target.designation.step;
+            let label = with_capital(&target.label);
+            let text = if step + 1 < self.stop_count() {
+                format!("{label} set; tracking all stops … Use ← →.")
+            } else {
+                format!("{label} set at the last stop of the drive.")
+            };
+            self.messages.note_of_session(text);
         }
     }
 
@@ -290,7 +303,15 @@ impl State {
         }
         self.cursor = Cursor { target: Some(target), run: number, ..self.cursor };
         self.draft.clear();
+        self.end_trial();
         self.did(Deed::Branched { target, run: number });
-        self.messages.note(format!("Run {} goes on from here.", run_letter(number)));
+        self.messages.note_of_session(format!("Run {} goes on from here.", run_letter(number)));
     }
+}
+
+/// The text with a capital letter.
+fn with_capital(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();
+    format!("{first}{}", letters.as_str())
 }

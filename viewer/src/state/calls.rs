@@ -29,7 +29,10 @@ impl State {
         refused: impl FnOnce(&mut Self, &Problem) -> Notice + 'static,
     ) {
         let request = self.calls.begin::<E>(call, move |state: &mut Self, call, outcome| match outcome {
-            Ok(reply) => take(state, reply),
+            Ok(reply) => {
+                state.messages.mended(&format!("{} {}", call.method, call.path));
+                take(state, reply);
+            }
             Err(problem) => match refused(state, &problem) {
                 Notice::Card => state.show_refusal(call, &problem, false),
                 Notice::List => state.show_refusal(call, &problem, true),

@@ -1,6 +1,6 @@
 //! The user's last changes (deeds), each with the data to undo it.
 //!
-//! It covers picks, removed targets, runs, breakpoints, derived plots and notes, branches, the draft of settings and what is
+//! It covers picks, removed and renamed targets, runs, breakpoints, derived plots and notes, branches, the draft of settings and what is
 //! tried. Nothing that was computed is lost by taking a deed back: targets and runs are hidden, and shown again.
 
 use sightline_session::what_if::WhatIf;
@@ -21,6 +21,15 @@ pub enum Deed {
     RemovedTarget {
         /// Its number.
         target: usize,
+    },
+    /// Renamed a target.
+    Renamed {
+        /// Its number.
+        target: usize,
+        /// Its former name.
+        before: String,
+        /// Its new name.
+        after: String,
     },
     /// Left a run.
     Branched {
@@ -110,6 +119,7 @@ impl Deed {
         match self {
             Self::Picked { target } => format!("the pick of target {}", target + 1),
             Self::RemovedTarget { target } => format!("the removal of target {}", target + 1),
+            Self::Renamed { target, .. } => format!("the name of target {}", target + 1),
             Self::Branched { run, .. } => format!("the branch {}", run_letter(*run)),
             Self::RemovedRun { run, .. } => format!("the removal of run {}", run_letter(*run)),
             Self::RemovedBreakpoint { expression, .. } => {

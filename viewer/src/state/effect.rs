@@ -21,6 +21,15 @@ pub enum Effect {
     UseLooks(Looks),
     /// Lets the user choose a file.
     ChooseFile,
+    /// Lets the user choose the folder of a recording, or an archive of one.
+    ChooseRecording {
+        /// Whether it is an archive.
+        is_archive: bool,
+    },
+    /// Sends the recording that was chosen last to an upload of this name.
+    SendRecording(String),
+    /// Sends no more of it.
+    StopSending,
     /// Reads the file at a path.
     ReadFile(String),
     /// Saves a panel as a figure.

@@ -30,6 +30,10 @@ pub struct Message {
     pub about: Option<Box<About>>,
     /// The deed that it tells of, which can be taken back while it is the last one.
     pub deed: Option<u64>,
+    /// Whether it is about a target or a run of the open session.
+    pub is_of_session: bool,
+    /// Whether it no longer applies: the list keeps it, the status line does not show it.
+    pub is_past: bool,
 }
 
 /// What else is known of a problem.
@@ -73,6 +77,19 @@ impl Messages {
     /// Something happened as asked.
     pub fn note(&mut self, text: impl Into<String>) {
         self.add(Weight::Note, text.into(), None, None);
+    }
+
+    /// Something happened to a target or a run of the open session.
+    pub(crate) fn note_of_session(&mut self, text: impl Into<String>) {
+        self.note(text);
+        if let Some(last) = self.list.last_mut() {
+            last.is_of_session = true;
+        }
+    }
+
+    /// Forgets the notes about targets and runs: another session is open.
+    pub(crate) fn forget_session(&mut self) {
+        self.list.retain(|message| !message.is_of_session);
     }
 
     /// Something happened as asked, and there is a page to it.
@@ -148,19 +165,48 @@ impl Messages {
         &self.list
     }
 
-    /// The newest.
+    /// The newest, unless it no longer applies.
     pub fn newest(&self) -> Option<&Message> {
-        self.list.last()
+        self.list.last().filter(|message| !message.is_past)
+    }
+
+    /// A request succeeded: problems of the same request no longer apply, and a card of one is closed.
+    pub(crate) fn mended(&mut self, asked: &str) {
+        let is_of = |message: &Message| {
+            let details = message.about.iter().flat_map(|about| &about.details);
+            details.into_iter().any(|(name, value)| *name == "asked" && value == asked)
+        };
+        for message in self.list.iter_mut().filter(|message| is_of(message)) {
+            message.is_past = true;
+            self.card = self.card.filter(|card| *card != message.id);
+        }
+    }
+
+    /// Another session was opened: notes of the earlier one no longer apply.
+    pub(crate) fn leave_session(&mut self) {
+        self.list.iter_mut().filter(|message| message.weight == Weight::Note).for_each(|m| m.is_past = true);
     }
 
     fn add(&mut self, weight: Weight, text: String, hint: Option<String>, link: Option<String>) {
         if let Some(last) = self.list.last_mut().filter(|last| last.text == text && last.weight == weight) {
             last.count += 1;
+            last.is_past = false;
             last.link = link.or(last.link.take());
             return;
         }
         let (id, about, deed) = (self.next, None, None);
-        self.list.push(Message { id, weight, text, hint, link, count: 1, about, deed });
+        self.list.push(Message {
+            id,
+            weight,
+            text,
+            hint,
+            link,
+            count: 1,
+            about,
+            deed,
+            is_of_session: false,
+            is_past: false,
+        });
         self.next += 1;
         if self.list.len() > KEPT {
             self.list.remove(0);
@@ -183,6 +229,39 @@ mod tests {
         let id = messages.all()[0].id;
         messages.dismiss(id);
         assert_eq!(messages.newest().unwrap().text, "yes");
+    }
+
+    #[test]
+    fn a_problem_leaves_the_status_line_once_its_request_succeeds() {
+        let problem = Problem {
+            code: "grid".to_owned(),
+            title: String::new(),
+            status: 422,
+            detail: "grid: 99 is too large".to_owned(),
+            hint: None,
+            nearest_pixel: None,
+            received: None,
+        };
+        let mut messages = Messages::default();
+        messages.refused(&problem, "post /studies/jobs".to_owned(), true);
+        messages.mended("post /sessions");
+        assert!(messages.newest().is_some() && messages.card().is_some());
+        messages.mended("post /studies/jobs");
+        assert!(messages.newest().is_none() && messages.card().is_none());
+        assert_eq!(messages.all().len(), 1, "the list keeps it");
+        messages.refused(&problem, "post /studies/jobs".to_owned(), true);
+        assert!(messages.newest().is_some() && messages.card().is_some(), "it happened again");
+    }
+
+    #[test]
+    fn notes_of_an_earlier_session_leave_the_status_line() {
+        let mut messages = Messages::default();
+        messages.note("target 1 is picked");
+        messages.leave_session();
+        assert!(messages.newest().is_none());
+        messages.problem("no", None);
+        messages.leave_session();
+        assert!(messages.newest().is_some(), "problems stay");
     }
 
     #[test]

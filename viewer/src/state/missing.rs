@@ -12,7 +12,7 @@ impl State {
         if step < target.designation.step {
             let first = target.designation.step;
             return format!(
-                "{} was picked at step {first}. Go there, or press PgDn for the next event.",
+                "{} was designated at step {first}. Go there, or press PgDn for the next event.",
                 target.label
             );
         }
@@ -43,11 +43,21 @@ impl State {
                     located.missing.clone().unwrap_or_default()
                 }
                 _ if trace.prediction().is_none() => {
-                    "Here the target was picked: nothing had to be matched. Go one step on (Right) to see a match.".to_owned()
+                    let next = self.next_step_words("for the first one");
+                    format!("Target designated here; no match yet.{next}")
                 }
                 _ => "This stage was not reached at this step.".to_owned(),
             },
             Slot::Absent | Slot::Loading => format!("Loading step {step} …"),
+        }
+    }
+
+    /// Where to go from a step that has nothing to show, as a sentence; empty at the last stop.
+    pub(crate) fn next_step_words(&self, purpose: &str) -> String {
+        if self.cursor.step + 1 < self.stop_count() {
+            format!(" Press → {purpose}.")
+        } else {
+            " This drive has no further stop.".to_owned()
         }
     }
 
@@ -59,7 +69,7 @@ impl State {
                 "The server has no traverse. Import one with `sightline import`, or simulate one with `sightline simulate`.".to_owned()
             }
             (None, Some(_)) => "Opening the traverse …".to_owned(),
-            (Some(_), _) => "No target yet. Press T, then click a rock in the left image.".to_owned(),
+            (Some(_), _) => "No target yet. Click a rock in the left image, or press T for the map of trackability.".to_owned(),
         }
     }
 }

@@ -21,6 +21,7 @@ pub(crate) mod messages;
 mod missing;
 mod panels;
 pub(crate) mod pointed;
+pub(crate) mod targets;
 pub(crate) mod tracker;
 mod undo;
 mod wanted;
@@ -29,7 +30,7 @@ pub(crate) use self::known::{Place, Progress, Refusal};
 pub(crate) use self::rows::{events, row_of, run_letter, state_of};
 pub(crate) use self::views::Views;
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::sync::LazyLock;
 
 use serde_json::Value;
@@ -52,6 +53,7 @@ use self::deeds::Undo;
 use self::effect::{Effect, Outbox};
 use self::known::Sync;
 use self::messages::Messages;
+use self::targets::Renaming;
 use crate::breakpoints::Asking;
 use crate::cache::{Cache, Eye, Key, Slot, StepKey};
 use crate::command::{Layer, Mode, Stage, Zoomable};
@@ -106,8 +108,14 @@ pub struct State {
     pub rendering: Option<(usize, usize)>,
     /// A designation that waits for its answer.
     pub designating: Option<Place>,
-    /// The last designation that was refused.
+    /// The last designation that was advised against or refused.
     pub refusal: Option<Refusal>,
+    /// The name of a target that is being typed.
+    pub renaming: Option<Renaming>,
+    /// The target that is designated again at the cursor's stop.
+    pub repicks: Option<usize>,
+    /// The targets whose marks are hidden in the images.
+    pub hidden_targets: BTreeSet<usize>,
     /// What was said to the person.
     pub messages: Messages,
     /// What each panel shows.
@@ -192,6 +200,9 @@ impl State {
             rendering: None,
             designating: None,
             refusal: None,
+            renaming: None,
+            repicks: None,
+            hidden_targets: BTreeSet::new(),
             messages: Messages::default(),
             views: Views::default(),
             chosen_camera: None,

@@ -1,5 +1,6 @@
 //! What the pointer rests on, as the panels ask for it and as the page takes it out of the commands of a frame.
 
+use egui::{Context, Order};
 use sightline_geometry::frames::Pixel;
 
 use crate::command::Command;
@@ -19,6 +20,13 @@ impl State {
             _ => None,
         }
     }
+}
+
+/// Whether the pointer is on a window, a menu or a bubble above the panels.
+pub(crate) fn is_covered(context: &Context) -> bool {
+    let pointer = context.input(|input| input.pointer.hover_pos());
+    let layer = pointer.and_then(|at| context.layer_id_at(at));
+    layer.is_some_and(|layer| layer.order > Order::Background)
 }
 
 /// Takes what was pointed at out of the commands of a frame.

@@ -29,6 +29,12 @@ impl State {
         }
     }
 
+    /// Ends the trial, and forgets the deeds that led to it: the branch has what was tried.
+    pub(crate) fn end_trial(&mut self) {
+        self.why.trial = None;
+        while self.undo.done.pop_if(|deed| matches!(deed, Deed::Tried { .. })).is_some() {}
+    }
+
     /// Remembers a removal and shows a message that offers to undo it.
     pub(crate) fn did_remove(&mut self, what: &str, deed: Deed) {
         self.did(deed);
@@ -129,7 +135,14 @@ impl State {
         match deed {
             Deed::Picked { target } => self.show_target(*target, again, None),
             Deed::RemovedTarget { target } => self.show_target(*target, !again, None),
-            Deed::Branched { target, run } => self.show_run(*target, *run, again, None),
+            Deed::Renamed { target, before, after } => {
+                let label = if again { after } else { before }.clone();
+                self.rename_target(*target, label, None);
+            }
+            Deed::Branched { target, run } => {
+                self.end_trial();
+                self.show_run(*target, *run, again, None);
+            }
             Deed::RemovedRun { target, run } => self.show_run(*target, *run, !again, None),
             Deed::RemovedBreakpoint { expression, .. } if again => self.unset(expression),
             Deed::RemovedBreakpoint { expression, is_on } => self.set_again(expression, *is_on),

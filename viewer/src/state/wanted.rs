@@ -5,6 +5,7 @@ use sightline_session::view::RunView;
 use sightline_track::trace::ArrayName;
 
 use crate::cache::{Eye, Key};
+use crate::panels::timeline::film;
 use crate::state::{State, row_of};
 
 /// How many windows of a long run are loaded at once, and how many of them lie after the cursor.
@@ -30,6 +31,9 @@ impl State {
         // The record of the pick has the warnings about it.
         let pick = self.run().and_then(|run| run.rows.first()).map(|row| row.step);
         keys.extend(pick.and_then(|step| self.step_key(step)).map(Key::Trace));
+        if let Some(run) = self.run() {
+            keys.extend(film::rows(self, run).filter_map(|row| self.window_key(run, row)));
+        }
         if let Some(run) = self.run().filter(|_| self.wants_history) {
             keys.extend(self.row().and_then(|_| self.step_key(step)).map(Key::EarlierTemplates));
             keys.extend(self.near_rows(run).filter_map(|row| self.window_key(run, row)));

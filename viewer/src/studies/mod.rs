@@ -3,6 +3,10 @@
 pub(crate) mod panel;
 pub(crate) mod update;
 
+mod chart;
+mod estimate;
+mod table;
+
 use std::collections::BTreeMap;
 
 use sightline_study::row::Row;
@@ -29,33 +33,48 @@ pub struct Studies {
 pub struct Order {
     /// The study's name; empty stands for the first.
     pub study: String,
-    /// Seeds with commas between them; empty: ten worlds from seed 1 on.
+    /// Seeds with commas between them; empty: [`WORLDS`] worlds from seed 1 on.
     pub seeds: String,
-    /// Configurations with commas between them; empty: the study's own.
+    /// Configurations with commas between them; empty: [`Order::proposed`].
     pub configurations: String,
     /// Values of the study's variable with commas between them; empty: its own.
     pub grid: String,
 }
 
+/// Number of worlds of a study whose seeds are not given.
+pub(crate) const WORLDS: u64 = 2;
+
+/// Configurations that a study begins with, where it has them: ours and the paper's three.
+const FIRST: [&str; 4] = ["sightline", "ncc-scale-roll", "ncc-scale", "ncc"];
+
 impl Order {
-    /// The request, for a study of that name.
+    /// The configurations that are run where none are given: few, so that the first result comes soon.
+    pub(crate) fn proposed(info: &StudyInfo) -> Vec<String> {
+        let has = |name: &&&str| info.configurations.iter().any(|known| known == **name);
+        let first: Vec<String> = FIRST.iter().filter(has).map(|&name| name.to_owned()).collect();
+        if first.is_empty() { info.configurations.iter().take(FIRST.len()).cloned().collect() } else { first }
+    }
+
+    /// The request that starts a study.
     ///
     /// # Errors
-    /// A sentence when a seed is no whole number.
-    pub fn request(&self, study: &str) -> Result<NewStudy, String> {
+    /// A sentence if a seed is not a whole number.
+    pub fn request(&self, info: &StudyInfo) -> Result<NewStudy, String> {
         let words = |text: &str| -> Vec<String> {
             text.split(',').map(|word| word.trim().to_owned()).filter(|word| !word.is_empty()).collect()
         };
         let seed = |word: &String| {
             word.parse::<u64>()
-                .map_err(|_| format!("seeds: {word} is no whole number; write for example 1,2,3"))
+                .map_err(|_| format!("seeds: {word} is not a whole number; write for example 1,2,3"))
         };
+        let seeds: Vec<u64> = words(&self.seeds).iter().map(seed).collect::<Result<_, _>>()?;
+        let configurations = words(&self.configurations);
         Ok(NewStudy {
-            study: study.to_owned(),
-            seeds: words(&self.seeds).iter().map(seed).collect::<Result<_, _>>()?,
-            worlds: None,
+            study: info.name.clone(),
+            worlds: seeds.is_empty().then_some(WORLDS),
+            seeds,
             first_seed: None,
-            configurations: words(&self.configurations),
+            configurations: if configurations.is_empty() { Self::proposed(info) } else { configurations },
             grid: words(&self.grid),
             scenario: None,
         })
@@ -69,12 +88,25 @@ impl Studies {
         infos.iter().find(|info| info.name == self.order.study).or(infos.first())
     }
 
-    /// Takes in how a job stands.
+    /// Stores the state of a job, unless a newer one is known: answers and events overtake each other.
     pub(crate) fn took(&mut self, job: StudyJob) {
         match self.jobs.iter_mut().find(|known| known.id == job.id) {
+            Some(known) if known.revision > job.revision => {}
             Some(known) => *known = job,
             None => self.jobs.push(job),
         }
+    }
+
+    /// Stores the server's list of jobs.
+    pub(crate) fn took_all(&mut self, list: Vec<StudyJob>) {
+        self.jobs.retain(|known| list.iter().any(|job| job.id == known.id));
+        list.into_iter().for_each(|job| self.took(job));
+    }
+
+    /// Requests everything again from a server that may have been restarted, and so counts revisions anew.
+    pub(crate) fn make_stale(&mut self) {
+        self.is_asked = false;
+        self.jobs.iter_mut().for_each(|job| job.revision = 0);
     }
 }
 
@@ -84,16 +116,29 @@ mod tests {
 
     #[test]
     fn an_order_becomes_a_request_and_a_wrong_seed_a_sentence() {
+        let info = StudyInfo {
+            name: "straight".to_owned(),
+            question: String::new(),
+            variable: "n_skip".to_owned(),
+            unit: String::new(),
+            grid: vec!["0".to_owned()],
+            configurations: ["ncc", "sdog", "sightline", "ncc-scale"].map(str::to_owned).to_vec(),
+            scenarios: Vec::new(),
+            points_per_value: 1,
+        };
         let order = Order {
             seeds: "7, 8".to_owned(),
             configurations: "ncc-scale, ncc+scale=true".to_owned(),
             ..Order::default()
         };
-        let new = order.request("straight").unwrap();
-        assert_eq!((new.study.as_str(), new.seeds), ("straight", vec![7, 8]));
+        let new = order.request(&info).unwrap();
+        assert_eq!((new.study.as_str(), new.seeds, new.worlds), ("straight", vec![7, 8], None));
         assert_eq!(new.configurations, ["ncc-scale", "ncc+scale=true"]);
-        assert!(new.grid.is_empty() && new.worlds.is_none());
+        assert!(new.grid.is_empty());
         let wrong = Order { seeds: "7,x".to_owned(), ..Order::default() };
-        assert!(wrong.request("straight").unwrap_err().contains("x is no whole number"));
+        assert!(wrong.request(&info).unwrap_err().contains("x is not a whole number"));
+        let small = Order::default().request(&info).unwrap();
+        assert_eq!(small.worlds, Some(WORLDS), "few worlds");
+        assert_eq!(small.configurations, ["sightline", "ncc-scale", "ncc"], "few configurations");
     }
 }

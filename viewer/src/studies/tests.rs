@@ -1,13 +1,16 @@
 //! The panel of the validation experiments.
 
+use egui_kittest::kittest::Queryable;
 use sightline_api::endpoint::Call;
-use sightline_api::endpoints::{ListStudies, ShowStudyRows, StartStudy};
+use sightline_api::endpoints::{CancelStudy, ListStudies, ListStudyJobs, ShowStudyRows, StartStudy};
 use sightline_api::event::Event;
 use sightline_api::location::AtStudyJob;
 use sightline_study::row::Row;
 use sightline_study::wire::{StudyInfo, StudyJob, StudyRows, StudyState};
 
 use crate::command::Command;
+use crate::figure::save;
+use crate::figure::wish::{Kind, Wish};
 use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::studies::Order;
@@ -21,6 +24,9 @@ fn job(state: StudyState, k: usize) -> StudyJob {
         state,
         k,
         n: 40,
+        share: 0.5,
+        seconds: 60.0,
+        revision: k as u64,
         doing: "world 7".to_owned(),
         notices: vec!["world 3 offers 12 targets".to_owned()],
         command: "sightline study straight".to_owned(),
@@ -38,6 +44,7 @@ fn with_job(state: StudyState) -> State {
         grid: vec!["0".to_owned(), "1".to_owned()],
         configurations: vec!["ncc".to_owned(), "ncc-scale".to_owned()],
         scenarios: vec!["approach-5".to_owned()],
+        points_per_value: 1,
     }]);
     page.told(Event::StudyProgress { job: job(state, 3) });
     page
@@ -57,6 +64,7 @@ fn studies_are_asked_for_once() {
 fn a_study_is_started_with_what_was_typed() {
     let mut shown = Shown::pane(Pane::Studies, |_| with_job(StudyState::Running));
     shown.says("How large may a step be?").says("n_skip");
+    shown.says("2 configurations × 2 points × 2 worlds = 8 runs, about");
     assert_eq!(shown.click("Start the study"), vec![Command::StartStudy]);
     let mut page = with_job(StudyState::Running);
     page.take_requests();
@@ -69,19 +77,69 @@ fn a_study_is_started_with_what_was_typed() {
         page.perform(Command::OrderStudy(Order { seeds: "seven".to_owned(), ..Order::default() }));
         page
     });
-    wrong.says("seven is no whole number");
+    wrong.says("seven is not a whole number");
 }
 
 #[test]
 fn a_job_says_how_far_it_is_and_can_be_stopped_or_read() {
     let mut running = Shown::pane(Pane::Studies, |_| with_job(StudyState::Running));
-    running.says("3 of 40").says("running").says("world 7").says("! world 3 offers 12 targets");
+    running
+        .says("3 of 40 runs")
+        .says("about 1 min left")
+        .says("running")
+        .says("world 7")
+        .says("! world 3 offers 12 targets");
     assert_eq!(running.click("Cancel"), vec![Command::CancelStudy("j1".to_owned())]);
     let mut done = Shown::pane(Pane::Studies, |_| with_job(StudyState::Done));
     assert_eq!(done.click("Report"), vec![Command::OpenReport("j1".to_owned())]);
-    assert_eq!(done.click("Table"), vec![Command::LookAtStudy("j1".to_owned())]);
+    assert_eq!(done.click("Result"), vec![Command::LookAtStudy("j1".to_owned())]);
     let mut stopped = Shown::pane(Pane::Studies, |_| with_job(StudyState::Cancelled));
     assert_eq!(stopped.click("Resume"), vec![Command::ResumeStudy("j1".to_owned())]);
+}
+
+#[test]
+fn a_late_progress_event_does_not_revive_a_cancelled_study() {
+    let mut page = with_job(StudyState::Running);
+    page.perform(Command::CancelStudy("j1".to_owned()));
+    // The event of the end arrives before the answer to the request, which was written while the study still ran.
+    page.told(Event::StudyProgress { job: job(StudyState::Cancelled, 5) });
+    answer::<CancelStudy>(&mut page, &job(StudyState::Running, 4));
+    assert_eq!(page.studies.jobs[0].state, StudyState::Cancelled);
+    page.told(Event::StudyProgress { job: job(StudyState::Running, 4) });
+    assert_eq!(page.studies.jobs[0].state, StudyState::Cancelled);
+    page.told(Event::StudyProgress { job: job(StudyState::Waiting, 6) });
+    assert_eq!(page.studies.jobs[0].state, StudyState::Waiting, "resumed elsewhere");
+}
+
+#[test]
+fn a_restarted_server_that_counts_anew_is_heard() {
+    let mut page = with_job(StudyState::Running);
+    page.studies.make_stale();
+    page.want_studies();
+    answer::<ListStudyJobs>(&mut page, &vec![job(StudyState::Cancelled, 1)]);
+    assert_eq!(page.studies.jobs[0].state, StudyState::Cancelled);
+}
+
+#[test]
+fn the_bar_moves_while_worlds_are_rendered() {
+    let shown = Shown::pane(Pane::Studies, |_| {
+        let mut page = with_job(StudyState::Running);
+        let rendering = StudyJob { share: 0.2, ..job(StudyState::Running, 0) };
+        page.told(Event::StudyProgress { job: StudyJob { revision: 9, ..rendering } });
+        page
+    });
+    shown.says("20 % done").says("0 of 40 runs");
+}
+
+#[test]
+fn the_state_of_a_study_is_said_once() {
+    let done = StudyJob { doing: "done".to_owned(), ..job(StudyState::Done, 40) };
+    let shown = Shown::pane(Pane::Studies, |_| {
+        let mut page = with_job(StudyState::Running);
+        page.told(Event::StudyProgress { job: done });
+        page
+    });
+    assert_eq!(shown.harness.query_all_by_label("done").count(), 1);
 }
 
 #[test]
@@ -116,4 +174,37 @@ fn the_table_has_a_row_for_each_unit_and_grows_with_the_job() {
         },
     );
     shown.says("median, cm").says("ncc-scale").says("19").says("1.23").says("–");
+}
+
+/// A study with results.
+fn with_result() -> State {
+    let mut page = with_job(StudyState::Done);
+    page.perform(Command::LookAtStudy("j1".to_owned()));
+    let rows = (0..10u64).map(|k| Row {
+        study: "straight".to_owned(),
+        configuration: ["ncc", "sightline"][(k % 2) as usize].to_owned(),
+        scenario: "approach-5".to_owned(),
+        seed: 7,
+        columns: serde_json::from_value(
+            serde_json::json!({"n_skip": k / 2, "targets": 20, "tracked": 20 - k}),
+        )
+        .unwrap(),
+    });
+    answer::<ShowStudyRows>(&mut page, &StudyRows { rows: rows.collect() });
+    page
+}
+
+#[test]
+fn a_figure_of_a_study_has_its_result_and_no_form() {
+    let shown = Shown::pane(Pane::Studies, |_| with_result());
+    shown.says("Start the study").says("targets tracked, %");
+    let context = egui::Context::default();
+    let mut output = context.run_ui(egui::RawInput::default(), |_| {});
+    output.textures_delta.clear();
+    let wish = Wish { pane: Pane::Studies, kind: Kind::Svg };
+    let file = save::take(&context, &with_result(), &[], wish).unwrap();
+    let text = String::from_utf8(file.bytes).unwrap();
+    assert!(text.contains("targets tracked, %") && !text.contains("Start the study"), "{text}");
+    // Three numbered ticks: 0, 50 and 100.
+    assert!(text.contains(">50</text>"), "{text}");
 }

@@ -29,7 +29,7 @@ impl State {
                 }
             });
             let jobs = Call::to::<ListStudyJobs>(&Anywhere {});
-            self.call::<ListStudyJobs>(jobs, |state, jobs| state.studies.jobs = jobs);
+            self.call::<ListStudyJobs>(jobs, |state, jobs| state.studies.took_all(jobs));
         }
     }
 
@@ -45,8 +45,8 @@ impl State {
 
     /// Starts the study that the order describes.
     pub(crate) fn start_study(&mut self) {
-        let Some(name) = self.studies.chosen().map(|info| info.name.clone()) else { return };
-        match self.studies.order.request(&name) {
+        let Some(info) = self.studies.chosen() else { return };
+        match self.studies.order.request(info) {
             Ok(new) => self.call::<StartStudy>(start_study(&new), |state, job| state.studies.took(job)),
             Err(sentence) => self.messages.problem(sentence, None),
         }

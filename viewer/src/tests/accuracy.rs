@@ -9,13 +9,13 @@ use crate::tests::{Shown, fixture};
 #[test]
 fn the_left_image_says_how_the_subframe_is_exposed_and_which_stretch_is_on() {
     let shown = Shown::pane(Pane::Left, |context| fixture::at_step(context, 2));
-    shown.says("subframe 161 × 161 px: mean 0.40, 0.0 % saturated").says("as recorded: 0 is black");
+    shown.says("subframe 161 × 161 px: mean 0.40, 0.0 % saturated").says("automatic: ");
     let stretched = Shown::pane(Pane::Left, |context| {
         let mut state = fixture::at_step(context, 2);
-        state.perform(Command::SetStretch(Stretch::Auto));
+        state.perform(Command::SetStretch(Stretch::None));
         state
     });
-    stretched.says("is black").says("automatic");
+    stretched.says("as recorded: 0 is black");
     let by_hand = Shown::pane(Pane::Left, |context| {
         let mut state = fixture::at_step(context, 2);
         state.perform(Command::SetStretch(Stretch::NEUTRAL));
@@ -27,8 +27,8 @@ fn the_left_image_says_how_the_subframe_is_exposed_and_which_stretch_is_on() {
 #[test]
 fn a_stretch_is_chosen_from_the_list() {
     let mut shown = Shown::pane(Pane::Left, |context| fixture::at_step(context, 2));
-    shown.click("stretch, as recorded: 0 is black, 1 is white");
-    assert_eq!(shown.click("automatic"), vec![Command::SetStretch(Stretch::Auto)]);
+    shown.click("stretch, automatic: 0.326 is black, 0.965 is white");
+    assert_eq!(shown.click("as recorded"), vec![Command::SetStretch(Stretch::None)]);
 }
 
 #[test]

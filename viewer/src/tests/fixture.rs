@@ -178,6 +178,7 @@ fn traverse() -> TraverseView {
         source: "/drives/six-stops".to_owned(),
         stereo: StereoGeometry::Lateral,
         warnings: Vec::new(),
+        odometry_error: sightline_geometry::odometry_error::OdometryError::default(),
         stops: (0..STOPS).map(stop).collect(),
     }
 }

@@ -43,16 +43,12 @@ fn a_loaded_history_says_score_and_shift_against_the_first_template() {
 }
 
 #[test]
-fn all_windows_are_fetched_only_while_they_are_looked_at() {
+fn earlier_templates_are_fetched_only_while_they_are_looked_at() {
     let mut state = fixture::at_step(&egui::Context::default(), 1);
-    let far = |key: &Key| match key {
-        Key::Array(step, _) => step.step == 4,
-        Key::EarlierTemplates(step) => step.step == 1,
-        _ => false,
-    };
-    assert!(!state.wanted().iter().any(far));
+    let earlier = |key: &Key| matches!(key, Key::EarlierTemplates(step) if step.step == 1);
+    assert!(!state.wanted().iter().any(earlier));
     state.wants_history = true;
-    assert!(state.wanted().iter().any(far));
+    assert!(state.wanted().iter().any(earlier));
 }
 
 #[test]
@@ -64,5 +60,5 @@ fn the_map_says_how_the_ellipses_shrink() {
         }
         state
     });
-    shown.says("3σ, cm: pick 6.0, here 1.5, end 0.4");
+    shown.says("3σ (cm): at pick 6.0 · now 1.5 · at end 0.4");
 }

@@ -191,28 +191,27 @@ fn the_editor_names_the_place_and_saves() {
     assert_eq!(shown.click("Save note"), vec![Command::Notes(Ask::Save)]);
 }
 
+/// The window of exports with a file.
+fn opened(context: &egui::Context) -> State {
+    let mut state = noted(context);
+    state.perform(Command::Exports(exports::Ask::Open));
+    assert!(!calls_of::<ListExports>(&mut state).is_empty());
+    state.exports.panes = vec![Pane::Map];
+    state.exports.entries = Some(vec![ExportEntry {
+        name: "rows.csv".to_owned(),
+        title: "Rows, CSV".to_owned(),
+        sentence: "One line a step.".to_owned(),
+        file: "sightline-s1-rows.csv".to_owned(),
+        size: Size { bytes: 1234, is_exact: true },
+        path: "sessions/s1/exports/rows.csv".to_owned(),
+        command: "sightline export rows.csv --session s1".to_owned(),
+    }]);
+    state
+}
+
 #[test]
 fn the_export_window_lists_files_with_sizes_and_ways_to_copy_them() {
-    let mut shown = Shown::new(
-        [900.0, 800.0],
-        |context| {
-            let mut state = noted(context);
-            state.perform(Command::Exports(exports::Ask::Open));
-            assert!(!calls_of::<ListExports>(&mut state).is_empty());
-            state.exports.panes = vec![Pane::Map];
-            state.exports.entries = Some(vec![ExportEntry {
-                name: "rows.csv".to_owned(),
-                title: "Rows, CSV".to_owned(),
-                sentence: "One line a step.".to_owned(),
-                file: "sightline-s1-rows.csv".to_owned(),
-                size: Size { bytes: 1234, is_exact: true },
-                path: "sessions/s1/exports/rows.csv".to_owned(),
-                command: "sightline export rows.csv --session s1".to_owned(),
-            }]);
-            state
-        },
-        window::show,
-    );
+    let mut shown = Shown::new([900.0, 800.0], opened, window::show);
     // A long window finds its place within a few frames.
     shown.harness.run_steps(4);
     shown.says("Rows, CSV").says("1 kB").says("One line a step.").says("pick ridge");
@@ -240,6 +239,25 @@ fn the_export_window_lists_files_with_sizes_and_ways_to_copy_them() {
     let wish = Wish { pane: Pane::Map, kind: Kind::Png(2) };
     assert_eq!(figure, vec![Command::Exports(exports::Ask::Figure(wish))]);
     assert_eq!(shown.click("SVG"), vec![Command::Exports(exports::Ask::Kind(Kind::Svg))]);
+}
+
+#[test]
+fn the_export_window_does_not_move_when_its_files_arrive() {
+    let arrive = std::rc::Rc::new(std::cell::Cell::new(false));
+    let arrived = std::rc::Rc::clone(&arrive);
+    let mut shown = Shown::new([1440.0, 900.0], opened, move |ui, state, out| {
+        if arrived.get() {
+            return window::show(ui, state, out);
+        }
+        let mut waiting = fixture::at_step(ui.ctx(), 2);
+        waiting.exports.is_open = true;
+        window::show(ui, &waiting, out);
+    });
+    let close = |shown: &Shown<'_>| shown.harness.get_by_label("Close").rect();
+    let before = close(&shown);
+    arrive.set(true);
+    shown.harness.run_steps(1);
+    assert_eq!(close(&shown), before);
 }
 
 #[test]

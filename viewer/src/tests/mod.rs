@@ -4,7 +4,7 @@ mod accuracy;
 #[path = "../compare/tests/mod.rs"]
 mod compare;
 #[path = "../breakpoints/tests.rs"]
-mod ask;
+pub(crate) mod ask;
 mod cameras;
 pub(crate) mod feature_run;
 mod features;
@@ -34,11 +34,15 @@ mod tour;
 #[path = "../why/tests.rs"]
 mod why;
 mod undo;
+#[path = "../why/card_tests.rs"]
+mod why_card;
 #[path = "../why/follow_tests.rs"]
 mod following;
 mod pointed;
 #[path = "../files/tests.rs"]
 mod opening;
+#[path = "../files/recording_tests.rs"]
+mod recordings;
 mod pauses;
 pub(crate) mod odometry;
 mod problems;
@@ -147,7 +151,7 @@ fn without_a_target_every_panel_tells_how_to_get_one() {
     for pane in
         [Pane::Targets, Pane::Settings, Pane::Strip, Pane::Surface, Pane::Plots, Pane::Gates, Pane::Inspector]
     {
-        Shown::pane(pane, |_| fixture::without_target()).says("Press T");
+        Shown::pane(pane, |_| fixture::without_target()).says("press T");
     }
 }
 
@@ -176,16 +180,21 @@ fn a_step_that_is_not_computed_yet_says_how_far_the_run_is() {
 }
 
 #[test]
-fn the_designation_says_that_nothing_had_to_be_matched() {
+fn the_designation_says_that_there_is_no_match_yet() {
     for pane in [Pane::Surface, Pane::Gates] {
-        Shown::pane(pane, |context| fixture::at_step(context, 0)).says("Here the target was picked");
+        Shown::pane(pane, |context| fixture::at_step(context, 0))
+            .says("Target designated here; no match yet. Press → for the first one.");
     }
-    Shown::pane(Pane::Strip, |context| fixture::at_step(context, 0)).says("right image patch");
+    let strip = Shown::pane(Pane::Strip, |context| fixture::at_step(context, 0));
+    strip.says("template patch").says("right image patch").hides("designated here");
+    let stereo = Shown::pane(Pane::StereoProfile, |context| fixture::at_step(context, 0));
+    stereo.says("no prediction: the whole curve").hides("designated here");
 }
 
 #[test]
 fn the_left_image_has_a_legend_that_switches_its_layers() {
     let mut shown = Shown::pane(Pane::Left, |context| fixture::at_step(context, 2));
+    shown.click("legend");
     for word in ["truth", "match, 3σ · run A", "predicted, 3σ gate", "search window", "subframe"] {
         shown.says(&format!("{word} (legend)"));
     }
@@ -194,7 +203,9 @@ fn the_left_image_has_a_legend_that_switches_its_layers() {
 
 #[test]
 fn the_right_image_names_the_epipolar_curve() {
-    Shown::pane(Pane::Right, |context| fixture::at_step(context, 2)).says("epipolar curve");
+    let mut shown = Shown::pane(Pane::Right, |context| fixture::at_step(context, 2));
+    shown.click("legend");
+    shown.says("epipolar curve");
 }
 
 #[test]

@@ -232,7 +232,9 @@ fn corners_are_a_layer_of_the_left_image() {
         };
         shapes.iter().filter(|clipped| is_line(&clipped.shape)).count()
     };
-    let (off, on) = (left(false), left(true));
+    let (mut off, mut on) = (left(false), left(true));
+    off.click("legend");
+    on.click("legend");
     off.says("odometry from step 2, 2 inliers (legend)");
     assert!(crosses(&on) > crosses(&off), "{} and {}", crosses(&on), crosses(&off));
 }

@@ -142,7 +142,10 @@ fn every_key_of_time_travel_is_on_the_sheet_and_means_what_it_says() {
     assert_eq!(press(Key::N, Modifiers::SHIFT), Some(Command::Ask(Ask::PreviousHit)));
     assert_eq!(press(Key::B, plain), Some(Command::Ask(Ask::BreakAt(2))));
     assert_eq!(press(Key::B, Modifiers::SHIFT), Some(Command::Ask(Ask::Focus)));
-    let lines: Vec<(String, &str)> = crate::command::table::sheet().collect();
+    let lines: Vec<(String, &str)> = {
+        use crate::command::table::{Group, sheet};
+        Group::ALL.into_iter().flat_map(sheet).collect()
+    };
     let sheet: Vec<&str> = lines.iter().flat_map(|(keys, _)| keys.split_whitespace()).collect();
     for key in
         ["Space", "J", "K", "L", "[", "]", "Backspace", "N", "Shift+N", "B", "Shift+B", "G", "PgUp", "PgDn"]

@@ -147,7 +147,7 @@ fn no_part_is_blank_without_a_sentence_that_says_why() {
         loading.says("Loading step 4");
     }
     Shown::pane(Pane::Shape, |context| fixture::at_step(context, 2)).says("Choose the preset “combined”");
-    Shown::pane(Pane::Shape, |_| fixture::without_target()).says("Press T");
+    Shown::pane(Pane::Shape, |_| fixture::without_target()).says("press T");
 }
 
 #[test]
@@ -183,9 +183,12 @@ fn a_prediction_that_may_lie_outside_the_basin_is_warned_of() {
 #[test]
 fn the_left_image_has_the_registered_target_and_the_basin_about_the_prediction() {
     let mut shown = left_image(2);
+    shown.click("legend");
     shown.says("registered here, 1σ 2σ 3σ").says("basin, half width 25 cm (legend)");
     assert_eq!(shown.click("basin, half width 25 cm (legend)"), vec![Command::ToggleLayer(Layer::Basin)]);
-    left_image(0).says("picked");
+    let mut designated = left_image(0);
+    designated.click("legend");
+    designated.says("picked");
 }
 
 #[test]

@@ -58,7 +58,7 @@ fn the_table_over_the_steps_has_the_values_of_the_run_in_the_units_of_the_plot()
     let row = state.row_at(2).unwrap();
     let value = |name: &str| sheet.rows[2].cells[column(name)].clone();
     assert_eq!(value("state"), Cell::Word("tracking".to_owned()));
-    assert_eq!(value("scores ncc"), Cell::from(row.ncc));
+    assert_eq!(value("scores match score"), Cell::from(row.ncc));
     assert_eq!(value("pixel error, px"), Cell::from(row.err_px));
     assert_eq!(value("position error error, cm"), Cell::from(row.err_m.map(|m| m * 100.0)));
     assert_eq!(sheet.csv().lines().count(), 1 + sheet.rows.len());

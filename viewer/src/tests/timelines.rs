@@ -150,3 +150,12 @@ fn ten_thousand_steps_cost_every_panel_hardly_more_than_a_thousand() {
         assert!(longer < 250_000, "{pane:?}: {longer}");
     }
 }
+
+#[test]
+fn the_filmstrip_of_a_long_drive_shows_few_windows_and_that_of_a_short_one_all() {
+    let count = |state: &State| timeline::film::rows(state, state.run().unwrap()).count();
+    assert_eq!(count(&fixture::at_step(&egui::Context::default(), 2)), 5);
+    for steps in [49, 480, 10_000] {
+        assert!((20..=48).contains(&count(&long(steps, 3))), "{steps} steps");
+    }
+}

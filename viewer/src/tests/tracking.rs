@@ -1,5 +1,6 @@
 //! The panels of configurations, tolerances and the state machine.
 
+use egui_kittest::kittest::Queryable;
 use serde_json::json;
 use sightline_track::stages::judge::Gate;
 
@@ -71,14 +72,53 @@ fn the_tolerances_say_value_tolerance_and_where_they_fired() {
 }
 
 #[test]
+fn steps_that_fire_in_a_row_have_no_words_over_each_other() {
+    let shown = Shown::pane(Pane::Tolerances, |context| {
+        let mut state = fires_at_three(context);
+        let rows = &mut state.session.as_mut().unwrap().targets[0].runs[0].rows;
+        (rows[4].distance_correction_m, rows[4].distance_tolerance_m) = (Some(0.26), Some(0.12));
+        state
+    });
+    shown.says("fired at 3, 4");
+    let painted = shown.harness.output().shapes.iter().flat_map(|clipped| texts(&clipped.shape));
+    let words: Vec<String> = painted.filter(|words| words == "fired").collect();
+    assert_eq!(words.len(), 1, "the legend alone names the mark");
+}
+
+/// The texts of a shape.
+fn texts(shape: &egui::Shape) -> Vec<String> {
+    match shape {
+        egui::Shape::Text(text) => vec![text.galley.text().to_owned()],
+        egui::Shape::Vec(shapes) => shapes.iter().flat_map(texts).collect(),
+        _ => Vec::new(),
+    }
+}
+
+#[test]
+fn in_a_narrow_panel_the_names_of_gates_are_beside_their_values() {
+    for width in [150.0, 190.0, 230.0, 520.0] {
+        let shown = Shown::new(
+            [width, 420.0],
+            |context| fixture::at_step(context, 3),
+            |ui, state, out| {
+                crate::layout::show_pane(ui, Pane::Gates, state, out);
+            },
+        );
+        let name = shown.harness.get_by_label("match score").rect();
+        let value = shown.harness.get_by_label("0.410").rect();
+        assert!(!name.intersects(value), "{width}: {name:?} is under {value:?}");
+    }
+}
+
+#[test]
 fn the_state_machine_shows_state_counter_and_what_fired() {
     let tracking = Shown::pane(Pane::Machine, |context| fixture::at_step(context, 2));
-    tracking.says("state tracking").says("with 2 retries").says("picked here").says("no criterion fired");
+    tracking.says("state tracking").says("2 retries left").says("designated here").says("all gates passed");
     let mut lost = Shown::pane(Pane::Machine, fires_at_three);
-    lost.says("retry 0 of 2").says("criterion 1: match score 0.410 < 0.700");
-    lost.says("criterion 3: range change 25.0 > 12.0 cm");
+    lost.says("Lost (2 retries left)").says("gate 1: match score 0.410 < 0.700");
+    lost.says("gate 3: range change 25.0 > 12.0 cm");
     assert_eq!(lost.click("step   2"), vec![Command::Go(Go::Step(2))]);
-    Shown::pane(Pane::Machine, |context| fixture::at_step(context, 4)).says("no retry is left");
+    Shown::pane(Pane::Machine, |context| fixture::at_step(context, 4)).says("no retry left");
 }
 
 #[test]
@@ -91,7 +131,7 @@ fn the_state_machine_counts_rejected_updates_as_recorded() {
         fixture::load(&mut state, trace);
         state
     });
-    shown.says("retry 1 of 2");
+    shown.says("Lost (1 retry left)");
 }
 
 #[test]

@@ -4,8 +4,8 @@ use egui_kittest::kittest::Queryable;
 use serde_json::json;
 use sightline_api::endpoint::Call;
 use sightline_api::endpoints::{
-    AddBreakpoint, ChangeBreakpoint, RemoveBreakpoint, RemoveNote, RemoveRun, RemoveTarget, RestoreNote,
-    RestoreRun, RestoreTarget,
+    AddBreakpoint, ChangeBreakpoint, DesignateTarget, RemoveBreakpoint, RemoveNote, RemoveRun, RemoveTarget,
+    RenameTarget, RestoreNote, RestoreRun, RestoreTarget,
 };
 use sightline_api::location::{AtBreakpoint, AtNote, AtRun, AtTarget};
 use sightline_api::wire::Problem;
@@ -15,12 +15,13 @@ use sightline_session::notes::{Note, Pin};
 use sightline_session::view::{RunView, SessionView};
 use sightline_track::settings::Changes;
 
-use crate::command::Command;
 use crate::command::keys;
+use crate::command::{Command, Mode};
 use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::state::deeds::Deed;
-use crate::tests::calls::{answer, at_session, calls, calls_of, refuse};
+use crate::state::targets::Rename;
+use crate::tests::calls::{answer, at_session, bodies, calls, calls_of, refuse};
 use crate::tests::{Shown, fixture};
 use crate::why::Ask;
 use crate::{breakpoints, notes};
@@ -237,4 +238,82 @@ fn only_the_message_of_the_last_deed_offers_to_take_it_back() {
     let later = Shown::pane(Pane::Messages, removed(true));
     later.says("Removed the plot `ncc`.");
     assert!(later.harness.query_by_label("Undo").is_none(), "it would take something else back");
+}
+
+#[test]
+fn a_target_is_renamed_and_the_new_name_can_be_undone() {
+    let mut state = fixture::at_step(&egui::Context::default(), 2);
+    let mut view = state.session.clone().unwrap();
+    state.perform(Command::Rename(Rename::Begin(0)));
+    assert_eq!(state.renaming.as_ref().unwrap().text, "ridge");
+    state.perform(Command::Rename(Rename::Type("tall ridge".to_owned())));
+    state.perform(Command::Rename(Rename::Save));
+    let sent = |state: &mut State| bodies::<RenameTarget>(state).pop().map(|body| body.label);
+    assert_eq!(sent(&mut state).as_deref(), Some("tall ridge"));
+    view.targets[0].label = "tall ridge".to_owned();
+    answer::<RenameTarget>(&mut state, &view);
+    assert_eq!(state.target().unwrap().label, "tall ridge");
+    undo(&mut state);
+    assert_eq!(sent(&mut state).as_deref(), Some("ridge"));
+    // The same name, and a field that is closed, change nothing.
+    state.perform(Command::Rename(Rename::Begin(0)));
+    state.perform(Command::Rename(Rename::Save));
+    state.perform(Command::Rename(Rename::Begin(0)));
+    state.perform(Command::Rename(Rename::Type("other".to_owned())));
+    state.perform(Command::Rename(Rename::Cancel));
+    assert!(sent(&mut state).is_none() && state.renaming.is_none());
+}
+
+#[test]
+fn the_field_of_a_name_takes_text_and_saves_with_enter() {
+    let mut shown = Shown::pane(Pane::Targets, |context| {
+        let mut state = fixture::at_step(context, 2);
+        state.perform(Command::Rename(Rename::Begin(0)));
+        state
+    });
+    shown.harness.get_by_label("name of the target").type_text("!");
+    shown.harness.run_steps(2);
+    assert_eq!(shown.asked(), vec![Command::Rename(Rename::Type("ridge!".to_owned()))]);
+    shown.harness.key_press(egui::Key::Enter);
+    shown.harness.run_steps(2);
+    assert!(shown.asked().contains(&Command::Rename(Rename::Save)));
+    let mut shown = Shown::pane(Pane::Targets, |context| fixture::at_step(context, 2));
+    assert_eq!(shown.click("Rename"), vec![Command::Rename(Rename::Begin(0))]);
+}
+
+#[test]
+fn the_marks_of_a_target_are_hidden_and_shown() {
+    let mut shown = Shown::pane(Pane::Targets, |context| fixture::at_step(context, 2));
+    assert_eq!(shown.click("marks of ridge"), vec![Command::ToggleTarget(0)]);
+    let mut state = lost();
+    assert!(state.shows_target());
+    state.perform(Command::ToggleTarget(0));
+    assert!(!state.shows_target());
+    state.perform(Command::ToggleTarget(0));
+    assert!(state.shows_target());
+}
+
+#[test]
+fn a_target_is_designated_again_at_a_later_stop_with_its_settings() {
+    let mut shown = Shown::pane(Pane::Targets, |context| fixture::at_step(context, 2));
+    assert_eq!(shown.click("Re-pick here"), vec![Command::Repick(0)]);
+    Shown::pane(Pane::Targets, |context| fixture::at_step(context, 0)).hides("Re-pick here");
+    let mut state = lost();
+    let changes: Changes = [("ncc_min".to_owned(), json!(0.6))].into();
+    state.session.as_mut().unwrap().targets[0].runs[0].changes = changes.clone();
+    let pick = |state: &mut State| {
+        state.perform(Command::Pick(sightline_geometry::frames::Pixel::new(20.0, 20.0)));
+        bodies::<DesignateTarget>(state).pop().unwrap()
+    };
+    state.perform(Command::Repick(0));
+    assert_eq!(state.mode, Mode::Pick);
+    let again = pick(&mut state);
+    assert_eq!((again.step, again.label.as_deref()), (LOST, Some("ridge, from stop 3")));
+    assert_eq!(again.settings, changes);
+    // Cancelled, the next pick is a new target.
+    let mut state = lost();
+    state.perform(Command::Repick(0));
+    state.perform(Command::SetMode(Mode::Look));
+    state.perform(Command::SetMode(Mode::Pick));
+    assert_eq!(pick(&mut state).label, None);
 }

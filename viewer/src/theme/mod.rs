@@ -99,9 +99,13 @@ pub(crate) fn trackability(verdict: Verdict) -> Color32 {
     }
 }
 
-/// The same laid over an image, which stays visible.
-pub(crate) fn trackability_fill(verdict: Verdict) -> Color32 {
-    trackability(verdict).gamma_multiply(0.16)
+/// What is laid over an image: a tint of good places, 12 % less light on poor ones; `None` for risky places, which are outlined.
+pub(crate) fn trackability_fill(verdict: Verdict) -> Option<Color32> {
+    match verdict {
+        Verdict::Good => Some(trackability(verdict).gamma_multiply(0.2)),
+        Verdict::Risky => None,
+        Verdict::Bad => Some(Color32::from_black_alpha(31)),
+    }
 }
 
 /// Grey from black (0) to white (1); transparent where there is no value.
@@ -194,6 +198,11 @@ fn visuals() -> Visuals {
 /// A panel's title: small capitals, widely set.
 pub(crate) fn title(text: &str) -> RichText {
     RichText::new(text.to_uppercase()).size(10.5).extra_letter_spacing(1.1).color(weak())
+}
+
+/// A formula in signs that the fonts have.
+pub(crate) fn formula(text: &str) -> String {
+    text.replace('ᵀ', "^T")
 }
 
 /// A label beside a value.

@@ -69,6 +69,17 @@ fn of(colours: [u32; 3]) -> Color32 {
     Color32::from_rgb(r, g, b)
 }
 
+/// Paints marks on an image: in their colours for dark ground with a dark halo, in the light looks too.
+pub(crate) fn on_image<R>(paint: impl FnOnce() -> R) -> R {
+    let present = looks();
+    if present == Looks::Light {
+        choose(Looks::Dark);
+    }
+    let painted = paint();
+    choose(present);
+    painted
+}
+
 macro_rules! colours {
     ($($(#[$doc:meta])* $name:ident: $dark:literal, $light:literal, $contrast:literal;)*) => {
         $($(#[$doc])* pub(crate) fn $name() -> Color32 { of([$dark, $light, $contrast]) })*
@@ -126,8 +137,8 @@ colours! {
 const RUNS: [[u32; 3]; 4] = [
     [0x2f_8f_d0, 0x00_6b_a8, 0x4d_b8_ff],
     [0xcc_79_a7, 0x9c_45_7d, 0xff_9a_d5],
-    [0xf4_f5_f7, 0x1a_1c_20, 0xff_ff_ff],
-    [0xf0_e4_42, 0x7d_6c_00, 0xff_f0_40],
+    [0xb0_94_ff, 0x6a_4f_c4, 0xc4_b0_ff],
+    [0x9c_cc_3c, 0x4f_78_00, 0xb4_f0_40],
 ];
 
 /// The colour of a run's measurements.
@@ -223,7 +234,10 @@ mod tests {
     fn states_and_runs_differ_in_all_looks() {
         for looks in Looks::ALL {
             choose(looks);
-            let all = [tracking(), lost(), failed(), run(0), run(1), run(2)];
+            let marks = [truth(), prediction(), search(), subframe()];
+            let states = [tracking(), lost(), failed()];
+            let runs = [run(0), run(1), run(2), run(3)];
+            let all: Vec<Color32> = marks.into_iter().chain(states).chain(runs).collect();
             for (i, a) in all.iter().enumerate() {
                 assert!(all.iter().skip(i + 1).all(|b| a != b), "{looks:?}");
             }

@@ -3,6 +3,7 @@
 use egui::{Area, Frame, Id, Margin, Order, Pos2, Rect, Stroke, StrokeKind, Ui, Vec2, pos2, vec2};
 
 use crate::command::Command;
+use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::theme;
 use crate::tour::{Bubble, Turn, place};
@@ -19,7 +20,8 @@ pub(crate) fn show(ui: &Ui, state: &State, out: &mut Vec<Command>) {
     let (Some(at), Some(bubble)) = (state.tour.at, state.tour.bubble()) else { return };
     let context = ui.ctx();
     let screen = context.content_rect();
-    let anchor = bubble.anchors().iter().find_map(|name| place(context, name));
+    let shown = bubble.anchors().iter().filter(|name| has_content(state, name));
+    let anchor = shown.into_iter().find_map(|name| place(context, name));
     if let Some(anchor) = anchor {
         let layer = egui::LayerId::new(Order::Foreground, Id::unique("tour outline"));
         let painter = context.layer_painter(layer);
@@ -36,6 +38,12 @@ pub(crate) fn show(ui: &Ui, state: &State, out: &mut Vec<Command>) {
             frame.show(ui, |ui| contents(ui, at, bubble, state, out));
         },
     );
+}
+
+/// Whether a place shows something: a panel may say only what it lacks.
+fn has_content(state: &State, name: &str) -> bool {
+    let pane = Pane::ALL.into_iter().find(|pane| pane.title() == name);
+    pane.is_none_or(|pane| pane.panel().missing(state).is_none())
 }
 
 fn contents(ui: &mut Ui, at: usize, bubble: Bubble, state: &State, out: &mut Vec<Command>) {
@@ -88,6 +96,14 @@ fn corner(anchor: Option<Rect>, screen: Rect) -> Pos2 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_places_with_content_are_pointed_at() {
+        let without = crate::tests::fixture::without_target();
+        let with = crate::tests::fixture::at_step(&egui::Context::default(), 3);
+        assert!(!has_content(&without, "Gates") && has_content(&with, "Gates"));
+        assert!(has_content(&without, crate::tour::TIMELINE));
+    }
 
     #[test]
     fn a_bubble_never_covers_its_place_where_there_is_room_and_never_leaves_the_screen() {

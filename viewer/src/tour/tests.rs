@@ -1,12 +1,15 @@
 //! The tour: walked and skipped by keyboard and by buttons, right about what is there, and never begun twice by itself.
 
 use egui::{Key, Modifiers};
+use egui_kittest::kittest::Queryable;
 use sightline_world::library;
 
 use crate::command::help;
 use crate::command::keys;
-use crate::command::{Command, Mode};
+use crate::command::{Command, Go, Mode};
+use crate::panels::pane::Pane;
 use crate::state::State;
+use crate::state::effect::Effect;
 use crate::tests::{Shown, fixture};
 use crate::tour::bubbles;
 use crate::tour::{Bubble, Turn};
@@ -65,6 +68,37 @@ fn the_second_bubble_names_the_step_at_which_the_target_is_lost() {
     shown(1).says("lost at step 3");
     let words = Bubble::Lost.words(&fixture::without_target());
     assert!(words.contains("press T"), "{words}");
+}
+
+#[test]
+fn the_tour_does_what_it_speaks_of() {
+    let mut state = fixture::at_step(&egui::Context::default(), 0);
+    state.perform(Command::Tour(Turn::Begin));
+    assert_eq!(state.cursor.step, 2, "just before the loss");
+    state.perform(Command::Tour(Turn::Next));
+    assert_eq!(state.cursor.step, 3, "at the loss");
+    state.perform(Command::Go(Go::Step(0)));
+    let _ = state.take_effects();
+    state.perform(Command::Tour(Turn::Next));
+    assert_eq!(state.cursor.step, 3);
+    let reveals = |state: &mut State, pane| state.take_effects().contains(&Effect::reveal(pane));
+    assert!(reveals(&mut state, Pane::Why), "W was pressed");
+}
+
+#[test]
+fn the_pointer_on_a_bubble_points_at_nothing_below_it() {
+    let mut shown = Shown::new([1280.0, 720.0], touring(2), |ui, state, out| {
+        crate::layout::show_pane(ui, Pane::Map, state, out);
+        bubbles::show(ui, state, out);
+    });
+    let is_covered = |shown: &mut Shown<'_>, at| {
+        shown.harness.hover_at(at);
+        shown.harness.run_steps(3);
+        crate::state::pointed::is_covered(&shown.harness.ctx)
+    };
+    let next = shown.harness.get_by_label("Next").rect().center();
+    assert!(is_covered(&mut shown, next));
+    assert!(!is_covered(&mut shown, egui::pos2(5.0, 5.0)));
 }
 
 #[test]

@@ -3,14 +3,39 @@
 use egui::Key;
 use sightline_world::library;
 
-use crate::command::Mode;
-use crate::state::State;
-use crate::tour::Turn;
+use crate::command::{Command, Go, Mode};
+use crate::state::{State, events};
+use crate::tour::{Bubble, Turn};
+use crate::why::Ask;
 
 impl State {
     /// Goes on in the tour as asked.
     pub(crate) fn turn_tour(&mut self, turn: Turn) {
         self.tour.turn(turn);
+        if turn != Turn::End {
+            self.do_bubble();
+        }
+    }
+
+    /// Does what the open bubble speaks of, so that it can be seen.
+    fn do_bubble(&mut self) {
+        let Some(bubble) = self.tour.bubble() else { return };
+        if let Some(step) = self.lost_step().filter(|_| bubble != Bubble::Share) {
+            // The first bubble begins just before the loss, the others at it.
+            let step = if bubble == Bubble::Step { step.saturating_sub(1) } else { step };
+            self.perform(Command::Go(Go::Step(step)));
+        }
+        match bubble {
+            Bubble::Why if self.row().is_some() => self.perform(Command::Why(Ask::Selected)),
+            Bubble::WhatIf if self.row().is_some() => self.perform(Command::Why(Ask::Saved)),
+            _ => {}
+        }
+    }
+
+    /// The first step at which the target is lost in the run at the cursor.
+    pub(super) fn lost_step(&self) -> Option<usize> {
+        let is_lost = |step: &usize| self.row_at(*step).is_some_and(|row| row.state == "lost");
+        events(self.run()?).into_iter().find(is_lost)
     }
 
     /// Begins the tour on the first drive as soon as its target is there, unless it was seen before.

@@ -1,6 +1,7 @@
 //! What the bubbles of the tour say of what is there.
 
-use crate::state::{State, events};
+use crate::panels::numbers::counted;
+use crate::state::State;
 use crate::tour::Bubble;
 
 impl Bubble {
@@ -8,17 +9,16 @@ impl Bubble {
     pub fn words(self, state: &State) -> String {
         match self {
             Self::Step => format!(
-                "A rover drives towards a rock and finds one point of it again at each of {} stops. Right and Left go \
-                 from stop to stop, End to the last; the band shows how each ended.",
-                state.stop_count()
+                "A rover drives towards a rock and finds one point of it again at each of {}. ← and → go from stop to \
+                 stop, End to the last; the band shows the tracking state of each.",
+                counted(state.stop_count(), "stop")
             ),
             Self::Lost => lost_words(state),
-            Self::Why => "Go there and press W: the panel Why says in one sentence why the match was rejected, \
-                lists every criterion with its margin, and follows any number back to where it came from."
+            Self::Why => "The panel Why (W) explains this step: why the match was rejected, the margin of every gate, and the \
+                origin of any number."
                 .to_owned(),
-            Self::WhatIf => "Press C there: the page looks for the smallest change of one setting that would have \
-                kept the target, and tries each by computing the step. Run from here makes a branch with it; nothing \
-                that was recorded is overwritten."
+            Self::WhatIf => "The page now searches (C) for the smallest change of one setting that would have kept the target, and \
+                tests each by computing the step. Run from here makes a branch with it; nothing recorded is overwritten."
                 .to_owned(),
             Self::Compare => "Choose the other run after vs in the top bar: its marks and differences appear \
                 everywhere. D goes to where the two first differ, V to the next way of laying the images beside each \
@@ -33,14 +33,10 @@ impl Bubble {
 
 /// Where the target is lost, as far as that is known.
 fn lost_words(state: &State) -> String {
-    let lost = state.run().and_then(|run| {
-        let is_lost = |step: &usize| state.row_at(*step).is_some_and(|row| row.state == "lost");
-        events(run).into_iter().find(is_lost)
-    });
-    match (lost, state.run_progress(), state.target()) {
+    match (state.lost_step(), state.run_progress(), state.target()) {
         (Some(step), ..) => {
             format!(
-                "The target is lost at step {step}. PgDn goes to the next event, PgUp back to the one before."
+                "The target is lost at step {step}, which is shown now. PgDn goes to the next event, PgUp to the previous one."
             )
         }
         (None, Some(progress), _) => format!(

@@ -16,8 +16,10 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         ui.set_width(560.0);
         ui.label(RichText::new("Limits of trackability").size(16.0).strong().color(theme::strong()));
         ui.add(
-            Label::new(theme::note("By these a place is good, risky or bad. The map is made anew by them."))
-                .wrap(),
+            Label::new(theme::note(
+                "A place is good, risky or poor by these limits. Apply computes the map again.",
+            ))
+            .wrap(),
         );
         let height = (ui.ctx().content_rect().height() - 220.0).max(120.0);
         ScrollArea::vertical().max_height(height).auto_shrink([false, true]).show(ui, |ui| {
@@ -32,7 +34,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             ui.add(Label::new(RichText::new(sentence).color(theme::lost())).wrap());
         }
         ui.horizontal(|ui| {
-            for (words, ask) in [("Make the map with these", Ask::Use), ("Put the defaults", Ask::Defaults)] {
+            for (words, ask) in [("Apply", Ask::Use), ("Reset", Ask::Defaults)] {
                 if ui.button(words).clicked() {
                     out.push(Command::Limits(ask));
                 }

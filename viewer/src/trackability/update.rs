@@ -62,16 +62,17 @@ impl State {
         }
     }
 
-    /// The advice against a place that the map calls bad; `None` without a map.
+    /// The advice against a place that the map calls risky or poor; `None` without a map.
     pub(crate) fn advised_against(&self, place: Place) -> Option<Refusal> {
-        let cell = self.trackability_at(place.pixel).filter(|cell| cell.verdict == Verdict::Bad)?;
-        let sentence = cell.sentence().unwrap_or_else(|| "a bad place".to_owned());
+        let cell = self.trackability_at(place.pixel).filter(|cell| cell.verdict != Verdict::Good)?;
+        let word = cell.verdict.title();
+        let sentence = cell.sentence().map_or_else(|| word.to_owned(), |why| format!("{word}: {why}"));
         let nearest = self.trackability_map().and_then(|map| map.nearest_good(place.pixel));
         Some(Refusal { place, sentence, nearest, is_advice: true })
     }
 
     /// The first aim of the keys: the refused pixel, else the middle of the view.
-    fn first_aim(&self) -> Pixel {
+    pub(crate) fn first_aim(&self) -> Pixel {
         let [width, height] = self.left_size().unwrap_or([1, 1]);
         let middle = match self.views.left {
             View2d::Fit => Pixel::new(f64::from(width / 2), f64::from(height / 2)),

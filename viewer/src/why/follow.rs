@@ -1,7 +1,8 @@
 //! Why follows the cursor: the value that was asked for last is asked again where the cursor goes, in whichever run.
 //!
 //! Only a move of the cursor does that, so that a value of an earlier step can be looked into from where one is. While an
-//! answer is waited for no further one is asked: who plays or drags gets the tree of where the cursor comes to rest.
+//! answer is waited for no further one is asked: who plays or drags gets the tree of where the cursor comes to rest. A step
+//! whose record is not here yet, or lacks the value, leaves the tree of the step before, which says whose it is.
 
 use crate::cache::StepKey;
 use crate::state::State;
@@ -20,8 +21,11 @@ impl State {
         if matches!(self.why.trees.get(&place), Some(Told::Waiting)) {
             return;
         }
-        self.why.followed = Some(here.clone());
         let (shown, value) = place;
+        if shown != here && !self.has_value(&value) {
+            return;
+        }
+        self.why.followed = Some(here.clone());
         if shown != here {
             self.want_tree(&here, &value);
             self.why.asked = vec![(here, value)];

@@ -1,5 +1,7 @@
 //! Why follows the cursor: to another step, into a branch, and never faster than the server answers.
 
+use std::sync::Arc;
+
 use sightline_api::endpoint::Call;
 use sightline_api::endpoints::{AskCounterfactual, ShowWhy};
 use sightline_api::query::ValueName;
@@ -8,11 +10,12 @@ use sightline_session::Fork;
 use sightline_session::view::RunView;
 use sightline_session::why::Explanation;
 
-use crate::cache::StepKey;
+use crate::cache::{Item, Key, StepKey};
 use crate::command::{Command, Go};
 use crate::state::State;
 use crate::tests::calls::{answer, calls_of, refuse};
 use crate::tests::fixture;
+use crate::tests::fixture::trace;
 use crate::why::{Ask, Told};
 
 /// The step that is lost.
@@ -76,9 +79,33 @@ fn a_branch_that_is_looked_at_gets_its_own_tree() {
     state.take_requests();
     state.perform(Command::Look { target: 0, run: 1 });
     state.follow_why();
+    assert!(calls_of::<ShowWhy>(&mut state).is_empty(), "nobody knows yet what the step of the branch has");
     let branch = StepKey { run: 1, ..key() };
+    let record = Item::Trace(Arc::new(trace(LOST)));
+    state.cache.arrived(Key::Trace(branch.clone()), Ok(record), 0.0);
+    state.follow_why();
     assert_eq!(calls_of::<ShowWhy>(&mut state), [explain(&branch)]);
     assert_eq!((state.explained().unwrap().0, state.why.asked.len()), (&branch, 1));
+}
+
+#[test]
+fn a_value_that_a_step_lacks_is_not_asked_for_there() {
+    let mut state = fixture::with_history(&egui::Context::default(), LOST);
+    state.perform(Command::Why(Ask::Value { step: LOST, value: "gate.ncc".to_owned() }));
+    state.follow_why();
+    refuse::<ShowWhy>(&mut state, Problem::new(422, "request", "", "no such value"));
+    state.take_requests();
+    // At the designation nothing is matched.
+    state.perform(Command::Go(Go::Step(0)));
+    state.follow_why();
+    assert!(calls_of::<ShowWhy>(&mut state).is_empty());
+    assert_eq!(state.explained().unwrap().0, &key());
+    state.perform(Command::Why(Ask::Selected));
+    let asked = Call::with_query::<ShowWhy>(
+        &StepKey { step: 0, ..key() },
+        &ValueName { value: Some("state".to_owned()) },
+    );
+    assert_eq!(calls_of::<ShowWhy>(&mut state), [asked]);
 }
 
 #[test]

@@ -3,6 +3,7 @@
 //! A what-if belongs to one step. While it changes, at most one of its requests is under way; when the answer comes, the
 //! newest change is asked for next, so that dragging never queues.
 
+mod book;
 mod follow;
 pub(crate) mod panel;
 mod update;
@@ -80,6 +81,22 @@ pub enum Told<T> {
     Refused(String),
 }
 
+/// The part of the panel that a person asked for, which scrolls into view.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct InView {
+    /// How often something was asked for; 0 before the first time.
+    pub count: usize,
+    /// Whether it is the tree of a value; the card otherwise.
+    pub is_tree: bool,
+}
+
+impl InView {
+    /// Something else was asked for.
+    fn ask(&mut self, is_tree: bool) {
+        *self = Self { count: self.count + 1, is_tree };
+    }
+}
+
 /// What is asked and known.
 #[derive(Default)]
 pub struct Why {
@@ -101,6 +118,8 @@ pub struct Why {
     pub(crate) trying: Option<(StepKey, WhatIf)>,
     /// Where the cursor was when it was followed last, or when a value was asked for.
     pub(crate) followed: Option<StepKey>,
+    /// The part of the panel that was asked for last.
+    pub(crate) in_view: InView,
     /// The steps whose question was looked for.
     looked_for: BTreeSet<StepKey>,
 }

@@ -28,9 +28,9 @@ use crate::tests::{Shown, fixture};
 use crate::why::{Ask, Told};
 
 /// The step that is lost.
-const LOST: usize = 3;
+pub(super) const LOST: usize = 3;
 
-fn key() -> StepKey {
+pub(super) fn key() -> StepKey {
     StepKey { session: "s1".to_owned(), target: 0, run: 0, step: LOST }
 }
 
@@ -39,15 +39,15 @@ fn explain(value: &str) -> Call {
     Call::with_query::<ShowWhy>(&key(), &ValueName { value: Some(value.to_owned()) })
 }
 
-fn lost() -> State {
+pub(super) fn lost() -> State {
     fixture::at_step(&egui::Context::default(), LOST)
 }
 
-fn changing(setting: &str, value: serde_json::Value) -> WhatIf {
+pub(super) fn changing(setting: &str, value: serde_json::Value) -> WhatIf {
     WhatIf { settings: Changes::from([(setting.to_owned(), value)]), ..WhatIf::default() }
 }
 
-fn ghost(what_if: WhatIf) -> Ghost {
+pub(super) fn ghost(what_if: WhatIf) -> Ghost {
     let tried = fixture::trace(2);
     let deltas = Deltas { state_recorded: "lost".to_owned(), ncc: Some(0.42), ..Deltas::default() };
     let mut ghost = Ghost::new(what_if, &tried, &fixture::trace(LOST), &Default::default());
@@ -61,6 +61,7 @@ fn finding(setting: &str, to: f64, outcome: Outcome) -> Finding {
     Finding {
         changes: vec![change],
         moved: None,
+        with_margin: None,
         relative: 0.42,
         outcome,
         gate: Some("ncc".to_owned()),
@@ -89,7 +90,8 @@ fn question(state: QuestionState, findings: Vec<Finding>) -> Question {
 #[test]
 fn the_panel_says_the_verdict_and_lists_the_criteria_worst_first() {
     let mut shown = Shown::pane(Pane::Why, |context| fixture::at_step(context, LOST));
-    shown.says("Rejected: ncc 0.410 is below 0.700 by 0.290").says("prediction off by").says("rightly so");
+    shown.says("Rejected: match score 0.410 is below 0.700 by 0.290").says("px from the truth");
+    shown.says("Correct rejection: the match is ");
     let value = |name: &str| vec![Command::Why(Ask::Value { step: LOST, value: name.to_owned() })];
     assert_eq!(shown.click("Why this state?"), value("state"));
     assert_eq!(shown.click("What would have saved it?"), vec![Command::Why(Ask::Saved)]);
@@ -104,7 +106,7 @@ fn a_limit_is_tried_by_its_slider_and_a_displacement_by_its_own() {
             crate::layout::show_pane(ui, Pane::Why, state, out);
         },
     );
-    for name in ["try ncc_min", "try search window", "try template", "move prediction x"] {
+    for name in ["try match score limit", "try search window", "try template", "move prediction x"] {
         shown.harness.get_by_role_and_label(egui::accesskit::Role::Slider, name);
     }
 }
@@ -125,7 +127,7 @@ fn a_slider_stays_the_same_one_when_a_value_is_explained_above_it() {
                 crate::layout::show_pane(ui, Pane::Why, state, out);
             },
         );
-        ["try ncc_min", "try search window"].map(|name| {
+        ["try match score limit", "try search window"].map(|name| {
             let found = shown.harness.get_by_role_and_label(egui::accesskit::Role::Slider, name);
             (found.accesskit_node().locate().0, found.rect().top())
         })
@@ -187,7 +189,7 @@ fn the_ghost_has_a_card_with_what_changed_and_what_can_be_done() {
         answer::<TryStep>(&mut state, &ghost(what_if));
         state
     });
-    shown.says("search_window_px = 81 instead of 143").says("TRACKING").says("was lost").says("Δ +0.420");
+    shown.says("search window 143 → 81 px").says("Lost → Tracking").says("Δ +0.420");
     assert_eq!(shown.click("Run from here as branch"), vec![Command::Why(Ask::Branch)]);
     assert_eq!(shown.click("discard what if"), vec![Command::Why(Ask::Discard)]);
 }
@@ -235,7 +237,19 @@ fn the_findings_can_be_tried_and_run_from_here() {
         to: Pixel::new(515.0, 480.0),
         because: "the truth lies that way".to_owned(),
     };
-    let right = Finding { changes: Vec::new(), moved: Some(moved), ..finding("none", 0.0, Outcome::Right) };
+    let margin = SettingChange {
+        setting: "search_window_px".to_owned(),
+        from: json!(143),
+        to: json!(223),
+        unit: "px".to_owned(),
+    };
+    let wide = changing("search_window_px", json!(223));
+    let right = Finding {
+        changes: Vec::new(),
+        moved: Some(moved),
+        with_margin: Some(margin),
+        ..finding("none", 0.0, Outcome::Right)
+    };
     let (tried, run) = (right.what_if(), false_one.what_if());
     let mut shown = Shown::new(
         [520.0, 900.0],
@@ -250,8 +264,13 @@ fn the_findings_can_be_tried_and_run_from_here() {
             crate::layout::show_pane(ui, Pane::Why, state, out);
         },
     );
-    shown.says("RIGHT").says("FALSE").says("the step computed 55 times").says("1 without effect");
+    shown.says("Correct").says("change 42 %").says("prediction moved by (+5.0, +0.0) px");
+    shown.says("Searched 31 changes (55 re-runs of this step)").says("1 without effect");
     assert_eq!(shown.click("try finding 1"), vec![Command::Why(Ask::Try(tried))]);
+    assert_eq!(shown.click("try finding 1 with margin"), vec![Command::Why(Ask::Try(wide))]);
+    shown.hides("Wrong target");
+    shown.click("1 change leads to a wrong target");
+    shown.harness.run_steps(20);
     assert_eq!(shown.click("run from here with finding 2"), vec![Command::Why(Ask::BranchWith(run))]);
 }
 
@@ -283,7 +302,7 @@ fn a_question_that_goes_on_shows_how_far_and_can_be_cancelled() {
         answer::<ShowCounterfactual>(&mut state, &question);
         state
     });
-    shown.says("4 of 31: kernel").says("ncc_min 0.4 instead of 0.7");
+    shown.says("4 of 31: kernel").says("match score limit 0.7 → 0.4");
     assert_eq!(shown.click("Cancel search"), vec![Command::Why(Ask::CancelSaved)]);
 }
 

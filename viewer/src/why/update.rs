@@ -63,8 +63,12 @@ impl State {
     /// Applies a command about a step.
     pub(crate) fn ask_why(&mut self, ask: Ask) {
         match ask {
-            Ask::Value { step, value } => self.ask_value(step, value),
+            Ask::Value { step, value } => {
+                self.why.in_view.ask(true);
+                self.ask_value(step, value);
+            }
             Ask::Back => {
+                self.why.in_view.ask(true);
                 self.why.asked.pop();
             }
             Ask::Selected => self.ask_selected(),
@@ -131,9 +135,12 @@ impl State {
         });
     }
 
-    /// Explains the last explained value at this step; without one the gate with the smallest margin, else the state.
+    /// Shows the card of this step and explains the last explained value where this step has it; else the gate with the
+    /// smallest margin, else the state.
     fn ask_selected(&mut self) {
+        self.why.in_view.ask(false);
         let last = self.why.asked.last().map(|(_, value)| value.clone());
+        let last = last.filter(|value| self.has_value(value));
         let worst = || {
             let verdict = self.trace()?.verdict()?;
             gates::by_margin(&verdict.gates).first().map(|margin| format!("gate.{}", margin.gate.name))

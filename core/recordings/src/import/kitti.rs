@@ -73,7 +73,7 @@ impl ImportFormat for Kitti {
     }
 
     fn import(&self, path: &Path, options: &ImportOptions, output: &mut Output<'_>) -> Result<TraverseIndex> {
-        let poses = read_poses(&poses_path(path))?;
+        let poses = read_poses(&poses_path(path, options))?;
         let times = read_times(&path.join("times.txt"))?;
         let frames = choose_frames(path, &poses, options)?;
         let size = image_size(&path.join("image_0").join(&frames[0].1))?;
@@ -183,12 +183,16 @@ fn cahv(p: &[f64; 12]) -> Option<CameraModel> {
     Some(CameraModel::Cahv(Cahv::as_printed(centre, row(2), row(0), row(1))))
 }
 
-/// Beside the images, or where the benchmark's own folders have them.
-fn poses_path(sequence: &Path) -> PathBuf {
+/// Beside the images, or where the benchmark's own folders have them, unless that is outside of the allowed folder.
+fn poses_path(sequence: &Path, options: &ImportOptions) -> PathBuf {
     let beside = sequence.join("poses.txt");
     let name = sequence.canonicalize().ok().and_then(|path| Some(path.file_name()?.to_owned()));
     let shared = name.map(|name| sequence.join("../../poses").join(name).with_extension("txt"));
-    shared.filter(|shared| !beside.is_file() && shared.is_file()).unwrap_or(beside)
+    let is_allowed = |shared: &PathBuf| {
+        let real = || shared.canonicalize().unwrap_or_default();
+        options.within.as_ref().is_none_or(|root| real().starts_with(root))
+    };
+    shared.filter(|shared| !beside.is_file() && shared.is_file() && is_allowed(shared)).unwrap_or(beside)
 }
 
 /// The poses of the rover frame in that of the sequence's first frame.
@@ -248,7 +252,7 @@ fn choose_frames(path: &Path, poses: &[Pose], options: &ImportOptions) -> Result
     };
     if *last >= poses.len() {
         let problem = format!("has {} poses, but image_0/{file} needs line {}", poses.len(), last + 1);
-        return Err(Error::format(poses_path(path), problem));
+        return Err(Error::format(poses_path(path, options), problem));
     }
     Ok(chosen)
 }

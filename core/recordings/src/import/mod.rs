@@ -8,7 +8,9 @@
 //! An importer writes the images through [`Output`] and returns the index; the index is written last, so a
 //! folder with an index is complete. When the import fails or is cancelled, what it wrote is removed.
 
+pub mod examine;
 pub mod kitti;
+mod links;
 pub(crate) mod odl;
 pub mod pds3;
 
@@ -47,6 +49,8 @@ pub struct ImportOptions {
     pub seed: u64,
     /// Whether files in the output folder may be replaced.
     pub existing: Existing,
+    /// The folder that no file of the recording may leave, also not by a symbolic link; `None`: links are followed anywhere.
+    pub within: Option<PathBuf>,
 }
 
 impl Default for ImportOptions {
@@ -61,6 +65,7 @@ impl Default for ImportOptions {
             attitude_deg: 0.2,
             seed: 1,
             existing: Existing::Refuse,
+            within: None,
         }
     }
 }
@@ -116,6 +121,8 @@ pub(crate) const FORMATS: [&dyn ImportFormat; 2] = [&kitti::Kitti, &pds3::Pds3];
 pub struct Output<'a> {
     folder: &'a Path,
     existing: Existing,
+    /// Whether the recording is only examined: files are checked as far as that is quick, and nothing is written.
+    is_dry: bool,
     cancel: &'a AtomicBool,
     progress: &'a mut dyn FnMut(usize, usize),
     expected: usize,
@@ -137,6 +144,9 @@ impl Output<'_> {
     /// written.
     pub fn write(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
         self.check_cancelled()?;
+        if self.is_dry {
+            return Ok(());
+        }
         let path = self.folder.join(name);
         if self.existing == Existing::Refuse && path.exists() {
             return Err(Error::format(path, "is already there; choose an empty folder"));
@@ -154,13 +164,28 @@ impl Output<'_> {
     pub fn copy(&mut self, source: &Path, name: &str) -> Result<()> {
         self.check_cancelled()?;
         let unreadable = |error| Error::Read { path: source.to_owned(), source: error };
-        let mut bytes = Vec::new();
-        let length = files::open(source)?.take(FILE_LIMIT + 1).read_to_end(&mut bytes).map_err(unreadable)?;
-        if length as u64 > FILE_LIMIT {
+        let too_large = || {
             let limit = FILE_LIMIT >> 20;
-            return Err(Error::format(source, format!("the file has more than the {limit} MiB allowed")));
+            Error::format(source, format!("the file has more than the {limit} MiB allowed"))
+        };
+        let file = files::open(source)?;
+        if file.metadata().map_err(unreadable)?.len() > FILE_LIMIT {
+            return Err(too_large());
+        }
+        if self.is_dry {
+            return Ok(());
+        }
+        let mut bytes = Vec::new();
+        let length = file.take(FILE_LIMIT + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+        if length as u64 > FILE_LIMIT {
+            return Err(too_large());
         }
         self.write(name, &bytes)
+    }
+
+    /// Whether nothing is written, so that no image needs to be made.
+    pub(crate) fn is_dry(&self) -> bool {
+        self.is_dry
     }
 
     /// Adds a sentence for the person about what was left out or assumed.
@@ -188,11 +213,15 @@ pub fn import(
     cancel: &AtomicBool,
 ) -> Result<Imported> {
     options.check()?;
+    if let Some(root) = &options.within {
+        links::check(path, root, cancel)?;
+    }
     let format = recognise(path)?;
     check_folder(path, folder, options.existing)?;
     let mut output = Output {
         folder,
         existing: options.existing,
+        is_dry: false,
         cancel,
         progress,
         expected: 0,

@@ -151,7 +151,7 @@ impl Aspect {
             }
             Self::Rim => format!("{v:.0} px from the image’s rim: a step may carry it out"),
             Self::Data => "pixels without data in the window".to_owned(),
-            Self::Range => format!("no range here: stereo hole ({})", hole(v)),
+            Self::Range => format!("no range: stereo hole ({})", hole(v)),
             Self::RangeError => format!("far off: the range is known to {percent:.0} % only"),
             Self::DepthEdge => format!("depth edge {v:.0} px away"),
             Self::Relief => format!("deep relief in the window: {percent:.0} % of the distance"),
@@ -162,7 +162,7 @@ impl Aspect {
             Self::Saturation => format!("{percent:.0} % of the window is overexposed"),
             Self::Dark => format!("{percent:.0} % of the window is dark, perhaps shadow"),
             Self::Contrast => format!("hardly any contrast: {percent:.1} % of full scale"),
-            Self::Texture => format!("weak texture: a match would be known to {v:.2} px"),
+            Self::Texture => format!("weak texture: expected match σ {v:.2} px"),
             Self::Likeness => format!("another place nearby looks the same: {v:.2}"),
         }
     }

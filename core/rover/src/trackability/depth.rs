@@ -1,4 +1,4 @@
-//! What dense stereo says of a place: its range, the nearest depth edge, and the plane of its window.
+//! What stereo says of a place: its range, the nearest depth edge, and the plane of its window.
 //!
 //! A depth edge lies between two neighbours with a disparity, or across a hole of at most `HOLE_PX`, when
 //! ```text
@@ -9,11 +9,15 @@
 //!
 //! The inverse range of a plane is linear over the image, as in `locate/template/warnings.rs`.
 //!
-//! Frames: px of the aligned left image, which shows nearly what the left one does; points in the rover frame, m.
+//! Frames: px of the aligned left image, which shows nearly what the left one does, or nodes of a grid of the left image
+//! where the rows of a pair cannot be aligned (`point_ranges`); points in the rover frame, m.
+
+use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::limits::TrackabilityLimits;
+use super::point_ranges::{PointRanges, SPACING_PX};
 use sightline_geometry::camera::Camera;
 use sightline_geometry::frames::{Pixel, Point3};
 use sightline_track::locate::shape_tracker::surface::StopSurface;
@@ -32,6 +36,59 @@ const SAMPLES_MIN: usize = 9;
 const NEAR_PX: i32 = 2;
 /// How many of them must have one.
 const NEAR_MIN: usize = 9;
+
+/// The ranges of a stop, by dense stereo or by point stereo.
+pub(super) enum Surface {
+    /// Of every pixel of the aligned left image.
+    Dense(Arc<StopSurface>),
+    /// Of the nodes of a grid of the left image.
+    Points(PointRanges),
+}
+
+impl Surface {
+    /// Disparities and outcomes.
+    pub(super) fn map(&self) -> &DisparityMap {
+        match self {
+            Self::Dense(surface) => &surface.disparities,
+            Self::Points(points) => &points.nodes,
+        }
+    }
+
+    /// The points of the map, m, rover frame; NaN where there is none.
+    fn points_m(&self) -> &[[f32; 3]] {
+        match self {
+            Self::Dense(surface) => &surface.points_m,
+            Self::Points(points) => &points.points_m,
+        }
+    }
+
+    /// The centre of the left camera, m, rover frame.
+    fn viewpoint(&self) -> Point3 {
+        match self {
+            Self::Dense(surface) => surface.viewpoint,
+            Self::Points(points) => points.viewpoint,
+        }
+    }
+
+    /// Pixels between two neighbours of the map.
+    fn spacing_px(&self) -> u32 {
+        match self {
+            Self::Dense(_) => 1,
+            Self::Points(_) => SPACING_PX,
+        }
+    }
+
+    /// For each element of the map the distance to the nearest depth edge, px.
+    ///
+    /// An edge between two nodes of a grid is half a spacing away from either of them.
+    pub(super) fn edge_distances_px(&self, limits: &TrackabilityLimits) -> Vec<f32> {
+        let (spacing_px, mut distances) = (self.spacing_px(), edge_distances(self.map(), limits));
+        if spacing_px > 1 {
+            distances.iter_mut().for_each(|nodes| *nodes = (*nodes + 0.5) * spacing_px as f32);
+        }
+        distances
+    }
+}
 
 /// For each pixel of the aligned image the distance to the nearest depth edge, px; infinite where there is none.
 pub fn edge_distances(map: &DisparityMap, limits: &TrackabilityLimits) -> Vec<f32> {
@@ -108,34 +165,42 @@ fn chamfer(distance: &mut [f32], width: usize, height: usize) {
 
 /// What dense stereo says of a window.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct WindowRanges {
+pub(super) struct WindowRanges {
     /// (farthest − nearest)/range.
-    pub spread: Option<f64>,
+    pub(super) spread: Option<f64>,
     /// Largest departure from a plane over the range.
-    pub departure: Option<f64>,
+    pub(super) departure: Option<f64>,
     /// Angle between the surface's normal and the line of sight, rad.
-    pub incidence_rad: Option<f64>,
+    pub(super) incidence_rad: Option<f64>,
 }
 
 /// The ranges under the pixels of a left image.
-pub struct Ranges<'a> {
+pub(super) struct Ranges<'a> {
     /// The surface.
-    pub surface: &'a StopSurface,
+    pub(super) surface: &'a Surface,
     /// The left camera.
-    pub left: &'a Camera,
+    pub(super) left: &'a Camera,
 }
 
 impl Ranges<'_> {
-    /// The pixel of the aligned image that shows what a pixel of the left image does.
-    pub fn aligned(&self, pixel: Pixel) -> Option<[u32; 2]> {
-        let ray = self.left.ray(pixel)?;
-        let seen = self.surface.alignment.left.project(&ray.at(ALONG_M))?;
-        let map = &self.surface.disparities;
+    /// The element of the map that shows what a pixel of the left image does.
+    pub(super) fn aligned(&self, pixel: Pixel) -> Option<[u32; 2]> {
+        let seen = match self.surface {
+            Surface::Dense(surface) => {
+                let ray = self.left.ray(pixel)?;
+                surface.alignment.left.project(&ray.at(ALONG_M))?
+            }
+            Surface::Points(_) => {
+                let spacing_px = f64::from(SPACING_PX);
+                Pixel::new(pixel.x / spacing_px, pixel.y / spacing_px)
+            }
+        };
+        let map = self.surface.map();
         seen.is_inside(map.width, map.height).then(|| [seen.x.round() as u32, seen.y.round() as u32])
     }
 
     /// The point under an aligned pixel, or the middle one of its nearest neighbours.
-    pub fn point(&self, [x, y]: [u32; 2]) -> Option<Point3> {
+    pub(super) fn point(&self, [x, y]: [u32; 2]) -> Option<Point3> {
         if let Some(point) = self.at(i64::from(x), i64::from(y)) {
             return Some(point);
         }
@@ -151,22 +216,30 @@ impl Ranges<'_> {
     }
 
     /// Why an aligned pixel has no range.
-    pub fn outcome(&self, [x, y]: [u32; 2]) -> Outcome {
-        let map = &self.surface.disparities;
+    pub(super) fn outcome(&self, [x, y]: [u32; 2]) -> Outcome {
+        let map = self.surface.map();
         map.outcome.get((y * map.width + x) as usize).copied().unwrap_or(Outcome::Outside)
     }
 
     /// The distance of a point from the left camera, m.
-    pub fn range_m(&self, point: &Point3) -> f64 {
-        (point - self.surface.viewpoint).norm()
+    pub(super) fn range_m(&self, point: &Point3) -> f64 {
+        (point - self.surface.viewpoint()).norm()
     }
 
     /// What the window of `half_px` around an aligned pixel at `range_m` holds.
-    pub fn window(&self, [x, y]: [u32; 2], range_m: f64, half_px: f64) -> WindowRanges {
-        let offset = |k: i32| (half_px * (2.0 * f64::from(k) / f64::from(SAMPLES - 1) - 1.0)).round();
+    pub(super) fn window(&self, [x, y]: [u32; 2], range_m: f64, half_px: f64) -> WindowRanges {
+        let spacing_px = f64::from(self.surface.spacing_px());
+        // Whole elements of the map, inside the window.
+        let offset = |k: i32| {
+            let offset_px = (half_px * (2.0 * f64::from(k) / f64::from(SAMPLES - 1) - 1.0)).round();
+            (offset_px / spacing_px).trunc()
+        };
         let places = (0..SAMPLES).flat_map(|v| (0..SAMPLES).map(move |u| (offset(u), offset(v))));
         let points: Vec<(f64, f64, Point3)> = places
-            .filter_map(|(u, v)| Some((u, v, self.at(i64::from(x) + u as i64, i64::from(y) + v as i64)?)))
+            .filter_map(|(u, v)| {
+                let point = self.at(i64::from(x) + u as i64, i64::from(y) + v as i64)?;
+                Some((u * spacing_px, v * spacing_px, point))
+            })
             .collect();
         if points.len() < SAMPLES_MIN {
             return WindowRanges::default();
@@ -197,17 +270,17 @@ impl Ranges<'_> {
         });
         let eigen = scatter.symmetric_eigen();
         let normal = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
-        let sight = (middle - self.surface.viewpoint.coords).try_normalize(1e-9)?;
+        let sight = (middle - self.surface.viewpoint().coords).try_normalize(1e-9)?;
         Some(normal.dot(&sight).abs().min(1.0).acos())
     }
 
     fn at(&self, x: i64, y: i64) -> Option<Point3> {
-        let map = &self.surface.disparities;
+        let map = self.surface.map();
         let (x, y) = (u32::try_from(x).ok()?, u32::try_from(y).ok()?);
         if x >= map.width || y >= map.height {
             return None;
         }
-        let point = self.surface.points_m.get((y * map.width + x) as usize)?;
+        let point = self.surface.points_m().get((y * map.width + x) as usize)?;
         point[0].is_finite().then(|| Point3::from(point.map(f64::from)))
     }
 }

@@ -15,7 +15,8 @@
 
 use std::sync::Arc;
 
-use super::depth::{Ranges, WindowRanges, edge_distances};
+use super::depth::{Ranges, Surface, WindowRanges};
+use super::point_ranges::{PointRanges, effective_baseline_m};
 use super::{Aspect, Criterion, TrackabilityLimits, Verdict, texture};
 use crate::pipeline::Stops;
 use sightline_geometry::camera::Camera;
@@ -23,6 +24,7 @@ use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::estimate::quantile::upper_median;
 use sightline_geometry::frames::Pixel;
+use sightline_geometry::stereo_geometry::StereoGeometry;
 use sightline_track::locate::shape_tracker::surface::StopSurface;
 use sightline_track::settings::Settings;
 use sightline_vision::correlate::Focus;
@@ -44,7 +46,7 @@ pub struct Ground {
     image: Arc<GrayImage>,
     left: Camera,
     right: Camera,
-    surface: Arc<StopSurface>,
+    surface: Surface,
     edges_px: Vec<f32>,
     focus: Focus,
     noise: f64,
@@ -167,10 +169,19 @@ impl Ground {
         }
         let pair = stops.capture(step, cancel)?;
         let (left, right) = stops.cameras(step);
-        let stereo = StereoSettings::default();
-        let surface = StopSurface::shared(stops.shared(step), &pair, [left, right], &stereo, cancel)?;
+        let surface = match stops.stereo() {
+            StereoGeometry::Lateral => {
+                let stereo = StereoSettings::default();
+                let shared = stops.shared(step);
+                Surface::Dense(StopSurface::shared(shared, &pair, [left, right], &stereo, cancel)?)
+            }
+            // The rows of two freely placed views cannot be aligned in general.
+            StereoGeometry::Convergent => {
+                Surface::Points(PointRanges::measure(&pair, [left, right], settings, cancel)?)
+            }
+        };
         cancel.check()?;
-        let (image, edges_px) = (pair.left, edge_distances(&surface.disparities, limits));
+        let (image, edges_px) = (pair.left, surface.edge_distances_px(limits));
         let ranges = Ranges { surface: &surface, left };
         Ok(Self {
             step,
@@ -251,7 +262,7 @@ impl Ground {
         let (range_m, half) =
             (ranges.range_m(&point), f64::from(self.settings.template.template_size_px / 2));
         let (limits, own) = (&self.settings.limits, &self.limits);
-        let edge = f64::from(self.edges_px[(at[1] * self.surface.disparities.width + at[0]) as usize]);
+        let edge = f64::from(self.edges_px[(at[1] * self.surface.map().width + at[0]) as usize]);
         // Beyond the focus of the refinement an edge has little say.
         let focus_px = self.settings.template.focus_px;
         let near = if focus_px > 0.0 { (own.edge_risky_focus * focus_px).min(half) } else { half };
@@ -277,7 +288,10 @@ impl Ground {
     /// 3σ of the range over the range (K-Eq 1).
     fn range_error(&self, pixel: Pixel, range_m: f64) -> Option<f64> {
         let focal_px = self.left.model.focal_length_px(pixel)?;
-        let baseline_m = (self.right.model.centre() - self.left.model.centre()).norm();
+        let baseline_m = match self.surface {
+            Surface::Dense(_) => (self.right.model.centre() - self.left.model.centre()).norm(),
+            Surface::Points(_) => effective_baseline_m(&self.left.ray(pixel)?, &self.right),
+        };
         Some(range_m * self.settings.limits.disparity_error_px / (focal_px * baseline_m))
     }
 

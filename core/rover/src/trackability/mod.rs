@@ -1,7 +1,7 @@
 //! Trackability: how well a target would do at each place of a left image, before one is picked (R20, R21).
 //!
 //! ```text
-//! pair ─► dense stereo ─► ranges, depth edges ┐
+//! pair ─► dense stereo ─► ranges, depth edges ┐      point stereo on a grid where the pair is convergent
 //! left image ─► noise, light, texture         ├─► criteria of a window ─► good │ risky │ bad, with one reason
 //! cameras ─► rim, range error, longest step   ┘
 //! ```
@@ -36,6 +36,7 @@ pub mod ground;
 pub mod limits;
 pub mod map;
 pub mod pixel;
+mod point_ranges;
 pub mod texture;
 
 use serde::{Deserialize, Serialize};
@@ -67,12 +68,21 @@ impl Verdict {
     /// All of them, the best first.
     pub const ALL: [Self; 3] = [Self::Good, Self::Risky, Self::Bad];
 
-    /// Its word.
+    /// Its word in sentences and tables; records have `bad` for `poor`.
     pub const fn word(self) -> &'static str {
         match self {
             Self::Good => "good",
             Self::Risky => "risky",
-            Self::Bad => "bad",
+            Self::Bad => "poor",
+        }
+    }
+
+    /// Its word at the beginning of a sentence.
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::Good => "Good",
+            Self::Risky => "Risky",
+            Self::Bad => "Poor",
         }
     }
 

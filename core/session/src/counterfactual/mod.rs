@@ -23,11 +23,14 @@
 //! `relative` is the change over the present value; where that is 0, over the width of the setting's range; 1 for
 //! switches and words; for the prediction its way over half the search window.
 //!
+//! The smallest change leaves the step at the edge of being lost again: `with_margin` is a larger one, verified too.
+//!
 //! No clock, no chance: the same step gives the same findings.
 
 mod by_vision;
 mod candidates;
 mod directed;
+mod margin;
 mod moved;
 mod search;
 #[cfg(test)]
@@ -111,6 +114,9 @@ pub struct Finding {
     pub changes: Vec<SettingChange>,
     /// The prediction that moves.
     pub moved: Option<Moved>,
+    /// The same setting with a margin beyond the smallest change, verified; `None` where no such value is as good.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub with_margin: Option<SettingChange>,
     /// The size of the change (see the module).
     pub relative: f64,
     /// What came of it.
@@ -277,12 +283,13 @@ fn one_setting<D: Drive>(trials: &mut Trials<'_, D>, info: &SettingInfo) -> Resu
         Some(to) => search::verified(trials, info, to)?,
         None => search::smallest(trials, info, &from)?,
     };
+    let Some((to, trace)) = found else { return Ok(None) };
+    let change = SettingChange { setting: info.key.clone(), from, to, unit: info.unit.clone() };
+    let with_margin = margin::of(trials, info, &change, &trace)?;
     let runs = trials.runs - before;
-    Ok(found.map(|(to, trace)| {
-        let change = SettingChange { setting: info.key.clone(), from, to, unit: info.unit.clone() };
-        let relative = search::relative(info, &change.from, &change.to);
-        trials.finding(vec![change], None, relative, (&trace, runs))
-    }))
+    let relative = search::relative(info, &change.from, &change.to);
+    let finding = trials.finding(vec![change], None, relative, (&trace, runs));
+    Ok(Some(Finding { with_margin, ..finding }))
 }
 
 /// What of a recorded step and its truth a change turns.

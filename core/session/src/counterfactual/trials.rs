@@ -121,6 +121,7 @@ impl<'a, D: Drive> Trials<'a, D> {
         let mut finding = Finding {
             changes,
             moved,
+            with_margin: None,
             relative,
             outcome,
             gate: worst.map(|gate| gate.name.clone()),

@@ -2,19 +2,17 @@
 
 use serde_json::Value;
 
-use super::{Finding, Outcome};
+use super::{Finding, Outcome, SettingChange};
 use crate::step::RunStep;
-use crate::why::words::{number, signed};
+use crate::why::gates::label;
+use crate::why::words::{number, setting_name, signed};
 
 /// What changes, what came of it, and how sure that is.
 pub(super) fn sentence(finding: &Finding, trace: &RunStep) -> String {
     let mut what: Vec<String> = finding
         .changes
         .iter()
-        .map(|change| {
-            let unit = if change.unit.is_empty() { String::new() } else { format!(" {}", change.unit) };
-            format!("{} {} instead of {}{unit}", change.setting, plain(&change.to), plain(&change.from))
-        })
+        .map(|change| format!("{} {}", setting_name(&change.setting), change.words()))
         .collect();
     if let Some(moved) = &finding.moved {
         let (dx, dy) = (moved.to.x - moved.from.x, moved.to.y - moved.from.y);
@@ -29,16 +27,23 @@ pub(super) fn sentence(finding: &Finding, trace: &RunStep) -> String {
     let truth = trace.truth.as_ref().and_then(|truth| truth.err_px);
     let off = truth.map_or_else(String::new, |err_px| format!(", {} px from the truth", number(err_px)));
     let outcome = match finding.outcome {
-        Outcome::Right => format!("accepted and right{off}"),
-        Outcome::Rejected => "rejected, as it should be".to_owned(),
-        Outcome::Unknown => "accepted; whether it is right is not known".to_owned(),
+        Outcome::Right => format!("accepted, correct{off}"),
+        Outcome::Rejected => "rejected, correct".to_owned(),
+        Outcome::Unknown => "accepted (truth unknown)".to_owned(),
         Outcome::False => format!("accepted, but FALSE tracking{off}"),
     };
     let margin =
         finding.gate.as_ref().zip(finding.margin_after).map_or_else(String::new, |(gate, margin)| {
-            format!("; {gate} has a margin of {} {}", signed(margin), finding.gate_unit).trim_end().to_owned()
+            format!("; {} margin {} {}", label(gate), signed(margin), finding.gate_unit).trim_end().to_owned()
         });
     format!("{}: {outcome}{margin}.", what.join(" and "))
+}
+
+impl SettingChange {
+    /// The value before and after, with the unit.
+    pub fn words(&self) -> String {
+        format!("{} → {} {}", plain(&self.from), plain(&self.to), self.unit).trim_end().to_owned()
+    }
 }
 
 /// A value of a setting without quotation marks.

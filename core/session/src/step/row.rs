@@ -92,10 +92,11 @@ impl Record for StepRow {
             .describe("Roll of the template, clockwise on screen.")
             .formula("roll_rad · 180 / π", &["scale_roll.roll_rad"]);
         r.quantity("ncc", Unit::One, |row| row.ncc)
+            .label("match score")
             .describe("Score of the match.")
             .formula("the score of the match", &["match_template.score"]);
         r.quantity("stereo_score", Unit::One, |row| row.stereo_score)
-            .label("stereo")
+            .label("stereo score")
             .describe("Score of point stereo.")
             .formula("the score of point stereo", &["point_stereo.score"]);
         r.quantity("err_px", Unit::Pixel, |row| row.err_px)
@@ -131,12 +132,16 @@ impl Record for StepRow {
 
 fn declare_judged(r: &mut Declaration<StepRow>) {
     r.quantity("distance_correction_m", Unit::Metre, |row| row.distance_correction_m)
+        .label("range change")
         .describe("Correction of the distance: criterion 3.");
     r.quantity("distance_tolerance_m", Unit::Metre, |row| row.distance_tolerance_m)
+        .label("range change tolerance")
         .describe("Tolerance of the distance's correction at this step.");
     r.quantity("position_correction_m", Unit::Metre, |row| row.position_correction_m)
+        .label("site position")
         .describe("Correction of the position since the designation: criterion 4.");
     r.quantity("position_tolerance_m", Unit::Metre, |row| row.position_tolerance_m)
+        .label("site position tolerance")
         .describe("Tolerance of the position's correction at this step.");
     r.quantity("budget_without_m", Unit::Metre, |row| row.budget_without_m)
         .describe("Budget of a drive without tracking at this range, 3σ [Kim09 Eq. 3].");

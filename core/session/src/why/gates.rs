@@ -1,8 +1,20 @@
 //! The gates of a step in Why: value, limit and margin.
 
+use std::sync::LazyLock;
+
 use super::Book;
 use super::node::Draft;
+use sightline_rover::visual_odometry;
+use sightline_track::gate::GateKind;
+use sightline_track::locate::gate_kinds;
 use sightline_track::stages::judge::Gate;
+
+/// The display name of a gate: its label where it is declared, the one table of these names.
+pub fn label(name: &str) -> &str {
+    static KINDS: LazyLock<Vec<GateKind>> = LazyLock::new(gate_kinds);
+    let mut all = KINDS.iter().chain(visual_odometry::gate_kinds());
+    all.find(|kind| kind.name == name).map_or(name, |kind| kind.label)
+}
 
 /// A criterion with how it compares with the others.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,8 +61,8 @@ impl Book<'_> {
         let (relation, formula) =
             if gate.at_least { ("≥", "value − limit") } else { ("≤", "limit − value") };
         let inputs = [format!("value.{name}"), format!("limit.{name}")];
-        let label = format!("margin of criterion {} ({name} {relation} limit): {word}", gate.criterion);
-        let draft = Draft::numbers(self.judge_of(gate), &label, &gate.unit, gate.margin);
+        let words = format!("margin of gate {} ({} {relation} limit): {word}", gate.criterion, label(name));
+        let draft = Draft::numbers(self.judge_of(gate), &words, &gate.unit, gate.margin);
         let draft = Draft { text: Some(word.to_owned()), ..draft };
         let inputs: Vec<&str> = inputs.iter().map(String::as_str).collect();
         Some(match gate.margin {
@@ -112,6 +124,21 @@ mod tests {
         ];
         let order: Vec<&str> = by_margin(&gates).iter().map(|margin| margin.gate.name.as_str()).collect();
         assert_eq!(order, ["stereo", "distance", "ncc", "position"]);
+    }
+
+    #[test]
+    fn a_quantity_that_a_gate_judges_is_named_like_the_gate() {
+        for (gate, quantities) in [
+            ("ncc", ["step.ncc", "match_template.score"]),
+            ("stereo_ncc", ["step.stereo_score", "point_stereo.score"]),
+            ("distance_correction_m", ["step.distance_correction_m"; 2]),
+            ("position_correction_m", ["step.position_correction_m"; 2]),
+        ] {
+            for name in quantities {
+                let quantity = crate::records::StageQuantity::named(name).unwrap();
+                assert_eq!(quantity.declared().label, label(gate), "{name}");
+            }
+        }
     }
 
     #[test]

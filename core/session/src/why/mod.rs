@@ -17,13 +17,18 @@
 //! | `truth` | errors against the truth |
 //! | `others` | features, shape, state, settings |
 //! | `recorded` | every other quantity, as its stage declares it |
-//! | `sentence` | the verdict as one sentence, from the evidence |
+//! | `sentence` | the summary of a step: headline and bullets, from the evidence |
+//! | `cause`, `jump` | the root cause of a loss, found without the truth |
+//! | `pose_change` | the change of the pose estimate at a step, with its σ |
 
+mod cause;
 pub mod gates;
+mod jump;
 mod limits;
 mod node;
 pub(crate) mod odometry;
 mod others;
+pub mod pose_change;
 mod position;
 mod prediction;
 mod recorded;
@@ -34,6 +39,10 @@ mod truth;
 mod tests;
 #[cfg(test)]
 mod odometry_tests;
+#[cfg(test)]
+mod cause_tests;
+#[cfg(test)]
+mod scenario_tests;
 pub mod words;
 
 use serde::{Deserialize, Serialize};
@@ -45,6 +54,7 @@ use crate::records::StageQuantity;
 use crate::step::RunStep;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::{Pixel, Pose};
+use sightline_geometry::odometry_error::OdometryError;
 use sightline_track::settings::Settings;
 use sightline_track::stages::judge::Gate;
 
@@ -55,6 +65,8 @@ const DEPTH: usize = 12;
 pub trait Sources {
     /// The estimated pose of a stop.
     fn site_from_rover(&self, step: usize) -> Pose;
+    /// The error model of the pose estimates.
+    fn pose_error(&self) -> OdometryError;
     /// The name of the left (0) or right (1) image file of a stop, where it is known.
     fn image_file(&self, step: usize, eye: usize) -> Option<String>;
 }
@@ -62,6 +74,10 @@ pub trait Sources {
 impl Sources for sightline_recordings::Traverse {
     fn site_from_rover(&self, step: usize) -> Pose {
         Self::site_from_rover(self, step)
+    }
+
+    fn pose_error(&self) -> OdometryError {
+        self.index().odometry_error
     }
 
     fn image_file(&self, step: usize, eye: usize) -> Option<String> {
@@ -90,7 +106,7 @@ pub struct Book<'a> {
 pub struct Explanation {
     /// The step.
     pub step: usize,
-    /// The verdict as one sentence.
+    /// The root cause of a loss, then the verdict with its evidence, in sentences.
     pub sentence: String,
     /// The criteria, worst margin first.
     pub gates: Vec<Gate>,
@@ -110,7 +126,7 @@ impl<'a> Book<'a> {
         let gates = self.trace.verdict().into_iter().flat_map(|verdict| gates::by_margin(&verdict.gates));
         Ok(Explanation {
             step: self.trace.step,
-            sentence: sentence::verdict(self.trace, self.before, self.settings),
+            sentence: self.summary().text(),
             gates: gates.map(|margin| margin.gate.clone()).collect(),
             values: self.names(),
             tree,
@@ -197,7 +213,7 @@ impl<'a> Book<'a> {
 }
 
 /// The values that are explained in words of their own, beside those of the criteria; all others as declared.
-const NAMES: [&str; 56] = [
+const NAMES: [&str; 58] = [
     "state",
     "ncc",
     "stereo_score",
@@ -212,6 +228,8 @@ const NAMES: [&str; 56] = [
     "range_m",
     "scale",
     "roll_deg",
+    "pose_change",
+    "pose_change_sigma",
     "predicted_left",
     "predicted_position",
     "predicted_sigma_px",

@@ -8,7 +8,7 @@ use sightline_track::settings::Settings;
 use sightline_track::stages::judge::{Gate, Verdict};
 
 use super::Book;
-use super::gates::by_margin;
+use super::gates::{by_margin, label};
 use super::node::{Draft, OriginKind};
 use super::sentence::AT_RIM_PX;
 use super::template::edge_distance_px;
@@ -25,21 +25,37 @@ const SIGMAS: f64 = 3.0;
 /// The number of the last criterion that scores a match; those after it are about the position.
 const LAST_SCORE: u8 = 2;
 
-/// What odometry has to do with the loss of the target, as one sentence; `None` where it is not lost, or where nothing says that
-/// the pose is to blame.
-pub(super) fn finding(trace: &RunStep, before: Option<&RunStep>, settings: &Settings) -> Option<String> {
+/// The part of odometry in the loss of a target.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Finding {
+    /// One sentence.
+    pub(super) sentence: String,
+    /// Whether odometry refused its motion, so that the pose lacks a correction whatever the cause is.
+    pub(super) is_refusal: bool,
+}
+
+/// What odometry has to do with the loss of the target; `None` where it is not lost, or where nothing says that the pose is
+/// to blame.
+pub(super) fn finding(trace: &RunStep, before: Option<&RunStep>, settings: &Settings) -> Option<Finding> {
     let verdict = trace.verdict().filter(|verdict| !verdict.good)?;
+    let plain = |sentence| Finding { sentence, is_refusal: false };
     match trace.odometry.as_deref() {
-        Some(measured) => {
-            refusal(measured).map_or_else(|| not_used(measured), |reason| Some(refused(&reason)))
-        }
+        Some(measured) => match refusal(measured) {
+            Some(reason) => Some(Finding { sentence: refused(&reason), is_refusal: true }),
+            None => not_used(measured).map(|words| plain(format!("{words}."))),
+        },
         None => {
             let evidence = against_the_pose(trace, verdict, before, settings)?;
-            Some(format!(
-                "The pose is without visual odometry, and {evidence}: the rover may have slipped from where its wheels put it."
-            ))
+            Some(plain(format!(
+                "The pose is without visual odometry, and {evidence}: the rover may have slipped."
+            )))
         }
     }
+}
+
+/// That the motion by vision, which does not correct the pose, is significantly elsewhere; a sentence without its stop.
+pub(super) fn disagreement(trace: &RunStep) -> Option<String> {
+    not_used(trace.odometry.as_deref().filter(|measured| measured.update.accepted)?)
 }
 
 /// Why a motion is refused, as a clause with value and limit of its worst gate; `None` for an accepted one.
@@ -63,7 +79,7 @@ fn gate_words(gate: &Gate) -> Option<String> {
     let unit = if gate.unit.is_empty() { String::new() } else { format!(" {}", gate.unit) };
     Some(format!(
         "{} is {value}{unit}, limit {limit}{unit}, margin {}{unit}",
-        gate.name,
+        label(&gate.name),
         signed(gate.margin?)
     ))
 }
@@ -78,7 +94,7 @@ fn not_used(measured: &MeasuredMotion) -> Option<String> {
     let sigma_m = block.symmetric_eigenvalues().max().max(0.0).sqrt();
     (!measured.corrects && apart_m > SIGMAS * sigma_m).then(|| {
         format!(
-            "Visual odometry checks the slip alone: it puts the rover {} m ({} σ) from the pose of wheels and gyro, which is used.",
+            "Visual odometry checks the slip alone: it puts the rover {} m ({} σ) from the pose of wheels and gyro, which is used",
             number(apart_m),
             number(apart_m / sigma_m)
         )

@@ -81,7 +81,7 @@ fn lost() -> (PlaneWorld, [RunStep; 2], Settings) {
 
 /// The sentence of a lost step with this odometry; the finding is the same without the truth.
 fn told(odometry: Option<MeasuredMotion>, displaced_px: f64) -> String {
-    let (_, [mut before, mut lost], settings) = lost();
+    let (world, [mut before, mut lost], settings) = lost();
     lost.odometry = odometry.map(Box::new);
     if let Some(predicted) = &mut before.trace.point_mast.predicted_left {
         predicted.x += displaced_px;
@@ -92,15 +92,20 @@ fn told(odometry: Option<MeasuredMotion>, displaced_px: f64) -> String {
     };
     let finding = odometry::finding(&lost, Some(&before), &settings);
     assert_eq!(finding, odometry::finding(&blind(lost.clone()), Some(&blind(before.clone())), &settings));
-    let sentence = sentence::verdict(&lost, Some(&before), &settings);
-    assert!(finding.is_none_or(|finding| sentence.ends_with(&finding)), "{sentence}");
-    sentence
+    let book = Book {
+        trace: &lost,
+        before: Some(&before),
+        settings: &settings,
+        prediction_px: None,
+        sources: &world,
+    };
+    book.summary().text()
 }
 
 #[test]
 fn a_refused_update_is_named_with_gate_value_limit_and_margin() {
     let words = told(Some(measured(0.021, true)), 0.0);
-    let expected = "Visual odometry refused its update: odometry_sigma_m is 0.0210 m, limit 0.0150 m, margin -0.00600 m; \
+    let expected = "Visual odometry refused its update: σ of the translation is 0.0210 m, limit 0.0150 m, margin -0.00600 m; \
                     the pose is that of wheels and gyro.";
     assert!(words.ends_with(expected), "{words}");
     let mut without = measured(0.021, true);
@@ -138,7 +143,7 @@ fn without_odometry_what_the_matches_say_of_the_pose_is_told() {
     if let Some(predicted) = &mut before.trace.point_mast.predicted_left {
         predicted.x += 60.0;
     }
-    let words = odometry::finding(&lost, Some(&before), &settings).unwrap();
+    let words = odometry::finding(&lost, Some(&before), &settings).unwrap().sentence;
     assert!(words.contains("at step 1 the match was ") && words.contains("σ from its prediction"), "{words}");
 }
 

@@ -4,6 +4,7 @@ use nalgebra::Matrix3;
 
 use super::Book;
 use super::node::{Draft, OriginKind};
+use super::pose_change::PoseChange;
 use sightline_geometry::frames::{Pixel, Point3, Pose};
 use sightline_track::locate::Evidence;
 
@@ -53,11 +54,42 @@ impl Book<'_> {
     pub(super) fn of_position(&self, name: &str) -> Option<Draft> {
         self.of_prediction(name)
             .or_else(|| self.of_projection(name))
+            .or_else(|| self.of_pose_change(name))
             .or_else(|| self.of_geometry(name))
             .or_else(|| self.of_location(name))
             .or_else(|| self.of_correction(name))
             .or_else(|| self.of_update(name))
             .or_else(|| self.of_covariance(name))
+    }
+
+    /// The change of the estimated pose since the stop before.
+    fn pose_change(&self) -> Option<PoseChange> {
+        let [before, now] =
+            [self.before?.step, self.trace.step].map(|step| self.sources.site_from_rover(step));
+        let measured = self.trace.odometry.as_deref();
+        Some(PoseChange::between(&before, &now, &self.sources.pose_error(), measured))
+    }
+
+    fn of_pose_change(&self, name: &str) -> Option<Draft> {
+        let step = self.trace.step;
+        Some(match name {
+            "pose_change" => {
+                let label = "pose change: Δx, Δy, Δz in m, Δroll, Δpitch, Δyaw in deg; rover frame before";
+                Draft::numbers("predict", label, "m, deg", self.pose_change()?.change)
+                    .exactly("pose_before⁻¹ · pose", &["pose_before", "pose", "pose_change_sigma"])
+            }
+            "pose_change_sigma" => {
+                let draft =
+                    Draft::numbers("predict", "1σ of the pose change", "m, deg", self.pose_change()?.sigma);
+                draft
+                    .roughly(
+                        "the error model of the pose estimates; of visual odometry where it corrects them",
+                        &[],
+                    )
+                    .from(OriginKind::Pose, format!("pose estimate of stop {step}"), Some(step))
+            }
+            _ => return None,
+        })
     }
 
     fn of_geometry(&self, name: &str) -> Option<Draft> {

@@ -42,8 +42,8 @@ impl Book<'_> {
                 predict.covariance_in_rover.transpose().iter().copied(),
             )
             .roughly(
-                "R Σ Rᵀ of the last position, plus the error of the way driven (odometry)",
-                &["last_position"],
+                "R Σ Rᵀ of the last position, plus the error of the pose change",
+                &["last_position", "pose_change", "pose_change_sigma"],
             ),
             "travelled_m" => Draft::number(stage, "driven since the designation", "m", predict.travelled_m)
                 .roughly("the sum of the steps' lengths", &["pose_before", "pose"]),

@@ -1,13 +1,15 @@
-//! The verdict of a step as one sentence, made of its evidence.
+//! The summary of a step: a headline with the root cause, and at most three bullets, made of its evidence.
 //!
-//! It names what failed, the worst first, with value, limit and by how much; then what the evidence adds: a peak at the rim
-//! of the search window, a second peak as good, how far off the prediction was, whether the truth lay outside the window;
-//! then what the truth says of the decision, and at the end the part that visual odometry had in a loss.
+//! | step | headline | bullets |
+//! |---|---|---|
+//! | rejected | the cause, found without the truth (`cause`) | failed gates; peak and prediction; truth and odometry |
+//! | accepted | the gate with the smallest margin | false tracking, where the truth says so |
+//! | others | why nothing is judged | none |
 
-use super::gates::by_margin;
-use super::odometry;
+use super::gates::{by_margin, label};
 use super::template::edge_distance_px;
-use super::words::{number, told_apart};
+use super::words::{capitalised, number, told_apart};
+use super::{Book, cause, jump, odometry};
 use crate::step::RunStep;
 use sightline_geometry::frames::Pixel;
 use sightline_track::locate::Evidence;
@@ -22,36 +24,75 @@ pub(super) const AT_RIM_PX: f64 = 3.0;
 /// A second peak of such a share of the best may as well be the right one.
 const AMBIGUOUS: f64 = 0.95;
 
-/// The verdict in words; `before` is the step before, where there is one.
-pub fn verdict(trace: &RunStep, before: Option<&RunStep>, settings: &Settings) -> String {
-    if let Some(fault) = trace.fault() {
-        return format!("Nothing could be judged, since the files of this stop are at fault: {fault}.");
+/// What came of a step and why, in sentences.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Summary {
+    /// The root cause of a loss, else the verdict.
+    pub headline: String,
+    /// At most three further sentences of evidence.
+    pub bullets: Vec<String>,
+}
+
+impl Summary {
+    fn new(headline: impl Into<String>) -> Self {
+        Self { headline: headline.into(), bullets: Vec::new() }
     }
-    if let (Some(before), None) = (trace.paused_before(), trace.verdict()) {
-        return format!("Nothing is decided yet, since the drive is paused before {}.", before.word());
+
+    /// All sentences in one line.
+    pub fn text(&self) -> String {
+        let bullets = self.bullets.iter().map(|bullet| format!(" {bullet}"));
+        std::iter::once(self.headline.clone()).chain(bullets).collect()
     }
-    if trace.is_odometry_alone() {
-        return format!("Nothing is judged here, since {ODOMETRY_ALONE}.");
+}
+
+impl Book<'_> {
+    /// The summary of the step.
+    pub fn summary(&self) -> Summary {
+        let trace = self.trace;
+        if let Some(fault) = trace.fault() {
+            return Summary::new(format!(
+                "Nothing could be judged: the files of this stop are damaged: {fault}."
+            ));
+        }
+        if let (Some(before), None) = (trace.paused_before(), trace.verdict()) {
+            return Summary::new(format!(
+                "Nothing is decided yet: the drive is paused before {}.",
+                before.word()
+            ));
+        }
+        if trace.is_odometry_alone() {
+            return Summary::new(format!("Nothing is judged here: {ODOMETRY_ALONE}."));
+        }
+        let Some(verdict) = trace.verdict() else {
+            return Summary::new("Target designated here; no match yet.");
+        };
+        if verdict.good {
+            let headline = format!("{}.", decision(verdict, trace));
+            return Summary { headline, bullets: truth_words(trace, verdict).into_iter().collect() };
+        }
+        self.of_rejected(verdict)
     }
-    let Some(verdict) = trace.verdict() else {
-        return "The target was picked here: nothing had to be found again, and nothing is judged."
-            .to_owned();
-    };
-    let mut parts = vec![decision(verdict, trace)];
-    parts.extend(peak_words(trace, settings, verdict.accepted));
-    parts.extend(prediction_words(trace, settings, verdict.accepted));
-    parts.extend(lost_before(verdict, before));
-    let mut sentence = parts.join("; ");
-    sentence.push('.');
-    if let Some(words) = truth_words(trace, verdict) {
-        sentence.push(' ');
-        sentence.push_str(&words);
+
+    fn of_rejected(&self, verdict: &Verdict) -> Summary {
+        let trace = self.trace;
+        let cause = cause::find(self, verdict);
+        let headline = cause.as_ref().map_or(cause::NONE, |cause| &cause.sentence);
+        let mut context = peak_words(trace, self.settings, verdict.accepted);
+        context.extend(prediction_words(trace, self.settings, verdict.accepted));
+        context.extend(cause.as_ref().and_then(|cause| cause.evidence.clone()));
+        context.extend(lost_before(verdict, self.before));
+        let context = (!context.is_empty()).then(|| format!("{}.", capitalised(&context.join("; "))));
+        // Odometry has no part in a loss whose cause is known to be another.
+        let is_open = cause.as_ref().is_none_or(|cause| cause.is_slip);
+        let odometry = odometry::finding(trace, self.before, self.settings).filter(|finding| {
+            (is_open || finding.is_refusal) && Some(&finding.sentence) != cause.as_ref().map(|c| &c.sentence)
+        });
+        let last: Vec<String> =
+            truth_words(trace, verdict).into_iter().chain(odometry.map(|finding| finding.sentence)).collect();
+        let last = (!last.is_empty()).then(|| last.join(" "));
+        let bullets = [Some(format!("{}.", decision(verdict, trace))), context, last];
+        Summary { headline: format!("{headline}."), bullets: bullets.into_iter().flatten().collect() }
     }
-    if let Some(words) = odometry::finding(trace, before, settings) {
-        sentence.push(' ');
-        sentence.push_str(&words);
-    }
-    sentence
 }
 
 /// What was decided, with the criteria that decided it.
@@ -71,9 +112,9 @@ fn decision(verdict: &Verdict, trace: &RunStep) -> String {
     let nearest = margins.first().and_then(|m| {
         let side = if m.gate.at_least { "above" } else { "below" };
         let margin = format!("{} {}", number(m.gate.margin?), m.gate.unit);
-        Some(format!("{} is nearest to its limit, {} {side} it", m.gate.name, margin.trim_end()))
+        Some(format!("{} is nearest to its limit, {} {side} it", label(&m.gate.name), margin.trim_end()))
     });
-    let all = format!("all {} criteria are met", verdict.gates.len());
+    let all = format!("all {} gates are met", verdict.gates.len());
     let words = nearest.map_or(all.clone(), |nearest| format!("{all}, {nearest}"));
     if verdict.accepted {
         format!("Accepted: {words}")
@@ -89,7 +130,7 @@ fn failed_words(gate: &Gate) -> String {
     let unit = if gate.unit.is_empty() { String::new() } else { format!(" {}", gate.unit) };
     format!(
         "{} {shown}{unit} is {side} {limit}{unit} by {}{unit}",
-        gate.name,
+        label(&gate.name),
         number((value - gate.limit).abs())
     )
 }
@@ -104,9 +145,9 @@ fn peak_words(trace: &RunStep, settings: &Settings, accepted: bool) -> Vec<Strin
         let rim_px = edge_distance_px(matched, settings.template.template_size_px);
         if rim_px <= AT_RIM_PX {
             words.push(match rim_px as i64 {
-                0 => "the peak lies on the rim of the search window".to_owned(),
-                1 => "the peak lies 1 px from the rim of the search window".to_owned(),
-                px => format!("the peak lies {px} px from the rim of the search window"),
+                0 => "the peak is on the rim of the search window".to_owned(),
+                1 => "the peak is 1 px from the rim of the search window".to_owned(),
+                px => format!("the peak is {px} px from the rim of the search window"),
             });
         }
     }
@@ -128,29 +169,20 @@ fn prediction_words(trace: &RunStep, settings: &Settings, accepted: bool) -> Opt
         _ => None,
     });
     if let Some(truth) = trace.truth.as_ref().and_then(|truth| truth.left_pixel) {
-        let off = format!("prediction off by {} px", number(predicted.distance(truth)));
-        let half = f64::from(settings.template.template_size_px / 2);
-        let is_outside = template.is_some_and(|matched| {
-            let window = matched.search_window;
-            let out = |at: f64, start: i32, length: u32| {
-                at < f64::from(start) + half || at > f64::from(start) + f64::from(length) - 1.0 - half
-            };
-            out(truth.x, window.x, window.width) || out(truth.y, window.y, window.height)
-        });
-        let beyond = "the truth lies outside the positions searched";
-        return Some(if is_outside { format!("{off}, so that {beyond}") } else { off });
+        let off = format!("the prediction is {} px from the truth", number(predicted.distance(truth)));
+        let is_outside = jump::is_outside(trace, settings.template.template_size_px, truth);
+        let beyond = "which is outside the search window";
+        return Some(if is_outside == Some(true) { format!("{off}, {beyond}") } else { off });
     }
     let matched: Pixel = template?.pixel;
-    Some(format!("the match lies {} px from the prediction", number(predicted.distance(matched))))
+    Some(format!("the match is {} px from the prediction", number(predicted.distance(matched))))
 }
 
 /// That it was lost before already.
 fn lost_before(verdict: &Verdict, before: Option<&RunStep>) -> Option<String> {
     match (verdict.state_before, verdict.good) {
-        (TrackingState::Lost { count: 1 }, false) => Some("the update before was bad already".to_owned()),
-        (TrackingState::Lost { count }, false) => {
-            Some(format!("the {count} updates before were bad already"))
-        }
+        (TrackingState::Lost { count: 1 }, false) => Some("the update before was bad, too".to_owned()),
+        (TrackingState::Lost { count }, false) => Some(format!("the {count} updates before were bad, too")),
         (TrackingState::Failed, _) => {
             let step =
                 before.map_or_else(String::new, |before| format!(" at step {} or before", before.step));
@@ -166,11 +198,11 @@ fn truth_words(trace: &RunStep, verdict: &Verdict) -> Option<String> {
     let (err_px, tolerance_px) = (truth.err_px?, truth.tolerance_px);
     let [err, tolerance] = told_apart(err_px, tolerance_px);
     match (verdict.accepted, err_px <= tolerance_px) {
-        (true, false) => Some(format!(
-            "That is FALSE: what was found lies {err} px from the truth, {tolerance} px are allowed."
-        )),
-        (false, true) => Some(format!("Yet what was found was right: {err} px from the truth.")),
-        (false, false) => Some(format!("And rightly so: what was found lies {err} px from the truth.")),
+        (true, false) => {
+            Some(format!("FALSE tracking: the match is {err} px from the truth (tolerance {tolerance} px)."))
+        }
+        (false, true) => Some(format!("False loss: the match is right, {err} px from the truth.")),
+        (false, false) => Some(format!("Correct rejection: the match is {err} px from the truth.")),
         (true, true) => None,
     }
 }

@@ -152,9 +152,9 @@ impl<'a> Book<'a> {
             && own.measure == Measure::Ncc
             && matched.affine.as_ref().is_none_or(|affine| !affine.accepted);
         Some(match name {
-            "ncc" if is_peak => Draft::number(stage, "score of the match", "", matched.score)
+            "ncc" if is_peak => Draft::number(stage, "match score", "", matched.score)
                 .exactly("the score of the peak", &["peak_score", "match_px", "template"]),
-            "ncc" => from_image(Draft::number(stage, "score of the match", "", matched.score).roughly(
+            "ncc" => from_image(Draft::number(stage, "match score", "", matched.score).roughly(
                 "normalised correlation of the template and the image's window at match_px",
                 &["match_px", "template"],
             )),
@@ -212,12 +212,10 @@ impl<'a> Book<'a> {
         let stage = "point_stereo";
         let from_image = |draft: Draft| draft.from(OriginKind::Image, self.image(1), Some(self.trace.step));
         Some(match name {
-            "stereo_score" => {
-                from_image(Draft::number(stage, "score of point stereo", "", stereo.score).roughly(
-                    "the best normalised correlation of the left window along the epipolar curve (R76)",
-                    &["left_px", "right_px", "setting.epipolar_tolerance_px", "setting.disparity_range_px"],
-                ))
-            }
+            "stereo_score" => from_image(Draft::number(stage, "stereo score", "", stereo.score).roughly(
+                "the best normalised correlation of the left window along the epipolar curve (R76)",
+                &["left_px", "right_px", "setting.epipolar_tolerance_px", "setting.disparity_range_px"],
+            )),
             "right_px" => from_image(
                 Draft::numbers(
                     stage,

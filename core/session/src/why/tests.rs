@@ -7,6 +7,7 @@ use super::*;
 use crate::track::{self, NextStep};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::{Point3, Vector3};
+use sightline_geometry::odometry_error::OdometryError;
 use sightline_testing::{PlaneWorld, Trouble};
 use sightline_track::settings::Changes;
 use sightline_track::target::{Designation, TrackingState};
@@ -14,6 +15,10 @@ use sightline_track::target::{Designation, TrackingState};
 impl Sources for PlaneWorld {
     fn site_from_rover(&self, step: usize) -> Pose {
         self.estimates[step]
+    }
+
+    fn pose_error(&self) -> OdometryError {
+        OdometryError::default()
     }
 
     fn image_file(&self, step: usize, eye: usize) -> Option<String> {
@@ -150,6 +155,9 @@ fn places(node: &Node, name: &str) -> Option<Vec<f64>> {
             (now_from_before * i.point("last_position")).coords.iter().copied().collect()
         }
         "position_in_site" => (i.pose("pose") * i.point("located_position")).coords.iter().copied().collect(),
+        "pose_change" => {
+            pose_change::components(&(i.pose("pose_before").inverse() * i.pose("pose"))).to_vec()
+        }
         "predicted_range_m" => apart("predicted_position", "camera_centre"),
         "range_located_m" => apart("located_position", "camera_centre"),
         "range_m" => apart("position", "camera_centre"),
@@ -328,19 +336,20 @@ fn the_sentence_of_a_lost_step_names_value_limit_rim_and_how_far_the_prediction_
     let lost = track::advance(&world, &steps[0], &steps[1], &settings);
     let row = lost.row();
     assert_ne!(lost.update.state, TrackingState::Tracking);
-    let words = sentence::verdict(&lost, Some(&steps[1]), &settings);
+    let before = Some(&steps[1]);
+    let summary =
+        Book { trace: &lost, before, settings: &settings, prediction_px: None, sources: &world }.summary();
+    let words = summary.text();
     let truth = lost.truth.as_ref().unwrap().left_pixel.unwrap();
     let off = lost.point_mast.predicted_left.unwrap().distance(truth);
-    assert!(words.starts_with("Rejected: "), "{words}");
-    let failed = format!("ncc {} is below 0.700 by ", words::number(row.ncc.unwrap()));
+    assert!(summary.bullets[0].starts_with("Rejected: ") && summary.bullets.len() <= 3, "{words}");
+    let failed = format!("match score {} is below 0.700 by ", words::number(row.ncc.unwrap()));
     assert!(words.contains(&failed), "{words}");
-    assert!(
-        words.contains(&format!(
-            "prediction off by {} px, so that the truth lies outside",
-            words::number(off)
-        ))
-    );
-    assert!(words.contains("And rightly so"), "{words}");
+    assert!(words.contains(&format!(
+        "prediction is {} px from the truth, which is outside the search window",
+        words::number(off)
+    )));
+    assert!(words.contains("Correct rejection: the match is "), "{words}");
     let rim = template::edge_distance_px(
         lost.template().unwrap().match_template.as_ref().unwrap(),
         settings.template.template_size_px,

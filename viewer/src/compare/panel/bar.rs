@@ -6,67 +6,76 @@ use sightline_session::compare::Alignment;
 use crate::command::Command;
 use crate::compare::{Ask, Closeness, View};
 use crate::state::State;
-use crate::{panels, theme};
+use crate::{figure, panels, theme};
 
 /// Shows the row, where runs are compared or the target is held still.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let compare = &state.compare;
-    if !state.is_comparing() && !compare.is_held && !compare.has_onion_skin {
+    let is_comparing = state.is_comparing();
+    if figure::is_on_paper() || !is_comparing && !compare.is_held && !compare.has_onion_skin {
         return;
     }
-    ui.horizontal_wrapped(|ui| {
+    ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing = vec2(5.0, 2.0);
-        if state.is_comparing() {
-            choices(ui, state, out);
-        }
-        for (words, help, is_on, ask) in [
-            (
-                "hold target",
-                "The target stays still and its drift shows (S)",
-                compare.is_held,
-                Ask::Stabilise,
-            ),
-            (
-                "step before",
-                "The step before shines through (onion skin)",
-                compare.has_onion_skin,
-                Ask::OnionSkin,
-            ),
-        ] {
-            let mut is_on = is_on;
-            if ui.checkbox(&mut is_on, RichText::new(words).size(11.5)).on_hover_text(help).changed() {
-                out.push(Command::Compare(ask));
-            }
+        if is_comparing {
+            let all = View::ALL.map(|view| (view, view.word(), view.help()));
+            choice(ui, ("compare by", "view"), compare.view.word(), all, compare.view, |view| {
+                out.push(Command::Compare(Ask::View(view)));
+            });
+            options(ui, state, out);
+            divergence(ui, state, out);
+        } else {
+            switches(ui, state, out);
         }
     });
-    if state.is_comparing() {
-        ui.horizontal(|ui| divergence(ui, state, out));
-    }
 }
 
-fn choices(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+/// What is rarely changed: which stops belong together, which differences count, and what the image does.
+fn options(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let compare = &state.compare;
-    let view = compare.view;
-    choice(
-        ui,
-        ("compare by", "view"),
-        view.word(),
-        View::ALL.map(|v| (v, v.word(), v.help())),
-        view,
-        |view| {
-            out.push(Command::Compare(Ask::View(view)));
-        },
-    );
-    let align = compare.align;
-    let all = Alignment::ALL.map(|align| (align, align.word(), align.sentence()));
-    choice(ui, ("aligned by", "align"), align.word(), all, align, |align| {
-        out.push(Command::Compare(Ask::Align(align)));
+    let button = Button::new(RichText::new("Options").size(11.5)).min_size(vec2(0.0, 24.0));
+    let menu = egui::containers::menu::MenuButton::from_button(button).ui(ui, |ui| {
+        ui.label(theme::note("align stops by"));
+        for align in Alignment::ALL {
+            let entry =
+                panels::entry(ui, align == compare.align, align.word()).on_hover_text(align.sentence());
+            if entry.accessible_name(format!("align by {}", align.word())).clicked() {
+                out.push(Command::Compare(Ask::Align(align)));
+            }
+        }
+        ui.label(theme::note("ignore differences below"));
+        for close in Closeness::ALL {
+            let entry = panels::entry(ui, close == compare.closeness, close.word());
+            if entry.accessible_name(format!("ignore below {}", close.word())).clicked() {
+                out.push(Command::Compare(Ask::Closeness(close)));
+            }
+        }
+        ui.separator();
+        switches(ui, state, out);
     });
-    let close = compare.closeness;
-    let all = Closeness::ALL.map(|close| (close, close.word(), "What counts as a difference."));
-    choice(ui, ("counts", "closeness"), close.word(), all, close, |closeness| {
-        out.push(Command::Compare(Ask::Closeness(closeness)));
-    });
+    menu.0.accessible_name("compare options").on_hover_text(format!(
+        "Stops aligned by {}; differences ignored below: {}",
+        compare.align.word(),
+        compare.closeness.word()
+    ));
+}
+
+fn switches(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let compare = &state.compare;
+    for (words, help, is_on, ask) in [
+        ("hold target", "The target stays still and its drift shows (S)", compare.is_held, Ask::Stabilise),
+        (
+            "overlay previous step",
+            "The previous step shines through (onion skin)",
+            compare.has_onion_skin,
+            Ask::OnionSkin,
+        ),
+    ] {
+        let mut is_on = is_on;
+        if ui.checkbox(&mut is_on, RichText::new(words).size(11.5)).on_hover_text(help).changed() {
+            out.push(Command::Compare(ask));
+        }
+    }
 }
 
 /// A box to choose from, with what it is about before it.

@@ -3,7 +3,7 @@
 //! Both are brought to mean 0 and deviation 1 over the pixels that both have, as correlation sees them (K-Eq 11), and
 //! subtracted; patches of different size are cut to what they share about their centres.
 
-use egui::{Align2, Color32, Mesh, Rect, Ui, pos2, vec2};
+use egui::{Color32, Mesh, Rect, Ui, pos2, vec2};
 use sightline_track::trace::ArrayName;
 use sightline_vision::image::GrayImage;
 
@@ -153,8 +153,10 @@ fn show_row(ui: &mut Ui, row: Rect, title: &str, names: [&str; 2], rasters: [&Ra
     for (i, (words, values, colour)) in columns.into_iter().enumerate() {
         let corner = row.min + vec2((side + 12.0) * i as f32, WORDS);
         let frame = Rect::from_min_size(corner, vec2(side, side));
-        let above = frame.left_top() - vec2(0.0, 2.0);
-        ui.painter().text(above, Align2::LEFT_BOTTOM, words, theme::image_font(), theme::text());
+        // A title is as wide as its patch: beside it begins the next one.
+        let above = Rect::from_min_size(frame.left_top() - vec2(0.0, WORDS), vec2(side + 8.0, WORDS));
+        let title = egui::Label::new(theme::note(&words).color(theme::text())).truncate();
+        ui.put(above, title.halign(egui::Align::Min)).on_hover_text(&words);
         crate::drawing::view2d::checker(ui.painter(), frame);
         paint(ui, frame, patches.size, values, colour);
     }

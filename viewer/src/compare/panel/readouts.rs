@@ -9,6 +9,7 @@ use sightline_session::records;
 use sightline_session::step::{RunStep, StepRow};
 use sightline_track::stages::judge::Gate;
 
+use crate::compare::Closeness;
 use crate::compare::panel::{chip, mark};
 use crate::compare::state::Other;
 use crate::panels::digits;
@@ -93,7 +94,8 @@ pub(crate) fn record(ui: &mut Ui, state: &State, record: impl Fn(&RunStep) -> Op
     let (own, there) = (record(own).unwrap_or_default(), record(there).unwrap_or_default());
     let found = differences(&there, &own, &state.tolerance());
     let title = match found.len() {
-        0 => format!("Δ vs {label}: alike ({})", state.compare.closeness.word()),
+        0 if state.compare.closeness == Closeness::Exact => format!("Δ vs {label}: identical"),
+        0 => format!("Δ vs {label}: equal within {}", state.compare.closeness.word()),
         1 => format!("Δ vs {label}: 1 value differs"),
         count => format!("Δ vs {label}: {count} values differ"),
     };

@@ -27,13 +27,18 @@ fn the_status_line_has_the_differences_and_the_other_runs_state() {
 #[test]
 fn the_row_above_the_image_says_the_sentence_and_chooses_how_to_compare() {
     let mut shown = panel(Pane::Left, View::Marks);
-    shown
-        .says("vs run B: first differ at step 3 in match_template")
-        .says("aligned by: step")
-        .says("counts: every bit");
+    shown.says("vs run B: first differ at step 3 in match_template");
+    let (view, button) = ("compare by: marks", "First divergence (D)");
+    let top = |label: &str| shown.harness.get_by_label(label).rect().center().y;
+    assert!((top(view) - top(button)).abs() < 8.0, "one row: {} and {}", top(view), top(button));
     assert_eq!(shown.click("First divergence (D)"), vec![Command::Compare(Ask::FirstDivergence)]);
+    shown.click("compare options");
+    shown.says("align by step").says("ignore below none");
     assert_eq!(shown.click("hold target"), vec![Command::Compare(Ask::Stabilise)]);
-    assert_eq!(shown.click("step before"), vec![Command::Compare(Ask::OnionSkin)]);
+    let mut shown = panel(Pane::Left, View::Marks);
+    shown.click("compare options");
+    assert_eq!(shown.click("overlay previous step"), vec![Command::Compare(Ask::OnionSkin)]);
+    let mut shown = panel(Pane::Left, View::Marks);
     shown.click("compare by: marks");
     assert_eq!(shown.click("difference"), vec![Command::Compare(Ask::View(View::Difference))]);
 }
@@ -41,6 +46,7 @@ fn the_row_above_the_image_says_the_sentence_and_chooses_how_to_compare() {
 #[test]
 fn all_runs_are_marked_on_one_image_with_their_names() {
     let mut shown = panel(Pane::Left, View::Marks);
+    shown.click("legend");
     assert_eq!(shown.click("compared: run B (legend)"), vec![Command::ToggleLayer(Layer::Compared)]);
     assert!(paints(&shown, "run B"));
     let hidden = Shown::pane(Pane::Left, |context| {
@@ -54,6 +60,7 @@ fn all_runs_are_marked_on_one_image_with_their_names() {
 #[test]
 fn the_right_image_marks_the_compared_runs_as_well() {
     let mut shown = panel(Pane::Right, View::Marks);
+    shown.click("legend");
     assert_eq!(shown.click("compared: run B (legend)"), vec![Command::ToggleLayer(Layer::Compared)]);
     assert!(paints(&shown, "run B"));
 }
@@ -219,7 +226,7 @@ fn gates_and_inspector_say_what_differs_from_the_other_run() {
         state.stage = Stage::MATCH_TEMPLATE;
         state
     });
-    alike.says("Δ vs run B: alike (every bit)");
+    alike.says("Δ vs run B: identical");
 }
 
 #[test]

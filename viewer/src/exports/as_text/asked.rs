@@ -27,7 +27,7 @@ pub(crate) fn calls(state: &State, session: &str) -> Vec<(String, Call)> {
         let call = map_call::<ShowTrackability>(&(traverse.id.clone(), step, limits));
         calls.push((format!("map of trackability at step {step}"), call));
     }
-    if let Some(new) = state.studies.chosen().and_then(|info| state.studies.order.request(&info.name).ok()) {
+    if let Some(new) = state.studies.chosen().and_then(|info| state.studies.order.request(info).ok()) {
         calls.push((format!("start the study {}", new.study), start_study(&new)));
     }
     if state.target().is_some() {

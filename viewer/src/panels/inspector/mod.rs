@@ -1,5 +1,6 @@
 //! The inspector: the quantities that the selected stage declares, then the rest of its evidence as a tree.
 
+mod motion;
 mod quantities;
 mod times;
 mod tree;
@@ -50,6 +51,9 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     }
     ScrollArea::vertical().auto_shrink(false).id_salt(state.stage()).show(ui, |ui| {
         readouts::record(ui, state, |trace| self::record(trace, state.stage()));
+        if state.stage() == Stage::PREDICT {
+            motion::show(ui, state, out);
+        }
         for (index, stage) in stages.into_iter().enumerate() {
             if index > 0 {
                 ui.add_space(4.0);
@@ -115,9 +119,8 @@ fn not_reached(trace: &RunStep, state: &State) -> String {
         (None, true) => {
             let mut steps = Stage::of(state.tracker()).filter(|stage| stage.is_step_of_locate());
             let other = steps.find(|stage| is_reached(trace, *stage)).unwrap_or(Stage::LOCATE).word();
-            format!(
-                "{word} is not part of the designation. Go one step on (Right) to see it, or select `{other}`."
-            )
+            let next = state.next_step_words("to see it");
+            format!("{word} is not part of the designation.{next} `{other}` can be selected here.")
         }
         (None, false) => format!("{word} was not reached: {}", state.missing_step()),
     }

@@ -1,7 +1,7 @@
-//! The quantities of a stage: name, value, unit and formula of each, with a link to the explanation of its value.
+//! The quantities of a stage that have a value: name, value, unit and formula of each, with a link to the explanation of its value.
 
 use egui::{RichText, Ui};
-use sightline_record::{Kind, Quantity, Unit, Value as Recorded};
+use sightline_record::{Kind, Quantity, Unit, Value as Recorded, label};
 use sightline_session::step::RunStep;
 
 use super::RecordedStage;
@@ -9,16 +9,44 @@ use crate::command::Command;
 use crate::panels::{digits, numbers};
 use crate::theme;
 
-/// Shows the quantities of a stage.
+/// Shows the quantities of a stage that have a value, those of a part under its title; then the names of those without.
 pub(super) fn show(ui: &mut Ui, trace: &RunStep, stage: RecordedStage, out: &mut Vec<Command>) {
     let schema = stage.schema();
-    egui::Grid::new(ui.next_auto_id()).num_columns(2).spacing([10.0, 2.0]).show(ui, |ui| {
-        for (index, quantity) in schema.quantities.iter().enumerate() {
-            let name = format!("{}.{}", schema.stage, quantity.name);
-            show_quantity(ui, trace.step, (&name, quantity), &stage.value(trace, index), out);
-            ui.end_row();
+    let all: Vec<(&Quantity, Recorded)> =
+        schema.quantities.iter().enumerate().map(|(k, quantity)| (quantity, stage.value(trace, k))).collect();
+    let mut groups: Vec<(&str, Vec<&(&Quantity, Recorded)>)> = vec![("", Vec::new())];
+    for entry in all.iter().filter(|(_, value)| *value != Recorded::Missing) {
+        let group = group_of(&entry.0.name);
+        match groups.iter_mut().find(|(known, _)| *known == group) {
+            Some((_, entries)) => entries.push(entry),
+            None => groups.push((group, vec![entry])),
         }
-    });
+    }
+    for (group, entries) in groups.iter().filter(|(_, entries)| !entries.is_empty()) {
+        if !group.is_empty() {
+            ui.label(theme::note(label(group, Unit::One)).color(theme::text()));
+        }
+        egui::Grid::new(ui.next_auto_id()).num_columns(2).spacing([10.0, 2.0]).show(ui, |ui| {
+            for (quantity, value) in entries {
+                let name = format!("{}.{}", schema.stage, quantity.name);
+                show_quantity(ui, trace.step, (&name, *quantity), value, out);
+                ui.end_row();
+            }
+        });
+    }
+    let missing: Vec<&str> = all
+        .iter()
+        .filter(|(_, value)| *value == Recorded::Missing)
+        .map(|(quantity, _)| quantity.label.as_ref())
+        .collect();
+    if !missing.is_empty() {
+        ui.add(egui::Label::new(theme::note(format!("no value: {}", missing.join(", ")))).wrap());
+    }
+}
+
+/// The part of the evidence to which a quantity belongs; empty for the stage itself.
+fn group_of(name: &str) -> &str {
+    name.split_once('.').map_or("", |(group, _)| group)
 }
 
 /// A quantity: its name, which leads to its origin, and its value with unit and formula.
@@ -33,14 +61,10 @@ fn show_quantity(
     let rows = matrix_of(quantity.kind, value);
     let mut help = quantity.description.to_string();
     if !quantity.formula.is_empty() {
-        help += &format!("\n= {}", quantity.formula);
+        help += &format!("\n= {}", theme::formula(&quantity.formula));
     }
-    if *value == Recorded::Missing {
-        ui.label(theme::label(quantity.label.as_ref()).size(12.0)).on_hover_text(help);
-    } else {
-        let link = ui.link(RichText::new(quantity.label.as_ref()).size(12.0)).on_hover_text(help);
-        numbers::ask(&link, step, name, &words, out);
-    }
+    let link = ui.link(RichText::new(quantity.label.as_ref()).size(12.0)).on_hover_text(help);
+    numbers::ask(&link, step, name, &words, out);
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         match rows {
@@ -50,7 +74,8 @@ fn show_quantity(
             }
         }
         let formula = Some(&quantity.formula).filter(|formula| !formula.is_empty());
-        let notes = [quantity.unit_label(), formula.map_or_else(String::new, |f| format!("= {f}"))];
+        let notes =
+            [quantity.unit_label(), formula.map_or_else(String::new, |f| format!("= {}", theme::formula(f)))];
         for note in notes.into_iter().filter(|note| !note.is_empty()) {
             ui.label(theme::note(note));
         }
@@ -101,16 +126,29 @@ fn matrix_of(kind: Kind, value: &Recorded) -> Option<Vec<Vec<f64>>> {
     }
 }
 
-/// A matrix in rows and columns.
+/// A matrix in rows and columns with the names of its axes.
 pub(super) fn matrix(ui: &mut Ui, rows: &[Vec<f64>]) {
+    let columns = rows.first().map_or(0, Vec::len);
     egui::Grid::new(ui.next_auto_id()).spacing([14.0, 1.0]).show(ui, |ui| {
-        for row in rows {
+        ui.label("");
+        for name in axes(columns) {
+            ui.label(theme::note(*name));
+        }
+        ui.end_row();
+        for (row, name) in rows.iter().zip(axes(rows.len())) {
+            ui.label(theme::note(*name));
             for value in row {
                 ui.label(theme::number(format!("{value:+.2e}")).size(11.0));
             }
             ui.end_row();
         }
     });
+}
+
+/// The names of the axes of a matrix with so many rows or columns.
+fn axes(count: usize) -> &'static [&'static str] {
+    const ALL: [&str; 6] = ["x", "y", "z", "roll", "pitch", "yaw"];
+    &ALL[..count.min(ALL.len())]
 }
 
 #[cfg(test)]

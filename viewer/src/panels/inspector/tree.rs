@@ -46,8 +46,10 @@ pub(super) fn entries(ui: &mut Ui, at: &Place, record: &Value, out: &mut Vec<Com
         ui.label(theme::number(record.to_string()));
         return;
     };
-    let (plain, nested): (Vec<_>, Vec<_>) =
-        fields.iter().partition(|(key, value)| words(key, value).is_some());
+    let (plain, nested): (Vec<_>, Vec<_>) = fields
+        .iter()
+        .filter(|(_, value)| !is_empty(value))
+        .partition(|(key, value)| words(key, value).is_some());
     egui::Grid::new(ui.next_auto_id()).num_columns(2).spacing([10.0, 2.0]).show(ui, |ui| {
         for (key, value) in plain {
             let (at, words) = (at.field(key), words(key, value).unwrap_or_default());
@@ -115,6 +117,16 @@ fn children(ui: &mut Ui, at: &Place, key: &str, value: &Value, out: &mut Vec<Com
     }
 }
 
+/// Whether an entry has nothing to show.
+fn is_empty(value: &Value) -> bool {
+    match value {
+        Value::Null => true,
+        Value::Array(list) => list.is_empty(),
+        Value::Object(fields) => fields.values().all(is_empty),
+        _ => false,
+    }
+}
+
 /// Whether a record is short enough to be open from the start.
 fn is_small(key: &str, value: &Value) -> bool {
     match value {
@@ -136,13 +148,11 @@ fn is_matrix(key: &str, value: &Value) -> bool {
 /// A value that fits on a line; none for records and long lists.
 fn words(key: &str, value: &Value) -> Option<String> {
     match value {
-        Value::Null => Some("none".to_owned()),
         Value::Bool(is) => Some(if *is { "yes" } else { "no" }.to_owned()),
         Value::Number(number) => {
             Some(with_degrees(number.as_f64()?, Unit::of_name(key).unwrap_or(Unit::One)))
         }
         Value::String(text) => Some(text.clone()),
-        Value::Array(list) if list.is_empty() => Some("none".to_owned()),
         Value::Array(list)
             if list.len() <= 4 && !is_matrix(key, value) && list.iter().all(Value::is_number) =>
         {
@@ -167,8 +177,10 @@ mod tests {
         assert_eq!(words("roll_rad", &json!(0.1)).unwrap(), "0.100 (5.73°)");
         assert_eq!(words("pixel", &json!({"x": 1.25, "y": 2.0})).unwrap(), "1.25, 2.00");
         assert_eq!(words("position_in_rover", &json!([1.0, 2.5, -0.2])).unwrap(), "1  2.500  -0.200");
-        assert_eq!(words("missing", &Value::Null).unwrap(), "none");
-        assert_eq!(words("tried", &json!([])).unwrap(), "none");
+        for empty in [Value::Null, json!([]), json!({ "left": null, "right": [] })] {
+            assert!(is_empty(&empty), "{empty}");
+        }
+        assert!(!is_empty(&json!({ "left": 0 })));
         assert!(words("peak", &json!({"score": 1, "x": 2})).is_none());
         assert!(words("covariance_px2", &json!([1.0, 0.0, 0.0, 1.0])).is_none());
     }

@@ -16,6 +16,7 @@ use crate::compare::state::{Look, Other};
 use crate::drawing::{decimate, ellipse};
 use crate::panels::chart::shape;
 use crate::panels::map::site::{in_site, on_map, truth_in_site};
+use crate::panels::numbers::fixed;
 use crate::state::State;
 use crate::theme;
 
@@ -73,9 +74,9 @@ pub(crate) fn show(ui: &mut Ui, state: &State, stops: &[StopView], run: &RunView
         .include_y(-LEAST_HALF_CM)
         .include_y(LEAST_HALF_CM)
         .set_margin_fraction(vec2(0.06, 0.06))
-        .x_axis_label(theme::note("east of the last position, cm"))
+        .x_axis_label(theme::note("east, cm (origin: last estimate)"))
         .y_axis_label(theme::note("north, cm"));
-    let plot = in_site(plot, |at| format!("E {:+.1}  N {:+.1} cm", at.x, at.y));
+    let plot = in_site(plot, |at| format!("E {}  N {} cm", fixed(at.x, 1), fixed(at.y, 1)));
     plot.show(ui, |plot| paint(plot, state, (run, &positions, here.as_ref()), origin));
 }
 
@@ -92,8 +93,8 @@ fn sentence(positions: &[Position], here: Option<&Position>) -> String {
         at.and_then(long_axis_cm).map_or_else(|| "none".to_owned(), |cm| format!("{cm:.1}"))
     };
     let (first, last) = (width(positions.first()), width(positions.last()));
-    let here = here.map_or_else(String::new, |here| format!(", here {}", width(Some(here))));
-    format!("3σ, cm: pick {first}{here}, end {last}")
+    let here = here.map_or_else(String::new, |here| format!(" · now {}", width(Some(here))));
+    format!("3σ (cm): at pick {first}{here} · at end {last}")
 }
 
 /// The longer half axis of the 3 σ ellipse, cm.

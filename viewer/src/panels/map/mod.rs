@@ -19,6 +19,7 @@ use crate::drawing::overlay;
 use crate::drawing::overlay::Mark;
 use crate::panels::map::site::{in_site, on_map, truth_in_site};
 use crate::panels::names;
+use crate::panels::numbers::fixed;
 use crate::panels::panel::{Panel, TableOf};
 use crate::panels::sheets;
 use crate::pointed::Pointed;
@@ -104,7 +105,7 @@ fn drive(ui: &mut Ui, state: &State, stops: &[StopView], run: Option<&RunView>, 
         .show_grid([true, true])
         .x_axis_label(theme::note("east, m"))
         .y_axis_label(theme::note("north, m"));
-    let plot = in_site(plot, |at| format!("E {:.2}  N {:.2} m", at.x, at.y));
+    let plot = in_site(plot, |at| format!("E {}  N {} m", fixed(at.x, 2), fixed(at.y, 2)));
     let response = plot.show(ui, |plot| {
         paint_paths(plot, stops, state.cursor.step);
         if let Some(run) = run {
@@ -143,7 +144,11 @@ fn names_of(state: &State, stops: &[StopView]) -> Vec<(Mark, Color32, String)> {
         names.push((other.look.mark, other.look.colour, format!("target, {}", state.run_label(other.name))));
     }
     if let Some((_, off_m)) = truth_in_site(state) {
-        names.push((Mark::Plus, theme::truth(), format!("truth, {:.0} cm off", off_m * 100.0)));
+        names.push((
+            Mark::Plus,
+            theme::truth(),
+            format!("truth, {:.0} cm off (site-frame drift of odometry)", off_m * 100.0),
+        ));
     }
     if state.cycle_at(state.cursor.step).is_some() {
         names.push((Mark::Cross, theme::accent(), "goal".to_owned()));

@@ -5,6 +5,7 @@ use sightline_geometry::frames::Point3;
 
 use crate::panels::chart::{few_marks, plain};
 use crate::state::State;
+use crate::theme;
 
 /// East and north of a point of the site frame.
 pub(super) fn on_map(point_in_site: &Point3) -> [f64; 2] {
@@ -14,6 +15,7 @@ pub(super) fn on_map(point_in_site: &Point3) -> [f64; 2] {
 /// A plot seen from above: few marks, and the place under the pointer in words.
 pub(super) fn in_site<'a>(plot: Plot<'a>, words: fn(&PlotPoint) -> String) -> Plot<'a> {
     plot.y_axis_min_width(22.0)
+        .grid_color(theme::line())
         .x_grid_spacer(few_marks)
         .x_axis_formatter(plain)
         .y_grid_spacer(few_marks)

@@ -5,6 +5,7 @@ use sightline_session::compare::RunName;
 use sightline_session::metrics::{Excluded, NAMES, RunMetrics};
 
 use crate::command::Command;
+use crate::panels::numbers::counted;
 use crate::panels::runs::table;
 use crate::state::State;
 use crate::theme;
@@ -82,7 +83,7 @@ fn header(found: &RunMetrics) -> Vec<String> {
     };
     let mut lines = vec![
         format!("protocol: {}; version {}", found.protocol, found.version),
-        format!("{} steps so far; {truth}", found.steps),
+        format!("{} so far; {truth}", counted(found.steps, "step")),
     ];
     lines.extend(found.excluded.iter().map(excluded));
     lines

@@ -43,13 +43,25 @@ fn one(ui: &mut Ui, sheet: &Sheet, tall: f32, out: &mut Vec<Command>) {
         ui.spacing_mut().item_spacing = vec2(0.0, 0.0);
         head(ui, sheet, &widths);
         // A long table keeps its head in sight and makes only the rows that are seen.
-        let rows = ScrollArea::vertical().id_salt("rows").max_height(tall).auto_shrink([false, true]);
+        let mut rows = ScrollArea::vertical().id_salt("rows").max_height(tall).auto_shrink([false, true]);
+        if let Some(at) = came_to(ui, sheet) {
+            rows = rows.vertical_scroll_offset((at as f32 * ROW - 0.5 * tall).max(0.0));
+        }
         rows.show_rows(ui, ROW, sheet.rows.len(), |ui, range| {
             for (number, row) in range.clone().zip(&sheet.rows[range]) {
                 ui.push_id(number, |ui| line(ui, row, &widths, out));
             }
         });
     });
+}
+
+/// The row of the cursor's step, in the frame in which the cursor came there.
+fn came_to(ui: &Ui, sheet: &Sheet) -> Option<usize> {
+    let present = sheet.rows.iter().position(|row| row.is_present);
+    let id = ui.unique_id().with("present row");
+    let before =
+        ui.data_mut(|data| std::mem::replace(data.get_temp_mut_or_default::<Option<usize>>(id), present));
+    present.filter(|_| before != present)
 }
 
 /// The width of every column: that of its longest word.
@@ -121,4 +133,29 @@ fn role(ui: &Ui, role: egui::Role, name: &str) {
             node.set_label(name);
         }
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::panels::sheets::Column;
+
+    #[test]
+    fn a_long_table_shows_the_row_of_the_cursor_s_step() {
+        let sheet = |present: usize| {
+            let mut sheet = Sheet::over_steps("Over the steps", vec![Column::new("ncc", "")]);
+            (0..200).for_each(|step| sheet.step(step, present, vec![Some(0.5).into()]));
+            sheet
+        };
+        let mut harness = egui_kittest::Harness::builder()
+            .with_size([300.0, 300.0])
+            .build_ui_state(move |ui, present: &mut usize| show(ui, &[sheet(*present)], &mut Vec::new()), 0);
+        for step in [150, 20] {
+            *harness.state_mut() = step;
+            harness.run_steps(4);
+            let name = format!("go to step {step}");
+            let row = egui_kittest::kittest::Queryable::query_by_label(&harness, &name);
+            assert!(row.is_some(), "step {step} is not on the screen");
+        }
+    }
 }

@@ -1,5 +1,6 @@
 //! The template strip: how the reference became what was compared, and what remained.
 
+mod designated;
 mod patch;
 mod pointed;
 
@@ -58,7 +59,7 @@ fn caption(trace: &RunStep, array: ArrayName) -> (String, String) {
         let is_on = number(applied) == number(computed);
         number(applied).filter(|_| is_on).map_or_else(|| "off".to_owned(), words)
     };
-    let score = |name: &str| number(name).map_or_else(String::new, |score| format!("ncc {score:.2}"));
+    let score = |name: &str| number(name).map_or_else(String::new, |score| format!("score {score:.2}"));
     let (title, step) = match array {
         ArrayName::REFERENCE => {
             let step = number("scale_roll.template_step").unwrap_or_default();
@@ -68,7 +69,9 @@ fn caption(trace: &RunStep, array: ArrayName) -> (String, String) {
             let scale = applied(["scale_roll.applied_scale", "scale_roll.scale"], |v| format!("×{v:.3}"));
             ("scaled", scale)
         }
-        ArrayName::ROLLED if number("scale_roll.warped") == Some(1.0) => ("warped", "slope".to_owned()),
+        ArrayName::ROLLED if number("scale_roll.warped") == Some(1.0) => {
+            ("warp: surface slope", String::new())
+        }
         ArrayName::ROLLED => {
             let roll = applied(["scale_roll.applied_roll_rad", "scale_roll.roll_rad"], |v| {
                 format!("{:+.2}°", v.to_degrees())
@@ -105,13 +108,18 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let patches = state.trace().map(patches).unwrap_or_default();
     let area = ui.available_rect_before_wrap();
     let has_pointer = state.trace().is_some_and(|trace| pointed::is_there(trace));
-    let count = (patches.len() + usize::from(has_pointer)) as f32;
+    let template = state.trace().and_then(designated::pixel).filter(|_| !patches.is_empty());
+    let count = (patches.len() + usize::from(has_pointer) + usize::from(template.is_some())) as f32;
     let across = (area.width() - BETWEEN * (count - 1.0)) / count;
     let side = across.min(area.height() - WORDS.0 - WORDS.1).max(16.0);
     let width = side * count + BETWEEN * (count - 1.0);
     let mut at = pos2(area.left() + ((area.width() - width) / 2.0).max(0.0), area.top() + WORDS.0);
+    if let Some(pixel) = template {
+        designated::show(ui, state, pixel, Rect::from_min_size(at, vec2(side, side)));
+        at.x += side + BETWEEN;
+    }
     for (i, patch) in patches.iter().enumerate() {
-        if i > 0 {
+        if i > 0 || template.is_some() {
             arrow(ui, pos2(at.x - BETWEEN / 2.0, at.y + side / 2.0), &patch.step);
         }
         let frame = Rect::from_min_size(at, vec2(side, side));

@@ -27,8 +27,8 @@ pub(super) fn paint_patch(ui: &Ui, raster: &Raster, frame: Rect) {
 fn statistics(ui: &Ui, raster: &Raster, frame: Rect) {
     let below = frame.center_bottom() + vec2(0.0, 4.0);
     let words = match frame.width() + BETWEEN {
-        room if room > 170.0 => format!("mean {:.3}  σ {:.3}", raster.mean, raster.sigma),
-        _ => format!("{:.3} ±{:.3}", raster.mean, raster.sigma),
+        room if room > 170.0 => format!("mean {:.3} ± std {:.3}", raster.mean, raster.sigma),
+        _ => format!("{:.3} ± {:.3}", raster.mean, raster.sigma),
     };
     ui.painter().text(below, Align2::CENTER_TOP, words, theme::digit_font(), theme::text());
 }

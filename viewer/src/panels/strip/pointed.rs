@@ -58,7 +58,7 @@ fn score_at(state: &State, pixel: Pixel) -> Option<(&'static str, Option<f32>)> 
 /// Shows the place.
 pub(crate) fn show(ui: &mut Ui, state: &State, frame: Rect) {
     paint_title(ui, frame, TITLE);
-    let words = match state.pointed_left().map(|pixel| cut(ui, state, pixel)) {
+    let words = match state.pointed_left().map(|pixel| cut(ui, state, pixel, Cut::Pointed)) {
         Some(Some(raster)) => {
             paint_patch(ui, &raster, frame);
             let score = score(state);
@@ -91,8 +91,17 @@ fn empty(ui: &Ui, frame: Rect, words: &str) -> String {
     format!("{TITLE}: {words}")
 }
 
-/// The patch, made once for as long as the pointer stays on the pixel; none where it would leave the image.
-fn cut(ui: &Ui, state: &State, pixel: Pixel) -> Option<Arc<Raster>> {
+/// Which patch is cut from the left image.
+#[derive(Clone, Copy, Debug, Hash)]
+pub(super) enum Cut {
+    /// The one about the pointer.
+    Pointed,
+    /// The template of the designation.
+    Template,
+}
+
+/// The patch about a pixel, made once for as long as the pixel stays; `None` where it would leave the image.
+pub(super) fn cut(ui: &Ui, state: &State, pixel: Pixel, which: Cut) -> Option<Arc<Raster>> {
     let image = state.image(Eye::Left).ready()?;
     let side = match state.array(ArrayName::ROLLED).ready() {
         Some(rolled) => rolled.size()[0],
@@ -100,14 +109,14 @@ fn cut(ui: &Ui, state: &State, pixel: Pixel) -> Option<Arc<Raster>> {
     };
     let area = window(pixel, side, image.size())?;
     let of = (state.traverse.as_ref()?.id.clone(), state.cursor.step, area);
-    let id = Id::unique("the patch that is pointed at");
+    let id = Id::unique(("a patch of the left image", which));
     let kept = ui.data(|data| data.get_temp::<Kept>(id)).filter(|kept| kept.of == of);
     let kept = kept.unwrap_or_else(|| Kept { of, raster: Arc::new(raster(ui, image, area)) });
     ui.data_mut(|data| data.insert_temp(id, kept.clone()));
     Some(kept.raster)
 }
 
-/// The patch of the last frame: traverse, step and pixels.
+/// A patch of the last frame: traverse, step and pixels.
 #[derive(Clone)]
 struct Kept {
     of: (String, usize, PixelRect),

@@ -1,4 +1,5 @@
-//! The timeline: a lane of events and breakpoints' hits, a state band for each run, the loop, and the playhead.
+//! The timeline: a lane of events and breakpoints' hits, a filmstrip of matched windows, a state band for each run, curves of
+//! score and error, the loop, and the playhead.
 //!
 //! A click goes to the step, a drag scrubs, a click in the lane breaks at the step. Everything is drawn by columns of
 //! the screen ([`lod`]): the shapes of a frame are bounded by the width, whatever the number of steps. Counted at 1400
@@ -6,6 +7,8 @@
 //! 1,000 steps as for 10,000 and 40,000 (`tests/timelines.rs` holds a bound of 13,220).
 
 mod cells;
+mod curves;
+pub(crate) mod film;
 pub(crate) mod lod;
 mod marks;
 
@@ -14,6 +17,7 @@ use sightline_session::view::{RunView, TargetView};
 
 use self::cells::cell_of;
 pub(crate) use self::cells::{Cell, cell};
+use self::film::FILM;
 use self::lod::{Scale, Span};
 use self::marks::{LANE, NUMBERS};
 use crate::breakpoints::Ask;
@@ -74,7 +78,7 @@ fn bands(state: &State) -> Vec<Band<'_>> {
 /// Height of the timeline as it is now, points.
 pub(crate) fn height(state: &State) -> f32 {
     let bands: f32 = bands(state).iter().map(|band| band.height() + GAP).sum();
-    LANE + bands.max(BAND + GAP) + NUMBERS
+    LANE + FILM + bands.max(BAND + GAP) + curves::HEIGHT + NUMBERS
 }
 
 /// Shows the timeline.
@@ -98,6 +102,10 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     marks::rendered(&painter, all.bottom() + 1.0, &scale, |step| is_ready(state, step));
     marks::numbers(&painter, drive.with_min_y(rect.bottom() - NUMBERS), count, &scale);
     marks::lane(&painter, lane, state, &scale);
+    film::paint(&painter, all.with_max_y(lane.bottom() + FILM), state, &scale);
+    let below = all.bottom() - curves::HEIGHT;
+    curves::paint(&painter, drive, below, GUTTER, state, &scale);
+    crate::notes::marks::timeline(&painter, lane, state, &scale);
     marks::loop_range(&painter, all, state, &scale, count);
     marks::playhead(&painter, all, state.cursor.step.min(count - 1), &scale);
     let pointed = response.hover_pos().or(response.interact_pointer_pos());
@@ -125,7 +133,7 @@ fn paint_bands(
     drive: Rect,
     scale: &Scale,
 ) -> Vec<Rect> {
-    let mut top = drive.top() + LANE + GAP;
+    let mut top = drive.top() + LANE + FILM + GAP;
     if bands.is_empty() {
         let frame = Rect::from_min_max(pos2(drive.left(), top), pos2(drive.right(), top + BAND));
         cells::paint(painter, frame, Cell::Before);
@@ -315,14 +323,41 @@ fn words(state: &State, band: Option<&Band<'_>>, step: usize, in_lane: bool) -> 
             words += &format!("\n{reason}");
         }
     }
-    for hit in state.hit_at(step).into_iter().take(4) {
+    let of_run = shown.and_then(|(target, run)| Some((target.number, run?.number)));
+    let hits = of_run.map(|(target, run)| state.hit_at(target, run, step)).unwrap_or_default();
+    for hit in hits.into_iter().take(4) {
         words += &format!("\n◆ {hit}");
     }
+    for note in crate::notes::marks::words(state, step).into_iter().take(3) {
+        words += &format!("\n{note}");
+    }
     if in_lane {
-        words += "\nclick: break at this step, or no longer";
+        words += "\nclick: toggle breakpoint here";
     }
     if !is_ready(state, step) {
         words += "\nits images are not rendered yet";
     }
     words
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::ask::breakpoint;
+    use crate::tests::fixture;
+
+    #[test]
+    fn the_tooltip_of_another_run_has_the_hits_of_that_run() {
+        let mut state = fixture::at_step(&egui::Context::default(), 2);
+        let target = &mut state.session.as_mut().unwrap().targets[0];
+        let second = RunView { number: 1, ..target.runs[0].clone() };
+        target.runs.push(second);
+        let mut hit = breakpoint(0, "ncc < 0.6", &[3]);
+        hit.hits[0].run = 1;
+        state.ask.breakpoints = vec![hit];
+        let bands = bands(&state);
+        let words = |run: usize| words(&state, Some(&bands[run]), 3, false);
+        assert!(!words(0).contains("◆ ncc < 0.6"), "{}", words(0));
+        assert!(words(1).contains("◆ ncc < 0.6"), "{}", words(1));
+    }
 }

@@ -3,7 +3,8 @@
 use egui::{Align, Button, Frame, Label, Layout, Margin, Pos2, Rect, RichText, Ui, UiBuilder, vec2};
 use sightline_session::marks::square;
 use sightline_session::what_if::Ghost;
-use sightline_session::why::words::signed;
+use sightline_session::why::gates;
+use sightline_session::why::words::{capitalised, setting_name, signed};
 
 use crate::command::Command;
 use crate::drawing::overlay::{Line, Mark, Overlay};
@@ -137,7 +138,9 @@ fn changes(state: &State, trial: &Trial) -> Vec<String> {
     let group = |key: &str| state.settings.iter().find(|info| info.key == key).map(|info| info.group.clone());
     let settings = trial.what_if.settings.iter().map(|(key, value)| {
         let before = group(key).and_then(|group| state.setting(&group, key));
-        format!("{key} = {value} instead of {}", before.unwrap_or_default())
+        let unit = state.settings.iter().find(|info| info.key == *key).map_or("", |info| info.unit.as_str());
+        let words = format!("{} {} → {value} {unit}", setting_name(key), before.unwrap_or_default());
+        words.trim_end().to_owned()
     });
     let moved = trial.what_if.prediction_px.map(|to| {
         let from = state.trace().and_then(|trace| trace.point_mast.predicted_left);
@@ -149,30 +152,34 @@ fn changes(state: &State, trial: &Trial) -> Vec<String> {
     settings.chain(moved).collect()
 }
 
+/// The recorded state and the one of the trial: `Lost → Tracking`.
+fn transition(recorded: &str, tried: &str) -> String {
+    let tried = capitalised(tried);
+    if recorded == tried.to_lowercase() { tried } else { format!("{} → {tried}", capitalised(recorded)) }
+}
+
 /// State, score and place of the ghost, with what changed.
 fn result(ui: &mut Ui, ghost: &Ghost, is_newest: bool) {
     let tracking = state_of(&ghost.row);
     let deltas = &ghost.deltas;
     flow(ui, |ui| {
-        ui.label(RichText::new(ghost.row.state.to_uppercase()).strong().color(theme::state(tracking)));
-        if deltas.state_recorded != ghost.row.state {
-            ui.label(theme::note(format!("was {}", deltas.state_recorded)));
-        }
+        let words = transition(&deltas.state_recorded, &ghost.row.state);
+        ui.label(RichText::new(words).strong().color(theme::state(tracking)));
         match ghost.is_right() {
             Some(true) => {
-                ui.label(theme::note("right"));
+                ui.label(theme::note("(correct)"));
             }
             Some(false) if ghost.row.state == "tracking" => {
-                ui.label(RichText::new("but FALSE").strong().color(theme::failed()));
+                ui.label(RichText::new("(wrong target)").strong().color(theme::failed()));
             }
             _ => {}
         }
     });
     let lines = [
-        ("ncc", ghost.row.ncc, deltas.ncc, ""),
-        ("stereo", ghost.row.stereo_score, deltas.stereo_score, ""),
+        (gates::label("ncc"), ghost.row.ncc, deltas.ncc, ""),
+        (gates::label("stereo_ncc"), ghost.row.stereo_score, deltas.stereo_score, ""),
         ("confidence", ghost.row.confidence.filter(|_| ghost.row.ncc.is_none()), deltas.confidence, ""),
-        ("err", ghost.row.err_px, deltas.err_px, " px"),
+        ("error", ghost.row.err_px, deltas.err_px, " px"),
     ];
     for (name, value, delta, unit) in lines {
         if let Some(value) = value {
@@ -181,7 +188,7 @@ fn result(ui: &mut Ui, ghost: &Ghost, is_newest: bool) {
         }
     }
     if let Some(moved) = deltas.moved_px {
-        ui.label(theme::number(format!("match moved {moved:.2} px")).size(11.0));
+        ui.label(theme::number(format!("Match shift {moved:.1} px")).size(11.0));
     }
     if let Some(missing) = &ghost.missing {
         sentence(ui, RichText::new(missing).small().color(theme::lost()));

@@ -1,6 +1,6 @@
 //! Handles in the left image: the search window's and the template's corners, and the predicted point.
 
-use egui::{Color32, CursorIcon, Rect, Response, Sense, Ui, Vec2, WidgetInfo, vec2};
+use egui::{Color32, CursorIcon, Rect, Response, Sense, Stroke, StrokeKind, Ui, Vec2, WidgetInfo, vec2};
 use serde_json::json;
 use sightline_geometry::frames::Pixel;
 use sightline_track::settings::TrackerKind;
@@ -30,11 +30,11 @@ pub(crate) fn show(ui: &mut Ui, canvas: &Canvas, state: &State, trace: &StepTrac
         let template = side(state, "template_size_px").unwrap_or(LEAST[1]);
         let limits = [LEAST[0].max(template), MOST[0]];
         let corner = Corner { name: "search window size", key: "search_window_px", centre, limits };
-        corner.show(ui, canvas, window, theme::search(), state, out);
+        corner.show(ui, canvas, window, theme::on_image(theme::search), state, out);
         let matched = trace.located().and_then(|located| located.left_pixel).unwrap_or(centre);
         let limits = [LEAST[1], MOST[1].min(window)];
         let corner = Corner { name: "template size", key: "template_size_px", centre: matched, limits };
-        let colour = theme::run(state.cursor.run);
+        let colour = theme::on_image(|| theme::run(state.cursor.run));
         corner.show(ui, canvas, template, colour, state, out);
     }
     point(ui, canvas, centre, out);
@@ -62,6 +62,13 @@ impl Corner {
         let at = self.centre.offset(half, half);
         let Some(response) = handle(ui, canvas, self.key, at, colour) else { return };
         response.widget_info(|| WidgetInfo::slider(true, side as f64, format!("{} handle, px", self.name)));
+        // Without limits of its own a slider in the page's document ends at 100.
+        ui.ctx().accesskit_node_builder(response.id, |node| {
+            let [least, most] = self.limits.map(|limit| limit as f64);
+            node.set_min_numeric_value(least);
+            node.set_max_numeric_value(most);
+            node.set_numeric_value_step(2.0);
+        });
         let dragged = response.dragged().then(|| response.interact_pointer_pos()).flatten();
         if let Some(pointer) = dragged {
             let to = canvas.transform.to_pixel(pointer);
@@ -81,7 +88,9 @@ impl Corner {
 
 /// The handle of the predicted point.
 fn point(ui: &mut Ui, canvas: &Canvas, at: Pixel, out: &mut Vec<Command>) {
-    let Some(response) = handle(ui, canvas, "prediction", at, theme::prediction()) else { return };
+    let Some(response) = handle(ui, canvas, "prediction", at, theme::on_image(theme::prediction)) else {
+        return;
+    };
     let words = format!("prediction handle, at {:.1}, {:.1} px", at.x, at.y);
     response.widget_info(|| WidgetInfo::labeled(egui::Role::Button, true, &words));
     let dragged = response.dragged().then(|| response.interact_pointer_pos()).flatten();
@@ -96,7 +105,7 @@ fn point(ui: &mut Ui, canvas: &Canvas, at: Pixel, out: &mut Vec<Command>) {
     response.on_hover_cursor(CursorIcon::Move).on_hover_text("Drag to try another prediction");
 }
 
-/// A handle, where it is on the canvas.
+/// A handle, where it is on the canvas; it is painted while the pointer or the keyboard is there.
 fn handle(ui: &mut Ui, canvas: &Canvas, id: &str, at: Pixel, colour: Color32) -> Option<Response> {
     let place = canvas.transform.to_screen(at);
     if !canvas.transform.rect.contains(place) {
@@ -106,8 +115,14 @@ fn handle(ui: &mut Ui, canvas: &Canvas, id: &str, at: Pixel, colour: Color32) ->
     let response = ui.interact(area, ui.scope_id().with(("what if", id)), Sense::drag());
     let reach = if response.hovered() || response.dragged() { MARK + 2.0 } else { MARK };
     let mark = Rect::from_center_size(place, vec2(2.0 * reach, 2.0 * reach));
-    canvas.painter.rect_filled(mark.expand(1.0), 1.0, theme::halo());
-    canvas.painter.rect_filled(mark, 1.0, colour);
+    // Without pointer or keyboard on the image nothing covers it.
+    let is_near =
+        ui.rect_contains_pointer(canvas.transform.rect) || response.dragged() || response.has_focus();
+    if is_near {
+        for (colour, width) in [(theme::on_image(theme::halo), 3.4), (colour, 1.4)] {
+            canvas.painter.rect_stroke(mark, 1.0, Stroke::new(width, colour), StrokeKind::Middle);
+        }
+    }
     Some(response)
 }
 

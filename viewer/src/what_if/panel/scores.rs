@@ -98,7 +98,7 @@ fn words(tried: &TemplateMatch, recorded: Option<&TemplateMatch>) -> String {
         let peak = matched.second_peak.as_ref();
         peak.map_or_else(
             || "none".to_owned(),
-            |peak| format!("{:.0} % at {:.0} px", peak.ratio * 100.0, peak.distance_px),
+            |peak| format!("{:.2} of best, {:.0} px away", peak.ratio, peak.distance_px),
         )
     };
     let peak = &tried.peak;

@@ -1,9 +1,9 @@
-//! The criteria by margin: value, limit, margin, and a slider by which the limit is tried.
+//! The gates by margin: value, limit, margin, and a slider by which the limit is tried.
 
 use egui::{RichText, Sense, Slider, Ui, WidgetInfo, pos2, vec2};
 use serde_json::json;
-use sightline_session::why::gates::by_margin;
-use sightline_session::why::words::{number, signed, told_apart};
+use sightline_session::why::gates::{by_margin, label};
+use sightline_session::why::words::{number, setting_name, signed, told_apart};
 use sightline_track::limits::Domain;
 use sightline_track::stages::judge::{Gate, Verdict};
 
@@ -40,7 +40,7 @@ fn headline(ui: &mut Ui, step: usize, gate: &Gate, out: &mut Vec<Command>) {
         let word = if gate.passed { "pass" } else { "FAIL" };
         ui.label(RichText::new(word).strong().color(theme::verdict(gate.passed)));
         for (words, name) in [
-            (gate.name.clone(), format!("gate.{}", gate.name)),
+            (label(&gate.name).to_owned(), format!("gate.{}", gate.name)),
             (value, format!("value.{}", gate.name)),
             (
                 format!("{relation} {limit} {}", gate.unit).trim_end().to_owned(),
@@ -79,8 +79,8 @@ fn bar(ui: &mut Ui, gate: &Gate, relative: f64) {
     ui.painter().rect_filled(fill, 2.0, theme::verdict(gate.passed).gamma_multiply(0.85));
     ui.painter().vline(middle, rail.expand(2.0).y_range(), egui::Stroke::new(2.0, theme::strong()));
     let words = match gate.margin {
-        Some(margin) => format!("margin of {}: {} {}", gate.name, signed(margin), gate.unit),
-        None => format!("margin of {}: nothing to judge", gate.name),
+        Some(margin) => format!("margin of {}: {} {}", label(&gate.name), signed(margin), gate.unit),
+        None => format!("margin of {}: nothing to judge", label(&gate.name)),
     };
     response.widget_info(|| WidgetInfo::labeled(egui::Role::Meter, true, words.trim_end()));
     response.on_hover_text("The margin over the limit, from −100 % to +100 %; the line is the limit.");
@@ -99,9 +99,9 @@ fn limit_slider(ui: &mut Ui, state: &State, setting: &str, out: &mut Vec<Command
     // A factor that may be a hundred is seldom dragged beyond five times what it is.
     let high = if high > 1.0 { high.min((5.0 * in_run).max(1.0)) } else { high };
     let mut value = tried;
-    let name = theme::note(format!("try {setting}"));
+    let name = theme::note(format!("try {}", setting_name(setting)));
     let response = ui.add(Slider::new(&mut value, low..=high).max_decimals(3).text(name));
-    if response.on_hover_text("Drag to try another limit at this step").changed() {
+    if response.on_hover_text(format!("Drag to try another {setting} at this step")).changed() {
         let new = (value != in_run).then(|| json!(value));
         out.push(Command::Why(Ask::Change { key: setting.to_owned(), value: new }));
     }

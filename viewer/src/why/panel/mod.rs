@@ -1,12 +1,13 @@
-//! Why: the verdict in a sentence, the criteria by margin with limits that can be dragged, what would have saved the step,
-//! and where any number came from.
+//! Why: a card with the root cause and its evidence, where any number came from, what would have saved the step, and the gates
+//! by margin with limits that can be dragged.
 
 mod criteria;
 mod saved;
 mod tree;
+mod view;
 
-use egui::{CollapsingHeader, Id, RichText, ScrollArea, Ui, UiBuilder};
-use sightline_session::why::sentence;
+use egui::{CollapsingHeader, Frame, Id, Label, Margin, RichText, ScrollArea, Sense, Stroke, Ui, UiBuilder};
+use sightline_session::why::sentence::Summary;
 
 use crate::command::Command;
 use crate::panels::pane::Need;
@@ -36,19 +37,15 @@ impl Panel for Why {
 /// Shows the panel.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let step = state.cursor.step;
-    let (Some(trace), Some(run)) = (state.trace(), state.run()) else { return };
-    let before = step.checked_sub(1).and_then(|before| state.trace_at(before).ready());
-    let words = sentence::verdict(trace, before, &run.settings);
+    let Some(poses) = state.poses() else { return };
+    let Some(book) = state.book(&poses) else { return };
+    let trace = book.trace;
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        let said = ui.add(
-            egui::Label::new(RichText::new(&words).color(theme::strong())).wrap().sense(egui::Sense::click()),
-        );
-        said.context_menu(|ui| {
-            if ui.button("Copy sentence").clicked() {
-                ui.ctx().copy_text(words.clone());
-                ui.close();
-            }
-        });
+        let top = ui.cursor().top();
+        card(ui, state, &book.summary());
+        if !state.why.in_view.is_tree {
+            view::bring(ui, state.why.in_view.count, top, true);
+        }
         ui.horizontal_wrapped(|ui| {
             let explain =
                 ui.button("Why this state?").on_hover_text("Where the tracking state of this step came from");
@@ -57,13 +54,36 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             }
             saved::button(ui, state, out);
         });
-        saved::show(ui, state, out);
         tree::show(ui, state, out);
+        saved::show(ui, state, out);
         if let Some(verdict) = trace.verdict() {
-            section(ui, "criteria, worst margin first", |ui| criteria::show(ui, state, verdict, out));
+            section(ui, "gates, worst margin first", |ui| criteria::show(ui, state, verdict, out));
         }
         if panel::can_be_tried(trace) {
             section(ui, "what if, for this step", |ui| panel::form(ui, state, trace, out));
+        }
+    });
+}
+
+/// The headline with its bullets, in a frame of the colour of the tracking state.
+fn card(ui: &mut Ui, state: &State, summary: &Summary) {
+    let colour = theme::state(state.tracking().unwrap_or_default());
+    let frame = Frame::new().stroke(Stroke::new(1.5, colour)).corner_radius(4).inner_margin(Margin::same(6));
+    let shown = frame.show(ui, |ui| {
+        ui.set_min_width(ui.available_width());
+        ui.spacing_mut().item_spacing.y = 3.0;
+        let headline = RichText::new(&summary.headline).size(14.0).strong().color(theme::strong());
+        let headline = ui.add(Label::new(headline).wrap().sense(Sense::click()));
+        for bullet in &summary.bullets {
+            let words = RichText::new(format!("• {bullet}")).size(12.0).color(theme::text());
+            ui.add(Label::new(words).wrap());
+        }
+        headline
+    });
+    shown.inner.context_menu(|ui| {
+        if ui.button("Copy text").clicked() {
+            ui.ctx().copy_text(summary.text());
+            ui.close();
         }
     });
 }

@@ -1,13 +1,17 @@
 //! What would have saved the step: the question, how far it is, and the findings with what can be done with each.
 
-use egui::{Button, Label, ProgressBar, RichText, Ui, vec2};
+use egui::{Button, CollapsingHeader, Color32, Frame, Label, Margin, ProgressBar, RichText, Ui, vec2};
 use sightline_session::counterfactual::wire::{Question, QuestionState};
-use sightline_session::counterfactual::{Answer, Finding, Outcome};
+use sightline_session::counterfactual::{Answer, Finding, Outcome, SettingChange};
 use sightline_session::view::RunView;
+use sightline_session::what_if::WhatIf;
+use sightline_session::why::gates::label;
+use sightline_session::why::words::{number, setting_name, signed};
 
 use crate::command::Command;
 use crate::state::{State, run_letter};
 use crate::theme;
+use crate::why::panel::view;
 use crate::why::{Ask, Told};
 
 /// The button that asks.
@@ -26,6 +30,7 @@ pub(crate) fn button(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 
 /// The findings so far.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let top = ui.cursor().top();
     match state.question() {
         None => {}
         Some(Told::Waiting) => {
@@ -36,6 +41,14 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         }
         Some(Told::Here(question)) => show_question(ui, state, question, out),
     }
+    // At another step the card comes first; at this one the answer that was asked for.
+    let answered = state.question().map(|told| match told {
+        Told::Here(question) => question.answer.as_ref().is_some_and(|answer| !answer.findings.is_empty()),
+        _ => false,
+    });
+    if let Some(key) = state.step_key(state.cursor.step) {
+        view::follow(ui, &format!("saved {key:?}"), Some(answered), top);
+    }
 }
 
 fn show_question(ui: &mut Ui, state: &State, question: &Question, out: &mut Vec<Command>) {
@@ -43,8 +56,20 @@ fn show_question(ui: &mut Ui, state: &State, question: &Question, out: &mut Vec<
     ui.label(theme::title("what would have saved it"));
     progress(ui, question, out);
     let Some(answer) = &question.answer else { return };
-    for (number, finding) in answer.findings.iter().enumerate() {
+    let all = || answer.findings.iter().enumerate();
+    for (number, finding) in all().filter(|(_, finding)| finding.outcome != Outcome::False) {
         ui.push_id(number, |ui| show_finding(ui, state, number, finding, out));
+    }
+    let is_false = |(_, finding): &(usize, &Finding)| finding.outcome == Outcome::False;
+    let count = all().filter(is_false).count();
+    if count > 0 {
+        let changes = if count == 1 { "1 change leads" } else { &format!("{count} changes lead") };
+        let title = theme::note(format!("{changes} to a wrong target"));
+        CollapsingHeader::new(title).id_salt("wrong targets").show(ui, |ui| {
+            for (number, finding) in all().filter(is_false) {
+                ui.push_id(number, |ui| show_finding(ui, state, number, finding, out));
+            }
+        });
     }
     if question.state == QuestionState::Done && answer.findings.is_empty() {
         ui.label("No change of one setting, and no other prediction, turns this step.");
@@ -67,19 +92,20 @@ fn progress(ui: &mut Ui, question: &Question, out: &mut Vec<Command>) {
                 if ui.button("Cancel search").clicked() {
                     out.push(Command::Why(Ask::CancelSaved));
                 }
-                let words =
-                    if n == 0 { "waiting for its turn".to_owned() } else { format!("{k} of {n}: {doing}") };
+                let words = if n == 0 {
+                    "waiting for its turn".to_owned()
+                } else {
+                    format!("{k} of {n}: {}", setting_name(doing))
+                };
                 ui.add(ProgressBar::new(k as f32 / n.max(1) as f32).text(words));
             });
         }
         QuestionState::Done => {
-            ui.label(theme::note(format!(
-                "{n} settings and places looked at, the step computed {runs} times"
-            )));
+            ui.label(theme::note(format!("Searched {n} changes ({runs} re-runs of this step)")));
         }
         QuestionState::Cancelled => {
             ui.label(theme::note(format!(
-                "Cancelled after {k} of {n}; what was found is kept. C goes on anew."
+                "Cancelled after {k} of {n}; the findings are kept. Press C to search again."
             )));
         }
         QuestionState::Failed => {
@@ -89,39 +115,97 @@ fn progress(ui: &mut Ui, question: &Question, out: &mut Vec<Command>) {
     }
 }
 
+/// The outcome of a finding in a word, with the colour of the state.
+fn outcome(finding: &Finding) -> (&'static str, Color32) {
+    match finding.outcome {
+        Outcome::Right => ("Correct", theme::tracking()),
+        Outcome::Rejected => ("Rejected", theme::lost()),
+        Outcome::Unknown => ("Accepted", theme::prediction()),
+        Outcome::False => ("Wrong target", theme::failed()),
+    }
+}
+
+/// A finding as a row: outcome, change, effect, and what can be done with it.
 fn show_finding(ui: &mut Ui, state: &State, number: usize, finding: &Finding, out: &mut Vec<Command>) {
-    let (word, colour) = match finding.outcome {
-        Outcome::Right => ("RIGHT", theme::tracking()),
-        Outcome::Rejected => ("REJECTED", theme::lost()),
-        Outcome::Unknown => ("ACCEPTED", theme::prediction()),
-        Outcome::False => ("FALSE", theme::failed()),
-    };
-    ui.horizontal_wrapped(|ui| {
-        ui.label(RichText::new(word).strong().color(colour));
-        ui.label(theme::note(format!("{:.0} %", 100.0 * finding.relative)))
-            .on_hover_text("The size of the change, over the present value");
-    });
-    ui.add(Label::new(RichText::new(&finding.sentence).color(theme::text())).wrap());
-    let what_if = finding.what_if();
-    ui.horizontal_wrapped(|ui| {
-        // Their names tell one finding from the others.
-        let name = |verb: &str| format!("{verb} finding {}", number + 1);
-        let tried = state.trial().is_some_and(|trial| trial.what_if == what_if);
-        let attempt = ui.add(Button::new("Try").selected(tried).min_size(vec2(40.0, 24.0)));
-        if attempt.accessible_name(name("try")).on_hover_text("Shows it as a ghost at this step").clicked() {
-            out.push(Command::Why(Ask::Try(what_if.clone())));
-        }
-        match state.branch_of(&what_if) {
-            Some(branch) => branch_words(ui, state, branch, out),
-            None => {
-                let run = ui.add(Button::new("Run from here").min_size(vec2(90.0, 24.0)));
-                let help = "Leaves this run with that change, to see how long it stays tracked";
-                if run.accessible_name(name("run from here with")).on_hover_text(help).clicked() {
-                    out.push(Command::Why(Ask::BranchWith(what_if.clone())));
-                }
+    let (word, colour) = outcome(finding);
+    let frame = Frame::new().fill(theme::well()).corner_radius(3).inner_margin(Margin::symmetric(6, 3));
+    frame.show(ui, |ui| {
+        ui.set_min_width(ui.available_width());
+        ui.horizontal_wrapped(|ui| {
+            ui.label(RichText::new(word).strong().color(colour));
+            let size = theme::note(format!("change {:.0} %", 100.0 * finding.relative));
+            ui.label(size).on_hover_text("The size of the change, over the present value");
+            ui.label(RichText::new(changes(finding)).color(theme::strong())).on_hover_text(&finding.sentence);
+            ui.label(theme::note(effect(finding)));
+        });
+        ui.horizontal_wrapped(|ui| {
+            let what_if = finding.what_if();
+            attempt(ui, state, (&format!("try finding {}", number + 1), "Try"), &what_if, out);
+            if let Some(change) = &finding.with_margin {
+                let words = format!("Try with margin: {}", value(change));
+                let name = format!("try finding {} with margin", number + 1);
+                let settings = [(change.setting.clone(), change.to.clone())].into_iter().collect();
+                let wide = WhatIf { settings, ..WhatIf::default() };
+                attempt(ui, state, (&name, &words), &wide, out);
             }
-        }
+            run(ui, state, number, &what_if, out);
+        });
     });
+}
+
+/// The changes of a finding, each with its unit.
+fn changes(finding: &Finding) -> String {
+    let settings =
+        finding.changes.iter().map(|change| format!("{} {}", setting_name(&change.setting), change.words()));
+    let moved = finding.moved.as_ref().map(|moved| {
+        let [dx, dy] = [moved.to.x - moved.from.x, moved.to.y - moved.from.y];
+        format!("prediction moved by ({dx:+.1}, {dy:+.1}) px")
+    });
+    settings.chain(moved).collect::<Vec<_>>().join(", ")
+}
+
+/// The effect of a finding: its distance from the truth, and the margin of the gate that failed.
+fn effect(finding: &Finding) -> String {
+    let error = finding.row.err_px.map(|px| format!("{} px from the truth", number(px)));
+    let margin = finding.gate.as_ref().zip(finding.margin_after).map(|(gate, margin)| {
+        format!("{} margin {} {}", label(gate), signed(margin), finding.gate_unit).trim_end().to_owned()
+    });
+    error.into_iter().chain(margin).collect::<Vec<_>>().join(" · ")
+}
+
+/// The value after a change, with its unit.
+fn value(change: &SettingChange) -> String {
+    let value = change.to.as_f64().map_or_else(|| change.to.to_string(), number);
+    format!("{value} {}", change.unit).trim_end().to_owned()
+}
+
+/// A button that tries a change.
+fn attempt(
+    ui: &mut Ui,
+    state: &State,
+    (name, words): (&str, &str),
+    what_if: &WhatIf,
+    out: &mut Vec<Command>,
+) {
+    let tried = state.trial().is_some_and(|trial| trial.what_if == *what_if);
+    let button = ui.add(Button::new(words).selected(tried).min_size(vec2(40.0, 24.0)));
+    if button.accessible_name(name).on_hover_text("Shows it as a ghost at this step").clicked() {
+        out.push(Command::Why(Ask::Try(what_if.clone())));
+    }
+}
+
+/// The button that branches with a change, or how long that branch stayed tracked.
+fn run(ui: &mut Ui, state: &State, number: usize, what_if: &WhatIf, out: &mut Vec<Command>) {
+    if let Some(branch) = state.branch_of(what_if) {
+        branch_words(ui, state, branch, out);
+        return;
+    }
+    let run = ui.add(Button::new("Run").min_size(vec2(40.0, 24.0)));
+    let help = "Runs on from this step with the change, as a branch, to see how long it stays tracked";
+    let name = format!("run from here with finding {}", number + 1);
+    if run.accessible_name(name).on_hover_text(help).clicked() {
+        out.push(Command::Why(Ask::BranchWith(what_if.clone())));
+    }
 }
 
 /// How long a branch stayed tracked.

@@ -8,6 +8,7 @@ use sightline_session::why::{Node, Origin, OriginKind};
 use crate::command::{Command, Go};
 use crate::state::State;
 use crate::theme;
+use crate::why::panel::view;
 use crate::why::{Ask, Told};
 
 /// How many levels are open at first.
@@ -15,8 +16,11 @@ const OPEN: usize = 2;
 
 /// Shows the tree of the value that was asked for last.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    let Some((key, value, told)) = state.explained() else { return };
+    let Some((key, value, told)) = state.explained() else {
+        return;
+    };
     ui.add_space(2.0);
+    let top = ui.cursor().top();
     ui.horizontal_wrapped(|ui| {
         ui.label(theme::title(&format!("why {value}, {}", state.whose(key))));
         if state.why.asked.len() > 1
@@ -42,6 +46,9 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             }
         }
     }
+    if state.why.in_view.is_tree {
+        view::bring(ui, state.why.in_view.count, top, !matches!(told, Told::Waiting));
+    }
 }
 
 /// One value with what it was made of.
@@ -57,7 +64,12 @@ fn branch(ui: &mut Ui, node: &Node, id: Id, depth: usize, out: &mut Vec<Command>
             if let Some(formula) = &node.formula {
                 let sign = if node.is_closed_form { "= " } else { "" };
                 ui.add(
-                    Label::new(RichText::new(format!("{sign}{formula}")).small().color(theme::text())).wrap(),
+                    Label::new(
+                        RichText::new(format!("{sign}{}", theme::formula(formula)))
+                            .small()
+                            .color(theme::text()),
+                    )
+                    .wrap(),
                 );
             }
             if let Some(origin) = &node.origin {

@@ -247,6 +247,9 @@ struct Scale {
 impl Scale {
     /// The same scale for all pictures, so that their brightness can be compared.
     fn of(frames: &[&Frame], output: &Output<'_>) -> Result<Self> {
+        if output.is_dry() {
+            return Ok(Self { factor: 1.0, full_scale_dn: PNG_LIMIT_DN });
+        }
         let mut largest = 0.0_f64;
         let mut full_scale = Some(0.0_f64);
         for frame in frames {
@@ -265,6 +268,10 @@ impl Scale {
 
 /// Writes the picture of a frame as PNG, named after its product.
 fn write_view(frame: &Frame, camera: Camera, scale: &Scale, output: &mut Output<'_>) -> Result<View> {
+    let name = format!("{}.png", file_name(&frame.product.id()));
+    if output.is_dry() {
+        return Ok(View { image: name, camera: CameraSource::Inline(camera) });
+    }
     let raster = frame.product.read_raster()?;
     let negative = raster.samples.iter().filter(|&&v| v < 0.0).count();
     if negative > 0 {
@@ -275,7 +282,6 @@ fn write_view(frame: &Frame, camera: Camera, scale: &Scale, output: &mut Output<
         raster.samples.iter().map(|&v| (f64::from(v) * scale.factor / PNG_LIMIT_DN) as f32).collect();
     let image = GrayImage::from_raw(raster.width, raster.height, samples);
     let image = image.ok_or_else(|| frame.product.problem("the picture is not complete"))?;
-    let name = format!("{}.png", file_name(&frame.product.id()));
     output.write(&name, &io::encode_png_u16(&image, Some(PNG_LIMIT_DN))?)?;
     Ok(View { image: name, camera: CameraSource::Inline(camera) })
 }

@@ -269,6 +269,7 @@ impl Record for TemplateMatch {
         r.quantity("flat_positions", Unit::One, |m| m.flat_positions)
             .describe("Number of positions without contrast.");
         r.quantity("score", Unit::One, |m| m.score)
+            .label("match score")
             .describe("Normalised correlation at the match: what is judged.")
             .formula(
                 "Σ (I − Ī)(T − T̄) / √(Σ (I − Ī)² Σ (T − T̄)²) [Kim09 Eq. 11]",

@@ -295,7 +295,9 @@ fn left_again(
 impl Record for PointStereo {
     fn declare(r: &mut Declaration<Self>) {
         r.quantity("right_pixel", Unit::Pixel, |s| s.right_pixel).describe("The match in the right image.");
-        r.quantity("score", Unit::One, |s| s.score).describe("Normalised correlation of the stereo match.");
+        r.quantity("score", Unit::One, |s| s.score)
+            .label("stereo score")
+            .describe("Normalised correlation of the stereo match.");
         r.quantity("range_m", Unit::Metre, |s| s.range_m)
             .describe("Range along the left ray on the epipolar curve.");
         r.quantity("disparity_px", Unit::Pixel, |s| s.disparity_px)

@@ -353,7 +353,8 @@ impl Candidates {
             if let Some(fit) = Fit::quadratic(&neighbours) {
                 best.along += fit.offset.x * self.spacing;
                 best.across += fit.offset.y;
-                best.score = fit.score;
+                // The fit may rise above the highest score of a correlation.
+                best.score = fit.score.min(1.0);
             }
         }
         Some(best)

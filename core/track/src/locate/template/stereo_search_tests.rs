@@ -218,3 +218,13 @@ fn disparities_counted_from_zero_exclude_targets_nearer_than_three_metres() {
     let disparity_px = Scene::new(2000, 3.05).stereo(&TemplateSettings::default()).disparity_px.unwrap();
     assert!((disparity_px - 80.0).abs() < 2.0, "{disparity_px}");
 }
+
+#[test]
+fn the_score_between_candidates_is_at_most_one() {
+    let mut candidates = Candidates::new((0.0, 2.0), 0.0);
+    // Column by column along the curve: a peak of 1 that is higher to one side.
+    candidates.scores = vec![0.90, 0.95, 0.90, 0.95, 1.0, 0.95, 0.95, 0.999, 0.95];
+    let best = candidates.refine(true).unwrap();
+    assert!(best.along > 1.0);
+    assert_eq!(best.score, 1.0);
+}

@@ -1,0 +1,58 @@
+//! How much of the page the left image has, in windows of many sizes, on the drive with which a new user begins.
+
+use sightline_recordings::create_simulated;
+use sightline_server::first_session;
+use sightline_server::state::AppState;
+use sightline_tests::browser::Browser;
+use sightline_tests::server::{TOKEN, access};
+
+/// Width and height of a window, px, and the least share of the page that the left image covers in *Overview* and in *Image*.
+const WINDOWS: [(u32, u32, [f64; 2]); 6] = [
+    (820, 1180, [0.1, 0.1]),
+    (1280, 720, [0.1, 0.25]),
+    (1440, 900, [0.15, 0.3]),
+    (1920, 1080, [0.15, 0.3]),
+    (2560, 1440, [0.15, 0.3]),
+    // 1440 × 900 at a zoom of 150 %.
+    (960, 600, [0.07, 0.2]),
+];
+
+/// Area of the image on the screen as a part of the page's.
+const SHARE: &str = "return (() => { const s = JSON.parse(document.querySelector('canvas').dataset.status); \
+     if (!s.image_to_screen) return null; const [w, h] = s.left_image_size; const [, , pw, ph] = s.left_image_rect; \
+     const k = s.image_to_screen.scale; return Math.min(w * k, pw) * Math.min(h * k, ph) / (innerWidth * innerHeight) })()";
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_left_image_has_most_of_the_page() {
+    let folder = tempfile::tempdir().unwrap();
+    let scenario = first_session::scenario().unwrap();
+    let traverse = create_simulated(&scenario, &folder.path().join("first")).unwrap();
+    let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let port = listener.local_addr().unwrap().port();
+    let state = AppState::new(vec![traverse], &folder.path().join("sessions"), access(port)).unwrap();
+    first_session::begin(&state, &scenario).unwrap();
+    tokio::spawn(async move { axum::serve(listener, sightline_server::app(state)).await });
+    let browser = Browser::start().await;
+    browser.goto(&format!("http://127.0.0.1:{port}/#token={TOKEN}")).await;
+    browser.wait_for_viewer().await;
+    browser.wait_status("the first target", "s.target === 0 && s.shown").await;
+    browser.click_on("button", "Skip").await;
+    browser.wait_status("the run", "s.steps_done > 1 && !s.running").await;
+    let mut too_small = Vec::new();
+    for (width, height, least) in WINDOWS {
+        browser.resize(width, height).await;
+        for (digit, name, least) in [("1", "overview", least[0]), ("8", "image", least[1])] {
+            browser.chord(&["Shift"], digit).await;
+            browser.wait_status("the image", "s.shown && s.complete && s.image_to_screen !== null").await;
+            tokio::time::sleep(std::time::Duration::from_millis(700)).await;
+            let share = browser.evaluate(SHARE).await.as_f64().unwrap();
+            println!("{width} × {height}, {name}: {:.1} %", 100.0 * share);
+            browser.shot(&format!("image-{width}-{name}")).await;
+            if share < least {
+                too_small.push((width, height, name, share));
+            }
+        }
+    }
+    assert!(too_small.is_empty(), "{too_small:?}");
+    browser.end().await;
+}
