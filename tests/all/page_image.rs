@@ -9,12 +9,12 @@ use sightline_tests::server::{TOKEN, access};
 /// Width and height of a window, px, and the least share of the page that the left image covers in *Overview* and in *Image*.
 const WINDOWS: [(u32, u32, [f64; 2]); 6] = [
     (820, 1180, [0.1, 0.1]),
-    (1280, 720, [0.1, 0.25]),
+    (1280, 720, [0.1, 0.2]),
     (1440, 900, [0.15, 0.3]),
     (1920, 1080, [0.15, 0.3]),
     (2560, 1440, [0.15, 0.3]),
     // 1440 × 900 at a zoom of 150 %.
-    (960, 600, [0.07, 0.2]),
+    (960, 600, [0.07, 0.15]),
 ];
 
 /// Area of the image on the screen as a part of the page's.

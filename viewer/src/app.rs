@@ -195,7 +195,7 @@ impl SightlineApp {
         let mut out = Vec::new();
         let state = &self.state;
         let bar = Frame::new().fill(theme::bar()).inner_margin(Margin::symmetric(10, 3));
-        let top = Panel::top("top").exact_size(34.0).frame(bar).show(ui, |ui| {
+        let top = Panel::top("top").exact_size(32.0).frame(bar).show(ui, |ui| {
             region(ui, "Status and actions", ui.max_rect());
             bars::top(ui, state, &mut out);
         });
@@ -203,13 +203,13 @@ impl SightlineApp {
         if matches!(state.connection, Connection::Gone { .. }) {
             Panel::top("banner").frame(bar).show(ui, |ui| bars::banner(ui, state, &mut out));
         }
-        Panel::bottom("stages").exact_size(30.0).frame(bar).show(ui, |ui| {
+        Panel::bottom("stages").exact_size(28.0).frame(bar).show(ui, |ui| {
             region(ui, "Stages", ui.max_rect());
             bars::stages(ui, state, &mut out);
         });
         let foot = Frame::new().fill(theme::panel()).inner_margin(Margin::symmetric(10, 4));
         let band =
-            Panel::bottom("timeline").exact_size(timeline::height(state) + 36.0).frame(foot).show(ui, |ui| {
+            Panel::bottom("timeline").exact_size(timeline::height(state) + 35.0).frame(foot).show(ui, |ui| {
                 region(ui, "Timeline", ui.max_rect());
                 bars::transport(ui, state, &mut out);
                 timeline::show(ui, state, &mut out);

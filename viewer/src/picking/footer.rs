@@ -12,7 +12,6 @@ use crate::drawing::overlay::{Line, Mark};
 use crate::drawing::view2d::Canvas;
 use crate::panels::legend;
 use crate::panels::legend::Entry;
-use crate::panels::status_line::STATUS;
 use crate::picking::aim::Aim;
 use crate::picking::{is_here, words};
 use crate::state::{Refusal, State};
@@ -20,7 +19,7 @@ use crate::theme;
 use crate::trackability::limits;
 
 /// Height of the line's contents, points.
-const ROW: f32 = STATUS - 6.0;
+const ROW: f32 = 18.0;
 
 /// The legend is left out where less remains for the sentence, points.
 const SENTENCE_MIN: f32 = 200.0;

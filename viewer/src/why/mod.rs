@@ -86,14 +86,26 @@ pub enum Told<T> {
 pub(crate) struct InView {
     /// How often something was asked for; 0 before the first time.
     pub count: usize,
-    /// Whether it is the tree of a value; the card otherwise.
-    pub is_tree: bool,
+    /// Which one.
+    pub part: Part,
+}
+
+/// A part of the panel that scrolls into view when a person asks for it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Part {
+    /// The headline with its bullets.
+    #[default]
+    Card,
+    /// The tree of a value.
+    Tree,
+    /// What would have saved the step.
+    Saved,
 }
 
 impl InView {
     /// Something else was asked for.
-    fn ask(&mut self, is_tree: bool) {
-        *self = Self { count: self.count + 1, is_tree };
+    fn ask(&mut self, part: Part) {
+        *self = Self { count: self.count + 1, part };
     }
 }
 

@@ -15,7 +15,7 @@ use crate::panels::pane::Pane;
 use crate::state::effect::Effect;
 use crate::state::{State, run_letter};
 use crate::what_if::Trial;
-use crate::why::{Ask, Told};
+use crate::why::{Ask, Part, Told};
 
 /// Maximum number of values in the history of the panel.
 const REMEMBERED: usize = 50;
@@ -64,11 +64,11 @@ impl State {
     pub(crate) fn ask_why(&mut self, ask: Ask) {
         match ask {
             Ask::Value { step, value } => {
-                self.why.in_view.ask(true);
+                self.why.in_view.ask(Part::Tree);
                 self.ask_value(step, value);
             }
             Ask::Back => {
-                self.why.in_view.ask(true);
+                self.why.in_view.ask(Part::Tree);
                 self.why.asked.pop();
             }
             Ask::Selected => self.ask_selected(),
@@ -138,7 +138,7 @@ impl State {
     /// Shows the card of this step and explains the last explained value where this step has it; else the gate with the
     /// smallest margin, else the state.
     fn ask_selected(&mut self) {
-        self.why.in_view.ask(false);
+        self.why.in_view.ask(Part::Card);
         let last = self.why.asked.last().map(|(_, value)| value.clone());
         let last = last.filter(|value| self.has_value(value));
         let worst = || {
@@ -150,6 +150,7 @@ impl State {
     }
 
     fn ask_what_saves(&mut self) {
+        self.why.in_view.ask(Part::Saved);
         self.outbox.add(Effect::reveal(Pane::Why));
         let Some(key) = self.step_key(self.cursor.step).filter(|_| self.row().is_some()) else {
             let missing = self.missing_step();

@@ -4,6 +4,7 @@ use egui::{Align2, Rect, Ui, pos2, vec2};
 
 use crate::drawing::raster::Raster;
 use crate::drawing::view2d;
+use crate::panels::numbers::fixed;
 use crate::theme;
 
 /// Room for the arrow and the number between two patches, points.
@@ -26,9 +27,10 @@ pub(super) fn paint_patch(ui: &Ui, raster: &Raster, frame: Rect) {
 /// Mean and standard deviation below a patch.
 fn statistics(ui: &Ui, raster: &Raster, frame: Rect) {
     let below = frame.center_bottom() + vec2(0.0, 4.0);
+    let [mean, std] = [raster.mean, raster.sigma].map(|value| fixed(f64::from(value), 3));
     let words = match frame.width() + BETWEEN {
-        room if room > 170.0 => format!("mean {:.3} ± std {:.3}", raster.mean, raster.sigma),
-        _ => format!("{:.3} ± {:.3}", raster.mean, raster.sigma),
+        room if room > 170.0 => format!("mean {mean} ± std {std}"),
+        _ => format!("{mean} ± {std}"),
     };
     ui.painter().text(below, Align2::CENTER_TOP, words, theme::digit_font(), theme::text());
 }

@@ -15,7 +15,7 @@ use crate::panels::panel::Panel;
 use crate::state::State;
 use crate::theme;
 use crate::what_if::panel;
-use crate::why::Ask;
+use crate::why::{Ask, Part};
 
 /// The panel “Why”.
 pub(crate) struct Why;
@@ -43,9 +43,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let top = ui.cursor().top();
         card(ui, state, &book.summary());
-        if !state.why.in_view.is_tree {
-            view::bring(ui, state.why.in_view.count, top, true);
-        }
+        view::bring(ui, state.why.in_view, Part::Card, top, true);
         ui.horizontal_wrapped(|ui| {
             let explain =
                 ui.button("Why this state?").on_hover_text("Where the tracking state of this step came from");

@@ -12,7 +12,7 @@ use crate::command::Command;
 use crate::state::{State, run_letter};
 use crate::theme;
 use crate::why::panel::view;
-use crate::why::{Ask, Told};
+use crate::why::{Ask, Part, Told};
 
 /// The button that asks.
 pub(crate) fn button(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
@@ -41,14 +41,14 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         }
         Some(Told::Here(question)) => show_question(ui, state, question, out),
     }
-    // At another step the card comes first; at this one the answer that was asked for.
-    let answered = state.question().map(|told| match told {
-        Told::Here(question) => question.answer.as_ref().is_some_and(|answer| !answer.findings.is_empty()),
-        _ => false,
-    });
-    if let Some(key) = state.step_key(state.cursor.step) {
-        view::follow(ui, &format!("saved {key:?}"), Some(answered), top);
-    }
+    let is_here = match state.question() {
+        Some(Told::Here(question)) => {
+            let is_searching = matches!(question.state, QuestionState::Waiting | QuestionState::Running);
+            !is_searching || question.answer.as_ref().is_some_and(|answer| !answer.findings.is_empty())
+        }
+        told => !matches!(told, Some(Told::Waiting)),
+    };
+    view::bring(ui, state.why.in_view, Part::Saved, top, is_here);
 }
 
 fn show_question(ui: &mut Ui, state: &State, question: &Question, out: &mut Vec<Command>) {

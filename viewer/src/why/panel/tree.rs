@@ -9,7 +9,7 @@ use crate::command::{Command, Go};
 use crate::state::State;
 use crate::theme;
 use crate::why::panel::view;
-use crate::why::{Ask, Told};
+use crate::why::{Ask, Part, Told};
 
 /// How many levels are open at first.
 const OPEN: usize = 2;
@@ -46,9 +46,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             }
         }
     }
-    if state.why.in_view.is_tree {
-        view::bring(ui, state.why.in_view.count, top, !matches!(told, Told::Waiting));
-    }
+    view::bring(ui, state.why.in_view, Part::Tree, top, !matches!(told, Told::Waiting));
 }
 
 /// One value with what it was made of.
