@@ -207,9 +207,9 @@ impl SightlineApp {
             region(ui, "Stages", ui.max_rect());
             bars::stages(ui, state, &mut out);
         });
-        let foot = Frame::new().fill(theme::panel()).inner_margin(Margin::symmetric(10, 4));
+        let foot = Frame::new().fill(theme::panel()).inner_margin(Margin::symmetric(10, 3));
         let band =
-            Panel::bottom("timeline").exact_size(timeline::height(state) + 35.0).frame(foot).show(ui, |ui| {
+            Panel::bottom("timeline").exact_size(timeline::height(state) + 33.0).frame(foot).show(ui, |ui| {
                 region(ui, "Timeline", ui.max_rect());
                 bars::transport(ui, state, &mut out);
                 timeline::show(ui, state, &mut out);

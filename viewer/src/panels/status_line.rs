@@ -8,7 +8,7 @@ use crate::drawing::view2d::Canvas;
 use crate::theme;
 
 /// Height of the status line below an image, points.
-pub(crate) const STATUS: f32 = 19.0;
+pub(crate) const STATUS: f32 = 22.0;
 
 /// Pixel and grey value under the pointer, else `pointed`; magnification, and the convention.
 pub(crate) fn status_line(
@@ -19,7 +19,7 @@ pub(crate) fn status_line(
     pointed: Option<String>,
 ) {
     ui.horizontal(|ui| {
-        ui.set_height(STATUS - 3.0);
+        ui.set_height(STATUS - 4.0);
         match canvas.hovered(region) {
             Some(pixel) => {
                 let value = raster.at(pixel.x.round() as i64, pixel.y.round() as i64);

@@ -10,7 +10,7 @@ use crate::state::State;
 use crate::theme;
 
 /// Height of the filmstrip, points; its windows are square.
-pub(super) const FILM: f32 = 26.0;
+pub(super) const FILM: f32 = 25.0;
 
 /// The most windows.
 const WINDOWS: usize = 48;
