@@ -60,6 +60,15 @@ async fn a_panel_is_saved_as_svg_and_png_which_look_alike_and_a_plot_is_read_as_
     browser.show_panel("Match scores").await;
     tokio::time::sleep(Duration::from_millis(1500)).await;
 
+    // For a paper: white, and as wide as chosen; then as on the screen.
+    let (_, png) = save(&browser, "Match scores", "PNG 2x").await;
+    let paper = image::load_from_memory(&png).unwrap().to_rgb8();
+    assert_eq!((paper.width(), paper.get_pixel(1, 1).0), (2 * 720, [255; 3]));
+    browser.click_on("button", "Match scores menu").await;
+    browser.click_on("button", "as on the screen").await;
+    browser.press("Escape").await;
+    browser.gone("button", "as on the screen").await;
+
     let (name, png) = save(&browser, "Match scores", "PNG 2x").await;
     assert!(name.starts_with("sightline-") && name.ends_with("-match-scores-2x.png"), "{name}");
     let png = image::load_from_memory(&png).unwrap().to_rgb8();

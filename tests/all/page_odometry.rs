@@ -116,7 +116,7 @@ async fn vision_shows_the_slip_and_a_branch_without_it_loses_the_target() {
     browser.show_panel("Odometry").await;
     browser.says("Visual odometry is off").await;
     browser.press("w").await;
-    browser.says("the truth lies outside the positions searched").await;
+    browser.says("outside the search window").await;
     browser.shot("odometry-why").await;
     // Where it is lost first, the scores are good and the position is impossible: the pose is to blame.
     let first = (2..=last).find(|number| {

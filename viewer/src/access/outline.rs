@@ -143,7 +143,7 @@ fn element(role: Role, is_named: bool, is_control: bool) -> Option<(Tag, &'stati
         Role::TabPanel => plain("tabpanel"),
         Role::ListBoxOption | Role::MenuListOption => plain("option"),
         Role::MenuItem => plain("menuitem"),
-        Role::Menu => plain("menu"),
+        Role::Menu if is_named => plain("menu"),
         Role::List => plain("list"),
         Role::ListItem => plain("listitem"),
         Role::Table => plain("table"),
