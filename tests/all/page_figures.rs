@@ -109,6 +109,10 @@ async fn a_panel_is_saved_as_svg_and_png_which_look_alike_and_a_plot_is_read_as_
     browser.chord(&["Control"], "k").await;
     browser.type_text("show runs").await;
     browser.press("Enter").await;
+    browser.control("button", "sort by ade_px").await;
+    // The table is wider than its panel.
+    browser.press("`").await;
+    browser.control("button", "Restore").await;
     browser.click_on("button", "sort by ade_px").await;
     browser.wait_for("the sorting in the address", "return location.hash.includes('sort=ade_px')").await;
     assert_eq!(browser.console_errors().await, Vec::<String>::new());

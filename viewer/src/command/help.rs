@@ -46,7 +46,7 @@ fn sheet(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             if ui.button("Take the tour").clicked() {
                 out.extend([Command::SetMode(Mode::Look), Command::Tour(Turn::Begin)]);
             }
-            ui.button("Close").clicked()
+            ui.button("Close").accessible_name("Close keys and conventions").clicked()
         })
         .inner
     });

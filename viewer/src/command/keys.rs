@@ -28,7 +28,7 @@ pub(crate) fn commands(context: &Context, state: &State) -> Vec<Command> {
     if context.text_edit_focused() {
         return Vec::new();
     }
-    let is_held = context.memory(|memory| memory.focused()).is_some_and(|id| !layout::is_panel(context, id));
+    let is_held = context.memory(egui::Memory::focused).is_some_and(|id| !layout::is_panel(context, id));
     let is_divided = comparison::is_divider_focused(context);
     let held = comparison::held(context, state);
     context.input(|input| {

@@ -343,15 +343,15 @@ mod tests {
         let mut harness = page();
         harness.state_mut().apply(LayoutCommand::Panel(1));
         harness.run_steps(3);
-        let focused = harness.ctx.memory(|memory| memory.focused()).expect("a panel has the keyboard");
+        let focused = harness.ctx.memory(egui::Memory::focused).expect("a panel has the keyboard");
         assert!(crate::layout::is_panel(&harness.ctx, focused));
         harness.key_press(egui::Key::ArrowRight);
         harness.run_steps(3);
-        let after = harness.ctx.memory(|memory| memory.focused());
+        let after = harness.ctx.memory(egui::Memory::focused);
         assert_eq!(after, Some(focused), "an arrow took the keyboard to a control");
         harness.key_press(egui::Key::Tab);
         harness.run_steps(3);
-        let after = harness.ctx.memory(|memory| memory.focused()).expect("Tab goes on in the panel");
+        let after = harness.ctx.memory(egui::Memory::focused).expect("Tab goes on in the panel");
         assert!(after != focused && !crate::layout::is_panel(&harness.ctx, after));
     }
 
