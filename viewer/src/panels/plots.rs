@@ -105,7 +105,9 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let count = (charts.len() + derived.len()) as f32;
     ui.spacing_mut().item_spacing.y = 1.0;
     let axis = 16.0;
-    let height = ((ui.available_height() - axis - count * (NAMES + 2.0)) / count).max(24.0);
+    // The first row of names also holds a button.
+    let button = (ui.spacing().interact_size.y - NAMES).max(0.0);
+    let height = ((ui.available_height() - axis - button - count * (NAMES + 2.0)) / count).max(24.0);
     for (i, chart) in charts.iter().enumerate() {
         let is_last = i + 1 == charts.len() && derived.is_empty();
         let (title, mut lines) = names_of(chart);
