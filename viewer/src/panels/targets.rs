@@ -18,6 +18,9 @@ use crate::{panels, theme};
 /// What the panel is for.
 const PURPOSE: &str = Pane::Targets.about().help;
 
+/// Least height of the list above the lines about the selected run, points; in a lower panel they are at its end.
+const LIST_MIN: f32 = 150.0;
+
 /// How much a branch stands in from what it left, points.
 const INDENT: f32 = 12.0;
 
@@ -51,11 +54,20 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         panels::missing(ui, PURPOSE, &state.missing_target());
         return;
     }
-    selected_run(ui, state);
+    let has_room = ui.available_height() >= LIST_MIN;
+    if has_room {
+        egui::Panel::bottom("the run that is looked at").frame(egui::Frame::new()).show(ui, |ui| {
+            ui.add_space(2.0);
+            selected_run(ui, state);
+        });
+    }
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         for target in targets {
             show_target(ui, state, target, out);
             ui.add_space(6.0);
+        }
+        if !has_room {
+            selected_run(ui, state);
         }
     });
 }
@@ -63,14 +75,11 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 /// All of the run that is looked at, below the list: a line of the list has no room for it.
 fn selected_run(ui: &mut Ui, state: &State) {
     let (Some(target), Some(run)) = (state.target(), state.run()) else { return };
-    egui::Panel::bottom("the run that is looked at").frame(egui::Frame::new()).show(ui, |ui| {
-        ui.add_space(2.0);
-        let mut lines = vec![format!("run {}: {}", run_letter(run.number), summary(run))];
-        lines.extend(about(target, run));
-        for line in lines {
-            ui.add(egui::Label::new(theme::note(line)).wrap());
-        }
-    });
+    let mut lines = vec![format!("run {}: {}", run_letter(run.number), summary(run))];
+    lines.extend(about(target, run));
+    for line in lines {
+        ui.add(egui::Label::new(theme::note(line)).wrap());
+    }
 }
 
 /// Where a run comes from and what it changes, each as a line.

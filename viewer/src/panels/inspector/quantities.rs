@@ -58,28 +58,34 @@ fn show_quantity(
     out: &mut Vec<Command>,
 ) {
     let words = in_words(quantity, value);
-    let rows = matrix_of(quantity.kind, value);
     let mut help = quantity.description.to_string();
     if !quantity.formula.is_empty() {
         help += &format!("\n= {}", theme::formula(&quantity.formula));
     }
     let link = ui.link(RichText::new(quantity.label.as_ref()).size(12.0)).on_hover_text(help);
     numbers::ask(&link, step, name, &words, out);
-    ui.horizontal_wrapped(|ui| {
-        ui.spacing_mut().item_spacing.x = 4.0;
-        match rows {
-            Some(rows) => matrix(ui, &rows),
-            None => {
-                ui.label(theme::number(words));
-            }
-        }
+    let notes = |ui: &mut Ui| {
         let formula = Some(&quantity.formula).filter(|formula| !formula.is_empty());
-        let notes =
-            [quantity.unit_label(), formula.map_or_else(String::new, |f| format!("= {}", theme::formula(f)))];
-        for note in notes.into_iter().filter(|note| !note.is_empty()) {
+        let formula = formula.map_or_else(String::new, |f| format!("= {}", theme::formula(f)));
+        for note in [quantity.unit_label(), formula].into_iter().filter(|note| !note.is_empty()) {
             ui.label(theme::note(note));
         }
-    });
+    };
+    match matrix_of(quantity.kind, value) {
+        Some(rows) => {
+            ui.vertical(|ui| {
+                matrix(ui, &rows);
+                ui.horizontal_wrapped(notes);
+            });
+        }
+        None => {
+            ui.horizontal_wrapped(|ui| {
+                ui.spacing_mut().item_spacing.x = 4.0;
+                ui.label(theme::number(words));
+                notes(ui);
+            });
+        }
+    }
 }
 
 /// The value of a quantity on one line.
