@@ -33,18 +33,18 @@ impl Study {
         };
         match self.name {
             "straight" => vec![
-                share("ncc", 0.0, 0.80, "R113"),
-                share("ncc", 4.0, 0.15, "R113"),
-                share("ncc-scale", 0.0, 1.00, "R113"),
-                share("ncc-scale", 4.0, 0.95, "R113"),
+                share("ncc", 0.0, 0.80, "Kim09 §5.1"),
+                share("ncc", 4.0, 0.15, "Kim09 §5.1"),
+                share("ncc-scale", 0.0, 1.00, "Kim09 §5.1"),
+                share("ncc-scale", 4.0, 0.95, "Kim09 §5.1"),
             ],
             "sideways" => vec![
-                share("ncc-scale", 5.0, 1.00, "R121"),
-                share("ncc-scale", 10.0, 1.00, "R121"),
-                share("ncc-scale", 15.0, 0.82, "R121"),
+                share("ncc-scale", 5.0, 1.00, "Kim09 §5.2"),
+                share("ncc-scale", 10.0, 1.00, "Kim09 §5.2"),
+                share("ncc-scale", 15.0, 0.82, "Kim09 §5.2"),
             ],
             "turn-in-place" => {
-                (1..=9).map(|step| share("ncc-scale", f64::from(5 * step), 1.0, "R123")).collect()
+                (1..=9).map(|step| share("ncc-scale", f64::from(5 * step), 1.0, "Kim09 §5.3")).collect()
             }
             "checkout-1" => checkout_1(),
             _ => Vec::new(),
@@ -107,7 +107,7 @@ fn checkout_1() -> Vec<PaperValue> {
             at: f64::from(position),
             value,
             column,
-            source: "R133",
+            source: "Kim09 Table III",
         })
     });
     rows.collect()

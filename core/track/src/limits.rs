@@ -220,48 +220,48 @@ macro_rules! settings_group {
 settings_group! {
     /// The thresholds of `judge`: the four loss criteria of K§4.6 and the state machine.
     Limits as "limits" {
-        /// Criterion 1: a match below this score is a loss. Too high: false losses; too low: false tracking.
-        ncc_min: f64 = 0.7, "", Domain::Between(-1.0, 1.0), "K§4.6, R81";
-        /// Criterion 2: a point-stereo match below this score is a loss.
-        stereo_ncc_min: f64 = 0.7, "", Domain::Between(-1.0, 1.0), "K§4.6, R82";
-        /// A point-stereo match that leads back farther than this from the left pixel is a loss; 0: not judged.
-        left_right_max_px: f64 = 0.0, "px", Domain::Between(0.0, 100.0), "ours, domain.md 7";
+        /// Criterion 1: a match that scores below this is rejected. Too high: false losses; too low: false tracking.
+        ncc_min: f64 = 0.7, "", Domain::Between(-1.0, 1.0), "Kim09 §4.6";
+        /// Criterion 2: a point-stereo match that scores below this is rejected.
+        stereo_ncc_min: f64 = 0.7, "", Domain::Between(-1.0, 1.0), "Kim09 §4.6";
+        /// Largest distance between the left pixel and the match of its right pixel in the left image; 0: off.
+        left_right_max_px: f64 = 0.0, "px", Domain::Between(0.0, 100.0), "ours";
         /// Safety factor on the distance and position tolerances (criteria 3 and 4).
-        tolerance_factor: f64 = 1.5, "", Domain::Between(0.1, 100.0), "ours, R87";
+        tolerance_factor: f64 = 1.5, "", Domain::Between(0.1, 100.0), "ours";
         /// Disparity error that the tolerances assume, as a 3σ value.
-        disparity_error_px: f64 = 1.0, "px", Domain::Between(0.01, 20.0), "K§4.2, R35";
+        disparity_error_px: f64 = 1.0, "px", Domain::Between(0.01, 20.0), "Kim09 §4.2";
         /// Navigation error that the tolerances assume, as a fraction of the distance driven.
-        navigation_error_fraction: f64 = 0.02, "", Domain::Between(0.0, 1.0), "K§4.2, R38";
-        /// A match far from the prediction is a loss below this score; -1: judged like any other.
+        navigation_error_fraction: f64 = 0.02, "", Domain::Between(0.0, 1.0), "Kim09 §4.2";
+        /// Lowest score of a match far from the prediction (see far_sigma); -1: the same as for other matches.
         far_ncc_min: f64 = 0.85, "", Domain::Between(-1.0, 1.0), "ours; docs/tracking.md";
-        /// What is far: standard deviations of the prediction and the match together.
+        /// Distance from the prediction beyond which a match is far, in standard deviations of prediction and match
+        /// combined.
         far_sigma: f64 = 3.0, "", Domain::Between(0.0, 1000.0), "ours; docs/tracking.md", unless far_ncc_min = -1.0;
-        /// A match is a loss whose second peak scores more than this share of the best (near 1: it may be the other one);
-        /// 1: off.
-        second_peak_ratio_max: f64 = 1.0, "", Domain::Between(0.0, 1.0), "ours, R68; off";
-        /// A match is a loss whose position is less sharply known, 1σ along its worst direction; 0: off.
+        /// Largest ratio of the second peak to the best one; near 1 the match is ambiguous. 1: off.
+        second_peak_ratio_max: f64 = 1.0, "", Domain::Between(0.0, 1.0), "ours; off";
+        /// Largest 1σ error of a match along its worst direction; 0: off.
         match_sigma_max_px: f64 = 0.0, "px", Domain::Between(0.0, 100.0), "ours; off";
-        /// A match is a loss that lies nearer to the edge of the search window: the true one may lie beyond it; 0: off.
+        /// Smallest distance of the peak from the border of the search window, beyond which the true match may be; 0: off.
         edge_distance_min_px: f64 = 0.0, "px", Domain::Between(0.0, 100.0), "ours; off";
-        /// A designation is warned of when the ranges in its window differ by a larger share of the distance.
-        warn_depth_range: f64 = 0.1, "", Domain::Between(0.0, 10.0), "ours, R21";
-        /// A designation is warned of when its window's standard deviation is a smaller share of full scale.
-        warn_contrast: f64 = 0.01, "", Domain::Between(0.0, 1.0), "ours, R21";
-        /// A designation is warned of when a larger share of its window lies in shadow, where the light is known.
-        warn_shadow_share: f64 = 0.2, "", Domain::Between(0.0, 1.0), "ours, R21";
-        /// A designation is warned of when the ranges in its window leave a plane by a larger share of the distance:
-        /// an occluding boundary runs through it.
-        warn_boundary: f64 = 0.03, "", Domain::Between(0.0, 10.0), "ours, R119";
-        /// The feature tracker loses the target below this confidence, and dead reckoning takes over.
-        confidence_min: f64 = 0.5, "", Domain::Between(0.0, 1.0), "ours, R185";
-        /// Once lost, it returns at this confidence.
-        confidence_return: f64 = 0.7, "", Domain::Between(0.0, 1.0), "ours, R185";
-        /// Two stops have the same cameras where their focal lengths differ by a smaller share than this; else the target is
+        /// Warns at designation if the spread of ranges in the window exceeds this fraction of the distance.
+        warn_depth_range: f64 = 0.1, "", Domain::Between(0.0, 10.0), "ours";
+        /// Warns at designation if the window's standard deviation is below this fraction of full scale.
+        warn_contrast: f64 = 0.01, "", Domain::Between(0.0, 1.0), "ours";
+        /// Warns at designation if a larger fraction of the window is in shadow; needs a known sun direction.
+        warn_shadow_share: f64 = 0.2, "", Domain::Between(0.0, 1.0), "ours";
+        /// Warns at designation of an occluding boundary: the ranges in the window deviate from a plane by more than this
+        /// fraction of the distance.
+        warn_boundary: f64 = 0.03, "", Domain::Between(0.0, 10.0), "ours";
+        /// Confidence below which the feature tracker declares the target lost and dead reckoning takes over.
+        confidence_min: f64 = 0.5, "", Domain::Between(0.0, 1.0), "ours";
+        /// Confidence at which a lost target counts as found again.
+        confidence_return: f64 = 0.7, "", Domain::Between(0.0, 1.0), "ours";
+        /// Largest relative difference of focal length at which two stops have the same cameras; otherwise the target is
         /// handed off. Too large: a change of cameras is missed.
-        same_camera_focal_share: f64 = 0.02, "", Domain::Between(0.0001, 1.0), "ours, R205";
-        /// Updates that may follow a loss before failure is declared.
-        n_retry: u32 = 2, "updates", Domain::Between(0.0, 100.0), "K§4.6, R90";
-        /// Whether the update that detects the loss counts among them (the stricter reading).
-        count_detecting_update: bool = false, "", Domain::Switch, "E16, R91";
+        same_camera_focal_share: f64 = 0.02, "", Domain::Between(0.0001, 1.0), "ours";
+        /// Number of further updates after a loss before tracking fails.
+        n_retry: u32 = 2, "updates", Domain::Between(0.0, 100.0), "Kim09 §4.6";
+        /// Counts the update that detects the loss among the n_retry updates (the stricter reading).
+        count_detecting_update: bool = false, "", Domain::Switch, "ours; Kim09 §4.6 leaves it open";
     }
 }

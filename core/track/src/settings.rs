@@ -48,9 +48,9 @@ impl TrackerKind {
     pub const fn about(self) -> &'static str {
         match self {
             Self::Template => "Normalised correlation of a scaled and rolled template",
-            Self::Features => "The motion of the whole scene by its features",
-            Self::Shape => "The shape of the target's surroundings",
-            Self::Combined => "Features on the way, the shape at the end",
+            Self::Features => "The rigid transform of the whole scene, from its features",
+            Self::Shape => "Registration of the shape of the target's surroundings",
+            Self::Combined => "Features during the drive, shape registration at the end",
         }
     }
 
@@ -103,9 +103,9 @@ impl Settings {
             unit: String::new(),
             default: serde_json::to_value(TrackerKind::default()).unwrap_or_default(),
             domain: Domain::choice(&TrackerKind::ALL.map(TrackerKind::word)),
-            source: "Kim et al. 2009, Deans et al. 2005".to_owned(),
-            help: "How the target is found again: by its own window, by the motion of the whole scene, by the shape of \
-                   its surroundings, or by the scene on the way and the shape at the end."
+            source: "Kim09, Deans05".to_owned(),
+            help: "Tracker: template matching, the rigid transform of scene features, registration of the shape of the \
+                   target's surroundings, or features during the drive and shape registration at the end."
                 .to_owned(),
             only_if: Vec::new(),
         }

@@ -37,71 +37,72 @@ pub enum MotionWeighting {
 settings_group! {
     /// How features are found, matched and turned into a motion (Deans et al. 2005).
     FeatureSettings as "features" {
-        /// Double the image first: twice as many features, the smallest ones among them.
-        sift_double_image: bool = true, "", Domain::Switch, "Lowe 2004";
-        /// Scales a feature may have within an octave.
-        sift_scales_per_octave: u32 = 3, "", Domain::Between(1.0, 8.0), "Lowe 2004";
+        /// Doubles the image first, which finds about twice as many features, including the smallest ones.
+        sift_double_image: bool = true, "", Domain::Switch, "Lowe04";
+        /// Number of scales per octave.
+        sift_scales_per_octave: u32 = 3, "", Domain::Between(1.0, 8.0), "Lowe04";
         /// Blur of the first image of every octave.
-        sift_sigma: f64 = 1.6, "px", Domain::Between(0.8, 4.0), "Lowe 2004";
-        /// Blur that the camera's images have already.
-        sift_image_blur_px: f64 = 0.5, "px", Domain::Between(0.0, 2.0), "Lowe 2004";
-        /// Features of less contrast are left out. Too high: too few for a motion; too low: noise.
-        sift_contrast_min: f64 = 0.03, "", Domain::Between(0.0, 1.0), "Lowe 2004";
-        /// Features on edges are left out: the largest ratio of the two curvatures.
-        sift_edge_ratio_max: f64 = 10.0, "", Domain::Between(1.0, 1000.0), "Lowe 2004";
-        /// A second orientation makes a second feature from this share of the first one's height.
-        sift_orientation_peak: f64 = 0.8, "", Domain::Between(0.1, 1.0), "Lowe 2004";
-        /// The strongest so many features of an image are kept; 0: all.
+        sift_sigma: f64 = 1.6, "px", Domain::Between(0.8, 4.0), "Lowe04";
+        /// Assumed blur of the camera images, 1σ.
+        sift_image_blur_px: f64 = 0.5, "px", Domain::Between(0.0, 2.0), "Lowe04";
+        /// Smallest contrast of a feature. Too high: too few features for a transform; too low: noise.
+        sift_contrast_min: f64 = 0.03, "", Domain::Between(0.0, 1.0), "Lowe04";
+        /// Largest ratio of the principal curvatures of a feature; rejects features on edges.
+        sift_edge_ratio_max: f64 = 10.0, "", Domain::Between(1.0, 1000.0), "Lowe04";
+        /// Height of a second orientation peak, relative to the highest, from which it makes a feature of its own.
+        sift_orientation_peak: f64 = 0.8, "", Domain::Between(0.1, 1.0), "Lowe04";
+        /// Maximum number of features per image, strongest first; 0: no limit.
         features_max: u32 = 0, "", Domain::Between(0.0, 100_000.0), "ours";
-        /// A match whose second neighbour is nearly as near is left out: the largest ratio of the two distances; 1: off.
-        ratio_max: f64 = 0.8, "", Domain::Between(0.1, 1.0), "Lowe 2004, R162";
-        /// Keep a match only if it is the nearest one seen from both sides.
-        mutual_matches: bool = true, "", Domain::Switch, "ours, R162";
-        /// Look for a feature's partner in the other eye along its epipolar curve only.
-        stereo_along_curve: bool = true, "", Domain::Switch, "ours, R162";
-        /// How far from that curve the partner may lie.
-        curve_tolerance_px: f64 = 2.0, "px", Domain::Between(0.1, 50.0), "ours, R162", if stereo_along_curve = true;
-        /// Nearest range of a feature.
+        /// Largest ratio of the nearest to the second-nearest descriptor distance (ratio test); 1: off.
+        ratio_max: f64 = 0.8, "", Domain::Between(0.1, 1.0), "Lowe04";
+        /// Keeps a match only if each feature is the nearest neighbour of the other.
+        mutual_matches: bool = true, "", Domain::Switch, "ours";
+        /// Restricts stereo matches of features to the epipolar curve.
+        stereo_along_curve: bool = true, "", Domain::Switch, "ours";
+        /// Largest distance of a stereo match from the epipolar curve.
+        curve_tolerance_px: f64 = 2.0, "px", Domain::Between(0.1, 50.0), "ours", if stereo_along_curve = true;
+        /// Smallest range of a feature.
         feature_range_min_m: f64 = 0.5, "m", Domain::Between(0.05, 1000.0), "ours";
-        /// Farthest range of a feature.
+        /// Largest range of a feature.
         feature_range_max_m: f64 = 100.0, "m", Domain::Between(0.1, 100_000.0), "ours";
-        /// Look for a feature of an earlier stop only so far from where the pose estimate expects it; 0: everywhere, as where
-        /// too few agree then.
+        /// Radius around the position predicted by dead reckoning in which a feature of an earlier stop is searched for; 0:
+        /// the whole image, which is also searched after too few inliers.
         prior_radius_px: f64 = 0.0, "px", Domain::Between(0.0, 2000.0), "ours; off";
-        /// Noise of each coordinate of a feature, from which the covariances of the points follow.
-        feature_sigma_px: f64 = 0.5, "px", Domain::Between(0.01, 10.0), "D§2, R172", if motion_gate = "mahalanobis", if motion_weighting = "range";
-        /// What that grows by for every pixel of a feature's scale: large features lie on no surface point in particular.
+        /// Noise of each coordinate of a feature, 1σ; determines the covariances of the points.
+        feature_sigma_px: f64 = 0.5, "px", Domain::Between(0.01, 10.0), "Deans05 Eq. 4", if motion_gate = "mahalanobis", if motion_weighting = "range";
+        /// Increase of that noise per pixel of the feature's scale.
         feature_sigma_per_scale: f64 = 0.0, "", Domain::Between(0.0, 10.0), "ours; off", if motion_gate = "mahalanobis", if motion_weighting = "range";
-        /// Error that the pixels of all features of a stop share, and their disparities, after a way as long as their range:
-        /// relief and shadows that are seen from elsewhere shift many features alike.
+        /// Error that all features of a stop share in position and disparity, after a motion as long as their range (relief
+        /// and shadows seen from elsewhere).
         feature_common_px: f64 = 0.0, "px", Domain::Between(0.0, 5.0), "ours; off";
-        /// Random draws of three matches.
-        motion_draws: u32 = 100, "", Domain::Between(1.0, 100_000.0), "D§2, R164";
-        /// Draw on until a good draw is nearly sure.
+        /// Number of RANSAC iterations; each fits a minimal sample of three matches.
+        motion_draws: u32 = 100, "", Domain::Between(1.0, 100_000.0), "Deans05 §2";
+        /// Continues RANSAC until an all-inlier sample is almost certain.
         motion_adaptive: bool = false, "", Domain::Switch, "ours; off";
-        /// What decides whether a match agrees with a motion.
-        motion_gate: MotionGate = MotionGate::Distance, "", Domain::choice(&["distance", "mahalanobis"]), "D-Eq 2, R167";
-        /// Farthest distance of a match that agrees.
-        motion_inlier_m: f64 = 0.03, "m", Domain::Between(1e-4, 10.0), "D-Eq 2, R165", if motion_gate = "distance";
-        /// The same in standard deviations of the two points.
-        motion_inlier_sigma: f64 = 3.0, "", Domain::Between(0.1, 100.0), "ours, R167", if motion_gate = "mahalanobis";
-        /// How matches that agree count.
-        motion_weighting: MotionWeighting = MotionWeighting::Range, "", Domain::choice(&["none", "range"]), "ours, R167";
-        /// How the weight of a match falls off with its residual, where they count by range.
+        /// Distance measure of the inlier test.
+        motion_gate: MotionGate = MotionGate::Distance, "", Domain::choice(&["distance", "mahalanobis"]), "Deans05 Eq. 2";
+        /// Largest residual of an inlier.
+        motion_inlier_m: f64 = 0.03, "m", Domain::Between(1e-4, 10.0), "Deans05 Eq. 2", if motion_gate = "distance";
+        /// Largest residual of an inlier, in standard deviations of the two points.
+        motion_inlier_sigma: f64 = 3.0, "", Domain::Between(0.1, 100.0), "ours", if motion_gate = "mahalanobis";
+        /// Weighting of the inliers in the fit.
+        motion_weighting: MotionWeighting = MotionWeighting::Range, "", Domain::choice(&["none", "range"]), "ours";
+        /// Robust loss of the residuals, with weighting by range.
         motion_loss: Loss = Loss::Cauchy, "", Domain::choice(&["squares", "huber", "cauchy"]), "ours", if motion_weighting = "range";
-        /// Seed of the draws.
+        /// Seed of the RANSAC samples.
         motion_seed: u32 = 1, "", Domain::Between(0.0, 1e9), "ours";
-        /// Sets that the bootstrap draws.
-        bootstrap_sets: u32 = 200, "", Domain::Between(10.0, 10_000.0), "ours, R173";
-        /// Side of the squares of the image within which features err alike, so that the bootstrap draws them together; 0:
-        /// each by itself, as the paper has it.
+        /// Number of bootstrap sets.
+        bootstrap_sets: u32 = 200, "", Domain::Between(10.0, 10_000.0), "ours";
+        /// Side of the square image cells that the bootstrap resamples as blocks, because errors within a cell are
+        /// correlated; 0: single features, as in the paper.
         bootstrap_cell_px: f64 = 0.0, "px", Domain::Between(0.0, 1024.0), "ours; off";
-        /// Matches that agree with the motion at which the confidence is one half.
-        confidence_matches: f64 = 30.0, "", Domain::Between(1.0, 1000.0), "D-Eq 7, R182";
-        /// How steeply it rises.
-        confidence_slope: f64 = 0.1, "", Domain::Between(0.001, 10.0), "D-Eq 7, R182";
-        /// Good stops whose features are remembered; the motion is taken from the one that leaves the target most certain.
-        feature_memory: u32 = 3, "stops", Domain::Between(1.0, 20.0), "ours, R186";
+        /// Number of inliers at which the confidence is 0.5.
+        confidence_matches: f64 = 30.0, "", Domain::Between(1.0, 1000.0), "Deans05 Eq. 7";
+        /// Slope of the confidence per inlier.
+        confidence_slope: f64 = 0.1, "", Domain::Between(0.001, 10.0), "Deans05 Eq. 7";
+        /// Number of earlier stops with remembered features; the transform with the smallest covariance of the target is
+        /// used.
+        feature_memory: u32 = 3, "stops", Domain::Between(1.0, 20.0), "ours";
     }
 }
 

@@ -27,60 +27,61 @@ const SEARCH_LEAST_M: f64 = 0.04;
 settings_group! {
     /// How a target is found by the shape of its surroundings (Deans et al. 2005).
     ShapeTrackerSettings as "shape" {
-        /// At which stops the combined tracker asks the shape; the shape tracker asks it at every one.
-        shape_use: ShapeUse = ShapeUse::AtEnd, "", Domain::choice(&["at_end", "when_lost", "every_stop"]), "D§4, R154, R189", if tracker = "combined";
-        /// Carry the line of sight of the designation along and meet the near surface with it, so that the error of the first
-        /// range does not stay.
-        carried_ray: bool = true, "", Domain::Switch, "ours, D§2";
-        /// How the motion is refined: the paper's simplex over absolute differences, or robust least squares along the normals.
-        shape_method: Method = Method::PointToPlane, "", Domain::choice(&["simplex_l1", "point_to_plane"]), "R195, R201; ours";
-        /// Half the width of what is to be recognised; 0: measured on the first surface, and 0.25 m where that is not possible.
-        shape_half_width_m: f64 = 0.0, "m", Domain::Between(0.0, 2.0), "ours, R200";
-        /// How far the coarse search goes to each side; 0: three standard deviations of the start and 4 cm, at most the half
-        /// width.
-        shape_search_m: f64 = 0.0, "m", Domain::Between(0.0, 2.0), "R200";
-        /// Hold the motion to its start as far as that is known; the paper's simplex never does.
-        shape_prior: bool = true, "", Domain::Switch, "ours, R197";
-        /// Attitude of the pose estimates since the earlier view, 1σ about each axis.
-        shape_attitude_deg: f64 = 1.0, "°", Domain::Between(0.01, 30.0), "ours, R198", if shape_prior = true;
-        /// What two pairs of cameras may disagree by about where a target is, 1σ on each axis.
-        hand_off_shift_m: f64 = 0.02, "m", Domain::Between(0.0001, 1.0), "ours, R205";
-        /// And about its attitude, 1σ about each axis.
-        hand_off_turn_deg: f64 = 0.3, "°", Domain::Between(0.01, 30.0), "ours, R205";
-        /// At a hand-off, find the target in the other camera's image by the last image draped over the surface.
-        hand_off_picture: bool = true, "", Domain::Switch, "ours, R205";
-        /// Side of that picture.
+        /// Stops at which the combined tracker registers the shape; the shape tracker registers it at every stop.
+        shape_use: ShapeUse = ShapeUse::AtEnd, "", Domain::choice(&["at_end", "when_lost", "every_stop"]), "Deans05 §4", if tracker = "combined";
+        /// Propagates the line of sight of the designation and intersects it with the near surface, which removes the range
+        /// error of the designation.
+        carried_ray: bool = true, "", Domain::Switch, "ours; Deans05 §2";
+        /// Method of the refinement: the paper's simplex over absolute differences, or robust point-to-plane least squares.
+        shape_method: Method = Method::PointToPlane, "", Domain::choice(&["simplex_l1", "point_to_plane"]), "Deans05 §2, Eq. 12; ours";
+        /// Half width of the registered surface; 0: measured on the first surface, or 0.25 m where that fails.
+        shape_half_width_m: f64 = 0.0, "m", Domain::Between(0.0, 2.0), "ours";
+        /// Reach of the coarse search to each side; 0: 3σ of the prior plus 4 cm, at most the half width.
+        shape_search_m: f64 = 0.0, "m", Domain::Between(0.0, 2.0), "ours";
+        /// Constrains the transform by its prior; the paper's simplex has none.
+        shape_prior: bool = true, "", Domain::Switch, "ours";
+        /// Attitude error of the pose estimates since the earlier view, 1σ about each axis.
+        shape_attitude_deg: f64 = 1.0, "°", Domain::Between(0.01, 30.0), "ours", if shape_prior = true;
+        /// Disagreement of two camera pairs about the target's position, 1σ on each axis.
+        hand_off_shift_m: f64 = 0.02, "m", Domain::Between(0.0001, 1.0), "ours";
+        /// Disagreement of two camera pairs about the target's attitude, 1σ about each axis.
+        hand_off_turn_deg: f64 = 0.3, "°", Domain::Between(0.01, 30.0), "ours";
+        /// At a hand-off, matches the last image, draped over the surface, in the other camera's image.
+        hand_off_picture: bool = true, "", Domain::Switch, "ours";
+        /// Side of the draped image.
         hand_off_window_px: u32 = 31, "px", Domain::OddBetween(7, 101), "ours", if hand_off_picture = true;
-        /// A picture that agrees less is not used.
+        /// Lowest match score of the draped image.
         hand_off_score_min: f64 = 0.7, "", Domain::Between(-1.0, 1.0), "ours", if hand_off_picture = true;
-        /// Pixels of a side of the virtual sensor.
-        shape_sensor_px: u32 = 64, "px", Domain::Between(16.0, 256.0), "ours, R191";
-        /// What the sensor spans beyond the half width, as a share of it: ground holds the height and the tilt.
+        /// Side of the virtual range sensor.
+        shape_sensor_px: u32 = 64, "px", Domain::Between(16.0, 256.0), "ours";
+        /// Margin of the virtual range sensor beyond the half width, as a fraction of it; the ground there constrains
+        /// height and tilt.
         shape_margin: f64 = 0.4, "", Domain::Between(0.0, 3.0), "ours";
-        /// Least share of the target's pixels that both surfaces must cover. R196 asks for 0.4; the
-        /// default is lower, as it was chosen on the simulated worlds 501 and 502.
-        shape_overlap_min: f64 = 0.25, "", Domain::Between(0.05, 1.0), "ours; deviates from R196; docs/shape.md";
-        /// Distance of neighbouring vertices; never less than twice the error of their range.
-        mesh_spacing_m: f64 = 0.01, "m", Domain::Between(0.0, 0.2), "ours, R188";
-        /// Neighbours whose ranges have a greater ratio are not joined.
-        mesh_ratio_max: f64 = 1.05, "", Domain::Between(1.001, 2.0), "R188";
-        /// How pixels are compared in dense stereo.
-        surface_method: StereoMethod = StereoMethod::SemiGlobal, "", Domain::choice(&["block_matching", "semi_global"]), "domain.md 7";
-        /// Nearest depth that dense stereo looks at; a far target raises it to three tenths of its distance.
+        /// Smallest overlap of the two surfaces, as a fraction of the target's pixels. The default was chosen on the
+        /// simulated worlds 501 and 502.
+        shape_overlap_min: f64 = 0.25, "", Domain::Between(0.05, 1.0), "ours; docs/shape.md";
+        /// Spacing of mesh vertices; at least twice the error of their range.
+        mesh_spacing_m: f64 = 0.01, "m", Domain::Between(0.0, 0.2), "ours";
+        /// Largest ratio of the ranges of two joined vertices.
+        mesh_ratio_max: f64 = 1.05, "", Domain::Between(1.001, 2.0), "Deans05 §2";
+        /// Matching method of dense stereo.
+        surface_method: StereoMethod = StereoMethod::SemiGlobal, "", Domain::choice(&["block_matching", "semi_global"]), "Hirschmueller08";
+        /// Smallest depth that dense stereo searches; at least 0.3 times the distance of the target.
         surface_range_min_m: f64 = 0.4, "m", Domain::Between(0.05, 100.0), "ours";
-        /// Noise of a disparity, from which that of the points follows.
+        /// Noise of a disparity, 1σ; determines the noise of the points.
         surface_sigma_px: f64 = 0.1, "px", Domain::Between(0.01, 5.0), "ours";
-        /// Error that all points of a surface share, 1σ on each axis: stereo's window makes what is convex smaller.
+        /// Error that all points of a surface share, 1σ on each axis; the stereo window shrinks convex surfaces.
         shape_common_m: f64 = 0.0008, "m", Domain::Between(0.0, 0.1), "ours";
-        /// Triangles that a surface needs.
+        /// Smallest number of triangles of a surface.
         shape_triangles_min: u32 = 100, "", Domain::Between(1.0, 10_000.0), "ours";
-        /// A registration is not used that holds the target less sharply, 1σ in its weakest direction.
+        /// Largest 1σ error of the registered target in its weakest direction.
         shape_sigma_max_m: f64 = 0.02, "m", Domain::Between(0.0001, 1.0), "ours";
-        /// A registration is not used whose surfaces differ so many times as much as their noise explains.
+        /// Largest reduced misfit: RMS residual over its predicted σ (1 = consistent with the noise model).
         shape_misfit_max: f64 = 1.8, "", Domain::Between(0.1, 100.0), "ours";
-        /// A registration is not used that turned farther from the pose estimates.
-        shape_turn_max_deg: f64 = 8.6, "°", Domain::Between(0.1, 90.0), "ours, R198";
-        /// A registration is not used where another place fits nearly as well: by this factor it must differ more.
+        /// Largest rotation between the registration and the pose estimates.
+        shape_turn_max_deg: f64 = 8.6, "°", Domain::Between(0.1, 90.0), "ours";
+        /// Smallest ratio of the mean difference at the next minimum to that at the best one; near 1 the registration is
+        /// ambiguous.
         shape_other_min: f64 = 1.15, "", Domain::Between(1.0, 10.0), "ours";
     }
 }
