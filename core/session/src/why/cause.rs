@@ -70,7 +70,8 @@ pub(super) fn find(book: &Book<'_>, verdict: &Verdict) -> Option<Cause> {
     };
     if verdict.state_before == TrackingState::Failed {
         return Some(Cause::new(
-            "The target had failed before and is not looked at again until it is designated anew".to_owned(),
+            "Tracking had failed before; the target is not searched for until it is designated again"
+                .to_owned(),
         ));
     }
     let by_template = book.settings.tracker == TrackerKind::Template;

@@ -43,7 +43,7 @@ impl Book<'_> {
     fn plain_limit(&self, gate: &Gate, draft: Draft) -> Option<Draft> {
         let setting = gate.setting.as_deref()?;
         let input = format!("setting.{setting}");
-        Some(draft.exactly(&format!("{setting} as it is set"), &[&input]))
+        Some(draft.exactly(&format!("the setting {setting}"), &[&input]))
     }
 
     /// A setting of the run.
@@ -70,7 +70,7 @@ impl Book<'_> {
             |distance_m: f64| distance_m * distance_m * limits.disparity_error_px / (focal_px * baseline_m);
         let stereo = |label: &str, distance_m: f64, of: &str| {
             Draft::number("judge", label, "m", stereo_m(distance_m)).exactly(
-                &format!("{of}² · disparity_error_px / (focal_px · baseline_m)  (K-Eq 1)"),
+                &format!("{of}² · disparity_error_px / (focal_px · baseline_m)  [Kim09 Eq. 1]"),
                 &[of, "setting.disparity_error_px", "focal_px", "baseline_m"],
             )
         };
@@ -110,7 +110,7 @@ impl Book<'_> {
             ),
             "designation_error_m" => Draft::number(
                 "judge",
-                "half a pixel of the first image, seen from here (R40)",
+                "drift of half a pixel of the first image, at the current range [Kim09 §4.2]",
                 "m",
                 0.5 * last.initial_distance_m / focal_px,
             )

@@ -157,12 +157,13 @@ impl Book<'_> {
         });
         Some(match gate.name.as_str() {
             "odometry_inlier_share" => draft.roughly(
-                "inliers as a part of the matches",
+                "inliers as a fraction of the matches",
                 &["visual_odometry.inliers", "visual_odometry.matches"],
             ),
-            "odometry_attitude_deg" => {
-                draft.roughly("angle between the turn by vision and that of gyro and accelerometers", &[])
-            }
+            "odometry_attitude_deg" => draft.roughly(
+                "angle between the rotation by vision and the rotation by gyro and accelerometers",
+                &[],
+            ),
             _ => draft,
         })
     }

@@ -20,40 +20,35 @@ impl Book<'_> {
         Some(match name {
             "inliers" => Draft::number(
                 "fit_motion",
-                "matches that agree with the motion",
+                "inliers of the transform",
                 "",
                 evidence.fit_motion.as_ref()?.inliers as f64,
             )
             .roughly(
-                "the largest set that agrees with one rigid motion (RANSAC, D-Eq 2)",
+                "largest set of inliers of one rigid transform (RANSAC) [Deans05 Eq. 2]",
                 &["matches", "setting.motion_gate", "setting.motion_inlier_m", "setting.motion_draws"],
             ),
             "matches" => {
                 let matched = evidence.match_features.as_ref()?;
-                Draft::number(
-                    "match_features",
-                    "matches with the remembered stop",
-                    "",
-                    matched.matches as f64,
-                )
-                .roughly(
-                    "nearest descriptors whose second neighbour is clearly farther",
-                    &["points", "points_then", "setting.ratio_max"],
-                )
-                .from(
-                    OriginKind::Step,
-                    format!("features of step {}", matched.from_step),
-                    Some(matched.from_step),
-                )
+                Draft::number("match_features", "matches with the earlier stop", "", matched.matches as f64)
+                    .roughly(
+                        "nearest descriptors that pass the ratio test",
+                        &["points", "points_then", "setting.ratio_max"],
+                    )
+                    .from(
+                        OriginKind::Step,
+                        format!("features of step {}", matched.from_step),
+                        Some(matched.from_step),
+                    )
             }
             "feature_covariance" => Draft::numbers(
                 "bootstrap",
-                "covariance of the motion: translation (m), roll, pitch, yaw (rad)",
+                "covariance of the transform: translation (m), roll, pitch, yaw (rad)",
                 "",
                 evidence.bootstrap.as_ref()?.covariance.transpose().iter().copied(),
             )
             .roughly(
-                "the scatter of motions fitted to sets drawn with replacement (R173)",
+                "covariance of the transforms fitted to the bootstrap sets [Deans05 §2]",
                 &["inliers", "setting.bootstrap_sets"],
             ),
             "feature_sigma_m" => {
@@ -72,19 +67,16 @@ impl Book<'_> {
         Some(match name {
             "points_then" => {
                 let matched = evidence.match_features.as_ref()?;
-                Draft::number("detect", "points of the remembered stop", "", matched.then as f64)
+                Draft::number("detect", "triangulated features of the earlier stop", "", matched.then as f64)
                     .at_step(matched.from_step)
             }
-            "points" => Draft::number(
-                "detect",
-                "features that became points",
-                "",
-                evidence.detect.as_ref()?.points as f64,
-            )
-            .roughly(
-                "features with a partner in the other eye, triangulated",
-                &["features_left", "setting.curve_tolerance_px"],
-            ),
+            "points" => {
+                Draft::number("detect", "triangulated features", "", evidence.detect.as_ref()?.points as f64)
+                    .roughly(
+                        "features matched in the right image, triangulated",
+                        &["features_left", "setting.curve_tolerance_px"],
+                    )
+            }
             "features_left" => {
                 let found = evidence.detect.as_ref()?;
                 let file = self.sources.image_file(step, 0);
@@ -106,12 +98,12 @@ impl Book<'_> {
             "shape_correction_m" => Some(
                 Draft::number(
                     "refine_register",
-                    "from the start to where the shape fits",
+                    "distance from the start to the registered target",
                     "m",
                     found.correction_m?,
                 )
                 .roughly(
-                    "coarse search over all shifts, then refinement of the whole motion",
+                    "coarse search over all shifts, then refinement of rotation and translation",
                     &["predicted_position", "setting.shape_method"],
                 )
                 .from(
@@ -131,22 +123,22 @@ impl Book<'_> {
         let (stage, formula): (&str, &str) = match name {
             "shape_overlap" => ("refine_register", "share of the target's pixels that both surfaces cover"),
             "shape_misfit" => {
-                ("refine_register", "how many times as much the surfaces differ as their noise explains")
+                ("refine_register", "RMS residual over its predicted σ (1 = consistent with the noise model)")
             }
-            "shape_sigma_m" => {
-                ("refine_register", "1σ of the target in the direction in which the shape holds it least")
+            "shape_sigma_m" => ("refine_register", "1σ of the registered target in its weakest direction"),
+            "shape_turn_deg" => {
+                ("refine_register", "rotation between the registration and the pose estimates")
             }
-            "shape_turn_deg" => ("refine_register", "how far the refinement turned from the pose estimates"),
             "shape_other_minimum" => (
                 "coarse_register",
-                "mean difference at the next minimum over that at the best; 99 without one",
+                "mean difference at the next minimum over that at the best one; 99 without a next one",
             ),
             "shape_edge_distance_m" => {
-                ("coarse_register", "from the best shift to the border of the coarse search")
+                ("coarse_register", "distance from the best shift to the border of the coarse search")
             }
             "picture_ncc" => (
                 "refine_register",
-                "score of the earlier image, draped over the surface and found in the present one",
+                "score of the earlier image, draped over the surface and matched in the current one",
             ),
             _ => ("refine_register", "a number of the registration"),
         };
@@ -173,7 +165,7 @@ impl Book<'_> {
                 inputs.extend(gates.iter().map(String::as_str));
                 inputs.extend(["setting.n_retry", "setting.count_detecting_update"]);
                 draft.roughly(
-                    "all criteria met: tracking; else lost, and failed once n_retry further updates were bad; failed stays (R90, R91)",
+                    "all gates passed: tracking; otherwise lost, then failed after n_retry further bad updates; failed is final [Kim09 §4.6]",
                     &inputs,
                 )
             }
@@ -182,7 +174,7 @@ impl Book<'_> {
                 let before = before.or_else(|| Some(self.before?.update.state))?;
                 Draft::text("judge", "state before this update", state_words(before)).from(
                     OriginKind::Step,
-                    "what the previous step left",
+                    "state after the previous step",
                     trace.step.checked_sub(1),
                 )
             }
@@ -192,10 +184,8 @@ impl Book<'_> {
                 let is_matched = trace.template().is_some_and(|e| e.match_template.is_some());
                 let has_motion = trace.features().is_some_and(|e| e.fit_motion.is_some());
                 match &located.evidence {
-                    _ if trace.prediction().is_none() => {
-                        draft.exactly("1, since a person designated it", &[])
-                    }
-                    Evidence::Template(_) if is_matched => draft.exactly("ncc, cut to 0 … 1", &["ncc"]),
+                    _ if trace.prediction().is_none() => draft.exactly("1: designated by the user", &[]),
+                    Evidence::Template(_) if is_matched => draft.exactly("ncc, clamped to 0 … 1", &["ncc"]),
                     Evidence::Shape(evidence) | Evidence::Combined(evidence)
                         if evidence.is_judged_by_shape =>
                     {
@@ -205,10 +195,10 @@ impl Book<'_> {
                         )
                     }
                     _ if has_motion => draft.exactly(
-                        "1 / (1 + exp(confidence_slope · (confidence_matches − inliers)))  (D-Eq 7)",
+                        "1 / (1 + exp(confidence_slope · (confidence_matches − inliers)))  [Deans05 Eq. 7]",
                         &["inliers", "setting.confidence_matches", "setting.confidence_slope"],
                     ),
-                    _ => draft.roughly("0, since nothing was found", &["predicted_position"]),
+                    _ => draft.roughly("0: the target was not located", &["predicted_position"]),
                 }
             }
             _ => return None,
@@ -224,18 +214,21 @@ impl Book<'_> {
         Some(match name {
             "budget_without_m" => Draft::number(
                 "budget",
-                "what the paper grants a drive without tracking, 3σ",
+                "the paper's error budget without tracking, 3σ",
                 "m",
                 budget.without_tracking_m,
             )
-            .roughly("stereo error, navigation error and pointing, in squares  (K-Eq 3)", &inputs),
+            .roughly(
+                "root sum of squares of the stereo, navigation and pointing errors  [Kim09 Eq. 3]",
+                &inputs,
+            ),
             _ => Draft::number(
                 "budget",
-                "what the paper grants tracking that drifts by half a pixel of the first image, 3σ",
+                "the paper's error budget with a drift of half a pixel of the first image, 3σ",
                 "m",
                 budget.with_tracking_m,
             )
-            .roughly("stereo error and drift, in squares  (K-Eq 5, R40)", &inputs),
+            .roughly("root sum of squares of the stereo error and the drift  [Kim09 Eq. 5]", &inputs),
         })
     }
 }

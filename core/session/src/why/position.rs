@@ -101,7 +101,7 @@ impl Book<'_> {
         };
         let left_by = |draft: Draft| {
             let before = self.before.map(|before| before.step);
-            draft.from(OriginKind::Step, "what the previous step left", before)
+            draft.from(OriginKind::Step, "pose after the previous step", before)
         };
         Some(match name {
             "pose" => pose("site_from_rover now", step),
@@ -115,7 +115,7 @@ impl Book<'_> {
             .from(OriginKind::Camera, self.camera_name(0), Some(step)),
             "last_position" => left_by(Draft::numbers(
                 "update",
-                "position that the step before left",
+                "position after the previous step",
                 "m",
                 of_point(&last()?.position_in_rover),
             )),
@@ -175,7 +175,7 @@ impl Book<'_> {
                 );
                 match &self.trace.located()?.evidence {
                     Evidence::Template(_) => draft.roughly(
-                        "the midpoint of the shortest connection of both pixels' rays",
+                        "the midpoint of the shortest segment between the two rays",
                         &["left_px", "right_px", "gap_px"],
                     ),
                     Evidence::Features(_) => draft.roughly(
@@ -183,7 +183,7 @@ impl Book<'_> {
                         &["inliers", "matches"],
                     ),
                     _ => draft.roughly(
-                        "the registration of this stop's surface with the earlier view, or the features where it was not asked",
+                        "the registration of this stop's surface to the earlier view, or the features where no registration ran",
                         &["shape_correction_m", "inliers", "predicted_position"],
                     ),
                 }
@@ -207,7 +207,7 @@ impl Book<'_> {
             "distance_correction_m" => {
                 let correction = (self.range_located_m()? - self.predicted_range_m()?).abs();
                 Draft::number("judge", "correction of the distance", "m", correction).exactly(
-                    "│range_located_m − predicted_range_m│  (R83)",
+                    "│range_located_m − predicted_range_m│  [Kim09 §4.6]",
                     &["range_located_m", "predicted_range_m"],
                 )
             }
@@ -216,20 +216,20 @@ impl Book<'_> {
                 let moved = (in_site - self.trace.update.target.initial_position_in_site).norm();
                 Draft::number("judge", "correction of the position since the designation", "m", moved)
                     .exactly(
-                        "│position_in_site − initial_position_in_site│  (R84)",
+                        "│position_in_site − initial_position_in_site│  [Kim09 §4.6]",
                         &["position_in_site", "initial_position_in_site"],
                     )
             }
             "correction_m" => Draft::number(
                 "update",
-                "from the prediction to what was located",
+                "distance from the prediction to the located position",
                 "m",
                 self.trace.update.correction_m?,
             )
             .exactly("│located_position − predicted_position│", &["located_position", "predicted_position"]),
             "correction_px" => Draft::number(
                 "update",
-                "from the prediction to the match",
+                "distance from the prediction to the match",
                 "px",
                 self.trace.update.correction_px?,
             )
@@ -281,15 +281,15 @@ impl Book<'_> {
                 );
                 match (self.is_found(), self.trace.features().is_some()) {
                     (false, _) => draft.exactly(
-                        "that of the prediction, since nothing was accepted",
+                        "covariance of the prediction, since nothing was accepted",
                         &["predicted_covariance_m2"],
                     ),
                     (true, true) => draft.roughly(
-                        "that of the remembered position carried by the motion, with the motion's own and that of the mast angles",
+                        "covariance of the earlier position moved by the transform, plus those of the transform and of the mast angles",
                         &["feature_covariance"],
                     ),
                     (true, false) => draft.roughly(
-                        "the unscented transform of both pixels' covariance through the triangulation, plus that of the mast angles",
+                        "the unscented transform of both pixels' covariance through the triangulation, plus the covariance from the mast angles",
                         &[
                             "left_error_px2",
                             "match_covariance_px2",
@@ -309,7 +309,7 @@ impl Book<'_> {
                     error.mean_square_px2().transpose().iter().copied(),
                 )
                 .roughly(
-                    "the template's drift carried here, plus this match, plus what biases it (estimate/drift)",
+                    "the propagated drift of the template, plus the covariance and the bias of this match (estimate/drift)",
                     &["match_covariance_px2", "setting.match_correlation"],
                 )
             }

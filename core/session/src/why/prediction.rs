@@ -19,7 +19,7 @@ impl Book<'_> {
                 );
                 match self.prediction_px {
                     Some(_) => draft.roughly(
-                        "on the line of sight of the pixel at which a person put it, as far away as dead reckoning says",
+                        "on the line of sight of the pixel that the user chose, at the distance of dead reckoning",
                         &["displaced_to", "last_position", "pose_before", "pose"],
                     ),
                     None => draft.exactly(
@@ -28,13 +28,10 @@ impl Book<'_> {
                     ),
                 }
             }
-            "displaced_to" => Draft::numbers(
-                stage,
-                "where a person put the prediction",
-                "px",
-                of_pixel(self.prediction_px?),
-            )
-            .from(OriginKind::Person, "displaced prediction", Some(self.trace.step)),
+            "displaced_to" => {
+                Draft::numbers(stage, "prediction placed by the user", "px", of_pixel(self.prediction_px?))
+                    .from(OriginKind::Person, "displaced prediction", Some(self.trace.step))
+            }
             "predicted_covariance_m2" => Draft::numbers(
                 stage,
                 "covariance of the prediction, rover frame",

@@ -42,9 +42,9 @@ impl<'a> Book<'a> {
         let left = || self.camera_name(0);
         Some(match name {
             "scale" => Draft::number(stage, "scale by the ratio of distances", "", prepared.scale)
-                .exactly("old_distance_m / new_distance_m  (K-Eq 6)", &["old_distance_m", "new_distance_m"]),
+                .exactly("old_distance_m / new_distance_m  [Kim09 Eq. 6]", &["old_distance_m", "new_distance_m"]),
             "roll_deg" => Draft::number(stage, "roll", "deg", prepared.roll_rad.to_degrees()).roughly(
-                "angle in the new left image of a helper 5 cm long that lay level in the old one  (K-Eq 7–10)",
+                "angle in the new left image of a 5 cm segment that was level in the old one  [Kim09 Eq. 7–10]",
                 &["setting.roll_reference", "predicted_left"],
             ),
             "old_distance_m" => {
@@ -52,7 +52,7 @@ impl<'a> Book<'a> {
                     .roughly("│p_old − C_old│ of the template's stop", &[])
                     .from(
                         OriginKind::Step,
-                        format!("step {} left its position", prepared.template_step),
+                        format!("position after step {}", prepared.template_step),
                         Some(prepared.template_step),
                     )
                     .at_step(prepared.template_step)
@@ -64,7 +64,7 @@ impl<'a> Book<'a> {
             }
             "template" => Draft::text(
                 stage,
-                "the template that was compared",
+                "the compared template",
                 format!("taken at step {}", prepared.template_step),
             )
             .roughly(
@@ -92,7 +92,7 @@ impl<'a> Book<'a> {
             "template_size_px" => {
                 self.template()?.scale_roll.as_ref()?;
                 Draft::number(stage, "side of the template", "px", f64::from(own.template_size_px))
-                    .exactly("template_size_px as it is set", &["setting.template_size_px"])
+                    .exactly("the setting template_size_px", &["setting.template_size_px"])
             }
             "search_window_px" => {
                 self.template()?.scale_roll.as_ref()?;
@@ -106,7 +106,7 @@ impl<'a> Book<'a> {
             "lost_count" => {
                 Draft::number("judge", "bad updates in a row before", "", f64::from(self.lost_count()?)).from(
                     OriginKind::Step,
-                    "what the previous step left",
+                    "state after the previous step",
                     self.trace.step.checked_sub(1),
                 )
             }
@@ -131,7 +131,7 @@ impl<'a> Book<'a> {
                 let matched = self.matched().filter(|matched| matched.descent.is_none())?;
                 Draft::number(
                     stage,
-                    "from the peak to the rim of the positions compared",
+                    "distance of the peak from the border of the compared positions",
                     "px",
                     edge_distance_px(matched, own.template_size_px),
                 )
@@ -160,20 +160,20 @@ impl<'a> Book<'a> {
             )),
             "peak_score" => from_image(
                 Draft::number(stage, "score at the peak", "", matched.peak.score).roughly(
-                    "Σ (T − T̄)(I − Ī) / √(Σ (T − T̄)² Σ (I − Ī)²), refined by a quadratic fit below the pixel (R67)",
+                    "Σ (T − T̄)(I − Ī) / √(Σ (T − T̄)² Σ (I − Ī)²), refined to sub-pixel by a quadratic fit [Kim09 §4.3.2]",
                     &["peak", "template", "setting.sub_pixel"],
                 ),
             ),
             "match_px" => from_image(
                 Draft::numbers(stage, "where the template matched", "px", [matched.pixel.x, matched.pixel.y]).roughly(
-                    "the peak, followed to the next maximum of scores that count the window's centre most",
+                    "the peak, refined to the nearest maximum of the centre-weighted score",
                     &["peak", "setting.focus_px", "setting.refine"],
                 ),
             ),
             "second_peak_score" => {
                 let second = matched.second_peak.as_ref()?;
                 from_image(Draft::number(stage, "score of the second peak", "", second.score).roughly(
-                    "the highest local maximum at least half a template from the match (R68)",
+                    "the highest local maximum at least half a template from the match",
                     &["search_window", "template_size_px"],
                 ))
             }
@@ -198,7 +198,7 @@ impl<'a> Book<'a> {
                 let (predicted, covariance) = (self.predicted_left()?, self.trace.point_mast.predicted_covariance_px2?);
                 let away = nalgebra::Vector2::new(matched.pixel.x - predicted.x, matched.pixel.y - predicted.y);
                 let inverse = (covariance + matched.covariance_px2).try_inverse()?;
-                Draft::number("judge", "from the prediction to the match, in standard deviations of both", "σ", away.dot(&(inverse * away)).max(0.0).sqrt())
+                Draft::number("judge", "distance from the prediction to the match, in standard deviations of both", "σ", away.dot(&(inverse * away)).max(0.0).sqrt())
                     .exactly("√(νᵀ (Σ_predicted + Σ_match)⁻¹ ν), ν = match_px − predicted_left", &["match_px", "predicted_left", "predicted_covariance_px2", "match_covariance_px2"])
             }
             _ => return None,
@@ -213,7 +213,7 @@ impl<'a> Book<'a> {
         let from_image = |draft: Draft| draft.from(OriginKind::Image, self.image(1), Some(self.trace.step));
         Some(match name {
             "stereo_score" => from_image(Draft::number(stage, "stereo score", "", stereo.score).roughly(
-                "the best normalised correlation of the left window along the epipolar curve (R76)",
+                "the best normalised correlation of the left window along the epipolar curve [Kim09 §4.4]",
                 &["left_px", "right_px", "setting.epipolar_tolerance_px", "setting.disparity_range_px"],
             )),
             "right_px" => from_image(
@@ -229,23 +229,26 @@ impl<'a> Book<'a> {
                 ),
             ),
             "disparity_px" => Draft::number(stage, "disparity", "px", stereo.disparity_px?).roughly(
-                "the way along the epipolar curve from a point at infinity",
+                "distance along the epipolar curve from the image of a point at infinity",
                 &["right_px", "left_px"],
             ),
             "left_right_px" => Draft::number(
                 stage,
-                "way from the left pixel to the right one and back",
+                "distance between the left pixel and the match of the right one in the left image",
                 "px",
                 stereo.left_right_px?,
             )
-            .roughly("the right pixel, looked for again in the left image", &["left_px", "right_px"]),
+            .roughly("the right pixel, matched back in the left image", &["left_px", "right_px"]),
             "gap_px" => Draft::number(
                 "triangulate",
-                "how far the two rays miss each other",
+                "smallest distance between the two rays",
                 "px",
                 evidence.triangulate.as_ref()?.gap_px,
             )
-            .roughly("length of the shortest connection · focal length / range", &["left_px", "right_px"]),
+            .roughly(
+                "length of the shortest segment between the rays · focal length / range",
+                &["left_px", "right_px"],
+            ),
             _ => return None,
         })
     }

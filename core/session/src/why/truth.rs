@@ -37,7 +37,7 @@ impl Book<'_> {
                 ),
             "tolerance_px" => {
                 Draft::number(stage, "error up to which it counts as tracked", "px", truth.tolerance_px)
-                    .exactly("max(5 px, 0.5 px · magnification)  (R116)", &["magnification"])
+                    .exactly("max(5 px, 0.5 px · magnification)", &["magnification"])
             }
             "tracked" => {
                 let word = match truth.tracked {

@@ -238,7 +238,7 @@ impl Record for ScaleRoll {
         r.quantity("roll_rad", Unit::Radian, |s| s.roll_rad)
             .describe("Roll, clockwise on screen; applied only where the setting `roll` is on.")
             .formula(
-                "angle in the new left image of a helper 5 cm long that was level in the old one [Kim09 Eq. 7–10]",
+                "angle in the new left image of a 5 cm segment that was level in the old one [Kim09 Eq. 7–10]",
                 &["setting.roll_reference", "point_mast.predicted_left"],
             );
         r.quantity("applied_scale", Unit::One, |s| s.applied_scale).describe("Scale that was applied.");
