@@ -248,7 +248,7 @@ fn every_example_of_the_page_is_read_and_every_bad_one_is_refused_as_it_says() {
         let wrong = Expression::read(&row[0]).expect_err(&row[0]);
         assert_eq!(wrong.to_string(), row[1], "{}", row[0]);
     }
-    let limits = [("characters", 500_usize), ("parts", 200), ("inside each other", 32)];
+    let limits = [("characters", 500_usize), ("parts", 200), ("levels of nesting", 32)];
     for (what, limit) in limits {
         assert!(page.text.contains(&format!("{limit}")), "the limit of {what}");
     }

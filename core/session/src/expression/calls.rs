@@ -19,7 +19,7 @@ impl Checker<'_> {
         let (least, most) = function.takes;
         if !(least..=most).contains(&given.len()) {
             let (count, form) = (given.len(), function.form);
-            let sentence = format!("`{name}` is given {count} values, and it is written `{form}`");
+            let sentence = format!("`{name}` has {count} arguments, but its form is `{form}`");
             return self.refuse(&node.span, sentence);
         }
         match function.signature {
@@ -100,21 +100,20 @@ impl Checker<'_> {
             (Kind::Text(part), _) => part.clone(),
             (_, Some(word)) => word,
             _ => {
-                let sentence = "`contains` looks for a text in quotes".to_owned();
+                let sentence = "the second argument of `contains` must be a text in quotes".to_owned();
                 return self.refuse(&given[1].span, sentence);
             }
         };
         if !matches!(text.kind, Type::Word(_)) {
             let (found, what) = (self.source(&given[0]), text.kind.in_words());
-            return self
-                .refuse(&given[0].span, format!("`contains` looks into texts, and `{found}` is {what}"));
+            return self.refuse(&given[0].span, format!("`contains` takes a text, and `{found}` is {what}"));
         }
         Ok(Checked { code: Code::Contains(Box::new(text.code), part), kind: Type::Truth })
     }
 
     fn differs(&mut self, node: &Node, given: &[Node]) -> Result<Checked, Refused> {
         if self.inside_differs {
-            return self.refuse(&node.span, "`differs` cannot stand inside another `differs`".to_owned());
+            return self.refuse(&node.span, "`differs` cannot be nested in another `differs`".to_owned());
         }
         let run = |of: &Node| {
             let letter = match &of.kind {
@@ -124,8 +123,7 @@ impl Checker<'_> {
                 },
                 _ => None,
             };
-            let sentence =
-                format!("`{}` is no run: runs are named by their letters, A, B, C", self.source(of));
+            let sentence = format!("`{}` is not a run: name a run by its letter, such as A", self.source(of));
             letter.ok_or_else(|| Refused::at(self.text, of.span.clone(), sentence))
         };
         let runs = [run(&given[0])?, run(&given[1])?];
@@ -158,7 +156,7 @@ impl Checker<'_> {
             let (found, what) = (self.source(of), kind.in_words());
             return self.refuse(
                 &node.span,
-                format!("`{found}` is {what}, which differs or does not: leave the last value out"),
+                format!("`{found}` is {what}, which has no tolerance: leave the last argument out"),
             );
         }
         let given = self.number(node, "differs")?;
@@ -167,8 +165,7 @@ impl Checker<'_> {
         match code.constant() {
             Some(beyond) if beyond >= 0.0 => Ok(beyond),
             _ => {
-                let sentence =
-                    "how much a value must differ is a number that does not change, and not negative";
+                let sentence = "the last argument of `differs` must be a constant number from 0";
                 self.refuse(&node.span, sentence.to_owned())
             }
         }

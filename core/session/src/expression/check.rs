@@ -275,7 +275,7 @@ impl Checker<'_> {
     }
 
     fn check_again(&self, node: &Node) -> Result<Checked, Refused> {
-        self.refuse(&node.span, "this is no word".to_owned())
+        self.refuse(&node.span, "unknown word".to_owned())
     }
 
     /// A constant word must be one that the other side can be.

@@ -49,7 +49,7 @@ pub fn complete(text: &str, cursor: usize) -> Completion {
         Where::Unit => ranked(units(), &word),
         Where::Word(of) => {
             let words = words_of(&of).into_iter().map(|word| Candidate {
-                meaning: format!("A word that `{of}` can be."),
+                meaning: format!("A value of `{of}`."),
                 unit: String::new(),
                 text: word,
             });
@@ -193,7 +193,7 @@ fn joints() -> Vec<Candidate> {
         ("!= ", "Not equal."),
         ("&& ", "Both conditions."),
         ("|| ", "Either condition."),
-        ("changes", "Whether it is another than at the step before."),
+        ("changes", "Whether the value differs from that of the previous step."),
         ("and ", "Both conditions."),
         ("or ", "Either condition."),
     ];

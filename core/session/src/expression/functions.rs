@@ -49,7 +49,7 @@ const MOST: usize = 16;
 
 /// All functions.
 pub static FUNCTIONS: [FunctionInfo; 12] = [
-    function("abs", "abs(x)", "The size of a number.", (1, 1), Signature::Numbers(Function::Abs)),
+    function("abs", "abs(x)", "The absolute value.", (1, 1), Signature::Numbers(Function::Abs)),
     function(
         "min",
         "min(x, y, …)",
@@ -74,26 +74,26 @@ pub static FUNCTIONS: [FunctionInfo; 12] = [
     function(
         "hypot",
         "hypot(x, y, …)",
-        "The root of the sum of squares: a length.",
+        "The square root of the sum of squares.",
         (2, MOST),
         Signature::Numbers(Function::Hypot),
     ),
     function(
         "prev",
         "prev(x)",
-        "The value at the step before; missing at the first one.",
+        "The value at the previous step; missing at the first step.",
         (1, 1),
         Signature::Before,
     ),
     function(
         "changes",
         "changes(x)",
-        "Whether it is another than at the step before; also `x changes`.",
+        "Whether the value differs from that of the previous step; also `x changes`.",
         (1, 1),
         Signature::Changes,
     ),
     function("has", "has(x)", "Whether there is a value.", (1, 1), Signature::Has(true)),
-    function("missing", "missing(x)", "Whether there is none.", (1, 1), Signature::Has(false)),
+    function("missing", "missing(x)", "Whether there is no value.", (1, 1), Signature::Has(false)),
     function("count", "count(list)", "How many entries a list has.", (1, 1), Signature::Count),
     function(
         "contains",
@@ -105,7 +105,7 @@ pub static FUNCTIONS: [FunctionInfo; 12] = [
     function(
         "differs",
         "differs(A, B, x, by)",
-        "Whether a value differs between two runs of the target by more than that; without the last, at all.",
+        "Whether a value differs between two runs of the target by more than `by`; without `by`, by any amount.",
         (3, 4),
         Signature::Differs,
     ),

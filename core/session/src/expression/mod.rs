@@ -114,7 +114,7 @@ impl Expression {
             }
             Type::Record => {
                 let refused = Refused::whole(text, "this is a record".to_owned());
-                return Err(refused.hint("Go on with a point: completion lists its fields."));
+                return Err(refused.hint("Add a dot: completion lists its fields."));
             }
         };
         Ok(Self { tree, code: checked.code, answers, unit, runs })

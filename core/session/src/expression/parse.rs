@@ -46,7 +46,7 @@ impl Parser<'_> {
     fn expression(&mut self, least: u8) -> Result<Node, Refused> {
         self.depth += 1;
         if self.depth > DEPTH_LIMIT {
-            let sentence = format!("more than {DEPTH_LIMIT} things stand inside each other");
+            let sentence = format!("more than {DEPTH_LIMIT} levels of nesting");
             return Err(Refused::at(self.text, self.here(), sentence));
         }
         let mut left = self.prefixed(least)?;
@@ -83,7 +83,7 @@ impl Parser<'_> {
         let start = self.here().start;
         if self.is_sign("!") || self.is_word("not") {
             if least > NOT {
-                let sentence = "`!` cannot stand here: put it and what it denies into parentheses".to_owned();
+                let sentence = "`!` is not allowed here: put it and its operand in parentheses".to_owned();
                 return Err(Refused::at(self.text, self.here(), sentence));
             }
             self.at += 1;
@@ -171,7 +171,7 @@ impl Parser<'_> {
                 match self.tokens.get(self.at) {
                     Some((Token::Name(name), _)) => segments.push(Segment::Field(name.clone())),
                     _ => {
-                        let sentence = "after a point stands the name of a field".to_owned();
+                        let sentence = "the name of a field must follow the dot".to_owned();
                         return Err(Refused::at(self.text, self.here(), sentence));
                     }
                 }
@@ -184,7 +184,7 @@ impl Parser<'_> {
                         segments.push(Segment::Index(*n as usize));
                     }
                     _ => {
-                        let sentence = "in brackets stands a whole number, from 0".to_owned();
+                        let sentence = "the index in brackets must be a whole number from 0".to_owned();
                         return Err(Refused::at(self.text, self.here(), sentence));
                     }
                 }
@@ -274,10 +274,10 @@ impl Parser<'_> {
                 let sentence = format!("`{word}` is no unit; the units are {}", units.join(", "));
                 Refused::at(self.text, span, sentence)
             }
-            Token::Sign(")") => Refused::at(self.text, span, "`)` closes nothing".to_owned()),
+            Token::Sign(")") => Refused::at(self.text, span, "`)` has no matching `(`".to_owned()),
             _ => {
                 let found = &self.text[span.clone()];
-                let sentence = format!("nothing joins `{found}` to what stands before it");
+                let sentence = format!("an operator is missing before `{found}`");
                 Refused::at(self.text, span, sentence).hint("Join two conditions with `&&` or `||`.")
             }
         }

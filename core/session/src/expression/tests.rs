@@ -243,10 +243,10 @@ fn an_unknown_name_is_refused_at_its_place_with_the_nearest_known_one() {
     assert!(refused("peak_ratio.ratio > 1").sentence.contains("has no parts"));
     assert!(refused("flor(ncc) > 1").sentence.contains("no function `flor`"));
     assert!(refused("state == lots").hint.unwrap().contains("lost"));
-    assert!(refused("contains(ncc, \"a\")").sentence.contains("looks into texts"));
-    assert!(refused("differs(A, Q9x, ncc)").sentence.contains("no run"));
+    assert!(refused("contains(ncc, \"a\")").sentence.contains("takes a text"));
+    assert!(refused("differs(A, Q9x, ncc)").sentence.contains("is not a run"));
     assert!(refused("differs(A, A, ncc)").sentence.contains("never differs from itself"));
-    assert!(refused("differs(A, B, differs(A, B, ncc))").sentence.contains("inside another"));
+    assert!(refused("differs(A, B, differs(A, B, ncc))").sentence.contains("nested in another"));
 }
 
 #[test]
@@ -255,21 +255,21 @@ fn every_kind_of_bad_text_gets_one_sentence_with_its_place() {
         ("", 0, "no expression yet"),
         ("ncc <", 5, "ends too soon"),
         ("(ncc < 1", 0, "never closed"),
-        ("ncc < 1)", 7, "closes nothing"),
+        ("ncc < 1)", 7, "has no matching"),
         ("ncc = 1", 4, "write `==`"),
         ("a < b < c", 2, "do not chain"),
-        ("ncc < 0.6 step > 1", 10, "nothing joins"),
+        ("ncc < 0.6 step > 1", 10, "an operator is missing"),
         ("ncc < 5 furlongs", 8, "is no unit"),
         ("state == \"lost", 9, "no closing quote"),
         ("ncc == null", 7, "null"),
         ("ncc && true", 0, "takes conditions"),
         ("state < lost", 0, "takes numbers"),
         ("ncc == lost", 7, "there is no name `lost`"),
-        ("abs(1, 2) > 1", 0, "is written `abs(x)`"),
+        ("abs(1, 2) > 1", 0, "its form is `abs(x)`"),
         ("ncc < 1e999", 6, "too large"),
         ("$ncc", 0, "has no meaning"),
-        ("1 + !fault", 4, "cannot stand here"),
-        ("judge.", 6, "after a point"),
+        ("1 + !fault", 4, "is not allowed here"),
+        ("judge.", 6, "must follow the dot"),
         ("judge.gates[x]", 12, "whole number"),
     ] {
         let wrong = refused(text);
@@ -294,7 +294,7 @@ fn length_depth_and_parts_are_limited() {
     let long = format!("{} < 1", "n".repeat(LENGTH_LIMIT));
     assert!(refused(&long).sentence.contains("characters"));
     let deep = format!("{}1{} < 2", "(".repeat(DEPTH_LIMIT + 1), ")".repeat(DEPTH_LIMIT + 1));
-    assert!(refused(&deep).sentence.contains("inside each other"));
+    assert!(refused(&deep).sentence.contains("levels of nesting"));
     let many = vec!["1"; NODE_LIMIT].join("+");
     assert!(refused(&many).sentence.contains("parts"));
 }
