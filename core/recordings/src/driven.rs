@@ -148,7 +148,7 @@ impl DrivenTraverse {
     /// A state without a stop, or files that cannot be written.
     pub fn restore(&mut self, state: Vec<DrivenStop>) -> Result<()> {
         if state.is_empty() {
-            return Err(Error::Request("a state of the world has one stop at least".to_owned()));
+            return Err(Error::Request("a state of the world must have at least one stop".to_owned()));
         }
         for (number, stop) in state.iter().enumerate() {
             let named = |problem| Error::Request(format!("driven[{number}].{problem}"));

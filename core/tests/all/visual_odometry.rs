@@ -138,7 +138,7 @@ fn what_cannot_be_measured_is_refused_with_a_sentence() {
     let predicted = traverse.site_from_rover(1).inverse() * traverse.site_from_rover(0);
     let found = of_pairs(traverse, [0, 1], [&flat, &flat], &predicted, &settings, Cancel::default()).unwrap();
     assert!(!found.accepted && found.corners == 0 && found.after_from_before.is_none());
-    assert_eq!(found.refusal().unwrap(), "no update: only 0 of 0 matches agree on a rigid motion");
+    assert_eq!(found.refusal().unwrap(), "no update: only 0 of 0 matches are inliers of a rigid transform");
     // A motion that no wheel can have made fails the gate of the translation, by name, value and limit.
     let far = Pose::translation(-0.05, 0.0, 0.0);
     let pairs = [0, 1].map(|stop| traverse.capture(stop).unwrap());

@@ -140,7 +140,7 @@ fn no_part_is_blank_without_a_sentence_that_says_why() {
     part(Part::Meshes, 0).says("the surface of the designation is what later stops are registered to");
     part(Part::Surface, 0).says("disparity, px");
     let refused = part(Part::Sensor, REFUSED);
-    refused.says("Not used: the surfaces differ 2.6 times as much as their noise explains");
+    refused.says("Not used: the RMS residual of the surfaces is 2.6 times its predicted σ");
     part(Part::Meshes, REFUSED).says("meshes in space");
     for part in Part::ALL {
         let loading = with(part, HAND_OFF, |state| state.cache = crate::cache::Cache::default());

@@ -55,22 +55,24 @@ pub enum Degenerate {
     #[error("all matches are at the same point")]
     Identical,
     /// All matches are near one point.
-    #[error("all matches are within {along_m:.4} m (rms) of each other, so that noise would turn them")]
+    #[error("the spread of the matches is only {along_m:.4} m (RMS): too small for a rotation")]
     Close {
         /// Their spread along the main axis, m.
         along_m: f64,
     },
     /// All matches are on or near a line, about which any turn fits.
-    #[error("all matches are on a line: they spread only {across_m:.4} m (rms) to its sides")]
+    #[error("all matches are on a line: their spread across it is only {across_m:.4} m (RMS)")]
     OnALine {
         /// Their spread across the line, m.
         across_m: f64,
     },
     /// The sets have different shapes, as when one is the mirror image of the other.
-    #[error("no rotation stands out: the matched points have different shapes before and after the motion")]
+    #[error(
+        "the rotation is ambiguous: the matched points have different shapes before and after the motion"
+    )]
     Unlike,
     /// A coordinate, a weight or a covariance is not finite, or there is no positive weight.
-    #[error("a coordinate or its weight is not a usable number")]
+    #[error("a coordinate, weight or covariance is not finite, or no weight is positive")]
     NotANumber,
     /// A match has no error in some direction, so that it cannot be weighted.
     #[error("a match has a covariance that is not positive definite")]

@@ -252,7 +252,7 @@ pub fn fit_motion(pairs: &[Correspondence], settings: &RansacSettings) -> Motion
             .map(|of| shape_of(&pairs.iter().map(of).collect::<Vec<_>>()));
         return match before.or(after) {
             Some(degenerate) => fit.without_motion(degenerate),
-            None => fit.without_motion("no three matches that were drawn span a triangle"),
+            None => fit.without_motion("no minimal sample of three matches spans a triangle"),
         };
     };
     if inliers.len() < 3 {
@@ -340,7 +340,7 @@ fn refit(
     for _ in 0..settings.refits_max {
         motion = match fit_to(matches.pairs, &inliers, settings) {
             Ok(motion) => motion,
-            Err(reason) => return fit.without_motion(format!("of the matches that agree: {reason}")),
+            Err(reason) => return fit.without_motion(format!("refit to the inliers: {reason}")),
         };
         matches.squares_m2(&motion, &mut squares);
         fit.refits.push(Refit { inliers: inliers.len() as u32, rms_m: rms(&squares, &inliers) });
@@ -354,7 +354,7 @@ fn refit(
         seen.push(inliers.clone());
     }
     if inliers.len() < 3 {
-        return fit.without_motion("fewer than three matches agree with the motion fitted to them");
+        return fit.without_motion("fewer than three inliers are left after the refit");
     }
     matches.squares_m2(&motion, &mut squares);
     fit.after_from_before = Some(PoseRecord::from(&motion));

@@ -54,7 +54,7 @@ pub struct Kitti;
 fn description(stops: usize, options: &ImportOptions) -> String {
     format!(
         "KITTI odometry sequence, {stops} stereo frames. Truth: the recording's poses. Estimate: the truth with a \
-         simulated odometry error of {} of the way and {}° a step, seed {}.",
+         simulated odometry error of {} of the distance driven and {}° a step, seed {}.",
         options.odometry_fraction, options.attitude_deg, options.seed,
     )
 }

@@ -182,35 +182,36 @@ impl Record for MeasuredMotion {
     fn declare(r: &mut Declaration<Self>) {
         r.quantity("accepted", Unit::One, |m| m.update.accepted).describe("Whether every gate is passed.");
         r.quantity("corrects", Unit::One, |m| m.corrects)
-            .describe("Whether the estimated pose of the stop is by this motion.");
+            .describe("Whether this motion corrects the estimated pose of the stop.");
         r.quantity("slip", Unit::One, |m| m.update.slip.map(|slip| slip.along))
-            .describe("Part of the wheels' motion that was lost along it; 1: the rover stayed.");
+            .describe("Slip ratio along the wheels' motion; 1: the rover did not move.");
         r.quantity("slip_aside", Unit::One, |m| m.update.slip.map(|slip| slip.aside))
-            .describe("Movement to the right of the wheels' motion, as a part of it.");
+            .describe("Lateral slip to the right, as a fraction of the wheels' motion.");
         r.quantity("slip_sigma", Unit::One, |m| m.update.slip.map(|slip| slip.along_sigma))
             .describe("1σ error of the slip.");
-        r.quantity("motion_m", Unit::Metre, |m| m.displacement().map(Point3::from))
-            .describe("Movement of the rover's origin by vision, in the rover frame of the stop before.");
+        r.quantity("motion_m", Unit::Metre, |m| m.displacement().map(Point3::from)).describe(
+            "Translation of the rover's origin by vision, in the rover frame of the previous stop.",
+        );
         r.quantity("wheels_apart_m", Unit::Metre, Self::wheels_apart_m)
-            .describe("Distance between the places of the rover by vision and by wheels.");
+            .describe("Distance between the rover positions by vision and by wheels.");
         r.quantity("sigma_m", Unit::Metre, |m| {
             m.update.covariance.map(|covariance| worst_sigma_m(&covariance))
         })
         .describe("1σ error of the translation in its worst direction.");
-        r.quantity("corners", Unit::One, |m| m.update.corners).describe("Corners of the left image before.");
-        r.quantity("points", Unit::One, |m| m.update.points).describe("Corners with a position by stereo.");
+        r.quantity("corners", Unit::One, |m| m.update.corners)
+            .describe("Number of corners in the previous left image.");
+        r.quantity("points", Unit::One, |m| m.update.points).describe("Number of triangulated corners.");
         r.quantity("matches", Unit::One, |m| m.update.matches)
-            .describe("Points matched in both images after.");
-        r.quantity("inliers", Unit::One, |m| m.update.inliers)
-            .describe("Matches that agree with the motion.");
+            .describe("Number of points matched in both current images.");
+        r.quantity("inliers", Unit::One, |m| m.update.inliers).describe("Number of inliers.");
         r.quantity("chi2_per_dof", Unit::One, |m| m.update.chi2_per_dof)
             .describe("χ² per degree of freedom of the residuals.");
         r.quantity("change", Unit::One, |m| m.update.change)
-            .describe("Mean change of the view: 0.1 where windows grow by a tenth.");
+            .describe("Mean relative change of the windows' scale; 0.1: 10 %.");
         r.quantity("ambiguity", Unit::One, |m| m.update.ambiguity)
-            .describe("Inliers of another motion as a part of those of the motion.");
+            .describe("Inliers of the second-best hypothesis as a fraction of those of the best one.");
         r.quantity("repetition", Unit::One, |m| m.update.repetition)
-            .describe("How well another way along the motion fits, as a part of how well the motion fits.");
+            .describe("Highest other maximum of the correlation along the motion, over that at the motion; near 1: repetitive ground.");
         for kind in super::gates::KINDS {
             r.gate(kind.name, kind.unit, kind.side, "");
         }

@@ -66,7 +66,11 @@ pub(super) fn fit(matches: &[Match], settings: &OdometrySettings) -> Result<Fitt
         ConsistentSet::Ransac => drawn(&pairs, settings)?,
     };
     if first.len() < 4 {
-        return Err(format!("only {} of {} matches agree on a rigid motion", first.len(), pairs.len()));
+        return Err(format!(
+            "only {} of {} matches are inliers of a rigid transform",
+            first.len(),
+            pairs.len()
+        ));
     }
     let fit_to = |which: &[usize]| {
         let chosen: Vec<Correspondence> = which.iter().map(|&i| pairs[i]).collect();
@@ -85,7 +89,7 @@ pub(super) fn fit(matches: &[Match], settings: &OdometrySettings) -> Result<Fitt
         }
         if now.len() < 4 {
             return Err(format!(
-                "only {} of {} matches agree with the fitted motion",
+                "only {} of {} matches are inliers of the fitted transform",
                 now.len(),
                 pairs.len()
             ));

@@ -43,7 +43,7 @@ pub enum DescentFailure {
     #[error("the descent left the image")]
     LeftImage,
     /// A step was too long.
-    #[error("the descent ran away")]
+    #[error("the descent diverged")]
     RanAway,
 }
 

@@ -67,7 +67,7 @@ pub enum Failure {
         least: f64,
     },
     /// The refinement turned farther than the start can be off.
-    #[error("the refinement turned by {:.1}°, more than {:.1}°", .turn_rad.to_degrees(), .limit_rad.to_degrees())]
+    #[error("the refinement rotated by {:.1}°, more than {:.1}°", .turn_rad.to_degrees(), .limit_rad.to_degrees())]
     TurnedAway {
         /// By how much, rad.
         turn_rad: f64,
@@ -84,7 +84,7 @@ pub enum Failure {
     },
     /// The surfaces differ by more than their noise.
     #[error(
-        "the surfaces differ {misfit:.1} times as much as their noise explains, more than {limit:.1} times"
+        "the RMS residual of the surfaces is {misfit:.1} times its predicted σ, more than {limit:.1} times"
     )]
     DoesNotFit {
         /// How many times.

@@ -86,15 +86,15 @@ impl Alignment {
             return Err(Error::setting("size", "must be from 16 to 8192 px"));
         }
         let cannot = |why: &str| Error::Request(format!("the pair cannot be aligned: {why}"));
-        let axes = Axes::of(left, right).ok_or_else(|| cannot("its cameras do not stand side by side"))?;
+        let axes = Axes::of(left, right).ok_or_else(|| cannot("its cameras are not side by side"))?;
         let at_most = settings.field_max_deg.to_radians().tan();
         let [x, y] = [[-axes.x, axes.x], [-axes.y, axes.y]]
             .map(|sides| sides.map(|side| axes.extent(&[left, right], &side, at_most)));
         let (Some(t_left), Some(t_right), Some(t_top), Some(t_bottom)) = (x[0], x[1], y[0], y[1]) else {
-            return Err(cannot("a side of an image has no rays"));
+            return Err(cannot("the border of an image has pixels without a ray"));
         };
         if !(t_left + t_right > 1e-3 && t_top + t_bottom > 1e-3) {
-            return Err(cannot("its cameras see nothing in common"));
+            return Err(cannot("the fields of view of its cameras do not overlap"));
         }
         let [hs, vs] = [(size[0], t_left + t_right), (size[1], t_top + t_bottom)]
             .map(|(side, extent)| (f64::from(side) - 1.0) / extent);

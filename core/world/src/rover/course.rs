@@ -153,7 +153,10 @@ impl<'a> Driver<'a> {
     fn advance(&mut self, place: Place, wheels_m: [f64; 2], turn_rad: f64) -> Result<()> {
         self.scene.cancel.check()?;
         let stand = self.scene.settle(place).ok_or_else(|| {
-            self.wrong(format!("the wheels find no stand at x {:.2} m, y {:.2} m", place.x_m, place.y_m))
+            self.wrong(format!(
+                "the rover has no stable footing at x {:.2} m, y {:.2} m",
+                place.x_m, place.y_m
+            ))
         })?;
         self.check_way(&stand)?;
         let length_m = wheels_m[0].hypot(wheels_m[1]);
@@ -217,7 +220,7 @@ impl<'a> Driver<'a> {
             .wheels_from_true(direction, level_length_m / rise)
             .ok_or_else(|| {
                 let number = self.drive.stops.len();
-                let problem = format!("on the way to stop {number} the wheels lose all that they advance");
+                let problem = format!("the wheels slip by 100 % on the way to stop {number}");
                 Error::setting("rover.slip_scale", problem)
             })
     }

@@ -293,7 +293,7 @@ fn slip_factor(scenario: &Scenario, number: usize) -> f64 {
 }
 
 fn no_stand(place: Place) -> Error {
-    Error::Request(format!("the wheels find no stand at x {:.2} m, y {:.2} m", place.x_m, place.y_m))
+    Error::Request(format!("the rover has no stable footing at x {:.2} m, y {:.2} m", place.x_m, place.y_m))
 }
 
 #[cfg(test)]

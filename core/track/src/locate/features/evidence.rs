@@ -209,15 +209,15 @@ impl FeatureEvidence {
                 .at("detect"),
             Stage::of(
                 "match_features",
-                "Which features are the same, in the other eye and at an earlier stop?",
+                "Which features match in the right image and at an earlier stop?",
                 |e: &Self| e.match_features.as_ref(),
             )
             .at("match_features"),
-            Stage::of("fit_motion", "Which rigid motion do most matches agree with?", |e: &Self| {
+            Stage::of("fit_motion", "Which rigid transform has the most inliers?", |e: &Self| {
                 e.fit_motion.as_ref()
             })
             .at("fit_motion"),
-            Stage::of("bootstrap", "How certain is that motion?", |e: &Self| e.bootstrap.as_ref())
+            Stage::of("bootstrap", "How certain is that transform?", |e: &Self| e.bootstrap.as_ref())
                 .with(|e| Some(e), Self::declare_cloud)
                 .at("bootstrap"),
         ]
@@ -249,7 +249,7 @@ impl Record for Detected {
         r.quantity("left", Unit::One, |d| d.left).describe("Number of features of the left image.");
         r.quantity("right", Unit::One, |d| d.right).describe("Number of features of the right image.");
         r.quantity("stereo_matches", Unit::One, |d| d.stereo_matches)
-            .describe("Number of features with a partner in the other eye.");
+            .describe("Number of features matched in the other image.");
         r.quantity("points", Unit::One, |d| d.points).describe("Number of triangulated features.");
         r.quantity("median_range_m", Unit::Metre, |d| d.median_range_m)
             .describe("Median distance of the points from the left camera.");

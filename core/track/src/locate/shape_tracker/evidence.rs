@@ -114,9 +114,11 @@ impl ShapeEvidence {
                 e.registration.as_ref()?.ray.as_ref()
             })
             .at("registration.ray"),
-            Stage::of("hand_off", "Where do other cameras see the last image of the target?", |e: &Self| {
-                e.registration.as_ref()?.draped.as_ref()
-            })
+            Stage::of(
+                "hand_off",
+                "Where does the last image of the target match in the new cameras?",
+                |e: &Self| e.registration.as_ref()?.draped.as_ref(),
+            )
             .at("registration.draped"),
             Stage::of("placement", "Can the arm reach the target, and where does it touch?", |e: &Self| {
                 e.placement.as_ref()

@@ -41,7 +41,7 @@ pub enum DrapeFailure {
     #[error("no position of the window could be compared")]
     NoScore,
     /// The score is too low.
-    #[error("the pictures agree by {score:.2} only, not by {limit:.2}")]
+    #[error("the draped image matches with a score of {score:.2}, less than {limit:.2}")]
     LowScore {
         /// The best score.
         score: f64,
@@ -49,7 +49,7 @@ pub enum DrapeFailure {
         limit: f64,
     },
     /// The best match may be outside the search region.
-    #[error("the best match is on the border of what was searched")]
+    #[error("the best match is on the border of the searched region")]
     AtSearchEdge,
     /// The ray of the match does not meet the surface.
     #[error("the ray of the match misses the surface")]

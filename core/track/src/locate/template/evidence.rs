@@ -50,7 +50,7 @@ impl TemplateEvidence {
                 e.drift_correction.as_ref()
             })
             .at("drift_correction"),
-            Stage::of("relief", "Which heights surround the target?", |e: &Self| e.relief.as_ref())
+            Stage::of("relief", "What is the relief around the target?", |e: &Self| e.relief.as_ref())
                 .at("relief"),
             Stage::of("point_stereo", "Which point of the right image is it?", |e: &Self| {
                 e.point_stereo.as_ref()

@@ -81,9 +81,7 @@ pub(super) fn look(
             kind: WarningKind::WeakStereo,
             value: stereo_score,
             limit: limits.stereo_ncc_min,
-            sentence: format!(
-                "the two eyes do not see the same here: stereo scores {stereo_score:.2}, so that the range may be wrong"
-            ),
+            sentence: format!("weak stereo match: score {stereo_score:.2}, so that the range may be wrong"),
         });
     }
     if let Some(contrast) = window.std().filter(|std| *std < limits.warn_contrast) {
@@ -113,7 +111,7 @@ pub fn of_shadow(share: f64, limits: &Limits) -> Option<Warning> {
         value: share,
         limit: limits.warn_shadow_share,
         sentence: format!(
-            "{:.0} % of the window lie in shadow, which moves on and takes the texture along",
+            "{:.0} % of the window is in shadow, which moves and changes the texture",
             100.0 * share
         ),
     })
