@@ -96,8 +96,10 @@ impl Session {
                     match kept {
                         Some(kept) => current.steps = kept,
                         None => {
-                            current.stopped =
-                                Some(format!("run {}, which it left, has not come so far", fork.run));
+                            current.stopped = Some(format!(
+                                "run {}, from which it branched, has not reached that step",
+                                fork.run
+                            ));
                         }
                     }
                 }
@@ -223,7 +225,7 @@ fn restored_target(number: usize, saved: &SavedTarget, stop_count: usize) -> Res
     }
     let runs = saved.runs.iter().enumerate().map(|(run, saved)| match saved.fork {
         Some(fork) if fork.run >= run => {
-            Err(wrong(format!("run {run} leaves run {}, which is later", fork.run)))
+            Err(wrong(format!("run {run} branches from run {}, which is later", fork.run)))
         }
         _ => Ok(restored_run(saved)),
     });

@@ -235,7 +235,7 @@ fn the_findings_can_be_tried_and_run_from_here() {
     let moved = Moved {
         from: Pixel::new(510.0, 480.0),
         to: Pixel::new(515.0, 480.0),
-        because: "the truth lies that way".to_owned(),
+        because: "towards the truth".to_owned(),
     };
     let margin = SettingChange {
         setting: "search_window_px".to_owned(),

@@ -51,12 +51,12 @@ impl Alignment {
     /// What it means, as one sentence.
     pub const fn sentence(self) -> &'static str {
         match self {
-            Self::Step => "Aligned by step: the same stop of the drive stands side by side.",
+            Self::Step => "Aligned by step: equal stops of the drive are side by side.",
             Self::Distance => {
-                "Aligned by distance: the stops nearest to each other in metres driven since each pick stand side by side."
+                "Aligned by distance: the stops nearest to each other in metres driven since each designation are side by side."
             }
             Self::Time => {
-                "Aligned by time: the stops nearest to each other in seconds since each pick stand side by side."
+                "Aligned by time: the stops nearest to each other in seconds since each designation are side by side."
             }
         }
     }

@@ -149,9 +149,9 @@ fn size_of(view: &ArrayView<'_>) -> String {
 fn sentence(divergence: Option<&Divergence>, compared: usize) -> String {
     let Some(found) = divergence else {
         return match compared {
-            0 => "cannot be compared: the two have no stop side by side".to_owned(),
-            1 => "do not differ: the one stop compared is alike".to_owned(),
-            count => format!("do not differ: all {count} stops compared are alike"),
+            0 => "cannot be compared: no two stops are aligned".to_owned(),
+            1 => "do not differ at the one compared stop".to_owned(),
+            count => format!("do not differ at any of the {count} compared stops"),
         };
     };
     let place = found.part.as_ref().unwrap_or(&found.stage);

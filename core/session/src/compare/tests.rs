@@ -107,7 +107,7 @@ fn equal_runs_never_differ_and_a_run_computed_anew_is_equal_to_the_bit() {
     complete(&mut session, &world, 0, again);
     let found = compared(&session, &asked(&[A, RunName { target: 0, run: again }]));
     assert_eq!(found.first[0].divergence, None);
-    assert_eq!(found.first[0].sentence, "do not differ: all 6 stops compared are alike");
+    assert_eq!(found.first[0].sentence, "do not differ at any of the 6 compared stops");
     assert!(found.settings.is_empty());
     assert!(found.columns.iter().all(|column| column.deltas.iter().flatten().flatten().all(|d| *d == 0.0)));
 }

@@ -37,8 +37,8 @@ pub(super) fn look<D: Drive>(trials: &mut Trials<'_, D>, cancel: Cancel<'_>) -> 
 fn motion<D: Drive>(drive: &D, recorded: &RunStep, cancel: Cancel<'_>) -> Result<Option<(Pose, String)>> {
     if let Some(measured) = recorded.odometry.as_deref() {
         let because = match refusal(measured) {
-            Some(reason) => format!("where the motion that visual odometry refused puts it: {reason}"),
-            None => "where visual odometry puts it, which checks the slip alone".to_owned(),
+            Some(reason) => format!("the prediction by the refused visual odometry: {reason}"),
+            None => "the prediction by visual odometry, which only checks the slip in this drive".to_owned(),
         };
         return Ok(measured.update.after_from_before.map(|motion| (motion.to_pose(), because)));
     }
@@ -48,7 +48,7 @@ fn motion<D: Drive>(drive: &D, recorded: &RunStep, cancel: Cancel<'_>) -> Result
         // Images of the stop before that cannot be read.
         Err(_) => Ok(None),
         Ok(measured) => {
-            let because = "where visual odometry puts it, which the drive runs without";
+            let because = "the prediction by visual odometry, which is off in this drive";
             Ok(measured.update.accepted_motion().map(|motion| (motion, because.to_owned())))
         }
     }

@@ -177,7 +177,7 @@ pub fn goal(base: &Base<'_>) -> Result<Goal> {
         return refuse(format!("the files of step {step} are at fault, which no setting mends: {fault}"));
     }
     if base.recorded.is_odometry_alone() {
-        return refuse(format!("at step {step} {ODOMETRY_ALONE}: ask at a tracked step"));
+        return refuse(format!("at step {step} {ODOMETRY_ALONE}: choose a tracked step"));
     }
     if let Some(before) = base.recorded.paused_before() {
         return refuse(format!(
@@ -190,7 +190,7 @@ pub fn goal(base: &Base<'_>) -> Result<Goal> {
     };
     if verdict.state_before == TrackingState::Failed {
         return refuse(format!(
-            "the target had failed before step {step}, so that no update is used any more: ask at the step where it was lost"
+            "the target had failed before step {step}, so that no update is used any more: choose the step where it was lost"
         ));
     }
     let is_false = base.recorded.truth.as_ref().is_some_and(|truth| truth.tracked == Some(false));

@@ -23,9 +23,7 @@ pub(super) fn look<D: Drive>(trials: &mut Trials<'_, D>) -> Result<Option<Findin
     let before = trials.runs;
     let truth = recorded.truth.as_ref().and_then(|truth| truth.left_pixel);
     let mut found = match truth {
-        Some(place) => {
-            on_the_way(trials, from, place)?.map(|way| (way, "the truth lies that way".to_owned()))
-        }
+        Some(place) => on_the_way(trials, from, place)?.map(|way| (way, "towards the truth".to_owned())),
         None => None,
     };
     if found.as_ref().is_none_or(|(way, _)| way.0 < Reach::Yes)
@@ -56,7 +54,7 @@ fn found_far<D: Drive>(trials: &mut Trials<'_, D>) -> Result<Option<(Pixel, Stri
     let changes = Changes::from([("search_window_px".to_owned(), widest.into())]);
     let wide = trials.run(&changes, None)?;
     let matched = wide.as_ref().and_then(|trace| trace.template()).and_then(|e| e.match_template.as_ref());
-    let because = || format!("a search window of {widest} px finds the best match that way");
+    let because = || format!("towards the best match in a search window of {widest} px");
     Ok(matched.map(|matched| (matched.pixel, because())))
 }
 

@@ -215,7 +215,7 @@ fn a_slip_that_odometry_would_have_seen_is_answered_by_the_place_where_it_puts_t
     let moved = finding.moved.as_ref().unwrap();
     assert!(moved.from.distance(truth) > 30.0 && moved.to.distance(truth) < 1.5, "{moved:?} {truth:?}");
     assert_eq!(finding.outcome, Outcome::Right);
-    assert!(finding.sentence.contains("which the drive runs without"), "{}", finding.sentence);
+    assert!(finding.sentence.contains("which is off in this drive"), "{}", finding.sentence);
     // A refused motion names its gate; a correction of the pose leaves nothing to ask.
     let mut refused = staged;
     let how = (OdometryMode::Full, OdometryPreset::Sightline);

@@ -8,7 +8,7 @@ use super::{Judged, Metric, THRESHOLDS_CM, THRESHOLDS_PX};
 use sightline_geometry::estimate::quantile::median;
 
 const NO_TRUTH: &str = "It needs the truth, which this traverse does not have.";
-const NOT_TRACKED: &str = "No step after the pick is tracked with the truth known.";
+const NOT_TRACKED: &str = "No step after the designation is tracked and has a known truth.";
 
 /// Steps tracked, survival, false losses and false tracking.
 pub(super) fn states(judged: &[Judged<'_>]) -> Vec<Metric> {
@@ -55,7 +55,8 @@ pub(super) fn in_image(judged: &[Judged<'_>]) -> Vec<Metric> {
     let seen: Vec<Sample> =
         judged.iter().filter(|step| step.is_seen()).map(|step| Sample::new(step, step.err_px())).collect();
     let is_known = judged.iter().any(|step| step.truth.is_some());
-    let why = if is_known { "The true point is in no image after the pick." } else { NO_TRUTH };
+    let why =
+        if is_known { "The true point is outside every image after the designation." } else { NO_TRUTH };
     of_samples(&seen, "px", &THRESHOLDS_PX, why)
 }
 

@@ -177,7 +177,11 @@ fn excluded(
     let those =
         |which: fn(&Judged<'_>) -> bool| judged.iter().filter(|step| which(step)).map(Judged::step).collect();
     let mut found = vec![
-        of("all metrics", "here the target was picked", pick.map(|trace| trace.step).into_iter().collect()),
+        of(
+            "all metrics",
+            "the target was designated here",
+            pick.map(|trace| trace.step).into_iter().collect(),
+        ),
         of("all metrics", "the stop's files are damaged", faulty.iter().map(|trace| trace.step).collect()),
         of("all metrics", "visual odometry ran alone there", alone.iter().map(|trace| trace.step).collect()),
         of(
@@ -192,7 +196,7 @@ fn excluded(
         ),
         of(
             "mean, median and largest error",
-            "the tracker says that it is lost",
+            "the tracker reports the target as lost",
             those(|step| step.truth.is_some() && !step.is_tracking),
         ),
     ];

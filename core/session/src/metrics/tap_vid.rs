@@ -21,9 +21,9 @@ pub(super) fn metrics(judged: &[Judged<'_>], truth: Option<TruthKind>) -> Vec<Me
     let why = match truth {
         None => "TAP-Vid needs the truth, which this traverse does not have.",
         Some(TruthKind::Carried) => {
-            "TAP-Vid does not apply: the truth is the first estimate carried along, so that nobody knows when the point is hidden."
+            "TAP-Vid does not apply: the truth is the first estimate, propagated by the true poses, so that occlusion is unknown."
         }
-        Some(TruthKind::Surface) if steps.is_empty() => "No step after the pick has a truth.",
+        Some(TruthKind::Surface) if steps.is_empty() => "No step after the designation has a known truth.",
         Some(TruthKind::Surface) => {
             let jaccard = THRESHOLDS_PX.map(|threshold| jaccard(&steps, threshold));
             let average = jaccard.iter().sum::<f64>() / jaccard.len() as f64;

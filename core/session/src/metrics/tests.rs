@@ -130,9 +130,9 @@ fn excluded_steps_are_listed_with_the_reason() {
         let found = found.excluded.iter().find(|excluded| excluded.why.contains(why));
         found.unwrap_or_else(|| panic!("{why}")).steps.clone()
     };
-    assert_eq!(steps("picked"), [0]);
+    assert_eq!(steps("designated here"), [0]);
     assert_eq!(steps("not in the image"), [3]);
-    assert_eq!(steps("says that it is lost"), [4]);
+    assert_eq!(steps("reports the target as lost"), [4]);
     let mut world =
         PlaneWorld::new((0..3).map(|i| Pose::translation(0.3 * f64::from(i), 0.0, 0.0)).collect());
     world.troubles[1] = Trouble::Missing;
