@@ -102,10 +102,10 @@ limits! {
     connections = 512, 1, "connections", "open connections; beyond it, the one that has waited for a request longest is closed";
     header_s = 30, 1, "s", "time for the head of a request, and between two requests of a connection";
     body_s = 30, 1, "s", "time for the body of a request";
-    send_s = 60, 1, "s", "time in which a client must take some of an answer";
+    send_s = 60, 1, "s", "time in which a client must accept part of a response";
     body_bytes = 1 << 20, 1, "bytes", "body of a request";
     file_bytes = FILE_BYTES as u64, 1, "bytes", "body of a request with an exported session";
-    listeners = 64, 1, "WebSockets", "pages that hear events";
+    listeners = 64, 1, "WebSockets", "pages that receive events";
     sessions = 1000, 1, "sessions", "sessions on open drives";
     targets = 256, 1, "targets", "targets of a session at a time";
     target_numbers = 4096, 1, "targets", "targets of a session, the removed ones included";
@@ -121,12 +121,12 @@ limits! {
     image_pixels = 64_000_000, 1, "pixels", "pixels of an image";
     studies = 64, 1, "studies", "studies in the list";
     studies_waiting = 16, 1, "studies", "studies that wait; one is carried out at a time";
-    questions = 256, 1, "questions", "answers to what would have saved a step";
-    step_s = 300, 0, "s", "time for one step of a run, a designation or a try; 0: any";
+    questions = 256, 1, "questions", "stored answers to “What would have saved this step?”";
+    step_s = 300, 0, "s", "time for one step of a run, a designation or a what-if; 0: no limit";
     runs_at_a_time = 2, 1, "runs", "runs that are computed at a time; each uses all processors where it can";
-    runs_waiting = 256, 1, "runs", "runs that wait for their turn, and questions likewise";
-    designations_at_a_time = 2, 1, "requests", "designations and scenarios that are computed at a time; tries likewise";
-    designations_waiting = 16, 1, "requests", "designations and scenarios that wait; tries likewise";
+    runs_waiting = 256, 1, "runs", "runs in the queue; the same number of counterfactual questions";
+    designations_at_a_time = 2, 1, "requests", "designations and scenarios that are computed at a time; the same number of what-ifs";
+    designations_waiting = 16, 1, "requests", "designations and scenarios in the queue; the same number of what-ifs";
     images_at_a_time = 8, 1, "requests", "images that are read or rendered for pages at a time";
     images_waiting = 256, 1, "requests", "requests for images that wait";
     queries_at_a_time = 2, 1, "requests", "expressions that are evaluated over all steps at a time";
@@ -137,9 +137,9 @@ limits! {
     maps = 64, 1, "maps", "trackability maps in memory, half a megabyte each";
     grounds = 2, 1, "stops", "surfaces behind trackability maps in memory, 24 bytes for each pixel";
     odometry_tables = 64, 1, "stops", "corners of visual odometry in memory, 20 kilobytes a stop";
-    cache_bytes = 512 << 20, 0, "bytes", "images, features, surfaces and motions in memory, of all drives; the idle ones go first";
-    step_bytes = 4 << 30, 1, "bytes", "steps of runs in memory, of all sessions; sessions that nobody asks for go first and are computed again";
-    rest_s = 60, 0, "s", "time for which nobody must have asked for a session before its steps go";
+    cache_bytes = 512 << 20, 0, "bytes", "images, features, surfaces and transforms in memory, of all drives; least recently used are dropped first";
+    step_bytes = 4 << 30, 1, "bytes", "steps of runs in memory, of all sessions; those of idle sessions are dropped first and computed again on request";
+    rest_s = 60, 0, "s", "time without a request after which a session is idle and its steps may be dropped";
     answers = 1000, 1, "answers", "answers to requests with an Idempotency-Key";
     answer_bytes = 64 << 20, 1, "bytes", "those answers in memory";
 }

@@ -82,7 +82,7 @@ async fn without_the_viewer_a_plain_page_of_the_same_step_is_offered() {
     browser.goto(link.as_str().unwrap()).await;
     browser
         .evaluate(
-            "[...document.links].find(link => link.text.startsWith('The step that is looked at')).click()",
+            "[...document.links].find(link => link.text.startsWith('Current step')).click()",
         )
         .await;
     browser

@@ -54,19 +54,19 @@ pub(super) struct Drive {
     /// Added to the goal, x and y of the site frame, m.
     #[arg(long, value_name = "X,Y", value_parser = pixel, allow_hyphen_values = true)]
     offset: Option<Pixel>,
-    /// Leave the goal where the designation put it, whatever tracking finds: the baseline.
+    /// Keep the goal of the designation, regardless of tracking: the baseline.
     #[arg(long)]
     fixed_goal: bool,
     /// Distance from the goal at which the rover has arrived, m.
     #[arg(long, value_name = "M", default_value_t = DriveCommand::default().tolerance_m)]
     tolerance: f64,
-    /// Longest step as a part of the distance to the target.
+    /// Longest step, as a fraction of the distance to the target.
     #[arg(long, value_name = "PART", default_value_t = DriveCommand::default().step_fraction)]
     step_fraction: f64,
-    /// The stops at which the tracker looks for the target.
+    /// The stops at which the target is tracked.
     #[arg(long, value_name = "STOPS", default_value = "every")]
     tracked_stops: Tracked,
-    /// Most stops, the first included.
+    /// Maximum number of stops, including the first.
     #[arg(long, value_name = "N", default_value_t = DriveCommand::default().stops_max)]
     stops: u32,
     /// What visual odometry is used for.
@@ -78,7 +78,7 @@ pub(super) struct Drive {
     /// The settings of visual odometry.
     #[arg(long, value_name = "NAME", default_value = "sightline")]
     odometry_preset: Configuration,
-    /// Slip of a step, as a part of the wheels' motion, above which the drive stops.
+    /// Slip ratio of a step above which the drive stops.
     #[arg(long, value_name = "PART", default_value_t = DriveCommand::default().slip_max)]
     slip_max: f64,
     /// An action after arrival; can be given more than once.
@@ -131,7 +131,7 @@ enum Pairs {
     Own,
 }
 
-/// The stops at which the target is looked for.
+/// The stops at which the target is tracked.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Tracked {
     /// Every stop.

@@ -39,7 +39,7 @@ pub(super) struct Import {
     /// Take every n-th frame of a sequence.
     #[arg(long, value_name = "N", default_value_t = 1)]
     every: usize,
-    /// For true poses: 1σ error of the simulated odometry, as a fraction of the way.
+    /// For true poses: 1σ error of the simulated odometry, as a fraction of the distance driven.
     #[arg(long, value_name = "FRACTION", default_value_t = ImportOptions::default().odometry_fraction)]
     odometry_fraction: f64,
     /// For true poses: 1σ error of the simulated attitude at each step, deg.

@@ -14,7 +14,7 @@ use sightline_world::traverse::Stop;
 use super::{open, terminal};
 use crate::printable::printable;
 
-/// Say what a traverse holds.
+/// Print the contents of a traverse.
 #[derive(Debug, Args)]
 pub(super) struct Info {
     /// The traverse: a folder, an index or a scenario.
@@ -127,7 +127,7 @@ fn images(traverse: &Traverse) -> String {
     let all = stops.iter().flat_map(Stop::views).count();
     match (missing.as_slice(), traverse.index().scenario.is_some()) {
         ([], _) => format!("all {all} there"),
-        (missing, true) => format!("{} of {all} to be rendered when they are needed", missing.len()),
+        (missing, true) => format!("{} of {all} not rendered yet; rendered on demand", missing.len()),
         (missing, false) => {
             let names: Vec<_> = missing.iter().take(10).map(|name| name.as_str()).collect();
             let more = if missing.len() > names.len() { ", …" } else { "" };

@@ -47,7 +47,7 @@ enum Command {
     Simulate(simulate::Simulate),
     /// Turn a foreign recording (KITTI odometry, PDS3) into a traverse.
     Import(import::Import),
-    /// Say what a traverse holds.
+    /// Print the contents of a traverse.
     Info(info::Info),
     /// List the named configurations of the tracker, or print one.
     Presets(presets::Presets),

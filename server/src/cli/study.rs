@@ -65,10 +65,10 @@ enum Experiment {
     Odometry(OdometryStudy),
 }
 
-/// What a study over worlds, configurations and a grid takes.
+/// Arguments of a study over worlds, configurations and a grid.
 #[derive(Debug, Args)]
 struct Experimental {
-    /// The seeds of the worlds, each with however many targets it offers.
+    /// The seeds of the worlds; each world contributes all its targets.
     #[arg(long, value_delimiter = ',', value_name = "SEEDS", conflicts_with_all = ["worlds", "first_seed"])]
     seeds: Vec<u64>,
     /// How many worlds; one that offers fewer targets than the scenario asks for is passed over and named.

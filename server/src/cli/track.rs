@@ -66,7 +66,7 @@ pub(super) struct Track {
     /// A setting of the tracker, for example ncc_min=0.6; can be given more than once.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Also repeat the search of every step both ways, and write where coarse to fine differs from exhaustive (R65).
+    /// Also run both searches at every step, and report where coarse-to-fine differs from exhaustive.
     #[arg(long)]
     compare_searches: bool,
     /// How the steps are written.
@@ -94,7 +94,7 @@ enum Format {
 fn trackers() -> impl TypedValueParser<Value = TrackerKind> {
     let words = TrackerKind::ALL.map(|tracker| PossibleValue::new(tracker.word()).help(tracker.about()));
     let of_word = |word: String| TrackerKind::ALL.into_iter().find(|tracker| tracker.word() == word);
-    PossibleValuesParser::new(words).try_map(move |word| of_word(word).ok_or("no tracker has this word"))
+    PossibleValuesParser::new(words).try_map(move |word| of_word(word).ok_or("unknown tracker"))
 }
 
 /// A line of a step.
@@ -230,10 +230,7 @@ fn designate(traverse: &Traverse, step: usize, place: &Place, settings: &Setting
     let named = place.name(traverse, step)?;
     let first = track::designate(traverse, named.designation, settings)?;
     if let Some(gap_m) = named.gap_m(&first) {
-        terminal::error(&format!(
-            "the surface that stereo finds lies {:.1} cm from the given point",
-            100.0 * gap_m
-        ));
+        terminal::error(&format!("the surface by stereo is {:.1} cm from the given point", 100.0 * gap_m));
     }
     Ok(first)
 }

@@ -353,7 +353,7 @@ fn configuration(source: &Source, run: NamedRun<'_>) -> String {
     };
     let settings = serde_json::to_vec(run.run.settings.as_ref()).unwrap_or_default();
     let again = bundle::command(source, run).map_or_else(
-        || "<p>The run left another one on its way; the reproduce bundle holds both.</p>".to_owned(),
+        || "<p>The run is a branch; the reproduce bundle contains its parent, too.</p>".to_owned(),
         |command| format!("<p>Again:</p>\n<pre>{}</pre>", escape(&command)),
     );
     format!(

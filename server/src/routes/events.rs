@@ -42,7 +42,7 @@ async fn listen(
     upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
 ) -> ApiResult<Response> {
     let upgrade = upgrade.map_err(|_| {
-        ApiError::new(StatusCode::UPGRADE_REQUIRED, "websocket", "Events are told over a WebSocket only.")
+        ApiError::new(StatusCode::UPGRADE_REQUIRED, "websocket", "Events are sent over a WebSocket only.")
     })?;
     let limit = &state.limits().listeners;
     if state.events().receiver_count() >= limit.count() {

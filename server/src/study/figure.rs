@@ -168,7 +168,7 @@ pub(crate) fn figures(plan: &Plan, units: &[Unit]) -> Result<Vec<Figure>, String
             plan,
             &series,
             ("evenness", "uneven_px"),
-            "unevenness of the two rows at the end (R115)",
+            "unevenness of the two rows at the end",
             (1.0, "residual of a cubic, px"),
         )?);
     }
@@ -355,7 +355,7 @@ fn nees(plan: &Plan, units: &[Unit]) -> Result<Figure, String> {
         ..Chart::default()
     };
     let sentence = format!(
-        "A right covariance follows the thin line. {}. The paper's formula (R41, 3σ, its navcam) gives 1.60 cm with a drift of \
+        "A correct covariance follows the thin line. {}. The paper's formula [Kim09 Eq. 5] (3σ, its navcam) gives 1.60 cm with a drift of \
          2.5 px and 2.19 cm with 10 px at 2 m.",
         said.join("; ")
     );

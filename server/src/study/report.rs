@@ -84,8 +84,8 @@ fn table_ii(rows: &[Row]) -> String {
     let body: String = table.iter().map(|line| row("td", &line.cells())).collect();
     format!(
         "<h2>Table II</h2>\n<p>Paper: 26 trials of one target each with visual odometry, 2 failures. Lost by the \
-         pose: the target was out of reach of the search around its prediction (window), or was found and refused because \
-         it lay too far from the prediction (correction). Not driven: slip ended the drive.</p>\n<div class=\"wide\"><table>\
+         pose: the target was out of reach of the search around its prediction (window), or was located but rejected as \
+         too far from the prediction (correction). Not driven: slip ended the drive.</p>\n<div class=\"wide\"><table>\
          {head}{body}</table></div>\n"
     )
 }

@@ -9,7 +9,7 @@ use crate::html::{escape, png_address};
 pub(super) fn figures(trace: &StepTrace) -> String {
     let figures: Vec<String> = ArrayName::all().filter_map(|name| figure(trace, name)).collect();
     if figures.is_empty() {
-        return "<p>This step came to no arrays.</p>\n".to_owned();
+        return "<p>This step has no arrays.</p>\n".to_owned();
     }
     format!("<div class=\"row\">\n{}</div>\n", figures.concat())
 }

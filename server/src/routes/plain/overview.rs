@@ -47,8 +47,7 @@ pub(super) fn session(source: &Source) -> String {
     let cursor = session.cursor;
     if let Some(target) = cursor.target.filter(|target| session.run(*target, cursor.run).is_ok()) {
         let path = step_path(&session.id, target, cursor.run, cursor.step);
-        let _ =
-            writeln!(html, "<p><a href=\"{path}\">The step that is looked at: step {}</a></p>", cursor.step);
+        let _ = writeln!(html, "<p><a href=\"{path}\">Current step: step {}</a></p>", cursor.step);
     }
     let runs = source.runs(Part::default());
     html.push_str("<h2>Targets and runs</h2>\n");
@@ -59,7 +58,12 @@ pub(super) fn session(source: &Source) -> String {
         let letter = run_letter(run.number);
         let _ = writeln!(html, "<h3>{}, run {letter}</h3>", escape(&run.record.label));
         if let Some(fork) = run.run.fork {
-            let _ = writeln!(html, "<p>It left run {} at step {}.</p>", run_letter(fork.run), fork.from_step);
+            let _ = writeln!(
+                html,
+                "<p>It branched from run {} at step {}.</p>",
+                run_letter(fork.run),
+                fork.from_step
+            );
         }
         let rows: Vec<_> = run.run.steps.iter().map(|trace| trace.row()).collect();
         html.push_str("<nav aria-label=\"Steps\"><ul>\n");

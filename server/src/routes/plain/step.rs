@@ -166,7 +166,7 @@ fn verdict(trace: &RunStep) -> String {
     let mut html = "<h2>Verdict</h2>\n".to_owned();
     let Some(verdict) = trace.verdict() else {
         html.push_str(
-            "<p>Nothing was judged: here the target was picked, or the stop's files are damaged.</p>\n",
+            "<p>Nothing was judged: the target was designated here, or the stop's files are damaged.</p>\n",
         );
         return html;
     };
@@ -202,7 +202,7 @@ fn verdict(trace: &RunStep) -> String {
         })
         .collect();
     html.push_str(&table(
-        "The criteria; a margin is how far the value is on the good side of its limit.",
+        "Gates; a positive margin is the distance by which the value passes its limit.",
         &["criterion", "value", "limit", "margin", "unit", "verdict"],
         &rows,
     ));
