@@ -125,7 +125,7 @@ impl Dom {
     }
 
     fn show_one(&mut self, entry: &Entry) -> Result<(), JsValue> {
-        let old = self.shown.get(&entry.id).filter(|shown| shown.entry.tag == entry.tag);
+        let old = self.shown.get(&entry.id).filter(|shown| entry.fits_element_of(&shown.entry));
         if old.is_some_and(|shown| shown.entry == *entry) {
             return Ok(());
         }
@@ -142,6 +142,8 @@ impl Dom {
                 shown.element.remove();
             }
             self.orders.remove(&entry.parent);
+            // The children go with that element and are appended again.
+            self.orders.remove(&Some(entry.id));
         }
         self.shown.insert(entry.id, Shown { element, entry: entry.clone() });
         Ok(())

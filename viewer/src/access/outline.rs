@@ -61,6 +61,17 @@ pub(crate) struct Entry {
     pub is_control: bool,
 }
 
+impl Entry {
+    /// Whether the element of `before`, an entry with the same number, can show this one.
+    ///
+    /// egui numbers widgets by their order, so a label may get the number of a button. A role or a name that the entry
+    /// lacks would stay on the element.
+    pub(crate) fn fits_element_of(&self, before: &Self) -> bool {
+        let kind = |entry: &Self| (entry.tag, entry.role, entry.name.is_empty());
+        kind(self) == kind(before)
+    }
+}
+
 /// The entries of a tree, every parent before its children; `zoom` is CSS px per point.
 pub(crate) fn outline(update: &TreeUpdate, zoom: f32) -> Vec<Entry> {
     let nodes: HashMap<NodeId, &Node> = update.nodes.iter().map(|(id, node)| (*id, node)).collect();
@@ -329,6 +340,30 @@ mod tests {
             let all = outline(&tree(vec![(0, node(Role::Window, &[1])), (1, control)]), 1.0);
             assert_eq!(all[0].attributes, [(state, "true".to_owned())], "{role:?}");
         }
+    }
+
+    #[test]
+    fn a_text_takes_no_role_or_name_from_an_earlier_control() {
+        let entry = |role: Role, label: &str, value: &str| {
+            let mut node = node(role, &[]);
+            node.add_action(Action::Click);
+            if !label.is_empty() {
+                node.set_label(label);
+            }
+            if !value.is_empty() {
+                node.set_value(value);
+            }
+            outline(&tree(vec![(0, self::node(Role::Window, &[1])), (1, node)]), 1.0).remove(0)
+        };
+        let cancel = entry(Role::Button, "Cancel", "");
+        let count = entry(Role::Label, "", "4 of 4 runs");
+        assert!(!count.fits_element_of(&cancel), "a text would be a button “Cancel”");
+        assert!(!cancel.fits_element_of(&count), "a button would contain “4 of 4 runs”");
+        let option = entry(Role::ListBoxOption, "Layout Stereo", "");
+        assert!(!entry(Role::Label, "", "Nothing is called that.").fits_element_of(&option));
+        assert!(!entry(Role::Button, "", "").fits_element_of(&cancel), "the name “Cancel” would stay");
+        assert!(entry(Role::Button, "Resume", "").fits_element_of(&cancel));
+        assert!(entry(Role::Label, "", "5 of 5 runs").fits_element_of(&count));
     }
 
     #[test]

@@ -68,6 +68,18 @@ fn the_palette_opens_takes_what_is_typed_and_opens_again() {
 }
 
 #[test]
+fn without_a_match_the_palette_lists_no_option() {
+    let mut harness = page();
+    press(&mut harness, Key::K, Modifiers::COMMAND);
+    type_text(&mut harness, "layout stereo");
+    let options = |harness: &Harness<'_, State>| harness.query_all_by_role(egui::Role::ListBoxOption).count();
+    assert!(options(&harness) > 0);
+    type_text(&mut harness, " nothing is called that");
+    harness.get_by_label("Nothing is called that. Try one word, or part of one.");
+    assert_eq!(options(&harness), 0);
+}
+
+#[test]
 fn what_is_typed_in_the_frame_of_enter_counts() {
     let mut harness = page();
     press(&mut harness, Key::K, Modifiers::COMMAND);
