@@ -2,9 +2,13 @@
 
 use std::path::Path;
 use std::process::{Command, Output};
+use std::sync::Mutex;
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use serde_json::{Value, json};
+use sightline_server::study::{Order, Progress, Seeds, carry_out};
+use sightline_study::plan::Plan;
 use sightline_tests::scenario::short_approach;
 use sightline_tests::server::{TestServer, small_drive};
 use sightline_world::Scenario;
@@ -151,6 +155,27 @@ async fn a_study_over_rest_is_carried_out_cancelled_and_resumed() {
     assert_eq!(server.get("studies/jobs/study-1/rows").await.json(), rows.json());
     let state = listed[1]["state"].as_str().unwrap();
     assert!(["cancelled", "done"].contains(&state), "nothing is under way that nobody works on: {state}");
+}
+
+#[test]
+fn the_share_of_a_study_grows_while_its_world_is_rendered() {
+    let folder = tempfile::tempdir().unwrap();
+    let order = Order {
+        plan: Plan::new("approach", &["sightline".to_owned()], &[]).unwrap(),
+        seeds: Seeds::Named(vec![3]),
+        scenario: Some(("small".to_owned(), small())),
+        folder: folder.path().to_owned(),
+        command: String::new(),
+    };
+    let shares = Mutex::new(Vec::new());
+    let tell = |progress: Progress| {
+        if let Progress::Rendering { share, .. } = progress {
+            shares.lock().unwrap().push(share);
+        }
+    };
+    carry_out(order, &AtomicBool::new(false), &tell).unwrap();
+    let shares = shares.into_inner().unwrap();
+    assert!(shares.len() > 1 && shares.is_sorted_by(|a, b| a < b), "{shares:?}");
 }
 
 /// Waits until the first study has ended, and returns how it stands.

@@ -41,13 +41,9 @@ fn summary(traverse: &Traverse) -> Vec<String> {
         lines.push(format!("description  {}", index.description));
     }
     lines.push(format!("folder       {}", traverse.folder().display()));
-    let way_m: f64 = index
-        .stops
-        .windows(2)
-        .map(|pair| between_m(&pair[0].site_from_rover, &pair[1].site_from_rover))
-        .sum();
     let duration_s = index.stops.last().map_or(0.0, |stop| stop.time_s);
-    lines.push(format!("stops        {count}, {way_m:.2} m driven by the estimates, {duration_s:.0} s"));
+    let driven_m = driven_m(&index.stops);
+    lines.push(format!("stops        {count}, {driven_m:.2} m driven by the estimates, {duration_s:.0} s"));
     lines.push(format!("left camera  {}", camera(traverse, true)));
     lines.push(format!("right camera {}", camera(traverse, false)));
     lines.extend(further(traverse));
@@ -136,7 +132,24 @@ fn images(traverse: &Traverse) -> String {
     }
 }
 
+/// Length of the estimated path, m.
+fn driven_m(stops: &[Stop]) -> f64 {
+    let steps = stops.windows(2).map(|pair| between_m(&pair[0].site_from_rover, &pair[1].site_from_rover));
+    // The sum of no numbers is −0.0.
+    steps.sum::<f64>().abs()
+}
+
 fn between_m(a: &PoseRecord, b: &PoseRecord) -> f64 {
     let difference = a.position_m.iter().zip(&b.position_m).map(|(a, b)| (a - b) * (a - b));
     difference.sum::<f64>().sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_drive_of_one_stop_has_no_negative_length() {
+        assert_eq!(format!("{:.2}", driven_m(&[])), "0.00");
+    }
 }
