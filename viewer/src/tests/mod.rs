@@ -18,6 +18,7 @@ mod playing;
 mod records;
 mod session;
 mod sheets;
+mod sizes;
 mod shape;
 mod shape_run;
 #[path = "../studies/tests.rs"]
@@ -189,6 +190,18 @@ fn the_designation_says_that_there_is_no_match_yet() {
     strip.says("template patch").says("right image patch").hides("designated here");
     let stereo = Shown::pane(Pane::StereoProfile, |context| fixture::at_step(context, 0));
     stereo.says("no prediction: the whole curve").hides("designated here");
+}
+
+#[test]
+fn a_drive_of_one_stop_offers_no_further_step() {
+    for pane in [Pane::Surface, Pane::Gates] {
+        let shown = Shown::pane(pane, |context| {
+            let mut state = fixture::at_step(context, 0);
+            state.traverse.as_mut().unwrap().stops.truncate(1);
+            state
+        });
+        shown.says("no match yet. This drive has no further stop.").hides("Press →");
+    }
 }
 
 #[test]

@@ -4,7 +4,7 @@ mod designated;
 mod patch;
 mod pointed;
 
-use egui::{Align2, Margin, Pos2, Rect, Sense, Ui, pos2, vec2};
+use egui::{Align2, Margin, Rect, Sense, Ui, pos2, vec2};
 use sightline_record::{ArrayKind, Unit, label};
 use sightline_session::records::{self, StageQuantity};
 use sightline_session::step::RunStep;
@@ -20,6 +20,8 @@ use crate::theme;
 
 /// Room for the words above and below a patch, points.
 const WORDS: (f32, f32) = (16.0, 18.0);
+/// Minimum side of a patch, points.
+const SIDE_MIN: f32 = 16.0;
 
 /// One patch of the strip.
 #[derive(Clone, Debug, PartialEq)]
@@ -109,32 +111,51 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let area = ui.available_rect_before_wrap();
     let has_pointer = state.trace().is_some_and(|trace| pointed::is_there(trace));
     let template = state.trace().and_then(designated::pixel).filter(|_| !patches.is_empty());
-    let count = (patches.len() + usize::from(has_pointer) + usize::from(template.is_some())) as f32;
-    let across = (area.width() - BETWEEN * (count - 1.0)) / count;
-    let side = across.min(area.height() - WORDS.0 - WORDS.1).max(16.0);
-    let width = side * count + BETWEEN * (count - 1.0);
-    let mut at = pos2(area.left() + ((area.width() - width) / 2.0).max(0.0), area.top() + WORDS.0);
-    if let Some(pixel) = template {
-        designated::show(ui, state, pixel, Rect::from_min_size(at, vec2(side, side)));
-        at.x += side + BETWEEN;
+    let first = usize::from(template.is_some());
+    let frames = frames(area, first + patches.len() + usize::from(has_pointer));
+    if let Some((pixel, &frame)) = template.zip(frames.first()) {
+        designated::show(ui, state, pixel, frame);
     }
-    for (i, patch) in patches.iter().enumerate() {
-        if i > 0 || template.is_some() {
-            arrow(ui, pos2(at.x - BETWEEN / 2.0, at.y + side / 2.0), &patch.step);
+    for (number, (patch, &frame)) in patches.iter().zip(frames.iter().skip(first)).enumerate() {
+        if first + number > 0 {
+            arrow(ui, frame, &patch.step);
         }
-        let frame = Rect::from_min_size(at, vec2(side, side));
         show_patch(ui, state, patch, frame, out);
-        at.x += side + BETWEEN;
     }
-    if has_pointer {
-        arrow(ui, pos2(at.x - BETWEEN / 2.0, at.y + side / 2.0), &pointed::score(state));
-        pointed::show(ui, state, Rect::from_min_size(at, vec2(side, side)));
+    if let Some(&frame) = frames.last().filter(|_| has_pointer) {
+        arrow(ui, frame, &pointed::score(state));
+        pointed::show(ui, state, frame);
     }
     ui.advance_cursor_after_rect(area);
 }
 
-/// The arrow between two patches with what happened.
-fn arrow(ui: &Ui, middle: Pos2, words: &str) {
+/// The squares of `count` patches in reading order, in as many rows as give the largest squares.
+fn frames(area: Rect, count: usize) -> Vec<Rect> {
+    // A row below another begins with an arrow.
+    let arrows = |rows: usize, columns: usize| if rows > 1 { columns } else { columns - 1 } as f32;
+    let side = |rows: usize| {
+        let columns = count.div_ceil(rows);
+        let across = (area.width() - BETWEEN * arrows(rows, columns)) / columns as f32;
+        across.min(area.height() / rows as f32 - WORDS.0 - WORDS.1)
+    };
+    let rows = (1..=count).reduce(|best, rows| if side(rows) > side(best) { rows } else { best });
+    let Some(rows) = rows else { return Vec::new() };
+    let (columns, side) = (count.div_ceil(rows), side(rows).max(SIDE_MIN));
+    let width = side * columns as f32 + BETWEEN * arrows(rows, columns);
+    let lead = if rows > 1 { BETWEEN } else { 0.0 };
+    let left = area.left() + ((area.width() - width) / 2.0).max(0.0) + lead;
+    let frame = |number: usize| {
+        let [column, row] = [number % columns, number / columns].map(|at| at as f32);
+        let x = left + (side + BETWEEN) * column;
+        let y = area.top() + WORDS.0 + (side + WORDS.0 + WORDS.1) * row;
+        Rect::from_min_size(pos2(x, y), vec2(side, side))
+    };
+    (0..count).map(frame).collect()
+}
+
+/// The arrow before a patch with what happened on the way to it.
+fn arrow(ui: &Ui, frame: Rect, words: &str) {
+    let middle = frame.left_center() - vec2(BETWEEN / 2.0, 0.0);
     let painter = ui.painter();
     let stroke = egui::Stroke::new(1.5, theme::weak());
     let tip = middle + vec2(12.0, 6.0);
