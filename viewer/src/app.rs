@@ -25,7 +25,7 @@ use crate::panels::pane::{Need, Pane};
 use crate::panels::{bars, card, timeline};
 use crate::state::State;
 use crate::state::effect::Effect;
-use crate::state::pointed::{is_covered, taken_out};
+use crate::state::pointed;
 use crate::tour::bubbles;
 use crate::trackability::limits_window;
 use crate::{figure, theme, tour};
@@ -242,9 +242,7 @@ impl SightlineApp {
 
     /// Takes in what the pointer rests on: the next frame shows it in all panels.
     fn point(&mut self, context: &Context, commands: &mut Vec<Command>) {
-        let below = taken_out(commands);
-        // What lies under a window or a bubble is not pointed at.
-        let pointed = below.filter(|_| !is_covered(context));
+        let pointed = pointed::taken(context, commands);
         if pointed != self.state.pointed {
             self.state.pointed = pointed;
             context.request_repaint();

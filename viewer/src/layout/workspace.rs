@@ -286,7 +286,7 @@ mod tests {
             "",
             "{}",
             "[1, 2",
-            &kept.replace("\"format\":1", "\"format\":9"),
+            &kept.replace("\"format\":2", "\"format\":9"),
             &kept.replace("\"gates\"", "\"no such panel\""),
             // A panel twice.
             &kept.replace("\"gates\"", "\"left\""),
@@ -333,6 +333,17 @@ mod tests {
         assert!(seen.len() > 2, "{seen:?}");
         for expected in &seen {
             harness.state_mut().apply(LayoutCommand::Panel(1));
+            harness.run_steps(3);
+            assert_eq!(harness.state().current, Some(*expected));
+        }
+    }
+
+    #[test]
+    fn every_press_of_shift_q_goes_one_panel_back() {
+        let mut harness = page();
+        let seen = harness.state().seen.clone();
+        for expected in seen.iter().rev().chain(seen.last()) {
+            harness.state_mut().apply(LayoutCommand::Panel(-1));
             harness.run_steps(3);
             assert_eq!(harness.state().current, Some(*expected));
         }

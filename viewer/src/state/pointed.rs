@@ -23,10 +23,15 @@ impl State {
 }
 
 /// Whether the pointer is on a window, a menu or a bubble above the panels.
-pub(crate) fn is_covered(context: &Context) -> bool {
+fn is_covered(context: &Context) -> bool {
     let pointer = context.input(|input| input.pointer.hover_pos());
     let layer = pointer.and_then(|at| context.layer_id_at(at));
     layer.is_some_and(|layer| layer.order > Order::Background)
+}
+
+/// Takes the place under the pointer out of the commands of a frame; `None` below a window, a menu or a bubble.
+pub(crate) fn taken(context: &Context, commands: &mut Vec<Command>) -> Option<Pointed> {
+    taken_out(commands).filter(|_| !is_covered(context))
 }
 
 /// Takes what was pointed at out of the commands of a frame.

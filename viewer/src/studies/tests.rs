@@ -5,6 +5,7 @@ use sightline_api::endpoint::Call;
 use sightline_api::endpoints::{CancelStudy, ListStudies, ListStudyJobs, ShowStudyRows, StartStudy};
 use sightline_api::event::Event;
 use sightline_api::location::AtStudyJob;
+use sightline_api::wire::Problem;
 use sightline_study::row::Row;
 use sightline_study::wire::{StudyInfo, StudyJob, StudyRows, StudyState};
 
@@ -13,8 +14,9 @@ use crate::figure::save;
 use crate::figure::wish::{Kind, Wish};
 use crate::panels::pane::Pane;
 use crate::state::State;
+use crate::state::messages::Weight;
 use crate::studies::Order;
-use crate::tests::calls::{answer, bodies, calls, calls_of};
+use crate::tests::calls::{answer, bodies, calls, calls_of, refuse};
 use crate::tests::{Shown, fixture};
 
 fn job(state: StudyState, k: usize) -> StudyJob {
@@ -78,6 +80,20 @@ fn a_study_is_started_with_what_was_typed() {
         page
     });
     wrong.says("seven is not a whole number");
+}
+
+#[test]
+fn a_started_study_clears_the_error_of_the_refused_one() {
+    let mut page = with_job(StudyState::Running);
+    page.take_requests();
+    page.perform(Command::StartStudy);
+    refuse::<StartStudy>(&mut page, Problem::new(422, "grid", "", "grid: 99 is too large."));
+    let problem =
+        |page: &State| page.messages.newest().filter(|message| message.weight == Weight::Problem).cloned();
+    assert!(problem(&page).is_some());
+    page.perform(Command::StartStudy);
+    answer::<StartStudy>(&mut page, &job(StudyState::Waiting, 0));
+    assert_eq!((problem(&page), page.messages.card()), (None, None));
 }
 
 #[test]

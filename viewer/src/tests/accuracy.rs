@@ -1,10 +1,13 @@
 //! The panels of exposure, stereo score and error budget.
 
-use crate::command::Command;
+use crate::command::{Command, Zoomable};
 use crate::drawing::stretch::Stretch;
+use crate::drawing::view2d::View2d;
 use crate::panels::pane::Pane;
 use crate::state::calculator::{Calculator, Pair};
 use crate::tests::{Shown, fixture};
+use crate::theme;
+use crate::theme::Looks;
 
 #[test]
 fn the_left_image_says_how_the_subframe_is_exposed_and_which_stretch_is_on() {
@@ -22,6 +25,38 @@ fn the_left_image_says_how_the_subframe_is_exposed_and_which_stretch_is_on() {
         state
     });
     by_hand.says("brightness").says("contrast").says("gamma");
+}
+
+/// How many lines of this colour a shape has.
+fn lines(shape: &egui::Shape, colour: egui::Color32) -> usize {
+    use egui::Shape;
+    let is_it = match shape {
+        Shape::Vec(shapes) => return shapes.iter().map(|shape| lines(shape, colour)).sum(),
+        Shape::LineSegment { stroke, .. } => stroke.color == colour,
+        Shape::Path(path) => path.stroke.color == egui::epaint::ColorMode::Solid(colour),
+        Shape::Circle(circle) => circle.stroke.color == colour || circle.fill == colour,
+        _ => false,
+    };
+    usize::from(is_it)
+}
+
+#[test]
+fn truth_is_white_on_an_image_in_the_light_looks_too() {
+    for pane in [Pane::Left, Pane::CloseUp] {
+        for looks in [Looks::Dark, Looks::Light] {
+            let shown = Shown::pane(pane, move |context| {
+                theme::apply(context, looks);
+                let mut state = fixture::at_step(context, 2);
+                let view = View2d::At { centre: fixture::PIXEL, scale: 1.0 };
+                state.perform(Command::View(Zoomable::Left, view));
+                state
+            });
+            let shapes = || shown.harness.output().shapes.iter();
+            let count = |colour| shapes().map(|clipped| lines(&clipped.shape, colour)).sum::<usize>();
+            let [white, black] = [egui::Color32::WHITE, egui::Color32::BLACK].map(count);
+            assert!(white >= 2 && black == 0, "{pane:?} {looks:?}: {white} white, {black} black");
+        }
+    }
 }
 
 #[test]

@@ -261,6 +261,43 @@ fn the_export_window_does_not_move_when_its_files_arrive() {
 }
 
 #[test]
+fn the_export_window_rests_from_the_second_frame_on() {
+    let is_open = std::rc::Rc::new(std::cell::Cell::new(false));
+    let opens = std::rc::Rc::clone(&is_open);
+    let mut shown = Shown::new([1440.0, 900.0], opened, move |ui, state, out| {
+        if opens.get() {
+            window::show(ui, state, out);
+        }
+    });
+    is_open.set(true);
+    // The frame of the key and the one that follows it; without an event no other one comes.
+    shown.harness.run_steps(2);
+    let close = |shown: &Shown<'_>| shown.harness.get_by_label("Close").rect();
+    let before = close(&shown);
+    assert!(before.bottom() > 800.0, "the window has half of its height: {before:?}");
+    shown.harness.hover_at(egui::pos2(700.0, 400.0));
+    shown.harness.run_steps(4);
+    assert_eq!(close(&shown), before);
+}
+
+#[test]
+fn the_buttons_of_a_note_leave_its_title_free() {
+    for width in [240.0, 300.0, 520.0] {
+        let shown = Shown::new([width, 420.0], noted, |ui, state, out| {
+            crate::layout::show_pane(ui, Pane::Notes, state, out);
+        });
+        let rect = |label: &str| shown.harness.get_by_label(label).rect();
+        let title = rect("go to note 1: step 3, ridge, run A, judge");
+        let buttons =
+            ["remove note 1", "edit note 1", "later in the tour: note 1", "earlier in the tour: note 1"];
+        for button in buttons.map(rect) {
+            assert!(!button.shrink(1.0).intersects(title), "{width}: {button:?} covers {title:?}");
+            assert!(button.left() >= 0.0 && button.right() <= width, "{width}: {button:?} is cut off");
+        }
+    }
+}
+
+#[test]
 fn the_plain_page_of_what_is_looked_at_is_opened() {
     let mut state = noted(&egui::Context::default());
     state.perform(Command::Exports(exports::Ask::PlainPage));

@@ -18,6 +18,29 @@ fn the_top_bar_chooses_the_run_to_compare_with_and_takes_it_out() {
 }
 
 #[test]
+fn no_words_of_the_top_bar_overlap_with_two_runs() {
+    for width in [820.0, 960.0, 1024.0, 1280.0, 1440.0] {
+        let shown = Shown::new([width, 60.0], |context| compared(context, 3), bars::top);
+        let texts = shown.harness.output().shapes.iter().filter_map(|clipped| match &clipped.shape {
+            egui::Shape::Text(text) => {
+                let seen = clipped.shape.visual_bounding_rect().intersect(clipped.clip_rect);
+                let is_seen = seen.is_positive() && !text.galley.text().is_empty();
+                is_seen.then(|| (text.galley.text().to_owned(), seen.shrink(0.5)))
+            }
+            _ => None,
+        });
+        let texts: Vec<(String, egui::Rect)> = texts.collect();
+        assert!(texts.iter().any(|(words, _)| words == "run A"), "{width}: {texts:?}");
+        for (number, (words, place)) in texts.iter().enumerate() {
+            assert!(place.right() <= width, "{width}: {words} is cut off");
+            for (other, there) in &texts[number + 1..] {
+                assert!(!there.intersects(*place), "{width}: {words} is over {other}");
+            }
+        }
+    }
+}
+
+#[test]
 fn the_status_line_has_the_differences_and_the_other_runs_state() {
     let shown = Shown::new([1700.0, 60.0], |context| compared(context, 3), bars::top);
     // 40 px less 4.5 px.
@@ -167,6 +190,31 @@ fn the_difference_has_a_row_for_template_and_match_with_its_correlation() {
         state
     });
     missing.says("less run B");
+}
+
+#[test]
+fn titles_of_compared_patches_are_clear_of_each_other() {
+    for width in [320.0, 420.0, 760.0] {
+        let shown = Shown::new(
+            [width, 480.0],
+            |context| {
+                let mut state = compared(context, 3);
+                state.compare.view = View::Difference;
+                state
+            },
+            |ui, state, out| {
+                show_pane(ui, Pane::Left, state, out);
+            },
+        );
+        for patch in ["warped template", "matched patch"] {
+            let rect = |run: &str| shown.harness.get_by_label(&format!("{patch}, {run}")).rect();
+            let [own, other] = ["run A", "run B"].map(rect);
+            assert!(own.right() <= other.left() && own.top() == other.top(), "{width}: {own:?} {other:?}");
+            let differences = shown.harness.query_all_by_label("difference").map(|node| node.rect());
+            let mut clear = differences.filter(|rect| rect.left() >= other.right());
+            assert!(clear.any(|rect| rect.top() == other.top()), "{width}: {patch}");
+        }
+    }
 }
 
 #[test]
