@@ -58,12 +58,7 @@ pub(super) fn session(source: &Source) -> String {
         let letter = run_letter(run.number);
         let _ = writeln!(html, "<h3>{}, run {letter}</h3>", escape(&run.record.label));
         if let Some(fork) = run.run.fork {
-            let _ = writeln!(
-                html,
-                "<p>It branched from run {} at step {}.</p>",
-                run_letter(fork.run),
-                fork.from_step
-            );
+            let _ = writeln!(html, "<p>Branch of run {}, step {}.</p>", run_letter(fork.run), fork.from_step);
         }
         let rows: Vec<_> = run.run.steps.iter().map(|trace| trace.row()).collect();
         html.push_str("<nav aria-label=\"Steps\"><ul>\n");
