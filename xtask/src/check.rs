@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result, bail};
 
-use crate::{cmd, deny, features, house_rules, public_functions, wasm_target, web};
+use crate::{cmd, deny, features, house_rules, public_functions, strings, wasm_target, web};
 
 /// Runs every check, the quick ones first.
 pub(crate) fn check() -> Result<()> {
@@ -34,6 +34,7 @@ pub(crate) fn check() -> Result<()> {
 fn keep_rules() -> Result<()> {
     let mut broken = house_rules::broken_rules(&cmd::root())?;
     broken.extend(public_functions::findings(&cmd::root())?);
+    broken.extend(strings::findings(&cmd::root())?);
     for finding in &broken {
         cmd::say(finding);
     }

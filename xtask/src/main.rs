@@ -1,4 +1,4 @@
-//! The project's commands: `cargo xtask serve | test | golden | fuzz | drill | check | web | bench | dist | screenshot`.
+//! The project's commands: `cargo xtask serve | test | golden | fuzz | drill | check | strings | web | bench | dist | screenshot`.
 //!
 //! Each command installs or builds what it needs and says in one sentence what to do when it cannot. `serve` builds
 //! the server alone, the other commands the whole workspace; `sightline-features` gives both the same features, so
@@ -21,6 +21,7 @@ mod check;
 mod house_rules;
 mod imports;
 mod public_functions;
+mod strings;
 mod packages;
 mod deny;
 mod bench;
@@ -76,6 +77,11 @@ enum Task {
     Drill,
     /// Check format, lints (native and WASM), documentation, and the rules of the house and for dependencies.
     Check,
+    /// List every text that users can see, one `file:line<TAB>text` a line.
+    Strings {
+        /// List only the texts of files whose path contains this.
+        filter: Option<String>,
+    },
     /// Build what the browser loads into `target/web`.
     Web,
     /// Run the benchmarks.
@@ -106,6 +112,7 @@ fn main() -> ExitCode {
         Task::Fuzz { target, minutes } => fuzz::fuzz(target.as_deref(), minutes),
         Task::Drill => drill::drill(),
         Task::Check => check::check(),
+        Task::Strings { filter } => strings::strings(filter.as_deref()),
         Task::Web => web::web(),
         Task::Bench { peers: true, json, .. } => peers::peers(json),
         Task::Bench { filter, .. } => bench::bench(filter.as_deref()),
