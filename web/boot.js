@@ -198,6 +198,53 @@ window.addEventListener("hashchange", () => {
   }
 });
 
+/** The most files that are read from a dropped folder. */
+const FOLDER_FILES_MAX = 100_000;
+
+/** Lists the files below a dropped folder as pairs of path and file; the path begins with the folder's name. */
+async function filesBelow(folder) {
+  const files = [];
+  const waiting = [folder];
+  while (waiting.length > 0) {
+    const reader = waiting.pop().createReader();
+    // A reader returns its entries in parts; an empty part is the last one.
+    for (;;) {
+      const entries = await new Promise((resolve, reject) => reader.readEntries(resolve, reject));
+      if (entries.length === 0) {
+        break;
+      }
+      waiting.push(...entries.filter((entry) => entry.isDirectory));
+      for (const entry of entries.filter((entry) => entry.isFile)) {
+        const file = await new Promise((resolve, reject) => entry.file(resolve, reject));
+        files.push([entry.fullPath.replace(/^\//, ""), file]);
+      }
+      if (files.length > FOLDER_FILES_MAX) {
+        throw new Error(`“${folder.name}” has more than ${FOLDER_FILES_MAX} files: drop the folder of one recording.`);
+      }
+    }
+  }
+  if (files.length === 0) {
+    throw new Error(`“${folder.name}” has no files: drop the folder of a recording.`);
+  }
+  return files;
+}
+
+// A browser shows a folder only to the handler of its drop. The viewer gets the list of files; what else is dropped it
+// handles itself.
+document.addEventListener("drop", (event) => {
+  const entries = Array.from(event.dataTransfer?.items ?? [], (item) => item.webkitGetAsEntry?.()).filter(Boolean);
+  if (entries.length !== 1 || !entries[0].isDirectory) {
+    return;
+  }
+  event.preventDefault();
+  event.stopPropagation();
+  // The viewer takes down its sign that something is being dragged.
+  document.getElementById(CANVAS).dispatchEvent(new DragEvent("dragleave", { bubbles: true }));
+  const send = (detail) => document.dispatchEvent(new CustomEvent("sightline-folder", { detail }));
+  filesBelow(entries[0]).then(send, (error) =>
+    send(error instanceof DOMException ? `“${entries[0].name}” cannot be read: ${error.message}` : error.message));
+}, true);
+
 // A panic inside the viewer calls this with its message; afterwards nothing on the canvas answers any more.
 window.addEventListener("sightline-panic", (event) => {
   fail("The viewer stopped because of a fault in it. Load this page again to go on.", event.detail);

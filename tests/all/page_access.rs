@@ -64,7 +64,7 @@ async fn arrangements_panels_and_palette_work_by_keyboard_and_survive_a_reload()
         ("3", "stereo", "Stereo scores"),
         ("4", "map", "Map, site frame"),
         ("5", "compare", "Over the steps"),
-        ("6", "sweep", "Studies"),
+        ("6", "studies", "Studies"),
         ("7", "report", "Template strip"),
         ("1", "overview", "Inspector"),
     ] {

@@ -80,11 +80,7 @@ async fn without_the_viewer_a_plain_page_of_the_same_step_is_offered() {
     let link = browser.evaluate("return document.querySelector('#message-plain a').href").await;
     assert!(link.as_str().unwrap().ends_with("/api/v1/sessions/s1/page"), "{link}");
     browser.goto(link.as_str().unwrap()).await;
-    browser
-        .evaluate(
-            "[...document.links].find(link => link.text.startsWith('Current step')).click()",
-        )
-        .await;
+    browser.evaluate("[...document.links].find(link => link.text.startsWith('Current step')).click()").await;
     browser
         .wait_for("the step", "return document.title.includes('tep ') && document.images.length > 0")
         .await;

@@ -27,3 +27,26 @@ async fn a_kitti_folder_below_a_named_one_is_opened_in_three_actions() {
     browser.shot("recording-imported").await;
     browser.end().await;
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_dropped_folder_is_sent_examined_and_imported() {
+    let Some(source) = data::set("kitti-seq1-frames-0-19", "a folder that is dropped on the page") else {
+        return;
+    };
+    let bench = Bench::start(&short_approach()).await;
+    let browser = Browser::start().await;
+    bench.open(&browser).await;
+    browser.drop_path(&source).await;
+    for words in ["KITTI odometry", "20 stops", "1226 × 370 px"] {
+        browser.says(words).await;
+    }
+    browser.shot("recording-dropped").await;
+    browser.click_on("button", "Import the recording").await;
+    let shown = "(s.traverse || '').startsWith('kitti') && s.shown && s.image_to_screen !== null";
+    browser.wait_status("its first image", shown).await;
+    // An empty folder is refused in one sentence, and the open drive stays.
+    let empty = tempfile::tempdir().unwrap();
+    browser.drop_path(empty.path()).await;
+    browser.says("has no files: drop the folder of a recording").await;
+    browser.end().await;
+}

@@ -199,6 +199,17 @@ impl Browser {
         panic!("the page does not take the size {width} × {height}");
     }
 
+    /// Drops a file or folder of this machine on the middle of the page, as a person does with the mouse.
+    pub async fn drop_path(&self, path: &std::path::Path) {
+        let size = self.evaluate("return [innerWidth / 2, innerHeight / 2]").await;
+        let data = json!({ "items": [], "files": [path], "dragOperationsMask": 1 });
+        for event in ["dragEnter", "dragOver", "drop"] {
+            let params = json!({ "type": event, "x": size[0], "y": size[1], "data": data });
+            let done = self.client.issue_cmd(DevTools { command: "Input.dispatchDragEvent", params }).await;
+            done.unwrap_or_else(|error| panic!("{} cannot be dropped: {error}", path.display()));
+        }
+    }
+
     /// The page as it looks now, as a PNG file's bytes.
     pub async fn screenshot(&self) -> Vec<u8> {
         self.client.screenshot().await.unwrap_or_else(|error| panic!("the page cannot be pictured: {error}"))
@@ -322,6 +333,24 @@ impl WebDriverCompatibleCommand for ConsoleLog {
 
     fn method_and_body(&self, _url: &url::Url) -> (axum::http::Method, Option<String>) {
         (axum::http::Method::POST, Some(json!({ "type": "browser" }).to_string()))
+    }
+}
+
+/// Chromedriver's command for the browser's own tools.
+#[derive(Debug)]
+struct DevTools {
+    command: &'static str,
+    params: Value,
+}
+
+impl WebDriverCompatibleCommand for DevTools {
+    fn endpoint(&self, base: &url::Url, session: Option<&str>) -> Result<url::Url, url::ParseError> {
+        base.join(&format!("session/{}/goog/cdp/execute", session.unwrap_or_default()))
+    }
+
+    fn method_and_body(&self, _url: &url::Url) -> (axum::http::Method, Option<String>) {
+        let body = json!({ "cmd": self.command, "params": self.params });
+        (axum::http::Method::POST, Some(body.to_string()))
     }
 }
 

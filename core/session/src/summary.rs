@@ -11,6 +11,8 @@ use sightline_track::target::TrackingState;
 pub struct Summary {
     /// Steps run, the designation included.
     pub steps: usize,
+    /// Steps at which visual odometry ran alone: the tracker did not look for the target.
+    pub steps_odometry_alone: usize,
     /// Steps that were tracked; null without truth.
     pub steps_tracked: Option<usize>,
     /// Steps in state `lost` or `failed`.
@@ -32,6 +34,10 @@ pub fn summarise<'a>(steps: impl IntoIterator<Item = &'a RunStep>) -> Summary {
     let mut summary = Summary::default();
     for step in steps {
         summary.steps += 1;
+        if step.is_odometry_alone() {
+            summary.steps_odometry_alone += 1;
+            continue;
+        }
         summary.steps_lost += usize::from(step.update.state.is_lost());
         let Some(truth) = &step.truth else { continue };
         let tracking = step.update.state == TrackingState::Tracking;

@@ -85,7 +85,8 @@ pub struct StepTruth {
     pub magnification: f64,
     /// The error up to which the target counts as tracked, px (R116).
     pub tolerance_px: f64,
-    /// Whether the target is tracked: state `tracking` and within the tolerance; null where the truth is hidden.
+    /// Whether the target is tracked: state `tracking` and within the tolerance; null where the truth is hidden, and at a
+    /// stop at which visual odometry runs alone.
     pub tracked: Option<bool>,
 }
 
@@ -151,7 +152,7 @@ impl<'a> TargetTruth<'a> {
             nees: nees.filter(|n| n.is_finite()),
             magnification,
             tolerance_px,
-            tracked: visible.then_some(tracking && within),
+            tracked: (visible && !trace.is_odometry_alone()).then_some(tracking && within),
         })
     }
 }
@@ -174,6 +175,6 @@ impl Record for StepTruth {
         r.quantity("tolerance_px", Unit::Pixel, |t| t.tolerance_px)
             .describe("The error up to which the target counts as tracked.");
         r.quantity("tracked", Unit::One, |t| t.tracked)
-            .describe("Whether the target is tracked; missing where the truth is hidden.");
+            .describe("Whether the target is tracked; missing where the truth is hidden or the tracker did not look for the target.");
     }
 }

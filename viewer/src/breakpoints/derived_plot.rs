@@ -78,7 +78,7 @@ fn title(
         let words = match (&derived.problem, of_run) {
             (Some(problem), _) => problem.clone(),
             (None, None) if derived.answer.is_none() => "being asked …".to_owned(),
-            (None, None) => "says nothing of this run: it compares others".to_owned(),
+            (None, None) => "not defined for this run: the expression compares other runs".to_owned(),
             (None, Some(_)) => match value_at(of_run, state.cursor.step) {
                 Some(value) => digits(value),
                 None => "missing at this step".to_owned(),

@@ -80,9 +80,9 @@ impl State {
             return Err(match word {
                 "fault" => "No stop of this run has damaged files.".to_owned(),
                 "hit" => "No breakpoint is hit in this run.".to_owned(),
-                "worst" => "Without truth no step is the worst.".to_owned(),
+                "worst" => "The worst step needs the truth, which this drive does not have.".to_owned(),
                 "pick" | "event" => "This run has no step yet.".to_owned(),
-                state => format!("This run never comes into the state {state}."),
+                state => format!("This run is never in the state {state}."),
             });
         }
         Ok(steps.swap_remove(next))

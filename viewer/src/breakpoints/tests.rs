@@ -308,7 +308,7 @@ fn a_step_is_reached_by_number_difference_time_and_event() {
     );
     assert!(go("99").unwrap_err().contains("the last one is 5"));
     assert!(go("fault").unwrap_err().contains("No stop of this run"));
-    assert!(go("tracking").unwrap_err().contains("never comes into the state tracking"));
+    assert!(go("tracking").unwrap_err().contains("is never in the state tracking"));
     assert!(go("soon").unwrap_err().contains("t=3.5"));
     assert!(go("t=now").unwrap_err().contains("no time in seconds"));
 }

@@ -32,7 +32,7 @@ fn sheet(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         for line in [
             "Pixels: x right, y down; (0, 0) is the centre of the first pixel.",
             "Rover frame: x forward, y right, z down. Site frame: x north, y east, z down.",
-            "Ellipses are 3σ in images, 1σ (solid) and 3σ (dashed) on the map.",
+            "Ellipses are 3σ, in images and on the map; a legend that names 1σ, 2σ, 3σ has all three.",
             "Scores are viridis from −1 to 1; a checker is no data.",
         ] {
             ui.add(egui::Label::new(line).wrap());

@@ -163,6 +163,13 @@ pub enum Command {
     Rename(Rename),
     /// Hides the marks of a target in the images, or shows them.
     ToggleTarget(usize),
+    /// Gives the marks of a target the colour with this number, or grey.
+    ColourTarget {
+        /// The target's number.
+        target: usize,
+        /// The number of the colour, as [`theme::run`](crate::theme::run) takes it.
+        colour: Option<usize>,
+    },
     /// Begins to designate a target again at the cursor's stop, as a target of its own.
     Repick(usize),
     /// Changes a setting of the draft; none takes the change back.

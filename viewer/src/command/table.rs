@@ -78,9 +78,8 @@ pub(crate) const HELP: Do =
     })
     .button("?", "Keys and conventions");
 /// Opens the palette.
-pub(crate) const PALETTE: Do = Do::new("Everything by name", &[On::ctrl(Key::K)], |_| {
-    Command::SetMode(Mode::Palette(Search::default()))
-});
+pub(crate) const PALETTE: Do =
+    Do::new("Command palette", &[On::ctrl(Key::K)], |_| Command::SetMode(Mode::Palette(Search::default())));
 /// Copies the link to what is shown.
 pub(crate) const COPY_LINK: Do =
     Do::new("Copy a link to this place", &[On::plain(Key::Y)], |_| Command::CopyLink);
@@ -228,7 +227,7 @@ pub(crate) static TABLE: &[Line] = &[
     ),
     line(Page, "cancel what was begun", &[Do::new("", &[On::plain(Key::Escape)], cancel)]),
     line(Page, "this sheet", &[HELP]),
-    line(Page, "the palette: whatever can be asked for, by name", &[PALETTE]),
+    line(Page, "the command palette: every action by name", &[PALETTE]),
     Line {
         group: Page,
         help: "arrangements of the panels, from the overview to the report",
@@ -239,7 +238,7 @@ pub(crate) static TABLE: &[Line] = &[
             Do::new("", &[On::shift(Key::Num3)], |_| arrange(Preset::Stereo)),
             Do::new("", &[On::shift(Key::Num4)], |_| arrange(Preset::Map)),
             Do::new("", &[On::shift(Key::Num5)], |_| arrange(Preset::Compare)),
-            Do::new("", &[On::shift(Key::Num6)], |_| arrange(Preset::Sweep)),
+            Do::new("", &[On::shift(Key::Num6)], |_| arrange(Preset::Studies)),
             Do::new("", &[On::shift(Key::Num7)], |_| arrange(Preset::Report)),
             Do::new("", &[On::shift(Key::Num8)], |_| arrange(Preset::Image)),
         ],
@@ -254,7 +253,7 @@ pub(crate) static TABLE: &[Line] = &[
         ],
     },
     line(Page, "let the panel fill the page, and again to restore", &[MAXIMISE]),
-    line(Page, "copy a link to what is looked at", &[COPY_LINK]),
+    line(Page, "copy a link to the current view", &[COPY_LINK]),
     gesture(Images, "Wheel", "zoom at the pointer"),
     gesture(Images, "Drag", "pan"),
     gesture(Images, "Double click", "fit the image or plot"),
@@ -286,7 +285,7 @@ pub(crate) static TABLE: &[Line] = &[
         "",
         &[
             Do::new("Trackability: limits of the map", &[], |_| Command::Limits(limits::Ask::Open)),
-            Do::new("Take the changed settings back", &[], |_| Command::ClearDraft),
+            Do::new("Discard the changed settings", &[], |_| Command::ClearDraft),
             Do::new("Open the plain page of this step", &[], |_| Command::Exports(exports::Ask::PlainPage)),
             OPEN_RERUN,
             CLOSE_RERUN,

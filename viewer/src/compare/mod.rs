@@ -47,8 +47,8 @@ impl View {
             Self::Marks => "the marks of all runs on one image",
             Self::SideBySide => "each run’s surroundings of the target, side by side",
             Self::Wipe => "this run left of a divider, the other right of it; drag it or use the arrow keys",
-            Self::Blink => "this run, and the other one while X is held; nothing flashes by itself",
-            Self::Difference => "what the two runs matched and searched for, one less the other",
+            Self::Blink => "this run; the other one while X is held (no automatic blinking)",
+            Self::Difference => "difference of the two runs’ templates and matched patches",
         }
     }
 

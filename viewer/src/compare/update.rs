@@ -114,7 +114,7 @@ impl State {
             Ask::NextView if self.is_comparing() => {
                 self.compare.view = self.compare.view.next();
                 let view = self.compare.view;
-                self.messages.note(format!("Comparing by {}: {}.", view.word(), view.help()));
+                self.messages.note(format!("Comparison “{}”: {}.", view.word(), view.help()));
             }
             Ask::NextView => self.say_how_to_compare(),
             Ask::Align(align) => self.compare.align = align,

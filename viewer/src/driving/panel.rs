@@ -75,7 +75,7 @@ fn form(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             " %",
             &mut percent,
             (1.0, 50.0),
-            "Longest step as a part of the distance to the target",
+            "Longest step, as a fraction of the distance to the target",
         );
         if percent != 100.0 * command.step_fraction {
             command.step_fraction = percent / 100.0;
@@ -89,9 +89,11 @@ fn form(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         let modes = [OdometryMode::Off, OdometryMode::SlipCheck, OdometryMode::Full];
         choice(ui, "visual odometry", 160.0, modes, &mut command.odometry, words::odometry);
     });
-    CollapsingHeader::new(theme::label("offset and limits")).id_salt("drive limits").show(ui, |ui| {
-        limits(ui, &mut command);
-    });
+    CollapsingHeader::new(theme::label("tracked stops, odometry, offset, limits"))
+        .id_salt("drive limits")
+        .show(ui, |ui| {
+            limits(ui, &mut command);
+        });
     if command != state.driving.command {
         out.push(Command::Drive(Ask::Form(command)));
     }
@@ -103,7 +105,7 @@ fn limits(ui: &mut Ui, command: &mut DriveCommand) {
         number(ui, "offset north", " m", north, (-20.0, 20.0), "Added to the goal");
         number(ui, "offset east", " m", east, (-20.0, 20.0), "Added to the goal");
         let stops = DragValue::new(&mut command.stops_max).range(2..=1000).prefix("stops ");
-        ui.add(stops).accessible_name("stops").on_hover_text("Most stops, the first included");
+        ui.add(stops).accessible_name("stops").on_hover_text("Maximum number of stops, including the first");
         let mut looks = command.on_arrival.len();
         let drag = DragValue::new(&mut looks).range(0..=10).prefix("looks on arrival ");
         let help =
@@ -113,9 +115,16 @@ fn limits(ui: &mut Ui, command: &mut DriveCommand) {
         let presets = [OdometryPreset::Sightline, OdometryPreset::Mer2007];
         let pairs = [OdometryPair::Shared, OdometryPair::Own];
         let stops = [TrackedStops::Every, TrackedStops::ByDistance];
+        let help = "The stops at which the tracker looks for the target. Visual odometry needs steps of at most 0.75 m; at the \
+                    stops in between it can run alone.";
+        ui.label(theme::label("tracked stops")).on_hover_text(help);
         choice(ui, "tracked stops", 140.0, stops, &mut command.tracked_stops, words::tracked_stops);
-        choice(ui, "pairs of odometry", 150.0, pairs, &mut command.odometry_pair, words::odometry_pair);
-        choice(ui, "settings of odometry", 80.0, presets, &mut command.odometry_preset, words::preset);
+        let help = "The stereo pairs in which visual odometry measures the motion";
+        ui.label(theme::label("odometry pairs")).on_hover_text(help);
+        choice(ui, "odometry pairs", 150.0, pairs, &mut command.odometry_pair, words::odometry_pair);
+        let help = "The settings of visual odometry: ours, or those flown on the rovers in 2007";
+        ui.label(theme::label("odometry preset")).on_hover_text(help);
+        choice(ui, "odometry preset", 80.0, presets, &mut command.odometry_preset, words::preset);
         let mut percent = 100.0 * command.slip_max;
         let help = "Largest slip of a step, by vision; the drive stops where it is exceeded";
         number(ui, "slip", " %", &mut percent, (5.0, 200.0), help);

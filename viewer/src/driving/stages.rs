@@ -29,7 +29,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State) {
         });
         let driver = state.drive().and_then(|drive| drive.steering.as_ref());
         if let Some(driver) = driver.filter(|driver| driver.run != state.cursor.run) {
-            let sentence = format!("On the estimates of run {}, which drives.", run_letter(driver.run));
+            let sentence = format!("Driven by the estimates of run {}.", run_letter(driver.run));
             ui.add(Label::new(theme::note(sentence)).wrap());
         }
     });

@@ -5,6 +5,7 @@ use sightline_rover::visual_odometry::{MeasuredMotion, OdometryMode, OdometryPre
 use sightline_session::driving::DriveSummary;
 
 use crate::panels::digits;
+use crate::panels::numbers::{counted, fixed};
 
 /// A motion as a person would tell it.
 pub(super) fn motion(motion: &Motion) -> String {
@@ -50,8 +51,8 @@ pub(super) fn odometry(mode: OdometryMode) -> &'static str {
 /// The stops at which the target is looked for.
 pub(super) fn tracked_stops(stops: TrackedStops) -> &'static str {
     match stops {
-        TrackedStops::Every => "track at every stop",
-        TrackedStops::ByDistance => "track once a step",
+        TrackedStops::Every => "every stop",
+        TrackedStops::ByDistance => "after each full step",
     }
 }
 
@@ -76,18 +77,21 @@ pub(super) fn slip(measured: &MeasuredMotion) -> String {
     match (measured.update.accepted, measured.update.slip) {
         (false, _) => "no update".to_owned(),
         (true, None) => "turned".to_owned(),
-        (true, Some(slip)) => format!("{:.1} % ± {:.1}", 100.0 * slip.along, 100.0 * slip.along_sigma),
+        (true, Some(slip)) => format!("{} % ± {:.1}", fixed(100.0 * slip.along, 1), 100.0 * slip.along_sigma),
     }
 }
 
 /// The end with the numbers that decided.
 pub(super) fn ending(ending: &Ending) -> String {
+    if let (StopReason::Arrived, Some(value), Some(limit)) = (ending.reason, ending.value, ending.limit) {
+        let [value, limit] = [value, limit].map(|metres| fixed(100.0 * metres, 1));
+        return format!("arrived: {value} cm from the goal by its own estimate, tolerance {limit} cm");
+    }
     let unit = match ending.reason {
-        StopReason::Arrived => " m from the goal",
         StopReason::Tilt => "°",
         StopReason::Time => " min",
         StopReason::StopLimit => " stops",
-        StopReason::Lost | StopReason::Stalled | StopReason::Slip => "",
+        StopReason::Arrived | StopReason::Lost | StopReason::Stalled | StopReason::Slip => "",
     };
     match (ending.value, ending.limit) {
         (Some(value), Some(limit)) => {
@@ -97,19 +101,23 @@ pub(super) fn ending(ending: &Ending) -> String {
     }
 }
 
-/// What a drive came to.
+/// The outcome of a drive; against the truth where it is known.
 pub(super) fn summary(summary: &DriveSummary) -> String {
-    let centimetres = |value: Option<f64>| {
-        value.map_or_else(|| "not known".to_owned(), |value_m| format!("{} cm", digits(100.0 * value_m)))
-    };
-    format!(
-        "{} stops, {} m driven in {} min on Mars; target off by {}, goal off by {}",
-        summary.stops,
-        digits(summary.driven_m),
-        digits(summary.flight_minutes),
-        centimetres(summary.target_error_m),
-        centimetres(summary.goal_error_m),
-    )
+    let mut words = format!(
+        "{}, {} m driven in {} min on Mars",
+        counted(summary.stops, "stop"),
+        fixed(summary.driven_m, 2),
+        fixed(summary.flight_minutes, 1)
+    );
+    if let Some(error_m) = summary.target_error_m {
+        words += &format!("; by the truth: target error {} cm", fixed(100.0 * error_m, 1));
+    }
+    match (summary.goal_error_m, summary.reason.is_some()) {
+        (Some(error_m), true) => words += &format!(", goal error {} cm", fixed(100.0 * error_m, 1)),
+        (Some(left_m), false) => words += &format!(", {} m to the goal", fixed(left_m, 2)),
+        (None, _) => {}
+    }
+    words
 }
 
 /// What the rover reported of the drive from a stop.
@@ -134,7 +142,7 @@ mod tests {
         assert_eq!(arc(-0.2, 0.0), "0.200 m back");
         assert_eq!(motion(&Motion::Turn { angle_rad: -0.5 }), "turn 28.65° left");
         let arrived = Ending { reason: StopReason::Arrived, value: Some(0.008), limit: Some(0.01) };
-        assert_eq!(ending(&arrived), "arrived: 0.00800 m from the goal, limit 0.0100");
+        assert_eq!(ending(&arrived), "arrived: 0.8 cm from the goal by its own estimate, tolerance 1.0 cm");
         assert_eq!(ending(&Ending { reason: StopReason::Lost, value: None, limit: None }), "target lost");
     }
 }

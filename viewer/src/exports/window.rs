@@ -32,7 +32,15 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             actions(ui, state);
         });
         ui.separator();
-        ui.button("Close").clicked()
+        ui.horizontal(|ui| {
+            let is_closed = ui.button("Close").clicked();
+            // The bar with the newest message is behind the window.
+            if let Some(message) = state.messages.newest() {
+                ui.add(egui::Label::new(theme::note(&message.text)).truncate());
+            }
+            is_closed
+        })
+        .inner
     });
     if modal.inner || modal.should_close() {
         out.push(Command::Exports(Ask::Close));
@@ -142,7 +150,7 @@ fn pictures(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 
 fn actions(ui: &mut Ui, state: &State) {
     let actions = as_text::actions(state);
-    ui.label(theme::title("What you did, as commands"));
+    ui.label(theme::title("This view and its actions, as commands"));
     if actions.is_empty() {
         ui.label(theme::note("Open a session first."));
     }

@@ -9,6 +9,8 @@ use egui::Context;
 use sightline_api::wire::Problem;
 
 use crate::files::documents;
+#[cfg(target_arch = "wasm32")]
+use crate::page::web::RecordingFile;
 
 /// What came of a file.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,13 +56,16 @@ impl Inbox {
     /// Nothing has arrived; `context` is woken when something does.
     pub(crate) fn new(context: Context) -> Self {
         let (sender, receiver) = channel();
-        Self {
+        let inbox = Self {
             sender,
             receiver,
             context,
             #[cfg(target_arch = "wasm32")]
             outgoing: Default::default(),
-        }
+        };
+        #[cfg(target_arch = "wasm32")]
+        inbox.watch_folders();
+        inbox
     }
 
     /// What arrived since the last time, with what was dropped in this frame.
@@ -121,12 +126,21 @@ impl Inbox {
         if let Some(file) = file.web_file() {
             let (sender, context) = (self.sender.clone(), self.context.clone());
             if file.name().to_lowercase().ends_with(".zip") {
-                return self
-                    .outgoing
-                    .chosen(vec![file.clone()], true, &|arrival| tell(&sender, &context, arrival));
+                return self.outgoing.chosen(vec![RecordingFile::of(file.clone())], true, &|arrival| {
+                    tell(&sender, &context, arrival)
+                });
             }
             read_file(file.clone(), sender, context);
         }
+    }
+
+    /// Takes every folder that is dropped as a recording that was chosen.
+    fn watch_folders(&self) {
+        let (sender, context, outgoing) = (self.sender.clone(), self.context.clone(), self.outgoing.clone());
+        crate::page::web::watch_folders(move |found| match found {
+            Ok(files) => outgoing.chosen(files, false, &|arrival| tell(&sender, &context, arrival)),
+            Err(why) => tell(&sender, &context, Arrival::Refused(why)),
+        });
     }
 
     /// Lets the person choose the folder of a recording, or an archive of one.

@@ -9,12 +9,12 @@ use sightline_api::location::AtUpload;
 use sightline_api::recording::UploadPath;
 
 use crate::files::inbox::{Arrival, Chosen};
-use crate::page::web;
+use crate::page::web::{self, RecordingFile};
 
 /// The recording that was chosen last.
 #[derive(Clone, Default)]
 pub(crate) struct Outgoing {
-    files: Rc<RefCell<Vec<web_sys::File>>>,
+    files: Rc<RefCell<Vec<RecordingFile>>>,
     is_archive: Rc<Cell<bool>>,
     /// The number of the choice that is being sent; another one ends the sending.
     number: Rc<Cell<u64>>,
@@ -22,10 +22,10 @@ pub(crate) struct Outgoing {
 
 impl Outgoing {
     /// Keeps what was chosen and tells it.
-    pub(crate) fn chosen(&self, files: Vec<web_sys::File>, is_archive: bool, tell: &dyn Fn(Arrival)) {
-        let first = files.first().map(web::path_in_folder).unwrap_or_default();
+    pub(crate) fn chosen(&self, files: Vec<RecordingFile>, is_archive: bool, tell: &dyn Fn(Arrival)) {
+        let first = files.first().map(|file| file.path.as_str()).unwrap_or_default();
         let name = first.split('/').next().unwrap_or_default().to_owned();
-        let bytes = files.iter().map(|file| file.size() as u64).sum();
+        let bytes = files.iter().map(|file| file.file.size() as u64).sum();
         let chosen = Chosen { name, file_count: files.len(), bytes };
         self.stop();
         self.files.replace(files);
@@ -48,9 +48,9 @@ impl Outgoing {
                 let below = if is_archive {
                     path::<SendArchive>(&at, &NoQuery {})
                 } else {
-                    path::<SendFile>(&at, &UploadPath { path: web::path_in_folder(file) })
+                    path::<SendFile>(&at, &UploadPath { path: file.path.clone() })
                 };
-                let sent = web::put_file(&format!("{base}/{below}"), file).await;
+                let sent = web::put_file(&format!("{base}/{below}"), &file.file).await;
                 if number.get() != own {
                     return;
                 }

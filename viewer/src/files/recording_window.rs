@@ -22,8 +22,9 @@ static SCENARIOS: LazyLock<Vec<(&str, String)>> = LazyLock::new(|| {
     library::names().map(described).collect()
 });
 
-/// Height of the list of recordings, points.
-const LIST_HEIGHT: f32 = 140.0;
+/// Largest height of the list of recordings, and height of one of its lines, points.
+const LIST_HEIGHT: f32 = 260.0;
+const LINE_HEIGHT: f32 = 30.0;
 
 /// Shows the recordings and a field for a path.
 pub(super) fn list(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(FilesAsk)) {
@@ -39,16 +40,20 @@ pub(super) fn list(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(FilesAsk)) {
             ui.add(Label::new(theme::note(words)).wrap());
         }
         Some(list) => {
-            ScrollArea::vertical().id_salt("recordings").max_height(LIST_HEIGHT).show(ui, |ui| {
-                for entry in &list.recordings {
-                    let short = short(&entry.path, &list.folders);
-                    let name = format!("recording {short}");
-                    let pressed = row(ui, [short, &entry.format], false, &name, None);
-                    if matches!(pressed, Some(Pressed::Row)) {
-                        ask(FilesAsk::Recording(Ask::Examine(entry.path.clone())));
+            let height = (list.recordings.len() as f32 * LINE_HEIGHT).min(LIST_HEIGHT);
+            ScrollArea::vertical().id_salt("recordings").max_height(height).min_scrolled_height(height).show(
+                ui,
+                |ui| {
+                    for entry in &list.recordings {
+                        let short = short(&entry.path, &list.folders);
+                        let name = format!("recording {short}");
+                        let pressed = row(ui, [short, &entry.format], false, &name, None);
+                        if matches!(pressed, Some(Pressed::Row)) {
+                            ask(FilesAsk::Recording(Ask::Examine(entry.path.clone())));
+                        }
                     }
-                }
-            });
+                },
+            );
             if list.recordings.is_empty() {
                 ui.label(theme::note(format!("No recording was found in {}.", list.folders.join(", "))));
             }

@@ -24,7 +24,7 @@ pub enum Preset {
     /// Runs beside each other.
     Compare,
     /// Many runs at once.
-    Sweep,
+    Studies,
     /// What is told of a drive.
     Report,
     /// The image with little else.
@@ -39,7 +39,7 @@ impl Preset {
         Self::Stereo,
         Self::Map,
         Self::Compare,
-        Self::Sweep,
+        Self::Studies,
         Self::Report,
         Self::Image,
     ];
@@ -52,7 +52,7 @@ impl Preset {
             Self::Stereo => "Stereo",
             Self::Map => "Map",
             Self::Compare => "Compare",
-            Self::Sweep => "Studies",
+            Self::Studies => "Studies",
             Self::Report => "Report",
             Self::Image => "Image",
         }
@@ -66,7 +66,7 @@ impl Preset {
             Self::Stereo => "stereo",
             Self::Map => "map",
             Self::Compare => "compare",
-            Self::Sweep => "sweep",
+            Self::Studies => "studies",
             Self::Report => "report",
             Self::Image => "image",
         }
@@ -78,10 +78,10 @@ impl Preset {
             Self::Overview => "everything at a glance",
             Self::Match => "how the template was matched",
             Self::Stereo => "how the point was found in space",
-            Self::Map => "where rover and target are",
+            Self::Map => "positions of rover and target",
             Self::Compare => "runs beside each other",
-            Self::Sweep => "many runs at once",
-            Self::Report => "what is told of a drive",
+            Self::Studies => "many runs at once",
+            Self::Report => "the report of a drive: metrics, notes, exports",
             Self::Image => "the image with little else",
         }
     }
@@ -103,7 +103,7 @@ impl Preset {
             Self::Stereo => &STEREO,
             Self::Map => &MAP,
             Self::Compare => &COMPARE,
-            Self::Sweep => &SWEEP,
+            Self::Studies => &STUDIES,
             Self::Report => &REPORT,
         }
     }
@@ -302,7 +302,7 @@ const COMPARE: Area = Row(&[
     ),
 ]);
 
-const SWEEP: Area = Row(&[
+const STUDIES: Area = Row(&[
     (Tabs(&[Pane::Targets, Pane::Settings]), 0.22),
     (Tabs(&[Pane::Studies, Pane::Runs, Pane::Budget]), 0.48),
     (Column(&[(Tabs(&[Pane::Left]), 0.5), (Tabs(&[Pane::Plots, Pane::Map, Pane::Messages]), 0.5)]), 0.3),

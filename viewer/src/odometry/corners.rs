@@ -161,13 +161,13 @@ pub(crate) fn words(corner: &OdometryCorner) -> String {
     }
     lines.push(
         match corner.fate {
-            Fate::Inlier => "inlier: it agrees with the motion",
+            Fate::Inlier => "inlier of the transform",
             Fate::Outlier => "outlier: it does not agree with the motion",
-            Fate::Unused => "matched, but there is no motion to agree with",
+            Fate::Unused => "matched, but no transform was fitted",
             Fate::NoMatch => "lost: no match between the stops",
             Fate::OutOfView => "lost: out of view after the motion",
-            Fate::NoStereoAfter => "lost: no match between the eyes after the motion",
-            Fate::NoStereo => "lost: no match between the eyes before the motion",
+            Fate::NoStereoAfter => "lost: no stereo match at the current stop",
+            Fate::NoStereo => "lost: no stereo match at the previous stop",
             Fate::OutOfRange => "lost: its range is beyond the limits",
         }
         .to_owned(),

@@ -101,7 +101,7 @@ fn disagreement(measured: &MeasuredMotion) -> Option<String> {
     let update = &measured.update;
     let seen = update.after_from_before?.to_pose().inverse().translation.vector;
     let apart_cm = 100.0 * (seen - nalgebra::Vector3::from(update.wheels_m)).norm();
-    let apart = format!("Wheels and vision are {} cm apart", digits(apart_cm));
+    let apart = format!("The translations by wheels and by vision differ by {} cm", digits(apart_cm));
     Some(match update.slip {
         None => format!("{apart}; the wheels hardly moved, so that there is no slip."),
         Some(slip) => format!(

@@ -151,15 +151,60 @@ fn try_choose_file(chosen: impl FnOnce(web_sys::File) + 'static) -> Result<(), J
     Ok(())
 }
 
+/// A file of a recording that was chosen or dropped.
+#[derive(Clone)]
+pub(crate) struct RecordingFile {
+    /// Its path from the folder's name on; the name of a single file.
+    pub(crate) path: String,
+    /// Its contents, which the browser reads when they are sent.
+    pub(crate) file: web_sys::File,
+}
+
+impl RecordingFile {
+    /// A file from the browser's dialog, or a single file.
+    pub(crate) fn of(file: web_sys::File) -> Self {
+        let path = js_sys::Reflect::get(&file, &"webkitRelativePath".into());
+        let path = path.ok().and_then(|path| path.as_string()).filter(|path| !path.is_empty());
+        Self { path: path.unwrap_or_else(|| file.name()), file }
+    }
+
+    /// A file of a dropped folder: a pair of path and file.
+    fn dropped(pair: &JsValue) -> Option<Self> {
+        let pair: &js_sys::Array = pair.dyn_ref()?;
+        Some(Self { path: pair.get(0).as_string()?, file: pair.get(1).dyn_into().ok()? })
+    }
+}
+
+/// The event with the files of a dropped folder, which `boot.js` reads: its detail is a list of pairs of path and file, or a
+/// sentence if the folder cannot be read.
+const FOLDER_EVENT: &str = "sightline-folder";
+
+/// Calls `found` with the files of every folder that is dropped on the page.
+pub(crate) fn watch_folders(found: impl Fn(Result<Vec<RecordingFile>, String>) + 'static) {
+    let dropped = Closure::<dyn Fn(web_sys::CustomEvent)>::new(move |event: web_sys::CustomEvent| {
+        let detail = event.detail();
+        found(match detail.dyn_ref::<js_sys::Array>() {
+            Some(pairs) => Ok(pairs.iter().filter_map(|pair| RecordingFile::dropped(&pair)).collect()),
+            None => Err(detail.as_string().unwrap_or_default()),
+        });
+    });
+    if let Some(document) = web_sys::window().and_then(|window| window.document()) {
+        // Where the browser refuses, a dropped folder is refused with the advice to use the dialog.
+        let listener = dropped.as_ref().unchecked_ref();
+        document.add_event_listener_with_callback(FOLDER_EVENT, listener).unwrap_or_default();
+    }
+    dropped.forget();
+}
+
 /// Lets the person choose a folder, or one archive; `chosen` gets its files, and is never called where none is chosen.
-pub(crate) fn choose_recording(is_archive: bool, chosen: impl FnOnce(Vec<web_sys::File>) + 'static) {
+pub(crate) fn choose_recording(is_archive: bool, chosen: impl FnOnce(Vec<RecordingFile>) + 'static) {
     // Where the browser refuses, no dialog opens.
     let _ = try_choose_recording(is_archive, chosen);
 }
 
 fn try_choose_recording(
     is_archive: bool,
-    chosen: impl FnOnce(Vec<web_sys::File>) + 'static,
+    chosen: impl FnOnce(Vec<RecordingFile>) + 'static,
 ) -> Result<(), JsValue> {
     let document = web_sys::window().and_then(|window| window.document()).ok_or(JsValue::NULL)?;
     let input: web_sys::HtmlInputElement = document.create_element("input")?.dyn_into()?;
@@ -174,18 +219,11 @@ fn try_choose_recording(
         let files = from.files();
         let count = files.as_ref().map_or(0, web_sys::FileList::length);
         let all = (0..count).filter_map(|index| files.as_ref().and_then(|files| files.get(index)));
-        chosen(all.collect());
+        chosen(all.map(RecordingFile::of).collect());
     });
     input.add_event_listener_with_callback("change", changed.unchecked_ref())?;
     input.click();
     Ok(())
-}
-
-/// The path of a file in the folder that was chosen, with that folder's name; the file's name where it was chosen by itself.
-pub(crate) fn path_in_folder(file: &web_sys::File) -> String {
-    let path =
-        js_sys::Reflect::get(file, &"webkitRelativePath".into()).ok().and_then(|path| path.as_string());
-    path.filter(|path| !path.is_empty()).unwrap_or_else(|| file.name())
 }
 
 /// Sends a file as the body of a PUT.

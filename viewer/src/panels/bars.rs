@@ -14,6 +14,7 @@ use crate::command::table::{
 use crate::command::{Command, Stage};
 use crate::compare::panel::{choosers, readouts};
 use crate::net::events::Connection;
+use crate::panels::timeline::cells;
 use crate::panels::{inspector, messages, numbers, playing, view_menu};
 use crate::state::messages::Weight;
 use crate::state::tracker::confidence_of;
@@ -111,11 +112,26 @@ pub(crate) fn status(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         return;
     };
     let tracking = state.tracking().unwrap_or_default();
-    let word = match tracking {
-        TrackingState::Lost { count } => format!("LOST {count}"),
-        other => other.word().to_uppercase(),
+    let is_not_searched = cells::is_not_searched(row);
+    let (word, colour) = match tracking {
+        _ if is_not_searched => ("NOT SEARCHED".to_owned(), theme::weak()),
+        _ if tracking == TrackingState::Tracking && row.tracked == Some(false) => {
+            ("FALSE TRACKING".to_owned(), theme::failed())
+        }
+        other => (other.word().to_uppercase(), theme::state(tracking)),
     };
-    ui.label(RichText::new(word).strong().color(theme::state(tracking)));
+    let shown = ui.label(RichText::new(word).strong().color(colour));
+    match tracking {
+        _ if is_not_searched => {
+            shown.on_hover_text(
+                "Visual odometry ran alone at this stop: the tracker did not look for the target.",
+            );
+        }
+        TrackingState::Lost { count } => {
+            shown.on_hover_text(format!("Bad updates in a row: {count}"));
+        }
+        _ => {}
+    }
     let has_confidence = state.run().and_then(|run| confidence_of(run, row)).is_some();
     for (column, unit, decimals) in STATUS {
         let value = records::row_value_in(row, column, unit);

@@ -21,7 +21,7 @@ pub(crate) fn over_steps<'a>(plot: Plot<'a>, last: f64, is_last: bool) -> Plot<'
         .x_grid_spacer(step_marks)
         .y_grid_spacer(few_marks)
         .y_axis_formatter(plain)
-        .y_axis_min_width(30.0)
+        .y_axis_min_width(40.0)
         .x_axis_formatter(
             |mark: GridMark, _: &std::ops::RangeInclusive<f64>| {
                 if mark.value.fract() == 0.0 { format!("{}", mark.value) } else { String::new() }

@@ -8,7 +8,7 @@ use crate::drawing::raster::Raster;
 use crate::drawing::stretch::Stretch;
 use crate::panels::legend::{self, Entry};
 use crate::state::State;
-use crate::{panels, theme};
+use crate::{figure, panels, theme};
 
 /// Height of the row, points.
 const HEIGHT: f32 = 20.0;
@@ -18,6 +18,9 @@ const SATURATED_SHARE: f32 = 0.01;
 
 /// Shows the row.
 pub(crate) fn show(ui: &mut Ui, state: &State, raster: &Raster, entries: &[Entry], out: &mut Vec<Command>) {
+    if figure::is_on_paper() {
+        return legend::above(ui, entries, state, out);
+    }
     ui.horizontal(|ui| {
         ui.set_height(HEIGHT);
         ui.spacing_mut().item_spacing.x = 4.0;

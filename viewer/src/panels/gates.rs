@@ -173,7 +173,7 @@ fn bar(ui: &mut Ui, gate: &Gate, colour: egui::Color32) {
     let sign = if gate.margin.is_some_and(|margin| margin >= 0.0) { "+" } else { "" };
     let margin = gate.margin.map_or_else(|| "–".to_owned(), |m| format!("{sign}{}", digits(m)));
     painter.text(rect.right_center(), Align2::RIGHT_CENTER, margin, theme::digit_font(), colour);
-    response.on_hover_text("At the end: the margin, positive on the good side of the limit.");
+    response.on_hover_text("Right: the margin, positive if the gate is passed.");
 }
 
 /// Value and limit as fractions of the bar: scores and shares from 0 to 1, others from 0 to twice the limit.
@@ -193,7 +193,7 @@ pub(crate) fn readable(name: &str) -> &str {
 pub(crate) fn failed_words(gate: &Gate) -> String {
     let relation = if gate.at_least { "<" } else { ">" };
     let name = readable(&gate.name);
-    let Some(value) = gate.value else { return format!("{name}: nothing was found to judge") };
+    let Some(value) = gate.value else { return format!("{name}: no value to judge") };
     let words = match gate.unit.as_str() {
         "m" => format!("{name} {:.1} {relation} {:.1} cm", value * 100.0, gate.limit * 100.0),
         unit => format!("{name} {value:.3} {relation} {:.3} {unit}", gate.limit),

@@ -6,7 +6,7 @@ use sightline_session::view::TargetView;
 use sightline_vision::image::PixelRect;
 
 use crate::cache::{Eye, Slot};
-use crate::command::{Command, Layer, Zoomable};
+use crate::command::{Command, Layer, Mode, Zoomable};
 use crate::compare::panel::{bar, marks as compared, modes};
 use crate::drawing::overlay::{Line, Mark, Overlay};
 use crate::drawing::raster::Raster;
@@ -158,6 +158,14 @@ fn waiting_words(state: &State, word: &str, step: usize) -> String {
 
 /// What the legend of the left image lists.
 fn entries(state: &State) -> Vec<Entry> {
+    let mut entries = entries_of_step(state);
+    if state.mode == Mode::Pick && state.trackability_map().is_some() {
+        entries.extend(picking::footer::entries());
+    }
+    entries
+}
+
+fn entries_of_step(state: &State) -> Vec<Entry> {
     let Some(trace) = state.trace_on_image() else { return Vec::new() };
     let evidence = trace.template();
     let matched = evidence.and_then(|e| e.match_template.as_ref());
@@ -229,8 +237,9 @@ fn paint_others(canvas: &Canvas, state: &State) {
     for target in others.filter(is_here).filter(is_shown) {
         let row = target.runs.last().and_then(|run| row_of(run, state.cursor.step));
         if let Some(pixel) = row.and_then(|row| row.left_pixel) {
-            overlay.mark(pixel, Mark::Diamond, theme::weak());
-            overlay.words(pixel, vec2(10.0, 0.0), &target.label, theme::weak());
+            let colour = state.colour_of(target.number);
+            overlay.mark(pixel, Mark::Diamond, colour);
+            overlay.words(pixel, vec2(10.0, 0.0), &target.label, colour);
         }
     }
 }

@@ -41,14 +41,13 @@ pub(crate) fn button(ui: &mut Ui, entries: &[Entry], state: &State, out: &mut Ve
         return;
     }
     let hidden = entries.iter().filter(|entry| state.hidden.contains(&entry.layer)).count();
-    let words = match hidden {
-        0 => format!("marks: {}", entries.len()),
-        hidden => format!("marks: {} of {}", entries.len() - hidden, entries.len()),
-    };
-    let button = ui.add(egui::Button::new(egui::RichText::new(words).size(11.0)).small());
-    let button = button
-        .accessible_name("legend")
-        .on_hover_text("What the marks are; a click on one hides or shows it");
+    let colour = if hidden == 0 { theme::text() } else { theme::accent() };
+    let button = ui.add(egui::Button::new(egui::RichText::new("legend").size(11.0).color(colour)).small());
+    let help = format!(
+        "The meaning of the marks; a click on one hides or shows it. Hidden: {hidden} of {}",
+        entries.len()
+    );
+    let button = button.on_hover_text(help);
     let ground = theme::on_image(theme::panel);
     let popup = egui::Popup::menu(&button).close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside);
     popup.frame(egui::Frame::popup(ui.style()).fill(ground)).show(|ui| {

@@ -1,4 +1,4 @@
-//! The list of messages: what was said to the person, the newest first.
+//! The list of messages, newest first: problems, then notes.
 
 use egui::{Align, Color32, Layout, ScrollArea, Ui};
 
@@ -35,18 +35,28 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         );
         return;
     }
+    let all = state.messages.all();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        for message in state.messages.all().iter().rev() {
-            show_message(ui, state, message, out);
+        for (weight, title) in [(Weight::Problem, "Problems"), (Weight::Note, "Notes")] {
+            let count = all.iter().filter(|message| message.weight == weight).count();
+            if count == 0 {
+                continue;
+            }
+            egui::CollapsingHeader::new(format!("{title} ({count})")).id_salt(title).default_open(true).show(
+                ui,
+                |ui| {
+                    for message in all.iter().rev().filter(|message| message.weight == weight) {
+                        show_message(ui, state, message, out);
+                    }
+                },
+            );
         }
     });
 }
 
 fn show_message(ui: &mut Ui, state: &State, message: &Message, out: &mut Vec<Command>) {
-    let is_problem = message.weight == Weight::Problem;
     egui::Frame::new().fill(theme::bar()).corner_radius(4).inner_margin(6).show(ui, |ui| {
         ui.horizontal(|ui| {
-            ui.label(theme::title(if is_problem { "problem" } else { "note" }));
             if message.count > 1 {
                 ui.label(theme::note(format!("{} times", message.count)));
             }

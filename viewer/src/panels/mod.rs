@@ -13,7 +13,7 @@ macro_rules! panel_table {
                 "Thresholds and parameters of a run",
                 panels::settings::Settings;
             Left: "left", "Left image", Home(Group::LeftImage, 0),
-                "The left image with what the tracker knew of the target",
+                "The left image with the prediction, the search window and the match",
                 panels::images_left::LeftView;
             CloseUp: "close_up", "Close-up", Home(Group::CloseUp, 0),
                 "The target in both images, four times magnified, with its marks",
@@ -22,10 +22,10 @@ macro_rules! panel_table {
                 "The right image with the epipolar curve and the stereo match",
                 panels::image_right::RightView;
             Features: "features", "Features", Home(Group::Views, 1),
-                "What the feature tracker saw: features, matches, the motion, and how certain it is.",
+                "Evidence of the feature tracker: features, matches, the transform and its covariance.",
                 panels::features::Features;
             Shape: "shape", "Shape", Home(Group::Views, 2),
-                "What the shape tracker saw: surface, sensor, search, meshes, and the hand-off.",
+                "Evidence of the shape tracker: surface, range sensor, coarse search, meshes and hand-off.",
                 panels::shape::Shape;
             Drive: "drive", "Drive", Home(Group::Views, 3),
                 "Sends the rover towards the target: its command, and the decision at every stop.",
@@ -34,7 +34,7 @@ macro_rules! panel_table {
                 "The motion since the stop before by vision, against wheels and gyro: slip, gates and corners.",
                 odometry::panel::Odometry;
             Budget: "budget", "Error budget", Home(Group::Views, 4),
-                "What accuracy stereo, driving and drift leave.",
+                "Error budget of stereo, navigation and drift.",
                 panels::budget::Budget;
             Studies: "studies", "Studies", Home(Group::Views, 5),
                 "The paper’s experiments, over worlds whose truth is known.",
@@ -61,10 +61,10 @@ macro_rules! panel_table {
                 "Criteria 3 and 4: each correction against its tolerance, step by step.",
                 panels::tolerances::Tolerances;
             Gates: "gates", "Gates", Home(Group::Verdict, 1),
-                "Whether the match can be trusted: the criteria with their limits.",
+                "Whether the match can be trusted: the gates with their limits.",
                 panels::gates::Gates;
             Machine: "machine", "State machine", Home(Group::Verdict, 2),
-                "Where tracking stands, and which criterion fired at each past update.",
+                "The tracking state, and the gates that rejected each past update.",
                 panels::machine::Machine;
             Inspector: "inspector", "Inspector", Home(Group::Details, 0),
                 "The record of the selected stage: values with units, formulas and origins",
@@ -73,7 +73,7 @@ macro_rules! panel_table {
                 "What was refused or failed, with how to mend it",
                 panels::messages::Messages;
             Runs: "runs", "Runs", Home(Group::Views, 6),
-                "What each run is worth, and which settings make the difference.",
+                "Metrics of each run, and the settings that differ.",
                 panels::runs::Runs;
             Uncertainty: "uncertainty", "Uncertainty", Home(Group::Plots, 2),
                 "Whether errors are as large as the covariances say.",
@@ -85,7 +85,7 @@ macro_rules! panel_table {
                 "What you wrote about places of the drive; the list is a tour that can be stepped through.",
                 notes::panel::Notes;
             Breakpoints: "breakpoints", "Breakpoints", Home(Group::Verdict, 3),
-                "Conditions that are looked for at all steps of all runs at once.",
+                "Conditions that are evaluated at all steps of all runs.",
                 breakpoints::panel::Breakpoints;
         }
     };

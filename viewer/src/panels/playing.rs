@@ -26,7 +26,7 @@ pub(crate) fn controls(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let mut rate = play.rate;
     let field = DragValue::new(&mut rate).range(RATES).speed(0.1).max_decimals(1).suffix(" /s");
     let field = ui.add(field).accessible_name("steps a second");
-    if field.on_hover_text("steps a second at single speed").changed() {
+    if field.on_hover_text("playback speed at 1×, steps/s").changed() {
         out.push(Command::Ask(Ask::Shuttle(Shuttle::Rate(rate))));
     }
     ui.label(theme::note(play.in_words()));

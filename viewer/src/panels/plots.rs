@@ -271,7 +271,7 @@ fn scores(state: &State, colour: Color32) -> Chart {
         unit: Unit::One,
         series: vec![
             series("ncc", colour, Mark::Ring, MarkerShape::Circle),
-            series("stereo_score", theme::prediction(), Mark::Square, MarkerShape::Square),
+            series("stereo_score", theme::text(), Mark::Square, MarkerShape::Square),
         ],
         thresholds: vec![limits.ncc_min, limits.stereo_ncc_min],
         threshold: "threshold".to_owned(),

@@ -122,7 +122,7 @@ fn sentences(stereo: &PointStereo, predicted: Option<(f64, f64)>) -> [RichText; 
         stereo.range_m, stereo.score, stereo.across_px
     );
     let back = match stereo.left_right_px {
-        Some(px) => format!("left to right and back: {px:.2} px off"),
+        Some(px) => format!("left–right check: {px:.2} px"),
         None => "left to right and back: nothing was found there".to_owned(),
     };
     let colour = if stereo.at_end { theme::lost() } else { theme::text() };

@@ -1,11 +1,13 @@
 //! Targets and their runs.
 
+use egui::text::{CCursor, CCursorRange};
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui, vec2};
 use sightline_session::view::{RunView, TargetView};
 
 use crate::command::table::PICK;
 use crate::command::{Command, Mode};
-use crate::drawing::overlay::{paint_mark, run_mark};
+use crate::drawing::overlay::{Mark, paint_mark, run_mark};
+use crate::layout::command::LayoutCommand;
 use crate::panels::numbers::counted;
 use crate::panels::pane::Pane;
 use crate::panels::panel::Panel;
@@ -26,6 +28,10 @@ const INDENT: f32 = 12.0;
 
 /// Width of the band of a run's states, points.
 const BAND_WIDTH: f32 = 56.0;
+
+/// The colours of a target's marks: name and number.
+const COLOURS: [(&str, Option<usize>); 5] =
+    [("grey", None), ("blue", Some(0)), ("pink", Some(1)), ("violet", Some(2)), ("green", Some(3))];
 
 /// Room beside the field of a name for “Remove”, points.
 const NAME_BESIDE: f32 = 80.0;
@@ -96,6 +102,7 @@ fn show_target(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Co
         if check.on_hover_text("Shows or hides its marks in the images").changed() {
             out.push(Command::ToggleTarget(target.number));
         }
+        colour_menu(ui, state, target, out);
         let renaming = state.renaming.as_ref().filter(|renaming| renaming.target == target.number);
         match renaming {
             Some(renaming) => name_field(ui, renaming, out),
@@ -109,6 +116,13 @@ fn show_target(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Co
             {
                 out.push(Command::RemoveTarget(target.number));
             }
+            let is_simulated = state.traverse.as_ref().is_some_and(|traverse| traverse.simulated);
+            if is_selected && is_simulated && renaming.is_none() {
+                let help = "Shows the panel Drive: the rover drives to this target on its own estimates";
+                if ui.small_button("Drive …").on_hover_text(help).clicked() {
+                    out.push(Command::Layout(LayoutCommand::Show(Pane::Drive)));
+                }
+            }
             let help = "Gives the target another name (double-click the name)";
             if renaming.is_none() && ui.small_button("Rename").on_hover_text(help).clicked() {
                 out.push(Command::Rename(Rename::Begin(target.number)));
@@ -120,7 +134,7 @@ fn show_target(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Co
     ui.horizontal(|ui| {
         let is_elsewhere = is_selected && state.cursor.step != at.step;
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let help = "Designates it again at this stop, as a target of its own with the same settings";
+            let help = "Designates a new target here with the same settings";
             if is_elsewhere && ui.small_button("Re-pick here").on_hover_text(help).clicked() {
                 out.push(Command::Repick(target.number));
             }
@@ -139,6 +153,25 @@ fn show_target(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Co
             ui.vertical(|ui| show_run(ui, state, target, run, out));
         });
     }
+}
+
+/// The mark of a target in its colour; a click opens the colours to choose from.
+fn colour_menu(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Command>) {
+    let button = ui.add(egui::Button::new("").frame(false).min_size(vec2(16.0, 16.0)));
+    let colour = state.colour_of(target.number);
+    paint_mark(ui.painter(), button.rect.center(), Mark::Diamond, colour, 6.0);
+    let button = button
+        .accessible_name(format!("colour of {}", target.label))
+        .on_hover_text("Chooses the colour of its marks while another target is selected");
+    egui::Popup::menu(&button).show(|ui| {
+        for (name, number) in COLOURS {
+            let is_chosen = state.target_colours.get(&target.number).copied() == number;
+            let sample = RichText::new(name).color(number.map_or_else(theme::weak, theme::run));
+            if ui.selectable_label(is_chosen, sample).clicked() {
+                out.push(Command::ColourTarget { target: target.number, colour: number });
+            }
+        }
+    });
 }
 
 /// The name of a target: a click shows its newest run, a double click renames it.
@@ -162,6 +195,13 @@ fn name_field(ui: &mut Ui, renaming: &Renaming, out: &mut Vec<Command>) {
     let field = field.accessible_name("name of the target");
     if field.changed() {
         out.push(Command::Rename(Rename::Type(text)));
+    }
+    if field.gained_focus() {
+        // Typing replaces the old name.
+        let mut cursor = egui::TextEdit::load_state(ui.ctx(), field.id).unwrap_or_default();
+        let end = CCursor::new(renaming.text.chars().count());
+        cursor.cursor.set_char_range(Some(CCursorRange::two(CCursor::new(0), end)));
+        cursor.store(ui.ctx(), field.id);
     }
     if field.lost_focus() {
         let is_cancelled = ui.input(|input| input.key_pressed(egui::Key::Escape));
@@ -189,6 +229,9 @@ fn show_run(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out:
         frame.show(ui, |ui| line_of(ui, state, target, run, out));
     });
     let response = inside.response;
+    if is_selected {
+        scroll_to_new(ui, &response, (target.number, run.number));
+    }
     response.widget_info(|| {
         egui::WidgetInfo::selected(
             egui::Role::Button,
@@ -199,6 +242,16 @@ fn show_run(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out:
     });
     if response.clicked() {
         out.push(Command::Look { target: target.number, run: run.number });
+    }
+}
+
+/// Scrolls to the selected run when another one was selected before: a new branch may be below the visible part of the list.
+fn scroll_to_new(ui: &Ui, line: &egui::Response, run: (usize, usize)) {
+    let id = egui::Id::unique("selected run of the list");
+    let before = ui.ctx().data_mut(|data| data.get_temp_mut_or(id, run).to_owned());
+    if before != run {
+        line.scroll_to_me(None);
+        ui.ctx().data_mut(|data| data.insert_temp(id, run));
     }
 }
 
@@ -214,7 +267,7 @@ fn line_of(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: 
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             if target.runs.len() > 1 {
                 let name = format!("remove run {}", run_letter(run.number));
-                let help = "Hides the run; what left it keeps its steps. Ctrl+Z takes it back";
+                let help = "Removes the run; its branches keep their steps. Ctrl+Z undoes it";
                 let button = ui.small_button("×").accessible_name(name).on_hover_text(help);
                 if button.clicked() {
                     out.push(Command::Why(Ask::RemoveRun { target: target.number, run: run.number }));
@@ -265,13 +318,16 @@ fn summary(run: &RunView) -> String {
     let summary = &run.summary;
     let mut words = Vec::new();
     if let Some(tracked) = summary.steps_tracked {
-        words.push(format!("{tracked} of {} tracked", summary.steps));
+        words.push(format!("{tracked} of {} tracked", summary.steps - summary.steps_odometry_alone));
     }
     if summary.steps_lost > 0 {
         words.push(format!("{} lost", summary.steps_lost));
     }
+    if summary.steps_odometry_alone > 0 {
+        words.push(format!("{} not searched", summary.steps_odometry_alone));
+    }
     if let Some(false_tracked) = summary.false_tracked.filter(|&n| n > 0) {
-        words.push(format!("{false_tracked} false"));
+        words.push(format!("{false_tracked} false tracking"));
     }
     if let Some(err_px) = summary.final_err_px {
         words.push(format!("last {err_px:.1} px"));

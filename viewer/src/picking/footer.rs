@@ -44,6 +44,9 @@ pub(crate) fn show(
     place: Option<Pixel>,
     out: &mut Vec<Command>,
 ) {
+    // A row is as high as a control by default, which is more than the line has.
+    ui.spacing_mut().interact_size.y = ROW;
+    ui.spacing_mut().button_padding.y = 0.0;
     ui.horizontal(|ui| {
         ui.set_height(ROW);
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
@@ -79,7 +82,7 @@ fn sentence(state: &State, place: Option<Pixel>) -> (String, Color32) {
     let Some(cell) = state.trackability_at(pixel) else {
         return (format!("x {:.1}  y {:.1} · {}", pixel.x, pixel.y, hint(state)), theme::accent());
     };
-    (format!("x {:.1}  y {:.1} · {}", pixel.x, pixel.y, words(&cell)), theme::trackability(cell.verdict))
+    (format!("{} · x {:.1}  y {:.1}", words(&cell), pixel.x, pixel.y), theme::trackability(cell.verdict))
 }
 
 /// A sentence with a capital letter and a full stop.
@@ -142,8 +145,8 @@ fn choices(ui: &mut Ui, refusal: &Refusal, out: &mut Vec<Command>) {
     }
 }
 
-/// The words of the legend.
-fn entries() -> [Entry; 3] {
+/// The legend of the map of trackability.
+pub(crate) fn entries() -> [Entry; 3] {
     let entry = |verdict: Verdict, mark: Mark| {
         Entry::new(Layer::Trackability, mark, theme::trackability(verdict), verdict.word())
     };

@@ -45,7 +45,7 @@ pub(crate) fn words(cell: &Cell) -> String {
         words += &format!(" · range {range_m:.2} m");
     }
     if let Some(step_m) = cell.longest_step_m {
-        words += &format!(" · longest safe step {step_m:.2} m");
+        words += &format!(" · step ≤ {step_m:.2} m");
     }
     words
 }

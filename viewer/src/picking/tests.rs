@@ -145,10 +145,10 @@ fn verdict_reason_range_and_longest_step_are_said_in_words_and_the_layer_can_be_
     let map = map(8);
     assert_eq!(
         picking::words(&map.at(PLACE).unwrap()),
-        "Poor: depth edge 2 px away · range 6.00 m · longest safe step 0.60 m"
+        "Poor: depth edge 2 px away · range 6.00 m · step ≤ 0.60 m"
     );
     assert!(picking::words(&map.at(Pixel::new(36.0, 30.0)).unwrap()).starts_with("Risky: depth edge"));
-    assert_eq!(picking::words(&map.at(GOOD).unwrap()), "Good · range 6.00 m · longest safe step 0.60 m");
+    assert_eq!(picking::words(&map.at(GOOD).unwrap()), "Good · range 6.00 m · step ≤ 0.60 m");
     let mut shown = Shown::new(
         [900.0, 420.0],
         |context| {

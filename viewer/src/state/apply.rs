@@ -50,6 +50,7 @@ impl State {
             Command::RemoveTarget(target) => self.remove_target(target),
             Command::Rename(rename) => self.rename(rename),
             Command::ToggleTarget(target) => self.toggle_target(target),
+            Command::ColourTarget { target, colour } => self.colour_target(target, colour),
             Command::Repick(target) => self.repick(target),
             Command::Draft { key, value } => {
                 match value {

@@ -226,8 +226,10 @@ impl State {
             self.forget_comparisons(true);
             (self.mode, self.renaming, self.repicks) = (Mode::Look, None, None);
             self.hidden_targets.clear();
+            self.target_colours.clear();
             (self.designating, self.refusal, self.rendering) = (None, None, None);
             self.forget_deeds();
+            self.why.leave_session();
         }
         self.drive_went_on();
         match &self.traverse {

@@ -116,6 +116,8 @@ pub struct State {
     pub repicks: Option<usize>,
     /// The targets whose marks are hidden in the images.
     pub hidden_targets: BTreeSet<usize>,
+    /// The colours that the user gave targets, by their numbers; the others are grey.
+    pub target_colours: BTreeMap<usize, usize>,
     /// What was said to the person.
     pub messages: Messages,
     /// What each panel shows.
@@ -203,6 +205,7 @@ impl State {
             renaming: None,
             repicks: None,
             hidden_targets: BTreeSet::new(),
+            target_colours: BTreeMap::new(),
             messages: Messages::default(),
             views: Views::default(),
             chosen_camera: None,

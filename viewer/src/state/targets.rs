@@ -1,5 +1,6 @@
 //! What is done to a target in the list: renaming it, hiding its marks, designating it again at another stop.
 
+use egui::Color32;
 use sightline_api::endpoint::Call;
 use sightline_api::endpoints::RenameTarget;
 use sightline_api::location::AtTarget;
@@ -10,6 +11,7 @@ use sightline_track::settings::Changes;
 use crate::command::Mode;
 use crate::state::State;
 use crate::state::deeds::Deed;
+use crate::theme;
 
 /// A request about the name of a target.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -74,6 +76,18 @@ impl State {
         if !self.hidden_targets.remove(&target) {
             self.hidden_targets.insert(target);
         }
+    }
+
+    pub(super) fn colour_target(&mut self, target: usize, colour: Option<usize>) {
+        match colour {
+            Some(colour) => self.target_colours.insert(target, colour),
+            None => self.target_colours.remove(&target),
+        };
+    }
+
+    /// The colour of a target's marks where it is not selected: grey unless the user chose another.
+    pub(crate) fn colour_of(&self, target: usize) -> Color32 {
+        self.target_colours.get(&target).map_or_else(theme::weak, |colour| theme::run(*colour))
     }
 
     pub(super) fn repick(&mut self, target: usize) {

@@ -134,8 +134,7 @@ impl State {
     pub(crate) fn missing_features(&self) -> String {
         match (self.tracker(), self.row()) {
             (TrackerKind::Shape, Some(_)) => {
-                "This run registers the shape of the target’s surroundings and looks for no features. Choose the \
-                 preset “combined” in Settings and press “Run from here” at the pick."
+                "This run registers the shape of the target’s surroundings and detects no features. Choose the preset “combined” in Settings and press “Run from here” at the step of the designation."
                     .to_owned()
             }
             (TrackerKind::Template, Some(_)) => {

@@ -111,7 +111,7 @@ impl State {
             Some(deed) => {
                 self.undo.changes += 1;
                 self.carry_over(&deed, false);
-                self.messages.note(format!("Took {} back.  Ctrl+Y does it again.", deed.words()));
+                self.messages.note(format!("Undid {}.  Ctrl+Y redoes it.", deed.words()));
                 self.undo.undone.push(deed);
             }
             None => self.messages.note("There is nothing to take back."),

@@ -49,7 +49,7 @@ impl Estimate {
     /// The estimate as one line.
     pub(super) fn words(&self) -> String {
         format!(
-            "{} × {} × {} = {}, about {}",
+            "{} × {} × {} = {}, about {} if nothing else is computed",
             count(self.configurations, "configuration"),
             count(self.points, "point"),
             count(self.worlds, "world"),
@@ -143,7 +143,10 @@ mod tests {
         let new = crate::studies::Order::default().request(&info).unwrap();
         let first = Estimate::of(&new, &info, &[]);
         assert_eq!(first.units(), 10);
-        assert_eq!(first.words(), "1 configuration × 5 points × 2 worlds = 10 runs, about 2 min");
+        assert_eq!(
+            first.words(),
+            "1 configuration × 5 points × 2 worlds = 10 runs, about 2 min if nothing else is computed"
+        );
         let again = Estimate::of(&new, &info, &[job(StudyState::Done, 1.0, 400.0)]);
         assert_eq!(again.seconds, 100.0, "10 s a unit");
     }

@@ -7,7 +7,7 @@ mod chart;
 mod estimate;
 mod table;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use sightline_study::row::Row;
 use sightline_study::wire::{NewStudy, StudyInfo, StudyJob};
@@ -25,6 +25,8 @@ pub struct Studies {
     pub looked: Option<String>,
     /// What the next study is made of.
     pub order: Order,
+    /// The jobs whose end was requested and is not here yet: a unit of work that has begun is completed first.
+    pub cancelling: BTreeSet<String>,
     is_asked: bool,
 }
 
@@ -106,6 +108,7 @@ impl Studies {
     /// Requests everything again from a server that may have been restarted, and so counts revisions anew.
     pub(crate) fn make_stale(&mut self) {
         self.is_asked = false;
+        self.cancelling.clear();
         self.jobs.iter_mut().for_each(|job| job.revision = 0);
     }
 }

@@ -157,6 +157,9 @@ fn show_job(ui: &mut Ui, state: &State, job: &StudyJob, out: &mut Vec<Command>) 
 /// What can be done with a job.
 fn buttons(ui: &mut Ui, state: &State, job: &StudyJob, out: &mut Vec<Command>) {
     match job.state {
+        StudyState::Waiting | StudyState::Running if state.studies.cancelling.contains(&job.id) => {
+            ui.label(theme::note("cancelling …")).on_hover_text("The run that has begun ends first.");
+        }
         StudyState::Waiting | StudyState::Running => {
             if ui.small_button("Cancel").clicked() {
                 out.push(Command::CancelStudy(job.id.clone()));

@@ -106,6 +106,12 @@ fn a_job_says_how_far_it_is_and_can_be_stopped_or_read() {
         .says("world 7")
         .says("! world 3 offers 12 targets");
     assert_eq!(running.click("Cancel"), vec![Command::CancelStudy("j1".to_owned())]);
+    let cancelling = Shown::pane(Pane::Studies, |_| {
+        let mut state = with_job(StudyState::Running);
+        state.perform(Command::CancelStudy("j1".to_owned()));
+        state
+    });
+    cancelling.says("cancelling …");
     let mut done = Shown::pane(Pane::Studies, |_| with_job(StudyState::Done));
     assert_eq!(done.click("Report"), vec![Command::OpenReport("j1".to_owned())]);
     assert_eq!(done.click("Result"), vec![Command::LookAtStudy("j1".to_owned())]);

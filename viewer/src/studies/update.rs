@@ -54,12 +54,14 @@ impl State {
 
     /// Stops a study.
     pub(crate) fn cancel_study(&mut self, job: String) {
+        self.studies.cancelling.insert(job.clone());
         let call = Call::to::<CancelStudy>(&AtStudyJob { job });
         self.call::<CancelStudy>(call, |state, job| state.studies.took(job));
     }
 
     /// Lets a stopped study go on.
     pub(crate) fn resume_study(&mut self, job: String) {
+        self.studies.cancelling.remove(&job);
         let call = Call::to::<ResumeStudy>(&AtStudyJob { job });
         self.call::<ResumeStudy>(call, |state, job| state.studies.took(job));
     }

@@ -69,7 +69,7 @@ fn a_stretch_is_chosen_from_the_list() {
 #[test]
 fn the_stereo_profile_says_best_interval_and_prediction() {
     let shown = Shown::pane(Pane::StereoProfile, |context| fixture::at_step(context, 2));
-    shown.says("best 6.000 m, score 0.910, disparity 61.00 px").says("and back: 0.10 px off");
+    shown.says("best 6.000 m, score 0.910, disparity 61.00 px").says("left–right check: 0.10 px");
     shown.says("searched 0.25 to 20.00 m, 80 positions; predicted");
     Shown::pane(Pane::StereoProfile, |context| fixture::at_step(context, 0))
         .says("no prediction: the whole curve");

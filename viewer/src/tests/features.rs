@@ -135,7 +135,7 @@ fn the_right_image_shows_the_partners() {
     shown.click("legend");
     shown
         .says("inliers 24 (legend)")
-        .says("partners of features (legend)")
+        .says("matches of features in the other image (legend)")
         .says("moved here · run A (legend)");
 }
 

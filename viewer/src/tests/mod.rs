@@ -281,7 +281,7 @@ fn the_status_line_tells_step_state_score_and_error() {
     let shown = Shown::new([1200.0, 60.0], |context| fixture::at_step(context, 2), bars::top);
     shown.says("Sightline").says("2/5").says("TRACKING").says("0.83").says("0.5");
     let lost = Shown::new([1200.0, 60.0], |context| fixture::at_step(context, 3), bars::top);
-    lost.says("LOST 1");
+    lost.says("LOST");
 }
 
 #[test]

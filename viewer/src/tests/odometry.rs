@@ -156,7 +156,7 @@ fn the_panel_says_by_how_much_wheels_and_vision_disagree() {
     let shown = panel(|context| loaded(context, true));
     shown.says("ACCEPTED").says("The pose of step 3 is by vision.");
     shown.says(
-        "Wheels and vision are 15.00 cm apart: slip 30.0 % ± 0.6 % along the motion, 2.0 % to the left.",
+        "The translations by wheels and by vision differ by 15.00 cm: slip 30.0 % ± 0.6 % along the motion, 2.0 % to the left.",
     );
     // Axes in centimetres and degrees: vision, wheels, difference, 1σ.
     shown.says("+35.00").says("+50.00").says("-15.00").says("0.30").says("+2.000");
@@ -199,11 +199,11 @@ fn a_corner_is_read_with_range_residual_and_fate() {
     let words = corners::words(&corners[0]);
     assert_eq!(
         words,
-        "before at 10.0, 20.0\nmatched at 10.0, 40.0\nrange before 4.25 m\nresidual 1.50 σ\ninlier: it agrees with the motion"
+        "before at 10.0, 20.0\nmatched at 10.0, 40.0\nrange before 4.25 m\nresidual 1.50 σ\ninlier of the transform"
     );
     assert_eq!(
         corners::words(&corners[6]),
-        "before at 46.0, 20.0\nlost: no match between the eyes before the motion"
+        "before at 46.0, 20.0\nlost: no stereo match at the previous stop"
     );
 }
 

@@ -294,6 +294,21 @@ fn the_marks_of_a_target_are_hidden_and_shown() {
 }
 
 #[test]
+fn the_marks_of_a_target_have_the_chosen_colour() {
+    let mut shown = Shown::pane(Pane::Targets, |context| fixture::at_step(context, 2));
+    shown.click("colour of ridge");
+    let asked = shown.click("violet");
+    assert_eq!(asked, vec![Command::ColourTarget { target: 0, colour: Some(2) }]);
+    let mut state = lost();
+    let grey = state.colour_of(0);
+    state.perform(asked[0].clone());
+    assert_eq!(state.colour_of(0), crate::theme::run(2));
+    assert_ne!(state.colour_of(0), grey);
+    state.perform(Command::ColourTarget { target: 0, colour: None });
+    assert_eq!(state.colour_of(0), grey);
+}
+
+#[test]
 fn a_target_is_designated_again_at_a_later_stop_with_its_settings() {
     let mut shown = Shown::pane(Pane::Targets, |context| fixture::at_step(context, 2));
     assert_eq!(shown.click("Re-pick here"), vec![Command::Repick(0)]);

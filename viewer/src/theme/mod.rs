@@ -200,9 +200,9 @@ pub(crate) fn title(text: &str) -> RichText {
     RichText::new(text.to_uppercase()).size(10.5).extra_letter_spacing(1.1).color(weak())
 }
 
-/// A formula in signs that the fonts have.
+/// A formula in signs that the fonts have: no raised T, and no bar over letters.
 pub(crate) fn formula(text: &str) -> String {
-    text.replace('ᵀ', "^T")
+    text.replace('ᵀ', "^T").replace("T\u{304}", "mean T").replace('Ī', "mean I")
 }
 
 /// A label beside a value.

@@ -38,6 +38,8 @@ pub struct Tour {
     pub at: Option<usize>,
     /// Whether it was seen or skipped before.
     pub is_seen: bool,
+    /// Whether the loss of the first drive was shown without the tour, or the cursor was elsewhere.
+    pub has_shown_loss: bool,
 }
 
 impl Tour {
@@ -155,7 +157,7 @@ mod tests {
         tour.turn(Turn::Next);
         tour.turn(Turn::Back);
         assert_eq!(tour.bubble(), Some(Bubble::Step));
-        let mut skipped = Tour { at: Some(2), is_seen: false };
+        let mut skipped = Tour { at: Some(2), ..Tour::default() };
         skipped.turn(Turn::End);
         assert!(skipped.is_seen && skipped.at.is_none());
     }

@@ -72,6 +72,29 @@ fn the_second_bubble_names_the_step_at_which_the_target_is_lost() {
 }
 
 #[test]
+fn the_first_drive_opens_at_its_loss_once_the_tour_was_seen() {
+    let opened = |step: usize| {
+        let mut state = fixture::at_step(&egui::Context::default(), step);
+        if let Some(traverse) = &mut state.traverse {
+            traverse.name = library::FIRST_NAME.to_owned();
+        }
+        state.tour.is_seen = true;
+        state.sync_tour();
+        state
+    };
+    let mut state = opened(0);
+    assert_eq!((state.cursor.step, state.tour.at), (3, None));
+    state.perform(Command::Go(Go::Step(0)));
+    state.sync_tour();
+    assert_eq!(state.cursor.step, 0, "only once");
+    let mut elsewhere = opened(1);
+    assert_eq!(elsewhere.cursor.step, 1, "a link or an earlier visit named the step");
+    elsewhere.perform(Command::Go(Go::Step(0)));
+    elsewhere.sync_tour();
+    assert_eq!(elsewhere.cursor.step, 0);
+}
+
+#[test]
 fn the_tour_does_what_it_speaks_of() {
     let mut state = fixture::at_step(&egui::Context::default(), 0);
     state.perform(Command::Tour(Turn::Begin));

@@ -38,12 +38,22 @@ impl State {
         events(self.run()?).into_iter().find(is_lost)
     }
 
-    /// Begins the tour on the first drive as soon as its target is there, unless it was seen before.
+    /// Begins the tour on the first drive as soon as its target is there. If it was seen before, the cursor goes to the loss
+    /// once, unless a link or an earlier visit put it elsewhere.
     pub(crate) fn sync_tour(&mut self) {
         let is_first = self.traverse.as_ref().is_some_and(|open| open.name == library::FIRST_NAME);
-        let is_new = !self.tour.is_seen && self.tour.at.is_none();
-        if is_first && is_new && self.target().is_some() && self.mode == Mode::Look {
+        if !is_first || self.tour.at.is_some() || self.target().is_none() || self.mode != Mode::Look {
+            return;
+        }
+        if !self.tour.is_seen {
+            self.tour.has_shown_loss = true;
             self.turn_tour(Turn::Begin);
+        } else if !self.tour.has_shown_loss {
+            let lost = self.lost_step().filter(|_| self.cursor.step == 0);
+            self.tour.has_shown_loss = lost.is_some() || self.cursor.step != 0;
+            if let Some(step) = lost {
+                self.perform(Command::Go(Go::Step(step)));
+            }
         }
     }
 }

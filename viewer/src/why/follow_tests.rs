@@ -116,3 +116,14 @@ fn what_would_have_saved_the_pick_is_answered_without_asking_the_server() {
     assert!(calls_of::<AskCounterfactual>(&mut state).is_empty());
     assert!(state.messages.newest().unwrap().text.contains("picked at this step"));
 }
+
+#[test]
+fn another_session_shows_no_value_of_the_last_one() {
+    let mut state = lost();
+    state.perform(Command::Why(Ask::Value { step: LOST, value: "ncc".to_owned() }));
+    assert!(state.explained().is_some());
+    let mut other = state.session.clone().expect("a session");
+    other.id = "s2".to_owned();
+    state.adopt(other, true);
+    assert!(state.explained().is_none());
+}

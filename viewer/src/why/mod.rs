@@ -135,3 +135,11 @@ pub struct Why {
     /// The steps whose question was looked for.
     looked_for: BTreeSet<StepKey>,
 }
+
+impl Why {
+    /// Another session was opened: nothing of the last one is shown or followed any more.
+    pub(crate) fn leave_session(&mut self) {
+        self.asked.clear();
+        (self.trial, self.trying, self.followed) = (None, None, None);
+    }
+}

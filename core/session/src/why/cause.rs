@@ -10,8 +10,8 @@
 //! | 6 | a search window that is too small | a poor score that rises towards its rim |
 //! | 7 | a hidden or changed target | the score fell in one step, prediction and change of pose being consistent |
 //! | 8 | the right image | a good match, a poor stereo score |
-//! | 9 | slip, or a match on another surface | a good match, range or site position beyond its tolerance |
-//! | 10 | two places alike | a good match, a second peak beyond its gate |
+//! | 9 | slip, or a match or range on another surface | a good match, range or site position beyond its tolerance |
+//! | 10 | an ambiguous match | a good match, a second peak beyond its gate |
 
 use sightline_track::locate::template::match_template::TemplateMatch;
 use sightline_track::settings::TrackerKind;
@@ -25,7 +25,7 @@ use super::words::{number, signed};
 use super::{Book, odometry};
 use crate::metrics::uncertainty::nis;
 
-/// What is said where the evidence supports no cause.
+/// The headline without a cause.
 pub(super) const NONE: &str = "No single cause is visible";
 
 /// A score that falls by more in one step did not wear out.
@@ -148,14 +148,14 @@ fn of_match(book: &Book<'_>, verdict: &Verdict) -> Option<Cause> {
     if let Some(gate) = failed("position_correction_m") {
         return Some(Cause::slip(format!(
             "The match is good, but {} m from the designated position in the site frame: the pose estimate drifted (slip), or \
-             another place looks alike",
+             a similar place was matched",
             number(gate.value?)
         )));
     }
     let second = matched.second_peak.as_ref().filter(|_| failed("second_peak_ratio").is_some());
     let second = second.map(|second| {
         Cause::new(format!(
-            "Two places {} px apart look alike: the second peak has {} of the best score",
+            "The match is ambiguous: the second peak, {} px away, has {} of the best score",
             number(second.distance_px),
             number(second.ratio)
         ))
@@ -175,7 +175,10 @@ fn of_range(book: &Book<'_>, gate: &Gate) -> Option<Cause> {
     );
     Some(if change_m.abs() > SLIP_SHARE * way_m {
         let why = "more than slip explains after";
-        Cause::new(format!("{what}, {why} {} m: a match on another surface", number(way_m)))
+        Cause::new(format!(
+            "{what}, {why} {} m: the match, or its stereo range, is on another surface",
+            number(way_m)
+        ))
     } else {
         let how = if change_m > 0.0 { "less" } else { "farther" };
         let why = format!("the rover moved {how} than the {} m of its pose estimate (slip)", number(way_m));

@@ -18,7 +18,7 @@ const PATCHES: [(ArrayName, &str); 2] =
     [(ArrayName::ROLLED, "warped template"), (ArrayName::MATCHED, "matched patch")];
 
 /// What is needed to fill the panel.
-const PURPOSE: &str = "What two runs searched for and found, one less the other.";
+const PURPOSE: &str = "Difference of the two runs: warped template and matched patch.";
 
 /// Room for the words above a patch, points.
 const WORDS: f32 = 16.0;

@@ -74,7 +74,7 @@ pub(crate) fn under(canvas: &Canvas, state: &State) {
 /// Paints what lies over the marks of the run that is looked at.
 pub(crate) fn over(ui: &Ui, canvas: &Canvas, state: &State, out: &mut Vec<Command>) {
     let others = state.others();
-    let Some(other) = others.first() else { return };
+    let Some(other) = others.first().filter(|_| state.mode != Mode::Pick) else { return };
     if state.compare.is_blinking {
         return paint_other(canvas, state, other, canvas.transform.rect);
     }

@@ -44,7 +44,7 @@ fn no_words_of_the_top_bar_overlap_with_two_runs() {
 fn the_status_line_has_the_differences_and_the_other_runs_state() {
     let shown = Shown::new([1700.0, 60.0], |context| compared(context, 3), bars::top);
     // 40 px less 4.5 px.
-    shown.says("Δ+35.50").says("LOST 1").says("TRACKING").says("Δ±0");
+    shown.says("Δ+35.50").says("LOST").says("TRACKING").says("Δ±0");
 }
 
 #[test]
@@ -96,7 +96,7 @@ fn marks_of_another_stop_are_not_painted_on_this_one() {
         twice_as_far(&mut state);
         state
     });
-    assert!(paints(&shown, "run B stands at step 1: press V to see its own image"));
+    assert!(paints(&shown, "run B is at step 1: press V for its own image"));
     assert!(!paints(&shown, "run B"));
 }
 

@@ -92,14 +92,14 @@ fn inputs(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
                 " px",
                 &mut approach.disparity_error_px,
                 0.01..=10.0,
-                "3σ error of a disparity (R35)",
+                "3σ error of a disparity [Kim09 §4.2]",
             ),
             (
                 "driving ±",
                 " %",
                 &mut percent,
                 0.0..=50.0,
-                "Error of navigation, per cent of the distance driven (R38)",
+                "3σ navigation error, % of the distance driven [Kim09 §4.2]",
             ),
             ("drift", " px", &mut approach.drift_px, 0.0..=100.0, "Drift of the track in the last image"),
         ] {

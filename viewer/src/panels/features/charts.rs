@@ -102,7 +102,7 @@ pub(crate) fn residuals(ui: &mut Ui, state: &State, features: &[Feature]) {
 /// Shows how many matches agreed with each draw of three.
 pub(crate) fn consensus(ui: &mut Ui, motion: &FittedMotion) {
     let best = motion.consensus_by_draw.iter().max().copied().unwrap_or_default();
-    let title = format!("matches that agree, by draw of three ({} draws)", motion.consensus_by_draw.len());
+    let title = format!("inliers by RANSAC iteration ({} iterations)", motion.consensus_by_draw.len());
     names::wrapped(
         ui,
         &title,

@@ -34,16 +34,16 @@ pub(crate) fn lines(evidence: &FeatureEvidence) -> Vec<Line> {
         let words = format!("matched with the {} points of step {}", matched.then, matched.from_step);
         add(Stage::MATCH_FEATURES, words, share(matched.matches, matched.now));
         if matched.prior_given_up {
-            let words = "too few agreed with the pose estimate: looked for everywhere".to_owned();
-            add(Stage::MATCH_FEATURES, words, "prior given up".to_owned());
+            let words = "too few inliers near the prior: the whole image was searched".to_owned();
+            add(Stage::MATCH_FEATURES, words, "prior dropped".to_owned());
         }
         if let Some(motion) = &evidence.fit_motion {
-            let words = "agree with the motion".to_owned();
+            let words = "inliers".to_owned();
             add(Stage::FIT_MOTION, words, share(motion.inliers, matched.matches));
         }
     }
     if let Some(bootstrap) = &evidence.bootstrap {
-        add(Stage::BOOTSTRAP, "sets drawn from those".to_owned(), bootstrap.sets.to_string());
+        add(Stage::BOOTSTRAP, "bootstrap sets of those".to_owned(), bootstrap.sets.to_string());
     }
     lines
 }
@@ -161,5 +161,5 @@ pub(crate) fn sentences(motion: &FittedMotion) -> [String; 2] {
     let begin = best.map_or_else(String::new, |best| format!("best draw {best}, then "));
     let rounds: Vec<String> =
         motion.refits.iter().map(|refit| format!("{} ({})", refit.inliers, mm(refit.rms_m))).collect();
-    [fit, format!("fitted again to those that agree: {begin}{}", rounds.join(" → "))]
+    [fit, format!("refit to the inliers: {begin}{}", rounds.join(" → "))]
 }

@@ -50,7 +50,7 @@ pub(crate) fn left_entries(state: &State) -> Vec<Entry> {
 
 /// What the legend of the right image lists of the features.
 pub(crate) fn right_entries(state: &State) -> Vec<Entry> {
-    kinds(state, "partners of features")
+    kinds(state, "matches of features in the other image")
 }
 
 /// The three kinds with how many of each are shown.

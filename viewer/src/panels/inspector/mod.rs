@@ -120,7 +120,7 @@ fn not_reached(trace: &RunStep, state: &State) -> String {
             let mut steps = Stage::of(state.tracker()).filter(|stage| stage.is_step_of_locate());
             let other = steps.find(|stage| is_reached(trace, *stage)).unwrap_or(Stage::LOCATE).word();
             let next = state.next_step_words("to see it");
-            format!("{word} is not part of the designation.{next} `{other}` can be selected here.")
+            format!("{word} is not part of the designation.{next} Select {other} to see values of this step.")
         }
         (None, false) => format!("{word} was not reached: {}", state.missing_step()),
     }

@@ -19,13 +19,13 @@ fn words(times: &[StageTime], stage: CycleStage) -> String {
     let of_stage = times.iter().find(|time| time.stage == stage);
     let flight_s: f64 = times.iter().map(|time| time.flight_s).sum();
     let own_s: Vec<f64> = times.iter().filter_map(|time| time.own_s).collect();
-    let here = |own_s: Option<f64>| own_s.map_or("not measured".to_owned(), milliseconds);
+    let here = |own_s: Option<f64>| {
+        own_s.map_or_else(String::new, |own_s| format!(", {} here", milliseconds(own_s)))
+    };
     let whole_s = (!own_s.is_empty()).then(|| own_s.iter().sum());
-    let whole = format!("the stop: {} s on Mars, here {}", short(flight_s), here(whole_s));
+    let whole = format!("the stop: {} s on Mars{}", short(flight_s), here(whole_s));
     match of_stage {
-        Some(time) => {
-            format!("{} s on Mars, here {}; {whole}", short(time.flight_s), here(time.own_s))
-        }
+        Some(time) => format!("this stage: {} s on Mars{}; {whole}", short(time.flight_s), here(time.own_s)),
         None => whole,
     }
 }
@@ -53,8 +53,8 @@ mod tests {
             time(CycleStage::Drive, 20.4, None),
         ];
         let line = words(&times, CycleStage::Capture);
-        assert_eq!(line, "7.5 s on Mars, here 40 ms; the stop: 33 s on Mars, here 51 ms");
-        assert!(words(&times, CycleStage::Drive).starts_with("20 s on Mars, here not measured; "));
+        assert_eq!(line, "this stage: 7.5 s on Mars, 40 ms here; the stop: 33 s on Mars, 51 ms here");
+        assert!(words(&times, CycleStage::Drive).starts_with("this stage: 20 s on Mars; "));
         assert!(words(&times, CycleStage::SetGoal).starts_with("the stop: 33 s"));
     }
 }

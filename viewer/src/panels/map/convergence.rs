@@ -66,7 +66,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, stops: &[StopView], run: &RunView
     if let Some(thinned) = decimate::words(run.rows.len(), decimate::PLACES) {
         words += &format!("; {thinned}");
     }
-    ui.add(egui::Label::new(theme::note(words)).truncate());
+    ui.add(egui::Label::new(theme::note(&words)).truncate()).on_hover_text(words);
     let plot = Plot::new(("convergence", run.number, positions.len()))
         .data_aspect(1.0)
         .include_x(-LEAST_HALF_CM)
@@ -74,7 +74,11 @@ pub(crate) fn show(ui: &mut Ui, state: &State, stops: &[StopView], run: &RunView
         .include_y(-LEAST_HALF_CM)
         .include_y(LEAST_HALF_CM)
         .set_margin_fraction(vec2(0.06, 0.06))
-        .x_axis_label(theme::note("east, cm (origin: last estimate)"))
+        .x_axis_label(theme::note(if ui.available_width() > 260.0 {
+            "east, cm (origin: last estimate)"
+        } else {
+            "east, cm"
+        }))
         .y_axis_label(theme::note("north, cm"));
     let plot = in_site(plot, |at| format!("E {}  N {} cm", fixed(at.x, 1), fixed(at.y, 1)));
     plot.show(ui, |plot| paint(plot, state, (run, &positions, here.as_ref()), origin));

@@ -32,10 +32,8 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         ui.end_row();
         for metric in NAMES {
             let first = found.metrics.iter().find(|found| found.name == metric);
-            let unit = first
-                .map(|first| first.unit.as_str())
-                .filter(|unit| !unit.is_empty() && !metric.ends_with(unit));
-            ui.label(theme::label(format!("{metric} {}", unit.unwrap_or_default())).size(11.5));
+            let unit = first.map_or("", |first| first.unit.as_str());
+            ui.label(theme::label(title(metric, unit)).size(11.5)).on_hover_text(metric);
             for &name in &names {
                 table::cell(ui, state, name, metric, &state.run_label(name), out);
             }
@@ -45,6 +43,20 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         }
     });
     settings(ui, state);
+}
+
+/// A metric in words with its unit.
+fn title(metric: &str, unit: &str) -> String {
+    let words = match metric.split_once('_') {
+        Some(("ade", of)) => return format!("mean error, {of}"),
+        Some((which @ ("median" | "max"), of)) => return format!("{which} error, {of}"),
+        Some(("pck", radius)) => {
+            let digits = radius.trim_end_matches(|letter: char| letter.is_ascii_alphabetic());
+            format!("within {digits} {}", &radius[digits.len()..])
+        }
+        _ => metric.replace("nees", "NEES").replace("nis", "NIS").replace('_', " "),
+    };
+    if unit.is_empty() || words.ends_with(unit) { words } else { format!("{words}, {unit}") }
 }
 
 /// The settings that are not alike in the compared runs.

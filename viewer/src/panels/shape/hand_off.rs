@@ -14,7 +14,7 @@ use crate::theme;
 
 /// What the part is for.
 const PURPOSE: &str =
-    "The last image of the old cameras in that of the new one, where other cameras take over.";
+    "The last image of the old cameras, draped and matched in the image of the new ones, at a hand-off.";
 
 /// Shows the part.
 pub(crate) fn show(ui: &mut Ui, look: &Look<'_>) {
@@ -46,11 +46,7 @@ fn numbers(ui: &mut Ui, look: &Look<'_>, draped: &Draped) {
         sigmas.map_or_else(String::new, |[a, b]| format!("1σ {:.2} and {:.2} px", a.norm(), b.norm()));
     let rows = [
         ("score", format!("{:.3}", draped.score), least),
-        (
-            "correction",
-            format!("{:.2} px", draped.correction_px),
-            "from where the surfaces put the target".to_owned(),
-        ),
+        ("correction", format!("{:.2} px", draped.correction_px), "from the registered target".to_owned()),
         ("pixel", format!("{:.1}, {:.1}", draped.pixel.x, draped.pixel.y), sigmas),
         (
             "on the mesh",
@@ -74,7 +70,7 @@ fn why_none(look: &Look<'_>) -> String {
     if let Some(found) = look.evidence.registration.as_ref().filter(|found| found.is_hand_off) {
         let reason = found.draped_missing.as_ref().or(found.reason.as_ref());
         let why = reason.map_or("the setting hand_off_picture is off", String::as_str);
-        return format!("Here, at step {step}, other cameras take over, but no picture was found: {why}.");
+        return format!("The cameras change at step {step}, but the draped image was not matched: {why}.");
     }
     let stops = look.state.traverse.as_ref().map_or(&[][..], |traverse| &traverse.stops);
     match hand_offs(stops).as_slice() {

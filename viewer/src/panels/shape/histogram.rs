@@ -49,7 +49,7 @@ pub(crate) fn show(
         names::wrapped(ui, &title, &said);
         let is_set = state.shape_view.error_limit_m.is_some();
         let button = ui.add_enabled(is_set, egui::Button::new("Automatic limit").small());
-        if button.on_hover_text("What ninety-nine in a hundred errors at the start keep to").clicked() {
+        if button.on_hover_text("99th percentile of the absolute errors at the start").clicked() {
             out.push(set(state, None));
         }
     });
@@ -74,7 +74,7 @@ fn set(state: &State, error_limit_m: Option<f64>) -> Command {
 fn words(errors: &[f32]) -> String {
     let mut sizes: Vec<f32> = errors.iter().filter(|v| v.is_finite()).map(|v| v.abs()).collect();
     if sizes.is_empty() {
-        return "no pixel is seen of both".to_owned();
+        return "no pixel is visible on both surfaces".to_owned();
     }
     let sum: f64 = sizes.iter().map(|v| f64::from(*v).powi(2)).sum();
     let rms_m = (sum / sizes.len() as f64).sqrt();
@@ -173,6 +173,6 @@ mod tests {
     fn the_words_give_rms_and_share_of_what_exists() {
         let words = words(&[0.03, -0.04, f32::NAN, f32::NAN]);
         assert!(words.starts_with("rms 3.54 cm") && words.ends_with("50 % of pixels"), "{words}");
-        assert_eq!(super::words(&[f32::NAN]), "no pixel is seen of both");
+        assert_eq!(super::words(&[f32::NAN]), "no pixel is visible on both surfaces");
     }
 }

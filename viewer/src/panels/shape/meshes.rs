@@ -57,7 +57,7 @@ pub(crate) fn show(ui: &mut Ui, look: &Look<'_>, out: &mut Vec<Command>) {
     let moving_words = format!("this step, {}", thinned(drawn_moving, all[1]));
     names::wrapped(
         ui,
-        "drag turns, wheel magnifies, double click takes both back",
+        "drag rotates, wheel zooms, double click resets",
         &[
             (Mark::Stroke(overlay::Line::Solid), theme::mesh_earlier(), fixed_words),
             (Mark::Dot, theme::mesh_present(), moving_words),

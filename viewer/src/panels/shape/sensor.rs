@@ -64,8 +64,7 @@ pub(super) fn show(ui: &mut Ui, look: &Look<'_>, out: &mut Vec<Command>) {
             }
         });
     }
-    let words = "error: present less earlier depth; red: the present surface lies deeper. Cross: the target. Checker: only \
-                 one of the surfaces, or none, is seen.";
+    let words = "error: current minus earlier depth; red: the current surface is deeper. Cross: target. Checker: at most one surface is visible.";
     ui.add(egui::Label::new(theme::note(words)).wrap());
     let errors = Errors { before: before.values.as_raw(), end: end.values.as_raw() };
     histogram::show(ui, look.state, &errors, [limit_m, automatic_m], out);

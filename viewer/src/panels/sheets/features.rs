@@ -58,7 +58,7 @@ fn each(state: &State, all: &[Feature]) -> Sheet {
         ("y", "px"),
         ("scale", "px"),
         ("range", "m"),
-        ("what became of it", ""),
+        ("outcome", ""),
         ("x before", "px"),
         ("y before", "px"),
         ("residual", "cm"),

@@ -106,7 +106,7 @@ pub(crate) fn stereo_profile(state: &State) -> Result<Vec<Sheet>, String> {
         ("range", Some(stereo.range_m), "m"),
         ("score", Some(stereo.score), ""),
         ("disparity", stereo.disparity_px, "px"),
-        ("beside the curve", Some(stereo.across_px), "px"),
+        ("off the epipolar curve", Some(stereo.across_px), "px"),
         ("left to right and back", stereo.left_right_px, "px"),
     ] {
         best.row(false, vec![Cell::Word(what.to_owned()), value.into(), Cell::Word(unit.to_owned())]);

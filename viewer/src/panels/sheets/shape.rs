@@ -49,7 +49,7 @@ fn numbers(state: &State, found: &Registered) -> Sheet {
         add(&format!("coarse search, {axis}"), found.coarse_shift_m.map(|shift| shift[k]), 100.0, "cm");
     }
     add("half width of the rock", Some(found.half_width_m), 100.0, "cm");
-    add("turned by", Some(found.turn_deg), 1.0, "°");
+    add("rotation", Some(found.turn_deg), 1.0, "°");
     add("moved the target by", found.correction_m, 100.0, "cm");
     for (what, k) in [("σ, largest axis", 0), ("σ, middle axis", 1), ("σ, smallest axis", 2)] {
         add(what, found.sigmas_m.map(|sigmas| sigmas[k]), 1000.0, "mm");
@@ -60,7 +60,7 @@ fn numbers(state: &State, found: &Registered) -> Sheet {
 fn errors(before: &Raster, end: &Raster) -> Sheet {
     let columns = [("from", "cm"), ("to", "cm"), ("pixels at the start", ""), ("pixels at the end", "")];
     let columns = columns.map(|(name, unit)| Column::new(name, unit)).to_vec();
-    let mut sheet = Sheet::of("Errors of depth; the outermost rows hold what lies beyond", columns);
+    let mut sheet = Sheet::of("Depth errors; the outermost bins include all values beyond them", columns);
     for (from_m, to_m, counts) in error_counts(before, end) {
         let edges = [from_m, to_m].map(|edge_m| Cell::Number(edge_m * 100.0));
         let counts = counts.map(|count| Cell::Number(count as f64));
@@ -99,7 +99,7 @@ fn refinement(path: &[PathStep]) -> Sheet {
         ("turn z", "°"),
     ];
     let columns = columns.map(|(name, unit)| Column::new(name, unit)).to_vec();
-    let mut sheet = Sheet::of("Way of the refinement, axes of the sensor", columns);
+    let mut sheet = Sheet::of("Iterations of the refinement, axes of the sensor", columns);
     for (place, step) in path.iter().enumerate() {
         let head = [f64::from(step.evaluations), f64::from(step.run), step.mean_m * 1000.0];
         let values =

@@ -22,6 +22,8 @@ use crate::theme;
 const WORDS: (f32, f32) = (16.0, 18.0);
 /// Minimum side of a patch, points.
 const SIDE_MIN: f32 = 16.0;
+/// One row is kept where its patches have at least this side, points.
+const ONE_ROW_MIN: f32 = 64.0;
 
 /// One patch of the strip.
 #[derive(Clone, Debug, PartialEq)]
@@ -129,8 +131,12 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.advance_cursor_after_rect(area);
 }
 
-/// The squares of `count` patches in reading order, in as many rows as give the largest squares.
+/// The squares of `count` patches in reading order: in one row, or in as many rows as give the largest squares where
+/// those of one row would be small.
 fn frames(area: Rect, count: usize) -> Vec<Rect> {
+    if count == 0 {
+        return Vec::new();
+    }
     // A row below another begins with an arrow.
     let arrows = |rows: usize, columns: usize| if rows > 1 { columns } else { columns - 1 } as f32;
     let side = |rows: usize| {
@@ -138,8 +144,8 @@ fn frames(area: Rect, count: usize) -> Vec<Rect> {
         let across = (area.width() - BETWEEN * arrows(rows, columns)) / columns as f32;
         across.min(area.height() / rows as f32 - WORDS.0 - WORDS.1)
     };
-    let rows = (1..=count).reduce(|best, rows| if side(rows) > side(best) { rows } else { best });
-    let Some(rows) = rows else { return Vec::new() };
+    let most = if side(1) < ONE_ROW_MIN { count } else { 1 };
+    let rows = (1..=most).fold(1, |best, rows| if side(rows) > side(best) { rows } else { best });
     let (columns, side) = (count.div_ceil(rows), side(rows).max(SIDE_MIN));
     let width = side * columns as f32 + BETWEEN * arrows(rows, columns);
     let lead = if rows > 1 { BETWEEN } else { 0.0 };

@@ -1,7 +1,9 @@
 //! What a stop shows on a state band, by colour, pattern and word.
 
 use egui::{Color32, Painter, Rect, Shape, Stroke, pos2, vec2};
+use sightline_session::step::StepRow;
 use sightline_session::view::{RunView, TargetView};
+use sightline_track::trace::ODOMETRY_ALONE;
 
 use crate::state::{State, row_of};
 use crate::theme;
@@ -13,8 +15,12 @@ pub(crate) enum Cell {
     Before,
     /// Not computed yet.
     Unknown,
+    /// Visual odometry ran alone: the tracker did not look for the target.
+    NotSearched,
     /// State `tracking`.
     Tracking,
+    /// State `tracking`, but the truth is beyond its tolerance.
+    FalseTracking,
     /// State `lost`.
     Lost,
     /// State `failed`.
@@ -29,7 +35,9 @@ impl Cell {
         match self {
             Self::Before => "before the pick",
             Self::Unknown => "not computed yet",
+            Self::NotSearched => "not searched: visual odometry alone",
             Self::Tracking => "tracking",
+            Self::FalseTracking => "false tracking",
             Self::Lost => "lost",
             Self::Failed => "failed",
             Self::Fault => "fault of the files",
@@ -41,10 +49,12 @@ impl Cell {
         match self {
             Self::Before => 0,
             Self::Unknown => 1,
-            Self::Tracking => 2,
-            Self::Fault => 3,
-            Self::Lost => 4,
-            Self::Failed => 5,
+            Self::NotSearched => 2,
+            Self::Tracking => 3,
+            Self::Fault => 4,
+            Self::FalseTracking => 5,
+            Self::Lost => 6,
+            Self::Failed => 7,
         }
     }
 }
@@ -62,6 +72,8 @@ pub(crate) fn cell_of(target: &TargetView, run: Option<&RunView>, step: usize) -
     match run.and_then(|run| row_of(run, step)) {
         None => Cell::Unknown,
         Some(row) if row.fault => Cell::Fault,
+        Some(row) if is_not_searched(row) => Cell::NotSearched,
+        Some(row) if row.state == "tracking" && row.tracked == Some(false) => Cell::FalseTracking,
         Some(row) => match row.state.as_str() {
             "tracking" => Cell::Tracking,
             "lost" => Cell::Lost,
@@ -69,6 +81,11 @@ pub(crate) fn cell_of(target: &TargetView, run: Option<&RunView>, step: usize) -
             _ => Cell::Unknown,
         },
     }
+}
+
+/// Whether visual odometry ran alone at a step, so that the tracker did not look for the target.
+pub(crate) fn is_not_searched(row: &StepRow) -> bool {
+    row.reason.as_deref() == Some(ODOMETRY_ALONE)
 }
 
 /// Paints a stretch of equal cells.
@@ -79,7 +96,15 @@ pub(crate) fn paint(painter: &Painter, frame: Rect, cell: Cell) {
     match cell {
         Cell::Before => fill(theme::before(), 1.0),
         Cell::Unknown => fill(theme::unknown(), 1.0),
+        Cell::NotSearched => {
+            fill(theme::unknown(), 1.0);
+            painter.hline(frame.x_range(), frame.center().y, Stroke::new(1.0, theme::tracking()));
+        }
         Cell::Tracking => fill(theme::tracking(), 1.0),
+        Cell::FalseTracking => {
+            fill(theme::tracking(), 1.0);
+            cross(painter, frame, theme::strong());
+        }
         Cell::Lost => {
             fill(theme::lost(), 0.25);
             dashes(painter, frame, theme::lost());

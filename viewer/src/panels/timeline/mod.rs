@@ -6,7 +6,7 @@
 //! points with five runs that change their state at every column and hits at every second step: about 7,000 shapes for
 //! 1,000 steps as for 10,000 and 40,000 (`tests/timelines.rs` holds a bound of 13,220).
 
-mod cells;
+pub(crate) mod cells;
 mod curves;
 pub(crate) mod film;
 pub(crate) mod lod;
@@ -193,7 +193,8 @@ pub(crate) fn thin_band(
     for span in scale.spans(|step| cells::cell_of(target, Some(run), step)) {
         let (colour, top) = match span.cell {
             Cell::Before | Cell::Unknown => continue,
-            Cell::Tracking => (theme::tracking(), band.top()),
+            Cell::NotSearched => (theme::weak(), band.center().y),
+            Cell::Tracking | Cell::FalseTracking => (theme::tracking(), band.top()),
             Cell::Lost => (theme::lost(), band.center().y),
             Cell::Failed => (theme::failed(), band.center().y),
             Cell::Fault => (theme::weak(), band.center().y),

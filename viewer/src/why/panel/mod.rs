@@ -12,6 +12,7 @@ use sightline_session::why::sentence::Summary;
 use crate::command::Command;
 use crate::panels::pane::Need;
 use crate::panels::panel::Panel;
+use crate::panels::timeline::cells;
 use crate::state::State;
 use crate::theme;
 use crate::what_if::panel;
@@ -40,7 +41,9 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let Some(poses) = state.poses() else { return };
     let Some(book) = state.book(&poses) else { return };
     let trace = book.trace;
-    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+    // Another run or target is shown from its headline on.
+    let of = state.step_key(step).map(|key| (key.session, key.target, key.run));
+    ScrollArea::vertical().id_salt(("why", of)).auto_shrink(false).show(ui, |ui| {
         let top = ui.cursor().top();
         card(ui, state, &book.summary());
         view::bring(ui, state.why.in_view, Part::Card, top, true);
@@ -65,7 +68,11 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 
 /// The headline with its bullets, in a frame of the colour of the tracking state.
 fn card(ui: &mut Ui, state: &State, summary: &Summary) {
-    let colour = theme::state(state.tracking().unwrap_or_default());
+    let colour = match state.row() {
+        Some(row) if cells::is_not_searched(row) => theme::weak(),
+        Some(row) if row.state == "tracking" && row.tracked == Some(false) => theme::failed(),
+        _ => theme::state(state.tracking().unwrap_or_default()),
+    };
     let frame = Frame::new().stroke(Stroke::new(1.5, colour)).corner_radius(4).inner_margin(Margin::same(6));
     let shown = frame.show(ui, |ui| {
         ui.set_min_width(ui.available_width());

@@ -1,0 +1,172 @@
+//! The page in windows of many sizes and in both looks, in six situations: no control is cut off or covered by another one.
+//!
+//! With `SIGHTLINE_SIZES=all` every size is tried in both looks; without it two of them. `SIGHTLINE_SHOTS` keeps the pictures.
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use sightline_recordings::create_simulated;
+use sightline_server::first_session;
+use sightline_server::limits::Limits;
+use sightline_server::state::AppState;
+use sightline_tests::browser::Browser;
+use sightline_tests::controls::Control;
+use sightline_tests::data;
+use sightline_tests::server::{TOKEN, access};
+
+/// Width and height of a window, px; the last one is 1440 × 900 at a zoom of 150 %.
+const WINDOWS: [(u32, u32); 6] =
+    [(820, 1180), (1280, 720), (1440, 900), (1920, 1080), (2560, 1440), (960, 600)];
+
+/// The windows of the short test.
+const FEW_WINDOWS: [(u32, u32); 2] = [(820, 1180), (960, 600)];
+
+/// Roles of controls that are clicked.
+const CLICKED: [&str; 5] = ["button", "checkbox", "combobox", "tab", "textbox"];
+
+/// Share of the smaller of two controls that may be covered by the other one.
+const COVERED_MAX: f64 = 0.3;
+
+/// Pictures and defects of one situation.
+struct Tour<'a> {
+    browser: &'a Browser,
+    defects: BTreeSet<String>,
+}
+
+impl Tour<'_> {
+    /// Looks at the present situation in every window, in the present looks.
+    async fn look(&mut self, situation: &str, looks: &str) {
+        let all = std::env::var("SIGHTLINE_SIZES").is_ok_and(|sizes| sizes == "all");
+        let windows: &[(u32, u32)] = if all { &WINDOWS } else { &FEW_WINDOWS };
+        for &(width, height) in windows {
+            self.browser.resize(width, height).await;
+            let controls = settled(self.browser).await;
+            self.browser.shot(&format!("size-{situation}-{width}-{looks}")).await;
+            let at = format!("{situation}, {width} × {height}");
+            self.defects.extend(
+                cut_off(&controls, f64::from(width), f64::from(height)).map(|c| format!("{at}: {c}")),
+            );
+            self.defects.extend(covered(&controls).into_iter().map(|c| format!("{at}: {c}")));
+        }
+    }
+}
+
+/// The controls, once they are the same in two looks at the page.
+async fn settled(browser: &Browser) -> Vec<Control> {
+    let mut before = Vec::new();
+    for _ in 0..40 {
+        tokio::time::sleep(Duration::from_millis(250)).await;
+        let now = browser.controls().await;
+        if now == before {
+            break;
+        }
+        before = now;
+    }
+    before
+}
+
+fn clicked(controls: &[Control]) -> impl Iterator<Item = &Control> {
+    controls.iter().filter(|c| CLICKED.contains(&c.role.as_str()) && c.rect[2] > 0.0 && c.rect[3] > 0.0)
+}
+
+/// Controls that begin in the window and end outside it at the right.
+fn cut_off(controls: &[Control], width: f64, height: f64) -> impl Iterator<Item = String> {
+    let is_cut = move |c: &&Control| {
+        let [x, y, w, _] = c.rect;
+        x < width && y < height && x + w > width + 1.0
+    };
+    clicked(controls).filter(is_cut).map(|c| format!("{} “{}” is cut off at {:?}", c.role, c.name, c.rect))
+}
+
+/// Pairs of controls of one panel of which one covers the other in part; a control inside another one is part of it.
+fn covered(controls: &[Control]) -> Vec<String> {
+    let all: Vec<&Control> = clicked(controls).collect();
+    let mut pairs = Vec::new();
+    for (index, a) in all.iter().enumerate() {
+        for b in all[index + 1..].iter().filter(|b| b.region == a.region) {
+            let overlap = |k: usize| {
+                let end = (a.rect[k] + a.rect[k + 2]).min(b.rect[k] + b.rect[k + 2]);
+                (end - a.rect[k].max(b.rect[k])).max(0.0)
+            };
+            let area = |c: &Control| c.rect[2] * c.rect[3];
+            let share = overlap(0) * overlap(1) / area(a).min(area(b));
+            if share > COVERED_MAX && share < 0.99 {
+                pairs.push(format!("“{}” and “{}” of “{}” overlap", a.name, b.name, a.region));
+            }
+        }
+    }
+    pairs
+}
+
+/// Chooses the looks by the palette.
+async fn choose_looks(browser: &Browser, looks: &str) {
+    browser.chord(&["Control"], "k").await;
+    browser.control("textbox", "palette").await;
+    browser.type_text(&format!("looks {looks}")).await;
+    browser.press("Enter").await;
+    browser.gone("textbox", "palette").await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn no_control_is_cut_off_or_covered_in_any_window() {
+    let folder = tempfile::tempdir().unwrap();
+    let scenario = first_session::scenario().unwrap();
+    let traverse = create_simulated(&scenario, &folder.path().join("first")).unwrap();
+    let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let port = listener.local_addr().unwrap().port();
+    let kitti = data::set("kitti-seq1-frames-0-19", "the pictures of an own recording");
+    let recordings: Vec<_> = kitti.iter().filter_map(|set| set.parent()).map(Into::into).collect();
+    let sessions = folder.path().join("sessions");
+    let state =
+        AppState::with_recordings(vec![traverse], &sessions, access(port), Limits::default(), &recordings)
+            .unwrap();
+    first_session::begin(&state, &scenario).unwrap();
+    tokio::spawn(async move { axum::serve(listener, sightline_server::app(state)).await });
+    let browser = Browser::start().await;
+    browser.goto(&format!("http://127.0.0.1:{port}/#token={TOKEN}")).await;
+    browser.wait_for_viewer().await;
+    browser.wait_status("the first target", "s.target === 0 && s.shown").await;
+    browser.wait_status("the run", "s.steps_done > 1 && !s.running").await;
+
+    let mut tour = Tour { browser: &browser, defects: BTreeSet::new() };
+    tour.look("open", "dark").await;
+    browser.click_on("button", "Skip").await;
+    browser.gone("button", "Skip").await;
+    browser.press("PageDown").await;
+    browser.wait_status("the loss", "s.state === 'lost' && s.shown").await;
+    for looks in ["light", "dark"] {
+        choose_looks(&browser, looks).await;
+        browser.resize(1440, 900).await;
+        browser.press("w").await;
+        browser.says("The heading estimate jumped by").await;
+        tour.look("why", looks).await;
+        browser.press("t").await;
+        browser.wait_status("pick mode", "s.pick_mode").await;
+        tour.look("pick", looks).await;
+        browser.press("Escape").await;
+        browser.wait_status("no pick mode", "!s.pick_mode").await;
+        browser.chord(&["Shift"], "6").await;
+        tour.look("study", looks).await;
+        browser.chord(&["Shift"], "1").await;
+        browser.chord(&["Control"], "o").await;
+        if kitti.is_some() {
+            browser.click_on("button", "recording kitti-seq1-frames-0-19").await;
+            browser.says("KITTI odometry").await;
+        }
+        tour.look("recording", looks).await;
+        browser.press("Escape").await;
+    }
+    browser.resize(1440, 900).await;
+    browser.press("r").await;
+    browser.wait_status("the branch", "s.run === 1 && !s.running && s.steps_done > s.step").await;
+    browser.click_on("combobox", "compared with").await;
+    browser.choose("run A").await;
+    browser.control("button", "First divergence").await;
+    for looks in ["light", "dark"] {
+        choose_looks(&browser, looks).await;
+        tour.look("compare", looks).await;
+    }
+    let defects: Vec<String> = tour.defects.into_iter().collect();
+    assert!(defects.is_empty(), "{}", defects.join("\n"));
+    browser.end().await;
+}
