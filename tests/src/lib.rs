@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 pub mod browser;
-mod controls;
+pub mod controls;
 pub mod bench;
 pub mod data;
 mod processes;

@@ -23,6 +23,8 @@ impl State {
                 self.files.is_open = true;
                 self.files.refused = None;
                 self.read_recent();
+                // A drive on commands has more stops than when the list was read.
+                self.read_traverses();
                 self.read_recordings();
             }
             Ask::Close => self.files.is_open = false,

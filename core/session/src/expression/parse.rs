@@ -7,6 +7,7 @@ use super::token::{Placed, Token, tokens};
 use super::tree::{Kind, NEGATE, NOT, Node, Operator, Segment};
 use super::unit::Unit;
 use super::{DEPTH_LIMIT, LENGTH_LIMIT, NODE_LIMIT, Refused};
+use crate::records;
 
 /// Reads an expression.
 pub(super) fn parse(text: &str) -> Result<Node, Refused> {
@@ -31,6 +32,14 @@ pub(super) fn parse(text: &str) -> Result<Node, Refused> {
 /// Whether a word is a name, so that it cannot have been meant as a unit.
 fn is_known(word: &str) -> bool {
     CATALOGUE.find(&[Segment::Field(word.to_owned())]).is_ok()
+}
+
+/// The label of several words that a text contains, as panels show it, with the name of its quantity.
+fn named_by_label(text: &str) -> Option<(String, String)> {
+    let text = text.to_lowercase();
+    let columns = records::row_columns().iter().filter_map(|column| records::row_quantity(&column.name));
+    let mut labels = columns.map(|quantity| (quantity.label.to_string(), quantity.name.to_string()));
+    labels.find(|(label, _)| label.contains(' ') && text.contains(&label.to_lowercase()))
 }
 
 struct Parser<'a> {
@@ -278,7 +287,11 @@ impl Parser<'_> {
             _ => {
                 let found = &self.text[span.clone()];
                 let sentence = format!("an operator is missing before `{found}`");
-                Refused::at(self.text, span, sentence).hint("Join two conditions with `&&` or `||`.")
+                let refused = Refused::at(self.text, span, sentence);
+                match named_by_label(self.text) {
+                    Some((label, name)) => refused.hint(format!("In expressions, “{label}” is `{name}`.")),
+                    None => refused.hint("Join two conditions with `&&` or `||`."),
+                }
             }
         }
     }

@@ -243,6 +243,8 @@ fn an_unknown_name_is_refused_at_its_place_with_the_nearest_known_one() {
     assert!(refused("peak_ratio.ratio > 1").sentence.contains("has no parts"));
     assert!(refused("flor(ncc) > 1").sentence.contains("no function `flor`"));
     assert!(refused("state == lots").hint.unwrap().contains("lost"));
+    let label = refused("match score < 0.85").hint;
+    assert_eq!(label.as_deref(), Some("In expressions, “match score” is `ncc`."));
     assert!(refused("contains(ncc, \"a\")").sentence.contains("takes a text"));
     assert!(refused("differs(A, Q9x, ncc)").sentence.contains("is not a run"));
     assert!(refused("differs(A, A, ncc)").sentence.contains("never differs from itself"));
