@@ -135,6 +135,8 @@ fn a_recording_is_opened_in_three_actions() {
     assert_eq!(asked, vec![Command::Files(FilesAsk::Recording(Ask::Import))]);
 
     let mut state = importing();
+    // The list that the window shows, as it was when it opened.
+    answer::<ListTraverses>(&mut state, &[fixture::entry()]);
     state.told(Event::ImportProgress {
         job: ImportJob { id: "import-9".to_owned(), ..job(ImportState::Done, 40) },
     });
