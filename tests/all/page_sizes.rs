@@ -154,6 +154,9 @@ async fn no_control_is_cut_off_or_covered_in_any_window() {
             browser.says("KITTI odometry").await;
         }
         tour.look("recording", looks).await;
+        if kitti.is_some() {
+            browser.click_on("button", "Back").await;
+        }
         browser.press("Escape").await;
     }
     browser.resize(1440, 900).await;

@@ -202,6 +202,7 @@ impl Browser {
     /// Drops a file or folder of this machine on the middle of the page, as a person does with the mouse.
     pub async fn drop_path(&self, path: &std::path::Path) {
         let size = self.evaluate("return [innerWidth / 2, innerHeight / 2]").await;
+        let path = std::fs::canonicalize(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
         let data = json!({ "items": [], "files": [path], "dragOperationsMask": 1 });
         for event in ["dragEnter", "dragOver", "drop"] {
             let params = json!({ "type": event, "x": size[0], "y": size[1], "data": data });

@@ -82,7 +82,7 @@ pub(crate) const PALETTE: Do =
     Do::new("Command palette", &[On::ctrl(Key::K)], |_| Command::SetMode(Mode::Palette(Search::default())));
 /// Copies the link to what is shown.
 pub(crate) const COPY_LINK: Do =
-    Do::new("Copy a link to this place", &[On::plain(Key::Y)], |_| Command::CopyLink);
+    Do::new("Copy a link to this view", &[On::plain(Key::Y)], |_| Command::CopyLink);
 /// Opens the session in Rerun.
 pub(crate) const OPEN_RERUN: Do = Do::new("Open the session in Rerun", &[], |_| Command::OpenRerun)
     .button("Open in Rerun", "Streams this session to a Rerun viewer in a new tab");

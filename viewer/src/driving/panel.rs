@@ -1,6 +1,6 @@
 //! The panel “Drive”: the command, the buttons that drive, and the decision at every stop.
 
-use egui::{Button, CollapsingHeader, ComboBox, DragValue, Grid, Label, RichText, ScrollArea, Ui};
+use egui::{Button, CollapsingHeader, ComboBox, DragValue, Grid, Label, Response, RichText, ScrollArea, Ui};
 use sightline_rover::driving::{
     ArrivalAction, DriveCommand, GoalRule, OdometryPair, StopReason, TrackedStops,
 };
@@ -117,14 +117,14 @@ fn limits(ui: &mut Ui, command: &mut DriveCommand) {
         let stops = [TrackedStops::Every, TrackedStops::ByDistance];
         let help = "The stops at which the tracker looks for the target. Visual odometry needs steps of at most 0.75 m; at the \
                     stops in between it can run alone.";
-        ui.label(theme::label("tracked stops")).on_hover_text(help);
-        choice(ui, "tracked stops", 140.0, stops, &mut command.tracked_stops, words::tracked_stops);
+        let shown = choice(ui, "tracked stops", 170.0, stops, &mut command.tracked_stops, words::tracked_stops);
+        shown.on_hover_text(help);
         let help = "The stereo pairs in which visual odometry measures the motion";
-        ui.label(theme::label("odometry pairs")).on_hover_text(help);
-        choice(ui, "odometry pairs", 150.0, pairs, &mut command.odometry_pair, words::odometry_pair);
+        let shown = choice(ui, "odometry pairs", 190.0, pairs, &mut command.odometry_pair, words::odometry_pair);
+        shown.on_hover_text(help);
         let help = "The settings of visual odometry: ours, or those flown on the rovers in 2007";
-        ui.label(theme::label("odometry preset")).on_hover_text(help);
-        choice(ui, "odometry preset", 80.0, presets, &mut command.odometry_preset, words::preset);
+        let shown = choice(ui, "odometry preset", 170.0, presets, &mut command.odometry_preset, words::preset);
+        shown.on_hover_text(help);
         let mut percent = 100.0 * command.slip_max;
         let help = "Largest slip of a step, by vision; the drive stops where it is exceeded";
         number(ui, "slip", " %", &mut percent, (5.0, 200.0), help);
@@ -189,7 +189,7 @@ fn choice<T: Copy + PartialEq, const N: usize>(
     all: [T; N],
     value: &mut T,
     word: impl Fn(T) -> &'static str,
-) {
+) -> Response {
     let list = ComboBox::from_id_salt(name).width(width).selected_text(word(*value));
     let shown = list.show_ui(ui, |ui| {
         for one in all {
@@ -198,7 +198,7 @@ fn choice<T: Copy + PartialEq, const N: usize>(
             }
         }
     });
-    shown.response.accessible_name(name);
+    shown.response.accessible_name(name)
 }
 
 /// Whether the motion at a stop is not chosen yet, because the drive is paused before that.

@@ -51,24 +51,24 @@ pub(super) fn odometry(mode: OdometryMode) -> &'static str {
 /// The stops at which the target is looked for.
 pub(super) fn tracked_stops(stops: TrackedStops) -> &'static str {
     match stops {
-        TrackedStops::Every => "every stop",
-        TrackedStops::ByDistance => "after each full step",
+        TrackedStops::Every => "track at every stop",
+        TrackedStops::ByDistance => "track after each full step",
     }
 }
 
 /// The pairs of visual odometry.
 pub(super) fn odometry_pair(pair: OdometryPair) -> &'static str {
     match pair {
-        OdometryPair::Shared => "the tracker's pairs",
-        OdometryPair::Own => "pairs of its own",
+        OdometryPair::Shared => "odometry in the tracker's pairs",
+        OdometryPair::Own => "odometry in pairs of its own",
     }
 }
 
 /// The settings of visual odometry.
 pub(super) fn preset(preset: OdometryPreset) -> &'static str {
     match preset {
-        OdometryPreset::Sightline => "sightline",
-        OdometryPreset::Mer2007 => "mer2007",
+        OdometryPreset::Sightline => "odometry as sightline",
+        OdometryPreset::Mer2007 => "odometry as mer2007",
     }
 }
 

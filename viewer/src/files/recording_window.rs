@@ -205,7 +205,7 @@ fn contents(ui: &mut Ui, view: &RecordingView) {
         for pair in &view.pairs {
             ui.label(theme::number(pair.step.to_string()));
             for image in [&pair.left, &pair.right] {
-                ui.add(Label::new(RichText::new(image).color(theme::text())).truncate());
+                ui.add(Label::new(RichText::new(image).color(theme::text())).extend());
             }
             ui.end_row();
         }

@@ -55,7 +55,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         });
     }
     match list {
-        None => panels::missing(ui, PURPOSE, "Asking the server for its notes …"),
+        None => panels::missing(ui, PURPOSE, "Loading the notes …"),
         Some([]) => panels::missing(
             ui,
             PURPOSE,

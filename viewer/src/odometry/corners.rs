@@ -162,10 +162,10 @@ pub(crate) fn words(corner: &OdometryCorner) -> String {
     lines.push(
         match corner.fate {
             Fate::Inlier => "inlier of the transform",
-            Fate::Outlier => "outlier: it does not agree with the motion",
+            Fate::Outlier => "outlier of the transform",
             Fate::Unused => "matched, but no transform was fitted",
             Fate::NoMatch => "lost: no match between the stops",
-            Fate::OutOfView => "lost: out of view after the motion",
+            Fate::OutOfView => "lost: outside the current image",
             Fate::NoStereoAfter => "lost: no stereo match at the current stop",
             Fate::NoStereo => "lost: no stereo match at the previous stop",
             Fate::OutOfRange => "lost: its range is beyond the limits",

@@ -79,7 +79,7 @@ fn show_message(ui: &mut Ui, state: &State, message: &Message, out: &mut Vec<Com
 pub(crate) fn undo(ui: &mut Ui, state: &State, message: &Message, out: &mut Vec<Command>) {
     if message.deed.is_some_and(|deed| state.undo.is_last(deed)) {
         let button = egui::Button::new("Undo").min_size(egui::vec2(24.0, 22.0));
-        if ui.add(button).on_hover_text(UNDO.with_keys("Takes it back")).clicked() {
+        if ui.add(button).on_hover_text(UNDO.with_keys("Undoes it")).clicked() {
             out.push(Command::Why(Ask::Undo));
         }
     }

@@ -7,7 +7,7 @@ macro_rules! panel_table {
     ($with:ident) => {
         $with! {
             Targets: "targets", "Targets and runs", Home(Group::Lists, 0),
-                "What is tracked, and each configuration tried on it.",
+                "The targets, and the runs of each.",
                 panels::targets::Targets;
             Settings: "settings", "Settings", Home(Group::Lists, 1),
                 "Thresholds and parameters of a run",
@@ -70,7 +70,7 @@ macro_rules! panel_table {
                 "The record of the selected stage: values with units, formulas and origins",
                 panels::inspector::Inspector;
             Messages: "messages", "Messages", Home(Group::Details, 3),
-                "What was refused or failed, with how to mend it",
+                "Errors and refused actions, with how to fix each",
                 panels::messages::Messages;
             Runs: "runs", "Runs", Home(Group::Views, 6),
                 "Metrics of each run, and the settings that differ.",

@@ -1,5 +1,6 @@
 //! The row above a chart that names its lines, each with its shape: it covers nothing of the chart.
 
+use egui::text::{LayoutJob, TextWrapping};
 use egui::{Color32, Sense, Ui, vec2};
 
 use crate::drawing::overlay::{Mark, paint_mark};
@@ -7,6 +8,9 @@ use crate::theme;
 
 /// Height of the row, points.
 pub(crate) const HEIGHT: f32 = 15.0;
+
+/// A name is left out of a row that has less room for its word, points.
+const WORD_MIN: f32 = 24.0;
 
 /// Shows the title and the names in one row.
 pub(crate) fn show(ui: &mut Ui, title: &str, names: &[(Mark, Color32, String)]) {
@@ -35,15 +39,27 @@ fn contents(ui: &mut Ui, title: &str, names: &[(Mark, Color32, String)]) {
     }
 }
 
-/// A mark with its word, which stay together where the row is broken.
+/// A mark with its word, which stay together where the row is broken. A word that is longer than the row is elided: the row
+/// must not widen its panel.
 fn entry(ui: &mut Ui, mark: Mark, colour: Color32, name: &str) {
     let reach = if matches!(mark, Mark::Stroke(_)) { 8.0 } else { 4.0 };
-    let word = ui.painter().layout_no_wrap(name.to_owned(), theme::image_font(), theme::weak());
     let beside = 2.0 * reach + 6.0;
+    let is_wrapped = ui.layout().main_wrap();
+    let room = if is_wrapped { ui.max_rect().width() } else { ui.available_width() };
+    if !is_wrapped && room < beside + WORD_MIN {
+        return;
+    }
+    let mut job = LayoutJob::simple_singleline(name.to_owned(), theme::image_font(), theme::weak());
+    job.wrap = TextWrapping::truncate_at_width(room - beside);
+    let word = ui.painter().layout_job(job);
     let size = vec2(beside + word.size().x, word.size().y.max(HEIGHT - 2.0));
     let (frame, response) = ui.allocate_exact_size(size, Sense::hover());
     paint_mark(ui.painter(), frame.left_center() + vec2(reach + 1.0, 0.0), mark, colour, reach);
     let at = frame.left_center() + vec2(beside, -word.size().y / 2.0);
+    let is_elided = word.elided;
     ui.painter().galley(at, word, theme::weak());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, name));
+    if is_elided {
+        response.on_hover_text(name);
+    }
 }

@@ -113,10 +113,11 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         let (title, mut lines) = names_of(chart);
         lines.extend(state.others().iter().map(|o| (o.look.mark, o.look.colour, state.run_label(o.name))));
         ui.horizontal(|ui| {
-            names::show(ui, &title, &lines);
+            // The button first: it stays in the panel where the names need more than that.
             if i == 0 && !figure::is_on_paper() {
                 choice(ui, out);
             }
+            names::show(ui, &title, &lines);
         });
         let height = if is_last { height + axis } else { height };
         if let Some(step) = plot(ui, state, run, (chart, height, is_last), out) {

@@ -123,7 +123,7 @@ fn sentences(stereo: &PointStereo, predicted: Option<(f64, f64)>) -> [RichText; 
     );
     let back = match stereo.left_right_px {
         Some(px) => format!("left–right check: {px:.2} px"),
-        None => "left to right and back: nothing was found there".to_owned(),
+        None => "left–right check: no match".to_owned(),
     };
     let colour = if stereo.at_end { theme::lost() } else { theme::text() };
     let ranges = stereo.curve.iter().map(|point| point.range_m);

@@ -29,6 +29,9 @@ const INDENT: f32 = 12.0;
 /// Width of the band of a run's states, points.
 const BAND_WIDTH: f32 = 56.0;
 
+/// A panel narrower than this has the buttons of a target below its name, points.
+const BUTTONS_BESIDE: f32 = 300.0;
+
 /// The colours of a target's marks: name and number.
 const COLOURS: [(&str, Option<usize>); 5] =
     [("grey", None), ("blue", Some(0)), ("pink", Some(1)), ("violet", Some(2)), ("green", Some(3))];
@@ -96,39 +99,18 @@ fn about(target: &TargetView, run: &RunView) -> Vec<String> {
 
 fn show_target(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Command>) {
     let is_selected = state.cursor.target == Some(target.number);
+    let is_narrow = ui.available_width() < BUTTONS_BESIDE;
     ui.horizontal(|ui| {
-        let mut is_shown = !state.hidden_targets.contains(&target.number);
-        let check = ui.checkbox(&mut is_shown, "").accessible_name(format!("marks of {}", target.label));
-        if check.on_hover_text("Shows or hides its marks in the images").changed() {
-            out.push(Command::ToggleTarget(target.number));
-        }
-        colour_menu(ui, state, target, out);
-        let renaming = state.renaming.as_ref().filter(|renaming| renaming.target == target.number);
-        match renaming {
-            Some(renaming) => name_field(ui, renaming, out),
-            None => name(ui, target, is_selected, out),
-        }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            if ui
-                .small_button("Remove")
-                .on_hover_text("Takes the target and its runs out of the session")
-                .clicked()
-            {
-                out.push(Command::RemoveTarget(target.number));
+            if !is_narrow {
+                buttons_of(ui, state, target, out);
             }
-            let is_simulated = state.traverse.as_ref().is_some_and(|traverse| traverse.simulated);
-            if is_selected && is_simulated && renaming.is_none() {
-                let help = "Shows the panel Drive: the rover drives to this target on its own estimates";
-                if ui.small_button("Drive …").on_hover_text(help).clicked() {
-                    out.push(Command::Layout(LayoutCommand::Show(Pane::Drive)));
-                }
-            }
-            let help = "Gives the target another name (double-click the name)";
-            if renaming.is_none() && ui.small_button("Rename").on_hover_text(help).clicked() {
-                out.push(Command::Rename(Rename::Begin(target.number)));
-            }
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| title_of(ui, state, target, out));
         });
     });
+    if is_narrow {
+        ui.horizontal_wrapped(|ui| buttons_of(ui, state, target, out));
+    }
     let at = target.designation;
     let place = format!("designated at step {}, pixel {:.1}, {:.1}", at.step, at.pixel.x, at.pixel.y);
     ui.horizontal(|ui| {
@@ -145,13 +127,50 @@ fn show_target(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Co
     });
     for sentence in warnings(state, target) {
         ui.add(egui::Label::new(RichText::new(format!("! {sentence}")).small().color(theme::lost())).wrap())
-            .on_hover_text("A warning about the pick; it can be tracked all the same.");
+            .on_hover_text("A warning about this designation; the target can be tracked all the same.");
     }
     for (depth, run) in run_tree::order(&target.runs) {
         ui.horizontal(|ui| {
             ui.add_space(INDENT * depth as f32);
             ui.vertical(|ui| show_run(ui, state, target, run, out));
         });
+    }
+}
+
+/// Whether its marks are shown, their colour, and its name.
+fn title_of(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Command>) {
+    let mut is_shown = !state.hidden_targets.contains(&target.number);
+    let check = ui.checkbox(&mut is_shown, "").accessible_name(format!("marks of {}", target.label));
+    if check.on_hover_text("Shows or hides its marks in the images").changed() {
+        out.push(Command::ToggleTarget(target.number));
+    }
+    colour_menu(ui, state, target, out);
+    let renaming = state.renaming.as_ref().filter(|renaming| renaming.target == target.number);
+    match renaming {
+        Some(renaming) => name_field(ui, renaming, out),
+        None => name(ui, target, state.cursor.target == Some(target.number), out),
+    }
+}
+
+/// The buttons of a target.
+fn buttons_of(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Command>) {
+    let is_renamed = state.renaming.as_ref().is_some_and(|renaming| renaming.target == target.number);
+    if ui.small_button("Remove").on_hover_text("Takes the target and its runs out of the session").clicked() {
+        out.push(Command::RemoveTarget(target.number));
+    }
+    if is_renamed {
+        return;
+    }
+    let is_simulated = state.traverse.as_ref().is_some_and(|traverse| traverse.simulated);
+    if is_simulated && state.cursor.target == Some(target.number) {
+        let help = "Shows the panel Drive: the rover drives to this target on its own estimates";
+        if ui.small_button("Drive …").on_hover_text(help).clicked() {
+            out.push(Command::Layout(LayoutCommand::Show(Pane::Drive)));
+        }
+    }
+    let help = "Gives the target another name (double-click the name)";
+    if ui.small_button("Rename").on_hover_text(help).clicked() {
+        out.push(Command::Rename(Rename::Begin(target.number)));
     }
 }
 
@@ -178,7 +197,7 @@ fn colour_menu(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Co
 fn name(ui: &mut Ui, target: &TargetView, is_selected: bool, out: &mut Vec<Command>) {
     let colour = if is_selected { theme::strong() } else { theme::text() };
     let text = RichText::new(&target.label).strong().color(colour);
-    let label = ui.add(egui::Label::new(text).sense(Sense::click()));
+    let label = ui.add(egui::Label::new(text).truncate().sense(Sense::click()));
     if label.double_clicked() {
         out.push(Command::Rename(Rename::Begin(target.number)));
     } else if label.clicked() {

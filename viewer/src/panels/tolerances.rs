@@ -43,7 +43,7 @@ const CRITERIA: [Criterion; 2] = [
     },
     Criterion {
         number: 4,
-        title: "4 site position since the pick, cm",
+        title: "4 site position since the designation, cm",
         value_m: |row| row.position_correction_m,
         tolerance_m: |row| row.position_tolerance_m,
     },
@@ -105,7 +105,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         let is_last = i + 1 == CRITERIA.len();
         let sentence = sentence(criterion, run, state.cursor.step);
         let label = ui.add(egui::Label::new(sentence.size(11.0)).truncate());
-        label.on_hover_text("The correction against its tolerance, which is computed anew at every update.");
+        label.on_hover_text("The correction against its tolerance, which changes with every update.");
         let height = height.max(30.0) + if is_last { AXIS } else { 0.0 };
         if let Some(step) = plot(ui, state, run, criterion, height, is_last) {
             out.push(Command::Go(Go::Step(step)));

@@ -114,7 +114,7 @@ impl State {
                 self.messages.note(format!("Undid {}.  Ctrl+Y redoes it.", deed.words()));
                 self.undo.undone.push(deed);
             }
-            None => self.messages.note("There is nothing to take back."),
+            None => self.messages.note("There is nothing to undo."),
         }
     }
 
@@ -123,10 +123,10 @@ impl State {
             Some(deed) => {
                 self.undo.changes += 1;
                 self.carry_over(&deed, true);
-                self.messages.note(format!("Did {} again.", deed.words()));
+                self.messages.note(format!("Redid {}.", deed.words()));
                 self.undo.done.push(deed);
             }
-            None => self.messages.note("There is nothing to do again."),
+            None => self.messages.note("There is nothing to redo."),
         }
     }
 

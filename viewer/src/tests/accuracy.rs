@@ -53,7 +53,12 @@ fn truth_is_white_on_an_image_in_the_light_looks_too() {
             });
             let shapes = || shown.harness.output().shapes.iter();
             let count = |colour| shapes().map(|clipped| lines(&clipped.shape, colour)).sum::<usize>();
-            let [white, black] = [egui::Color32::WHITE, egui::Color32::BLACK].map(count);
+            // White in the dark looks, black in the light ones.
+            let of = [Looks::Dark, Looks::Light].map(|looks| {
+                theme::choose(looks);
+                theme::truth()
+            });
+            let [white, black] = of.map(count);
             assert!(white >= 2 && black == 0, "{pane:?} {looks:?}: {white} white, {black} black");
         }
     }

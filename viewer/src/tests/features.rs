@@ -64,7 +64,7 @@ fn the_panel_counts_from_the_images_to_the_motion() {
     shown.says("60 and 62").says("48 (80 %)").says("45 (94 %)").says("median range 5.50 m");
     shown.says("30 (67 %)").says("24 (80 %)").says("matched with the 50 points of step 1");
     shown.says("● chosen").says("step 0: fewer than three matches").says("0.354").says("2.10");
-    shown.says("best draw 22, then 23 (9.0 mm) → 24 (8.0 mm)").says("by 5.0 cm against the prediction");
+    shown.says("best hypothesis 22, then 23 (9.0 mm) → 24 (8.0 mm)").says("by 5.0 cm against the prediction");
     shown.says("± 1 mm").says("gate 3.0 cm").says("in the end 24");
     let mut shown = shown;
     assert_eq!(shown.click("fit_motion"), vec![Command::SelectStage(Stage::FIT_MOTION)]);
@@ -151,7 +151,7 @@ fn a_feature_says_its_scale_range_residual_and_verdict() {
     assert!(words.contains("scale 1.00 px") && words.contains("range 4.000 m"), "{words}");
     assert!(words.ends_with("at step 1 at 88.0, 194.0\nresidual 1.0 mm, 0.56 px: inlier"), "{words}");
     assert!(of(|f| f.matched.as_ref().is_some_and(|m| !m.is_inlier)).ends_with(": outlier"));
-    assert!(of(|f| f.right.is_none()).contains("no partner in the other eye"));
+    assert!(of(|f| f.right.is_none()).contains("no match in the other image"));
 }
 
 #[test]

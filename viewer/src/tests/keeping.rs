@@ -67,7 +67,7 @@ fn notes_are_listed_in_their_order_and_a_click_goes_there() {
     assert_eq!(shown.click("remove note 2"), vec![Command::Notes(Ask::Remove(7))]);
     assert_eq!(shown.click("later in the tour: note 1"), vec![Command::Notes(Ask::Move { id: 4, place: 1 })]);
     assert_eq!(shown.click("Pin a note here  (M)"), vec![Command::Notes(Ask::Pin)]);
-    Shown::pane(Pane::Notes, |context| fixture::at_step(context, 2)).says("Asking the server for its notes");
+    Shown::pane(Pane::Notes, |context| fixture::at_step(context, 2)).says("Loading the notes");
     let none = |context: &egui::Context| {
         let mut state = fixture::at_step(context, 2);
         state.notes.list = Some(Vec::new());

@@ -18,6 +18,10 @@ const GAP: f32 = 10.0;
 /// Shows the open bubble, if one is open.
 pub(crate) fn show(ui: &Ui, state: &State, out: &mut Vec<Command>) {
     let (Some(at), Some(bubble)) = (state.tour.at, state.tour.bubble()) else { return };
+    // A dialog is in front; the bubble is there again once it is closed.
+    if state.files.is_open || state.exports.is_open {
+        return;
+    }
     let context = ui.ctx();
     let screen = context.content_rect();
     let shown = bubble.anchors().iter().filter(|name| has_content(state, name));

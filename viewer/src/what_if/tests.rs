@@ -117,7 +117,7 @@ fn scores_that_are_missing_say_why() {
         }
         state
     });
-    none.says("What if has no scores: the step did not come to compare a window of positions.");
+    none.says("What if has no scores: this step did not reach the search.");
 }
 
 /// Where the left image is, and on it the target and the search window; and the panel.

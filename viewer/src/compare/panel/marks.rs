@@ -77,7 +77,7 @@ pub(crate) fn elsewhere(state: &State) -> Option<String> {
         match step {
             Some(step) if step == state.cursor.step => None,
             Some(step) => Some(format!("{label} is at step {step}: press V for its own image")),
-            None => Some(format!("{label} has no stop beside this one")),
+            None => Some(format!("{label} has no stop aligned with this one")),
         }
     })
 }

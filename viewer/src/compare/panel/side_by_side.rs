@@ -63,7 +63,7 @@ fn show_part(ui: &mut Ui, state: &State, part: &Part<'_>, out: &mut Vec<Command>
     let Some(raster) = part.raster else {
         let sentence = match state.beside(part.name, state.cursor.step) {
             Some(step) => format!("{label}: the image of step {step} is being loaded."),
-            None => format!("{label} has no stop beside this one; align by step to see it."),
+            None => format!("{label} has no stop aligned with this one; align by step to see it."),
         };
         crate::panels::missing(ui, "", &sentence);
         return None;

@@ -107,7 +107,7 @@ pub(crate) fn consensus(ui: &mut Ui, motion: &FittedMotion) {
         ui,
         &title,
         &[
-            (Mark::Dot, theme::prediction(), format!("a draw, best {best}")),
+            (Mark::Dot, theme::prediction(), format!("an iteration, best {best}")),
             (Mark::Stroke(Line::Dashed), theme::inlier(), format!("in the end {}", motion.inliers)),
         ],
     );

@@ -25,7 +25,7 @@ pub(crate) fn lines(evidence: &FeatureEvidence) -> Vec<Line> {
     if let Some(found) = &evidence.detect {
         let words = "features, left and right".to_owned();
         add(Stage::DETECT, words, format!("{} and {}", found.left, found.right));
-        let words = "of them with a partner in the other eye".to_owned();
+        let words = "of them matched in the other image".to_owned();
         add(Stage::MATCH_FEATURES, words, share(found.stereo_matches, found.left));
         let range = found.median_range_m.map_or_else(String::new, |m| format!(", median range {m:.2} m"));
         add(Stage::TRIANGULATE, format!("points{range}"), share(found.points, found.stereo_matches));
@@ -158,7 +158,7 @@ pub(crate) fn sentences(motion: &FittedMotion) -> [String; 2] {
         motion.correction_m * 100.0
     );
     let best = motion.consensus_by_draw.iter().max();
-    let begin = best.map_or_else(String::new, |best| format!("best draw {best}, then "));
+    let begin = best.map_or_else(String::new, |best| format!("best hypothesis {best}, then "));
     let rounds: Vec<String> =
         motion.refits.iter().map(|refit| format!("{} ({})", refit.inliers, mm(refit.rms_m))).collect();
     [fit, format!("refit to the inliers: {begin}{}", rounds.join(" → "))]

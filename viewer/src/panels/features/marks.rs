@@ -200,7 +200,7 @@ pub(crate) fn words(feature: &Feature, from_step: Option<usize>) -> String {
     ];
     lines.push(match (feature.range_m, feature.right) {
         (Some(range_m), Some(right)) => format!("range {range_m:.3} m, partner at {}", place(right)),
-        _ => "no partner in the other eye".to_owned(),
+        _ => "no match in the other image".to_owned(),
     });
     let Some(matched) = &feature.matched else {
         lines.push("no match with the earlier stop".to_owned());

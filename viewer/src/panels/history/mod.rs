@@ -95,7 +95,7 @@ fn strip(ui: &mut Ui, state: &State, run: &RunView, out: &mut Vec<Command>) {
 /// Scale and roll, then the score, of a step.
 fn words_of(run: &RunView, row: &StepRow) -> [String; 2] {
     if is_pick(run, row) {
-        return ["as picked".to_owned(), String::new()];
+        return ["as designated".to_owned(), String::new()];
     }
     let scale = row.scale.map_or_else(String::new, |scale| format!("×{scale:.2}"));
     let roll = row.roll_deg.map_or_else(String::new, |roll| format!("{roll:+.1}°"));

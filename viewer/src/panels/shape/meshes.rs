@@ -18,7 +18,7 @@ use crate::shape_view::{Orbit, ShapeView};
 use crate::theme;
 
 /// What the part is for.
-const PURPOSE: &str = "Both surfaces as meshes, and how they lie on each other.";
+const PURPOSE: &str = "Both surfaces as meshes, registered.";
 /// Facets that are drawn at most.
 const FACETS: usize = 6000;
 /// The least part of them that is left to the earlier mesh.

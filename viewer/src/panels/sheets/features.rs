@@ -44,7 +44,7 @@ fn residuals(state: &State, all: &[Feature]) -> Sheet {
 
 fn draws(agreeing: &[u32]) -> Sheet {
     let columns = vec![Column::new("draw of three", ""), Column::new("matches that agree", "")];
-    let mut sheet = Sheet::of("Matches that agree, by draw of three", columns);
+    let mut sheet = Sheet::of("Inliers by RANSAC iteration", columns);
     let best = agreeing.iter().max();
     for (draw, count) in agreeing.iter().enumerate() {
         sheet.row(Some(count) == best, vec![Cell::Number(draw as f64), Cell::Number(f64::from(*count))]);

@@ -107,7 +107,7 @@ pub(crate) fn stereo_profile(state: &State) -> Result<Vec<Sheet>, String> {
         ("score", Some(stereo.score), ""),
         ("disparity", stereo.disparity_px, "px"),
         ("off the epipolar curve", Some(stereo.across_px), "px"),
-        ("left to right and back", stereo.left_right_px, "px"),
+        ("left–right distance", stereo.left_right_px, "px"),
     ] {
         best.row(false, vec![Cell::Word(what.to_owned()), value.into(), Cell::Word(unit.to_owned())]);
     }

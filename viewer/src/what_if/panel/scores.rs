@@ -84,8 +84,7 @@ fn why_none(trial: &Trial) -> String {
     match (&trial.refused, &trial.ghost) {
         (Some(refused), _) => format!("What if cannot be tried: {refused}"),
         (None, Some(ghost)) if trial.has_scores && ghost.what_if == trial.what_if => {
-            let why =
-                ghost.missing.as_deref().unwrap_or("the step did not come to compare a window of positions");
+            let why = ghost.missing.as_deref().unwrap_or("this step did not reach the search");
             format!("What if has no scores: {why}.")
         }
         (None, _) => "What if: computing the scores …".to_owned(),
