@@ -127,7 +127,7 @@ impl Inbox {
             let (sender, context) = (self.sender.clone(), self.context.clone());
             if file.name().to_lowercase().ends_with(".zip") {
                 return self.outgoing.chosen(vec![RecordingFile::of(file.clone())], true, &|arrival| {
-                    tell(&sender, &context, arrival)
+                    tell(&sender, &context, arrival);
                 });
             }
             read_file(file.clone(), sender, context);
