@@ -134,7 +134,7 @@ async fn a_bad_expression_is_a_problem_with_field_position_and_hint() {
             .post(&query, &json!({ "expression": deep }))
             .await
             .problem(422, "expression")
-            .contains("inside")
+            .contains("levels of nesting")
     );
     assert_eq!(server.get(&breakpoints).await.expect(200), json!([]), "nothing was set");
 }

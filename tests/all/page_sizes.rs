@@ -21,8 +21,8 @@ const WINDOWS: [(u32, u32); 6] =
 /// The windows of the short test.
 const FEW_WINDOWS: [(u32, u32); 2] = [(820, 1180), (960, 600)];
 
-/// Roles of controls that are clicked.
-const CLICKED: [&str; 5] = ["button", "checkbox", "combobox", "tab", "textbox"];
+/// Roles of controls that are clicked; tabs are left out, because a strip of tabs scrolls.
+const CLICKED: [&str; 4] = ["button", "checkbox", "combobox", "textbox"];
 
 /// Share of the smaller of two controls that may be covered by the other one.
 const COVERED_MAX: f64 = 0.3;
