@@ -49,7 +49,7 @@ async fn a_screen_reader_finds_controls_by_role_and_name_and_can_act_on_them() {
     browser.activate("tab", "State machine").await;
     browser.control("region", "State machine").await;
     browser.activate("button", "Keys and conventions").await;
-    browser.says("the palette: whatever can be asked for").await;
+    browser.says("the command palette: every action by name").await;
     browser.activate("button", "Close keys").await;
     browser.gone("button", "Close keys").await;
     browser.end().await;
