@@ -44,7 +44,7 @@ async fn check_panel(browser: &Browser) {
     browser.show_panel("Odometry").await;
     browser.says("The pose of step 2 is by vision.").await;
     browser.says("% along the motion").await;
-    browser.says("Wheels and vision are ").await;
+    browser.says("The translations by wheels and by vision differ by ").await;
     browser.control("checkbox", "inliers ").await;
     browser.says("left image: corners of step 1").await;
     browser.says("left image: matches at step 2").await;
