@@ -24,8 +24,8 @@ const SHARE: &str = "return (() => { const s = JSON.parse(document.querySelector
      if (!s.image_to_screen) return null; const [w, h] = s.left_image_size; const [, , pw, ph] = s.left_image_rect; \
      const k = s.image_to_screen.scale; return Math.min(w * k, pw) * Math.min(h * k, ph) / (innerWidth * innerHeight) })()";
 
-/// The share of the page that the left image covers, once the page is painted in its new size and arrangement: as soon
-/// as it is large enough, or what it is after 20 s.
+/// Waits up to 20 s until the left image covers at least the share `least` of the page, because a large page is painted
+/// late. Returns the last share measured.
 async fn share_of_the_image(browser: &Browser, least: f64) -> f64 {
     let mut share = 0.0;
     for _ in 0..100 {

@@ -80,7 +80,7 @@ fn cut_off(controls: &[Control], width: f64, height: f64) -> impl Iterator<Item 
 
 /// Pairs of controls of one panel of which one covers the other in part; a control inside another one is part of it.
 fn covered(controls: &[Control]) -> Vec<String> {
-    // The top bar scrolls below its buttons; the viewer's own tests compare what is painted there.
+    // The top bar scrolls, so that clipped controls overlap its buttons. A unit test of the viewer covers it.
     let all: Vec<&Control> = clicked(controls).filter(|c| c.region != "Status and actions").collect();
     let mut pairs = Vec::new();
     for (index, a) in all.iter().enumerate() {
