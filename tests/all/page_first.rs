@@ -1,12 +1,9 @@
 //! A new user's first minutes: from the first page to why the target was lost, and to what would have saved it, by keys and
 //! by names alone, each action counted. Nothing but what the page shows is used to find the way.
 
-use sightline_recordings::create_simulated;
-use sightline_server::first_session;
-use sightline_server::state::AppState;
+use sightline_tests::bench::first_page;
 use sightline_tests::browser::Browser;
-use sightline_tests::server::{TOKEN, access};
-use sightline_world::Scenario;
+use sightline_tests::server::TOKEN;
 
 /// Actions from the first page to the cause, at most.
 const TO_THE_CAUSE: usize = 6;
@@ -32,30 +29,11 @@ impl Walk<'_> {
     }
 }
 
-/// Serves the drive with which a new user begins.
-async fn serve(scenario: &Scenario, folder: &std::path::Path) -> u16 {
-    let traverse = create_simulated(scenario, &folder.join("first")).unwrap();
-    let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
-    let port = listener.local_addr().unwrap().port();
-    let state = AppState::new(vec![traverse], &folder.join("sessions"), access(port)).unwrap();
-    first_session::begin(&state, scenario).unwrap();
-    tokio::spawn(async move { axum::serve(listener, sightline_server::app(state)).await });
-    port
-}
-
 #[tokio::test(flavor = "multi_thread")]
 async fn a_new_user_finds_why_the_first_target_was_lost_and_what_saves_it() {
-    let folder = tempfile::tempdir().unwrap();
-    let scenario = first_session::scenario().unwrap();
-    let port = serve(&scenario, folder.path()).await;
-    let browser = Browser::start().await;
-    browser.goto(&format!("http://127.0.0.1:{port}/#token={TOKEN}")).await;
-    browser.wait_for_viewer().await;
-    browser.wait_status("the first target", "s.target === 0 && s.shown").await;
+    let (bench, browser) = first_page(&[]).await;
     browser.says("1 of 6").await;
     browser.shot("first-1-page").await;
-    // The loss may still have to be computed; the page shows how far the run is meanwhile.
-    browser.wait_status("the loss", "s.steps_done > 1 && !s.running").await;
 
     let mut walk = Walk { browser: &browser, done: Vec::new() };
     walk.click("Skip", "the tour is for later").await;
@@ -87,7 +65,7 @@ async fn a_new_user_finds_why_the_first_target_was_lost_and_what_saves_it() {
     // Whoever gets the link sees the branch at that step.
     let link = browser.fragment().await;
     let other = Browser::start().await;
-    other.goto(&format!("http://127.0.0.1:{port}/#{link}&token={TOKEN}")).await;
+    other.goto(&format!("{}#{link}&token={TOKEN}", bench.url())).await;
     other.wait_for_viewer().await;
     other.wait_status("the same place", "s.run === 1 && s.shown && s.state === 'tracking'").await;
     assert_eq!(browser.console_errors().await, Vec::<String>::new());

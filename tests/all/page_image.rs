@@ -2,11 +2,8 @@
 
 use std::time::Duration;
 
-use sightline_recordings::create_simulated;
-use sightline_server::first_session;
-use sightline_server::state::AppState;
+use sightline_tests::bench::first_page;
 use sightline_tests::browser::Browser;
-use sightline_tests::server::{TOKEN, access};
 
 /// Width and height of a window, px, and the least share of the page that the left image covers in *Overview* and in *Image*.
 const WINDOWS: [(u32, u32, [f64; 2]); 6] = [
@@ -40,20 +37,8 @@ async fn share_of_the_image(browser: &Browser, least: f64) -> f64 {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn the_left_image_has_most_of_the_page() {
-    let folder = tempfile::tempdir().unwrap();
-    let scenario = first_session::scenario().unwrap();
-    let traverse = create_simulated(&scenario, &folder.path().join("first")).unwrap();
-    let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
-    let port = listener.local_addr().unwrap().port();
-    let state = AppState::new(vec![traverse], &folder.path().join("sessions"), access(port)).unwrap();
-    first_session::begin(&state, &scenario).unwrap();
-    tokio::spawn(async move { axum::serve(listener, sightline_server::app(state)).await });
-    let browser = Browser::start().await;
-    browser.goto(&format!("http://127.0.0.1:{port}/#token={TOKEN}")).await;
-    browser.wait_for_viewer().await;
-    browser.wait_status("the first target", "s.target === 0 && s.shown").await;
+    let (_bench, browser) = first_page(&[]).await;
     browser.click_on("button", "Skip").await;
-    browser.wait_status("the run", "s.steps_done > 1 && !s.running").await;
     let mut too_small = Vec::new();
     for (width, height, least) in WINDOWS {
         browser.resize(width, height).await;

@@ -5,14 +5,10 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use sightline_recordings::create_simulated;
-use sightline_server::first_session;
-use sightline_server::limits::Limits;
-use sightline_server::state::AppState;
+use sightline_tests::bench::first_page;
 use sightline_tests::browser::Browser;
 use sightline_tests::controls::Control;
 use sightline_tests::data;
-use sightline_tests::server::{TOKEN, access};
 
 /// Width and height of a window, px; the last one is 1440 × 900 at a zoom of 150 %.
 const WINDOWS: [(u32, u32); 6] =
@@ -110,24 +106,9 @@ async fn choose_looks(browser: &Browser, looks: &str) {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn no_control_is_cut_off_or_covered_in_any_window() {
-    let folder = tempfile::tempdir().unwrap();
-    let scenario = first_session::scenario().unwrap();
-    let traverse = create_simulated(&scenario, &folder.path().join("first")).unwrap();
-    let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
-    let port = listener.local_addr().unwrap().port();
     let kitti = data::set("kitti-seq1-frames-0-19", "the pictures of an own recording");
     let recordings: Vec<_> = kitti.iter().filter_map(|set| set.parent()).map(Into::into).collect();
-    let sessions = folder.path().join("sessions");
-    let state =
-        AppState::with_recordings(vec![traverse], &sessions, access(port), Limits::default(), &recordings)
-            .unwrap();
-    first_session::begin(&state, &scenario).unwrap();
-    tokio::spawn(async move { axum::serve(listener, sightline_server::app(state)).await });
-    let browser = Browser::start().await;
-    browser.goto(&format!("http://127.0.0.1:{port}/#token={TOKEN}")).await;
-    browser.wait_for_viewer().await;
-    browser.wait_status("the first target", "s.target === 0 && s.shown").await;
-    browser.wait_status("the run", "s.steps_done > 1 && !s.running").await;
+    let (_bench, browser) = first_page(&recordings).await;
 
     let mut tour = Tour { browser: &browser, defects: BTreeSet::new() };
     tour.look("open", "dark").await;

@@ -10,6 +10,7 @@ use std::time::Duration;
 use serde_json::Value;
 use sightline_geometry::frames::Pixel;
 use sightline_recordings::{Traverse, create_simulated};
+use sightline_server::first_session;
 use sightline_server::limits::Limits;
 use sightline_server::state::AppState;
 use sightline_world::Scenario;
@@ -54,12 +55,18 @@ impl Bench {
 
     async fn serve(traverse: Traverse, rock: Pixel, folder: TempDir, recordings: &[PathBuf]) -> Self {
         let stop_count = traverse.stop_count();
-        let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
-        let port = listener.local_addr().unwrap().port();
-        let (sessions, limits) = (folder.path().join("sessions"), Limits::default());
-        let state = AppState::with_recordings(vec![traverse], &sessions, access(port), limits, recordings);
-        let state = state.unwrap();
-        tokio::spawn(async move { axum::serve(listener, sightline_server::app(state)).await });
+        let (port, _) = listen(traverse, &folder, recordings).await;
+        Self { port, rock, stop_count, _folder: folder }
+    }
+
+    /// Serves the drive with which a new user begins; its first target is being tracked.
+    async fn first_drive(recordings: &[PathBuf]) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let scenario = first_session::scenario().unwrap();
+        let traverse = create_simulated(&scenario, &folder.path().join("first")).unwrap();
+        let (rock, stop_count) = (rock(&scenario, &traverse), traverse.stop_count());
+        let (port, state) = listen(traverse, &folder, recordings).await;
+        first_session::begin(&state, &scenario).unwrap();
         Self { port, rock, stop_count, _folder: folder }
     }
 
@@ -122,6 +129,30 @@ pub async fn picked(scenario: &Scenario) -> (Bench, Browser) {
     let browser = Browser::start().await;
     bench.pick(&browser).await;
     (bench, browser)
+}
+
+/// The page as a new user finds it: the tour's first card over the drive of sixty stops, whose run has ended. The page may
+/// open the recordings below the folders.
+pub async fn first_page(recordings: &[PathBuf]) -> (Bench, Browser) {
+    let bench = Bench::first_drive(recordings).await;
+    let browser = Browser::start().await;
+    browser.goto(&format!("{}#token={TOKEN}", bench.url())).await;
+    browser.wait_for_viewer().await;
+    browser.wait_status("the first target", "s.target === 0 && s.shown").await;
+    browser.wait_status("the run", "s.steps_done > 1 && !s.running").await;
+    (bench, browser)
+}
+
+/// Serves a traverse at a port of its own; its sessions are kept in the folder.
+async fn listen(traverse: Traverse, folder: &TempDir, recordings: &[PathBuf]) -> (u16, AppState) {
+    let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let port = listener.local_addr().unwrap().port();
+    let (sessions, limits) = (folder.path().join("sessions"), Limits::default());
+    let state = AppState::with_recordings(vec![traverse], &sessions, access(port), limits, recordings);
+    let state = state.unwrap();
+    let app = sightline_server::app(state.clone());
+    tokio::spawn(async move { axum::serve(listener, app).await });
+    (port, state)
 }
 
 /// A folder with the drive of a scenario in `approach`, a copy of one that all tests share: it is rendered once.
