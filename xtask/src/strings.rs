@@ -1,8 +1,8 @@
 //! `cargo xtask strings`: lists the texts that a user can see, read from the sources, one `file:line<TAB>text` a line.
 //!
-//! Texts are string literals (also those inside macros), the help of the command line and of settings (doc comments), and
-//! the text of the page's HTML. Left out are tests, panics, keys and identifiers, scripts and markup. For reviewers of the
-//! language, and for the rule that no such text quotes a requirement by its number.
+//! Texts are string literals (also those inside macros), the help of the command line and of settings (doc comments), the
+//! descriptions of scenarios, and the text of the page's HTML. Left out are tests, panics, keys and identifiers, scripts
+//! and markup. For reviewers of the language, and for the rule that no such text quotes a requirement by its number.
 
 mod text;
 
@@ -46,8 +46,8 @@ const SHOWN_ATTRIBUTES: [&str; 5] = ["arg", "clap", "command", "error", "value"]
 /// Derived traits that turn doc comments into help.
 const HELP_TRAITS: [&str; 4] = ["Args", "Parser", "Subcommand", "ValueEnum"];
 
-/// Sources whose texts still quote requirements; remove an entry once its texts are mended.
-const NOT_YET_MENDED: [&str; 2] = ["core/rover/src/trackability", "viewer/src/panels/budget"];
+/// The folder with the scenarios of the library; their descriptions are shown.
+const SCENARIOS: &str = "core/world/src/library";
 
 /// A text that a user can see.
 #[derive(Debug, PartialEq)]
@@ -76,8 +76,7 @@ pub(crate) fn strings(filter: Option<&str>) -> Result<()> {
 /// # Errors
 /// A source that cannot be read or is no Rust.
 pub(crate) fn findings(root: &Path) -> Result<Vec<Finding>> {
-    let is_mended = |text: &Text| !NOT_YET_MENDED.iter().any(|folder| text.file.starts_with(folder));
-    let numbered = texts(root)?.into_iter().filter(|text| is_mended(text) && quotes_requirement(&text.text));
+    let numbered = texts(root)?.into_iter().filter(|text| quotes_requirement(&text.text));
     let found = numbered.map(|Text { file, line, text }| {
         let message = format!(
             "users see `{text}`: cite the source as in docs/references.md, not a requirement's number"
@@ -107,6 +106,15 @@ fn texts(root: &Path) -> Result<Vec<Text>> {
         sources.retain(|(file, _)| !file.ancestors().any(|part| of_tests.contains(&part.with_extension(""))));
         found.extend(sources.into_iter().flat_map(|(file, texts)| {
             texts.into_iter().map(move |(line, text)| Text { file: file.clone(), line, text })
+        }));
+    }
+    for file in files(root, Path::new(SCENARIOS), "toml")? {
+        let described = read(root, &file)?;
+        let lines = described.lines().enumerate().filter(|(_, line)| line.starts_with("description"));
+        found.extend(lines.map(|(at, line)| Text {
+            file: file.clone(),
+            line: at + 1,
+            text: line.to_owned(),
         }));
     }
     for file in files(root, Path::new("web"), "html")? {
@@ -371,7 +379,7 @@ mod tests {
     #[test]
     fn a_planted_requirement_number_is_reported() {
         let folder = tempfile::tempdir().unwrap();
-        for source in ["core/a/src", "server/src", "viewer/src/panels", "web"] {
+        for source in ["core/a/src", "core/world/src/library", "server/src", "viewer/src/panels", "web"] {
             std::fs::create_dir_all(folder.path().join(source)).unwrap();
         }
         let write = |file: &str, text: &str| std::fs::write(folder.path().join(file), text).unwrap();
@@ -382,11 +390,13 @@ mod tests {
         write("core/a/src/helper.rs", "fn f() { say(\"tests R71\"); }\n");
         write("server/src/lib.rs", "");
         write("viewer/src/panels/tests.rs", "fn f() { say(\"tests R71\"); }\n");
+        write("core/world/src/library/ramp.toml", "# as in R126\ndescription = \"A ramp (R124).\"\n");
         write("web/index.html", "<p>R9 is here</p>\n");
         let found: Vec<String> = findings(folder.path()).unwrap().iter().map(ToString::to_string).collect();
-        assert_eq!(found.len(), 2, "{found:?}");
+        assert_eq!(found.len(), 3, "{found:?}");
         assert!(found[0].starts_with("core/a/src/lib.rs:4: ") && found[0].contains("as in R71"), "{found:?}");
-        assert!(found[1].starts_with("web/index.html:1: "), "{found:?}");
+        assert!(found[1].starts_with("core/world/src/library/ramp.toml:2: "), "{found:?}");
+        assert!(found[2].starts_with("web/index.html:1: "), "{found:?}");
     }
 
     #[test]

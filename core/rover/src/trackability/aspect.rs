@@ -128,15 +128,19 @@ impl Aspect {
     /// Where its limit comes from.
     pub const fn source(self) -> &'static str {
         match self {
-            Self::Refused => "R16, R21",
-            Self::Rim | Self::Saturation | Self::Texture => "ours",
-            Self::Data => "R66",
-            Self::Range => "R19, R187",
-            Self::RangeError => "K-Eq 1, R35",
-            Self::DepthEdge | Self::Relief => "R119",
-            Self::Slant => "ours, R20",
-            Self::DepthRange | Self::Dark | Self::Contrast => "R21",
-            Self::Likeness => "R68",
+            Self::Refused => "Kim09 §3",
+            Self::Rim
+            | Self::Data
+            | Self::DepthRange
+            | Self::Dark
+            | Self::Contrast
+            | Self::Saturation
+            | Self::Texture
+            | Self::Likeness => "ours",
+            Self::Range => "Kim09 §3, Deans05 §2",
+            Self::RangeError => "Kim09 Eq. 1",
+            Self::DepthEdge | Self::Relief => "Kim09 §5.2",
+            Self::Slant => "ours; Kim09 §3",
         }
     }
 

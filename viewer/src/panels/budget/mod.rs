@@ -122,17 +122,21 @@ fn results(ui: &mut Ui, pair: &StereoPair, approach: &Approach) {
         format!("focal length {:.1} px, baseline {:.3} m; every error is 3σ", pair.focal_px, pair.baseline_m);
     ui.label(theme::note(optics));
     let rows = [
-        ("K-Eq 1", format!("stereo at {} m", approach.start_m), centimetres(budget.designation_m)),
+        ("[Kim09 Eq. 1]", format!("stereo at {} m", approach.start_m), centimetres(budget.designation_m)),
         (
-            "K-Eq 3",
+            "[Kim09 Eq. 3]",
             format!("at {} m without tracking", approach.end_m),
             centimetres(budget.without_tracking_m),
         ),
-        ("K-Eq 1", format!("stereo at {} m", approach.end_m), centimetres(budget.stereo_m)),
-        ("K-Eq 4", "one pixel of drift there".to_owned(), centimetres(budget.drift_per_px_m)),
-        ("K-Eq 5", format!("at {} m with tracking", approach.end_m), centimetres(budget.with_tracking_m)),
+        ("[Kim09 Eq. 1]", format!("stereo at {} m", approach.end_m), centimetres(budget.stereo_m)),
+        ("[Kim09 Eq. 4]", "one pixel of drift there".to_owned(), centimetres(budget.drift_per_px_m)),
         (
-            "R40",
+            "[Kim09 Eq. 5]",
+            format!("at {} m with tracking", approach.end_m),
+            centimetres(budget.with_tracking_m),
+        ),
+        (
+            "[Kim09 §4.2]",
             "least drift, ± half a pixel of the first image".to_owned(),
             format!("{:.2} px", budget.least_drift_px),
         ),
