@@ -140,6 +140,8 @@ async fn the_report_is_one_well_formed_page_without_scripts_remote_things_or_pat
     assert!(missing.is_empty(), "the report has the metrics of the page: {missing:?}");
     for part in [
         "Worst steps",
+        "The target was not lost at any step.",
+        "First loss: step 2",
         "<strong>why</strong>",
         "ncc_min",
         "SHA-256",
@@ -149,6 +151,8 @@ async fn the_report_is_one_well_formed_page_without_scripts_remote_things_or_pat
     ] {
         assert!(html.contains(part), "{part} is missing");
     }
+    let why = server.get("sessions/s1/targets/0/runs/1/steps/2/why").await.json()["sentence"].clone();
+    assert!(html.contains(why.as_str().unwrap()), "why the target was lost: {why}");
     assert_eq!(html.matches("data:image/png").count(), 2 * 4, "four steps after the designation of two runs");
     for path in [drive.path(), folder.path()] {
         assert!(!html.contains(path.to_str().unwrap()), "no path of this machine");

@@ -99,7 +99,7 @@ impl Kind {
             }
             Self::Sheet => "The same pictures side by side in one PNG.",
             Self::Report => {
-                "One HTML page that needs nothing else: metrics, worst steps with pictures, notes, settings; printable."
+                "One HTML page that needs nothing else: metrics, why the target was lost, worst steps with pictures, notes, settings; printable."
             }
             Self::Bundle => {
                 "Settings, seed, versions, hashes and commands with which anybody gets the same rows, bit for bit."

@@ -10,9 +10,9 @@ pub(crate) mod rows;
 pub(crate) mod picture;
 pub(crate) mod sheet;
 pub(crate) mod report;
+mod report_steps;
 pub(crate) mod bundle;
 mod canvas;
-mod worst;
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -15,9 +15,8 @@ use sightline_track::settings::Changes;
 
 use super::kind::Part;
 use super::source::{NamedRun, Source};
-use super::worst::worst;
-use super::{bundle, picture, sheet};
-use crate::html::{escape, markdown, number, png_address, table};
+use super::{bundle, report_steps, sheet};
+use crate::html::{escape, markdown, number, table};
 use crate::naming::hash;
 use crate::problem::{ApiError, ApiResult};
 use crate::study::chart::{Chart, Line};
@@ -76,13 +75,13 @@ pub(crate) fn html(source: &Source, part: Part, cancel: &AtomicBool) -> ApiResul
 fn overview(source: &Source, runs: &[NamedRun<'_>]) -> String {
     let row = |run: &NamedRun<'_>| {
         let summary = sightline_session::summary::summarise(run.run.whole_steps().iter().map(AsRef::as_ref));
-        let left = run.run.fork.map_or_else(String::new, |fork| {
+        let parent = run.run.fork.map_or_else(String::new, |fork| {
             format!("run {} at step {}", sheet::run_letter(fork.run), fork.from_step)
         });
         vec![
             format!("{}, run {}", run.record.label, sheet::run_letter(run.number)),
             run.run.settings.tracker.word().to_owned(),
-            left,
+            parent,
             summary.steps.to_string(),
             summary.steps_tracked.map_or_else(|| "–".to_owned(), |count| count.to_string()),
             summary.steps_lost.to_string(),
@@ -95,7 +94,7 @@ fn overview(source: &Source, runs: &[NamedRun<'_>]) -> String {
     let head = [
         "target and run",
         "tracker",
-        "left",
+        "branched from",
         "steps",
         "tracked",
         "lost",
@@ -191,34 +190,11 @@ fn chapter(text: &mut String, source: &Source, run: NamedRun<'_>, cancel: &Atomi
     for figure in figures(steps, &run)? {
         text.push_str(&figure);
     }
-    text.push_str("<h3>Worst steps</h3>\n<div class=\"row\">");
-    for place in worst(steps) {
-        let drawn = sheet::picture_of(source, run, place, None, cancel)?;
-        let png = drawn.png().map_err(ApiError::internal)?;
-        text.push_str(&figure_of(&steps[place], &png));
-    }
-    let _ = writeln!(text, "</div>\n<p class=\"at\">{}</p>", escape(picture::LEGEND));
+    text.push_str(&report_steps::html(source, run, cancel)?);
     text.push_str(&step_table(steps));
     text.push_str(&quantity_table(steps));
     text.push_str(&configuration(source, run));
     Ok(())
-}
-
-fn figure_of(trace: &RunStep, png: &[u8]) -> String {
-    let row = trace.row();
-    let words = format!(
-        "Step {}, {}: {}.",
-        row.step,
-        picture::state_words(trace).to_lowercase(),
-        picture::numbers(&row)
-    );
-    let reason = row.reason.unwrap_or_else(|| "The update was accepted".to_owned());
-    format!(
-        "<figure><img src=\"{}\" width=\"320\" alt=\"{}\"><figcaption>{}</figcaption></figure>",
-        png_address(png),
-        escape(&format!("The target in the left image. {words}")),
-        escape(&format!("Step {}. {}.", row.step, reason.trim_end_matches('.')))
-    )
 }
 
 /// Scores and errors over the steps.
