@@ -75,7 +75,7 @@ async fn a_panel_is_saved_as_svg_and_png_which_look_alike_and_a_plot_is_read_as_
     let (width, height) = png.dimensions();
 
     let (name, svg) = save(&browser, "Match scores", "SVG").await;
-    assert!(name.contains("-target-0-run-a-step-") && name.ends_with("-match-scores.svg"), "{name}");
+    assert!(name.contains("-target-1-run-a-step-") && name.ends_with("-match-scores.svg"), "{name}");
     let text = String::from_utf8(svg).unwrap();
     assert!(
         text.contains("<title id=\"title\">Match scores: ") && text.contains("<image "),

@@ -234,6 +234,17 @@ mod tests {
     }
 
     #[test]
+    fn the_last_stop_of_a_drive_says_whether_another_one_follows() {
+        let mut state = driving(5);
+        let words = |state: &State| state.next_step_words("for the next match");
+        assert_eq!(words(&state), " This drive has no further stop.");
+        state.took_drive("s1".to_owned(), view(2, true));
+        assert_eq!(words(&state), " The rover drives; its next stop is added here.");
+        state.took_drive("s1".to_owned(), view(2, false));
+        assert_eq!(words(&state), " The rover waits; continue in the panel Drive.");
+    }
+
+    #[test]
     fn the_drive_is_read_when_it_goes_on_and_the_cursor_goes_with_the_rover() {
         let mut state = driving(1);
         assert_eq!(calls_of(&mut state), [("sessions/s1/drive".to_owned(), None)]);

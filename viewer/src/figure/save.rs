@@ -185,7 +185,8 @@ pub(crate) fn file_name(state: &State, wish: Wish) -> String {
     let mut parts = vec!["sightline".to_owned()];
     parts.extend(state.session.as_ref().map(|session| session.id.clone()));
     if let Some(target) = state.cursor.target {
-        parts.push(format!("target-{target}-run-{}", run_letter(state.cursor.run)));
+        parts.extend(state.label_of(target));
+        parts.push(format!("run-{}", run_letter(state.cursor.run)));
     }
     if state.session.is_some() {
         parts.push(format!("step-{}", state.cursor.step));

@@ -58,14 +58,17 @@ pub(crate) struct Panels<'a> {
     pub closed: Vec<Pane>,
     /// The panel that fills the page.
     pub maximised: Option<Pane>,
+    /// A front tab that its strip is to scroll into view.
+    scrolls_to: Option<TileId>,
 }
 
 impl<'a> Panels<'a> {
     /// Shows `state` and puts what is asked for into `out`.
     pub(crate) fn new(state: &'a State, out: &'a mut Vec<Command>) -> Self {
         let (seen, places, closed) = (Vec::new(), Vec::new(), Vec::new());
-        let (left_image, current, maximised) = (None, None, None);
-        Self { state, out, left_image, seen, places, current, takes_keyboard: false, closed, maximised }
+        let (left_image, current, maximised, scrolls_to) = (None, None, None, None);
+        let takes_keyboard = false;
+        Self { state, out, left_image, seen, places, current, takes_keyboard, closed, maximised, scrolls_to }
     }
 
     /// Shows a panel's contents on its ground, as a region that a screen reader and the keyboard find.
@@ -150,6 +153,19 @@ fn is_pressed(ui: &Ui, place: egui::Rect) -> bool {
     ui.input(|input| input.pointer.any_pressed()) && ui.rect_contains_pointer(place)
 }
 
+/// Whether a tab came to the front of its group a moment ago, or its strip got another width: by then the arrows beside the
+/// tabs have their places.
+fn is_new_front(ui: &Ui, group: TileId, tile: TileId) -> bool {
+    let (now, width) = (ui.ctx().cumulative_pass_nr(), ui.max_rect().width());
+    let id = egui::Id::unique("front tab").with(group);
+    ui.data_mut(|data| {
+        let last = data.get_temp::<(TileId, f32, u64)>(id).filter(|last| (last.0, last.1) == (tile, width));
+        let (.., since) = last.unwrap_or((tile, width, now));
+        data.insert_temp(id, (tile, width, since));
+        now <= since + 3
+    })
+}
+
 /// Makes what `ui` holds a region with a name.
 pub(crate) fn region(ui: &Ui, name: &str, place: egui::Rect) {
     ui.ctx().accesskit_node_builder(ui.unique_id(), |node| {
@@ -191,6 +207,9 @@ impl Behavior<Pane> for Panels<'_> {
             // What is painted is in capitals, which some readers would spell.
             node.set_label(name.unwrap_or("panels"));
         });
+        if self.scrolls_to == Some(tile) {
+            button.scroll_to_me_animation(None, egui::style::ScrollAnimation::none());
+        }
         if button.clicked() {
             self.current = tiles.get_pane(&tile).copied().or(self.current);
         }
@@ -201,10 +220,11 @@ impl Behavior<Pane> for Panels<'_> {
         &mut self,
         tiles: &Tiles<Pane>,
         ui: &mut Ui,
-        _tile: TileId,
+        group: TileId,
         tabs: &egui_tiles::Tabs,
         _scroll: &mut f32,
     ) {
+        self.scrolls_to = tabs.active.filter(|tile| is_new_front(ui, group, *tile));
         let front = tabs.active.and_then(|tile| tiles.get_pane(&tile)).copied();
         self.menu(ui, front);
         if let Some(pane) = front {

@@ -24,6 +24,9 @@ use crate::{panels, theme};
 /// How wide the buttons on the right are taken to be before they were laid out once, points.
 const BUTTONS: f32 = 320.0;
 
+/// The width of the page below which its title is left out, points.
+const NARROW: f32 = 900.0;
+
 /// The columns of a row that the status line shows, each with its unit there and its number of decimals.
 const STATUS: [(&str, Unit, usize); 5] = [
     ("ncc", Unit::One, 2),
@@ -36,8 +39,11 @@ const STATUS: [(&str, Unit, usize); 5] = [
 /// The top bar: what is open, where the cursor is, and what can be done with the whole.
 pub(crate) fn top(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.horizontal_centered(|ui| {
-        ui.label(RichText::new("Sightline").size(16.0).strong().color(theme::accent()));
-        ui.separator();
+        // In a narrow window the state of the target has the room.
+        if ui.available_width() >= NARROW {
+            ui.label(RichText::new("Sightline").size(16.0).strong().color(theme::accent()));
+            ui.separator();
+        }
         traverse_choice(ui, state, out);
         ui.separator();
         // The buttons keep their place: what is left of it can be scrolled where there is too much, as with four runs.
@@ -81,7 +87,10 @@ fn traverse_choice(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let choice = ComboBox::from_id_salt("traverse").width(170.0).selected_text(name).show_ui(ui, |ui| {
         for entry in list {
             let is_open = open.is_some_and(|traverse| traverse.id == entry.id);
-            if panels::entry(ui, is_open, &entry.name).clicked() {
+            // A drive on commands has the name of the one from which it began.
+            let is_only = list.iter().filter(|other| other.name == entry.name).count() == 1;
+            let words = if is_only { entry.name.clone() } else { format!("{} ({})", entry.name, entry.id) };
+            if panels::entry(ui, is_open, &words).clicked() {
                 out.push(Command::OpenTraverse(entry.id.clone()));
             }
         }
@@ -104,10 +113,13 @@ pub(crate) fn status(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     };
     ui.label(theme::label("step"));
     ui.label(theme::number(format!("{}/{last}", state.cursor.step)).size(13.0));
-    if let Some(target) = state.target() {
-        ui.label(theme::label(format!("{} · run {}", target.label, run_letter(state.cursor.run))));
-    }
+    let of_what = |ui: &mut Ui| {
+        if let Some(target) = state.target() {
+            ui.label(theme::label(format!("{} · run {}", target.label, run_letter(state.cursor.run))));
+        }
+    };
     let Some(row) = state.row() else {
+        of_what(ui);
         ui.label(theme::label(if state.target().is_some() { "not computed" } else { "no target" }));
         return;
     };
@@ -132,6 +144,7 @@ pub(crate) fn status(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         }
         _ => {}
     }
+    of_what(ui);
     let has_confidence = state.run().and_then(|run| confidence_of(run, row)).is_some();
     for (column, unit, decimals) in STATUS {
         let value = records::row_value_in(row, column, unit);

@@ -22,11 +22,12 @@ pub(crate) fn over_steps<'a>(plot: Plot<'a>, last: f64, is_last: bool) -> Plot<'
         .y_grid_spacer(few_marks)
         .y_axis_formatter(plain)
         .y_axis_min_width(40.0)
-        .x_axis_formatter(
-            |mark: GridMark, _: &std::ops::RangeInclusive<f64>| {
-                if mark.value.fract() == 0.0 { format!("{}", mark.value) } else { String::new() }
-            },
-        )
+        .x_axis_formatter(|mark: GridMark, _: &std::ops::RangeInclusive<f64>| match mark.value {
+            // The first tick says what the axis counts.
+            0.0 => "step 0".to_owned(),
+            whole if whole.fract() == 0.0 => format!("{whole}"),
+            _ => String::new(),
+        })
         .link_axis(Id::unique("steps"), [true, false])
 }
 

@@ -18,6 +18,7 @@ use crate::net::request::{Arrived, Reply, Request};
 use crate::state::deeds::Deed;
 use crate::state::effect::Effect;
 use crate::state::{Progress, State, run_letter};
+use crate::tour::Turn;
 
 impl State {
     /// Requests the lists and the session that a new page needs.
@@ -216,6 +217,10 @@ impl State {
             // Notes of the first session are about opening it.
             if self.session.is_some() {
                 self.messages.leave_session();
+                // Its cards are about the drive that was left.
+                if self.tour.at.is_some() {
+                    self.tour.turn(Turn::End);
+                }
             }
             self.open_notes(&view.id);
             self.ask.forget();

@@ -1,6 +1,6 @@
 //! Calls of endpoints and their answers.
 
-use sightline_api::endpoint::{Call, Endpoint};
+use sightline_api::endpoint::{Call, Endpoint, Method};
 use sightline_api::wire::Problem;
 
 use crate::net::request::Reply;
@@ -28,6 +28,10 @@ impl State {
         take: impl FnOnce(&mut Self, E::Reply) + 'static,
         refused: impl FnOnce(&mut Self, &Problem) -> Notice + 'static,
     ) {
+        // What is tried again, with another value as a rule, says anew what is wrong with it.
+        if call.method != Method::Get {
+            self.messages.mended(&format!("{} {}", call.method, call.path));
+        }
         let request = self.calls.begin::<E>(call, move |state: &mut Self, call, outcome| match outcome {
             Ok(reply) => {
                 state.messages.mended(&format!("{} {}", call.method, call.path));

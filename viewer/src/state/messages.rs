@@ -170,7 +170,7 @@ impl Messages {
         self.list.last().filter(|message| !message.is_past)
     }
 
-    /// A request succeeded: problems of the same request no longer apply, and a card of one is closed.
+    /// A request succeeded or is tried again: problems of the same request no longer apply, and a card of one is closed.
     pub(crate) fn mended(&mut self, asked: &str) {
         let is_of = |message: &Message| {
             let details = message.about.iter().flat_map(|about| &about.details);

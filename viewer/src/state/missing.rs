@@ -55,9 +55,12 @@ impl State {
     /// Where to go from a step that has nothing to show, as a sentence; empty at the last stop.
     pub(crate) fn next_step_words(&self, purpose: &str) -> String {
         if self.cursor.step + 1 < self.stop_count() {
-            format!(" Press → {purpose}.")
-        } else {
-            " This drive has no further stop.".to_owned()
+            return format!(" Press → {purpose}.");
+        }
+        match self.drive_word() {
+            Some("drives") => " The rover drives; its next stop is added here.".to_owned(),
+            Some("waits") => " The rover waits; continue in the panel Drive.".to_owned(),
+            _ => " This drive has no further stop.".to_owned(),
         }
     }
 

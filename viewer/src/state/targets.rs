@@ -63,7 +63,7 @@ impl State {
         self.session.as_ref()?.targets.iter().find(|known| known.number == target)
     }
 
-    fn label_of(&self, target: usize) -> Option<String> {
+    pub(crate) fn label_of(&self, target: usize) -> Option<String> {
         self.target_numbered(target).map(|known| known.label.clone())
     }
 

@@ -254,7 +254,7 @@ fn a_file_says_in_its_name_and_above_it_of_what_it_is() {
     let mut state = fixture::at_step(&context, 2);
     let wish = |kind| Wish { pane: Pane::Map, kind };
     let svg = save::take(&context, &state, &[], wish(Kind::Svg)).unwrap();
-    assert_eq!(svg.name, "sightline-s1-target-0-run-a-step-2-map-site-frame.svg");
+    assert_eq!(svg.name, "sightline-s1-ridge-run-a-step-2-map-site-frame.svg");
     assert!(svg.sentence.contains("not on the screen: it was drawn apart"), "{}", svg.sentence);
     let text = String::from_utf8(svg.bytes).unwrap();
     let document = roxmltree::Document::parse(&text).unwrap();
@@ -266,7 +266,7 @@ fn a_file_says_in_its_name_and_above_it_of_what_it_is() {
 
     state.perform(Command::Exports(Ask::BurnIn(true)));
     let png = save::take(&context, &state, &[], wish(Kind::Png(3))).unwrap();
-    assert_eq!(png.name, "sightline-s1-target-0-run-a-step-2-map-site-frame-3x.png");
+    assert_eq!(png.name, "sightline-s1-ridge-run-a-step-2-map-site-frame-3x.png");
     let picture = image::load_from_memory(&png.bytes).unwrap();
     assert!(picture.width() == 3 * 720 && picture.height() > 3 * 480, "the line is above the panel");
     let svg = save::take(&context, &state, &[], wish(Kind::Svg)).unwrap();

@@ -166,3 +166,13 @@ fn it_begins_by_itself_on_the_first_drive_alone_and_only_once() {
     early.take_requests();
     assert_eq!(early.tour.at, None);
 }
+
+#[test]
+fn the_tour_ends_when_another_drive_is_opened() {
+    let mut state = touring(0)(&egui::Context::default());
+    let same = state.session.clone().unwrap();
+    state.adopt(same.clone(), false);
+    assert_eq!(state.tour.at, Some(0), "the same session, read again");
+    state.adopt(sightline_session::view::SessionView { id: "s2".to_owned(), ..same }, false);
+    assert_eq!((state.tour.at, state.tour.is_seen), (None, true));
+}
